@@ -21,6 +21,7 @@ from typing import TYPE_CHECKING
 from dsl_core.version import __version__
 
 if TYPE_CHECKING:
+    from dsl_core.api.answers import classify as classify
     from dsl_core.api.results import evaluate as evaluate
     from dsl_core.api.results import export as export
     from dsl_core.api.results import load_result as load_result
@@ -35,11 +36,17 @@ if TYPE_CHECKING:
 
 _SCANS = ("load_calibration", "load_scan", "open_rig", "plan", "reconstruct", "rigs", "scan")
 _RESULTS = ("evaluate", "export", "load_result", "save_result")
+_ANSWERS = ("classify",)
 #: The module of each public name.
-_HOMES = dict.fromkeys(_SCANS, "dsl_core.api.scans") | dict.fromkeys(_RESULTS, "dsl_core.api.results")
+_HOMES = (
+    dict.fromkeys(_SCANS, "dsl_core.api.scans")
+    | dict.fromkeys(_RESULTS, "dsl_core.api.results")
+    | dict.fromkeys(_ANSWERS, "dsl_core.api.answers")
+)
 
 __all__ = [
     "__version__",
+    "classify",
     "evaluate",
     "export",
     "load_calibration",

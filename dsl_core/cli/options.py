@@ -210,6 +210,26 @@ def parse_region(name: str, text: str) -> tuple[int, int, int, int]:
     return x, y, width, height
 
 
+def parse_span(name: str, text: str) -> tuple[float, float]:
+    """Two wavelengths in nm from ``450:650``; raises `PlanError`."""
+    low, high = _parts(name, text, "START:STOP in nm, like 450:650", float, ":", 2)
+    return low, high
+
+
+def parse_place(name: str, text: str) -> tuple[str, list[int]]:
+    """A name and a pixel, or a rectangle, from ``leaf=120,80`` or ``leaf=120,80,10,10``; raises `PlanError`.
+
+    >>> parse_place("--at", "leaf=120,80")
+    ('leaf', [120, 80])
+    """
+    called, _, place = text.partition("=")
+    wanted = "NAME=X,Y or NAME=X,Y,WIDTH,HEIGHT in whole pixels"
+    numbers = _parts(name, place, wanted, int, ",") if called and place else []
+    if len(numbers) not in (2, 4):
+        raise PlanError(f"{name} must be {wanted}, not {text!r}.")
+    return called, numbers
+
+
 def _lengths(name: str, text: str, form: str) -> list[int]:
     """Whole pixels separated by x, as many as their ``form`` has."""
     wanted = f"{form} in whole pixels of at least 1"

@@ -16,6 +16,7 @@ from typing import Annotated
 import typer
 
 from dsl_core.cli import (
+    answers,
     calibrate,
     calibrations,
     compare,
@@ -58,6 +59,7 @@ for command in (
     compare.sweep,
     results.export,
     results.mesh,
+    answers.classify,
 ):
     app.command()(command)
 app.command("import")(files.import_)

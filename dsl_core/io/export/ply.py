@@ -64,12 +64,24 @@ def write_mesh_ply(
 
 def _table(result: xr.Dataset, lit: NDArray[np.bool_], check: Check) -> NDArray[Any]:
     """The vertices with all their properties."""
-    columns = _columns(result, lit, check)
-    table = np.empty(int(lit.sum()), [(name, column.dtype.str) for name, column in columns.items()])
+    return _filled(_columns(result, lit, check), check)
+
+
+def _filled(columns: dict[str, NDArray[Any]], check: Check) -> NDArray[Any]:
+    """Properties, each with one value per vertex, as one table."""
+    count = len(next(iter(columns.values())))
+    table = np.empty(count, [(name, column.dtype.str) for name, column in columns.items()])
     for name, column in columns.items():
         check()
         table[name] = column
     return table
+
+
+def write_points(draft: Path, columns: dict[str, NDArray[Any]], comments: dict[str, str]) -> None:
+    """Write properties, each with one value (float32 or uint8) per point, to a file that is being staged."""
+    with draft.open("wb") as file:
+        file.write(_header(table := _filled(columns, never), comments))
+        table.tofile(file)
 
 
 def _columns(result: xr.Dataset, lit: NDArray[np.bool_], check: Check) -> dict[str, NDArray[Any]]:

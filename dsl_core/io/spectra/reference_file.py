@@ -42,7 +42,7 @@ def read_references(path: Path) -> ReferenceFile:
     spectra = of_kind(path, kind.read(path), radiance=False, all_unstated=True)
     if len(spectra) == 1 and not kind.is_library:
         spectra = [replace(spectra[0], name="")]
-    return _gathered(path, spectra)
+    return as_references(path, spectra)
 
 
 def read_reference(path: Path, name: str = "") -> SpectralCurve:
@@ -69,7 +69,8 @@ def _without_gaps(nm: Floats, values: Floats) -> Floats:
     return kept
 
 
-def _gathered(path: Path, spectra: list[Spectrum]) -> ReferenceFile:
+def as_references(path: Path, spectra: list[Spectrum]) -> ReferenceFile:
+    """Spectra of a file as curves without gaps, each name once; raises `CalibrationError` without any."""
     found: dict[str, SpectralCurve] = {}
     empty = []
     for place, spectrum in enumerate(spectra, 1):

@@ -1,0 +1,102 @@
+"""Spectra of other instruments at the bands of a result, averaged as those bands average."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dsl_core.errors import CalibrationError
+from dsl_core.model.spectral import SpectralCurve
+
+Floats = NDArray[np.float64]
+#: A band of a result is the mean over a triangle as wide at half height as bands are apart.
+Shape = Literal["triangle", "gaussian", "box"]
+#: Samples of a kernel across its width at half height, and how far a kernel reaches, in such widths.
+_PER_WIDTH = 32
+_REACH: dict[Shape, float] = {"triangle": 1.0, "gaussian": 1.5, "box": 0.5}
+#: At most this share of a band's kernel may lie beyond the ends of a spectrum.
+MOST_BEYOND = 0.5
+
+
+@dataclass(frozen=True)
+class BandValues:
+    """A spectrum at bands (bands,): values, and the deviations of those values."""
+
+    values: Floats
+    std: Floats
+
+
+def band_widths_nm(bands_nm: Floats) -> Floats:
+    """Full width at half height (nm) of bands (bands,) as a result has them: the distance of its bands."""
+    if len(bands_nm) < 2:
+        return np.ones(len(bands_nm))
+    return np.asarray(np.gradient(np.asarray(bands_nm, np.float64)))
+
+
+def band_weights(nm: Floats, bands_nm: Floats, widths_nm: Floats, shape: Shape = "triangle") -> Floats:
+    """Weights (bands, samples) that turn a spectrum, linear between its samples, into band means.
+
+    The kernel of a band is centred on it and ``widths_nm`` (bands,) wide at half height. Where it reaches
+    beyond the ends of the spectrum, the rest of it decides; a row is NaN where more than `MOST_BEYOND` does.
+    """
+    weights = np.full((len(bands_nm), len(nm)), np.nan)
+    at = np.linspace(-_REACH[shape], _REACH[shape], round(2 * _REACH[shape] * _PER_WIDTH) + 1)
+    kernel = _kernel(at, shape)
+    for band, (centre, width) in enumerate(zip(bands_nm, widths_nm, strict=True)):
+        # Samples of the spectrum itself are nodes too, so that the narrowest line of it counts in full.
+        inside = nm[np.abs(nm - centre) <= _REACH[shape] * width]
+        fine = np.union1d(centre + at * width, inside)
+        mass = np.interp(fine, centre + at * width, kernel) * np.gradient(fine)
+        covered = (fine >= nm[0] - 1e-9) & (fine <= nm[-1] + 1e-9)
+        total = mass[covered].sum()
+        if total < (1 - MOST_BEYOND) * mass.sum() or total <= 0:
+            continue
+        weights[band] = _spread(fine[covered], mass[covered] / total, nm)
+    return weights
+
+
+def _kernel(at: Floats, shape: Shape) -> Floats:
+    if shape == "gaussian":
+        return np.asarray(np.exp(-4 * np.log(2) * at**2))
+    return 1 - np.abs(at) if shape == "triangle" else np.ones_like(at)
+
+
+def _spread(fine: Floats, mass: Floats, nm: Floats) -> Floats:
+    """Masses at wavelengths handed to the two samples around each, in proportion."""
+    if len(nm) == 1:
+        return np.array([mass.sum()])
+    right = np.clip(np.searchsorted(nm, fine), 1, len(nm) - 1)
+    share = np.clip((fine - nm[right - 1]) / (nm[right] - nm[right - 1]), 0, 1)
+    row = np.bincount(right, mass * share, len(nm)) + np.bincount(right - 1, mass * (1 - share), len(nm))
+    return np.asarray(row)
+
+
+def at_bands(
+    curve: SpectralCurve, bands_nm: Floats, widths_nm: Floats | None = None, shape: Shape = "triangle"
+) -> BandValues:
+    """A spectrum at the bands of a result; raises `CalibrationError` where it does not cover them.
+
+    The deviation holds that of the curve, if it states one, and what its sampling leaves open where it is
+    coarser than the bands: half of the difference between straight lines and a smooth curve between samples.
+    """
+    from scipy.interpolate import PchipInterpolator
+
+    nm, values = np.asarray(curve.wavelengths_nm), np.asarray(curve.values)
+    widths = band_widths_nm(bands_nm) if widths_nm is None else widths_nm
+    weights = band_weights(nm, bands_nm, widths, shape)
+    missing = ~np.isfinite(weights).all(1)
+    if missing.any():
+        raise CalibrationError(
+            f"It covers {nm[0]:g} to {nm[-1]:g} nm; the bands from {bands_nm[0]:g} to {bands_nm[-1]:g} nm are"
+            " needed."
+        )
+    found = weights @ values
+    variance = np.zeros(len(bands_nm)) if curve.std is None else weights**2 @ np.square(curve.std)
+    if len(nm) > 2:
+        between = np.abs(PchipInterpolator(nm, values)(np.clip(bands_nm, nm[0], nm[-1])) - curve.at(bands_nm))
+        is_coarse = np.interp(bands_nm, nm, np.gradient(nm)) > widths
+        variance += np.where(is_coarse, between / 2, 0.0) ** 2
+    return BandValues(found, np.sqrt(variance))

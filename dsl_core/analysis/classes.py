@@ -1,0 +1,141 @@
+"""What a class of a class map is: spectra at the bands of a result, and how they vary."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dsl_core.analysis.at_bands import Shape, at_bands
+from dsl_core.analysis.library import SpectralLibrary
+from dsl_core.errors import CalibrationError, DecodeError
+
+Floats = NDArray[np.float64]
+Cube = NDArray[np.float32] | NDArray[np.float64]
+
+#: A class of more spectra than this is summed up: a mean, and components of how its spectra vary.
+MOST_MEMBERS = 8
+MOST_COMPONENTS = 3
+#: The share of a class's variance that its components have to explain.
+_EXPLAINED = 0.99
+#: Noise of neighbouring pixels hangs together over about this many of them.
+_PIXELS_TOGETHER = 9
+#: The part of a pixel's variance that no number of pixels averages out, because all have it in common.
+_IN_COMMON = 0.05
+
+
+@dataclass(frozen=True)
+class Member:
+    """One spectrum (bands,) of a class with the deviation of its bands, and how the class varies around it.
+
+    ``components`` (components, bands) are deviations in reflectance, each of one standard deviation.
+    """
+
+    mean: Floats
+    std: Floats
+    components: Floats
+
+    @classmethod
+    def of(cls, mean: Floats, std: Floats | None = None) -> Member:
+        """A spectrum that does not vary."""
+        return cls(mean, np.zeros_like(mean) if std is None else std, np.empty((0, len(mean))))
+
+
+@dataclass(frozen=True)
+class SpectralClass:
+    """A class by its name: one or several spectra, any of which a pixel may have."""
+
+    name: str
+    members: tuple[Member, ...]
+
+    @property
+    def mean(self) -> Floats:
+        """The mean of its spectra, (bands,)."""
+        return np.asarray(np.mean([member.mean for member in self.members], axis=0))
+
+
+def summed_up(name: str, members: Sequence[Member]) -> SpectralClass:
+    """A class of these spectra; of many, their mean and how they vary around it."""
+    if len(members) <= MOST_MEMBERS:
+        return SpectralClass(name, tuple(members))
+    means = np.stack([member.mean for member in members])
+    own = np.mean([member.std**2 for member in members], axis=0)
+    components, rest = components_of(np.cov(means, rowvar=False))
+    return SpectralClass(name, (Member(means.mean(0), np.sqrt(own + rest), components),))
+
+
+def components_of(covariance: Floats) -> tuple[Floats, Floats]:
+    """Leading components (components, bands) of a covariance, and the variance (bands,) left beside them."""
+    values, vectors = np.linalg.eigh(covariance)
+    values, vectors = np.maximum(values[::-1], 0), vectors[:, ::-1]
+    if values[0] <= 0:
+        return np.empty((0, len(values))), np.zeros(len(values))
+    needed = int(np.searchsorted(np.cumsum(values) / values.sum(), _EXPLAINED)) + 1
+    kept = min(needed, MOST_COMPONENTS)
+    components = (vectors[:, :kept] * np.sqrt(values[:kept])).T
+    return components, np.maximum(np.diag(covariance) - (components**2).sum(0), 0)
+
+
+def classes_of_library(
+    library: SpectralLibrary, bands_nm: Floats, shape: Shape = "triangle"
+) -> tuple[tuple[SpectralClass, ...], tuple[str, ...]]:
+    """The groups of a library as classes at bands (nm), and notes on entries that are left out.
+
+    Raises `CalibrationError` when no entry covers the bands.
+    """
+    members: dict[str, list[Member]] = {group: [] for group in library.groups}
+    notes = []
+    for entry in library.entries:
+        try:
+            found = at_bands(entry.curve, bands_nm, shape=shape)
+        except CalibrationError as error:
+            notes.append(f"{entry.name} ({entry.file.name}) is left out. {error}")
+        else:
+            members[entry.group].append(Member.of(found.values, found.std))
+    kept = tuple(summed_up(name, found) for name, found in members.items() if found)
+    if not kept:
+        raise CalibrationError(
+            f"No spectrum of the library covers {bands_nm[0]:g} to {bands_nm[-1]:g} nm. {notes[0]} Give the"
+            " range that library and result share, or choose another library."
+        )
+    return kept, tuple(notes)
+
+
+def class_of_pixels(name: str, reflectance: Cube, std: Cube, mask: NDArray[np.bool_]) -> SpectralClass:
+    """The class of marked pixels: their mean, and how they vary more than their deviations say.
+
+    Cubes (bands, rows, columns), mask (rows, columns). Raises `DecodeError` where no pixel has a spectrum.
+    """
+    y, x = np.nonzero(mask)
+    values, spread = reflectance[:, y, x].astype(np.float64), std[:, y, x].astype(np.float64)
+    known = np.isfinite(values).all(0) & np.isfinite(spread).all(0)
+    values, spread = values[:, known], spread[:, known]
+    count = values.shape[1]
+    if count == 0:
+        raise DecodeError(f"{name}: none of its {len(y)} pixels has a spectrum. Mark another place.")
+    noise = np.mean(spread**2, axis=1)
+    averaged = max(min(_PIXELS_TOGETHER / count, 1.0), _IN_COMMON)
+    member = Member.of(values.mean(1), np.sqrt(noise * averaged))
+    if count > 4 * len(values):
+        components, rest = _more_than_noise(np.cov(values), noise)
+        member = replace(member, std=np.sqrt(member.std**2 + rest), components=components)
+    return SpectralClass(name, (member,))
+
+
+def _more_than_noise(covariance: Floats, noise: Floats) -> tuple[Floats, Floats]:
+    """As `components_of`, of what exceeds the stated noise; nothing where it explains all."""
+    components, rest = components_of(covariance)
+    level = np.sqrt(noise)
+    strength = ((components / level) ** 2).mean(1) if len(components) else np.empty(0)
+    kept = components[strength > 1]
+    return kept, np.maximum(rest - noise, 0) if len(kept) else np.zeros_like(rest)
+
+
+def shared_names(classes: Sequence[SpectralClass]) -> tuple[SpectralClass, ...]:
+    """Classes of which those of one name are one."""
+    by_name: dict[str, list[Member]] = {}
+    for each in classes:
+        by_name.setdefault(each.name, []).extend(each.members)
+    return tuple(SpectralClass(name, tuple(members)) for name, members in by_name.items())

@@ -1,0 +1,163 @@
+"""Class maps of results: classes from a library or from what is marked, limits, areas, and words."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import astuple, dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dsl_core.analysis.areas import pixel_areas_mm2
+from dsl_core.analysis.class_table import ClassRow, class_colours, class_table
+from dsl_core.analysis.classes import SpectralClass, class_of_pixels
+from dsl_core.analysis.classify import FEWEST_BANDS, Brightness, ClassMap, Limits, Measure, Scores, score
+from dsl_core.errors import DecodeError
+from dsl_core.evaluation.marks import mask_of_outline, mask_of_runs
+from dsl_core.io.export.class_map import (
+    Classified,
+    export_class_envi,
+    export_class_ply,
+    export_class_table,
+)
+from dsl_core.io.export.common import require_suffix
+from dsl_core.io.result.annotations_file import Annotations
+from dsl_core.progress import Progress
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+Mask = NDArray[np.bool_]
+#: The endings that a class map is written with, and what is written.
+ENDINGS = {".hdr": "ENVI classification", ".ply": "points with their class", ".csv": "table of areas"}
+
+
+@dataclass(frozen=True)
+class Classification:
+    """Scores, the map under limits, and its table."""
+
+    scores: Scores
+    limits: Limits
+    shown: ClassMap
+    rows: tuple[ClassRow, ...]
+    brightness: Brightness
+
+    @property
+    def method(self) -> str:
+        """How the map came about, in a sentence."""
+        return method_in_words(self.scores.measure, self.limits, self.brightness)
+
+
+def method_in_words(measure: Measure, limits: Limits, brightness: Brightness) -> str:
+    """How a map came about, in a sentence.
+
+    >>> method_in_words(Measure.ANGLE, Limits(0.1, 0.1), "stated")
+    'spectral angle: at most 0.1 rad, the second class at least 10 % worse'
+    """
+    if measure is Measure.PROBABILITY:
+        level = "with any brightness" if brightness == "free" else "brightness as stated"
+        return (
+            f"probability by the stated deviations, {level}: at most {limits.worst:.3g} of the pixels of a"
+            f" class are called none of these, probability of the class at least {limits.margin:.3g}"
+        )
+    name, unit = ("spectral angle", " rad") if measure is Measure.ANGLE else ("root mean square", "")
+    return (
+        f"{name}{' difference' * (not unit)}: at most {limits.worst:.3g}{unit}, the second class at least"
+        f" {limits.margin * 100:.3g} % worse"
+    )
+
+
+def classify_result(
+    result: xr.Dataset,
+    classes: Sequence[SpectralClass],
+    measure: Measure = Measure.PROBABILITY,
+    limits: Limits | None = None,
+    brightness: Brightness = "stated",
+    progress: Progress | None = None,
+) -> Classification:
+    """The class map of a result; raises `DecodeError` for a result without spectra or unfitting classes."""
+    require_spectra(result)
+    names = ("reflectance", "reflectance_std", "data_share")
+    values, std, share = (result[name].values if name in result else None for name in names)
+    assert values is not None
+    flags = result["flags"].values if "flags" in result else np.zeros(values.shape[1:], np.uint16)
+    scores = score(values, std, share, flags, classes, measure, brightness, progress)
+    limits = limits or Limits.usual(measure)
+    shown = ClassMap.of(scores, limits)
+    return Classification(scores, limits, shown, class_table(shown, areas_of(result)), brightness)
+
+
+def require_spectra(result: xr.Dataset) -> None:
+    """Raise `DecodeError` for a result without spectra."""
+    if "reflectance" not in result:
+        raise DecodeError("The result contains depth only. Reconstruct the scan with spectra.")
+
+
+def within_nm(result: xr.Dataset, low_nm: float, high_nm: float) -> xr.Dataset:
+    """The result with its bands between two wavelengths only; raises `DecodeError` where fewer than 3 are."""
+    require_spectra(result)
+    nm = result["wavelength_nm"].values
+    kept = np.flatnonzero((nm >= low_nm) & (nm <= high_nm))
+    if len(kept) < FEWEST_BANDS:
+        raise DecodeError(
+            f"Only {len(kept)} bands of the result are between {low_nm:g} and {high_nm:g} nm; its bands"
+            f" reach from {nm[0]:g} to {nm[-1]:g} nm. Give a wider range."
+        )
+    return result.isel(wavelength_nm=kept)
+
+
+def areas_of(result: xr.Dataset) -> NDArray[np.float64] | None:
+    """Areas of the pixels, mm2; None for a result without points."""
+    if "points_mm" not in result:
+        return None
+    return pixel_areas_mm2(
+        result["points_mm"].values, result["normals"].values if "normals" in result else None
+    )
+
+
+def classes_of_masks(result: xr.Dataset, masks: Mapping[str, Mask]) -> tuple[SpectralClass, ...]:
+    """A class for each marked place by its name; raises `DecodeError`."""
+    require_spectra(result)
+    if "reflectance_std" not in result:
+        raise DecodeError("The result states no deviations. Reconstruct the scan again.")
+    reflectance, std = result["reflectance"].values, result["reflectance_std"].values
+    return tuple(class_of_pixels(name, reflectance, std, mask) for name, mask in masks.items())
+
+
+def masks_of_marks(marks: Annotations, shape: tuple[int, int]) -> dict[str, Mask]:
+    """Pins and regions of a result as masks by their names; raises `DecodeError` where there are none."""
+    masks: dict[str, Mask] = {}
+    for pin in marks.pins:
+        mask = np.zeros(shape, bool)
+        x, y = pin.pixel
+        if 0 <= x < shape[1] and 0 <= y < shape[0]:
+            mask[y, x] = True
+        masks[pin.name] = masks.get(pin.name, np.zeros(shape, bool)) | mask
+    for region in marks.regions:
+        own = mask_of_runs(region.runs, shape) if region.runs else mask_of_outline(region.outline_px, shape)
+        masks[region.name] = masks.get(region.name, np.zeros(shape, bool)) | own
+    if not masks:
+        raise DecodeError(
+            "Nothing is marked on the result. Pin pixels or mark regions of known materials first, or give"
+            " a library."
+        )
+    return masks
+
+
+def write_classification(
+    result: xr.Dataset, found: Classification, path: Path, *, overwrite: bool = False
+) -> list[Path]:
+    """Write the map as the ending of the path says, one of `ENDINGS`; raises `StoreError`."""
+    require_suffix(path, *ENDINGS)
+    rows = [astuple(row) for row in found.rows]
+    if path.suffix.lower() == ".csv":
+        return export_class_table(result, found.method, rows, path, overwrite=overwrite)
+    shown, names = found.shown, found.shown.labels
+    scores = found.scores
+    colours = class_colours(len(shown.names))
+    made = Classified(shown.values, names, colours, scores.fit, scores.margin, found.method)
+    if path.suffix.lower() == ".ply":
+        return export_class_ply(result, made, path, overwrite=overwrite)
+    return export_class_envi(result, made, path, overwrite=overwrite)

@@ -1,0 +1,304 @@
+"""A class for every pixel of a result, from how well each class explains its spectrum.
+
+Three measures: the spectral angle (F. A. Kruse et al., Remote Sens. Environ. 44, 1993), the root mean square
+difference, and the probability that follows from the deviation stated for each band. The first two need a
+threshold that somebody chooses; the third needs a rate: how many pixels of a known class may be called
+"none of these". Scores are computed once; `ClassMap.of` applies limits to them in milliseconds.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from enum import Enum
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dsl_core.analysis.band_noise import band_correlation, usual_correlation
+from dsl_core.analysis.classes import SpectralClass, shared_names
+from dsl_core.analysis.likelihood import Block, class_fit
+from dsl_core.errors import DecodeError
+from dsl_core.evaluation.uncertainty import DECIDED_FROM
+from dsl_core.model.result import SPECTRUM_INVALID, Flag
+from dsl_core.progress import NoProgress, Progress
+
+Cube = NDArray[np.float32] | NDArray[np.float64]
+Map = NDArray[np.float32]
+Mask = NDArray[np.bool_]
+#: Level of a spectrum relative to its class: as sure as the result states it, or any.
+Brightness = Literal["stated", "free"]
+
+#: Pixels with these flags get no class: their spectrum is absent, cut off, or that of two materials.
+NOT_JUDGED = SPECTRUM_INVALID | Flag.SATURATED | Flag.POOR_FIT
+#: Pixels at once, so that intermediates stay small.
+_AT_ONCE = 8192
+#: Classes of a map that ENVI, and a colour table, can hold.
+MOST_CLASSES = 250
+#: Fewer bands than this decide nothing.
+FEWEST_BANDS = 3
+
+
+class Measure(Enum):
+    """How a spectrum is compared with a class; the value is its name on the command line."""
+
+    PROBABILITY = "probability"
+    ANGLE = "angle"
+    RMSE = "rmse"
+
+
+@dataclass(frozen=True)
+class Limits:
+    """What a pixel must fulfil to be given a class.
+
+    ``worst``: for the probability, the share of pixels of a known class that may be called none of these; for
+    the other measures the largest angle (rad) or difference (1). ``margin``: for the probability, that of the
+    class, and for the others by which share the second class must be worse.
+    """
+
+    worst: float
+    margin: float
+
+    @classmethod
+    def usual(cls, measure: Measure) -> Limits:
+        """The limits that are used unless others are given."""
+        return _USUAL[measure]
+
+
+_USUAL = {
+    Measure.PROBABILITY: Limits(0.01, 0.95),
+    Measure.ANGLE: Limits(0.1, 0.1),
+    Measure.RMSE: Limits(0.03, 0.1),
+}
+
+
+@dataclass(frozen=True)
+class Scores:
+    """How each pixel (rows, columns) compares with the classes.
+
+    ``best`` and ``second`` are indices into ``names``, -1 where nothing was judged. ``fit`` is, of the best
+    class, the share of its own pixels that fit worse (probability), else its angle (rad) or difference;
+    ``margin`` its probability among the classes, else by which share the second is worse.
+    """
+
+    measure: Measure
+    names: tuple[str, ...]
+    best: NDArray[np.int16]
+    second: NDArray[np.int16]
+    fit: Map
+    margin: Map
+
+
+@dataclass(frozen=True)
+class ClassMap:
+    """A class for every pixel (rows, columns).
+
+    0 is not judged, 1 + an index in ``names`` a class; then come `none` and `unsure`.
+    """
+
+    names: tuple[str, ...]
+    values: NDArray[np.uint8]
+
+    @classmethod
+    def of(cls, scores: Scores, limits: Limits | None = None) -> ClassMap:
+        """The map under limits; a pixel without margin to a second class is not given a name."""
+        limits = limits or Limits.usual(scores.measure)
+        judged = scores.best >= 0
+        is_rate = scores.measure is Measure.PROBABILITY
+        with np.errstate(invalid="ignore"):
+            none = scores.fit < limits.worst if is_rate else scores.fit > limits.worst
+            unsure = scores.margin < limits.margin
+        values = (scores.best + 1).astype(np.uint8)
+        values[judged & unsure] = len(scores.names) + 2
+        values[judged & none] = len(scores.names) + 1
+        values[~judged] = 0
+        return cls(scores.names, values)
+
+    @property
+    def none(self) -> int:
+        """The value of pixels that are none of the classes."""
+        return len(self.names) + 1
+
+    @property
+    def unsure(self) -> int:
+        """The value of pixels that may be of two classes."""
+        return len(self.names) + 2
+
+    @property
+    def labels(self) -> tuple[str, ...]:
+        """A name for every value of the map."""
+        return ("not judged", *self.names, "none of these", "undecided")
+
+
+def score(
+    reflectance: Cube,
+    std: Cube | None,
+    data_share: Cube | None,
+    flags: NDArray[np.integer],
+    classes: Sequence[SpectralClass],
+    measure: Measure = Measure.PROBABILITY,
+    brightness: Brightness = "stated",
+    progress: Progress | None = None,
+) -> Scores:
+    """Compare every pixel with every class.
+
+    Cubes (bands, rows, columns), ``flags`` (rows, columns). Bands that the prior decided, not the data, count
+    for the probability in no pixel. Raises `DecodeError` for too few classes or other bands, and for a
+    probability without deviations.
+    """
+    classes = shared_names(classes)
+    _check(reflectance, std, classes, measure)
+    judged = ((flags & int(NOT_JUDGED)) == 0) & np.isfinite(reflectance).all(0)
+    progress = progress or NoProgress()
+    names = tuple(each.name for each in classes)
+    scores = Scores(
+        measure,
+        names,
+        best=np.full(flags.shape, -1, np.int16),
+        second=np.full(flags.shape, -1, np.int16),
+        fit=np.full(flags.shape, np.nan, np.float32),
+        margin=np.full(flags.shape, np.nan, np.float32),
+    )
+    if measure is not Measure.PROBABILITY:
+        _by_distance(scores, reflectance, np.flatnonzero(judged), classes, progress)
+        return scores
+    assert std is not None
+    judged &= np.isfinite(std).all(0)
+    at, done = np.flatnonzero(judged), 0
+    shape = _shapes(reflectance, at, classes)
+    correlations = _correlations(reflectance, std, shape.reshape(flags.shape), flags == 0, len(classes))
+    flat = [cube.reshape(len(cube), -1) for cube in (reflectance, std)]
+    decided = None if data_share is None else data_share.reshape(len(data_share), -1) >= DECIDED_FROM
+    for pixels, alike, bands in _alike(at, shape, decided, len(reflectance)):
+        progress.report("compare with the classes", done, at.size)
+        done += pixels.size
+        if np.count_nonzero(bands) < FEWEST_BANDS:
+            continue
+        values, spread = (np.asarray(cube[np.ix_(bands, pixels)], np.float32) for cube in flat)
+        correlation = correlations[alike][np.ix_(bands, bands)]
+        block = Block.of(values, spread, correlation, brightness == "free")
+        _by_probability(scores, block, pixels, [_of_bands(each, bands) for each in classes])
+    return scores
+
+
+def _shapes(reflectance: Cube, at: NDArray[np.intp], classes: Sequence[SpectralClass]) -> NDArray[np.intp]:
+    """Which class's spectrum each pixel (flat) is most like in shape, -1 where nothing is judged."""
+    shape = np.full(reflectance[0].size, -1, np.intp)
+    flat = reflectance.reshape(len(reflectance), -1)
+    means = np.stack([each.mean / max(float(np.linalg.norm(each.mean)), 1e-9) for each in classes])
+    for start in range(0, at.size, _AT_ONCE):
+        pixels = at[start : start + _AT_ONCE]
+        shape[pixels] = np.argmax(means.astype(np.float32) @ flat[:, pixels], axis=0)
+    return shape
+
+
+def _correlations(
+    reflectance: Cube, std: Cube, shape: NDArray[np.intp], good: Mask, count: int
+) -> list[NDArray[np.float64]]:
+    """How bands err together in pixels of each shape; of all together where one has too few pixels."""
+    together = band_correlation(reflectance, std, good & (shape >= 0))
+    if together is None:
+        together = usual_correlation(len(reflectance))
+    each = (band_correlation(reflectance, std, good & (shape == index)) for index in range(count))
+    return [together if found is None else found for found in each]
+
+
+def _check(reflectance: Cube, std: Cube | None, classes: Sequence[SpectralClass], measure: Measure) -> None:
+    if not classes or len(classes) > MOST_CLASSES:
+        raise DecodeError(
+            f"A class map needs 1 to {MOST_CLASSES} classes; given {len(classes)}. Choose other spectra, or"
+            " group them."
+        )
+    wrong = [each.name for each in classes if len(each.mean) != len(reflectance)]
+    if wrong:
+        raise DecodeError(f"{wrong[0]} does not have the {len(reflectance)} bands of the result.")
+    if measure is Measure.PROBABILITY and std is None:
+        raise DecodeError(
+            "The result states no deviations, so there are no probabilities. Classify by angle or rmse."
+        )
+
+
+def _alike(
+    at: NDArray[np.intp], shape: NDArray[np.intp], decided: Mask | None, bands: int
+) -> Iterator[tuple[NDArray[np.intp], int, Mask]]:
+    """Pixels in blocks of one shape of which the data decide the same bands, with shape and bands."""
+    if decided is None:
+        patterns, which = np.ones((1, bands), bool), np.zeros(at.size, np.intp)
+    else:
+        packed = np.packbits(decided[:, at], axis=0)
+        _, first, which = np.unique(packed, axis=1, return_index=True, return_inverse=True)
+        patterns, which = decided[:, at[first]].T, which.ravel()
+    order = np.lexsort((shape[at], which))
+    at, keys = at[order], np.stack([which[order], shape[at[order]]])
+    borders = np.flatnonzero(np.any(np.diff(keys, axis=1), axis=0)) + 1
+    for members, key in zip(np.split(at, borders), np.split(keys, borders, axis=1), strict=True):
+        for start in range(0, members.size, _AT_ONCE):
+            yield members[start : start + _AT_ONCE], int(key[1, 0]), patterns[key[0, 0]]
+
+
+def _of_bands(each: SpectralClass, bands: Mask) -> SpectralClass:
+    """A class at some of its bands."""
+    if bands.all():
+        return each
+    return SpectralClass(
+        each.name,
+        tuple(
+            replace(m, mean=m.mean[bands], std=m.std[bands], components=m.components[:, bands])
+            for m in each.members
+        ),
+    )
+
+
+def _by_probability(
+    scores: Scores, block: Block, at: NDArray[np.intp], classes: Sequence[SpectralClass]
+) -> None:
+    from scipy.special import chdtrc
+
+    chi_square, log_likelihood = np.empty((2, len(classes), at.size))
+    for index, each in enumerate(classes):
+        chi_square[index], log_likelihood[index] = class_fit(block, each)
+    order = np.argsort(-log_likelihood, axis=0)
+    best = order[0]
+    total = np.logaddexp.reduce(log_likelihood, axis=0)
+    every = np.arange(at.size)
+    freedom = len(block.reflectance) - int(block.is_free)
+    scores.best.flat[at] = best
+    scores.second.flat[at] = order[1] if len(classes) > 1 else -1
+    scores.fit.flat[at] = chdtrc(freedom, chi_square[best, every])
+    scores.margin.flat[at] = np.exp(log_likelihood[best, every] - total)
+
+
+def _by_distance(
+    scores: Scores,
+    reflectance: Cube,
+    at: NDArray[np.intp],
+    classes: Sequence[SpectralClass],
+    progress: Progress,
+) -> None:
+    """Angle or root mean square difference to the nearest spectrum of each class."""
+    flat = reflectance.reshape(len(reflectance), -1)
+    for start in range(0, at.size, _AT_ONCE):
+        progress.report("compare with the classes", start, at.size)
+        pixels = at[start : start + _AT_ONCE]
+        values = flat[:, pixels].astype(np.float32)
+        distance = np.stack(
+            [np.min([_distance(scores.measure, values, m.mean) for m in c.members], axis=0) for c in classes]
+        )
+        order = np.argsort(distance, axis=0)
+        every = np.arange(pixels.size)
+        nearest = distance[order[0], every]
+        scores.best.flat[pixels] = order[0]
+        scores.fit.flat[pixels] = nearest
+        scores.margin.flat[pixels] = 1.0
+        if len(classes) > 1:
+            scores.second.flat[pixels] = order[1]
+            scores.margin.flat[pixels] = 1 - nearest / np.maximum(distance[order[1], every], 1e-9)
+
+
+def _distance(measure: Measure, values: Map, mean: NDArray[np.float64]) -> Map:
+    wanted = mean.astype(np.float32)
+    if measure is Measure.RMSE:
+        return np.asarray(np.sqrt(np.mean(np.square(values - wanted[:, None]), axis=0)))
+    size = np.linalg.norm(values, axis=0) * np.linalg.norm(wanted)
+    return np.asarray(np.arccos(np.clip(wanted @ values / np.maximum(size, 1e-20), -1, 1)), np.float32)

@@ -1,0 +1,102 @@
+"""First answers from a result: which material, of which area, of which colour."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dsl_core.api import FilePath
+from dsl_core.errors import DecodeError
+from dsl_core.progress import Progress
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from dsl_core.analysis.classes import SpectralClass
+
+#: Where a known material is: a mask (rows, columns), a pixel (x, y), or x, y, width and height.
+Place = NDArray[np.bool_] | Sequence[int]
+
+
+def classify(
+    result: xr.Dataset,
+    library: FilePath | Sequence[FilePath] | None = None,
+    pins: Mapping[str, Place] | None = None,
+    *,
+    measure: Literal["probability", "angle", "rmse"] = "probability",
+    worst: float | None = None,
+    margin: float | None = None,
+    brightness: Literal["stated", "free"] = "stated",
+    grouping: str = "auto",
+    range_nm: tuple[float, float] | None = None,
+    progress: Progress | None = None,
+) -> xr.Dataset:
+    """Name the material of every pixel, with classes from a ``library``, from ``pins``, or from both.
+
+    ``library`` is a file or folder of spectra (or several); ``pins`` says by name where known materials are:
+    a mask, a pixel (x, y), or x, y, width and height. ``worst`` is, for the probability, the share of the
+    pixels of a class that may be called "none of these" (0.01), else the largest angle (rad) or difference;
+    ``margin`` the least probability of the class (0.95), else by which share the second must be worse.
+    ``brightness`` "free" compares shapes alone.
+
+    The dataset holds ``class`` (y, x), an index into the coordinate ``label``, ``fit`` and ``margin`` (y, x),
+    and for each label ``pixels`` and ``area_mm2``; the attribute ``notes`` lists what was converted or left
+    out of the library. Raises `CalibrationError` for a library without usable spectra and `DecodeError` for
+    places without spectra or a result that has none.
+    """
+    import xarray as xr
+
+    from dsl_core.analysis.classes import classes_of_library
+    from dsl_core.analysis.classification import classes_of_masks, classify_result, require_spectra, within_nm
+    from dsl_core.analysis.classify import Limits, Measure
+    from dsl_core.analysis.library import read_library
+
+    require_spectra(result)
+    if range_nm is not None:
+        result = within_nm(result, *range_nm)
+    classes: list[SpectralClass] = []
+    notes: list[str] = []
+    if library is not None:
+        paths = [library] if not isinstance(library, Sequence) or isinstance(library, str) else library
+        read = read_library([Path(path) for path in paths], grouping, progress=progress)
+        found, left_out = classes_of_library(read, result["wavelength_nm"].values)
+        classes += found
+        notes += [*read.notes, *left_out]
+    if pins:
+        classes += classes_of_masks(result, {name: place_mask(result, name, p) for name, p in pins.items()})
+    chosen = Measure(measure)
+    usual = Limits.usual(chosen)
+    limits = Limits(usual.worst if worst is None else worst, usual.margin if margin is None else margin)
+    made = classify_result(result, classes, chosen, limits, brightness, progress)
+    over = ("y", "x")
+    rows = {row.label: row for row in made.rows}
+    labels = list(made.shown.labels)
+    variables: dict[str, Any] = {
+        "class": (over, made.shown.values),
+        "fit": (over, made.scores.fit),
+        "margin": (over, made.scores.margin),
+        "pixels": ("label", [rows[label].pixels for label in labels]),
+    }
+    if made.rows[0].area_mm2 is not None:
+        variables["area_mm2"] = ("label", [rows[label].area_mm2 for label in labels], {"units": "mm2"})
+    coords = {"label": labels, "y": result["y"], "x": result["x"]}
+    return xr.Dataset(variables, coords=coords, attrs={"method": made.method, "notes": notes})
+
+
+def place_mask(result: xr.Dataset, name: str, place: Place) -> NDArray[np.bool_]:
+    """The mask (rows, columns) of a place; raises `DecodeError` for anything that is none."""
+    given, rows, columns = np.asarray(place), result["y"].values, result["x"].values
+    if given.dtype == bool and given.shape == (len(rows), len(columns)):
+        return given
+    if given.dtype == bool or given.shape not in ((2,), (4,)):
+        raise DecodeError(
+            f"{name}: a place is a mask of {len(rows)} x {len(columns)}, a pixel x, y, or x, y, width,"
+            f" height; given {place!r}."
+        )
+    x, y, width, height = (*(int(v) for v in given), 1, 1)[:4]
+    inside_y, inside_x = (rows >= y) & (rows < y + height), (columns >= x) & (columns < x + width)
+    return np.asarray(inside_y[:, None] & inside_x)

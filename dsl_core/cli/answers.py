@@ -1,0 +1,172 @@
+"""Commands for first answers from a result: which material, of which area, of which colour."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import numpy as np
+import typer
+from numpy.typing import NDArray
+
+from dsl_core.cli.options import Force, Json, parse_place, parse_span
+from dsl_core.cli.output import Output
+from dsl_core.errors import PlanError
+from dsl_core.io.staging import check_targets
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from dsl_core.analysis.classes import SpectralClass
+    from dsl_core.progress import Progress
+
+Result = Annotated[Path, typer.Argument(metavar="RESULT.zarr", help="A result of 'reconstruct'.")]
+#: So many notes on a library are printed; the rest is counted.
+_MOST_NOTES = 6
+
+
+def classify(
+    path: Result,
+    library: Annotated[
+        list[Path],
+        typer.Option("--library", "-l", help="File or folder of spectra; may be repeated."),
+    ] = [],  # noqa: B006 - typer reads it, nobody changes it
+    group: Annotated[
+        str,
+        typer.Option(
+            "--group",
+            help="What makes a class of the library: auto, name, folder, file, none, or a CSV file with the"
+            " columns name and group.",
+        ),
+    ] = "auto",
+    pins: Annotated[
+        bool, typer.Option("--pins", help="Classes are the pins and regions marked on the result.")
+    ] = False,
+    at: Annotated[
+        list[str],
+        typer.Option("--at", help="A known material, as NAME=X,Y or NAME=X,Y,WIDTH,HEIGHT; may be repeated."),
+    ] = [],  # noqa: B006
+    measure: Annotated[
+        str,
+        typer.Option("--by", help="probability (from the stated deviations), angle or rmse."),
+    ] = "probability",
+    worst: Annotated[
+        float | None,
+        typer.Option(
+            "--worst",
+            help="Share of a class's own pixels that may become 'none of these' (probability; usual 0.01),"
+            " largest angle in rad (0.1), or largest difference (0.03).",
+        ),
+    ] = None,
+    margin: Annotated[
+        float | None,
+        typer.Option(
+            "--margin",
+            help="Least probability of the class (usual 0.95), or by which share the second class must be"
+            " worse (0.1).",
+        ),
+    ] = None,
+    free: Annotated[
+        bool, typer.Option("--free-brightness", help="Compare the shape of spectra, not their level.")
+    ] = False,
+    span: Annotated[
+        str | None, typer.Option("--range", help="START:STOP in nm, to use some of the bands.")
+    ] = None,
+    outputs: Annotated[
+        list[Path],
+        typer.Option(
+            "--output",
+            "-o",
+            help="NAME.hdr (ENVI classification), NAME.ply (points with their class) or NAME.csv (areas);"
+            " may be repeated.",
+        ),
+    ] = [],  # noqa: B006
+    force: Force = False,
+    json: Json = False,
+) -> None:
+    """Name the material of every pixel, or say 'none of these', with areas in pixels and mm2."""
+    from dsl_core.analysis.classification import ENDINGS, classify_result, within_nm, write_classification
+    from dsl_core.analysis.classify import Limits, Measure
+    from dsl_core.io.result.result_file import load_result
+
+    output = Output(json)
+    if measure not in (names := [each.value for each in Measure]):
+        raise PlanError(f"--by must be one of {', '.join(names)}, not {measure!r}.")
+    wrong = [str(each) for each in outputs if each.suffix.lower() not in ENDINGS]
+    if wrong:
+        raise PlanError(f"{wrong[0]} must end in {', '.join(ENDINGS)}: choose one for --output.")
+    check_targets(outputs, overwrite=force)
+    usual = Limits.usual(Measure(measure))
+    limits = Limits(usual.worst if worst is None else worst, usual.margin if margin is None else margin)
+    result = load_result(path)
+    if span is not None:
+        result = within_nm(result, *parse_span("--range", span))
+    with output.progress() as progress:
+        classes, notes = _classes(path, result, library, group, pins, at, progress)
+        found = classify_result(
+            result, classes, Measure(measure), limits, "free" if free else "stated", progress
+        )
+        files = [
+            file for each in outputs for file in write_classification(result, found, each, overwrite=force)
+        ]
+    for note in notes[:_MOST_NOTES]:
+        output.say(note)
+    if len(notes) > _MOST_NOTES:
+        output.say(f"... and {len(notes) - _MOST_NOTES} more notes on the library (see --json).")
+    shown = [row for row in found.rows if row.pixels]
+    areas = ["-" if row.area_mm2 is None else f"{row.area_mm2:.1f}" for row in shown]
+    output.table(
+        ("class", "pixels", "share", "area (mm2)"),
+        [(r.label, r.pixels, f"{r.share:.1%}", area) for r, area in zip(shown, areas, strict=True)],
+    )
+    output.say(f"By {found.method}.")
+    if files:
+        output.say(f"Written: {', '.join(str(file) for file in files)}")
+    output.put(
+        result=path,
+        method=found.method,
+        notes=list(notes),
+        classes=[row.__dict__ for row in found.rows],
+        files=[str(file) for file in files],
+    )
+    output.finish()
+
+
+def _classes(
+    path: Path,
+    result: xr.Dataset,
+    library: Sequence[Path],
+    group: str,
+    pins: bool,
+    at: Sequence[str],
+    progress: Progress,
+) -> tuple[list[SpectralClass], list[str]]:
+    """The classes that the options name, and notes on the library."""
+    from dsl_core.analysis.classes import classes_of_library
+    from dsl_core.analysis.classification import classes_of_masks, masks_of_marks, require_spectra
+    from dsl_core.analysis.library import read_library
+    from dsl_core.api.answers import place_mask
+    from dsl_core.io.result.annotations_file import load_annotations
+
+    if not (library or pins or at):
+        raise PlanError("Say what to look for: --library FOLDER, --pins, or --at NAME=X,Y.")
+    require_spectra(result)
+    classes: list[SpectralClass] = []
+    notes: list[str] = []
+    if library:
+        table = Path(group) if group.lower().endswith(".csv") else None
+        read = read_library(library, "auto" if table else group, table, progress)
+        found, left_out = classes_of_library(read, result["wavelength_nm"].values)
+        classes += found
+        notes += [*read.notes, *left_out]
+    masks: dict[str, NDArray[np.bool_]] = {}
+    if pins:
+        masks |= masks_of_marks(load_annotations(path), (result.sizes["y"], result.sizes["x"]))
+    for text in at:
+        name, place = parse_place("--at", text)
+        mask = place_mask(result, name, place)
+        masks[name] = masks[name] | mask if name in masks else mask
+    if masks:
+        classes += classes_of_masks(result, masks)
+    return classes, notes

@@ -1,0 +1,43 @@
+import numpy as np
+import pytest
+
+from dsl_core.analysis.at_bands import Shape, at_bands, band_weights
+from dsl_core.errors import CalibrationError
+from dsl_core.model.spectral import SpectralCurve
+
+BANDS_NM = np.arange(430.0, 661.0, 5.0)
+FINE_NM = np.arange(400.0, 700.5, 0.5)
+
+
+def test_a_line_finer_than_a_band_keeps_its_area_and_is_no_peak_of_its_own_height() -> None:
+    line = np.where(np.abs(FINE_NM - 547.5) < 0.6, 1.0, 0.0)
+    found = at_bands(SpectralCurve.of(FINE_NM, line), BANDS_NM).values
+    assert found.sum() * 5.0 == pytest.approx(np.trapezoid(line, FINE_NM), rel=0.02)
+    # Plain interpolation would miss the line between two bands altogether.
+    assert found.max() == pytest.approx(0.5 * np.trapezoid(line, FINE_NM) / 5.0, rel=0.05)
+    assert np.interp(BANDS_NM, FINE_NM, line).max() == 0.0
+
+
+@pytest.mark.parametrize(
+    ("shape", "width"), [("triangle", 5 / np.sqrt(6)), ("box", 5 / np.sqrt(12)), ("gaussian", 5 / 2.355)]
+)
+def test_kernels_are_as_wide_as_they_say(shape: Shape, width: float) -> None:
+    weights = band_weights(FINE_NM, np.array([550.0]), np.array([5.0]), shape)[0]
+    assert weights.sum() == pytest.approx(1.0)
+    assert np.sqrt(weights @ (FINE_NM - 550.0) ** 2) == pytest.approx(width, rel=0.06)
+
+
+def test_coarse_samples_are_less_sure_between_them_and_stated_deviations_are_kept() -> None:
+    nm = np.arange(400.0, 701.0, 20.0)
+    values = 0.3 + 0.2 * np.sin(nm / 25)
+    found = at_bands(SpectralCurve.of(nm, values), BANDS_NM)
+    at, between = BANDS_NM % 20 == 0, BANDS_NM % 20 == 10
+    assert found.std[at].max() < 1e-6 < found.std[between].mean()
+    noisy = at_bands(SpectralCurve.of(FINE_NM, np.full(601, 0.5), std=np.full(601, 0.01)), BANDS_NM)
+    # The sum of squares of a triangle's weights, ten samples wide at half height, is two thirds of a tenth.
+    assert noisy.std == pytest.approx(0.01 * np.sqrt(2 / 3 / 10), rel=0.01)
+
+
+def test_what_a_spectrum_does_not_cover_is_not_made_up() -> None:
+    with pytest.raises(CalibrationError, match="500 to 600 nm; the bands from 430 to 660"):
+        at_bands(SpectralCurve.of([500.0, 600.0], [0.1, 0.2]), BANDS_NM)

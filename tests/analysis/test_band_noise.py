@@ -1,0 +1,25 @@
+import numpy as np
+
+from dsl_core.analysis.band_noise import OWN_SHARE, band_correlation, usual_correlation
+from tests.cases.chart_cube import chart_cube
+
+
+def test_the_correlation_of_bands_is_found_from_neighbouring_pixels() -> None:
+    cube = chart_cube()
+    found = band_correlation(cube.reflectance, cube.std, cube.flags == 0)
+    assert found is not None
+    # Two Gaussian kernels of 1.2 bands overlap by exp(-lag² / (4 · 1.2²)).
+    lags = np.arange(6)
+    expected = np.exp(-(lags**2) / (4 * 1.2**2)) * (1 - OWN_SHARE)
+    expected[0] = 1.0
+    measured = [np.mean(np.diag(found, int(lag))[3:-3]) for lag in lags]
+    assert np.abs(measured - expected).max() < 0.04
+
+
+def test_few_pixels_tell_nothing_and_what_is_usual_can_be_inverted() -> None:
+    cube = chart_cube()
+    assert band_correlation(cube.reflectance[:, :3, :8], cube.std[:, :3, :8], cube.flags[:3, :8] == 0) is None
+    for bands in (3, 47):
+        usual = usual_correlation(bands)
+        assert np.linalg.eigvalsh(usual)[0] >= OWN_SHARE * 0.99
+        assert np.allclose(np.diag(usual), 1)

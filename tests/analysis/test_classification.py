@@ -1,0 +1,129 @@
+import csv
+import json
+from pathlib import Path
+
+import meshio
+import numpy as np
+import pytest
+import spectral
+
+import dsl_core as dsl
+from dsl_core.analysis.classes import Member, SpectralClass
+from dsl_core.analysis.classification import classify_result, masks_of_marks, write_classification
+from dsl_core.cli import main
+from dsl_core.errors import DecodeError, StoreError
+from dsl_core.io.result.annotations_file import Annotations, PinRecord, RegionRecord, save_annotations
+from dsl_core.io.result.result_file import load_result, save_result
+from dsl_core.optics.charts import chart_reflectance
+from tests.cases.chart_cube import NM, chart_cube, chart_result
+
+NAMES = ("dark {skin}, größer", "light skin", "blue sky")
+
+
+@pytest.fixture(scope="module")
+def found():  # type: ignore[no-untyped-def]
+    result, cube = chart_result(), chart_cube()
+    classes = [SpectralClass(n, (Member.of(s),)) for n, s in zip(NAMES, cube.spectra[:3], strict=True)]
+    return result, classify_result(result, classes)
+
+
+def test_spectral_opens_the_classification(found, tmp_path: Path) -> None:  # type: ignore[no-untyped-def]
+    result, made = found
+    write_classification(result, made, tmp_path / "map.hdr")
+    image = spectral.open_image(str(tmp_path / "map.hdr"))
+    assert image.metadata["file type"] == "ENVI Classification"
+    assert int(image.metadata["classes"]) == len(image.metadata["class names"]) == 6
+    assert image.metadata["class names"][1:3] == ["dark (skin); gr??er", "light skin"]
+    assert len(image.metadata["class lookup"]) == 18
+    assert np.array_equal(image.read_band(0), made.shown.values)
+
+
+def test_meshio_opens_the_points_with_their_class(found, tmp_path: Path) -> None:  # type: ignore[no-untyped-def]
+    result, made = found
+    write_classification(result, made, tmp_path / "map.ply")
+    points = meshio.read(tmp_path / "map.ply")
+    lit = np.isfinite(result["points_mm"].values[2])
+    assert np.array_equal(points.point_data["scalar_class"], made.shown.values[lit])
+
+
+def test_areas_are_those_of_the_surface(found) -> None:  # type: ignore[no-untyped-def]
+    _, made = found
+    by_name = {row.label: row for row in made.rows}
+    # Pixels of a plane at 700 mm are 1 mm apart.
+    for row in made.rows[:-1]:
+        assert row.area_mm2 == pytest.approx(row.pixels, rel=1e-3)
+    assert by_name["none of these"].pixels > 40 * 60
+    assert by_name["not judged"].pixels == 61
+
+
+def test_the_table_is_written_with_its_method(found, tmp_path: Path) -> None:  # type: ignore[no-untyped-def]
+    result, made = found
+    write_classification(result, made, tmp_path / "map.csv")
+    lines = (tmp_path / "map.csv").read_text(encoding="utf-8").splitlines()
+    rows = list(csv.DictReader(line for line in lines if not line.startswith("#")))
+    assert lines[0].startswith("# method: probability")
+    assert rows[0]["class"] == NAMES[0]
+    assert sum(int(row["pixels"]) for row in rows) == made.shown.values.size
+    with pytest.raises(StoreError, match="does not end in"):
+        write_classification(result, made, tmp_path / "map.jpg")
+
+
+def test_the_face_of_python_takes_places_and_libraries(tmp_path: Path) -> None:
+    result, chart = chart_result(), chart_reflectance(NM)
+    text = ["wavelength_nm,light skin", *(f"{nm},{v}" for nm, v in zip(NM, chart["light skin"], strict=True))]
+    (tmp_path / "skin.csv").write_text("\n".join(text))
+    made = dsl.classify(result, tmp_path, {"sky": (5, 40), "foliage": (0, 50, 20, 8)})
+    assert list(made["label"].values)[1:4] == ["skin", "sky", "foliage"]
+    assert (made["class"].values[18:30] == 1).mean() > 0.9
+    assert (made["class"].values[34:46] == 2).mean() > 0.9
+    assert float(made["area_mm2"].sel(label="skin")) == pytest.approx(960, rel=0.1)
+    part = dsl.classify(result, pins={"sky": (5, 40)}, range_nm=(500, 600))
+    assert (part["class"].values[34:46] == 1).mean() > 0.9
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ({"pins": {"x": (5, 95)}}, "none of its 1 pixels has a spectrum"),
+        ({"pins": {"x": (1, 2, 3)}}, "a place is a mask"),
+        ({}, "given 0"),
+        ({"pins": {"x": (5, 5)}, "range_nm": (100, 200)}, "Only 0 bands"),
+    ],
+)
+def test_wrong_places_are_told(options, words: str) -> None:  # type: ignore[no-untyped-def]
+    with pytest.raises(DecodeError, match=words):
+        dsl.classify(chart_result(), **options)
+
+
+def test_a_result_of_depth_alone_is_told() -> None:
+    depth = chart_result().drop_vars(["reflectance", "reflectance_std", "data_share"])
+    with pytest.raises(DecodeError, match="depth only"):
+        dsl.classify(depth, pins={"x": (5, 5)})
+
+
+def test_the_command_names_pins_and_writes_files(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = save_result(chart_result(), tmp_path / "chart.zarr")
+    marks = Annotations(
+        pins=(PinRecord(name="sky", pixel=(9, 40)),),
+        regions=(RegionRecord(name="skin", outline_px=((0, 17), (20, 17), (20, 30), (0, 30))),),
+    )
+    save_annotations(marks, path)
+    target = tmp_path / "m.hdr"
+    assert main(["classify", str(path), "--pins", "-o", str(target), "--json"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert [row["label"] for row in told["classes"]][:3] == ["sky", "skin", "none of these"]
+    assert target.is_file()
+    assert load_result(path).sizes["y"] == 96
+    for wrong, words in (
+        (["classify", str(path)], "Say what to look for"),
+        (["classify", str(path), "--at", "x=1"], "NAME=X,Y"),
+        (["classify", str(path), "--pins", "--by", "svm"], "must be one of"),
+        (["classify", str(path), "--pins", "-o", "m.jpg"], "must end in"),
+    ):
+        assert main(wrong) == 2
+        assert words in capsys.readouterr().err
+
+
+def test_nothing_marked_is_told() -> None:
+    with pytest.raises(DecodeError, match="Nothing is marked"):
+        masks_of_marks(Annotations(), (4, 4))

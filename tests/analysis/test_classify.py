@@ -1,0 +1,135 @@
+import numpy as np
+import pytest
+
+from dsl_core.analysis.classes import Member, SpectralClass, class_of_pixels, summed_up
+from dsl_core.analysis.classify import ClassMap, Limits, Measure, score
+from dsl_core.errors import DecodeError
+from dsl_core.model.result import Flag
+from tests.cases.chart_cube import SMOOTH, ChartCube, chart_cube
+
+
+@pytest.fixture(scope="module")
+def cube() -> ChartCube:
+    return chart_cube()
+
+
+def _classes(cube: ChartCube, left_out: int | None = None) -> list[SpectralClass]:
+    known = zip(cube.names, cube.spectra, strict=True)
+    return [SpectralClass(n, (Member.of(s),)) for i, (n, s) in enumerate(known) if i != left_out]
+
+
+def _map(cube: ChartCube, classes: list[SpectralClass], rate: float = 0.01, **options: object) -> ClassMap:
+    scores = score(cube.reflectance, cube.std, None, cube.flags, classes, **options)  # type: ignore[arg-type]
+    return ClassMap.of(scores, Limits(rate, 0.95))
+
+
+@pytest.mark.parametrize("rate", [0.01, 0.1])
+@pytest.mark.parametrize("smooth", [0.0, SMOOTH])
+def test_none_of_these_keeps_its_rate_and_no_pixel_gets_a_wrong_name(rate: float, smooth: float) -> None:
+    cube = chart_cube(smooth=smooth)
+    shown = _map(cube, _classes(cube), rate)
+    judged = shown.values > 0
+    named = judged & (shown.values <= len(cube.names))
+    assert (shown.values[named] == cube.material[named] + 1).all()
+    none = (shown.values[judged] == shown.none).mean()
+    if smooth:
+        # A share of each deviation is taken as the band's own: fewer pixels than stated, never more.
+        assert none <= rate
+    else:
+        assert none == pytest.approx(rate, rel=0.35)
+
+
+def test_a_material_that_is_in_no_class_is_none_of_these(cube: ChartCube) -> None:
+    shown = _map(cube, _classes(cube, left_out=4))
+    unknown = cube.material == 4
+    assert (shown.values[unknown] == shown.none).mean() > 0.99
+
+
+def test_flags_are_respected(cube: ChartCube) -> None:
+    assert cube.flags[0, 0] == Flag.POOR_FIT
+    assert _map(cube, _classes(cube)).values[0, 0] == 0
+
+
+def test_what_only_brightness_tells_apart_is_undecided_when_brightness_is_free(cube: ChartCube) -> None:
+    twice = [SpectralClass("dark", (Member.of(cube.spectra[1] / 1.5),))]
+    twice += [SpectralClass("bright", (Member.of(cube.spectra[1]),))]
+    here = cube.material == 1
+    stated, free = _map(cube, twice), _map(cube, twice, brightness="free")
+    assert (stated.values[here] == 2).mean() > 0.98
+    assert (free.values[here] == free.unsure).mean() > 0.98
+
+
+def test_a_brightness_of_its_own_is_within_what_is_stated() -> None:
+    cube = chart_cube(share=0.003, level=0.05)
+    shown = _map(cube, _classes(cube))
+    judged = shown.values > 0
+    assert (shown.values[judged] == shown.none).mean() <= 0.012
+
+
+def test_deviations_decide_and_angles_do_not() -> None:
+    """Two classes whose shapes differ by less than the noise are undecided, not named at random."""
+    cube = chart_cube(count=2, share=0.2)
+    near = cube.spectra[0] * (1 + 0.01 * np.linspace(-1, 1, cube.spectra.shape[1]))
+    classes = [SpectralClass("a", (Member.of(cube.spectra[0]),)), SpectralClass("b", (Member.of(near),))]
+    here = cube.material == 0
+    assert (_map(cube, classes).values[here] > 2).mean() > 0.98
+    angles = score(cube.reflectance, None, None, cube.flags, classes, Measure.ANGLE)
+    assert (angles.best[here] == 1).mean() > 0.2
+
+
+def test_bands_that_the_prior_decided_do_not_count(cube: ChartCube) -> None:
+    share, values = np.ones_like(cube.reflectance), cube.reflectance.copy()
+    share[:4, 30:40], values[:4, 30:40] = 0.1, 0.9
+    scores = score(values, cube.std, share, cube.flags, _classes(cube))
+    assert (scores.best[30:40] == cube.material[30:40]).all()
+    assert np.median(scores.fit[30:40]) > 0.2
+    assert np.median(score(values, cube.std, None, cube.flags, _classes(cube)).fit[30:40]) < 1e-6
+
+
+@pytest.mark.parametrize("measure", [Measure.ANGLE, Measure.RMSE])
+def test_distances_name_the_nearest_and_limits_work_afterwards(cube: ChartCube, measure: Measure) -> None:
+    scores = score(cube.reflectance, None, None, cube.flags, _classes(cube), measure)
+    wide, narrow = ClassMap.of(scores, Limits(1.0, 0.0)), ClassMap.of(scores, Limits(1e-4, 0.0))
+    judged = scores.best >= 0
+    assert (wide.values[judged] == cube.material[judged] + 1).mean() > 0.98
+    assert (narrow.values[judged] == narrow.none).all()
+
+
+def test_marked_pixels_make_a_class_that_varies_as_they_do(cube: ChartCube) -> None:
+    varied = cube.reflectance * (1 + 0.2 * np.sin(np.arange(cube.flags.shape[1]) / 3)).astype("f4")
+    made = class_of_pixels("x", varied, cube.std, cube.material == 1)
+    (member,) = made.members
+    assert len(member.components) == 1
+    level = np.abs(member.components[0]) / member.mean
+    assert level == pytest.approx(0.2 * np.sqrt(0.5), rel=0.2)
+    scores = score(varied, cube.std, None, cube.flags, [made])
+    assert (scores.fit[cube.material == 1] < 0.01).mean() < 0.02
+    plain = class_of_pixels("x", cube.reflectance, cube.std, cube.material == 1)
+    assert len(plain.members[0].components) == 0
+
+
+def test_few_members_stay_and_many_are_summed_up(cube: ChartCube) -> None:
+    members = [Member.of(cube.spectra[0] * level) for level in np.linspace(0.9, 1.1, 30)]
+    assert len(summed_up("x", members[:5]).members) == 5
+    assert len(summed_up("x", members).members) == 1
+
+
+def test_pixels_of_pins_find_their_material(cube: ChartCube) -> None:
+    pins = []
+    for index, name in enumerate(cube.names):
+        mask = np.zeros(cube.flags.shape, bool)
+        mask[tuple(np.argwhere(cube.material == index)[70])] = True
+        pins.append(class_of_pixels(name, cube.reflectance, cube.std, mask))
+    shown = _map(cube, pins)
+    named = (shown.values > 0) & (shown.values <= len(pins))
+    assert named.mean() > 0.9
+    assert (shown.values[named] == cube.material[named] + 1).mean() > 0.995
+
+
+def test_wrong_input_is_told(cube: ChartCube) -> None:
+    with pytest.raises(DecodeError, match="1 to 250 classes; given 0"):
+        score(cube.reflectance, cube.std, None, cube.flags, [])
+    with pytest.raises(DecodeError, match="states no deviations"):
+        score(cube.reflectance, None, None, cube.flags, _classes(cube))
+    with pytest.raises(DecodeError, match="does not have the 24 bands"):
+        score(cube.reflectance, cube.std, None, cube.flags, [SpectralClass("x", (Member.of(np.ones(3)),))])

@@ -1,0 +1,82 @@
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from dsl_core.analysis.classes import classes_of_library
+from dsl_core.analysis.library import read_library
+from dsl_core.errors import CalibrationError
+from tests.cases.spectra_files import NM, SHARE, asd
+
+BANDS_NM = np.arange(430.0, 661.0, 10.0)
+
+
+def _csv(path: Path, *columns: np.ndarray, titles: tuple[str, ...], nm: np.ndarray = NM) -> Path:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    rows = [",".join(f"{value:.6g}" for value in row) for row in zip(nm, *columns, strict=True)]
+    path.write_text("\n".join([",".join(("wavelength_nm", *titles)), *rows]), encoding="utf-8")
+    return path
+
+
+def test_folders_are_groups_and_any_format_is_read(tmp_path: Path) -> None:
+    _csv(tmp_path / "blätter" / "a.csv", SHARE, titles=("<b>Ahorn</b>",))
+    (tmp_path / "blätter" / "b.asd").write_bytes(asd())
+    _csv(tmp_path / "stein" / "c.csv", SHARE / 2, titles=("granite",))
+    library = read_library([tmp_path])
+    assert library.groups == ("blätter", "stein")
+    assert [entry.name for entry in library.entries if entry.group == "stein"] == ["c"]
+    classes, notes = classes_of_library(library, BANDS_NM)
+    assert [each.name for each in classes] == ["blätter", "stein"]
+    assert classes[1].mean == pytest.approx(classes[0].mean / 2, rel=1e-3)
+    assert not notes
+
+
+def test_percent_is_told_and_dark_spectra_of_such_a_file_are_percent_too(tmp_path: Path) -> None:
+    _csv(tmp_path / "two.csv", SHARE * 100, SHARE * 2, titles=("bright", "dark"))
+    library = read_library([tmp_path / "two.csv"])
+    bright, dark = (np.asarray(entry.curve.values) for entry in library.entries)
+    assert bright == pytest.approx(SHARE, rel=1e-4)
+    # Values up to 1.4 look like shares, but the other spectrum of the file shows that they are percent.
+    assert dark == pytest.approx(SHARE * 0.02, rel=1e-4)
+    assert "read as percent" in library.notes[0]
+
+
+def test_two_hundred_entries_of_one_name_are_one_class_that_varies(tmp_path: Path) -> None:
+    levels = np.linspace(0.8, 1.2, 200)
+    _csv(tmp_path / "l.csv", *(SHARE * level for level in levels), titles=("leaf",) * 200)
+    library = read_library([tmp_path / "l.csv"])
+    assert library.groups == ("leaf",)
+    (one,), _ = classes_of_library(library, BANDS_NM)
+    assert len(one.members) == 1
+    # All that varies is the level.
+    component = one.members[0].components[0]
+    assert np.abs(component / one.mean) == pytest.approx(np.std(levels, ddof=1), rel=0.02)
+
+
+def test_groups_by_name_and_by_table(tmp_path: Path) -> None:
+    titles = ("oak 1", "oak 2", "ash_01")
+    file = _csv(tmp_path / "l.csv", SHARE, SHARE, SHARE, titles=titles)
+    assert read_library([file]).groups == titles
+    assert read_library([file], "name").groups == ("oak", "ash")
+    table = tmp_path / "groups.csv"
+    table.write_text("name,group\noak 1,tree\nash_01,tree\n")
+    assert read_library([tmp_path], table=table).groups == ("tree", "oak 2")
+
+
+def test_what_cannot_be_used_is_left_out_and_told(tmp_path: Path) -> None:
+    _csv(tmp_path / "good.csv", SHARE, titles=("reflectance",))
+    _csv(tmp_path / "counts.csv", SHARE * 9000, titles=("counts",))
+    _csv(tmp_path / "part.csv", SHARE[10:20], titles=("reflectance",), nm=NM[10:20])
+    library = read_library([tmp_path])
+    assert [entry.name for entry in library.entries] == ["good", "part"]
+    assert "counts.csv" in library.notes[0]
+    classes, notes = classes_of_library(library, BANDS_NM)
+    assert len(classes) == 1
+    assert "It covers 500 to 590 nm" in notes[0]
+
+
+def test_nothing_to_read_is_one_sentence(tmp_path: Path) -> None:
+    with pytest.raises(CalibrationError, match="no file of a format"):
+        read_library([tmp_path])
+    with pytest.raises(CalibrationError, match="no library"):
+        read_library([tmp_path / "not there"])
