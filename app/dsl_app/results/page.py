@@ -109,7 +109,7 @@ class ResultsPage(PageWidget):
         column_of(head, self.warning, (self.stack, 1), on=self, margins=(16, 10, 12, 8))
 
     def _content(self) -> QWidget:
-        self.pictures = splitter(Qt.Orientation.Horizontal, (self.image, 1), (self.cloud, 2))
+        self.pictures = splitter(Qt.Orientation.Horizontal, (self.image, 1), (self.cloud, 1))
         self.pictures.setObjectName("result-pictures")
         left = boxed(column_of(self.bar, (self.pictures, 1), self.pixel_info, margins=0))
         tabs = tabs_of("", (self.marks, "Pins, regions, references", ""), (self.search, "Search", ""))

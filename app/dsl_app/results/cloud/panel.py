@@ -1,6 +1,8 @@
-"""The 3D cloud of a result, with cursor, pins and a lasso."""
+"""The 3D view of a result, with cursor, pins, a lasso and measurements."""
 
 from __future__ import annotations
+
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -8,6 +10,11 @@ from PySide6.QtCore import QEvent, Qt, QTimer
 from PySide6.QtGui import QMouseEvent, QShowEvent
 from PySide6.QtWidgets import QWidget
 
+from dsl_app.results.cloud.look import Grid
+from dsl_app.results.cloud.measuring import Measure, Measured, measure_plane, measure_points
+from dsl_app.results.cloud.overlay import Overlay
+from dsl_app.results.cloud.picking import HOVER_POINTS, Picking
+from dsl_app.results.cloud.tools import CloudTools
 from dsl_app.results.cloud.views import CloudView, make_cloud_view, normalised, prepare_cloud_view
 from dsl_app.results.controller import ResultsController
 from dsl_app.results.layers import Layers, rgb_of, within
@@ -15,15 +22,17 @@ from dsl_app.results.state import ResultsState, ResultView, Tool
 from dsl_app.shared.jobs.base import Job, JobRunner
 from dsl_app.shared.spectrum import Pixel
 from dsl_app.shared.theme import DARK, Theme
-from dsl_app.shared.widgets.forms import label, push_button
-from dsl_app.shared.widgets.layouts import column_of, row_of
-from dsl_core.evaluation.marks import inside_outline, nearest_on_screen, on_screen
+from dsl_app.shared.widgets.forms import label
+from dsl_app.shared.widgets.layouts import column_of
 from dsl_core.io.result.result_arrays import ResultArrays
+from dsl_core.model.result import Flag
 
-#: Number of points searched for the one under the moving mouse; a click searches all.
-HOVER_POINTS = 60_000
+if TYPE_CHECKING:
+    from dsl_app.results.cloud.section_plot import SectionPlot
+
 #: Delay between the steps that fill a view, ms.
 STEP_MS = 20
+HINT = "Drag or arrow keys rotate, Shift+drag pans, wheel or +/− zooms."
 
 
 class CloudPanel(QWidget):
@@ -35,18 +44,25 @@ class CloudPanel(QWidget):
         self._is_preparing = False
         self.view: CloudView | None = None
         self._layers: Layers | None = None
-        self._points = np.empty((0, 3), np.float32)
-        self._flat = np.empty(0, np.intp)
+        self._picking, self._grid = Picking(), Grid((0, 0), np.empty(0, np.intp))
         #: Whether the points are of another result than those on screen.
         self._is_new = True
-        self._projected: NDArray[np.float64] | None = None
         self._lasso: list[tuple[float, float]] = []
         self._press: tuple[float, float] | None = None
-        self._hint = label("", "muted")
-        self._reset = push_button("Reset view", "Look from the position of the camera")
-        self._reset.clicked.connect(lambda: None if self.view is None else self.view.reset())
-        row = row_of((self._hint, 1), self._reset)
-        self._box = column_of(row, on=self, margins=0)
+        self._measure, self._picked = Measure.NOTHING, list[Pixel]()
+        self._hint = label("", "muted", wraps=True, can_be_copied=True)
+        self.tools = CloudTools()
+        self.section: SectionPlot | None = None
+        self._box = column_of(self.tools, self._hint, on=self, margins=0, spacing=4)
+        self._connect()
+        # Colours follow a dragged slider once it rests for a moment.
+        self._later = QTimer(self)
+        self._later.setSingleShot(True)
+        self._later.setInterval(60)
+        self._later.timeout.connect(self._paint)
+
+    def _connect(self) -> None:
+        state, tools = self._state, self.tools
         state.result.changed.connect(lambda _: self._new_result())
         for value in (state.cloud_by, state.band, state.quality, state.picture, state.search):
             value.changed.connect(lambda _: self._later.start())
@@ -54,11 +70,10 @@ class CloudPanel(QWidget):
         state.cursor.changed.connect(self._show_cursor)
         state.marks.changed.connect(lambda _: self._show_pins())
         state.tool.follow(lambda _: self._show_hint())
-        # Colours follow a dragged slider once it rests for a moment.
-        self._later = QTimer(self)
-        self._later.setSingleShot(True)
-        self._later.setInterval(60)
-        self._later.timeout.connect(self._paint)
+        tools.look_chosen.connect(lambda look: None if self.view is None else self.view.take_look(look))
+        tools.side_chosen.connect(lambda side: None if self.view is None else self.view.see_from(side))
+        tools.share_chosen.connect(self._show_share)
+        tools.measure_chosen.connect(self._start_measuring)
 
     # Make and fill ---------------------------------------------------------------------------------
 
@@ -88,8 +103,9 @@ class CloudPanel(QWidget):
         self._hint.setText(sentence)
 
     def _make(self, can_draw: bool) -> None:
-        self.view = view = make_cloud_view(can_draw, self._view_moved, self._mouse)
-        view.set_background(self._theme.base)
+        self.view = view = make_cloud_view(can_draw, self._picking.view_moved, self._mouse)
+        view.apply_theme(self._theme)
+        self.tools.setEnabled(can_draw)
         self._box.insertWidget(0, view, 1)
         # The widget gets its size, and with it the camera, in the event loop.
         QTimer.singleShot(STEP_MS, self, self._new_result)
@@ -98,7 +114,9 @@ class CloudPanel(QWidget):
         result = self._state.result.value
         if self._layers is not None and self._layers.result is not result:
             # Even while hidden: a closed result must not stay in memory.
-            self._layers, self._points = None, np.empty((0, 3), np.float32)
+            self._layers, self._grid = None, Grid((0, 0), np.empty(0, np.intp))
+            self._picking.take(np.empty((0, 3), np.float32), self._grid.flat, 1)
+            self._show_measured(None)
         if self.view is None or not self.isVisible():
             return
         if result is None or "points_mm" not in result.arrays:
@@ -116,11 +134,27 @@ class CloudPanel(QWidget):
             self._choose_points(self._layers.result)
             self._later.start()
 
+    def _show_share(self, percent: int) -> None:
+        """Hide the nearest and farthest points, but for the middle ``percent``."""
+        result = self._state.result.value
+        if result is None:
+            return
+        depth = result["depth_mm"]
+        rest = (100 - percent) / 2
+        known = depth[np.isfinite(depth)]
+        if percent == 100 or known.size == 0:
+            self._control.limit_depth(None)
+        else:
+            low, high = np.percentile(known, (rest, 100 - rest))
+            self._control.limit_depth((float(low), float(high)))
+
     def _choose_points(self, result: ResultArrays) -> None:
         """Choose the points within the limits; the others can neither be seen nor pointed at."""
-        points = result["points_mm"]
-        self._flat = np.flatnonzero(within(points[2], self._state.depth_limits.value))
-        self._points = np.ascontiguousarray(points.reshape(3, -1)[:, self._flat].T)
+        points, arrays = result["points_mm"], result.arrays
+        flat = np.flatnonzero(within(points[2], self._state.depth_limits.value))
+        self._picking.take(np.ascontiguousarray(points.reshape(3, -1)[:, flat].T), flat, result.shape[1])
+        edge = (arrays["flags"] & int(Flag.DEPTH_EDGE)) != 0 if "flags" in arrays else None
+        self._grid = Grid(result.shape, flat, arrays.get("depth_std_mm"), edge, arrays.get("normals"))
 
     def _show_result(self) -> None:
         self._paint()
@@ -133,14 +167,14 @@ class CloudPanel(QWidget):
         layer = self._layers.layer(self._state)
         if layer is None:
             return
-        colours = rgb_of(layer).reshape(-1, 3)[self._flat]
+        colours = rgb_of(layer).reshape(-1, 3)[self._grid.flat]
         search = self._state.search.value
         if search is not None:
             colours = colours.copy()
-            colours[search.found.ravel()[self._flat]] = tuple(bytes.fromhex(self._theme.accent[1:]))
-        self.view.show_cloud(self._points, colours, self._is_new)
+            colours[search.found.ravel()[self._grid.flat]] = tuple(bytes.fromhex(self._theme.accent[1:]))
+        self.view.show_cloud(self._picking.points, colours, self._is_new, self._grid)
         self._is_new = False
-        self._projected = None
+        self._picking.view_moved()
 
     def _show_cursor(self, pixel: Pixel | None) -> None:
         result = self._state.result.value
@@ -165,85 +199,121 @@ class CloudPanel(QWidget):
         self.view.show_pins(points[known], np.array(colours, np.uint8).reshape(-1, 3)[known])
 
     def _show_hint(self) -> None:
-        lasso = self._state.tool.value is Tool.LASSO
-        self._hint.setText(
-            "Draw around points with the left button."
-            if lasso
-            else "Drag or arrow keys rotate, Shift+drag pans, wheel or +/− zooms."
-        )
+        if self._measure is not Measure.NOTHING:
+            self._hint.setText(self._measure.value)
+        elif self._draws:
+            self._hint.setText("Draw around points with the left button.")
+        else:
+            self._hint.setText(HINT)
+
+    # Measure ---------------------------------------------------------------------------------------
+
+    def _start_measuring(self, kind: Measure) -> None:
+        self._measure = kind
+        self._picked.clear()
+        self._show_measured(None)
+        self._show_hint()
+
+    def _measure_pixel(self, pixel: Pixel) -> None:
+        result = self._state.result.value
+        assert result is not None
+        self._picked.append(pixel)
+        if len(self._picked) < 2:
+            self._show_measured(None)
+            self._show_overlay([np.asarray(result.at("points_mm", pixel), np.float64)])
+            return
+        first, last = self._picked
+        self._picked.clear()
+        self._show_measured(measure_points(result, self._measure, first, last))
+
+    def _show_measured(self, found: Measured | None) -> None:
+        cut = None if found is None else found.section
+        if cut is not None:
+            self._section_plot().show_section(cut)
+        if self.section is not None:
+            self.section.setVisible(cut is not None)
+        if found is not None:
+            self._hint.setText(found.text)
+        if self.view is not None:
+            self.view.show_overlay(Overlay(line=None if found is None else found.ends))
+
+    def _section_plot(self) -> SectionPlot:
+        if self.section is None:
+            # pyqtgraph takes a moment to import.
+            from dsl_app.results.cloud.section_plot import SectionPlot
+
+            self.section = SectionPlot()
+            self.section.apply_theme(self._theme)
+            self._box.insertWidget(self._box.indexOf(self.tools), self.section)
+        return self.section
+
+    def _show_overlay(self, points: list[NDArray[np.float64]]) -> None:
+        if self.view is not None:
+            self.view.show_overlay(Overlay(points, lasso=self._lasso))
 
     # Mouse -----------------------------------------------------------------------------------------
 
-    def _view_moved(self) -> None:
-        self._projected = None
+    @property
+    def _draws(self) -> bool:
+        """Whether the left button draws around points."""
+        if self._measure is not Measure.NOTHING:
+            return self._measure is Measure.PLANE
+        return self._state.tool.value is Tool.LASSO
 
     def _mouse(self, event: QMouseEvent) -> bool:
-        """Point, pin or draw; True if the event must not rotate the view."""
+        """Point, pin, measure or draw; True if the event must not rotate the view."""
         assert self.view is not None
         at = normalised(event.position(), self.view)
-        lasso = self._state.tool.value is Tool.LASSO
         match event.type():
             case QEvent.Type.MouseButtonPress if event.button() == Qt.MouseButton.LeftButton:
                 self._press = at
-                self._lasso = [at] if lasso else []
-                return lasso
-            case QEvent.Type.MouseMove if self._press is not None and lasso:
+                self._lasso = [at] if self._draws else []
+                return self._draws
+            case QEvent.Type.MouseMove if self._press is not None and self._lasso:
                 self._lasso.append(at)
+                self._show_overlay([])
                 return True
             case QEvent.Type.MouseMove if event.buttons() == Qt.MouseButton.NoButton:
                 self._point(at, HOVER_POINTS)
             case QEvent.Type.MouseMove:
-                self._projected = None
+                self._picking.view_moved()
             case QEvent.Type.MouseButtonRelease if event.button() == Qt.MouseButton.LeftButton:
-                return self._released(at, lasso)
+                return self._released(at)
         return False
 
-    def _released(self, at: tuple[float, float], lasso: bool) -> bool:
+    def _released(self, at: tuple[float, float]) -> bool:
         press, self._press = self._press, None
-        if lasso:
+        if self._lasso:
             self._end_lasso()
             return True
         if press is not None and np.hypot(at[0] - press[0], at[1] - press[1]) < 0.01:
-            pixel = self._point(at, len(self._points))
-            if pixel is not None:
+            pixel = self._point(at, None)
+            if pixel is not None and self._measure is Measure.NOTHING:
                 self._control.marks.pin(pixel)
+            elif pixel is not None:
+                self._measure_pixel(pixel)
         return False
 
-    def _point(self, at: tuple[float, float], most: int) -> Pixel | None:
+    def _point(self, at: tuple[float, float], most: int | None) -> Pixel | None:
         """Put the cursor on the point under the mouse, searching at most ``most`` points."""
         assert self.view is not None
-        if len(self._points) == 0:
-            return None
-        step = max(len(self._points) // most, 1)
-        if step == 1 or self._projected is None:
-            seen = on_screen(self._points[::step], self.view.projection())
-            self._projected = seen if step > 1 else None
-        else:
-            seen = self._projected
         size = self.view.width(), self.view.height()
-        found = nearest_on_screen(seen, at, size, 6.0 * step**0.5)
-        if found is None:
-            return None
-        pixel = self._pixel(found * step)
-        self._control.point_at(pixel)
+        pixel = self._picking.pixel_at(at, self.view.projection(), size, most)
+        if pixel is not None:
+            self._control.point_at(pixel)
         return pixel
-
-    def _pixel(self, index: int) -> Pixel:
-        result = self._state.result.value
-        assert result is not None
-        y, x = divmod(int(self._flat[index]), result.shape[1])
-        return x, y
 
     def _end_lasso(self) -> None:
         outline, self._lasso = self._lasso, []
+        self._show_overlay([])
         result = self._state.result.value
-        if self.view is None or result is None or len(outline) < 3:
+        if self.view is None or result is None:
             return
-        seen = on_screen(self._points, self.view.projection())
-        inside = inside_outline(seen[:, 0], seen[:, 1], outline)
-        mask = np.zeros(result.shape, bool)
-        mask.ravel()[self._flat[inside]] = True
-        if mask.any():
+        size = self.view.width(), self.view.height()
+        mask = self._picking.mask_inside(outline, self.view.projection(), size, result.shape)
+        if self._measure is Measure.PLANE:
+            self._show_measured(measure_plane(result, mask))
+        elif mask.any():
             self._control.marks.add_pixels(mask)
 
     # Theme and end ---------------------------------------------------------------------------------
@@ -251,8 +321,10 @@ class CloudPanel(QWidget):
     def apply_theme(self, theme: Theme) -> None:
         """Apply the colours of a theme."""
         self._theme = theme
+        if self.section is not None:
+            self.section.apply_theme(theme)
         if self.view is not None:
-            self.view.set_background(theme.base)
+            self.view.apply_theme(theme)
         if self._state.view.value is ResultView.CLOUD:
             self._show_pins()
 

@@ -8,17 +8,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-Points = NDArray[np.float32]
+from dsl_app.results.cloud.look import Grid, Points
+
 #: Points drawn while the view rotates.
 COARSE = 60_000
+#: Sizes of points, px, and how much they overlap, so that no hole shows between neighbours.
+LEAST_PX, LARGEST_PX, OVERLAP = 2.0, 60.0, 1.35
 #: A picture at rest may take this long, s, as rotating has to wait for it. Steps that add less than this
 #: share of the points are not worth it.
 SLOW_S, LEAST_STEP = 0.1, 0.25
-POINT_PX, COARSE_PX, LARGEST_PX = 2, 3, 10
-#: Depth buffer offset that draws marks in front of any cloud.
-TO_THE_FRONT = -66_000
-#: About the share of the view that a cloud covers; few points are drawn larger, so that it looks solid.
-COVERED = 0.6
 
 
 class PointsActor:
@@ -35,9 +33,15 @@ class PointsActor:
         self._order = np.empty(0, np.int32)
         self.is_coarse = False
         self._size = 640, 480
+        self._is_on, self._scale = True, 1.0
+        #: Typical distance of neighbours, mm.
+        self.spacing_mm = 1.0
 
-    def show(self, points: Points, colours: NDArray[np.uint8]) -> bool:
-        """Show a cloud; True when the points are new, and not only their colours."""
+    def show(self, points: Points, colours: NDArray[np.uint8], grid: Grid | None = None) -> bool:
+        """Show a cloud; True when the points are new, and not only their colours.
+
+        With the ``grid`` that they come from, a part of them leaves no holes.
+        """
         self._colours = colours
         if points is self._points and self._parts:
             # Uploading colours is as slow as points, so the rest grows again.
@@ -48,8 +52,12 @@ class PointsActor:
             return False
         self._drop(list(self._parts))
         self._points = points
-        # A fixed random order, so that a part of the cloud is evenly spread and does not flicker.
-        self._order = np.random.default_rng(0).permutation(len(points)).astype(np.int32)
+        # A fixed order, so that a part of the cloud is evenly spread and does not flicker.
+        if grid is not None:
+            self._order = grid.even_order()
+        else:
+            self._order = np.random.default_rng(0).permutation(len(points)).astype(np.int32)
+        self.spacing_mm = spacing(points)
         self._add(COARSE)
         return True
 
@@ -73,10 +81,10 @@ class PointsActor:
         name, index = f"part {len(self._parts)}", self._order[self.shown : self.shown + count]
         self._parts[name] = index
         self.shown += len(index)
-        self._put(name, self._points[index], self._colours[index], POINT_PX)
+        self._put(name, self._points[index], self._colours[index], LEAST_PX)
         self.be_coarse(self.is_coarse)
 
-    def _put(self, name: str, points: Points, colours: NDArray[np.uint8], size_px: int) -> None:
+    def _put(self, name: str, points: Points, colours: NDArray[np.uint8], size_px: float) -> None:
         import pyvista
 
         if name in self._actors:
@@ -98,45 +106,35 @@ class PointsActor:
             render=False,
         )
 
-    def mark(self, name: str, points: Points, colours: NDArray[np.uint8], size_px: int) -> None:
-        """Show points in front of all others, so that marks are always visible."""
-        old = self._meshes.get(name)
-        if old is not None and len(points) and old.n_points == len(points):
-            old.points = np.ascontiguousarray(points)
-            old["colours"] = colours
-        else:
-            self._put(name, points, colours, size_px)
-            mapper = self._actors[name].GetMapper()
-            mapper.SetResolveCoincidentTopologyToPolygonOffset()
-            mapper.SetRelativeCoincidentTopologyPointOffsetParameter(TO_THE_FRONT)
-
     def resize(self, width: int, height: int) -> None:
-        """Adapt the point size to a view of this size, px."""
+        """Set the size of the view, px."""
         self._size = width, height
+
+    def turn_on(self, on: bool, scale: float) -> None:
+        """Show the points, ``scale`` times as large as fills the room between them, or hide them."""
+        self._is_on, self._scale = on, scale
         self.be_coarse(self.is_coarse)
 
     def be_coarse(self, coarse: bool) -> None:
-        """Show only the first part, or all; the fewer points, the larger they are."""
+        """Show only the first part, or all."""
         self.is_coarse = coarse
-        width, height = self._size
-        size_px = point_size(min(COARSE, self.shown) if coarse else self.shown, width * height)
         for number, name in enumerate(self._parts):
-            actor = self._actors[name]
-            actor.SetVisibility(number == 0 or not coarse)
-            actor.GetProperty().SetPointSize(min(size_px, COARSE_PX) if self.shown > COARSE else size_px)
+            self._actors[name].SetVisibility(self._is_on and (number == 0 or not coarse))
 
-    def reset(self) -> None:
-        """Look along the axis of the camera, so that the whole cloud fits into the view."""
+    def fit_size(self, mm_per_px: float) -> None:
+        """Give points the size that fills the room between them: the nearer and the fewer, the larger."""
+        drawn = min(COARSE, self.shown) if self.is_coarse else self.shown
+        apart_mm = self.spacing_mm * math.sqrt(len(self._order) / max(drawn, 1))
+        size_px = point_size(apart_mm, mm_per_px, self._scale)
+        for name in self._parts:
+            self._actors[name].GetProperty().SetPointSize(size_px)
+
+    def extent(self) -> tuple[NDArray[np.float64], NDArray[np.float64]] | None:
+        """Lowest and highest x, y, z of nearly all points, mm; None without points."""
         if self._points is None or len(self._order) == 0:
-            return
+            return None
         low, high = np.percentile(self._points[self._order[:COARSE]], (0.5, 99.5), axis=0)
-        width, height = self._size
-        centre, span = (low + high) / 2, (high - low) / 2
-        camera = self.plotter.camera
-        camera.position, camera.up, camera.focal_point = (0.0, 0.0, 0.0), (0.0, -1.0, 0.0), tuple(centre)
-        reach = 1.1 * max(span[1], span[0] * height / max(width, 1))
-        camera.view_angle = float(np.degrees(2 * np.arctan2(reach, low[2])))
-        self.plotter.reset_camera_clipping_range()
+        return low, high
 
     def projection(self) -> NDArray[np.float64]:
         """From points to normalised screen coordinates, 4 x 4."""
@@ -145,10 +143,25 @@ class PointsActor:
         return np.array([[matrix.GetElement(i, j) for j in range(4)] for i in range(4)])
 
 
-def point_size(count: int, view_px: int) -> int:
-    """Size of ``count`` points in a view of ``view_px`` pixels, px.
+def point_size(apart_mm: float, mm_per_px: float, scale: float = 1.0) -> float:
+    """Size of points that are so far apart in a view of so many mm a pixel, px.
 
-    >>> point_size(500_000, 300_000), point_size(14_000, 300_000), point_size(100, 300_000)
-    (2, 4, 10)
+    >>> point_size(0.5, 0.25), point_size(0.5, 0.025), point_size(0.5, 5.0), point_size(0.5, 0.001)
+    (2.7, 27.0, 2.0, 60.0)
     """
-    return min(max(round(math.sqrt(COVERED * view_px / max(count, 1))), POINT_PX), LARGEST_PX)
+    if not mm_per_px > 0:
+        return LEAST_PX
+    return min(max(scale * OVERLAP * apart_mm / mm_per_px, LEAST_PX * min(scale, 1.0)), LARGEST_PX)
+
+
+def spacing(points: Points) -> float:
+    """Typical distance of neighbours among points (n, 3), mm.
+
+    Pixels of a row follow each other. Where points are in no order, the area that they cover says more.
+    """
+    if len(points) < 2:
+        return 1.0
+    step = max(len(points) // COARSE, 1)
+    apart = np.linalg.norm(points[1::step] - points[:-1:step][: len(points[1::step])], axis=1)
+    wide, tall, _ = np.ptp(points[::step], axis=0)
+    return max(min(float(np.median(apart)), math.sqrt(wide * tall / len(points))), 1e-6)

@@ -8,7 +8,7 @@ from collections.abc import Callable
 from contextlib import suppress
 from queue import Empty, SimpleQueue
 
-from dsl_app.results.cloud.points import Points
+from dsl_app.results.cloud.look import Grid, Look, Points
 from dsl_app.results.cloud.render_window import Colours, MouseButton, Place, Rendering, RenderWindow
 
 #: Time after the last move until the whole cloud is drawn again, s.
@@ -56,11 +56,22 @@ class CloudRenderer:
             picture, self._picture = self._picture, None
         return picture
 
-    def show(self, points: Points, colours: Colours, reset_view: bool = True) -> None:
+    def show(
+        self, points: Points, colours: Colours, reset_view: bool = True, grid: Grid | None = None
+    ) -> None:
         """Show a cloud; points other than before reset the view, or keep it."""
 
         def act() -> None:
-            self._window.show(points, colours, reset_view)
+            self._window.show(points, colours, reset_view, grid)
+            self._is_fresh, self._is_grown = True, False
+
+        self._request(act)
+
+    def take_look(self, look: Look) -> None:
+        """Draw something else of the cloud."""
+
+        def act() -> None:
+            self._window.take_look(look)
             self._is_fresh, self._is_grown = True, False
 
         self._request(act)
@@ -142,13 +153,13 @@ class CloudRenderer:
         elif self._is_fresh:
             self._is_fresh = False
         else:
-            self._is_fresh = self._window.cloud.grow(self._picture_s)
+            self._is_fresh = self._window.grow(self._picture_s)
             self._is_grown = not self._is_fresh
 
     def _draw(self) -> None:
         begun = time.perf_counter()
         picture = self._window.draw()
-        self._picture_s, self.shown = time.perf_counter() - begun, self._window.cloud.shown
+        self._picture_s, self.shown = time.perf_counter() - begun, self._window.shown
         with self._lock:
             is_taken, self._picture = self._picture is None, picture
         if is_taken:
@@ -158,9 +169,9 @@ class CloudRenderer:
 
     def _be_coarse(self) -> None:
         """Show a part of the cloud until nothing has moved for a while, and while a button is held."""
-        self._window.cloud.be_coarse(True)
+        self._window.be_coarse(True)
         self._rest_at = None if self._is_held else time.monotonic() + SETTLE_S
 
     def _rest(self) -> None:
         self._rest_at = None
-        self._window.cloud.be_coarse(False)
+        self._window.be_coarse(False)

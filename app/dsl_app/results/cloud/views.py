@@ -20,9 +20,11 @@ from PySide6.QtGui import (
 )
 from PySide6.QtWidgets import QWidget
 
-from dsl_app.results.cloud.points import Points
+from dsl_app.results.cloud.look import Grid, Look, Points, Side
+from dsl_app.results.cloud.overlay import Overlay, OverlayPainter
 from dsl_app.results.cloud.render_window import Colours, MouseButton, Rendering, graphics_work
 from dsl_app.results.cloud.renderer import CloudRenderer
+from dsl_app.shared.theme import DARK, Theme
 from dsl_app.shared.widgets.forms import label
 from dsl_app.shared.widgets.layouts import column_of
 from dsl_app.shared.widgets.pictures import arrow_step
@@ -43,9 +45,23 @@ _BUTTONS: dict[Qt.MouseButton, MouseButton] = {
 class CloudView(QWidget):
     """Shows a cloud; this base has one fixed view without marks."""
 
-    def show_cloud(self, points: Points, colours: Colours, reset_view: bool = True) -> None:
-        """Show points (n, 3) in mm with colours (n, 3); other points reset the view, or keep it."""
+    def show_cloud(
+        self, points: Points, colours: Colours, reset_view: bool = True, grid: Grid | None = None
+    ) -> None:
+        """Show points (n, 3) in mm with colours (n, 3); other points reset the view, or keep it.
+
+        With the ``grid`` that they come from, the surface between them can be drawn.
+        """
         raise NotImplementedError
+
+    def take_look(self, look: Look) -> None:
+        """Draw something else."""
+
+    def see_from(self, side: Side) -> None:
+        """Look from a side."""
+
+    def show_overlay(self, overlay: Overlay) -> None:
+        """Draw what is measured over the picture."""
 
     def show_marker(self, point: Points | None, colour: str) -> None:
         """Mark a point; None marks nothing."""
@@ -53,8 +69,8 @@ class CloudView(QWidget):
     def show_pins(self, points: Points, colours: Colours) -> None:
         """Mark the pins."""
 
-    def set_background(self, colour: str) -> None:
-        """Set the colour behind the cloud."""
+    def apply_theme(self, theme: Theme) -> None:
+        """Apply the colours of a theme to what is behind the cloud and written over it."""
         raise NotImplementedError
 
     def projection(self) -> NDArray[np.float64]:
@@ -100,8 +116,8 @@ class InteractiveCloud(CloudView):
         super().__init__()
         self._moved, self._mouse = moved, mouse
         self.image, self._pixels = QImage(), np.empty(0, np.uint8)
-        self._background = QColor()
-        self._projection = np.zeros((4, 4))
+        self._theme, self._overlay = DARK, Overlay()
+        self._seen: Rendering | None = None
         self.setAccessibleName("Point cloud")
         self.setAccessibleDescription("Arrow keys rotate, plus and minus zoom, Home resets the view")
         self.setMouseTracking(True)
@@ -112,31 +128,46 @@ class InteractiveCloud(CloudView):
 
     # Show ------------------------------------------------------------------------------------------
 
-    def show_cloud(self, points: Points, colours: Colours, reset_view: bool = True) -> None:
+    def show_cloud(
+        self, points: Points, colours: Colours, reset_view: bool = True, grid: Grid | None = None
+    ) -> None:
         """Show points with their colours, as many as this computer draws in time."""
-        self.renderer.show(points, colours, reset_view)
+        self.renderer.show(points, colours, reset_view, grid)
+
+    def take_look(self, look: Look) -> None:
+        """Draw something else."""
+        self.renderer.take_look(look)
+
+    def see_from(self, side: Side) -> None:
+        """Look from a side."""
+        self.renderer.call(lambda window: window.see_from(side))
+
+    def show_overlay(self, overlay: Overlay) -> None:
+        """Draw what is measured over the picture."""
+        self._overlay = overlay
+        self.update()
 
     def show_marker(self, point: Points | None, colour: str) -> None:
         """Mark a point; the cloud is coarse until the marker rests."""
         rgb = np.frombuffer(bytes.fromhex(colour[1:]), np.uint8)[None]
         points = np.empty((0, 3), np.float32) if point is None else point[None]
         size_px = round(14 * self.devicePixelRatioF())
-        self.renderer.call(lambda window: window.cloud.mark("marker", points, rgb, size_px), moves=True)
+        self.renderer.call(lambda window: window.marks.show("marker", points, rgb, size_px), moves=True)
 
     def show_pins(self, points: Points, colours: Colours) -> None:
         """Mark the pins."""
         size_px = round(10 * self.devicePixelRatioF())
-        self.renderer.call(lambda window: window.cloud.mark("pins", points, colours, size_px))
+        self.renderer.call(lambda window: window.marks.show("pins", points, colours, size_px))
 
-    def set_background(self, colour: str) -> None:
-        """Set the colour behind the cloud, also where there is no picture yet."""
-        self._background = QColor(colour)
-        self.renderer.call(lambda window: window.set_background(colour))
+    def apply_theme(self, theme: Theme) -> None:
+        """Apply the colours of a theme, also where there is no picture yet."""
+        self._theme = theme
+        self.renderer.call(lambda window: window.set_background(theme.base))
         self.update()
 
     def projection(self) -> NDArray[np.float64]:
         """The 4 x 4 matrix of the picture shown."""
-        return self._projection
+        return np.zeros((4, 4)) if self._seen is None else self._seen.projection
 
     def reset(self) -> None:
         """Look from the position of the camera."""
@@ -150,9 +181,9 @@ class InteractiveCloud(CloudView):
         picture = self.renderer.take()
         if picture is None:
             return
+        before, self._seen = self.projection(), picture
         self._show(picture)
-        if not np.array_equal(picture.projection, self._projection):
-            self._projection = picture.projection
+        if not np.array_equal(picture.projection, before):
             self._moved()
 
     def _show(self, picture: Rendering) -> None:
@@ -166,8 +197,13 @@ class InteractiveCloud(CloudView):
     def paintEvent(self, event: QPaintEvent) -> None:
         """Paint the latest picture."""
         painter = QPainter(self)
-        painter.fillRect(event.rect(), self._background)
+        painter.fillRect(event.rect(), QColor(self._theme.base))
         painter.drawImage(0, 0, self.image)
+        if self._seen is not None:
+            theme = self._theme
+            over = OverlayPainter(painter, self.width(), self.height(), theme.text, theme.accent, theme.base)
+            over.paint(self._seen, self._overlay)
+        painter.end()
 
     def resizeEvent(self, event: QResizeEvent) -> None:
         """Request pictures of the new size."""
@@ -243,7 +279,9 @@ class StaticCloud(CloudView):
         column_of((self._picture, 1), label(NO_OPENGL, "muted", wraps=True), on=self, margins=0)
         self._background = "#000000"
 
-    def show_cloud(self, points: Points, colours: Colours, reset_view: bool = True) -> None:
+    def show_cloud(
+        self, points: Points, colours: Colours, reset_view: bool = True, grid: Grid | None = None
+    ) -> None:
         """Draw points into a picture."""
         picture = static_picture(points, colours, self._background)
         if picture is None:
@@ -252,9 +290,9 @@ class StaticCloud(CloudView):
         image = QImage(picture.data, width, height, 3 * width, QImage.Format.Format_RGB888).copy()
         self._picture.setPixmap(QPixmap.fromImage(image))
 
-    def set_background(self, colour: str) -> None:
+    def apply_theme(self, theme: Theme) -> None:
         """Set the colour behind the next picture."""
-        self._background = colour
+        self._background = theme.base
 
 
 def static_picture(points: Points, colours: Colours, background: str) -> NDArray[np.uint8] | None:

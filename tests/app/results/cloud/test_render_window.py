@@ -39,7 +39,7 @@ def test_a_mark_is_seen_whole_on_a_noisy_depth_and_behind_it() -> None:
     window.show(np.stack([x, y, z], axis=1).astype(np.float32), np.full((40_000, 3), 90, np.uint8))
     red, size_px = np.array([[255, 0, 0]], np.uint8), 14
     for depth_mm in (520.0, 600.0, 680.0):
-        window.cloud.mark("marker", np.array([[0, 0, depth_mm]], np.float32), red, size_px)
+        window.marks.show("marker", np.array([[0, 0, depth_mm]], np.float32), red, size_px)
         pixels = window.draw().pixels
         assert (pixels[..., 0] > 200).sum() == pytest.approx(size_px**2, rel=0.2), depth_mm
     window.close()

@@ -1,0 +1,46 @@
+"""The curve of a section: height above the line between two points, with its 95 % band."""
+
+from __future__ import annotations
+
+import numpy as np
+import pyqtgraph as pg
+from PySide6.QtGui import QColor
+
+from dsl_app.shared.theme import DARK, Theme
+from dsl_app.shared.widgets.plots import CalmPlot
+from dsl_core.evaluation.shape import Section
+
+#: Height of the plot, px, and deviations to either side of the band.
+HEIGHT_PX, BAND = 150, 1.96
+
+
+class SectionPlot(CalmPlot):
+    """Shows a section."""
+
+    def __init__(self) -> None:
+        tip = "Height of the surface above the straight line between the two points, towards the camera"
+        super().__init__("Section", tip, "height (mm)", "along the line (mm)")
+        self.setFixedHeight(HEIGHT_PX)
+        item = self.getPlotItem()
+        self._low, self._high = (pg.PlotCurveItem(pen=pg.mkPen(None)) for _ in range(2))
+        self._band = pg.FillBetweenItem(self._low, self._high)
+        self.curve = pg.PlotCurveItem(connect="finite")
+        for each in (self._low, self._high, self._band, self.curve):
+            item.addItem(each)
+        self.apply_theme(DARK)
+
+    def apply_theme(self, theme: Theme) -> None:
+        """Apply the colours of a theme."""
+        super().apply_theme(theme)
+        self.curve.setPen(pg.mkPen(theme.accent, width=1.6))
+        fill = QColor(theme.accent)
+        fill.setAlpha(56)
+        self._band.setBrush(fill)
+
+    def show_section(self, cut: Section) -> None:
+        """Show the curve of a section."""
+        known = np.isfinite(cut.height_mm)
+        spread = BAND * np.where(np.isfinite(cut.std_mm), cut.std_mm, 0.0)
+        self.curve.setData(cut.along_mm, cut.height_mm)
+        for side, limit in ((-1, self._low), (1, self._high)):
+            limit.setData(cut.along_mm[known], (cut.height_mm + side * spread)[known])
