@@ -33,5 +33,5 @@ def test_a_lasso_does_not_reach_through() -> None:
 def test_the_foremost_point_is_meant() -> None:
     picking = _two_sheets()
     assert picking.pixel_at((-0.95, 0.95), VIEW, SIZE_PX) == (0, 0)
-    assert picking.pixel_at((0.95, -0.95), VIEW, SIZE_PX, most=400) == (19, 19)
+    assert picking.pixel_at((0.85, -0.95), VIEW, SIZE_PX, most=400) == (18, 19)
     assert Picking().pixel_at((0, 0), VIEW, SIZE_PX) is None
