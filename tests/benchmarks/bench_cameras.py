@@ -68,13 +68,20 @@ class FedCamera(Camera):
         A frame that was lost comes again with the same noise; one that was judged wrong with other noise.
         """
         self._twin.prepare(shot_index, attempt - attempt % RetryPolicy().attempts)
-        self._seen = self._twin.snap()
-        self._feed(self._seen.pixels)
+        self._is_fed = False
+        self._next()
 
     def snap(self, timeout_ms: float = 5000.0) -> Frame:
-        """The frame as the library delivers it."""
+        """The frame as the library delivers it; one more of the same shot has noise of its own."""
+        if not self._is_fed:
+            self._next()
         frame = self.camera.snap(timeout_ms)
+        self._is_fed = False
         return Frame(frame.pixels, self._seen.exposure_ms, frame.timestamp_s, frame.frame_id)
+
+    def _next(self) -> None:
+        self._seen, self._is_fed = self._twin.snap(), True
+        self._feed(self._seen.pixels)
 
     def close(self) -> None:
         """Close the library's camera."""
