@@ -6,6 +6,7 @@ import logging
 from collections.abc import Collection
 from dataclasses import replace
 
+from dsl_core.capture.diagnosis import Diagnosis
 from dsl_core.capture.exposure import ShotTaker
 from dsl_core.capture.proof.finding import Finding, Verdict
 from dsl_core.capture.proof.verifier import FrameProof
@@ -29,10 +30,16 @@ class ProvenShots:
     """Takes shots into a sink; without a proof, any picture is believed."""
 
     def __init__(
-        self, taker: ShotTaker, proof: FrameProof | None, sink: FrameSink, token: CancelToken
+        self,
+        taker: ShotTaker,
+        proof: FrameProof | None,
+        diagnosis: Diagnosis,
+        sink: FrameSink,
+        token: CancelToken,
     ) -> None:
-        """Keep the parts."""
+        """Keep the parts; the ``diagnosis`` says why pictures are wrong that stay so."""
         self._taker, self._proof, self._sink, self._token = taker, proof, sink, token
+        self._diagnosis = diagnosis
         self._failures = 0
         self._is_late = False
         self._untold: list[Shot] = []
@@ -64,6 +71,7 @@ class ProvenShots:
             frame, found = self._ask_again(shot, frame, self._proof)
         if shot not in found.again:
             self._sink.write(shot, frame)
+            self._diagnosis.keep(shot, frame.pixels)
         if found.is_wrong:
             self._failures += 1
         elif found.verdict is Verdict.RIGHT:
@@ -127,7 +135,10 @@ class ProvenShots:
                 again += tail[-MOST_UNTOLD:]
                 tail = []
                 continue
-            found = self._proof.judge(shot, stored.read(shot))
+            pixels = stored.read(shot)
+            found = self._proof.judge(shot, pixels)
+            if not found.is_wrong:
+                self._diagnosis.keep(shot, pixels)
             is_untold = found.verdict is Verdict.UNTOLD and self._is_alone(shot)
             tail = [*tail, shot] if is_untold else []
             self._correct(found, self._proof)
@@ -140,12 +151,24 @@ class ProvenShots:
             frame = self._taker.take(control, 1, SETTLE_MS[0], twice=True)
             if proof.is_as_before(control, frame.pixels):
                 continue
+            reason = self._explain() or (
+                "Projector, camera, light or target have changed since. Check that the projector follows,"
+                " that no automatic mode is on, and that nothing has moved, and resume the scan."
+            )
             raise DeviceError(
                 f"{describe_shot(control).capitalize()}, captured once more as a control, no longer shows its"
-                " pattern: projector, camera, light or target have changed since. Check that the"
-                " projector follows, that no automatic mode is on, and that nothing has moved. Frames before"
-                " are saved; resume the scan afterwards."
+                f" pattern. {reason} Frames before are saved."
             )
+
+    def _explain(self) -> str:
+        """What has changed since the scan began, and what to do; empty where that does not show."""
+        try:
+            return self._diagnosis.sentence(
+                lambda shot: self._taker.take(shot, 1, SETTLE_MS[0], twice=True).pixels
+            )
+        except DeviceError as error:
+            _log.warning("No pictures could be taken to see what has changed: %s", error)
+            return ""
 
     def _correct(self, found: Finding, proof: FrameProof) -> None:
         for earlier, settle_ms in enumerate(SETTLE_MS):
@@ -166,10 +189,12 @@ class ProvenShots:
             for shot, frame in taken:
                 if shot not in found.again:
                     self._sink.write(shot, frame)
+                    self._diagnosis.keep(shot, frame.pixels)
                     self.corrected += 1
         if found.is_wrong:
+            reason = self._explain() or f"{found.remedy} Resume the scan afterwards."
             raise DeviceError(
                 f"{found.names.capitalize()} does not show its pattern after {len(SETTLE_MS) + 1} exposures:"
-                f" {found.seen}. {found.remedy} Frames before it are saved; resume the scan afterwards. If"
-                " the pictures are right, resume it without checking that the scene has not moved."
+                f" {found.seen}. {reason} Frames before it are saved. If the pictures are right all the same,"
+                " resume without checking that the scene has not moved."
             )

@@ -13,6 +13,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from enum import StrEnum
 
+from dsl_core.capture.diagnosis import Diagnosis
 from dsl_core.capture.exposure import PatternImage, RetryPolicy, ShotTaker
 from dsl_core.capture.preflight import require_possible
 from dsl_core.capture.proof.verifier import FrameProof
@@ -22,6 +23,7 @@ from dsl_core.devices.base import DeviceRig
 from dsl_core.errors import Cancelled, DriftError, DslError, StoreError
 from dsl_core.model.frames import FrameSink, FrameSource
 from dsl_core.model.plan import CapturePlan, Shot, describe_shot
+from dsl_core.model.rig import Sensor
 from dsl_core.progress import CancelToken, NoProgress, Progress
 
 
@@ -102,7 +104,8 @@ class Runner:
         self._sink = sink
         self._token = token or CancelToken()
         self._taker = ShotTaker(rig, plan, pattern_image, policy or RetryPolicy(), self._token)
-        self._shots = ProvenShots(self._taker, proof, sink, self._token)
+        sensor = rig.calibration.sensor if rig.calibration else Sensor()
+        self._shots = ProvenShots(self._taker, proof, Diagnosis(plan, sensor), sink, self._token)
         self._stored = stored
         self._progress = progress or NoProgress()
         self._pace = _Pace(clock, rig.projector.info.latency_ms)

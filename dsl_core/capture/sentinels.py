@@ -7,7 +7,7 @@ hardly moves in the picture, but the stripes on it do.
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +19,7 @@ from dsl_core.optics.sensor import raw_variance
 from dsl_core.solve.image_shift import TileShifts, tile_shifts
 
 Floats = NDArray[np.float64]
+Mosaic = NDArray[np.uint16]
 
 #: Tiles of the picture, down and across.
 TILES = (4, 6)
@@ -34,13 +35,13 @@ MOST = 0.6
 class Movement:
     """What moved: ``shift_px`` camera pixels (median of the moved tiles) between two shots of the plan.
 
-    None: the picture changed, but by no shift.
+    None: the picture changed, but by no shift; as shots: at some time since the scan began.
     ``is_pattern``: the picture stayed, but the pattern on it moved. ``columns`` and ``rows`` bound what
     moved, camera pixels; None for all of the picture.
     """
 
-    after: int
-    before: int
+    after: int | None
+    before: int | None
     shift_px: float | None
     std_px: float
     is_pattern: bool
@@ -50,7 +51,9 @@ class Movement:
     @property
     def sentence(self) -> str:
         """What moved, by how much and when."""
-        when = f"between frame {self.after} and frame {self.before}"
+        when = "since the scan began"
+        if self.before is not None:
+            when = f"between frame {self.after} and frame {self.before}"
         part = ""
         if self.columns is not None and self.rows is not None:
             part = " in columns {}-{}, rows {}-{} of the picture".format(*self.columns, *self.rows)
@@ -115,44 +118,58 @@ class SentinelWatch:
         needed = (black, old_black, index, -1 if old is None else old.index)
         if old is None or any(each not in self._kept for each in needed):
             return
-        before, old_variance = self._light(old.index, old_black)
-        now, variance = self._light(index, black)
-        found = tile_shifts(before, now, old_variance + variance, TILES)
-        self.found = self._movement(found, before.shape, old, index)
+        kept = self._kept
+        self.found = moved_between(
+            (kept[old.index], kept[old_black]), (kept[index], kept[black]), self._sensor, old.role == "code"
+        )
         if self.found is None:
             self._still[old.role] = index
+        else:
+            since = self._still.get(old.role, old.index)
+            self.found = replace(self.found, after=since, before=index)
 
-    def _light(self, index: int, black: int) -> tuple[Floats, Floats]:
-        """Light of a picture over its black, means over 2 x 2 pixels, and its variance."""
-        picture, dark = (self._kept[i].astype(np.float64) for i in (index, black))
-        noise = sum(
-            raw_variance(self._sensor, each - self._sensor.black_level_dn) for each in (picture, dark)
-        )
-        full = 0.98 * self._sensor.full_scale_dn
-        variance = np.where(picture < full, noise, 1e12)
-        return _binned(picture - dark), _binned(np.asarray(variance)) / 4
 
-    def _movement(self, found: TileShifts, shape: tuple[int, ...], old: Shot, index: int) -> Movement | None:
-        std = np.maximum(found.x_std, found.y_std)
-        telling = 2 * std < TELLING_PX
-        moved = telling & (2 * found.length > LEAST_PX) & (found.sigmas > SIGMAS)
-        moved |= found.change > CHANGED
-        if moved.sum() < FEWEST:
-            return None
-        sure = moved & telling
-        whole = moved.sum() >= MOST * max(int(telling.sum()), FEWEST)
-        rows, columns = (
-            _span(np.asarray(moved.any(axis)), 2 * size) for axis, size in ((1, shape[0]), (0, shape[1]))
-        )
-        return Movement(
-            after=self._still.get(old.role, old.index),
-            before=index,
-            shift_px=float(np.median(2 * found.length[sure])) if sure.any() else None,
-            std_px=float(2 * np.median(std[sure])) if sure.any() else 0.0,
-            is_pattern=old.role == "code",
-            columns=None if whole else columns,
-            rows=None if whole else rows,
-        )
+def moved_between(
+    before: tuple[Mosaic, Mosaic], now: tuple[Mosaic, Mosaic], sensor: Sensor, is_pattern: bool
+) -> Movement | None:
+    """What moved from one picture to the other, each with a black one (raw mosaics, DN); None: nothing did.
+
+    Light that changes all over the picture, and light of the room, do not matter. ``is_pattern`` says that
+    the pictures show a pattern, white otherwise.
+    """
+    (old, old_variance), (new, variance) = (_light(*pair, sensor) for pair in (before, now))
+    return _movement(tile_shifts(old, new, old_variance + variance, TILES), old.shape, is_pattern)
+
+
+def _light(picture: Mosaic, black: Mosaic, sensor: Sensor) -> tuple[Floats, Floats]:
+    """Light of a picture over its black, means over 2 x 2 pixels, and its variance."""
+    lit, dark = (each.astype(np.float64) for each in (picture, black))
+    noise = sum(raw_variance(sensor, each - sensor.black_level_dn) for each in (lit, dark))
+    variance = np.where(lit < 0.98 * sensor.full_scale_dn, noise, 1e12)
+    return _binned(lit - dark), _binned(np.asarray(variance)) / 4
+
+
+def _movement(found: TileShifts, shape: tuple[int, ...], is_pattern: bool) -> Movement | None:
+    std = np.maximum(found.x_std, found.y_std)
+    telling = 2 * std < TELLING_PX
+    moved = telling & (2 * found.length > LEAST_PX) & (found.sigmas > SIGMAS)
+    moved |= found.change > CHANGED
+    if moved.sum() < FEWEST:
+        return None
+    sure = moved & telling
+    whole = moved.sum() >= MOST * max(int(telling.sum()), FEWEST)
+    rows, columns = (
+        _span(np.asarray(moved.any(axis)), 2 * size) for axis, size in ((1, shape[0]), (0, shape[1]))
+    )
+    return Movement(
+        after=None,
+        before=None,
+        shift_px=float(np.median(2 * found.length[sure])) if sure.any() else None,
+        std_px=float(2 * np.median(std[sure])) if sure.any() else 0.0,
+        is_pattern=is_pattern,
+        columns=None if whole else columns,
+        rows=None if whole else rows,
+    )
 
 
 def movement_of(

@@ -253,6 +253,23 @@ class CapturePlan(Record):
             return shot
         return next(each for each in self.shots() if each.index == shot.pattern)
 
+    def references(self) -> dict[Role, Shot]:
+        """White, black and a frame of the code, by which changes of light and position are told.
+
+        They are of the first setting that has the code; empty in plans without a code.
+        """
+        if not self.code_count:
+            return {}
+        setting = min(self.code_settings)
+        wanted: dict[Role, int] = {"white": 0, "black": 0, "code": self._sentinel_code}
+        of_setting = {(each.role, each.pattern): each for each in self.shots() if each.setting == setting}
+        return {role: of_setting[role, pattern] for role, pattern in wanted.items()}
+
+    @property
+    def _sentinel_code(self) -> int:
+        """The frame of the code that shows a small motion."""
+        return 2 * min(_SENTINEL_BIT, self.code_bits[0] - 1)
+
     def _rounds(self) -> Iterator[tuple[int, tuple[int, ...]]]:
         """After how many other shots each round of sentinels comes, and which of these it repeats."""
         if self.sentinels is None:
@@ -260,7 +277,7 @@ class CapturePlan(Record):
         first = min(self.code_settings)
         before = sum(count for i in range(first) for _, count in self._roles(i))
         codes, total = self.code_count, self._own_count
-        code = 2 * min(_SENTINEL_BIT, self.code_bits[0] - 1)
+        code = self._sentinel_code
         white, black, line = before + codes, before + codes + (codes > 0), before + codes + 1 + (codes > 0)
         rounds = max(total // self.sentinels.every, 1)
         for number in range(1, rounds + 1):

@@ -27,7 +27,7 @@ from dsl_core.pipeline import Options, evaluate, reconstruct
 from dsl_core.simulation.sim_devices import open_twin
 from dsl_core.workflows.scans import twin_truth
 from tests.benchmarks.common import options, print_table, write_json
-from tests.cases.changing_rig import Change, changing, shifted
+from tests.cases.changing_rig import Change, changing, from_shot, shifted
 from tests.cases.memory_sink import MemorySink
 from tests.cases.rendered_rig import RenderedScene, render, token_image
 
@@ -48,19 +48,21 @@ def cases(plan: CapturePlan, seed: int) -> list[Case]:
     middle, in_code = int(rng.integers(lines + 5, shots - 10)), int(rng.integers(6, lines - 4))
 
     def after(at: int) -> Callable[[int], int]:
-        return lambda shot: int(shot >= at)
+        moved = from_shot(at, 0, 1)
+        return lambda shot: int(moved(shot))
 
+    after_middle = after(middle)
     return [
         Case("clean", Change()),
         Case("light drifts 10 %", Change(light=lambda shot: 1 - 0.1 * shot / shots)),
         Case("light flickers ±10 %", Change(light=lambda shot: float(flicker[shot]))),
-        Case("room light twice", Change(room=lambda shot: 1.0 + (shot >= middle))),
+        Case("room light twice", Change(room=from_shot(middle, 1.0, 2.0))),
         Case("room light rises", Change(room=lambda shot: 1.0 + shot / shots)),
-        Case("exposure halves", Change(exposure=lambda shot: 0.5 if shot >= middle else 1.0)),
+        Case("exposure halves", Change(exposure=from_shot(middle, 1.0, 0.5))),
         Case("camera 2 px after code", Change(scene=after(lines))),
         Case("camera 2 px within code", Change(scene=after(in_code))),
         Case("camera 2 px later", Change(scene=after(middle))),
-        Case("object 2 mm", Change(scene=lambda shot: 2 * (shot >= middle))),
+        Case("object 2 mm", Change(scene=lambda shot: 2 * after_middle(shot))),
     ]
 
 

@@ -76,6 +76,8 @@ def test_a_camera_that_moves_ends_the_scan_where_it_is_seen(scene: RenderedScene
         runner.run()
     found = movement_of(sink, scene.calibration.sensor, (s.index for s in sink.missing()))
     assert found is not None
+    assert found.after is not None
+    assert found.before is not None
     assert found.after < at <= found.before
     assert runner.status.state is State.FAILED
 

@@ -19,6 +19,18 @@ def steady(shot: int) -> float:
     return 1.0
 
 
+def from_shot(at: int, before: float, after: float) -> Callable[[int], float]:
+    """A change that stays: also for old shots that are taken once more after it."""
+    seen = 0
+
+    def value(shot: int) -> float:
+        nonlocal seen
+        seen = max(seen, shot)
+        return after if seen >= at else before
+
+    return value
+
+
 @dataclass(frozen=True)
 class Change:
     """What happens at each shot: factors of the projector's light, the room's and the exposure.

@@ -1,0 +1,101 @@
+"""What has changed since a scan began, when its pictures no longer show what they should.
+
+White, black and a frame of the code are captured once more and compared with the first ones: black tells the
+light of the room, white the exposure and the light of the projector, and where both are in the picture and
+the pattern is on the scene tells what moved.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dsl_core.capture.sentinels import moved_between
+from dsl_core.model.plan import CapturePlan, Shot
+from dsl_core.model.rig import Sensor
+
+Mosaic = NDArray[np.uint16]
+
+#: Changes of light that matter: a factor of white, and a part of white by which black differs.
+LEAST_LIGHT, LEAST_ROOM = 0.05, 0.03
+#: Factors of white and of black that are this much alike have one cause: the exposure.
+ALIKE = 0.1
+#: What black is above its level has to exceed this to tell a factor, DN.
+TELLING_DN = 2.0
+#: Pixels needed to say anything.
+FEWEST = 12
+
+
+@dataclass(frozen=True)
+class References:
+    """Raw mosaics (rows, columns), DN, of the shots of `CapturePlan.references` at one time."""
+
+    white: Mosaic
+    black: Mosaic
+    code: Mosaic
+
+
+class Diagnosis:
+    """Keeps the first pictures of the references of a plan, and compares them with later ones."""
+
+    def __init__(self, plan: CapturePlan, sensor: Sensor) -> None:
+        """Without white, black and code in the plan there is never anything to say."""
+        self._sensor = sensor
+        self._shots = plan.references()
+        self._kept: dict[int, Mosaic] = {}
+
+    def keep(self, shot: Shot, pixels: Mosaic) -> None:
+        """Keep a picture that the scan believes, if it is one of a reference."""
+        if shot in self._shots.values():
+            self._kept[shot.index] = pixels
+
+    def sentence(self, take: Callable[[Shot], Mosaic]) -> str:
+        """What has changed and what to do, after capturing the references again; empty where nothing shows.
+
+        Raises what ``take`` raises.
+        """
+        if not self._shots or any(shot.index not in self._kept for shot in self._shots.values()):
+            return ""
+        before = References(**{role: self._kept[shot.index] for role, shot in self._shots.items()})
+        now = References(**{role: take(shot) for role, shot in self._shots.items()})
+        return what_changed(before, now, self._sensor)
+
+
+def what_changed(before: References, now: References, sensor: Sensor) -> str:
+    """What is different in later pictures, and what to do; empty where nothing is."""
+    old, new = (each.white.astype(np.float64) - each.black for each in (before, now))
+    # All of the picture but what is saturated: of bright pixels alone, a motion would dim many.
+    full = 0.98 * sensor.full_scale_dn
+    used = (before.white < full) & (now.white < full)
+    lit = used & (old > 0.25 * np.percentile(old, 95))
+    if lit.sum() < FEWEST:
+        return ""
+    light = float(new[used].sum() / old[used].sum())
+    dark_old, dark_new = (
+        float(each.black.mean(dtype=np.float64)) - sensor.black_level_dn for each in (before, now)
+    )
+    room = (dark_new - dark_old) / float(old[lit].mean())
+    moved = moved_between((before.white, before.black), (now.white, now.black), sensor, is_pattern=False)
+    if moved is None and abs(light - 1) < LEAST_LIGHT:
+        moved = moved_between((before.code, before.black), (now.code, now.black), sensor, is_pattern=True)
+    found = []
+    if abs(light - 1) > LEAST_LIGHT:
+        is_exposure = dark_old > TELLING_DN and abs(dark_new / dark_old / light - 1) < ALIKE
+        what = "exposure or gain of the camera" if is_exposure else "light of the projector or the exposure"
+        found.append(
+            f"The {what} is {light:.2f} times what it was when the scan began. Switch automatic exposure"
+            " and gain of the camera off, check the lamp, and resume the scan."
+        )
+        room = 0.0 if is_exposure else room
+    if abs(room) > LEAST_ROOM:
+        found.append(
+            f"The light of the room has changed: without the projector the picture is at {dark_new:.0f} DN"
+            f" above its black level, and was at {dark_old:.0f} DN when the scan began. Keep the room as it"
+            " was, and resume the scan."
+        )
+    if moved is not None:
+        found.append(f"{moved.sentence} {moved.advice}")
+    return " ".join(found)

@@ -1,0 +1,95 @@
+"""What stops a scan is named by pictures taken again: the room's light, the exposure, a motion."""
+
+import re
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from scipy.ndimage import gaussian_filter
+
+from dsl_core.capture.diagnosis import Diagnosis, References, what_changed
+from dsl_core.capture.proof.verifier import FrameProof
+from dsl_core.capture.runner import Runner
+from dsl_core.errors import DeviceError
+from dsl_core.model.plan import CapturePlan, GrayCode, NoCode, ScanLines, Shot
+from dsl_core.model.rig import Sensor
+from tests.cases.changing_rig import Change, changing, from_shot, shifted
+from tests.cases.memory_sink import MemorySink
+from tests.cases.rendered_rig import RenderedScene, render, token_image
+
+SENSOR = Sensor()
+
+
+def pictures(
+    *, light: float = 1.0, room_dn: float = 60.0, shift_px: int = 0, pattern_px: int = 0
+) -> References:
+    rng = np.random.default_rng(2)
+    texture = 1.5 + 4 * gaussian_filter(np.random.default_rng(4).normal(size=(64, 96)), 1.5)
+    stripes = gaussian_filter((np.arange(96) // 6 % 2).astype(float), 0.7)
+
+    def picture(pattern: np.ndarray | float) -> np.ndarray:
+        lit = 600 * light * np.roll(texture.clip(0.3) * pattern, shift_px, 1)
+        return (SENSOR.black_level_dn + room_dn + lit + rng.normal(0, 3, lit.shape)).clip(0).astype(np.uint16)
+
+    return References(picture(1.0), picture(0.0), picture(np.roll(stripes, pattern_px)))
+
+
+def test_nothing_is_said_of_pictures_that_differ_by_noise() -> None:
+    assert what_changed(pictures(), pictures(), SENSOR) == ""
+    assert what_changed(pictures(), pictures(light=1.03), SENSOR) == ""
+
+
+@pytest.mark.parametrize(
+    ("later", "said", "not_said"),
+    [
+        (pictures(light=0.5, room_dn=30), "exposure or gain of the camera is 0.50 times", "room"),
+        (pictures(light=1.4), "light of the projector or the exposure is 1.40 times", "room"),
+        (pictures(room_dn=140), "at 140 DN above its black level, and was at 60 DN", "times"),
+        (pictures(shift_px=2), r"The camera or the scene moved by (1\.9|2\.\d) ± 0\.\d px, since", "times"),
+        (
+            pictures(pattern_px=2),
+            r"The pattern moved by (1\.9|2\.\d) ± 0\.\d px on the scene, since the scan",
+            "room",
+        ),
+    ],
+)
+def test_the_cause_is_named(later: References, said: str, not_said: str) -> None:
+    found = what_changed(pictures(), later, SENSOR)
+    assert re.search(said, found), found
+    assert not_said not in found
+
+
+def test_a_plan_without_a_code_has_no_references() -> None:
+    plan = CapturePlan(code=NoCode(), spectral=ScanLines())
+    assert plan.references() == {}
+
+    def never(shot: Shot) -> np.ndarray:
+        raise AssertionError
+
+    assert Diagnosis(plan, SENSOR).sentence(never) == ""
+
+
+@pytest.fixture(scope="module")
+def scene() -> RenderedScene:
+    plan = CapturePlan(code=GrayCode(rows=False), spectral=ScanLines(step_px=5), code_settings=(0,))
+    return render(plan, scene="plane", size="64x48")
+
+
+def later(at: int) -> Callable[[int], int]:
+    moved = from_shot(at, 0, 1)
+    return lambda shot: int(moved(shot))
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (Change(exposure=from_shot(60, 1.0, 0.5)), "times what it was when the scan began"),
+        (Change(scene=later(60)), "moved by"),
+        (Change(room=from_shot(60, 1.0, 40.0)), "The light of the room has changed"),
+    ],
+)
+def test_a_scan_that_stops_says_why(scene: RenderedScene, change: Change, said: str) -> None:
+    rig = changing([scene, shifted(scene, 4)], change, 1)
+    proof = FrameProof(scene.plan, scene.calibration)
+    with pytest.raises(DeviceError, match=said):
+        Runner(rig, scene.plan, MemorySink(scene.plan), token_image, proof=proof).run()
