@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from dsl_core.capture.display import PLAIN, Display, display_tables
 from dsl_core.errors import DecodeError
 from dsl_core.model.plan import CapturePlan, LineComb, ScanLines, Shot
 from dsl_core.model.rig import BayerPattern
@@ -48,22 +49,26 @@ class Statistics:
 
 
 def quick_picture(
-    mosaic: NDArray[np.uint16], bayer: BayerPattern, full_scale_dn: int, show_saturation: bool = False
+    mosaic: NDArray[np.uint16],
+    bayer: BayerPattern,
+    full_scale_dn: int,
+    show_saturation: bool = False,
+    display: Display = PLAIN,
 ) -> NDArray[np.uint8]:
     """RGB picture of half the size, one pixel a Bayer cell, shape (rows // 2, columns // 2, 3), 0 to 255.
 
-    Linear counts are shown by a square root, so that dark parts can be seen. With ``show_saturation`` a cell
-    with any pixel at full scale is pure red, judged on raw counts. Raises `DecodeError`
-    for images below 2 x 2 pixels.
+    Counts are shown by a square root, so that dark parts can be seen, unless ``display`` says otherwise. With
+    ``show_saturation`` a cell with any pixel at full scale is pure red, judged on raw counts. Raises
+    `DecodeError` for images below 2 x 2 pixels.
     """
     sites = _cells(mosaic, bayer)
-    table = _display_table(full_scale_dn)
     picture = np.empty((*sites[0].shape, 3), np.uint8)
     green = (sites[1].astype(np.uint32) + sites[2]) >> 1
     # Two pixels of one row are the same colour to a monochrome camera, and would show edges in false colours.
     ends = (green, green) if bayer == "MONO" else (sites[0], sites[3])
-    for channel, values in ((0, ends[0]), (1, green), (2, ends[1])):
-        picture[..., channel] = table[np.minimum(values, full_scale_dn)]
+    shown = [np.minimum(values, full_scale_dn) for values in (ends[0], green, ends[1])]
+    for channel, table in enumerate(display_tables(display, shown, full_scale_dn)):
+        picture[..., channel] = table[shown[channel]]
     if show_saturation:
         hit = np.maximum(np.maximum(sites[0], sites[1]), np.maximum(sites[2], sites[3])) >= full_scale_dn
         picture[hit] = (255, 0, 0)
@@ -106,9 +111,15 @@ def _cells(mosaic: NDArray[np.uint16], bayer: BayerPattern) -> tuple[NDArray[np.
     return tuple(np.ascontiguousarray(whole[y::2, x::2]) for y, x in _SITES[bayer])
 
 
-def _display_table(full_scale_dn: int) -> NDArray[np.uint8]:
-    share = np.arange(full_scale_dn + 1) / full_scale_dn
-    return np.round(255 * np.sqrt(share)).astype(np.uint8)
+def site_colour(column: int, row: int, bayer: BayerPattern) -> str:
+    """The colour that a pixel of the mosaic sees; empty for a monochrome camera.
+
+    >>> site_colour(0, 0, "RGGB"), site_colour(3, 0, "RGGB"), site_colour(5, 7, "RGGB")
+    ('red', 'green', 'blue')
+    """
+    if bayer == "MONO":
+        return ""
+    return ("red", "green", "green", "blue")[_SITES[bayer].index((row % 2, column % 2))]
 
 
 def _focus(green: NDArray[np.uint16]) -> float:

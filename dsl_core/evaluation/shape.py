@@ -74,7 +74,8 @@ def fit_plane(points_mm: Floats, depth_std_mm: Floats | None = None) -> PlaneFit
     expected = float("nan")
     if std is not None:
         expected = float(np.sqrt(np.mean((std[known][used] * (rays[used] @ normal)) ** 2)))
-    noise = 1.0 if std is not None else float(np.mean(residual[used] ** 2))
+    # What is not flat within the deviations bounds how well a tilt is known, too.
+    noise = max(float(np.mean(residual[used] ** 2)), 0.0 if std is None else 1.0)
     tilt = float(np.degrees(np.arccos(np.clip(-normal[2], -1, 1))))
     # Only the part of an error that is across the normal tilts it, towards or from the axis.
     towards = np.array([0.0, 0.0, -1.0]) - normal * -normal[2]

@@ -10,12 +10,13 @@ from PySide6.QtCore import QPointF, Qt
 from PySide6.QtGui import QKeyEvent
 from PySide6.QtWidgets import QCheckBox, QWidget
 
+from dsl_app.rig.display_row import DisplayRow
 from dsl_app.rig.state import FrameCounts
 from dsl_app.shared.theme import Theme
 from dsl_app.shared.widgets.forms import check_box, label, push_button, set_role
 from dsl_app.shared.widgets.layouts import STRETCH, column_of, row_of
 from dsl_app.shared.widgets.pictures import PictureView, Region, RegionBox, arrow_step, cut, moved_within
-from dsl_core.capture.preview import BINS, MANY_SATURATED, Statistics, quick_picture, statistics
+from dsl_core.capture.preview import BINS, MANY_SATURATED, Statistics, quick_picture, site_colour, statistics
 from dsl_core.devices.base import CameraInfo
 from dsl_core.model.frames import Frame
 
@@ -26,6 +27,7 @@ NO_PICTURE = "No picture yet. Start the live view."
 #: Side of the cell of raw pixels that is shown as one, px.
 CELL_PX = 2
 _CHANNELS = ("R", "G", "B")
+_NAMES = ("red", "green", "blue")
 _COLOURS = ("#d94545", "#3fa34d", "#3f7fd9")
 
 
@@ -51,6 +53,8 @@ class LiveView(QWidget):
         self.rectangle.hide()
         self.rectangle.sigRegionChangeFinished.connect(self._repaint)
         self.view.scene().sigMouseMoved.connect(self._hover)
+        self.display = DisplayRow()
+        self.display.changed.connect(self._repaint)
         self.saturation = QCheckBox("Saturation")
         self.saturation.setToolTip("Mark in red the cells that contain a raw pixel at full scale")
         self.saturation.setChecked(True)
@@ -71,7 +75,11 @@ class LiveView(QWidget):
         # Room for half of the outermost numbers of the axes.
         self._histogram.getPlotItem().setContentsMargins(0, 8, 14, 0)
         self._histogram.setXRange(0, 4096, padding=0)
-        self._curves = [self._histogram.plot(pen=pg.mkPen(colour, width=1)) for colour in _COLOURS]
+        self._legend = self._histogram.addLegend(offset=(-4, 1), colCount=3, verSpacing=-6)
+        self._curves = [
+            self._histogram.plot(pen=pg.mkPen(colour, width=1), name=name)
+            for colour, name in zip(_COLOURS, _NAMES, strict=True)
+        ]
         self._rate = label("", "muted")
         self._counts = label("", "muted")
         self._saturated = label("", wraps=True)
@@ -87,7 +95,8 @@ class LiveView(QWidget):
         figures = row_of((self._saturated, 1), (self._focus, 0, Qt.AlignmentFlag.AlignTop), spacing=16)
         switches = row_of(self.saturation, self.logarithmic, self.region_box, self.fit, STRETCH, spacing=6)
         frames = row_of(self._rate, STRETCH, self._counts)
-        column_of((self.view, 1), self._pixel, figures, frames, switches, self._histogram, on=self, margins=0)
+        parts = (self.display, self._pixel, figures, frames, switches, self._histogram)
+        column_of((self.view, 1), *parts, on=self, margins=0)
 
     def set_camera(self, camera: CameraInfo | None) -> None:
         """Show frames of this camera from now on."""
@@ -134,6 +143,7 @@ class LiveView(QWidget):
             axis = self._histogram.getAxis(side)
             axis.setPen(theme.line)
             axis.setTextPen(theme.muted)
+        self._legend.setLabelTextColor(theme.muted)
 
     @property
     def frames_per_second(self) -> float:
@@ -152,7 +162,11 @@ class LiveView(QWidget):
         assert self._frame is not None
         full_scale = 2**self._camera.bit_depth - 1
         picture = quick_picture(
-            self._frame.pixels, self._camera.bayer, full_scale, self.saturation.isChecked()
+            self._frame.pixels,
+            self._camera.bayer,
+            full_scale,
+            self.saturation.isChecked(),
+            self.display.display,
         )
         self._item.setImage(picture, autoLevels=False, levels=None)
 
@@ -192,7 +206,10 @@ class LiveView(QWidget):
     def _show_pixel(self) -> None:
         if self._read is not None and self._frame is not None:
             column, row = self._read
-            self._pixel.setText(f"column {column} px, row {row} px: {self._frame.pixels[row, column]} DN")
+            assert self._camera is not None
+            seen = f"column {column} px, row {row} px: {self._frame.pixels[row, column]} DN"
+            colour = site_colour(column, row, self._camera.bayer)
+            self._pixel.setText(f"{seen}, {colour} pixel" if colour else seen)
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
         """Arrow keys move the pixel that is read, F shows the whole picture."""

@@ -187,7 +187,9 @@ def test_raw_counts_are_read_by_keys_too(qtbot: QtBot, bench: Bench) -> None:
     QTest.keyClick(page.live.content, Qt.Key.Key_Up, Qt.KeyboardModifier.ShiftModifier)
     frame = page._live_state.frame.value
     assert frame is not None
-    assert page.live.content._pixel.text() == f"column 33 px, row 14 px: {frame.pixels[14, 33]} DN"
+    assert (
+        page.live.content._pixel.text() == f"column 33 px, row 14 px: {frame.pixels[14, 33]} DN, green pixel"
+    )
     QTest.keyClick(page.live.content, Qt.Key.Key_F)
 
 
