@@ -6,16 +6,17 @@ from collections.abc import Callable, Sequence
 
 from PySide6.QtCore import QTimer, Signal
 from PySide6.QtGui import QHideEvent, QShowEvent
-from PySide6.QtWidgets import QFormLayout, QGroupBox, QLineEdit
+from PySide6.QtWidgets import QFormLayout, QGroupBox
 
 from dsl_app.connection.state import Link, RigChoice
 from dsl_app.rig.controller import LiveController
 from dsl_app.rig.live_view import LiveView
+from dsl_app.rig.options_form import OptionsForm
 from dsl_app.rig.projector_panel import ProjectorPanel
 from dsl_app.rig.state import rig_view
 from dsl_app.shared.evented import follow_any
 from dsl_app.shared.widgets.deferred import Deferred
-from dsl_app.shared.widgets.forms import ChoiceBox, NumberBox, label, named, push_button, quiet, show_parts
+from dsl_app.shared.widgets.forms import ChoiceBox, NumberBox, label, push_button, quiet, show_parts
 from dsl_app.shared.widgets.help_window import set_help
 from dsl_app.shared.widgets.layouts import STRETCH, boxed, column_of, row_of
 from dsl_app.shared.widgets.page import PageWidget
@@ -45,9 +46,10 @@ class RigPage(PageWidget):
         self.projector = ProjectorPanel()
         set_help(self.projector, "rig#projector")
         self._rig = ChoiceBox("Rig", "The rig to connect", [(name, name) for name in rigs])
-        tip = "Options as key=value, separated by spaces; see the help on this page (F1)"
-        self._options = named(QLineEdit(), "Options of the rig", tip)
-        self._options.setPlaceholderText("scene=color-checker size=445x290")
+        self.options = OptionsForm()
+        self._rig.currentIndexChanged.connect(lambda _: self.options.set_rig(str(self._rig.currentData())))
+        self.options.set_rig(str(self._rig.currentData()))
+        self.options.chosen.connect(self._change_options)
         self.connect_button = push_button(
             "Connect", "Open or close the devices of this rig", self._toggle_link, "primary"
         )
@@ -89,7 +91,7 @@ class RigPage(PageWidget):
         devices = QGroupBox("Devices")
         form = QFormLayout(devices)
         form.addRow("Rig", self._rig)
-        form.addRow("Options", self._options)
+        form.addRow(self.options)
         form.addRow("", self.connect_button)
         form.addRow("State", self.link)
         form.addRow(self.trouble)
@@ -129,9 +131,18 @@ class RigPage(PageWidget):
         if self._state.link.value is Link.OPEN:
             self._rig_commands.disconnect()
             return
-        choice = RigChoice(str(self._rig.currentData()), parse_options(self._options.text()))
-        self._rig_commands.connect(choice)
+        self._rig_commands.connect(self._choice)
         self._commands.begin_when_open()
+
+    @property
+    def _choice(self) -> RigChoice:
+        return RigChoice(str(self._rig.currentData()), self.options.options)
+
+    def _change_options(self) -> None:
+        """Put another scene in front of a connected camera at once."""
+        if self._state.link.value is Link.OPEN and not self._state.used_by.value:
+            self._rig_commands.connect(self._choice)
+            self._commands.begin_when_open()
 
     def _toggle_live(self) -> None:
         if self._state.live.value:
@@ -148,7 +159,7 @@ class RigPage(PageWidget):
     def _show_choice(self, choice: RigChoice) -> None:
         """Show what is connected, whichever page requested it."""
         self._rig.setCurrentIndex(max(self._rig.findData(choice.name), 0))
-        self._options.setText(" ".join(f"{key}={value}" for key, value in choice.options))
+        self.options.show_options(choice.options)
 
     def _show_devices(self, devices: DeviceRig | None) -> None:
         camera = self._state.camera
@@ -201,9 +212,3 @@ class RigPage(PageWidget):
         super().release()
         self._timer.stop()
         self._commands.stop()
-
-
-def parse_options(text: str) -> tuple[tuple[str, str], ...]:
-    """Options from ``key=value`` texts separated by spaces; a word without ``=`` means ``on``."""
-    pairs = [part.partition("=") for part in text.split()]
-    return tuple((key, value if sign else "on") for key, sign, value in pairs)

@@ -100,7 +100,7 @@ class Session:
         key(Qt.Key.Key_1, self.window, CONTROL)
         page = self.window.page_of("rig")
         assert isinstance(page, RigPage)
-        write(page._options, RIG)
+        write(page.options.text, RIG)
         click(page.connect_button)
         rig = self.composition.rig
         wait(lambda: rig.state.link.value is Link.OPEN, "the rig to answer")

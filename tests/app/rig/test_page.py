@@ -7,7 +7,8 @@ import pytest
 from dsl_app.connection.controller import RigController
 from dsl_app.connection.state import Link, RigChoice, RigState
 from dsl_app.rig.controller import LiveController
-from dsl_app.rig.page import RigPage, parse_options
+from dsl_app.rig.options_form import parse_options
+from dsl_app.rig.page import RigPage
 from dsl_app.shared.jobs.qt_runner import QtRunner
 from dsl_app.shared.theme import LIGHT
 from PySide6.QtCore import QPoint, QPointF, Qt
@@ -97,7 +98,7 @@ def test_the_camera_rests_while_another_page_is_open(qtbot: QtBot, bench: Bench)
 
 def test_a_wrong_option_is_told_on_the_page(qtbot: QtBot, bench: Bench) -> None:
     page, _, _, notifier = bench
-    page._options.setText("scene=moon")
+    page.options.text.setText("scene=moon")
     click(page.connect_button)
     qtbot.waitUntil(lambda: bool(notifier.told))
     assert "moon" in page.trouble.text()
@@ -129,7 +130,7 @@ def test_the_wheel_changes_nothing_without_focus(qtbot: QtBot, bench: Bench) -> 
     page, state, _, _ = bench
     connect(qtbot, page, state)
     before = page.exposure.value()
-    page._options.setFocus()
+    page.options.text.setFocus()
     spot = QPointF(5, 5)
     wheel = QWheelEvent(
         spot, page.exposure.mapToGlobal(spot), QPoint(0, 0), QPoint(0, 120), Qt.MouseButton.NoButton,
@@ -195,10 +196,10 @@ def test_raw_counts_are_read_by_keys_too(qtbot: QtBot, bench: Bench) -> None:
 
 def test_the_form_shows_a_rig_that_another_page_asked_for(bench: Bench) -> None:
     page, state, _, _ = bench
-    assert page._options.text() == "scene=plane size=64x48"
+    assert page.options.text.text() == "scene=plane size=64x48"
     state.choice.set(RigChoice("replay", (("session", "first.dsl"),)))
     assert page._rig.currentText() == "replay"
-    assert page._options.text() == "session=first.dsl"
+    assert page.options.text.text() == "session=first.dsl"
 
 
 def test_a_scan_has_the_projector_for_itself(qtbot: QtBot, bench: Bench) -> None:

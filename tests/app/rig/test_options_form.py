@@ -1,0 +1,52 @@
+"""Options of a rig as choices and as text."""
+
+from __future__ import annotations
+
+from dsl_app.rig.options_form import OptionsForm, SceneBox
+from pytestqt.qtbot import QtBot
+
+SCENES = (("plane", "A white wall"), ("face", "A face"))
+
+
+def _choose(box: SceneBox, name: str) -> None:
+    box.fill()
+    box.choose(name)
+    box.activated.emit(box.currentIndex())
+
+
+def test_choices_and_text_say_the_same(qtbot: QtBot) -> None:
+    form, told = OptionsForm(lambda: SCENES), list[None]()
+    qtbot.addWidget(form)
+    form.chosen.connect(lambda: told.append(None))
+    assert form.scene.currentData() == "color-checker"
+    form.text.setText("seed=3 scene=plane size=64x48")
+    assert form.scene.currentData() == "plane"
+    assert form.size_px.currentText() == "64 × 48 px"
+    assert told == [], "typing connects nothing"
+    _choose(form.scene, "face")
+    assert form.options == (("scene", "face"), ("seed", "3"), ("size", "64x48"))
+    form.size_px.setCurrentIndex(0)
+    form.size_px.activated.emit(0)
+    assert form.text.text() == "scene=face seed=3"
+    assert len(told) == 2
+
+
+def test_all_scenes_are_listed_once_with_what_they_show(qtbot: QtBot) -> None:
+    form = OptionsForm(lambda: SCENES)
+    qtbot.addWidget(form)
+    form.text.setText("scene=face")
+    form.scene.fill()
+    form.scene.fill()
+    names = [form.scene.itemData(place) for place in range(form.scene.count())]
+    assert sorted(names) == ["color-checker", "face", "plane"]
+    assert form.scene.itemData(form.scene.findData("plane"), 3) == "A white wall"
+    assert form.scene.currentData() == "face"
+
+
+def test_other_rigs_have_no_scene(qtbot: QtBot) -> None:
+    form = OptionsForm(lambda: SCENES)
+    qtbot.addWidget(form)
+    form.set_rig("replay")
+    assert not form.form.isRowVisible(form.scene)
+    form.set_rig("twin")
+    assert form.form.isRowVisible(form.scene)
