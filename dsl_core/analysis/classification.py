@@ -43,6 +43,24 @@ class Classification:
     shown: ClassMap
     rows: tuple[ClassRow, ...]
     brightness: Brightness
+    areas_mm2: NDArray[np.float64] | None = None
+
+    @classmethod
+    def of(
+        cls,
+        scores: Scores,
+        limits: Limits | None = None,
+        brightness: Brightness = "stated",
+        areas_mm2: NDArray[np.float64] | None = None,
+    ) -> Classification:
+        """The map of scores under limits, with the areas (rows, columns) of its pixels."""
+        limits = limits or Limits.usual(scores.measure)
+        shown = ClassMap.of(scores, limits)
+        return cls(scores, limits, shown, class_table(shown, areas_mm2), brightness, areas_mm2)
+
+    def under(self, limits: Limits) -> Classification:
+        """The same scores under other limits, in milliseconds."""
+        return Classification.of(self.scores, limits, self.brightness, self.areas_mm2)
 
     @property
     def method(self) -> str:
@@ -84,9 +102,7 @@ def classify_result(
     assert values is not None
     flags = result["flags"].values if "flags" in result else np.zeros(values.shape[1:], np.uint16)
     scores = score(values, std, share, flags, classes, measure, brightness, progress)
-    limits = limits or Limits.usual(measure)
-    shown = ClassMap.of(scores, limits)
-    return Classification(scores, limits, shown, class_table(shown, areas_of(result)), brightness)
+    return Classification.of(scores, limits, brightness, areas_of(result))
 
 
 def require_spectra(result: xr.Dataset) -> None:

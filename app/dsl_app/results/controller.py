@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from dsl_app.results.answers.controller import AnswersController
 from dsl_app.results.export.controller import ExportController
 from dsl_app.results.marks.controller import MarksController
 from dsl_app.results.search.controller import SearchController
@@ -29,7 +30,8 @@ from dsl_core.workflows.inspection import FrameBlock, IntensityGraph, intensity_
 class ResultsController:
     """Fills a `ResultsState`.
 
-    ``marks`` has the pins, regions and references, ``search`` looks for spectra, ``export`` writes files.
+    ``marks`` has the pins, regions and references, ``search`` looks for spectra, ``answers``
+    names materials, ``export`` writes files.
     ``opened`` fires when a result is open and its views are set, so that listeners can change them.
     """
 
@@ -37,6 +39,7 @@ class ResultsController:
         self.state, self._runner, self._notifier = state, runner, notifier
         self.marks = MarksController(state, runner, notifier, undo)
         self.search = SearchController(state, runner, notifier)
+        self.answers = AnswersController(state, runner, notifier)
         self.export = ExportController(state, runner, notifier)
         self._undo = undo
         self.opened: Event[ResultArrays] = Event()
@@ -120,6 +123,7 @@ class ResultsController:
         state = self.state
         state.offer.set(None)
         state.search.set(None)
+        self.answers.clear()
         state.graph.set(None)
         self._block = None
         state.cursor.set(None)

@@ -13,7 +13,7 @@ from PySide6.QtWidgets import QLabel, QWidget
 from dsl_app.results.controller import ResultsController
 from dsl_app.results.layers import Layer, Layers
 from dsl_app.results.outline_box import OutlineBox
-from dsl_app.results.state import Mark, ResultsState, Tool
+from dsl_app.results.state import Mark, Materials, ResultsState, Tool
 from dsl_app.shared.evented import follow_any
 from dsl_app.shared.spectrum import Pixel
 from dsl_app.shared.theme import DARK, Theme
@@ -21,6 +21,7 @@ from dsl_app.shared.widgets.forms import named
 from dsl_app.shared.widgets.layouts import column_of
 from dsl_app.shared.widgets.pictures import PictureView, arrow_step, colour_map
 from dsl_app.shared.widgets.plots import theme_bar
+from dsl_core.analysis.class_table import class_colours
 
 #: Mouse moves are handled at most this often, Hz.
 CURSOR_HZ = 60
@@ -59,9 +60,11 @@ class ResultImage(QWidget):
         )
         self.image, self.overlay = self.canvas.image, pg.ImageItem(axisOrder="row-major")
         self.overlay.setZValue(5)
+        self.materials = pg.ImageItem(axisOrder="row-major")
+        self.materials.setZValue(4)
         self._vertical, self._horizontal = (pg.InfiniteLine(angle=angle, movable=False) for angle in (90, 0))
         self.pins = pg.ScatterPlotItem(size=11, pxMode=True)
-        for item in (self.overlay, self._vertical, self._horizontal, self.pins):
+        for item in (self.overlay, self.materials, self._vertical, self._horizontal, self.pins):
             self.box.addItem(item, ignoreBounds=True)
         for line in (self._vertical, self._horizontal):
             line.setZValue(20)
@@ -89,6 +92,7 @@ class ResultImage(QWidget):
         state.cursor.follow(self._show_cursor)
         state.marks.follow(self._show_marks)
         state.search.follow(lambda _: self._show_search())
+        state.materials.follow(self._show_materials)
         state.tool.follow(self._take_tool)
 
     # Mouse and keys --------------------------------------------------------------------------------
@@ -227,6 +231,15 @@ class ResultImage(QWidget):
             height, width = search.likeness.delta_e.shape
             self.overlay.setRect(-0.5, -0.5, width, height)
 
+    def _show_materials(self, materials: Materials | None) -> None:
+        self.materials.setVisible(materials is not None)
+        if materials is not None:
+            shown = materials.found.shown
+            table = materials_table(len(shown.names))
+            self.materials.setImage(shown.values, levels=(0, 255), lut=table, autoLevels=False)
+            height, width = shown.values.shape
+            self.materials.setRect(-0.5, -0.5, width, height)
+
     def apply_theme(self, theme: Theme) -> None:
         """Apply the colours of a theme."""
         self._theme = theme
@@ -238,6 +251,18 @@ class ResultImage(QWidget):
         self._show_marks(self._state.marks.value)
         self._show_search()
         self.paint()
+
+
+def materials_table(classes: int) -> np.ndarray[Any, np.dtype[np.uint8]]:
+    """Colours (256, 4) of a map of so many classes; what is not judged shows the picture below."""
+    table = np.zeros((256, 4), np.uint8)
+    colours = class_colours(classes)
+    for value, colour in enumerate(colours):
+        table[value] = (*bytes.fromhex(colour[1:]), 215)
+    table[0, 3] = 0
+    # What has no name is fainter than what has.
+    table[len(colours) - 2 : len(colours), 3] = 150
+    return table
 
 
 def rgba_of(mask: np.ndarray[Any, np.dtype[np.bool_]], colour: str, alpha: int) -> Any:

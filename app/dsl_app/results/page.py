@@ -8,6 +8,7 @@ from pathlib import Path
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import QDialog, QFileDialog, QStackedWidget, QWidget
 
+from dsl_app.results.answers.materials_panel import MaterialsPanel
 from dsl_app.results.cloud.panel import CloudPanel
 from dsl_app.results.controller import ResultsController
 from dsl_app.results.export.dialog import ExportDialog
@@ -66,6 +67,8 @@ class ResultsPage(PageWidget):
         set_help(self.spectra, "numbers#spectra")
         self.marks = MarksPanel(state, control.marks)
         set_help(self.marks, "numbers#pins-regions-references")
+        self.materials = MaterialsPanel(state, control.answers)
+        set_help(self.materials, "materials")
         self.search = SearchPanel(state, control.search)
         set_help(self.search, "numbers#search")
         self._graph: IntensityWindow | None = None
@@ -112,7 +115,12 @@ class ResultsPage(PageWidget):
         self.pictures = splitter(Qt.Orientation.Horizontal, (self.image, 1), (self.cloud, 1))
         self.pictures.setObjectName("result-pictures")
         left = boxed(column_of(self.bar, (self.pictures, 1), self.pixel_info, margins=0))
-        tabs = tabs_of("", (self.marks, "Pins, regions, references", ""), (self.search, "Search", ""))
+        tabs = tabs_of(
+            "",
+            (self.marks, "Pins, regions, references", ""),
+            (self.materials, "Materials", "Which material is where, with areas"),
+            (self.search, "Search", ""),
+        )
         right = splitter(Qt.Orientation.Vertical, (self.spectra, 3), (tabs, 2), sizes=(400, 340))
         return splitter(Qt.Orientation.Horizontal, (left, 3), (right, 2), sizes=(720, 440))
 

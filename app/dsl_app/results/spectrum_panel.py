@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import pyqtgraph as pg
@@ -9,16 +10,23 @@ from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QWidget
 
 from dsl_app.results.state import Mark, ResultsState
-from dsl_app.shared.spectrum import Pixel
+from dsl_app.shared.spectrum import Pixel, Spectrum
 from dsl_app.shared.theme import DARK, Theme
-from dsl_app.shared.widgets.forms import quiet
-from dsl_app.shared.widgets.layouts import column_of
+from dsl_app.shared.widgets.forms import ChoiceBox, check_box, quiet
+from dsl_app.shared.widgets.layouts import STRETCH, column_of, row_of
 from dsl_app.shared.widgets.pictures import spread_of
 from dsl_app.shared.widgets.plots import CalmPlot
 from dsl_app.shared.widgets.spectrum_curve import SpectrumCurve
+from dsl_core.analysis.transforms import Transform, transformed
 
 #: Higher reflectances are errors or gloss; zooming out shows them.
 TOP = 1.08
+#: The range that a transform fills at first; reflectance has that of the result.
+_RANGES = {
+    Transform.NORMALISED: (0.0, 2.5),
+    Transform.DERIVATIVE: (-0.01, 0.015),
+    Transform.CONTINUUM: (0.0, 1.1),
+}
 
 
 class SpectrumPanel(QWidget):
@@ -26,7 +34,7 @@ class SpectrumPanel(QWidget):
 
     def __init__(self, state: ResultsState) -> None:
         super().__init__()
-        self._state, self._theme = state, DARK
+        self._state, self._theme, self._top = state, DARK, TOP
         self.plot = CalmPlot(
             "Spectra",
             "Reflectance with its 95 % band; dashed where the prior decides and not the data. Regions show"
@@ -41,12 +49,25 @@ class SpectrumPanel(QWidget):
         self.item.addItem(self.band_line, ignoreBounds=True)
         self.live = SpectrumCurve(self.item)
         self._curves: dict[int, tuple[Mark, SpectrumCurve]] = {}
-        column_of(self.plot, on=self, margins=0)
+        self.transform = ChoiceBox(
+            "Draw",
+            "What is drawn of the spectra; their deviations are carried along",
+            [(each.value[0].upper() + each.value[1:], each) for each in Transform],
+            state.transform.set,
+        )
+        self.stacked = check_box("Offset", "Draw the spectra of marks one above the other")
+        self.stacked.clicked.connect(state.stacked.set)
+        column_of(
+            row_of(self.transform, self.stacked, STRETCH), (self.plot, 1), on=self, margins=0, spacing=2
+        )
         self.band_line.sigPositionChanged.connect(self._band_dragged)
         state.result.follow(lambda _: self._new_result())
         state.cursor.follow(self._show_cursor)
         state.marks.follow(self._show_marks)
         state.band.follow(lambda _: self._show_band())
+        state.stacked.follow(self.stacked.setChecked)
+        for each in (state.transform, state.stacked):
+            each.changed.connect(lambda _: self._draw_again())
 
     def _new_result(self) -> None:
         result = self._state.result.value
@@ -55,13 +76,41 @@ class SpectrumPanel(QWidget):
             return
         nm = result.wavelengths_nm
         self.item.setXRange(nm[0], nm[-1], padding=0.02)
-        top = 1.08 * spread_of(result["reflectance"][::6], 0.5, 99.8)[1]
-        self.item.setYRange(0, min(max(top, 0.1), TOP), padding=0)
-        self.item.getViewBox().setLimits(xMin=nm[0] - 20, xMax=nm[-1] + 20, yMin=-0.5, yMax=3)
+        self.item.getViewBox().setLimits(xMin=nm[0] - 20, xMax=nm[-1] + 20)
+        self._top = min(max(1.08 * spread_of(result["reflectance"][::6], 0.5, 99.8)[1], 0.1), TOP)
         self._show_band()
+        self._draw_again()
 
     def _show_cursor(self, pixel: Pixel | None) -> None:
-        self.live.set_spectrum(None if pixel is None else self._state.spectrum_at(pixel))
+        spectrum = None if pixel is None else self._state.spectrum_at(pixel)
+        self.live.set_spectrum(None if spectrum is None else self._drawn(spectrum, 0))
+
+    def _drawn(self, spectrum: Spectrum, place: int) -> Spectrum:
+        """A spectrum as it is drawn, at a place among those that are stacked."""
+        transform = self._state.transform.value
+        raised = place * self._top / 4 if self._state.stacked.value else 0.0
+        if transform is Transform.NONE and not raised:
+            return spectrum
+        mean, std = transformed(spectrum.nm, spectrum.mean, spectrum.std, transform)
+        scale = _RANGES[transform][1] if transform in _RANGES else self._top
+        return replace(spectrum, mean=mean + raised * scale / self._top, std=std)
+
+    def _draw_again(self) -> None:
+        """Draw all spectra in the chosen transform, and show the range that they fill."""
+        transform = self._state.transform.value
+        self.transform.choose(transform)
+        self.item.setLabel("left", transform.value[0].upper() + transform.value[1:])
+        for _, curve in self._curves.values():
+            curve.remove()
+        self._curves.clear()
+        self._show_marks(self._state.marks.value)
+        self._show_cursor(self._state.cursor.value)
+        low, high = _RANGES.get(transform, (0.0, self._top))
+        if self._state.stacked.value:
+            high += len(self._curves) * high / 4
+        # Old limits would cut the new range.
+        self.item.getViewBox().setLimits(yMin=min(-0.5, 4 * low), yMax=max(3.0, 4 * high))
+        self.item.setYRange(low, high, padding=0)
 
     def _show_band(self) -> None:
         result = self._state.result.value
@@ -87,7 +136,7 @@ class SpectrumPanel(QWidget):
             if key not in self._curves and mark.shown and not mark.trouble:
                 curve = SpectrumCurve(self.item, with_band=mark.kind != "reference")
                 self._colour(curve, mark)
-                curve.set_spectrum(mark.spectrum)
+                curve.set_spectrum(self._drawn(mark.spectrum, len(self._curves) + 1))
                 self._curves[key] = (mark, curve)
 
     def _colour(self, curve: SpectrumCurve, mark: Mark) -> None:

@@ -13,6 +13,8 @@ from numpy.typing import NDArray
 
 from dsl_app.shared.evented import Value
 from dsl_app.shared.spectrum import Floats, Pixel, Spectrum, spectrum_of_pixel
+from dsl_core.analysis.classification import Classification
+from dsl_core.analysis.transforms import Transform
 from dsl_core.evaluation.similarity import Likeness
 from dsl_core.io.result.result_arrays import ResultArrays
 from dsl_core.io.spectra.reference_file import ReferenceFile
@@ -125,6 +127,15 @@ class Search:
         return int(self.found.sum()) / known if known else None
 
 
+@dataclass(frozen=True, eq=False)
+class Materials:
+    """The materials of the pixels: where the classes are from, the map, and notes on the classes."""
+
+    name: str
+    found: Classification
+    notes: tuple[str, ...] = ()
+
+
 class ResultsState:
     """Values that the controllers of results set and the page follows.
 
@@ -132,7 +143,8 @@ class ResultsState:
     computed for ``picture_light``, which follows the chosen ``light`` and ``adapted`` with a delay.
     ``cloud_by`` is the view that colours the cloud; ``busy`` says what is being opened (empty: nothing).
     ``graph`` is the intensity graph of the pixel inspected last; ``library`` is a file whose spectra the user
-    has to choose from. ``depth_limits`` are the depths shown, mm; None for all.
+    has to choose from. ``depth_limits`` are the depths shown, mm; None for all. The plot draws a ``transform``
+    of the spectra, one above the other if ``stacked``.
     """
 
     def __init__(self) -> None:
@@ -153,6 +165,9 @@ class ResultsState:
         self.adapted = Value(True)
         self.picture_light = Value((DAYLIGHT, True))
         self.search: Value[Search | None] = Value(None)
+        self.materials: Value[Materials | None] = Value(None)
+        self.transform = Value(Transform.NONE)
+        self.stacked = Value(False)
         self.graph: Value[IntensityGraph | None] = Value(None)
         self.library: Value[Library | None] = Value(None)
 

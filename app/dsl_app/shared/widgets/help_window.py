@@ -25,6 +25,7 @@ ORDER = (
     "effects-of-the-twin",
     "reconstructing-again",
     "numbers",
+    "materials",
     "hard-cases",
     "reading-an-intensity-graph",
     "comparing",

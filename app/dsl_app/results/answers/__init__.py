@@ -1,0 +1,1 @@
+"""Answers from a result: which material is where, and of which colour."""

@@ -1,0 +1,160 @@
+"""Names the material of every pixel, from a library or from what is marked. No Qt."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from dsl_app.results.state import Mark, Materials, ResultsState
+from dsl_app.shared.jobs.base import Job, JobRunner
+from dsl_app.shared.notify import Notifier
+from dsl_core.analysis.classes import SpectralClass
+from dsl_core.analysis.classify import Brightness, Limits, Measure
+from dsl_core.io.result.result_arrays import ResultArrays
+from dsl_core.progress import Progress
+
+
+@dataclass(frozen=True)
+class Way:
+    """How spectra are compared with classes."""
+
+    measure: Measure = Measure.PROBABILITY
+    brightness: Brightness = "stated"
+
+
+#: Reads or makes the classes for a result, with notes.
+_Classes = Callable[[ResultArrays, Progress], tuple[tuple[SpectralClass, ...], tuple[str, ...]]]
+
+
+class AnswersController:
+    """Sets the materials of a `ResultsState`; an older request never replaces the answer to a newer one."""
+
+    def __init__(self, state: ResultsState, runner: JobRunner, notifier: Notifier) -> None:
+        self.state, self._runner, self._notifier = state, runner, notifier
+        self._request = 0
+
+    def from_marks(self, way: Way) -> None:
+        """Look for the spectra of all ticked pins, regions and references."""
+        marks = [mark for mark in self.state.marks.value if mark.shown and not mark.trouble]
+        if not marks:
+            self._notifier.tell(
+                "info",
+                "Pin pixels, mark regions of known materials or add references first; they are the classes.",
+            )
+            return
+        self._start("Materials by marks", way, lambda result, _: (classes_of_marks(result, marks), ()))
+
+    def from_library(self, path: Path, way: Way) -> None:
+        """Look for the spectra of a file, or of a folder with all below it."""
+
+        def classes(
+            result: ResultArrays, progress: Progress
+        ) -> tuple[tuple[SpectralClass, ...], tuple[str, ...]]:
+            from dsl_core.analysis.classes import classes_of_library
+            from dsl_core.analysis.library import read_library
+
+            library = read_library([path], progress=progress)
+            found, left_out = classes_of_library(library, result.wavelengths_nm)
+            return found, (*library.notes, *left_out)
+
+        self._start(f"Materials by {path.name}", way, classes)
+
+    def _start(self, title: str, way: Way, classes: _Classes) -> None:
+        result = self.state.result.value
+        if result is None or not result.has_spectra:
+            self._notifier.tell("info", "Materials need a result with spectra. Open one first.")
+            return
+        self._request += 1
+        request = self._request
+
+        def work(progress: Progress) -> Materials:
+            from dsl_core.analysis.areas import pixel_areas_mm2
+            from dsl_core.analysis.classification import Classification
+            from dsl_core.analysis.classify import score
+
+            found, notes = classes(result, progress)
+            held = result.arrays
+            scores = score(
+                result["reflectance"],
+                held.get("reflectance_std"),
+                held.get("data_share"),
+                result["flags"],
+                found,
+                way.measure,
+                way.brightness,
+                progress,
+            )
+            areas = pixel_areas_mm2(result["points_mm"], held.get("normals")) if "points_mm" in held else None
+            made = Classification.of(scores, brightness=way.brightness, areas_mm2=areas)
+            return Materials(title.removeprefix("Materials by "), made, notes)
+
+        def done(materials: Materials) -> None:
+            if self.state.result.value is result and request == self._request:
+                self.state.materials.set(materials)
+
+        self._runner.submit(Job(title, work, done, is_minor=True))
+
+    def set_limits(self, worst: float, margin: float) -> None:
+        """Change the limits; the picture and the table follow at once."""
+        materials = self.state.materials.value
+        limits = Limits(worst, margin)
+        if materials is not None and materials.found.limits != limits:
+            self.state.materials.set(replace(materials, found=materials.found.under(limits)))
+
+    def clear(self) -> None:
+        """Show the picture without materials."""
+        self._request += 1
+        self.state.materials.set(None)
+
+    def write(self, path: Path, overwrite: bool = False) -> None:
+        """Write the map: ENVI (.hdr), points (.ply) or table (.csv), as the ending of the path says."""
+        materials, result = self.state.materials.value, self.state.result.value
+        if materials is None or result is None:
+            return
+
+        def work(progress: Progress) -> list[Path]:
+            from dsl_core.analysis.classification import write_classification
+            from dsl_core.io.result.result_file import load_result
+
+            progress.report("write the map", 0, 1)
+            return write_classification(load_result(result.path), materials.found, path, overwrite=overwrite)
+
+        def done(files: list[Path]) -> None:
+            self._notifier.tell("success", f"Written: {', '.join(file.name for file in files)}.")
+
+        self._runner.submit(Job(f"Write {path.name}", work, done))
+
+
+def classes_of_marks(result: ResultArrays, marks: list[Mark]) -> tuple[SpectralClass, ...]:
+    """A class for each mark: its pixels in the result, or the curve of its file.
+
+    Raises `DecodeError` or `CalibrationError` where one has no spectrum at the bands of the result.
+    """
+    import numpy as np
+
+    from dsl_core.analysis.at_bands import at_bands
+    from dsl_core.analysis.classes import Member, class_of_pixels
+    from dsl_core.errors import CalibrationError, DecodeError
+    from dsl_core.evaluation.marks import mask_of_outline, mask_of_runs
+
+    if "reflectance_std" not in result.arrays:
+        raise DecodeError("The result states no deviations. Reconstruct the scan again.")
+    classes = []
+    for mark in marks:
+        if mark.curve is not None:
+            try:
+                found = at_bands(mark.curve, result.wavelengths_nm)
+            except CalibrationError as error:
+                raise CalibrationError(f"{mark.name} cannot be looked for. {error}") from error
+            classes.append(SpectralClass(mark.name, (Member.of(found.values, found.std),)))
+            continue
+        if mark.pixel is not None:
+            mask = np.zeros(result.shape, bool)
+            mask[mark.pixel[1], mark.pixel[0]] = True
+        elif mark.runs:
+            mask = mask_of_runs(mark.runs, result.shape)
+        else:
+            mask = mask_of_outline(mark.outline_px, result.shape)
+        classes.append(class_of_pixels(mark.name, result["reflectance"], result["reflectance_std"], mask))
+    return tuple(classes)

@@ -1,0 +1,183 @@
+"""Which material is where: classes, limits that the picture follows at once, and a legend with areas."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from PySide6.QtCore import Qt
+from PySide6.QtGui import QColor, QIcon, QPixmap
+from PySide6.QtWidgets import QFileDialog, QWidget
+
+from dsl_app.results.answers.controller import AnswersController, Way
+from dsl_app.results.state import Materials, ResultsState
+from dsl_app.shared.theme import Theme
+from dsl_app.shared.widgets.forms import ChoiceBox, NumberBox, check_box, label, push_button, quiet
+from dsl_app.shared.widgets.layouts import STRETCH, column_of, row_of
+from dsl_app.shared.widgets.read_table import RIGHT, ReadTable, cell
+from dsl_core.analysis.classify import Limits, Measure
+from dsl_core.io.spectra.catalogue import SUFFIXES
+
+HINT = (
+    "Name the material of every pixel: choose a folder or file of spectra, or mark known materials and use"
+    " those."
+)
+_MEASURES = (
+    ("Probability", Measure.PROBABILITY),
+    ("Spectral angle", Measure.ANGLE),
+    ("Difference", Measure.RMSE),
+)
+#: Name, range, decimals, unit and explanation of the first limit.
+_WORST = {
+    Measure.PROBABILITY: (
+        (0.0, 0.5, 3, ""),
+        "Share of the pixels of a class that may be called 'none of these', by the stated deviations",
+    ),
+    Measure.ANGLE: ((0.0, 1.5, 3, " rad"), "Largest spectral angle; beyond it a pixel is none of these"),
+    Measure.RMSE: ((0.0, 1.0, 3, ""), "Largest difference of reflectance; beyond it, none of these"),
+}
+_MARGIN = {
+    True: "Least probability of the class; below it a pixel is undecided between two",
+    False: "By which share the second class must be worse; else a pixel is undecided between two",
+}
+
+
+class MaterialsPanel(QWidget):
+    """Follows the materials of a state and asks their controller."""
+
+    def __init__(self, state: ResultsState, control: AnswersController) -> None:
+        super().__init__()
+        self._state, self._control = state, control
+        self.measure = ChoiceBox(
+            "By",
+            "How spectra are compared: the probability by the deviations of the bands, the spectral angle, or"
+            " the difference",
+            _MEASURES,
+            lambda _: self._new_measure(),
+        )
+        self.free = check_box("Any brightness", "Compare the shape of spectra and not their level")
+        self.worst = NumberBox("Limit", 0, 1, 0.01, "", 3)
+        self.margin = NumberBox("Margin", 0, 1, 0.95, "", 2)
+        self.folder = push_button("Folder…", "Classes are the spectra of a folder; its subfolders are groups")
+        self.file = push_button("File…", "Classes are the spectra of a file: CSV, ENVI, ASD, JCAMP, ...")
+        self.marks = push_button("From marks", "Classes are the ticked pins, regions and references")
+        self.clear = push_button("Clear", "Show the picture without materials", control.clear)
+        self.write = push_button(
+            "Write…", "Write the map as ENVI classification, as points (PLY), or the areas as CSV"
+        )
+        self.table = ReadTable(
+            "Materials", "Classes with their pixels and areas", ("Material", "Pixels", "Share", "Area")
+        )
+        self.table.setMinimumHeight(60)
+        self.text = label(HINT, "muted", wraps=True)
+        sources = row_of(label("Spectra of"), self.folder, self.file, self.marks, STRETCH, self.clear)
+        ways = row_of(label("By"), (self.measure, 1), self.free)
+        limits = row_of(label("Limit"), self.worst, label("Margin"), self.margin, STRETCH, self.write)
+        column_of(sources, ways, limits, (self.table, 1), self.text, on=self, margins=0)
+        self.folder.clicked.connect(self.choose_folder)
+        self.file.clicked.connect(self.choose_file)
+        self.marks.clicked.connect(lambda: control.from_marks(self.way))
+        self.write.clicked.connect(self.choose_target)
+        for box in (self.worst, self.margin):
+            box.setKeyboardTracking(True)
+            box.valueChanged.connect(lambda _: control.set_limits(self.worst.value(), self.margin.value()))
+        self._new_measure()
+        state.materials.follow(self._show)
+
+    @property
+    def way(self) -> Way:
+        """How to compare, as it is chosen."""
+        return Way(Measure(self.measure.currentData()), "free" if self.free.isChecked() else "stated")
+
+    def choose_folder(self) -> None:
+        """Ask for the folder of a library."""
+        name = QFileDialog.getExistingDirectory(self, "A folder of spectra; its subfolders are groups")
+        if name:
+            self._control.from_library(Path(name), self.way)
+
+    def choose_file(self) -> None:
+        """Ask for the file of a library."""
+        kinds = " ".join(f"*{suffix}" for suffix in SUFFIXES)
+        kinds = f"Spectra ({kinds});;All files (*)"
+        name, _ = QFileDialog.getOpenFileName(self, "A file of spectra", "", kinds)
+        if name:
+            self._control.from_library(Path(name), self.way)
+
+    def choose_target(self) -> None:
+        """Ask for a file and write the map."""
+        result = self._state.result.value
+        if result is None:
+            return
+        draft = str(result.path.with_name(f"{result.path.stem}_materials.hdr"))
+        kinds = "ENVI classification (*.hdr);;Points with their class (*.ply);;Table of areas (*.csv)"
+        name, kind = QFileDialog.getSaveFileName(self, "Write the map of materials", draft, kinds)
+        if name:
+            path = Path(name)
+            is_whole = path.suffix.lower() in (".hdr", ".ply", ".csv")
+            ending = kind[kind.index("*") + 1 : -1]
+            # The dialog asked about replacing the name as typed, not one with a suffix added.
+            self._control.write(path if is_whole else path.with_name(path.name + ending), overwrite=is_whole)
+
+    def _new_measure(self) -> None:
+        """Other limits belong to another measure; a map that is shown keeps its own."""
+        measure = Measure(self.measure.currentData())
+        self.free.setEnabled(measure is Measure.PROBABILITY)
+        self._offer_limits(measure, Limits.usual(measure))
+
+    def _offer_limits(self, measure: Measure, limits: Limits) -> None:
+        (low, high, decimals, unit), tip = _WORST[measure]
+        with quiet(self.worst, self.margin):
+            self.worst.setRange(low, high)
+            self.worst.setDecimals(decimals)
+            self.worst.setSuffix(unit)
+            self.worst.setSingleStep(0.005)
+            self.margin.setSingleStep(0.01)
+            self.worst.setToolTip(tip)
+            self.margin.setToolTip(_MARGIN[measure is Measure.PROBABILITY])
+            self.worst.setValue(limits.worst)
+            self.margin.setValue(limits.margin)
+
+    def _show(self, materials: Materials | None) -> None:
+        for button in (self.clear, self.write):
+            button.setEnabled(materials is not None)
+        self.table.setVisible(materials is not None)
+        self.text.setText(HINT if materials is None else materials_text(materials))
+        self.text.setToolTip("" if materials is None else "\n".join(materials.notes[:20]))
+        if materials is None:
+            return
+        with quiet(self.measure):
+            self.measure.choose(materials.found.scores.measure)
+        self._offer_limits(materials.found.scores.measure, materials.found.limits)
+        rows = []
+        for row in materials.found.rows:
+            if not row.pixels and len(materials.found.rows) > 20:
+                continue
+            first = cell(row.label)
+            first.setIcon(_swatch(row.colour))
+            area = "–" if row.area_mm2 is None else f"{row.area_mm2:,.1f} mm²"
+            share = f"{row.share:.1%}" if row.label != "not judged" else ""
+            figures = (cell(text, "", RIGHT) for text in (f"{row.pixels:,}", share, area))
+            rows.append((first, *figures))
+        self.table.show_rows(rows)
+
+    def apply_theme(self, theme: Theme) -> None:
+        """Apply the colours of a theme."""
+        self.table.apply_theme(theme)
+
+
+def _swatch(colour: str) -> QIcon:
+    picture = QPixmap(14, 14)
+    picture.fill(QColor(colour))
+    if colour == "#000000":
+        picture.fill(Qt.GlobalColor.transparent)
+    return QIcon(picture)
+
+
+def materials_text(materials: Materials) -> str:
+    """What the map rests on, in a sentence or two."""
+    classes = len(materials.found.shown.names)
+    counted = "1 class" if classes == 1 else f"{classes} classes"
+    text = f"{counted} by {materials.name}: {materials.found.method}."
+    if materials.notes:
+        more = f" (and {len(materials.notes) - 1} more notes)" if len(materials.notes) > 1 else ""
+        text += f" {materials.notes[0]}{more}"
+    return text

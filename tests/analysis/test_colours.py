@@ -1,0 +1,64 @@
+import numpy as np
+import pytest
+
+from dsl_core.analysis.colours import ILLUMINANTS, colours_of, lab_of, xyz_weights
+from dsl_core.errors import DecodeError
+from dsl_core.optics.charts import chart_reflectance
+from dsl_core.optics.colour import delta_e_2000
+from tests.cases.colour_science import colour_library
+
+NM = np.arange(430.0, 661.0, 5.0)
+
+
+@pytest.mark.parametrize("light", list(ILLUMINANTS))
+def test_colours_are_those_of_colour_science(light: str) -> None:
+    colour = colour_library()
+    chart, fine = chart_reflectance(NM), np.arange(360.0, 831.0)
+    observer = colour.MSDS_CMFS["CIE 1931 2 Degree Standard Observer"]
+    power = colour.SDS_ILLUMINANTS[light].copy().align(observer.shape)
+    weights, labs = xyz_weights(NM, light), []
+    for values in (chart["foliage"], chart["magenta"], np.ones(len(NM))):
+        sd = colour.SpectralDistribution(np.interp(fine, NM, values), fine)
+        xyz = colour.sd_to_XYZ(sd, observer, power, method="Integration") / 100
+        white = colour.sd_to_XYZ(
+            colour.SpectralDistribution(np.ones(471), fine), observer, power, method="Integration"
+        )
+        labs.append(colour.XYZ_to_Lab(xyz, colour.XYZ_to_xy(white / 100)))
+        assert np.abs(lab_of(values, weights) - labs[-1]).max() < 1e-6
+    expected = colour.delta_E(labs[0], labs[1], method="CIE 2000")
+    assert delta_e_2000(*(np.asarray(lab) for lab in labs[:2])) == pytest.approx(expected, abs=1e-6)
+
+
+def test_deviations_are_those_of_repeated_measurements() -> None:
+    rng, chart = np.random.default_rng(2), chart_reflectance(NM)
+    names = ("foliage", "blue sky")
+    std = {name: 0.02 * chart[name] for name in names}
+    spectra = {name: (chart[name], std[name]) for name in names}
+    found = {c.name: c for c in colours_of(spectra, NM, ("A",), "blue sky", correlation=np.eye(len(NM)))}
+    weights, shots = xyz_weights(NM, "A"), {}
+    for name in names:
+        noise = rng.standard_normal((len(NM), 4000)) * std[name][:, None]
+        shots[name] = lab_of(chart[name][:, None] + noise, weights)
+    assert found["foliage"].lab_std == pytest.approx(shots["foliage"].std(1), rel=0.05)
+    distances = delta_e_2000(shots["foliage"], shots["blue sky"])
+    assert found["foliage"].delta_e == pytest.approx(distances.mean(), rel=0.01)
+    assert found["foliage"].delta_e_std == pytest.approx(distances.std(), rel=0.1)
+    assert found["blue sky"].delta_e is None
+
+
+def test_bands_that_err_together_make_a_colour_less_sure() -> None:
+    chart = chart_reflectance(NM)
+    spectra = {"x": (chart["neutral 5 (.70 D)"], np.full(len(NM), 0.004))}
+    lone, together = (
+        colours_of(spectra, NM, ("D65",), correlation=c)[0]
+        for c in (np.eye(len(NM)), np.ones((len(NM),) * 2))
+    )
+    assert together.lab_std[0] > 3 * lone.lab_std[0]
+
+
+def test_unknown_lights_and_names_are_told() -> None:
+    spectra = {"x": (np.ones(len(NM)), np.zeros(len(NM)))}
+    with pytest.raises(DecodeError, match="no light 'candle'"):
+        colours_of(spectra, NM, ("candle",))
+    with pytest.raises(DecodeError, match="no spectrum 'y'"):
+        colours_of(spectra, NM, reference="y")

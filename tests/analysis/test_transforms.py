@@ -1,0 +1,50 @@
+import numpy as np
+import pytest
+
+from dsl_core.analysis.band_noise import usual_correlation
+from dsl_core.analysis.transforms import Transform, hull_weights, transformed
+
+NM = np.arange(430.0, 661.0, 5.0)
+#: Curved, so that no three of its corners are on a line.
+MEAN = 0.3 + 0.001 * (NM - 430) - 4e-6 * (NM - 545) ** 2 - 0.1 * np.exp(-0.5 * ((NM - 550) / 12) ** 2)
+STD = np.full(len(NM), 0.004)
+
+
+@pytest.mark.parametrize("transform", list(Transform))
+def test_deviations_are_those_of_repeated_measurements(transform: Transform) -> None:
+    rng = np.random.default_rng(1)
+    root = np.linalg.cholesky(usual_correlation(len(NM)))
+    # The hull of a noisy spectrum has other corners: deviations to first order are of small noise.
+    small = 1e-3
+    shots = MEAN + small * STD * (root @ rng.standard_normal((len(NM), 3000))).T
+    found = np.stack([transformed(NM, shot, None, transform)[0] for shot in shots])
+    mean, std = transformed(NM, MEAN, STD, transform)
+    assert std is not None
+    assert found.mean(0) == pytest.approx(mean, abs=1e-4)
+    assert found.std(0) == pytest.approx(small * std, rel=0.1, abs=2e-7)
+
+
+def test_a_level_leaves_a_normalised_spectrum_and_a_line_its_derivative() -> None:
+    twice = transformed(NM, 2 * MEAN, 2 * STD, Transform.NORMALISED)
+    once = transformed(NM, MEAN, STD, Transform.NORMALISED)
+    for a, b in zip(once, twice, strict=True):
+        assert a == pytest.approx(b)
+    slope = transformed(NM, 0.1 + 0.002 * NM, None, Transform.DERIVATIVE)[0]
+    assert slope == pytest.approx(0.002)
+
+
+def test_the_continuum_touches_from_above_and_leaves_the_band() -> None:
+    hull = hull_weights(NM, MEAN) @ MEAN
+    assert (hull >= MEAN - 1e-12).all()
+    assert np.diff(hull, 2).max() < 1e-12
+    removed = transformed(NM, MEAN, None, Transform.CONTINUUM)[0]
+    assert removed.max() == pytest.approx(1.0)
+    assert NM[removed.argmin()] == 550.0
+    assert removed.min() == pytest.approx(1 - 0.1 / (0.3 + 0.12), abs=0.02)
+
+
+def test_what_has_no_shape_is_not_a_number() -> None:
+    values, std = transformed(NM, np.zeros(len(NM)), STD, Transform.NORMALISED)
+    assert np.isnan(values).all()
+    assert std is not None
+    assert np.isnan(transformed(NM, np.full(len(NM), np.nan), None, Transform.CONTINUUM)[0]).all()

@@ -1,0 +1,113 @@
+"""Materials of a result: from marks, from a library, under limits that are changed."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from dsl_app.results.answers.controller import Way
+from dsl_app.results.answers.materials_panel import HINT, MaterialsPanel, materials_text
+from dsl_app.results.image import materials_table
+from dsl_app.results.state import Materials
+from dsl_app.shared.theme import LIGHT
+from pytestqt.qtbot import QtBot
+
+from dsl_core.analysis.classify import Measure
+from tests.app.support.results_controller import SQUARE, Bench
+from tests.app.support.results_controller import bench as bench
+from tests.app.support.small_result import BLUE, NM
+
+ANGLE = Way(Measure.ANGLE)
+
+
+def _shown(bench: Bench) -> Materials:
+    materials = bench.state.materials.value
+    assert materials is not None
+    return materials
+
+
+def _library(folder: Path) -> Path:
+    rows = [f"{nm},{value}" for nm, value in zip(NM, BLUE, strict=True)]
+    path = folder / "bläu <b>.csv"
+    path.write_text("\n".join(["wavelength_nm,reflectance", *rows]), encoding="utf-8")
+    return path
+
+
+def test_marks_are_classes_and_limits_work_at_once(bench: Bench) -> None:
+    bench.control.answers.from_marks(ANGLE)
+    assert "Pin pixels" in bench.told
+    bench.control.marks.pin((30, 5))
+    bench.control.marks.add_outline(SQUARE)
+    bench.control.answers.from_marks(ANGLE)
+    values = _shown(bench).found.shown.values
+    assert (values[:, 18:] == 1).mean() > 0.95
+    assert (values[:, :18] == 2).mean() > 0.95
+    bench.control.answers.set_limits(0.0, 0.1)
+    assert (_shown(bench).found.shown.values[:, :18] == 3).mean() > 0.95
+    bench.control.answers.clear()
+    assert bench.state.materials.value is None
+
+
+def test_probability_is_the_usual_way_and_a_library_gives_names(bench: Bench, tmp_path: Path) -> None:
+    bench.control.answers.from_library(_library(tmp_path), Way())
+    materials = _shown(bench)
+    assert materials.found.scores.measure is Measure.PROBABILITY
+    assert materials.found.shown.names == ("bläu <b>",)
+    assert (materials.found.scores.best[:, 18:] == 0).mean() > 0.9
+    assert sum(row.pixels for row in materials.found.rows) == materials.found.shown.values.size
+
+
+def test_a_library_that_does_not_fit_is_told(bench: Bench, tmp_path: Path) -> None:
+    (tmp_path / "none").mkdir()
+    bench.control.answers.from_library(tmp_path / "none", Way())
+    assert "no reflectance spectrum" in bench.told
+    assert bench.state.materials.value is None
+
+
+def test_the_map_is_written(bench: Bench, tmp_path: Path) -> None:
+    bench.control.marks.pin((30, 5))
+    bench.control.answers.from_marks(ANGLE)
+    bench.control.answers.write(tmp_path / "map.hdr")
+    assert (tmp_path / "map.img").stat().st_size == _shown(bench).found.shown.values.size
+    bench.control.answers.write(tmp_path / "map.hdr")
+    assert "already exists" in bench.told
+
+
+def test_another_result_has_no_materials(bench: Bench) -> None:
+    bench.control.marks.pin((30, 5))
+    bench.control.answers.from_marks(ANGLE)
+    result = bench.state.result.value
+    assert result is not None
+    assert bench.control.open(result.path)
+    assert bench.state.materials.value is None
+
+
+def test_the_panel_is_a_legend_with_areas(qtbot: QtBot, bench: Bench) -> None:
+    panel = MaterialsPanel(bench.state, bench.control.answers)
+    qtbot.addWidget(panel)
+    panel.apply_theme(LIGHT)
+    assert panel.text.text() == HINT
+    bench.control.marks.pin((30, 5))
+    panel.measure.setCurrentIndex(1)
+    panel.measure.activated.emit(1)
+    assert panel.worst.suffix() == " rad"
+    panel.marks.click()
+    assert panel.table.item(0, 0).text() == "pin 1"  # type: ignore[union-attr]
+    assert panel.table.rowCount() == 4
+    found = _shown(bench).found
+    panel.worst.setValue(1.5)
+    assert _shown(bench).found.limits.worst == 1.5
+    assert _shown(bench).found.scores is found.scores
+    assert "1 class by marks: spectral angle" in materials_text(_shown(bench))
+    panel.clear.click()
+    assert not panel.write.isEnabled()
+
+
+@pytest.mark.parametrize("classes", [1, 24, 250])
+def test_every_class_has_a_colour_and_what_is_not_judged_none(classes: int) -> None:
+    table = materials_table(classes)
+    assert table[0, 3] == 0
+    assert (table[1 : classes + 3, 3] > 0).all()
+    if classes == 24:
+        assert len(np.unique(table[1 : classes + 1], axis=0)) == classes
