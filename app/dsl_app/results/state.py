@@ -143,8 +143,8 @@ class ResultsState:
     computed for ``picture_light``, which follows the chosen ``light`` and ``adapted`` with a delay.
     ``cloud_by`` is the view that colours the cloud; ``busy`` says what is being opened (empty: nothing).
     ``graph`` is the intensity graph of the pixel inspected last; ``library`` is a file whose spectra the user
-    has to choose from. ``depth_limits`` are the depths shown, mm; None for all. The plot draws a ``transform``
-    of the spectra, one above the other if ``stacked``.
+    has to choose from. ``depth_limits`` are the depths shown, mm; None for all. The plot draws a
+    ``transform`` of the spectra, one above the other if ``stacked``.
     """
 
     def __init__(self) -> None:

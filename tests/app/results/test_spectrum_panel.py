@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import numpy as np
+import pytest
 from dsl_app.results.state import ResultView
 
 from tests.app.support.results_bench import Bench
@@ -17,3 +19,19 @@ def test_the_band_line_and_the_slider_agree(bench: Bench) -> None:
     bench.page.spectra.content.band_line.setValue(611.0)
     assert bench.state.band.value == 36
     assert bench.page.bar.nm.text() == "610 nm"
+
+
+def test_transforms_are_drawn_with_their_deviations_and_stacked(bench: Bench) -> None:
+    panel = bench.page.spectra.content
+    bench.control.marks.pin((30, 5))
+    bench.control.marks.pin((5, 5))
+    panel.transform.setCurrentIndex(1)
+    panel.transform.activated.emit(1)
+    (first, _), (second, _) = panel.named_curves
+    assert np.mean(first.getData()[1]) == pytest.approx(1.0)
+    before = second.getData()[1]
+    panel.stacked.click()
+    (_, _), (second, _) = panel.named_curves
+    assert (second.getData()[1] > before + 0.5).all()
+    bench.control.point_at((30, 5))
+    assert np.mean(panel.live.solid.getData()[1]) == pytest.approx(1.0)
