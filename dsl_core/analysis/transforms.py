@@ -61,7 +61,7 @@ def _normalised(nm: Floats, values: Floats) -> tuple[Floats, Floats]:
 
 
 def _derivative(nm: Floats, values: Floats) -> tuple[Floats, Floats]:
-    slope = np.gradient(np.eye(len(nm)), nm, axis=0)
+    slope: Floats = np.asarray(np.gradient(np.eye(len(nm)), nm, axis=0), np.float64)
     return slope @ values, slope
 
 

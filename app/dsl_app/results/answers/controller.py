@@ -121,7 +121,7 @@ class AnswersController:
             return write_classification(load_result(result.path), materials.found, path, overwrite=overwrite)
 
         def done(files: list[Path]) -> None:
-            self._notifier.tell("success", f"Written: {', '.join(file.name for file in files)}.")
+            self._notifier.tell("info", f"Written: {', '.join(file.name for file in files)}.")
 
         self._runner.submit(Job(f"Write {path.name}", work, done))
 
