@@ -57,10 +57,16 @@ def scan_command(
     return first + " ".join(words)
 
 
-def rig_words(notes: Mapping[str, object]) -> str:
-    """The rig of a scan in command-line form; empty when the scan does not name it."""
+def rig_of_scan(notes: Mapping[str, object]) -> tuple[RigChoice | None, bool]:
+    """The rig of a scan, None when the scan does not name it, and whether it may be opened unasked."""
+    from dsl_core.devices.registry import is_built_in
+    from dsl_core.io.scan.origin import is_of_this_computer
+
     origin = rig_of_notes(notes)
-    return "" if origin is None else RigChoice(origin[0], tuple(sorted(origin[1].items()))).command
+    if origin is None:
+        return None, False
+    choice = RigChoice(origin[0], tuple(sorted(origin[1].items())))
+    return choice, is_built_in(choice.name) or is_of_this_computer(notes)
 
 
 def fresh_target(folder: Path, now: datetime) -> Path:

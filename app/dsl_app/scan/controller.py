@@ -9,7 +9,7 @@ from pathlib import Path
 
 from dsl_app.connection.controller import RIG, RigController
 from dsl_app.connection.state import Link
-from dsl_app.scan.command_line import fresh_target, rig_words, scan_command
+from dsl_app.scan.command_line import fresh_target, rig_of_scan, scan_command
 from dsl_app.scan.job import ScanJob, ScanRequest
 from dsl_app.scan.plan import ScanPlanController
 from dsl_app.scan.reconnect import Reconnector
@@ -68,7 +68,10 @@ class ScanController:
             self._notifier.tell("info", _BUSY)
             return
         self.plans.refresh()
-        facts = state.facts.value
+        facts, session = state.facts.value, state.interrupted.value
+        if facts is not None and facts.connects and session is not None:
+            self._reconnector.open_rig_of(session)
+            return
         if devices is None or facts is None or facts.obstacles:
             self._notifier.tell("warning", facts.obstacles[0] if facts is not None else "")
             return
@@ -301,7 +304,7 @@ class ScanController:
         self.plans.take_plan(reader.plan)
         self.state.target.set(folder)
         self.state.interrupted.set(
-            InterruptedScan(folder, total - missing, total, rig_words(reader.manifest.notes))
+            InterruptedScan(folder, total - missing, total, *rig_of_scan(reader.manifest.notes))
         )
         self.plans.refresh()
         return True

@@ -52,13 +52,13 @@ def run_controls(
     is_resumable = session is not None and not phase.is_busy
     lines = [*obstacles, *([note] if note else [])]
     if session is not None and is_resumable:
-        lines.insert(0, f"{session.folder.name} contains {session.done} of {session.total} frames.")
+        lines.insert(0, session.words)
     is_ready = phase is not Phase.PLANNING or not obstacles
     return RunControls(
         start=ButtonState(
             is_enabled=not phase.is_busy and not obstacles,
             is_primary=True,
-            text="&Start scan" if session is None else "&Resume scan",
+            text=_start_text(session, facts),
         ),
         pause=ButtonState(
             is_enabled=phase in (Phase.RUNNING, Phase.PAUSED),
@@ -71,6 +71,12 @@ def run_controls(
         phase=LabelState(f"● {phase.value}" if is_ready else "● not ready", _PHASE_ROLES.get(phase, "muted")),
         remarks=LabelState("\n".join(lines), "warn" if obstacles else "muted"),
     )
+
+
+def _start_text(session: InterruptedScan | None, facts: Facts | None) -> str:
+    if session is None:
+        return "&Start scan"
+    return "Connect and &resume" if facts is not None and facts.connects else "&Resume scan"
 
 
 def banner_controls(reconnection: Reconnection) -> BannerControls:

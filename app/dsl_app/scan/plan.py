@@ -153,7 +153,9 @@ class ScanPlanController:
             self._devices, state.plan.value, state.target.value, self.calibration, state.override.value
         )
         if session is not None:
-            facts = replace(facts, obstacles=() if self._devices else (connect_first(session),), remarks=())
+            connects = self._devices is None and session.rig_to_open is not None
+            needs = () if self._devices or connects else (connect_first(session),)
+            facts = replace(facts, obstacles=needs, remarks=(), connects=connects)
         state.facts.set(facts)
 
     def _fitted(self, plan: CapturePlan) -> CapturePlan:
@@ -271,7 +273,7 @@ class ScanPlanController:
 
 def connect_first(session: InterruptedScan) -> str:
     """Which rig an interrupted scan needs."""
-    which = f" It was captured with {session.rig}." if session.rig else ""
+    which = f" It was captured with {session.rig.words}." if session.rig is not None else ""
     return f"Connect the rig of this scan on the Rig page.{which}"
 
 

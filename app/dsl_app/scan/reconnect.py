@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 from dsl_app.connection.controller import RigController
 from dsl_app.connection.state import Link
-from dsl_app.scan.state import Reconnection, ScanState
+from dsl_app.scan.state import InterruptedScan, Reconnection, ScanState
 from dsl_app.shared.notify import Notifier
 
 #: Number of automatic attempts, and the wait after a failed one, s.
@@ -33,6 +33,20 @@ class Reconnector:
         self._story, self._choice = "", rig.state.choice.value
         self._attempt, self._next_s, self._resumes = 0, 0.0, False
         self._unfollow = rig.state.link.changed.connect(self._take_link)
+
+    def open_rig_of(self, session: InterruptedScan) -> None:
+        """Connect the rig that an interrupted scan was captured with, once, and resume the scan."""
+        assert session.rig is not None
+
+        def failed(reason: str) -> None:
+            name = session.folder.name
+            self._notifier.tell("error", f"The rig of {name} could not be connected: {reason}")
+
+        def connected() -> None:
+            if self._state.interrupted.value == session:
+                self._resume()
+
+        self._rig.reconnect(session.rig, connected, failed)
 
     def begin(self, story: str) -> None:
         """Start to reconnect the rig that a scan lost; ``story`` says how it was lost."""

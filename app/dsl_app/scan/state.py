@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from dsl_app.connection.state import RigChoice
 from dsl_app.shared.evented import Event, Value
 from dsl_core.capture.preview import BlockGraph
 from dsl_core.capture.runner import State, Status
@@ -76,17 +77,35 @@ OWN_CALIBRATION = CalibrationChoice("", "none")
 
 @dataclass(frozen=True)
 class InterruptedScan:
-    """A scan that lacks frames; ``rig`` is the command-line form of the rig it was captured with."""
+    """A scan that lacks frames, and the rig it was captured with (None: unknown).
+
+    A rig of another computer is not opened only because a file names it: then ``may_open`` is False.
+    """
 
     folder: Path
     done: int
     total: int
-    rig: str = ""
+    rig: RigChoice | None = None
+    may_open: bool = False
+
+    @property
+    def rig_to_open(self) -> RigChoice | None:
+        """The rig to connect before the scan resumes, if that can be done without asking."""
+        return self.rig if self.may_open else None
+
+    @property
+    def words(self) -> str:
+        """How far it came and with which rig, as one sentence."""
+        which = f" It was captured with {self.rig.words}." if self.rig is not None else ""
+        return f"{self.folder.stem}: {self.done} of {self.total} frames are safe.{which}"
 
 
 @dataclass(frozen=True)
 class Facts:
-    """The cost of a plan, ``obstacles`` that prevent it from starting, and ``remarks`` that do not."""
+    """The cost of a plan, ``obstacles`` that prevent it from starting, and ``remarks`` that do not.
+
+    ``connects`` says that starting connects the rig first.
+    """
 
     frames: int
     seconds: float
@@ -95,6 +114,7 @@ class Facts:
     obstacles: tuple[str, ...] = ()
     remarks: tuple[str, ...] = ()
     settings_differ: bool = False
+    connects: bool = False
 
 
 @dataclass(frozen=True)

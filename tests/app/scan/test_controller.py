@@ -7,11 +7,11 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import pytest
-from dsl_app.connection.state import Link
+from dsl_app.connection.state import Link, RigChoice
 from dsl_app.scan.job import ScanJob
 from dsl_app.scan.plan import connect_first
 from dsl_app.scan.reconnect import ATTEMPTS, RETRY_S
-from dsl_app.scan.state import CalibrationChoice, Phase, Reconnection
+from dsl_app.scan.state import CalibrationChoice, InterruptedScan, Phase, Reconnection
 
 from dsl_core.capture.runner import State, Status
 from dsl_core.cli.options import PlanChoice
@@ -236,14 +236,44 @@ def test_an_interrupted_session_is_offered_and_a_complete_one_is_not(
     facts, session = other.state.facts.value, other.state.interrupted.value
     assert session is not None
     assert facts is not None
-    assert facts.obstacles == (connect_first(session),)
-    assert "--option scene=color-checker" in facts.obstacles[0]
-    other.rig.connect(TWIN)
+    # The twin may be opened because a file names it, so that nobody has to connect it first.
+    assert facts.obstacles == ()
+    assert facts.connects
+    assert session.rig == TWIN
+    other.rig.state.choice.set(SMALL)
     other.state.then_reconstruct.set(False)
     other.scans.start()
     assert phase(other) is Phase.DONE
+    assert other.rig.state.choice.value == TWIN
     assert not other.scans.open(tmp_path / "first.dsl")
     assert not other.scans.open(tmp_path)
+
+
+@pytest.mark.parametrize("named", [True, False])
+def test_a_rig_of_another_computer_is_not_opened_unasked(tmp_path: Path, named: bool) -> None:
+    bench = make_bench(tmp_path)
+    rig = RigChoice("lab", (("port", "3"),)) if named else None
+    session = InterruptedScan(tmp_path / "first.dsl", 3, 76, rig)
+    bench.state.interrupted.set(session)
+    bench.scans.plans.refresh()
+    facts = bench.state.facts.value
+    assert facts is not None
+    assert facts.obstacles == (connect_first(session),)
+    assert ("lab, port 3" in facts.obstacles[0]) == named
+    bench.scans.start()
+    assert bench.rig.state.link.value is Link.CLOSED
+
+
+def test_a_rig_that_cannot_be_connected_is_told_and_not_tried_again(tmp_path: Path) -> None:
+    bench = make_bench(tmp_path)
+    gone = RigChoice("twin", (("scene", "moon"),))
+    bench.state.interrupted.set(InterruptedScan(tmp_path / "first.dsl", 3, 76, gone, may_open=True))
+    bench.scans.start()
+    assert phase(bench) is Phase.PLANNING
+    assert "The rig of first.dsl could not be connected" in bench.notifier.told[-1][1]
+    told = len(bench.notifier.told)
+    bench.scans.take_news()
+    assert len(bench.notifier.told) == told
 
 
 def test_a_damaged_session_is_told(bench: ScanBench, tmp_path: Path) -> None:

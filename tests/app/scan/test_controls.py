@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -54,8 +55,10 @@ def test_an_interrupted_scan_is_resumed_or_left() -> None:
     shown = run_controls(Phase.LOST, HALF, FREE, "A note.", has_finished=False)
     assert (shown.start.text, shown.renew.is_visible, shown.again.is_visible) == ("&Resume scan", True, False)
     assert shown.drift == shown.renew
-    assert shown.remarks.text == "half.dsl contains 30 of 76 frames.\nA note."
+    assert shown.remarks.text == "half: 30 of 76 frames are safe.\nA note."
     assert not run_controls(Phase.RUNNING, HALF, FREE, "", has_finished=False).renew.is_visible
+    away = replace(FREE, connects=True)
+    assert run_controls(Phase.PLANNING, HALF, away, "", False).start.text == "Connect and &resume"
 
 
 @pytest.mark.parametrize(
