@@ -101,6 +101,7 @@ class ScanController:
             self._failed,
             self._cancelled,
             exclusive=RIG,
+            time_left=scan.left_s,
         )
         scan.token = self._job.token
         if not self._rig.run(self._job):

@@ -47,6 +47,7 @@ class ScanJob:
         self._graphs: BlockGraphs | None = None
         self._status: Status | None = None
         self._picture: LivePicture | None = None
+        self._left_s: float | None = None
 
     # In the job's thread ---------------------------------------------------------------------------
 
@@ -115,7 +116,7 @@ class ScanJob:
 
     def _listen(self, status: Status) -> None:
         with self._lock:
-            self._status = status
+            self._status, self._left_s = status, status.remaining_s if status.done else None
 
     # In the window's thread ------------------------------------------------------------------------
 
@@ -125,6 +126,11 @@ class ScanJob:
             news = self._status, self._picture
             self._status = self._picture = None
         return news
+
+    def left_s(self) -> float | None:
+        """Seconds left of the whole scan, which stand still in a pause; None before the first frame."""
+        with self._lock:
+            return self._left_s
 
     def graph(self, pixel: tuple[int, int]) -> BlockGraph | None:
         """The intensity graph of a pixel, as far as captured."""

@@ -103,9 +103,10 @@ def _words_of(job: Job[Any], others: int) -> list[str]:
         parts.append("stopping")
     elif job.progress.stage:
         parts.append(job.progress.stage)
-    left = job.remaining_s
-    if left is not None and left >= 2 and not job.token.is_cancelled:
-        parts.append(f"{describe_seconds(left)} left")
+    left = job.left
+    if left is not None and left.seconds >= 2 and not job.token.is_cancelled:
+        of_what = "" if left.is_whole else " of this step"
+        parts.append(f"{describe_seconds(left.seconds)} left{of_what}")
     if others:
         parts.append(f"and {others} more")
     return parts

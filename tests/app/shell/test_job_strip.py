@@ -5,6 +5,7 @@ from collections.abc import Iterator
 
 import pytest
 from dsl_app.shared.jobs.base import Job, JobProgress
+from dsl_app.shared.jobs.clock import TimeLeft
 from dsl_app.shared.jobs.qt_runner import QtRunner
 from dsl_app.shell.job_strip import JobStrip, strip_view
 from PySide6.QtCore import Qt
@@ -58,6 +59,20 @@ def test_work_that_runs_by_itself_does_not_hide_what_was_asked_for(bench: Bench)
     bench.click()
     assert export.token.is_cancelled
     assert not prediction.token.is_cancelled
+
+
+@pytest.mark.parametrize(("is_whole", "words"), [(True, "40 s left"), (False, "40 s left of this step")])
+def test_the_time_left_says_of_what(is_whole: bool, words: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    job = Job("Reconstruct leaf", lambda progress: None)
+    monkeypatch.setattr(Job, "left", TimeLeft(40.0, is_whole))
+    view = strip_view([job])
+    assert view is not None
+    assert view.text.split(" · ")[-1] == words
+
+
+def test_a_job_that_knows_better_is_believed() -> None:
+    job = Job("Scan leaf", lambda progress: None, time_left=lambda: 90.0)
+    assert job.left == TimeLeft(90.0, True)
 
 
 def test_work_that_runs_by_itself_can_be_cancelled_where_it_is_alone(bench: Bench) -> None:

@@ -76,7 +76,9 @@ class WizardJobs:
     def take_news(self) -> None:
         """Update how far the current job is."""
         if self._job is not None:
-            self.state.progress.set(replace(self._job.progress, remaining_s=self._job.remaining_s))
+            left = self._job.left
+            seconds = None if left is None else left.seconds
+            self.state.progress.set(replace(self._job.progress, remaining_s=seconds))
 
     def stop(self) -> None:
         """Stop what a person waits for at its next safe point."""

@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 import logging
-import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from enum import Enum
 from typing import Any, Generic, Protocol, TypeVar
 
+from dsl_app.shared.jobs.clock import Course, JobClock, TimeLeft
 from dsl_core.errors import Cancelled
 from dsl_core.progress import CallbackProgress, CancelToken, Progress
 
 T = TypeVar("T")
 _log = logging.getLogger(__name__)
+#: How long the stages of jobs took in this session, by kind.
+_courses: dict[str, Course] = {}
 
 
 class JobState(Enum):
@@ -47,6 +49,7 @@ class Job(Generic[T]):
 
     ``work`` runs in a worker thread and reports to the `Progress` it is given; the callbacks run in the
     window's thread. ``exclusive`` names something that only one job may use at a time, such as the rig.
+    ``time_left`` tells the time left where the work knows it better than its reports say.
     ``is_minor`` jobs are stopped without a question when the window closes. ``on_accepted`` is called when
     the runner has accepted the job, before the work begins; ``on_ended`` before the other callbacks, however
     the job ends. Without ``on_failed`` the runner tells the person what went wrong.
@@ -64,8 +67,12 @@ class Job(Generic[T]):
     state: JobState = JobState.WAITING
     progress: JobProgress = JobProgress()
     error: Exception | None = None
-    started_s: float | None = None
+    time_left: Callable[[], float | None] | None = None
     token: CancelToken = field(default_factory=CancelToken)
+
+    def __post_init__(self) -> None:
+        # Jobs of a kind begin with the same word.
+        self._clock = JobClock(self.title.split(" ")[0], _courses)
 
     def accept(self) -> None:
         """Call ``on_accepted``; called by the runner."""
@@ -77,16 +84,16 @@ class Job(Generic[T]):
         self.token.cancel()
 
     @property
-    def remaining_s(self) -> float | None:
-        """Seconds left at the pace so far; None while unknown."""
-        if self.started_s is None or self.progress.total <= 0 or self.progress.done <= 0:
-            return None
-        spent = time.monotonic() - self.started_s
-        return spent * (self.progress.total - self.progress.done) / self.progress.done
+    def left(self) -> TimeLeft | None:
+        """The time left; None while unknown."""
+        if self.time_left is not None:
+            seconds = self.time_left()
+            return None if seconds is None else TimeLeft(seconds, True)
+        return self._clock.left() if self.state is JobState.RUNNING else None
 
     def run(self) -> Callable[[], None]:
         """Do the work in this thread; the returned function finishes the job in the window's thread."""
-        self.state, self.started_s = JobState.RUNNING, time.monotonic()
+        self.state = JobState.RUNNING
         try:
             if self.token.is_cancelled:
                 raise Cancelled(f"{self.title} was stopped before it began.")
@@ -100,11 +107,11 @@ class Job(Generic[T]):
         return lambda: self._finish_done(result)
 
     def _report(self, stage: str, done: int, total: int) -> None:
-        if stage != self.progress.stage:
-            self.started_s = time.monotonic()
+        self._clock.report(stage, done, total)
         self.progress = JobProgress(stage, done, total)
 
     def _finish_done(self, result: T) -> None:
+        self._clock.end()
         self._end(JobState.DONE)
         if self.on_done is not None:
             self.on_done(result)
