@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dsl_core.errors import StoreError
+from dsl_core.model.fit import ATTRIBUTE, Fit
 from dsl_core.version import __version__
 
 if TYPE_CHECKING:
@@ -51,12 +52,19 @@ def provenance(result: xr.Dataset) -> dict[str, str]:
 
 
 def provenance_of(attributes: Mapping[str, Any]) -> dict[str, str]:
-    """Every plain attribute of a result as text, and the version of the program that exports."""
+    """Every plain attribute of a result as text, and the version of the program that exports.
+
+    What the result says about its model is there in words, not as the record that programs read.
+    """
     plain = {
         key: " ".join(str(value).split())
         for key, value in attributes.items()
         if isinstance(value, str | int | float | np.number)
     }
+    fit = Fit.read(plain)
+    if fit is not None:
+        del plain[ATTRIBUTE]
+        plain["verdict"] = " ".join(fit.words.split())
     return {**plain, "exported_by": f"dsl-scan {__version__}"}
 
 

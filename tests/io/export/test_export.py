@@ -13,10 +13,12 @@ import pytest
 
 from dsl_core.errors import Cancelled, StoreError
 from dsl_core.io.export import FORMATS, export, export_csv, export_png
+from dsl_core.io.export.common import provenance_of
 from dsl_core.io.export.envi import export_envi
 from dsl_core.io.export.exr import export_exr, linear_from_srgb
 from dsl_core.io.export.ply import export_ply
 from dsl_core.io.export.png import GREY, flags_picture
+from dsl_core.model.fit import ATTRIBUTE, Fit, FitFinding
 from dsl_core.model.result import FLAG_COLOURS, Flag, reasons
 from dsl_core.optics.relighting import relight
 from dsl_core.solve.many import never
@@ -100,6 +102,18 @@ def test_ply_with_a_long_provenance_is_read_by_all(tmp_path: Path) -> None:
     lit = np.isfinite(result["depth_mm"].values)
     assert reader.GetOutput().GetNumberOfPoints() == lit.sum()
     np.testing.assert_array_equal(meshio.read(path).points.T, result["points_mm"].values[:, lit])
+
+
+def test_what_the_model_does_not_fit_is_exported_in_words(tmp_path: Path) -> None:
+    finding = FitFinding(
+        part="film", name="place", value=1.0, std=None, unit="px", limit=0.1, significant=True,
+        sentence="The film has moved.", advice="Calibrate it again.",
+    )  # fmt: skip
+    told = provenance_of({ATTRIBUTE: Fit.of([finding]).model_dump_json(), "rig": "twin"})
+    assert told["verdict"].startswith("The model does not fit this rig and scene in every respect.")
+    assert told["verdict"].endswith("The film has moved. Calibrate it again.")
+    assert ATTRIBUTE not in told
+    assert told["rig"] == "twin"
 
 
 def test_ply_of_depth_alone(tmp_path: Path) -> None:
