@@ -33,6 +33,10 @@ class StoreError(DslError):
     """A scan, result or export on disk cannot be read or written."""
 
 
+class TakenError(StoreError):
+    """What is to be written exists already; it may be replaced where that was allowed."""
+
+
 class MissingPackageError(DslError):
     """The work needs a package that belongs to an extra, which was not installed."""
 

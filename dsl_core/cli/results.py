@@ -56,15 +56,19 @@ def reconstruct(
     """Turn frames into depth, points, normals, reflectance and their uncertainty."""
     from dsl_core.io.calibration_library import load_calibration
     from dsl_core.io.result.result_file import RESULT_FOLDER, save_result
+    from dsl_core.io.scan.manifest import read_manifest
     from dsl_core.model.options import MODELS, SOLVERS, names
     from dsl_core.pipeline import Options
     from dsl_core.workflows.scans import DOUBTS, NOT_JUDGED, reconstruct_scan
 
-    output, timer, target = Output(json), StageTimer(), target or session.with_suffix(".zarr")
+    output, timer = Output(json), StageTimer()
     _require_one_of("--model", model, names(MODELS))
     _require_one_of("--solver", solver, names(SOLVERS))
     _require_one_of("--device", device, DEVICES)
     grid = parse_bands(bands)
+    if target is None:
+        read_manifest(session)  # that it is no scan is told before that its result exists
+        target = session.with_suffix(".zarr")
     check_targets([target], overwrite=force, kind=RESULT_FOLDER)
     rig = load_calibration(calibration) if calibration else None
     if rig is None and _tells_columns_only(session):
@@ -146,10 +150,13 @@ def evaluate(
     from dsl_core import pipeline
     from dsl_core.evaluation.report.scan_report import report_content
     from dsl_core.evaluation.verdict import deviations, figures
-    from dsl_core.io.result.result_file import load_result
+    from dsl_core.io.result.result_file import load_result, read_attributes
     from dsl_core.workflows import scans
 
-    output, report = Output(json), report or path.with_suffix(".html")
+    if report is None:
+        read_attributes(path)
+        report = path.with_suffix(".html")
+    output = Output(json)
     check_targets([report], overwrite=force)
     result = load_result(path)
     truth = scans.truth_of(result, truth_rig, parse_options(option))
@@ -222,6 +229,7 @@ def _export(
     output: Output, path: Path, form: str, target: Path, pixels: list[tuple[int, int]], force: bool
 ) -> list[Path]:
     from dsl_core.io.calibration_library import load_calibration
+    from dsl_core.io.export import FORMATS as EXPORTS
     from dsl_core.io.export import export as export_result
     from dsl_core.io.export import export_csv
     from dsl_core.io.published.calibration import export_calibration
@@ -230,6 +238,12 @@ def _export(
     from dsl_core.workflows import exchange
     from dsl_core.workflows.scans import calibration_of
 
+    form = form.lower()
+    known = (*EXPORTS, "dataset", "calibration")
+    if form not in known:
+        raise PlanError(f"There is no export format {form!r}. Choose one of {', '.join(known)}.")
+    if form not in ("dataset", "calibration"):
+        check_targets([target], overwrite=True)  # what else a format writes, it checks itself
     if pixels and form != "csv":
         raise PlanError(f"--pixel is for csv only; {form} contains all pixels. Leave it out.")
     if form == "dataset":

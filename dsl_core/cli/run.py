@@ -8,6 +8,7 @@ from __future__ import annotations
 import json
 import logging
 import os
+import re
 import sys
 import traceback
 import warnings
@@ -21,6 +22,7 @@ from dsl_core.cli import (
     calibrations,
     compare,
     demo,
+    doctor,
     effects,
     files,
     gui,
@@ -29,7 +31,7 @@ from dsl_core.cli import (
     scans,
     tradeoff,
 )
-from dsl_core.errors import Cancelled, DslError
+from dsl_core.errors import Cancelled, DslError, PlanError, TakenError
 from dsl_core.extras import missing_package
 from dsl_core.version import __version__
 
@@ -37,9 +39,17 @@ OK, BUG, WRONG_INPUT, STOPPED = 0, 1, 2, 130
 #: Wrong use of a command line; typer gives this class no public name.
 _WrongUse: type[BaseException] = typer.BadParameter.__mro__[2]
 
+#: What the parser's checks say, and how this program says it.
+_PLAIN = {
+    r"Invalid value for '(\S+)': Input should be a valid number.*": r"\1 must be a number.",
+    r"Invalid value for '(\S+)': Input should be a valid integer.*": r"\1 must be a whole number.",
+    r"Invalid value for '(\S+)': Input should be greater than or equal to (\S+)": r"\1 must be at least \2",
+    r"Invalid value for '(\S+)': Input should be less than or equal to (\S+)": r"\1 must be at most \2",
+    r"Invalid value for '(\S+)': Input should be": r"\1 must be",
+}
+
 app = typer.Typer(
     name="dsl-scan",
-    add_completion=False,
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
@@ -65,6 +75,7 @@ for command in (
 app.command("import")(files.import_)
 app.command()(files.info)
 app.command()(gui.gui)
+app.command()(doctor.doctor)
 app.command()(calibrate.selftest)
 app.add_typer(rigs.rigs, name="rigs")
 app.add_typer(calibrate.calibrate, name="calibrate")
@@ -97,6 +108,10 @@ def run(arguments: list[str]) -> int:
     if not debug:
         warnings.simplefilter("ignore")
     try:
+        if "" in arguments:
+            raise PlanError(
+                "An argument is empty: perhaps a variable of the shell is not set. Name what is meant."
+            )
         code = app(arguments, prog_name="dsl-scan", standalone_mode=False)
         sys.stdout.flush()
     except BaseException as error:
@@ -122,6 +137,8 @@ def _judge(error: BaseException) -> tuple[int, str]:
         return STOPPED, "Stopped. What was finished before is kept."
     if isinstance(error, ModuleNotFoundError):
         error = missing_package(error) or error
+    if isinstance(error, TakenError):
+        return WRONG_INPUT, str(error).replace("allow it to be replaced", "add --force to replace it")
     if isinstance(error, DslError):
         return WRONG_INPUT, str(error)
     if isinstance(error, _WrongUse):
@@ -144,9 +161,11 @@ def _judge(error: BaseException) -> tuple[int, str]:
 def _usage(error: BaseException) -> str:
     """What was wrong with the command line, and which help to read."""
     message = " ".join(str(getattr(error, "format_message", error.__str__)()).split())
+    for theirs, ours in _PLAIN.items():
+        message = re.sub(theirs, ours, message)
     context = getattr(error, "ctx", None)
     command = context.command_path if context is not None else "dsl-scan"
-    if getattr(error, "option_name", "") == "-o":
+    if type(error).__name__ == "NoSuchOption" and getattr(error, "option_name", "") == "-o":
         message = "There is no option -o here; options of a rig are given with -O or --option"
     return f"{message.rstrip('.')}. See '{command} --help'."
 

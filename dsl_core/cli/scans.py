@@ -30,6 +30,7 @@ from dsl_core.cli.options import (
 from dsl_core.cli.output import Output
 from dsl_core.errors import StoreError
 from dsl_core.io import MANIFEST_NAME
+from dsl_core.io.staging import check_targets
 
 if TYPE_CHECKING:
     from dsl_core.capture.runner import Status
@@ -68,6 +69,7 @@ def plan(
     from dsl_core.io.plan_file import save_plan
     from dsl_core.pipeline import fit_plan
 
+    check_targets([target], overwrite=force)
     output, choice = Output(json), PlanChoice(None, code, lines, comb, setting, sentinels).build()
     with open_rig(rig, parse_options(option)) as devices:
         made = fit_plan(choice, devices)

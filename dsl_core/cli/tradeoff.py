@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -11,6 +12,7 @@ import typer
 from dsl_core.cli.options import CalibrationName, Force, Json, RigName, RigOptions, parse_options
 from dsl_core.cli.output import Output
 from dsl_core.errors import CalibrationError, PlanError
+from dsl_core.io.staging import check_targets
 
 if TYPE_CHECKING:
     from dsl_core.devices.base import DeviceRig
@@ -43,6 +45,9 @@ def tradeoff(
     from dsl_core.planning.choice import choose, pareto, possible_plans, weigh
 
     output, budget_s = Output(json), None if budget is None else parse_seconds(budget)
+    if error is not None and not 0 < error < math.inf:
+        raise PlanError(f"--error must be a number above 0, such as 0.01, not {error:g}.")
+    check_targets([path for path in (plan, report) if path is not None], overwrite=force)
     with open_rig(rig, parse_options(option)) as devices:
         known = _calibration(devices, calibration)
         latency_ms, plans = devices.projector.info.latency_ms, possible_plans(devices, known)
@@ -73,7 +78,10 @@ def design(
     option: RigOptions = [],  # noqa: B006
     calibration: CalibrationName = None,
     orders: Annotated[
-        int, typer.Option("--orders", help="Orderings of the best lines to try; more take longer.", min=1)
+        int,
+        typer.Option(
+            "--orders", help="Orderings of the best lines to try; more take longer.", min=1, max=10_000
+        ),
     ] = 24,
     plan: Annotated[
         Path | None, typer.Option("--plan", help="Also write a plan with these patterns.")
@@ -90,6 +98,7 @@ def design(
     from dsl_core.planning.designed import DesignedSet, packed, save_design
 
     output = Output(json)
+    check_targets([path for path in (target, plan) if path is not None], overwrite=force)
     with open_rig(rig, parse_options(option)) as devices:
         known = _calibration(devices, calibration)
         base = CapturePlan(name=f"designed {frames}", code=GrayCode(rows=False), sentinels=Sentinels())

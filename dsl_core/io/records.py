@@ -75,5 +75,22 @@ def _problems(failure: ValidationError, most: int) -> str:
         return f"the file is not JSON ({found[0]['ctx']['error']}); it may be cut off"
     if not found[0]["loc"] and found[0]["type"] == "model_type":
         return "the file does not contain a JSON object"
+    kind = _looks_like({str(item["loc"][0]) for item in found if item["type"] == "extra_forbidden"})
+    if kind:
+        return f"it contains {kind}"
     more = f"; and {len(found) - most} more" if len(found) > most else ""
     return problems_in_words(failure, most) + more
+
+
+#: Fields that tell what else a file may be.
+_KINDS = {
+    "a calibrated rig": {"camera", "film"},
+    "a capture plan": {"code", "spectral"},
+    "a set of patterns": {"comb_error", "levels"},
+    "a rig profile": {"camera", "projector"},
+}
+
+
+def _looks_like(foreign: set[str]) -> str:
+    """What a file is whose fields a record does not know; empty where that is not known either."""
+    return next((kind for kind, fields in _KINDS.items() if fields <= foreign), "")

@@ -14,7 +14,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
-from dsl_core.errors import StoreError
+from dsl_core.errors import StoreError, TakenError
 from dsl_core.io import CAMPAIGN_NAME, MANIFEST_NAME
 from dsl_core.io.atomic import PARTIAL_SUFFIX, make_durable, store_error, sync_folder
 from dsl_core.io.scan.lock import FolderLock
@@ -100,20 +100,39 @@ def write_text(path: Path, text: str | Callable[[], str], *, overwrite: bool = F
 def check_targets(targets: Sequence[Path], *, overwrite: bool, kind: FolderKind | None = None) -> None:
     """Raise `StoreError` when a target exists and may not be replaced; asked before long work too.
 
-    A file may replace a file, a folder only one of its own ``kind`` with nothing else in it.
+    A file may replace a file, a folder only one of its own ``kind`` with nothing else in it. Nor may what
+    would hold the target be a file, or closed to this user.
     """
+    for target in targets:
+        _require_room(target)
     taken = [target for target in targets if target.exists()]
     for target in taken:
         _require_form(target, kind)
     if taken and not overwrite:
         names = ", ".join(str(target) for target in taken)
-        raise StoreError(f"{names} already exists. Choose another name, or allow it to be replaced.")
+        raise TakenError(f"{names} already exists. Choose another name, or allow it to be replaced.")
     for target in taken:
         if kind is not None and (why := kind.refusal(target)):
             raise StoreError(
                 f"{target} {why} and is not replaced: only {kind.name} may be replaced by another."
                 " Choose another name."
             )
+
+
+def _require_room(target: Path) -> None:
+    """Raise `StoreError` when the nearest folder above that exists cannot take a new entry."""
+    if target.name in ("", ".."):
+        raise StoreError(f"{str(target)!r} names no file to write. Give a name.")
+    above = next(folder for folder in target.absolute().parents if folder.exists())
+    if not above.is_dir():
+        raise StoreError(
+            f"{target} cannot be written: {above} is a file, not a folder. Choose another place."
+        )
+    if not os.access(above, os.W_OK | os.X_OK):
+        raise StoreError(
+            f"{target} cannot be written: the folder {above} is closed to you. Choose another place, or change"
+            " its permissions."
+        )
 
 
 def _require_form(target: Path, kind: FolderKind | None) -> None:

@@ -24,6 +24,10 @@ class WavelengthGrid(Record):
 
     @model_validator(mode="after")
     def _check(self) -> Self:
+        if self.stop_nm <= self.start_nm:
+            raise ValueError(
+                f"the last band, {self.stop_nm:g} nm, must be above the first, {self.start_nm:g} nm"
+            )
         if self.start_nm < LIGHT_NM[0] or self.stop_nm > LIGHT_NM[1]:
             raise ValueError(
                 f"bands from {self.start_nm:g} to {self.stop_nm:g} nm reach beyond the {LIGHT_NM[0]:g} to"

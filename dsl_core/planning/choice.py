@@ -81,7 +81,7 @@ def choose(weighed: Sequence[Weighed], budget_s: float | None = None, error: flo
         raise PlanError(
             f"No plan takes at most {budget_s:g} s on this rig. Allow more time, or lower its latency."
         )
-    best = min(able, key=lambda each: each.expected.pixel_rmse)
+    best = min(able, key=lambda each: (each.expected.pixel_rmse, each.expected.seconds))
     if error is None:
         return best
     good = [each for each in able if each.expected.pixel_rmse <= error]
@@ -90,7 +90,7 @@ def choose(weighed: Sequence[Weighed], budget_s: float | None = None, error: flo
             f"No plan is expected to reach a reflectance error of {error:g}; the best,"
             f" {best.plan.name!r}, reaches {best.expected.pixel_rmse:.4f} in {best.expected.seconds:.0f} s."
         )
-    return min(good, key=lambda each: each.expected.seconds)
+    return min(good, key=lambda each: (each.expected.seconds, each.expected.pixel_rmse))
 
 
 def candidate_plans(rig: Rig) -> Iterator[CapturePlan]:

@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dsl_core.errors import StoreError
+from dsl_core.io.kinds import what_is_at
 from dsl_core.io.reading import read_json
 from dsl_core.io.result.inventory import CHECKSUM, INVENTORY, check_inventory, with_inventory
 from dsl_core.io.staging import FolderKind, staged
@@ -96,7 +97,7 @@ def load_result(path: Path, *, lazy: bool = True) -> xr.Dataset:
 
     from dsl_core.io.result.stored_arrays import FAILURES, stored_variables
 
-    stored = _read_attributes(path)
+    stored = read_attributes(path)
     if not check_inventory(path, stored):
         _log.warning("%s was written without checksums: damage to it would not be noticed.", path)
 
@@ -122,7 +123,7 @@ def load_result(path: Path, *, lazy: bool = True) -> xr.Dataset:
 
 def has_checksums(path: Path) -> bool:
     """Whether damage to a result is noticed; False for those of earlier versions."""
-    return INVENTORY in _read_attributes(path)
+    return INVENTORY in read_attributes(path)
 
 
 def _node(path: Path) -> dict[str, Any]:
@@ -148,10 +149,10 @@ def _is_of_result(entry: Path) -> bool:
 RESULT_FOLDER = FolderKind("a result", _is_result, _is_of_result)
 
 
-def _read_attributes(path: Path) -> dict[str, Any]:
+def read_attributes(path: Path) -> dict[str, Any]:
     """The attributes of a folder, after checking that it is a result that can be read."""
     if not (path / "zarr.json").is_file():
-        raise StoreError(f"{path} is not a result: a folder with a file zarr.json is needed.")
+        raise StoreError(f"{path} is not a result: {what_is_at(path)}. Give the folder of one (NAME.zarr).")
     try:
         attributes: dict[str, Any] = read_json(path / "zarr.json")["attributes"]
         version, labels = attributes.get("schema_version"), attributes.get("labels", {})

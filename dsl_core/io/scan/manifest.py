@@ -14,6 +14,7 @@ from dsl_core.devices.base import CameraInfo, DeviceRig, ProjectorInfo
 from dsl_core.devices.conditions import conditions_of
 from dsl_core.errors import StoreError
 from dsl_core.io import MANIFEST_NAME
+from dsl_core.io.kinds import what_is_at
 from dsl_core.io.records import read_record
 from dsl_core.model.base import Record
 from dsl_core.model.conditions import differences as setting_differences
@@ -60,7 +61,7 @@ def read_manifest(folder: Path) -> Manifest:
     """Load the manifest of a scan folder; raises `StoreError`."""
     if not (folder / MANIFEST_NAME).exists():
         raise StoreError(
-            f"{folder} is not a scan: it has no {MANIFEST_NAME}. Give the folder of a scan (NAME.dsl)."
+            f"{folder} is not a scan: {what_is_at(folder)}. Give the folder of a scan (NAME.dsl)."
         )
     return read_record(folder / MANIFEST_NAME, Manifest, "Restore it from a copy.")
 
