@@ -1,8 +1,8 @@
 # %% [markdown]
 # # A first scan
 #
-# The digital twin of the published rig stands for a camera, a projector and a film. This scan is small, so that it ends in
-# seconds; a real one differs by the name of the rig alone.
+# The digital twin of the published rig stands for a camera, a projector and a film. This scan is small, so
+# that it ends in seconds; a real one differs by the name of the rig alone.
 
 # %%
 import dsl_core as dsl
@@ -13,7 +13,8 @@ with dsl.open_rig("twin", size="112x72", scene="color-checker") as rig:
 print(f"{plan.shot_count} frames are in {scan.folder}")
 
 # %% [markdown]
-# Frames become a result: depth, points, normals, and a reflectance spectrum with a deviation for every pixel.
+# Frames become a result: depth, points, normals, and a reflectance spectrum with a deviation for every
+# pixel.
 
 # %%
 result = dsl.reconstruct(scan)

@@ -1,8 +1,8 @@
 # %% [markdown]
 # # What accuracy costs
 #
-# The same object with three plans: what more frames buy. On a real rig the minutes are those of exposures and of the
-# projector; the twin renders in seconds.
+# The same object with three plans: what more frames buy. On a real rig the minutes are those of exposures
+# and of the projector; the twin renders in seconds.
 
 # %%
 import dsl_core as dsl
@@ -21,8 +21,8 @@ for preset, frames, seconds, deviation in found:
     print(f"{preset:8s} {frames:4d} frames, {seconds:5.1f} s on a rig, deviation of a pixel {deviation:.4f}")
 
 # %% [markdown]
-# Saved results open again in a later session, and a script that was stopped goes on where it was: a finished scan is not
-# captured again.
+# Saved results open again in a later session, and a script that was stopped goes on where it was: a
+# finished scan is not captured again.
 
 # %%
 again = dsl.load_result("quick.zarr")

@@ -1,7 +1,8 @@
 # %% [markdown]
 # # Read spectra
 #
-# A finished scan comes with the program. Its spectra have a deviation per band, and pixels that are limited say why.
+# A finished scan comes with the program. Its spectra have a deviation per band, and pixels that are
+# limited say why.
 
 # %%
 import dsl_core as dsl
@@ -18,9 +19,8 @@ for nm in (450, 550, 650):
 
 # %%
 patch = result.dsl.region((92, 92, 16, 16))
-print(
-    f"mean of {patch.attrs['used']} pixels at 550 nm: {float(patch['reflectance'].sel(wavelength_nm=550)):.3f}"
-)
+middle = float(patch["reflectance"].sel(wavelength_nm=550))
+print(f"mean of {patch.attrs['used']} pixels at 550 nm: {middle:.3f}")
 
 # %% [markdown]
 # Where is a spectrum like this one? The spectral angle compares shapes, whatever the brightness.

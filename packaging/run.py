@@ -3,8 +3,11 @@
 
 python3 packaging/run.py demo [...]       a scan on the digital twin, from patterns to a report
 python3 packaging/run.py test [...]       all checks and tests; the rest goes to pytest (-n 0: one process)
+python3 packaging/run.py test quick       what breaks most often, in a minute and a half
 python3 packaging/run.py dsl-scan [...]   the command line of the project
 python3 packaging/run.py shell            a shell inside the environment
+python3 packaging/run.py site             the site of the documentation, in build/site/html
+python3 packaging/run.py bundle           the program with all it needs in build/bundle, and a Debian package
 python3 packaging/run.py lock             write packaging/constraints.txt again (for maintainers)
 """
 
@@ -31,7 +34,7 @@ if not (3, 11) <= sys.version_info[:2] <= (3, 14):  # a newer one lacks wheels o
 ROOT = Path(__file__).resolve().parent.parent
 CONSTRAINTS = ROOT / "packaging" / "constraints.txt"
 STAMP = "dsl-scan-setup.json"
-COMMANDS = ("demo", "test", "dsl-scan", "shell", "lock")
+COMMANDS = ("demo", "test", "dsl-scan", "shell", "site", "bundle", "lock")
 
 # Shared library or program -> Debian package. Qt and VTK load these at run time; their wheels lack them.
 LIBRARIES = {
@@ -58,6 +61,21 @@ CHECKS = (
 #: Tests of a file share what they prepare and stay together. More processes would cost too much memory.
 #: Files go out in the order of their names: by their numbers of tests, the longest would come last and alone.
 SHARED = ("-n", "logical", "--maxprocesses", "4", "--dist", "loadfile", "--no-loadscope-reorder")
+
+
+#: Tests that are quick and reach far, for a look between two changes; mypy keeps what it found.
+QUICK = (
+    *(
+        "tests/architecture/test_dependencies.py",
+        "tests/architecture/test_imports.py",
+        "tests/api",
+        "tests/install",
+    ),
+    *("tests/io", "tests/model", "tests/optics", "tests/packaging_script", "tests/patterns", "tests/solve"),
+)
+#: Seconds on two cores, said before a computer's own first run is known.
+USUAL_S = {"test": 700, "test quick": 90}
+TIMES = "dsl-scan-times.json"
 
 
 class SetupError(Exception):
@@ -273,13 +291,32 @@ def run(command: Sequence[str], variables: dict[str, str], folder: Path | None =
             return (code if code >= 0 else 128 - code), interrupted
 
 
+def expected_s(venv: Path, what: str) -> float:
+    """How long tests took here the last time, or usually take on two cores."""
+    try:
+        return float(json.loads((venv / TIMES).read_text())[what])
+    except (OSError, ValueError, KeyError, TypeError):
+        return USUAL_S[what]
+
+
+def remember_s(venv: Path, what: str, seconds: float) -> None:
+    """Keep how long tests took, for `expected_s`; a folder that cannot be written is no reason to fail."""
+    with contextlib.suppress(OSError):
+        times = {name: expected_s(venv, name) for name in USUAL_S} | {what: round(seconds)}
+        (venv / TIMES).write_text(json.dumps(times))
+
+
 def test(venv: Path, arguments: Sequence[str]) -> int:
     """Run every check and the tests; the first exit code that is not zero is the answer."""
     # Tests start many processes. What they import is compiled once, and kept with the environment.
     variables = venv_variables(venv) | {"PYTHONPYCACHEPREFIX": str(venv / "bytecode")}
     variables.pop("PYTHONDONTWRITEBYTECODE", None)
+    what = "test quick" if arguments[:1] == ["quick"] else "test"
+    chosen = [*QUICK, *arguments[1:]] if what == "test quick" else list(arguments)
+    if not arguments or what == "test quick":
+        say(f"{what} takes about {max(1, round(expected_s(venv, what) / 60))} min on this computer")
     results: list[tuple[str, int, float]] = []
-    for name, (program, *options) in (*CHECKS, ("pytest", ("pytest", *SHARED, *arguments))):
+    for name, (program, *options) in (*CHECKS, ("pytest", ("pytest", *SHARED, *chosen))):
         start = time.monotonic()
         say(f"{name} ...")
         code, interrupted = run([str(venv_program(venv, program)), *options], variables, ROOT)
@@ -288,7 +325,28 @@ def test(venv: Path, arguments: Sequence[str]) -> int:
             return 130
     for name, code, seconds in results:
         say(f"{name:17s} {'passed' if code == 0 else f'FAILED ({code})':11s} {seconds:6.1f} s")
-    return next((code for _, code, _ in results if code != 0), 0)
+    worst = next((code for _, code, _ in results if code != 0), 0)
+    if worst == 0 and (not arguments or what == "test quick"):
+        remember_s(venv, what, sum(seconds for _, _, seconds in results))
+    return worst
+
+
+def install_group(venv: Path, group: str) -> None:
+    """Install the tools of a dependency group, pinned; raises `SetupError`."""
+    python = str(venv_program(venv, "python"))
+    command = [python, "-m", "uv", "pip", "install", "--quiet", "--python", python, "--group", group]
+    command += ["--constraint", str(CONSTRAINTS)]
+    with timed(f"Installing what {group} needs"):
+        done = subprocess.run(command, cwd=ROOT, check=False)
+    if done.returncode != 0:
+        raise SetupError("That failed; the lines above say why. It needs a network.")
+
+
+def build(venv: Path, what: str, arguments: Sequence[str]) -> int:
+    """Make the site or the bundle with the script of that name."""
+    install_group(venv, what)
+    script = ROOT / "packaging" / what / "make.py"
+    return run([str(venv_program(venv, "python")), str(script), *arguments], venv_variables(venv), ROOT)[0]
 
 
 def lock(venv: Path) -> int:
@@ -296,7 +354,18 @@ def lock(venv: Path) -> int:
     command = [str(venv_program(venv, "python")), "-m", "uv", "pip", "compile", "--universal", "--upgrade"]
     command += ["--fork-strategy", "fewest", "--python-version", "3.11", "--no-annotate", "--quiet"]
     command += ["--custom-compile-command", "python3 packaging/run.py lock"]
-    command += ["--all-extras", "--group", "lock", "--output-file", str(CONSTRAINTS), "pyproject.toml"]
+    command += [
+        "--all-extras",
+        "--group",
+        "lock",
+        "--group",
+        "site",
+        "--group",
+        "bundle",
+        "--output-file",
+        str(CONSTRAINTS),
+        "pyproject.toml",
+    ]
     hidden = ("UV_FIND_LINKS", "PIP_FIND_LINKS")  # local builds must not get into the file
     variables = {key: value for key, value in os.environ.items() if key not in hidden}
     return run(command, variables, ROOT)[0]
@@ -320,6 +389,8 @@ def dispatch(command: str, venv: Path, arguments: Sequence[str]) -> int:
     """Run the requested command inside the environment."""
     if command == "test":
         return test(venv, arguments)
+    if command in ("site", "bundle"):
+        return build(venv, command, arguments)
     if command == "lock":
         return lock(venv)
     if command == "shell":

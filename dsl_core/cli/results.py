@@ -67,8 +67,9 @@ def reconstruct(
     _require_one_of("--device", device, DEVICES)
     grid = parse_bands(bands)
     if target is None:
-        read_manifest(session)  # that it is no scan is told before that its result exists
         target = session.with_suffix(".zarr")
+        if target.exists():
+            read_manifest(session)  # that it is no scan is told before that its result exists
     check_targets([target], overwrite=force, kind=RESULT_FOLDER)
     rig = load_calibration(calibration) if calibration else None
     if rig is None and _tells_columns_only(session):
@@ -229,9 +230,8 @@ def _export(
     output: Output, path: Path, form: str, target: Path, pixels: list[tuple[int, int]], force: bool
 ) -> list[Path]:
     from dsl_core.io.calibration_library import load_calibration
-    from dsl_core.io.export import FORMATS as EXPORTS
     from dsl_core.io.export import export as export_result
-    from dsl_core.io.export import export_csv
+    from dsl_core.io.export import export_csv, formats
     from dsl_core.io.published.calibration import export_calibration
     from dsl_core.io.result.result_file import load_result
     from dsl_core.io.scan.folder import ScanReader
@@ -239,7 +239,7 @@ def _export(
     from dsl_core.workflows.scans import calibration_of
 
     form = form.lower()
-    known = (*EXPORTS, "dataset", "calibration")
+    known = (*sorted(formats()), "dataset", "calibration")
     if form not in known:
         raise PlanError(f"There is no export format {form!r}. Choose one of {', '.join(known)}.")
     if form not in ("dataset", "calibration"):

@@ -46,6 +46,7 @@ _PLAIN = {
     r"Invalid value for '(\S+)': Input should be greater than or equal to (\S+)": r"\1 must be at least \2",
     r"Invalid value for '(\S+)': Input should be less than or equal to (\S+)": r"\1 must be at most \2",
     r"Invalid value for '(\S+)': Input should be": r"\1 must be",
+    r"Invalid value for '(\S+)': Value error, (.*) is not one of (.*)": r"\1 must be one of \3, not \2",
 }
 
 app = typer.Typer(
@@ -171,6 +172,8 @@ def _usage(error: BaseException) -> str:
 
 
 def _of_system(error: OSError) -> str:
+    if isinstance(error, FileExistsError | NotADirectoryError) and error.filename:
+        return f"{error.filename} cannot be made: a file is where a folder is needed. Choose another place."
     where = f"{error.filename}: " if error.filename else ""
     reason = error.strerror or str(error) or type(error).__name__
     return f"{where}{reason}. Check the path, its permissions and the space on its drive."

@@ -130,8 +130,8 @@ def _require_room(target: Path) -> None:
         )
     if not os.access(above, os.W_OK | os.X_OK):
         raise StoreError(
-            f"{target} cannot be written: the folder {above} is closed to you. Choose another place, or change"
-            " its permissions."
+            f"{target} cannot be written: the folder {above} is closed to you. Choose another place, or"
+            " change its permissions."
         )
 
 

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dsl_core.io.export import FORMATS, export_csv
+from dsl_core.io.export import export_csv, formats
 from dsl_core.io.result.result_file import load_result, save_result
 from dsl_core.model.result import Reach, build_result
 
@@ -41,13 +41,13 @@ def main() -> None:
         timed("read all", lambda: opened(load_result(path, lazy=False)))
         worst = float(np.nanmax(np.abs(loaded["reflectance"].values - result["reflectance"].values)))
         print(f"{'largest change of reflectance':30s} {worst:.1e}")
-        for name, exporter in FORMATS.items():
+        for name, form in formats().items():
             target = folder / f"out{'.hdr' if name == 'envi' else '.' + name}"
             if name == "csv":
                 pixels = [(x, 200) for x in range(100)]
                 timed("csv, 100 pixels", lambda t=target, p=pixels: export_csv(result, t, pixels=p))  # type: ignore[misc]
             else:
-                timed(name, lambda t=target, e=exporter: e(result, t, overwrite=True))  # type: ignore[misc]
+                timed(name, lambda t=target, e=form.write: e(result, t, overwrite=True))  # type: ignore[misc]
 
 
 def opened(_: object) -> list[Path]:

@@ -77,6 +77,7 @@ WRONG: dict[str, dict[str, str]] = {
     "setting": {"no level": "100", "too bright": "100@2", "not a number": "nan@0.5", "too long": "99999@0.5"},
     "pictures": {"absent": "absent", "no pictures": "folder", "another kind": "text.txt"},
     "name": {"absent": "nobody", "a path": "../nobody", "an empty text": ""},
+    "library name": {"a path": "../nobody", "an empty text": ""},
     "new name": {"two words": "My Lab", "taken": "twin", "an empty text": ""},
     "step setting": {"without a value": "scene", "unknown": "speed=5"},
 }
@@ -91,14 +92,16 @@ class Command:
     options: dict[str, tuple[str, str]] = field(default_factory=dict)
     #: Arguments that go with the wrong option, where it needs company.
     also: tuple[str, ...] = ()
+    #: Arguments without which the command would mean something else.
+    always: tuple[str, ...] = ()
 
     def mistakes(self) -> Iterator[tuple[str, list[str]]]:
         """Each kind of mistake and the command line with it."""
-        words = self.name.split()
+        words = [*self.name.split(), *self.always]
         right = [value for _, value in self.arguments]
         yield "an unknown option", [*words, *right, "--unheard-of"]
         yield "one argument too many", [*words, *right, "one-more", "and-another"]
-        if self.arguments and self.name not in ("selftest", "gui"):
+        if self.arguments and self.name != "rigs doctor":
             yield "an argument too few", [*words, *right[:-1]]
         for place, (kind, _) in enumerate(self.arguments):
             for mistake, wrong in WRONG[kind].items():
@@ -180,11 +183,13 @@ COMMANDS = (
         "calibrate geometry",
         (("pictures", "folder"),),
         {"--board": ("size", "11x7"), "--square-mm": ("number", "20"), "--projector": ("size", "640x360")},
-        ("--pictures",),
+        always=("--pictures",),
     ),
     Command("calibrate spectralon", (("new folder", "campaign"),), {"--rig": ("rig", "twin")}, ("--yes",)),
     Command(
-        "calibrate all", (("new folder", "campaign"),), {"--rig": ("rig", "twin"), "--name": ("name", "a")}
+        "calibrate all",
+        (("new folder", "campaign"),),
+        {"--rig": ("rig", "twin"), "--name": ("library name", "a")},
     ),
     Command("calibrations show", (("name", "lab"),)),
     Command("calibrations check", (("name", "lab"),)),

@@ -9,11 +9,11 @@ from pathlib import Path
 
 from dsl_core.io import CAMPAIGN_NAME, MANIFEST_NAME, PUBLISHED_PLACES, PUBLISHED_STARTS
 from dsl_core.io.reading import read_json
-from dsl_core.io.spectra.catalogue import SUFFIXES
+from dsl_core.io.spectra.catalogue import suffixes
 
 RESULT_NAME = "zarr.json"
 #: Endings of files that may hold a reference spectrum.
-REFERENCE_SUFFIXES = SUFFIXES
+REFERENCE_SUFFIXES = suffixes()
 _MARKS = ".marks.json"
 _OPENS = (
     "dsl-scan opens scans (folders NAME.dsl), results (folders NAME.zarr), plans and pattern sets (.json),"

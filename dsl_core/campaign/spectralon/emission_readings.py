@@ -10,7 +10,7 @@ from dsl_core.campaign.common.recipe import Bench, Step
 from dsl_core.devices.base import DeviceRig
 from dsl_core.devices.plausible import require_light
 from dsl_core.errors import CalibrationError
-from dsl_core.io.spectra.catalogue import SUFFIXES
+from dsl_core.io.spectra.catalogue import suffixes
 from dsl_core.io.spectra.spectrum_file import read_radiances
 from dsl_core.model.calibration.spectralon import COLOURS, EmissionReadings, LightColour
 from dsl_core.model.spectral import SpectralCurve
@@ -84,13 +84,13 @@ def _from_files(folder: Path) -> dict[LightColour, tuple[SpectralCurve, ...]]:
     """Spectra of all files whose names begin with a colour."""
     if not folder.is_dir():
         raise CalibrationError(f"The folder of spectra {folder} does not exist. Correct emission_folder.")
-    paths = sorted(path for path in folder.iterdir() if path.suffix.lower() in SUFFIXES)
+    paths = sorted(path for path in folder.iterdir() if path.suffix.lower() in suffixes())
     named = {c: [path for path in paths if path.name.lower().startswith(c)] for c in COLOURS}
     missing = [colour for colour, found in named.items() if not found]
     if missing:
         raise CalibrationError(
             f"{folder} has no spectrum of {', '.join(missing)}. Name the files red*, green*, blue*, white*"
-            f" and black*, with one of {', '.join(SUFFIXES)} at the end."
+            f" and black*, with one of {', '.join(suffixes())} at the end."
         )
     return {
         colour: tuple(curve for path in found for curve in read_radiances(path))

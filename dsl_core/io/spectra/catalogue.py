@@ -1,10 +1,15 @@
-"""All formats of spectra, recognised by content: a new one is a file in ``formats/`` and a line here."""
+"""All formats of spectra, recognised by content: a new one is a file in ``formats/`` and a line here.
+
+Packages add some by the entry-point group ``dsl_scan.spectra``, whose values are `Format`.
+"""
 
 from __future__ import annotations
 
+from functools import cache
 from pathlib import Path
 
 from dsl_core.errors import CalibrationError
+from dsl_core.io.plugins import load_plugins
 from dsl_core.io.reading import require_plain
 from dsl_core.io.spectra.formats import (
     asd,
@@ -22,7 +27,7 @@ from dsl_core.io.spectra.formats import (
 )
 from dsl_core.io.spectra.records import HEAD_BYTES, Format, Spectrum
 
-#: In the order in which they are tried; the last takes any text.
+#: Those of this package in the order in which they are tried; the last takes any text.
 FORMATS: tuple[Format, ...] = (
     envi.FORMAT,
     asd.FORMAT,
@@ -37,8 +42,18 @@ FORMATS: tuple[Format, ...] = (
     konica_minolta.FORMAT,
     columns.FORMAT,
 )
-#: Endings of files that can contain spectra, each once, for a list of files.
-SUFFIXES: tuple[str, ...] = tuple(dict.fromkeys(s for each in reversed(FORMATS) for s in each.suffixes))
+GROUP = "dsl_scan.spectra"
+
+
+@cache
+def formats() -> tuple[Format, ...]:
+    """All formats in the order in which they are tried: those of other packages before that for any text."""
+    return (*FORMATS[:-1], *load_plugins(GROUP, Format), FORMATS[-1])
+
+
+def suffixes() -> tuple[str, ...]:
+    """Endings of files that can contain spectra, each once, for a list of files."""
+    return tuple(dict.fromkeys(s for each in reversed(formats()) for s in each.suffixes))
 
 
 def format_of(path: Path) -> Format:
@@ -51,10 +66,10 @@ def format_of(path: Path) -> Format:
         raise CalibrationError(
             f"The spectrum {path} cannot be read ({error.strerror or error}). Correct its path."
         ) from error
-    for each in FORMATS:
+    for each in formats():
         if each.recognises(path, head):
             return each
-    names = ", ".join(each.name for each in FORMATS if each.suffixes)
+    names = ", ".join(each.name for each in formats() if each.suffixes)
     raise CalibrationError(
         f"{path.name} is in no format of spectra that is read here ({names}). Export the spectrum as CSV."
     )

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from dsl_core.errors import Cancelled, StoreError
-from dsl_core.io.export import FORMATS, export, export_csv, export_png
+from dsl_core.io.export import Format, export, export_by_ending, export_csv, export_png, formats
 from dsl_core.io.export.common import provenance_of
 from dsl_core.io.export.envi import export_envi
 from dsl_core.io.export.exr import export_exr, linear_from_srgb
@@ -21,7 +21,8 @@ from dsl_core.io.export.png import GREY, flags_picture
 from dsl_core.model.fit import ATTRIBUTE, Fit, FitFinding
 from dsl_core.model.result import FLAG_COLOURS, Flag, reasons
 from dsl_core.optics.relighting import relight
-from dsl_core.solve.many import never
+from dsl_core.solve.many import Check, never
+from tests.cases.plugins import added_by_a_package
 from tests.cases.small_result import COLUMNS, ROWS, UNLIT, UNSURE, WARNED, WAVELENGTHS_NM, small_result
 
 SUFFIX = {
@@ -319,9 +320,9 @@ def test_pictures_of_nothing_and_of_the_middle_band(tmp_path: Path) -> None:
         export_png(result[["shading"]], tmp_path / "other.png")
 
 
-@pytest.mark.parametrize("name", sorted(FORMATS))
+@pytest.mark.parametrize("name", sorted(formats()))
 def test_every_format_refuses_to_replace_unless_allowed(tmp_path: Path, name: str) -> None:
-    exporter = FORMATS[name]
+    exporter = formats()[name].write
     if name == "csv":
         exporter = lambda result, path, *, overwrite=False, check=never: export_csv(  # noqa: E731
             result, path, overwrite=overwrite, pixels=[(0, 0)], check=check
@@ -339,13 +340,13 @@ def test_every_format_refuses_to_replace_unless_allowed(tmp_path: Path, name: st
     assert files[-1].read_bytes() != b"mine"
 
 
-@pytest.mark.parametrize("name", sorted(FORMATS))
+@pytest.mark.parametrize("name", sorted(formats()))
 def test_every_format_refuses_wrong_endings_and_places(tmp_path: Path, name: str) -> None:
     with pytest.raises(StoreError, match="does not end in"):
         export(small_result(), tmp_path / "x.doc", name)
     (tmp_path / "file").write_text("x")
     if name != "csv":
-        with pytest.raises(StoreError, match="could not be written"):
+        with pytest.raises(StoreError, match="is a file, not a folder"):
             export(small_result(), tmp_path / "file" / f"x{SUFFIX[name]}", name)
 
 
@@ -355,12 +356,36 @@ def test_every_format_says_what_the_result_lacks(tmp_path: Path, name: str) -> N
         export(small_result()[["shading"]], tmp_path / f"x{SUFFIX[name]}", name)
 
 
+def test_a_package_adds_a_format_and_replaces_none(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    def write(result: object, path: Path, *, overwrite: bool = False, check: Check = never) -> list[Path]:
+        path.write_text("points")
+        return [path]
+
+    offered = [
+        added_by_a_package(
+            "dsl_scan.exporters", Format("las", ".las", "LAS – points", write, endings=(".laz",))
+        ),
+        added_by_a_package("dsl_scan.exporters", Format("ply", ".ply", "another PLY", write)),
+        added_by_a_package("dsl_scan.exporters", ImportError("no such library")),
+    ]
+    with monkeypatch.context() as patch:
+        patch.setattr("dsl_core.io.plugins.entry_points", lambda group: offered)
+        formats.cache_clear()
+        assert export_by_ending(small_result(), tmp_path / "a.laz") == [tmp_path / "a.laz"]
+        assert formats()["ply"].about != "another PLY"
+    formats.cache_clear()
+    assert "las" not in formats()
+    assert "a package offers mine, which cannot be loaded" in caplog.text
+
+
 def test_an_unknown_format(tmp_path: Path) -> None:
     with pytest.raises(StoreError, match="csv, envi, exr, glb, mesh, npy, obj, ply, png, stl, tiff"):
         export(small_result(), tmp_path / "x.las", "las")
 
 
-@pytest.mark.parametrize("name", sorted(set(FORMATS) - {"csv"}))
+@pytest.mark.parametrize("name", sorted(set(formats()) - {"csv"}))
 def test_who_stops_an_export_finds_nothing_half_written(tmp_path: Path, name: str) -> None:
     asked, least = list[None](), 0
 

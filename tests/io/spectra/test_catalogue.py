@@ -8,10 +8,12 @@ import numpy as np
 import pytest
 
 from dsl_core.errors import CalibrationError
-from dsl_core.io.spectra.catalogue import FORMATS, SUFFIXES, format_of, read_spectra
+from dsl_core.io.spectra.catalogue import FORMATS, format_of, formats, read_spectra, suffixes
+from dsl_core.io.spectra.records import Format
 from dsl_core.io.spectra.reference_file import read_reference, read_references
 from dsl_core.io.spectra.spectrum_file import read_radiances, read_spectrum
 from tests.cases import spectra_files as made
+from tests.cases.plugins import added_by_a_package
 from tests.cases.spectra_files import NM, SHARE, SPECTRA_FILES, write
 
 COVERS = 401.0, 699.0
@@ -32,9 +34,22 @@ def test_a_format_is_recognised_whatever_its_ending(tmp_path: Path, name: str, f
 
 
 def test_endings_and_names_are_listed_once() -> None:
-    assert len(set(SUFFIXES)) == len(SUFFIXES)
-    assert {".asd", ".sig", ".sed", ".jdx", ".cgats", ".sp", ".sli", ".csv", ".txt"} <= set(SUFFIXES)
+    assert len(set(suffixes())) == len(suffixes())
+    assert {".asd", ".sig", ".sed", ".jdx", ".cgats", ".sp", ".sli", ".csv", ".txt"} <= set(suffixes())
     assert len({each.name for each in FORMATS}) == len(FORMATS)
+
+
+def test_a_package_adds_a_format_by_one_entry_point(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    mine = Format("Mine", (".mine",), lambda path, head: head.startswith(b"mine"), lambda path: [])
+    offered = [added_by_a_package("dsl_scan.spectra", mine), added_by_a_package("dsl_scan.spectra", "text")]
+    with monkeypatch.context() as patch:
+        patch.setattr("dsl_core.io.plugins.entry_points", lambda group: offered)
+        formats.cache_clear()
+        assert format_of(write(tmp_path / "a.txt", b"mine, 1, 2")) is mine
+        assert ".mine" in suffixes()
+        assert formats()[-1] is FORMATS[-1]  # which takes any text
+    formats.cache_clear()
+    assert formats() == FORMATS
 
 
 @pytest.mark.parametrize(

@@ -3,40 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
 from dsl_app.results.state import ResultsState
 from dsl_app.shared.jobs.base import Job, JobRunner
 from dsl_app.shared.notify import Notifier
+from dsl_core.io.export.format import Exporter, Format
 from dsl_core.io.result.result_arrays import ResultArrays
 from dsl_core.progress import Progress
-
-
-@dataclass(frozen=True)
-class Format:
-    """A format of the dialog: its key, suffix and description."""
-
-    key: str
-    suffix: str
-    about: str
-    needs_spectra: bool = False
-    needs_pins: bool = False
-
-
-FORMATS = (
-    Format("ply", ".ply", "PLY – points with normals, colours, spectra and deviations"),
-    Format("glb", ".glb", "glTF – surface with its colours, in metres"),
-    Format("obj", ".obj", "OBJ – surface with its colours, in mm, in three files"),
-    Format("stl", ".stl", "STL – surface without colours, in mm"),
-    Format("envi", ".hdr", "ENVI – spectral cube and its deviation", needs_spectra=True),
-    Format("exr", ".exr", "OpenEXR – spectral image", needs_spectra=True),
-    Format("csv", ".csv", "CSV – spectra of the pins, with deviations", needs_spectra=True, needs_pins=True),
-    Format("tiff", ".tiff", "TIFF – depth in mm, with its deviation and flags in separate files"),
-    Format("npy", ".npy", "NumPy – the same as arrays"),
-    Format("png", ".png", "PNG – pictures of colour, depth, the band shown, and flags"),
-)
 
 
 class ExportController:
@@ -88,11 +63,11 @@ class ExportController:
         light, adapted = state.picture_light.value
 
         def work(progress: Progress) -> list[Path]:
-            from dsl_core.io.export import FORMATS, Exporter, export_csv, export_png
+            from dsl_core.io.export import export_csv, export_png, formats
             from dsl_core.io.result.result_file import load_result
 
             exporters: dict[str, Exporter] = {
-                **FORMATS,
+                **{form.key: form.write for form in formats().values()},
                 "csv": partial(export_csv, pixels=pixels),
                 "png": partial(export_png, band_nm=band_nm, light=light, adapted=adapted),
             }

@@ -15,7 +15,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from dsl_app.results.export.controller import FORMATS, ExportController
+from dsl_app.results.export.controller import ExportController
 from dsl_app.shared.widgets.forms import check_box, label, named, push_button, set_role
 from dsl_app.shared.widgets.help_window import add_help_key
 from dsl_app.shared.widgets.layouts import STRETCH, column_of, row_of
@@ -26,8 +26,12 @@ class ExportDialog(QDialog):
     """Asks for formats, folder and name; the controller writes."""
 
     def __init__(self, result: ResultArrays, control: ExportController, parent: QWidget) -> None:
+        # What writes files is imported when somebody wants to.
+        from dsl_core.io.export import formats
+
         super().__init__(parent)
         self._control = control
+        self._offered = [form for form in formats().values() if form.listed]
         self.setWindowTitle("Export")
         self.resize(560, 360)
         add_help_key(self, "exporting")
@@ -36,7 +40,7 @@ class ExportDialog(QDialog):
         self.name = named(QLineEdit(result.path.stem), "Name without suffix", tip)
         browse = push_button("Choose…", "Choose the folder to write to", self._browse)
         self.formats: dict[str, QCheckBox] = {}
-        for form in FORMATS:
+        for form in self._offered:
             box = self.formats[form.key] = QCheckBox(form.about)
             refusal = control.refusal(form)
             box.setEnabled(not refusal)
@@ -69,7 +73,7 @@ class ExportDialog(QDialog):
         folder, name = Path(self.folder.text()), self.name.text().strip()
         return {
             form.key: folder / f"{name}{form.suffix}"
-            for form in FORMATS
+            for form in self._offered
             if self.formats[form.key].isChecked()
         }
 

@@ -24,7 +24,7 @@ from dsl_app.results.state import Mark, ResultsState
 from dsl_app.shared.theme import DARK, Theme
 from dsl_app.shared.widgets.forms import label, named, push_button, quiet
 from dsl_app.shared.widgets.layouts import STRETCH, column_of, row_of
-from dsl_core.io.spectra.catalogue import FORMATS, SUFFIXES
+from dsl_core.io.spectra.catalogue import formats, suffixes
 
 KEY = Qt.ItemDataRole.UserRole
 EMPTY = (
@@ -37,13 +37,10 @@ def _filter(name: str, suffixes: Iterable[str]) -> str:
     return f"{name} ({' '.join(f'*{suffix}' for suffix in suffixes)})"
 
 
-_FORMATS = ";;".join(
-    [
-        _filter("Spectra", SUFFIXES),
-        *(_filter(each.name, each.suffixes) for each in FORMATS if each.suffixes),
-        "All files (*)",
-    ]
-)
+def _filters() -> str:
+    """Every format that files can be chosen by."""
+    each_one = (_filter(each.name, each.suffixes) for each in formats() if each.suffixes)
+    return ";;".join([_filter("Spectra", suffixes()), *each_one, "All files (*)"])
 
 
 class MarksPanel(QWidget):
@@ -113,7 +110,7 @@ class MarksPanel(QWidget):
 
     def choose_reference(self) -> None:
         """Ask for a file with a spectrum."""
-        name, _ = QFileDialog.getOpenFileName(self, "Add a reference spectrum", "", _FORMATS)
+        name, _ = QFileDialog.getOpenFileName(self, "Add a reference spectrum", "", _filters())
         if name:
             self._control.add_reference(Path(name))
 

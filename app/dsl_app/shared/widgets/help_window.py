@@ -32,6 +32,10 @@ ORDER = (
     "exporting",
     "scripting",
     "importing",
+    "connecting-devices",
+    "adding-a-rig",
+    "adding-a-format",
+    "files",
     "how-it-measures",
     "glossary",
 )

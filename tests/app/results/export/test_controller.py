@@ -6,10 +6,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from dsl_app.results.export.controller import FORMATS
 from dsl_app.results.layers import Layers, rgb_of
 from dsl_app.results.state import ResultView
 
+from dsl_core.io.export import formats
 from tests.app.support.results_controller import Bench
 from tests.app.support.results_controller import bench as bench
 from tests.app.support.small_result import write_small_result
@@ -71,7 +71,9 @@ def test_what_stands_in_the_way_of_an_export_is_said(
 ) -> None:
     for suffix in ("ply", "hdr"):
         (tmp_path / f"old.{suffix}").touch()
-    targets = {form.key: tmp_path / f"{name}{form.suffix}" for form in FORMATS if form.key in forms}
+    targets = {
+        form.key: tmp_path / f"{name}{form.suffix}" for form in formats().values() if form.key in forms
+    }
     found = bench.control.export.trouble(str(tmp_path), name, targets, replace)
     assert found.startswith(trouble)
     assert bool(found) == bool(trouble)
@@ -93,7 +95,7 @@ def test_formats_that_lack_spectra_or_pins_are_refused(
     bench = Bench(write_small_result(tmp_path, spectra=spectra))
     if pinned:
         bench.control.marks.pin((3, 3))
-    for form in FORMATS:
+    for form in formats().values():
         refusal = bench.control.export.refusal(form)
         assert refused.get(form.key, "") in refusal
         assert bool(refusal) == (form.key in refused)

@@ -7,8 +7,18 @@ from pathlib import Path
 from dsl_app.results.export.dialog import ExportDialog
 from pytestqt.qtbot import QtBot
 
+from dsl_core.io.export import formats
 from tests.app.support.results_bench import Bench
 from tests.app.support.results_bench import bench as bench
+
+
+def test_the_dialog_offers_every_format(bench: Bench, qtbot: QtBot) -> None:
+    result = bench.state.result.value
+    assert result is not None
+    dialog = ExportDialog(result, bench.control.export, bench.page)
+    qtbot.addWidget(dialog)
+    assert set(dialog.formats) == {key for key, form in formats().items() if form.listed}
+    assert {"ply", "glb", "envi"} <= set(dialog.formats)
 
 
 def test_the_export_dialog_warns_before_it_replaces(bench: Bench, qtbot: QtBot, tmp_path: Path) -> None:

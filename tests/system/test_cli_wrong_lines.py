@@ -1,0 +1,84 @@
+"""Every kind of mistake in every command: exit code 2, one sentence, at once, and nothing is changed."""
+
+from __future__ import annotations
+
+import io
+import re
+import shutil
+from pathlib import Path
+
+import pytest
+
+import dsl_core as dsl
+from dsl_core.cli import main
+from dsl_core.io.plan_file import save_plan
+from tests.cases.wrong_lines import COMMANDS, wrong_lines
+
+from .conftest import Ending, without_progress
+
+#: Words of libraries, and of programs that broke.
+FOREIGN = re.compile(
+    r"Traceback|This is a bug|Input should|Value error|Field required|Errno|pydantic|None\b|<class"
+)
+#: Of all lines the test gives every fifth; `tests.benchmarks.bench_wrong_lines` gives all.
+STEP = 5
+
+
+def make_desk(home: Path) -> None:
+    """Files of each kind beside a scan and its result in the present folder, for commands to mistake."""
+    save_plan(dsl.load_scan("scan.dsl").plan, home / "plan.json")
+    (home / "folder").mkdir()
+    (home / "text.txt").write_text("text\n")
+    (home / "braces.json").write_text("{}")
+    calibration = dsl.load_scan("scan.dsl").calibration
+    assert calibration is not None
+    (home / "rig.json").write_text(calibration.model_dump_json())
+
+
+def contents(home: Path) -> list[tuple[str, int]]:
+    """Every file below a folder, with its size."""
+    return sorted((str(path.relative_to(home)), path.stat().st_size) for path in home.rglob("*"))
+
+
+def faults_of(ending: Ending) -> str:
+    """What is wrong with the answer to a wrong command line; empty where nothing is."""
+    lines = without_progress(ending.err).strip().splitlines()
+    faults = [
+        f"code {ending.code}" if ending.code != 2 else "",
+        f"{len(lines)} lines" if len(lines) != 1 else "",
+        "words of a library" if FOREIGN.search(ending.err) else "",
+    ]
+    return ", ".join(fault for fault in faults if fault)
+
+
+def test_there_are_enough_of_them() -> None:
+    lines = wrong_lines()
+    assert len(lines) > 250
+    for command in COMMANDS:
+        assert len(list(command.mistakes())) >= 5, command.name
+    assert len({tuple(line) for _, line in lines}) > 250
+
+
+def test_each_is_answered_in_one_sentence_before_any_work(
+    finished: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    for name in ("DISPLAY", "WAYLAND_DISPLAY", "QT_QPA_PLATFORM"):
+        monkeypatch.delenv(name, raising=False)
+    monkeypatch.setenv("XDG_DATA_HOME", str(tmp_path / "data"))
+    monkeypatch.chdir(tmp_path)
+    for name in ("scan.dsl", "scan.zarr"):
+        shutil.copytree(finished / name, tmp_path / name)
+    make_desk(tmp_path)
+    before, wrong = contents(tmp_path), []
+    for name, line in wrong_lines()[::STEP]:
+        monkeypatch.setattr("sys.stdin", io.StringIO())
+        capsys.readouterr()
+        code = main(line)
+        said = capsys.readouterr()
+        faults = faults_of(Ending(code, said.out, said.err))
+        if contents(tmp_path) != before:
+            faults += ", changed files"
+            before = contents(tmp_path)
+        if faults:
+            wrong.append(f"{name}: {faults}: {said.err[-300:]}")
+    assert wrong == []
