@@ -7,7 +7,7 @@
 # %%
 import dsl_core as dsl
 
-with dsl.open_rig("twin", size="112x72", scene="color-checker") as rig:
+with dsl.open_rig("twin", size="64x48", scene="color-checker") as rig:
     plan = dsl.plan(rig, "quick")
     scan = dsl.scan(rig, "first.dsl", plan)
 print(f"{plan.shot_count} frames are in {scan.folder}")
@@ -28,7 +28,7 @@ print(f"{float(result.dsl.good.mean()):.0%} of the pixels are without any flag")
 import matplotlib.pyplot as plt
 
 figure, (left, right) = plt.subplots(1, 2, figsize=(9, 3))
-result.dsl.plot(x=50, y=30, ax=left)
+result.dsl.plot(x=32, y=20, ax=left)
 result["depth_mm"].plot.imshow(ax=right, yincrease=False, cmap="viridis")
 figure.savefig("first.png")
 

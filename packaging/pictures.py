@@ -1,7 +1,7 @@
-"""Make the pictures of the README from the scans that come with the program: ``python packaging/pictures.py``.
+"""Make the pictures of the README from the scans of the program: ``python packaging/pictures.py``.
 
-Needs the environment of the tests and Xvfb. ``resources/pictures`` gets the window with spectra, a point cloud
-and spectra with their bands. Run it again when the window has changed.
+Needs the environment of the tests and Xvfb. ``resources/pictures`` gets the window with spectra, a cloud, and
+spectra with their bands. Run it again when the window has changed.
 """
 
 from __future__ import annotations
@@ -19,8 +19,8 @@ EXAMPLES = ROOT / "resources" / "examples"
 #: Pixels of patches that tell colours apart: red, green, blue, yellow, white.
 PINS = ((190, 178), (124, 178), (60, 178), (255, 178), (60, 243))
 JPEG_QUALITY = 82
-#: How often the cloud is turned by its arrow key, and its part of the picture: left, top, right, bottom.
-TURNS, CLOUD_PX = 5, (256, 200, 822, 610)
+#: How often the cloud is turned by its arrow key.
+TURNS = 5
 
 
 def spectra() -> None:
@@ -81,6 +81,8 @@ def window(folder: Path) -> None:
                 QTest.keyClick(cloud, Qt.Key.Key_Left)
             stage.settle()
         stage.shoot()
+        if name == "face":
+            cloud.grab().save(str(folder / "cloud.png"))
         stage.close()
 
 
@@ -95,14 +97,14 @@ def main() -> int:
 
     TARGET.mkdir(exist_ok=True)
     spectra()
-    with tempfile.TemporaryDirectory() as spare, virtual_display(1280, 800) as display:
+    # The picture shows the folder's name.
+    with tempfile.TemporaryDirectory(prefix="lab-") as spare, virtual_display(1280, 800) as display:
         environment = {**os.environ, "DISPLAY": display, "QT_QPA_PLATFORM": "xcb", "QT_API": "pyside6"}
         home = Path(spare) / "scans"
         home.mkdir()
         subprocess.run([sys.executable, __file__, home], env=environment, check=True)
-        for scene, name in (("color-checker", "window"), ("face", "cloud")):
+        for scene, name in (("color-checker", "window"), ("cloud", "cloud")):
             picture = Image.open(home / f"{scene}.png").convert("RGB")
-            picture = picture.crop(CLOUD_PX) if name == "cloud" else picture
             picture.save(TARGET / f"{name}.jpg", quality=JPEG_QUALITY, optimize=True)
     for path in sorted(TARGET.iterdir()):
         print(f"{path.relative_to(ROOT)}: {path.stat().st_size / 1e3:.0f} kB")

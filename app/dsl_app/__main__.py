@@ -5,9 +5,11 @@ from __future__ import annotations
 import argparse
 import os
 import sys
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
+
+from dsl_app.shared.display import has_screen
 
 if TYPE_CHECKING:
     from dsl_app.shell.main_window import MainWindow
@@ -54,13 +56,6 @@ def _after_first_page(window: MainWindow, *acts: Callable[[], object]) -> None:
             act()
 
     window.opened.connect(opened)
-
-
-def has_screen(platform: str, environment: Mapping[str, str]) -> bool:
-    """Whether Qt will find a screen; without one it would abort the process."""
-    if not platform.startswith("linux") or environment.get("QT_QPA_PLATFORM"):
-        return True
-    return bool(environment.get("DISPLAY") or environment.get("WAYLAND_DISPLAY"))
 
 
 def _parser() -> argparse.ArgumentParser:

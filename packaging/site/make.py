@@ -1,16 +1,19 @@
-"""Gather the pages of the site from where their texts are, and build it: ``python packaging/run.py site``.
+"""Gather the pages of the site from where their texts are, and build it: ``run.py site``.
 
-No text is written twice: the guide is the help of the window, the tutorials are the notebooks of ``examples``,
-commands and functions describe themselves. Links between files of the repository become links between pages.
+No text is written twice: the guide is the help of the window, the tutorials are the notebooks of
+``examples``, commands and functions describe themselves. Links between
+files of the repository become links between pages.
 """
 
 from __future__ import annotations
 
 import json
+import os
 import re
 import shutil
 import subprocess
 import sys
+import tempfile
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -47,7 +50,30 @@ DOCUMENTS = {
 
 
 def main() -> int:
-    """Gather and build; returns the builder's exit code."""
+    """Run the notebooks, gather and build; returns the exit code of what failed, or 0."""
+    for name in () if "--no-run" in sys.argv else TUTORIALS:
+        with tempfile.TemporaryDirectory() as folder:
+            script = [sys.executable, "-W", "error", str(ROOT / "examples" / f"{name}.py")]
+            code = subprocess.run(
+                script, cwd=folder, check=False, env=os.environ | {"MPLBACKEND": "agg"}
+            ).returncode
+        if code:
+            return code
+    gather()
+    config = PAGES.parent / "mkdocs.yml"
+    # The two folders are relative to the file, which moves.
+    text = CONFIG.read_text(encoding="utf-8").replace("../../build/site/", "").replace("[../..]", f"[{ROOT}]")
+    config.write_text(f"{text}nav: {json.dumps(navigation())}\n", encoding="utf-8")
+    command = [sys.executable, "-m", "mkdocs", "build", "--strict", "--quiet", "--config-file", str(config)]
+    quiet = {**os.environ, "NO_MKDOCS_2_WARNING": "1"}
+    code = subprocess.run(command, check=False, env=quiet).returncode
+    if code == 0:
+        print(f"The site is in {PAGES.parent / 'html'}: {len(list(PAGES.rglob('*.md')))} pages")
+    return code
+
+
+def gather() -> None:
+    """Put every page into the folder of the builder."""
     shutil.rmtree(PAGES, ignore_errors=True)
     for name, page in DOCUMENTS.items():
         write(page, (ROOT / name).read_text(encoding="utf-8"))
@@ -61,15 +87,6 @@ def main() -> int:
     write("reference/python.md", python_page())
     write("reference/commands.md", commands_page())
     shutil.copytree(PICTURES, PAGES / "pictures")
-    config = PAGES.parent / "mkdocs.yml"
-    # The two folders are relative to the file, which moves.
-    text = CONFIG.read_text(encoding="utf-8").replace("../../build/site/", "").replace("[../..]", f"[{ROOT}]")
-    config.write_text(f"{text}nav: {json.dumps(navigation())}\n", encoding="utf-8")
-    command = [sys.executable, "-m", "mkdocs", "build", "--strict", "--quiet", "--config-file", str(config)]
-    code = subprocess.run(command, check=False).returncode
-    if code == 0:
-        print(f"The site is in {PAGES.parent / 'html'}: {len(list(PAGES.rglob('*.md')))} pages")
-    return code
 
 
 def write(page: str, text: str) -> None:
@@ -152,21 +169,13 @@ def commands_page() -> str:
     from dsl_core.cli.run import app
 
     parts = [
-        "# Commands\n\nEach takes `--help`, and most take `--json`. Exit codes: 0 success, 2 wrong input, 130 stopped."
+        "# Commands\n\nEach takes `--help`, most `--json`. Exit codes: 0 success, 2 wrong input, 130 stopped."
     ]
     for name, command in walk(typer.main.get_command(app), "dsl-scan"):
         about = (command.help or "").strip()
         arguments = [each for each in command.params if each.param_type_name == "argument"]
         options = [each for each in command.params if each.param_type_name == "option"]
-        usage = " ".join(
-            [
-                name,
-                *(
-                    each.make_metavar(command.make_context(name, [], resilient_parsing=True))
-                    for each in arguments
-                ),
-            ]
-        )
+        usage = " ".join([name, *(each.metavar or each.name.upper() for each in arguments)])
         parts.append(f"## {name.removeprefix('dsl-scan ')}\n\n{about}\n\n```\n{usage}\n```")
         rows = [
             f"| `{'`, `'.join([*each.opts, *each.secondary_opts])}` | {cell(each.help)} |" for each in options

@@ -9,7 +9,7 @@ import json
 import os
 import sys
 
-from dsl_app.__main__ import has_screen
+from dsl_app.shared.display import has_screen
 
 
 def screens() -> list[str]:

@@ -1,0 +1,85 @@
+"""What pages show runs as written, and their tables are those of the code."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import Any
+
+import matplotlib as mpl
+import numpy as np
+import pytest
+
+from dsl_core.io.export import Format
+from dsl_core.io.spectra.records import Format as SpectraFormat
+from dsl_core.model.result import VARIABLES
+from tests.cases.small_result import small_result
+
+ROOT = Path(__file__).resolve().parents[2]
+HELP = ROOT / "resources" / "help"
+EXAMPLES = sorted((ROOT / "examples").glob("*.py"))
+
+
+def blocks(path: Path, language: str = "python") -> list[str]:
+    """The code that a page shows in a language."""
+    return re.findall(rf"```{language}\n(.*?)```", path.read_text(encoding="utf-8"), re.DOTALL)
+
+
+@pytest.mark.parametrize("name", ["many_scans", "read_spectra"])
+def test_a_notebook_runs_as_written(
+    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The first scan is that of the help on scripts, which another test runs; making the site runs all."""
+    monkeypatch.chdir(tmp_path)
+    path = ROOT / "examples" / f"{name}.py"
+    with mpl.rc_context({"backend": "agg"}):
+        exec(compile(path.read_text(encoding="utf-8"), str(path), "exec"), {"__name__": "notebook"})
+    assert capsys.readouterr().out
+
+
+def test_there_are_three_notebooks() -> None:
+    assert len(EXAMPLES) == 3
+
+
+def test_formats_of_the_help_page_work(tmp_path: Path) -> None:
+    names: dict[str, Any] = {}
+    for block in blocks(HELP / "adding-a-format.md"):
+        exec(block, names)
+    xyz, lab = names["XYZ"], names["LAB"]
+    assert isinstance(xyz, Format)
+    assert isinstance(lab, SpectraFormat)
+    result = small_result()
+    (written,) = xyz.write(result, tmp_path / "a.xyz")
+    assert np.loadtxt(written).shape[1] == 3
+    (tmp_path / "a.lab").write_text("OUR LAB\n400 0.1\n500 0.2\n")
+    (spectrum,) = lab.read(tmp_path / "a.lab")
+    assert lab.recognises(tmp_path / "a.lab", b"OUR LAB\n400")
+    np.testing.assert_array_equal(spectrum.values, [0.1, 0.2])
+
+
+def test_entry_points_of_the_help_page_are_those_that_are_read() -> None:
+    from dsl_core.io import export
+    from dsl_core.io.spectra import catalogue
+
+    shown = "".join(blocks(HELP / "adding-a-format.md", "toml"))
+    assert f'"{export.GROUP}"' in shown
+    assert f'"{catalogue.GROUP}"' in shown
+
+
+def test_the_specification_lists_every_variable_of_a_result() -> None:
+    text = (HELP / "files.md").read_text(encoding="utf-8")
+    for name, (axes, unit, words) in VARIABLES.items():
+        assert f"| `{name}` | {', '.join(axes)} | {unit} | {words} |" in text
+
+
+def test_the_python_of_the_readme_is_that_of_the_help_which_is_run() -> None:
+    shown = blocks(ROOT / "README.md")
+    assert shown
+    assert set(shown) <= set(blocks(HELP / "scripting.md"))
+
+
+def test_pictures_of_the_readme_are_there_and_small() -> None:
+    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    shown = re.findall(r"!\[[^\]]+\]\(([^)]+)\)", text)
+    assert len(shown) == 3
+    assert all((ROOT / name).stat().st_size < 300_000 for name in shown)
