@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from dsl_core.errors import CalibrationError
-from dsl_core.io.spectra.catalogue import SUFFIXES, format_of
+from dsl_core.io.spectra.catalogue import format_of, suffixes
 from dsl_core.io.spectra.records import Spectrum
 from dsl_core.io.spectra.reference_file import as_references
 from dsl_core.io.spectra.spectrum_file import of_kind
@@ -94,7 +94,7 @@ def _files(paths: Sequence[Path]) -> list[Path]:
             files.append(path)
             continue
         inside = (each for each in sorted(path.rglob("*")) if each.is_file() and not _is_hidden(each, path))
-        files += [each for each in inside if each.suffix.lower() in SUFFIXES and not _is_beside(each)]
+        files += [each for each in inside if each.suffix.lower() in suffixes() and not _is_beside(each)]
         if len(files) > MOST_FILES:
             raise CalibrationError(
                 f"{path} contains more than {MOST_FILES} files. Choose the folder of the spectra."

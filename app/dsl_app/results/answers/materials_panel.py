@@ -15,7 +15,7 @@ from dsl_app.shared.widgets.forms import ChoiceBox, NumberBox, check_box, label,
 from dsl_app.shared.widgets.layouts import STRETCH, column_of, row_of
 from dsl_app.shared.widgets.read_table import RIGHT, ReadTable, cell
 from dsl_core.analysis.classify import Limits, Measure
-from dsl_core.io.spectra.catalogue import SUFFIXES
+from dsl_core.io.spectra.catalogue import suffixes
 
 HINT = (
     "Name the material of every pixel: choose a folder or file of spectra, or mark known materials and use"
@@ -96,7 +96,7 @@ class MaterialsPanel(QWidget):
 
     def choose_file(self) -> None:
         """Ask for the file of a library."""
-        kinds = " ".join(f"*{suffix}" for suffix in SUFFIXES)
+        kinds = " ".join(f"*{suffix}" for suffix in suffixes())
         kinds = f"Spectra ({kinds});;All files (*)"
         name, _ = QFileDialog.getOpenFileName(self, "A file of spectra", "", kinds)
         if name:
