@@ -6,7 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from PySide6.QtCore import Qt, Signal
-from PySide6.QtWidgets import QDialog, QFileDialog, QStackedWidget, QWidget
+from PySide6.QtWidgets import QDialog, QStackedWidget, QWidget
 
 from dsl_app.results.answers.materials_panel import MaterialsPanel
 from dsl_app.results.cloud.panel import CloudPanel
@@ -32,6 +32,7 @@ from dsl_app.shared.widgets.figure_file import PlotFigure
 from dsl_app.shared.widgets.forms import label, push_button, show_label
 from dsl_app.shared.widgets.help_window import set_help
 from dsl_app.shared.widgets.layouts import boxed, column_of, row_of, splitter, tabs_of
+from dsl_app.shared.widgets.open_dialog import OpenDialog
 from dsl_app.shared.widgets.page import PageWidget
 from dsl_core.workflows.inspection import IntensityGraph
 
@@ -191,10 +192,10 @@ class ResultsPage(PageWidget):
         }
 
     def choose(self) -> None:
-        """Ask for the folder of a result or scan."""
-        name = QFileDialog.getExistingDirectory(self, "Open a result (NAME.zarr) or a scan (NAME.dsl)")
-        if name:
-            self.open_chosen.emit(Path(name))
+        """Ask for a result or scan."""
+        path = OpenDialog.ask(self, "Open a result (NAME.zarr) or a scan (NAME.dsl)")
+        if path is not None:
+            self.open_chosen.emit(path)
 
     def export(self) -> None:
         """Open the export dialog."""

@@ -20,6 +20,7 @@ from dsl_app.shared.widgets.dialogs import command_window, text_window
 from dsl_app.shared.widgets.figure_file import FORMATS, save_figure
 from dsl_app.shared.widgets.forms import named
 from dsl_app.shared.widgets.help_window import help_of, help_window
+from dsl_app.shared.widgets.open_dialog import OpenDialog
 from dsl_app.shell.actions import ACTIONS, Action
 from dsl_app.shell.paged_window import PagedWindow
 from dsl_app.shell.tour import STEPS, Tour, TourStep
@@ -67,9 +68,9 @@ class WindowActions:
     # Files -----------------------------------------------------------------------------------------
 
     def _open(self) -> None:
-        name, _ = QFileDialog.getOpenFileName(self._window, "Open", self._parts.settings.output_folder)
-        if name:
-            self._window.open_path(Path(name))
+        path = OpenDialog.ask(self._window, "Open", self._parts.settings.output_folder)
+        if path is not None:
+            self._window.open_path(path)
 
     def _open_last(self) -> None:
         if self._parts.recent.paths.value:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from PySide6.QtWidgets import QFileDialog
+from dsl_app.shared.widgets.open_dialog import OpenDialog
 from pytestqt.qtbot import QtBot
 
 from tests.app.support.compare_page import Bench
@@ -24,11 +24,7 @@ def test_two_results_dropped_together_are_both_opened(qtbot: QtBot, bench: Bench
 def test_the_action_leads_to_the_series(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
     asked: list[str] = []
 
-    def refuse(_parent: object, title: str) -> str:
-        asked.append(title)
-        return ""
-
-    monkeypatch.setattr(QFileDialog, "getExistingDirectory", refuse)
+    monkeypatch.setattr(OpenDialog, "ask", lambda _parent, title, **_: asked.append(title))
     bench.page.page_actions()["series_add"]()
     assert bench.page.tabs.currentIndex() == 1
     assert asked == ["Add a result, or a folder that contains several"]

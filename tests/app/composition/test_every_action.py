@@ -10,6 +10,7 @@ import pytest
 from dsl_app.composition import demo
 from dsl_app.composition.window import Composition, StartOptions
 from dsl_app.connection.state import Link, RigChoice
+from dsl_app.shared.widgets.open_dialog import OpenDialog
 from dsl_app.shell.actions import ACTIONS, Action
 from dsl_app.shell.main_window import MainWindow
 from dsl_app.shell.tour import Tour
@@ -78,6 +79,7 @@ def chosen(monkeypatch: pytest.MonkeyPatch) -> list[str]:
     for name in ("getOpenFileName", "getSaveFileName"):
         monkeypatch.setattr(QFileDialog, name, refuse_file)
     monkeypatch.setattr(QFileDialog, "getExistingDirectory", refuse_folder)
+    monkeypatch.setattr(OpenDialog, "ask", lambda _parent, title, *_, **__: asked.append(title))
     return asked
 
 

@@ -17,6 +17,7 @@ from dsl_app.results.page import ResultsPage
 from dsl_app.results.state import ResultView
 from dsl_app.scan.page import ScanPage
 from dsl_app.scan.state import Phase
+from dsl_app.shared.widgets.open_dialog import OpenDialog
 from dsl_app.shell.actions import PAGES
 from dsl_app.shell.application import ExceptionHook
 from dsl_app.shell.main_window import MainWindow
@@ -113,6 +114,7 @@ def test_clicking_everything_while_a_scan_runs_loses_nothing(
     monkeypatch.setattr(QFileDialog, "getOpenFileName", lambda *_: ("", ""))
     monkeypatch.setattr(QFileDialog, "getSaveFileName", lambda *_: ("", ""))
     monkeypatch.setattr(QFileDialog, "getExistingDirectory", lambda *_: "")
+    monkeypatch.setattr(OpenDialog, "ask", lambda *_, **__: None)
     caught: list[str] = []
     bench.hook.caught.connect(caught.append)
     bench.window.open_path(write_small_result(tmp_path))

@@ -18,6 +18,7 @@ from dsl_app.shared.widgets.deferred import Deferred
 from dsl_app.shared.widgets.forms import label, push_button, remark_line, show_parts
 from dsl_app.shared.widgets.help_window import set_help
 from dsl_app.shared.widgets.layouts import STRETCH, boxed, column_of, row_of, splitter
+from dsl_app.shared.widgets.open_dialog import OpenDialog
 from dsl_app.shared.widgets.plots import CalmPlot
 from dsl_app.shared.widgets.spectrum_curve import SpectrumCurve
 
@@ -73,9 +74,9 @@ class PairPanel(QWidget):
         ]
 
     def _choose(self, second: bool) -> None:
-        name = QFileDialog.getExistingDirectory(self, f"Open a result as {'B' if second else 'A'}")
-        if name:
-            self._control.open_side(Path(name), second)
+        path = OpenDialog.ask(self, f"Open a result as {'B' if second else 'A'}")
+        if path is not None:
+            self._control.open_side(path, second)
 
     def _choose_report(self) -> None:
         pair = self._state.pair.value

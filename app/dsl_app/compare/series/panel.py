@@ -20,6 +20,7 @@ from dsl_app.shared.widgets.deferred import Deferred
 from dsl_app.shared.widgets.forms import ChoiceBox, push_button, remark_line, show_label
 from dsl_app.shared.widgets.help_window import set_help
 from dsl_app.shared.widgets.layouts import STRETCH, column_of, row_of, splitter
+from dsl_app.shared.widgets.open_dialog import OpenDialog
 from dsl_core.evaluation.stage_test import stage_table
 from dsl_core.evaluation.time_sweep import FIGURES
 
@@ -80,9 +81,9 @@ class SeriesPanel(QWidget):
 
     def choose(self) -> None:
         """Ask for a result or a folder of results."""
-        name = QFileDialog.getExistingDirectory(self, "Add a result, or a folder that contains several")
-        if name:
-            self._control.add([Path(name)])
+        path = OpenDialog.ask(self, "Add a result, or a folder that contains several", takes_folders=True)
+        if path is not None:
+            self._control.add([path])
 
     def _remove(self) -> None:
         if self._state.selected.value is not None:

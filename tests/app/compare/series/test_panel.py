@@ -9,6 +9,7 @@ import pytest
 from dsl_app.compare.series.panel import SeriesPanel
 from dsl_app.compare.series.state import NOTHING, SeriesKind
 from dsl_app.shared.theme import DARK
+from dsl_app.shared.widgets.open_dialog import OpenDialog
 from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QFileDialog, QLineEdit
@@ -106,7 +107,7 @@ def test_accuracy_over_time_and_its_report(
     paths = write_sweep(tmp_path)
     panel.kind.setCurrentIndex(1)
     panel.kind.activated.emit(1)
-    monkeypatch.setattr(QFileDialog, "getExistingDirectory", lambda *_: str(tmp_path))
+    monkeypatch.setattr(OpenDialog, "ask", lambda *_, **__: tmp_path)
     QTest.mouseClick(panel.add, Qt.MouseButton.LeftButton)
     qtbot.waitUntil(lambda: not bench.state.busy.value and bool(bench.state.rows.value), timeout=30_000)
     at = panel.against.findText("reference")

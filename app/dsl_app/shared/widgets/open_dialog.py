@@ -1,0 +1,83 @@
+"""A dialog to open files, in which a scan, a result or a campaign is one thing and no folder to walk into."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from PySide6.QtCore import QDir, QFileInfo
+from PySide6.QtGui import QAbstractFileIconProvider, QIcon
+from PySide6.QtWidgets import QFileDialog, QFileIconProvider, QWidget
+
+from dsl_app.shared.known_files import Kind, kind_of, meant_by
+
+#: Folders that are opened whole.
+THINGS = (Kind.SCAN, Kind.RESULT, Kind.CAMPAIGN)
+
+
+class _Icons(QFileIconProvider):
+    """Scans and results look like files, and say what they are in the column of types."""
+
+    def icon(self, kind: QFileInfo | QAbstractFileIconProvider.IconType) -> QIcon:
+        """The icon of a file for things."""
+        if isinstance(kind, QFileInfo) and is_thing(Path(kind.filePath())):
+            return super().icon(QAbstractFileIconProvider.IconType.File)
+        return super().icon(kind)
+
+    def type(self, info: QFileInfo) -> str:
+        """What a thing is."""
+        kind = kind_of(Path(info.filePath())) if info.isDir() else Kind.UNKNOWN
+        return kind.value.capitalize() if kind in THINGS else super().type(info)
+
+
+def is_thing(path: Path) -> bool:
+    """Whether a folder is opened whole."""
+    return path.is_dir() and kind_of(path) in THINGS
+
+
+class OpenDialog(QFileDialog):
+    """Ends with the thing that is double-clicked, or chosen with *Open*; other folders are entered.
+
+    Where ``takes_folders``, *Open* chooses any folder. It is Qt's own dialog: those of systems know only
+    folders.
+    """
+
+    def __init__(self, parent: QWidget | None, title: str, folder: str, takes_folders: bool) -> None:
+        super().__init__(parent, title, folder)
+        self._takes_folders = takes_folders
+        self.chosen: Path | None = None
+        self.setOption(QFileDialog.Option.DontUseNativeDialog)
+        modes = QFileDialog.FileMode
+        self.setFileMode(modes.Directory if takes_folders else modes.ExistingFile)
+        self.setOption(QFileDialog.Option.ShowDirsOnly, False)
+        self._icons = _Icons()
+        self.setIconProvider(self._icons)
+        self.setFilter(QDir.Filter.AllEntries | QDir.Filter.NoDotAndDotDot | QDir.Filter.AllDirs)
+        self.directoryEntered.connect(self._entered)
+
+    def _entered(self, folder: str) -> None:
+        """A thing that is entered was meant."""
+        if self.chosen is None and is_thing(Path(folder)):
+            self._choose(Path(folder))
+
+    def _choose(self, path: Path) -> None:
+        self.chosen = meant_by(path)
+        self.done(QFileDialog.DialogCode.Accepted)
+
+    def accept(self) -> None:
+        """Choose what is selected, or enter it."""
+        names = [Path(name) for name in self.selectedFiles()]
+        if len(names) == 1 and (names[0].is_file() or is_thing(names[0]) or self._takes_folders):
+            self._choose(names[0])
+        else:
+            super().accept()
+
+    @classmethod
+    def ask(
+        cls, parent: QWidget | None, title: str, folder: str = "", takes_folders: bool = False
+    ) -> Path | None:
+        """What a person chooses, None for nothing."""
+        dialog = cls(parent, title, folder, takes_folders)
+        dialog.exec()
+        chosen = dialog.chosen
+        dialog.deleteLater()
+        return chosen

@@ -1,0 +1,67 @@
+"""Scans and results are opened as things, by double click and by the button."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from dsl_app.shared.widgets.open_dialog import OpenDialog, is_thing
+from PySide6.QtCore import QFileInfo
+from pytestqt.qtbot import QtBot
+
+
+@pytest.fixture
+def home(tmp_path: Path) -> Path:
+    for name, content in (("leaf.dsl", "manifest.json"), ("leaf.zarr", "zarr.json"), ("plain", "notes.txt")):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / content).write_text("{}")
+    return tmp_path
+
+
+def _dialog(qtbot: QtBot, home: Path, takes_folders: bool = False) -> OpenDialog:
+    dialog = OpenDialog(None, "Open", str(home), takes_folders)
+    qtbot.addWidget(dialog)
+    return dialog
+
+
+@pytest.mark.parametrize("name", ["leaf.dsl", "leaf.zarr"])
+def test_a_thing_is_chosen_and_not_entered(qtbot: QtBot, home: Path, name: str) -> None:
+    assert is_thing(home / name)
+    by_button = _dialog(qtbot, home)
+    by_button.selectFile(str(home / name))
+    by_button.accept()
+    assert by_button.chosen == home / name
+    by_click = _dialog(qtbot, home)
+    by_click.directoryEntered.emit(str(home / name))
+    assert by_click.chosen == home / name
+    assert by_click.result() == OpenDialog.DialogCode.Accepted
+    assert by_click._icons.type(QFileInfo(str(home / name))) in ("Scan", "Result")
+
+
+def test_a_folder_is_entered_and_a_file_chosen(qtbot: QtBot, home: Path) -> None:
+    assert not is_thing(home / "plain")
+    dialog = _dialog(qtbot, home)
+    dialog.selectFile(str(home / "plain"))
+    dialog.accept()
+    assert dialog.chosen is None
+    dialog = _dialog(qtbot, home)
+    dialog.directoryEntered.emit(str(home / "plain"))
+    assert dialog.chosen is None
+    dialog.setDirectory(str(home / "plain"))
+    dialog.selectFile(str(home / "plain" / "notes.txt"))
+    dialog.accept()
+    assert dialog.chosen == home / "plain" / "notes.txt"
+
+
+def test_who_walked_into_a_thing_all_the_same_gets_it(qtbot: QtBot, home: Path) -> None:
+    dialog = _dialog(qtbot, home / "leaf.dsl")
+    dialog.selectFile(str(home / "leaf.dsl" / "manifest.json"))
+    dialog.accept()
+    assert dialog.chosen == home / "leaf.dsl"
+
+
+def test_any_folder_may_be_meant(qtbot: QtBot, home: Path) -> None:
+    dialog = _dialog(qtbot, home, takes_folders=True)
+    dialog.selectFile(str(home / "plain"))
+    dialog.accept()
+    assert dialog.chosen == home / "plain"
