@@ -29,10 +29,11 @@ from dsl_core.model.fit import FitFinding
 from dsl_core.model.frames import FrameSink, FrameSource
 from dsl_core.model.options import Options
 from dsl_core.model.plan import CapturePlan
+from dsl_core.model.result_sink import MemorySink, ResultSink
 from dsl_core.model.rig import Rig
 from dsl_core.patterns.images import pattern_image
 from dsl_core.progress import CancelToken, NoProgress, Progress
-from dsl_core.reconstruction.merge import MergedScan, check_source, decode_columns, stack_lines
+from dsl_core.reconstruction.merge import check_source
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -97,61 +98,69 @@ def reconstruct(
     options: Options | None = None,
     progress: Progress | None = None,
     timer: StageTimer | None = None,
+    sink: ResultSink | None = None,
 ) -> xr.Dataset:
-    """Frames -> linear radiance -> columns -> depth -> surface -> spectra -> colour -> result."""
+    """Frames -> linear radiance -> columns -> depth -> surface -> spectra -> colour -> result.
+
+    Frames are read, and the result is made, by bands of rows, so that those of a large picture need not be
+    in memory at once; the result is, unless a ``sink`` takes it.
+    """
     from dsl_core.optics.line_set import LineSet
-    from dsl_core.reconstruction.columns.line_spread import own_spread, with_own_spread
-    from dsl_core.reconstruction.geometry import reconstruct_geometry, require_light, require_pixels
+    from dsl_core.reconstruction.columns.line_spread import own_spread, spread_pixels, with_own_spread
+    from dsl_core.reconstruction.geometry import require_light, require_pixels
     from dsl_core.reconstruction.lenses import follow_lenses
-    from dsl_core.reconstruction.light.followed import read_steady
-    from dsl_core.reconstruction.scan_result import assemble, known_pixels
-    from dsl_core.reconstruction.spectral.solvers import check_solver, solve_spectra
+    from dsl_core.reconstruction.light.followed import follow_light
+    from dsl_core.reconstruction.rows.assembly import Assembly
+    from dsl_core.reconstruction.rows.bands import bands_of
+    from dsl_core.reconstruction.rows.columns import geometry_by_rows
+    from dsl_core.reconstruction.rows.frames import ScanFrames
+    from dsl_core.reconstruction.scan_result import known_pixels
+    from dsl_core.reconstruction.spectral.solvers import check_solver, row_solver, rows_together
     from dsl_core.reconstruction.spread_findings import spread_findings
 
     options, progress, timer = options or Options(), progress or NoProgress(), timer or StageTimer()
-    plan = check_source(source, rig)
+    plan, lines = check_source(source, rig), LineSet.of(source.plan)
     if options.spectra:
         check_solver(options.solver, rig, plan, options.correspondence)
+    frames = ScanFrames(source, rig, bands_of(plan, options.band_rows, rows_together(rig, options)))
+    findings: list[FitFinding] = []
     with timer.stage("read, merge, decode the binary code"):
-        merged = MergedScan(source, rig)
-        code, white = decode_columns(merged, progress)
+        code, white = frames.decode(progress)
         require_light(white.radiance, white.saturated)
     with timer.stage("read and merge the line frames"):
-        findings: list[FitFinding] = []
         if options.as_calibrated:
-            stack = stack_lines(merged, progress)
+            frames.look(progress=progress)
         else:
-            steady = read_steady(merged, code, white, progress)
-            code, white, stack = steady.code, steady.white, steady.stack
+            steady = follow_light(frames, code, white, lambda *seen: spread_pixels(lines, *seen), progress)
+            code, white = steady.code, steady.white
             findings += steady.findings
     with timer.stage("columns, depth, normals"):
         if options.refine_columns and not options.as_calibrated:
-            found = own_spread(rig, LineSet.of(plan), code, white, stack)
+            found = own_spread(rig, lines, code, white, frames)
             if found is not None:
                 findings += spread_findings(rig.projector_response, found)
             rig = with_own_spread(rig, found)
-        geometry = reconstruct_geometry(
-            rig,
-            plan,
-            code,
-            white,
-            stack,
-            refine_columns=options.refine_columns,
-            surface_window_px=options.surface_window_px,
-            device=options.device,
-            progress=progress,
-        )
+        geometry = geometry_by_rows(rig, options, frames, code, white, progress)
+        del code, white
         require_pixels(geometry.flags)
         if options.refine_columns and not options.as_calibrated:
-            lines, window_px = LineSet.of(plan), options.surface_window_px
-            rig, geometry, found_of_lenses = follow_lenses(rig, lines, geometry, window_px)
+            rig, geometry, found_of_lenses = follow_lenses(rig, lines, geometry, options.surface_window_px)
             findings += found_of_lenses
-    spectra = None
+    solver = None
     if options.spectra:
         with timer.stage("spectra"):
-            spectra = solve_spectra(rig, plan, options, stack, known_pixels(geometry), progress)
+            solver = row_solver(rig, plan, options, frames, known_pixels(geometry), progress)
+    result = Assembly(rig, plan, options, geometry, sink or MemorySink())
+    # The frames of the last band are still in memory.
+    for band in result.missing(reversed(frames.bands)):
+        spectra = None
+        if solver is not None:
+            with timer.stage("spectra"):
+                spectra = solver.rows(band, progress)
+        with timer.stage("colour and result"):
+            result.put(band, spectra)
     with timer.stage("colour and result"):
-        return assemble(rig, plan, options.grid, geometry, spectra, findings, options.part)
+        return result.finish(solver, findings)
 
 
 def evaluate(result: xr.Dataset, truth: Truth) -> Evaluation:

@@ -26,6 +26,8 @@ class StageCost:
 class StageTimer:
     """Collects the cost of stages; the same timer may be used from several places in turn.
 
+    What is done in several goes under one name is one stage.
+
     >>> timer = StageTimer()
     >>> with timer.stage("decode"):
     ...     total = sum(range(1000))
@@ -43,8 +45,16 @@ class StageTimer:
         try:
             yield
         finally:
-            seconds = time.perf_counter() - started
-            self.stages.append(StageCost(name, seconds, watch.stop(), watch.first))
+            seconds, peak = time.perf_counter() - started, watch.stop()
+            self._add(StageCost(name, seconds, peak, watch.first))
+
+    def _add(self, cost: StageCost) -> None:
+        for at, known in enumerate(self.stages):
+            if known.name == cost.name:
+                seconds, peak = known.seconds + cost.seconds, max(known.peak_bytes, cost.peak_bytes)
+                self.stages[at] = StageCost(known.name, seconds, peak, known.start_bytes)
+                return
+        self.stages.append(cost)
 
 
 class _MemoryWatch:

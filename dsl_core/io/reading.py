@@ -8,6 +8,9 @@ import math
 import os
 import stat
 import tokenize
+from collections.abc import Iterator
+from contextlib import contextmanager
+from mmap import ACCESS_READ, mmap
 from pathlib import Path
 from typing import Any
 
@@ -26,6 +29,19 @@ def read_bounded(path: Path, most_bytes: int = MOST_BYTES) -> bytes:
         raise _refusal(path, f"it is larger than {most_bytes / 1e6:.0f} MB, which no file of its kind is")
     with path.open("rb") as file:
         return file.read()
+
+
+@contextmanager
+def mapped(path: Path, most_bytes: int = MOST_BYTES) -> Iterator[bytes | mmap]:
+    """The same without reading what nobody looks at."""
+    size = require_plain(path)
+    if size > most_bytes:
+        raise _refusal(path, f"it is larger than {most_bytes / 1e6:.0f} MB, which no file of its kind is")
+    if size == 0:
+        yield b""
+        return
+    with path.open("rb") as file, mmap(file.fileno(), 0, access=ACCESS_READ) as content:
+        yield content
 
 
 def read_json(path: Path) -> Any:

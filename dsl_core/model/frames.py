@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -39,6 +39,19 @@ class FrameSource(Protocol):
 
     def read(self, shot: Shot) -> NDArray[np.uint16]:
         """The raw mosaic of a shot, shape (rows, columns); raises `StoreError` when it is not there."""
+
+
+@runtime_checkable
+class RowSource(Protocol):
+    """A `FrameSource` that reads some rows of a mosaic at less cost than the whole."""
+
+    def read_rows(self, shot: Shot, rows: slice) -> NDArray[np.uint16]:
+        """Some rows of the raw mosaic of a shot, shape (rows, columns); raises `StoreError`."""
+
+
+def read_rows(source: FrameSource, shot: Shot, rows: slice) -> NDArray[np.uint16]:
+    """Some rows of the raw mosaic of a shot, from any source; raises `StoreError`."""
+    return source.read_rows(shot, rows) if isinstance(source, RowSource) else source.read(shot)[rows]
 
 
 class FrameSink(Protocol):

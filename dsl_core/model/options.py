@@ -55,6 +55,7 @@ class Options:
     the image's width, which is wrong for a piece cut out of a larger image. ``as_calibrated`` corrects
     nothing in the calibration by what the scan itself shows. ``region_px`` (x, y, width, height) keeps only
     that part of the picture and solves spectra there alone; depth and the check of the model use all of it.
+    ``band_rows`` is the most rows of the picture whose frames are in memory at once; None: as memory allows.
     """
 
     grid: WavelengthGrid = field(default_factory=WavelengthGrid)
@@ -66,6 +67,7 @@ class Options:
     solver: str = "best"
     as_calibrated: bool = False
     region_px: tuple[int, int, int, int] | None = None
+    band_rows: int | None = None
 
     @property
     def part(self) -> tuple[slice, slice]:

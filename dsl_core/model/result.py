@@ -97,8 +97,11 @@ def build_result(
     arrays: dict[str, NDArray[np.generic]],
     wavelengths_nm: NDArray[np.float64],
     attributes: dict[str, str | int | float],
+    origin: tuple[int, int] = (0, 0),
 ) -> xr.Dataset:
     """Assemble the dataset of a scan from arrays named as in `VARIABLES`.
+
+    ``origin`` is the row and column of the camera's picture where the arrays begin.
 
     Unknown names raise ``KeyError``; missing ones are left out, so that a depth-only result is possible.
     """
@@ -114,8 +117,12 @@ def build_result(
         data["flags"][2].update({"flag_masks": masks, "flag_meanings": names})  # type: ignore[dict-item]
     rows, columns = next((values.shape[-2:] for values in arrays.values()), (0, 0))
     coords = {
-        "y": ("y", np.arange(rows), {"units": "px", "long_name": "row of the camera's picture"}),
-        "x": ("x", np.arange(columns), {"units": "px", "long_name": "column of the camera's picture"}),
+        "y": ("y", origin[0] + np.arange(rows), {"units": "px", "long_name": "row of the camera's picture"}),
+        "x": (
+            "x",
+            origin[1] + np.arange(columns),
+            {"units": "px", "long_name": "column of the camera's picture"},
+        ),
         "wavelength_nm": ("wavelength_nm", wavelengths_nm, {"units": "nm", "long_name": "band centre"}),
         "axis": ("axis", ["x", "y", "z"]),
         "channel": ("channel", ["R", "G", "B"]),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from typing import TYPE_CHECKING
+from dataclasses import astuple, dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,10 +26,9 @@ from dsl_core.reconstruction.spectral.causes import (
 )
 from dsl_core.reconstruction.spectral.film_motion import LEAST_MOTION_PX, FilmMotion, coarseness
 from dsl_core.reconstruction.spectral.line_probe import PROFILE
+from dsl_core.reconstruction.spectral.model_error import ModelError
 from dsl_core.reconstruction.spectral.probe import Probe
-
-if TYPE_CHECKING:
-    from dsl_core.reconstruction.spectral.spectra import SpectralMaps
+from dsl_core.reconstruction.spectral.self_correction import Followed
 
 #: Shares of pixels above which a scan is not what the twin's scenes lead to expect.
 MOST_POOR, MOST_AT_BOUND, MOST_LOST, MOST_UNDECIDED = 0.4, 0.1, 0.1, 0.5
@@ -54,24 +53,61 @@ _MOTIONS = (
 _CALIBRATE = "Run the drift check; calibrate again the part that it names."
 
 
+@dataclass(frozen=True)
+class SpectralCounts:
+    """Of spectra: pixels that measured ``poor`` fits or are ``at_bound``, and what there are of bands.
+
+    ``reached`` are bands of pixels that lines reach, ``undecided`` those of them that the prior decides.
+    """
+
+    poor: int = 0
+    at_bound: int = 0
+    reached: int = 0
+    undecided: int = 0
+
+    def __add__(self, other: SpectralCounts) -> SpectralCounts:
+        return SpectralCounts(*(a + b for a, b in zip(astuple(self), astuple(other), strict=True)))
+
+
+def count_spectra(
+    flags: NDArray[np.integer], data_share: NDArray[np.floating], reach: NDArray[np.integer]
+) -> SpectralCounts:
+    """Counts of the flags (rows, columns) of a result with spectra, or of some rows of it.
+
+    ``data_share`` and ``reach`` (bands, rows, columns) are NaN and 0 where there is no spectrum.
+    """
+    _, measured = _lit_and_measured(flags)
+    reached = (reach & int(Reach.PLUS_ONE | Reach.MINUS_ONE) != 0) & np.isfinite(data_share)
+    poor, at_bound = ((flags & int(flag)) != 0 for flag in (Flag.POOR_FIT, Flag.AT_BOUND))
+    return SpectralCounts(
+        poor=int(np.count_nonzero(measured & poor)),
+        at_bound=int(np.count_nonzero(measured & at_bound)),
+        reached=int(np.count_nonzero(reached)),
+        undecided=int(np.count_nonzero(reached & (data_share < 0.5))),
+    )
+
+
 def fit_of(
     rig: Rig,
     plan: CapturePlan,
     grid: WavelengthGrid,
     depth_mm: NDArray[np.floating],
     flags: NDArray[np.integer],
-    spectra: SpectralMaps | None,
+    spectra: SpectralCounts | None,
+    followed: Followed | None = None,
+    error: ModelError | None = None,
     earlier: Iterable[FitFinding] = (),
 ) -> Fit:
-    """The verdict on a result with these depths and flags (rows, columns), and what was found on the way."""
-    findings = [*earlier, *share_findings(flags, spectra is not None)]
+    """The verdict on a result with these depths and flags (rows, columns), and what was found on the way.
+
+    ``followed`` is what its scan says of the model, where it can say anything, and ``error`` what is left.
+    """
+    findings = [*earlier, *share_findings(flags, spectra)]
     width_nm = line_width_nm(rig, plan, grid, depth_mm)
     if spectra is not None and width_nm is not None:
-        findings += band_findings(grid.step_nm, width_nm, spectra.data_share, spectra.reach)
-    if spectra is not None and spectra.followed is not None:
-        followed = spectra.followed
+        findings += band_findings(grid.step_nm, width_nm, spectra)
+    if followed is not None:
         findings += cause_findings(followed.probe, followed.balanced, followed.motion)
-    error = None if spectra is None else spectra.error
     return Fit.of(findings, () if error is None else np.round(error.relative, 4).tolist())
 
 
@@ -100,29 +136,30 @@ def line_width_nm(
     return lines.width_px / dispersion if dispersion > 0 else None
 
 
-def share_findings(flags: NDArray[np.integer], has_spectra: bool) -> Iterator[FitFinding]:
-    """Findings from the flags (rows, columns) of a result."""
-    bits = flags.astype(np.int64)
-    lit = (bits & int(Flag.NO_LIGHT)) == 0
-    measured = lit & ((bits & int(DEPTH_INVALID)) == 0)
-    if np.count_nonzero(lit) >= FEWEST:
+def _lit_and_measured(flags: NDArray[np.integer]) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    lit = (flags & int(Flag.NO_LIGHT)) == 0
+    return lit, lit & ((flags & int(DEPTH_INVALID)) == 0)
+
+
+def share_findings(flags: NDArray[np.integer], spectra: SpectralCounts | None) -> Iterator[FitFinding]:
+    """Findings from the flags (rows, columns) of a result, and from what was counted of its spectra."""
+    lit, measured = (int(np.count_nonzero(where)) for where in _lit_and_measured(flags))
+    if lit >= FEWEST:
         yield _share(
             "coverage",
             "lit pixels without a depth",
-            lit,
-            ~measured,
+            (lit - measured) / lit,
             MOST_LOST,
             "Light reaches {0} of the pixels that have no depth.",
             "See the flags: codes that disagree or a depth out of range tell of motion, of surfaces that"
             " light each other, or of another rig's calibration.",
         )
-    if not has_spectra or np.count_nonzero(measured) < FEWEST:
+    if spectra is None or measured < FEWEST:
         return
     yield _share(
         "mixed pixels",
         "poor fit",
-        measured,
-        (bits & int(Flag.POOR_FIT)) != 0,
+        spectra.poor / measured,
         MOST_POOR,
         "No spectrum explains the line frames of {0} of the pixels.",
         "Look at a picture of the flags: along edges a pixel sees two materials, and more pixels help.",
@@ -130,34 +167,19 @@ def share_findings(flags: NDArray[np.integer], has_spectra: bool) -> Iterator[Fi
     yield _share(
         "light",
         "at a bound",
-        measured,
-        (bits & int(Flag.AT_BOUND)) != 0,
+        spectra.at_bound / measured,
         MOST_AT_BOUND,
         "The spectra of {0} of the pixels touch 0 or 1.5.",
         "Look for highlights and for light that the scan's black frames do not have.",
     )
 
 
-def _share(
-    part: Part,
-    name: str,
-    among: NDArray[np.bool_],
-    where: NDArray[np.bool_],
-    limit: float,
-    sentence: str,
-    advice: str,
-) -> FitFinding:
-    share = float(np.mean(where[among]))
+def _share(part: Part, name: str, share: float, limit: float, sentence: str, advice: str) -> FitFinding:
     return FitFinding.judged(part, name, share, "share", limit, sentence.format(f"{share:.0%}"), advice)
 
 
-def band_findings(
-    step_nm: float, line_nm: float, data_share: NDArray[np.floating], reach: NDArray[np.integer]
-) -> Iterator[FitFinding]:
-    """Whether bands of ``step_nm`` suit lines that are ``line_nm`` wide, and what data there are.
-
-    ``data_share`` and ``reach`` (bands, rows, columns) are those of a result, NaN and 0 where there is none.
-    """
+def band_findings(step_nm: float, line_nm: float, spectra: SpectralCounts) -> Iterator[FitFinding]:
+    """Whether bands of ``step_nm`` suit lines that are ``line_nm`` wide, and what data there are."""
     wide = step_nm / line_nm
     yield FitFinding.judged(
         "bands",
@@ -168,10 +190,9 @@ def band_findings(
         f"Bands of {step_nm:g} nm are coarse for lines that are {line_nm:.0f} nm wide.",
         f"Reconstruct with bands of at most {line_nm:.0f} nm.",
     )
-    reached = (reach & int(Reach.PLUS_ONE | Reach.MINUS_ONE) != 0) & np.isfinite(data_share)
-    if np.count_nonzero(reached) < FEWEST:
+    if spectra.reached < FEWEST:
         return
-    undecided = float(np.mean(data_share[reached] < 0.5))
+    undecided = spectra.undecided / spectra.reached
     yield FitFinding.judged(
         "bands",
         "bands that lines reach and the prior decides",

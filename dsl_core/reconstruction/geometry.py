@@ -24,6 +24,7 @@ from dsl_core.reconstruction.columns.maps import WHOLE_PX_STD, ColumnFinder, Col
 from dsl_core.reconstruction.columns.pattern_column import radiance_profiles
 from dsl_core.reconstruction.hdr import MergedFrame
 from dsl_core.reconstruction.merge import LineStack
+from dsl_core.reconstruction.rows.bands import some_rows
 from dsl_core.reconstruction.surface import Surface, reconstruct_surface
 
 #: A pixel is lit when white stands this many standard deviations above black.
@@ -83,9 +84,14 @@ class Geometry:
             flags=(self.flags & ~np.uint16(int(Flag.DEPTH_EDGE))) | edge,
         )
 
-    def points_mm(self, rig: Rig) -> NDArray[np.float32]:
-        """Points in camera coordinates, (3, rows, columns), NaN where there is no depth."""
-        return (pixel_rays(rig.camera) * self.depth_mm).astype(np.float32)
+    def of_rows(self, rows: slice) -> Geometry:
+        """That of some rows of the picture."""
+        maps = {name: values[rows] for name, values in vars(self).items() if name != "surface"}
+        return Geometry(**maps, surface=some_rows(self.surface, rows))
+
+    def points_mm(self, rig: Rig, rows: slice) -> NDArray[np.float32]:
+        """Points in camera coordinates, (3, rows, columns), of these ``rows``; NaN without a depth."""
+        return (pixel_rays(rig.camera)[:, rows] * self.depth_mm).astype(np.float32)
 
 
 def reconstruct_geometry(
@@ -106,18 +112,69 @@ def reconstruct_geometry(
     Deviations leave out what all columns share, unless ``shared_errors`` are wanted.
     ``surface_window_px`` is the window of the plane fits; by default it follows from the image's width.
     """
-    shape = code.column.shape
-    lines = LineSet.of(plan) if refine_columns else None
-    profiles = radiance_profiles(rig, plan) if refine_columns and plan.spectral_count else None
-    finder = ColumnFinder(rig, white, stack, lines, profiles, device)
-    start_px, start_std_px = _start(code)
-    maps = finder.find(np.arange(start_px.size), start_px, start_std_px, progress)
-    lit = _lit(white)
-    settled = settle(code, maps, finder, lit, progress)
+    search = ColumnSearch(rig, plan, refine_columns, device)
+    found = search.find(code, white, stack, 0, progress)
+    return geometry_of(rig, search.lines, found, code.column.shape, surface_window_px, shared_errors)
+
+
+@dataclass(frozen=True)
+class FoundColumns:
+    """What is found of the columns of some pixels (P,), and their flags (P,)."""
+
+    maps: ColumnMaps
+    flags: NDArray[np.uint16]
+
+    @classmethod
+    def empty(cls, count: int) -> FoundColumns:
+        """Room for so many pixels."""
+        return cls(ColumnMaps.empty(count), np.zeros(count, np.uint16))
+
+    def put(self, where: slice, other: FoundColumns) -> None:
+        """Replace some pixels by others."""
+        self.maps.put(where, other.maps)
+        self.flags[where] = other.flags
+
+
+class ColumnSearch:
+    """Refines and judges the columns of a picture, or of some rows of it."""
+
+    def __init__(self, rig: Rig, plan: CapturePlan, refine_columns: bool = True, device: str = "cpu") -> None:
+        self.rig, self._device = rig, device
+        self.lines = LineSet.of(plan) if refine_columns else None
+        self._profiles = radiance_profiles(rig, plan) if refine_columns and plan.spectral_count else None
+
+    def find(
+        self,
+        code: DecodedCode,
+        white: MergedFrame,
+        stack: LineStack,
+        first: int = 0,
+        progress: Progress | None = None,
+    ) -> FoundColumns:
+        """Columns of all pixels of some rows, the first of which is the ``first`` (flat) of the picture."""
+        finder = ColumnFinder(self.rig, white, stack, self.lines, self._profiles, self._device, first)
+        start_px, start_std_px = _start(code)
+        maps = finder.find(np.arange(start_px.size), start_px, start_std_px, progress)
+        lit = _lit(white)
+        settled = settle(code, maps, finder, lit, progress)
+        return FoundColumns(
+            maps, _flags(self.rig, code, white, maps, settled, lit, self._profiles is not None)
+        )
+
+
+def geometry_of(
+    rig: Rig,
+    lines: LineSet | None,
+    found: FoundColumns,
+    shape: tuple[int, ...],
+    surface_window_px: int | None = None,
+    shared_errors: bool = True,
+) -> Geometry:
+    """Depth and surface from the columns of a whole picture of a shape; arguments as above."""
+    maps, flags = found.maps, found.flags
     waves = wave_std_px(maps.column_px.reshape(shape), maps.refined.reshape(shape), lines)
     common = math.hypot(rig.column_std_px, _zero_std_px(rig)) if shared_errors else 0.0
     dq = np.hypot(np.hypot(maps.column_std_px, common), waves.ravel())
-    flags = _flags(rig, code, white, maps, settled, lit, profiles is not None)
     good = (flags & int(DEPTH_INVALID)) == 0
     depth_mm = np.where(good, maps.depth_mm, np.nan).reshape(shape)
     depth_std = np.where(good, dq * maps.slope_mm_per_px, np.nan).reshape(shape)

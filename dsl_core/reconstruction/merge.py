@@ -44,9 +44,20 @@ class Readout(Protocol):
 class MergedScan:
     """Reads the settings of a shot and merges them; one merger and its buffers per thread."""
 
-    def __init__(self, source: FrameSource, rig: Readout, levels: NDArray[np.float64] | None = None) -> None:
-        """``levels`` (shots,) is the light of each shot relative to that it should have had; None: all 1."""
+    def __init__(
+        self,
+        source: FrameSource,
+        rig: Readout,
+        levels: NDArray[np.float64] | None = None,
+        *,
+        compares: bool = True,
+    ) -> None:
+        """``levels`` (shots,) is the light of each shot relative to that it should have had; None: all 1.
+
+        Settings of one pattern are compared with each other unless ``compares`` is off.
+        """
         self.source, self.rig, self.plan, self._levels = source, rig, source.plan, levels
+        self._compares = compares
         #: What settings of one pattern say of each other's light, of the patterns merged so far.
         self.ratios: dict[tuple[Role, int], tuple[Ratio | None, ...]] = {}
         self._shots: dict[tuple[Role, int], list[Shot]] = {}
@@ -62,15 +73,32 @@ class MergedScan:
 
     def merge(self, role: Role, pattern: int, out: MergedFrame | None = None) -> MergedFrame:
         """Linear radiance of one pattern, from every setting it was captured with."""
+        return self.merge_raws(
+            role, pattern, [self.source.read(s) for s in self.shots_of(role, pattern)], out
+        )
+
+    def merge_raws(
+        self,
+        role: Role,
+        pattern: int,
+        raws: Sequence[NDArray[np.uint16]],
+        out: MergedFrame | None = None,
+    ) -> MergedFrame:
+        """The same from mosaics that were read already, one for each of the pattern's shots."""
         shots = self.shots_of(role, pattern)
         settings = [shot.setting for shot in shots]
         merger = self._merger(tuple(settings))
-        raws = [self.source.read(shot) for shot in shots]
-        if len(shots) > 1:
-            blacks, gains = [self.blacks[i] for i in settings], [float(self.gains_ms[i]) for i in settings]
-            self.ratios[role, pattern] = compare_settings(raws, blacks, gains, self.rig.sensor)
+        if self._compares:
+            self.compare(role, pattern, raws)
         levels = None if self._levels is None else [float(self._levels[shot.index]) for shot in shots]
         return merger.merge(raws, out, levels)
+
+    def compare(self, role: Role, pattern: int, raws: Sequence[NDArray[np.uint16]]) -> None:
+        """Put down in ``ratios`` what settings of one pattern say of each other's light."""
+        settings = [shot.setting for shot in self.shots_of(role, pattern)]
+        if len(settings) > 1:
+            blacks, gains = [self.blacks[i] for i in settings], [float(self.gains_ms[i]) for i in settings]
+            self.ratios[role, pattern] = compare_settings(raws, blacks, gains, self.rig.sensor)
 
     def shots_of(self, role: Role, pattern: int) -> list[Shot]:
         """The shots of a pattern, one for each setting it was captured with."""
@@ -95,6 +123,31 @@ class LineStack:
     std: NDArray[np.floating]
     black_std: NDArray[np.float32]
 
+    def pick(self, pixels: NDArray[np.intp]) -> PickedLines:
+        """The frames of some pixels (flat indices)."""
+        radiance, std = (cube.reshape(len(cube), -1)[:, pixels] for cube in (self.radiance, self.std))
+        return PickedLines(pixels, radiance, std, self.black_std.ravel()[pixels])
+
+
+@dataclass(frozen=True)
+class PickedLines:
+    """Merged line frames of some ``pixels`` (n,) of a picture, as in `LineStack`: (frames, n), and (n,)."""
+
+    pixels: NDArray[np.intp]
+    radiance: NDArray[np.float32]
+    std: NDArray[np.floating]
+    black_std: NDArray[np.float32]
+
+    def pick(self, pixels: NDArray[np.intp]) -> PickedLines:
+        """Some of them, all of which must be there."""
+        order = np.argsort(self.pixels, kind="stable")
+        at = order[np.searchsorted(self.pixels, pixels, sorter=order)]
+        return PickedLines(pixels, self.radiance[:, at], self.std[:, at], self.black_std[at])
+
+    def as_stack(self) -> LineStack:
+        """The same memory as a picture of a single row."""
+        return LineStack(self.radiance[:, None], self.std[:, None], self.black_std[None])
+
 
 def decode_columns(scan: MergedScan, progress: Progress | None = None) -> tuple[DecodedCode, MergedFrame]:
     """Decode the binary code (seed Eqs. 4 to 8) and merge the white frame."""
@@ -115,7 +168,7 @@ def decode_columns(scan: MergedScan, progress: Progress | None = None) -> tuple[
         positive, inverse = pair
         decoder.add(positive.radiance, inverse.radiance, np.sqrt(positive.variance + inverse.variance))
 
-    _each(
+    in_order(
         lambda i: (scan.merge("code", 2 * i), scan.merge("code", 2 * i + 1)),
         plan.code_count // 2,
         "binary code",
@@ -127,9 +180,8 @@ def decode_columns(scan: MergedScan, progress: Progress | None = None) -> tuple[
 
 def stack_lines(scan: MergedScan, progress: Progress | None = None) -> LineStack:
     """Read and merge every spectral frame; deviations take half precision wherever it holds them."""
-    plan = scan.plan
-    shape = (plan.spectral_count, plan.camera_size_px[1], plan.camera_size_px[0])
-    stack = LineStack(np.empty(shape, np.float32), np.empty(shape, _deviation_type(scan)), scan.black_std)
+    shape = (scan.plan.spectral_count, *scan.black_std.shape)
+    stack = LineStack(np.empty(shape, np.float32), np.empty(shape, deviation_type(scan)), scan.black_std)
 
     def load(k: int) -> None:
         buffer = MergedFrame(stack.radiance[k], np.empty(shape[1:], np.float32), np.empty(shape[1:], bool))
@@ -137,7 +189,7 @@ def stack_lines(scan: MergedScan, progress: Progress | None = None) -> LineStack
         np.sqrt(merged.variance, out=merged.variance)
         stack.std[k] = merged.variance
 
-    _each(load, shape[0], "line frames", progress)
+    in_order(load, shape[0], "line frames", progress)
     return stack
 
 
@@ -149,7 +201,7 @@ def _merged_std(blacks: Sequence[BlackFrame], gains_ms: NDArray[np.float64]) -> 
     return np.asarray(1 / np.sqrt(information), np.float32)
 
 
-def _deviation_type(scan: MergedScan) -> type[np.floating]:
+def deviation_type(scan: MergedScan) -> type[np.floating]:
     """Half precision unless some deviation of the merge would overflow it or lose digits; else single."""
     sensor, gains = scan.rig.sensor, scan.gains_ms
     dark, full = raw_variance(sensor, np.array([0.0, sensor.full_scale_dn]))
@@ -174,7 +226,7 @@ def check_source(source: FrameSource, rig: Rig) -> CapturePlan:
     return plan
 
 
-def _each(
+def in_order(
     task: Callable[[int], T],
     count: int,
     stage: str,

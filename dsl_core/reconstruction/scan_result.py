@@ -2,26 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from typing import TYPE_CHECKING
-
 import numpy as np
 from numpy.typing import NDArray
 
 from dsl_core.model.calibration.accepted import missed_attributes
-from dsl_core.model.fit import ATTRIBUTE, FitFinding
+from dsl_core.model.fit import ATTRIBUTE, Fit
 from dsl_core.model.plan import CapturePlan
-from dsl_core.model.result import SPECTRUM_INVALID, Flag, build_result
+from dsl_core.model.result import SPECTRUM_INVALID, Flag
 from dsl_core.model.rig import Rig
 from dsl_core.model.spectral import WavelengthGrid
-from dsl_core.reconstruction.fit_findings import fit_of
 from dsl_core.reconstruction.geometry import Geometry
 from dsl_core.reconstruction.spectral.spectra import SpectralMaps
 from dsl_core.reconstruction.spectral.tile_frames import Pixels
 from dsl_core.version import __version__
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 #: Bands with less than this share of data count as decided by the prior.
 DECIDED_FROM = 0.5
@@ -46,30 +39,21 @@ def known_pixels(geometry: Geometry) -> Pixels:
     )
 
 
-def assemble(
-    rig: Rig,
-    plan: CapturePlan,
-    grid: WavelengthGrid,
-    geometry: Geometry,
-    spectra: SpectralMaps | None,
-    findings: Iterable[FitFinding] = (),
-    part: tuple[slice, slice] = (slice(None), slice(None)),
-) -> xr.Dataset:
-    """The dataset of a scan; without spectra when only depth was requested.
-
-    ``findings`` are those that were made on the way. Of the picture, a ``part`` (rows, columns) is kept.
-    """
+def maps_of_rows(
+    rig: Rig, grid: WavelengthGrid, geometry: Geometry, rows: slice, spectra: SpectralMaps | None
+) -> dict[str, NDArray[np.generic]]:
+    """The variables of a result for some rows of a picture, with ``spectra`` of these if there are any."""
     from dsl_core.optics.colour import reflectance_to_srgb
 
-    flags = geometry.flags.copy()
+    here, flags = geometry.of_rows(rows), geometry.flags[rows].copy()
     arrays: dict[str, NDArray[np.generic]] = {
-        "depth_mm": geometry.depth_mm.astype(np.float32),
-        "depth_std_mm": geometry.depth_std_mm.astype(np.float32),
-        "column_px": geometry.column_px,
-        "column_std_px": geometry.column_std_px,
-        "points_mm": geometry.points_mm(rig),
-        "normals": geometry.surface.normals.astype(np.float32),
-        "shading": geometry.surface.shading.astype(np.float32),
+        "depth_mm": here.depth_mm.astype(np.float32),
+        "depth_std_mm": here.depth_std_mm.astype(np.float32),
+        "column_px": here.column_px,
+        "column_std_px": here.column_std_px,
+        "points_mm": here.points_mm(rig, rows),
+        "normals": here.surface.normals.astype(np.float32),
+        "shading": here.surface.shading.astype(np.float32),
     }
     if spectra is not None:
         flags |= _spectral_flags(spectra)
@@ -81,11 +65,13 @@ def assemble(
             rgb=reflectance_to_srgb(spectra.reflectance, grid.centres_nm).astype(np.float32),
         )
     arrays["flags"] = flags
+    return arrays
+
+
+def attributes_of(rig: Rig, plan: CapturePlan, fit: Fit) -> dict[str, str | int | float]:
+    """What a result says of itself."""
     attributes: dict[str, str | int | float] = {"rig": rig.name, "plan": plan.name, "version": __version__}
-    fit = fit_of(rig, plan, grid, geometry.depth_mm, flags[part], spectra, findings)
-    attributes[ATTRIBUTE] = fit.model_dump_json()
-    attributes |= missed_attributes(rig.calibrations)
-    return build_result(arrays, grid.centres_nm, attributes).isel(y=part[0], x=part[1])
+    return attributes | {ATTRIBUTE: fit.model_dump_json()} | missed_attributes(rig.calibrations)
 
 
 def with_calibration(rig: Rig, grid: WavelengthGrid, spectra: SpectralMaps) -> NDArray[np.float32]:

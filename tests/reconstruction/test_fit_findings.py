@@ -9,13 +9,20 @@ import numpy as np
 import pytest
 
 from dsl_core.devices.base import DeviceRig
-from dsl_core.model.fit import Fit, Part
+from dsl_core.model.fit import Fit, FitFinding, Part
 from dsl_core.model.plan import CapturePlan, GrayCode, ScanLines
 from dsl_core.model.result import Flag, Reach
 from dsl_core.model.rig import Rig
 from dsl_core.model.spectral import WavelengthGrid
 from dsl_core.optics.correspondence import correspondence
-from dsl_core.reconstruction.fit_findings import band_findings, cause_findings, line_width_nm, share_findings
+from dsl_core.reconstruction.fit_findings import (
+    SpectralCounts,
+    band_findings,
+    cause_findings,
+    count_spectra,
+    line_width_nm,
+    share_findings,
+)
 from dsl_core.reconstruction.spectral.causes import MOST_SHIFT_PX
 from dsl_core.reconstruction.spectral.film_motion import FilmMotion
 from dsl_core.reconstruction.spectral.probe import Probe, probe
@@ -25,6 +32,16 @@ from tests.cases.twin_scan import MemoryScan, solver_input, twin_scan
 
 SHAPE = (20, 20)
 GRID = WavelengthGrid(step_nm=10.0)
+
+
+def counted(data_share: np.ndarray, reach: np.ndarray) -> SpectralCounts:
+    return count_spectra(np.zeros(SHAPE, np.uint16), data_share, reach)
+
+
+def judged(made: np.ndarray[tuple[int, ...], np.dtype[np.uint16]]) -> list[FitFinding]:
+    """What is said of flags and of spectra that reach nothing."""
+    nothing = np.zeros((1, *SHAPE), np.uint8)
+    return list(share_findings(made, count_spectra(made, nothing.astype(float), nothing)))
 
 
 def flags(flag: Flag, share: float) -> np.ndarray[tuple[int, ...], np.dtype[np.uint16]]:
@@ -43,22 +60,30 @@ def flags(flag: Flag, share: float) -> np.ndarray[tuple[int, ...], np.dtype[np.u
     ],
 )
 def test_a_flag_is_told_from_the_share_that_is_not_normal(flag: Flag, limit: float, part: str) -> None:
-    below, above = (Fit.of(share_findings(flags(flag, limit + d), True)) for d in (-0.02, 0.02))
+    below, above = (Fit.of(judged(flags(flag, limit + d))) for d in (-0.02, 0.02))
     assert below.parts == ()
     assert above.parts == (part,)
     assert f"{limit + 0.02:.0%}" in above.words
 
 
 def test_pixels_in_shadow_are_not_lost_and_depth_alone_has_no_spectra_to_judge() -> None:
-    assert Fit.of(share_findings(flags(Flag.NO_LIGHT, 0.8), True)).parts == ()
-    assert Fit.of(share_findings(flags(Flag.POOR_FIT, 0.8), False)).parts == ()
+    assert Fit.of(judged(flags(Flag.NO_LIGHT, 0.8))).parts == ()
+    assert Fit.of(share_findings(flags(Flag.POOR_FIT, 0.8), None)).parts == ()
+
+
+def test_counts_of_rows_add_up_to_those_of_the_picture() -> None:
+    made, rng = flags(Flag.POOR_FIT, 0.3), np.random.default_rng(0)
+    share, reach = rng.uniform(0, 1, (3, *SHAPE)), rng.integers(1, 5, (3, *SHAPE))
+    rows = (slice(0, 7), slice(7, 20))
+    parts = (count_spectra(made[each], share[:, each], reach[:, each]) for each in rows)
+    assert sum(parts, SpectralCounts()) == count_spectra(made, share, reach)
 
 
 @pytest.mark.parametrize(("step_nm", "share", "words"), [(20, 0.9, "coarse"), (1, 0.2, "fine"), (5, 0.9, "")])
 def test_bands_are_judged_by_the_lines_and_by_the_data(step_nm: float, share: float, words: str) -> None:
     cube = (3, *SHAPE)
     found = Fit.of(
-        band_findings(step_nm, 11.0, np.full(cube, share), np.full(cube, int(Reach.PLUS_ONE), np.uint8))
+        band_findings(step_nm, 11.0, counted(np.full(cube, share), np.full(cube, int(Reach.PLUS_ONE))))
     )
     assert bool(found.parts) == bool(words)
     assert words in found.words
@@ -66,8 +91,8 @@ def test_bands_are_judged_by_the_lines_and_by_the_data(step_nm: float, share: fl
 
 def test_bands_that_no_line_reaches_are_not_blamed_on_their_width() -> None:
     cube = (3, *SHAPE)
-    zero_only = np.full(cube, int(Reach.ZERO_ONLY), np.uint8)
-    assert Fit.of(band_findings(5, 11.0, np.full(cube, 0.1), zero_only)).parts == ()
+    zero_only = np.full(cube, int(Reach.ZERO_ONLY))
+    assert Fit.of(band_findings(5, 11.0, counted(np.full(cube, 0.1), zero_only))).parts == ()
 
 
 def test_a_line_of_the_published_rig_is_about_ten_nanometres_wide() -> None:

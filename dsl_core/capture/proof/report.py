@@ -11,7 +11,7 @@ from dsl_core.capture.proof.finding import Finding, ProofReport, Verdict
 from dsl_core.capture.proof.raster import Counts, Raster
 from dsl_core.capture.proof.verifier import FrameProof
 from dsl_core.errors import StoreError
-from dsl_core.model.frames import FrameSource
+from dsl_core.model.frames import FrameSource, read_rows
 from dsl_core.model.plan import CapturePlan, Shot
 from dsl_core.model.rig import Rig
 
@@ -38,6 +38,10 @@ class WatchedSource:
         with self._lock:
             self._seen[shot.index] = seen
         return pixels
+
+    def read_rows(self, shot: Shot, rows: slice) -> NDArray[np.uint16]:
+        """Some rows of a mosaic, of which nothing is kept; raises `StoreError`."""
+        return read_rows(self._source, shot, rows)
 
     def report(self, calibration: Rig | None, bit_depth: int = 12, bayer: str = "RGGB") -> ProofReport:
         """What the frames read so far show."""

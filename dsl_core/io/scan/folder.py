@@ -105,6 +105,18 @@ class ScanReader:
             raise StoreError(self._sentence(shot, self._mismatch(shot, found)))
         return pixels
 
+    def read_rows(self, shot: Shot, rows: slice) -> NDArray[np.uint16]:
+        """Some rows of a mosaic, shape (rows, columns), without a look at its checksum: `read` compares that.
+
+        Raises `StoreError` naming frame and file.
+        """
+        if shot.index not in self.entries:
+            raise StoreError(self._sentence(shot, "it was never finished"))
+        try:
+            return self.store.read_rows(shot.index, rows)
+        except ChunkError as error:
+            raise StoreError(self._sentence(shot, str(error))) from error
+
     def _mismatch(self, shot: Shot, found: int) -> str:
         twins = [e.shot for e in self.entries.values() if e.crc32 == found and e.shot != shot.index]
         path = self.store.path(shot.index)

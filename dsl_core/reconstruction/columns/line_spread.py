@@ -9,6 +9,7 @@ smooth surfaces have waves; how large these are is an error that no pixel's own 
 from __future__ import annotations
 
 from itertools import pairwise
+from typing import Protocol
 
 import numpy as np
 import torch
@@ -22,7 +23,7 @@ from dsl_core.optics.spread.fit import REACH_PX, SpreadFit, fit_spread
 from dsl_core.optics.spread.wave import column_wave
 from dsl_core.patterns.gray_code import DecodedCode
 from dsl_core.reconstruction.hdr import MergedFrame
-from dsl_core.reconstruction.merge import LineStack
+from dsl_core.reconstruction.merge import PickedLines
 from dsl_core.solve.threads import one_kernel_thread
 
 #: Pixels that are looked at, spread evenly over bright ones, and neighbours of a row in a run.
@@ -38,18 +39,16 @@ FEWEST, MOST, ASKED = 30, 400, 3
 
 
 def own_spread(
-    rig: Rig, lines: LineSet | None, code: DecodedCode, white: MergedFrame, stack: LineStack
+    rig: Rig, lines: LineSet | None, code: DecodedCode, white: MergedFrame, stack: Pickable
 ) -> SpreadFit | None:
     """The line spread that single scan lines show; None for other patterns and where too few are seen."""
-    if lines is None or not lines.single or lines.step_px > lines.width_px:
-        return None
-    pixels = _sample(code, white)
-    if pixels.size == 0:
+    pixels = spread_pixels(lines, code, white)
+    if lines is None or pixels.size == 0:
         return None
     column = torch.as_tensor(code.likely_column.ravel()[pixels].astype(np.float64))
     with one_kernel_thread():
         place = places_of(rig, torch.as_tensor(pixels), column)
-        return fit_spread(_peaks(stack, lines, pixels, column), column, rig.projector_response, place)
+        return fit_spread(_peaks(stack.pick(pixels), lines, column), column, rig.projector_response, place)
 
 
 def with_own_spread(rig: Rig, found: SpreadFit | None) -> Rig:
@@ -59,8 +58,20 @@ def with_own_spread(rig: Rig, found: SpreadFit | None) -> Rig:
     return rig.model_copy(update={"projector_response": found.response})
 
 
-def _sample(code: DecodedCode, white: MergedFrame) -> NDArray[np.intp]:
-    """Flat indices of bright pixels, in runs of neighbours on smooth surfaces, evenly thinned."""
+class Pickable(Protocol):
+    """Line frames of which those of some pixels can be had."""
+
+    def pick(self, pixels: NDArray[np.intp]) -> PickedLines:
+        """The frames of some pixels (flat indices)."""
+
+
+def spread_pixels(lines: LineSet | None, code: DecodedCode, white: MergedFrame) -> NDArray[np.intp]:
+    """Flat indices of bright pixels, in runs of neighbours on smooth surfaces, evenly thinned.
+
+    None where single lines do not cover the picture.
+    """
+    if lines is None or not lines.single or lines.step_px > lines.width_px:
+        return np.empty(0, np.intp)
     light = white.radiance
     good = ~code.undecided & ~white.saturated & np.isfinite(light) & (light > 0)
     if not good.any():
@@ -78,14 +89,14 @@ def _sample(code: DecodedCode, white: MergedFrame) -> NDArray[np.intp]:
     return np.asarray((first[:, None] + np.arange(RUN)).ravel())
 
 
-def _peaks(stack: LineStack, lines: LineSet, pixels: NDArray[np.intp], column: torch.Tensor) -> Peaks:
+def _peaks(seen: PickedLines, lines: LineSet, column: torch.Tensor) -> Peaks:
     """The lines around the columns of some pixels."""
     half = int((lines.width_px / 2 + REACH_PX) / lines.step_px)
     line = lines.nearest(column) + torch.arange(-half, half + 1)[:, None]
     frame = lines.frame(line).numpy()
     y, std = (
-        torch.as_tensor(frames.reshape(len(frames), -1)[frame, pixels].astype(np.float64))
-        for frames in (stack.radiance, stack.std)
+        torch.as_tensor(frames[frame, np.arange(len(column))].astype(np.float64))
+        for frames in (seen.radiance, seen.std)
     )
     used = lines.exists(line) & torch.isfinite(y) & torch.isfinite(std)
     return Peaks(

@@ -76,6 +76,8 @@ class ColumnFinder:
     lines: LineSet | None
     profiles: NDArray[np.float64] | None
     device: str = "cpu"
+    #: Where the first pixel of ``white`` and ``stack`` is in the whole picture, a flat index.
+    first: int = 0
 
     def find(
         self,
@@ -84,7 +86,7 @@ class ColumnFinder:
         start_std_px: Floats | None = None,
         progress: Progress | None = None,
     ) -> ColumnMaps:
-        """Columns of pixels (P,), flat indices, from decoded ones (P,) and what those are sure to."""
+        """Columns of pixels (P,), flat indices into the stack, from decoded ones (P,) with deviations."""
         maps = ColumnMaps.empty(len(pixels))
 
         def work(start: int, _: Check) -> None:
@@ -105,7 +107,7 @@ class ColumnFinder:
         refined = column.refined.cpu().numpy()
         if std_px is not None:
             spread = np.where(refined, spread, std_px)
-        at = torch.as_tensor(pixels, device=self.device)
+        at = torch.as_tensor(pixels + self.first, device=self.device)
         depth, slope = triangulate(self.rig, at, column.column_px.double())
         a, da = (v.cpu().numpy() for v in (column.amplitude, column.amplitude_std))
         dark, dark_std = (v.cpu().numpy() for v in (offset, open_offset))
@@ -122,7 +124,7 @@ class ColumnFinder:
         std = torch.as_tensor(stack.std.reshape(len(stack.std), -1)[:, where], device=self.device)
         if self.lines is None:
             return self._of_patterns(where, start, y, std), torch.zeros_like(start), black_std
-        widths = widths_at(self.rig, _indices(where, start), start)
+        widths = widths_at(self.rig, self._places(where, start), start)
         column, offset, offset_std = _on_lines(start, y, std, self.lines, self.rig, widths)
         known = offset_std < OFFSET_KNOWN * black_std
         return column, offset, torch.where(known, 0.0, torch.minimum(offset_std, black_std))
@@ -131,8 +133,13 @@ class ColumnFinder:
         """Columns from any pattern set, with what the first orders of a grey surface add to its frames."""
         assert self.profiles is not None
         profiles = one_if_grey(self.profiles)
-        light = first_order_share(self.rig, profiles, _indices(where, start), start)
+        light = first_order_share(self.rig, profiles, self._places(where, start), start)
         return refine_by_profiles(start, y, std, profiles, self.rig.projector_response, light)
+
+    def _places(self, where: Indices | slice, like: Tensor) -> Tensor:
+        """Flat indices into the whole picture."""
+        index = np.arange(where.start, where.stop) if isinstance(where, slice) else where
+        return torch.as_tensor(index + self.first, device=like.device)
 
     def _of_white(self, where: Indices | slice, start: Tensor) -> Column:
         """What is known without any pattern but white."""
@@ -140,11 +147,6 @@ class ColumnFinder:
         spread = torch.as_tensor(self.white.variance.ravel()[where], device=self.device).sqrt()
         none = torch.zeros_like(start, dtype=torch.bool)
         return Column(start, torch.full_like(start, WHOLE_PX_STD), amplitude, spread, none)
-
-
-def _indices(where: Indices | slice, like: Tensor) -> Tensor:
-    index = np.arange(where.start, where.stop) if isinstance(where, slice) else where
-    return torch.as_tensor(index, device=like.device)
 
 
 def _on_lines(

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dsl_core.model.fit import FitFinding
-from dsl_core.model.plan import Shot
+from dsl_core.model.frames import FrameSource
+from dsl_core.model.plan import CapturePlan, Role, Shot
+from dsl_core.model.rig import Rig
 from dsl_core.optics.sensor import raw_variance
 from dsl_core.patterns.gray_code import DecodedCode
 from dsl_core.progress import Progress
@@ -21,8 +24,10 @@ from dsl_core.reconstruction.light.course import (
     Witness,
     light_course,
 )
-from dsl_core.reconstruction.light.line_levels import LineLevels, line_levels
-from dsl_core.reconstruction.merge import LineStack, MergedScan, decode_columns, stack_lines
+from dsl_core.reconstruction.light.line_levels import LineLevels, candidates, line_levels
+from dsl_core.reconstruction.light.setting_ratios import Ratio
+from dsl_core.reconstruction.light.steady import SteadyLight
+from dsl_core.reconstruction.merge import PickedLines
 
 #: Frames whose sum is this far from white are of a scene that moved, or not what was asked for.
 MOST_MISFIT = 0.2
@@ -31,42 +36,80 @@ LEVEL_ERROR = 0.004
 _CORRECTED = " The frames are corrected for it."
 
 
+class Pictures(Protocol):
+    """The frames of a scan, as far as its light is concerned; see `dsl_core.reconstruction.rows.frames`."""
+
+    source: FrameSource
+    rig: Rig
+    plan: CapturePlan
+    ratios: dict[tuple[Role, int], tuple[Ratio | None, ...]]
+
+    def shots_of(self, role: Role, pattern: int) -> list[Shot]:
+        """The shots of a pattern, one for each setting it was captured with."""
+
+    def expose(self, levels: NDArray[np.float64]) -> None:
+        """From now on merge frames as exposed to other light."""
+
+    def follow(self, light: SteadyLight) -> None:
+        """From now on give line frames as they would be in steady light."""
+
+    def decode(self, progress: Progress | None = None) -> tuple[DecodedCode, MergedFrame]:
+        """What the binary code says of every pixel, and white."""
+
+    def look(self, pixels: NDArray[np.intp], progress: Progress | None = None) -> None:
+        """Look at every frame once: compare settings, and keep the lines of some pixels for `pick`."""
+
+    def pick(self, pixels: NDArray[np.intp], progress: Progress | None = None) -> PickedLines:
+        """The lines of some pixels (flat indices)."""
+
+
 @dataclass(frozen=True)
-class SteadyFrames:
-    """Columns, white and lines in steady light, and what was found."""
+class Steady:
+    """Code and white in steady light, and what was found."""
 
     code: DecodedCode
     white: MergedFrame
-    stack: LineStack
     findings: tuple[FitFinding, ...] = ()
 
 
-def read_steady(
-    scan: MergedScan, code: DecodedCode, white: MergedFrame, progress: Progress | None = None
-) -> SteadyFrames:
-    """Read the lines of a scan, and take the course of its light off all its frames.
+def follow_light(
+    frames: Pictures,
+    code: DecodedCode,
+    white: MergedFrame,
+    also: Callable[[DecodedCode, MergedFrame], NDArray[np.intp]],
+    progress: Progress | None = None,
+) -> Steady:
+    """Look at the frames of a scan, and have them follow the course of its light.
 
-    Frames of several settings are read a second time if these had different light.
+    Frames of several settings are read a second time if these had different light. ``also`` says which
+    pixels will be asked for later, so that they are read at the same time.
     """
-    stack = stack_lines(scan, progress)
-    before = light_course([*_of_settings(scan), *_of_whites(scan)], scan.plan.shot_count)
+
+    def look() -> NDArray[np.intp]:
+        pixels = candidates(code.column, (white.radiance, white.variance))
+        frames.look(np.union1d(pixels, also(code, white)), progress)
+        return pixels
+
+    pixels = look()
+    before = light_course([*_of_settings(frames), *_of_whites(frames)], frames.plan.shot_count)
     if before is not None and not before.is_steady:
-        del stack  # the largest array of a reconstruction
-        scan = MergedScan(scan.source, scan.rig, _between_settings(scan, before))
-        code, white = decode_columns(scan, progress)
-        stack = stack_lines(scan, progress)
+        frames.expose(_between_settings(frames, before))
+        code, white = frames.decode(progress)
+        pixels = look()
     lines = line_levels(
-        scan.plan, code.column, (white.radiance, white.variance), stack.radiance, stack.std, stack.black_std
+        frames.plan, code.column, (white.radiance, white.variance), frames.pick(pixels, progress)
     )
     if lines is not None and lines.misfit > MOST_MISFIT:
         lines = None
-    witnesses = [*_of_settings(scan), *_of_whites(scan), *_of_lines(scan, lines)]
-    course = light_course(witnesses, scan.plan.shot_count)
+    witnesses = [*_of_settings(frames), *_of_whites(frames), *_of_lines(frames, lines)]
+    course = light_course(witnesses, frames.plan.shot_count)
     if course is None:
-        return SteadyFrames(code, white, stack)
+        return Steady(code, white)
     if not course.is_steady:
-        white = _corrected(scan, course, lines, white, stack)
-    return SteadyFrames(code, white, stack, tuple(light_findings(course, lines is not None)))
+        light = _steady(frames, course, lines)
+        frames.follow(light)
+        white = light.steady_white(white)
+    return Steady(code, white, tuple(light_findings(course, lines is not None)))
 
 
 def light_findings(course: LightCourse, with_lines: bool) -> Iterator[FitFinding]:
@@ -94,7 +137,7 @@ def light_findings(course: LightCourse, with_lines: bool) -> Iterator[FitFinding
     yield flicker.model_copy(update={"significant": course.flickers})
 
 
-def _of_settings(scan: MergedScan) -> Iterator[Witness]:
+def _of_settings(scan: Pictures) -> Iterator[Witness]:
     for (role, pattern), ratios in sorted(scan.ratios.items()):
         shots = scan.shots_of(role, pattern)
         for shot, ratio in zip(shots[:-1], ratios, strict=False):
@@ -102,7 +145,7 @@ def _of_settings(scan: MergedScan) -> Iterator[Witness]:
                 yield Witness(shot.index, shots[-1].index, ratio.log, ratio.std, between_settings=True)
 
 
-def _of_whites(scan: MergedScan) -> Iterator[Witness]:
+def _of_whites(scan: Pictures) -> Iterator[Witness]:
     """White taken again, over white as it was taken first, each less the black next to it."""
     plan = scan.plan
     again = {shot: plan.original(shot) for shot in plan.shots() if shot.role == "sentinel"}
@@ -111,13 +154,14 @@ def _of_whites(scan: MergedScan) -> Iterator[Witness]:
         near = [black for black in blacks if abs(black.index - shot.index) < 4]
         if old.role != "white" or not near:
             continue
-        first = scan.source.read(old) - scan.blacks[old.setting].mean
+        black = scan.shots_of("black", 0)[old.setting]
+        first = scan.source.read(old).astype(np.float32) - scan.source.read(black)
         now = scan.source.read(shot).astype(np.float32) - scan.source.read(near[0])
         yield _compared(scan, shot, old, first, now)
 
 
 def _compared(
-    scan: MergedScan, shot: Shot, old: Shot, first: NDArray[np.floating], now: NDArray[np.floating]
+    scan: Pictures, shot: Shot, old: Shot, first: NDArray[np.floating], now: NDArray[np.floating]
 ) -> Witness:
     limit = 0.9 * scan.rig.sensor.full_scale_dn
     used = (first > 0.25 * np.percentile(first, 95)) & (first < limit) & (now < limit)
@@ -127,7 +171,7 @@ def _compared(
     return Witness(shot.index, old.index, float(np.log(sums[0] / sums[1])), float(std))
 
 
-def _of_lines(scan: MergedScan, lines: LineLevels | None) -> Iterator[Witness]:
+def _of_lines(scan: Pictures, lines: LineLevels | None) -> Iterator[Witness]:
     if lines is None:
         return
     for pattern, (log, std) in enumerate(zip(lines.log, lines.std, strict=True)):
@@ -136,7 +180,7 @@ def _of_lines(scan: MergedScan, lines: LineLevels | None) -> Iterator[Witness]:
         yield Witness(shot.index, None, float(log), float(np.hypot(std, LEVEL_ERROR)), slope)
 
 
-def _between_settings(scan: MergedScan, course: LightCourse) -> NDArray[np.float64]:
+def _between_settings(scan: Pictures, course: LightCourse) -> NDArray[np.float64]:
     """Levels (shots,) that make the shots of a pattern agree with that of its last setting."""
     levels = np.ones(scan.plan.shot_count)
     for (role, pattern), ratios in scan.ratios.items():
@@ -148,12 +192,11 @@ def _between_settings(scan: MergedScan, course: LightCourse) -> NDArray[np.float
     return levels
 
 
-def _corrected(
-    scan: MergedScan, course: LightCourse, lines: LineLevels | None, white: MergedFrame, stack: LineStack
-) -> MergedFrame:
-    """White in steady light; the lines are changed where they are."""
+def _steady(scan: Pictures, course: LightCourse, lines: LineLevels | None) -> SteadyLight:
+    """What to take off the frames."""
     follows = lines is not None and course.flickers
-    for pattern in range(len(stack.radiance)):
+    logs, stds = np.zeros((2, scan.plan.spectral_count))
+    for pattern in range(len(logs)):
         shot = scan.shots_of("spectral", pattern)[-1].index
         log, std = course.log[shot], course.std[shot]
         if lines is not None and follows:
@@ -161,9 +204,6 @@ def _corrected(
             own, std = lines.log[pattern] + course.white - slope, np.hypot(lines.std[pattern], LEVEL_ERROR)
             share = course.flicker**2 / (course.flicker**2 + std**2)
             log, std = log + share * (own - log), np.sqrt(share) * std
-        stack.radiance[pattern] /= np.float32(np.exp(log))
-        deviation = stack.std[pattern].astype(np.float32) / np.float32(np.exp(log))
-        stack.std[pattern] = np.hypot(deviation, np.float32(std) * stack.radiance[pattern])
+        logs[pattern], stds[pattern] = log, std
     level = course.white if follows else course.log[scan.shots_of("white", 0)[-1].index]
-    factor = np.float32(np.exp(-level))
-    return replace(white, radiance=white.radiance * factor, variance=white.variance * factor**2)
+    return SteadyLight(logs, stds, float(level))

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from dsl_core.model.plan import CapturePlan, NoSpectral, ScanLines
 from dsl_core.patterns.images import spectral_profiles
+from dsl_core.reconstruction.merge import PickedLines
 
 Floats = NDArray[np.float64]
 
@@ -52,28 +53,29 @@ def line_levels(
     plan: CapturePlan,
     column: NDArray[np.integer],
     white: tuple[NDArray[np.floating], NDArray[np.floating]],
-    radiance: NDArray[np.floating],
-    std: NDArray[np.floating],
-    black_std: NDArray[np.floating],
+    seen: PickedLines,
 ) -> LineLevels | None:
-    """Levels of the frames (frames, rows, columns); None where the patterns or the picture do not tell.
+    """Levels of the frames, from `candidates`; None where the patterns or the picture do not tell.
 
-    ``column`` is the projector column of each pixel (negative: unknown), ``white`` radiance and variance.
+    ``column`` is the projector column of each pixel (negative: unknown), ``white`` radiance and variance,
+    both of the whole picture.
     """
     if isinstance(plan.spectral, NoSpectral):
         return None
     cover = _coverage(plan)
-    picked = _pick(column, white, std)
-    if cover is None or len(picked) < FEWEST:
+    sound = np.flatnonzero(np.isfinite(seen.std).all(0))
+    sound = sound[:: max(len(sound) // PIXELS, 1)]
+    if cover is None or len(sound) < FEWEST:
         return None
+    picked = seen.pixels[sound]
     flat = column.ravel()[picked]
-    frames = radiance.reshape(len(radiance), -1)[:, picked].T.astype(np.float64)
-    variance = std.reshape(len(std), -1)[:, picked].T.astype(np.float64) ** 2
+    frames = seen.radiance[:, sound].T.astype(np.float64)
+    variance = seen.std[:, sound].T.astype(np.float64) ** 2
     light, light_variance = (each.ravel()[picked].astype(np.float64) for each in white)
     mean = float(cover.mean())
     total = light * (STRAIGHT * cover[flat] + (1 - STRAIGHT) * mean)
     # What black is off by adds up over all frames.
-    blacks = len(radiance) * black_std.ravel()[picked].astype(np.float64)
+    blacks = len(seen.radiance) * seen.black_std[sound].astype(np.float64)
     # Weights must not know the noise of white: they would prefer pixels whose white is too dark.
     summed = frames.sum(1) * (total.sum() / frames.sum())
     usual = np.polyval(np.polyfit(summed, light_variance, 1), summed).clip(light_variance.min())
@@ -129,19 +131,14 @@ def _coverage(plan: CapturePlan) -> Floats | None:
     return cover if inner.std() < EVEN * inner.mean() else None
 
 
-def _pick(
-    column: NDArray[np.integer],
-    white: tuple[NDArray[np.floating], NDArray[np.floating]],
-    std: NDArray[np.floating],
+def candidates(
+    column: NDArray[np.integer], white: tuple[NDArray[np.floating], NDArray[np.floating]]
 ) -> NDArray[np.intp]:
-    """Flat indices of pixels that are lit, decoded, and saturated in no frame, spread over the picture."""
+    """Flat indices of pixels that are lit and decoded, spread over the picture: about twice those asked."""
     light, variance = white
     lit = (column >= 0) & np.isfinite(variance) & (light > 5 * np.sqrt(np.maximum(variance, 0)))
     some = np.flatnonzero(lit.ravel())
-    some = some[:: max(len(some) // (2 * PIXELS), 1)]
-    sound = np.isfinite(std.reshape(len(std), -1)[:, some]).all(0)
-    some = some[sound]
-    return np.asarray(some[:: max(len(some) // PIXELS, 1)])
+    return np.asarray(some[:: max(len(some) // (2 * PIXELS), 1)])
 
 
 def _pitch(column: NDArray[np.integer]) -> float:

@@ -26,6 +26,11 @@ class Ratio:
     std: float
 
 
+def compared_rows(height: int) -> NDArray[np.intp]:
+    """Rows of a picture of a height that are looked at."""
+    return np.unique(np.linspace(0, height - 1, min(height, ROWS)).astype(np.intp))
+
+
 def compare_settings(
     raws: Sequence[NDArray[np.unsignedinteger]],
     blacks: Sequence[BlackFrame],
@@ -33,8 +38,7 @@ def compare_settings(
     sensor: Sensor,
 ) -> tuple[Ratio | None, ...]:
     """The light of each mosaic of one pattern relative to the last one's; None where too little is seen."""
-    height = raws[0].shape[0]
-    rows = np.unique(np.linspace(0, height - 1, min(height, ROWS)).astype(int))
+    rows = compared_rows(raws[0].shape[0])
     pictures = [raw[rows].astype(np.float32) for raw in raws]
     light = [each - black.mean[rows] for each, black in zip(pictures, blacks, strict=True)]
     found: list[Ratio | None] = []

@@ -16,6 +16,7 @@ from torch import Tensor
 from dsl_core.model.rig import ProjectorResponse
 from dsl_core.optics.line_profile import LineTable
 from dsl_core.optics.line_set import LineSet
+from dsl_core.reconstruction.spectral.picked_cube import PickedCube
 from dsl_core.reconstruction.spectral.tile_frames import Pixels, weighted
 
 Floats = NDArray[np.float64]
@@ -76,8 +77,8 @@ def probe_lines(
     lines: LineSet,
     response: ProjectorResponse,
     pixels: Pixels,
-    radiance: NDArray[np.float32],
-    std: NDArray[np.floating],
+    radiance: NDArray[np.float32] | PickedCube,
+    std: NDArray[np.floating] | PickedCube,
     targets: NDArray[np.intp],
     widths: Tensor | None = None,
 ) -> LineProbe:

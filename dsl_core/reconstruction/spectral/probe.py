@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from dsl_core.model.line_spread import Spread, stretched
+from dsl_core.model.rig import BayerPattern
 from dsl_core.optics.colour_neighbours import bayer_colours
 from dsl_core.optics.correspondence import Footprint, like
 from dsl_core.optics.line_profile import SAMPLES, ProfileTable, halo_of_line
@@ -37,6 +38,7 @@ from dsl_core.reconstruction.spectral.curve_probe import (
 )
 from dsl_core.reconstruction.spectral.dense_solver import solve_dense
 from dsl_core.reconstruction.spectral.line_probe import LineProbe, probe_lines, sound_pixels
+from dsl_core.reconstruction.spectral.picked_cube import PickedCube
 from dsl_core.reconstruction.spectral.probed_pixels import Indices, cell_of, sample_pixels, samples_of
 from dsl_core.reconstruction.spectral.solver import Prior, band_mean, roughness
 from dsl_core.reconstruction.spectral.tile_frames import Pixels, weighted
@@ -83,12 +85,15 @@ SPECTRUM = 25
 
 @dataclass(frozen=True)
 class ProbedScan:
-    """A scan and its model: ``radiance`` and ``std`` are (frames, rows, columns), in DN per ms."""
+    """A scan and its model: ``radiance`` and ``std`` are (frames, rows, columns), in DN per ms.
+
+    Of the picture only `probed_pixels` are looked at.
+    """
 
     model: PixelModel
     pixels: Pixels
-    radiance: NDArray[np.float32]
-    std: NDArray[np.floating]
+    radiance: NDArray[np.float32] | PickedCube
+    std: NDArray[np.floating] | PickedCube
     prior: Prior
 
 
@@ -140,10 +145,20 @@ class Probe:
         return curve_misfit(*self.with_curves, self.weight, np.array(PRIOR_STD), self.step_nm)
 
 
+def _targets(valid: NDArray[np.bool_]) -> Indices:
+    """Pixels that are probed."""
+    return sample_pixels(valid, int(np.clip(np.count_nonzero(valid) // ONE_OF, *PIXELS_PER_CELL)))
+
+
+def probed_pixels(valid: NDArray[np.bool_], bayer: BayerPattern) -> Indices:
+    """Flat indices, rising, of all pixels of a picture whose frames a probe of it looks at."""
+    targets = _targets(valid)
+    return np.union1d(targets, samples_of(targets, valid.shape, bayer)[0])
+
+
 def probe(scan: ProbedScan) -> Probe | None:
     """Probe pixels of a scan of single lines; None for other patterns, and where there are too few pixels."""
-    per_cell = int(np.clip(np.count_nonzero(scan.pixels.valid) // ONE_OF, *PIXELS_PER_CELL))
-    targets = sample_pixels(scan.pixels.valid, per_cell)
+    targets = _targets(scan.pixels.valid)
     if not scan.model.single or len(targets) < FEWEST:
         return None
     with torch.inference_mode():

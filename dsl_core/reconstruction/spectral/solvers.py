@@ -2,18 +2,31 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
 from dsl_core.errors import PlanError
 from dsl_core.model.options import SOLVERS, Options, names
 from dsl_core.model.plan import CapturePlan
 from dsl_core.model.rig import Rig
 from dsl_core.optics.correspondence import correspondence
+from dsl_core.optics.line_set import LineSet
+from dsl_core.optics.spectra import Bands
 from dsl_core.progress import Progress
-from dsl_core.reconstruction.merge import LineStack
+from dsl_core.reconstruction.rows.bands import Band
+from dsl_core.reconstruction.rows.frames import ScanFrames
+from dsl_core.reconstruction.spectral.model_error import ModelError
 from dsl_core.reconstruction.spectral.nearest_line import ColourBasis, NearestLine
+from dsl_core.reconstruction.spectral.picked_cube import PickedCube
+from dsl_core.reconstruction.spectral.probe import probed_pixels
 from dsl_core.reconstruction.spectral.published_objective import PublishedReconstruction, require_single_lines
-from dsl_core.reconstruction.spectral.spectra import SpectralMaps, SpectralReconstruction
+from dsl_core.reconstruction.spectral.self_correction import Followed
+from dsl_core.reconstruction.spectral.spectra import SpectralMaps, SpectralReconstruction, tile_shape
 from dsl_core.reconstruction.spectral.tile_frames import Pixels
 
+_NONE = np.empty(0, np.intp)
 _KINDS = {"published": PublishedReconstruction, "nearest-line": NearestLine}
 
 
@@ -28,14 +41,30 @@ def check_solver(solver: str, rig: Rig, plan: CapturePlan, model: str) -> None:
         require_single_lines(plan)
 
 
-def solve_spectra(
+@dataclass(frozen=True)
+class RowSolver:
+    """Spectra of a scan by rows; with what it says about its model, and what is left of that, if anything."""
+
+    rows: Callable[[Band, Progress | None], SpectralMaps]
+    followed: Followed | None = None
+    error: ModelError | None = None
+
+
+def rows_together(rig: Rig, options: Options) -> int | None:
+    """Rows of a picture that are solved together; None where all are, by solvers to compare with."""
+    if not options.spectra:
+        return 2
+    return tile_shape(Bands.of(rig, options.grid).count)[0] if options.solver == "best" else None
+
+
+def row_solver(
     rig: Rig,
     plan: CapturePlan,
     options: Options,
-    stack: LineStack,
+    frames: ScanFrames,
     pixels: Pixels,
     progress: Progress | None = None,
-) -> SpectralMaps:
+) -> RowSolver:
     """Spectra of known pixels, with the solver and the model of correspondence that ``options`` name.
 
     Raises `PlanError` for an unknown solver or patterns that it cannot read, `CalibrationError` for a model
@@ -43,11 +72,27 @@ def solve_spectra(
     """
     check_solver(options.solver, rig, plan, options.correspondence)
     if options.solver == "colour-basis":
-        return ColourBasis(rig, options.grid, pixels).run(progress)
-    kind = _KINDS.get(options.solver)
+        return RowSolver(lambda _, progress: ColourBasis(rig, options.grid, pixels).run(progress))
     model = correspondence(rig, options.correspondence)
-    data = (rig, plan, options.grid, model, stack.radiance, stack.std, pixels)
-    if kind is None:
-        solver = SpectralReconstruction(*data, device=options.device, as_calibrated=options.as_calibrated)
-        return solver.run(progress, part=options.part)
-    return kind(*data, device=options.device).run(progress)
+    if options.solver in _KINDS:
+        stack = frames.lines(frames.bands[0], progress)
+        kind = _KINDS[options.solver](
+            rig, plan, options.grid, model, stack.radiance, stack.std, pixels, device=options.device
+        )
+        return RowSolver(lambda _, progress: kind.run(progress))
+    lines = LineSet.of(plan)
+    asked = probed_pixels(pixels.valid, rig.sensor.bayer) if lines is not None and lines.single else _NONE
+    picked = frames.pick(asked, progress)
+    radiance, std = (PickedCube(v, asked, pixels.valid.shape[1]) for v in (picked.radiance, picked.std))
+    best = SpectralReconstruction(
+        rig, plan, options.grid, model, radiance, std, pixels,
+        device=options.device, as_calibrated=options.as_calibrated,
+    )  # fmt: skip
+    best.learn()
+
+    def solve(band: Band, progress: Progress | None) -> SpectralMaps:
+        stack = frames.lines(band, progress)
+        best.take(stack.radiance, stack.std, band.near.start)
+        return best.solve(band.rows, progress, part=options.part)
+
+    return RowSolver(solve, best.followed, best.error)

@@ -24,6 +24,7 @@ from dsl_core.progress import NoProgress, Progress
 from dsl_core.reconstruction.columns.pattern_column import radiance_profiles, rounding_error
 from dsl_core.reconstruction.spectral.causes import common_error, fit_causes
 from dsl_core.reconstruction.spectral.model_error import ModelError, model_error, neighbour_contrast
+from dsl_core.reconstruction.spectral.picked_cube import PickedCube
 from dsl_core.reconstruction.spectral.probe import ProbedScan
 from dsl_core.reconstruction.spectral.self_correction import Followed, follow
 from dsl_core.reconstruction.spectral.solver import Prior, Spectra, solve_spectra
@@ -34,6 +35,8 @@ from dsl_core.solve.threads import one_kernel_thread
 
 #: Pixels of a tile of up to `TILE_BANDS` bands, and of the smallest; even numbers keep the Bayer phase.
 TILE, TILE_BANDS, LEAST_TILE = (64, 96), 60, (16, 24)
+#: Pixels whose light is traced at a time, where all are.
+CHUNK = 1 << 18
 #: Pixels whose full matrices are solved at a time.
 DENSE_PIXELS = 512
 #: Degrees of freedom that a spectrum takes from its data, roughly, in the reduced chi-square.
@@ -99,8 +102,8 @@ class SpectralReconstruction:
         plan: CapturePlan,
         grid: WavelengthGrid,
         model: Correspondence,
-        radiance: NDArray[np.float32],
-        std: NDArray[np.floating],
+        radiance: NDArray[np.float32] | PickedCube,
+        std: NDArray[np.floating] | PickedCube,
         pixels: Pixels,
         *,
         prior: Prior | None = None,
@@ -108,7 +111,10 @@ class SpectralReconstruction:
         dtype: torch.dtype = torch.float32,
         as_calibrated: bool = False,
     ) -> None:
-        """With ``as_calibrated`` the model stays as it is, whatever the scan itself says."""
+        """With ``as_calibrated`` the model stays as it is, whatever the scan itself says.
+
+        Where frames come by rows, ``radiance`` and ``std`` are those of the pixels that `learn` asks.
+        """
         self.rig, self.pixels = rig, pixels
         self.model = model_of_plan(rig, plan, grid, model)
         self.bands = self.model.bands
@@ -117,8 +123,11 @@ class SpectralReconstruction:
         self.device, self.dtype = torch.device(device), dtype
         self.colour_weight = self._colour_weight()
         self.contrast = neighbour_contrast(pixels.amplitude)
-        self._error: ModelError | None = None
+        self.followed: Followed | None = None
+        self.error: ModelError | None = None
         self._as_calibrated = as_calibrated
+        #: The row of the picture that the stacks begin with.
+        self._first_row = 0
 
     def run(
         self,
@@ -126,50 +135,71 @@ class SpectralReconstruction:
         threads: int = 2,
         part: tuple[slice, slice] = (slice(None), slice(None)),
     ) -> SpectralMaps:
-        """Solve all tiles; single-threaded kernels in a few threads keep every core and its cache busy.
+        """Learn, and solve all rows.
 
         Where only a ``part`` (rows, columns) of the picture is wanted, tiles outside it stay NaN.
         """
-        progress = progress or NoProgress()
-        out = SpectralMaps.empty(
-            self.bands.reported.stop - self.bands.reported.start, self.pixels.valid.shape
-        )
+        self.learn()
+        found = self.solve(slice(0, self.pixels.valid.shape[0]), progress, threads, part)
+        return replace(found, followed=self.followed, error=self.error)
+
+    def learn(self) -> None:
+        """Have the model follow what the scan says of it, and know how wrong it still is."""
         with one_kernel_thread():
-            found = follow(self.probed, self._as_calibrated)
+            self.followed = found = follow(self.probed, self._as_calibrated)
             if found is not None:
                 self.model, self.bands = found.model, found.model.bands
-                self._error = model_error(found.left, common_error(found.left, fit_causes(found.left)))
+                self.error = model_error(found.left, common_error(found.left, fit_causes(found.left)))
+
+    def take(self, radiance: NDArray[np.float32], std: NDArray[np.floating], first_row: int) -> None:
+        """From now on work on stacks that begin with a row of the picture."""
+        self.radiance, self.std, self._first_row = radiance, std, first_row
+
+    def solve(
+        self,
+        rows: slice,
+        progress: Progress | None = None,
+        threads: int = 2,
+        part: tuple[slice, slice] = (slice(None), slice(None)),
+    ) -> SpectralMaps:
+        """Maps of some rows, tile by tile; their stacks must hold them and those next to them.
+
+        Single-threaded kernels in a few threads keep every core and its cache busy.
+        """
+        shape = rows.stop - rows.start, self.pixels.valid.shape[1]
+        out = SpectralMaps.empty(self.bands.reported.stop - self.bands.reported.start, shape)
+        with one_kernel_thread():
             work_through(
-                lambda tile, check: self._tile(*tile, out, check),
-                [tile for tile in self._tiles() if _wanted(tile, part, self.pixels.valid.shape)],
+                lambda tile, check: self._tile(*tile, out, rows.start, check),
+                [tile for tile in self._tiles(rows) if _wanted(tile, part, self.pixels.valid.shape)],
                 threads,
                 "spectra",
-                progress,
+                progress or NoProgress(),
             )
-        return replace(out, followed=found, error=self._error)
+        return out
 
     @property
     def probed(self) -> ProbedScan:
         """What a probe needs of the scan, with the model as it is now."""
         return ProbedScan(self.model, self.pixels, self.radiance, self.std, self.prior)
 
-    def _tiles(self) -> Iterator[tuple[slice, slice]]:
-        height, width = self.pixels.valid.shape
+    def _tiles(self, of: slice) -> Iterator[tuple[slice, slice]]:
+        width = self.pixels.valid.shape[1]
         rows, columns = tile_shape(self.bands.count)
-        for y in range(0, height, rows):
+        for y in range(of.start, of.stop, rows):
             for x in range(0, width, columns):
-                yield slice(y, min(y + rows, height)), slice(x, min(x + columns, width))
+                yield slice(y, min(y + rows, of.stop)), slice(x, min(x + columns, width))
 
     def _colour_weight(self) -> NDArray[np.float32]:
         """Weight of the zero-order colour: one minus the blurred mask of complete pixels (seed 7.1)."""
         valid = np.flatnonzero(self.pixels.valid)
         complete = np.ones(self.pixels.valid.shape, np.float32)
-        if valid.size:
-            nm = self.bands.centres_nm[self.bands.reported][[0, -1]]
-            reached = torch.zeros((2, valid.size), dtype=torch.bool)
+        nm = self.bands.centres_nm[self.bands.reported][[0, -1]]
+        for some in np.array_split(valid, -(-valid.size // CHUNK)) if valid.size else ():
+            reached = torch.zeros((2, some.size), dtype=torch.bool)
             for order in ORDERS:
-                reached |= self.model.reached(order, *self._pixels_and_depth(valid), nm).cpu()
-            complete.ravel()[valid] = reached.all(0).numpy()
+                reached |= self.model.reached(order, *self._pixels_and_depth(some), nm).cpu()
+            complete.ravel()[some] = reached.all(0).numpy()
         return (1 - blurred_mask(complete)).clip(0, 1)
 
     def _pixels_and_depth(self, flat: NDArray[np.intp]) -> tuple[Tensor, Tensor]:
@@ -178,14 +208,17 @@ class SpectralReconstruction:
     def frames(self, rows: slice, columns: slice) -> TileFrames:
         """What is measured of the valid pixels of a part of the picture."""
         like = torch.empty(0, device=self.device, dtype=self.dtype)
-        return TileFrames(self.rig, self.radiance, self.std, self.pixels, rows, columns, like)
+        assert isinstance(self.radiance, np.ndarray)
+        assert isinstance(self.std, np.ndarray)
+        stacks = self.radiance, self.std
+        return TileFrames(self.rig, *stacks, self.pixels, rows, columns, like, self._first_row)
 
     def trace(self, frames: TileFrames) -> Traced:
         """Where the light of pixels comes from."""
         return self.model.trace(*self._pixels_and_depth(frames.flat), frames.known("column_px"))
 
     @torch.inference_mode()
-    def _tile(self, rows: slice, columns: slice, out: SpectralMaps, check: Check) -> None:
+    def _tile(self, rows: slice, columns: slice, out: SpectralMaps, first_row: int, check: Check) -> None:
         if not self.pixels.valid[rows, columns].any():
             return
         frames = self.frames(rows, columns)
@@ -206,7 +239,7 @@ class SpectralReconstruction:
             traced = self.trace(frames)
             check()
             spectra, misfit = self._dense(frames, traced, check)
-        self._store(spectra, misfit, frames, traced, out)
+        self._store(spectra, misfit, frames, traced, out, first_row)
 
     def _banded(
         self, frames: TileFrames, near: TileFrames, traced: Traced, check: Check
@@ -297,15 +330,17 @@ class SpectralReconstruction:
         frames: TileFrames,
         traced: Traced,
         out: SpectralMaps,
+        first_row: int,
     ) -> None:
+        """Put spectra into maps that begin with a row of the picture."""
         reported = self.bands.reported
         flat, mean = frames.flat, spectra.mean[reported]
         relative = frames.known("shading_rel_std").nan_to_num(nan=0.0)
         # What the model cannot explain makes the answer that much less certain (Birge ratio).
         excess, error = misfit.clip(min=1), relative
-        if self._error is not None:
-            excess = excess + (misfit - SURE_MISFIT).clip(min=0) * (self._error.correlation - 1)
-            share = self._error.at(*frames.place(), self.pixels.valid.shape)
+        if self.error is not None:
+            excess = excess + (misfit - SURE_MISFIT).clip(min=0) * (self.error.correlation - 1)
+            share = self.error.at(*frames.place(), self.pixels.valid.shape)
             error = torch.hypot(relative, like(share, mean))
         # A pixel that no spectrum explains may have that of a neighbour, one at the upper bound any level.
         high = (spectra.at_bound & (spectra.nodes > self.prior.bounds[1] / 2)).any(0)
@@ -313,6 +348,7 @@ class SpectralReconstruction:
         std = torch.hypot(spectra.std[reported] * excess.sqrt(), mean * error)
         mixed = torch.where(misfit > MIXED_MISFIT, self._map(self.contrast, flat), 0.0)
         std = torch.hypot(std, (mean * mixed).clip(max=MIXED_STD))
+        flat = flat - first_row * self.pixels.valid.shape[1]
         for cube, values in (
             (out.reflectance, mean),
             (out.std, std),

@@ -48,10 +48,12 @@ class TileFrames:
         rows: slice,
         columns: slice,
         like: Tensor,
+        first_row: int = 0,
     ) -> None:
-        """``radiance`` and ``std`` (frames, rows, columns) and ``pixels`` are those of the whole picture.
+        """``pixels`` are those of the whole picture; ``radiance`` and ``std`` are (frames, rows, columns).
 
-        All comes in the precision and on the device of ``like``.
+        Their first row is the ``first_row`` of the picture. All comes in the precision and on the device of
+        ``like``.
         """
         self.response, self.bayer, self.like = rig.projector_response, rig.sensor.bayer, like
         self.rows, self.columns = rows, columns
@@ -61,7 +63,8 @@ class TileFrames:
         #: Flat indices of the tile's valid pixels in the picture, ascending.
         self.flat = y * self.width + x
         near = np.s_[max(rows.start - 2, 0) : rows.stop + 2, max(columns.start - 2, 0) : columns.stop + 2]
-        self._radiance, self._std = radiance[:, *near], std[:, *near]
+        there = slice(near[0].start - first_row, near[0].stop - first_row), near[1]
+        self._radiance, self._std = radiance[:, *there], std[:, *there]
         self._near = Pixels(**{name: values[near] for name, values in vars(pixels).items()})
         at = (y - near[0].start) * self._near.valid.shape[1] + x - near[1].start
         self.at = torch.as_tensor(at, device=like.device)

@@ -6,7 +6,8 @@ from scipy.ndimage import gaussian_filter1d
 
 from dsl_core.model.plan import CapturePlan, Columns, GrayCode, ScanLines
 from dsl_core.patterns.images import spectral_profiles
-from dsl_core.reconstruction.light.line_levels import LineLevels, line_levels
+from dsl_core.reconstruction.light.line_levels import LineLevels, candidates, line_levels
+from dsl_core.reconstruction.merge import LineStack
 
 PLAN = CapturePlan(code=GrayCode(rows=False), spectral=ScanLines(), projector_size_px=(120, 60))
 SHAPE = (24, 120)
@@ -27,7 +28,9 @@ def levels(gains: np.ndarray, plan: CapturePlan = PLAN) -> LineLevels | None:
     sure = np.full(SHAPE, 0.02)
     white = seen(np.ones(SHAPE[1])) + 0.02 * rng.normal(size=SHAPE)
     frames = light * gains[:, None, None] + 0.02 * rng.normal(size=light.shape)
-    return line_levels(plan, column, (white, sure**2), frames, np.full(light.shape, 0.02), 0 * sure)
+    stack = LineStack(frames.astype(np.float32), np.full(light.shape, 0.02), np.zeros(SHAPE, np.float32))
+    whites = (white, sure**2)
+    return line_levels(plan, column, whites, stack.pick(candidates(column, whites)))
 
 
 def test_levels_of_flickering_frames_are_found() -> None:

@@ -1,0 +1,46 @@
+"""Part of a Blosc chunk: the blocks that hold some bytes, as a smaller chunk that any Blosc decompresses.
+
+A chunk is a header, where each block starts, and the blocks, each compressed by itself. Chunk format:
+https://github.com/Blosc/c-blosc/blob/main/README_CHUNK_FORMAT.rst
+"""
+
+from __future__ import annotations
+
+import struct
+from mmap import mmap
+
+import numpy as np
+
+Bytes = bytes | mmap
+HEADER = struct.Struct("<BBBBIII")
+_IS_COPY = 0x2
+
+
+def blocks_of(chunk: Bytes, first: int, last: int) -> tuple[bytes, int]:
+    """A chunk of the blocks of another one that hold its bytes ``first`` to ``last``.
+
+    With it, where its own first byte is in the whole. Raises ``ValueError`` for one that is not as it says.
+    """
+    version, codec, flags, typesize, raw, block, size = HEADER.unpack_from(chunk)
+    if size != len(chunk) or not 0 <= first < last <= raw or not block:
+        raise ValueError("its header does not describe it")
+    if flags & _IS_COPY:
+        part = chunk[HEADER.size + first : HEADER.size + last]
+        head = HEADER.pack(version, codec, flags, typesize, len(part), block, HEADER.size + len(part))
+        return head + part, first
+    count = -(-raw // block)
+    starts = np.frombuffer(chunk, "<i4", count, HEADER.size).astype(np.int64)
+    low, high = first // block, -(-last // block)
+    if low == count - 1:
+        # A last block that is shorter than the others is only understood after one of them.
+        low = max(low - 1, 0)
+    # Several threads may have written the blocks in any order.
+    order = np.sort(starts)
+    ends = np.append(order, size)[np.searchsorted(order, starts, side="right")]
+    if starts.min() < HEADER.size + 4 * count or ends.max() > size:
+        raise ValueError("its blocks are not where it says")
+    parts = [chunk[start:end] for start, end in zip(starts[low:high], ends[low:high], strict=True)]
+    lengths = np.cumsum([0, *map(len, parts)]) + HEADER.size + 4 * len(parts)
+    bytes_here = min(high * block, raw) - low * block
+    head = HEADER.pack(version, codec, flags, typesize, bytes_here, block, int(lengths[-1]))
+    return b"".join([head, lengths[:-1].astype("<i4").tobytes(), *parts]), low * block

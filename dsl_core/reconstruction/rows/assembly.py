@@ -1,0 +1,90 @@
+"""A result that is made of bands of rows."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Iterator
+from dataclasses import asdict
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dsl_core.model.fit import FitFinding
+from dsl_core.model.options import Options
+from dsl_core.model.plan import CapturePlan
+from dsl_core.model.result_sink import ResultSink
+from dsl_core.model.rig import Rig
+from dsl_core.reconstruction.fit_findings import SpectralCounts, count_spectra, fit_of
+from dsl_core.reconstruction.geometry import Geometry
+from dsl_core.reconstruction.rows.bands import Band
+from dsl_core.reconstruction.scan_result import attributes_of, maps_of_rows
+from dsl_core.reconstruction.spectral.solvers import RowSolver
+from dsl_core.reconstruction.spectral.spectra import SpectralMaps
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+
+class Assembly:
+    """Puts what is known of a picture into a sink, band by band; of the part alone that is wanted."""
+
+    def __init__(
+        self, rig: Rig, plan: CapturePlan, options: Options, geometry: Geometry, sink: ResultSink
+    ) -> None:
+        self._rig, self._plan, self._options = rig, plan, options
+        self._geometry, self._sink = geometry, sink
+        self._counts = SpectralCounts()
+        self._rows, self._columns = (
+            slice(*wanted.indices(size)[:2])
+            for wanted, size in zip(options.part, geometry.flags.shape, strict=True)
+        )
+        shape = self._rows.stop - self._rows.start, self._columns.stop - self._columns.start
+        sink.begin(shape, (self._rows.start, self._columns.start), options.grid.centres_nm)
+
+    def missing(self, bands: Iterable[Band]) -> Iterator[Band]:
+        """Bands that are wanted and not in the sink yet."""
+        for band in bands:
+            place = self._place(band)
+            if place.start >= place.stop:
+                continue
+            note = self._sink.note_of(place)
+            if note is None:
+                yield band
+            else:
+                self._counts += SpectralCounts(**json.loads(note))
+
+    def put(self, band: Band, spectra: SpectralMaps | None) -> None:
+        """Put the rows of a band into the sink, with spectra if there are any."""
+        maps = maps_of_rows(self._rig, self._options.grid, self._geometry, band.rows, spectra)
+        place, top = self._place(band), self._rows.start - band.rows.start
+        own = slice(place.start + top, place.stop + top)
+        wanted = {name: values[..., own, self._columns] for name, values in maps.items()}
+        counts = SpectralCounts()
+        if spectra is not None:
+            inside = (..., own, self._columns)
+            flags: NDArray[np.uint16] = np.asarray(wanted["flags"], np.uint16)
+            counts = count_spectra(flags, spectra.data_share[inside], spectra.reach[inside])
+        self._counts += counts
+        self._sink.put(place, wanted, json.dumps(asdict(counts)))
+
+    def finish(self, solver: RowSolver | None, findings: Iterable[FitFinding]) -> xr.Dataset:
+        """The whole result, with the verdict on it; ``findings`` are those that were made on the way."""
+        geometry = self._geometry
+        fit = fit_of(
+            self._rig,
+            self._plan,
+            self._options.grid,
+            geometry.depth_mm,
+            geometry.flags[self._rows, self._columns],
+            None if solver is None else self._counts,
+            None if solver is None else solver.followed,
+            None if solver is None else solver.error,
+            findings,
+        )
+        return self._sink.finish(attributes_of(self._rig, self._plan, fit))
+
+    def _place(self, band: Band) -> slice:
+        """Rows of a band in the result."""
+        top, bottom = self._rows.start, self._rows.stop
+        return slice(max(band.rows.start, top) - top, min(band.rows.stop, bottom) - top)

@@ -1,0 +1,33 @@
+"""Columns and depth of a picture whose frames come by rows."""
+
+from __future__ import annotations
+
+from dsl_core.model.options import Options
+from dsl_core.model.rig import Rig
+from dsl_core.patterns.gray_code import DecodedCode
+from dsl_core.progress import Progress
+from dsl_core.reconstruction.geometry import ColumnSearch, FoundColumns, Geometry, geometry_of
+from dsl_core.reconstruction.hdr import MergedFrame
+from dsl_core.reconstruction.merge import LineStack
+from dsl_core.reconstruction.rows.bands import some_rows
+from dsl_core.reconstruction.rows.frames import ScanFrames
+
+
+def geometry_by_rows(
+    rig: Rig,
+    options: Options,
+    frames: ScanFrames,
+    code: DecodedCode,
+    white: MergedFrame,
+    progress: Progress | None = None,
+) -> Geometry:
+    """Refine decoded columns band by band, and triangulate and fit the surface of the whole picture."""
+    height, width = code.column.shape
+    search = ColumnSearch(rig, frames.plan, options.refine_columns, options.device)
+    found = FoundColumns.empty(height * width)
+    for band in frames.bands:
+        stack, here = frames.lines(band, progress), band.rows
+        own = LineStack(stack.radiance[:, band.own], stack.std[:, band.own], stack.black_std[band.own])
+        flat = slice(here.start * width, here.stop * width)
+        found.put(flat, search.find(some_rows(code, here), some_rows(white, here), own, flat.start, progress))
+    return geometry_of(rig, search.lines, found, (height, width), options.surface_window_px)

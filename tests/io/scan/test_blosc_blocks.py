@@ -1,0 +1,61 @@
+"""Some rows of a mosaic, from the blocks that hold them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from dsl_core.io.scan.blosc_blocks import HEADER, blocks_of
+from dsl_core.io.scan.frame_store import ChunkError, FrameStore
+
+
+@pytest.fixture(scope="module")
+def mosaic() -> np.ndarray:
+    """Two and a half blocks."""
+    return np.random.default_rng(0).integers(100, 140, (330, 1000)).astype(np.uint16)
+
+
+@pytest.fixture
+def store(tmp_path: Path, mosaic: np.ndarray) -> FrameStore:
+    made = FrameStore(tmp_path / "frames", 2, *mosaic.shape)
+    made.create()
+    made.write(0, mosaic)
+    return made
+
+
+@pytest.mark.parametrize(("first", "last"), [(0, 330), (0, 1), (130, 133), (131, 270), (329, 330)])
+def test_rows_are_those_of_the_mosaic(store: FrameStore, mosaic: np.ndarray, first: int, last: int) -> None:
+    np.testing.assert_array_equal(store.read_rows(0, slice(first, last)), mosaic[first:last])
+
+
+def test_rows_of_a_mosaic_that_could_not_be_compressed(store: FrameStore) -> None:
+    noise = np.random.default_rng(1).integers(0, 65536, (330, 1000)).astype(np.uint16)
+    store.write(1, noise)
+    np.testing.assert_array_equal(store.read_rows(1, slice(100, 300)), noise[100:300])
+
+
+def test_only_the_blocks_that_are_needed_are_in_a_part(store: FrameStore) -> None:
+    chunk = store.path(0).read_bytes()
+    part, begins = blocks_of(chunk, 0, 10)
+    assert begins == 0
+    assert HEADER.unpack_from(part)[4] == 1 << 18
+    assert len(part) < 0.5 * len(chunk)
+
+
+@pytest.mark.parametrize("place", [4, 12, 16, 20])
+def test_a_damaged_head_is_told(store: FrameStore, place: int) -> None:
+    chunk = bytearray(store.path(0).read_bytes())
+    chunk[place + 3] ^= 0x7F
+    store.path(0).write_bytes(chunk)
+    with pytest.raises(ChunkError, match="its file"):
+        store.read_rows(0, slice(200, 330))
+
+
+def test_a_missing_or_empty_file_is_told(store: FrameStore) -> None:
+    with pytest.raises(ChunkError, match="cannot be read"):
+        store.read_rows(1, slice(0, 2))
+    store.path(1).write_bytes(b"")
+    with pytest.raises(ChunkError, match="cut off"):
+        store.read_rows(1, slice(0, 2))
