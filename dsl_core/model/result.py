@@ -116,13 +116,10 @@ def build_result(
         names = " ".join(str(f.name).lower() for f in Flag)
         data["flags"][2].update({"flag_masks": masks, "flag_meanings": names})  # type: ignore[dict-item]
     rows, columns = next((values.shape[-2:] for values in arrays.values()), (0, 0))
+    y, x = origin[0] + np.arange(rows), origin[1] + np.arange(columns)
     coords = {
-        "y": ("y", origin[0] + np.arange(rows), {"units": "px", "long_name": "row of the camera's picture"}),
-        "x": (
-            "x",
-            origin[1] + np.arange(columns),
-            {"units": "px", "long_name": "column of the camera's picture"},
-        ),
+        "y": ("y", y, {"units": "px", "long_name": "row of the camera's picture"}),
+        "x": ("x", x, {"units": "px", "long_name": "column of the camera's picture"}),
         "wavelength_nm": ("wavelength_nm", wavelengths_nm, {"units": "nm", "long_name": "band centre"}),
         "axis": ("axis", ["x", "y", "z"]),
         "channel": ("channel", ["R", "G", "B"]),

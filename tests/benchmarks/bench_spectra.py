@@ -29,12 +29,13 @@ from dsl_core.model.spectral import WavelengthGrid
 from dsl_core.optics.correspondence import correspondence
 from dsl_core.reconstruction.geometry import Geometry, reconstruct_geometry
 from dsl_core.reconstruction.merge import LineStack, MergedScan, decode_columns, stack_lines
-from dsl_core.reconstruction.scan_result import assemble, known_pixels
+from dsl_core.reconstruction.scan_result import known_pixels
 from dsl_core.reconstruction.spectral.solver import Prior
 from dsl_core.reconstruction.spectral.spectra import SpectralReconstruction
 from dsl_core.simulation.sim_devices import open_twin
 from dsl_core.workflows import scans
 from tests.benchmarks.common import options, print_table, write_json
+from tests.cases.twin_scan import assembled
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -75,7 +76,7 @@ class Prepared:
         spectra = solver.run()
         solved = np.isfinite(spectra.reflectance[0])
         fit = float(np.median(spectra.chi_square[solved]))
-        return assemble(self.rig, self.plan, GRID, self.geometry, spectra), fit
+        return assembled(self.rig, self.plan, GRID, self.geometry, spectra), fit
 
 
 def prepare(scene: str, size: str) -> Prepared:

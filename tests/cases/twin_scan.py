@@ -3,20 +3,31 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dsl_core.devices.base import DeviceRig
+from dsl_core.model.options import Options
 from dsl_core.model.plan import CapturePlan, Shot
+from dsl_core.model.result_sink import MemorySink
 from dsl_core.model.rig import Rig
+from dsl_core.model.spectral import WavelengthGrid
 from dsl_core.patterns.images import pattern_image
 from dsl_core.pipeline import fit_plan
-from dsl_core.reconstruction.geometry import reconstruct_geometry
+from dsl_core.reconstruction.geometry import Geometry, reconstruct_geometry
 from dsl_core.reconstruction.merge import LineStack, MergedScan, decode_columns, stack_lines
+from dsl_core.reconstruction.rows.assembly import Assembly
+from dsl_core.reconstruction.rows.bands import bands_of
 from dsl_core.reconstruction.scan_result import known_pixels
+from dsl_core.reconstruction.spectral.solvers import RowSolver
+from dsl_core.reconstruction.spectral.spectra import SpectralMaps
 from dsl_core.reconstruction.spectral.tile_frames import Pixels
 from dsl_core.simulation.sim_devices import open_twin
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 
 @dataclass(frozen=True)
@@ -47,6 +58,16 @@ def twin_scan(plan: CapturePlan | None = None, **options: str) -> tuple[DeviceRi
     """Open a twin and scan its scene."""
     devices = open_twin(options)
     return devices, capture(devices, plan or CapturePlan())
+
+
+def assembled(
+    rig: Rig, plan: CapturePlan, grid: WavelengthGrid, geometry: Geometry, maps: SpectralMaps
+) -> xr.Dataset:
+    """The result of a whole picture's geometry and spectra, as `dsl_core.pipeline.reconstruct` makes it."""
+    result = Assembly(rig, plan, Options(grid), geometry, MemorySink())
+    (band,) = bands_of(plan, multiple=None)
+    result.put(band, maps)
+    return result.finish(RowSolver(lambda *_: maps, maps.followed, maps.error), ())
 
 
 def solver_input(rig: Rig, scan: MemoryScan) -> tuple[LineStack, Pixels]:

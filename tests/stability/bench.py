@@ -28,10 +28,10 @@ from dsl_core.patterns.images import pattern_image
 from dsl_core.reconstruction.geometry import reconstruct_geometry
 from dsl_core.reconstruction.hdr import MergedFrame
 from dsl_core.reconstruction.merge import LineStack, MergedScan, decode_columns, stack_lines
-from dsl_core.reconstruction.scan_result import assemble, known_pixels
+from dsl_core.reconstruction.scan_result import known_pixels
 from dsl_core.reconstruction.spectral.spectra import SpectralReconstruction
 from tests.cases.crop import cropped_rig
-from tests.cases.twin_scan import MemoryScan
+from tests.cases.twin_scan import MemoryScan, assembled
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -171,7 +171,7 @@ class Staged:
             device=device,
             dtype=dtype,
         ).run(threads=threads)
-        return assemble(self.rig, self.plan, GRID, geometry, maps)
+        return assembled(self.rig, self.plan, GRID, geometry, maps)
 
 
 def staged(patch: Patch) -> Staged:
