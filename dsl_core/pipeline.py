@@ -150,7 +150,7 @@ def reconstruct(
     if options.spectra:
         with timer.stage("spectra"):
             solver = row_solver(rig, plan, options, frames, known_pixels(geometry), progress)
-    result = Assembly(rig, plan, options, geometry, sink or MemorySink())
+    result = Assembly(rig, plan, options, geometry, frames.bands, sink or MemorySink())
     # The frames of the last band are still in memory.
     for band in result.missing(reversed(frames.bands)):
         spectra = None

@@ -55,11 +55,11 @@ def reconstruct(
 ) -> None:
     """Turn frames into depth, points, normals, reflectance and their uncertainty."""
     from dsl_core.io.calibration_library import load_calibration
-    from dsl_core.io.result.result_file import RESULT_FOLDER, save_result
+    from dsl_core.io.result.result_file import RESULT_FOLDER, load_result
     from dsl_core.io.scan.manifest import read_manifest
     from dsl_core.model.options import MODELS, SOLVERS, names
     from dsl_core.pipeline import Options
-    from dsl_core.workflows.scans import DOUBTS, NOT_JUDGED, reconstruct_scan
+    from dsl_core.workflows.scans import DOUBTS, NOT_JUDGED, reconstruct_to
 
     output, timer = Output(json), StageTimer()
     _require_one_of("--model", model, names(MODELS))
@@ -88,9 +88,10 @@ def reconstruct(
         as_calibrated=as_calibrated,
     )
     with output.progress() as progress:
-        result = reconstruct_scan(session, rig, options, progress, timer, override)
-        with timer.stage("save the result"):
-            save_result(result, target, overwrite=force)
+        reconstruct_to(
+            target, session, rig, options, progress, timer, override_calibration=override, overwrite=force
+        )
+    result = load_result(target)
     output.costs(timer.stages)
     doubts = loads(result.attrs.get(DOUBTS, "[]"))
     for sentence in doubts:

@@ -51,6 +51,13 @@ def write_all(descriptor: int, data: bytes | bytearray | memoryview) -> None:
         rest = rest[os.write(descriptor, rest) :]
 
 
+def make_safe(file: Path) -> None:
+    """Have the content of a file survive a power cut."""
+    # Opened for writing because Windows only flushes handles that may write.
+    with file.open("rb+") as handle:
+        os.fsync(handle.fileno())
+
+
 def sync_folder(folder: Path) -> None:
     """Make renames and new names in a folder durable; Windows does so by itself."""
     if os.name == "nt":

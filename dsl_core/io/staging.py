@@ -16,7 +16,7 @@ from pathlib import Path
 
 from dsl_core.errors import StoreError, TakenError
 from dsl_core.io import CAMPAIGN_NAME, MANIFEST_NAME
-from dsl_core.io.atomic import PARTIAL_SUFFIX, make_durable, store_error, sync_folder
+from dsl_core.io.atomic import PARTIAL_SUFFIX, make_durable, make_safe, store_error, sync_folder
 from dsl_core.io.scan.lock import FolderLock
 from dsl_core.io.swap import exchange
 
@@ -146,9 +146,7 @@ def _require_form(target: Path, kind: FolderKind | None) -> None:
 def _sync_tree(path: Path) -> None:
     files = [path] if path.is_file() else [file for file in path.rglob("*") if file.is_file()]
     for file in files:
-        # Opened for writing because Windows only flushes handles that may write.
-        with file.open("rb+") as handle:
-            os.fsync(handle.fileno())
+        make_safe(file)
     if path.is_dir():
         for folder in [path, *(f for f in path.rglob("*") if f.is_dir())]:
             sync_folder(folder)

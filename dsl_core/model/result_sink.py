@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
@@ -20,9 +20,16 @@ class ResultSink(Protocol):
     """Takes the rows of a result in any order; ``note`` is a little text that belongs to some rows."""
 
     def begin(
-        self, shape: tuple[int, int], origin: tuple[int, int], wavelengths_nm: NDArray[np.float64]
+        self,
+        shape: tuple[int, int],
+        origin: tuple[int, int],
+        wavelengths_nm: NDArray[np.float64],
+        bands: Sequence[slice],
     ) -> None:
-        """Expect the rows of a picture of a shape; ``origin`` is its first row and column in the camera's."""
+        """Expect the rows of a picture of a shape, in ``bands``.
+
+        ``origin`` is its first row and column in the camera's picture.
+        """
 
     def note_of(self, rows: slice) -> str | None:
         """The note of rows that are kept already, from an earlier run that was stopped; None for others."""
@@ -38,9 +45,16 @@ class MemorySink:
     """Keeps a result in memory."""
 
     def begin(
-        self, shape: tuple[int, int], origin: tuple[int, int], wavelengths_nm: NDArray[np.float64]
+        self,
+        shape: tuple[int, int],
+        origin: tuple[int, int],
+        wavelengths_nm: NDArray[np.float64],
+        bands: Sequence[slice],
     ) -> None:
-        """Expect the rows of a picture of a shape; ``origin`` is its first row and column in the camera's."""
+        """Expect the rows of a picture of a shape, in ``bands``.
+
+        ``origin`` is its first row and column in the camera's picture.
+        """
         self._shape, self._origin, self._nm = shape, origin, wavelengths_nm
         self._maps: dict[str, NDArray[np.generic]] = {}
 

@@ -26,11 +26,13 @@ from dsl_core.io.scan.origin import is_of_this_computer, model_notes, rig_of_not
 from dsl_core.model.conditions import differences
 from dsl_core.model.frames import FrameSource
 from dsl_core.model.plan import CapturePlan
+from dsl_core.model.result_sink import ResultSink
 from dsl_core.model.rig import Rig, Sensor
 from dsl_core.model.spectral import WavelengthGrid
 from dsl_core.patterns.images import pattern_image
 from dsl_core.pipeline import Options, reconstruct, scan
 from dsl_core.progress import Progress
+from dsl_core.version import __version__
 from dsl_core.workflows.captures import with_own_sensor
 
 if TYPE_CHECKING:
@@ -95,11 +97,12 @@ def reconstruct_scan(
     progress: Progress | None = None,
     timer: StageTimer | None = None,
     override_calibration: bool = False,
+    sink: ResultSink | None = None,
 ) -> xr.Dataset:
     """The result of a complete scan, with its origin and the cost of each stage among its attributes.
 
-    Raises `CalibrationError` when the scan was taken with other settings than the calibration given, unless
-    that is overridden.
+    It is in memory, unless a ``sink`` takes it. Raises `CalibrationError` when the scan was taken with other
+    settings than the calibration given, unless that is overridden.
     """
     reader, timer = ScanReader(folder), timer or StageTimer()
     require_complete(reader)
@@ -107,7 +110,7 @@ def reconstruct_scan(
         _require_conditions(folder, reader.manifest, calibration)
     rig, options = with_own_sensor(reader, calibration_of(reader, calibration)), options or Options()
     watched = WatchedSource(reader)
-    result = reconstruct(watched, rig, options, progress, timer)
+    result = reconstruct(watched, rig, options, progress, timer, sink)
     with timer.stage("compare frames with their patterns"):
         proof = watched.report(rig, rig.sensor.bit_depth, rig.sensor.bayer)
         doubts = (*_moved(reader, rig.sensor), *proof.sentences)
@@ -124,6 +127,35 @@ def reconstruct_scan(
             "stage_costs": json.dumps([asdict(stage) for stage in timer.stages]),
         }
     )
+
+
+def reconstruct_to(
+    target: Path,
+    folder: Path,
+    calibration: Rig | None = None,
+    options: Options | None = None,
+    progress: Progress | None = None,
+    timer: StageTimer | None = None,
+    *,
+    override_calibration: bool = False,
+    overwrite: bool = False,
+) -> Path:
+    """Reconstruct a complete scan into a folder, by rows, so that neither has to fit into memory.
+
+    One that was interrupted goes on where it was, if scan, calibration and options are the same. Raises what
+    `reconstruct_scan` does, and `StoreError` when the target exists (unless ``overwrite``) or the disk fails.
+    """
+    from dsl_core.io.result.row_writer import RowWriter
+
+    reader, options, timer = ScanReader(folder), options or Options(), timer or StageTimer()
+    frames = {str(shot): entry.crc32 for shot, entry in sorted(reader.entries.items())}
+    rig = calibration_of(reader, calibration)
+    facts = [__version__, reader.manifest.model_dump_json(), frames, rig.model_dump_json(), repr(options)]
+    with RowWriter(target, json.dumps(facts), overwrite=overwrite) as writer:
+        given = folder, calibration, options, progress, timer, override_calibration
+        result = reconstruct_scan(*given, sink=writer)
+        with timer.stage("save the result"):
+            return writer.publish(result.attrs)
 
 
 def _moved(reader: ScanReader, sensor: Sensor | None) -> tuple[str, ...]:

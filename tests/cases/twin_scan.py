@@ -64,9 +64,9 @@ def assembled(
     rig: Rig, plan: CapturePlan, grid: WavelengthGrid, geometry: Geometry, maps: SpectralMaps
 ) -> xr.Dataset:
     """The result of a whole picture's geometry and spectra, as `dsl_core.pipeline.reconstruct` makes it."""
-    result = Assembly(rig, plan, Options(grid), geometry, MemorySink())
-    (band,) = bands_of(plan, multiple=None)
-    result.put(band, maps)
+    bands = bands_of(plan, multiple=None)
+    result = Assembly(rig, plan, Options(grid), geometry, bands, MemorySink())
+    result.put(bands[0], maps)
     return result.finish(RowSolver(lambda *_: maps, maps.followed, maps.error), ())
 
 

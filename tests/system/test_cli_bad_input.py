@@ -340,7 +340,7 @@ def test_a_full_disk_while_the_result_is_saved(
     def full(*_: object) -> None:
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
-    monkeypatch.setattr("dsl_core.io.result.result_file._write_variable", full)
+    monkeypatch.setattr("dsl_core.io.result.row_writer.new_array", full)
     ending = give("reconstruct", finished / "scan.dsl", "-o", tmp_path / "a.zarr", "--depth-only")
     assert ending.code == 2
     assert "disk is full" in ending.sentence

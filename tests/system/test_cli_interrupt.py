@@ -91,7 +91,7 @@ def test_an_interrupted_reconstruction_leaves_nothing(
     def stop(*_: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("dsl_core.io.result.result_file._write_variable", stop)
+    monkeypatch.setattr("dsl_core.io.result.row_writer.new_array", stop)
     ending = give("reconstruct", finished / "scan.dsl", "-o", tmp_path / "a.zarr", "--depth-only")
     assert ending.code == 130
     assert ending.sentence.startswith("Stopped.")

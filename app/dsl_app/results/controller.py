@@ -85,11 +85,9 @@ class ResultsController:
         target = session.with_suffix(".zarr")
 
         def work(progress: Progress) -> ResultArrays:
-            from dsl_core.io.result.result_file import save_result
-            from dsl_core.workflows.scans import reconstruct_scan
+            from dsl_core.workflows.scans import reconstruct_to
 
-            save_result(reconstruct_scan(session, progress=progress), target)
-            return load_arrays(target, progress)
+            return load_arrays(reconstruct_to(target, session, progress=progress), progress)
 
         self._start(f"Reconstruct {session.name}", work)
 

@@ -244,11 +244,9 @@ class ScanController:
         waiting = f"{before} Reconstructing…".strip()
 
         def work(progress: Progress) -> Path:
-            from dsl_core.io.result.result_file import save_result
-            from dsl_core.workflows.scans import reconstruct_scan
+            from dsl_core.workflows.scans import reconstruct_to
 
-            save_result(reconstruct_scan(session, progress=progress), target)
-            return target
+            return reconstruct_to(target, session, progress=progress)
 
         def done(path: Path) -> None:
             self.state.note.set(f"The result is saved in {path}.")

@@ -12,48 +12,27 @@ from __future__ import annotations
 
 import logging
 import warnings
-from dataclasses import dataclass
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dsl_core.errors import StoreError
 from dsl_core.io.kinds import what_is_at
 from dsl_core.io.reading import read_json
+from dsl_core.io.result.arrays import plain, write_variable
 from dsl_core.io.result.inventory import CHECKSUM, INVENTORY, check_inventory, with_inventory
 from dsl_core.io.staging import FolderKind, staged
 from dsl_core.model.result import SCHEMA_VERSION
 
 if TYPE_CHECKING:
     import xarray as xr
-    import zarr
 
 
 _log = logging.getLogger(__name__)
 #: Attributes on disk that are not the result's.
 _OF_THE_FOLDER = ("labels", INVENTORY, CHECKSUM)
-
-
-@dataclass(frozen=True)
-class _Packing:
-    """Stored integer = value / step; ``fill`` stands for NaN."""
-
-    dtype: type[np.signedinteger[Any] | np.unsignedinteger[Any]]
-    step: float
-    lowest: int
-    highest: int
-    fill: int
-
-
-_PACKINGS = {
-    "reflectance": _Packing(np.int16, 5e-5, -32767, 32767, -32768),
-    "reflectance_std": _Packing(np.uint16, 5e-5, 0, 65534, 65535),
-    "data_share": _Packing(np.uint8, 1 / 250, 0, 254, 255),
-}
-# Number of bits that flags need; the model may hold them in any integer type.
-_INTEGERS: dict[str, type[np.unsignedinteger[Any]]] = {"flags": np.uint16, "reach": np.uint8}
 
 
 def save_result(result: xr.Dataset, path: Path, *, overwrite: bool = False) -> Path:
@@ -66,24 +45,31 @@ def save_result(result: xr.Dataset, path: Path, *, overwrite: bool = False) -> P
     import zarr
 
     with staged([path], overwrite=overwrite, kind=RESULT_FOLDER) as (draft,):
-        attributes = {key: _plain(value) for key, value in result.attrs.items()}
-        labels = {str(n): c.values.tolist() for n, c in result.coords.items() if c.dtype.kind in "UO"}
-        group = zarr.create_group(draft, zarr_format=3, attributes={**attributes, "labels": labels})
+        group = zarr.create_group(draft, zarr_format=3)
+        labels = labels_of(result)
         for name, variable in result.variables.items():
             if str(name) not in labels:
-                _write_variable(group, str(name), variable)
-        group.update_attributes(with_inventory(draft, dict(group.attrs)))
-        _consolidate(draft)
+                write_variable(group, str(name), variable)
+        seal_folder(draft, {**result.attrs, "labels": labels})
     return path
 
 
-def _consolidate(folder: Path) -> None:
-    """Repeat the arrays' metadata at the root, where other readers of zarr look for them first."""
+def labels_of(result: xr.Dataset) -> dict[str, list[str]]:
+    """The names along the axes that have some."""
+    return {str(n): c.values.tolist() for n, c in result.coords.items() if c.dtype.kind in "UO"}
+
+
+def seal_folder(folder: Path, attributes: Mapping[Any, Any]) -> None:
+    """Write attributes and inventory of a folder whose arrays are complete."""
     import zarr
     from zarr.errors import ZarrUserWarning
 
+    group = zarr.open_group(folder, mode="r+", zarr_format=3, use_consolidated=False)
+    group.attrs.put({str(key): plain(value) for key, value in attributes.items()})
+    group.update_attributes(with_inventory(folder, dict(group.attrs)))
     with warnings.catch_warnings():
-        # Not yet in the specification of version 3, but in use: zarr and xarray write and read it.
+        # The arrays' metadata at the root, where other readers look for them first. Not yet in the
+        # specification of version 3, but in use: zarr and xarray write and read it.
         warnings.simplefilter("ignore", ZarrUserWarning)
         zarr.consolidate_metadata(folder, zarr_format=3)
 
@@ -93,13 +79,18 @@ def load_result(path: Path, *, lazy: bool = True) -> xr.Dataset:
 
     Raises `StoreError` when the folder is missing, damaged, not a result, or of another schema version.
     """
-    import xarray as xr
-
-    from dsl_core.io.result.stored_arrays import FAILURES, stored_variables
-
     stored = read_attributes(path)
     if not check_inventory(path, stored):
         _log.warning("%s was written without checksums: damage to it would not be noticed.", path)
+
+    return opened(path, stored, lazy=lazy)
+
+
+def opened(path: Path, stored: Mapping[str, Any], *, lazy: bool = True) -> xr.Dataset:
+    """A folder's arrays with its attributes, whether all belongs to it or not; raises `StoreError`."""
+    import xarray as xr
+
+    from dsl_core.io.result.stored_arrays import FAILURES, stored_variables
 
     def damaged(error: Exception) -> StoreError:
         return StoreError(
@@ -175,56 +166,3 @@ def _check_version(version: object, path: Path) -> None:
         f"{path} is a result of schema version {version}; this program supports version {SCHEMA_VERSION}."
         " Use the version of the program that wrote it, or reconstruct the scan again."
     )
-
-
-def _write_variable(group: zarr.Group, name: str, variable: xr.Variable) -> None:
-    from zarr.codecs import BloscCodec, Crc32cCodec
-
-    values, encoding = _encode(name, variable)
-    plane = values.shape[-2:]
-    one_band = (1,) * (values.ndim - len(plane)) + plane
-    array = group.create_array(
-        name,
-        shape=values.shape,
-        dtype=values.dtype,
-        chunks=one_band,
-        shards=values.shape if values.ndim > 2 else None,
-        compressors=[BloscCodec(cname="zstd", clevel=1, shuffle="bitshuffle"), Crc32cCodec()],
-        dimension_names=[str(d) for d in variable.dims],
-        attributes={**{str(k): _plain(v) for k, v in variable.attrs.items()}, **encoding},
-        # Looking for chunks that hold only the fill value costs more than writing them.
-        config={"write_empty_chunks": True},
-    )
-    array[...] = values
-
-
-def _encode(name: str, variable: xr.Variable) -> tuple[NDArray[Any], dict[str, float | int]]:
-    """Stored array of a variable, and the CF attributes that undo the packing."""
-    values: NDArray[Any] = np.asarray(variable.values)
-    packing = _PACKINGS.get(name)
-    if packing is not None and _fits(values, packing):
-        return _pack(values, packing), {"scale_factor": packing.step, "_FillValue": packing.fill}
-    if values.dtype.kind == "f" and variable.ndim > 1:
-        return values.astype(np.float32, copy=False), {}
-    return values.astype(_INTEGERS.get(name, values.dtype), copy=False), {}
-
-
-def _fits(values: NDArray[Any], packing: _Packing) -> bool:
-    lowest, highest = np.fmin.reduce(values, axis=None), np.fmax.reduce(values, axis=None)
-    if np.isnan(lowest):  # nothing but NaN
-        return True
-    return bool(lowest >= packing.lowest * packing.step and highest <= packing.highest * packing.step)
-
-
-def _pack(values: NDArray[Any], packing: _Packing) -> NDArray[Any]:
-    packed: NDArray[Any] = np.empty(values.shape, packing.dtype)
-    for band, out in zip(values, packed, strict=True):
-        steps = np.rint(band / np.float32(packing.step))
-        steps[np.isnan(band)] = packing.fill
-        out[...] = steps
-    return packed
-
-
-def _plain(value: object) -> Any:
-    """A value that JSON can hold."""
-    return value.tolist() if isinstance(value, np.generic | np.ndarray) else value

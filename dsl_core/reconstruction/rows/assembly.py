@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import asdict
 from typing import TYPE_CHECKING
 
@@ -30,7 +30,13 @@ class Assembly:
     """Puts what is known of a picture into a sink, band by band; of the part alone that is wanted."""
 
     def __init__(
-        self, rig: Rig, plan: CapturePlan, options: Options, geometry: Geometry, sink: ResultSink
+        self,
+        rig: Rig,
+        plan: CapturePlan,
+        options: Options,
+        geometry: Geometry,
+        bands: Sequence[Band],
+        sink: ResultSink,
     ) -> None:
         self._rig, self._plan, self._options = rig, plan, options
         self._geometry, self._sink = geometry, sink
@@ -40,7 +46,8 @@ class Assembly:
             for wanted, size in zip(options.part, geometry.flags.shape, strict=True)
         )
         shape = self._rows.stop - self._rows.start, self._columns.stop - self._columns.start
-        sink.begin(shape, (self._rows.start, self._columns.start), options.grid.centres_nm)
+        places = [place for band in bands if (place := self._place(band)).start < place.stop]
+        sink.begin(shape, (self._rows.start, self._columns.start), options.grid.centres_nm, places)
 
     def missing(self, bands: Iterable[Band]) -> Iterator[Band]:
         """Bands that are wanted and not in the sink yet."""

@@ -116,14 +116,14 @@ def test_a_write_that_breaks_off_leaves_the_old_result(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, error: BaseException | type[BaseException]
 ) -> None:
     path = save_result(small_result(), tmp_path / "r.zarr")
-    original = result_file._write_variable
+    original = result_file.write_variable
 
     def fail_at_reflectance(group: object, name: str, variable: object) -> None:
         if name == "reflectance":
             raise error
         original(group, name, variable)  # type: ignore[arg-type]
 
-    monkeypatch.setattr(result_file, "_write_variable", fail_at_reflectance)
+    monkeypatch.setattr(result_file, "write_variable", fail_at_reflectance)
     changed = small_result()
     changed["depth_mm"][0, 0] = 123.0
     with pytest.raises((KeyboardInterrupt, StoreError), match=r"^$|disk is full"):

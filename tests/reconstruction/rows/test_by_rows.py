@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -11,6 +13,8 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from dsl_core import pipeline
+from dsl_core.io.result import row_writer
+from dsl_core.io.result.result_file import load_result
 from dsl_core.model.fit import Fit
 from dsl_core.model.frames import read_rows
 from dsl_core.model.plan import CapturePlan, GrayCode, ScanLines, Shot
@@ -82,6 +86,42 @@ def test_a_part_of_the_picture_is_that_part_of_the_whole(
     part = pipeline.Options(grid=GRID, band_rows=16, region_px=(20, 10, 30, 15))
     found = pipeline.reconstruct(scan, rig, part)
     xr.testing.assert_equal(found, whole.isel(y=slice(10, 25), x=slice(20, 50)))
+
+
+def test_a_reconstruction_that_was_killed_goes_on_and_ends_the_same(
+    scanned: tuple[Rig, MemoryScan], whole: xr.Dataset, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    rig, scan = scanned
+    options = pipeline.Options(grid=GRID, band_rows=16)
+    notes, solved = list[str](), list[slice]()
+    write, solve = row_writer.write_atomic, spectra.SpectralReconstruction.solve
+
+    def killed(path: Path, data: bytes) -> None:
+        notes.append(path.name)
+        if len(notes) == 3:
+            raise KeyboardInterrupt  # after the rows were written, and before that was noted
+        write(path, data)
+
+    def solving(solver: spectra.SpectralReconstruction, rows: slice, *given: Any, **more: Any) -> Any:
+        solved.append(rows)
+        return solve(solver, rows, *given, **more)
+
+    def reconstructed(name: str) -> xr.Dataset:
+        with row_writer.RowWriter(tmp_path / name, "all that it depends on") as writer:
+            found = pipeline.reconstruct(scan, rig, options, sink=writer)
+            return load_result(writer.publish(found.attrs), lazy=False)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(row_writer, "write_atomic", killed)
+        with pytest.raises(KeyboardInterrupt):
+            reconstructed("killed.zarr")
+    assert notes == ["key.json", "rows.32.48.json", "rows.16.32.json"]
+    monkeypatch.setattr(spectra.SpectralReconstruction, "solve", solving)
+    gone_on = reconstructed("killed.zarr")
+    assert solved == [slice(16, 32), slice(0, 16)]
+    xr.testing.assert_identical(gone_on, reconstructed("at once.zarr"))
+    xr.testing.assert_allclose(gone_on, whole, atol=2.1e-3, rtol=0)
+    assert gone_on.attrs["fit"] == whole.attrs["fit"]
 
 
 def test_bands_cover_the_picture_once_and_begin_at_multiples() -> None:

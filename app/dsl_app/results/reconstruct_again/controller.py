@@ -103,11 +103,11 @@ def reconstruct(
 ) -> Path:
     """Run a request; raises what the engine raises, and then writes nothing."""
     from dsl_core.io.calibration_library import load_calibration
-    from dsl_core.io.result.result_file import RESULT_FOLDER, save_result
+    from dsl_core.io.result.result_file import RESULT_FOLDER
     from dsl_core.io.staging import check_targets
     from dsl_core.pipeline import Options
     from dsl_core.reconstruction.torch_device import torch_device
-    from dsl_core.workflows.scans import reconstruct_scan
+    from dsl_core.workflows.scans import reconstruct_to
 
     check_targets([target], overwrite=request.replace, kind=RESULT_FOLDER)
     rig = None if request.calibration == OWN else load_calibration(request.calibration, library)
@@ -120,9 +120,15 @@ def reconstruct(
         device=torch_device(request.device),
         solver=request.solver,
     )
-    result = reconstruct_scan(source.session, rig, options, progress, override_calibration=request.override)
-    progress.report("save the result", 0, 0)
-    return save_result(result, target, overwrite=request.replace)
+    return reconstruct_to(
+        target,
+        source.session,
+        rig,
+        options,
+        progress,
+        override_calibration=request.override,
+        overwrite=request.replace,
+    )
 
 
 def read_source(path: Path, library: tuple[str, ...]) -> ReconstructionSource:

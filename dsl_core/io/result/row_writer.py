@@ -1,0 +1,183 @@
+"""A result written to disk as it is made, some rows at a time, which an interrupted run goes on with.
+
+Until it is finished the result is in a hidden folder next to its place, ``.NAME.unfinished``: its arrays, and
+a file for each band of rows that is complete. What it is a result of is in ``key.json``; another run goes on
+with it only if that is the same to the letter.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import logging
+import os
+import shutil
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Self
+
+import numpy as np
+import zarr
+from numpy.typing import NDArray
+
+from dsl_core.io.atomic import make_folder, make_safe, store_error, write_atomic
+from dsl_core.io.reading import read_bounded
+from dsl_core.io.result.arrays import PACKINGS, encoded, fits, new_array, stored_as, write_variable
+from dsl_core.io.result.result_file import RESULT_FOLDER, labels_of, opened, seal_folder
+from dsl_core.io.scan.lock import FolderLock
+from dsl_core.io.staging import check_targets, staged
+from dsl_core.model.result import VARIABLES, build_result
+from dsl_core.model.result_sink import Maps
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+_log = logging.getLogger(__name__)
+_KEY, _LOCK, _ARRAYS = "key.json", "writer.lock", "result.zarr"
+
+
+class RowWriter:
+    """A `ResultSink` on disk. Used in a ``with`` block, after which nothing is locked."""
+
+    def __init__(self, target: Path, key: str, *, overwrite: bool = False) -> None:
+        """Nothing is written before `begin`. ``key`` is all that the result depends on, as a text.
+
+        Raises `StoreError` where the target exists (unless ``overwrite``, and it is a result too).
+        """
+        check_targets([target], overwrite=overwrite, kind=RESULT_FOLDER)
+        self._target, self._key, self._overwrite = target, key, overwrite
+        self.work = target.with_name(f".{target.name}.unfinished")
+        self._lock: FolderLock | None = None
+        self._labels: dict[str, list[str]] = {}
+
+    def begin(
+        self,
+        shape: tuple[int, int],
+        origin: tuple[int, int],
+        wavelengths_nm: NDArray[np.float64],
+        bands: Sequence[slice],
+    ) -> None:
+        """Expect the rows of a picture of a shape, in bands all but the last of which are of equal height.
+
+        Raises `StoreError` where another process writes to the same place, or the disk fails.
+        """
+        make_folder(self.work)
+        self._lock = FolderLock(self.work / _LOCK)
+        self._shape, self._origin, self._nm = shape, origin, wavelengths_nm
+        self._height = bands[0].stop - bands[0].start
+        key = f"{self._key}\n{shape} {origin} {self._height} {wavelengths_nm.tolist()}".encode()
+        if self._is_of(key):
+            done = len(list(self.work.glob("rows.*.json")))
+            _log.warning("Going on where a run was interrupted: %d of %d bands are done.", done, len(bands))
+        else:
+            self._clear()
+            zarr.create_group(self.work / _ARRAYS, zarr_format=3)
+            write_atomic(self.work / _KEY, key)
+
+    def note_of(self, rows: slice) -> str | None:
+        """The note of rows that are complete; None for others."""
+        path = self._note(rows)
+        return read_bounded(path).decode() if path.is_file() else None
+
+    def put(self, rows: slice, maps: Maps, note: str) -> None:
+        """Write the maps (..., rows, columns) of a band of rows; raises `StoreError`."""
+        part = build_result(dict(maps), self._nm, {})
+        try:
+            for name in maps:
+                self._write(name, part[name].variable, rows)
+            # The note comes last, and once all else is safe: rows without one are made again.
+            write_atomic(self._note(rows), note.encode())
+        except OSError as error:
+            raise store_error(self._target, error) from error
+
+    def _write(self, name: str, part: xr.Variable, rows: slice) -> None:
+        packing, values = PACKINGS.get(name), np.asarray(part.values)
+        fitting = packing is not None and fits(values, packing)
+        group = self._group()
+        if name not in group:
+            self._create(name, part, fitting)
+        elif "scale_factor" in group[name].attrs and not fitting:
+            self._widen(name, part)
+        array = self._array(name)
+        packed = packing if "scale_factor" in array.attrs else None
+        array[..., rows, :] = encoded(values, array.dtype, packed)
+        place = ["0"] * (array.ndim - 1)
+        place[array.ndim - 2 :] = [str(rows.start // self._height), "0"]
+        make_safe(self.work / _ARRAYS / name / "c" / Path(*place))
+
+    def _create(self, name: str, part: xr.Variable, fitting: bool) -> None:
+        kind, encoding = stored_as(name, part, fitting)
+        shape = (*part.shape[:-2], *self._shape)
+        new_array(self._group(), name, part, shape, kind, encoding, (self._height, self._shape[1]))
+
+    def _widen(self, name: str, part: xr.Variable) -> None:
+        """Store a variable as float32 from now on: some of its values are out of the range of its packing."""
+        old, packing = self._array(name), PACKINGS[name]
+        aside = self.work / f"{name}.packed"
+        os.replace(self.work / _ARRAYS / name, aside)
+        old = zarr.open_array(aside, mode="r", zarr_format=3)
+        self._create(name, part, fitting=False)
+        for start in range(0, self._shape[0], self._height):
+            rows = slice(start, min(start + self._height, self._shape[0]))
+            if self.note_of(rows) is not None:
+                steps = np.asarray(old[..., rows, :])
+                values = steps.astype(np.float32) * np.float32(packing.step)
+                self._array(name)[..., rows, :] = np.where(steps == packing.fill, np.float32(np.nan), values)
+        shutil.rmtree(aside)
+
+    def finish(self, attributes: dict[str, str | int | float]) -> xr.Dataset:
+        """The whole result, read from the disk when it is used; it is in its place after `publish`."""
+        group = self._group()
+        shapes = {name: array.shape for name, array in group.arrays()}
+        empty = {n: np.broadcast_to(np.int8(0), shapes[n]) for n in VARIABLES if n in shapes}
+        like = build_result(empty, self._nm, attributes, self._origin)
+        self._labels = labels_of(like)
+        for name, variable in like.coords.variables.items():
+            if name not in self._labels and name not in group:
+                write_variable(group, str(name), variable)
+        return opened(self.work / _ARRAYS, {**like.attrs, "labels": self._labels})
+
+    def publish(self, attributes: Mapping[Any, Any]) -> Path:
+        """Move the result to its place, whole or not at all, with its attributes; raises `StoreError`."""
+        seal_folder(self.work / _ARRAYS, {**attributes, "labels": self._labels})
+        with staged([self._target], overwrite=self._overwrite, kind=RESULT_FOLDER) as (draft,):
+            os.replace(self.work / _ARRAYS, draft)
+        self._clear()
+        return self._target
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *failure: object) -> None:
+        """Let others write; what is not worth going on with is removed."""
+        if self._lock is None:
+            return
+        if not any(self.work.glob("rows.*.json")):
+            self._clear()
+        self._lock.release()
+        self._lock = None
+        with contextlib.suppress(OSError):
+            if [path.name for path in self.work.iterdir()] == [_LOCK]:
+                shutil.rmtree(self.work)
+
+    def _is_of(self, key: bytes) -> bool:
+        """Whether what is there is the beginning of the same result."""
+        path = self.work / _KEY
+        half = any(self.work.glob("*.packed"))
+        return path.is_file() and read_bounded(path) == key and (self.work / _ARRAYS).is_dir() and not half
+
+    def _clear(self) -> None:
+        """Remove all but the lock."""
+        for path in self.work.iterdir():
+            if path.is_dir():
+                shutil.rmtree(path)
+            elif path.name != _LOCK:
+                path.unlink()
+
+    def _note(self, rows: slice) -> Path:
+        return self.work / f"rows.{rows.start}.{rows.stop}.json"
+
+    def _group(self) -> zarr.Group:
+        return zarr.open_group(self.work / _ARRAYS, mode="r+", zarr_format=3, use_consolidated=False)
+
+    def _array(self, name: str) -> zarr.Array[Any]:
+        return zarr.open_array(self.work / _ARRAYS / name, mode="r+", zarr_format=3)

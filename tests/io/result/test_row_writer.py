@@ -1,0 +1,113 @@
+"""A result that is written by rows, interrupted and gone on with."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from dsl_core.errors import StoreError
+from dsl_core.io.result.result_file import load_result, save_result
+from dsl_core.io.result.row_writer import RowWriter
+from dsl_core.model.result import build_result
+from dsl_core.model.result_sink import Maps, MemorySink, ResultSink
+
+NM = np.array([500.0, 550.0, 600.0])
+SHAPE, BANDS = (10, 7), (slice(0, 4), slice(4, 8), slice(8, 10))
+ATTRIBUTES: dict[str, str | int | float] = {"rig": "twin"}
+
+
+def maps(highest: float = 1.2) -> dict[str, np.ndarray]:
+    """Of the whole picture; reflectance rises from row to row."""
+    rng = np.random.default_rng(3)
+    cube = np.broadcast_to(np.linspace(0.1, highest, SHAPE[0])[:, None], (3, *SHAPE)).astype(np.float32)
+    cube[:, 2, 3] = np.nan
+    return {
+        "depth_mm": rng.uniform(600, 700, SHAPE).astype(np.float32),
+        "points_mm": rng.normal(size=(3, *SHAPE)).astype(np.float32),
+        "reflectance": cube.copy(),
+        "reach": rng.integers(0, 5, (3, *SHAPE)).astype(np.uint8),
+        "flags": rng.integers(0, 900, SHAPE).astype(np.uint16),
+    }
+
+
+def some(given: Maps, rows: slice) -> Maps:
+    return {name: values[..., rows, :] for name, values in given.items()}
+
+
+def begin(sink: ResultSink) -> None:
+    sink.begin(SHAPE, (4, 2), NM, BANDS)
+
+
+def write(target: Path, given: Maps, key: str = "a", overwrite: bool = False) -> xr.Dataset:
+    """Put what is not there yet, the last rows first."""
+    with RowWriter(target, key, overwrite=overwrite) as writer:
+        begin(writer)
+        for rows in reversed(BANDS):
+            if writer.note_of(rows) is None:
+                writer.put(rows, some(given, rows), f"{rows}")
+        result = writer.finish(ATTRIBUTES)
+        assert result["depth_mm"].shape == SHAPE
+        writer.publish({**result.attrs, "more": "of it"})
+    return load_result(target, lazy=False)
+
+
+@pytest.mark.parametrize("highest", [1.2, 4.0])
+def test_rows_make_the_result_that_is_saved_at_once(tmp_path: Path, highest: float) -> None:
+    given = maps(highest)
+    memory = MemorySink()
+    begin(memory)
+    for rows in BANDS:
+        memory.put(rows, some(given, rows), "")
+    at_once = memory.finish({**ATTRIBUTES, "more": "of it"})
+    xr.testing.assert_identical(at_once, build_result(given, NM, {**ATTRIBUTES, "more": "of it"}, (4, 2)))
+    save_result(at_once, tmp_path / "whole.zarr")
+    found, wanted = write(tmp_path / "rows.zarr", given), load_result(tmp_path / "whole.zarr", lazy=False)
+    # Rows that were packed before others turned out too bright for it keep their half steps.
+    xr.testing.assert_allclose(found, wanted, atol=3e-5, rtol=0)
+    assert found.attrs == wanted.attrs
+    assert found["reflectance"].dtype == wanted["reflectance"].dtype
+    assert [path.name for path in tmp_path.glob(".*")] == []
+
+
+def test_rows_that_are_there_are_not_asked_for_again(tmp_path: Path) -> None:
+    given, target = maps(), tmp_path / "r.zarr"
+    with RowWriter(target, "a") as writer:
+        begin(writer)
+        writer.put(BANDS[2], some(given, BANDS[2]), "last")
+    assert not target.exists()
+    with RowWriter(target, "a") as writer:
+        begin(writer)
+        assert [writer.note_of(rows) for rows in BANDS] == [None, None, "last"]
+    xr.testing.assert_identical(write(target, given), write(tmp_path / "again.zarr", given))
+
+
+@pytest.mark.parametrize("change", ["key", "half written"])
+def test_what_is_of_another_result_is_made_anew(tmp_path: Path, change: str) -> None:
+    target = tmp_path / "r.zarr"
+    with RowWriter(target, "a") as writer:
+        begin(writer)
+        writer.put(BANDS[0], some(maps(), BANDS[0]), "first")
+    if change == "half written":
+        (writer.work / "reflectance.packed").mkdir()
+    with RowWriter(target, "b" if change == "key" else "a") as writer:
+        begin(writer)
+        assert writer.note_of(BANDS[0]) is None
+    assert not writer.work.exists()
+
+
+def test_two_writers_of_one_result_are_told_of_each_other(tmp_path: Path) -> None:
+    with RowWriter(tmp_path / "r.zarr", "a") as one, RowWriter(tmp_path / "r.zarr", "a") as other:
+        begin(one)
+        with pytest.raises(StoreError, match="another process"):
+            begin(other)
+
+
+def test_a_result_is_replaced_only_when_that_is_wanted(tmp_path: Path) -> None:
+    target = tmp_path / "r.zarr"
+    write(target, maps())
+    with pytest.raises(StoreError, match="already exists"):
+        RowWriter(target, "a")
+    assert float(write(target, maps(0.5), overwrite=True)["reflectance"].max()) == pytest.approx(0.5)
