@@ -128,11 +128,14 @@ class RowWriter:
         """The whole result, read from the disk when it is used; it is in its place after `publish`."""
         group = self._group()
         shapes = {name: array.shape for name, array in group.arrays()}
-        empty = {n: np.broadcast_to(np.int8(0), shapes[n]) for n in VARIABLES if n in shapes}
+        nothing = np.zeros((), np.int8)
+        empty: dict[str, NDArray[np.generic]] = {
+            name: np.broadcast_to(nothing, shapes[name]) for name in VARIABLES if name in shapes
+        }
         like = build_result(empty, self._nm, attributes, self._origin)
         self._labels = labels_of(like)
         for name, variable in like.coords.variables.items():
-            if name not in self._labels and name not in group:
+            if name not in self._labels and str(name) not in group:
                 write_variable(group, str(name), variable)
         return opened(self.work / _ARRAYS, {**like.attrs, "labels": self._labels})
 

@@ -13,6 +13,7 @@ import xarray as xr
 from dsl_core.errors import StoreError
 from dsl_core.io import staging
 from dsl_core.io.result import result_file
+from dsl_core.io.result.arrays import write_variable
 from dsl_core.io.result.result_file import load_result, save_result
 from tests.cases.small_result import UNLIT, WAVELENGTHS_NM, small_result
 
@@ -116,7 +117,7 @@ def test_a_write_that_breaks_off_leaves_the_old_result(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, error: BaseException | type[BaseException]
 ) -> None:
     path = save_result(small_result(), tmp_path / "r.zarr")
-    original = result_file.write_variable
+    original = write_variable
 
     def fail_at_reflectance(group: object, name: str, variable: object) -> None:
         if name == "reflectance":

@@ -13,6 +13,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from dsl_core import pipeline
+from dsl_core.io.atomic import write_atomic
 from dsl_core.io.result import row_writer
 from dsl_core.io.result.result_file import load_result
 from dsl_core.model.fit import Fit
@@ -94,7 +95,7 @@ def test_a_reconstruction_that_was_killed_goes_on_and_ends_the_same(
     rig, scan = scanned
     options = pipeline.Options(grid=GRID, band_rows=16)
     notes, solved = list[str](), list[slice]()
-    write, solve = row_writer.write_atomic, spectra.SpectralReconstruction.solve
+    write, solve = write_atomic, spectra.SpectralReconstruction.solve
 
     def killed(path: Path, data: bytes) -> None:
         notes.append(path.name)
