@@ -16,11 +16,12 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from dsl_core.errors import CalibrationError
+from dsl_core.model.geometry import Lens, Pose
 from dsl_core.model.rig import BayerPattern, CorrespondenceGrid, Rig
 from dsl_core.optics.colour_neighbours import bayer_colours
 from dsl_core.optics.column_residual import residual_columns
 from dsl_core.optics.grating import FilmFrame, Vectors, incoming_direction
-from dsl_core.optics.pinhole import pixel_rays, project
+from dsl_core.optics.pinhole import KEPT_PX, project, rays_at, rays_in
 
 #: Chebyshev nodes over the wavelength range; the interpolation error stays below 1e-3 px.
 NODES = 6
@@ -28,6 +29,8 @@ NODES = 6
 NEWTON_STEPS = 4
 #: Pixels solved at once.
 CHUNK = 8192
+#: Of large pictures rays are kept by so many rows; pixels spread over more of these blocks are few.
+ROWS, BLOCKS = 64, 4
 
 
 class Footprint(NamedTuple):
@@ -55,28 +58,44 @@ class Correspondence(Protocol):
         """
 
 
+def _rays_in_projector(camera: Lens, pose: Pose, pixels: Tensor, like: Tensor) -> Tensor:
+    """Directions of pixels' rays in the projector's coordinates, (3, n), of the kind that ``like`` is."""
+    kind = like.device, like.dtype
+    if camera.width_px * camera.height_px <= KEPT_PX or pixels.numel() == 0:
+        return _rays_of_rows(camera, pose, 0, camera.height_px, *kind)[:, pixels]
+    first, last = (int(at) // camera.width_px // ROWS for at in torch.aminmax(pixels))
+    if last - first >= BLOCKS:
+        at = pixels.cpu().numpy()
+        rays = rays_at(camera, (at % camera.width_px).astype(float), (at // camera.width_px).astype(float))
+        return torch.as_tensor(np.einsum("ij,jn->in", pose.matrix, rays)).to(like)
+    parts = [_rays_of_rows(camera, pose, k * ROWS, (k + 1) * ROWS, *kind) for k in range(first, last + 1)]
+    return torch.cat(parts, 1)[:, pixels - first * ROWS * camera.width_px]
+
+
 @lru_cache(maxsize=8)
-def _rays_in_projector(rig_key: tuple[object, ...], device: torch.device, dtype: torch.dtype) -> Tensor:
-    camera, pose = rig_key
-    rays = np.einsum("ij,jhw->ihw", pose.matrix, pixel_rays(camera)).reshape(3, -1)  # type: ignore[attr-defined,arg-type]
+def _rays_of_rows(
+    camera: Lens, pose: Pose, first: int, last: int, device: torch.device, dtype: torch.dtype
+) -> Tensor:
+    rays = np.einsum("ij,jhw->ihw", pose.matrix, rays_in(camera, slice(first, last))).reshape(3, -1)
     return torch.as_tensor(np.ascontiguousarray(rays), device=device, dtype=dtype)
 
 
 @lru_cache(maxsize=8)
 def _mosaic(bayer: BayerPattern, height: int, width: int) -> Tensor:
     """Colour, 0 to 2, of every pixel of a picture, flat."""
-    return torch.as_tensor(bayer_colours(bayer, *np.divmod(np.arange(height * width), width)))
+    rows, columns = np.arange(height)[:, None], np.arange(width)[None]
+    return torch.as_tensor(bayer_colours(bayer, rows, columns).astype(np.uint8).ravel())
 
 
 def _of_colour(values: tuple[float, float, float], rig: Rig, pixels: Tensor, other: Tensor) -> Tensor:
     """That of three values which belongs to the colour of each pixel."""
-    colours = _mosaic(rig.sensor.bayer, rig.camera.height_px, rig.camera.width_px)[pixels.cpu()]
+    colours = _mosaic(rig.sensor.bayer, rig.camera.height_px, rig.camera.width_px)[pixels.cpu()].long()
     return like(np.array(values), other)[colours.to(other.device)]
 
 
 def projector_points(rig: Rig, pixels: Tensor, depth_mm: Tensor) -> Vectors:
     """Points seen by flat pixel indices at a depth, in projector coordinates (mm), shape of ``depth_mm``."""
-    rays = _rays_in_projector((rig.camera, rig.pose), depth_mm.device, depth_mm.dtype)[:, pixels]
+    rays = _rays_in_projector(rig.camera, rig.pose, pixels, depth_mm)
     t = rig.pose.translation_mm
     if rig.lateral_colour is not None:
         # A colour that the camera's lens magnifies comes from nearer to its axis, which is where z is.

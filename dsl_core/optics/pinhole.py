@@ -19,6 +19,8 @@ from dsl_core.model.geometry import Lens
 FADE_RADIUS_SQ = 0.3
 #: Places along each side of the image where the distortion is inverted to find the image circle.
 GRID_POINTS = 17
+#: Pixels of a picture whose rays are all kept once they are known.
+KEPT_PX = 1 << 20
 
 
 def distort(
@@ -81,6 +83,16 @@ def pixel_rays(lens: Lens) -> NDArray[np.float64]:
     rays = rays_at(lens, columns, rows)
     rays.setflags(write=False)
     return rays
+
+
+def rays_in(lens: Lens, rows: slice, columns: slice = slice(None)) -> NDArray[np.float64]:
+    """The same of a part of the picture; only those of small pictures are computed once and kept."""
+    if lens.width_px * lens.height_px <= KEPT_PX:
+        return pixel_rays(lens)[:, rows, columns]
+    across, down = np.meshgrid(
+        np.arange(lens.width_px, dtype=np.float64)[columns], np.arange(lens.height_px, dtype=np.float64)[rows]
+    )
+    return rays_at(lens, across, down)
 
 
 def rays_at(lens: Lens, columns_px: NDArray[np.float64], rows_px: NDArray[np.float64]) -> NDArray[np.float64]:

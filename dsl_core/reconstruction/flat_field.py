@@ -87,7 +87,7 @@ def with_flat_field(rig: Rig, found: FlatFit) -> Rig:
 
 def unsure_gain(rig: Rig, found: FlatFit) -> Floats:
     """Relative deviation of such a gain (rows, columns)."""
-    rows, columns = np.indices((rig.camera.height_px, rig.camera.width_px))
+    rows, columns = np.arange(rig.camera.height_px)[:, None], np.arange(rig.camera.width_px)[None]
     unsure = float(np.hypot(found.corner_std, FORM * found.corner))
     return _square(rig, rows, columns) * unsure
 
@@ -125,9 +125,13 @@ def _square(rig: Rig, rows: NDArray[np.generic], columns: NDArray[np.generic]) -
 def _pairs(rig: Rig, amplitude: NDArray[np.floating], shading: Floats) -> tuple[Floats, ...]:
     """Steps of level, squared distance and shading between pixels that look alike, and their quarters."""
     height, width = amplitude.shape
-    with np.errstate(invalid="ignore", divide="ignore"):
-        level, light = np.log(amplitude / shading), np.log(shading)
-    square = _square(rig, *np.indices((height, width)))
+
+    def seen(where: tuple[slice, slice]) -> tuple[Floats, NDArray[np.intp]]:
+        rows, columns = np.meshgrid(np.arange(height)[where[0]], np.arange(width)[where[1]], indexing="ij")
+        with np.errstate(invalid="ignore", divide="ignore"):
+            level, light = np.log(amplitude[where] / shading[where]), np.log(shading[where])
+        return np.stack([level, _square(rig, rows, columns), light]), np.stack([rows, columns])
+
     step = max(2, 2 * round(width * APART / 2))
     # Single pixels, evenly thinned: the stride keeps no colour out.
     stride = max(int((height * width / PAIRS) ** 0.5) | 1, 1)
@@ -136,10 +140,10 @@ def _pairs(rig: Rig, amplitude: NDArray[np.floating], shading: Floats) -> tuple[
         for down, across in ((0, step), (step, 0)):
             first = np.s_[: height - down : stride, : width - across : stride]
             second = np.s_[down::stride, across::stride]
-            found = np.stack([values[second] - values[first] for values in (level, square, light)])
+            (here, (rows, columns)), (there, _) = seen(first), seen(second)
+            found = there - here
             with np.errstate(invalid="ignore"):
                 alike = (np.abs(found[0]) < ALIKE) & (np.abs(found[2]) < EVEN)
-            rows, columns = np.indices((height, width))[(slice(None), *first)]
             quarter = 2 * (rows + down / 2 > height / 2) + (columns + across / 2 > width / 2)
             yield np.concatenate([found[:, alike], quarter[alike][None]])
 

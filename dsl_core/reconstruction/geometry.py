@@ -15,12 +15,12 @@ from dsl_core.model.result import DEPTH_INVALID, REASONS, Flag
 from dsl_core.model.rig import Rig
 from dsl_core.optics.correspondence import triangulate
 from dsl_core.optics.line_set import LineSet
-from dsl_core.optics.pinhole import pixel_rays
+from dsl_core.optics.pinhole import rays_in
 from dsl_core.patterns.gray_code import DecodedCode
 from dsl_core.progress import Progress
 from dsl_core.reconstruction.columns.code_dispute import Settled, has_peak, is_dark, settle
 from dsl_core.reconstruction.columns.line_spread import wave_std_px
-from dsl_core.reconstruction.columns.maps import WHOLE_PX_STD, ColumnFinder, ColumnMaps
+from dsl_core.reconstruction.columns.maps import CHUNK, WHOLE_PX_STD, ColumnFinder, ColumnMaps
 from dsl_core.reconstruction.columns.pattern_column import radiance_profiles
 from dsl_core.reconstruction.hdr import MergedFrame
 from dsl_core.reconstruction.merge import LineStack
@@ -67,12 +67,14 @@ class Geometry:
         ``column_error_px`` (rows, columns) is what their deviation has to hold besides; other arguments are
         those of `reconstruct_geometry`.
         """
-        good = np.flatnonzero(np.isfinite(self.depth_mm))
-        column = torch.as_tensor(self.column_px.ravel()[good], dtype=torch.float64)
-        found, slope = (v.numpy() for v in triangulate(rig, torch.as_tensor(good), column))
         std_px = np.hypot(self.column_std_px, column_error_px).astype(np.float32)
         depth, depth_std = np.full_like(self.depth_mm, np.nan), np.full_like(self.depth_std_mm, np.nan)
-        depth.ravel()[good], depth_std.ravel()[good] = found, slope * std_px.ravel()[good]
+        good = np.flatnonzero(np.isfinite(self.depth_mm))
+        for start in range(0, good.size, CHUNK):
+            some = good[start : start + CHUNK]
+            column = torch.as_tensor(self.column_px.ravel()[some], dtype=torch.float64)
+            found, slope = (v.numpy() for v in triangulate(rig, torch.as_tensor(some), column))
+            depth.ravel()[some], depth_std.ravel()[some] = found, slope * std_px.ravel()[some]
         surface = reconstruct_surface(rig, depth, depth_std, window_px)
         edge = np.where(surface.edge, int(Flag.DEPTH_EDGE), 0).astype(np.uint16)
         return replace(
@@ -91,7 +93,7 @@ class Geometry:
 
     def points_mm(self, rig: Rig, rows: slice) -> NDArray[np.float32]:
         """Points in camera coordinates, (3, rows, columns), of these ``rows``; NaN without a depth."""
-        return (pixel_rays(rig.camera)[:, rows] * self.depth_mm).astype(np.float32)
+        return (rays_in(rig.camera, rows) * self.depth_mm).astype(np.float32)
 
 
 def reconstruct_geometry(
@@ -170,14 +172,17 @@ def geometry_of(
     surface_window_px: int | None = None,
     shared_errors: bool = True,
 ) -> Geometry:
-    """Depth and surface from the columns of a whole picture of a shape; arguments as above."""
+    """Depth and surface from the columns of a whole picture of a shape, which it takes over."""
     maps, flags = found.maps, found.flags
     waves = wave_std_px(maps.column_px.reshape(shape), maps.refined.reshape(shape), lines)
     common = math.hypot(rig.column_std_px, _zero_std_px(rig)) if shared_errors else 0.0
     dq = np.hypot(np.hypot(maps.column_std_px, common), waves.ravel())
     good = (flags & int(DEPTH_INVALID)) == 0
-    depth_mm = np.where(good, maps.depth_mm, np.nan).reshape(shape)
-    depth_std = np.where(good, dq * maps.slope_mm_per_px, np.nan).reshape(shape)
+    # In place, because maps of a large picture are large.
+    depth_mm, depth_std = maps.depth_mm.reshape(shape), maps.slope_mm_per_px.reshape(shape)
+    maps.slope_mm_per_px[:] *= dq
+    for values in (maps.depth_mm, maps.slope_mm_per_px):
+        values[~good] = np.nan
     surface = reconstruct_surface(rig, depth_mm, depth_std, surface_window_px)
     edge = np.where(surface.edge, int(Flag.DEPTH_EDGE), 0).astype(np.uint16)
     q = np.where(good, maps.column_px, np.float32(np.nan)).reshape(shape)

@@ -8,17 +8,22 @@ where the surface curves, and one on the pixel's own side of a jump or a crease.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Iterator
+from dataclasses import dataclass, fields
+from itertools import pairwise, product
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dsl_core.model.rig import Rig
-from dsl_core.optics.pinhole import pixel_rays
+from dsl_core.optics.pinhole import rays_in
 from dsl_core.optics.sensor import relative_gain
 
 Map = NDArray[np.float64]
+Block = tuple[slice, slice]
 
+#: Pixels that are worked on at once, with those around them: they take 300 bytes each.
+BLOCK_PX = 1_500_000
 #: Smallest window, and the ratio of one size to the next.
 LEAST_PX, RATIO = 3, 1.7
 #: Error of a slope that a misfit causes, relative to that of as much noise in a single sample: a curved
@@ -44,6 +49,12 @@ class Surface:
     shading_rel_std: Map
     edge: NDArray[np.bool_]
 
+    @classmethod
+    def empty(cls, shape: tuple[int, ...]) -> Surface:
+        """Room for maps of a shape, in single precision."""
+        normals, shading, std = (np.empty((*lead, *shape), np.float32) for lead in ((3,), (), ()))
+        return cls(normals, shading, std, np.zeros(shape, bool))
+
 
 def default_window_px(rig: Rig) -> int:
     """Largest window of the plane fits: about 1/45 of the image width, odd, at least 5."""
@@ -67,21 +78,54 @@ def reconstruct_surface(rig: Rig, depth_mm: Map, depth_std_mm: Map, window_px: i
 
     ``window_px`` is the size of the largest window. The deviation of a normal holds the noise of depth and
     what the misfit of the plane says about curvature; next to a jump that of shading holds mixed pixels.
+    Large pictures are worked on block by block, with all pixels around that take part.
     """
-    rays = pixel_rays(rig.camera)
+    window = window_px or default_window_px(rig)
+    # A window next to a pixel, the neighbourhood of its misfit, and a neighbour beyond a jump.
+    beside = 2 * window + 2
+    blocks = list(_blocks(depth_mm.shape, beside))
+    if len(blocks) == 1:
+        return _surface_of(rig, depth_mm, depth_std_mm, window, blocks[0][1])
+    found = Surface.empty(depth_mm.shape)
+    for own, near in blocks:
+        part = _surface_of(rig, depth_mm[near], depth_std_mm[near], window, near)
+        inside = tuple(slice(o.start - n.start, o.stop - n.start) for o, n in zip(own, near, strict=True))
+        for field in fields(Surface):
+            getattr(found, field.name)[..., *own] = getattr(part, field.name)[..., *inside]
+    return found
+
+
+def _blocks(shape: tuple[int, ...], beside: int) -> Iterator[tuple[Block, Block]]:
+    """Blocks of a picture (rows, columns), each with the same and what is within ``beside`` of it."""
+    side = max(int(BLOCK_PX**0.5) - 2 * beside, beside)
+    counts = [1, 1] if shape[0] * shape[1] <= BLOCK_PX else [-(-size // side) for size in shape]
+    edges = [np.linspace(0, size, n + 1).astype(int).tolist() for size, n in zip(shape, counts, strict=True)]
+    for (top, bottom), (left, right) in product(*(pairwise(each) for each in edges)):
+        own = slice(top, bottom), slice(left, right)
+        near = (
+            slice(max(part.start - beside, 0), min(part.stop + beside, size))
+            for part, size in zip(own, shape, strict=True)
+        )
+        yield own, (next(near), next(near))
+
+
+def _surface_of(rig: Rig, depth_mm: Map, depth_std_mm: Map, window: int, place: Block) -> Surface:
+    """The surface of a block at a place of the picture."""
+    rays = rays_in(rig.camera, *place)
     valid = np.isfinite(depth_mm)
     inverse = np.where(valid, 1 / np.where(valid, depth_mm, 1), 0.0)
     std = np.where(valid, depth_std_mm, 1.0) * np.where(valid, inverse, 1.0) ** 2
     best = _Best(rays, inverse, std)
-    for window in windows_px(window_px or default_window_px(rig)):
-        best.offer(_plane_fits(rays, inverse, std, valid, window), window)
+    for size in windows_px(window):
+        best.offer(_plane_fits(rays, inverse, std, valid, size), size)
     bad = ~valid | ~np.isfinite(best.variance)
     length = np.maximum(np.linalg.norm(best.fit, axis=0), 1e-12)
     normal = -best.fit / length
     normal[:, bad] = np.nan
     spread = np.where(bad, np.nan, np.sqrt(best.variance) / length)
     edge = (_beside_jump(rays, inverse, best.fit[:2], std, valid) | bad) & valid
-    shading, incidence_tan = _shading(rig, rays * np.where(valid, depth_mm, np.nan), normal)
+    gain = np.broadcast_to(relative_gain(rig), (rig.camera.height_px, rig.camera.width_px))[place]
+    shading, incidence_tan = _shading(rig, rays * np.where(valid, depth_mm, np.nan), normal, gain)
     relative = np.hypot(incidence_tan * spread, 2 * np.where(valid, depth_std_mm * inverse, np.nan))
     relative = np.where(edge, np.hypot(relative, MIXED_REL_STD), relative)
     return Surface(normal, shading, relative, edge)
@@ -210,11 +254,11 @@ def _beside_jump(
     return found & valid
 
 
-def _shading(rig: Rig, points: Map, normals: Map) -> tuple[Map, Map]:
+def _shading(rig: Rig, points: Map, normals: Map, gain: Map) -> tuple[Map, Map]:
     """``cos(incidence) (reference / distance)^2`` times the camera's gain; tangent of the incidence."""
     to_light = rig.pose.projector_centre_mm[:, None, None] - points
     distance = np.linalg.norm(to_light, axis=0)
     cosine = (normals * to_light).sum(0) / distance
     safe = np.clip(cosine, 0.05, 1)
-    shading = safe * (rig.reference_distance_mm / distance) ** 2 * relative_gain(rig)
+    shading = safe * (rig.reference_distance_mm / distance) ** 2 * gain
     return shading, np.sqrt(1 - safe**2) / safe

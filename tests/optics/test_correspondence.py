@@ -10,7 +10,9 @@ from torch import Tensor
 from dsl_core.errors import CalibrationError
 from dsl_core.model.lateral_colour import LateralColour
 from dsl_core.model.rig import ColumnResidual, CorrespondenceGrid, Rig
+from dsl_core.optics import correspondence as correspondence_module
 from dsl_core.optics import correspondence as module
+from dsl_core.optics import pinhole
 from dsl_core.optics.correspondence import (
     Footprint,
     GratingModel,
@@ -243,3 +245,15 @@ def test_a_column_that_no_ray_meets_gives_no_depth() -> None:
     rig = published_rig()
     far, _ = triangulate(rig, PIXELS[:1], torch.tensor([1e5], dtype=torch.float64))
     assert far.isnan().all()
+
+
+@pytest.mark.parametrize("step", [1, 700])
+def test_rays_of_large_pictures_are_those_of_small_ones(monkeypatch: pytest.MonkeyPatch, step: int) -> None:
+    rig = published_rig()
+    pixels = torch.arange(100_000, 100_000 + 500 * step, step)
+    depth = torch.linspace(500.0, 900.0, len(pixels), dtype=torch.float64)
+    wanted = zero_order(rig, pixels, depth)
+    for module in (correspondence_module, pinhole):
+        monkeypatch.setattr(module, "KEPT_PX", 1000)
+    for seen, known in zip(zero_order(rig, pixels, depth), wanted, strict=True):
+        assert torch.equal(seen, known)

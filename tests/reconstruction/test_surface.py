@@ -197,3 +197,18 @@ def test_a_plane_is_taken_where_it_is_clearly_better_and_holds_the_pixel() -> No
     best.variance[:] = 1.0
     best.offer(_Fits(fit, np.full(shape, 0.71), 0 * one, 1e10 * one, 25 * one), 3)
     assert best.variance[0].tolist() == [1.0, 1.0, 1.0]
+
+
+def test_blocks_of_a_large_picture_make_the_surface_of_the_whole(monkeypatch: pytest.MonkeyPatch) -> None:
+    rig, rng = small_rig(), np.random.default_rng(4)
+    rows, columns = np.indices((80, 120))
+    depth = 700 + 20 * np.sin(columns / 15) * np.cos(rows / 12) + rng.normal(size=rows.shape) * NOISE_MM
+    depth[30:50, 50:80] -= 60
+    depth[rng.random(depth.shape) < 0.02] = np.nan
+    std = np.where(np.isfinite(depth), NOISE_MM, np.nan)
+    whole = reconstruct_surface(rig, depth, std, 7)
+    monkeypatch.setattr("dsl_core.reconstruction.surface.BLOCK_PX", 4000)
+    blocks = reconstruct_surface(rig, depth, std, 7)
+    np.testing.assert_array_equal(blocks.edge, whole.edge)
+    for name in ("normals", "shading", "shading_rel_std"):
+        np.testing.assert_allclose(getattr(blocks, name), getattr(whole, name), rtol=1e-6, atol=1e-7)

@@ -12,6 +12,9 @@ from dsl_core.reconstruction.merge import LineStack
 from dsl_core.reconstruction.rows.bands import some_rows
 from dsl_core.reconstruction.rows.frames import ScanFrames
 
+#: With more bands than these, the maps of the picture need the memory more than the frames of the last band.
+FEW_BANDS = 2
+
 
 def geometry_by_rows(
     rig: Rig,
@@ -30,4 +33,6 @@ def geometry_by_rows(
         own = LineStack(stack.radiance[:, band.own], stack.std[:, band.own], stack.black_std[band.own])
         flat = slice(here.start * width, here.stop * width)
         found.put(flat, search.find(some_rows(code, here), some_rows(white, here), own, flat.start, progress))
+    if len(frames.bands) > FEW_BANDS:
+        frames.let_go()
     return geometry_of(rig, search.lines, found, (height, width), options.surface_window_px)

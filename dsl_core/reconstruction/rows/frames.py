@@ -122,6 +122,11 @@ class ScanFrames:
             self._held = band, stack
         return self._held[1]
 
+    def let_go(self) -> None:
+        """Keep no frames in memory until some are asked for."""
+        if not self.in_one:
+            self._held = None
+
     def _scan(self) -> MergedScan:
         if self._whole is None:
             self._whole = MergedScan(self.source, self.rig, self._levels)

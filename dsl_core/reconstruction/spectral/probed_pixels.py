@@ -20,7 +20,7 @@ def sample_pixels(valid: NDArray[np.bool_], per_cell: int) -> Indices:
 
     inner = np.flatnonzero(minimum_filter(valid.astype(np.uint8), 3, mode="constant"))
     inner = np.random.default_rng(0).permutation(inner)
-    cell = cell_of(*np.divmod(inner, valid.shape[1]), valid.shape)
+    cell = cell_of(*np.divmod(inner, valid.shape[1]), valid.shape).astype(np.uint8)
     order = np.argsort(cell, kind="stable")
     first = np.searchsorted(cell[order], cell[order])
     return np.sort(inner[order[np.arange(len(order)) - first < per_cell]])
