@@ -10,7 +10,6 @@ from torch import Tensor
 from dsl_core.errors import CalibrationError
 from dsl_core.model.lateral_colour import LateralColour
 from dsl_core.model.rig import ColumnResidual, CorrespondenceGrid, Rig
-from dsl_core.optics import correspondence as correspondence_module
 from dsl_core.optics import correspondence as module
 from dsl_core.optics import pinhole
 from dsl_core.optics.correspondence import (
@@ -253,7 +252,7 @@ def test_rays_of_large_pictures_are_those_of_small_ones(monkeypatch: pytest.Monk
     pixels = torch.arange(100_000, 100_000 + 500 * step, step)
     depth = torch.linspace(500.0, 900.0, len(pixels), dtype=torch.float64)
     wanted = zero_order(rig, pixels, depth)
-    for module in (correspondence_module, pinhole):
-        monkeypatch.setattr(module, "KEPT_PX", 1000)
+    for place in (module, pinhole):
+        monkeypatch.setattr(place, "KEPT_PX", 1000)
     for seen, known in zip(zero_order(rig, pixels, depth), wanted, strict=True):
         assert torch.equal(seen, known)
