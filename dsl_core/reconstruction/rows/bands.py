@@ -14,7 +14,7 @@ from dsl_core.model.plan import CapturePlan, Shot
 T = TypeVar("T")
 
 #: Memory for the merged line frames of a band.
-BAND_BYTES = 512 << 20
+BAND_BYTES = 320 << 20
 #: Bytes of a value in one of them: radiance, and its deviation in half precision.
 VALUE_BYTES = 6
 #: Further rows on either side that belong to the neighbourhood of a band's pixels; even, as the mosaic is.
