@@ -2,9 +2,9 @@
 
 ``python -m tests.benchmarks.bench_bands [--sizes 445x290,890x580,...] [--settings 2] [--depth-only]
 [--rows N] [--json FILE]``. Scans are made of a plane by formula (see `bench_growth`), a strip of rows
-repeated down the picture, and written to a temporary folder; each is reconstructed in a process of its own, whose
-processor seconds and largest resident memory, libraries included, are told. ``--rows`` ends each one after
-so many rows of the result; by then its memory has reached its peak.
+repeated down the picture, and written to a temporary folder; each is reconstructed in a process of its own,
+whose processor seconds and largest resident memory, libraries included, are told. ``--rows`` ends each one
+after so many rows of the result; by then its memory has reached its peak.
 """
 
 from __future__ import annotations
