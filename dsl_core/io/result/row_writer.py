@@ -1,8 +1,8 @@
-"""A result written to disk as it is made, some rows at a time, which an interrupted run goes on with.
+"""A result written to disk as it is made, some rows at a time, which is resumed where a run was interrupted.
 
 Until it is finished the result is in a hidden folder next to its place, ``.NAME.unfinished``: its arrays, and
-a file for each band of rows that is complete. What it is a result of is in ``key.json``; another run goes on
-with it only if that is the same to the letter.
+a file for each band of rows that is complete. What it is a result of is in ``key.json``; another run resumes it
+only if that is the same to the letter.
 """
 
 from __future__ import annotations
@@ -67,7 +67,7 @@ class RowWriter:
         key = f"{self._key}\n{shape} {origin} {self._height} {wavelengths_nm.tolist()}".encode()
         if self._is_of(key):
             done = len(list(self.work.glob("rows.*.json")))
-            _log.warning("Going on where a run was interrupted: %d of %d bands are done.", done, len(bands))
+            _log.warning("Continued where a run was interrupted: %d of %d bands of rows are there.", done, len(bands))
         else:
             self._clear()
             zarr.create_group(self.work / _ARRAYS, zarr_format=3)
@@ -151,7 +151,7 @@ class RowWriter:
         return self
 
     def __exit__(self, *failure: object) -> None:
-        """Let others write; what is not worth going on with is removed."""
+        """Let others write; what is not worth resuming is removed."""
         if self._lock is None:
             return
         if not any(self.work.glob("rows.*.json")):
