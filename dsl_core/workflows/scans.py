@@ -142,8 +142,9 @@ def reconstruct_to(
 ) -> Path:
     """Reconstruct a complete scan into a folder, by rows, so that neither has to fit into memory.
 
-    One that was interrupted continues where it was, if scan, calibration and options are the same. Raises what
-    `reconstruct_scan` does, and `StoreError` when the target exists (unless ``overwrite``) or the disk fails.
+    One that was interrupted continues where it was if scan, calibration and options are the same. Raises
+    what `reconstruct_scan` does, and `StoreError` when the target exists (unless ``overwrite``) or the disk
+    fails.
     """
     from dsl_core.io.result.row_writer import RowWriter
 

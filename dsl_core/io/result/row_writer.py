@@ -1,8 +1,8 @@
 """A result written to disk as it is made, some rows at a time, which is resumed where a run was interrupted.
 
 Until it is finished the result is in a hidden folder next to its place, ``.NAME.unfinished``: its arrays, and
-a file for each band of rows that is complete. What it is a result of is in ``key.json``; another run resumes it
-only if that is the same to the letter.
+a file for each band of rows that is complete. What it is a result of is in ``key.json``; another run resumes
+it only if that is the same to the letter.
 """
 
 from __future__ import annotations
@@ -67,7 +67,7 @@ class RowWriter:
         key = f"{self._key}\n{shape} {origin} {self._height} {wavelengths_nm.tolist()}".encode()
         if self._is_of(key):
             done = len(list(self.work.glob("rows.*.json")))
-            _log.warning("Continued where a run was interrupted: %d of %d bands of rows are there.", done, len(bands))
+            _log.warning("Continued where a run was interrupted: %d of %d bands are there.", done, len(bands))
         else:
             self._clear()
             zarr.create_group(self.work / _ARRAYS, zarr_format=3)

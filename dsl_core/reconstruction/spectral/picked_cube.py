@@ -27,5 +27,5 @@ class PickedCube:
         flat = row * self.width + column
         place = np.searchsorted(self.pixels, flat)
         if not np.array_equal(self.pixels[np.minimum(place, len(self.pixels) - 1)], flat):
-            raise IndexError("a pixel that was not picked was asked for")
+            raise IndexError("this pixel was not picked")
         return np.asarray(self.values[frame, place])
