@@ -18,6 +18,7 @@ import tempfile
 import time
 from pathlib import Path
 from typing import Any
+from unittest.mock import patch
 
 import numpy as np
 
@@ -74,8 +75,7 @@ def measure(folder: Path, rig_file: Path, depth_only: bool, rows: int) -> dict[s
         if rows and made[0] >= rows:
             raise Enough
 
-    row_writer.RowWriter.put = counting  # type: ignore[method-assign]
-    with contextlib.suppress(Enough):
+    with contextlib.suppress(Enough), patch.object(row_writer.RowWriter, "put", counting):
         reconstruct_to(folder.with_suffix(".zarr"), folder, rig, Options(spectra=not depth_only))
     spent, peak = time.process_time() - began, resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     reader, began = ScanReader(folder), time.process_time()
@@ -104,7 +104,8 @@ def main() -> int:
     )
     given = parser.parse_args()
     if given.measure:
-        print(json.dumps(measure(*given.measure, given.depth_only, given.rows)))
+        scan, rig = given.measure
+        print(json.dumps(measure(scan, rig, given.depth_only, given.rows)))
         return 0
     sizes = ["222x145", "445x290"] if given.quick else given.sizes.split(",")
     found = []
@@ -124,7 +125,7 @@ def main() -> int:
     if len(found) > 1 and not given.rows:
         slope, std, _ = exponent([p["megapixels"] for p in found], [p["cpu_s"] for p in found])
         print(f"time grows with the pixels to the power of {slope:.2f} ± {std:.2f}")
-    write_json(given.json, found)
+    write_json(given.json, {"points": found})
     return 0
 
 
