@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import Literal, Protocol
 
+from dsl_app.shared.wording import in_window
 from dsl_core.errors import DslError
 
 Level = Literal["info", "warning", "error"]
@@ -24,7 +25,7 @@ class Notifier(Protocol):
 
 def sentence_of(error: Exception) -> str:
     """What went wrong, for people."""
-    return str(error) if isinstance(error, DslError) else f"{type(error).__name__}: {error}"
+    return in_window(str(error)) if isinstance(error, DslError) else f"{type(error).__name__}: {error}"
 
 
 def describe_seconds(seconds: float) -> str:

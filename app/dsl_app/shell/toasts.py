@@ -10,6 +10,7 @@ from PySide6.QtWidgets import QFrame, QMessageBox, QVBoxLayout, QWidget
 from dsl_app.shared.notify import Level
 from dsl_app.shared.widgets.forms import label, push_button
 from dsl_app.shared.widgets.layouts import row_of
+from dsl_app.shared.wording import in_window
 
 #: How long a message is shown, ms; an error stays until it is closed.
 STAY_MS = {"info": 5000, "warning": 9000}
@@ -83,7 +84,7 @@ class Toasts(QObject):
 
     def tell(self, level: Level, text: str, details: str = "") -> None:
         """Show a sentence."""
-        self._show(Toast(level, text, details, self._window), level in STAY_MS)
+        self._show(Toast(level, in_window(text), details, self._window), level in STAY_MS)
 
     def offer(self, text: str, offers: Mapping[str, Callable[[], object]]) -> None:
         """Show a sentence with buttons by their texts; it stays until one is used or it is closed."""

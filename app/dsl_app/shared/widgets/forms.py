@@ -24,6 +24,7 @@ from PySide6.QtWidgets import (
 
 from dsl_app.shared.widget_state import ButtonState, LabelState
 from dsl_app.shared.widgets.layouts import row_of
+from dsl_app.shared.wording import in_window
 
 W = TypeVar("W", bound=QWidget)
 #: A function or signal that a click calls.
@@ -203,7 +204,7 @@ def show_button(button: QAbstractButton, state: ButtonState) -> None:
 def show_label(line: QLabel, state: LabelState) -> None:
     """Draw a label as it was decided."""
     # One that keeps its line while it is hidden needs a text to know how high that is.
-    line.setText(state.text or " " * line.sizePolicy().retainSizeWhenHidden())
+    line.setText(in_window(state.text) or " " * line.sizePolicy().retainSizeWhenHidden())
     line.setToolTip(state.tip)
     line.setVisible(bool(state.text))
     set_role(line, state.role)
@@ -260,6 +261,7 @@ class Banner(QFrame):
 
     def say(self, text: str) -> None:
         """Show a sentence, or hide for none."""
+        text = in_window(text)
         self._text.setText(text)
         self.setAccessibleName(text)
         self.setVisible(bool(text))

@@ -1,0 +1,41 @@
+"""Sentences of the engine as the window says them: what to click instead of options to type. No Qt."""
+
+from __future__ import annotations
+
+import re
+
+_OVERRIDE = "tick 'Use despite different settings'"
+#: What the engine says to those who type commands, and what stands for it in the window.
+PHRASES = (
+    (
+        "If you mean that rig, name it with --rig and --option.",
+        "If you mean that rig, connect it on the Rig page.",
+    ),
+    ("Name it with --rig and --option.", "Connect its rig on the Rig page."),
+    ("Leave out --rig and --option, or begin", "Connect that rig, or begin"),
+    ("Name one with --calibration FILE.", "Choose one."),
+    ("Name one with --calibration to reconstruct depth.", "Choose one to reconstruct depth."),
+    ("or use it anyway with --override-calibration.", f"or {_OVERRIDE}."),
+    ("or use this one anyway with --override-calibration.", f"or {_OVERRIDE}."),
+    (" Name a twin of the scene with --truth-rig twin and --option.", ""),
+    (" Name a twin of it with --truth-rig twin and --option.", ""),
+    ("or let 'dsl-scan import FOLDER --guess' write one.", "or import the folder without one."),
+    (": name one with --set", ""),
+    ("; give --projector", ""),
+)
+#: The same with what changes in the middle of them.
+PATTERNS = ((r"'dsl-scan calibrate geometry .* --pictures' reads", "the calibration of the geometry reads"),)
+
+
+def in_window(text: str) -> str:
+    """A sentence without options of commands.
+
+    >>> in_window("The scan contains no calibration. Name one with --calibration FILE.")
+    'The scan contains no calibration. Choose one.'
+    """
+    if "--" in text:
+        for typed, clicked in PHRASES:
+            text = text.replace(typed, clicked)
+        for pattern, clicked in PATTERNS:
+            text = re.sub(pattern, clicked, text)
+    return text
