@@ -14,22 +14,20 @@ from dsl_core.analysis.areas import pixel_areas_mm2
 from dsl_core.analysis.class_table import ClassRow, class_colours, class_table
 from dsl_core.analysis.classes import SpectralClass, class_of_pixels
 from dsl_core.analysis.classify import FEWEST_BANDS, Brightness, ClassMap, Limits, Measure, Scores, score
+from dsl_core.analysis.places import Mask, require_spectra
 from dsl_core.errors import DecodeError
-from dsl_core.evaluation.marks import mask_of_outline, mask_of_runs
 from dsl_core.io.export.class_map import (
     Classified,
     export_class_envi,
     export_class_ply,
-    export_class_table,
 )
 from dsl_core.io.export.common import require_suffix
-from dsl_core.io.result.annotations_file import Annotations
+from dsl_core.io.export.table import export_table
 from dsl_core.progress import Progress
 
 if TYPE_CHECKING:
     import xarray as xr
 
-Mask = NDArray[np.bool_]
 #: The endings that a class map is written with, and what is written.
 ENDINGS = {".hdr": "ENVI classification", ".ply": "points with their class", ".csv": "table of areas"}
 
@@ -105,12 +103,6 @@ def classify_result(
     return Classification.of(scores, limits, brightness, areas_of(result))
 
 
-def require_spectra(result: xr.Dataset) -> None:
-    """Raise `DecodeError` for a result without spectra."""
-    if "reflectance" not in result:
-        raise DecodeError("The result contains depth only. Reconstruct the scan with spectra.")
-
-
 def within_nm(result: xr.Dataset, low_nm: float, high_nm: float) -> xr.Dataset:
     """The result with its bands between two wavelengths only; raises `DecodeError` where fewer than 3 are."""
     require_spectra(result)
@@ -142,26 +134,6 @@ def classes_of_masks(result: xr.Dataset, masks: Mapping[str, Mask]) -> tuple[Spe
     return tuple(class_of_pixels(name, reflectance, std, mask) for name, mask in masks.items())
 
 
-def masks_of_marks(marks: Annotations, shape: tuple[int, int]) -> dict[str, Mask]:
-    """Pins and regions of a result as masks by their names; raises `DecodeError` where there are none."""
-    masks: dict[str, Mask] = {}
-    for pin in marks.pins:
-        mask = np.zeros(shape, bool)
-        x, y = pin.pixel
-        if 0 <= x < shape[1] and 0 <= y < shape[0]:
-            mask[y, x] = True
-        masks[pin.name] = masks.get(pin.name, np.zeros(shape, bool)) | mask
-    for region in marks.regions:
-        own = mask_of_runs(region.runs, shape) if region.runs else mask_of_outline(region.outline_px, shape)
-        masks[region.name] = masks.get(region.name, np.zeros(shape, bool)) | own
-    if not masks:
-        raise DecodeError(
-            "Nothing is marked on the result. Pin pixels or mark regions of known materials first, or give"
-            " a library."
-        )
-    return masks
-
-
 def write_classification(
     result: xr.Dataset, found: Classification, path: Path, *, overwrite: bool = False
 ) -> list[Path]:
@@ -169,7 +141,8 @@ def write_classification(
     require_suffix(path, *ENDINGS)
     rows = [astuple(row) for row in found.rows]
     if path.suffix.lower() == ".csv":
-        return export_class_table(result, found.method, rows, path, overwrite=overwrite)
+        header = ("class", "colour", "pixels", "share_of_judged", "area_mm2")
+        return export_table(result, header, rows, {"method": found.method}, path, overwrite=overwrite)
     shown, names = found.shown, found.shown.labels
     scores = found.scores
     colours = class_colours(len(shown.names))

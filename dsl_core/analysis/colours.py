@@ -35,6 +35,10 @@ ILLUMINANTS: dict[str, str] = {
 USUAL = ("A", "D50", "D65", "FL11", "LED-B3")
 
 
+#: What `Colour.cells` are.
+HEADER = ("place", "light", "L*", "±L*", "a*", "±a*", "b*", "±b*", "ΔE00", "±ΔE00")
+
+
 @dataclass(frozen=True)
 class Colour:
     """A colour under a light: L*a*b* (3,) relative to the perfect diffuser, with deviations.
@@ -48,6 +52,12 @@ class Colour:
     lab_std: tuple[float, float, float]
     delta_e: float | None = None
     delta_e_std: float | None = None
+
+    @property
+    def cells(self) -> tuple[str | float | None, ...]:
+        """Its row in a table, as `HEADER` names the columns."""
+        pairs = (value for pair in zip(self.lab, self.lab_std, strict=True) for value in pair)
+        return (self.name, self.light, *pairs, self.delta_e, self.delta_e_std)
 
 
 @cache

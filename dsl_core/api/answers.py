@@ -51,9 +51,10 @@ def classify(
     import xarray as xr
 
     from dsl_core.analysis.classes import classes_of_library
-    from dsl_core.analysis.classification import classes_of_masks, classify_result, require_spectra, within_nm
+    from dsl_core.analysis.classification import classes_of_masks, classify_result, within_nm
     from dsl_core.analysis.classify import Limits, Measure
     from dsl_core.analysis.library import read_library
+    from dsl_core.analysis.places import require_spectra
 
     require_spectra(result)
     if range_nm is not None:

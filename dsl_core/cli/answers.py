@@ -144,10 +144,9 @@ def _classes(
 ) -> tuple[list[SpectralClass], list[str]]:
     """The classes that the options name, and notes on the library."""
     from dsl_core.analysis.classes import classes_of_library
-    from dsl_core.analysis.classification import classes_of_masks, masks_of_marks, require_spectra
+    from dsl_core.analysis.classification import classes_of_masks
     from dsl_core.analysis.library import read_library
-    from dsl_core.api.answers import place_mask
-    from dsl_core.io.result.annotations_file import load_annotations
+    from dsl_core.analysis.places import require_spectra
 
     if not (library or pins or at):
         raise PlanError("Say what to look for: --library FOLDER, --pins, or --at NAME=X,Y.")
@@ -160,6 +159,99 @@ def _classes(
         found, left_out = classes_of_library(read, result["wavelength_nm"].values)
         classes += found
         notes += [*read.notes, *left_out]
+    masks = _masks(path, result, pins, at)
+    if masks:
+        classes += classes_of_masks(result, masks)
+    return classes, notes
+
+
+def colours(
+    path: Result,
+    pins: Annotated[bool, typer.Option("--pins", help="Places are the marked pins and regions.")] = False,
+    at: Annotated[
+        list[str],
+        typer.Option("--at", help="A place, as NAME=X,Y or NAME=X,Y,WIDTH,HEIGHT; can be repeated."),
+    ] = [],  # noqa: B006
+    light: Annotated[
+        list[str], typer.Option("--light", help="A CIE illuminant, such as A, D50, D65, FL11 or LED-B3.")
+    ] = [],  # noqa: B006
+    reference: Annotated[
+        str | None, typer.Option("--to", help="Place that colour differences (CIEDE2000) are to.")
+    ] = None,
+    table: Annotated[Path | None, typer.Option("--output", "-o", help="NAME.csv to write.")] = None,
+    force: Force = False,
+    json: Json = False,
+) -> None:
+    """Colours of places under several lights: L*a*b* and CIEDE2000, each with its deviation."""
+    from dsl_core.analysis.colours import HEADER, USUAL, colours_of
+    from dsl_core.analysis.places import spectra_of_masks
+    from dsl_core.io.export.table import export_table
+    from dsl_core.io.result.result_file import load_result
+
+    output = Output(json)
+    if not (pins or at):
+        raise PlanError("Say which places: --pins, or --at NAME=X,Y.")
+    check_targets([] if table is None else [table], overwrite=force)
+    result = load_result(path)
+    spectra = spectra_of_masks(result, _masks(path, result, pins, at))
+    found = colours_of(spectra, result["wavelength_nm"].values, light or USUAL, reference)
+    rows = [each.cells for each in found]
+    shown = [[f"{v:.2f}" if isinstance(v, float) else v or "" for v in row] for row in rows]
+    output.table(HEADER, shown)
+    if table is not None:
+        notes = {"colours": "CIE 1931 observer, relative to the perfect diffuser"}
+        export_table(result, HEADER, rows, notes, table, overwrite=force)
+        output.say(f"Written: {table}")
+    output.put(result=path, colours=[dict(zip(HEADER, row, strict=True)) for row in rows])
+    output.finish()
+
+
+def report(
+    path: Result,
+    outputs: Annotated[
+        list[Path],
+        typer.Option("--output", "-o", help="NAME.html or NAME.pdf; the default is RESULT_report.html."),
+    ] = [],  # noqa: B006
+    library: Annotated[
+        list[Path], typer.Option("--library", "-l", help="Spectra to name materials by; may be repeated.")
+    ] = [],  # noqa: B006
+    materials: Annotated[
+        bool, typer.Option("--materials", help="Name materials by the marked pins and regions.")
+    ] = False,
+    force: Force = False,
+    json: Json = False,
+) -> None:
+    """Write pictures, spectra and colours of marks, materials and origin of a result as one document."""
+    from dsl_core.analysis.classification import classify_result
+    from dsl_core.analysis.session_report import ENDINGS, session_content, write_report
+    from dsl_core.io.result.annotations_file import load_annotations
+    from dsl_core.io.result.result_file import load_result
+
+    output = Output(json)
+    targets = list(outputs) or [path.with_name(f"{path.stem}_report.html")]
+    wrong = [str(each) for each in targets if each.suffix.lower() not in ENDINGS]
+    if wrong:
+        raise PlanError(f"{wrong[0]} must end in {' or '.join(ENDINGS)}: choose one for --output.")
+    check_targets(targets, overwrite=force)
+    result, found = load_result(path), None
+    with output.progress() as progress:
+        if library or materials:
+            classes, _ = _classes(path, result, library, "auto", materials, (), progress)
+            found = classify_result(result, classes, progress=progress)
+        content = session_content(path.stem, result, load_annotations(path), found)
+        for target in targets:
+            write_report(content, target, overwrite=force)
+    output.say(f"Written: {', '.join(str(target) for target in targets)}")
+    output.put(files=[str(target) for target in targets])
+    output.finish()
+
+
+def _masks(path: Path, result: xr.Dataset, pins: bool, at: Sequence[str]) -> dict[str, NDArray[np.bool_]]:
+    """The places that the options name."""
+    from dsl_core.analysis.places import masks_of_marks
+    from dsl_core.api.answers import place_mask
+    from dsl_core.io.result.annotations_file import load_annotations
+
     masks: dict[str, NDArray[np.bool_]] = {}
     if pins:
         masks |= masks_of_marks(load_annotations(path), (result.sizes["y"], result.sizes["x"]))
@@ -167,6 +259,4 @@ def _classes(
         name, place = parse_place("--at", text)
         mask = place_mask(result, name, place)
         masks[name] = masks[name] | mask if name in masks else mask
-    if masks:
-        classes += classes_of_masks(result, masks)
-    return classes, notes
+    return masks

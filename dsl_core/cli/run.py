@@ -71,6 +71,8 @@ for command in (
     results.export,
     results.mesh,
     answers.classify,
+    answers.colours,
+    answers.report,
 ):
     app.command()(command)
 app.command("import")(files.import_)

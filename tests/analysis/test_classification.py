@@ -9,7 +9,8 @@ import spectral
 
 import dsl_core as dsl
 from dsl_core.analysis.classes import Member, SpectralClass
-from dsl_core.analysis.classification import classify_result, masks_of_marks, write_classification
+from dsl_core.analysis.classification import classify_result, write_classification
+from dsl_core.analysis.places import masks_of_marks
 from dsl_core.cli import main
 from dsl_core.errors import DecodeError, StoreError
 from dsl_core.io.result.annotations_file import Annotations, PinRecord, RegionRecord, save_annotations

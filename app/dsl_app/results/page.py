@@ -8,6 +8,7 @@ from pathlib import Path
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import QDialog, QStackedWidget, QWidget
 
+from dsl_app.results.answers.colours_panel import ColoursPanel
 from dsl_app.results.answers.materials_panel import MaterialsPanel
 from dsl_app.results.cloud.panel import CloudPanel
 from dsl_app.results.controller import ResultsController
@@ -70,6 +71,8 @@ class ResultsPage(PageWidget):
         set_help(self.marks, "numbers#pins-regions-references")
         self.materials = MaterialsPanel(state, control.answers)
         set_help(self.materials, "materials")
+        self.colours = ColoursPanel(state)
+        set_help(self.colours, "materials#colours")
         self.search = SearchPanel(state, control.search)
         set_help(self.search, "numbers#search")
         self._graph: IntensityWindow | None = None
@@ -84,6 +87,9 @@ class ResultsPage(PageWidget):
             "Show what the pixel under the cursor received in each frame, and the model (I)",
         )
         self._open = push_button("Open…", "Open a result or a finished scan (Ctrl+O opens any file)")
+        self._report = push_button(
+            "Report…", "Write pictures, spectra, colours and materials of the marks as HTML page or PDF"
+        )
         self._export = push_button("Export…", "Write the result in formats of other programs (Ctrl+E)")
         self._lay_out()
         self._connect()
@@ -102,9 +108,8 @@ class ResultsPage(PageWidget):
         self.about.setSizePolicy(
             self.about.sizePolicy().Policy.Ignored, self.about.sizePolicy().verticalPolicy()
         )
-        head = row_of(
-            self.title, 10, (self.about, 1), self.reconstruct_again, self._inspect, self._open, self._export
-        )
+        buttons = (self.reconstruct_again, self._inspect, self._open, self._report, self._export)
+        head = row_of(self.title, 10, (self.about, 1), *buttons)
         greeting = boxed(column_of((self.welcome, 0, Qt.AlignmentFlag.AlignCenter)))
         self.stack = QStackedWidget()
         # In the order of `Content`.
@@ -120,6 +125,7 @@ class ResultsPage(PageWidget):
             "",
             (self.marks, "Pins, regions, references", ""),
             (self.materials, "Materials", "Which material is where, with areas"),
+            (self.colours, "Colours", "Colours of the marks under several lights"),
             (self.search, "Search", ""),
         )
         right = splitter(Qt.Orientation.Vertical, (self.spectra, 3), (tabs, 2), sizes=(400, 340))
@@ -130,6 +136,7 @@ class ResultsPage(PageWidget):
         for button in (self._open, self.welcome.choose):
             button.clicked.connect(self.choose)
         self._export.clicked.connect(self.export)
+        self._report.clicked.connect(self.report)
         self._inspect.clicked.connect(control.inspect)
         self.offer.reconstruct.clicked.connect(control.reconstruct)
         for button in (self.reconstruct_again, self.offer.otherwise):
@@ -146,7 +153,7 @@ class ResultsPage(PageWidget):
         summary = summarise(state.result.value, state.offer.value, state.busy.value)
         self.stack.setCurrentIndex(summary.content)
         self.offer.show_offer(summary.message, summary.can_reconstruct)
-        for button in (self.reconstruct_again, self._inspect, self._export):
+        for button in (self.reconstruct_again, self._inspect, self._report, self._export):
             button.setEnabled(summary.has_result)
         self.title.setText(summary.title)
         self.about.setText(summary.about)
@@ -202,6 +209,23 @@ class ResultsPage(PageWidget):
         result = self._state.result.value
         if result is not None:
             self._open_dialog(ExportDialog(result, self._control.export, self))
+
+    def report(self) -> None:
+        """Ask for a file and write a report about what is marked."""
+        result = self._state.result.value
+        if result is None:
+            return
+        draft = str(result.path.with_name(f"{result.path.stem}_report.html"))
+        kinds = "HTML page (*.html);;PDF (*.pdf)"
+        name, kind = QFileDialog.getSaveFileName(self, "Write a report", draft, kinds)
+        if name:
+            path = Path(name)
+            # The dialog asked about replacing the name as typed, not one with a suffix added.
+            is_whole = path.suffix.lower() in (".html", ".pdf")
+            ending = ".pdf" if "pdf" in kind else ".html"
+            self._control.answers.write_report(
+                path if is_whole else path.with_name(path.name + ending), overwrite=is_whole
+            )
 
     def subject(self) -> Path | None:
         """The offered scan, or the open result."""

@@ -36,12 +36,23 @@ _SAMPLE_GRID = (4, 2)
 
 
 @dataclass(frozen=True)
+class ReportTable:
+    """A table of texts with a title, headings and a note below; numbers stand right of the first column."""
+
+    title: str
+    heads: tuple[str, ...]
+    rows: tuple[tuple[str, ...], ...]
+    note: str = ""
+
+
+@dataclass(frozen=True)
 class ReportContent:
     """What a report is made of; everything but title and result may be absent.
 
     ``pixels`` are (row, column) whose spectra are shown; ``effects`` is what a twin rendered; ``provenance``
     lists facts by name, ``fit`` says how well the model fits, ``missed`` which limits the rig's calibrations
-    missed.
+    missed. ``more`` pictures, ``curves`` and ``tables`` are shown as they are; ``places`` are (row, column)
+    of what the curves are of, in their order. Without pixels, ``has_samples`` shows some of a grid.
     """
 
     title: str
@@ -57,6 +68,21 @@ class ReportContent:
     pixels: Sequence[tuple[int, int]] = ()
     fit: Fit | None = None
     missed: Sequence[str] = ()
+    more: Sequence[ReportPicture] = ()
+    curves: Sequence[Curve] = ()
+    tables: Sequence[ReportTable] = ()
+    places: Sequence[tuple[int, int]] = ()
+    has_samples: bool = True
+
+
+def pictures_of(content: ReportContent) -> list[ReportPicture]:
+    """All pictures of a report."""
+    return [*_pictures(content, _pixels(content) or content.places), *content.more]
+
+
+def curves_of(content: ReportContent) -> list[Curve]:
+    """All curves of spectra of a report."""
+    return [*_spectra(content, _pixels(content)), *content.curves]
 
 
 def render_report(content: ReportContent) -> str:
@@ -66,7 +92,6 @@ def render_report(content: ReportContent) -> str:
     the image.
     """
     evaluation = content.evaluation
-    pixels = _pixels(content)
     has_spectra = "reflectance" in content.result
     return render_page(
         "report.html.j2",
@@ -75,8 +100,9 @@ def render_report(content: ReportContent) -> str:
         fit=content.fit,
         missed=content.missed,
         verdicts=content.verdicts,
-        pictures=_pictures(content, pixels),
-        spectra=_spectra(content, pixels),
+        pictures=pictures_of(content),
+        spectra=curves_of(content),
+        tables=content.tables,
         honesty=_honesty(content),
         rainbow=rainbow(_bands(content)) if has_spectra else [],
         width=WIDTH,
@@ -97,7 +123,7 @@ def _bands(content: ReportContent) -> np.ndarray[tuple[int, ...], np.dtype[np.fl
 
 def _pixels(content: ReportContent) -> list[tuple[int, int]]:
     """Pixels whose spectra are drawn: the chosen ones, or a grid where patches do not say more."""
-    if content.pixels or "reflectance" not in content.result:
+    if content.pixels or "reflectance" not in content.result or not content.has_samples:
         return list(content.pixels)
     if content.evaluation is not None and content.evaluation.patches:
         return []
@@ -218,8 +244,8 @@ def _plan_facts(plan: CapturePlan) -> dict[str, str]:
 def report_content(
     title: str,
     result: xr.Dataset,
-    truth: Truth,
-    evaluation: Evaluation,
+    truth: Truth | None = None,
+    evaluation: Evaluation | None = None,
     summary: str = "",
     goals: dict[str, Goal] | None = None,
 ) -> ReportContent:
@@ -240,7 +266,7 @@ def report_content(
         summary=summary,
         evaluation=evaluation,
         truth=truth,
-        verdicts=verdicts(evaluation, goals),
+        verdicts=() if evaluation is None else verdicts(evaluation, goals),
         costs=costs,
         plan=CapturePlan.model_validate_json(plan) if plan else None,
         effects=effects,

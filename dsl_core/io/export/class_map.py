@@ -1,9 +1,7 @@
-"""Class maps for other programs: an ENVI classification, points with their class, a table."""
+"""Class maps for other programs: an ENVI classification, and points with their class."""
 
 from __future__ import annotations
 
-import csv
-from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -91,26 +89,4 @@ def export_class_ply(
     names = {f"class {value}": label for value, label in enumerate(found.labels)}
     with staged([path], overwrite=overwrite) as (draft,):
         write_points(draft, columns, {**names, "method": found.method, **provenance(result)})
-    return [path]
-
-
-def export_class_table(
-    result: xr.Dataset,
-    method: str,
-    rows: Sequence[tuple[object, ...]],
-    path: Path,
-    *,
-    overwrite: bool = False,
-) -> list[Path]:
-    """Write the table of areas (class, colour, pixels, share, area) as CSV; raises `StoreError`."""
-    require_suffix(path, ".csv")
-    with (
-        staged([path], overwrite=overwrite) as (draft,),
-        draft.open("w", newline="", encoding="utf-8") as file,
-    ):
-        notes = {"method": method, **provenance(result)}
-        file.writelines(f"# {key}: {value}\n" for key, value in notes.items())
-        writer = csv.writer(file)
-        writer.writerow(("class", "colour", "pixels", "share_of_judged", "area_mm2"))
-        writer.writerows(["" if cell is None else cell for cell in row] for row in rows)
     return [path]

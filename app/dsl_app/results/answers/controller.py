@@ -125,6 +125,29 @@ class AnswersController:
 
         self._runner.submit(Job(f"Write {path.name}", work, done))
 
+    def write_report(self, path: Path, overwrite: bool = False) -> None:
+        """Write a report about the result, its saved marks and its materials: HTML page or PDF."""
+        materials, result = self.state.materials.value, self.state.result.value
+        if result is None:
+            return
+
+        def work(progress: Progress) -> Path:
+            from dsl_core.analysis.session_report import session_content, write_report
+            from dsl_core.io.result.annotations_file import load_annotations
+            from dsl_core.io.result.result_file import load_result
+
+            progress.report("write the report", 0, 1)
+            content = session_content(
+                result.path.stem,
+                load_result(result.path),
+                load_annotations(result.path),
+                None if materials is None else materials.found,
+            )
+            return write_report(content, path, overwrite=overwrite)
+
+        done = lambda path: self._notifier.tell("info", f"The report is saved in {path.name}.")  # noqa: E731
+        self._runner.submit(Job(f"Write {path.name}", work, done))
+
 
 def classes_of_marks(result: ResultArrays, marks: list[Mark]) -> tuple[SpectralClass, ...]:
     """A class for each mark: its pixels in the result, or the curve of its file.

@@ -1,0 +1,118 @@
+"""Colours of the marks under a light, and their differences to the selected one."""
+
+from __future__ import annotations
+
+import numpy as np
+from PySide6.QtGui import QColor, QGuiApplication, QIcon, QPixmap, QShowEvent
+from PySide6.QtWidgets import QWidget
+
+from dsl_app.results.state import Mark, ResultsState
+from dsl_app.shared.evented import follow_any
+from dsl_app.shared.theme import DARK, Theme
+from dsl_app.shared.widgets.forms import ChoiceBox, label, push_button
+from dsl_app.shared.widgets.layouts import STRETCH, column_of, row_of
+from dsl_app.shared.widgets.read_table import RIGHT, ReadTable, cell
+from dsl_core.analysis.at_bands import at_bands
+from dsl_core.analysis.colours import HEADER, ILLUMINANTS, Colour, colours_of
+from dsl_core.errors import CalibrationError
+
+EMPTY = "Pin pixels, mark regions or add references; their colours under a light are listed here."
+_CHOSEN = "Differences are CIEDE2000 to {}, which is selected among the marks; ± is one deviation."
+_NONE = "Select a mark to see differences to it; ± is one deviation."
+
+
+class ColoursPanel(QWidget):
+    """Follows the marks of a state; computes only while it is seen."""
+
+    def __init__(self, state: ResultsState) -> None:
+        super().__init__()
+        self._state, self._theme = state, DARK
+        lights = [(text, key) for key, text in ILLUMINANTS.items()]
+        self.light = ChoiceBox("Light", "The light source that colours are computed for", lights)
+        self.light.be_narrow(140)
+        self.copy = push_button("Copy", "Copy the colours under all lights for a spreadsheet", self.copy_all)
+        self.table = ReadTable(
+            "Colours", "CIELAB relative to the perfect diffuser", ("Mark", "L*", "a*", "b*", "ΔE00")
+        )
+        self.text = label(EMPTY, "muted", wraps=True)
+        column_of(
+            row_of(label("Light"), (self.light, 1), self.copy, STRETCH), (self.table, 1), self.text,
+            on=self, margins=0,
+        )  # fmt: skip
+        self.light.currentIndexChanged.connect(lambda _: self._show())
+        follow_any(self._show, state.marks, state.selected, state.result)
+
+    def showEvent(self, event: QShowEvent) -> None:
+        """Compute what changed while the tab was hidden."""
+        super().showEvent(event)
+        self._show()
+
+    def _show(self) -> None:
+        if not self.isVisible():
+            return
+        marks = {mark.name: mark for mark in self._state.marks.value if not mark.trouble}
+        selected = self._state.selected_mark
+        reference = selected.name if selected is not None and selected.name in marks else None
+        found = self._colours(marks, (str(self.light.currentData()),), reference)
+        self.copy.setEnabled(bool(found))
+        self.table.setVisible(bool(found))
+        if not found:
+            self.text.setText(EMPTY)
+            return
+        self.text.setText(_NONE if reference is None else _CHOSEN.format(reference))
+        rows = []
+        for each in found:
+            first = cell(each.name)
+            first.setIcon(_swatch(self._theme.pins[marks[each.name].colour % len(self._theme.pins)]))
+            texts = [_value(v, s) for v, s in zip(each.lab, each.lab_std, strict=True)]
+            texts.append("" if each.delta_e is None else _value(each.delta_e, each.delta_e_std or 0.0))
+            rows.append((first, *(cell(text, "", RIGHT) for text in texts)))
+        self.table.show_rows(rows)
+
+    def _colours(
+        self, marks: dict[str, Mark], lights: tuple[str, ...], reference: str | None
+    ) -> list[Colour]:
+        result = self._state.result.value
+        if result is None or not result.has_spectra:
+            return []
+        bands, spectra = result.wavelengths_nm, {}
+        for name, mark in marks.items():
+            spectrum = mark.spectrum
+            mean, std = spectrum.mean, mark.pixel_std if mark.pixel_std is not None else spectrum.std
+            if mark.curve is not None:
+                try:
+                    at = at_bands(mark.curve, bands)
+                except CalibrationError:
+                    continue
+                mean, std = at.values, at.std
+            if len(mean) == len(bands) and np.isfinite(mean).all():
+                none = np.zeros(len(bands))
+                spectra[name] = (np.asarray(mean, float), none if std is None else np.asarray(std, float))
+        return colours_of(spectra, bands, lights, reference if reference in spectra else None)
+
+    def copy_all(self) -> None:
+        """Copy the colours under all lights."""
+        marks = {mark.name: mark for mark in self._state.marks.value if not mark.trouble}
+        selected = self._state.selected_mark
+        found = self._colours(marks, tuple(ILLUMINANTS), None if selected is None else selected.name)
+        lines = ["\t".join(HEADER)]
+        for each in found:
+            cells = (f"{v:.4f}" if isinstance(v, float) else v or "" for v in each.cells)
+            lines.append("\t".join(cells))
+        QGuiApplication.clipboard().setText("\n".join(lines))
+
+    def apply_theme(self, theme: Theme) -> None:
+        """Apply the colours of a theme."""
+        self._theme = theme
+        self.table.apply_theme(theme)
+        self._show()
+
+
+def _value(value: float, std: float) -> str:
+    return f"{value:.2f} ± {std:.2f}".replace("-", "−")
+
+
+def _swatch(colour: str) -> QIcon:
+    picture = QPixmap(14, 14)
+    picture.fill(QColor(colour))
+    return QIcon(picture)

@@ -1,0 +1,108 @@
+"""A report of what was looked at: pictures, spectra of marks, their colours, materials, origin."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dsl_core.analysis.class_table import class_colours
+from dsl_core.analysis.classification import Classification
+from dsl_core.analysis.colours import Colour, colours_of
+from dsl_core.analysis.places import masks_of_marks, spectra_of_masks
+from dsl_core.errors import DecodeError, StoreError
+from dsl_core.evaluation.report.curves import spectrum_curve
+from dsl_core.evaluation.report.pictures import Key, ReportPicture, png_uri
+from dsl_core.evaluation.report.scan_report import (
+    ReportContent,
+    ReportTable,
+    render_report,
+    report_content,
+)
+from dsl_core.io.result.annotations_file import Annotations
+from dsl_core.io.staging import write_text
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+#: What a report is written as, by the ending of its file.
+ENDINGS = (".html", ".pdf")
+
+
+def session_content(
+    title: str, result: xr.Dataset, marks: Annotations, found: Classification | None = None
+) -> ReportContent:
+    """What the report of a result says: its marks with spectra and colours, and materials if given."""
+    content = report_content(title, result)
+    shape = (result.sizes["y"], result.sizes["x"])
+    if "reflectance" in result and (marks.pins or marks.regions):
+        masks = masks_of_marks(marks, shape)
+        spectra, missing = {}, []
+        for name, mask in masks.items():
+            try:
+                spectra |= spectra_of_masks(result, {name: mask})
+            except DecodeError as error:
+                missing.append(str(error))
+        bands = np.asarray(result["wavelength_nm"].values, np.float64)
+        curves = [
+            spectrum_curve(name, f"{int(masks[name].sum())} px", bands, mean, std)
+            for name, (mean, std) in spectra.items()
+            if np.isfinite(mean).all()
+        ]
+        tables = [colour_table(colours_of(spectra, bands))] if spectra else []
+        places = tuple(tuple(int(v) for v in np.argwhere(masks[name]).mean(0).round()) for name in spectra)
+        content = replace(
+            content, curves=curves, tables=tables, places=places, summary=" ".join(missing), has_samples=False
+        )
+    if found is not None:
+        picture, table = _materials(found)
+        content = replace(content, more=[picture], tables=[table, *content.tables])
+    return content
+
+
+def colour_table(colours: list[Colour]) -> ReportTable:
+    """Colours as a table: a line for each mark and light."""
+    rows = []
+    for each in colours:
+        lab = [f"{v:.2f} ± {s:.2f}" for v, s in zip(each.lab, each.lab_std, strict=True)]
+        difference = "" if each.delta_e is None else f"{each.delta_e:.2f} ± {each.delta_e_std:.2f}"
+        rows.append((each.name, each.light, *lab, difference))
+    heads = ("Mark", "Light", "L*", "a*", "b*", "ΔE00")
+    if not any(row[-1] for row in rows):
+        heads, rows = heads[:-1], [row[:-1] for row in rows]
+    note = "CIE 1931 observer, relative to the perfect diffuser; ± one deviation."
+    return ReportTable("Colours", heads, tuple(tuple(row) for row in rows), note)
+
+
+def _materials(found: Classification) -> tuple[ReportPicture, ReportTable]:
+    shown = found.shown
+    colours = class_colours(len(shown.names))
+    table = np.zeros((len(colours), 4), np.uint8)
+    for value, colour in enumerate(colours):
+        table[value] = (*bytes.fromhex(colour[1:]), 255 if value else 0)
+    keys = tuple(Key(row.colour, row.label, row.share) for row in found.rows[:-1] if row.pixels)
+    picture = ReportPicture("Materials", f"by {found.method}", png_uri(table[shown.values]), keys=keys)
+    rows = tuple(
+        (
+            row.label,
+            str(row.pixels),
+            f"{row.share:.1%}",
+            "–" if row.area_mm2 is None else f"{row.area_mm2:.1f}",
+        )
+        for row in found.rows
+    )
+    note = f"By {found.method}."
+    return picture, ReportTable("Materials", ("Material", "Pixels", "Share", "Area, mm²"), rows, note)
+
+
+def write_report(content: ReportContent, path: Path, *, overwrite: bool = False) -> Path:
+    """Write a report as HTML page or PDF, as the ending of the path says; raises `StoreError`."""
+    if path.suffix.lower() not in ENDINGS:
+        raise StoreError(f"{path.name!r} does not end in {' or '.join(ENDINGS)}. Add the ending to the name.")
+    if path.suffix.lower() == ".html":
+        return write_text(path, lambda: render_report(content), overwrite=overwrite)
+    from dsl_core.analysis.pdf_report import write_pdf
+
+    return write_pdf(content, path, overwrite=overwrite)

@@ -1,0 +1,39 @@
+"""A table of answers as CSV: lines that begin with ``#`` say where it comes from."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from dsl_core.io.export.common import provenance, require_suffix
+from dsl_core.io.staging import staged
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+
+def export_table(
+    result: xr.Dataset,
+    header: Sequence[str],
+    rows: Iterable[Sequence[object]],
+    notes: Mapping[str, str],
+    path: Path,
+    *,
+    overwrite: bool = False,
+) -> list[Path]:
+    """Write rows under a header, after ``notes`` and the origin of the result; None is an empty cell.
+
+    Raises `StoreError`.
+    """
+    require_suffix(path, ".csv")
+    with (
+        staged([path], overwrite=overwrite) as (draft,),
+        draft.open("w", newline="", encoding="utf-8") as file,
+    ):
+        file.writelines(f"# {key}: {value}\n" for key, value in {**notes, **provenance(result)}.items())
+        writer = csv.writer(file)
+        writer.writerow(header)
+        writer.writerows(["" if cell is None else cell for cell in row] for row in rows)
+    return [path]

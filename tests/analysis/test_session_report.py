@@ -1,0 +1,69 @@
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from dsl_core.analysis.classes import class_of_pixels
+from dsl_core.analysis.classification import classify_result
+from dsl_core.analysis.session_report import session_content, write_report
+from dsl_core.cli import main
+from dsl_core.errors import StoreError
+from dsl_core.io.result.annotations_file import Annotations, PinRecord, RegionRecord, save_annotations
+from dsl_core.io.result.result_file import save_result
+from tests.cases.chart_cube import chart_result
+
+MARKS = Annotations(
+    pins=(PinRecord(name="$sky_1$ <b>", pixel=(9, 40)), PinRecord(name="dark", pixel=(3, 95))),
+    regions=(RegionRecord(name="häut 木", outline_px=((0, 17), (20, 17), (20, 30), (0, 30))),),
+)
+
+
+def test_a_report_holds_marks_colours_and_materials_as_page_and_on_paper(tmp_path: Path) -> None:
+    result = chart_result()
+    mask = np.zeros((96, 60), bool)
+    mask[18:28, :20] = True
+    skin = class_of_pixels("skin", result["reflectance"].values, result["reflectance_std"].values, mask)
+    content = session_content("A <chart>", result, MARKS, classify_result(result, [skin]))
+    page = write_report(content, tmp_path / "r.html").read_text(encoding="utf-8")
+    names = ("A &lt;chart&gt;", "$sky_1$ &lt;b&gt;", "häut 木")
+    for words in (*names, "Materials", "none of these", "LED-B3", "±"):
+        assert words in page
+    # The pin on a pixel without light is told, and nothing else is lost.
+    assert "dark: none of its 1 pixels has a spectrum" in page
+    written = write_report(content, tmp_path / "r.pdf").read_bytes()
+    assert written.startswith(b"%PDF")
+    assert written.count(b"/Type /Page\n") + written.count(b"/Type /Page ") >= 4
+    assert b"<chart>" in written
+    with pytest.raises(StoreError, match="already exists"):
+        write_report(content, tmp_path / "r.pdf")
+    with pytest.raises(StoreError, match="does not end in"):
+        write_report(content, tmp_path / "r.docx")
+
+
+def test_the_commands_tell_colours_and_write_reports(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = save_result(chart_result(), tmp_path / "chart.zarr")
+    save_annotations(MARKS.model_copy(update={"pins": MARKS.pins[:1]}), path)
+    csv = tmp_path / "c.csv"
+    assert main(["colours", str(path), "--pins", "--light", "A", "--to", "häut 木", "-o", str(csv)]) == 0
+    told = capsys.readouterr().out
+    assert "ΔE00" in told
+    lines = csv.read_text(encoding="utf-8").splitlines()
+    assert lines[-2].startswith("$sky_1$ <b>,A,")
+    assert main(["report", str(path)]) == 0
+    assert "häut 木" in (tmp_path / "chart_report.html").read_text(encoding="utf-8")
+    for wrong, words in (
+        (["colours", str(path)], "Say which places"),
+        (["colours", str(path), "--pins", "--light", "candle"], "no light 'candle'"),
+        (["report", str(path), "-o", "x.docx"], "must end in"),
+    ):
+        assert main(wrong) == 2
+        assert words in capsys.readouterr().err
+
+
+def test_a_result_of_depth_alone_has_a_report(tmp_path: Path) -> None:
+    depth = chart_result().drop_vars(["reflectance", "reflectance_std", "data_share"])
+    content = session_content("depth", depth, Annotations())
+    assert "Depth" in write_report(content, tmp_path / "d.html").read_text(encoding="utf-8")
+    write_report(content, tmp_path / "d.pdf")

@@ -1,0 +1,36 @@
+"""The table of colours of the marks."""
+
+from __future__ import annotations
+
+import pytest
+from dsl_app.results.answers.colours_panel import EMPTY, ColoursPanel
+from dsl_app.shared.theme import LIGHT
+from PySide6.QtGui import QGuiApplication
+from pytestqt.qtbot import QtBot
+
+from dsl_core.optics.colour import reflectance_to_lab
+from tests.app.support.results_controller import SQUARE, Bench
+from tests.app.support.results_controller import bench as bench
+
+
+def test_marks_have_colours_and_differences_to_the_selected_one(qtbot: QtBot, bench: Bench) -> None:
+    panel = ColoursPanel(bench.state)
+    qtbot.addWidget(panel)
+    panel.show()
+    assert panel.text.text() == EMPTY
+    bench.control.marks.pin((30, 5))
+    bench.control.marks.add_outline(SQUARE)
+    panel.apply_theme(LIGHT)
+    assert [panel.table.item(row, 0).text() for row in range(2)] == ["pin 1", "region 1"]  # type: ignore[union-attr]
+    result = bench.state.result.value
+    assert result is not None
+    light, _, _ = reflectance_to_lab(result["reflectance"][:, 5, 30].astype(float), result.wavelengths_nm)
+    shown = panel.table.item(0, 1)
+    assert shown is not None
+    assert float(shown.text().split(" ± ")[0]) == pytest.approx(light, abs=0.05)
+    # The region was added last and is selected, so it has no difference to itself.
+    assert [panel.table.item(row, 4).text() == "" for row in range(2)] == [False, True]  # type: ignore[union-attr]
+    panel.copy.click()
+    lines = QGuiApplication.clipboard().text().splitlines()
+    assert lines[0].startswith("place\tlight\tL*")
+    assert len(lines) == 1 + 2 * panel.light.count()
