@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from dsl_core.analysis.at_bands import Shape, at_bands
 from dsl_core.analysis.library import SpectralLibrary
 from dsl_core.errors import CalibrationError, DecodeError
+from dsl_core.model.result import SPECTRUM_INVALID, Flag
 
 Floats = NDArray[np.float64]
 Cube = NDArray[np.float32] | NDArray[np.float64]
@@ -24,6 +25,10 @@ _EXPLAINED = 0.99
 _PIXELS_TOGETHER = 9
 #: The part of a pixel's variance that no number of pixels averages out, because all have it in common.
 _IN_COMMON = 0.05
+#: A class that varies by more than this share of its reflectance is doubted.
+WIDE = 0.2
+#: Pixels with these flags get no class: their spectrum is absent, cut off, or that of two materials.
+NOT_JUDGED = SPECTRUM_INVALID | Flag.SATURATED | Flag.POOR_FIT
 
 
 @dataclass(frozen=True)
@@ -103,11 +108,20 @@ def classes_of_library(
     return kept, tuple(notes)
 
 
-def class_of_pixels(name: str, reflectance: Cube, std: Cube, mask: NDArray[np.bool_]) -> SpectralClass:
+def class_of_pixels(
+    name: str,
+    reflectance: Cube,
+    std: Cube,
+    mask: NDArray[np.bool_],
+    flags: NDArray[np.integer] | None = None,
+) -> SpectralClass:
     """The class of marked pixels: their mean, and how they vary more than their deviations say.
 
-    Cubes (bands, rows, columns), mask (rows, columns). Raises `DecodeError` where no pixel has a spectrum.
+    Cubes (bands, rows, columns), mask and ``flags`` (rows, columns): pixels that get no class define none,
+    unless there are no others. Raises `DecodeError` where no pixel has a spectrum.
     """
+    if flags is not None and (mask & ((flags & int(NOT_JUDGED)) == 0)).any():
+        mask = mask & ((flags & int(NOT_JUDGED)) == 0)
     y, x = np.nonzero(mask)
     values, spread = reflectance[:, y, x].astype(np.float64), std[:, y, x].astype(np.float64)
     known = np.isfinite(values).all(0) & np.isfinite(spread).all(0)
@@ -131,6 +145,18 @@ def _more_than_noise(covariance: Floats, noise: Floats) -> tuple[Floats, Floats]
     strength = ((components / level) ** 2).mean(1) if len(components) else np.empty(0)
     kept = components[strength > 1]
     return kept, np.maximum(rest - noise, 0) if len(kept) else np.zeros_like(rest)
+
+
+def doubt_of(each: SpectralClass) -> str:
+    """A sentence where a class varies so much that it explains nearly anything; else empty."""
+    for member in each.members:
+        varied = float(np.sqrt((member.components**2).sum(0)).mean() / max(member.mean.mean(), 1e-9))
+        if varied > WIDE:
+            return (
+                f"{each.name} varies by {varied:.0%} of its reflectance and explains much: it may hold two"
+                " materials. Mark a smaller region, or group the library otherwise."
+            )
+    return ""
 
 
 def shared_names(classes: Sequence[SpectralClass]) -> tuple[SpectralClass, ...]:

@@ -131,7 +131,8 @@ def classes_of_masks(result: xr.Dataset, masks: Mapping[str, Mask]) -> tuple[Spe
     if "reflectance_std" not in result:
         raise DecodeError("The result states no deviations. Reconstruct the scan again.")
     reflectance, std = result["reflectance"].values, result["reflectance_std"].values
-    return tuple(class_of_pixels(name, reflectance, std, mask) for name, mask in masks.items())
+    flags = result["flags"].values if "flags" in result else None
+    return tuple(class_of_pixels(name, reflectance, std, mask, flags) for name, mask in masks.items())
 
 
 def write_classification(

@@ -17,11 +17,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dsl_core.analysis.band_noise import band_correlation, usual_correlation
-from dsl_core.analysis.classes import SpectralClass, shared_names
+from dsl_core.analysis.classes import NOT_JUDGED, SpectralClass, shared_names
 from dsl_core.analysis.likelihood import Block, class_fit
 from dsl_core.errors import DecodeError
 from dsl_core.evaluation.uncertainty import DECIDED_FROM
-from dsl_core.model.result import SPECTRUM_INVALID, Flag
 from dsl_core.progress import NoProgress, Progress
 
 Cube = NDArray[np.float32] | NDArray[np.float64]
@@ -30,8 +29,6 @@ Mask = NDArray[np.bool_]
 #: Level of a spectrum relative to its class: as sure as the result states it, or any.
 Brightness = Literal["stated", "free"]
 
-#: Pixels with these flags get no class: their spectrum is absent, cut off, or that of two materials.
-NOT_JUDGED = SPECTRUM_INVALID | Flag.SATURATED | Flag.POOR_FIT
 #: Pixels at once, so that intermediates stay small.
 _AT_ONCE = 8192
 #: Classes of a map that ENVI, and a colour table, can hold.

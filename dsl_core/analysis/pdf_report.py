@@ -141,12 +141,9 @@ def _draw_curve(axis: Axes, curve: Curve) -> None:
         axis.fill(*_points(curve.band), color=_ACCENT, alpha=0.2, lw=0)
     axis.plot(*_points(curve.line), color=_ACCENT, lw=1)
     axis.set(xlim=(0, WIDTH), ylim=(HEIGHT, 0))
-    for ticks, place, name in (
-        (curve.x_ticks, axis.set_xticks, "x"),
-        (curve.y_ticks, axis.set_yticks, "y"),
-    ):
-        place([tick.at for tick in ticks], [tick.label for tick in ticks])
-        axis.tick_params(name, labelsize=6, length=2)
+    axis.set_xticks([tick.at for tick in curve.x_ticks], [tick.label for tick in curve.x_ticks])
+    axis.set_yticks([tick.at for tick in curve.y_ticks], [tick.label for tick in curve.y_ticks])
+    axis.tick_params(labelsize=6, length=2)
     axis.set_title(f"{curve.title}  {curve.note}", size=7, loc="left", color=_INK, parse_math=False)
 
 

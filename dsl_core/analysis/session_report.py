@@ -11,7 +11,7 @@ import numpy as np
 from dsl_core.analysis.class_table import class_colours
 from dsl_core.analysis.classification import Classification
 from dsl_core.analysis.colours import Colour, colours_of
-from dsl_core.analysis.places import masks_of_marks, spectra_of_masks
+from dsl_core.analysis.places import Floats, masks_of_marks, spectra_of_masks
 from dsl_core.errors import DecodeError, StoreError
 from dsl_core.evaluation.report.curves import spectrum_curve
 from dsl_core.evaluation.report.pictures import Key, ReportPicture, png_uri
@@ -39,7 +39,8 @@ def session_content(
     shape = (result.sizes["y"], result.sizes["x"])
     if "reflectance" in result and (marks.pins or marks.regions):
         masks = masks_of_marks(marks, shape)
-        spectra, missing = {}, []
+        spectra: dict[str, tuple[Floats, Floats]] = {}
+        missing = []
         for name, mask in masks.items():
             try:
                 spectra |= spectra_of_masks(result, {name: mask})
@@ -52,7 +53,8 @@ def session_content(
             if np.isfinite(mean).all()
         ]
         tables = [colour_table(colours_of(spectra, bands))] if spectra else []
-        places = tuple(tuple(int(v) for v in np.argwhere(masks[name]).mean(0).round()) for name in spectra)
+        centres = (np.argwhere(masks[name]).mean(0).round() for name in spectra)
+        places = [(int(y), int(x)) for y, x in centres]
         content = replace(
             content, curves=curves, tables=tables, places=places, summary=" ".join(missing), has_samples=False
         )
@@ -64,12 +66,12 @@ def session_content(
 
 def colour_table(colours: list[Colour]) -> ReportTable:
     """Colours as a table: a line for each mark and light."""
-    rows = []
+    rows: list[tuple[str, ...]] = []
     for each in colours:
         lab = [f"{v:.2f} ± {s:.2f}" for v, s in zip(each.lab, each.lab_std, strict=True)]
         difference = "" if each.delta_e is None else f"{each.delta_e:.2f} ± {each.delta_e_std:.2f}"
         rows.append((each.name, each.light, *lab, difference))
-    heads = ("Mark", "Light", "L*", "a*", "b*", "ΔE00")
+    heads: tuple[str, ...] = ("Mark", "Light", "L*", "a*", "b*", "ΔE00")
     if not any(row[-1] for row in rows):
         heads, rows = heads[:-1], [row[:-1] for row in rows]
     note = "CIE 1931 observer, relative to the perfect diffuser; ± one deviation."

@@ -50,7 +50,7 @@ def classify(
     """
     import xarray as xr
 
-    from dsl_core.analysis.classes import classes_of_library
+    from dsl_core.analysis.classes import classes_of_library, doubt_of
     from dsl_core.analysis.classification import classes_of_masks, classify_result, within_nm
     from dsl_core.analysis.classify import Limits, Measure
     from dsl_core.analysis.library import read_library
@@ -72,6 +72,7 @@ def classify(
     chosen = Measure(measure)
     usual = Limits.usual(chosen)
     limits = Limits(usual.worst if worst is None else worst, usual.margin if margin is None else margin)
+    notes = [*(doubt for each in classes if (doubt := doubt_of(each))), *notes]
     made = classify_result(result, classes, chosen, limits, brightness, progress)
     over = ("y", "x")
     rows = {row.label: row for row in made.rows}

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from dsl_core.analysis.classes import Member, SpectralClass, class_of_pixels, summed_up
+from dsl_core.analysis.classes import Member, SpectralClass, class_of_pixels, doubt_of, summed_up
 from dsl_core.analysis.classify import ClassMap, Limits, Measure, score
 from dsl_core.errors import DecodeError
 from dsl_core.model.result import Flag
@@ -106,6 +106,16 @@ def test_marked_pixels_make_a_class_that_varies_as_they_do(cube: ChartCube) -> N
     assert (scores.fit[cube.material == 1] < 0.01).mean() < 0.02
     plain = class_of_pixels("x", cube.reflectance, cube.std, cube.material == 1)
     assert len(plain.members[0].components) == 0
+
+
+def test_a_region_of_two_materials_is_doubted_and_flagged_pixels_define_nothing(cube: ChartCube) -> None:
+    both = class_of_pixels("both", cube.reflectance, cube.std, cube.material < 2)
+    assert "both varies by" in doubt_of(both)
+    one = class_of_pixels("one", cube.reflectance, cube.std, cube.material == 1)
+    assert doubt_of(one) == ""
+    flags = np.where(cube.material == 0, np.uint16(Flag.POOR_FIT), cube.flags)
+    kept = class_of_pixels("kept", cube.reflectance, cube.std, cube.material < 2, flags)
+    assert kept.mean == pytest.approx(one.mean)
 
 
 def test_few_members_stay_and_many_are_summed_up(cube: ChartCube) -> None:

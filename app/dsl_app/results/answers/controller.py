@@ -70,6 +70,7 @@ class AnswersController:
 
         def work(progress: Progress) -> Materials:
             from dsl_core.analysis.areas import pixel_areas_mm2
+            from dsl_core.analysis.classes import doubt_of
             from dsl_core.analysis.classification import Classification
             from dsl_core.analysis.classify import score
 
@@ -87,7 +88,8 @@ class AnswersController:
             )
             areas = pixel_areas_mm2(result["points_mm"], held.get("normals")) if "points_mm" in held else None
             made = Classification.of(scores, brightness=way.brightness, areas_mm2=areas)
-            return Materials(title.removeprefix("Materials by "), made, notes)
+            doubts = tuple(doubt for each in found if (doubt := doubt_of(each)))
+            return Materials(title.removeprefix("Materials by "), made, (*doubts, *notes))
 
         def done(materials: Materials) -> None:
             if self.state.result.value is result and request == self._request:
@@ -179,5 +181,6 @@ def classes_of_marks(result: ResultArrays, marks: list[Mark]) -> tuple[SpectralC
             mask = mask_of_runs(mark.runs, result.shape)
         else:
             mask = mask_of_outline(mark.outline_px, result.shape)
-        classes.append(class_of_pixels(mark.name, result["reflectance"], result["reflectance_std"], mask))
+        cubes = (result["reflectance"], result["reflectance_std"])
+        classes.append(class_of_pixels(mark.name, *cubes, mask, result["flags"]))
     return tuple(classes)
