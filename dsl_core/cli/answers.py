@@ -6,9 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-import numpy as np
 import typer
-from numpy.typing import NDArray
 
 from dsl_core.cli.options import Force, Json, parse_place, parse_span
 from dsl_core.cli.output import Output
@@ -16,7 +14,9 @@ from dsl_core.errors import PlanError
 from dsl_core.io.staging import check_targets
 
 if TYPE_CHECKING:
+    import numpy as np
     import xarray as xr
+    from numpy.typing import NDArray
 
     from dsl_core.analysis.classes import SpectralClass
     from dsl_core.progress import Progress
