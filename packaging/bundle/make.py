@@ -2,8 +2,8 @@
 
 ``build/bundle/dist/dsl-scan`` runs where no Python is installed: ``dsl-scan`` is the command,
 ``dsl-scan-gui`` the window, and packages in its folder ``drivers`` are found as if they were installed. Where
-``dpkg-deb`` is, the folder becomes ``build/bundle/dsl-scan_VERSION_ARCHITECTURE.deb`` with a desktop entry and
-an icon. ``--smoke`` only tries what was made.
+``dpkg-deb`` is, the folder becomes ``build/bundle/dsl-scan_VERSION_ARCHITECTURE.deb`` with a desktop entry
+and an icon. ``--smoke`` only tries what was made.
 """
 
 from __future__ import annotations
@@ -162,9 +162,8 @@ def smoke() -> int:
             )
             good = answer.returncode == 0 and words in answer.stdout
             wrong += not good
-            print(
-                f"{'good ' if good else 'WRONG'} {time.monotonic() - start_s:5.1f} s  dsl-scan {' '.join(arguments)}"
-            )
+            seconds = time.monotonic() - start_s
+            print(f"{'good ' if good else 'WRONG'} {seconds:5.1f} s  dsl-scan {' '.join(arguments)}")
             if not good:
                 print(answer.stdout[-500:] + answer.stderr[-2000:])
     return wrong
