@@ -189,5 +189,5 @@ def test_a_path_that_is_no_folder(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("x")
     with pytest.raises(StoreError, match="not a result"):
         load_result(tmp_path / "file")
-    with pytest.raises(StoreError, match="could not be written"):
+    with pytest.raises(StoreError, match="is a file, not a folder"):
         save_result(small_result(), tmp_path / "file" / "r.zarr")
