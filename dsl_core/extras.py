@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Callable
+from importlib.util import find_spec
 from typing import ParamSpec, TypeVar
 
 from dsl_core.errors import MissingPackageError
@@ -15,6 +16,7 @@ R = TypeVar("R")
 EXTRA_OF = {
     "torch": "reconstruct",
     "cv2": "reconstruct",
+    "numba": "reconstruct",
     "PySide6": "gui",
     "pyqtgraph": "gui",
     "pyvista": "gui",
@@ -39,6 +41,17 @@ def missing_package(error: ModuleNotFoundError) -> MissingPackageError | None:
         f"This needs the package {module}, which is not installed here. It comes with the extra {extra!r}"
         f" ({_PURPOSE[extra]}): pip install 'dsl-scan[{extra}]'"
     )
+
+
+def require_package(module: str) -> None:
+    """Raise `MissingPackageError` now where a package of an extra is missing that is imported only later."""
+    try:
+        found = find_spec(module)
+    except ModuleNotFoundError:
+        found = None
+    missing = missing_package(ModuleNotFoundError(name=module)) if found is None else None
+    if missing is not None:
+        raise missing
 
 
 def names_missing_packages(function: Callable[P, R]) -> Callable[P, R]:

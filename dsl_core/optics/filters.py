@@ -25,10 +25,3 @@ def passed(rig: Rig, transmission: SpectralCurve) -> Floats:
     """Zero-order signal through a filter per nm at `FINE_NM`, white light, DN per ms, (3, wavelengths)."""
     through = np.interp(FINE_NM, transmission.wavelengths_nm, transmission.values, 0.0, 0.0)
     return np.asarray(chain_response(rig, 0, FINE_NM).sum(1) * through)
-
-
-def moved(transmission: SpectralCurve, by_nm: float) -> SpectralCurve:
-    """The same filter with its pass band elsewhere."""
-    return transmission.model_copy(
-        update={"wavelengths_nm": tuple(nm + by_nm for nm in transmission.wavelengths_nm)}
-    )

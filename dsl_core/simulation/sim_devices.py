@@ -5,7 +5,6 @@ from __future__ import annotations
 import time
 
 import numpy as np
-import torch
 from numpy.typing import NDArray
 
 from dsl_core.devices.base import (
@@ -19,15 +18,13 @@ from dsl_core.devices.base import (
 )
 from dsl_core.devices.registry import with_options
 from dsl_core.errors import DeviceError
+from dsl_core.extras import require_package
 from dsl_core.model.frames import Frame
 from dsl_core.model.rig import Rig
 from dsl_core.model.spectral import SpectralCurve
-from dsl_core.optics.correspondence import GratingModel, zero_order
 from dsl_core.simulation.bandpass_filters import measured_transmissions
 from dsl_core.simulation.effects.catalogue import USUAL_CHOICE
 from dsl_core.simulation.effects.planner import describe
-from dsl_core.simulation.foreign.exposure import light_level
-from dsl_core.simulation.foreign.rig_changes import led_radiance
 from dsl_core.simulation.placing import TwinHand
 from dsl_core.simulation.published_rig import published_rig
 from dsl_core.simulation.random_rig import random_rig
@@ -36,7 +33,6 @@ from dsl_core.simulation.scenes.catalogue import make_scene
 from dsl_core.simulation.twin_options import TwinOptions, number
 from dsl_core.simulation.world import Clock, World
 
-Floats = NDArray[np.float64]
 LATENCY_MS = 50.0
 #: What the projector says of its frames, whatever its LEDs do.
 CLAIMED_PERIOD_MS = 1000.0 / 60.0
@@ -156,6 +152,8 @@ class SimSpectroradiometer(Spectroradiometer):
 
     def measure(self) -> SpectralCurve:
         """Spectral radiance of the spot in relative units of W/(sr m2 nm)."""
+        from dsl_core.simulation.spot_light import spot_light
+
         world, truth = self.world, self.world.truth
         nm = truth.materials.wavelengths_nm
         spot = (truth.depth_mm.shape[0] // 2, truth.depth_mm.shape[1] // 2)
@@ -169,40 +167,6 @@ class SimSpectroradiometer(Spectroradiometer):
         return SpectralCurve.of(nm, value, unit="W/(sr m2 nm)")
 
 
-def spot_light(world: World, spot: tuple[int, int], wavelengths_nm: Floats) -> Floats:
-    """Spectral radiance of the light on a camera pixel (row, column), in units of the emission curves.
-
-    The zero order comes from one projector pixel, first orders (with the film) from another column at each
-    wavelength.
-    """
-    rig, depth_mm = world.setup.true_rig, float(world.truth.depth_mm[spot])
-    if not np.isfinite(depth_mm):
-        return np.zeros(len(wavelengths_nm))
-    pixel = torch.tensor([spot[0] * rig.camera.width_px + spot[1]])
-    depth = torch.tensor([depth_mm], dtype=torch.float64)
-    emission = np.stack([curve.at(wavelengths_nm) for curve in rig.emission])
-    column, row = (float(q[0]) for q in zero_order(rig, pixel, depth))
-    total = (_drive(world, np.array([column]), np.array([row])) * emission).sum(0)
-    nm = wavelengths_nm.copy()  # torch needs a writable copy
-    for order in (1, -1) if world.setup.film else ():
-        columns, rows = (q[:, 0].numpy() for q in GratingModel(rig).exact(pixel, depth, order, nm))
-        share = rig.efficiency[order].at(wavelengths_nm)
-        total = total + share * (_drive(world, columns, rows) * emission).sum(0)
-    return np.asarray(total)
-
-
-def _drive(world: World, columns: Floats, rows: Floats) -> Floats:
-    """Radiance of each LED at projector pixels, shape (3, n); only the dark projector's outside its frame."""
-    foreign, response = world.setup.foreign, world.rig.projector_response
-    height, width = world.rig.projector.height_px, world.rig.projector.width_px
-    shown = np.zeros((height, width, 1), np.uint8) if world.image is None else np.atleast_3d(world.image)
-    x, y = np.round(columns).astype(int), np.round(rows).astype(int)
-    inside = (x >= 0) & (x < width) & (y >= 0) & (y < height)
-    levels = shown[y.clip(0, height - 1), x.clip(0, width - 1)] / 255
-    radiance = np.where(inside, led_radiance(response, levels.T, foreign), 0.0)
-    return radiance if foreign is None else radiance * light_level(foreign, world.clock.now_s)
-
-
 @with_options(TwinOptions)
 def open_twin(options: dict[str, str]) -> DeviceRig:
     """The twin of the published rig; scenes, noise and image size as options.
@@ -210,6 +174,7 @@ def open_twin(options: dict[str, str]) -> DeviceRig:
     See `TwinOptions`; all other options are those of the scene. Raises `DeviceError` for a value that makes
     no sense, and `PlanError` for an option that the scene does not have.
     """
+    require_package("torch")  # imported with the first picture
     chosen, of_scene = TwinOptions.of(options)
     nominal = published_rig()
     if chosen.size:

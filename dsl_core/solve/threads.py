@@ -6,8 +6,6 @@ import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-import torch
-
 _lock = threading.Lock()
 #: How deep each thread is in such blocks; how many threads are; and what torch had before the first came.
 _own, _threads, _before = threading.local(), 0, 1
@@ -31,6 +29,8 @@ def one_kernel_thread() -> Iterator[None]:
 
 def _enter() -> None:
     global _threads, _before
+    import torch
+
     with _lock:
         _own.depth = getattr(_own, "depth", 0) + 1
         if _own.depth > 1:
@@ -43,6 +43,8 @@ def _enter() -> None:
 
 def _leave() -> None:
     global _threads
+    import torch
+
     with _lock:
         _own.depth -= 1
         if _own.depth > 0:

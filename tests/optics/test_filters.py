@@ -1,11 +1,11 @@
-"""Bandpass filters: the pass band of a data sheet, moved, and what the chain sees through it."""
+"""Bandpass filters: the pass band of a data sheet, and what the chain sees through it."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
 
-from dsl_core.optics.filters import FINE_NM, moved, nominal_filter, passed
+from dsl_core.optics.filters import FINE_NM, nominal_filter, passed
 from dsl_core.optics.spectra import chain_response
 from dsl_core.simulation.published_rig import published_rig
 
@@ -30,8 +30,3 @@ def test_light_through_a_filter_is_that_of_white_times_its_transmission_and_none
     flat = curve.model_copy(update={"values": (0.5,) * len(curve.values)})
     assert passed(rig, flat)[:, FINE_NM < 490].max() == 0.0
     assert passed(rig, flat)[:, FINE_NM > 610].max() == 0.0
-
-
-def test_a_moved_filter_passes_the_same_elsewhere() -> None:
-    curve = nominal_filter(550.0)
-    assert moved(curve, 3.0).at(np.array([553.0, 548.0])) == pytest.approx(curve.at(np.array([550.0, 545.0])))

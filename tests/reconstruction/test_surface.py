@@ -18,7 +18,7 @@ from dsl_core.reconstruction.surface import (
     windows_px,
 )
 from dsl_core.simulation.published_rig import published_rig
-from dsl_core.simulation.rendering.renderer import surface_shading
+from dsl_core.simulation.rendering.shading import surface_shading
 from dsl_core.simulation.scenes.catalogue import make_scene
 from dsl_core.simulation.scenes.truth import SceneTruth
 

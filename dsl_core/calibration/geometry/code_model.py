@@ -36,6 +36,8 @@ OUTLIER_SIGMAS = 4.0
 LEAST_LIGHT = 0.01
 #: Pixels that a corner needs.
 MIN_PIXELS = 30
+#: Eigenvalues below this share of the largest count as zero.
+RANK = 1e-10
 
 
 @dataclass(frozen=True)
@@ -124,9 +126,7 @@ def refine_maps(light: CodeLight, windows: Sequence[CornerWindow], maps: Floats)
     for _ in range(ROUNDS):
         table = _BitTable(light.signs, fit.blur_px)
         fit = fit.improved(table, windows, seen, maps)
-        table = _BitTable(light.signs, fit.blur_px)
-        for k, (window, (contrast, weight)) in enumerate(zip(windows, seen, strict=True)):
-            maps[k] = fit.step(table, window, contrast, weight, maps[k])
+        maps = fit.steps(_BitTable(light.signs, fit.blur_px), windows, seen, maps)
     return maps
 
 
@@ -187,22 +187,35 @@ class _CodeFit:
         sigma = robust_std(scatter, 1) if lit.any() else np.ones(len(contrast))
         return _CodeFit(blur, strength, np.maximum(sigma, 1e-6))
 
-    def step(
-        self, table: _BitTable, window: CornerWindow, contrast: Floats, weight: Floats, start: Floats
+    def steps(
+        self,
+        table: _BitTable,
+        windows: Sequence[CornerWindow],
+        seen: Sequence[tuple[Floats, Floats]],
+        maps: Floats,
     ) -> Floats:
-        """A map after one step of Gauss and Newton."""
-        value, slope = table.at(window.terms @ start, table.values, table.slopes)
-        slope = slope * self.strength
-        residual = contrast - self.strength * value
-        each = weight * self._near(residual, weight) / self.sigma[:, None] ** 2
-        information = (each * slope**2).sum(0)
-        square = (window.terms * information[:, None]).T @ window.terms
-        right = window.terms.T @ (each * slope * residual).sum(0)
-        if (information > 0).sum() < MIN_PIXELS:
-            return start
-        step = np.linalg.pinv(square, rcond=1e-10, hermitian=True) @ right
-        limit = min(1.0, 0.5 / max(float(np.abs(step).max()), 1e-12))
-        return np.asarray(start + limit * step)
+        """The maps after one step of Gauss and Newton."""
+        from dsl_core.calibration.geometry.window_sums import normal_equations
+
+        values, slopes = (np.ascontiguousarray(each.T) for each in (table.values, table.slopes))
+        sums = [
+            normal_equations(
+                window.terms, start, contrast.T, weight, values, slopes, OVERSAMPLE, self.strength,
+                self.sigma, OUTLIER_SIGMAS,
+            )
+            for window, (contrast, weight), start in zip(windows, seen, maps, strict=True)
+        ]  # fmt: skip
+        if not sums:
+            return maps
+        squares, rights = np.stack([each[0] for each in sums]), np.stack([each[1] for each in sums])
+        # The pseudoinverse: directions that no pixel tells of are left alone.
+        strength, directions = np.linalg.eigh(squares)
+        known = np.abs(strength) > RANK * np.abs(strength).max(1, keepdims=True)
+        along = np.einsum("nij,ni->nj", directions, rights) * known / np.where(known, strength, 1.0)
+        step = np.einsum("nij,nj->ni", directions, along)
+        limit = np.minimum(1.0, 0.5 / np.maximum(np.abs(step).max(1), 1e-12))
+        enough = np.array([each[2] >= MIN_PIXELS for each in sums])
+        return np.asarray(maps + (enough * limit)[:, None] * step)
 
     def _near(self, residual: Floats, weight: Floats) -> NDArray[np.bool_]:
         """Differences that are not outliers."""

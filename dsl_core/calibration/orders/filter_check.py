@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from dsl_core.model.rig import Rig
 from dsl_core.model.spectral import SpectralCurve
-from dsl_core.optics.filters import FINE_NM, moved, passed
+from dsl_core.optics.filters import FINE_NM
+from dsl_core.optics.spectra import chain_response
 
 Floats = NDArray[np.float64]
 
@@ -133,8 +134,11 @@ def colour_shift(rig: Rig, seen: Floats, transmission: SpectralCurve) -> tuple[f
     The gain is in chi-square against no shift; beyond about ten the filter is another one.
     """
     chi = []
+    white = chain_response(rig, 0, FINE_NM).sum(1)
+    known_nm, passes = np.array(transmission.wavelengths_nm), np.array(transmission.values)
     for shift in SHIFTS_NM:
-        expected = passed(rig, moved(transmission, float(shift))).sum(1)
+        through = np.interp(FINE_NM - shift, known_nm, passes, 0.0, 0.0)
+        expected = white @ through
         if not expected.max() > 0:
             chi.append(np.inf)
             continue

@@ -107,14 +107,15 @@ def filter_light(
 
 def _light(graph: LineGraph, order: int, place: OrderPlace | None, half_px: float) -> OrderLight:
     """Sum an order's light around its place, over pixels whose window is inside the frame."""
+    from dsl_core.calibration.orders.line_sums import window_sums
+
     ratio, spread = np.full(3, np.nan), np.full(3, np.inf)
     if place is None:
         return OrderLight(order, ratio, spread, np.nan, np.inf, 0.0, np.nan, 0)
     centre = place.at(graph.pixels.place)
     use = graph.holds(centre, half_px)
     use &= graph.pixels.whole.get(order, np.ones(len(use), bool))
-    window = np.abs(graph.distance - centre) < half_px
-    light, variance = (graph.signal * window).sum(0), (graph.variance * window).sum(0)
+    light, variance = window_sums(graph.signal, graph.variance, graph.distance, centre, half_px)
     for colour in range(3):
         mine = use & (graph.pixels.colour == colour)
         total = float(graph.amplitude[mine].sum())

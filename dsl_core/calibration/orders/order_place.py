@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from dsl_core.model.plan import ScanLines
 from dsl_core.model.rig import ProjectorResponse
-from dsl_core.optics.line_profile import zero_order_profile
+from dsl_core.optics.line_profile import LineTable
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -110,26 +110,27 @@ def line_graph(
 
     The dark signal is that of lines between the distances ``unlit_px``; zero where there are none.
     """
-    half, small = lines.width_px / 2, 0.01
+    from dsl_core.calibration.orders.line_sums import take_out, zero_sums
 
-    def profile(shift_px: float) -> Floats:
-        return zero_order_profile(torch.as_tensor(shift_px - distance), -half, half, response).numpy()
-
-    expected, slope = profile(0.0), (profile(small) - profile(-small)) / (2 * small)
-    unlit = (np.abs(distance) > unlit_px[0]) & (np.abs(distance) < unlit_px[1])
-    near = np.abs(distance) < ZERO_HALF_PX
+    # The profile is symmetric: the slope is that against a zero order that moves on.
+    reach_px = float(np.abs(distance).max(initial=1.0)) + 1
+    table = LineTable(lines.width_px, response, reach_px, torch.zeros(1, dtype=torch.float64))
+    expected, slope = (each.numpy() for each in table.at(torch.as_tensor(-distance)))
     # Amplitude and dark signal of each pixel from its sums over lit and unlit lines, which hold whatever the
     # blur: lines that tile the frame share a pixel's light out among them.
-    scale = near.sum(0) / np.maximum(unlit.sum(0), 1)
-    lit, dark = (radiance * near).sum(0), (radiance * unlit).sum(0)
-    lit_light, dark_light = (expected * near).sum(0), (expected * unlit).sum(0)
+    lit, lit_light, near, dark, dark_light, unlit = zero_sums(
+        radiance, expected, distance, ZERO_HALF_PX, unlit_px
+    )
+    count = np.maximum(unlit, 1)
+    scale = near / count
     amplitude = (lit - scale * dark) / (lit_light - scale * dark_light)
-    offset = (dark - amplitude * dark_light) / np.maximum(unlit.sum(0), 1)
-    signal = radiance - offset - amplitude * expected
-    lever = np.where(near, amplitude * slope, 0.0)
-    total = max(float((lever**2).sum()), 1e-30)
-    moved = float((lever * signal).sum()) / total, float(np.sqrt(((lever * std) ** 2).sum())) / total
-    return LineGraph(signal, std**2, distance, amplitude, pixels, frame_px), moved
+    offset = (dark - amplitude * dark_light) / count
+    signal, variance, sums = take_out(
+        radiance, std, expected, slope, distance, amplitude, offset, ZERO_HALF_PX
+    )
+    total = max(float(sums[0]), 1e-30)
+    moved = float(sums[1]) / total, float(np.sqrt(sums[2])) / total
+    return LineGraph(signal, variance, distance, amplitude, pixels, frame_px), moved
 
 
 def by_cell(pixels: PlanePixels, which: NDArray[np.bool_]) -> list[NDArray[np.bool_]]:
@@ -188,11 +189,11 @@ def find_second(graph: LineGraph, sign: int, first: OrderPlace | None) -> OrderP
     if first is None:
         return None
     lined = first.at(graph.pixels.place)
-    everywhere = np.ones(len(lined), bool)
     middle = float(np.median(np.abs(lined)))
     scale = middle / np.maximum(np.abs(lined), 1e-6)
     reach = (SECOND_PLACE[0] * middle, SECOND_PLACE[1] * middle)
-    peak = _peak(graph, everywhere, sign * graph.distance * scale, reach, SECOND_HALF_PX)
+    whole = np.zeros(len(lined), np.int64)
+    (peak,) = _peaks(graph, whole, 1, sign * graph.distance * scale, reach, SECOND_HALF_PX)
     times = float(np.mean(SECOND_PLACE)) if peak is None else peak.centre_px / middle
     coefficients, std_px = first.coefficients * times, first.std_px * times
     if peak is None:
@@ -216,9 +217,11 @@ def _fit(
     distance = sign * (graph.distance - centre)
     use = np.ones(len(centre), bool) if before is None else graph.holds(centre, INSIDE_PX)
     peaks, values, places = [], [], []
-    for which in by_cell(graph.pixels, use):
-        peak = _peak(graph, which, distance, reach_px, ORDER_HALF_PX)
+    cells = np.where(use, graph.pixels.cell, -1)
+    found = _peaks(graph, cells, CELLS[0] * CELLS[1], distance, reach_px, ORDER_HALF_PX)
+    for cell, peak in enumerate(found):
         if peak is not None:
+            which = cells == cell
             peaks.append(peak)
             values.append(sign * peak.centre_px + (float(centre[which].mean()) if before is None else 0.0))
             places.append(graph.pixels.place[:, which].mean(1))
@@ -254,26 +257,27 @@ class _Peak:
     width_px: float
 
 
-def _peak(
+def _peaks(
     graph: LineGraph,
-    which: NDArray[np.bool_],
+    cell: Ints,
+    cells: int,
     distance: Floats,
     reach_px: tuple[float, float],
     half_px: float,
-) -> _Peak | None:
-    """The brightest peak of some pixels (P,) with deviations by the noise of their signals; None for none."""
-    if which.sum() < MIN_PIXELS:
-        return None
-    low, high = reach_px[0] - half_px, reach_px[1] + half_px
-    own = distance[:, which]
-    inside = (own > low) & (own < high)
-    index = ((own[inside] - low) / BIN_PX).astype(int)
-    bins = int((high - low) / BIN_PX) + 1
-    weights = np.broadcast_to(graph.amplitude[which], own.shape)[inside]
-    light, noise, reference = (
-        np.bincount(index, values, bins)
-        for values in (graph.signal[:, which][inside], graph.variance[:, which][inside], weights)
-    )
+) -> list[_Peak | None]:
+    """The brightest peak of the pixels of each cell, by the number of it that each pixel (P,) has."""
+    from dsl_core.calibration.orders.line_sums import histograms
+
+    ends_px = reach_px[0] - half_px, reach_px[1] + half_px
+    sums = histograms(graph.signal, graph.variance, graph.amplitude, distance, cell, cells, ends_px, BIN_PX)
+    enough = np.bincount(cell[cell >= 0], minlength=cells) >= MIN_PIXELS
+    return [_peak(mine, reach_px, half_px) if some else None for mine, some in zip(sums, enough, strict=True)]
+
+
+def _peak(sums: Floats, reach_px: tuple[float, float], half_px: float) -> _Peak | None:
+    """The brightest peak of light, noise and amplitude (3, bins) by distance; None for none."""
+    light, noise, reference = sums
+    low, bins = reach_px[0] - half_px, len(light)
     box = np.ones(SMOOTH_BINS)
     sums, spread, below = (np.convolve(values, box, "same") for values in (light, noise, reference))
     enough = below > 0.2 * below.max(initial=0)

@@ -14,7 +14,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from types import MappingProxyType
-from typing import Any, ClassVar, Protocol
+from typing import TYPE_CHECKING, Any, ClassVar, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,11 +27,15 @@ from dsl_core.optics.sensor import bayer_channels, raw_variance
 from dsl_core.optics.spectra import chain_response
 from dsl_core.simulation.effects.cost import slowness
 from dsl_core.simulation.effects.tolerance import EffectBound
-from dsl_core.simulation.foreign.renderer import ForeignRenderer
 from dsl_core.simulation.foreign.variants import Foreign
-from dsl_core.simulation.rendering.renderer import ORDERS, Renderer, surface_shading
-from dsl_core.simulation.rendering.spectral_tables import NM
+from dsl_core.simulation.rendering.shading import surface_shading
+from dsl_core.simulation.rendering.spectral_tables import NM, ORDERS
 from dsl_core.simulation.scenes.truth import Parts, Scene, SceneTruth
+
+if TYPE_CHECKING:
+    # They import torch, which whoever only asks for a rig's options need not wait for.
+    from dsl_core.simulation.foreign.renderer import ForeignRenderer
+    from dsl_core.simulation.rendering.renderer import Renderer
 
 Image = NDArray[np.uint8]
 Signal = NDArray[np.float32]
@@ -95,6 +99,8 @@ class LightPath:
 
     def renderer(self, parts: Parts | None = None) -> Renderer:
         """The plain renderer, of all that the scene consists of or of some ``parts``."""
+        from dsl_core.simulation.rendering.renderer import Renderer
+
         return Renderer(
             self.rig, self.truth, film=self.film, device=self.device, orders=self.orders, shaded=self.shaded,
             parts=parts,
@@ -102,6 +108,8 @@ class LightPath:
 
     def foreign_renderer(self) -> ForeignRenderer | None:
         """The renderer of foreign variants, which has no depth of field, if the path has any."""
+        from dsl_core.simulation.foreign.renderer import ForeignRenderer
+
         if self.foreign is None:
             return None
         return ForeignRenderer(

@@ -7,9 +7,7 @@ from operator import attrgetter
 from types import MappingProxyType
 
 import numpy as np
-import torch
 
-from dsl_core.optics.correspondence import GratingModel
 from dsl_core.simulation.effects.base import Effect, LightPath, Limits
 from dsl_core.simulation.effects.tolerance import EffectBound
 from dsl_core.simulation.rendering.spectral_tables import NM
@@ -58,6 +56,10 @@ def reaches(path: LightPath, orders: tuple[int, ...]) -> bool:
 
     Traced on a raster of pixels; columns vary so smoothly that the margin covers what is between.
     """
+    import torch
+
+    from dsl_core.optics.correspondence import GratingModel
+
     lens, depth = path.rig.camera, path.truth.depth_mm
     across, down = (
         np.linspace(0, size - 1, count).round().astype(int)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,9 +15,12 @@ from dsl_core.optics.spectra import chain_response
 from dsl_core.simulation.effects.base import SLACK, ExtraEffect, Image, ImageStep, LightPath, Limits, Signal
 from dsl_core.simulation.effects.patches import Patches
 from dsl_core.simulation.effects.tolerance import EffectBound
-from dsl_core.simulation.rendering.renderer import Renderer, surface_shading
+from dsl_core.simulation.rendering.shading import surface_shading
 from dsl_core.simulation.rendering.spectral_tables import NM
 from dsl_core.simulation.scenes.truth import FINE_NM, Materials, Parts
+
+if TYPE_CHECKING:
+    from dsl_core.simulation.rendering.renderer import Renderer
 
 Floats = NDArray[np.float64]
 #: Light is followed in bands of this width, nm, and over so many reflections.

@@ -20,7 +20,7 @@ from dsl_core.simulation.effects.base import (
     Signal,
 )
 from dsl_core.simulation.effects.tolerance import EffectBound
-from dsl_core.simulation.rendering.renderer import surface_shading
+from dsl_core.simulation.rendering.shading import surface_shading
 from dsl_core.simulation.rendering.spectral_tables import NM
 from dsl_core.simulation.scenes.truth import Finish, Materials, Parts
 

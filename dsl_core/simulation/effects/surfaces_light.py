@@ -9,7 +9,7 @@ import numpy as np
 
 from dsl_core.simulation.effects.base import SLACK, Effect, LightPath, Limits
 from dsl_core.simulation.effects.tolerance import EffectBound
-from dsl_core.simulation.rendering.renderer import surface_shading
+from dsl_core.simulation.rendering.shading import surface_shading
 
 
 class Shading(Effect):

@@ -24,7 +24,8 @@ from dsl_core.simulation.foreign.rig_changes import led_radiance
 from dsl_core.simulation.foreign.spread import FINE, Spread
 from dsl_core.simulation.foreign.transport import Axis, Brought, Frame, sampled
 from dsl_core.simulation.foreign.variants import Foreign
-from dsl_core.simulation.rendering.renderer import ORDERS, surface_shading
+from dsl_core.simulation.rendering.shading import surface_shading
+from dsl_core.simulation.rendering.spectral_tables import ORDERS
 from dsl_core.simulation.scenes.truth import Scene, SceneTruth
 
 Floats = NDArray[np.float64]

@@ -12,6 +12,7 @@ change too little in a slice for the second; those that vary both ways are taken
 from __future__ import annotations
 
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 import torch
@@ -20,23 +21,48 @@ from torch import Tensor
 
 from dsl_core.optics.correspondence import chebyshev_nodes, interpolation_matrix, like
 from dsl_core.simulation.rendering.order_tables import OrderTables
-from dsl_core.simulation.rendering.pattern_table import Edge, PatternTable, between, without_colour
+from dsl_core.simulation.rendering.pattern_table import SHORT_PX, Edge, PatternTable, between
 from dsl_core.simulation.rendering.spectral_tables import NM, Slicing
 
 #: Slices times pixels that are worked out at once: they stay in the cache of a core.
 BLOCK = 1 << 16
 #: Bands of white columns: start and stop (px), level 0..1.
 Runs = list[tuple[float, float, float]]
+Floats = NDArray[np.float32]
 
 
-def white_runs(colour: NDArray[np.uint8]) -> Runs | None:
-    """Lit bands of a grey, column-only image as (start px, stop px, level 0..1); None for other images."""
-    grey = without_colour(colour)
-    if grey.shape[2] != 1 or not (grey == grey[:1]).all():
+def white_runs(levels: NDArray[np.uint8]) -> Runs | None:
+    """Lit bands of levels `without_repeats` as (start px, stop px, level 0..1); None for other levels."""
+    height, _, colours = levels.shape
+    if height != 1 or colours != 1:
         return None
-    levels = grey[0, :, 0].astype(int)
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], levels, [0]])))
-    return [(a - 0.5, b - 0.5, levels[a] / 255) for a, b in pairwise(edges) if levels[a]]
+    line = levels[0, :, 0].astype(int)
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], line, [0]])))
+    return [(a - 0.5, b - 0.5, line[a] / 255) for a, b in pairwise(edges) if line[a]]
+
+
+def by_pixel(signal: Tensor) -> bool:
+    """Whether loops over pixels compute it: on the processor."""
+    return signal.device.type == "cpu"
+
+
+def add_bands(signal: Tensor, tables: OrderTables, material_channel: Tensor, bands: Floats) -> None:
+    """Add an order's light of bands (n, 3) of white columns to the signal (P,): edges (px), radiance."""
+    if not by_pixel(signal):
+        for start, stop, radiance in bands.tolist():
+            add_band(signal, tables, material_channel, start, stop, radiance)
+        return
+    from dsl_core.simulation.rendering.kernels import add_order_runs
+
+    add_order_runs(
+        signal.numpy(), tables.active.numpy(), _numpy(tables.reach_px), tables.middle_px.numpy(),
+        tables.spread_px.numpy(), tables.inverse.numpy(), _numpy(tables.limits_nm), material_channel.numpy(),
+        tables.spectra.cumulative.numpy(), bands, float(NM[0]), float(NM.mean()), len(NM),
+    )  # fmt: skip
+
+
+def _numpy(pair: tuple[Tensor, Tensor]) -> tuple[Floats, Floats]:
+    return pair[0].numpy(), pair[1].numpy()
 
 
 def add_band(
@@ -79,15 +105,53 @@ def order_light(
         mean, tilt = slices.mean[:, of_led].sum(1), slices.tilt[:, of_led].sum(1)
         strongest = mean.amax(1)
         used = torch.nonzero(strongest >= slicing.floor * strongest.max()).ravel()
-        lit.append((led, slice(int(used[0]), int(used[-1]) + 1), mean, tilt))
+        lit.append(_Lit(led, slice(int(used[0]), int(used[-1]) + 1), mean, tilt))
     edges_nm = np.arange(NM[0], NM[-1] + 1, step)
+    if by_pixel(tables.middle_px) and (table.along_rows or not table.has_rows):
+        return _sliced_by_pixel(tables, table, material_channel[tables.active], edges_nm, lit)
     total = torch.empty_like(tables.middle_px)
     pixels = max(BLOCK // len(edges_nm), 1)
     for start in range(0, len(total), pixels):
         part = slice(start, start + pixels)
         stretches = _Stretches(tables, table, edges_nm, part)
         material = material_channel[tables.active[part]]
-        total[part] = sum(stretches.light(led, used, mean, tilt, material) for led, used, mean, tilt in lit)
+        total[part] = sum(stretches.light(*of_led, material) for of_led in lit)
+    return total
+
+
+class _Lit(NamedTuple):
+    """An LED of a pattern, the slices in which it has light, and their weights (slices, materials)."""
+
+    led: int
+    used: slice
+    mean: Tensor
+    tilt: Tensor
+
+
+def _sliced_by_pixel(
+    tables: OrderTables, table: PatternTable, material: Tensor, edges_nm: NDArray[np.float64], lit: list[_Lit]
+) -> Tensor:
+    """`order_light` on the processor, of patterns that vary one way only."""
+    from dsl_core.simulation.rendering.kernels import add_order_rows, add_order_slices
+
+    total = torch.zeros_like(tables.middle_px)
+    nodes = chebyshev_nodes(NM[0], NM[-1])
+    for led, used, mean, tilt in lit:
+        edges = edges_nm[used.start : used.stop + 1]
+        to_edges = np.ascontiguousarray(interpolation_matrix(nodes, edges).T, np.float32)
+        weights, tilts = (w[used].T.contiguous().numpy() for w in (mean, tilt))
+        if table.along_rows:
+            first = table.integrals[0][led, 0].numpy()
+            add_order_rows(
+                total.numpy(), to_edges, tables.node_columns.numpy(), tables.node_rows.numpy(), first,
+                table.oversample[1], table.width_px, SHORT_PX, material.numpy(), weights,
+            )  # fmt: skip
+            continue
+        first, second = (each[led, 0].numpy() for each in table.integrals if each is not None)
+        add_order_slices(
+            total.numpy(), to_edges, tables.node_columns.numpy(), (first, second), table.oversample[0],
+            edges.astype(np.float32), _numpy(tables.limits_nm), material.numpy(), weights, tilts,
+        )  # fmt: skip
     return total
 
 

@@ -51,14 +51,20 @@ class PatternTable:
         cls, colour: NDArray[np.uint8], response: ProjectorResponse, device: torch.device
     ) -> PatternTable:
         """Table of drive levels, (height, width, 3); those of patterns that vary one way only are kept."""
-        levels = without_colour(colour)
-        if (levels == levels[:1]).all():
-            levels = levels[:1]
-        elif (levels[:, 1:] == levels[:, :-1]).all():
-            levels = levels[:, :1]
-        else:
+        return cls.of_strip(without_repeats(colour), colour.shape[:2], response, device)
+
+    @classmethod
+    def of_strip(
+        cls,
+        levels: NDArray[np.uint8],
+        size: tuple[int, ...],
+        response: ProjectorResponse,
+        device: torch.device,
+    ) -> PatternTable:
+        """The same from levels `without_repeats`, and the size (height, width) of the image."""
+        if 1 not in levels.shape[:2]:
             return cls.of(_radiance(levels, response), response, device)
-        return _of_strip(levels.tobytes(), levels.shape, colour.shape[:2], response, device)
+        return _of_strip(levels.tobytes(), levels.shape, (size[0], size[1]), response, device)
 
     @classmethod
     def of(
@@ -67,9 +73,21 @@ class PatternTable:
         """Make the table of a radiance image, shape (height, width, LEDs)."""
         flat = bool((radiance == radiance[:1]).all())
         upright = not flat and bool((radiance == radiance[:, :1]).all())
-        height, width = radiance.shape[:2]
-        kx, ky = (FINE, 1) if flat else (COARSE, FINE if upright else COARSE)
         strip = radiance[:1] if flat else radiance[:, :1] if upright else radiance
+        return cls._of(strip, radiance.shape[:2], response, device)
+
+    @classmethod
+    def _of(
+        cls,
+        strip: NDArray[np.float64],
+        size: tuple[int, ...],
+        response: ProjectorResponse,
+        device: torch.device,
+    ) -> PatternTable:
+        """Table of radiances, one row or column of which is given if they repeat over the size."""
+        flat, upright = len(strip) == 1, len(strip) > 1 and strip.shape[1] == 1
+        height, width = size
+        kx, ky = (FINE, 1) if flat else (COARSE, FINE if upright else COARSE)
         source = torch.from_numpy(np.moveaxis(strip, 2, 0).astype(np.float32)).to(device)
         sides = _spread(width, kx, response, True).to(device)
         pixels, kept = (height, ky) if upright else (width, kx)
@@ -160,11 +178,21 @@ class PatternTable:
         return nearest.mul_(table.shape[1])
 
 
-def without_colour(levels: NDArray[np.uint8]) -> NDArray[np.uint8]:
-    """Drive levels (height, width, 3) as (height, width, 1) if all of them are grey, as they are if not."""
+def without_repeats(levels: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    """Drive levels (height, width, 3) once for all rows or columns, and colours, if they are alike there."""
+    if levels.strides[2] == 0:
+        levels = levels[..., :1]
+    height, _, colours = levels.shape
+    # Rows of bytes are compared many at once, pixels of three bytes one by one.
+    rows = levels.reshape(height, -1)
+    if (rows[1:] == rows[:-1]).all():
+        levels = levels[:1]
+    elif (rows[:, colours:] == rows[:, :-colours]).all():
+        levels = levels[:, :1]
+    if colours == 1:
+        return levels
     red, green, blue = np.moveaxis(levels, 2, 0)
-    grey = levels.strides[2] == 0 or ((red == green).all() and (red == blue).all())
-    return levels[..., :1] if grey else levels
+    return levels[..., :1] if (red == green).all() and (red == blue).all() else levels
 
 
 def between(start: Edge, stop: Edge) -> tuple[Tensor, Tensor]:
@@ -211,7 +239,7 @@ def _of_strip(
     Calibrations show the same codes at every pose and position.
     """
     strip = _radiance(np.frombuffer(levels, np.uint8).reshape(shape), response)
-    return PatternTable.of(np.broadcast_to(strip, (*size, shape[2])), response, device)
+    return PatternTable._of(strip, size, response, device)
 
 
 @lru_cache(maxsize=12)

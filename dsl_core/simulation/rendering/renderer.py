@@ -9,8 +9,9 @@ from __future__ import annotations
 
 import copy
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import nullcontext
 from dataclasses import replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import torch
@@ -21,19 +22,36 @@ from dsl_core.model.rig import Rig
 from dsl_core.model.spectral import SpectralCurve
 from dsl_core.optics.correspondence import zero_order
 from dsl_core.optics.line_profile import zero_order_profile
-from dsl_core.optics.pinhole import pixel_rays
-from dsl_core.optics.sensor import bayer_channels, relative_gain
-from dsl_core.simulation.rendering.first_orders import Runs, add_band, order_light, white_runs
+from dsl_core.optics.sensor import bayer_channels
+from dsl_core.simulation.rendering.first_orders import Runs, add_bands, by_pixel, order_light, white_runs
 from dsl_core.simulation.rendering.order_tables import OrderTables
-from dsl_core.simulation.rendering.pattern_table import PatternTable
-from dsl_core.simulation.rendering.spectral_tables import BROAD, NARROW, NM, SpectralTables, zero_table
+from dsl_core.simulation.rendering.pattern_table import PatternTable, without_repeats
+from dsl_core.simulation.rendering.shading import surface_shading
+from dsl_core.simulation.rendering.spectral_tables import (
+    BROAD,
+    NARROW,
+    NM,
+    ORDERS,
+    SpectralTables,
+    zero_table,
+)
 from dsl_core.simulation.scenes.truth import Parts, SceneTruth
 
-ORDERS = (1, -1, 2, -2)
 THREADS = 2
 #: Patterns with more runs of lit columns than this are summed over slices; behind a filter, slices would blur
 #: the narrow images of the lines.
-MAX_RUNS, MAX_RUNS_FILTERED = 8, 64
+MAX_RUNS, MAX_RUNS_FILTERED = 24, 64
+#: With more runs the zero order is looked up in the pattern's table, but for the filter's narrow images.
+MAX_RUNS_EXACT = 8
+#: Orders are shared among threads in pictures with more light paths than this.
+SHARED_FROM = 1 << 16
+
+
+class _Light(NamedTuple):
+    """Runs of white and a table of the pattern: of two the zero order has the table, the others the runs."""
+
+    runs: Runs | None
+    table: PatternTable | None
 
 
 class Renderer:
@@ -127,20 +145,35 @@ class Renderer:
         other._white, other._colours = None, ()
         return other
 
-    def _light(self, colour: NDArray[np.uint8]) -> Runs | PatternTable:
+    def _light(self, colour: NDArray[np.uint8]) -> _Light:
         """A few bands of white, or any other pattern as a table."""
-        runs = white_runs(colour)
-        most = MAX_RUNS if self.slicing is BROAD else MAX_RUNS_FILTERED
-        if runs is None or len(runs) > most:
-            return PatternTable.of_levels(colour, self.response, self.device)
-        return runs
+        levels = without_repeats(colour)
+        runs, broad = white_runs(levels), self.slicing is BROAD
+        if runs is not None and len(runs) > (MAX_RUNS if broad else MAX_RUNS_FILTERED):
+            runs = None
+        if runs is not None and (len(runs) <= MAX_RUNS_EXACT or not broad):
+            return _Light(runs, None)
+        return _Light(runs, PatternTable.of_strip(levels, colour.shape, self.response, self.device))
 
-    def _signal(self, light: Runs | PatternTable) -> Tensor:
-        if isinstance(light, PatternTable):
-            return (self._sliced(light) + self._black()) * self.shading
-        return self._lines(light) * self.shading
+    def _signal(self, light: _Light) -> Tensor:
+        signal = torch.zeros_like(self.column) + self._black()
+        response, bands = self.rig.projector_response, np.zeros((0, 3), np.float32)
+        if light.runs:
+            radiance = [response.radiance(level) - response.black_fraction for *_, level in light.runs]
+            bands = np.column_stack([np.asarray(light.runs)[:, :2], radiance]).astype(np.float32)
+        if light.table is None:
+            self._add_zero_bands(signal, bands)
+        else:
+            self._add_zero_table(signal, light.table)
+        if light.runs is None:
+            assert light.table is not None
+            self._add_slices(signal, light.table)
+        else:
+            for tables in self.orders:
+                add_bands(signal, tables, self.material_channel, bands)
+        return signal * self.shading
 
-    def _picture(self, light: Runs | PatternTable) -> NDArray[np.float32]:
+    def _picture(self, light: _Light) -> NDArray[np.float32]:
         out = torch.zeros(self.shape[0] * self.shape[1], device=self.device)
         out.index_add_(0, self.pixels, self._signal(light))
         return out.reshape(self.shape).cpu().numpy()
@@ -152,56 +185,64 @@ class Renderer:
             return 0.0
         if self._white is None:
             h, w = self.rig.projector.height_px, self.rig.projector.width_px
+            signal = torch.zeros_like(self.column)
             if self.slicing is BROAD:
-                self._white = self._sliced(PatternTable.of(np.ones((h, w, 1)), self.response, self.device))
+                white = PatternTable.of(np.ones((h, w, 1)), self.response, self.device)
+                self._add_zero_table(signal, white)
+                self._add_slices(signal, white)
             else:
-                self._white = torch.zeros_like(self.column)
-                self._add_band(self._white, -0.5, w - 0.5, 1.0)
+                bands = np.array([[-0.5, w - 0.5, 1.0]], np.float32)
+                self._add_zero_bands(signal, bands)
+                for tables in self.orders:
+                    add_bands(signal, tables, self.material_channel, bands)
+            self._white = signal
         return black * self._white
 
-    def _lines(self, runs: Runs) -> Tensor:
-        signal = torch.zeros_like(self.column) + self._black()
-        response = self.rig.projector_response
-        for start, stop, level in runs:
-            self._add_band(signal, start, stop, float(response.radiance(level)) - response.black_fraction)
-        return signal
+    def _add_zero_bands(self, signal: Tensor, bands: NDArray[np.float32]) -> None:
+        """Add the zero order of white columns, (n, 3) of start, stop (px) and radiance."""
+        zero, response = self.zero_table.sum(0), self.response
+        if by_pixel(signal) and response.spread is None:
+            from dsl_core.simulation.rendering.kernels import add_zero_runs
 
-    def _add_band(self, signal: Tensor, start: float, stop: float, radiance: float) -> None:
-        """Add the light of white columns between two edges (px)."""
-        zero = self.zero_table.sum(0)[self.material_channel]
-        signal += radiance * zero * zero_order_profile(self.column, start, stop, self.response)
-        for tables in self.orders:
-            add_band(signal, tables, self.material_channel, start, stop, radiance)
+            add_zero_runs(
+                signal.numpy(), self.column.numpy(), bands, zero.numpy(), self.material_channel.numpy(),
+                response.blur_px, response.halo_peak_per_px * response.halo_decay_px, response.halo_decay_px,
+            )  # fmt: skip
+            return
+        for start, stop, radiance in bands.tolist():
+            light = zero_order_profile(self.column, start, stop, response)
+            signal += radiance * zero[self.material_channel] * light
 
-    def _sliced(self, table: PatternTable) -> Tensor:
-        signal = torch.zeros_like(self.column)
+    def _add_zero_table(self, signal: Tensor, table: PatternTable) -> None:
+        """Add the zero order of any pattern."""
         for led, shown in enumerate(table.leds_shown):
-            zero = self.zero_table[shown].sum(0)[self.material_channel]
-            signal += zero * table.at(led, self.column, self.row)
+            zero = self.zero_table[shown].sum(0)
+            if not by_pixel(signal) or (table.has_rows and not table.along_rows):
+                signal += zero[self.material_channel] * table.at(led, self.column, self.row)
+                continue
+            from dsl_core.simulation.rendering.kernels import add_zero_table
+
+            across = np.zeros(0, np.float32) if table.across is None else table.across.numpy()
+            add_zero_table(
+                signal.numpy(), self.column.numpy(), self.row.numpy(), table.blurred[led, 0].numpy(), across,
+                table.oversample, zero.numpy(), self.material_channel.numpy(),
+            )  # fmt: skip
+
+    def _add_slices(self, signal: Tensor, table: PatternTable) -> None:
+        """Add the light of all orders of the film by slices of the spectrum."""
         orders = [tables for tables in self.orders if len(tables.active)]
+
+        def light(tables: OrderTables) -> Tensor:
+            return order_light(tables, table, self.material_channel, self.slicing)
+
         # Orders are independent, so each core takes its share of them.
-        with ThreadPoolExecutor(THREADS) as pool:
-            parts = pool.map(lambda t: order_light(t, table, self.material_channel, self.slicing), orders)
+        share = len(signal) > SHARED_FROM
+        with ThreadPoolExecutor(THREADS) if share else nullcontext() as pool:
+            parts = map(light, orders) if pool is None else pool.map(light, orders)
             for tables, part in zip(orders, parts, strict=True):
                 signal[tables.active] += part
-        return signal
 
 
 def as_colour(image: NDArray[np.uint8]) -> NDArray[np.uint8]:
     """Drive levels (height, width, 3) of an image that may be grey."""
-    return image if image.ndim == 3 else np.repeat(image[..., None], 3, 2)
-
-
-def surface_shading(rig: Rig, truth: SceneTruth, shaded: bool = True) -> NDArray[np.float64]:
-    """Cosine of incidence times inverse square distance times gain, zero in shadow, (rows, columns).
-
-    Without ``shaded``, what is lit is lit like a surface at the reference distance facing the projector.
-    """
-    if not shaded:
-        return np.asarray(truth.lit * relative_gain(rig))
-    points = pixel_rays(rig.camera) * np.nan_to_num(truth.depth_mm, nan=1.0)
-    to_light = rig.pose.projector_centre_mm[:, None, None] - points
-    distance = np.linalg.norm(to_light, axis=0)
-    cosine = (np.nan_to_num(truth.normals) * to_light).sum(0) / distance
-    light = cosine.clip(min=0) * (rig.reference_distance_mm / distance) ** 2 * truth.lit
-    return np.asarray(light * relative_gain(rig))
+    return image if image.ndim == 3 else np.broadcast_to(image[..., None], (*image.shape, 3))

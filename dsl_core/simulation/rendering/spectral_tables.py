@@ -3,17 +3,21 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
-import torch
 from numpy.typing import NDArray
-from torch import Tensor
 
 from dsl_core.model.rig import Rig
 from dsl_core.optics.spectra import chain_response
 
+if TYPE_CHECKING:
+    import torch
+    from torch import Tensor
+
 NM = np.arange(400.0, 701.0)
+#: Orders of the film besides the zero order.
+ORDERS = (1, -1, 2, -2)
 
 
 class Slicing(NamedTuple):
@@ -100,4 +104,6 @@ def _cumulative(density: NDArray[np.float64], sigma_nm: float) -> NDArray[np.flo
 
 
 def _tensor(array: NDArray[Any], device: torch.device) -> Tensor:
+    import torch
+
     return torch.as_tensor(np.ascontiguousarray(array), device=device, dtype=torch.float32)

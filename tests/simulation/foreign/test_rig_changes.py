@@ -18,7 +18,8 @@ from dsl_core.simulation.foreign.rig_changes import (
 from dsl_core.simulation.foreign.variants import Foreign
 from dsl_core.simulation.published_rig import published_rig
 from dsl_core.simulation.random_rig import random_rig
-from dsl_core.simulation.sim_devices import SimCamera, open_twin, spot_light
+from dsl_core.simulation.sim_devices import SimCamera, open_twin
+from dsl_core.simulation.spot_light import spot_light
 
 RIG = published_rig()
 NM = np.arange(420.0, 681.0, 2.0)

@@ -61,6 +61,28 @@ def test_lines_and_slices_render_the_same_light(
     assert np.abs(lines - sliced)[dim].max() < 4e-4 * scale
 
 
+@pytest.mark.parametrize("film", [True, False])
+def test_loops_over_pixels_and_operations_over_arrays_render_the_same(
+    film: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    some = renderer(small_rig(black_fraction=0.01), film=film)
+    drawn = np.random.default_rng(3).integers(0, 256, (360, 640, 3)).astype(np.uint8)
+    images = {
+        "line": bands_of_columns((300, 305)),
+        "beside the frame": bands_of_columns((0, 3), (600, 640), level=90),
+        "comb": bands_of_columns(*((start, start + 5) for start in range(20, 640, 52))),
+        "code": bands_of_columns(*((start, start + 2) for start in range(0, 640, 4))),
+        "colours": np.repeat(drawn[:1], 360, 0),
+        "rows": np.repeat(drawn[:, :1], 640, 1),
+    }
+    looped = {name: some.expected(image) for name, image in images.items()}
+    monkeypatch.setattr("dsl_core.simulation.rendering.renderer.by_pixel", lambda signal: False)
+    monkeypatch.setattr("dsl_core.simulation.rendering.first_orders.by_pixel", lambda signal: False)
+    for name, image in images.items():
+        assert looped[name] == pytest.approx(some.expected(image), abs=3e-5 * float(looped[name].max())), name
+        assert looped[name].max() > 0
+
+
 def test_disjoint_bands_add_up_to_white(chart: Renderer) -> None:
     edges = range(0, 641, 80)
     parts = sum(
