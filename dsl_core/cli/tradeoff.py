@@ -43,6 +43,7 @@ def tradeoff(
     from dsl_core.devices.registry import open_rig
     from dsl_core.io.plan_file import save_plan
     from dsl_core.planning.choice import choose, pareto, possible_plans, weigh
+    from dsl_core.planning.store import PredictionStore, store_folder
 
     output, budget_s = Output(json), None if budget is None else parse_seconds(budget)
     if error is not None and not 0 < error < math.inf:
@@ -54,7 +55,10 @@ def tradeoff(
     view = _view(known, look)
     with output.progress() as progress:
         limit_s = None if report else budget_s
-        weighed = weigh(known, plans, view, latency_ms=latency_ms, budget_s=limit_s, progress=progress)
+        store = PredictionStore(store_folder(), known, latency_ms) if view is None else None
+        weighed = weigh(
+            known, plans, view, latency_ms=latency_ms, budget_s=limit_s, progress=progress, store=store
+        )
     chosen = choose(weighed, budget_s, error)
     _tell(output, pareto(weighed), chosen)
     if report is not None:

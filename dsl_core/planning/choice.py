@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
+from typing import TYPE_CHECKING
 
 from dsl_core.capture.preflight import find_obstacles
 from dsl_core.devices.base import DeviceRig
@@ -15,10 +16,13 @@ from dsl_core.errors import PlanError
 from dsl_core.model.plan import CapturePlan, GrayCode, LineComb, ScanLines, Sentinels, Setting, SpectralSet
 from dsl_core.model.rig import Rig
 from dsl_core.planning.designed import designed_sets
-from dsl_core.planning.prediction import Prediction, predict
-from dsl_core.planning.samples import SamplePixels, plane_samples
+from dsl_core.planning.expected import Prediction
 from dsl_core.progress import NoProgress, Progress
 from dsl_core.solve.front import front
+
+if TYPE_CHECKING:
+    from dsl_core.planning.samples import SamplePixels
+    from dsl_core.planning.store import PredictionStore
 
 #: Width and step of single lines; width, step and period of combs, px; those whose two edges fall between
 #: different columns find the column best.
@@ -53,15 +57,29 @@ def weigh(
     latency_ms: float = 0.0,
     budget_s: float | None = None,
     progress: Progress | None = None,
+    store: PredictionStore | None = None,
 ) -> list[Weighed]:
-    """Predict every plan that takes no longer than the budget."""
+    """Predict every plan that takes no longer than the budget.
+
+    A ``store`` of the same rig, latency and view is asked first, and keeps what is new.
+    """
     progress = progress or NoProgress()
-    view = view or plane_samples(rig)
     todo = [plan for plan in plans if budget_s is None or plan.duration_s(latency_ms) <= budget_s]
     found = []
     for done, plan in enumerate(todo, 1):
-        found.append(Weighed(plan, predict(rig, plan, view, latency_ms=latency_ms, peaks=False)))
+        expected = None if store is None else store.find(plan, peaks=False)
+        if expected is None:
+            from dsl_core.planning.prediction import predict
+            from dsl_core.planning.samples import plane_samples
+
+            view = view or plane_samples(rig)
+            expected = predict(rig, plan, view, latency_ms=latency_ms, peaks=False)
+            if store is not None:
+                store.keep(plan, expected, peaks=False)
+        found.append(Weighed(plan, expected))
         progress.report("plans", done, len(todo))
+    if store is not None:
+        store.save()
     return found
 
 

@@ -15,13 +15,13 @@ from numpy.typing import NDArray
 
 from dsl_core.errors import DecodeError, PlanError
 from dsl_core.evaluation.spectral import peak_width, spectral_errors
-from dsl_core.model.base import Record
 from dsl_core.model.plan import CapturePlan, NoSpectral
 from dsl_core.model.rig import Rig
 from dsl_core.model.spectral import WavelengthGrid
 from dsl_core.optics.line_set import LineSet
 from dsl_core.optics.spectra import Bands
 from dsl_core.planning import references
+from dsl_core.planning.expected import Prediction
 from dsl_core.planning.samples import SamplePixels, plane_samples
 from dsl_core.planning.virtual import Outcome, VirtualPixels
 from dsl_core.reconstruction.scan_result import DECIDED_FROM
@@ -41,31 +41,6 @@ REFERENCE_MM = 700.0
 LINES_S, EXPOSURE_S = 41.0, 0.042
 DENSE_S, PATTERN_S = 229.0, 9.9
 BANDS = 47
-
-
-class Prediction(Record):
-    """Expected figures of a plan; what its scan is expected to reach.
-
-    ``pixel_*`` are of single pixels, the others of patch means. ``fwhm_nm`` is how wide a 10 nm filter
-    looks. ``coverage`` is the share of the picture that gets a depth, ``decided`` the share of bands that
-    data decide. ``seconds`` is latency and exposures, ``raw_bytes`` before compression. ``depth_std_mm`` is
-    without the calibration's share.
-    """
-
-    frames: int
-    spectral_frames: int
-    seconds: float
-    raw_bytes: int
-    computing_s: float
-    rmse: float
-    pixel_rmse: float
-    angle_rad: float
-    pixel_angle_rad: float
-    delta_e: float
-    fwhm_nm: float | None
-    depth_std_mm: float
-    coverage: float
-    decided: float
 
 
 def predict(

@@ -18,7 +18,8 @@ from dsl_core.model.plan import CapturePlan, GrayCode, LineComb, ScanLines, Sett
 from dsl_core.model.rig import Rig
 from dsl_core.model.spectral import WavelengthGrid
 from dsl_core.planning import references
-from dsl_core.planning.prediction import Prediction, predict
+from dsl_core.planning.expected import Prediction
+from dsl_core.planning.prediction import predict
 from dsl_core.simulation.published_rig import published_rig
 from dsl_core.simulation.sim_devices import LATENCY_MS
 from tests.benchmarks.common import options, print_table, write_json

@@ -19,7 +19,7 @@ from dsl_core.io.plan_file import load_plan, save_plan
 from dsl_core.model.plan import CapturePlan, GrayCode, LineComb
 from dsl_core.planning.choice import Weighed, candidate_plans, choose, pareto, possible_plans, weigh
 from dsl_core.planning.designed import DesignedSet, load_design, packed, save_design
-from dsl_core.planning.prediction import Prediction
+from dsl_core.planning.expected import Prediction
 from dsl_core.planning.report import write_tradeoff_report
 from dsl_core.planning.samples import plane_samples
 from dsl_core.simulation.published_rig import published_rig

@@ -8,7 +8,8 @@ from dsl_core.errors import PlanError
 from dsl_core.model.plan import CapturePlan, GrayCode, LineComb, NoCode, NoSpectral, ScanLines, Setting
 from dsl_core.model.presets import PRESETS, Preset
 from dsl_core.planning import references
-from dsl_core.planning.prediction import Prediction, predict
+from dsl_core.planning.expected import Prediction
+from dsl_core.planning.prediction import predict
 from dsl_core.planning.samples import plane_samples
 from dsl_core.simulation.published_rig import published_rig
 from tests.cases.trial import run_trial, trial_samples

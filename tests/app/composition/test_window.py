@@ -64,10 +64,11 @@ def test_accuracy_is_predicted_in_the_background_and_closing_ends_it(
     qtbot: QtBot, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     from dsl_core.planning import prediction
+    from dsl_core.planning.expected import Prediction
 
     monkeypatch.setenv("DSL_SCAN_HOME", str(tmp_path))
 
-    def predict(rig: Rig, plan: CapturePlan, view: object, latency_ms: float) -> prediction.Prediction:
+    def predict(rig: Rig, plan: CapturePlan, view: object, latency_ms: float) -> Prediction:
         time.sleep(0.05)
         return made_up_prediction(rig, plan, latency_ms)
 

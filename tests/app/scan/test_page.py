@@ -256,7 +256,7 @@ def figures(page: ScanPage, column: int) -> dict[str, str]:
 def begin(qtbot: QtBot, page: ScanPage) -> ForecastState:
     control = page.forecast._controller
     assert isinstance(control, ForecastController)
-    control.begin()
+    control.predict_all()
     qtbot.waitUntil(lambda: control.state.progress.value == (0, 0), timeout=60_000)
     return control.state
 

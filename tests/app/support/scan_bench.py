@@ -23,7 +23,7 @@ from dsl_core.model.rig import Rig
 from tests.app.support.doubles import InlineRunner, RecordingNotifier
 
 if TYPE_CHECKING:
-    from dsl_core.planning.prediction import Prediction
+    from dsl_core.planning.expected import Prediction
 
 TWIN = RigChoice("twin", (("scene", "color-checker"), ("size", "64x48")))
 #: A rig of another size.
@@ -104,7 +104,7 @@ def make_forecast(
 
 def made_up_prediction(rig: Rig, plan: CapturePlan, latency_ms: float) -> Prediction:
     """A prediction that takes no time: errors fall with time and grow with noise."""
-    from dsl_core.planning.prediction import Prediction
+    from dsl_core.planning.expected import Prediction
 
     seconds = plan.duration_s(latency_ms)
     error = (1 + rig.sensor.read_noise_dn) / seconds

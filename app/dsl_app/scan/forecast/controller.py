@@ -33,7 +33,9 @@ NO_CALIBRATION = (
 class ForecastController:
     """Predicts presets, candidates and the current plan in one job that can be stopped and restarted.
 
-    ``folder`` caches predictions. Unless ``automatic``, only `begin` starts the job.
+    ``folder`` caches predictions. Unless ``automatic``, only `begin` starts the job; if so, it starts while
+    the page is open. What is not cached is predicted for presets and the current plan, and for all candidates
+    on request.
     """
 
     def __init__(
@@ -50,7 +52,8 @@ class ForecastController:
     ) -> None:
         self.state, self._scan, self._rig, self._plans = state, scan, rig, plans
         self._runner, self._notifier, self._folder = runner, notifier, folder
-        self._automatic, self._candidates = automatic, candidates
+        self._may_start, self._candidates = automatic, candidates
+        self._is_open = self._wants_all = False
         self._known: dict[int, ForecastPoint] = {}
         self._refused: dict[int, str] = {}
         self._work: ForecastJob | None = None
@@ -65,6 +68,16 @@ class ForecastController:
             scan.phase.changed.connect(self._phase_changed),
             scan.result.connect(self._measure),
         ]
+
+    @property
+    def _automatic(self) -> bool:
+        return self._may_start and self._is_open
+
+    def open(self, is_open: bool) -> None:
+        """Whether the page that shows predictions is open."""
+        self._is_open = is_open
+        if self._automatic:
+            self.begin()
 
     # Predict ---------------------------------------------------------------------------------------
 
@@ -88,7 +101,9 @@ class ForecastController:
             return
         self._stop()
         self._of, self._known, self._refused, self._is_complete = now, {}, {}, False
+        self._wants_all = False
         self.state.points.set(())
+        self.state.left.set(0)
         self._show_current()
         self.state.answer.set("")
         if self._automatic:
@@ -102,7 +117,7 @@ class ForecastController:
         if self._is_complete and (identity(plan) in self._known or identity(plan) in self._refused):
             return
         candidates = None if self._is_complete else self._candidates
-        self._work = work = ForecastJob(self._of, self._folder, candidates, self._must_wait)
+        self._work = work = ForecastJob(self._of, self._folder, candidates, self._must_wait, self._wants_all)
         work.want(plan)
         self._job = job = Job(
             "Predict accuracy against time",
@@ -115,6 +130,11 @@ class ForecastController:
         # The total is not known yet, but show that something is running.
         self.state.progress.set((0, 1))
         self._runner.submit(job)
+
+    def predict_all(self) -> None:
+        """Predict all candidates as well."""
+        self._wants_all, self._is_complete = True, False
+        self.begin()
 
     def _must_wait(self) -> bool:
         return any(not job.is_minor for job in self._runner.active)
@@ -130,6 +150,8 @@ class ForecastController:
             return  # its predictions are for another rig
         self.take_news()
         self._is_complete = True
+        if complete and work.asked_for_candidates:
+            self.state.left.set(work.left)
         self._stop()
         if complete and self._automatic:
             # The plan may have changed just before the job ended.

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from dsl_app.scan.forecast.state import MeasuredScan
 
 if TYPE_CHECKING:
-    from dsl_core.planning.prediction import Prediction
+    from dsl_core.planning.expected import Prediction
 
 NOTHING = "–"
 

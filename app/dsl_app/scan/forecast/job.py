@@ -11,7 +11,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from dsl_app.scan.forecast.state import ForecastPoint, identity
-from dsl_app.scan.forecast.store import ForecastStore
 from dsl_core.errors import DslError
 from dsl_core.model.plan import CapturePlan
 from dsl_core.model.presets import PRESETS, on_cycles
@@ -19,8 +18,9 @@ from dsl_core.model.rig import Rig
 from dsl_core.progress import Progress
 
 if TYPE_CHECKING:
-    from dsl_core.planning.prediction import Prediction
+    from dsl_core.planning.expected import Prediction
     from dsl_core.planning.samples import SamplePixels
+    from dsl_core.planning.store import PredictionStore
 
 #: Interval at which to check whether other work has ended, s.
 LOOK_S = 0.1
@@ -67,8 +67,9 @@ class ForecastBasis:
 class ForecastJob:
     """Predicts presets, then candidates; `work` belongs to the job's thread, everything else to the window's.
 
-    Without candidates only the requested plan is predicted. ``must_wait`` tells whether other work has
-    priority.
+    Of the candidates only known ones are shown, unless ``all_plans`` are to be predicted; ``left`` counts the
+    others. Without candidates only the requested plan is predicted. ``must_wait`` tells whether other work
+    has priority.
     """
 
     def __init__(
@@ -77,13 +78,19 @@ class ForecastJob:
         folder: Path,
         candidates: Callable[[Rig], Iterable[CapturePlan]] | None,
         must_wait: Callable[[], bool],
+        all_plans: bool = False,
     ) -> None:
-        self.rigging = rigging
+        self.rigging, self.left, self._all = rigging, 0, all_plans
         self._folder, self._candidates, self._must_wait = folder, candidates, must_wait
         self._lock = threading.Lock()
         self._wanted: CapturePlan | None = None
         self._news: list[ForecastPoint | Refused] = []
         self._view: SamplePixels | None = None
+
+    @property
+    def asked_for_candidates(self) -> bool:
+        """Whether candidates were looked at."""
+        return self._candidates is not None
 
     # In the window's thread ------------------------------------------------------------------------
 
@@ -102,15 +109,19 @@ class ForecastJob:
 
     def work(self, progress: Progress) -> None:
         """Predict everything that is not cached; raises `DslError` if nothing can be predicted at all."""
-        from dsl_core.planning import choice as _choice  # noqa: F401 - the window needs it soon
+        from dsl_core.planning.store import PredictionStore
 
         rig = self.rigging.rig
-        store = ForecastStore(self._folder, rig, self.rigging.latency_ms, self.rigging.scene)
+        store = PredictionStore(self._folder, rig, self.rigging.latency_ms, self.rigging.scene)
         presets = {identity(p): key for key, p in self._presets()}
         seen: dict[int, CapturePlan] = {}
         if self._candidates is not None:
             for plan in (*(p for _, p in self._presets()), *self._candidates(rig)):
-                seen.setdefault(identity(plan), plan)
+                key = identity(plan)
+                if self._all or key in presets or store.find(plan.sized(rig.camera, rig.projector)):
+                    seen.setdefault(key, plan)
+                elif key not in seen:
+                    self.left += 1
         todo = deque(seen.values())
         try:
             while (turn := self._next(todo)) is not None:
@@ -143,7 +154,7 @@ class ForecastJob:
         with self._lock:
             self._news.append(news)
 
-    def _of(self, plan: CapturePlan, store: ForecastStore, preset: str) -> ForecastPoint | Refused:
+    def _of(self, plan: CapturePlan, store: PredictionStore, preset: str) -> ForecastPoint | Refused:
         rig = self.rigging.rig
         sized = plan.sized(rig.camera, rig.projector)
         known = store.find(sized)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from PySide6.QtCore import Qt
+from PySide6.QtGui import QHideEvent, QShowEvent
 from PySide6.QtWidgets import QAbstractItemView, QFrame, QHeaderView, QWidget
 
 from dsl_app.scan.forecast.controller import ForecastController
@@ -51,6 +52,8 @@ class ForecastPanel(QWidget):
         )
         tip = "Find the most accurate plan within that time, or the quickest within that error"
         self.ask = push_button("Find plan", tip, self._ask)
+        tip = "Predict all plans that the planner considers, which takes about a minute"
+        self.all = push_button("Predict all plans", tip, controller.predict_all)
         self._answer, self._note = label("", wraps=True), label("", "muted", wraps=True)
         self._timer = Ticker(self, FETCH_MS, controller.take_news)
         self._lay_out()
@@ -61,6 +64,7 @@ class ForecastPanel(QWidget):
         column_of(
             (self.curve, 1),
             self._note,
+            row_of(self.all, STRETCH),
             wish,
             self._answer,
             self.table,
@@ -80,6 +84,7 @@ class ForecastPanel(QWidget):
             *follow_any(self._show_points, state.points, state.current),
             *follow_any(self._show_figures, state.measured),
             *follow_any(self._show_note, state.progress, state.trouble, state.refusal),
+            *follow_any(self._show_rest, state.progress, state.left),
             *follow_any(self._show_scene, state.look, state.last_look),
             state.answer.follow(lambda text: show_label(self._answer, LabelState(text))),
         ]
@@ -177,12 +182,29 @@ class ForecastPanel(QWidget):
         self._note.setText(text)
         self._enable_search()
 
+    def _show_rest(self) -> None:
+        left, (_, total) = self._state.left.value, self._state.progress.value
+        self.all.setText(f"Predict {left} more plans")
+        self.all.setVisible(bool(left))
+        self.all.setEnabled(not total and not self._is_fixed)
+
+    def showEvent(self, event: QShowEvent) -> None:
+        """Predictions are made while they can be seen."""
+        super().showEvent(event)
+        self._controller.open(True)
+
+    def hideEvent(self, event: QHideEvent) -> None:
+        """What runs goes on; nothing new is begun."""
+        super().hideEvent(event)
+        self._controller.open(False)
+
     def fix(self, fixed: bool) -> None:
         """Disable choices while a scan is running."""
         self._is_fixed = fixed
         if self.curve.made is not None:
             self.curve.made.fix(fixed)
         self._enable_search()
+        self._show_rest()
 
     def _enable_search(self) -> None:
         for box in (self.wish, self.budget, self.error):

@@ -13,8 +13,7 @@ from dsl_core.model.plan import CapturePlan
 from dsl_core.model.presets import PRESETS
 
 if TYPE_CHECKING:
-    # Importing it imports torch, which only jobs may wait for.
-    from dsl_core.planning.prediction import Prediction
+    from dsl_core.planning.expected import Prediction
 
 #: The preset whose plan is the published one.
 PUBLISHED = "reference"
@@ -72,8 +71,9 @@ class ForecastState:
 
     ``points`` are the plans predicted so far, ``current`` is the current plan (None while unknown;
     ``trouble`` or, for this plan alone, ``refusal`` says why). ``progress`` counts plans done and in total
-    (0 of 0: nothing is computed). ``answer`` answers a budget of time or error. ``look`` is the result whose
-    scene is planned for (None: a Color Checker), ``last_look`` the latest one.
+    (0 of 0: nothing is computed), ``left`` those that are predicted on request only. ``answer`` answers a
+    budget of time or error. ``look`` is the result whose scene is planned for (None: a Color Checker),
+    ``last_look`` the latest one.
     """
 
     def __init__(self) -> None:
@@ -82,6 +82,7 @@ class ForecastState:
         self.trouble = Value("")
         self.refusal = Value("")
         self.progress = Value((0, 0))
+        self.left = Value(0)
         self.answer = Value("")
         self.look: Value[Path | None] = Value(None)
         self.last_look: Value[Path | None] = Value(None)

@@ -7,7 +7,6 @@ from dsl_app.connection.state import RigChoice
 from dsl_app.scan.forecast.controller import NO_CALIBRATION, ForecastController
 from dsl_app.scan.forecast.job import ForecastBasis, ForecastJob
 from dsl_app.scan.forecast.state import ForecastPoint, ForecastState, identity, plan_title
-from dsl_app.scan.forecast.store import ForecastStore
 from dsl_app.scan.state import Phase
 from dsl_app.shared.jobs.base import Job
 
@@ -17,6 +16,8 @@ from dsl_core.model.plan import CapturePlan, LineComb, NoSpectral
 from dsl_core.model.presets import PRESETS
 from dsl_core.model.rig import Rig
 from dsl_core.planning import prediction, samples
+from dsl_core.planning.expected import Prediction
+from dsl_core.planning.store import PredictionStore
 from tests.app.support.doubles import InlineRunner
 from tests.app.support.scan_bench import (
     COMB,
@@ -32,7 +33,9 @@ from tests.app.support.small_result import write_small_result
 
 
 def forecast(bench: ScanBench, folder: Path, automatic: bool = True) -> ForecastController:
-    return make_forecast(bench, ForecastState(), folder / "forecasts", automatic=automatic)
+    made = make_forecast(bench, ForecastState(), folder / "forecasts", automatic=automatic)
+    made.open(True)
+    return made
 
 
 @pytest.fixture
@@ -48,7 +51,7 @@ def counted(monkeypatch: pytest.MonkeyPatch) -> list[str]:
     """Names of plans that were predicted, by a prediction that takes no time."""
     seen = list[str]()
 
-    def predict(rig: Rig, plan: CapturePlan, *_: object, latency_ms: float) -> prediction.Prediction:
+    def predict(rig: Rig, plan: CapturePlan, *_: object, latency_ms: float) -> Prediction:
         seen.append(plan.name)
         if isinstance(plan.spectral, NoSpectral):
             raise PlanError(f"The plan {plan.name!r} has no spectral patterns.")
@@ -62,19 +65,36 @@ def test_the_planner_is_asked(bench: ScanBench, tmp_path: Path) -> None:
     work = ForecastJob(
         ForecastBasis(bench.calibration, 50.0, 1000 / 60), tmp_path, lambda rig: (), lambda: False
     )
-    found = work._of(COMB, ForecastStore(tmp_path, bench.calibration, 50.0), "")
+    found = work._of(COMB, PredictionStore(tmp_path, bench.calibration, 50.0), "")
     assert isinstance(found, ForecastPoint)
     assert found.expected.spectral_frames == 32
     assert 0 < found.expected.rmse < found.expected.pixel_rmse < 1
+
+
+def test_nothing_is_predicted_while_nobody_looks(
+    bench: ScanBench, tmp_path: Path, counted: list[str]
+) -> None:
+    control = make_forecast(bench, ForecastState(), tmp_path / "forecasts", automatic=True)
+    bench.rig.connect(RigChoice("twin", (*TWIN.options, ("sigma", "0.01"))))
+    assert counted == []
+    control.open(True)
+    assert len(counted) == len(PRESETS) == len(control.state.points.value)
+    control.open(False)
+    bench.rig.connect(TWIN)
+    assert len(counted) == len(PRESETS)
 
 
 def test_presets_and_candidates_are_predicted_once_and_remembered(
     bench: ScanBench, tmp_path: Path, counted: list[str]
 ) -> None:
     control = forecast(bench, tmp_path)
+    assert len(control.state.points.value) == len(PRESETS)
+    assert control.state.left.value == 1
+    control.predict_all()
     points = control.state.points.value
     # The published candidate is the reference preset.
     assert len(points) == len(PRESETS) + 1
+    assert control.state.left.value == 0
     assert control.state.published is not None
     assert control.state.published.expected.frames == 748
     assert control.state.current.value is not None
@@ -213,11 +233,11 @@ def test_after_a_scan_what_it_was_stands_beside_what_was_expected(
 
 
 def test_a_damaged_store_is_made_anew(bench: ScanBench, tmp_path: Path) -> None:
-    store = ForecastStore(tmp_path, bench.calibration, 50.0)
+    store = PredictionStore(tmp_path, bench.calibration, 50.0)
     store._path.write_text("[1")
-    assert ForecastStore(tmp_path, bench.calibration, 50.0).find(COMB) is None
+    assert PredictionStore(tmp_path, bench.calibration, 50.0).find(COMB) is None
     store._path.write_text('{"a": {"frames": 1}}')
-    assert ForecastStore(tmp_path, bench.calibration, 50.0).find(COMB) is None
+    assert PredictionStore(tmp_path, bench.calibration, 50.0).find(COMB) is None
 
 
 def test_titles_have_typographic_signs() -> None:

@@ -1,38 +1,52 @@
-"""A cache of predictions, in one file per rig. No Qt."""
+"""Predictions that are known: a file for each rig and scene, and the twin's that come with the program."""
 
 from __future__ import annotations
 
 import hashlib
 import json
 import logging
+from functools import lru_cache
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import Any
 
-from dsl_core import __version__
 from dsl_core.errors import StoreError
 from dsl_core.io.atomic import write_atomic
+from dsl_core.io.calibration_library import library_home
 from dsl_core.io.reading import read_json
 from dsl_core.model.plan import CapturePlan
 from dsl_core.model.rig import Rig
-
-if TYPE_CHECKING:
-    from dsl_core.planning.prediction import Prediction
+from dsl_core.planning.expected import Prediction
+from dsl_core.resources import resource_path
+from dsl_core.version import __version__
 
 _log = logging.getLogger(__name__)
 #: Beyond this number, the files of the least recently used rigs are deleted.
 MOST_RIGS = 20
+#: What keys of predictions without the width of peaks end with.
+WITHOUT_PEAKS = " without peaks"
 
 
-class ForecastStore:
+#: The predictions that come with the program, by `rig_stamp`.
+SHIPPED = "predictions/twin.json"
+
+
+def store_folder() -> Path:
+    """Where predictions are kept on this system, for the window and the command line."""
+    return library_home().parent / "forecasts"
+
+
+class PredictionStore:
     """Predictions of plans for one rig, latency and scene; an unreadable file is replaced.
 
-    ``scene`` identifies the scene.
+    ``scene`` identifies the scene; empty for the usual one. ``peaks`` tells predictions with the width of
+    narrow peaks from those without, which take less time and serve where any does.
     """
 
     def __init__(self, folder: Path, rig: Rig, latency_ms: float, scene: str = "") -> None:
         self._path = folder / f"{_stamp(rig, latency_ms, scene)}.json"
         self._known: dict[str, dict[str, object]] = {}
         self._is_changed = False
+        self._shipped = _shipped().get(rig_stamp(rig, latency_ms), {}) if not scene else {}
         try:
             content = read_json(self._path)
             self._known = {str(key): dict(value) for key, value in content.items()}
@@ -41,20 +55,22 @@ class ForecastStore:
         except (OSError, ValueError, TypeError, AttributeError) as error:
             _log.warning("The predictions %s cannot be read (%s) and are computed again.", self._path, error)
 
-    def find(self, plan: CapturePlan) -> Prediction | None:
+    def find(self, plan: CapturePlan, peaks: bool = True) -> Prediction | None:
         """The prediction of a plan, or None."""
         from pydantic import ValidationError
 
-        from dsl_core.planning.prediction import Prediction
-
+        key = plan_key(plan)
+        known = self._known.get(key) or self._shipped.get(key)
+        if known is None and not peaks:
+            known = self._known.get(key + WITHOUT_PEAKS)
         try:
-            return Prediction.model_validate(self._known[_key(plan)])
-        except (KeyError, ValidationError):
+            return None if known is None else Prediction.model_validate(known)
+        except ValidationError:
             return None
 
-    def keep(self, plan: CapturePlan, found: Prediction) -> None:
+    def keep(self, plan: CapturePlan, found: Prediction, peaks: bool = True) -> None:
         """Remember a prediction until `save`."""
-        self._known[_key(plan)] = found.model_dump()
+        self._known[plan_key(plan) + ("" if peaks else WITHOUT_PEAKS)] = found.model_dump()
         self._is_changed = True
 
     def save(self) -> None:
@@ -78,7 +94,28 @@ def _stamp(rig: Rig, latency_ms: float, scene: str) -> str:
     return _digest(f"{_method()} {latency_ms!r} {scene!r} {known}")
 
 
-def _key(plan: CapturePlan) -> str:
+def rig_stamp(rig: Rig, latency_ms: float) -> str:
+    """A name for a rig as far as predictions depend on it, the same on machines that round otherwise."""
+    known = rig.model_dump(mode="json", exclude={"name", "provenance", "calibrations"})
+    return _digest(json.dumps([latency_ms, _rounded(known)]))
+
+
+def _rounded(value: Any) -> Any:
+    if isinstance(value, float):
+        return float(f"{value:.9g}")
+    if isinstance(value, dict):
+        return {key: _rounded(each) for key, each in value.items()}
+    return [_rounded(each) for each in value] if isinstance(value, list) else value
+
+
+@lru_cache(maxsize=1)
+def _shipped() -> dict[str, dict[str, dict[str, Any]]]:
+    """Predictions that come with the program, by rig and plan."""
+    return dict(json.loads(resource_path(SHIPPED).read_text(encoding="utf-8")))
+
+
+def plan_key(plan: CapturePlan) -> str:
+    """A name for a plan as far as predictions depend on it."""
     return _digest(plan.model_dump_json(exclude={"name", "schema_version"}))
 
 
