@@ -107,12 +107,12 @@ def reconstruct(
     """
     from dsl_core.optics.line_set import LineSet
     from dsl_core.reconstruction.columns.line_spread import own_spread, spread_pixels, with_own_spread
-    from dsl_core.reconstruction.geometry import require_light, require_pixels
+    from dsl_core.reconstruction.geometry import geometry_of, require_light, require_pixels
     from dsl_core.reconstruction.lenses import follow_lenses
     from dsl_core.reconstruction.light.followed import follow_light
     from dsl_core.reconstruction.rows.assembly import Assembly
     from dsl_core.reconstruction.rows.bands import bands_of
-    from dsl_core.reconstruction.rows.columns import geometry_by_rows
+    from dsl_core.reconstruction.rows.columns import columns_by_rows
     from dsl_core.reconstruction.rows.frames import ScanFrames
     from dsl_core.reconstruction.scan_result import known_pixels
     from dsl_core.reconstruction.spectral.solvers import check_solver, row_solver, rows_together
@@ -131,17 +131,21 @@ def reconstruct(
         if options.as_calibrated:
             frames.look(progress=progress)
         else:
-            steady = follow_light(frames, code, white, lambda *seen: spread_pixels(lines, *seen), progress)
-            code, white = steady.code, steady.white
-            findings += steady.findings
+            asked = lambda *seen: spread_pixels(lines, *seen)  # noqa: E731
+            code, white, found_of_light = follow_light(frames, code, white, asked, progress)
+            findings += found_of_light
     with timer.stage("columns, depth, normals"):
         if options.refine_columns and not options.as_calibrated:
             found = own_spread(rig, lines, code, white, frames)
             if found is not None:
                 findings += spread_findings(rig.projector_response, found)
             rig = with_own_spread(rig, found)
-        geometry = geometry_by_rows(rig, options, frames, code, white, progress)
-        del code, white
+        columns = columns_by_rows(rig, options, frames, code, white, progress)
+        del code, white  # of large pictures they take much of the memory
+        geometry = geometry_of(
+            rig, lines if options.refine_columns else None, columns, frames.shape, options.surface_window_px
+        )
+        del columns
         require_pixels(geometry.flags)
         if options.refine_columns and not options.as_calibrated:
             rig, geometry, found_of_lenses = follow_lenses(rig, lines, geometry, options.surface_window_px)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
@@ -63,23 +62,16 @@ class Pictures(Protocol):
         """The lines of some pixels (flat indices)."""
 
 
-@dataclass(frozen=True)
-class Steady:
-    """Code and white in steady light, and what was found."""
-
-    code: DecodedCode
-    white: MergedFrame
-    findings: tuple[FitFinding, ...] = ()
-
-
 def follow_light(
     frames: Pictures,
     code: DecodedCode,
     white: MergedFrame,
     also: Callable[[DecodedCode, MergedFrame], NDArray[np.intp]],
     progress: Progress | None = None,
-) -> Steady:
+) -> tuple[DecodedCode, MergedFrame, tuple[FitFinding, ...]]:
     """Look at the frames of a scan, and have them follow the course of its light.
+
+    Returns code and white in steady light, and what was found.
 
     Frames of several settings are read a second time if these had different light. ``also`` says which
     pixels will be asked for later, so that they are read at the same time.
@@ -104,12 +96,12 @@ def follow_light(
     witnesses = [*_of_settings(frames), *_of_whites(frames), *_of_lines(frames, lines)]
     course = light_course(witnesses, frames.plan.shot_count)
     if course is None:
-        return Steady(code, white)
+        return code, white, ()
     if not course.is_steady:
         light = _steady(frames, course, lines)
         frames.follow(light)
         white = light.steady_white(white)
-    return Steady(code, white, tuple(light_findings(course, lines is not None)))
+    return code, white, tuple(light_findings(course, lines is not None))
 
 
 def light_findings(course: LightCourse, with_lines: bool) -> Iterator[FitFinding]:

@@ -1,4 +1,4 @@
-"""Columns and depth of a picture whose frames come by rows."""
+"""Columns of a picture whose frames come by rows."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from dsl_core.model.options import Options
 from dsl_core.model.rig import Rig
 from dsl_core.patterns.gray_code import DecodedCode
 from dsl_core.progress import Progress
-from dsl_core.reconstruction.geometry import ColumnSearch, FoundColumns, Geometry, geometry_of
+from dsl_core.reconstruction.geometry import ColumnSearch, FoundColumns
 from dsl_core.reconstruction.hdr import MergedFrame
 from dsl_core.reconstruction.merge import LineStack
 from dsl_core.reconstruction.rows.bands import some_rows
@@ -16,15 +16,15 @@ from dsl_core.reconstruction.rows.frames import ScanFrames
 FEW_BANDS = 2
 
 
-def geometry_by_rows(
+def columns_by_rows(
     rig: Rig,
     options: Options,
     frames: ScanFrames,
     code: DecodedCode,
     white: MergedFrame,
     progress: Progress | None = None,
-) -> Geometry:
-    """Refine decoded columns band by band, and triangulate and fit the surface of the whole picture."""
+) -> FoundColumns:
+    """Refine and triangulate decoded columns band by band."""
     height, width = code.column.shape
     search = ColumnSearch(rig, frames.plan, options.refine_columns, options.device)
     found = FoundColumns.empty(height * width)
@@ -35,4 +35,4 @@ def geometry_by_rows(
         found.put(flat, search.find(some_rows(code, here), some_rows(white, here), own, flat.start, progress))
     if len(frames.bands) > FEW_BANDS:
         frames.let_go()
-    return geometry_of(rig, search.lines, found, (height, width), options.surface_window_px)
+    return found

@@ -55,6 +55,11 @@ class ScanFrames:
         """Whether all rows are held at once."""
         return len(self.bands) == 1
 
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Rows and columns of the picture."""
+        return self.plan.camera_size_px[1], self.plan.camera_size_px[0]
+
     def shots_of(self, role: Role, pattern: int) -> list[Shot]:
         """The shots of a pattern, one for each setting it was captured with."""
         return self._shots[role, pattern]
