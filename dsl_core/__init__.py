@@ -22,6 +22,7 @@ from dsl_core.version import __version__
 
 if TYPE_CHECKING:
     from dsl_core.api.answers import classify as classify
+    from dsl_core.api.answers import colours as colours
     from dsl_core.api.results import evaluate as evaluate
     from dsl_core.api.results import export as export
     from dsl_core.api.results import load_result as load_result
@@ -36,7 +37,7 @@ if TYPE_CHECKING:
 
 _SCANS = ("load_calibration", "load_scan", "open_rig", "plan", "reconstruct", "rigs", "scan")
 _RESULTS = ("evaluate", "export", "load_result", "save_result")
-_ANSWERS = ("classify",)
+_ANSWERS = ("classify", "colours")
 #: The module of each public name.
 _HOMES = (
     dict.fromkeys(_SCANS, "dsl_core.api.scans")
@@ -47,6 +48,7 @@ _HOMES = (
 __all__ = [
     "__version__",
     "classify",
+    "colours",
     "evaluate",
     "export",
     "load_calibration",

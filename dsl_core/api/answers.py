@@ -89,6 +89,41 @@ def classify(
     return xr.Dataset(variables, coords=coords, attrs={"method": made.method, "notes": notes})
 
 
+def colours(
+    result: xr.Dataset,
+    pins: Mapping[str, Place],
+    lights: Sequence[str] = ("A", "D50", "D65", "FL11", "LED-B3"),
+    reference: str | None = None,
+) -> xr.Dataset:
+    """CIELAB of places under CIE illuminants, and CIEDE2000 to one of them, each with its deviation.
+
+    ``pins`` says by name where: a mask, a pixel (x, y), or x, y, width and height. The dataset holds ``lab``
+    and ``lab_std`` (place, light, component) relative to the perfect diffuser, and, with a ``reference``,
+    ``delta_e`` and ``delta_e_std`` (place, light). Raises `DecodeError` for unknown lights or names, and for
+    places without spectra.
+    """
+    import xarray as xr
+
+    from dsl_core.analysis.colours import colours_of
+    from dsl_core.analysis.places import spectra_of_masks
+
+    masks = {name: place_mask(result, name, place) for name, place in pins.items()}
+    spectra = spectra_of_masks(result, masks)
+    found = colours_of(spectra, result["wavelength_nm"].values, lights, reference)
+    shape = (len(lights), len(spectra))
+    over = ("light", "place")
+    variables: dict[str, Any] = {
+        name: ((*over, "component"), np.array([getattr(c, name) for c in found]).reshape(*shape, 3))
+        for name in ("lab", "lab_std")
+    }
+    if reference is not None:
+        for name in ("delta_e", "delta_e_std"):
+            values = [getattr(c, name) or 0.0 for c in found]
+            variables[name] = (over, np.array(values).reshape(shape))
+    coords = {"light": list(lights), "place": list(spectra), "component": ["L*", "a*", "b*"]}
+    return xr.Dataset(variables, coords=coords).transpose("place", "light", ...)
+
+
 def place_mask(result: xr.Dataset, name: str, place: Place) -> NDArray[np.bool_]:
     """The mask (rows, columns) of a place; raises `DecodeError` for anything that is none."""
     given, rows, columns = np.asarray(place), result["y"].values, result["x"].values

@@ -82,6 +82,17 @@ def test_the_face_of_python_takes_places_and_libraries(tmp_path: Path) -> None:
     assert (part["class"].values[34:46] == 1).mean() > 0.9
 
 
+def test_the_face_of_python_tells_colours() -> None:
+    made = dsl.colours(chart_result(), {"skin": (0, 18, 20, 10), "sky": (5, 40)}, ("A", "D65"), "sky")
+    assert made["lab"].dims == ("place", "light", "component")
+    skin = made.sel(place="skin", light="D65")
+    # ISO 17321 and the charts since: light skin is about L* 66, a* 15, b* 17 under daylight.
+    assert skin["lab"].values == pytest.approx([66, 15, 17], abs=2.5)
+    assert 0 < float(skin["lab_std"][0]) < 1
+    assert float(made["delta_e"].sel(place="sky", light="A")) == 0
+    assert float(skin["delta_e"]) > 20
+
+
 @pytest.mark.parametrize(
     ("options", "words"),
     [

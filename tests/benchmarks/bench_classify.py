@@ -1,6 +1,6 @@
 """Class maps of the twin's chart, leaves (metamers) and filters: right, wrong, none, by noise and by method.
 
-Run ``python -m tests.benchmarks.bench_classify [--size 222x145] [--seeds 2] [--json FILE]`` from the
+Run ``python -m tests.benchmarks.bench_classify [--size 222x145] [--noise 0 0.001] [--json FILE]`` from the
 repository's root. Classes are the true spectra of the scene, averaged over the bands by their width; a second
 table leaves one class after the other out of the list, when all of its pixels should be none of these. Beside
 the probability stand the spectral angle and the difference at their usual limits and, from the package
@@ -38,6 +38,7 @@ SCENES = ("color-checker", "leaves", "filters")
 NOISE = (0.0, 0.002)
 #: Materials around a scene, of which nobody asks.
 _AROUND = ("frame", "wall", "board")
+ABSENT = ("scene", "noise", "seed", "method", "pixels", "none", "undecided", "wrong")
 HEADS = ("scene", "noise", "seed", "method", "pixels", "right", "wrong", "none", "undecided", "seconds")
 
 
@@ -151,18 +152,20 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else "")
     parser.add_argument("--size", default="222x145")
     parser.add_argument("--seeds", type=int, default=1)
+    parser.add_argument("--noise", type=float, nargs="+", default=NOISE)
+    parser.add_argument("--scenes", nargs="+", default=SCENES)
     parser.add_argument("--json", type=Path)
     given = parser.parse_args()
     rows, unknown = [], []
     with tempfile.TemporaryDirectory() as folder:
-        for scene in SCENES:
-            for noise in NOISE:
+        for scene in given.scenes:
+            for noise in given.noise:
                 for seed in range(1, given.seeds + 1):
                     case = scanned(scene, noise, seed, given.size, Path(folder))
-                    rows += rows_of(case)
-                    unknown += left_out(case)
-    print_table(HEADS, rows)
-    print_table(("scene", "noise", "seed", "method", "pixels", "none", "undecided", "wrong"), unknown)
+                    rows += (known := rows_of(case))
+                    unknown += (absent := left_out(case))
+                    print_table(HEADS, known)
+                    print_table(ABSENT, absent)
     write_json(given.json, {"known": rows, "left out": unknown})
 
 
