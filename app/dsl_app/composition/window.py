@@ -13,6 +13,7 @@ from PySide6.QtCore import QObject, QTimer
 
 from dsl_app.composition.calibrations import CalibrationInUse
 from dsl_app.composition.dialogs import ImportAction, ReconstructAgainAction
+from dsl_app.composition.first_connection import FirstConnection
 from dsl_app.connection.state import Link, RigChoice, RigState
 from dsl_app.shared.known_files import Kind
 from dsl_app.shared.settings import data_folder
@@ -106,8 +107,7 @@ class Composition(QObject):
 
     def _start_now(self) -> None:
         self.session.start()
-        if self.rig.state.link.value is Link.CLOSED:
-            self.rig.connect(self.rig.state.choice.value)
+        FirstConnection(self.window, self.rig).begin(self._options.rig is not None)
         if self._options.open is not None:
             self.window.open_path(self._options.open)
         if self._options.demo:

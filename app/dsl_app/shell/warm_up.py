@@ -37,6 +37,8 @@ PAGE_MODULES = {
         "dsl_app.compare.page",
     ),
 }
+#: What a first look at a result needs, which takes least time.
+_LOOK = (*PAGE_MODULES["results"], "zarr", "pandas", "xarray", "dsl_core.io.result.result_file")
 #: What connecting a rig needs.
 _FIRST = (
     "scipy.linalg",
@@ -46,14 +48,11 @@ _FIRST = (
     "cv2",
     "torch",
     "dsl_core.simulation.sim_devices",
-    "zarr",
     "dsl_core.pipeline",
 )
 #: Calibrations, results and the 3D view.
 _LAST = (
     "dsl_app.calibrate.wizard.window",
-    "pandas",
-    "xarray",
     "dsl_core.workflows.scans",
     "dsl_core.campaign.recipes",
     "dsl_app.calibrate.evidence.selftest",
@@ -70,7 +69,7 @@ _LAST = (
     "vtkmodules.vtkViewsContext2D",
     "vtkmodules.vtkInteractionStyle",
 )
-STEPS = tuple(dict.fromkeys((*_FIRST, *chain.from_iterable(PAGE_MODULES.values()), *_LAST)))
+STEPS = tuple(dict.fromkeys((*_LOOK, *_FIRST, *chain.from_iterable(PAGE_MODULES.values()), *_LAST)))
 #: Pause between two steps, s.
 REST_S = 0.05
 #: Large libraries of some packages: while the system loads them, Python's lock is free.
