@@ -155,7 +155,7 @@ def reconstruct(
         with timer.stage("spectra"):
             solver = row_solver(rig, plan, options, frames, known_pixels(geometry), progress)
     result = Assembly(rig, plan, options, geometry, frames.bands, sink or MemorySink())
-    # The frames of the last band are still in memory.
+    # The frames of the last band may still be in memory.
     for band in result.missing(reversed(frames.bands)):
         spectra = None
         if solver is not None:
