@@ -15,8 +15,8 @@ R = TypeVar("R")
 #: The extra that brings a module which the core does without, and what it is for.
 EXTRA_OF = {
     "torch": "reconstruct",
-    "cv2": "reconstruct",
     "numba": "reconstruct",
+    "cv2": "reconstruct",
     "PySide6": "gui",
     "pyqtgraph": "gui",
     "pyvista": "gui",

@@ -1,12 +1,14 @@
 """Normal equations of single scan lines: a line lights only a few neighbouring bands through one order.
 
 So their matrix is banded. Lines' light over a band comes from a table that pixels of like dispersion share.
+With tensors, as a GPU needs them; `dsl_core.optics.line_sums` is compiled and faster without one.
 A pixel has one colour, that of its own filter; `dsl_core.optics.colour_neighbours` brings three together.
 """
 
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from functools import lru_cache
 
 import torch
@@ -26,6 +28,8 @@ CLOSENESS_PIXELS = 256
 MIN_DISPERSION = 0.1
 #: Diagonals whose sum is below this share of the main one are left out.
 DROPPED = 2e-5
+#: What is added to the main diagonal at least, relative to it.
+LEAST_SURPLUS = 1e-6
 #: Bands that share one window of lines while the normal equations are added up.
 GROUP = 3
 
@@ -52,6 +56,37 @@ def closeness_px(columns: Tensor, inside: Tensor, spacing_px: float, reach_px: f
     return slack
 
 
+@dataclass(frozen=True)
+class OrderLines:
+    """How the lines of one order light the bands of some pixels.
+
+    ``columns`` (bands, pixels) are on the grid of the ``table``, so that a band has the same profile wherever
+    it is looked up and the matrix is a true square. Diagonals beyond ``bandwidth`` may sum to half of
+    ``dropped``, relative to the main one.
+    """
+
+    columns: Tensor
+    table: ProfileTable
+    bandwidth: int
+    dropped: float
+
+    @classmethod
+    def of(
+        cls, bands: Bands, lines: LineSet, spread: Spread, columns: Tensor, inside: Tensor, width: float
+    ) -> OrderLines:
+        """Those of ``columns`` that are ``inside`` (bands, pixels); ``width`` is that of the spread."""
+        half = bands.half_width_px(columns)
+        table = _table(lines.width_px, stretched(spread, width), half, columns.device, columns.dtype)
+        columns = (columns * SAMPLES).round() / SAMPLES
+        spacing = ((columns[-1] - columns[0]).abs().min() / (bands.count - 1)).clip(
+            min=MIN_DISPERSION * bands.step_nm
+        )
+        slack = closeness_px(columns, inside, float(spacing), 2 * table.support_px)
+        tails = table.overlaps(float(spacing), slack)[::-1].cumsum()[::-1]
+        bandwidth = max(min(int((tails > DROPPED).sum()), bands.count - 1), 1)
+        return cls(columns, table, bandwidth, 2 * float(tails[bandwidth:].max(initial=0)))
+
+
 class LineEquations:
     """Adds the first orders of scan lines, one order and band at a time, over all pixels of a tile."""
 
@@ -74,7 +109,7 @@ class LineEquations:
         #: Right side of an offset of one DN per ms, (bands, pixels), if it is asked for.
         self.offset = torch.zeros_like(self.right) if offsets else None
         #: Bound of the diagonals left out, relative to the main one.
-        self.dropped = 1e-6
+        self.dropped = LEAST_SURPLUS
         #: Weighted sum of squares of the data that entered, and their number, (pixels,).
         self.square, self.samples = torch.zeros_like(self.right[0]), torch.zeros_like(self.right[0])
 
@@ -94,21 +129,11 @@ class LineEquations:
 
         Bands are taken in groups that share one window of lines, so that data are gathered once a group.
         """
-        half = self.bands.half_width_px(columns)
-        table = _table(
-            self.lines.width_px, stretched(self.spread, width), half, columns.device, columns.dtype
-        )
-        # On the table's grid a band has the same profile in every group, and the matrix is a true square.
-        columns = (columns * SAMPLES).round() / SAMPLES
-        spacing = ((columns[-1] - columns[0]).abs().min() / (self.bands.count - 1)).clip(
-            min=MIN_DISPERSION * self.bands.step_nm
-        )
-        slack = closeness_px(columns, inside, float(spacing), 2 * table.support_px)
-        tails = table.overlaps(float(spacing), slack)[::-1].cumsum()[::-1]
-        bandwidth = max(min(int((tails > DROPPED).sum()), self.bands.count - 1), 1)
+        order_lines = OrderLines.of(self.bands, self.lines, self.spread, columns, inside, width)
+        columns, table, bandwidth = order_lines.columns, order_lines.table, order_lines.bandwidth
         # What the left-out diagonals may sum to is added to the main one: a truncated matrix of bright pixels
         # would not be positive definite.
-        self.dropped = max(self.dropped, 2 * float(tails[bandwidth:].max(initial=0)))
+        self.dropped = max(self.dropped, order_lines.dropped)
         if self.matrix.shape[0] < bandwidth + 1:
             self.matrix = torch.nn.functional.pad(
                 self.matrix, (0, 0, 0, 0, 0, bandwidth + 1 - self.matrix.shape[0])

@@ -11,6 +11,8 @@ from dataclasses import dataclass
 import torch
 from torch import Tensor
 
+NOT_DEFINITE = "a banded system is not positive definite; its weights or prior are not positive"
+
 
 @dataclass(frozen=True)
 class Factor:
@@ -43,7 +45,7 @@ def factorise(matrix: Tensor, overwrite: bool = False) -> Factor:
             work[: reach - a + 1, j + a].addcmul_(lower[a - 1, j], work[a : reach + 1, j], value=-1)
     # NaN fails both comparisons; infinity would leave zeros behind instead of an answer.
     if not bool(((work[0] > 0) & (work[0] < torch.inf)).all()):
-        raise ValueError("a banded system is not positive definite; its weights or prior are not positive")
+        raise ValueError(NOT_DEFINITE)
     return Factor(lower, work[0])
 
 

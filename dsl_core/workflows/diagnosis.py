@@ -18,7 +18,15 @@ from dsl_core.version import __version__
 #: Draws and lists screens in a process of its own; named, as the engine imports no window.
 GRAPHICS = "dsl_app.shell.graphics_process"
 #: What the extras bring, by its name at the registry.
-_OF_EXTRAS = ("torch", "opencv-contrib-python-headless", "PySide6-Essentials", "vtk", "pyvista", "pyqtgraph")
+_OF_EXTRAS = (
+    "torch",
+    "numba",
+    "opencv-contrib-python-headless",
+    "PySide6-Essentials",
+    "vtk",
+    "pyvista",
+    "pyqtgraph",
+)
 _PACKAGES = ("numpy", "scipy", "zarr", "numcodecs", "xarray", "pydantic", "typer", "OpenEXR")
 _DRIVERS = ("pyserial", "zaber-motion", "seabreeze", "pypylon", "genicam", "harvesters")
 _GRAPHICS_S = 60.0

@@ -20,6 +20,7 @@ HEAVY = (
     "colour",
     "cv2",
     "matplotlib",
+    "numba",
     "pandas",
     "pyvista",
     "scipy",

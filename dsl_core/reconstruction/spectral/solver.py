@@ -183,10 +183,10 @@ def gradient(matrix: Tensor, rows: Tensor | None, x: Tensor, right: Tensor) -> T
     return g
 
 
-def solve_spectra(
+def solve_tensors(
     data: Tensor, right: Tensor, rows: Tensor | None, prior: Prior, check: Check = never
 ) -> Spectra:
-    """Posterior of every pixel's spectrum.
+    """Posterior of every pixel's spectrum, with tensors, as a GPU needs it.
 
     ``data`` (bandwidth + 1, bands, pixels) and ``right`` (bands, pixels) are the first orders' normal
     equations in reflectance; ``rows`` (bands, n, pixels) are weighted broad-band equations whose values are

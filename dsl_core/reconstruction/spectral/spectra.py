@@ -23,11 +23,13 @@ from dsl_core.optics.spectra import ORDERS, Bands
 from dsl_core.progress import NoProgress, Progress
 from dsl_core.reconstruction.columns.pattern_column import radiance_profiles, rounding_error
 from dsl_core.reconstruction.spectral.causes import common_error, fit_causes
+from dsl_core.reconstruction.spectral.compiled_tiles import PARAMETERS, CompiledTiles
+from dsl_core.reconstruction.spectral.lane_solver import solve_spectra
 from dsl_core.reconstruction.spectral.model_error import ModelError, model_error, neighbour_contrast
 from dsl_core.reconstruction.spectral.picked_cube import PickedCube
 from dsl_core.reconstruction.spectral.probe import ProbedScan
 from dsl_core.reconstruction.spectral.self_correction import Followed, follow
-from dsl_core.reconstruction.spectral.solver import Prior, Spectra, solve_spectra
+from dsl_core.reconstruction.spectral.solver import Prior, Spectra
 from dsl_core.reconstruction.spectral.tile_frames import Pixels, TileFrames
 from dsl_core.solve.banded import multiply
 from dsl_core.solve.many import Check, work_through
@@ -39,8 +41,6 @@ TILE, TILE_BANDS, LEAST_TILE = (64, 96), 60, (16, 24)
 CHUNK = 1 << 18
 #: Pixels whose full matrices are solved at a time.
 DENSE_PIXELS = 512
-#: Degrees of freedom that a spectrum takes from its data, roughly, in the reduced chi-square.
-PARAMETERS = 25
 #: Chi-square that noise alone does not reach: what exceeds it is misfit that neighbouring lines share.
 SURE_MISFIT = 1.3
 #: Chi-square from which a pixel may see several surfaces, and the most that it is then unsure by.
@@ -125,6 +125,9 @@ class SpectralReconstruction:
         self.contrast = neighbour_contrast(pixels.amplitude)
         self.followed: Followed | None = None
         self.error: ModelError | None = None
+        usual = self.device.type == "cpu" and dtype == torch.float32
+        #: Tensors are for a GPU, and for other precisions.
+        self._compiled = CompiledTiles(self.prior) if usual and self.model.single else None
         self._as_calibrated = as_calibrated
         #: The row of the picture that the stacks begin with.
         self._first_row = 0
@@ -225,21 +228,36 @@ class SpectralReconstruction:
         if self.model.single:
             # The samples of pixels just outside the tile belong to pixels inside it.
             height, width = self.pixels.valid.shape
-            near = self.frames(
-                *(
-                    slice(max(part.start - 1, 0), min(part.stop + 1, size))
-                    for part, size in ((rows, height), (columns, width))
+            near = (
+                frames
+                if self.rig.sensor.bayer == "MONO"
+                else self.frames(
+                    *(
+                        slice(max(part.start - 1, 0), min(part.stop + 1, size))
+                        for part, size in ((rows, height), (columns, width))
+                    )
                 )
             )
             traced = self.trace(near)
             check()
-            spectra, misfit = self._banded(frames, near, traced, check)
+            solve = self._banded if self._compiled is None else self._compiled_tile
+            spectra, misfit = solve(frames, near, traced, check)
             traced = traced.part(torch.as_tensor(np.searchsorted(near.flat, frames.flat), device=self.device))
         else:
             traced = self.trace(frames)
             check()
             spectra, misfit = self._dense(frames, traced, check)
         self._store(spectra, misfit, frames, traced, out, first_row)
+
+    def _compiled_tile(
+        self, frames: TileFrames, near: TileFrames, traced: Traced, check: Check
+    ) -> tuple[Spectra, Tensor]:
+        """As `_banded`, without tensors."""
+        assert self._compiled is not None
+        assert isinstance(self.radiance, np.ndarray)
+        assert isinstance(self.std, np.ndarray)
+        stacks, colour = (self.radiance, self.std, self._first_row), self._colour_roots(frames)
+        return self._compiled.solve(self.model, stacks, frames, near, traced, colour, check)
 
     def _banded(
         self, frames: TileFrames, near: TileFrames, traced: Traced, check: Check
@@ -283,15 +301,22 @@ class SpectralReconstruction:
 
     def _colour_rows(self, frames: TileFrames, shading: Tensor, right: Tensor) -> Tensor | None:
         """Weighted zero-order equations (bands, 3, pixels), added to ``right``; None if unneeded."""
-        kappa = self._map(self.colour_weight, frames.flat)
-        if float(kappa.max()) < 1e-3:
+        found = self._colour_roots(frames)
+        if found is None:
             return None
-        colour, variance = frames.zero_order_colour()
-        root = (kappa / (variance + (COLOUR_ERROR * colour) ** 2)).sqrt()
+        colour, root = found
         moments = like(self.bands.moments[0].sum(1).T, right)
         rows = moments[:, :, None] * (root * shading)
         right += torch.einsum("jcp,cp->jp", rows, colour * root)
         return rows
+
+    def _colour_roots(self, frames: TileFrames) -> tuple[Tensor, Tensor] | None:
+        """Zero-order colour of a tile and the roots of its weights, (3, pixels); None if they are zero."""
+        kappa = self._map(self.colour_weight, frames.flat)
+        if float(kappa.max()) < 1e-3:
+            return None
+        colour, variance = frames.zero_order_colour()
+        return colour, (kappa / (variance + (COLOUR_ERROR * colour) ** 2)).sqrt()
 
     def _dense(self, frames: TileFrames, traced: Traced, check: Check) -> tuple[Spectra, Tensor]:
         from dsl_core.reconstruction.spectral.dense_solver import solve_dense

@@ -10,6 +10,7 @@ from scipy.optimize import lsq_linear
 from torch import Tensor
 
 from dsl_core.reconstruction.spectral.dense_solver import solve_dense
+from dsl_core.reconstruction.spectral.lane_solver import solve_spectra
 from dsl_core.reconstruction.spectral.solver import (
     Posterior,
     Prior,
@@ -17,7 +18,6 @@ from dsl_core.reconstruction.spectral.solver import (
     gradient,
     parabola_peak,
     roughness,
-    solve_spectra,
     within_band,
 )
 from dsl_core.solve import banded

@@ -1,0 +1,36 @@
+"""The compiled solver against the one of tensors, which a GPU runs."""
+
+from __future__ import annotations
+
+import pytest
+import torch
+
+from dsl_core.reconstruction.spectral.lane_solver import diagonals_for, solve_spectra, whole_blocks
+from dsl_core.reconstruction.spectral.solver import Prior, solve_tensors
+from tests.stability.random_pixels import random_equations
+
+
+@pytest.mark.parametrize("with_colour", [True, False])
+def test_compiled_solver_and_tensors_give_the_same_spectra(with_colour: bool) -> None:
+    # Not a whole number of blocks; many of these pixels are at a bound or see the zero order's colour.
+    data, right, rows = random_equations(43, 5, torch.float64)
+    some = rows if with_colour else None
+    found, wanted = (solve(data, right, some, Prior()) for solve in (solve_spectra, solve_tensors))
+    assert 0 < int(wanted.at_bound.sum()) == int((wanted.at_bound & found.at_bound).sum())
+    for name in ("nodes", "mean"):
+        assert ((getattr(found, name) - getattr(wanted, name)).abs() / wanted.std).max() < 1e-6
+    for name in ("std", "data_share", "tau"):
+        assert torch.allclose(getattr(found, name), getattr(wanted, name), rtol=1e-7, atol=1e-12)
+
+
+def test_a_pixel_has_the_same_spectrum_whoever_is_beside_it() -> None:
+    data, right, rows = random_equations(12, 6, torch.float64)
+    together = solve_spectra(data, right, rows, Prior())
+    alone = solve_spectra(data[..., 9:10], right[:, 9:10], rows[..., 9:10], Prior())
+    assert torch.equal(alone.nodes[:, 0], together.nodes[:, 9])
+    assert torch.equal(alone.std[:, 0], together.std[:, 9])
+
+
+def test_few_kernels_serve_all_bandwidths_and_blocks_are_whole() -> None:
+    assert [diagonals_for(n) for n in (1, 4, 5, 8, 9)] == [4, 4, 8, 8, 16]
+    assert [whole_blocks(n) for n in (0, 1, 8, 9)] == [0, 8, 8, 16]
