@@ -72,6 +72,19 @@ def test_options_after_the_command_belong_to_the_command() -> None:
     assert (asked.command, asked.torch, asked.arguments) == ("demo", "cpu", ["--json", "--venv", "x"])
 
 
+def test_tests_say_how_long_they_take_here(tmp_path: Path) -> None:
+    assert run.expected_s(tmp_path, "test quick") == run.USUAL_S["test quick"]
+    run.remember_s(tmp_path, "test", 1234.4)
+    assert run.expected_s(tmp_path, "test") == 1234
+    assert run.expected_s(tmp_path, "test quick") == run.USUAL_S["test quick"]
+    (tmp_path / run.TIMES).write_text("[]")
+    assert run.expected_s(tmp_path, "test") == run.USUAL_S["test"]
+
+
+def test_what_is_quick_is_there() -> None:
+    assert all((run.ROOT / path).exists() for path in run.QUICK)
+
+
 def test_what_ldconfig_does_not_list_is_missing() -> None:
     present = [library for library in run.LIBRARIES if library != "libEGL.so.1"]
     listing = "2 libs found in cache\n" + "\n".join(
