@@ -198,4 +198,4 @@ def _steady(scan: Pictures, course: LightCourse, lines: LineLevels | None) -> St
             log, std = log + share * (own - log), np.sqrt(share) * std
         logs[pattern], stds[pattern] = log, std
     level = course.white if follows else course.log[scan.shots_of("white", 0)[-1].index]
-    return SteadyLight(logs, stds, float(level))
+    return SteadyLight(logs, stds, float(level), follows)

@@ -70,11 +70,16 @@ class ScanFrames:
 
     def follow(self, light: SteadyLight) -> None:
         """From now on give line frames as they would be in steady light."""
-        self._light = light
+        before, self._light = self._light, light
         if self._held is not None:
-            light.steady(self._held[1])
+            light.steady(self._held[1], before)
         if self._picked is not None:
-            light.steady(self._picked.as_stack())
+            light.steady(self._picked.as_stack(), before)
+
+    @property
+    def light(self) -> SteadyLight | None:
+        """What line frames follow."""
+        return self._light
 
     def decode(self, progress: Progress | None = None) -> tuple[DecodedCode, MergedFrame]:
         """What the binary code says of every pixel, and white."""

@@ -19,6 +19,10 @@ class PickedCube:
     pixels: NDArray[np.intp]
     width: int
 
+    def __len__(self) -> int:
+        """The number of frames."""
+        return len(self.values)
+
     def __getitem__(
         self, at: tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.intp]]
     ) -> NDArray[np.floating]:

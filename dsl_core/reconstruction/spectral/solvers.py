@@ -17,6 +17,7 @@ from dsl_core.optics.spectra import Bands
 from dsl_core.progress import Progress
 from dsl_core.reconstruction.rows.bands import Band
 from dsl_core.reconstruction.rows.frames import ScanFrames
+from dsl_core.reconstruction.spectral.frame_levels import frame_levels
 from dsl_core.reconstruction.spectral.model_error import ModelError
 from dsl_core.reconstruction.spectral.nearest_line import ColourBasis, NearestLine
 from dsl_core.reconstruction.spectral.picked_cube import PickedCube
@@ -82,12 +83,21 @@ def row_solver(
         return RowSolver(lambda _, progress: kind.run(progress))
     lines = LineSet.of(plan)
     asked = probed_pixels(pixels.valid, rig.sensor.bayer) if lines is not None and lines.single else _NONE
-    picked = frames.pick(asked, progress)
-    radiance, std = (PickedCube(v, asked, pixels.valid.shape[1]) for v in (picked.radiance, picked.std))
+
+    def picked() -> tuple[PickedCube, PickedCube]:
+        lines = frames.pick(asked, progress)
+        width = pixels.valid.shape[1]
+        return PickedCube(lines.radiance, asked, width), PickedCube(lines.std, asked, width)
+
     best = SpectralReconstruction(
-        rig, plan, options.grid, model, radiance, std, pixels,
+        rig, plan, options.grid, model, *picked(), pixels,
         device=options.device, as_calibrated=options.as_calibrated,
     )  # fmt: skip
+    if frames.light is not None and frames.light.flickers:
+        found = frame_levels(best.probed, frames.light.std)
+        if found is not None:
+            frames.follow(frames.light.refined(found.log, found.std))
+            best.take(*picked(), 0)
     best.learn()
 
     def solve(band: Band, progress: Progress | None) -> SpectralMaps:

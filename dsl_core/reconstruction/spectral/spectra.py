@@ -154,7 +154,12 @@ class SpectralReconstruction:
                 self.model, self.bands = found.model, found.model.bands
                 self.error = model_error(found.left, common_error(found.left, fit_causes(found.left)))
 
-    def take(self, radiance: NDArray[np.float32], std: NDArray[np.floating], first_row: int) -> None:
+    def take(
+        self,
+        radiance: NDArray[np.float32] | PickedCube,
+        std: NDArray[np.floating] | PickedCube,
+        first_row: int,
+    ) -> None:
         """From now on work on stacks that begin with a row of the picture."""
         self.radiance, self.std, self._first_row = radiance, std, first_row
 

@@ -1,0 +1,268 @@
+"""The light that probed pixels receive line by line, as measured and as the model says, and its changes.
+
+It is worked out for single lines, for the samples of the mosaic that belong to some pixels.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from torch import Tensor
+
+from dsl_core.model.line_spread import Spread, stretched
+from dsl_core.optics.colour_neighbours import bayer_colours
+from dsl_core.optics.correspondence import Footprint, like
+from dsl_core.optics.line_profile import SAMPLES, ProfileTable, halo_of_line
+from dsl_core.optics.pixel_model import PixelModel
+from dsl_core.optics.spectra import ORDERS
+from dsl_core.reconstruction.spectral.dense_solver import solve_dense
+from dsl_core.reconstruction.spectral.picked_cube import PickedCube
+from dsl_core.reconstruction.spectral.probed_pixels import Indices, samples_of
+from dsl_core.reconstruction.spectral.solver import Prior, roughness
+from dsl_core.reconstruction.spectral.tile_frames import Pixels, weighted
+from dsl_core.solve import banded
+
+Floats = NDArray[np.float64]
+
+#: The parameters, in their order: shifts in projector columns, stretches (a shift that rises by this many
+#: columns from the middle wavelength to the last), all others relative.
+PARAMETERS = (
+    "shift +1",
+    "shift -1",
+    "gain +1",
+    "gain -1",
+    "blur",
+    "tail",
+    "drift",
+    "stretch +1",
+    "stretch -1",
+)
+#: Steps of the numerical derivatives: columns (px) and blur (share).
+SHIFT_PX, BLUR_STEP = 0.05, 0.05
+#: Blur of the tail of a line, relative to its own.
+TAIL_BLUR = 4.0
+#: Degrees of freedom that a spectrum takes, roughly.
+SPECTRUM = 25
+#: Relative error of the zero order that neighbours need not share.
+ZERO_ERROR = 0.01
+
+
+@dataclass(frozen=True)
+class ProbedScan:
+    """A scan and its model: ``radiance`` and ``std`` are (frames, rows, columns), in DN per ms.
+
+    Of the picture only `probed_pixels` are looked at.
+    """
+
+    model: PixelModel
+    pixels: Pixels
+    radiance: NDArray[np.float32] | PickedCube
+    std: NDArray[np.floating] | PickedCube
+    prior: Prior
+
+
+def along_bands(model: PixelModel) -> Floats:
+    """Place of each internal band over the reported ones, -1 to 1, which a stretch rises with."""
+    nm = model.bands.centres_nm
+    first, last = nm[model.bands.reported][[0, -1]]
+    return np.asarray((2 * nm - first - last) / (last - first))
+
+
+@dataclass(frozen=True)
+class OrderLight:
+    """Lines near one order: the model's rows (samples, bands, lines), data, weight and time of each.
+
+    Each band is lit by a few lines, numbered ``near`` (samples, bands, n): what their rows gain, of the light
+    ``white`` (samples, bands), is ``changes`` (samples, bands, n, kinds). ``frame`` (samples, lines) has the
+    frame of each line.
+    """
+
+    rows: Tensor
+    white: Tensor
+    near: Tensor
+    changes: Tensor
+    values: Tensor
+    weight: Tensor
+    time: Tensor
+    frame: Tensor
+
+
+def _changed_profiles(width_px: float, spread: Spread, band_px: float, like: Tensor) -> Tensor:
+    """Profiles of a line on a band at even distances, `SAMPLES` a column, zero at both ends: (distances, 4).
+
+    As it is, and what it gains per column of shift, per share of blur and per share of light in the tail.
+    """
+    own, blurred, tail = (
+        ProfileTable(width_px, stretched(spread, by), band_px, like.device, like.dtype).values
+        for by in (1.0, 1 + BLUR_STEP, TAIL_BLUR)
+    )
+    own, blurred = (
+        torch.nn.functional.pad(each, ((len(tail) - len(each)) // 2,) * 2) for each in (own, blurred)
+    )
+    step = round(SHIFT_PX * SAMPLES)
+    shifted = (own.roll(-step) - own.roll(step)) * (SAMPLES / (2 * step))
+    return torch.stack([own, shifted, (blurred - own) / BLUR_STEP, tail - own], 1)
+
+
+class ProbedLight:
+    """Data of samples, and the rows of the model of unit shading and of its changes.
+
+    ``values`` and ``weight`` (samples, k), ``rows`` (samples, bands, k): the lines near each order, one order
+    after the other, and last the zero order.
+    """
+
+    def __init__(self, scan: ProbedScan, samples: Indices) -> None:
+        self._scan, self._samples = scan, samples
+        self._known = {
+            name: torch.as_tensor(values.ravel()[samples], dtype=torch.float64)
+            for name, values in vars(scan.pixels).items()
+            if name != "valid"
+        }
+        self._place = np.divmod(samples, scan.pixels.valid.shape[1])
+        colour = bayer_colours(scan.model.rig.sensor.bayer, *self._place)
+        self.colour = torch.as_tensor(colour)
+        known = self._known
+        traced = scan.model.trace(torch.as_tensor(samples), known["depth_mm"], known["column_px"], ORDERS)
+        self._orders = [self._order(order, traced.orders[order]) for order in ORDERS]
+        zero = like(scan.model.bands.moments[0].sum(1), known["shading"])[self.colour][..., None]
+        amplitude, std = known["amplitude"][:, None], known["amplitude_std"][:, None]
+        weight = 1 / (std**2 + (ZERO_ERROR * amplitude) ** 2)
+        self.rows = torch.cat([*(order.rows for order in self._orders), zero], 2)
+        self.values = torch.cat([*(order.values for order in self._orders), amplitude], 1)
+        self.weight = torch.cat([*(order.weight for order in self._orders), weight], 1)
+        #: The frame (samples, k) of each value; that of the zero order is one behind the last.
+        self.frame = torch.cat(
+            [*(order.frame for order in self._orders), torch.full_like(amplitude, len(scan.radiance)).long()],
+            1,
+        )
+        self.weight = self.weight.nan_to_num(0.0, 0.0, 0.0)
+
+    def _order(self, order: int, footprint: Footprint) -> OrderLight:
+        scan, lines = self._scan, self._scan.model.lines
+        assert lines is not None
+        columns, inside = footprint.columns, scan.model.inside(footprint)
+        half = scan.model.bands.half_width_px(columns)
+        spread = stretched(scan.model.response(0.0).line_spread, scan.model.width(footprint, inside))
+        table = _changed_profiles(lines.width_px, spread, half, columns)
+        reach = (len(table) - 1) / 2 / SAMPLES
+        low = torch.where(inside, columns, torch.inf).amin(0)
+        high = torch.where(inside, columns, -torch.inf).amax(0)
+        any_inside = inside.any(0)
+        span = float((high - low)[any_inside].max()) if bool(any_inside.any()) else 0.0
+        first = torch.where(any_inside, lines.position(low - reach).ceil(), 0.0).long()
+        index = first[:, None] + torch.arange(math.ceil((span + 2 * reach) / lines.step_px) + 1)
+        used = lines.exists(index) & any_inside[:, None]
+        white = like(scan.model.bands.moments[order].sum(1), columns)[self.colour] * inside.T
+        # Only these lines light a band: all others are too far away.
+        near = (lines.position(columns.T - reach).ceil().long() - first[:, None])[..., None]
+        near = near + torch.arange(math.floor(2 * reach / lines.step_px) + 1)
+        distance = columns.T[..., None] - lines.centre_px(near + first[:, None, None]).to(columns)
+        at = ((distance + reach) * SAMPLES).add_(0.5).clip_(0, len(table) - 1).int()
+        light = table.index_select(0, at.reshape(-1)).reshape(*at.shape, -1)
+        near = near.clip_(0, index.shape[1] - 1)
+        own = columns.new_zeros((*white.shape, index.shape[1]))
+        own.scatter_add_(2, near, light[..., 0] * white[..., None])
+        frame = lines.frame(index).numpy()
+        rows, columns_at = (at[:, None] for at in self._place)
+        y = torch.as_tensor(scan.radiance[frame, rows, columns_at]).double()
+        std = torch.as_tensor(scan.std[frame, rows, columns_at]).double()
+        known = self._known
+        away = known["column_px"][:, None] - lines.centre_px(index)
+        halo = known["amplitude"][:, None] * halo_of_line(
+            away, lines.width_px, scan.model.rig.projector_response
+        )
+        values, weight = weighted(y - known["offset"][:, None] - halo, std**2)
+        lit = (own > 0).any(1) & used
+        return OrderLight(
+            own,
+            white,
+            near,
+            light[..., 1:],
+            values,
+            weight * lit,
+            index / lines.lines - 0.5,
+            lines.frame(index),
+        )
+
+    def changes(self, nodes: Tensor) -> Tensor:
+        """What each of `PARAMETERS` adds to ``values`` of unit shading for spectra (samples, bands).
+
+        Shape (samples, k, parameters).
+        """
+        parts = []
+        along = torch.as_tensor(along_bands(self._scan.model), dtype=nodes.dtype)
+        for number, light in enumerate(self._orders):
+            own = (nodes[:, None] @ light.rows)[:, 0]
+            gained = light.changes * (light.white * nodes)[..., None, None]
+            gained = torch.cat([gained, gained[..., :1] * along[:, None, None]], -1).flatten(1, 2)
+            line = light.near.flatten(1)[..., None].expand_as(gained)
+            of_lines = own.new_zeros((*own.shape, gained.shape[-1])).scatter_add_(1, line, gained)
+            part = torch.zeros((*own.shape, len(PARAMETERS)), dtype=own.dtype)
+            shifted, part[..., 4], part[..., 5], part[..., 7 + number] = of_lines.unbind(-1)
+            part[..., number], part[..., 2 + number] = shifted, own
+            part[..., 6] = own * light.time
+            parts.append(part)
+        zero = torch.zeros_like(parts[0][:, :1])
+        lines = self._scan.model.lines
+        assert lines is not None
+        time = lines.position(self._known["column_px"]) / lines.lines - 0.5
+        zero[:, 0, 6] = (self.rows[..., -1] * nodes).sum(1) * time
+        return torch.cat([*parts, zero], 1)
+
+
+@dataclass(frozen=True)
+class SolvedPixels:
+    """Probed pixels (n,) and their spectra, found by the samples (m,) of each, whose values are (m, k).
+
+    ``owner`` (m,) is the pixel of a sample, ``shading`` (m,) its shading, ``rows`` (m, bands, k) the model
+    for that and ``heavy`` the same, weighted; ``residual`` (m, k) is what spectra leave. ``nodes`` (n, bands)
+    and ``mean`` (bands, n) are the spectra, ``information`` (n, bands, bands) what is known of them, with the
+    prior.
+    """
+
+    light: ProbedLight
+    owner: Tensor
+    shading: Tensor
+    rows: Tensor
+    heavy: Tensor
+    residual: Tensor
+    nodes: Tensor
+    mean: Tensor
+    information: Tensor
+
+    def gather(self, values: Tensor) -> Tensor:
+        """Sums over the samples of each pixel: (m, ...) -> (n, ...)."""
+        into = values.new_zeros((len(self.nodes), *values.shape[1:]))
+        return into.index_add_(0, self.owner, values)
+
+    @property
+    def chi_square(self) -> Tensor:
+        """Reduced chi-square (n,) of the frames of each pixel."""
+        weight = self.light.weight
+        freedom = (self.gather((weight > 0).double().sum(1)) - SPECTRUM).clip(min=1)
+        return self.gather((weight * self.residual**2).sum(1)) / freedom
+
+
+def solve_pixels(scan: ProbedScan, targets: Indices) -> SolvedPixels:
+    """Spectra of some pixels (flat indices) by all that their samples receive, in double precision."""
+    shape = scan.pixels.valid.shape
+    samples, owner = samples_of(targets, shape, scan.model.rig.sensor.bayer)
+    light, owners = ProbedLight(scan, samples), torch.as_tensor(owner)
+    lit = torch.as_tensor(scan.pixels.shading.ravel()[targets], dtype=torch.float64)[owners]
+    rows = light.rows * lit[:, None, None]
+    heavy = rows * light.weight[:, None]
+
+    def gather(values: Tensor) -> Tensor:
+        return values.new_zeros((len(targets), *values.shape[1:])).index_add_(0, owners, values)
+
+    matrix, right = gather(heavy @ rows.mT), gather((heavy @ light.values[..., None])[..., 0])
+    found = solve_dense(matrix, right, scan.prior)
+    nodes = found.nodes.T.contiguous()
+    prior = banded.to_dense(roughness(nodes.shape[1], matrix)[..., None])[0] * found.tau[:, None, None] ** -2
+    prior = prior + torch.eye(nodes.shape[1]).to(matrix) * scan.prior.level_std**-2
+    residual = light.values - (nodes[owners][:, None] @ rows)[:, 0]
+    return SolvedPixels(light, owners, lit, rows, heavy, residual, nodes, found.mean, matrix + prior)
