@@ -25,9 +25,9 @@ from dsl_core.reconstruction.spectral.causes import (
     fit_causes,
 )
 from dsl_core.reconstruction.spectral.film_motion import LEAST_MOTION_PX, FilmMotion, coarseness
-from dsl_core.reconstruction.spectral.line_probe import PROFILE
 from dsl_core.reconstruction.spectral.model_error import ModelError
-from dsl_core.reconstruction.spectral.probe import Probe
+from dsl_core.reconstruction.spectral.probing.line_probe import PROFILE
+from dsl_core.reconstruction.spectral.probing.probe import Probe
 from dsl_core.reconstruction.spectral.self_correction import Followed
 
 #: Shares of pixels above which a scan is not what the twin's scenes lead to expect.

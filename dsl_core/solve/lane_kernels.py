@@ -1,11 +1,11 @@
 """The banded solver as compiled code: eight pixels side by side, from samples' equations to the posterior.
 
-It computes what `dsl_core.reconstruction.spectral.solver` explains, in double precision, many times as fast
-as tensors do on a processor. Those remain for a GPU; a test holds both together. Arrays of a block are flat,
-one row of `LANES` numbers after the other, at offsets that are constant in the innermost loops: only so do
-these become vector instructions. The length of the tuple ``diagonals`` is the bandwidth, constant for
-the compiler because it is part of a type. Nothing is allocated here and no slice is taken, since both take
-long to compile; all that call each other are here, as `dsl_core.solve.compiled` asks.
+It computes what `dsl_core.reconstruction.spectral.solving.solver` explains, in double precision, many times
+as fast as tensors do on a processor. Those remain for a GPU; a test holds both together. Arrays of a block
+are flat, one row of `LANES` numbers after the other, at offsets that are constant in the innermost loops:
+only so do these become vector instructions. The length of the tuple ``diagonals`` is the bandwidth, constant
+for the compiler because it is part of a type. Nothing is allocated here and no slice is taken, since both
+take long to compile; all that call each other are here, as `dsl_core.solve.compiled` asks.
 """
 
 from __future__ import annotations

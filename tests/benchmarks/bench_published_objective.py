@@ -22,8 +22,8 @@ from dsl_core.model.result import build_result
 from dsl_core.model.spectral import WavelengthGrid
 from dsl_core.optics.correspondence import correspondence
 from dsl_core.reconstruction.spectral.published_objective import AdamOptions, PublishedReconstruction
+from dsl_core.reconstruction.spectral.solving.tile_frames import Pixels
 from dsl_core.reconstruction.spectral.spectra import SpectralReconstruction
-from dsl_core.reconstruction.spectral.tile_frames import Pixels
 from dsl_core.workflows import scans
 from tests.cases.twin_scan import solver_input, twin_scan
 

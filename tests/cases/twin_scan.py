@@ -22,8 +22,8 @@ from dsl_core.reconstruction.rows.assembly import Assembly
 from dsl_core.reconstruction.rows.bands import bands_of
 from dsl_core.reconstruction.scan_result import known_pixels
 from dsl_core.reconstruction.spectral.solvers import RowSolver
+from dsl_core.reconstruction.spectral.solving.tile_frames import Pixels
 from dsl_core.reconstruction.spectral.spectra import SpectralMaps
-from dsl_core.reconstruction.spectral.tile_frames import Pixels
 from dsl_core.simulation.sim_devices import open_twin
 
 if TYPE_CHECKING:

@@ -23,8 +23,8 @@ from dsl_core.optics.pixel_model import DEMOSAIC_SPREAD, EDGE_PX, PixelModel, de
 from dsl_core.optics.spectra import ORDERS, SECOND_ORDERS
 from dsl_core.planning.samples import chosen_samples
 from dsl_core.planning.virtual import VirtualPixels
+from dsl_core.reconstruction.spectral.solving.tile_frames import Pixels
 from dsl_core.reconstruction.spectral.spectra import SpectralReconstruction, model_of_plan
-from dsl_core.reconstruction.spectral.tile_frames import Pixels
 from dsl_core.simulation.published_rig import published_rig
 from dsl_core.solve import banded
 from dsl_core.workflows.inspection import FrameBlock, intensity_graph

@@ -25,7 +25,7 @@ from dsl_core.reconstruction.fit_findings import (
 )
 from dsl_core.reconstruction.spectral.causes import MOST_SHIFT_PX
 from dsl_core.reconstruction.spectral.film_motion import FilmMotion
-from dsl_core.reconstruction.spectral.probe import Probe, probe
+from dsl_core.reconstruction.spectral.probing.probe import Probe, probe
 from dsl_core.reconstruction.spectral.spectra import SpectralReconstruction
 from dsl_core.simulation.published_rig import published_rig
 from tests.cases.twin_scan import MemoryScan, solver_input, twin_scan

@@ -1,8 +1,8 @@
 """The spectral solver's answer again, pixel by pixel in 106 bits, by another elimination.
 
-The posterior of `dsl_core.reconstruction.spectral.solver` is the solution of an arrow: the banded matrix of
-data and prior, bordered by the broad-band rows, ``[[A, R], [R', -I]]``. Its factorisation ``L D L'`` in
-double-double arithmetic needs neither Woodbury's identity nor a banded triangular solver.
+The posterior of `dsl_core.reconstruction.spectral.solving.solver` is the solution of an arrow: the banded
+matrix of data and prior, bordered by the broad-band rows, ``[[A, R], [R', -I]]``. Its factorisation
+``L D L'`` in double-double arithmetic needs neither Woodbury's identity nor a banded triangular solver.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from dsl_core.reconstruction.spectral.solver import Prior
+from dsl_core.reconstruction.spectral.solving.solver import Prior
 from tests.stability.double_double import Floats, Wide
 
 Mask = NDArray[np.bool_]

@@ -8,8 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dsl_core.model.fit import matters
-from dsl_core.reconstruction.spectral.pooled import pool
-from dsl_core.reconstruction.spectral.probe import LEADING, PARAMETERS, PRIOR_STD, Probe
+from dsl_core.reconstruction.spectral.probing.pooled import pool
+from dsl_core.reconstruction.spectral.probing.probe import LEADING, PRIOR_STD, Probe
+from dsl_core.reconstruction.spectral.probing.probed_light import PARAMETERS
 
 Floats = NDArray[np.float64]
 

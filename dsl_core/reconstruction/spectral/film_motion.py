@@ -21,10 +21,11 @@ from dsl_core.model.rig import Rig
 from dsl_core.optics.correspondence import GratingModel
 from dsl_core.optics.pixel_model import PixelModel
 from dsl_core.optics.spectra import ORDERS
-from dsl_core.reconstruction.spectral.pooled import pool
-from dsl_core.reconstruction.spectral.probe import LEADING, PARAMETERS, Probe, ProbedScan
-from dsl_core.reconstruction.spectral.probe import PRIOR_STD as PARAMETER_STD
-from dsl_core.reconstruction.spectral.probed_pixels import CELLS
+from dsl_core.reconstruction.spectral.probing.pooled import pool
+from dsl_core.reconstruction.spectral.probing.probe import LEADING, Probe
+from dsl_core.reconstruction.spectral.probing.probe import PRIOR_STD as PARAMETER_STD
+from dsl_core.reconstruction.spectral.probing.probed_light import PARAMETERS, ProbedScan
+from dsl_core.reconstruction.spectral.probing.probed_pixels import CELLS
 
 Floats = NDArray[np.float64]
 

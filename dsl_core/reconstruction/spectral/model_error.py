@@ -1,8 +1,9 @@
 """How wrong spectra are by the model itself, learned from the probed pixels of a scan.
 
-The parameters of `dsl_core.reconstruction.spectral.probe` are fitted cell by cell. What a cell asks for, less
-what its noise alone would ask for, times its effect on reflectance is the error that the model has there; it
-is stated as a share of reflectance for every cell and band, and added to the deviation of every pixel.
+The parameters of `dsl_core.reconstruction.spectral.probing.probe` are fitted cell by cell. What a cell asks
+for, less what its noise alone would ask for, times its effect on reflectance is the error that the model has
+there; it is stated as a share of reflectance for every cell and band, and added to the deviation of every
+pixel.
 """
 
 from __future__ import annotations
@@ -12,8 +13,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from dsl_core.reconstruction.spectral.probe import LEADING, PARAMETERS, PRIOR_STD, Probe
-from dsl_core.reconstruction.spectral.probed_pixels import CELLS
+from dsl_core.reconstruction.spectral.probing.probe import LEADING, PRIOR_STD, Probe
+from dsl_core.reconstruction.spectral.probing.probed_light import PARAMETERS
+from dsl_core.reconstruction.spectral.probing.probed_pixels import CELLS
 
 Floats = NDArray[np.float64]
 

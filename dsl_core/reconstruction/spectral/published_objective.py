@@ -30,8 +30,8 @@ from dsl_core.optics.line_profile import step_edge
 from dsl_core.optics.line_set import LineSet
 from dsl_core.optics.spectra import ORDERS, chain_response, hat_moments
 from dsl_core.progress import NoProgress, Progress
+from dsl_core.reconstruction.spectral.solving.tile_frames import Pixels
 from dsl_core.reconstruction.spectral.spectra import SpectralMaps, blurred_mask
-from dsl_core.reconstruction.spectral.tile_frames import Pixels
 from dsl_core.solve.many import Check, work_through
 from dsl_core.solve.threads import one_kernel_thread
 

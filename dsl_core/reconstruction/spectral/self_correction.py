@@ -19,7 +19,8 @@ from dsl_core.optics.pixel_model import PixelModel
 from dsl_core.optics.spectra import ORDERS
 from dsl_core.reconstruction.spectral.causes import Causes, fit_causes
 from dsl_core.reconstruction.spectral.film_motion import FilmMotion, fit_motion, moved
-from dsl_core.reconstruction.spectral.probe import Probe, ProbedScan, probe
+from dsl_core.reconstruction.spectral.probing.probe import Probe, probe
+from dsl_core.reconstruction.spectral.probing.probed_light import ProbedScan
 
 #: How many deviations the chi-square of pixels has to fall by.
 SURELY = 3.0

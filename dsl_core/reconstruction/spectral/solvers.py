@@ -17,15 +17,15 @@ from dsl_core.optics.spectra import Bands
 from dsl_core.progress import Progress
 from dsl_core.reconstruction.rows.bands import Band
 from dsl_core.reconstruction.rows.frames import ScanFrames
-from dsl_core.reconstruction.spectral.frame_levels import frame_levels
 from dsl_core.reconstruction.spectral.model_error import ModelError
 from dsl_core.reconstruction.spectral.nearest_line import ColourBasis, NearestLine
-from dsl_core.reconstruction.spectral.picked_cube import PickedCube
-from dsl_core.reconstruction.spectral.probe import probed_pixels
+from dsl_core.reconstruction.spectral.probing.frame_levels import frame_levels
+from dsl_core.reconstruction.spectral.probing.picked_cube import PickedCube
+from dsl_core.reconstruction.spectral.probing.probe import probed_pixels
 from dsl_core.reconstruction.spectral.published_objective import PublishedReconstruction, require_single_lines
 from dsl_core.reconstruction.spectral.self_correction import Followed
+from dsl_core.reconstruction.spectral.solving.tile_frames import Pixels
 from dsl_core.reconstruction.spectral.spectra import SpectralMaps, SpectralReconstruction, tile_shape
-from dsl_core.reconstruction.spectral.tile_frames import Pixels
 
 _NONE = np.empty(0, np.intp)
 _KINDS = {"published": PublishedReconstruction, "nearest-line": NearestLine}

@@ -23,14 +23,14 @@ from dsl_core.optics.spectra import ORDERS, Bands
 from dsl_core.progress import NoProgress, Progress
 from dsl_core.reconstruction.columns.pattern_column import radiance_profiles, rounding_error
 from dsl_core.reconstruction.spectral.causes import common_error, fit_causes
-from dsl_core.reconstruction.spectral.compiled_tiles import PARAMETERS, CompiledTiles
-from dsl_core.reconstruction.spectral.lane_solver import solve_spectra
 from dsl_core.reconstruction.spectral.model_error import ModelError, model_error, neighbour_contrast
-from dsl_core.reconstruction.spectral.picked_cube import PickedCube
-from dsl_core.reconstruction.spectral.probe import ProbedScan
+from dsl_core.reconstruction.spectral.probing.picked_cube import PickedCube
+from dsl_core.reconstruction.spectral.probing.probed_light import ProbedScan
 from dsl_core.reconstruction.spectral.self_correction import Followed, follow
-from dsl_core.reconstruction.spectral.solver import Prior, Spectra
-from dsl_core.reconstruction.spectral.tile_frames import Pixels, TileFrames
+from dsl_core.reconstruction.spectral.solving.compiled_tiles import PARAMETERS, CompiledTiles
+from dsl_core.reconstruction.spectral.solving.lane_solver import solve_spectra
+from dsl_core.reconstruction.spectral.solving.solver import Prior, Spectra
+from dsl_core.reconstruction.spectral.solving.tile_frames import Pixels, TileFrames
 from dsl_core.solve.banded import multiply
 from dsl_core.solve.many import Check, work_through
 from dsl_core.solve.threads import one_kernel_thread
@@ -324,7 +324,7 @@ class SpectralReconstruction:
         return colour, (kappa / (variance + (COLOUR_ERROR * colour) ** 2)).sqrt()
 
     def _dense(self, frames: TileFrames, traced: Traced, check: Check) -> tuple[Spectra, Tensor]:
-        from dsl_core.reconstruction.spectral.dense_solver import solve_dense
+        from dsl_core.reconstruction.spectral.solving.dense_solver import solve_dense
 
         shading, blur = frames.known("shading"), frames.blur_px()
         radiance, weight = frames.colours()

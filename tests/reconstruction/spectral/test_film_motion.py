@@ -14,12 +14,13 @@ from dsl_core.model.spectral import WavelengthGrid
 from dsl_core.optics.correspondence import GratingModel
 from dsl_core.optics.spectra import ORDERS
 from dsl_core.reconstruction.spectral.film_motion import FIELDS, FilmMotion, fit_motion, with_film
-from dsl_core.reconstruction.spectral.line_probe import LineProbe
-from dsl_core.reconstruction.spectral.probe import PARAMETERS, Probe, ProbedScan
-from dsl_core.reconstruction.spectral.probed_pixels import CELLS, cell_of, sample_pixels
-from dsl_core.reconstruction.spectral.solver import Prior
+from dsl_core.reconstruction.spectral.probing.line_probe import LineProbe
+from dsl_core.reconstruction.spectral.probing.probe import Probe
+from dsl_core.reconstruction.spectral.probing.probed_light import PARAMETERS, ProbedScan
+from dsl_core.reconstruction.spectral.probing.probed_pixels import CELLS, cell_of, sample_pixels
+from dsl_core.reconstruction.spectral.solving.solver import Prior
+from dsl_core.reconstruction.spectral.solving.tile_frames import Pixels
 from dsl_core.reconstruction.spectral.spectra import model_of_plan
-from dsl_core.reconstruction.spectral.tile_frames import Pixels
 from dsl_core.simulation.published_rig import published_rig
 
 SHAPE, DEPTH_MM = (72, 112), 700.0

@@ -8,10 +8,11 @@ import numpy as np
 import pytest
 
 from dsl_core.reconstruction.spectral.causes import common_error, fit_causes
-from dsl_core.reconstruction.spectral.line_probe import LineProbe
 from dsl_core.reconstruction.spectral.model_error import MARGIN, model_error, neighbour_contrast
-from dsl_core.reconstruction.spectral.probe import PARAMETERS, Probe
-from dsl_core.reconstruction.spectral.probed_pixels import CELLS
+from dsl_core.reconstruction.spectral.probing.line_probe import LineProbe
+from dsl_core.reconstruction.spectral.probing.probe import Probe
+from dsl_core.reconstruction.spectral.probing.probed_light import PARAMETERS
+from dsl_core.reconstruction.spectral.probing.probed_pixels import CELLS
 
 PER_CELL, BANDS, LEVEL = 8, 5, 0.4
 GAIN = PARAMETERS.index("gain +1")

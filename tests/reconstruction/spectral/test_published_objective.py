@@ -17,8 +17,8 @@ from dsl_core.reconstruction.spectral.published_objective import (
     fit,
     objective,
 )
+from dsl_core.reconstruction.spectral.solving.tile_frames import Pixels
 from dsl_core.reconstruction.spectral.spectra import model_of_plan
-from dsl_core.reconstruction.spectral.tile_frames import Pixels
 from dsl_core.simulation.published_rig import published_rig
 
 SHADING, GREY = 1.7, 0.4

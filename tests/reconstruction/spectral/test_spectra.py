@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import torch
 
-from dsl_core.reconstruction.spectral.solver import Prior, Spectra
+from dsl_core.reconstruction.spectral.solving.solver import Prior, Spectra
 from dsl_core.reconstruction.spectral.spectra import LEAST_TILE, TILE, blurred_mask, tile_shape, with_offset
 
 BANDS = 4

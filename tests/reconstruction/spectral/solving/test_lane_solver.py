@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 import torch
 
-from dsl_core.reconstruction.spectral.lane_solver import diagonals_for, solve_spectra, whole_blocks
-from dsl_core.reconstruction.spectral.solver import Prior, solve_tensors
+from dsl_core.reconstruction.spectral.solving.lane_solver import diagonals_for, solve_spectra, whole_blocks
+from dsl_core.reconstruction.spectral.solving.solver import Prior, solve_tensors
 from tests.stability.random_pixels import random_equations
 
 

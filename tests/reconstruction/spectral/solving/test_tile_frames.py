@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from dsl_core.optics.line_set import LineSet
 from dsl_core.optics.pixel_model import MODEL_ERROR
 from dsl_core.optics.sensor import bayer_channels
-from dsl_core.reconstruction.spectral.tile_frames import Pixels, TileFrames
+from dsl_core.reconstruction.spectral.solving.tile_frames import Pixels, TileFrames
 from dsl_core.simulation.published_rig import published_rig
 
 SHAPE, FRAMES = (12, 16), 3

@@ -15,10 +15,10 @@ from dsl_core.optics.correspondence import correspondence
 from dsl_core.reconstruction.geometry import reconstruct_geometry
 from dsl_core.reconstruction.scan_result import known_pixels
 from dsl_core.reconstruction.spectral import spectra
-from dsl_core.reconstruction.spectral.compiled_tiles import on_grid
-from dsl_core.reconstruction.spectral.solver import solve_tensors
+from dsl_core.reconstruction.spectral.solving.compiled_tiles import on_grid
+from dsl_core.reconstruction.spectral.solving.solver import solve_tensors
+from dsl_core.reconstruction.spectral.solving.tile_frames import Pixels
 from dsl_core.reconstruction.spectral.spectra import SpectralMaps, SpectralReconstruction
-from dsl_core.reconstruction.spectral.tile_frames import Pixels
 from tests.stability.bench import GRID, WINDOW_PX, Patch, Staged, staged
 
 

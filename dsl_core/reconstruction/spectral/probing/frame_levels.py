@@ -16,8 +16,8 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
-from dsl_core.reconstruction.spectral.probe import CHUNK, FEWEST, probe_targets
-from dsl_core.reconstruction.spectral.probed_light import ProbedScan, SolvedPixels, solve_pixels
+from dsl_core.reconstruction.spectral.probing.probe import CHUNK, FEWEST, probe_targets
+from dsl_core.reconstruction.spectral.probing.probed_light import ProbedScan, SolvedPixels, solve_pixels
 from dsl_core.solve.threads import one_kernel_thread
 
 Floats = NDArray[np.float64]

@@ -21,7 +21,7 @@ from torch import Tensor
 from dsl_core.model.rig import BayerPattern
 from dsl_core.optics.spectra import ORDERS
 from dsl_core.optics.spread.field import widths_at
-from dsl_core.reconstruction.spectral.curve_probe import (
+from dsl_core.reconstruction.spectral.probing.curve_probe import (
     CurveMisfit,
     curve_changes,
     curve_misfit,
@@ -30,10 +30,10 @@ from dsl_core.reconstruction.spectral.curve_probe import (
     tells_of_curves,
     variety,
 )
-from dsl_core.reconstruction.spectral.line_probe import LineProbe, probe_lines, sound_pixels
-from dsl_core.reconstruction.spectral.probed_light import PARAMETERS, ProbedScan, solve_pixels
-from dsl_core.reconstruction.spectral.probed_pixels import Indices, cell_of, sample_pixels, samples_of
-from dsl_core.reconstruction.spectral.solver import band_mean
+from dsl_core.reconstruction.spectral.probing.line_probe import LineProbe, probe_lines, sound_pixels
+from dsl_core.reconstruction.spectral.probing.probed_light import PARAMETERS, ProbedScan, solve_pixels
+from dsl_core.reconstruction.spectral.probing.probed_pixels import Indices, cell_of, sample_pixels, samples_of
+from dsl_core.reconstruction.spectral.solving.solver import band_mean
 
 Floats = NDArray[np.float64]
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from dsl_core.reconstruction.spectral.probe import Probe
+from dsl_core.reconstruction.spectral.probing.probe import Probe
 
 Floats = NDArray[np.float64]
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from dsl_core.reconstruction.spectral.probed_pixels import cell_of, sample_pixels, samples_of
+from dsl_core.reconstruction.spectral.probing.probed_pixels import cell_of, sample_pixels, samples_of
 
 
 def test_chosen_pixels_are_spread_over_all_cells_and_have_whole_neighbourhoods() -> None:

@@ -10,7 +10,7 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
-from dsl_core.reconstruction.spectral.solver import (
+from dsl_core.reconstruction.spectral.solving.solver import (
     ACTIVE_SET_ROUNDS,
     LOCAL_STD,
     PENALTY,

@@ -16,9 +16,14 @@ from dsl_core.optics.colour_neighbours import bayer_colours
 from dsl_core.optics.line_equations import LEAST_SURPLUS, OrderLines
 from dsl_core.optics.line_profile import SAMPLES, halo_of_line
 from dsl_core.optics.pixel_model import MODEL_ERROR, PixelModel, Traced
-from dsl_core.reconstruction.spectral.lane_solver import Found, LaneSolver, diagonals_for, whole_blocks
-from dsl_core.reconstruction.spectral.solver import Prior, Spectra
-from dsl_core.reconstruction.spectral.tile_frames import TileFrames
+from dsl_core.reconstruction.spectral.solving.lane_solver import (
+    Found,
+    LaneSolver,
+    diagonals_for,
+    whole_blocks,
+)
+from dsl_core.reconstruction.spectral.solving.solver import Prior, Spectra
+from dsl_core.reconstruction.spectral.solving.tile_frames import TileFrames
 from dsl_core.solve.compiled import compiled
 from dsl_core.solve.many import Check
 

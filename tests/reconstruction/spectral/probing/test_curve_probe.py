@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import torch
 
-from dsl_core.reconstruction.spectral.curve_probe import (
+from dsl_core.reconstruction.spectral.probing.curve_probe import (
     KNOTS_NM,
     curve_changes,
     curve_misfit,

@@ -19,11 +19,11 @@ from dsl_core.optics.correspondence import Footprint, like
 from dsl_core.optics.line_profile import SAMPLES, ProfileTable, halo_of_line
 from dsl_core.optics.pixel_model import PixelModel
 from dsl_core.optics.spectra import ORDERS
-from dsl_core.reconstruction.spectral.dense_solver import solve_dense
-from dsl_core.reconstruction.spectral.picked_cube import PickedCube
-from dsl_core.reconstruction.spectral.probed_pixels import Indices, samples_of
-from dsl_core.reconstruction.spectral.solver import Prior, roughness
-from dsl_core.reconstruction.spectral.tile_frames import Pixels, weighted
+from dsl_core.reconstruction.spectral.probing.picked_cube import PickedCube
+from dsl_core.reconstruction.spectral.probing.probed_pixels import Indices, samples_of
+from dsl_core.reconstruction.spectral.solving.dense_solver import solve_dense
+from dsl_core.reconstruction.spectral.solving.solver import Prior, roughness
+from dsl_core.reconstruction.spectral.solving.tile_frames import Pixels, weighted
 from dsl_core.solve import banded
 
 Floats = NDArray[np.float64]

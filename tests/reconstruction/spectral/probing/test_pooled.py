@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from dsl_core.reconstruction.spectral.line_probe import LineProbe
-from dsl_core.reconstruction.spectral.pooled import pool
-from dsl_core.reconstruction.spectral.probe import PARAMETERS, Probe
+from dsl_core.reconstruction.spectral.probing.line_probe import LineProbe
+from dsl_core.reconstruction.spectral.probing.pooled import pool
+from dsl_core.reconstruction.spectral.probing.probe import Probe
+from dsl_core.reconstruction.spectral.probing.probed_light import PARAMETERS
 
 CELL = np.repeat(np.arange(48), 8)
 INFORMATION = 100.0

@@ -8,8 +8,8 @@ import pytest
 from dsl_core.model.plan import CapturePlan, GrayCode, LineComb, ScanLines
 from dsl_core.model.spectral import WavelengthGrid
 from dsl_core.optics.correspondence import correspondence
-from dsl_core.reconstruction.spectral.frame_levels import frame_levels
-from dsl_core.reconstruction.spectral.probed_light import ProbedScan
+from dsl_core.reconstruction.spectral.probing.frame_levels import frame_levels
+from dsl_core.reconstruction.spectral.probing.probed_light import ProbedScan
 from dsl_core.reconstruction.spectral.spectra import SpectralReconstruction
 from tests.cases.twin_scan import solver_input, twin_scan
 

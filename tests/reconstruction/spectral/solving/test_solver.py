@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 from scipy.optimize import lsq_linear
 from torch import Tensor
 
-from dsl_core.reconstruction.spectral.dense_solver import solve_dense
-from dsl_core.reconstruction.spectral.lane_solver import solve_spectra
-from dsl_core.reconstruction.spectral.solver import (
+from dsl_core.reconstruction.spectral.solving.dense_solver import solve_dense
+from dsl_core.reconstruction.spectral.solving.lane_solver import solve_spectra
+from dsl_core.reconstruction.spectral.solving.solver import (
     Posterior,
     Prior,
     band_mean,

@@ -9,8 +9,8 @@ import torch
 from dsl_core.model.rig import ProjectorResponse
 from dsl_core.optics.line_profile import zero_order_profile
 from dsl_core.optics.line_set import LineSet
-from dsl_core.reconstruction.spectral.line_probe import TAIL_BLUR, LineProbe, probe_lines
-from dsl_core.reconstruction.spectral.tile_frames import Pixels
+from dsl_core.reconstruction.spectral.probing.line_probe import TAIL_BLUR, LineProbe, probe_lines
+from dsl_core.reconstruction.spectral.solving.tile_frames import Pixels
 
 LINES = LineSet(width_px=5, step_px=2, first_px=2.0, lines=60, frames=60)
 RESPONSE = ProjectorResponse(blur_px=0.6, halo_peak_per_px=1e-4)

@@ -16,8 +16,8 @@ from torch import Tensor
 from dsl_core.model.rig import ProjectorResponse
 from dsl_core.optics.line_profile import LineTable
 from dsl_core.optics.line_set import LineSet
-from dsl_core.reconstruction.spectral.picked_cube import PickedCube
-from dsl_core.reconstruction.spectral.tile_frames import Pixels, weighted
+from dsl_core.reconstruction.spectral.probing.picked_cube import PickedCube
+from dsl_core.reconstruction.spectral.solving.tile_frames import Pixels, weighted
 
 Floats = NDArray[np.float64]
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from dsl_core.reconstruction.spectral.curve_probe import variety
-from dsl_core.reconstruction.spectral.probe import ONE_COLOUR
+from dsl_core.reconstruction.spectral.probing.curve_probe import variety
+from dsl_core.reconstruction.spectral.probing.probe import ONE_COLOUR
 
 RISING = np.linspace(0.2, 0.6, 24)
 

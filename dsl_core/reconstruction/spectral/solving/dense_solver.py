@@ -5,7 +5,7 @@ from __future__ import annotations
 import torch
 from torch import Tensor
 
-from dsl_core.reconstruction.spectral.solver import (
+from dsl_core.reconstruction.spectral.solving.solver import (
     ACTIVE_SET_ROUNDS,
     LOCAL_STD,
     PENALTY,
