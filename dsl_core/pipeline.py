@@ -159,11 +159,11 @@ def reconstruct(
     for band in result.missing(reversed(frames.bands)):
         spectra = None
         if solver is not None:
-            with timer.stage("spectra"):
+            with timer.stage("spectra", in_parts=True):
                 spectra = solver.rows(band, progress)
-        with timer.stage("colour and result"):
+        with timer.stage("colour and result", in_parts=True):
             result.put(band, spectra)
-    with timer.stage("colour and result"):
+    with timer.stage("colour and result", in_parts=True):
         return result.finish(solver, findings)
 
 

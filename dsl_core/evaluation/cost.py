@@ -26,8 +26,6 @@ class StageCost:
 class StageTimer:
     """Collects the cost of stages; the same timer may be used from several places in turn.
 
-    What is done in several goes under one name is one stage.
-
     >>> timer = StageTimer()
     >>> with timer.stage("decode"):
     ...     total = sum(range(1000))
@@ -38,19 +36,22 @@ class StageTimer:
     stages: list[StageCost] = field(default_factory=list)
 
     @contextmanager
-    def stage(self, name: str) -> Iterator[None]:
-        """Measure a block; its cost is kept also when it fails."""
+    def stage(self, name: str, in_parts: bool = False) -> Iterator[None]:
+        """Measure a block; its cost is kept also when it fails.
+
+        With ``in_parts`` it belongs to what was done under that name before.
+        """
         watch = _MemoryWatch()
         started = time.perf_counter()
         try:
             yield
         finally:
             seconds, peak = time.perf_counter() - started, watch.stop()
-            self._add(StageCost(name, seconds, peak, watch.first))
+            self._add(StageCost(name, seconds, peak, watch.first), in_parts)
 
-    def _add(self, cost: StageCost) -> None:
+    def _add(self, cost: StageCost, in_parts: bool) -> None:
         for at, known in enumerate(self.stages):
-            if known.name == cost.name:
+            if in_parts and known.name == cost.name:
                 seconds, peak = known.seconds + cost.seconds, max(known.peak_bytes, cost.peak_bytes)
                 self.stages[at] = StageCost(known.name, seconds, peak, known.start_bytes)
                 return

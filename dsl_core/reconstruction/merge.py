@@ -125,7 +125,8 @@ class LineStack:
 
     def pick(self, pixels: NDArray[np.intp]) -> PickedLines:
         """The frames of some pixels (flat indices)."""
-        radiance, std = (cube.reshape(len(cube), -1)[:, pixels] for cube in (self.radiance, self.std))
+        flat = (cube.reshape(len(cube), self.black_std.size) for cube in (self.radiance, self.std))
+        radiance, std = (cube[:, pixels] for cube in flat)
         return PickedLines(pixels, radiance, std, self.black_std.ravel()[pixels])
 
 

@@ -194,7 +194,7 @@ def test_the_solvers_equations_are_those_of_the_predictions_operator(
         given.append(data.clone())
         raise Seen
 
-    for solve in ("dense_solver.solve_dense", "spectra.solve_spectra"):
+    for solve in ("solving.dense_solver.solve_dense", "spectra.solve_spectra"):
         monkeypatch.setattr(f"dsl_core.reconstruction.spectral.{solve}", watched)
     solver, virtual = readers.solver(), readers.virtual()
     with pytest.raises(Seen):

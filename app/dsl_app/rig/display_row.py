@@ -1,4 +1,4 @@
-"""The row of controls by which the live picture is shown; nothing that is saved depends on them."""
+"""The controls by which the live picture is shown; nothing that is saved depends on them."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import QSlider, QWidget
 
 from dsl_app.shared.widgets.forms import ChoiceBox, check_box, label, named
-from dsl_app.shared.widgets.layouts import STRETCH, row_of
+from dsl_app.shared.widgets.layouts import STRETCH, column_of, row_of
 from dsl_core.capture.display import PLAIN, Display, Tone
 
 #: Steps of the gain's slider for a factor of two, and the highest gain in factors of two.
@@ -38,8 +38,10 @@ class DisplayRow(QWidget):
         self.stretch.toggled.connect(lambda on: self._be(stretch=on))
         self.balance.toggled.connect(lambda on: self._be(balance=on))
         self.gain.valueChanged.connect(lambda step: self._be(gain=2.0 ** (step / STEPS)))
-        row = (self.tone, self.stretch, self.balance, label("Gain"), self.gain, self._factor, STRETCH)
-        row_of(*row, on=self, margins=0, spacing=6)
+        chosen = row_of(self.tone, self.stretch, self.balance, STRETCH, margins=0, spacing=6)
+        gain = row_of(label("Gain"), self.gain, self._factor, STRETCH, margins=0, spacing=6)
+        # One below the other: side by side they are wider than the picture in a small window.
+        column_of(chosen, gain, on=self, margins=0, spacing=4)
 
     def _be(self, **parts: Tone | bool | float) -> None:
         self.display = replace(self.display, **parts)  # type: ignore[arg-type]

@@ -113,7 +113,7 @@ def test_create_never_overwrites(session: Path, plan: CapturePlan, tmp_path: Pat
 
 
 def test_reading_something_else_says_what_to_give(tmp_path: Path) -> None:
-    with pytest.raises(StoreError, match=r"no manifest.json. Give the folder"):
+    with pytest.raises(StoreError, match=r"is not a scan: it is an empty folder. Give the folder"):
         ScanReader(tmp_path)
 
 
