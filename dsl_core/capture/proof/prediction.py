@@ -88,10 +88,13 @@ class Expected:
 
 
 def rescaled(picture: Counts, old_black: Counts, new_black: Floats, scale: float, noise: Noise) -> Expected:
-    """The picture of an earlier setting at another one, whose light is ``scale`` times as strong."""
+    """The picture of an earlier setting at another one, whose light is ``scale`` times as strong.
+
+    Noise is scaled as well and may take counts below zero: cut off there, their sum would be too bright.
+    """
     factor, full = np.float32(scale), noise.sensor.full_scale_dn
     light = factor * (picture.astype(np.float32) - old_black.astype(np.float32))
-    counts = np.clip(new_black + light, 0, np.float32(full))
+    counts = np.minimum(new_black + light, np.float32(full))
     variance = factor**2 * (noise.variance(picture) + noise.variance(old_black))
     # Nobody knows how much brighter a saturated pixel was.
     unknown = (picture >= full) & (counts < full)

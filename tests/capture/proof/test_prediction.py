@@ -200,3 +200,22 @@ def test_brightness_of_a_picture_asks_for_light_beyond_both_noises() -> None:
         wanted = Expected(black + light, floats(np.full(16, 5.65)))
         found = brightness_of_picture(np.full(16, 200, np.uint16), wanted, black, NOISE)
         assert (found is not None) == is_told
+
+
+def test_noise_that_is_scaled_up_with_a_picture_does_not_make_it_brighter() -> None:
+    noise, rng = (
+        Noise(Sensor(black_level_dn=100.0, electrons_per_dn=10.0, read_noise_dn=4.0)),
+        np.random.default_rng(5),
+    )
+    true = np.where(np.arange(20_000) < 400, 60.0, 1.0)
+
+    def picture(light: NDArray[np.float64], room: float) -> NDArray[np.uint16]:
+        return np.asarray(np.rint(100 + room + light + rng.normal(0, 4, light.shape)), np.uint16)
+
+    dark = np.zeros_like(true)
+    old_black, new_black = picture(dark, 6.0), picture(dark, 12.0)
+    wanted = rescaled(picture(true, 6.0), old_black, floats(new_black), 40.0, noise)
+    seen = picture(40 * true, 12.0)
+    share = brightness_of_picture(seen, wanted, floats(new_black), noise)
+    assert share is not None
+    assert share == pytest.approx(1.0, abs=0.1)
