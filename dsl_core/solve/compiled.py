@@ -1,9 +1,10 @@
 """How loops over pixels are compiled: one place for the options of numba.
 
-Compiled code is kept beside its module, or in the user's cache where that cannot be written to. It is made
-again when that module changes: functions that call each other belong in one module, or an edit would not be
-noticed. Products and sums may be fused, which rounds less; nothing else about the order of operations is
-given up, so that NaN, infinity and zero behave as they do in numpy.
+Compiled code is kept beside its module, or in the user's cache where that cannot be written to; where
+nothing can, as in a container that only reads, it is made by every process. It is made again when that
+module changes: functions that call each other belong in one module, or an edit would not be noticed.
+Products and sums may be fused, which rounds less; nothing else about the order of operations is given up, so
+that NaN, infinity and zero behave as they do in numpy.
 """
 
 from __future__ import annotations
@@ -27,7 +28,13 @@ _NO_PYTHON: dict[str, Any] = {"no_cpython_wrapper": True}
 
 def compiled(function: Callable[..., T]) -> Callable[..., T]:
     """A function of arrays and numbers as machine code, which runs without Python's lock on one thread."""
-    made: Callable[..., T] = njit(cache=True, **_OPTIONS)(function)
+    made: Callable[..., T]
+    try:
+        made = njit(cache=True, **_OPTIONS)(function)
+    except RuntimeError as error:
+        if "no locator" not in str(error):
+            raise
+        made = njit(**_OPTIONS)(function)
     return made
 
 
