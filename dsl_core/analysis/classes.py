@@ -25,6 +25,8 @@ _EXPLAINED = 0.99
 _PIXELS_TOGETHER = 9
 #: The part of a pixel's variance that no number of pixels averages out, because all have it in common.
 _IN_COMMON = 0.05
+#: The part of a library's error that bands do not have in common.
+BAND_SHARE = 0.25
 #: A class that varies by more than this share of its reflectance is doubted.
 WIDE = 0.2
 #: Pixels with these flags get no class: their spectrum is absent, cut off, or that of two materials.
@@ -66,7 +68,7 @@ def summed_up(name: str, members: Sequence[Member]) -> SpectralClass:
     if len(members) <= MOST_MEMBERS:
         return SpectralClass(name, tuple(members))
     means = np.stack([member.mean for member in members])
-    own = np.mean([member.std**2 for member in members], axis=0)
+    own = np.mean([member.std**2 + (member.components**2).sum(0) for member in members], axis=0)
     components, rest = components_of(np.cov(means, rowvar=False))
     return SpectralClass(name, (Member(means.mean(0), np.sqrt(own + rest), components),))
 
@@ -84,12 +86,18 @@ def components_of(covariance: Floats) -> tuple[Floats, Floats]:
 
 
 def classes_of_library(
-    library: SpectralLibrary, bands_nm: Floats, shape: Shape = "triangle"
+    library: SpectralLibrary, bands_nm: Floats, shape: Shape = "triangle", relative_error: float = 0.0
 ) -> tuple[tuple[SpectralClass, ...], tuple[str, ...]]:
     """The groups of a library as classes at bands (nm), and notes on entries that are left out.
 
-    Raises `CalibrationError` when no entry covers the bands.
+    ``relative_error`` is the standard deviation, as a share of reflectance, that its spectra have because
+    another instrument measured them: of the level of each, and a quarter of it of single bands. Raises
+    `CalibrationError` when no entry covers the bands, or for an error that is none.
     """
+    if not 0 <= relative_error < 1:
+        raise CalibrationError(
+            f"The error of a library is a share from 0 to 1, not {relative_error:g}. Give 0.02 for 2 %."
+        )
     members: dict[str, list[Member]] = {group: [] for group in library.groups}
     notes = []
     for entry in library.entries:
@@ -98,7 +106,9 @@ def classes_of_library(
         except CalibrationError as error:
             notes.append(f"{entry.name} ({entry.file.name}) is left out. {error}")
         else:
-            members[entry.group].append(Member.of(found.values, found.std))
+            std = np.hypot(found.std, BAND_SHARE * relative_error * found.values)
+            level = found.values[None] * relative_error if relative_error else np.empty((0, len(bands_nm)))
+            members[entry.group].append(Member(found.values, std, level))
     kept = tuple(summed_up(name, found) for name, found in members.items() if found)
     if not kept:
         raise CalibrationError(

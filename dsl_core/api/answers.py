@@ -32,6 +32,7 @@ def classify(
     margin: float | None = None,
     brightness: Literal["stated", "free"] = "stated",
     grouping: str = "auto",
+    library_error: float = 0.0,
     range_nm: tuple[float, float] | None = None,
     progress: Progress | None = None,
 ) -> xr.Dataset:
@@ -41,7 +42,8 @@ def classify(
     a mask, a pixel (x, y), or x, y, width and height. ``worst`` is, for the probability, the share of the
     pixels of a class that may be called "none of these" (0.01), else the largest angle (rad) or difference;
     ``margin`` the least probability of the class (0.95), else by which share the second must be worse.
-    ``brightness`` "free" compares shapes alone.
+    ``brightness`` "free" compares shapes alone. ``library_error`` is the standard deviation of the library's
+    spectra as a share of reflectance, such as 0.02 where another instrument measured them.
 
     The dataset holds ``class`` (y, x), an index into the coordinate ``label``, ``fit`` and ``margin`` (y, x),
     and for each label ``pixels`` and ``area_mm2``; the attribute ``notes`` lists what was converted or left
@@ -64,7 +66,9 @@ def classify(
     if library is not None:
         paths = [library] if not isinstance(library, Sequence) or isinstance(library, str) else library
         read = read_library([Path(path) for path in paths], grouping, progress=progress)
-        found, left_out = classes_of_library(read, result["wavelength_nm"].values)
+        found, left_out = classes_of_library(
+            read, result["wavelength_nm"].values, relative_error=library_error
+        )
         classes += found
         notes += [*read.notes, *left_out]
     if pins:

@@ -19,11 +19,14 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from dsl_core.analysis.classes import SpectralClass
+    from dsl_core.analysis.classification import Classification
     from dsl_core.progress import Progress
 
 Result = Annotated[Path, typer.Argument(metavar="RESULT.zarr", help="A result of 'reconstruct'.")]
 #: So many notes on a library are printed; the rest is counted.
 _MOST_NOTES = 6
+#: From this share of "none of these" on, the library itself may be what does not fit.
+_MOSTLY = 0.8
 
 
 def classify(
@@ -40,6 +43,14 @@ def classify(
             " columns name and group.",
         ),
     ] = "auto",
+    library_error: Annotated[
+        float,
+        typer.Option(
+            "--library-error",
+            help="Standard deviation of the library's spectra as a share of reflectance, such as 0.02, where"
+            " another instrument measured them.",
+        ),
+    ] = 0.0,
     pins: Annotated[
         bool, typer.Option("--pins", help="Classes are the pins and regions marked on the result.")
     ] = False,
@@ -103,7 +114,7 @@ def classify(
     if span is not None:
         result = within_nm(result, *parse_span("--range", span))
     with output.progress() as progress:
-        classes, notes = _classes(path, result, library, group, pins, at, progress)
+        classes, notes = _classes(path, result, library, library_error, group, pins, at, progress)
         found = classify_result(
             result, classes, Measure(measure), limits, "free" if free else "stated", progress
         )
@@ -121,6 +132,11 @@ def classify(
         [(r.label, r.pixels, f"{r.share:.1%}", area) for r, area in zip(shown, areas, strict=True)],
     )
     output.say(f"By {found.method}.")
+    if library and not library_error and _are_mostly_none(found):
+        output.say(
+            "Few pixels fit any class. Spectra that another instrument measured differ by some percent: state"
+            " that with --library-error 0.02, or compare shapes with --free-brightness."
+        )
     if files:
         output.say(f"Written: {', '.join(str(file) for file in files)}")
     output.put(
@@ -133,10 +149,17 @@ def classify(
     output.finish()
 
 
+def _are_mostly_none(found: Classification) -> bool:
+    """Whether most judged pixels are none of the classes, by the probability."""
+    none = next(row.share for row in found.rows if row.label == found.shown.labels[-2])
+    return found.scores.measure.value == "probability" and none > _MOSTLY
+
+
 def _classes(
     path: Path,
     result: xr.Dataset,
     library: Sequence[Path],
+    library_error: float,
     group: str,
     pins: bool,
     at: Sequence[str],
@@ -156,7 +179,9 @@ def _classes(
     if library:
         table = Path(group) if group.lower().endswith(".csv") else None
         read = read_library(library, "auto" if table else group, table, progress)
-        found, left_out = classes_of_library(read, result["wavelength_nm"].values)
+        found, left_out = classes_of_library(
+            read, result["wavelength_nm"].values, relative_error=library_error
+        )
         classes += found
         notes += [*read.notes, *left_out]
     masks = _masks(path, result, pins, at)
@@ -236,7 +261,7 @@ def report(
     result, found = load_result(path), None
     with output.progress() as progress:
         if library or materials:
-            classes, _ = _classes(path, result, library, "auto", materials, (), progress)
+            classes, _ = _classes(path, result, library, 0.0, "auto", materials, (), progress)
             found = classify_result(result, classes, progress=progress)
         content = session_content(path.stem, result, load_annotations(path), found)
         for target in targets:

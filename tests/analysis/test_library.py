@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from dsl_core.analysis.classes import classes_of_library
+from dsl_core.analysis.classify import ClassMap, score
 from dsl_core.analysis.library import read_library
 from dsl_core.errors import CalibrationError
 from tests.cases.spectra_files import NM, SHARE, asd
@@ -80,3 +81,28 @@ def test_nothing_to_read_is_one_sentence(tmp_path: Path) -> None:
         read_library([tmp_path])
     with pytest.raises(CalibrationError, match="no library"):
         read_library([tmp_path / "not there"])
+
+
+def test_spectra_of_another_instrument_fit_by_the_error_stated_for_them(
+    tmp_path: Path,
+) -> None:
+    library = read_library([_csv(tmp_path / "l.csv", SHARE, SHARE[::-1], titles=("one", "other"))])
+    (own, _), _ = classes_of_library(library, BANDS_NM)
+    noise = 0.001 * np.random.default_rng(0).standard_normal((len(BANDS_NM), 4, 5))
+    pixels = (1.02 * own.mean[:, None, None] + noise).astype(np.float32)
+    std = np.full_like(pixels, 0.001)
+    flags = np.zeros((4, 5), np.uint16)
+
+    def shares(relative_error: float) -> tuple[float, float]:
+        classes, _ = classes_of_library(library, BANDS_NM, relative_error=relative_error)
+        found = ClassMap.of(score(pixels, std, None, flags, classes))
+        return float((found.values == 1).mean()), float((found.values == found.none).mean())
+
+    assert shares(0.0) == (0.0, 1.0)
+    assert shares(0.02)[0] >= 0.95
+
+
+def test_an_error_in_percent_is_refused(tmp_path: Path) -> None:
+    library = read_library([_csv(tmp_path / "l.csv", SHARE, titles=("one",))])
+    with pytest.raises(CalibrationError, match=r"share from 0 to 1, not 2\. Give 0\.02 for 2 %"):
+        classes_of_library(library, BANDS_NM, relative_error=2.0)

@@ -1,5 +1,8 @@
 """Compiled loops work where their machine code cannot be kept."""
 
+from collections.abc import Callable
+from typing import Any
+
 import numpy as np
 
 from dsl_core.solve.compiled import compiled
@@ -15,8 +18,8 @@ def total(values):
 
 
 def test_a_function_that_cannot_be_kept_is_compiled_all_the_same() -> None:
-    names: dict[str, object] = {}
+    names: dict[str, Any] = {}
     exec(compile(_SOURCE, "<nowhere>", "exec"), names)
-    total = compiled(names["total"])  # type: ignore[arg-type]
+    total: Callable[..., float] = compiled(names["total"])
     assert total(np.arange(4.0)) == 6.0
     assert np.isnan(total(np.array([1.0, np.nan])))
