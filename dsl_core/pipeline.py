@@ -105,7 +105,7 @@ def reconstruct(
     Frames are read, and the result is made, by bands of rows, so that those of a large picture need not be
     in memory at once; the result is, unless a ``sink`` takes it.
     """
-    from dsl_core.optics.line_set import LineSet
+    from dsl_core.optics.lines.line_set import LineSet
     from dsl_core.reconstruction.columns.line_spread import own_spread, spread_pixels, with_own_spread
     from dsl_core.reconstruction.geometry import geometry_of, require_light, require_pixels
     from dsl_core.reconstruction.lenses import follow_lenses

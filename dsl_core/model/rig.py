@@ -10,11 +10,11 @@ from pydantic import Field, model_validator
 
 from dsl_core.model.base import Record
 from dsl_core.model.calibration.accepted import CalibrationNote
+from dsl_core.model.calibration.lateral_colour import LateralColour
 from dsl_core.model.conditions import BayerPattern as BayerPattern
 from dsl_core.model.conditions import CaptureConditions
 from dsl_core.model.conditions import colour_sites as colour_sites
 from dsl_core.model.geometry import Lens, Pose
-from dsl_core.model.lateral_colour import LateralColour
 from dsl_core.model.line_spread import LineSpread, Spread
 from dsl_core.model.spectral import SpectralCurve
 from dsl_core.model.spread_field import SpreadField

@@ -21,7 +21,7 @@ from torch import Tensor
 
 from dsl_core.model.rig import ProjectorResponse
 from dsl_core.optics.correspondence import like
-from dsl_core.optics.line_profile import band_profile, zero_order_profile
+from dsl_core.optics.lines.profile import band_profile, zero_order_profile
 
 #: Samples a column, and columns beyond each edge of the frame over which a line's blurred light dies away.
 OVERSAMPLE, MARGIN_PX = 4, 16

@@ -25,8 +25,8 @@ from torch import Tensor
 from dsl_core.model.rig import ProjectorResponse, Rig
 from dsl_core.optics.correspondence import Correspondence, Footprint, like, zero_order
 from dsl_core.optics.image_formation import BlurredProfiles, ImageFormation, OrderPath, one_if_grey
-from dsl_core.optics.line_equations import LineEquations
-from dsl_core.optics.line_set import LineSet
+from dsl_core.optics.lines.equations import LineEquations
+from dsl_core.optics.lines.line_set import LineSet
 from dsl_core.optics.spectra import ORDERS, Bands
 from dsl_core.optics.spread.field import relative_width
 

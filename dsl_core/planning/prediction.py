@@ -18,7 +18,7 @@ from dsl_core.evaluation.spectral import peak_width, spectral_errors
 from dsl_core.model.plan import CapturePlan, NoSpectral
 from dsl_core.model.rig import Rig
 from dsl_core.model.spectral import WavelengthGrid
-from dsl_core.optics.line_set import LineSet
+from dsl_core.optics.lines.line_set import LineSet
 from dsl_core.optics.spectra import Bands
 from dsl_core.planning import references
 from dsl_core.planning.expected import Prediction

@@ -14,7 +14,7 @@ from dsl_core.model.result import DEPTH_INVALID, Flag, Reach
 from dsl_core.model.rig import Rig
 from dsl_core.model.spectral import WavelengthGrid
 from dsl_core.optics.correspondence import GratingModel
-from dsl_core.optics.line_set import LineSet
+from dsl_core.optics.lines.line_set import LineSet
 from dsl_core.optics.spectra import ORDERS
 from dsl_core.reconstruction.spectral.causes import (
     MOST_CURVES,

@@ -14,7 +14,7 @@ from dsl_core.model.plan import CapturePlan
 from dsl_core.model.result import DEPTH_INVALID, REASONS, Flag
 from dsl_core.model.rig import Rig
 from dsl_core.optics.correspondence import triangulate
-from dsl_core.optics.line_set import LineSet
+from dsl_core.optics.lines.line_set import LineSet
 from dsl_core.optics.pinhole import rays_in
 from dsl_core.patterns.gray_code import DecodedCode
 from dsl_core.progress import Progress

@@ -9,7 +9,7 @@ import numpy as np
 from dsl_core.model.fit import FitFinding
 from dsl_core.model.result import Flag
 from dsl_core.model.rig import Rig
-from dsl_core.optics.line_set import LineSet
+from dsl_core.optics.lines.line_set import LineSet
 from dsl_core.optics.sensor import relative_gain
 from dsl_core.reconstruction.columns.lateral_colour import (
     lateral_finding,

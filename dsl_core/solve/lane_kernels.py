@@ -352,7 +352,7 @@ def solve_blocks(
 ) -> bool:  # fmt: skip
     """Solve pixels from the sums of their samples' equations; False where a system is not positive definite.
 
-    ``equations`` are (rows, channels, columns), see `dsl_core.optics.line_sums`. With ``neighbours`` they
+    ``equations`` are (rows, channels, columns), see `dsl_core.optics.lines.sums`. With ``neighbours`` they
     have one more sample on every side, of which a ``green`` pixel takes four and another eight. ``index`` is
     the pixel's place in the results, negative where none is wanted. ``rows`` (rows, bands, 3, columns) are
     broad-band equations of values ``levels`` (rows, 3, columns), both empty where there are none. ``prior``

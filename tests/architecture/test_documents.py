@@ -60,9 +60,7 @@ def test_the_rig_of_the_help_page_keeps_every_promise(installed: Path) -> None:
 
 
 def test_the_rig_of_the_help_page_is_found_and_scans(installed: Path) -> None:
-    told = _run(
-        installed, "dsl_core.cli", "scan", "first.dsl", "--rig", "room-12", "--lines", "8x8", "--json"
-    )
+    told = _run(installed, "dsl_core", "scan", "first.dsl", "--rig", "room-12", "--lines", "8x8", "--json")
     found = json.loads(told)
     assert found["frames"] > 10
 

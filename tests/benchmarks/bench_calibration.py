@@ -71,7 +71,7 @@ def calibrate(seed: int, size: str, folder: Path, settings: Sequence[str]) -> tu
     import resource
 
     start = time.perf_counter()
-    command = [sys.executable, "-m", "dsl_core.cli", "calibrate", "all", str(folder), "--rig", "twin"]
+    command = [sys.executable, "-m", "dsl_core", "calibrate", "all", str(folder), "--rig", "twin"]
     chosen = ["--option", f"truth={seed}", "--option", f"size={size}", "--option", f"seed={seed}"]
     chosen += [part for setting in settings for part in ("--set", setting)]
     done = subprocess.run(

@@ -154,7 +154,7 @@ def calibrated(variant: str, seed: int, size: str, folder: Path) -> Rig:
         words = ["--rig", "twin", "--yes", "--no-library"]
         words += [part for key, value in chosen.items() for part in ("--option", f"{key}={value}")]
         done = subprocess.run(
-            [sys.executable, "-m", "dsl_core.cli", "calibrate", "all", str(home), *words],
+            [sys.executable, "-m", "dsl_core", "calibrate", "all", str(home), *words],
             env={**os.environ, "PYTHONPATH": str(Path.cwd())},
             capture_output=True,
             text=True,

@@ -57,7 +57,7 @@ def kill_at(folder: Path, begun: str, patience_s: float = 240.0) -> None:
     """Calibrate everything in a process of its own and kill it once the file ``begun`` is there."""
     environment = {**os.environ, "PYTHONPATH": str(ROOT), "OMP_NUM_THREADS": "1"}
     process = subprocess.Popen(
-        [sys.executable, "-m", "dsl_core.cli", *command_all(folder)],
+        [sys.executable, "-m", "dsl_core", *command_all(folder)],
         env=environment,
         stdout=subprocess.DEVNULL,
         stderr=subprocess.PIPE,

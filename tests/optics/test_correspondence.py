@@ -8,7 +8,7 @@ import torch
 from torch import Tensor
 
 from dsl_core.errors import CalibrationError
-from dsl_core.model.lateral_colour import LateralColour
+from dsl_core.model.calibration.lateral_colour import LateralColour
 from dsl_core.model.rig import ColumnResidual, CorrespondenceGrid, Rig
 from dsl_core.optics import correspondence as module
 from dsl_core.optics import pinhole

@@ -9,7 +9,7 @@ import torch
 from dsl_core.model.rig import ProjectorResponse, Rig
 from dsl_core.optics.correspondence import GratingModel
 from dsl_core.optics.image_formation import BlurredProfiles, ImageFormation, OrderPath
-from dsl_core.optics.line_profile import band_profile
+from dsl_core.optics.lines.profile import band_profile
 from dsl_core.optics.spectra import hat_moments
 from dsl_core.simulation.published_rig import published_rig
 from dsl_core.simulation.rendering.renderer import Renderer

@@ -8,7 +8,7 @@ import torch
 from scipy.ndimage import convolve1d
 
 from dsl_core.model.rig import BayerPattern, ProjectorResponse, Sensor
-from dsl_core.optics.line_profile import (
+from dsl_core.optics.lines.profile import (
     ProfileTable,
     band_profile,
     halo_integral,

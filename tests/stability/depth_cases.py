@@ -10,8 +10,8 @@ import torch
 from dsl_core.model.geometry import Pose
 from dsl_core.model.rig import ProjectorResponse, Rig
 from dsl_core.optics.correspondence import GratingModel, triangulate, zero_order
-from dsl_core.optics.line_profile import zero_order_profile
-from dsl_core.optics.line_set import LineSet
+from dsl_core.optics.lines.line_set import LineSet
+from dsl_core.optics.lines.profile import zero_order_profile
 from dsl_core.reconstruction.columns.column import refine
 from dsl_core.simulation.published_rig import published_rig
 from tests.stability.case import Case, Outcome, is_honest, spread

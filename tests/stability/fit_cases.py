@@ -14,7 +14,7 @@ from dsl_core.calibration.light.zero_order import fit_zero_order
 from dsl_core.calibration.orders.efficiency import RatioSample, fit_efficiency
 from dsl_core.model.plan import ScanLines
 from dsl_core.optics.filters import FINE_NM
-from dsl_core.optics.line_profile import zero_order_profile
+from dsl_core.optics.lines.profile import zero_order_profile
 from dsl_core.simulation.published_rig import published_rig
 from dsl_core.solve.smooth_functions import Equations, SmoothPrior, solve_smooth
 from tests.stability.case import Case, Outcome, spread

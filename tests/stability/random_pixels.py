@@ -13,8 +13,8 @@ from torch import Tensor
 from dsl_core.model.plan import CapturePlan
 from dsl_core.model.spectral import WavelengthGrid
 from dsl_core.optics.correspondence import GratingModel
-from dsl_core.optics.line_equations import LineEquations
-from dsl_core.optics.line_set import LineSet
+from dsl_core.optics.lines.equations import LineEquations
+from dsl_core.optics.lines.line_set import LineSet
 from dsl_core.optics.spectra import ORDERS, Bands
 from dsl_core.simulation.published_rig import published_rig
 from dsl_core.solve.banded import factorise, multiply

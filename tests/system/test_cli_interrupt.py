@@ -40,7 +40,7 @@ def _interrupted(arguments: list[str], log: Path, lines: int) -> tuple[int, str]
     """Run a command, send it SIGINT once its log has that many lines; exit code and complaint."""
     environment = {**os.environ, "PYTHONPATH": str(ROOT), "OMP_NUM_THREADS": "1"}
     process = subprocess.Popen(
-        [sys.executable, "-m", "dsl_core.cli", *arguments],
+        [sys.executable, "-m", "dsl_core", *arguments],
         env=environment,
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,

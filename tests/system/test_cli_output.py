@@ -45,7 +45,7 @@ def test_a_reader_that_leaves_early_causes_no_traceback(arguments: list[str], co
     # Nobody reads: like "| head", but sure to have left before anything is printed.
     os.close(ours)
     found = subprocess.run(
-        [sys.executable, "-u", "-m", "dsl_core.cli", *arguments, "--json"],
+        [sys.executable, "-u", "-m", "dsl_core", *arguments, "--json"],
         env={**os.environ, "PYTHONPATH": str(Path(__file__).parents[2])},
         stdout=theirs,
         stderr=subprocess.PIPE,

@@ -14,7 +14,7 @@ from dsl_core.model.plan import ScanLines
 from dsl_core.model.rig import Rig
 from dsl_core.model.spectral import SpectralCurve
 from dsl_core.optics.correspondence import Correspondence, Footprint
-from dsl_core.optics.line_profile import ProfileTable, halo_of_line
+from dsl_core.optics.lines.profile import ProfileTable, halo_of_line
 from dsl_core.optics.pixel_model import MODEL_ERROR
 from dsl_core.optics.sensor import bayer_channels
 from dsl_core.optics.spectra import ORDERS, chain_response, hat_moments

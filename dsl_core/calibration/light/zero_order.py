@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from dsl_core.errors import CalibrationError
 from dsl_core.model.plan import ScanLines
 from dsl_core.model.rig import ProjectorResponse
-from dsl_core.optics.line_profile import zero_order_profile
+from dsl_core.optics.lines.profile import zero_order_profile
 from dsl_core.progress import NoProgress, Progress
 
 Floats = NDArray[np.float64]

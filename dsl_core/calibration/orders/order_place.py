@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from dsl_core.model.plan import ScanLines
 from dsl_core.model.rig import ProjectorResponse
-from dsl_core.optics.line_profile import LineTable
+from dsl_core.optics.lines.profile import LineTable
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

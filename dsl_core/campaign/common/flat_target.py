@@ -120,7 +120,7 @@ def scanned_geometry(
     As in a reconstruction, columns follow the line spread that the scan itself shows. Deviations contain what
     all its columns have in common where ``shared_errors`` are wanted.
     """
-    from dsl_core.optics.line_set import LineSet
+    from dsl_core.optics.lines.line_set import LineSet
     from dsl_core.reconstruction.columns.line_spread import own_spread, with_own_spread
     from dsl_core.reconstruction.geometry import reconstruct_geometry, require_light, require_pixels
     from dsl_core.reconstruction.merge import MergedScan, check_source, decode_columns, stack_lines

@@ -17,7 +17,7 @@ from scipy.special import ndtr
 from torch import Tensor
 
 from dsl_core.model.rig import ProjectorResponse
-from dsl_core.optics.line_profile import LineTable, halo_integral
+from dsl_core.optics.lines.profile import LineTable, halo_integral
 from dsl_core.optics.spread.curves import SAMPLES, EvenTable
 from dsl_core.optics.spread.wave import column_wave
 

@@ -17,7 +17,7 @@ from torch import Tensor
 from dsl_core.model.rig import ProjectorResponse, Rig
 from dsl_core.model.spread_field import POWERS, SpreadField
 from dsl_core.optics.correspondence import triangulate, zero_order
-from dsl_core.optics.line_profile import LineTable
+from dsl_core.optics.lines.profile import LineTable
 from dsl_core.optics.spread.equations import MAX_SHIFT_PX, MIN_PIXELS, MODEL_ERROR, View, settle, unit
 
 Floats = NDArray[np.float64]

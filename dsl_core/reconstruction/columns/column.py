@@ -15,8 +15,8 @@ import torch
 from torch import Tensor
 
 from dsl_core.model.rig import ProjectorResponse
-from dsl_core.optics.line_profile import LineTable, halo_of_line
-from dsl_core.optics.line_set import LineSet
+from dsl_core.optics.lines.line_set import LineSet
+from dsl_core.optics.lines.profile import LineTable, halo_of_line
 
 #: Steps of the fit, and the longest, px.
 ITERATIONS, STEP_PX = 6, 0.7

@@ -13,11 +13,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from dsl_core.model.calibration.lateral_colour import SHARES, LateralColour
 from dsl_core.model.fit import FitFinding
-from dsl_core.model.lateral_colour import SHARES, LateralColour
 from dsl_core.model.rig import Rig
 from dsl_core.optics.colour_neighbours import bayer_colours
-from dsl_core.optics.line_set import LineSet
+from dsl_core.optics.lines.line_set import LineSet
 from dsl_core.optics.spectra import chain_response
 from dsl_core.solve.robust import robust_linear
 

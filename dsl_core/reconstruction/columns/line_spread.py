@@ -16,7 +16,7 @@ import torch
 from numpy.typing import NDArray
 
 from dsl_core.model.rig import Rig
-from dsl_core.optics.line_set import LineSet
+from dsl_core.optics.lines.line_set import LineSet
 from dsl_core.optics.spread.equations import Peaks
 from dsl_core.optics.spread.field import places_of
 from dsl_core.optics.spread.fit import REACH_PX, SpreadFit, fit_spread

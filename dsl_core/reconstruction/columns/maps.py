@@ -12,7 +12,7 @@ from torch import Tensor
 from dsl_core.model.rig import Rig
 from dsl_core.optics.correspondence import triangulate
 from dsl_core.optics.image_formation import one_if_grey
-from dsl_core.optics.line_set import LineSet
+from dsl_core.optics.lines.line_set import LineSet
 from dsl_core.optics.spread.field import widths_at
 from dsl_core.optics.unlit import unlit_px
 from dsl_core.progress import NoProgress, Progress

@@ -26,8 +26,8 @@ from dsl_core.model.rig import Rig
 from dsl_core.model.spectral import WavelengthGrid
 from dsl_core.optics.correspondence import Correspondence, Footprint
 from dsl_core.optics.demosaic import demosaic
-from dsl_core.optics.line_profile import step_edge
-from dsl_core.optics.line_set import LineSet
+from dsl_core.optics.lines.line_set import LineSet
+from dsl_core.optics.lines.profile import step_edge
 from dsl_core.optics.spectra import ORDERS, chain_response, hat_moments
 from dsl_core.progress import NoProgress, Progress
 from dsl_core.reconstruction.spectral.solving.tile_frames import Pixels

@@ -12,7 +12,7 @@ from dsl_core.model.options import SOLVERS, Options, names
 from dsl_core.model.plan import CapturePlan
 from dsl_core.model.rig import Rig
 from dsl_core.optics.correspondence import correspondence
-from dsl_core.optics.line_set import LineSet
+from dsl_core.optics.lines.line_set import LineSet
 from dsl_core.optics.spectra import Bands
 from dsl_core.progress import Progress
 from dsl_core.reconstruction.rows.bands import Band

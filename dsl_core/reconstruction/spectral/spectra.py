@@ -16,8 +16,8 @@ from dsl_core.model.rig import Rig
 from dsl_core.model.spectral import WavelengthGrid
 from dsl_core.optics.colour_neighbours import ColourNeighbours, bayer_colours
 from dsl_core.optics.correspondence import Correspondence, like
-from dsl_core.optics.line_equations import LineEquations
-from dsl_core.optics.line_set import LineSet
+from dsl_core.optics.lines.equations import LineEquations
+from dsl_core.optics.lines.line_set import LineSet
 from dsl_core.optics.pixel_model import COLOUR_ERROR, DIRECT_ERROR, PixelModel, Traced
 from dsl_core.optics.spectra import ORDERS, Bands
 from dsl_core.progress import NoProgress, Progress

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from dsl_core.model.rig import ProjectorResponse
-from dsl_core.optics.line_profile import zero_order_profile
+from dsl_core.optics.lines.profile import zero_order_profile
 
 #: Samples a pixel along the way that a pattern varies, and both ways where it varies both.
 FINE, COARSE = 8, 4

@@ -21,7 +21,7 @@ from torch import Tensor
 from dsl_core.model.rig import Rig
 from dsl_core.model.spectral import SpectralCurve
 from dsl_core.optics.correspondence import zero_order
-from dsl_core.optics.line_profile import zero_order_profile
+from dsl_core.optics.lines.profile import zero_order_profile
 from dsl_core.optics.sensor import bayer_channels
 from dsl_core.simulation.rendering.first_orders import Runs, add_bands, by_pixel, order_light, white_runs
 from dsl_core.simulation.rendering.order_tables import OrderTables

@@ -10,7 +10,7 @@ from dsl_core.calibration.light.zero_order import fit_zero_order, require_plausi
 from dsl_core.errors import CalibrationError
 from dsl_core.model.plan import ScanLines
 from dsl_core.model.rig import ProjectorResponse
-from dsl_core.optics.line_profile import zero_order_profile
+from dsl_core.optics.lines.profile import zero_order_profile
 
 LINES = ScanLines(width_px=5, step_px=2)
 TRUTH = ProjectorResponse(blur_px=0.72, halo_peak_per_px=0.0012, halo_decay_px=26.0)

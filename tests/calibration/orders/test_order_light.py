@@ -10,7 +10,7 @@ from dsl_core.calibration.orders.order_light import FilterLight, filter_light
 from dsl_core.calibration.orders.order_place import PlanePixels
 from dsl_core.model.plan import ScanLines
 from dsl_core.model.rig import ProjectorResponse
-from dsl_core.optics.line_profile import zero_order_profile
+from dsl_core.optics.lines.profile import zero_order_profile
 
 FRAME_PX, LINES = 640, ScanLines(width_px=5, step_px=5)
 RESPONSE = ProjectorResponse(blur_px=0.6, halo_peak_per_px=1e-3, halo_decay_px=20.0)

@@ -8,7 +8,7 @@ import torch
 
 from dsl_core.model.line_spread import LineSpread
 from dsl_core.model.rig import ProjectorResponse
-from dsl_core.optics.line_profile import LineTable, ProfileTable, band_profile, step_edge, zero_order_profile
+from dsl_core.optics.lines.profile import LineTable, ProfileTable, band_profile, step_edge, zero_order_profile
 from dsl_core.optics.spread.curves import BEYOND, EvenTable, density, reach_px, step_response
 
 STEP_PX, BLUR_PX = 0.125, 0.6

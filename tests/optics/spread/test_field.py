@@ -11,7 +11,7 @@ from dsl_core.model.line_spread import stretched
 from dsl_core.model.rig import ProjectorResponse
 from dsl_core.model.spread_field import SpreadField
 from dsl_core.optics.correspondence import zero_order
-from dsl_core.optics.line_profile import LineTable
+from dsl_core.optics.lines.profile import LineTable
 from dsl_core.optics.spread.equations import Peaks
 from dsl_core.optics.spread.field import RANGE, relative_width, widths_at
 from dsl_core.optics.spread.fit import SpreadFit, fit_spread

@@ -8,7 +8,7 @@ import torch
 
 from dsl_core.model.line_spread import LineSpread
 from dsl_core.model.rig import ProjectorResponse
-from dsl_core.optics.line_profile import zero_order_profile
+from dsl_core.optics.lines.profile import zero_order_profile
 from dsl_core.optics.spread.curves import density
 from dsl_core.optics.spread.equations import MIN_PIXELS, Peaks
 from dsl_core.optics.spread.fit import fit_spread

@@ -7,12 +7,12 @@ import pytest
 import torch
 
 from dsl_core import pipeline
+from dsl_core.model.calibration.lateral_colour import SHARES, LateralColour
 from dsl_core.model.fit import Fit
-from dsl_core.model.lateral_colour import SHARES, LateralColour
 from dsl_core.model.plan import CapturePlan, GrayCode, ScanLines
 from dsl_core.model.rig import Rig
 from dsl_core.optics.correspondence import triangulate, zero_order
-from dsl_core.optics.line_set import LineSet
+from dsl_core.optics.lines.line_set import LineSet
 from dsl_core.reconstruction.columns.lateral_colour import material_std_px, own_lateral_colour, white_nm
 from dsl_core.simulation.sim_devices import open_twin
 from dsl_core.workflows import scans

@@ -11,7 +11,7 @@ from dsl_core.model.rig import Rig
 from dsl_core.model.spectral import WavelengthGrid
 from dsl_core.optics.correspondence import correspondence
 from dsl_core.optics.image_formation import BlurredProfiles, one_if_grey
-from dsl_core.optics.line_set import LineSet
+from dsl_core.optics.lines.line_set import LineSet
 from dsl_core.optics.pixel_model import PixelModel
 from dsl_core.optics.spectra import Bands
 from dsl_core.patterns.images import pattern_image

@@ -7,7 +7,7 @@ import pytest
 import torch
 
 from dsl_core.model.rig import Rig
-from dsl_core.optics.line_profile import zero_order_profile
+from dsl_core.optics.lines.profile import zero_order_profile
 from dsl_core.simulation.published_rig import published_rig
 from dsl_core.simulation.rendering.pattern_table import PatternTable, between
 

@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from dsl_core.model.rig import ProjectorResponse
-from dsl_core.optics.line_profile import LineTable
-from dsl_core.optics.line_set import LineSet
+from dsl_core.optics.lines.line_set import LineSet
+from dsl_core.optics.lines.profile import LineTable
 from dsl_core.reconstruction.spectral.probing.picked_cube import PickedCube
 from dsl_core.reconstruction.spectral.solving.tile_frames import Pixels, weighted
 

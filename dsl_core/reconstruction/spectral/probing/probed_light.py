@@ -16,7 +16,7 @@ from torch import Tensor
 from dsl_core.model.line_spread import Spread, stretched
 from dsl_core.optics.colour_neighbours import bayer_colours
 from dsl_core.optics.correspondence import Footprint, like
-from dsl_core.optics.line_profile import SAMPLES, ProfileTable, halo_of_line
+from dsl_core.optics.lines.profile import SAMPLES, ProfileTable, halo_of_line
 from dsl_core.optics.pixel_model import PixelModel
 from dsl_core.optics.spectra import ORDERS
 from dsl_core.reconstruction.spectral.probing.picked_cube import PickedCube

@@ -11,10 +11,10 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
-from dsl_core.optics import line_sums
 from dsl_core.optics.colour_neighbours import bayer_colours
-from dsl_core.optics.line_equations import LEAST_SURPLUS, OrderLines
-from dsl_core.optics.line_profile import SAMPLES, halo_of_line
+from dsl_core.optics.lines import sums as line_sums
+from dsl_core.optics.lines.equations import LEAST_SURPLUS, OrderLines
+from dsl_core.optics.lines.profile import SAMPLES, halo_of_line
 from dsl_core.optics.pixel_model import MODEL_ERROR, PixelModel, Traced
 from dsl_core.reconstruction.spectral.solving.lane_solver import (
     Found,

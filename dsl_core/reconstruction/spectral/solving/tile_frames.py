@@ -11,8 +11,8 @@ from torch import Tensor
 
 from dsl_core.model.rig import Rig
 from dsl_core.optics.demosaic import demosaic, demosaic_variance
-from dsl_core.optics.line_profile import halo_of_line
-from dsl_core.optics.line_set import LineSet
+from dsl_core.optics.lines.line_set import LineSet
+from dsl_core.optics.lines.profile import halo_of_line
 from dsl_core.optics.pixel_model import MODEL_ERROR, demosaic_blur_px
 
 

@@ -7,8 +7,8 @@ import pytest
 import torch
 
 from dsl_core.model.rig import ProjectorResponse
-from dsl_core.optics.line_profile import zero_order_profile
-from dsl_core.optics.line_set import LineSet
+from dsl_core.optics.lines.line_set import LineSet
+from dsl_core.optics.lines.profile import zero_order_profile
 from dsl_core.reconstruction.spectral.probing.line_probe import TAIL_BLUR, LineProbe, probe_lines
 from dsl_core.reconstruction.spectral.solving.tile_frames import Pixels
 

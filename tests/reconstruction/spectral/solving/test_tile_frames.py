@@ -7,7 +7,7 @@ import pytest
 import torch
 from numpy.typing import NDArray
 
-from dsl_core.optics.line_set import LineSet
+from dsl_core.optics.lines.line_set import LineSet
 from dsl_core.optics.pixel_model import MODEL_ERROR
 from dsl_core.optics.sensor import bayer_channels
 from dsl_core.reconstruction.spectral.solving.tile_frames import Pixels, TileFrames

@@ -1,6 +1,6 @@
 """Normal equations of single scan lines, one sample after the other, from the frames: a loop to be compiled.
 
-It adds up what `dsl_core.optics.line_equations` explains and does with tensors, which remain for a GPU; a
+It adds up what `dsl_core.optics.lines.equations` explains and does with tensors, which remain for a GPU; a
 test holds both together. Columns are whole numbers of the profile table's steps, so that a line of a band is
 found in it without rounding.
 """

@@ -10,9 +10,9 @@ from dsl_core.model.plan import CapturePlan
 from dsl_core.model.rig import Rig
 from dsl_core.model.spectral import WavelengthGrid
 from dsl_core.optics.correspondence import GratingModel
-from dsl_core.optics.line_equations import CENTROID_SLACK_PX, DROPPED, LineEquations, closeness_px
-from dsl_core.optics.line_profile import band_profile
-from dsl_core.optics.line_set import LineSet
+from dsl_core.optics.lines.equations import CENTROID_SLACK_PX, DROPPED, LineEquations, closeness_px
+from dsl_core.optics.lines.line_set import LineSet
+from dsl_core.optics.lines.profile import band_profile
 from dsl_core.optics.pixel_model import PixelModel
 from dsl_core.optics.spectra import ORDERS, Bands
 from dsl_core.reconstruction.columns.pattern_column import radiance_profiles

@@ -6,7 +6,7 @@ import pytest
 import torch
 
 from dsl_core.model.plan import CapturePlan, GrayCode, LineComb, NoSpectral, ScanLines
-from dsl_core.optics.line_set import LineSet
+from dsl_core.optics.lines.line_set import LineSet
 from dsl_core.patterns.multiplexed import profile
 
 LINES = LineSet(width_px=5, step_px=4, first_px=2.0, lines=10, frames=10)

@@ -1,7 +1,7 @@
 """Normal equations of single scan lines: a line lights only a few neighbouring bands through one order.
 
 So their matrix is banded. Lines' light over a band comes from a table that pixels of like dispersion share.
-With tensors, as a GPU needs them; `dsl_core.optics.line_sums` is compiled and faster without one.
+With tensors, as a GPU needs them; `dsl_core.optics.lines.sums` is compiled and faster without one.
 A pixel has one colour, that of its own filter; `dsl_core.optics.colour_neighbours` brings three together.
 """
 
@@ -16,8 +16,8 @@ from torch import Tensor
 
 from dsl_core.model.line_spread import Spread, stretched
 from dsl_core.optics.correspondence import like
-from dsl_core.optics.line_profile import SAMPLES, ProfileTable
-from dsl_core.optics.line_set import LineSet
+from dsl_core.optics.lines.line_set import LineSet
+from dsl_core.optics.lines.profile import SAMPLES, ProfileTable
 from dsl_core.optics.spectra import Bands
 
 #: How much closer than their mean spacing bands may be at least, because the response moves their centroids;
