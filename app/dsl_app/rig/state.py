@@ -68,11 +68,13 @@ def rig_view(rig: RigState, live: LiveState) -> RigView:
         projector_text=_describe(rig.projector),
         connect_button=ButtonState(
             is_enabled=link is not Link.OPENING,
-            is_primary=True,
+            is_primary=link is not Link.OPEN,
             text="Disconnect" if link is Link.OPEN else "Connect",
         ),
         live_button=ButtonState(
-            is_enabled=has_devices, text="Stop live view" if rig.live.value else "Start live view"
+            is_enabled=has_devices,
+            is_primary=has_devices and not rig.live.value,
+            text="Stop live view" if rig.live.value else "Start live view",
         ),
         selftest=has_devices,
         exposure=has_devices,

@@ -15,6 +15,7 @@ def test_a_page_without_a_rig_offers_to_connect_one() -> None:
     view = rig_view(rig, live)
     assert (view.link.text, view.link.role) == ("● not connected", "muted")
     assert (view.connect_button.text, view.connect_button.is_enabled) == ("Connect", True)
+    assert (view.connect_button.is_primary, view.live_button.is_primary) == (True, False)
     assert (view.camera_text, view.projector_text, view.cycles.text) == ("–", "–", "")
     assert [view.live_button.is_enabled, view.selftest, view.exposure, view.auto] == 4 * [False]
     rig.link.set(Link.OPENING)
@@ -29,6 +30,7 @@ def test_a_page_with_a_rig_names_its_devices_and_offers_to_expose() -> None:
     view = rig_view(rig, live)
     assert (view.connect_button.text, view.link.role) == ("Disconnect", "good")
     assert (view.live_button.text, view.live_button.is_enabled) == ("Start live view", True)
+    assert (view.connect_button.is_primary, view.live_button.is_primary) == (False, True)
     assert view.camera_text.endswith("64 × 48 px")
     assert view.selftest
     assert view.exposure
@@ -38,6 +40,7 @@ def test_a_page_with_a_rig_names_its_devices_and_offers_to_expose() -> None:
     live.is_exposing.set(True)
     view = rig_view(rig, live)
     assert view.live_button.text == "Stop live view"
+    assert not view.live_button.is_primary
     assert not view.auto
 
 
