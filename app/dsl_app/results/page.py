@@ -6,7 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from PySide6.QtCore import Qt, Signal
-from PySide6.QtWidgets import QDialog, QFileDialog, QStackedWidget, QWidget
+from PySide6.QtWidgets import QDialog, QStackedWidget, QWidget
 
 from dsl_app.results.answers.colours_panel import ColoursPanel
 from dsl_app.results.answers.materials_panel import MaterialsPanel
@@ -35,6 +35,7 @@ from dsl_app.shared.widgets.help_window import set_help
 from dsl_app.shared.widgets.layouts import boxed, column_of, row_of, splitter, tabs_of
 from dsl_app.shared.widgets.open_dialog import OpenDialog
 from dsl_app.shared.widgets.page import PageWidget
+from dsl_app.shared.widgets.save_dialog import ask_target
 from dsl_core.workflows.inspection import IntensityGraph
 
 
@@ -217,15 +218,9 @@ class ResultsPage(PageWidget):
             return
         draft = str(result.path.with_name(f"{result.path.stem}_report.html"))
         kinds = "HTML page (*.html);;PDF (*.pdf)"
-        name, kind = QFileDialog.getSaveFileName(self, "Write a report", draft, kinds)
-        if name:
-            path = Path(name)
-            # The dialog asked about replacing the name as typed, not one with a suffix added.
-            is_whole = path.suffix.lower() in (".html", ".pdf")
-            ending = ".pdf" if "pdf" in kind else ".html"
-            self._control.answers.write_report(
-                path if is_whole else path.with_name(path.name + ending), overwrite=is_whole
-            )
+        target = ask_target(self, "Write a report", draft, kinds)
+        if target is not None:
+            self._control.answers.write_report(target[0], overwrite=target[1])
 
     def subject(self) -> Path | None:
         """The offered scan, or the open result."""

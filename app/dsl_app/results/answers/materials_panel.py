@@ -14,6 +14,7 @@ from dsl_app.shared.theme import Theme
 from dsl_app.shared.widgets.forms import ChoiceBox, NumberBox, check_box, label, push_button, quiet
 from dsl_app.shared.widgets.layouts import STRETCH, column_of, row_of
 from dsl_app.shared.widgets.read_table import RIGHT, ReadTable, cell
+from dsl_app.shared.widgets.save_dialog import ask_target
 from dsl_core.analysis.classify import Limits, Measure
 from dsl_core.io.spectra.catalogue import suffixes
 
@@ -110,13 +111,9 @@ class MaterialsPanel(QWidget):
             return
         draft = str(result.path.with_name(f"{result.path.stem}_materials.hdr"))
         kinds = "ENVI classification (*.hdr);;Points with their class (*.ply);;Table of areas (*.csv)"
-        name, kind = QFileDialog.getSaveFileName(self, "Write the map of materials", draft, kinds)
-        if name:
-            path = Path(name)
-            is_whole = path.suffix.lower() in (".hdr", ".ply", ".csv")
-            ending = kind[kind.index("*") + 1 : -1]
-            # The dialog asked about replacing the name as typed, not one with a suffix added.
-            self._control.write(path if is_whole else path.with_name(path.name + ending), overwrite=is_whole)
+        target = ask_target(self, "Write the map of materials", draft, kinds)
+        if target is not None:
+            self._control.write(target[0], overwrite=target[1])
 
     def _new_measure(self) -> None:
         """Other limits belong to another measure; a map that is shown keeps its own."""

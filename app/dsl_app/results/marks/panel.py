@@ -24,6 +24,7 @@ from dsl_app.results.state import Mark, ResultsState
 from dsl_app.shared.theme import DARK, Theme
 from dsl_app.shared.widgets.forms import label, named, push_button, quiet
 from dsl_app.shared.widgets.layouts import STRETCH, column_of, row_of
+from dsl_app.shared.widgets.save_dialog import ask_target
 from dsl_core.io.spectra.catalogue import formats, suffixes
 
 KEY = Qt.ItemDataRole.UserRole
@@ -128,14 +129,9 @@ class MarksPanel(QWidget):
         if result is None or not self._control.can_export():
             return
         draft = str(result.path.with_name(f"{result.path.stem}_spectra.csv"))
-        name, _ = QFileDialog.getSaveFileName(self, "Export spectra", draft, "Spectra (*.csv)")
-        if name:
-            path = Path(name)
-            # The dialog asked about replacing the name as typed, not one with a suffix added.
-            is_whole = path.suffix.lower() == ".csv"
-            self._control.export_spectra(
-                path if is_whole else path.with_name(f"{path.name}.csv"), overwrite=is_whole
-            )
+        target = ask_target(self, "Export spectra", draft, "Spectra (*.csv)")
+        if target is not None:
+            self._control.export_spectra(target[0], overwrite=target[1])
 
     def _fill(self) -> None:
         with quiet(self.tree):
