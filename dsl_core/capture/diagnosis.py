@@ -21,6 +21,8 @@ Mosaic = NDArray[np.uint16]
 
 #: Changes of light that matter: a factor of white, and a part of white by which black differs.
 LEAST_LIGHT, LEAST_ROOM = 0.05, 0.03
+#: With less light than this, as a share of what it was, white and black are the same picture.
+NO_LIGHT = 0.02
 #: Factors of white and of black that are this much alike have one cause: the exposure.
 ALIKE = 0.1
 #: What black is above its level has to exceed this to tell a factor, DN.
@@ -74,6 +76,11 @@ def what_changed(before: References, now: References, sensor: Sensor) -> str:
     if lit.sum() < FEWEST:
         return ""
     light = float(new[used].sum() / old[used].sum())
+    if light < NO_LIGHT:
+        return (
+            "White and black now look the same: the projector gives no light, something covers it or the"
+            " lens, or the camera repeats a picture. Check projector and camera, and resume the scan."
+        )
     dark_old, dark_new = (
         float(each.black.mean(dtype=np.float64)) - sensor.black_level_dn for each in (before, now)
     )

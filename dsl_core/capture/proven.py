@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 from collections.abc import Collection
 from dataclasses import replace
+from typing import NoReturn
 
 from dsl_core.capture.diagnosis import Diagnosis
 from dsl_core.capture.exposure import ShotTaker
@@ -24,6 +25,10 @@ CONTROL_EVERY = 8
 #: On resuming, so many shots before a missing one are captured again where nothing can be told of them.
 MOST_UNTOLD = 32
 _log = logging.getLogger(__name__)
+
+
+class PictureError(DeviceError):
+    """Pictures do not show their pattern, however often they are taken."""
 
 
 class ProvenShots:
@@ -60,15 +65,50 @@ class ProvenShots:
         """Take a shot and save it.
 
         Raises `DeviceError` when it does not show its pattern however often it is taken, `StoreError` when it
-        cannot be saved, `Cancelled` when someone requested the end.
+        cannot be saved, `Cancelled` when someone requested the end. What could not be judged since a picture
+        last showed its pattern is then withdrawn: it may have been wrong already.
         """
+        try:
+            self._take(shot)
+        except PictureError as error:
+            self._withdraw(error)
+
+    def conclude(self) -> None:
+        """Where the last pictures could not be judged, see that devices and scene are as they were.
+
+        Raises `DeviceError` if they are not, after withdrawing those pictures.
+        """
+        if self._proof is None or not self._untold:
+            return
+        try:
+            self._require_control(self._proof)
+        except PictureError as error:
+            self._withdraw(error)
+        self._untold.clear()
+
+    def _withdraw(self, error: PictureError) -> NoReturn:
+        """Remove the pictures that may be wrong for the same reason, and say so."""
+        untold, self._untold = self._untold, []
+        if not untold:
+            raise error
+        self._sink.withdraw(untold)
+        first, last = untold[0].index, untold[-1].index
+        which, it = f"{len(untold)} frames, {first} to {last}, show", "they"
+        if len(untold) == 1:
+            which, it = f"Frame {first} shows", "it"
+        raise PictureError(
+            f"{error} {which} too little to be judged and may be wrong too; the resumed scan captures"
+            f" {it.replace('they', 'them')} again."
+        ) from error
+
+    def _take(self, shot: Shot) -> None:
         frame = self._taker.take(shot, twice=self._is_late)
         if self._proof is None:
             self._sink.write(shot, frame)
             return
         found = self._proof.judge(shot, frame.pixels)
         if found.is_doubtful and not self._is_late:
-            frame, found = self._ask_again(shot, frame, self._proof)
+            frame, found = self._ask_again(found, frame, self._proof)
         if shot not in found.again:
             self._sink.write(shot, frame)
             self._diagnosis.keep(shot, frame.pixels)
@@ -89,18 +129,21 @@ class ProvenShots:
             self._proof is not None and shot.setting != self._proof.first_setting
         )
 
-    def _ask_again(self, shot: Shot, frame: Frame, proof: FrameProof) -> tuple[Frame, Finding]:
-        """A second picture of a shot that may be wrong, and whether the first one was."""
-        second = self._taker.take(shot, 1, SETTLE_MS[0], twice=True)
-        if proof.differ(frame.pixels, second.pixels):
+    def _ask_again(self, doubt: Finding, frame: Frame, proof: FrameProof) -> tuple[Frame, Finding]:
+        """A second picture of a shot that may be wrong, and what it shows."""
+        second = self._taker.take(doubt.shot, 1, SETTLE_MS[0], twice=True)
+        differs = proof.differ(frame.pixels, second.pixels)
+        found = proof.judge(doubt.shot, second.pixels)
+        was_torn = doubt.verdict is Verdict.RIGHT and not found.is_doubtful
+        if differs or was_torn:
             self._failures += 1
             self.corrected += 1
-            second = replace(second, corrected="it was unlike those before it")
-        else:
-            if self._doubts % CONTROL_EVERY == 0:
-                self._require_control(proof)
-            self._doubts += 1
-        return second, proof.judge(shot, second.pixels)
+            reason = "a few rows of it showed another pattern" if was_torn else "it was unlike those before it"
+            return replace(second, corrected=reason), found
+        if self._doubts % CONTROL_EVERY == 0:
+            self._require_control(proof)
+        self._doubts += 1
+        return second, found
 
     def _be_late(self, shot: Shot, proof: FrameProof) -> None:
         """Expect every picture to be late from now on, and so of those before that could not be told."""
@@ -155,7 +198,7 @@ class ProvenShots:
                 "Projector, camera, light or target have changed since. Check that the projector follows,"
                 " that no automatic mode is on, and that nothing has moved, and resume the scan."
             )
-            raise DeviceError(
+            raise PictureError(
                 f"{describe_shot(control).capitalize()}, captured once more as a control, no longer shows its"
                 f" pattern. {reason} Frames before are saved."
             )
@@ -193,7 +236,7 @@ class ProvenShots:
                     self.corrected += 1
         if found.is_wrong:
             reason = self._explain() or f"{found.remedy} Resume the scan afterwards."
-            raise DeviceError(
+            raise PictureError(
                 f"{found.names.capitalize()} does not show its pattern after {len(SETTLE_MS) + 1} exposures:"
                 f" {found.seen}. {reason} Frames before it are saved. If the pictures are right all the same,"
                 " resume without checking that the scene has not moved."

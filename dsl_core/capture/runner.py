@@ -156,6 +156,7 @@ class Runner:
             if self._stored is not None:
                 self._shots.learn(self._stored, {shot.index for shot in missing})
             self._take_all(missing)
+            self._shots.conclude()
             self._complete()
         except (Cancelled, KeyboardInterrupt) as error:
             self._end(

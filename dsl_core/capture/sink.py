@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 
 from dsl_core.model.frames import Frame, FrameSink
 from dsl_core.model.plan import Shot
@@ -31,6 +31,10 @@ class WatchedSink:
             self._watch(shot, frame)
         except Exception:
             _log.exception("a watcher of the scan failed; the scan continues")
+
+    def withdraw(self, shots: Iterable[Shot]) -> None:
+        """Take frames back; raises `StoreError`."""
+        self._sink.withdraw(shots)
 
     def read_back(self) -> list[Shot]:
         """The shots whose frames are not kept as they were written."""

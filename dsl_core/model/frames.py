@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from typing import Protocol, runtime_checkable
 
@@ -62,6 +62,9 @@ class FrameSink(Protocol):
 
     def write(self, shot: Shot, frame: Frame) -> None:
         """Store a frame so that it survives a crash from this moment on; raises `StoreError`."""
+
+    def withdraw(self, shots: Iterable[Shot]) -> None:
+        """Take frames back that nobody believes any more, so that they are missing; raises `StoreError`."""
 
     def read_back(self) -> list[Shot]:
         """Look again at everything that is kept; the shots whose frames are not as they were written."""

@@ -44,6 +44,7 @@ def test_nothing_is_said_of_pictures_that_differ_by_noise() -> None:
     [
         (pictures(light=0.5, room_dn=30), "exposure or gain of the camera is 0.50 times", "room"),
         (pictures(light=1.4), "light of the projector or the exposure is 1.40 times", "room"),
+        (pictures(light=0.0), "White and black now look the same: the projector gives no light", "times"),
         (pictures(room_dn=140), "at 140 DN above its black level, and was at 60 DN", "times"),
         (pictures(shift_px=2), r"The camera or the scene moved by (1\.9|2\.\d) ± 0\.\d px, since", "times"),
         (

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from dsl_core.capture.proof import contest
 from dsl_core.capture.proof.finding import Finding, Verdict
 from dsl_core.capture.proof.raster import Counts
 from dsl_core.capture.proof.verifier import FrameProof
@@ -112,22 +113,66 @@ def test_a_resumed_scan_learns_from_saved_frames_and_takes_wrong_ones_again(scen
     assert sink.frames[26].frame_id == -1
 
 
+@pytest.fixture
+def blind(monkeypatch: pytest.MonkeyPatch) -> int:
+    """Number of the first shot of which nothing can be told."""
+    judge, first = FrameProof.judge_raster, 27
+
+    def untold(self: FrameProof, shot: Shot, seen: Counts) -> Finding:
+        found = judge(self, shot, seen)
+        return Finding(shot, Verdict.UNTOLD) if shot.index >= first else found
+
+    monkeypatch.setattr(FrameProof, "judge_raster", untold)
+    return first
+
+
 def test_shots_nobody_can_judge_before_the_stop_are_taken_again_on_resuming(
-    scene: RenderedScene, monkeypatch: pytest.MonkeyPatch
+    scene: RenderedScene, blind: int
 ) -> None:
     whole = MemorySink(scene.plan)
     _run(scene, whole)[0].run()
     sink = MemorySink(scene.plan)
     sink.frames.update({index: replace(whole.frames[index], frame_id=-1) for index in range(30)})
-    judge = FrameProof.judge_raster
-
-    def blind(self: FrameProof, shot: Shot, seen: Counts) -> Finding:
-        found = judge(self, shot, seen)
-        return replace(found, verdict=Verdict.UNTOLD) if shot.index >= 27 else found
-
-    monkeypatch.setattr(FrameProof, "judge_raster", blind)
     _run(scene, sink)[0].run()
-    assert [index for index in range(30) if sink.frames[index].frame_id != -1] == [27, 28, 29]
+    assert [index for index in range(30) if sink.frames[index].frame_id != -1] == list(range(blind, 30))
+
+
+@pytest.mark.parametrize("kind", ["half from", "dark from"])
+def test_pictures_at_the_end_that_cannot_be_judged_are_withdrawn_where_a_control_fails(
+    scene: RenderedScene, blind: int, kind: str
+) -> None:
+    sink = MemorySink(scene.plan)
+    runner, spoiled = _run(scene, sink, PatternFault(kind, 31))
+    last = scene.plan.shot_count - 1
+    said = f"captured once more as a control.*{last + 1 - blind} frames, {blind} to {last}, show too little"
+    with pytest.raises(DeviceError, match=said):
+        runner.run()
+    assert spoiled.wrong
+    assert sorted(sink.frames) == list(range(blind))
+    assert _run(scene, sink)[0].run().state is State.FINISHED
+    assert _wrong(sink, spoiled) == []
+
+
+def test_a_scan_whose_last_pictures_cannot_be_judged_ends_with_a_control(
+    scene: RenderedScene, blind: int
+) -> None:
+    sink = MemorySink(scene.plan)
+    runner, _ = _run(scene, sink)
+    assert runner.run().corrected == 0
+    assert len(sink.frames) == scene.plan.shot_count
+
+
+@pytest.mark.parametrize("at", [25, 30])
+def test_a_picture_torn_in_its_last_rows_is_taken_again(
+    scene: RenderedScene, monkeypatch: pytest.MonkeyPatch, at: int
+) -> None:
+    # One line in a small picture has so few pixels in these rows; ten lines of a comb have more.
+    monkeypatch.setattr(contest, "TORN_VOTES", 100.0)
+    sink = MemorySink(scene.plan)
+    runner, spoiled = _run(scene, sink, PatternFault("torn", at, 0.965))
+    assert runner.run().corrected == 1
+    assert _wrong(sink, spoiled) == []
+    assert "a few rows" in sink.frames[at].corrected
 
 
 @pytest.mark.parametrize("is_changed", [True, False])

@@ -77,7 +77,7 @@ def open_lab(options: dict[str, str]) -> DeviceRig:
 
 
 class LabCamera(Camera):
-    """Passes everything on, and spoils frames from shot ``at`` on, or that one only once."""
+    """Passes everything on, and spoils frames from the time of shot ``at`` on, or that one only once."""
 
     def __init__(self, camera: Camera, kind: str, at: int) -> None:
         self.camera, self.kind, self.at = camera, kind, at
@@ -105,7 +105,7 @@ class LabCamera(Camera):
         frame = self.camera.snap(timeout_ms)
         self.snaps += 1
         found = CAMERA.get(self.kind)
-        if found is not None and self.shot >= self.at:
+        if found is not None and (self.shot >= self.at or self.happened):
             is_single, change = found
             if not (is_single and self.happened):
                 self.happened += 1

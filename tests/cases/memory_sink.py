@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,6 +32,11 @@ class MemorySink:
     def write(self, shot: Shot, frame: Frame) -> None:
         """Keep a frame."""
         self.frames[shot.index] = frame
+
+    def withdraw(self, shots: Iterable[Shot]) -> None:
+        """Forget frames."""
+        for shot in shots:
+            self.frames.pop(shot.index, None)
 
     def read(self, shot: Shot) -> NDArray[np.uint16]:
         """The raw mosaic of a shot, shape (rows, columns); raises `StoreError` when it is not there."""

@@ -20,7 +20,7 @@ PatternImage = Callable[[CapturePlan, Shot], Image]
 
 #: What may be wrong with single pictures: only the first exposure of a shot, so that a second one is right.
 SINGLE = ("late", "repeated", "swapped", "torn", "half", "dark", "saturated")
-#: What stays wrong from a shot on.
+#: What stays wrong from a shot on, also where earlier shots are captured again.
 LASTING = ("frozen", "projector late", "camera late", "camera repeats", "half from", "dark from")
 #: Of these, those that a second take of the same shot makes good.
 CURABLE = ("projector late", "camera late")
@@ -52,7 +52,7 @@ class PatternFaults:
                 self._single[fault.at] = fault
                 if fault.kind == "swapped":
                     self._single[fault.at + 1] = replace(fault, at=fault.at + 1)
-        self.shot, self._exposure_ms = 0, 0.0
+        self.shot, self._latest, self._exposure_ms = 0, 0, 0.0
         self._asked: list[Image] = []
         self._snaps: dict[int, int] = {}
         self._last: Frame | None = None
@@ -60,6 +60,9 @@ class PatternFaults:
         self.wrong: dict[int, PatternFault] = {}
         self.first_takes = 0
         self.rig = replace(rig, camera=_Camera(self), projector=_Projector(self))
+
+    def prepare(self, shot: int) -> None:
+        self.shot, self._latest = shot, max(self._latest, shot)
 
     def show(self, image: Image) -> None:
         self._asked.append(image)
@@ -72,7 +75,7 @@ class PatternFaults:
         count = self._snaps[self.shot] = self._snaps.get(self.shot, 0) + 1
         fault = self._single.get(self.shot) if count == 1 else None
         if fault is None:
-            fault = next((each for each in self._lasting if self.shot >= each.at), None)
+            fault = next((each for each in self._lasting if self._latest >= each.at), None)
         frame = self._camera.snap(timeout_ms)
         if fault is not None:
             frame, is_wrong = self._spoiled(fault, frame, timeout_ms)
@@ -130,7 +133,7 @@ class PatternFaults:
 
     def _is_lasting(self, kind: str) -> bool:
         # A pattern is shown before its shot is announced.
-        return any(fault.kind == kind and self.shot + 1 >= fault.at for fault in self._lasting)
+        return any(fault.kind == kind and self._latest + 1 >= fault.at for fault in self._lasting)
 
 
 class _Camera(Camera):
@@ -145,7 +148,7 @@ class _Camera(Camera):
         return self._camera.configure(exposure_ms)
 
     def prepare(self, shot_index: int, attempt: int = 0) -> None:
-        self._faults.shot = shot_index
+        self._faults.prepare(shot_index)
         self._camera.prepare(shot_index, attempt)
 
     def snap(self, timeout_ms: float = 5000.0) -> Frame:

@@ -16,6 +16,8 @@ LEAST_MEAN = 0.15
 #: Votes against, net of those for, at the upper or lower end of a picture that make it torn: at least so
 #: many, and at least this share of all.
 TORN_VOTES, TORN_SHARE = 8.0, 0.02
+#: The same from which on another picture is asked for: of right ones, hardly any has a single net vote against.
+DOUBTFUL_VOTES, DOUBTFUL_SHARE = 1.5, 0.005
 
 
 @dataclass(frozen=True)
@@ -40,6 +42,11 @@ class Contest:
     def is_torn(self) -> bool:
         """Whether the picture is the one wanted only above or below some row."""
         return self.is_told and self.worst_end < -max(TORN_VOTES, TORN_SHARE * self.count)
+
+    @property
+    def is_doubtful(self) -> bool:
+        """Whether a few pixels at the upper or lower end are unlike the picture wanted."""
+        return self.is_told and self.worst_end < -max(DOUBTFUL_VOTES, DOUBTFUL_SHARE * self.count)
 
 
 def vote(seen: Floats, wanted: Floats, rival: Floats) -> Contest:

@@ -51,7 +51,8 @@ class Finding:
 
     ``again`` are the shots to take again, in the order of the plan: more than one where only together they
     are known to be wrong. ``detail`` says what was seen in more words, such as which other shot. A picture
-    that cannot be told ``is_doubtful`` if it is unlike its neighbours; a second one says if it was right.
+    ``is_doubtful`` if it cannot be told and is unlike its neighbours, or if a few rows at its upper or lower
+    end do not show its pattern; a second picture says if it was right.
     """
 
     shot: Shot

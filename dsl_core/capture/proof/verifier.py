@@ -100,7 +100,8 @@ class FrameProof:
         if shot.role == "spectral" and not found.is_wrong:
             black = self._kept.get(self._blacks[shot.setting])
             doubtful = self._neighbours.is_doubtful(shot.index, seen, black)
-            found = replace(found, is_doubtful=doubtful and found.verdict is Verdict.UNTOLD)
+            doubtful &= found.verdict is Verdict.UNTOLD
+            found = replace(found, is_doubtful=found.is_doubtful or doubtful)
         self._last = (shot, seen)
         for wrong in found.again:
             self._kept.pop(wrong.index, None)
@@ -335,6 +336,8 @@ class FrameProof:
         if any(contest.is_torn for contest in told.values()):
             return Finding(shot, Verdict.TORN, (shot,))
         found = self._judge_exposure(shot, share)
+        if not found.is_wrong and any(contest.is_doubtful for contest in told.values()):
+            found = replace(found, is_doubtful=True)
         # That a picture is neither white nor black does not say that it is the one wanted.
         return found if Verdict.LATE in told or found.is_wrong else Finding(shot, Verdict.UNTOLD)
 

@@ -13,7 +13,7 @@ A frame is done when its line and its chunk exist and agree.
 from __future__ import annotations
 
 import logging
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Self
@@ -233,6 +233,15 @@ class ScanWriter:
         )
         self._log.append(entry)
         self._done.add(shot.index)
+
+    def withdraw(self, shots: Iterable[Shot]) -> None:
+        """Remove frames that nobody believes any more, so that they are missing; raises `StoreError`.
+
+        Their lines stay in the log, as those of frames that somebody deleted.
+        """
+        indices = {shot.index for shot in shots} & self._done
+        self._done -= indices
+        self._store.remove(indices)
 
     def read_back(self) -> list[Shot]:
         """Shots whose frames are not on the disk as they were written; manifest and log are written again.

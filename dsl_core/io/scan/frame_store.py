@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import json
 import zlib
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -18,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dsl_core.errors import StoreError
-from dsl_core.io.atomic import make_folder, write_atomic
+from dsl_core.io.atomic import make_folder, store_error, sync_folder, write_atomic
 from dsl_core.io.reading import mapped, read_bounded, read_json
 from dsl_core.io.scan.blosc_blocks import HEADER, Bytes, blocks_of
 
@@ -91,6 +92,15 @@ class FrameStore:
             cname=_BLOSC["cname"], clevel=_BLOSC["clevel"], shuffle=_BITSHUFFLE, blocksize=_BLOSC["blocksize"]
         )
         write_atomic(self.path(index), codec.encode(np.ascontiguousarray(pixels, _PIXEL)))
+
+    def remove(self, indices: Iterable[int]) -> None:
+        """Delete mosaics, also for a power cut that follows; raises `StoreError`."""
+        try:
+            for index in indices:
+                self.path(index).unlink(missing_ok=True)
+            sync_folder(self.folder)
+        except OSError as error:
+            raise store_error(self.folder, error) from error
 
     def read(self, index: int, out: NDArray[np.uint16] | None = None) -> NDArray[np.uint16]:
         """Load a mosaic, shape (height, width), into ``out`` if given; raises `ChunkError`."""

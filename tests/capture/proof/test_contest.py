@@ -55,3 +55,10 @@ def test_a_tear_has_eight_votes_and_a_fiftieth_of_all(count: int, limit: float) 
     assert Contest(count, 0.9, -limit - 0.1).is_torn
     assert not Contest(count, 0.9, -limit + 0.1).is_torn
     assert not Contest(11, 0.9, -limit - 0.1).is_torn
+
+
+@pytest.mark.parametrize(("count", "limit"), [(100, 1.5), (1000, 5.0)])
+def test_few_votes_against_at_an_end_are_a_doubt(count: int, limit: float) -> None:
+    assert Contest(count, 0.9, -limit - 0.1).is_doubtful
+    assert not Contest(count, 0.9, -limit + 0.1).is_doubtful
+    assert not Contest(11, 0.9, -limit - 0.1).is_doubtful

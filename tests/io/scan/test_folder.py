@@ -83,6 +83,20 @@ def test_a_chunk_without_its_line_or_damaged_is_taken_again(session: Path, plan:
         assert list(writer.missing()) == [shots[4], shots[6], shots[-1]]
 
 
+def test_withdrawn_frames_are_missing_at_once_and_after_resuming(
+    session: Path, plan: CapturePlan, frame_of: FrameOf
+) -> None:
+    shots = list(plan.shots())
+    with ScanWriter.resume(session, plan) as writer:
+        writer.withdraw(shots[3:5])
+        assert list(writer.missing()) == shots[3:5]
+        writer.write(shots[3], frame_of(shots[3]))
+        assert writer.read_back() == [shots[4]]
+    assert ScanReader(session).missing() == [shots[4]]
+    with ScanWriter.resume(session, plan) as writer:
+        assert list(writer.missing()) == [shots[4]]
+
+
 def test_a_damaged_line_in_the_middle_is_named(session: Path) -> None:
     log = session / "frames.jsonl"
     lines = log.read_bytes().splitlines(keepends=True)
