@@ -138,7 +138,9 @@ class ProvenShots:
         if differs or was_torn:
             self._failures += 1
             self.corrected += 1
-            reason = "a few rows of it showed another pattern" if was_torn else "it was unlike those before it"
+            reason = (
+                "a few rows of it showed another pattern" if was_torn else "it was unlike those before it"
+            )
             return replace(second, corrected=reason), found
         if self._doubts % CONTROL_EVERY == 0:
             self._require_control(proof)
