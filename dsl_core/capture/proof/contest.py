@@ -16,7 +16,7 @@ LEAST_MEAN = 0.15
 #: Votes against, net of those for, at the upper or lower end of a picture that make it torn: at least so
 #: many, and at least this share of all.
 TORN_VOTES, TORN_SHARE = 8.0, 0.02
-#: The same from which on another picture is asked for: of right ones, hardly any has a single net vote against.
+#: The same from which on another picture is asked for: right ones hardly ever have one net vote against.
 DOUBTFUL_VOTES, DOUBTFUL_SHARE = 1.5, 0.005
 
 
