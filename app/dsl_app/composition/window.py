@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 from PySide6.QtCore import QObject, QTimer
 
 from dsl_app.composition.calibrations import CalibrationInUse
+from dsl_app.composition.captures import CapturesAction
 from dsl_app.composition.dialogs import ImportAction, ReconstructAgainAction
 from dsl_app.composition.first_connection import FirstConnection
 from dsl_app.connection.state import Link, RigChoice, RigState
@@ -89,7 +90,10 @@ class Composition(QObject):
     @property
     def handlers(self) -> dict[Kind, Callable[[Path], object]]:
         """What opens files and folders that no page opens, by kind."""
-        return {Kind.PUBLISHED: lambda path: self.importer.look(path)}
+        return {
+            Kind.PUBLISHED: lambda path: self.importer.look(path),
+            Kind.PICTURES: lambda path: self.captures.look(path),
+        }
 
     @property
     def commands(self) -> dict[str, Callable[[], object]]:
@@ -98,6 +102,7 @@ class Composition(QObject):
             "demo": lambda: self.demo.show(),
             "live_demo": lambda: self.demo.scan_live(),
             "import": lambda: self.importer.begin(),
+            "import_captures": lambda: self.captures.begin(),
             "reconstruct_again": lambda: self.reconstruct_again.begin(),
         }
 
@@ -201,6 +206,11 @@ class Composition(QObject):
         """Imports folders of other programs."""
         return ImportAction(self.window)
 
+    @cached_property
+    def captures(self) -> CapturesAction:
+        """Imports pictures of other programs."""
+        return CapturesAction(self.window)
+
     # Pages -----------------------------------------------------------------------------------------
 
     def _start_page(self) -> PageWidget:
@@ -214,6 +224,7 @@ class Composition(QObject):
             self._start_live,
             lambda: window.open_page("rig"),
             lambda: window.do("open"),
+            lambda: window.do("import_captures"),
         )
 
     def _start_live(self) -> None:

@@ -85,9 +85,14 @@ class ResultsController:
         target = session.with_suffix(".zarr")
 
         def work(progress: Progress) -> ResultArrays:
+            from dsl_core.io.scan.folder import ScanReader
+            from dsl_core.pipeline import Options
+            from dsl_core.workflows.captures import is_import
             from dsl_core.workflows.scans import reconstruct_to
 
-            return load_arrays(reconstruct_to(target, session, progress=progress), progress)
+            # Pictures of other programs have no frames of spectral patterns.
+            options = Options(spectra=not is_import(ScanReader(session)))
+            return load_arrays(reconstruct_to(target, session, None, options, progress), progress)
 
         self._start(f"Reconstruct {session.name}", work)
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from enum import Enum
-from itertools import chain, count
+from itertools import chain, count, islice
 from pathlib import Path
 
 from dsl_core.io import CAMPAIGN_NAME, MANIFEST_NAME, PUBLISHED_PLACES, PUBLISHED_STARTS
@@ -18,7 +18,8 @@ _MARKS = ".marks.json"
 _OPENS = (
     "dsl-scan opens scans (folders NAME.dsl), results (folders NAME.zarr), plans and pattern sets (.json),"
     " campaigns, calibrated rigs, and reference spectra (text, ENVI, ASD, SVC, JCAMP-DX, CGATS and others)."
-    " Use File, Import for folders of images."
+    " Use File, Import for folders in the published layout, and File, Import captures for folders of"
+    " pictures."
 )
 
 
@@ -33,6 +34,7 @@ class Kind(Enum):
     PATTERNS = "pattern set"
     REFERENCE = "reference spectrum"
     PUBLISHED = "folder in the published layout"
+    PICTURES = "folder of pictures"
     MISSING = "missing"
     UNKNOWN = "unknown"
 
@@ -50,6 +52,8 @@ def kind_of(path: Path) -> Kind:
             return kind
     if path.is_dir() and _is_published(path):
         return Kind.PUBLISHED
+    if path.is_dir() and _has_pictures(path):
+        return Kind.PICTURES
     suffix = path.suffix.lower()
     if suffix == ".json" and path.is_file():
         return _kind_of_json(path)
@@ -65,6 +69,18 @@ def _is_published(folder: Path) -> bool:
     except OSError:
         return False
     return any(re.sub("[^a-z0-9]", "", name).startswith(PUBLISHED_STARTS) for name in names)
+
+
+def _has_pictures(folder: Path) -> bool:
+    """Whether a folder has as many pictures as a capture needs."""
+    from dsl_core.io.pictures.candidates import FEWEST
+    from dsl_core.io.pictures.picture_file import PICTURES
+
+    try:
+        pictures = (each for each in folder.iterdir() if each.suffix.lower() in PICTURES)
+        return len(list(islice(pictures, FEWEST))) == FEWEST
+    except OSError:
+        return False
 
 
 def _kind_of_json(path: Path) -> Kind:

@@ -62,6 +62,13 @@ ACTIONS: tuple[Action, ...] = (
         "Import a folder of images or a calibration from another program; lists missing and misnamed files",
     ),
     Action(
+        "import_captures",
+        "Import captu&res…",
+        "File",
+        "Ctrl+Shift+I",
+        "Import the pictures of any structured-light program; what each picture shows is guessed",
+    ),
+    Action(
         "show_command",
         "Show &command line",
         "File",

@@ -30,6 +30,7 @@ class StartPage(PageWidget):
         start_live: Callable[[], object],
         choose_rig: Callable[[], object],
         choose_file: Callable[[], object],
+        import_captures: Callable[[], object],
     ) -> None:
         super().__init__()
         self.examples = {
@@ -47,6 +48,11 @@ class StartPage(PageWidget):
             "Choose a rig…", "Open the Rig page, where installed rigs and rig profiles are listed", choose_rig
         )
         self.choose = push_button("Open a file…", "Choose the folder of a result or of a scan", choose_file)
+        self.captures = push_button(
+            "Import captures…",
+            "Make a scan of pictures that another structured-light program took",
+            import_captures,
+        )
         self.files = RecentList(recent, open_path)
         self._lay_out()
 
@@ -80,7 +86,7 @@ class StartPage(PageWidget):
             14,
             row_of(*cards, spacing=GAP_PX),
             14,
-            row_of(self.choose, STRETCH),
+            row_of(self.choose, self.captures, STRETCH),
             8,
             self.files,
             STRETCH,

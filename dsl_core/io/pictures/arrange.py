@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
+from itertools import zip_longest
 from pathlib import Path, PurePosixPath
 
 from pydantic import ValidationError
@@ -52,9 +53,7 @@ class Arrangement:
 def arrange(folder: Path, mapping: Mapping) -> Arrangement:
     """Find every picture of a mapping; raises `StoreError` that names what is missing or too many."""
     slots = list(_slots(mapping))
-    own = {i: _listed(folder, part.files, mapping) for i, part in enumerate(mapping.parts) if part.files}
-    taken = {picture for pictures in own.values() for picture in pictures}
-    rest = [p for p in _listed(folder, mapping.files, mapping) if p not in taken]
+    own, rest = _pictures_of(folder, mapping)
     shared = [slot for slot in slots if slot.part not in own]
     if any(not 0 <= place < len(shared) for place in mapping.missing):
         raise StoreError(
@@ -65,6 +64,36 @@ def arrange(folder: Path, mapping: Mapping) -> Arrangement:
     for index, pictures in own.items():
         found |= _matched(folder, [slot for slot in slots if slot.part == index], pictures)
     return _arrangement(folder, mapping, slots, found)
+
+
+def draft_table(folder: Path, mapping: Mapping) -> tuple[tuple[str, str], ...]:
+    """The table of a mapping that does not fit yet: pictures that it leaves over, and those that it lacks.
+
+    Raises `StoreError` when the pictures cannot be listed.
+    """
+    slots = list(_slots(mapping))
+    own, rest = _pictures_of(folder, mapping)
+    shared = [slot for slot in slots if slot.part not in own]
+    shared = [slot for place, slot in enumerate(shared) if place not in mapping.missing]
+    pairs = list(zip_longest(rest, shared))
+    for index, pictures in own.items():
+        pairs += zip_longest(pictures, [slot for slot in slots if slot.part == index])
+    return tuple(
+        (
+            "-" if picture is None else _shown(picture, folder),
+            "not in the mapping"
+            if slot is None
+            else f"{slot.words}{': no picture' if picture is None else ''}",
+        )
+        for picture, slot in pairs
+    )
+
+
+def _pictures_of(folder: Path, mapping: Mapping) -> tuple[dict[int, list[Picture]], list[Picture]]:
+    """The pictures of parts with files of their own, and those that the other parts share."""
+    own = {i: _listed(folder, part.files, mapping) for i, part in enumerate(mapping.parts) if part.files}
+    taken = {picture for pictures in own.values() for picture in pictures}
+    return own, [p for p in _listed(folder, mapping.files, mapping) if p not in taken]
 
 
 def natural(text: str) -> list[tuple[int, str]]:

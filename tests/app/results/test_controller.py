@@ -4,8 +4,16 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import pytest
+from dsl_app.importing.captures.fields import first_mapping
+from dsl_app.results.reconstruct_again.controller import read_source
+from dsl_app.results.reconstruct_again.state import ReconstructionRequest, trouble_of
 from dsl_app.results.state import Limits, ResultView
 
+from dsl_core.errors import StoreError
+from dsl_core.pipeline import Options
+from dsl_core.workflows.captures import import_pictures
+from tests.app.importing.captures.small_capture import PROJECTOR, make_capture
 from tests.app.support.results_controller import SQUARE, Bench
 from tests.app.support.results_controller import bench as bench
 from tests.app.support.small_result import DARK, NM, write_small_result
@@ -42,6 +50,26 @@ def test_a_scan_is_offered_or_its_result_opened(bench: Bench, tmp_path: Path) ->
     assert "reconstruct" in bench.control.command_line()
     bench.control.reconstruct()
     assert "manifest" in bench.told
+
+
+def test_captures_of_others_are_reconstructed_without_spectra(
+    bench: Bench, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    capture = make_capture(tmp_path / "set")
+    import_pictures(capture, tmp_path / "set.dsl", first_mapping(12, PROJECTOR))
+    asked: list[Options] = []
+
+    def refuse(*given: object, **_: object) -> None:
+        asked.extend(each for each in given if isinstance(each, Options))
+        raise StoreError("Enough.")
+
+    monkeypatch.setattr("dsl_core.workflows.scans.reconstruct_to", refuse)
+    bench.control.open(tmp_path / "set.dsl")
+    bench.control.reconstruct()
+    assert [options.spectra for options in asked] == [False]
+    source = read_source(tmp_path / "set.dsl", ())
+    assert not source.has_spectra
+    assert "Leave out the spectra" in trouble_of(ReconstructionRequest("a"), source)
 
 
 def test_depth_only_results_show_depth_and_say_why_not_more(tmp_path: Path) -> None:

@@ -41,6 +41,14 @@ def test_json_is_known_by_what_it_holds(tmp_path: Path, content: str, kind: Kind
     assert path.name in refusal(path)
 
 
+def test_a_folder_of_pictures_has_as_many_as_a_capture_needs(tmp_path: Path) -> None:
+    for name in ("a.PNG", "b.tif", "c.bmp", "notes.txt"):
+        (tmp_path / name).touch()
+    assert kind_of(tmp_path) is Kind.UNKNOWN
+    (tmp_path / "d.jpg").touch()
+    assert kind_of(tmp_path) is Kind.PICTURES
+
+
 def test_every_refusal_says_what_to_do(tmp_path: Path) -> None:
     (tmp_path / "spectrum.csv").write_text("nm,r\n")
     (tmp_path / "cat.jpeg").write_bytes(b"\xff\xd8")

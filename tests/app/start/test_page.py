@@ -20,6 +20,7 @@ def make_page(qtbot: QtBot, recent: RecentFiles) -> tuple[StartPage, list[object
         lambda: asked.append("live"),
         lambda: asked.append("rig"),
         lambda: asked.append("file"),
+        lambda: asked.append("captures"),
     )
     qtbot.addWidget(page)
     page.resize(1200, 700)
@@ -29,9 +30,9 @@ def make_page(qtbot: QtBot, recent: RecentFiles) -> tuple[StartPage, list[object
 
 def test_each_button_asks_for_what_it_says(qtbot: QtBot) -> None:
     page, asked = make_page(qtbot, RecentFiles(Settings()))
-    for button in (*page.examples.values(), page.live, page.connect_rig, page.choose):
+    for button in (*page.examples.values(), page.live, page.connect_rig, page.choose, page.captures):
         button.click()
-    assert asked == [*(each.key for each in EXAMPLES), "live", "rig", "file"]
+    assert asked == [*(each.key for each in EXAMPLES), "live", "rig", "file", "captures"]
     primary = [b for b in (*page.examples.values(), page.live) if b.property("role") == "primary"]
     assert primary == [page.examples["color-checker"]]
 

@@ -9,7 +9,7 @@ import pytest
 from pydantic import ValidationError
 
 from dsl_core.errors import StoreError
-from dsl_core.io.pictures.arrange import Arrangement, arrange, natural, picture_files
+from dsl_core.io.pictures.arrange import Arrangement, arrange, draft_table, natural, picture_files
 from dsl_core.io.pictures.mapping import Mapping, Part, PhasePictures, Skipped, StripePictures, WhitePicture
 from dsl_core.model.captured_code import CapturedCode, Phases, Stripes
 from dsl_core.model.plan import GrayCode, XorCode
@@ -100,3 +100,19 @@ def test_a_mapping_cannot_leave_its_folder_or_code_nothing() -> None:
             Mapping(parts=(StripePictures(bits=3),), projector_size_px=SIZE, files=(name,))
     with pytest.raises(ValidationError, match="nothing is coded"):
         Mapping(parts=(WhitePicture(),), projector_size_px=SIZE)
+
+
+def test_a_mapping_that_does_not_fit_yet_has_a_table_all_the_same(tmp_path: Path) -> None:
+    folder = _folder(tmp_path, ["0.png", "1.png", "2.png", "w.png"])
+    parts: tuple[Part, ...] = (StripePictures(bits=1), WhitePicture(files=("w.png", "x.png")))
+    mapping = Mapping(parts=parts, projector_size_px=SIZE, files=("*",))
+    assert draft_table(folder, mapping) == (
+        ("0.png", "columns, gray bit 0"),
+        ("1.png", "columns, gray bit 0 inverse"),
+        ("2.png", "not in the mapping"),
+        ("w.png", "white"),
+    )
+    more = mapping.model_copy(update={"parts": (StripePictures(bits=2), parts[1])})
+    assert draft_table(folder, more)[3] == ("-", "columns, gray bit 0 inverse: no picture")
+    lacking = mapping.model_copy(update={"missing": (1,), "files": ("0.png",)})
+    assert draft_table(folder, lacking)[:1] == (("0.png", "columns, gray bit 0"),)

@@ -52,7 +52,9 @@ class ReconstructionController:
 
         def done(source: ReconstructionSource) -> None:
             self.state.source.set(source)
-            self.state.request.set(ReconstructionRequest(fresh_name(source.session)))
+            self.state.request.set(
+                ReconstructionRequest(fresh_name(source.session), spectra=source.has_spectra)
+            )
             self._judge()
             self.state.ready.emit(source)
 
@@ -136,6 +138,7 @@ def read_source(path: Path, library: tuple[str, ...]) -> ReconstructionSource:
     from dsl_core.io.result.result_file import load_result
     from dsl_core.io.scan.check import require_complete
     from dsl_core.io.scan.folder import ScanReader
+    from dsl_core.model.plan import NoSpectral
     from dsl_core.reconstruction.torch_device import has_cuda
     from dsl_core.workflows.inspection import session_of
 
@@ -162,6 +165,7 @@ def read_source(path: Path, library: tuple[str, ...]) -> ReconstructionSource:
         has_cuda(),
         before,
         0.0 if before is None else took_s(load_result(before).attrs),
+        not isinstance(reader.plan.spectral, NoSpectral),
     )
 
 

@@ -24,7 +24,8 @@ class ReconstructionSource:
     """What the choices depend on.
 
     ``calibration`` is the name of the scan's own (empty: it has none), ``library`` those of this computer.
-    ``before`` is the result to compare with, if any, which took ``took_s`` (0: not known).
+    ``before`` is the result to compare with, if any, which took ``took_s`` (0: not known). Without
+    ``has_spectra`` the scan has no frames of spectral patterns.
     """
 
     session: Path
@@ -34,6 +35,7 @@ class ReconstructionSource:
     has_cuda: bool = False
     before: Path | None = None
     took_s: float = 0.0
+    has_spectra: bool = True
 
 
 @dataclass(frozen=True)
@@ -106,6 +108,8 @@ def bands_of(request: ReconstructionRequest) -> WavelengthGrid:
 
 def trouble_of(request: ReconstructionRequest, source: ReconstructionSource) -> str:
     """Why a request cannot be run, and what to do; empty when it can."""
+    if request.spectra and not source.has_spectra:
+        return "The scan has no frames of spectral patterns. Leave out the spectra."
     if request.spectra:
         try:
             bands_of(request)

@@ -1,0 +1,1 @@
+"""Import of pictures of any structured-light program, by a mapping that is guessed and corrected."""

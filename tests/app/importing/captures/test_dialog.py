@@ -1,0 +1,121 @@
+"""Captures by mouse: a folder is dropped, its guess is corrected and saved, and a scan is made of it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from dsl_app.composition.window import Composition, StartOptions
+from dsl_app.importing.captures.dialog import CapturesDialog
+from dsl_app.importing.captures.state import NOMINAL
+from dsl_app.shell.main_window import MainWindow
+from PySide6.QtCore import Qt
+from PySide6.QtTest import QTest
+from PySide6.QtWidgets import QApplication, QFileDialog, QPlainTextEdit, QSpinBox
+from pytestqt.qtbot import QtBot
+
+from dsl_core.io.scan.folder import ScanReader
+from dsl_core.workflows.captures import load_mapping
+from tests.app.composition.test_drops import drop
+from tests.app.composition.test_names import complaints
+from tests.app.importing.captures.small_capture import make_capture
+from tests.app.support.real_window import show_window
+
+PATIENCE_MS = 60_000
+LEFT = Qt.MouseButton.LeftButton
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """To be read only."""
+    return make_capture(tmp_path_factory.mktemp("capture") / "set")
+
+
+@pytest.fixture
+def window(qtbot: QtBot, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> MainWindow:
+    monkeypatch.setenv("DSL_SCAN_HOME", str(tmp_path / "home"))
+    made = Composition(StartOptions()).open_window(tmp_path / "home")
+    made.parts.settings.output_folder = str(tmp_path / "scans")
+    show_window(qtbot, made)
+    return made
+
+
+def opened(qtbot: QtBot, window: MainWindow) -> CapturesDialog:
+    found: list[CapturesDialog] = []
+
+    def look() -> bool:
+        found[:] = [each for each in window.findChildren(CapturesDialog) if each.isVisible()]
+        return bool(found)
+
+    qtbot.waitUntil(look, timeout=PATIENCE_MS)
+    settle(qtbot, found[0])
+    return found[0]
+
+
+def settle(qtbot: QtBot, dialog: CapturesDialog) -> None:
+    qtbot.waitUntil(lambda: not dialog._state.busy.value, timeout=PATIENCE_MS)
+
+
+def test_dropped_pictures_are_corrected_by_mouse_and_become_a_scan(
+    qtbot: QtBot, window: MainWindow, folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert drop(window, folder)
+    dialog = opened(qtbot, window)
+    assert complaints(dialog) == []
+    assert (dialog.width(), dialog.height()) <= (1024, 700)
+    assert "mapping guessed" in dialog.about_folder.text()
+    assert "of the lit pixels have a column" in dialog.about_columns.text()
+    first = dialog.files.item(0, 0)
+    assert first is not None
+    assert not first.icon().isNull()
+    # The code has one digit more than there are pictures of.
+    stripes = next(i for i in range(3) if "gray" in dialog.editor.parts.item(i).text())
+    spot = dialog.editor.parts.visualItemRect(dialog.editor.parts.item(stripes)).center()
+    QTest.mouseClick(dialog.editor.parts.viewport(), LEFT, pos=spot)
+    bits = dialog.editor.part.controls["bits"]
+    assert isinstance(bits, QSpinBox)
+    bits.setFocus()
+    QTest.keyClick(bits, Qt.Key.Key_Up)
+    settle(qtbot, dialog)
+    assert "12 pictures where the mapping wants 14" in dialog.about_mapping.text()
+    assert not dialog.go.isEnabled()
+    assert dialog.decoded.words.text() == "Nothing can be decoded yet."
+    QTest.keyClick(bits, Qt.Key.Key_Down)
+    settle(qtbot, dialog)
+    assert dialog.go.isEnabled()
+    file = tmp_path / "m.json"
+    monkeypatch.setattr(QFileDialog, "getSaveFileName", lambda *_: (str(file), ""))
+    QTest.mouseClick(dialog.save, LEFT)
+    assert load_mapping(file).parts[stripes].kind == "stripes"
+    QTest.mouseClick(dialog.command, LEFT)
+    (text,) = dialog.findChildren(QPlainTextEdit)
+    assert f"--mapping {file}" in text.toPlainText()
+    QApplication.activeModalWidget().close()  # type: ignore[union-attr]
+    dialog.name.selectAll()
+    QTest.keyClicks(dialog.name, "box")
+    QTest.mouseClick(dialog.go, LEFT)
+    target = tmp_path / "scans" / "box.dsl"
+    qtbot.waitUntil(lambda: window.page == "results", timeout=PATIENCE_MS)
+    assert not ScanReader(target).missing()
+    assert any("have a column" in toast.text for toast in window.toasts.shown)
+
+
+def test_a_wrong_folder_and_calibration_are_said_beside_them(
+    qtbot: QtBot, window: MainWindow, folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    QTest.mouseClick(window.page_of("start").captures, LEFT)  # type: ignore[attr-defined]
+    dialog = opened(qtbot, window)
+    assert not dialog.go.isEnabled()
+    monkeypatch.setattr(QFileDialog, "getExistingDirectory", lambda *_: str(tmp_path))
+    QTest.mouseClick(dialog.choose, LEFT)
+    settle(qtbot, dialog)
+    assert "contains 0 pictures" in dialog.about_folder.text()
+    dialog.open_folder(folder)
+    settle(qtbot, dialog)
+    QTest.keyClick(dialog.calibration, Qt.Key.Key_Down)
+    settle(qtbot, dialog)
+    assert dialog._state.request.value.calibration == NOMINAL
+    assert "The pictures are 64 x 48 px" in dialog.about_calibration.text()
+    assert dialog.about_calibration.property("role") == "bad"
+    QTest.keyClick(dialog, Qt.Key.Key_Escape)
+    assert not dialog.isVisible()

@@ -1,0 +1,184 @@
+"""What workers find out about real files."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from dsl_app.importing.captures.fields import first_mapping, with_part_field
+from dsl_app.importing.captures.look import (
+    Thinned,
+    carry_out,
+    decode,
+    guess,
+    list_files,
+    require_sizes,
+    small_pictures,
+)
+from dsl_app.importing.captures.state import NOMINAL, CaptureRequest, Place
+
+from dsl_core.errors import CalibrationError, StoreError
+from dsl_core.io.calibration_library import CalibrationLibrary
+from dsl_core.io.pictures.source import open_pictures
+from dsl_core.io.result.result_file import load_result
+from dsl_core.io.scan.folder import ScanReader
+from dsl_core.progress import NoProgress
+from tests.app.importing.captures.small_capture import CAMERA, PROJECTOR, make_capture
+from tests.cases.foreign_captures import scene
+from tests.cases.small_rig import small_rig
+
+MAPPING = first_mapping(12, PROJECTOR)
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """To be read only."""
+    return make_capture(tmp_path_factory.mktemp("capture") / "set")
+
+
+def request_for(folder: Path, tmp_path: Path) -> CaptureRequest:
+    return CaptureRequest(folder, tmp_path / "a.dsl", PROJECTOR)
+
+
+def listed(request: CaptureRequest, tmp_path: Path) -> tuple[str, dict[Place, str]]:
+    found = list_files(request, MAPPING, CalibrationLibrary(tmp_path / "library"))
+    return found.calibration, dict(found.troubles)
+
+
+def test_a_guess_is_what_was_captured(folder: Path, tmp_path: Path) -> None:
+    found = guess(request_for(folder, tmp_path), NoProgress())
+    assert found.trouble == ""
+    assert found.stated.is_guessed
+    assert found.stated.mapping.parts == MAPPING.parts
+    assert found.sets == ("set",)
+
+
+def test_pictures_that_make_no_sense_leave_a_mapping_to_correct(tmp_path: Path) -> None:
+    from tests.cases.foreign_captures import write
+
+    noise = np.random.default_rng(1)
+    named = {f"{i}.png": noise.integers(0, 255, (24, 32)).astype(np.uint16) for i in range(6)}
+    request = request_for(write(tmp_path / "noise", named), tmp_path)
+    found = guess(request, NoProgress())
+    assert found.trouble
+    assert not found.stated.is_guessed
+    assert found.stated.mapping == first_mapping(6, PROJECTOR)
+
+
+def test_a_folder_without_pictures_has_nothing_to_correct(tmp_path: Path) -> None:
+    with pytest.raises(StoreError, match="contains 0 pictures"):
+        guess(request_for(tmp_path, tmp_path), NoProgress())
+
+
+def test_columns_are_decoded_from_some_of_the_pixels(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("dsl_app.importing.captures.look.PREVIEW_PIXELS", 64 * 48 // 4)
+    found = decode(folder, MAPPING)
+    assert found.column_px.shape == (24, 32)
+    assert found.share > 0.9
+    rows, columns = (np.arange(size)[np.arange(size) // 2 % 2 == 0] for size in (48, 64))
+    truth = scene(CAMERA, PROJECTOR).columns[np.ix_(rows, columns)]
+    known = np.isfinite(found.column_px)
+    assert np.percentile(np.abs(found.column_px - truth)[known], 90) < 0.7
+
+
+def test_thinning_keeps_a_mosaic(folder: Path) -> None:
+    source = open_pictures(folder, MAPPING)
+    thinned = Thinned(source, 3)
+    shot = next(iter(thinned.plan.shots()))
+    frame = thinned.read(shot)
+    assert frame.shape[::-1] == thinned.plan.camera_size_px
+    assert np.array_equal(frame[2:4, 2:4], source.read(shot)[6:8, 6:8])
+
+
+def test_wrong_parts_are_seen_in_the_columns(folder: Path) -> None:
+    wrong = with_part_field(MAPPING, 2, "first", "least")
+    steps = [np.nanmean(np.abs(np.diff(decode(folder, each).column_px))) for each in (MAPPING, wrong)]
+    assert steps[1] > 3 * steps[0]
+
+
+def test_files_that_do_not_fit_are_listed_all_the_same(folder: Path, tmp_path: Path) -> None:
+    more = with_part_field(MAPPING, 2, "bits", 6)
+    found = list_files(request_for(folder, tmp_path), more, CalibrationLibrary(tmp_path))
+    assert "has 12 pictures where the mapping wants 14" in dict(found.troubles)[Place.MAPPING]
+    assert found.table[0] == ("im_00.png", "white")
+    assert found.table[-1] == ("-", "columns, gray bit 0 inverse: no picture")
+    less = with_part_field(MAPPING, 2, "bits", 4)
+    assert list_files(request_for(folder, tmp_path), less, CalibrationLibrary(tmp_path)).table[-1] == (
+        "im_11.png",
+        "not in the mapping",
+    )
+
+
+def test_small_pictures_are_as_bright_as_each_other(folder: Path) -> None:
+    small = small_pictures(
+        folder, MAPPING, (("im_00.png", "white"), ("im_01.png", "black"), ("-", "missing"))
+    )
+    assert list(small) == ["im_00.png", "im_01.png"]
+    assert small["im_00.png"].dtype == np.uint8
+    assert small["im_00.png"].mean() > 5 * small["im_01.png"].mean()
+
+
+def test_what_a_calibration_lacks_is_named(folder: Path, tmp_path: Path) -> None:
+    request = request_for(folder, tmp_path)
+    assert "no depth" in listed(request, tmp_path)[0]
+    matrix = [[50.0, 0, 16], [0, 50.0, 12], [0, 0, 1]]
+    file = tmp_path / "stereo.json"
+    parts = {"cam_K": matrix, "proj_K": matrix, "R": np.eye(3).tolist(), "T": [0.1, 0, 0]}
+    file.write_text(json.dumps(parts))
+    given = replace(request, calibration=str(file), unit_mm=1000.0)
+    told, troubles = listed(given, tmp_path)
+    assert not troubles
+    assert "the projector is 100 mm from the camera" in told
+    assert "Missing, so assumed: no camera distortion, no projector distortion." in told
+    file.write_text(json.dumps({key: parts[key] for key in ("cam_K", "R")}))
+    assert "lacks projector matrix and translation" in listed(given, tmp_path)[1][Place.CALIBRATION]
+    missing = replace(request, calibration=str(tmp_path / "none.json"))
+    assert Place.CALIBRATION in listed(missing, tmp_path)[1]
+
+
+def test_a_calibration_for_other_sizes_is_refused(folder: Path, tmp_path: Path) -> None:
+    nominal = replace(request_for(folder, tmp_path), calibration=NOMINAL)
+    assert "The pictures are 64 x 48 px" in listed(nominal, tmp_path)[1][Place.CALIBRATION]
+    rig = small_rig()
+    camera_px = rig.camera.width_px, rig.camera.height_px
+    with pytest.raises(CalibrationError, match="The projector of the mapping is 32 x 24 px"):
+        require_sizes(rig, MAPPING, camera_px)
+
+
+def test_an_import_without_calibration_tells_its_columns(folder: Path, tmp_path: Path) -> None:
+    request = request_for(folder, tmp_path)
+    made = carry_out(request, MAPPING, CalibrationLibrary(tmp_path / "library"), NoProgress())
+    assert made.result is None
+    assert "of the lit pixels have a column. There is no depth" in made.verdict
+    assert not ScanReader(made.scan).missing()
+
+
+def test_an_import_that_fails_leaves_nothing(
+    folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def full(*_: object) -> None:
+        raise StoreError("The disk is full.")
+
+    monkeypatch.setattr("dsl_core.workflows.captures._write", full)
+    with pytest.raises(StoreError, match="full"):
+        carry_out(request_for(folder, tmp_path), MAPPING, CalibrationLibrary(tmp_path / "l"), NoProgress())
+    assert not list(tmp_path.iterdir())
+
+
+def test_an_import_with_a_calibration_has_depth(folder: Path, tmp_path: Path) -> None:
+    # The wall of the scene is where lenses of these focal lengths, 100 mm apart, see it shifted like this.
+    camera, projector = ([[50.0, 0, 32], [0, 50.0, 24], [0, 0, 1]], [[22.5, 0, 12], [0, 22.5, 12], [0, 0, 1]])
+    parts = {"cam_K": camera, "proj_K": projector, "R": np.eye(3).tolist(), "T": [100.0, 0, 0]}
+    file = tmp_path / "stereo.json"
+    file.write_text(json.dumps(parts))
+    request = replace(request_for(folder, tmp_path), calibration=str(file))
+    made = carry_out(request, MAPPING, CalibrationLibrary(tmp_path / "library"), NoProgress())
+    assert made.result == tmp_path / "a.zarr"
+    assert "of the pixels have a depth" in made.verdict
+    result = load_result(made.result)
+    assert "reflectance" not in result
+    wall = result["depth_mm"].values[:8, 8:24]
+    assert np.nanmedian(wall) == pytest.approx(22.5 * 100 / 3.75, rel=0.1)

@@ -1,0 +1,115 @@
+"""What the dialog says is decided without a window."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from dsl_app.importing.captures.fields import first_mapping
+from dsl_app.importing.captures.state import (
+    NOMINAL,
+    CaptureRequest,
+    CapturesState,
+    Decoded,
+    Listing,
+    Place,
+    Stated,
+    captures_view,
+    command_of,
+    target_trouble,
+)
+
+MAPPING = first_mapping(12, (32, 24))
+
+
+def state_of(tmp_path: Path) -> CapturesState:
+    state = CapturesState(tmp_path)
+    state.request.set(CaptureRequest(tmp_path / "in", tmp_path / "out.dsl"))
+    state.stated.set(Stated(MAPPING, is_guessed=True))
+    state.listing.set(Listing((("a.png", "white"),), "No depth."))
+    return state
+
+
+def test_an_empty_dialog_asks_for_a_folder(tmp_path: Path) -> None:
+    view = captures_view(CapturesState(tmp_path))
+    assert view.folder.text.startswith("Choose the folder")
+    assert (view.can_guess, view.can_change, view.can_import) == (False, False, False)
+
+
+def test_a_guess_can_be_imported(tmp_path: Path) -> None:
+    view = captures_view(state_of(tmp_path))
+    assert view.can_import
+    assert view.folder.text == "1 pictures, mapping guessed from the pictures."
+    assert (view.mapping.text, view.calibration.text) == ("Nothing is unsure.", "No depth.")
+    assert view.target.text == "Creates out.dsl."
+
+
+@pytest.mark.parametrize("place", list(Place))
+def test_a_trouble_is_said_beside_what_it_is_about_and_prevents_the_import(
+    tmp_path: Path, place: Place
+) -> None:
+    state = state_of(tmp_path)
+    state.trouble.set(((place, "Wrong."),))
+    view = captures_view(state)
+    assert not view.can_import
+    said = {where: getattr(view, where.value) for where in Place}
+    assert [where for where, each in said.items() if each.role == "bad"] == [place]
+    assert said[place].text == "Wrong."
+
+
+def test_doubts_are_told_without_options_of_commands(tmp_path: Path) -> None:
+    state = state_of(tmp_path)
+    doubts = ("a projector of 32 x 24 px is assumed; give --projector", "rows fall")
+    state.stated.set(Stated(MAPPING.model_copy(update={"unsure": doubts})))
+    said = captures_view(state).mapping
+    assert said.text == "Unsure: a projector of 32 x 24 px is assumed; rows fall."
+    assert said.role == "warn"
+
+
+@pytest.mark.parametrize(
+    ("share", "lit", "role", "words"),
+    [
+        (0.97, 0.8, "good", "97% of the lit pixels have a column, from 3 to 9"),
+        (0.7, 0.8, "warn", "too fine or too dark"),
+        (0.2, 0.8, "bad", "the order of its digits"),
+        (0.0, 0.0, "bad", "No pixel is lit"),
+    ],
+)
+def test_columns_are_judged(tmp_path: Path, share: float, lit: float, role: str, words: str) -> None:
+    state = state_of(tmp_path)
+    state.decoded.set(Decoded(np.array([[3.0, np.nan, 9.0]], np.float32), share, lit))
+    said = captures_view(state).columns
+    assert said.role == role
+    assert words in said.text
+
+
+def test_nothing_that_exists_is_replaced(tmp_path: Path) -> None:
+    request = CaptureRequest(tmp_path, tmp_path / "a.dsl")
+    assert target_trouble(request) == ""
+    (tmp_path / "a.zarr").mkdir()
+    assert target_trouble(request) == ""
+    assert "a.zarr already exists" in target_trouble(replace(request, calibration=NOMINAL))
+    (tmp_path / "a.dsl").mkdir()
+    assert "a.dsl already exists" in target_trouble(request)
+    assert target_trouble(replace(request, target=tmp_path / ".dsl")) == "Enter a name."
+
+
+def test_the_command_does_the_same() -> None:
+    request = CaptureRequest(Path("in"), Path("out.dsl"), (32, 24), "cam 1")
+    guessed = Stated(MAPPING, is_guessed=True)
+    assert (
+        command_of(request, guessed)
+        == "dsl-scan import in --guess --projector 32x24 --set 'cam 1' -o out.dsl"
+    )
+    saved = Stated(MAPPING, file=Path("m.json"))
+    assert command_of(request, saved) == "dsl-scan import in --mapping m.json -o out.dsl"
+    assert command_of(request, Stated(MAPPING)).startswith("# Save the mapping first")
+    stereo = replace(request, calibration="s.yml", unit_mm=1000)
+    lines = command_of(stereo, saved, (64, 48)).splitlines()
+    assert lines[1:] == [
+        "dsl-scan import s.yml --camera-size 64x48 --projector 32x24 --unit-mm 1000 -o out-rig.json",
+        "dsl-scan reconstruct out.dsl --calibration out-rig.json",
+    ]
+    assert command_of(CaptureRequest(None, Path("out.dsl")), None) == ""
