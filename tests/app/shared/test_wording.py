@@ -19,6 +19,7 @@ COMMANDS = (
     "app/dsl_app/__main__.py",
     "app/dsl_app/compare/series/controller.py",
     "app/dsl_app/connection/state.py",
+    "app/dsl_app/importing/captures/command_line.py",
     "app/dsl_app/importing/state.py",
     "app/dsl_app/results/reconstruct_again/state.py",
     "app/dsl_app/rig/projector_process.py",

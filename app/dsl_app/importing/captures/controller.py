@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dsl_app.importing.captures import fields, look
+from dsl_app.importing.captures.command_line import command_of
 from dsl_app.importing.captures.state import (
     SUFFIX,
     CapturesState,
@@ -21,7 +22,6 @@ from dsl_app.importing.captures.state import (
     Size,
     Stated,
     captures_view,
-    command_of,
 )
 from dsl_app.shared.jobs.base import Job, JobRunner
 from dsl_app.shared.known_files import first_free

@@ -17,7 +17,6 @@ from dsl_app.importing.captures.state import (
     Place,
     Stated,
     captures_view,
-    command_of,
     target_trouble,
 )
 
@@ -94,22 +93,3 @@ def test_nothing_that_exists_is_replaced(tmp_path: Path) -> None:
     (tmp_path / "a.dsl").mkdir()
     assert "a.dsl already exists" in target_trouble(request)
     assert target_trouble(replace(request, target=tmp_path / ".dsl")) == "Enter a name."
-
-
-def test_the_command_does_the_same() -> None:
-    request = CaptureRequest(Path("in"), Path("out.dsl"), (32, 24), "cam 1")
-    guessed = Stated(MAPPING, is_guessed=True)
-    assert (
-        command_of(request, guessed)
-        == "dsl-scan import in --guess --projector 32x24 --set 'cam 1' -o out.dsl"
-    )
-    saved = Stated(MAPPING, file=Path("m.json"))
-    assert command_of(request, saved) == "dsl-scan import in --mapping m.json -o out.dsl"
-    assert command_of(request, Stated(MAPPING)).startswith("# Save the mapping first")
-    stereo = replace(request, calibration="s.yml", unit_mm=1000)
-    lines = command_of(stereo, saved, (64, 48)).splitlines()
-    assert lines[1:] == [
-        "dsl-scan import s.yml --camera-size 64x48 --projector 32x24 --unit-mm 1000 -o out-rig.json",
-        "dsl-scan reconstruct out.dsl --calibration out-rig.json",
-    ]
-    assert command_of(CaptureRequest(None, Path("out.dsl")), None) == ""
