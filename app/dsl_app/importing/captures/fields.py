@@ -116,7 +116,7 @@ def _phase_fields(part: PhasePictures) -> list[Field]:
 def picture_fields(mapping: Mapping) -> tuple[Field, ...]:
     """What can be changed of how the files of a mapping are found and read."""
     raw = mapping.raw or RawLayout(width_px=1, height_px=1)
-    depths: Choices = (("as stored", None), *((f"{bits} bits", bits) for bits in (8, 10, 12, 14, 16)))
+    depths: Choices = (("as in the file", None), *((f"{bits} bits", bits) for bits in (8, 10, 12, 14, 16)))
     mosaics: Choices = (("none", None), *_words("RGGB", "GRBG", "GBRG", "BGGR"))
     fields = [
         Field("files", "Files", "text", ", ".join(mapping.files),
