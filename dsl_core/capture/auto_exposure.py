@@ -71,7 +71,7 @@ class ExposureSearch:
         else:
             following = exposure_ms * min(FILL / max(share, 1e-6), LENGTHEN)
         following = min(max(self._whole(following), self._low), self._high)
-        if share < 1.0 and (NEAR <= share <= FILL or following == exposure_ms):
+        if NEAR <= share <= FILL or following == exposure_ms:
             self._end(share, exposure_ms)
             return exposure_ms
         if self._judged >= MOST_FRAMES:
@@ -93,7 +93,7 @@ class ExposureSearch:
         """The brightest pixels that count, as a share of the range above black; 1 if saturated."""
         flat = pixels.ravel()
         judged = flat[:: max(flat.size // _PIXELS, 1)]
-        place = min(int(judged.size * (1.0 - BRIGHTEST_SHARE)), judged.size - 1)
+        place = int(judged.size * (1.0 - BRIGHTEST_SHARE))
         level = float(np.partition(judged, place)[place])
         if level >= self._full:
             return 1.0

@@ -142,3 +142,8 @@ def test_exposures_are_whole_cycles_within_the_range() -> None:
     ]
     assert ExposureSearch((12.0, 15.0), 1000, 10.0).start_from(1.0) == 20.0
     assert ExposureSearch((1.0, 2.0), 1000, 10.0)._whole(0.5) == 10.0
+
+
+def test_too_much_light_is_told_from_too_little() -> None:
+    assert judged(1.0, 1.0)[0].is_too_bright
+    assert not judged(0.05, 1000.0)[0].is_too_bright

@@ -94,3 +94,58 @@ def test_a_scan_that_stops_says_why(scene: RenderedScene, change: Change, said: 
     proof = FrameProof(scene.plan, scene.calibration)
     with pytest.raises(DeviceError, match=said):
         Runner(rig, scene.plan, MemorySink(scene.plan), token_image, proof=proof).run()
+
+
+def even(white: np.ndarray | float, room_dn: float) -> References:
+    """Pictures without noise or detail of a scene under ``white`` DN of light, on so much light of the room."""
+    black = np.full((48, 72), SENSOR.black_level_dn + room_dn)
+    # Fractions of counts as their share of the pixels.
+    spread = np.resize(np.arange(10) / 10, black.shape)
+    lit, dark = (np.floor(part + spread).astype(np.uint16) for part in (black + white, black))
+    return References(lit, dark, lit)
+
+
+@pytest.mark.parametrize(
+    ("light", "room_dn", "said"),
+    [
+        (1.04, 20, ""), (1.06, 20, "is 1.06 times what it was"),
+        (0.96, 20, ""), (0.94, 20, "is 0.94 times what it was"),
+        (1.0, 49, ""), (1.0, 51, "at 51 DN above its black level, and was at 20 DN"),
+        (0.5, 10.8, "exposure or gain of the camera is 0.50"),
+        (0.5, 11.2, "light of the projector or the exposure is 0.50"),
+        (0.5, 9.2, "exposure or gain of the camera is 0.50"),
+        (0.5, 8.8, "light of the projector or the exposure is 0.50"),
+    ],
+)  # fmt: skip
+def test_changes_matter_from_a_share_of_the_light_on(light: float, room_dn: float, said: str) -> None:
+    found = what_changed(even(1000.0, 20.0), even(1000.0 * light, room_dn), SENSOR)
+    assert (said in found) if said else (found == "")
+
+
+@pytest.mark.parametrize(("room_dn", "is_told"), [(1.8, False), (2.4, True)])
+def test_black_tells_the_exposure_from_two_counts_on(room_dn: float, is_told: bool) -> None:
+    found = what_changed(even(1000.0, room_dn), even(500.0, room_dn / 2), SENSOR)
+    assert ("exposure or gain" in found) == is_told
+
+
+@pytest.mark.parametrize(("added", "is_told"), [(21, False), (24, True)])
+def test_the_rooms_light_counts_against_the_lit_part_of_the_picture(added: int, is_told: bool) -> None:
+    white = np.full((48, 72), 1000.0)
+    white[:, 36:58], white[:, 58:] = 300.0, 100.0
+    found = what_changed(even(white, 20.0), even(white, 20.0 + added), SENSOR)
+    assert ("light of the room" in found) == is_told
+
+
+def test_saturated_pixels_tell_nothing() -> None:
+    white = np.full((48, 72), 1000.0)
+    glint = white.copy()
+    glint[:, :24] = 0.99 * SENSOR.full_scale_dn - SENSOR.black_level_dn
+    assert what_changed(even(glint, 0.0), even(white, 0.0), SENSOR) == ""
+    assert what_changed(even(white, 0.0), even(glint, 0.0), SENSOR) == ""
+
+
+@pytest.mark.parametrize(("lit", "is_told"), [(11, False), (12, True)])
+def test_a_dozen_lit_pixels_are_needed(lit: int, is_told: bool) -> None:
+    white = np.zeros((48, 72))
+    white[0, :lit] = 2000.0
+    assert bool(what_changed(even(white, 20.0), even(white * 0.5, 20.0), SENSOR)) == is_told

@@ -55,3 +55,45 @@ def test_the_picture_uses_the_tables() -> None:
     plain, bright = (quick_picture(mosaic, "RGGB", FULL, display=each) for each in (PLAIN, Display(gain=4)))
     assert (plain == quick_picture(mosaic, "RGGB", FULL)).all()
     assert bright.mean() > 1.9 * plain.mean()
+
+
+def _levelled(*levels: int) -> list[NDArray[np.uint16]]:
+    return [np.full((8, 8), level, np.uint16) for level in levels]
+
+
+def test_a_stretch_spans_half_a_percent_to_all_but_a_fifth_of_a_percent() -> None:
+    thin = np.arange(0, 4000, 4, dtype=np.uint16).reshape(100, 10)
+    full = np.zeros((400, 40), np.uint16)
+    full[1::4], full[:, 1::4] = FULL, FULL
+    full[::4, ::4] = thin
+    low, high = (float(np.percentile(thin, share)) for share in (0.5, 99.8))
+    table = display_tables(Display(Tone.LINEAR, stretch=True), [full, full, full], FULL)[0]
+    counts = np.arange(FULL + 1)
+    assert len(table) == FULL + 1
+    np.testing.assert_array_equal(table, np.round(255 * ((counts - low) / (high - low)).clip(0, 1)))
+
+
+def test_a_stretch_is_sixteen_counts_at_least() -> None:
+    table = display_tables(Display(Tone.LINEAR, stretch=True), _levelled(100, 100, 100), FULL)[0]
+    assert table[100:117].tolist() == np.round(255 * np.arange(17) / 16).tolist()
+
+
+def test_a_logarithmic_tone_reaches_down_to_a_thousandth() -> None:
+    table = display_tables(Display(Tone.LOG), _levelled(1, 1, 1), FULL)[0]
+    assert table[41] == round(255 * np.log1p(1000 * 41 / FULL) / np.log1p(1000))
+
+
+def test_white_balance_makes_means_above_black_equal_within_a_factor_of_six() -> None:
+    def shown(levels: tuple[int, int, int], at: tuple[int, int, int], **how: bool) -> list[int]:
+        tables = display_tables(Display(Tone.LINEAR, balance=True, **how), _levelled(*levels), FULL)
+        return [int(table[count]) for table, count in zip(tables, at, strict=True)]
+
+    assert shown((1000, 2000, 500), (1000, 2000, 500)) == [62, 62, 62]
+    # The darkest colour is brightened sixfold at most, and the brightest darkened as far.
+    assert shown((100, 1000, 2000), (100, 1000, 2000)) == [37, 62, 62]
+    assert shown((300, 300, 3600), (300, 300, 3600)) == [19, 19, 37]
+    # A channel at black, and one with no pixel below saturation, is one count bright.
+    assert shown((0, 1, 3), (1000, 1000, 1000)) == [62, 62, 21]
+    assert shown((FULL, 200, 300), (100, 100, 100)) == [6, 6, 6]
+    # What a stretch puts at black does not count.
+    assert shown((400, 600, 1000), (450, 600, 600), stretch=True) == [128, 85, 28]

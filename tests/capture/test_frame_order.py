@@ -82,3 +82,73 @@ def test_a_frame_without_a_time_has_none(caplog: pytest.LogCaptureFixture) -> No
     assert order.take(_frame(1, float("nan"))).timestamp_s == 0.0
     assert order.take(_frame(2, float("nan"))).timestamp_s == 0.0
     assert len(caplog.messages) == 1
+
+
+@pytest.mark.parametrize(
+    ("last", "first", "is_new"),
+    [(224, 31, True), (223, 31, False), (224, 32, False), (2**64 - 1, 0, True), (2**16 - 32, 31, True)],
+)
+def test_a_counter_wraps_within_32_of_its_end(last: int, first: int, is_new: bool) -> None:
+    order = FrameOrder()
+    order.take(_frame(last, 1.0))
+    if is_new:
+        assert order.take(_frame(first, 2.0)).frame_id == first
+    else:
+        with pytest.raises(StaleFrameError):
+            order.take(_frame(first, 2.0))
+
+
+def test_a_number_that_wraps_at_the_same_time_is_an_old_frame() -> None:
+    order = FrameOrder()
+    order.take(_frame(250, 1.0))
+    with pytest.raises(StaleFrameError):
+        order.take(_frame(3, 1.0))
+
+
+@pytest.mark.parametrize(("numbers", "is_told"), [(8, False), (9, True)])
+@pytest.mark.parametrize("before", ["nothing", "failure", "gap"])
+def test_a_gap_is_worth_a_word_after_eight_frames_without_one(
+    numbers: int, is_told: bool, before: str, caplog: pytest.LogCaptureFixture
+) -> None:
+    order, first = FrameOrder(), 1
+    if before != "nothing":
+        order.take(_frame(1, 0.5))
+        order.take(_frame(2, 0.7))
+        first = 3 if before == "failure" else 40
+    if before == "failure":
+        order.take(_frame(3, 0.8))
+        order.interrupted()
+        first, numbers = 4, numbers - 1
+    for k in range(numbers):
+        order.take(_frame(first + k, 1.0 + k))
+    order.take(_frame(first + numbers + 1, 99.0))
+    assert ("the camera lost 1 frames" in caplog.text) == is_told
+
+
+@pytest.mark.parametrize(
+    ("passed_s", "step_s", "is_told"),
+    [(0.0, 1.9, False), (0.0, 2.1, True), (10.0, 12.9, False), (10.0, 13.1, True), (10.0, 7.1, False),
+     (10.0, 6.9, True)],
+)  # fmt: skip
+def test_clocks_may_differ_by_two_seconds_and_a_tenth(
+    passed_s: float, step_s: float, is_told: bool, caplog: pytest.LogCaptureFixture
+) -> None:
+    seconds = iter([5.0, 5.0 + passed_s])
+    order = FrameOrder(lambda: next(seconds))
+    order.take(_frame(1, 1.0))
+    order.take(_frame(2, 1.0 + step_s))
+    assert bool(caplog.messages) == is_told
+    if is_told:
+        assert f"jumped by {step_s - passed_s:.3g} s before frame 2" in caplog.text
+
+
+def test_a_clock_that_stands_at_zero_is_none(caplog: pytest.LogCaptureFixture) -> None:
+    seconds = iter([0.0, 1.0, 2.0])
+    order = FrameOrder(lambda: next(seconds))
+    for number, time_s in enumerate((0.0, 500.0, 0.0), start=1):
+        order.take(_frame(number, time_s))
+    assert caplog.messages == []
+    order = FrameOrder()
+    for number, time_s in enumerate((1.0, 1.5, 90.0), start=1):
+        order.take(_frame(number, time_s))
+    assert caplog.messages == [], "without a clock of ours any time that rises will do"

@@ -85,7 +85,7 @@ def fit_corners(
             break
     shift = np.linalg.norm(state[:, :2] - start_px, axis=1)
     contrast = np.abs(levels[:, 3]) > 0.05 * np.abs(levels[:, 0])
-    good = (shift < np.maximum(MAX_SHIFT * reach, 1.0)) & contrast & np.isfinite(state).all(1)
+    good = (shift < MAX_SHIFT * reach) & contrast & np.isfinite(state).all(1)
     return EdgeCorners(np.where(good[:, None], state[:, :2], np.nan), state[:, 4])
 
 
