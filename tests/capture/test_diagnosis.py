@@ -97,7 +97,7 @@ def test_a_scan_that_stops_says_why(scene: RenderedScene, change: Change, said: 
 
 
 def even(white: np.ndarray | float, room_dn: float) -> References:
-    """Pictures without noise or detail of a scene under ``white`` DN of light, on so much light of the room."""
+    """Pictures without noise or detail of a scene, ``white`` DN above the light of the room."""
     black = np.full((48, 72), SENSOR.black_level_dn + room_dn)
     # Fractions of counts as their share of the pixels.
     spread = np.resize(np.arange(10) / 10, black.shape)

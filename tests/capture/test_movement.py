@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from dsl_core.capture.movement import MovementReport, check_movement, pick_reference_shots
+from dsl_core.capture.movement import MovementReport, _blocks, check_movement, pick_reference_shots
 from dsl_core.devices.base import DeviceRig
 from dsl_core.devices.replay import replay_rig
 from dsl_core.model.frames import Frame
@@ -94,3 +94,69 @@ def test_the_black_level_is_no_light() -> None:
 def test_without_shots_there_is_nothing_to_compare() -> None:
     with pytest.raises(ValueError, match="at least one shot"):
         check_movement(_rig(lambda scene: scene), _scan(1), [], pattern_image)
+
+
+def test_blocks_are_means_of_eight_by_eight_pixels() -> None:
+    pixels = np.arange(17 * 27, dtype=np.uint16).reshape(17, 27)
+    wanted = [[pixels[8 * r : 8 * r + 8, 8 * c : 8 * c + 8].mean() for c in range(3)] for r in range(2)]
+    assert _blocks(pixels).tolist() == wanted
+    assert _blocks(pixels[:4, :8]).tolist() == [[pixels[:4, :4].mean(), pixels[:4, 4:8].mean()]]
+
+
+def test_a_change_is_the_largest_of_all_shots_after_scaling() -> None:
+    shots = list(PLAN.shots())[:2]
+
+    def frames(*pictures: list[float]) -> MemorySink:
+        sink = MemorySink(PLAN)
+        for shot, (left, right) in zip(shots, pictures, strict=True):
+            pixels = np.repeat([left, right], 32).astype(np.uint16) * np.ones((48, 1), np.uint16)
+            sink.write(shot, Frame(pixels, shot.exposure_ms))
+        return sink
+
+    old, new = frames([100, 300], [200, 200]), frames([60, 140], [100, 100])
+    report = check_movement(replay_rig(new), old, shots, pattern_image)
+    assert report.brightness_ratio == pytest.approx(0.5)
+    assert report.change == pytest.approx(10 / np.sqrt((50**2 + 150**2) / 2))
+    assert report.shots == (0, 1)
+
+
+@pytest.mark.parametrize("level", [0, 1])
+def test_old_pictures_without_light_are_no_measure(level: int) -> None:
+    shot = next(PLAN.shots())
+    dark, new = MemorySink(PLAN), _scan(2)
+    dark.write(shot, Frame(np.full((48, 64), level, np.uint16), shot.exposure_ms))
+    report = check_movement(replay_rig(new), dark, [shot], pattern_image)
+    assert np.isfinite(report.brightness_ratio) == bool(level)
+    assert np.isfinite(report.change) == bool(level)
+
+
+def test_the_projector_is_dark_afterwards() -> None:
+    rig = _rig(lambda scene: scene)
+    shown: list[bool] = []
+
+    class Noted(type(rig.projector)):  # type: ignore[misc]
+        def show(self, image: NDArray[np.uint8]) -> None:
+            shown.append(bool(image.any()))
+            super().show(image)
+
+    rig.projector.__class__ = Noted
+    check_movement(rig, _scan(1), list(PLAN.shots())[:1], pattern_image)
+    assert shown[-1] is False
+
+
+def test_a_scan_allows_three_percent_of_either() -> None:
+    assert MovementReport((1,), brightness_ratio=0.971, change=0.029).is_stable
+    assert not MovementReport((1,), brightness_ratio=0.969, change=0.0).is_stable
+    assert not MovementReport((1,), brightness_ratio=1.0, change=0.031).is_stable
+
+
+def test_the_last_white_and_the_last_of_the_code_are_compared() -> None:
+    plan = PLAN.model_copy(update={"settings": PLAN.settings * 2, "code_settings": (0, 1)})
+    shots = list(plan.shots())
+    chosen = pick_reference_shots(shots)
+    assert [shot.role for shot in chosen] == ["code", "white"]
+    assert [shot.index for shot in chosen] == [
+        max(shot.index for shot in shots if shot.role == role) for role in ("code", "white")
+    ]
+    lines = [shot for shot in shots if shot.role == "spectral"]
+    assert pick_reference_shots(lines) == lines[-2:]

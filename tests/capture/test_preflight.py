@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 
-from dsl_core.capture.preflight import fit_plan
+from dsl_core.capture.preflight import find_obstacles, fit_plan
+from dsl_core.devices.base import DeviceRig
 from dsl_core.devices.registry import open_rig
 from dsl_core.model.plan import CapturePlan, Setting
+from dsl_core.simulation.published_rig import published_rig
 
 TWIN = {"size": "160x104", "scene": "plane"}
 
@@ -20,3 +24,37 @@ def test_default_exposures_are_whole_colour_cycles(rate_hz: float, cycles: list[
         assert fit_plan(chosen, rig).settings == chosen.settings
     if rate_hz == 60:
         assert fitted.settings == CapturePlan().settings
+
+
+def test_sizes_and_exposures_that_do_not_fit_are_obstacles(rig: DeviceRig, plan: CapturePlan) -> None:
+    assert find_obstacles(rig, plan) == []
+    large = plan.model_copy(
+        update={
+            "camera_size_px": (24, 18),
+            "projector_size_px": (30, 18),
+            "settings": tuple(Setting(exposure_ms=ms, level=0.5) for ms in (0.9, 1.0, 100.0, 101.0)),
+        }
+    )
+    assert find_obstacles(rig, large) == [
+        "the plan is for a camera of 24 x 18 pixels, this one has 24 x 16"
+        " (make the plan with this camera's size)",
+        "the plan is for a projector of 30 x 18 pixels, this one has 32 x 18"
+        " (make the plan with this projector's size)",
+        "setting 0 exposes for 0.9 ms, but the camera supports 1 to 100 ms",
+        "setting 3 exposes for 101 ms, but the camera supports 1 to 100 ms",
+    ]
+
+
+def test_a_calibration_of_other_devices_is_an_obstacle(rig: DeviceRig, plan: CapturePlan) -> None:
+    published = published_rig()
+    known = published.model_copy(
+        update={"camera": published.camera.resized(24, 15), "projector": published.projector.resized(32, 17)}
+    )
+    known = known.model_copy(update={"sensor": published.sensor.model_copy(update={"bit_depth": 10})})
+    camera, projector, mosaic = find_obstacles(replace(rig, calibration=known), plan)[:3]
+    assert camera.startswith("the calibration is for a camera of 24 x 15 pixels, this one has 24 x 16 (")
+    assert projector.startswith("the calibration is for a projector of 32 x 17 pixels,")
+    assert "this one has 32 x 18 (" in projector
+    assert mosaic.startswith(
+        "the calibration is for a RGGB mosaic of 10 bits, the camera delivers RGGB of 12"
+    )

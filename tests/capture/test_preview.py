@@ -5,7 +5,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from dsl_core.capture.preview import BlockGraphs, line_positions, quick_picture, statistics
+from dsl_core.capture.preview import (
+    BlockGraphs,
+    channels,
+    line_positions,
+    quick_picture,
+    site_colour,
+    statistics,
+)
 from dsl_core.capture.sink import WatchedSink
 from dsl_core.errors import DecodeError
 from dsl_core.model.frames import Frame
@@ -165,3 +172,39 @@ def test_a_monochrome_picture_is_grey_at_edges_too() -> None:
     shown = quick_picture(picture, "MONO", 4095)
     assert (shown == shown[..., :1]).all()
     assert statistics(picture, "MONO", 4095).saturated == (0, 0, 0)
+
+
+def test_a_pixel_has_the_colour_of_its_site() -> None:
+    seen = {bayer: [site_colour(x, y, bayer) for y in (6, 7) for x in (4, 5)] for bayer in PATTERNS}
+    assert seen["RGGB"] == ["red", "green", "green", "blue"]
+    assert seen["BGGR"] == ["blue", "green", "green", "red"]
+    assert seen["GRBG"] == ["green", "red", "blue", "green"]
+    assert seen["GBRG"] == ["green", "blue", "red", "green"]
+    assert site_colour(0, 0, "MONO") == ""
+
+
+def test_cells_of_a_monochrome_camera_keep_their_places() -> None:
+    mosaic = np.array([[1, 20], [30, 400]], np.uint16)
+    first, middle, last = channels(mosaic, "MONO")
+    assert (first.item(), middle.item(), last.item()) == (1, 25, 400)
+
+
+@pytest.mark.parametrize("site", [(2, 2), (2, 3), (3, 2), (3, 3)])
+def test_any_saturated_pixel_of_a_cell_shows_it(site: tuple[int, int]) -> None:
+    mosaic = np.full((4, 4), 100, np.uint16)
+    mosaic[site] = 4095
+    picture = quick_picture(mosaic, "RGGB", 4095, show_saturation=True)
+    assert (picture == (255, 0, 0)).all(2).tolist() == [[False, False], [False, True]]
+
+
+def test_counts_beyond_the_last_bin_are_in_it() -> None:
+    # Bins of 8 counts, as a full scale of 4000 is nearest to 2048: 3000 would be bin 375.
+    histogram = statistics(mosaic_of((3000, 800, 8), "RGGB", (6, 8)), "RGGB", 4000).histogram
+    assert (histogram[0, 255], histogram[1, 100], histogram[2, 1]) == (12, 24, 12)
+    assert histogram.sum() == 48
+
+
+def test_two_columns_of_green_have_a_focus() -> None:
+    mosaic = np.zeros((2, 4), np.uint16)
+    mosaic[0, 1::2] = 10, 30
+    assert statistics(mosaic, "RGGB", 4095).focus == pytest.approx(400 / 20**2)

@@ -143,7 +143,7 @@ def test_levels_are_those_of_the_pixels_that_count() -> None:
 
 
 def test_a_step_goes_to_a_corner_nearby() -> None:
-    near = STATE + [0.02, -0.03, 0.004, -0.003, 0.01]
+    near = STATE + np.array([0.02, -0.03, 0.004, -0.003, 0.01])
     model, slope = _model(near, PLACES, START, STRAIGHT)
     usable = np.ones((1, 441), bool)
     values = drawn()

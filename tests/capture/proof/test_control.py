@@ -1,0 +1,78 @@
+"""Which pictures of the first code are taken once more, and when two takes are the same."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from dsl_core.capture.proof.code_pairs import Pair
+from dsl_core.capture.proof.control import choose_pairs, is_same
+from dsl_core.capture.proof.raster import Noise
+from dsl_core.model.rig import Sensor
+
+SHAPE = (5, 16)
+#: Variance of counts: light above 100 DN over 10, and 0.35.
+NOISE = Noise(Sensor(black_level_dn=100.0, electrons_per_dn=10.0, read_noise_dn=0.5))
+
+
+def stripes(width: int, contrast: np.ndarray | float = 100.0, share: float = 1.0) -> Pair:
+    """Stripes of so many columns and their inverse, with a share of the contrast of each pixel."""
+    light = np.broadcast_to(np.arange(16) // width % 2, SHAPE).ravel()
+    half = np.broadcast_to(contrast, SHAPE).ravel() / 2
+    one = 200 + half * share * np.where(light, 1, -1)
+    return one.round().astype(np.uint16), (400 - one).round().astype(np.uint16)
+
+
+def test_the_pairs_with_the_most_and_the_fewest_stripes_are_chosen() -> None:
+    pairs = {0: stripes(16), 1: stripes(8), 2: stripes(4), 3: stripes(2), 4: stripes(1)}
+    assert choose_pairs(pairs, SHAPE) == (4, 1), "without a stripe nothing moves"
+    assert choose_pairs({0: stripes(16), 2: stripes(4)}, SHAPE) == (2,)
+    assert choose_pairs({0: stripes(16)}, SHAPE) == ()
+    assert choose_pairs({}, SHAPE) == ()
+
+
+@pytest.mark.parametrize(("share", "chosen"), [(0.68, (2, 1)), (0.74, (4, 1))])
+def test_stripes_need_seven_tenths_of_the_contrast(share: float, chosen: tuple[int, ...]) -> None:
+    pairs = {1: stripes(8), 2: stripes(4), 4: stripes(1, share=share)}
+    assert choose_pairs(pairs, SHAPE) == chosen
+
+
+@pytest.mark.parametrize(("seen", "chosen"), [(11, (2, 1)), (12, (4, 1))])
+def test_stripes_are_seen_in_seven_tenths_of_the_lit_pixels(seen: int, chosen: tuple[int, ...]) -> None:
+    part = np.where(np.arange(16) < seen, 1.0, 0.2)
+    pairs = {1: stripes(8), 2: stripes(4), 4: stripes(1, 100.0 * part)}
+    assert choose_pairs(pairs, SHAPE) == chosen
+
+
+@pytest.mark.parametrize(("contrast", "chosen"), [(40.0, (4, 1)), (60.0, (2, 1))])
+def test_pixels_with_less_than_half_the_usual_contrast_do_not_count(
+    contrast: float, chosen: tuple[int, ...]
+) -> None:
+    light = np.where(np.arange(16) < 10, 100.0, contrast)
+    part = np.where(np.arange(16) < 10, 1.0, 0.2)
+    pairs = {1: stripes(8, light), 2: stripes(4, light), 4: stripes(1, light * part)}
+    assert choose_pairs(pairs, SHAPE) == chosen
+
+
+def test_stripes_between_unseen_pixels_are_not_counted() -> None:
+    # Of single stripes that every fourth pixel does not see, 7 of 15 changes are seen: as many as of two.
+    gaps = np.where(np.arange(16) % 4 == 1, 0.2, 1.0)
+    assert choose_pairs({1: stripes(1, 100 * gaps), 2: stripes(2)}, SHAPE) == (1,)
+    assert choose_pairs({1: stripes(1), 2: stripes(2)}, SHAPE) == (1, 2)
+
+
+def test_a_take_is_the_same_where_light_reaches() -> None:
+    one, other = stripes(2)
+    pairs = {0: (one, other)}
+    assert is_same(one, one, pairs, NOISE)
+    assert is_same(one + np.uint16(7), one, pairs, NOISE)
+    assert not is_same(one + np.uint16(9), one, pairs, NOISE)
+    assert not is_same(other, one, pairs, NOISE)
+
+
+@pytest.mark.parametrize(("contrast", "is_lit"), [(7, False), (8, True)])
+def test_light_reaches_pixels_with_twelve_deviations_of_contrast(contrast: int, is_lit: bool) -> None:
+    # The noise of black is the root of 0.35: twelve times that is 7.1 DN.
+    black = np.full(80, 100, np.uint16)
+    pairs = {0: (black, black + np.uint16(contrast))}
+    assert is_same(black, black, pairs, NOISE) == is_lit
