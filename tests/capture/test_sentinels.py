@@ -110,10 +110,10 @@ def test_a_scan_that_waits_pauses_until_somebody_decides(scene: RenderedScene) -
 
 def tiles(x: float = 0.0, std: float = 0.01, change: float = 0.0, moved: int = 24) -> TileShifts:
     """Shifts of 4 x 6 tiles, of which the first ones moved; the others tell that they did not."""
-    shift, changed = np.zeros(24), np.zeros(24)
-    shift[:moved], changed[:moved] = x, change
-    each = [part.reshape(4, 6) for part in (shift, np.zeros(24), np.full(24, std), np.full(24, std / 2))]
-    return TileShifts(*each, changed.reshape(4, 6), np.ones((4, 6)))
+    is_moved = (np.arange(24) < moved).reshape(4, 6)
+    nothing, one = np.zeros((4, 6)), np.ones((4, 6))
+    shift, changed = (np.asarray(size * is_moved, np.float64) for size in (x, change))
+    return TileShifts(shift, nothing, std * one, std / 2 * one, changed, one)
 
 
 @pytest.mark.parametrize(

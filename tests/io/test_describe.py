@@ -1,18 +1,20 @@
 from __future__ import annotations
 
+import itertools
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from dsl_core.errors import StoreError
 from dsl_core.io.campaign_folder import CampaignFolder
-from dsl_core.io.describe import describe
+from dsl_core.io.describe import _sentinel_fact, describe
 from dsl_core.io.plan_file import save_plan
 from dsl_core.io.result.result_file import save_result
 from dsl_core.io.rig_file import save_rig
 from dsl_core.io.scan.folder import ScanReader
-from dsl_core.model.plan import CapturePlan
-from tests.cases.small_result import small_result
+from dsl_core.model.plan import CapturePlan, ScanLines, Sentinels
+from tests.cases.small_result import COLUMNS, ROWS, WAVELENGTHS_NM, small_result
 from tests.cases.small_rig import small_rig
 
 
@@ -61,3 +63,26 @@ def test_what_is_none_of_these_is_refused(tmp_path: Path) -> None:
     (tmp_path / "cut.json").write_text("{")
     with pytest.raises(StoreError, match="is not JSON"):
         describe(tmp_path / "cut.json")
+
+
+def test_sentinels_are_counted_in_rounds_and_as_a_share(plan: CapturePlan) -> None:
+    assert _sentinel_fact(plan) == "none"
+    often = plan.model_copy(update={"spectral": ScanLines(step_px=1), "sentinels": Sentinels(every=8)})
+    shots = [shot.index for shot in often.shots() if shot.role == "sentinel"]
+    rounds = 1 + sum(later - earlier > 1 for earlier, later in itertools.pairwise(shots))
+    assert 1 < rounds < len(shots)
+    share = f"{100 * len(shots) / often.shot_count:.1f}"
+    assert _sentinel_fact(often) == f"{len(shots)} repeats in {rounds} rounds ({share} %)"
+
+
+def test_a_result_says_its_bands_and_depths(tmp_path: Path) -> None:
+    result = small_result()
+    path = tmp_path / "result.zarr"
+    save_result(result, path)
+    facts = describe(path)
+    depth = result["depth_mm"].values
+    known = depth[np.isfinite(depth)]
+    assert facts["bands"] == f"{len(WAVELENGTHS_NM)} from {WAVELENGTHS_NM[0]:g} to {WAVELENGTHS_NM[-1]:g} nm"
+    assert facts["pixels_with_depth"] == round(known.size / depth.size, 4)
+    assert facts["depth_mm"] == [round(float(v), 2) for v in (known.min(), np.median(known), known.max())]
+    assert facts["size_px"] == [COLUMNS, ROWS]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from dsl_core.calibration.common.tiles import tile_columns, tile_edges, tile_of_pixels
+from dsl_core.calibration.common.tiles import _straight, tile_columns, tile_edges, tile_of_pixels
 
 SIZE = (96, 64)
 Y, X = np.mgrid[: SIZE[1], : SIZE[0]].astype(float)
@@ -53,3 +53,15 @@ def test_tiles_of_which_little_is_known_are_left_out() -> None:
     found = tile_columns(COLUMNS, std)
     assert len(found) == 16 * 24 - 1
     assert found.camera_px[0] == pytest.approx([5.0, 1.5])
+
+
+def test_a_course_is_the_weighted_plane_through_a_tile() -> None:
+    rng = np.random.default_rng(1)
+    x, y, tiles = rng.random(60), rng.random(60), np.repeat([0, 1, 2], 20)
+    values = np.choose(tiles, [2 + 3 * x - y, 1 - 0.5 * x + 4 * y, 7.0 + x])
+    weight = 1e-3 * rng.random(60)
+    assert _straight(tiles, x, y, values, weight) == pytest.approx(values)
+    # Pixels in one line have no slope across it.
+    flat = _straight(tiles, x, np.zeros(60), np.choose(tiles, [x, x, x]), weight)
+    mean = [np.average(x[tiles == k], weights=weight[tiles == k]) for k in range(3)]
+    assert flat == pytest.approx(np.array(mean)[tiles])

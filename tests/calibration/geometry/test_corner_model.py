@@ -160,7 +160,7 @@ def test_a_step_is_limited_and_so_is_the_blur() -> None:
 
     def stepped(move: list[float]) -> np.ndarray:
         values = (model[0] @ LEVELS[0] + strength * (slope[0] @ move))[None]
-        return np.asarray(_step(STATE, slope, model, LEVELS, values, usable) - STATE)[0]
+        return np.asarray((_step(STATE, slope, model, LEVELS, values, usable) - STATE)[0])
 
     assert stepped([0.9, -0.9, 0.18, -0.18, 0.27]) == pytest.approx([0.9, -0.9, 0.18, -0.18, 0.27], abs=1e-4)
     assert stepped([5, -5, 3, -3, 2]) == pytest.approx([1, -1, 0.2, -0.2, 0.3])
@@ -174,7 +174,9 @@ def test_a_step_is_limited_and_so_is_the_blur() -> None:
         assert _step(state, slope, model, LEVELS, values, usable)[0, 4] == pytest.approx(limit)
 
 
-def fitted(grey: np.ndarray, pitch: float, start: tuple[float, float] = (30.0, 30.0), gap: float = 1.0):  # type: ignore[no-untyped-def]
+def fitted(
+    grey: np.ndarray, pitch: float, start: tuple[float, float] = (30.0, 30.0), gap: float = 1.0
+) -> np.ndarray:
     along = pitch * np.array([[[1.0, 0.1], [-0.1, 1.0]]]) / np.hypot(1, 0.1)
     found = fit_corners(grey, np.array([start]), along, gap)
     return np.append(found.points_px[0], found.blur_px)

@@ -180,3 +180,57 @@ def test_the_scale_ends_where_regions_clip_or_beyond_the_largest_signal() -> Non
     assert found.std == pytest.approx(np.std([4090, 4094, 4095]))
     readings.clipped[:] = 0.0
     assert _saturation(readings, SIZES).value == 4095.0
+
+
+@pytest.mark.parametrize("read_dn", [0.5, 3.0])
+def test_read_noise_is_what_rounding_leaves_of_the_variance_without_light(read_dn: float) -> None:
+    signal = np.array([0.0, 500.0, 1000.0, 2000.0, 3000.0])
+    readings = replace(
+        table(np.full(5, 10.0), BLACK_DN + signal[:, None] * np.ones(3)),
+        pair_variance_dn2=(read_dn**2 + 1 / 12 + signal / 8)[:, None] * np.ones(3),
+        is_pair=np.ones(5, bool),
+    )
+    found = fit_transfer(readings, BLACK_DN, RegionSizes(np.full(3, 5000), np.zeros(3, np.int64), 12))
+    assert found.electrons_per_dn.value == pytest.approx(8.0)
+    assert found.read_noise_dn.value == pytest.approx(read_dn)
+    model = np.repeat(read_dn**2 + 1 / 12 + signal / 8, 3)
+    rows = np.stack([np.ones(15), np.repeat(signal, 3)], 1) / (model * np.sqrt(2 / 5000))[:, None]
+    covariance = np.linalg.inv(rows.T @ rows)
+    assert found.read_noise_dn.std == pytest.approx(np.sqrt(covariance[0, 0]) / (2 * read_dn))
+    assert found.electrons_per_dn.std == pytest.approx(np.sqrt(covariance[1, 1]) * 64)
+
+
+def test_intercepts_are_weighted_by_their_deviations_and_hot_pixels_are_a_share() -> None:
+    exposure = np.arange(1.0, 9.0)
+    signal = exposure[:, None] * [400.0, 100.0, 10.0] + [1.0, 2.0, 3.0]
+    series = table(exposure, BLACK_DN + signal)
+    sizes = RegionSizes(np.array([4000, 2000, 100]), np.zeros(3, np.int64), 12)
+    none = np.zeros(3)
+    dark = Dark(Measured(value=BLACK_DN, std=0.01), none, none, none, none)
+    transfer = Transfer(Measured(value=10.0, std=0.01), Measured(value=1.0, std=0.01))
+    end = replace(series[-1:], mean_dn=np.full((1, 3), 4000.0), clipped=np.ones((1, 3)))
+    found = check_camera(dark, transfer, series, end, (3, 1000), sizes)
+    lines = [exposure_line(series, channel, dark, transfer, sizes).intercept for channel in range(3)]
+    weight = np.array([line.std**-2 for line in lines])
+    values = np.array([line.value for line in lines])
+    assert len(set(weight.round(6))) == 3
+    assert found.intercept_dn.value == pytest.approx(weight @ values / weight.sum())
+    assert found.intercept_dn.std == pytest.approx(weight.sum() ** -0.5)
+    assert (found.hot_share.value, found.hot_share.std) == pytest.approx((3e-3, 3**0.5 * 1e-3))
+
+
+def test_glow_is_taken_off_the_shortest_exposure() -> None:
+    exposure = np.repeat([4.0, 104.0], 8)
+    readings = replace(
+        table(exposure, 200 + exposure[:, None] * [0.5, 0.25, 0.125]),
+        beside_dn=200 + exposure[:, None] * np.full(3, 0.0625),
+        pair_variance_dn2=np.full((16, 3), 4.0),
+        is_pair=np.arange(16) % 2 == 1,
+    )
+    sizes = RegionSizes(np.array([400, 800, 400]), np.array([100, 0, 100]), 12)
+    found = fit_dark(readings, sizes)
+    assert found.level_dn.value == pytest.approx(200.0)
+    assert found.rate == pytest.approx(np.array([0.5, 0.25, 0.125]))
+    assert found.beside_rate == pytest.approx(np.full(3, 0.0625))
+    assert found.rate_std == pytest.approx(2 * np.sqrt(0.25 / sizes.pixels) / 100)
+    assert found.beside_std == pytest.approx(2 * np.sqrt(0.25 / np.array([100, 1, 100])) / 100)

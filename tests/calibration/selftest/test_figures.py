@@ -30,7 +30,7 @@ from dsl_core.model.calibration.selftest import (
     RampCheck,
     SelfTest,
 )
-from dsl_core.model.figure import failures
+from dsl_core.model.figure import Figure, failures
 
 
 def of(value: float) -> Measured:
@@ -163,3 +163,48 @@ def test_a_figure_fails_beyond_its_limit(at: SelfTest, beyond: SelfTest, name: s
     (failed,) = failures(selftest_figures(beyond))
     assert failed.name.startswith(name)
     assert failed.advice
+
+
+def named(selftest: SelfTest) -> dict[str, Figure]:
+    return {figure.name: figure for figure in selftest_figures(selftest)}
+
+
+def test_bounds_follow_from_the_camera_and_the_projector() -> None:
+    found = named(GOOD)
+    assert found["saturation"].low == pytest.approx(0.9 * 4095)
+    assert found["black level"].low == pytest.approx(5 * 2.0)
+    assert (found["gamma"].low, found["gamma"].high) == (1.0, 3.5)
+    assert found["beat at 166.67 ms"].high == pytest.approx(0.3 + 3 * 0.01)
+    assert (LINEARITY_PERCENT, GAMMA_SPREAD_PERCENT, RAMP_PERCENT) == (0.5, 2.0, 1.0)
+    assert (HOT, BLACK, AMBIENT, WAIT_MS, BLUR_PX) == (1e-3, 0.01, 0.01, 1.0, 1.5)
+
+
+def test_the_difference_between_colours_is_a_share_of_gamma_with_its_deviation() -> None:
+    uneven = ramps(gamma=Measured(value=2.222, std=0.02))
+    found = named(with_("projector", ramps=uneven))["gamma, difference between colours"]
+    assert found.value == pytest.approx(1.0)
+    assert found.std == pytest.approx(100 * 2**0.5 * 0.02 / 2.2)
+
+
+def test_latency_is_blocking_and_waiting_together() -> None:
+    late = with_(
+        "latency",
+        blocking_ms=Measured(value=25.0, std=3.0),
+        wait_ms=Measured(value=2.0, std=4.0),
+        claimed_ms=50.0,
+    )
+    found = named(late)
+    both = found["latency from show to light"]
+    assert (both.value, both.std) == (27.0, 5.0)
+    assert "from 50 to at least 56 ms" in found["latency not waited for"].advice
+
+
+@pytest.mark.parametrize(
+    ("exposure_ms", "advised_ms", "has_limit"),
+    [(160.0, 500 / 3, False), (160.0, 160.0, True), (150.0, 500 / 3, True)],
+)
+def test_only_published_exposures_that_are_not_advised_may_beat(
+    exposure_ms: float, advised_ms: float, has_limit: bool
+) -> None:
+    cycle = with_("cycle", advised_ms=(advised_ms,), beats=(beat(exposure_ms, 4.0),))
+    assert (named(cycle)[f"beat at {exposure_ms:.2f} ms"].high is not None) == has_limit

@@ -13,6 +13,7 @@ from dsl_core.calibration.selftest.focus import (
     Floats,
     _blur,
     _Edges,
+    _find_edges,
     _shares,
     bar_levels,
     check_focus,
@@ -116,3 +117,94 @@ def test_thirds_of_a_picture_are_told_apart_and_the_worst_is_named() -> None:
 def test_bars_are_forty_columns_wide_and_the_inverse_begins_dark() -> None:
     assert bar_levels(100, 7, False).tolist() == [7] * 40 + [0] * 40 + [7] * 20
     assert bar_levels(100, 7, True).tolist() == [0] * 40 + [7] * 40 + [0] * 20
+
+
+def stepped(count: int = 60, columns: tuple[int, ...] = (20, 40, 60, 80), middle: float = 0.6) -> Floats:
+    """Shares of sharp bars whose edges each have one pixel in between, right of these columns."""
+    row = np.zeros(100)
+    for i, column in enumerate(columns):
+        row[column + 1 :] = (i + 1) % 2
+        row[column] = middle if i % 2 == 0 else 1 - middle
+    return np.tile(row, (count, 1))
+
+
+LIT = np.ones((60, 100), bool)
+
+
+def test_an_edge_is_a_crossing_of_one_half_with_the_products_around_it() -> None:
+    share = stepped()
+    found = _find_edges(share, share, LIT)
+    assert len(found.row) == 240
+    assert sorted(set(found.column.tolist())) == [19, 39, 59, 79]
+    assert found.pitch_px == 20.0
+    assert found.blur_px == pytest.approx(np.full(240, np.sqrt(np.pi) * 0.6 * 0.4))
+
+
+def test_two_pictures_are_multiplied_and_stray_light_of_the_plateaus_taken_away() -> None:
+    first, second = 0.05 + 0.85 * stepped(middle=0.5), 0.05 + 0.85 * stepped(middle=0.8)
+    found = _find_edges(first, second, LIT)
+    a, b = 0.05 + 0.85 * 0.5, 0.05 + 0.85 * 0.8
+    # Eleven pixels of the dark plateau, ten of the bright one, and the mean of both taken off 22 times.
+    left = 11 * 0.05 * 0.95 + 10 * 0.9 * 0.1 + (a + b - 2 * a * b) / 2 - 11 * (0.05 * 0.95 + 0.9 * 0.1)
+    assert found.blur_px[found.column == 19] == pytest.approx(np.full(60, np.sqrt(np.pi) * left))
+
+
+def test_a_bar_is_the_mean_of_those_within_a_quarter_of_the_usual_one() -> None:
+    share = stepped(columns=(20, 40, 60, 87))
+    assert _find_edges(share, share, LIT).pitch_px == 20.0
+    share = stepped(columns=(20, 40, 62, 82))
+    assert _find_edges(share, share, LIT).pitch_px == pytest.approx(62 / 3)
+
+
+def test_deviations_are_scaled_to_the_projector_with_their_values() -> None:
+    found = check_focus(bar_frames(1.07, 30.0), BLACK_DN)
+    scale = found.projector_px.value / found.camera_px.value
+    assert found.projector_px.std == pytest.approx(found.camera_px.std * scale)
+    assert 1.0 < found.worst_px.std / found.projector_px.std < 3.0
+
+
+@pytest.mark.parametrize(("at", "seen"), [(29, 240), (30, 180), (31, 240)])
+def test_plateaus_begin_eleven_pixels_before_and_after_an_edge(at: int, seen: int) -> None:
+    # Bars of 20 pixels; an edge at 19 uses columns 9 to 30, one at 39 columns 29 to 50.
+    share = stepped()
+    share[:, at] = 0.75
+    dark = LIT.copy()
+    dark[:, at] = False
+    assert len(_find_edges(share, share, LIT).row) == {29: 120, 30: 120, 31: 240}[at]
+    assert len(_find_edges(stepped(), stepped(), dark).row) < 240
+
+
+def test_a_soft_edge_that_crosses_twice_counts_never() -> None:
+    share = stepped()
+    share[:, 24], share[:, 25] = 0.4, 0.9
+    found = _find_edges(share, share, LIT)
+    assert 19 not in found.column
+    assert 59 in found.column
+
+
+def test_edges_too_near_to_the_border_have_no_plateau() -> None:
+    # One edge a row: it needs 49 pixels on both sides.
+    for column, seen in ((50, True), (49, False), (51, False)):
+        share = stepped(columns=(column,), middle=1.0)
+        if seen:
+            assert len(_find_edges(share, share, LIT).row) == 60
+        else:
+            with pytest.raises(CalibrationError, match="No clear edges"):
+                _find_edges(share, share, LIT)
+
+
+@pytest.mark.parametrize(("rows", "enough"), [(50, True), (49, False)])
+def test_fifty_edges_are_needed(rows: int, enough: bool) -> None:
+    share = stepped(rows, (50,), 1.0)
+    if enough:
+        found = _find_edges(share, share, LIT[:rows])
+        assert found.pitch_px == 98.0, "without a second edge in a row the window stands for a bar"
+    else:
+        with pytest.raises(CalibrationError, match="No clear edges"):
+            _find_edges(share, share, LIT[:rows])
+
+
+def test_a_bar_that_is_missing_does_not_stretch_the_others() -> None:
+    share = stepped()
+    share[:10] = stepped(columns=(20, 40))[0]
+    assert _find_edges(share, share, LIT).pitch_px == 20.0

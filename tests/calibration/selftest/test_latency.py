@@ -96,3 +96,29 @@ def test_the_deviation_of_a_wait_is_that_between_two_waits_and_of_what_a_frame_c
     assert found.wait_ms.std == pytest.approx(np.hypot(20 / np.sqrt(12), 0.03 * 10))
     safe = check_latency(latency_readings(0.0, [400, 0]), 25.0, True, 0.0)
     assert safe.wait_ms.std == pytest.approx(0.3)
+
+
+def test_any_drive_above_zero_is_light() -> None:
+    readings = latency_readings(0.0, [400])
+    assert is_right(replace(readings, drive=np.minimum(readings.drive, 1))).all()
+
+
+def test_first_frames_are_counted_and_blocking_leaves_out_what_the_camera_takes() -> None:
+    readings = latency_readings(0.0, [400, 100])
+    # The camera takes longer for the reference pictures, and one of those is missing.
+    times = readings.timestamp_s.copy()
+    times[2:] += 0.2
+    times[5:] += 0.2
+    found = check_latency(replace(readings, timestamp_s=times)[np.arange(len(times)) != 1], 25.0, True, 0.0)
+    assert found.blocking_ms.value == pytest.approx(25.0, abs=1e-6)
+    assert found.checked == 14
+    plain = check_latency(readings, 25.0, False, 0.012)
+    assert (plain.blocking_ms.value, plain.blocking_ms.std) == (12.0, 1.0)
+
+
+def test_a_frame_is_stale_only_if_the_next_is_not() -> None:
+    with pytest.raises(DeviceError, match="400 ms after"):
+        check_latency(latency_readings(0.0, [400, 100], stale=(8, 9)), 25.0, True, 0.0)
+    # All first frames late at the longest wait are no stale ones.
+    with pytest.raises(DeviceError, match="400 ms after"):
+        check_latency(latency_readings(408.0, [400, 100]), 25.0, True, 0.0)

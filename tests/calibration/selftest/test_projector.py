@@ -8,7 +8,15 @@ import numpy as np
 import pytest
 
 from dsl_core.calibration.selftest.camera import Dark, Transfer
-from dsl_core.calibration.selftest.projector import RAMPS, _black_fraction, _falls, check_projector, ramp_of
+from dsl_core.calibration.selftest.projector import (
+    RAMPS,
+    _ambient,
+    _black_fraction,
+    _falls,
+    _fit_ramp,
+    check_projector,
+    ramp_of,
+)
 from dsl_core.calibration.selftest.readings import Readings, RegionSizes
 from dsl_core.errors import CalibrationError
 from dsl_core.model.calibration.selftest import Measured
@@ -172,3 +180,77 @@ def test_a_ramp_needs_four_levels_that_are_neither_dark_nor_clipped(levels: int,
     else:
         with pytest.raises(CalibrationError, match="3 of 9 frames"):
             check_projector(part, dark(), TRANSFER, SIZES)
+
+
+def test_white_and_ambient_light_of_a_colour_without_light_say_nothing() -> None:
+    level = Measured(value=BLACK_DN, std=0.01)
+    found = _ambient(
+        Dark(level, np.array([0.1, 0.3, 9.0]), np.array([0.01, 0.02, 0.5]), np.zeros(3), np.zeros(3)),
+        np.array([0.5, 0.6, 0.0]),
+    )
+    assert [rate.value for rate in found.rate_dn_per_ms] == [0.1, 0.3, 9.0]
+    assert [rate.std for rate in found.rate_dn_per_ms] == [0.01, 0.02, 0.5]
+    assert (found.share_of_white.value, found.share_of_white.std) == pytest.approx((0.5, 0.02 / 0.6))
+
+
+def test_signals_below_thirty_deviations_are_left_out_of_the_fit() -> None:
+    # Noise of 1 DN and of one in a thousand of the light: 25 and 40 deviations.
+    quiet = Transfer(Measured(value=1e9, std=1.0), Measured(value=np.sqrt(1 - 1 / 12), std=0.0))
+    sizes = RegionSizes(np.ones(3, np.int64), np.ones(3, np.int64), 12)
+    none = np.zeros(3)
+    dark_none = Dark(Measured(value=BLACK_DN, std=0.0), none, none, none, none)
+    levels = np.array([40, 80, 120, 160, 200, 255])
+    signal = 1000 * (levels / 255.0) ** 2
+    for at, is_used in ((25.0, False), (40.0, True)):
+        seen = signal.copy()
+        seen[0] = at
+        ramp = replace(
+            table(np.full(6, 10.0), BLACK_DN + seen[:, None] * [1.0, 0.0, 0.0]),
+            drive=levels[:, None] * np.array([1, 0, 0]),
+        )
+        check, full, _ = _fit_ramp(ramp, "red", dark_none, quiet, sizes)
+        assert (abs(check.gamma.value - 2.0) < 1e-6) != is_used
+        assert (abs(full[0] - 100.0) < 1e-3) != is_used
+        assert full[1:].tolist() == [0.0, 0.0]
+
+
+def test_deviations_of_light_are_those_of_noise_black_and_glow_together() -> None:
+    transfer = Transfer(Measured(value=10.0, std=0.0), Measured(value=2.0, std=0.0))
+    exposure = np.array([4.0, 3.0, 2.0, 1.5, 1.2])
+    levels = np.array([51, 102, 153, 204, 255])
+    light = 600 * (levels / 255.0)[:, None] ** 2 * exposure[:, None] * [0.0, 1.0, 0.5]
+    glow = Dark(Measured(value=BLACK_DN, std=0.7), np.full(3, 0.2), np.full(3, 0.3), np.zeros(3), np.zeros(3))
+    ramp = replace(
+        table(exposure, BLACK_DN + light + 0.2 * exposure[:, None]),
+        drive=levels[:, None] * np.array([0, 1, 0]),
+    )
+    sizes = RegionSizes(np.full(3, 25), np.full(3, 25), 12)
+    check, full, full_std = _fit_ramp(ramp, "green", glow, transfer, sizes)
+    signal = light[:, 1:]
+    std = np.sqrt(
+        (4 + 1 / 12 + signal / 10) / 25 + (1e-4 * signal) ** 2 + 0.7**2 + (0.3 * exposure[:, None]) ** 2
+    )
+    used = signal > 30 * std
+    channel = np.nonzero(used)[1]
+    level = np.log(np.broadcast_to(levels[:, None] / 255, used.shape)[used])
+    design = (
+        np.stack([channel == 0, channel == 1, level], 1) / (std / np.where(used, signal, 1))[used][:, None]
+    )
+    covariance = np.linalg.inv(design.T @ design)
+    assert check.gamma.value == pytest.approx(2.0)
+    assert check.gamma.std == pytest.approx(np.sqrt(covariance[2, 2]))
+    assert full == pytest.approx([0.0, 600.0, 300.0])
+    assert full_std[1:] == pytest.approx(full[1:] * np.sqrt(np.diag(covariance)[:2]))
+
+
+def test_black_is_a_share_of_faint_white_too_and_less_than_all() -> None:
+    level, none = Measured(value=BLACK_DN, std=0.01), np.zeros(3)
+    faint = Dark(level, np.array([0.05, 0.08, 0.0]), np.full(3, 1e-3), none, np.full(3, 1e-3))
+    found, _ = _black_fraction(faint, np.array([0.5, 0.8, 0.0]), np.full(3, 1e-3), SIZES)
+    assert found.value == pytest.approx(1 / 11)
+    bright = replace(faint, rate=np.full(3, 500.0))
+    assert _black_fraction(bright, np.array([0.5, 0.8, 0.0]), np.full(3, 1e-3), SIZES)[0].value == 0.99
+
+
+def test_leds_of_a_ramp_are_those_of_its_colour() -> None:
+    assert RAMPS == {"white": (1, 1, 1), "red": (1, 0, 0), "green": (0, 1, 0), "blue": (0, 0, 1)}
