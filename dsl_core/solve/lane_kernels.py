@@ -46,7 +46,8 @@ def eliminate(
         window[sums + i] = 1.0 if i < LANES else 0.0
     count = prior.shape[1]
     last, last_z, last_y = band * size * LANES, z0 + band * LANES, y0 + band * ROWS * LANES
-    # Columns come in at the end of the window and are eliminated at its beginning.
+    # Columns come in at the end of the window and are eliminated at its beginning. What remains there after
+    # the last one has come in reaches no other: nothing couples a band to one beyond the last.
     for j in range(-size, count):
         if j >= 0:
             if keep:
@@ -121,13 +122,6 @@ def eliminate(
             if broad:
                 for i in range(ROWS * LANES):
                     window[last_y + i] = rows[k * ROWS * LANES + i]
-        else:
-            for i in range(size * LANES):
-                window[last + i] = 1.0 if i < LANES else 0.0
-            for i in range(LANES):
-                window[last_z + i] = 0.0
-            for i in range(ROWS * LANES):
-                window[last_y + i] = 0.0
     for i in range(LANES):
         logs = window[sums + LOGS * LANES + i] + math.log(window[sums + PRODUCT * LANES + i])
         window[sums + EVIDENCE * LANES + i] -= logs
@@ -407,9 +401,7 @@ def solve_blocks(
                             broad_rows[(j * ROWS + r) * LANES + i] = value
                             right[j * LANES + i] += value * levels[y, r, x0 + i]
             for k in range(count * LANES):
-                pinned[k], extra[k], stiff_right[k], slope[k] = False, 0.0, right[k], 0.0
-            for k in range(count * LANES, (count + 2 * band) * LANES):
-                slope[k] = 0.0
+                pinned[k], extra[k], stiff_right[k] = False, 0.0, right[k]
             for i in range(LANES):
                 todo[i] = used[i]
             # The candidates for the smoothness, then the best of them, then bands held at a bound.
@@ -484,9 +476,6 @@ def solve_blocks(
                     share[j, p] = data / (data + local)
                 freedom = max(sums[at_square + LANES + i] - parameters, 1.0)
                 misfit[p] = (sums[at_square + i] - explained) / freedom
-            # What a pixel leaves beyond the last band must not reach the next one.
-            for k in range(band * LANES):
-                x[k], x[(count + band) * LANES + k] = 0.0, 0.0
     return True
 
 
