@@ -10,7 +10,7 @@ from numpy.polynomial.chebyshev import chebval
 from dsl_core.model.rig import ColumnResidual
 from dsl_core.optics.column_residual import chebyshev, residual_columns, scaled
 
-DEGREES = ((0, 0, 0, 0), (1, 0, 0, 2), (3, 1, 2, 0), (0, 2, 1, 1))
+DEGREES = ((0, 0, 0, 0), (1, 0, 0, 1), (4, 1, 2, 0), (0, 3, 1, 1))
 RESIDUAL = ColumnResidual(
     orders=(-1, 1),
     column_range_px=(0.0, 100.0),

@@ -126,3 +126,31 @@ def test_film_of_no_lines_bends_nothing() -> None:
     direction = incoming_direction(frame, target, 1, NM)
     assert (direction.x / direction.z - target.x / target.z).abs().max() < 1e-7
     assert (direction.y / direction.z - target.y / target.z).abs().max() < 1e-7
+
+
+@pytest.mark.parametrize("order", [1, -1, 2])
+def test_light_through_a_bent_film_leaves_from_where_it_meets_it(
+    order: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(grating, "ITERATIONS", 80)
+    film = Film(
+        lines_per_mm=200, bend_per_mm=0.03, tilt_x_deg=2.0, tilt_y_deg=-4.0, roll_deg=3.0, distance_mm=30.0
+    )
+    frame = FilmFrame.of(film)
+    target = point(80.0, 30.0, 600.0)
+    direction = frame.to_film(incoming_direction(frame, target, order, NM))
+    origin, goal = frame.axes @ np.array([0.0, 0.0, 30.0]), frame.to_film(target)
+    # Where the ray meets the surface z = z0 + bend / 2 (x - x0)^2.
+    a = 0.015 * direction.x**2
+    b, c = -0.03 * origin[0] * direction.x - direction.z, 0.015 * origin[0] ** 2 + origin[2]
+    along = 2 * c / (-b + torch.sqrt(b * b - 4 * a * c))
+    x, y, z = (along * part for part in direction)
+    tilt = torch.atan(0.03 * (x - origin[0]))
+    cos, sin = torch.cos(tilt), torch.sin(tilt)
+    into = direction.x * cos + direction.z * sin - order * NM / frame.period_nm
+    through = torch.sqrt(1 - into**2 - direction.y**2)
+    out = into * cos - through * sin, direction.y, into * sin + through * cos
+    assert (direction.x**2 + direction.y**2 + direction.z**2 - 1).abs().max() < 1e-9
+    far = (goal.z - z) / out[2]
+    assert (x + far * out[0] - goal.x).abs().max() < 1e-6
+    assert (y + far * out[1] - goal.y).abs().max() < 1e-6

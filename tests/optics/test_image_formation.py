@@ -116,3 +116,16 @@ def test_operator_sees_what_the_twin_renders() -> None:
     difference = np.abs(seen[1, :, 0].numpy() - np.array(rendered)) / np.array(rendered)
     assert difference.max() < 0.03
     assert max(rendered) > 20 * min(rendered) > 0
+
+
+def test_columns_far_outside_see_the_ends_of_the_table() -> None:
+    blurred = BlurredProfiles(
+        ProjectorResponse(), np.ones((1, 10, 1)), 1.0, torch.zeros(1, dtype=torch.float64)
+    )
+    count = len(blurred.table)
+    assert count == 4 * (10 + 2 * 16)
+    blurred.table = torch.arange(count, dtype=torch.float64)[:, None, None]
+    columns = torch.tensor([-1e6, -16.375, 0.0, 3.3, 1e6], dtype=torch.float64)
+    # Four samples a column, the first of them an eighth inside the margin's edge.
+    wanted = [0.0, 0.0, 4 * 16.5 - 0.5, 4 * 19.8 - 0.5, count - 1.001]
+    assert blurred.at(columns)[:, 0, 0].tolist() == pytest.approx(wanted)

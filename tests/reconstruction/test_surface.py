@@ -8,7 +8,8 @@ from numpy.typing import NDArray
 from scipy.ndimage import binary_dilation
 
 from dsl_core.model.rig import Rig
-from dsl_core.optics.pinhole import pixel_rays
+from dsl_core.optics.pinhole import pixel_rays, rays_in
+from dsl_core.reconstruction import surface as surface_module
 from dsl_core.reconstruction.surface import (
     MIXED_REL_STD,
     Surface,
@@ -212,3 +213,129 @@ def test_blocks_of_a_large_picture_make_the_surface_of_the_whole(monkeypatch: py
     np.testing.assert_array_equal(blocks.edge, whole.edge)
     for name in ("normals", "shading", "shading_rel_std"):
         np.testing.assert_allclose(getattr(blocks, name), getattr(whole, name), rtol=1e-6, atol=1e-7)
+
+
+def test_planes_are_weighted_least_squares_in_every_window() -> None:
+    rng = np.random.default_rng(5)
+    shape, window = (9, 11), 5
+    rays = np.stack([*np.meshgrid(np.linspace(-0.2, 0.2, 11), np.linspace(-0.1, 0.15, 9)), np.ones(shape)])
+    inverse = 0.002 + 1e-4 * rng.normal(size=shape)
+    std = rng.uniform(0.5e-6, 2e-6, shape)
+    valid = rng.random(shape) < 0.9
+    found = surface_module._plane_fits(rays, np.where(valid, inverse, 0.0), std, valid, window)
+    for y, x in ((4, 5), (4, 2), (2, 8), (0, 0), (8, 5)):
+        near = np.zeros(shape, bool)
+        near[max(y - 2, 0) : y + 3, max(x - 2, 0) : x + 3] = True
+        near &= valid
+        count = near.sum()
+        design, weight = rays[:, near].T, 1 / std[near] ** 2
+        normal = design.T @ (design * weight[:, None])
+        plane = np.linalg.solve(normal, design.T @ (weight * inverse[near]))
+        assert found.fit[:, y, x] == pytest.approx(plane, rel=1e-5)
+        assert found.count[y, x] == pytest.approx(count)
+        share = weight / weight.sum()
+        centred = design[:, :2] - share @ design[:, :2]
+        moments = centred.T @ (centred * share[:, None])
+        unit = np.diag(moments).max() / np.linalg.det(moments) / count
+        assert found.unit[y, x] == pytest.approx(unit, rel=1e-5)
+        assert found.variance[y, x] == pytest.approx(unit * (share @ std[near] ** 2), rel=1e-5)
+    # Six pixels, or fifteen in a hundred of a large window, make a plane.
+    few = np.zeros(shape, bool)
+    few[3:5, 4:7] = True
+    assert surface_module._plane_fits(rays, inverse, std, few, window).count[4, 5] == pytest.approx(6)
+    few[3, 4] = False
+    assert not surface_module._plane_fits(rays, inverse, std, few, window).count.any()
+    few[2:5, 3:7] = True
+    assert surface_module._plane_fits(rays, inverse, std, few, 9).count[4, 5] == 0.0
+    few[2, 7] = True
+    assert surface_module._plane_fits(rays, inverse, std, few, 9).count[4, 5] == pytest.approx(13)
+
+
+def test_misfit_is_what_planes_leave_beyond_noise_here_or_all_around() -> None:
+    shape = (40, 40)
+    count, noise = np.full(shape, 9.0), np.full(shape, 2.0)
+    # Three parameters take a third of nine squares: 2 of noise and 3 of misfit leave 10 / 3.
+    residual = np.full(shape, 5.0 * 6 / 9)
+    assert surface_module._beyond_noise(residual, noise, count, 3)[20, 20] == pytest.approx(3.0)
+    # Ten deviations of the noise are clear by themselves; a little less is averaged over seven pixels.
+    limit = 10 * 2.0 * np.sqrt(2 / 9)
+    for excess, here, beside in (
+        (1.01 * limit, 1.01 * limit, 0.0),
+        (0.99 * limit, 0.99 * limit / 49, 0.99 * limit / 49),
+    ):
+        residual = np.full(shape, 2.0 * 6 / 9)
+        residual[20, 20] += excess * 6 / 9
+        found = surface_module._beyond_noise(residual, noise, count, 3)
+        assert found[20, 20] == pytest.approx(here)
+        assert found[20, 23] == pytest.approx(beside, abs=1e-9)
+        assert found[20, 24] == pytest.approx(0.0, abs=1e-9)
+    # Windows without a plane do not count, nor is less than nothing left.
+    count[:, :20] = 0.0
+    residual = np.where(count > 0, 3.0 * 6 / 9, 99.0)
+    assert surface_module._beyond_noise(residual, noise, count, 3)[20, 22] == pytest.approx(1.0)
+    assert not surface_module._beyond_noise(0 * residual, noise, count, 3)[:, 23:].any()
+
+
+@pytest.mark.parametrize(("down", "right"), [(d, r) for d in (-1, 0, 1) for r in (-1, 0, 1) if d or r])
+def test_a_jump_is_five_deviations_and_four_thousandths_off_a_plane(down: int, right: int) -> None:
+    shape = (7, 8)
+    y, x = np.indices(shape) * 0.01
+    rays, plane = np.stack([x, y, np.ones(shape)]), 0.002 + 0.001 * x - 0.0005 * y
+    slope = np.stack([np.full(shape, 0.001), np.full(shape, -0.0005)])
+    std, valid = np.full(shape, 3e-6), np.ones(shape, bool)
+    std[3 + down, 4 + right] = 4e-6
+    limit = 5 * 5e-6 + 0.004 * plane[3, 4]
+    for sign in (1, -1):
+        for share, found in ((1.01, True), (0.97, False)):
+            inverse = plane.copy()
+            inverse[3 + down, 4 + right] += sign * share * limit
+            edge = surface_module._beside_jump(rays, inverse, slope, std, valid)
+            assert edge[3, 4] == found
+            assert not edge[0, 0]
+    gone = valid.copy()
+    gone[3 + down, 4 + right] = False
+    assert not surface_module._beside_jump(rays, inverse * 2, slope, std, gone)[3 + down, 4 + right]
+
+
+def test_shading_is_the_cosine_over_the_squared_distance_and_bounded() -> None:
+    rig = small_rig()
+    light = rig.pose.projector_centre_mm
+    angles = np.radians([0.0, 30.0, 86.0, 88.0])
+    points = np.stack([light + np.array([0, 0, 500.0])] * 4, 1)[:, None]
+    normals = -np.stack([np.sin(angles), 0 * angles, np.cos(angles)])[:, None]
+    gain = np.full((1, 4), 1.5)
+    shading, tangent = surface_module._shading(rig, points, normals, gain)
+    cosine = np.maximum(np.cos(angles), 0.05)
+    assert shading[0] == pytest.approx(1.5 * cosine * (rig.reference_distance_mm / 500) ** 2)
+    assert tangent[0] == pytest.approx(np.sqrt(1 - cosine**2) / cosine, abs=1e-7)
+
+
+def test_the_largest_window_is_a_forty_fifth_of_the_width_and_odd() -> None:
+    rig = published_rig()
+    widths = {890: 19, 900: 21, 945: 21, 990: 23, 100: 5, 222: 5}
+    for width, window in widths.items():
+        sized = rig.model_copy(update={"camera": rig.camera.model_copy(update={"width_px": width})})
+        assert surface_module.default_window_px(sized) == window
+
+
+def test_deviations_hold_noise_tilt_and_mixed_pixels() -> None:
+    rig = small_rig()
+    depth = np.full((80, 120), 700.0)
+    depth[:, 60:] = 760.0
+    surface = reconstruct_surface(rig, depth, np.full(depth.shape, 0.7), 5)
+    fits = surface_module._plane_fits(
+        rays_in(rig.camera, slice(0, 80), slice(0, 120)), 1 / depth, 0.7 / depth**2, depth > 0, 5
+    )
+    spread = np.sqrt(fits.variance[40, 20]) / np.linalg.norm(fits.fit[:, 40, 20])
+    point = rays_in(rig.camera, slice(0, 80), slice(0, 120))[:, 40, 20] * 700
+    to_light = rig.pose.projector_centre_mm - point
+    cosine = -surface.normals[:, 40, 20] @ to_light / np.linalg.norm(to_light) * -1
+    tangent = np.sqrt(1 - cosine**2) / cosine
+    assert not surface.edge[40, 20]
+    assert surface.shading_rel_std[40, 20] == pytest.approx(
+        np.hypot(tangent * spread, 2 * 0.7 / 700), rel=1e-3
+    )
+    beside = surface.edge & (np.abs(np.arange(120) - 59.5) < 1)
+    assert beside[40].sum() == 2
+    assert (surface.shading_rel_std[beside] > MIXED_REL_STD).all()
+    assert pytest.approx(np.var(np.linspace(0.5, 1, 100_001)) * 2, rel=1e-3) == MIXED_REL_STD**2

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -15,7 +16,7 @@ from tests.solve.plain import plain
 Floats = NDArray[np.float64]
 
 kernels = plain("dsl_core.solve.lane_kernels")
-LANES, ROWS, SUMS = kernels.LANES, kernels.ROWS, kernels.SUMS
+LANES, ROWS, SUMS = int(kernels.LANES), int(kernels.ROWS), int(kernels.SUMS)
 BANDS, LEVEL, RIDGE, UNEVEN, LOCAL = 11, 0.4, 2.5, 1 / 36, 100.0
 TAUS = np.array([0.005, 0.03, 0.18, 1.1])
 #: Lowest, highest, tolerance, stiffness and rounds.
@@ -140,7 +141,7 @@ class Scene:
         ]
         marks = tuple(np.ones(count * LANES, bool) for count in (BANDS, BANDS, 1, 1))
         names = "nodes", "mean", "std", "share", "at_bound", "tau", "misfit"
-        out = {name: np.full((BANDS, self.pixels), np.nan) for name in names[:4]}
+        out: dict[str, Any] = {name: np.full((BANDS, self.pixels), np.nan) for name in names[:4]}
         out |= {"at_bound": np.zeros((BANDS, self.pixels), bool)}
         out |= {name: np.full(self.pixels, np.nan) for name in names[5:]}
         sound = kernels.solve_blocks(

@@ -9,7 +9,15 @@ import torch
 from dsl_core.model.line_spread import LineSpread
 from dsl_core.model.rig import ProjectorResponse
 from dsl_core.optics.lines.profile import LineTable, ProfileTable, band_profile, step_edge, zero_order_profile
-from dsl_core.optics.spread.curves import BEYOND, EvenTable, density, reach_px, step_response
+from dsl_core.optics.spread.curves import (
+    BEYOND,
+    EvenTable,
+    density,
+    mixed,
+    reach_px,
+    step_response,
+    step_table,
+)
 
 STEP_PX, BLUR_PX = 0.125, 0.6
 PLACES = np.arange(-48, 49) * STEP_PX
@@ -74,3 +82,41 @@ def test_slope_beside_a_line_is_that_of_its_halo_alone() -> None:
     far, near = np.abs(x) + 2.5, np.abs(x) - 2.5
     wanted = np.sign(x) * 1e-3 * (np.exp(-far / 20) - np.exp(-near / 20))
     assert slope.numpy() == pytest.approx(wanted, rel=1e-3)
+
+
+@pytest.mark.parametrize("spread", [BLUR_PX, SKEWED])
+def test_a_table_of_steps_is_the_light_up_to_a_distance_and_its_slope(spread: float | LineSpread) -> None:
+    x = torch.as_tensor(X)
+    light, slope = step_table(spread, x).at(x)
+    assert light.numpy() == pytest.approx(step_response(spread, X), abs=1e-5)
+    assert slope.numpy() == pytest.approx(density(spread, X), abs=2e-3)
+
+
+def test_a_mixture_is_the_sum_of_what_each_gaussian_does_at_its_own_place() -> None:
+    spread = LineSpread(first_px=-0.25, step_px=0.25, core_px=0.1, shares=(0.2, 0.6, 0.2))
+
+    def of_one(x: np.ndarray) -> np.ndarray:
+        return np.asarray(np.exp(-(x**2)) + np.clip(x, -1, 1))
+
+    at, found = mixed(spread, 1.5, of_one)
+    wanted = sum(
+        share * of_one(at - place) for place, share in zip((-0.25, 0, 0.25), spread.shares, strict=True)
+    )
+    assert found == pytest.approx(wanted)
+    # As far as the function reaches beyond the outermost Gaussians, 256 samples a column.
+    assert (at[0], at[-1]) == pytest.approx((-1.75, 1.75))
+    assert len(at) == 2 * 1.75 * 256 + 1
+    finer = LineSpread(first_px=-0.13, step_px=0.13, core_px=0.1, shares=(0.25, 0.5, 0.25))
+    at, _ = mixed(finer, 1.0, of_one)
+    assert at[1] - at[0] == pytest.approx(0.13 / 34)
+
+
+def test_a_table_looks_up_every_curve_between_its_samples() -> None:
+    first, second = np.array([0.0, 1.0, 4.0, 9.0]), np.array([5.0, 3.0, 8.0, 8.0])
+    table = EvenTable(2.0, 0.5, [first, second], torch.zeros(1, dtype=torch.float64))
+    at = torch.tensor([[2.0, 2.125], [3.25, 3.0]], dtype=torch.float64)
+    squares, others = table.at(at)
+    assert squares.flatten().tolist() == pytest.approx([0.0, 0.25, 6.5, 4.0])
+    assert others.flatten().tolist() == pytest.approx([5.0, 4.5, 8.0, 8.0])
+    # A thousandth of a step before the last sample, which would need one more.
+    assert float(table.at(torch.tensor(9.0, dtype=torch.float64))[0]) == pytest.approx(9 - 5 * 0.001)

@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
+import numpy as np
 import pytest
 import torch
 
 from dsl_core.model.line_spread import stretched
 from dsl_core.model.rig import ProjectorResponse
-from dsl_core.model.spread_field import SpreadField
+from dsl_core.model.spread_field import POWERS, SpreadField
 from dsl_core.optics.correspondence import zero_order
 from dsl_core.optics.lines.profile import LineTable
-from dsl_core.optics.spread.equations import Peaks
-from dsl_core.optics.spread.field import RANGE, relative_width, widths_at
+from dsl_core.optics.spread.equations import Peaks, View, settle
+from dsl_core.optics.spread.field import RANGE, FieldFamily, FieldFit, _single, relative_width, widths_at
 from dsl_core.optics.spread.fit import SpreadFit, fit_spread
 from dsl_core.simulation.published_rig import published_rig
 from tests.optics.spread.test_fit import KNOWN, RUN, SKEWED, STEP_PX, WIDTH_PX
@@ -122,3 +124,67 @@ def test_each_pixel_has_the_profile_of_its_own_width(response: ProjectorResponse
         profile, slope = LineTable(5, other, 6.0, x).at(x)
         assert (together[0][:, k] - profile).abs().max() < 1e-4
         assert (together[1][:, k] - slope).abs().max() < 2e-3
+
+
+def small_fit(width: torch.Tensor, std: float = 0.0) -> FieldFit:
+    return FieldFit(FIELD, np.diag([1.0, 4.0, 9.0, 16.0, 25.0, 36.0]), width, std)
+
+
+def test_widths_matter_from_a_scatter_of_a_hundredth_and_four_deviations_on() -> None:
+    sign = torch.tensor([1.0, -1.0] * 20, dtype=torch.float64)
+    cases = ((0.0101, 0.0, True), (0.0099, 0.0, False), (0.041, 0.01, True), (0.039, 0.01, False))
+    for scatter, std, matters in cases:
+        wide = (0.3 + scatter * sign).exp()
+        assert small_fit(wide, std).matters() == matters
+        known = (0.2 * sign).exp()
+        assert small_fit(wide * known, std).matters(known) == matters
+
+
+def test_a_contrast_is_a_difference_of_means_and_as_sure_as_its_coefficients() -> None:
+    # Powers in the order of the coefficients: what differs between two places counts, and no other.
+    here, there = ((1, 1), (1, -1)), ((0, 0), (-1, 0))
+    powers = np.array([[x**i * y**j for i, j in POWERS[:6]] for x, y in (*here, *there)])
+    apart = powers[:2].mean(0) - powers[2:].mean(0)
+    value, std = small_fit(torch.ones(1)).contrast(here, there)
+    assert value == pytest.approx(apart @ np.array(FIELD.coefficients))
+    assert std == pytest.approx(np.sqrt(apart**2 @ [1.0, 4.0, 9.0, 16.0, 25.0, 36.0]))
+
+
+def test_a_family_spans_the_measured_places_without_their_outermost() -> None:
+    rng = np.random.default_rng(3)
+    place = torch.as_tensor(rng.uniform([[20], [50]], [[620], [310]], (2, 4001)))
+    place[:, 7] = torch.nan
+    family = FieldFamily(place)
+    known = np.delete(place.numpy(), 7, 1)
+    low, high = np.quantile(known, [0.002, 0.998], axis=1)
+    assert family._centre.numpy() == pytest.approx((low + high) / 2)
+    assert family._half.numpy() == pytest.approx((high - low) / 2)
+    x, y = np.clip((place.numpy().T - (low + high) / 2) / ((high - low) / 2), -1, 1).T
+    wanted = np.stack([np.nan_to_num(x) ** i * np.nan_to_num(y) ** j for i, j in POWERS[:6]], 1)
+    assert family._shapes.numpy() == pytest.approx(wanted)
+    assert {i + j for i, j in POWERS[:6]} == {0, 1, 2}
+    assert FieldFamily(place * 1e-9)._half.tolist() == [1.0, 1.0]
+
+
+def test_a_pixel_asks_for_the_width_it_has() -> None:
+    peaks, column, _ = seen(KNOWN, FLAT)
+    for wider in (0.02, -0.03):
+        light = LineTable(WIDTH_PX, KNOWN, 12.0, column, torch.full_like(column, math.exp(wider)))
+        exact = replace(peaks, y=0.8 * light.at(column - peaks.centres)[0])
+        one = torch.ones_like(column)
+        own, amplitude, _ = settle(exact, column, 0.8 * one, KNOWN, one)
+        score, information = _single(View(exact, column, own, amplitude), own, amplitude, KNOWN, one)
+        assert (score / information).median() == pytest.approx(wider, rel=0.08)
+        assert (score / information).numpy() == pytest.approx(wider, abs=0.25 * abs(wider))
+
+
+def test_pixels_that_see_something_else_hardly_bend_the_field() -> None:
+    peaks, column, place = seen(KNOWN, FIELD)
+    peaks.y[3, ::25] *= 0.7
+    family = FieldFamily(place)
+    found = family.fit(View(peaks, column, column.clone(), peaks.y.amax(0)), KNOWN)
+    assert found is not None
+    exact = relative_width(FIELD, *place)
+    off = (found.width / exact).log()
+    assert float((off - off.mean()).abs().max()) < 0.02
+    assert found.std < 0.004

@@ -86,3 +86,61 @@ def test_runs_at_one_place_count_as_one() -> None:
         values = (mean + sign)[:, None].expand(48, 4)
         found = _significant(shapes, values, torch.arange(48.0, dtype=torch.float64))
         assert (float(found[0]) != 0.0) == kept
+
+
+def test_no_wave_is_longer_than_the_period_shorter_than_half_a_pixel_or_large() -> None:
+    true = runs()
+    used = torch.ones_like(true, dtype=torch.bool)
+    # Four waves fit into a period of two columns: the fifth is not looked for.
+    for k, kept in ((4, True), (5, False)):
+        short = 0.05 * torch.sin(2 * math.pi * k / PERIOD_PX * true)
+        found = column_wave(true + short, used, PERIOD_PX).px
+        assert (float(found.abs().max()) > 0.02) == kept, k
+    huge = column_wave(true + 0.9 * torch.sin(2 * math.pi / PERIOD_PX * true), used, PERIOD_PX)
+    assert float(huge.px.abs().max()) == 0.3
+
+
+def test_columns_follow_polynomials_of_the_third_degree() -> None:
+    at = torch.linspace(-1, 1, 12, dtype=torch.float64)
+    start = torch.linspace(0, 400, 60, dtype=torch.float64)[:, None]
+    used = torch.ones((60, 12), dtype=torch.bool)
+    cubic = start + 4 * at + 0.8 * at**2 - 0.7 * at**3
+    assert column_wave(cubic, used, PERIOD_PX).std_px < 1e-6
+    assert column_wave(cubic + 0.7 * at**4, used, PERIOD_PX).std_px > 0.01
+
+
+@pytest.mark.parametrize(("pixels", "smooth"), [(6, True), (5, False)])
+def test_a_run_needs_six_pixels(pixels: int, smooth: bool) -> None:
+    true = runs()
+    used = torch.arange(true.shape[1]).expand(true.shape) < pixels
+    used[100:] = True
+    found = column_wave(true, used, PERIOD_PX)
+    assert bool(found.smooth[:100].all()) == bool(found.smooth[:100].any()) == smooth
+    none = column_wave(true[:100], used[:100] & False, PERIOD_PX)
+    assert not none.smooth.any()
+    assert not none.px.any()
+    assert none.std_px == math.inf
+
+
+@pytest.mark.parametrize(("times", "smooth"), [(3.7, True), (4.3, False)])
+def test_runs_that_scatter_four_times_as_much_as_others_are_rough(times: float, smooth: bool) -> None:
+    true = runs()
+    noise = torch.randn(true.shape, generator=torch.Generator().manual_seed(3), dtype=torch.float64)
+    powers = torch.stack([torch.linspace(-1, 1, 10, dtype=torch.float64) ** k for k in range(4)])
+    noise = noise - noise @ torch.linalg.pinv(powers) @ powers
+    noise = 0.01 * noise / (noise.square().sum(1, keepdim=True) / 6).sqrt()
+    noise[0] *= times
+    found = column_wave(true + noise, torch.ones_like(true, dtype=torch.bool), PERIOD_PX)
+    assert bool(found.smooth[0]) == smooth
+    assert found.smooth[1:].all()
+    assert found.std_px == pytest.approx(0.01, rel=0.05)
+
+
+def test_coefficients_are_least_squares_with_a_ridge_of_a_tenth() -> None:
+    random = torch.Generator().manual_seed(2)
+    shapes = torch.randn((40, 6, 2), generator=random, dtype=torch.float64)
+    values = shapes @ torch.tensor([0.8, -0.5], dtype=torch.float64)
+    flat = shapes.flatten(0, 1)
+    wanted = torch.linalg.solve(flat.T @ flat + 0.1 * 240 * torch.eye(2), flat.T @ values.flatten())
+    found = _significant(shapes, values, torch.arange(40.0))
+    assert found.tolist() == pytest.approx(wanted.tolist())

@@ -1,9 +1,12 @@
 """The course of the light from witnesses: a drift is found, chance is not, and flicker is told from both."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from dsl_core.reconstruction.light.course import Witness, light_course
+from dsl_core.reconstruction.light import course as course_module
+from dsl_core.reconstruction.light.course import LightCourse, Witness, light_course
 
 SHOTS = 200
 
@@ -51,3 +54,81 @@ def test_flicker_is_not_taken_for_drift() -> None:
 
 def test_too_few_witnesses_say_nothing() -> None:
     assert light_course(witnesses(0.0, 0.0)[:3], SHOTS) is None
+
+
+def test_terms_are_those_of_weighted_least_squares_with_what_is_believed_before() -> None:
+    heard = [each for each in witnesses(0.08, 0.02, 4) if each.shot % 3]
+    heard[5] = replace(heard[5], log=heard[5].log + 0.3)
+    flicker = 0.01
+    values, covariance, left = course_module._fit(heard, SHOTS, flicker, (0.5, 0.3))
+    rows, noise = [], []
+    for each in heard:
+        t, u = each.shot / 199, 0.0 if each.against is None else each.against / 199
+        free = each.against is None
+        rows.append([t - u, t**2 - u**2, -1.0 if free else 0.0, each.slope, float(each.between_settings)])
+        noise.append(each.std**2 + 0.002**2 + (1 if free else 2) * flicker**2)
+    design, sigma = np.array(rows), np.sqrt(noise)
+    log = np.array([each.log for each in heard])
+    believed = np.diag(1 / np.array([0.5, 0.3, 1.0, 0.02, 0.01]))
+    share = np.ones(len(log))
+    for _ in range(4):
+        root = np.sqrt(share) / sigma
+        stacked = np.vstack([design * root[:, None], believed])
+        wanted = np.linalg.lstsq(stacked, np.append(log * root, np.zeros(5)), rcond=None)[0]
+        off = np.abs(log - design @ wanted) / sigma
+        share = np.where(off > 2.5, 2.5 / off, 1.0)
+    assert values == pytest.approx(wanted, rel=1e-6, abs=1e-9)
+    assert covariance == pytest.approx(np.linalg.inv(stacked.T @ stacked), rel=1e-6, abs=1e-12)
+    assert left == pytest.approx(log - design @ wanted, abs=1e-9)
+
+
+def test_flicker_is_what_the_middle_of_the_squares_leaves_beyond_their_own_noise() -> None:
+    heard = [Witness(k, None if k % 2 else 0, 0.0, 0.003) for k in range(7)]
+    left = np.array([0.0, 0.01, 0.02, 0.03, -0.04, 0.05, 0.9])
+    found, std = course_module._flicker(heard, left)
+    many, own = np.array([2, 1, 2, 1, 2, 1, 2]), 0.003**2 + 0.002**2
+    assert found == pytest.approx(np.sqrt(np.median((left**2 / 0.455 - own) / many)))
+    assert std == pytest.approx(np.median((left**2 + own) / many) * np.sqrt(2 / 7) / found)
+    none, chance = course_module._flicker(heard, 0 * left)
+    assert none == 0.0
+    assert chance == pytest.approx(np.sqrt(np.median(own / many) * np.sqrt(2 / 7) * 2))
+
+
+@pytest.mark.parametrize(
+    ("value", "std", "drifts", "flickers"),
+    [(0.0061, 0.0, True, False), (0.0059, 0.0, False, False), (0.0081, 0.0, True, True),
+     (0.046, 0.01, True, True), (0.044, 0.01, False, False)],
+)  # fmt: skip
+def test_changes_count_beyond_chance_and_beyond_what_nobody_minds(
+    value: float, std: float, drifts: bool, flickers: bool
+) -> None:
+    for sign in (1, -1):
+        course = LightCourse(np.zeros(1), np.zeros(1), 0.0, 0.0, sign * value, std, value, std)
+        assert (course.drifts, course.flickers) == (drifts, flickers)
+        assert course.is_steady == (not drifts and not flickers)
+
+
+def test_the_curve_begins_at_zero_and_its_deviation_is_that_of_its_terms() -> None:
+    heard = witnesses(-0.1, 0.0)
+    course = course_module._course(heard, SHOTS, (0.5, 0.3))
+    values, covariance, _ = course_module._fit(heard, SHOTS, course.flicker, (0.5, 0.3))
+    time = np.arange(SHOTS) / (SHOTS - 1)
+    terms = np.stack([time, time**2])
+    assert course.log == pytest.approx(values[:2] @ terms, abs=1e-4)
+    assert course.std == pytest.approx(np.sqrt(np.diag(terms.T @ covariance[:2, :2] @ terms)), rel=1e-2)
+    assert (course.log[0], course.std[0]) == (0.0, 0.0)
+    assert (course.drift, course.drift_std) == (course.log[-1], course.std[-1])
+    assert (course.white, course.slope) == pytest.approx((values[2], values[3]), abs=1e-4)
+
+
+def test_four_witnesses_are_enough_and_a_drift_by_chance_is_told_but_not_followed() -> None:
+    heard = [Witness(k, None, 0.0001 * k, 0.01) for k in (0, 50, 100, 199)]
+    course = light_course(heard, SHOTS)
+    assert course is not None
+    assert np.abs(course.log).max() < 1e-5
+    assert course.drift == course_module._course(heard, SHOTS, (0.5, 0.3)).drift
+    assert abs(course.drift) > 0.001
+    # A scan of one shot has no course, and is divided by nothing.
+    alone = light_course([Witness(0, None, 0.01, 0.01)] * 4, 1)
+    assert alone is not None
+    assert alone.log.tolist() == [0.0]

@@ -6,7 +6,7 @@ import pytest
 from dsl_core.model.rig import Sensor
 from dsl_core.optics.sensor import digitise
 from dsl_core.reconstruction.hdr import BlackFrame
-from dsl_core.reconstruction.light.setting_ratios import compare_settings
+from dsl_core.reconstruction.light.setting_ratios import compare_settings, compared_rows
 
 SENSOR, GAINS_MS = Sensor(), (4.0, 100.0)
 
@@ -31,3 +31,56 @@ def test_a_fainter_shot_is_told(level: float) -> None:
 def test_dark_pictures_say_nothing() -> None:
     black = BlackFrame(np.full((60, 80), SENSOR.black_level_dn, np.float32), np.zeros((60, 80), np.float32))
     assert compare_settings(mosaics(1.0, 0.001), [black, black], GAINS_MS, SENSOR)[0] is None
+
+
+def black_of(shape: tuple[int, int], level: float) -> BlackFrame:
+    return BlackFrame(np.full(shape, level, np.float32), np.zeros(shape, np.float32))
+
+
+@pytest.mark.parametrize("gains", [(4.0, 10.0), (10.0, 4.0)])
+def test_a_ratio_is_the_factor_of_the_brighter_setting_that_fits_the_fainter_one(
+    gains: tuple[float, float],
+) -> None:
+    rng = np.random.default_rng(2)
+    light = rng.uniform(30, 330, (6, 9))
+    raws = [
+        np.rint(260 + gain * light * level).astype(np.uint16)
+        for gain, level in zip(gains, (1.03, 1.0), strict=True)
+    ]
+    raws[0][0, :3], raws[1][1, :3] = 3700, 3690
+    # Too little or too much light to be compared: of 4095 counts, less than 41 above black or more than 3685.
+    raws[gains.index(10.0)][2, :2] = 300, 302
+    blacks = [black_of((6, 9), 260), black_of((6, 9), 260)]
+    found, own = compare_settings(raws, blacks, gains, SENSOR)
+    assert found is not None
+    assert own is not None
+    assert (own.log, own.std) == (0.0, 0.0)
+    bright, faint = (raws[gains.index(gain)].astype(float) - 260 for gain in (10.0, 4.0))
+    used = (bright > 40.95) & (raws[0] < 3685.5) & (raws[1] < 3685.5)
+    assert 12 < used.sum() < 48
+    x, y, scale = bright[used], faint[used], 0.4
+    weight = 1 / (2 * (0.25 + 1 / 12) + scale * x / 10)
+    power = weight @ (x**2 - x / 10 - 0.25 - 1 / 12)
+    factor = weight @ (x * y) / power
+    assert found.std == pytest.approx(1 / np.sqrt(power) / factor)
+    assert found.log == pytest.approx(np.log(factor / scale) * (1 if gains[0] < gains[1] else -1))
+    assert found.log == pytest.approx(np.log(1.03), abs=0.01)
+
+
+@pytest.mark.parametrize(("count", "told"), [(12, True), (11, False)])
+def test_twelve_pixels_are_enough(count: int, told: bool) -> None:
+    raws = [np.full((4, 5), 260, np.uint16) for _ in range(2)]
+    for raw, light in zip(raws, (400, 1000), strict=True):
+        raw.ravel()[:count] += light
+    found = compare_settings(raws, [black_of((4, 5), 260)] * 2, (4.0, 10.0), SENSOR)[0]
+    assert (found is not None) == told
+    # Nothing at all of the fainter one.
+    raws[0][:] = 255
+    assert compare_settings(raws, [black_of((4, 5), 260)] * 2, (4.0, 10.0), SENSOR)[0] is None
+
+
+def test_rows_are_spread_over_the_picture() -> None:
+    assert compared_rows(5).tolist() == [0, 1, 2, 3, 4]
+    rows = compared_rows(1000)
+    assert (len(rows), rows[0], rows[-1]) == (145, 0, 999)
+    assert set(np.diff(rows)) == {6, 7}

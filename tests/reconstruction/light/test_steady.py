@@ -1,7 +1,9 @@
 """Light is taken off frames once, or in two steps with the same outcome."""
 
 import numpy as np
+import pytest
 
+from dsl_core.reconstruction.hdr import MergedFrame
 from dsl_core.reconstruction.light.steady import SteadyLight
 from dsl_core.reconstruction.merge import LineStack
 
@@ -35,3 +37,22 @@ def test_a_refined_course_gives_the_same_from_frames_that_were_steadied_before()
     np.testing.assert_allclose(twice.radiance, at_once.radiance, rtol=1e-5)
     np.testing.assert_allclose(twice.std, at_once.std, rtol=1e-3)
     assert refined.white == FIRST.white
+
+
+def test_what_steadied_frames_are_left_with_is_at_least_a_part_of_their_deviation() -> None:
+    surer = FIRST.refined(np.zeros(5), np.zeros(5))
+    stack = _stack()
+    before = np.float32(0.05)
+    unsure = SteadyLight(np.zeros(5), np.full(5, 0.5), 0.0)
+    SteadyLight(np.zeros(5), surer.std, 0.0).steady(stack, unsure)
+    assert stack.std[1:] == pytest.approx(0.05 * before)
+
+
+def test_white_is_taken_to_steady_light_with_its_variance() -> None:
+    shape = (2, 3)
+    white = MergedFrame(
+        np.full(shape, 4.0, np.float32), np.full(shape, 0.2, np.float32), np.zeros(shape, bool)
+    )
+    steady = FIRST.steady_white(white)
+    assert steady.radiance == pytest.approx(4 * np.exp(-0.03), rel=1e-6)
+    assert steady.variance == pytest.approx(0.2 * np.exp(-0.06), rel=1e-6)

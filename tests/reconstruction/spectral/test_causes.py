@@ -1,0 +1,105 @@
+"""What all probed pixels ask of the model together: a shift over the picture, gains and a drift."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from dsl_core.reconstruction.spectral.causes import Causes, common_error, fit_causes
+from dsl_core.reconstruction.spectral.probing.line_probe import LineProbe
+from dsl_core.reconstruction.spectral.probing.probe import Probe
+from dsl_core.reconstruction.spectral.probing.probed_light import PARAMETERS
+
+INFORMATION = 1e6
+#: Terms of the shifts in 1, x, y, x², xy and y², then what is the same everywhere.
+PLUS, MINUS = np.array([0.1, 0.02, -0.03, 0.04, 0.05, -0.06]), np.array([-0.2, 0.0, 0.03, 0.02, 0.0, 0.01])
+REST = {"gain +1": 0.03, "gain -1": -0.02, "blur": 0.01, "tail": 0.002, "drift": 0.04}
+
+
+def probe_of(noise: float = 0.0) -> Probe:
+    rng = np.random.default_rng(2)
+    cell = np.repeat(np.arange(48), 8)
+    place = rng.uniform(-1, 1, (len(cell), 2))
+    y, x = place.T
+    terms = np.stack([np.ones_like(x), x, y, x * x, x * y, y * y], 1)
+    count, p = len(cell), len(PARAMETERS)
+    wanted = np.zeros((count, p))
+    wanted[:, 0], wanted[:, 1] = terms @ PLUS, terms @ MINUS
+    for name, value in REST.items():
+        wanted[:, PARAMETERS.index(name)] = value
+    wanted[:, :7] += noise * rng.standard_normal((count, 7))
+    return Probe(
+        normal=np.broadcast_to(INFORMATION * np.eye(p), (count, p, p)).copy(), score=INFORMATION * wanted,
+        bias=np.zeros((count, 1, p)), reflectance=np.ones((count, 1)), chi_square=np.ones(count),
+        correlation=np.ones(count), place=place, cell=cell, pixel=np.arange(count),
+        lines=LineProbe(np.eye(2)[None], np.zeros((1, 2)), np.ones(1)), nm_per_px=2.0,
+    )  # fmt: skip
+
+
+def test_shifts_gains_and_drift_are_found_at_once() -> None:
+    probe = probe_of()
+    found = fit_causes(probe)
+    assert found.shift_px == pytest.approx(probe.score[:, :2] / INFORMATION, abs=1e-4)
+    assert found.gain == pytest.approx([0.03, -0.02], abs=1e-5)
+    assert found.drift == pytest.approx(0.04, abs=1e-5)
+    assert found.rms_px == pytest.approx(np.sqrt(np.mean(found.shift_px**2)), rel=1e-3)
+
+
+def test_deviations_are_those_of_independent_pixels() -> None:
+    found = fit_causes(probe_of())
+    one = 1 / np.sqrt(384 * INFORMATION)
+    assert found.drift_std == pytest.approx(one, rel=1e-3)
+    assert found.common_std == pytest.approx(one / np.sqrt(2), rel=1e-3)
+    assert found.difference_std == pytest.approx(one * np.sqrt(2), rel=1e-3)
+    # Six terms an order, spread over the pixels.
+    noise = 6 / (384 * INFORMATION)
+    assert found.rms_std_px == pytest.approx(np.sqrt(noise / 12), rel=1e-3)
+
+
+def test_noise_alone_is_no_shift() -> None:
+    probe = probe_of()
+    probe.score[:] = 0.0
+    assert fit_causes(probe).rms_px == 0.0
+    small = probe_of()
+    small.score[:] *= 1e-3
+    small.normal[:] *= 1e-3 * np.eye(len(PARAMETERS))
+    noise, found = 6 / (384 * INFORMATION * 1e-3), fit_causes(small)
+    square = np.mean(found.shift_px**2)
+    assert found.rms_px == pytest.approx(np.sqrt(square - noise), rel=1e-3)
+
+
+CAUSES = Causes(np.zeros((1, 2)), 0.0, 0.0, np.array([0.02, -0.01]), 0.001, 0.002, 0.015, 0.001)
+
+
+def test_changes_count_from_what_matters_on() -> None:
+    assert CAUSES.drifts
+    assert not replace(CAUSES, drift=-0.0139).drifts
+    assert not replace(CAUSES, drift_std=0.01).drifts
+    assert CAUSES.unequal
+    assert not replace(CAUSES, gain=np.array([0.03, 0.0151])).unequal
+    assert not replace(CAUSES, difference_std=0.05).unequal
+
+
+@pytest.mark.parametrize(
+    ("gain", "common"),
+    [((0.02, 0.01), 0.01), ((-0.02, -0.05), -0.02), ((0.02, -0.01), 0.0), ((0.02, 0.0), 0.0)],
+)
+def test_orders_share_the_smaller_gain_of_one_sign(gain: tuple[float, float], common: float) -> None:
+    assert replace(CAUSES, gain=np.array(gain)).common_gain == common
+
+
+def test_curves_and_drift_add_to_what_no_pixel_sees() -> None:
+    def probe(curves: Any) -> Any:
+        return SimpleNamespace(curves=curves)
+
+    seen, chance, small = ((0.016, 0.001), (0.016, 0.02), (0.014, 0.001))
+    drift = 0.015 / np.sqrt(3)
+    for (rms, std), share in ((seen, 0.016), (chance, 0.0), (small, 0.0)):
+        found = common_error(probe(SimpleNamespace(rms=rms, std=std)), CAUSES)
+        assert found == pytest.approx(np.hypot(share, drift))
+    assert common_error(probe(None), CAUSES) == pytest.approx(drift)
+    assert common_error(probe(None), replace(CAUSES, drift=0.001)) == 0.0
