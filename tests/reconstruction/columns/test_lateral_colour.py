@@ -13,8 +13,16 @@ from dsl_core.model.plan import CapturePlan, GrayCode, ScanLines
 from dsl_core.model.rig import Rig
 from dsl_core.optics.correspondence import triangulate, zero_order
 from dsl_core.optics.lines.line_set import LineSet
-from dsl_core.reconstruction.columns.lateral_colour import material_std_px, own_lateral_colour, white_nm
+from dsl_core.reconstruction.columns import lateral_colour
+from dsl_core.reconstruction.columns.lateral_colour import (
+    LateralFit,
+    lateral_finding,
+    material_std_px,
+    own_lateral_colour,
+    white_nm,
+)
 from dsl_core.simulation.sim_devices import open_twin
+from dsl_core.solve.robust import robust_linear
 from dsl_core.workflows import scans
 from tests.cases.twin_scan import capture
 
@@ -105,3 +113,71 @@ def test_a_scan_through_such_lenses_is_corrected_and_says_so() -> None:
         held = float(np.mean(error[known] < 1.96 * result["depth_std_mm"].values[known]))
         assert (held > 0.92) is not as_calibrated
     assert errors[False] < 0.9 * errors[True]
+
+
+def test_a_bend_is_how_far_a_column_is_from_the_middle_of_its_neighbours(
+    rig: Rig, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    rng = np.random.default_rng(4)
+    seen = np.cumsum(rng.uniform(0.5, 0.9, (8, 30)), 1) + 200
+    seen[3, 10], seen[2, 20] = np.nan, seen[2, 20] + 2
+    monkeypatch.setattr(lateral_colour, "FEWEST", 10)
+    for pixels, rows in ((60_000, range(8)), (120, (0, 1, 4, 5))):
+        monkeypatch.setattr(lateral_colour, "PIXELS", pixels)
+        found = lateral_colour._bends(rig, seen)
+        assert found is not None
+        wanted = []
+        for y in rows:
+            for x in range(1, 29):
+                bend = seen[y, x] - (seen[y, x - 1] + seen[y, x + 1]) / 2
+                if abs(bend) < 0.5:
+                    # Rows of red and green, and rows of green and blue; green is at odd places of even rows.
+                    green = (x + y) % 2 == 1
+                    slope = (seen[y, x + 1] - seen[y, x - 1]) / 2
+                    camera, projector = (x - rig.camera.cx_px) * slope, seen[y, x] - rig.projector.cx_px
+                    wanted.append((bend, -1 if green else 1, y % 2 == 1, camera, projector))
+        assert rig.sensor.bayer == "RGGB"
+        for got, values in zip(found, zip(*wanted, strict=True), strict=True):
+            assert got == pytest.approx(values)
+    monkeypatch.setattr(lateral_colour, "FEWEST", len(wanted))
+    assert lateral_colour._bends(rig, seen) is not None
+    monkeypatch.setattr(lateral_colour, "FEWEST", len(wanted) + 1)
+    assert lateral_colour._bends(rig, seen) is None
+
+
+def test_magnifications_are_a_linear_fit_of_bends_and_as_sure_as_those_are_shared(rig: Rig) -> None:
+    seen = columns(coloured(rig, 8e-4))
+    found = own_lateral_colour(rig, LINES, seen, np.ones(seen.shape, bool))
+    bends = lateral_colour._bends(rig, seen)
+    assert found is not None
+    assert bends is not None
+    bend, sign, blue, camera, projector = bends
+    red_nm, green_nm, blue_nm = white_nm(rig)
+    assert red_nm > green_nm + 30 > blue_nm + 60
+    rows = [
+        (0.0, -c, p * (blue_nm - green_nm)) if b else (-c, 0.0, p * (red_nm - green_nm))
+        for b, c, p in zip(blue, camera, projector, strict=True)
+    ]
+    values, inverse, scatter = robust_linear(sign[:, None] * np.array(rows), bend)
+    green = -SHARES[0] * values[0] - SHARES[2] * values[1]
+    assert found.colour.camera == pytest.approx((values[0] + green, green, values[1] + green))
+    assert found.colour.projector_per_nm == pytest.approx(values[2])
+    assert found.colour.white_nm == white_nm(rig)
+    apart = np.stack([-camera, camera, projector * (red_nm - blue_nm)], 1)
+    # Each column is in three bends, so that sums scatter by eight thirds more than they seem to.
+    noise = np.mean(((apart @ inverse) * apart).sum(1)) * scatter**2 * 8 / 3
+    assert found.apart_std_px == pytest.approx(np.sqrt(noise))
+    assert found.apart_px == pytest.approx(np.sqrt(np.mean((apart @ values) ** 2) - noise))
+
+
+@pytest.mark.parametrize(
+    ("apart", "std", "present"),
+    [(0.0041, 0.0, True), (0.0039, 0.0, False), (0.041, 0.01, True), (0.039, 0.01, False)],
+)
+def test_lateral_colour_counts_where_it_matters(apart: float, std: float, present: bool) -> None:
+    colour = LateralColour(camera=(0.0, 0.0, 0.0), projector_per_nm=0.0, white_nm=(600.0, 540.0, 460.0))
+    found = LateralFit(colour, apart, std)
+    assert found.present == present
+    finding = lateral_finding(found)
+    assert (finding.value, finding.std, finding.limit, finding.significant) == (apart, std, 0.004, present)
+    assert f"{apart:.4f} ± {std:.4f}" in finding.sentence

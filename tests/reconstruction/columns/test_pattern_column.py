@@ -18,7 +18,8 @@ from dsl_core.patterns.images import pattern_image
 from dsl_core.planning.noise import own_channel
 from dsl_core.planning.samples import plane_samples
 from dsl_core.planning.virtual import VirtualPixels
-from dsl_core.reconstruction.columns.column import Column
+from dsl_core.reconstruction.columns import pattern_column
+from dsl_core.reconstruction.columns.column import MAX_CHI_SQUARE, Column
 from dsl_core.reconstruction.columns.pattern_column import (
     first_order_share,
     radiance_profiles,
@@ -189,3 +190,66 @@ def test_lines_and_combs_leave_nothing_to_round() -> None:
         plan = CapturePlan(spectral=spectral)
         assert np.isin(radiance_profiles(published_rig(), plan).round(12), (0.0, 1.0)).all()
         assert rounding_error(published_rig(), plan) < 1e-9
+
+
+def from_costs(
+    monkeypatch: pytest.MonkeyPatch,
+    costs: list[tuple[float, float, float]],
+    frames: int = 14,
+    amplitude: float = 5.0,
+) -> Column:
+    """Columns from 100 on whose squares are a parabola in the shift: its least, its place, its strength."""
+    least, place, strength = torch.tensor(costs, dtype=torch.float64).T
+    shifts = iter(torch.linspace(-1, 1, 17, dtype=torch.float64))
+
+    def fit(light: torch.Tensor, y: torch.Tensor, weight: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
+        shift = next(shifts)
+        return least + strength * (shift - place) ** 2, amplitude + 0 * place + shift
+
+    monkeypatch.setattr(pattern_column, "_fit", fit)
+    start = torch.full((len(costs),), 100.0, dtype=torch.float64)
+    y = torch.ones((frames, len(costs)), dtype=torch.float64)
+    profiles = np.ones((frames, 640, 1))
+    return refine_by_profiles(start, y, y, profiles, published_rig().projector_response)
+
+
+def test_a_column_is_at_the_bottom_of_a_parabola(monkeypatch: pytest.MonkeyPatch) -> None:
+    # Fourteen frames less one amplitude and a column leave twelve degrees of freedom.
+    found = from_costs(monkeypatch, [(6.0, 0.3, 400.0), (24.0, -0.71, 100.0), (12.0, 0.0, 50.0)])
+    assert found.refined.all()
+    assert found.column_px.tolist() == pytest.approx([100.3, 99.29, 100.0])
+    assert found.std_px.tolist() == pytest.approx([0.05, np.sqrt(0.01 * 24.16 / 12), np.sqrt(0.02)])
+    assert found.amplitude.tolist() == pytest.approx([5.25, 4.25, 5.0]), "that of the nearest candidate"
+    assert found.amplitude_std.tolist() == pytest.approx([0.105, 0.085, 0.1])
+
+
+def test_a_fit_that_says_little_or_is_bad_leaves_the_decoded_column(monkeypatch: pytest.MonkeyPatch) -> None:
+    bad = 12 * MAX_CHI_SQUARE
+    cases = {
+        (0.99 * bad, 0.25, 1e4): True, (1.01 * bad, 0.25, 1e4): False, (1.0, 0.3, 12.1): True,
+        (1.0, 0.3, 11.9): False, (1.0, 0.93, 1e3): True, (1.0, 0.95, 1e3): False, (1.0, -0.95, 1e3): False,
+    }  # fmt: skip
+    found = from_costs(monkeypatch, list(cases))
+    assert found.refined.tolist() == list(cases.values())
+    left = ~found.refined
+    assert (found.column_px[left] == 100.0).all()
+    assert found.std_px[left].tolist() == pytest.approx([12**-0.5] * 4)
+    assert torch.isinf(found.amplitude_std[left]).all()
+    assert not from_costs(monkeypatch, [(1.0, 0.3, 1e3)], amplitude=-3.0).refined.any()
+    assert from_costs(monkeypatch, [(1.0, 0.3, 1e3)], frames=4).refined.all()
+    assert not from_costs(monkeypatch, [(1.0, 0.3, 1e3)], frames=3).refined.any()
+
+
+def test_amplitudes_are_weighted_least_squares_that_a_ridge_keeps_apart() -> None:
+    draw = torch.Generator().manual_seed(1)
+    light = torch.rand((4, 3, 9), generator=draw, dtype=torch.float64)
+    y = torch.rand((4, 9), generator=draw, dtype=torch.float64)
+    weight = torch.rand((4, 9), generator=draw, dtype=torch.float64)
+    left, total = pattern_column._fit(light, y, weight)
+    for p in range(4):
+        design = light[p].T.numpy()
+        normal = design.T @ (design * weight[p].numpy()[:, None])
+        normal += 1e-4 * np.diag(normal).max() * np.eye(3)
+        own = np.linalg.solve(normal, design.T @ (weight[p] * y[p]).numpy())
+        assert float(total[p]) == pytest.approx(own.sum())
+        assert float(left[p]) == pytest.approx(float(weight[p].numpy() @ (y[p].numpy() - design @ own) ** 2))
