@@ -78,6 +78,16 @@ def test_the_python_of_the_readme_is_that_of_the_help_which_is_run() -> None:
     assert set(shown) <= set(blocks(HELP / "scripting.md"))
 
 
+def test_the_readme_names_every_command_and_no_other() -> None:
+    from typer.main import get_command
+
+    from dsl_core.cli.run import app
+
+    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    named = re.findall(r"^\| `dsl-scan ([\w-]+)[^`]*` \|", text, re.MULTILINE)
+    assert set(named) == set(get_command(app).commands)  # type: ignore[attr-defined]
+
+
 def test_pictures_of_the_readme_are_there_and_small() -> None:
     text = (ROOT / "README.md").read_text(encoding="utf-8")
     shown = re.findall(r"!\[[^\]]+\]\(([^)]+)\)", text)
