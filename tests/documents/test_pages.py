@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import shlex
 from pathlib import Path
 from typing import Any
 
@@ -78,14 +79,19 @@ def test_the_python_of_the_readme_is_that_of_the_help_which_is_run() -> None:
     assert set(shown) <= set(blocks(HELP / "scripting.md"))
 
 
-def test_the_readme_names_every_command_and_no_other() -> None:
+@pytest.fixture(scope="module")
+def program() -> Any:
     from typer.main import get_command
 
     from dsl_core.cli.run import app
 
+    return get_command(app)
+
+
+def test_the_readme_names_every_command_and_no_other(program: Any) -> None:
     text = (ROOT / "README.md").read_text(encoding="utf-8")
     named = re.findall(r"^\| `dsl-scan ([\w-]+)[^`]*` \|", text, re.MULTILINE)
-    assert set(named) == set(get_command(app).commands)  # type: ignore[attr-defined]
+    assert set(named) == set(program.commands)
 
 
 def test_pictures_of_the_readme_are_there_and_small() -> None:
@@ -93,3 +99,26 @@ def test_pictures_of_the_readme_are_there_and_small() -> None:
     shown = re.findall(r"!\[[^\]]+\]\(([^)]+)\)", text)
     assert len(shown) == 3
     assert all((ROOT / name).stat().st_size < 300_000 for name in shown)
+
+
+def commands(path: Path) -> list[str]:
+    """What a page shows of the command, in blocks and in sentences, without what is remarked behind it."""
+    text = path.read_text(encoding="utf-8").replace("\\\n", " ")
+    plain = re.findall(r"^```(?:\w*)\n(.*?)^```", text, re.DOTALL | re.MULTILINE)
+    lines = [line.split(" # ")[0].strip() for block in plain for line in block.splitlines()]
+    told = [" ".join(part.split()) for part in re.findall(r"`(dsl-scan\s[^`]+)`", text)]
+    return [line for line in (*lines, *told) if line.startswith("dsl-scan ")]
+
+
+@pytest.mark.parametrize(
+    "page", [ROOT / "README.md", *sorted(HELP.glob("*.md"))], ids=lambda page: str(page.stem)
+)
+def test_commands_of_a_page_have_the_options_that_they_show(page: Path, program: Any) -> None:
+    for line in commands(page):
+        command = program
+        words = shlex.split(line)[1:]
+        while words and words[0] in getattr(command, "commands", {}):
+            command, words = command.commands[words[0]], words[1:]
+        context = command.context_class(command)
+        _, left, _ = command.make_parser(context).parse_args(words)
+        assert not left, f"{line}: {left} is not taken"
