@@ -106,7 +106,9 @@ def reconstruct(
     in memory at once; the result is, unless a ``sink`` takes it.
     """
     from dsl_core.optics.lines.line_set import LineSet
+    from dsl_core.reconstruction.columns.column import MODEL_ERROR
     from dsl_core.reconstruction.columns.line_spread import own_spread, spread_pixels, with_own_spread
+    from dsl_core.reconstruction.columns.peak_error import own_peak_error
     from dsl_core.reconstruction.geometry import geometry_of, require_light, require_pixels
     from dsl_core.reconstruction.lenses import follow_lenses
     from dsl_core.reconstruction.light.followed import follow_light
@@ -135,12 +137,14 @@ def reconstruct(
             code, white, found_of_light = follow_light(frames, code, white, asked, progress)
             findings += found_of_light
     with timer.stage("columns, depth, normals"):
+        peak_error = MODEL_ERROR
         if options.refine_columns and not options.as_calibrated:
             found = own_spread(rig, lines, code, white, frames)
             if found is not None:
                 findings += spread_findings(rig.projector_response, found)
             rig = with_own_spread(rig, found)
-        columns = columns_by_rows(rig, options, frames, code, white, progress)
+            peak_error = own_peak_error(rig, lines, code, white, frames)
+        columns = columns_by_rows(rig, options, frames, code, white, peak_error, progress)
         del code, white  # of large pictures they take much of the memory
         geometry = geometry_of(
             rig, lines if options.refine_columns else None, columns, frames.shape, options.surface_window_px

@@ -253,7 +253,7 @@ class VirtualPixels:
         radiance, std = (v.reshape(-1, frames).T.contiguous() for v in (y, std))
         response, profiles = self.rig.projector_response, self.model.profiles
         if self.model.lines is not None:
-            column = refine(true.round(), radiance, std, self.model.lines, response)
+            column = refine(true.round(), radiance, std, self.model.lines, response, model_error=0.0)
         else:
             share = first_order_share(self.rig, profiles, self.pixels, self.column.to(self.shading).round())
             share = share.repeat_interleave(count, 0)

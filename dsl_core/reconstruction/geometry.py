@@ -19,6 +19,7 @@ from dsl_core.optics.pinhole import rays_in
 from dsl_core.patterns.gray_code import DecodedCode
 from dsl_core.progress import Progress
 from dsl_core.reconstruction.columns.code_dispute import Settled, has_peak, is_dark, settle
+from dsl_core.reconstruction.columns.column import MODEL_ERROR
 from dsl_core.reconstruction.columns.line_spread import wave_std_px
 from dsl_core.reconstruction.columns.maps import CHUNK, WHOLE_PX_STD, ColumnFinder, ColumnMaps
 from dsl_core.reconstruction.columns.pattern_column import radiance_profiles
@@ -140,8 +141,15 @@ class FoundColumns:
 class ColumnSearch:
     """Refines and judges the columns of a picture, or of some rows of it."""
 
-    def __init__(self, rig: Rig, plan: CapturePlan, refine_columns: bool = True, device: str = "cpu") -> None:
-        self.rig, self._device = rig, device
+    def __init__(
+        self,
+        rig: Rig,
+        plan: CapturePlan,
+        refine_columns: bool = True,
+        device: str = "cpu",
+        peak_error: float = MODEL_ERROR,
+    ) -> None:
+        self.rig, self._device, self._peak_error = rig, device, peak_error
         self.lines = LineSet.of(plan) if refine_columns else None
         self._profiles = radiance_profiles(rig, plan) if refine_columns and plan.spectral_count else None
 
@@ -154,7 +162,9 @@ class ColumnSearch:
         progress: Progress | None = None,
     ) -> FoundColumns:
         """Columns of all pixels of some rows, the first of which is the ``first`` (flat) of the picture."""
-        finder = ColumnFinder(self.rig, white, stack, self.lines, self._profiles, self._device, first)
+        finder = ColumnFinder(
+            self.rig, white, stack, self.lines, self._profiles, self._device, first, self._peak_error
+        )
         start_px, start_std_px = _start(code)
         maps = finder.find(np.arange(start_px.size), start_px, start_std_px, progress)
         lit = _lit(white)

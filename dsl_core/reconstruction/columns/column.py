@@ -22,7 +22,8 @@ from dsl_core.optics.lines.profile import LineTable, halo_of_line
 ITERATIONS, STEP_PX = 6, 0.7
 #: Where the fit of a measured spread starts, from the decoded column, px.
 ASIDE_PX = 0.35
-#: Relative error of the modelled peak (blur, halo, neighbouring pixels), added to each variance.
+#: Relative error of the modelled peak (blur, halo, neighbouring pixels), added to each variance, where a scan was
+#: not asked for its own (`peak_error`).
 MODEL_ERROR = 0.0015
 #: The same for combs, where the first orders of other lines are under the peak.
 COMB_ERROR = 0.05
@@ -50,21 +51,65 @@ def refine(
     lines: LineSet,
     response: ProjectorResponse,
     widths: Tensor | None = None,
+    model_error: float = MODEL_ERROR,
 ) -> Column:
     """Refine decoded columns.
 
     ``coarse_px`` (pixels,) float; ``radiance`` and ``std`` (frames, pixels), DN per ms, infinite where
-    saturated; ``widths`` (pixels,) are those of the spread relative to the response's. Where the fit fails,
-    the decoded column stays, with the deviation of a whole pixel, ``1/sqrt(12)``. Its amplitude is that of
+    saturated; ``widths`` (pixels,) are those of the spread relative to the response's; ``model_error`` is
+    that of the peak of single lines, relative to it. Where the fit fails, the decoded column stays, with the deviation of a whole pixel, ``1/sqrt(12)``. Its amplitude is that of
     the brightest frame near it, or of the fit to what is left where frames are saturated, with an infinite
     deviation: less would make light of the zero order next to them.
     """
+    fit = fit_peaks(coarse_px, radiance, std, lines, response, widths, model_error)
+    q, chi_square = fit.column_px, fit.chi_square
+    std_px = torch.sqrt(chi_square.clip(min=1) / fit.information)
+    good = (fit.used > 3) & (fit.amplitude > 0) & (chi_square < MAX_CHI_SQUARE) & (std_px < 1 / math.sqrt(12))
+    good &= ((q - coarse_px).abs() < MAX_SHIFT_PX) & torch.isfinite(q)
+    otherwise = torch.where(fit.measured, fit.brightest, torch.maximum(fit.amplitude, fit.brightest))
+    return Column(
+        torch.where(good, q, coarse_px),
+        torch.where(good, std_px, torch.full_like(q, 1 / math.sqrt(12))),
+        torch.where(good, fit.amplitude, otherwise),
+        torch.where(good | fit.measured, fit.amplitude_std, torch.inf),
+        good,
+    )
+
+
+@dataclass(frozen=True)
+class PeakFit:
+    """Column (px) and amplitude of some peaks as they were fitted, each (pixels,).
+
+    With the information on the column (1/px2), reduced chi-square, frames used, the brightest of them, and
+    whether all of them were measured.
+    """
+
+    column_px: Tensor
+    amplitude: Tensor
+    amplitude_std: Tensor
+    information: Tensor
+    chi_square: Tensor
+    used: Tensor
+    brightest: Tensor
+    measured: Tensor
+
+
+def fit_peaks(
+    coarse_px: Tensor,
+    radiance: Tensor,
+    std: Tensor,
+    lines: LineSet,
+    response: ProjectorResponse,
+    widths: Tensor | None,
+    model_error: float,
+) -> PeakFit:
+    """Fit column and amplitude, with the arguments of `refine`, and judge nothing."""
     widest = 1.0 if widths is None else float(widths.max())
     y, variance, centres = _window(coarse_px, radiance, std, lines, response.blur_px * widest)
     # Measured spreads may end sharply: from the middle between two frames no frame shows a slope.
     q = coarse_px.clone() if response.spread is None else coarse_px + ASIDE_PX
     brightest = amplitude = y.amax(0)
-    error = MODEL_ERROR if lines.single else COMB_ERROR
+    error = model_error if lines.single else COMB_ERROR
     # No distance grows by more than the steps of all iterations.
     reach_px = float((q - centres).abs().max()) + ITERATIONS * STEP_PX
     table = LineTable(lines.width_px, response, reach_px, q, widths)
@@ -80,18 +125,8 @@ def refine(
         q = q + (amplitude * (weight * along * residual).sum(0) / information).clip(-STEP_PX, STEP_PX)
     used = (weight > 0).sum(0)
     chi_square = (weight * residual**2).sum(0) / (used - 2).clip(min=1)
-    std_px = torch.sqrt(chi_square.clip(min=1) / information)
-    good = (used > 3) & (amplitude > 0) & (chi_square < MAX_CHI_SQUARE) & (std_px < 1 / math.sqrt(12))
-    good &= ((q - coarse_px).abs() < MAX_SHIFT_PX) & torch.isfinite(q)
     measured = torch.isfinite(variance).all(0)
-    otherwise = torch.where(measured, brightest, torch.maximum(amplitude, brightest))
-    return Column(
-        torch.where(good, q, coarse_px),
-        torch.where(good, std_px, torch.full_like(q, 1 / math.sqrt(12))),
-        torch.where(good, amplitude, otherwise),
-        torch.where(good | measured, 1 / torch.sqrt(gg), torch.inf),
-        good,
-    )
+    return PeakFit(q, amplitude, 1 / torch.sqrt(gg), information, chi_square, used, brightest, measured)
 
 
 def dark_offset(

@@ -16,7 +16,7 @@ from dsl_core.optics.lines.line_set import LineSet
 from dsl_core.optics.spread.field import widths_at
 from dsl_core.optics.unlit import unlit_px
 from dsl_core.progress import NoProgress, Progress
-from dsl_core.reconstruction.columns.column import Column, dark_offset, refine
+from dsl_core.reconstruction.columns.column import MODEL_ERROR, Column, dark_offset, refine
 from dsl_core.reconstruction.columns.pattern_column import first_order_share, refine_by_profiles
 from dsl_core.reconstruction.hdr import MergedFrame
 from dsl_core.reconstruction.merge import LineStack
@@ -78,6 +78,8 @@ class ColumnFinder:
     device: str = "cpu"
     #: Where the first pixel of ``white`` and ``stack`` is in the whole picture, a flat index.
     first: int = 0
+    #: Relative error of the modelled peak of single lines.
+    peak_error: float = MODEL_ERROR
 
     def find(
         self,
@@ -125,7 +127,7 @@ class ColumnFinder:
         if self.lines is None:
             return self._of_patterns(where, start, y, std), torch.zeros_like(start), black_std
         widths = widths_at(self.rig, self._places(where, start), start)
-        column, offset, offset_std = _on_lines(start, y, std, self.lines, self.rig, widths)
+        column, offset, offset_std = _on_lines(start, y, std, self.lines, self.rig, widths, self.peak_error)
         known = offset_std < OFFSET_KNOWN * black_std
         return column, offset, torch.where(known, 0.0, torch.minimum(offset_std, black_std))
 
@@ -150,9 +152,15 @@ class ColumnFinder:
 
 
 def _on_lines(
-    start: Tensor, y: Tensor, std: Tensor, lines: LineSet, rig: Rig, widths: Tensor | None
+    start: Tensor,
+    y: Tensor,
+    std: Tensor,
+    lines: LineSet,
+    rig: Rig,
+    widths: Tensor | None,
+    peak_error: float,
 ) -> tuple[Column, Tensor, Tensor]:
     response = rig.projector_response
-    column = refine(start, y, std, lines, response, widths)
+    column = refine(start, y, std, lines, response, widths, peak_error)
     unlit = unlit_px(rig, lines.width_px)
     return column, *dark_offset(column.column_px, column.amplitude, y, std, lines, response, unlit)

@@ -22,11 +22,15 @@ def columns_by_rows(
     frames: ScanFrames,
     code: DecodedCode,
     white: MergedFrame,
+    peak_error: float,
     progress: Progress | None = None,
 ) -> FoundColumns:
-    """Refine and triangulate decoded columns band by band."""
+    """Refine and triangulate decoded columns band by band.
+
+    ``peak_error`` is that of the modelled peak of single lines, relative to it.
+    """
     height, width = code.column.shape
-    search = ColumnSearch(rig, frames.plan, options.refine_columns, options.device)
+    search = ColumnSearch(rig, frames.plan, options.refine_columns, options.device, peak_error)
     found = FoundColumns.empty(height * width)
     for band in frames.bands:
         stack, here = frames.lines(band, progress), band.rows

@@ -86,7 +86,7 @@ class Frame:
                 # Of a lit row all columns are lit, and each has its halo.
                 light = light * self._lit_columns(across[:, :1])
             else:
-                light = light * ((across > -0.5) & (across < other - 0.5))
+                light = light * self._within(across, other)
             reached = self._spread(along, across, light, axis)
             if some.order == 0 and axis == "columns":
                 at = torch.arange(self.lines(axis), device=light.device)
@@ -96,16 +96,28 @@ class Frame:
     def _lit_columns(self, column_px: Tensor) -> Tensor:
         """Zero-order light at columns (px) when all columns are lit, (n, 1)."""
         at = torch.arange(self.size_px[0], device=column_px.device)
-        x = column_px.double().cpu().numpy()
+        return self._within(column_px, self.size_px[0]) + self.halo(column_px - at).sum(1, keepdim=True)
+
+    def _within(self, place_px: Tensor, lines: int) -> Tensor:
+        """Light at places (px) of a frame all of whose ``lines`` are lit: 1 inside, spread at its two ends.
+
+        White, columns and rows so fall off alike there, and a pattern and its inverse add up to white.
+        """
+        found = ((place_px > -0.5) & (place_px < lines - 0.5)).to(place_px.dtype)
+        reach_px = self.spread.reach / FINE + 1
+        near = (place_px.abs() < reach_px) | ((place_px - lines).abs() < reach_px)
+        x = place_px[near].double().cpu().numpy()
         edge = np.cumsum(self.spread.point())
         places = (np.arange(len(edge)) + 0.5 - self.spread.reach) / FINE
-        passed = [np.interp(x - at_px, places, edge) for at_px in (-0.5, self.size_px[0] - 0.5)]
-        inside = torch.as_tensor(passed[0] - passed[1], dtype=column_px.dtype, device=column_px.device)
-        return inside + self.halo(column_px - at).sum(1, keepdim=True)
+        passed = [np.interp(x - at_px, places, edge) for at_px in (-0.5, lines - 0.5)]
+        found[near] = torch.as_tensor(passed[0] - passed[1], dtype=found.dtype, device=found.device)
+        return found
 
     def _spread(self, along: Tensor, across: Tensor, light: Tensor, axis: Axis) -> Tensor:
         """Light of each line (parts, lines) from light at positions (px), all (parts, wavelengths)."""
         lines, reach = self.lines(axis), self.spread.reach // FINE
+        # Light from beyond every line's reach falls on none, however far away a steep film says it comes from.
+        along = along.clip(-reach - 2, lines + reach + 1)
         # Each part has a grid of its own lines: those that its wavelengths come from, and the reach.
         first = along.amin(1).floor() - reach
         own = int((along.amax(1) - first).max()) + reach + 2

@@ -13,6 +13,9 @@ from numpy.typing import NDArray
 
 import dsl_core.simulation.foreign.renderer as module
 from dsl_core.optics.correspondence import zero_order
+from dsl_core.simulation.foreign.spread import Spread
+from dsl_core.simulation.foreign.transport import Frame
+from dsl_core.simulation.foreign.variants import Foreign
 from dsl_core.simulation.published_rig import published_rig
 from dsl_core.simulation.sim_devices import SimCamera, open_twin
 from dsl_core.simulation.world import World
@@ -53,6 +56,13 @@ def columns_px(world: World, scale: float = 1.0) -> Floats:
     return found
 
 
+def inside_rows(world: World, border_px: float = 3.0) -> NDArray[np.bool_]:
+    """Pixels whose zero order comes from rows that are not at the top or bottom of the frame."""
+    depth = torch.as_tensor(world.truth.depth_mm.ravel())
+    row = zero_order(world.rig, torch.arange(len(depth)), depth)[1].numpy().reshape(-1)
+    return np.asarray((row > border_px) & (row < world.rig.projector.height_px - 1 - border_px))
+
+
 def free_image(world: World) -> NDArray[np.uint8]:
     """Colours that differ along columns and rows both."""
     rng = np.random.default_rng(5)
@@ -82,17 +92,40 @@ def pattern(world: World, kind: str) -> NDArray[np.uint8]:
 def test_with_nothing_foreign_the_light_is_that_of_the_usual_renderer(kind: str, scene: str) -> None:
     """Two ways to one picture: closed form and sampling.
 
-    The usual renderer leaves out first orders where the zero order would come from beyond the frame.
+    The usual renderer leaves out first orders where the zero order would come from beyond the frame, and
+    ends sharply at the frame's top and bottom.
     """
     usual, plain = twin("", scene=scene), twin("plain", scene=scene)
     ours, theirs = (picture(world, pattern(world, kind)) for world in (plain, usual))
-    lit = theirs > 1e-6 * theirs.max()
+    lit = (theirs > 1e-6 * theirs.max()) & inside_rows(usual).reshape(theirs.shape)
     ours, theirs = ours[lit], theirs[lit]
     error = np.abs(ours - theirs)
     assert np.sqrt((error**2).mean()) < 0.004 * theirs.max()
     # Free patterns are tables of four samples a pixel in both.
     assert np.quantile(error, 0.99) < (0.02 if kind == "free" else 0.01) * theirs.max()
     assert ours.sum() == pytest.approx(theirs.sum(), rel=0.003)
+
+
+def test_a_pattern_and_its_inverse_add_up_to_white_at_the_edge_of_the_frame_too() -> None:
+    """Whichever way they vary: a check of frames relies on it."""
+    world = twin("spread-tails", film="off")
+    stripes = np.zeros_like(line(world, 0))
+    stripes[:, ::2] = 255
+    bars = np.zeros_like(stripes)
+    bars[::2] = 255
+    white = picture(world, np.full_like(stripes, 255)) + picture(world, black(world))
+    for pattern_shown in (stripes, bars):
+        both = picture(world, pattern_shown) + picture(world, 255 - pattern_shown)
+        np.testing.assert_allclose(both, white, atol=0.01 * white.max())
+
+
+def test_light_from_far_beyond_the_frame_takes_no_room() -> None:
+    """The ray search of a steeply bent film may end anywhere."""
+    frame = Frame((640, 360), published_rig().projector_response, Spread(0.7, Foreign.of("plain")), True)
+    along = torch.tensor([[100.0, 1e9], [100.0, -1e9]])
+    found = frame._spread(along, torch.full_like(along, 100.0), torch.ones_like(along), "columns")
+    assert found.sum(1).tolist() == pytest.approx([1.0, 1.0], abs=1e-4)
+    assert found.argmax(1).tolist() == [100, 100]
 
 
 def test_through_a_filter_both_agree_too() -> None:

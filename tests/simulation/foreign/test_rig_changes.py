@@ -82,6 +82,8 @@ def test_what_is_foreign_is_in_frames_and_measurements_and_not_in_the_calibratio
         world.show(white)
     signal = [world.rate() - world.path.ambient_dn_per_ms for world in worlds]
     lit = signal[0] > 1
+    # Two rows in, where the projector's frame does not end.
+    lit[:2] = lit[-2:] = False
     ratio = signal[1][lit] / signal[0][lit]
     assert 0.85 < ratio.min() < 0.97
     light = [spot_light(world, (16, 24), NM) for world in worlds]
