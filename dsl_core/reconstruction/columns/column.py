@@ -22,8 +22,8 @@ from dsl_core.optics.lines.profile import LineTable, halo_of_line
 ITERATIONS, STEP_PX = 6, 0.7
 #: Where the fit of a measured spread starts, from the decoded column, px.
 ASIDE_PX = 0.35
-#: Relative error of the modelled peak (blur, halo, neighbouring pixels), added to each variance, where a scan was
-#: not asked for its own (`peak_error`).
+#: Relative error of the modelled peak (blur, halo, neighbouring pixels), added to each variance, where a scan
+#: was not asked for its own (`peak_error`).
 MODEL_ERROR = 0.0015
 #: The same for combs, where the first orders of other lines are under the peak.
 COMB_ERROR = 0.05
@@ -57,9 +57,10 @@ def refine(
 
     ``coarse_px`` (pixels,) float; ``radiance`` and ``std`` (frames, pixels), DN per ms, infinite where
     saturated; ``widths`` (pixels,) are those of the spread relative to the response's; ``model_error`` is
-    that of the peak of single lines, relative to it. Where the fit fails, the decoded column stays, with the deviation of a whole pixel, ``1/sqrt(12)``. Its amplitude is that of
-    the brightest frame near it, or of the fit to what is left where frames are saturated, with an infinite
-    deviation: less would make light of the zero order next to them.
+    that of the peak of single lines, relative to it. Where the fit fails, the decoded column stays, with
+    the deviation of a whole pixel, ``1/sqrt(12)``. Its amplitude is that of the brightest frame near it, or
+    of the fit to what is left where frames are saturated, with an infinite deviation: less would make light
+    of the zero order next to them.
     """
     fit = fit_peaks(coarse_px, radiance, std, lines, response, widths, model_error)
     q, chi_square = fit.column_px, fit.chi_square

@@ -116,7 +116,7 @@ class Frame:
     def _spread(self, along: Tensor, across: Tensor, light: Tensor, axis: Axis) -> Tensor:
         """Light of each line (parts, lines) from light at positions (px), all (parts, wavelengths)."""
         lines, reach = self.lines(axis), self.spread.reach // FINE
-        # Light from beyond every line's reach falls on none, however far away a steep film says it comes from.
+        # Light from beyond every line's reach falls on none, however far off a steep film says it comes from.
         along = along.clip(-reach - 2, lines + reach + 1)
         # Each part has a grid of its own lines: those that its wavelengths come from, and the reach.
         first = along.amin(1).floor() - reach
