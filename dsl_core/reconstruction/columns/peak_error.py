@@ -1,8 +1,8 @@
 """How far the modelled peak of a line is off what a scan's own frames show.
 
 Noise is known, so whatever the fitted peaks leave beyond it is an error of the model: of the spread, the
-halo, what neighbouring pixels add. It is the same share of every peak; as part of each variance it makes brighter
-frames count less and deviations wider, so that it is taken no larger than the frames ask for.
+halo, what neighbouring pixels add. It is the same share of every peak; as part of each variance it makes
+brighter frames count less and deviations wider, so that it is taken no larger than the frames ask for.
 """
 
 from __future__ import annotations
