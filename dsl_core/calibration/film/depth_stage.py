@@ -45,8 +45,8 @@ FINE_ROUNDS = 2
 MIN_TILES = 40
 #: A filter's light is this far (px) from where all others put it: another filter, or a tilted one.
 WRONG_PX, OFF_PX = 2.0, 0.5
-#: Doubt about a filter: this far off (px), as much as columns that a fit never saw may be. Lenses that magnify
-#: red by a little more than green move a filter by less, and harm no band.
+#: Doubt about a filter: this far off (px), as much as columns that a fit never saw may be. Lenses that
+#: magnify red by a little more than green move a filter by less, and harm no band.
 DOUBT_PX = 0.3
 #: Depths at which curves are drawn.
 CURVE_POINTS = 41
