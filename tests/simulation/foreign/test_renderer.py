@@ -121,7 +121,7 @@ def test_a_pattern_and_its_inverse_add_up_to_white_at_the_edge_of_the_frame_too(
 
 def test_light_from_far_beyond_the_frame_takes_no_room() -> None:
     """The ray search of a steeply bent film may end anywhere."""
-    frame = Frame((640, 360), published_rig().projector_response, Spread(0.7, Foreign.of("plain")), True)
+    frame = Frame((640, 360), published_rig().projector_response, Spread(0.7, Foreign(frozenset())), True)
     along = torch.tensor([[100.0, 1e9], [100.0, -1e9]])
     found = frame._spread(along, torch.full_like(along, 100.0), torch.ones_like(along), "columns")
     assert found.sum(1).tolist() == pytest.approx([1.0, 1.0], abs=1e-4)
