@@ -105,3 +105,41 @@ def test_a_tile_counts_from_half_of_its_pixels_on_and_eighteen_are_needed() -> N
     half[tuple(place[: len(place) // 2 + 2].T)] = False
     with pytest.raises(CalibrationError, match="only 17 tiles"):
         smooth_part(np.zeros(int(half.sum())), half)
+
+
+def test_the_smooth_part_is_a_quadratic_and_its_deviation_what_six_terms_keep_of_noise() -> None:
+    known = np.ones((32, 48), bool)
+    y, x = np.mgrid[:32, :48]
+    across, down = 2 * x / 48 - 1, 2 * y / 32 - 1
+    course = 0.3 - 0.2 * across + 0.1 * down + 0.4 * across**2 - 0.3 * across * down + 0.2 * down**2
+    tiles = 8 * 12
+
+    def mean(values: np.ndarray) -> np.ndarray:
+        return np.asarray(values.reshape(8, 4, 12, 4).mean((1, 3)).ravel())
+
+    noise = np.random.default_rng(1).normal(0, 0.2, (32, 48))
+    value, one = mean(course + noise), np.ones(tiles)
+    a, b = mean(across), mean(down)
+    basis = np.stack([one, a, b, a * a, a * b, b * b], 1)
+    smooth = basis @ np.linalg.lstsq(basis, value, rcond=None)[0]
+    left = 6 * ((value - smooth) ** 2).sum() / (tiles - 6) / tiles
+    rms, std = smooth_part((course + noise).ravel(), known)
+    assert std == pytest.approx(np.sqrt(left))
+    assert rms == pytest.approx(np.sqrt((smooth**2).mean() - left))
+    assert smooth_part(0 * noise.ravel(), known) == (0.0, 0.0)
+
+
+@pytest.mark.parametrize(("tiles", "enough"), [(18, True), (17, False)])
+def test_eighteen_tiles_of_which_half_is_known_are_needed(tiles: int, enough: bool) -> None:
+    known = np.zeros((32, 48), bool)
+    for tile in range(tiles):
+        row, column = divmod(tile, 6)
+        known[4 * row : 4 * row + 2, 4 * column : 4 * column + 4] = True
+    # Less than half of a tile is none.
+    known[20, 20:23] = True
+    values = np.zeros(int(known.sum()))
+    if enough:
+        assert smooth_part(values, known) == (0.0, 0.0)
+    else:
+        with pytest.raises(CalibrationError, match="fills only 17 tiles"):
+            smooth_part(values, known)
