@@ -8,7 +8,12 @@ import numpy as np
 import pytest
 
 from dsl_core.calibration.geometry.boards import (
+    SATURATED_SHARE,
     Corners,
+    _bends_per_px,
+    _eight_bit,
+    _exposure_hint,
+    _full_light,
     _nearest_known,
     find_corners,
     grey_of,
@@ -17,7 +22,7 @@ from dsl_core.calibration.geometry.boards import (
     saturated,
 )
 from dsl_core.errors import CalibrationError
-from dsl_core.model.board import Charuco
+from dsl_core.model.board import Charuco, Checkerboard, corner_positions_mm
 from dsl_core.model.calibration.pose_frames import PoseFrames
 from tests.cases.board_poses import SMALL_BOARD, board_frames
 from tests.cases.board_twin import BOARD, TILTED, TILTED_SIZE_PX, true_corners
@@ -113,3 +118,68 @@ def test_what_is_unknown_is_taken_from_the_nearest_corner_of_the_board() -> None
     assert _nearest_known(row, at, one)[1].tolist() == [2.0, 2.0]
     one[3] = True
     assert _nearest_known(row, at, one)[1].tolist() == [4.0, 4.0]
+
+
+def test_white_light_is_the_mean_of_all_pairs_and_white_above_black() -> None:
+    white, black = np.full((2, 3), 900.0), np.full((2, 3), 100.0)
+    pairs = [np.full((2, 3), value) for value in (700.0, 300.0, 500.0, 520.0)]
+    # Each pair gives white and black once more: (800 + 800 + 820) / 3 above black.
+    found = _full_light(PoseFrames("pose", pairs, white, black))
+    assert found == pytest.approx(np.full((2, 3), (800 + 800 + 820) / 3))
+
+
+@pytest.mark.parametrize("full", [255, 1023, 4095, 16383, 65535])
+def test_white_is_saturated_near_the_end_of_its_scale(full: int) -> None:
+    white = np.full((2, 2), full // 2, np.uint16)
+    white[0, 0], white[0, 1] = full, int(SATURATED_SHARE * full) - 1
+    black = np.zeros((2, 2), np.uint16)
+    wanted = [[True, False], [False, False]]
+    assert saturated(PoseFrames("pose", (), white, black)).tolist() == wanted
+    colours = np.stack([white, white * 0, white * 0], 2)
+    assert saturated(PoseFrames("pose", (), colours, black)).tolist() == wanted
+
+
+def test_detectors_see_bytes_up_to_all_but_the_brightest_thousandth() -> None:
+    grey = np.linspace(0, 1000, 10_001, dtype=np.float32).reshape(1, -1)
+    found = _eight_bit(grey)
+    assert found.tolist() == np.clip(np.round(grey * (255 / 999.0)), 0, 255).astype(np.uint8).tolist()
+    assert _eight_bit(np.zeros((3, 3), np.float32)).max() == 0
+
+
+def test_over_exposure_and_lack_of_contrast_are_told() -> None:
+    flat = np.full((10, 10), 100, np.uint8)
+    bright = np.linspace(0, 1, 100, dtype=np.float32).reshape(10, 10)
+    assert "hardly any contrast" in _exposure_hint(flat, bright)
+    steps = np.where(np.arange(100).reshape(10, 10) % 2, 94, 106).astype(np.uint8)
+    assert _exposure_hint(steps, bright) == ""
+    assert "hardly any contrast" in _exposure_hint(np.where(steps > 100, 104, 96).astype(np.uint8), bright)
+    for clipped, is_told in ((20, False), (21, True)):
+        part = bright.copy()
+        part.ravel()[-clipped:] = 5.0
+        assert ("A fifth of the picture" in _exposure_hint(steps, part)) == is_told
+
+
+def test_what_a_corner_lacks_is_that_of_the_nearest() -> None:
+    places = np.array([[0, 0], [1, 0], [5, 0], [0, 3]])
+    values = np.array([[1.0, 10.0], [np.nan, 20.0], [3.0, np.nan], [np.nan, np.nan]])
+    found = _nearest_known(places, values, np.isfinite(values))
+    assert found.tolist() == [[1.0, 10.0], [1.0, 20.0], [3.0, 20.0], [1.0, 10.0]]
+    assert _nearest_known(places, values, np.zeros((4, 2), bool)).tolist() == [[0, 0]] * 4
+
+
+def test_the_nearest_corner_gives_the_pitch() -> None:
+    assert pitches_px(np.array([[0.0, 0.0], [3.0, 4.0], [3.0, 5.0]])).tolist() == [5.0, 1.0, 1.0]
+
+
+def test_edges_bend_by_the_curvature_of_three_corners() -> None:
+    board = Checkerboard(columns=5, rows=4, square_mm=10.0)
+    ids = np.arange(len(corner_positions_mm(board)))
+    x, y = np.rint(corner_positions_mm(board)[:, :2] / 10).astype(int).T
+    # Edges along x are circles of radius 500 px about a point below; those along y are straight.
+    points = np.stack([30.0 * x, 20.0 * y + (30.0 * x) ** 2 / 1000], 1)
+    found = _bends_per_px(Corners(ids, points), board)
+    inner = (x > x.min()) & (x < x.max())
+    slope = 2 * 30.0 * x[inner] / 1000
+    assert found[inner, 0] == pytest.approx((1 / 500) / (1 + slope**2) ** 1.5, rel=1e-6)
+    assert found[:, 1] == pytest.approx(np.zeros(len(ids)), abs=1e-12)
+    assert np.isfinite(found).all()

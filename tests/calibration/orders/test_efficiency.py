@@ -101,3 +101,25 @@ def test_a_second_order_has_the_deviations_of_the_first_and_of_its_share() -> No
     assert second.std is not None
     expected = [np.hypot(0.04 * 0.003, 0.005 * 0.1), np.hypot(0.04 * 0.001, 0.005 * 0.2), 0.005 * 0.05]
     assert second.std == pytest.approx(expected)
+
+
+def test_the_share_of_second_orders_is_a_weighted_mean_with_the_larger_deviation() -> None:
+    samples = [(0.02, 0.004, 0.5), (0.08, 0.01, 1.0), (0.05, np.inf, 1.0), (0.05, 0.01, 0.0)]
+    share, std = second_order_share(samples)
+    weight = np.array([(0.5 / 0.004) ** 2, (1.0 / 0.01) ** 2])
+    each = np.array([0.04, 0.08])
+    mean = weight @ each / weight.sum()
+    chi = weight @ (each - mean) ** 2
+    assert chi > 1
+    assert share == pytest.approx(mean)
+    assert std == pytest.approx(np.sqrt(chi / weight.sum()))
+    assert second_order_share([(0.02, 0.01, 0.5)]) == pytest.approx((0.04, 0.02))
+    assert second_order_share([(-0.02, 0.01, 0.5)])[0] == 0.0
+    assert second_order_share([(0.1, np.inf, 0.5)]) == (0.0, np.inf)
+
+
+def test_a_second_order_has_the_deviations_of_share_and_first() -> None:
+    first = SpectralCurve.of([400.0, 700.0], [0.2, 0.4], std=[0.01, 0.02])
+    second = second_order_curve(first, 0.1, 0.03)
+    assert second.values == pytest.approx((0.02, 0.04))
+    assert second.std == pytest.approx((np.hypot(0.001, 0.006), np.hypot(0.002, 0.012)))

@@ -9,7 +9,7 @@ import pytest
 from numpy.typing import NDArray
 
 from dsl_core.errors import StoreError
-from dsl_core.io.pictures.guess import guess_mapping
+from dsl_core.io.pictures.guess import _bayer_of, _depth_of, guess_mapping
 from dsl_core.io.pictures.mapping import BlackPicture, PhasePictures, StripePictures, WhitePicture
 from dsl_core.model.captured_code import Phases, Stripes
 from tests.cases.foreign_captures import PROJECTOR, frames, write
@@ -100,3 +100,33 @@ def test_folders_of_no_capture_end_in_a_sentence(tmp_path: Path) -> None:
     sizes = {f"{i}.png": np.zeros((30, 40 + i), np.uint16) for i in range(8)}
     with pytest.raises(StoreError, match=r"1\.png is 41 x 30 px, the first picture 40 x 30"):
         guess_mapping(write(tmp_path / "sizes", sizes))
+
+
+@pytest.mark.parametrize(
+    ("bits", "most", "is_wide", "floats", "found"),
+    [
+        (0xFF, 255, False, False, (None, False)), (0x3FF, 1023, True, False, (10, False)),
+        (0xFFF, 1024, True, False, (12, False)), (0xFFF, 4095, True, False, (12, False)),
+        (0xFFC0, 0xFFC0, True, False, (10, True)), (0xFFF0, 0xFFF0, True, False, (12, True)),
+        (0x1FFF, 4096, True, False, (16, False)), (0xFFF8, 0xFFF8, True, False, (16, False)),
+        (0, 1.0, False, True, (16, False)),
+    ],
+)  # fmt: skip
+def test_the_depth_of_pictures_is_told_by_the_bits_that_occur(
+    bits: int, most: float, is_wide: bool, floats: bool, found: tuple[int | None, bool]
+) -> None:
+    assert _depth_of(bits, most, is_wide, floats) == found
+
+
+@pytest.mark.parametrize(
+    ("cells", "bayer"),
+    [
+        ([[50, 100], [100, 60]], "RGGB"), ([[100, 50], [60, 100]], "GRBG"), ([[100, 100], [104, 111]], None),
+        ([[100, 100], [104, 113]], "RGGB"), ([[50, 100], [106, 60]], None), ([[50, 100], [104, 60]], "RGGB"),
+        ([[0, 100], [100, 60]], None), ([[100, 50], [55, 104]], "GRBG"),
+    ],
+)  # fmt: skip
+def test_a_mosaic_has_two_like_greens_and_unlike_neighbours(
+    cells: list[list[int]], bayer: str | None
+) -> None:
+    assert _bayer_of(np.tile(np.array(cells, np.float32), (4, 6))) == bayer

@@ -5,7 +5,14 @@ from pathlib import Path
 import pytest
 
 from dsl_core.errors import StoreError
-from dsl_core.io.scan.estimate import COMPRESSED_SHARE, MARGIN_BYTES, check_space, estimate, needed_bytes
+from dsl_core.io.scan.estimate import (
+    COMPRESSED_SHARE,
+    MARGIN_BYTES,
+    Estimate,
+    check_space,
+    estimate,
+    needed_bytes,
+)
 from dsl_core.model.plan import CapturePlan
 
 
@@ -37,3 +44,13 @@ def test_only_the_missing_frames_need_room(
     check_space(tmp_path, large, 3)
     with pytest.raises(StoreError, match=r"for 4 frames, but .* Free some space or choose another drive"):
         check_space(tmp_path, large, 4)
+
+
+def test_an_estimate_is_said_in_minutes_and_megabytes() -> None:
+    found = Estimate(frames=340, seconds=90.0, needed_bytes=1_234_000_000, free_bytes=5_000_000_000)
+    assert str(found) == "340 frames, 1.5 min on the rig, 1234 MB of 5000 MB free"
+
+
+def test_frames_are_compressed_to_three_fifths_beside_a_margin_of_64_mib(plan: CapturePlan) -> None:
+    assert needed_bytes(plan, 0) == 64 * 2**20
+    assert needed_bytes(plan, plan.shot_count) == int(0.6 * plan.raw_bytes) + 64 * 2**20

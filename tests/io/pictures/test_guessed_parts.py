@@ -1,0 +1,105 @@
+"""Sizes of projectors from digits, and parts of a mapping from what was recognised."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+from dsl_core.io.pictures.guessed_parts import _stripes, _unit, guessed_size, part_of
+from dsl_core.io.pictures.mapping import StripePictures, WhitePicture
+from dsl_core.model.captured_code import Axis
+from dsl_core.patterns.recognition.phase_sets import PhaseReading
+from dsl_core.patterns.recognition.sequence import Block
+from dsl_core.patterns.recognition.stripe_sets import StripeReading
+
+READING = StripeReading(
+    code="gray", base_bit=0, bits=10, first="most", inverse="interleaved", inverse_first=False,
+    roughness=0.0, rival=1.0, numbers=(3, 1000), rises=True,
+)  # fmt: skip
+SINUSOID = PhaseReading(4, "set", (1.0,), 0.0, 1, 0.01, 1.0)
+
+
+def stripes(axis: Axis, bits: int, most: int, **other: object) -> Block:
+    return Block("stripes", (), axis, replace(READING, bits=bits, numbers=(0, most), **other))  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    "size",
+    [
+        (1024, 768), (1280, 800), (1920, 1080), (854, 480), (912, 1140), (1140, 912), (1920, 1200),
+        (2560, 1600), (3840, 2160),
+    ],
+)  # fmt: skip
+def test_a_common_projector_is_known_by_its_last_column_and_row(size: tuple[int, int]) -> None:
+    width, height = size
+    blocks = [
+        stripes("columns", (width - 1).bit_length(), width - 1),
+        stripes("rows", (height - 1).bit_length(), height - 1),
+    ]
+    found, said = guessed_size(blocks)
+    assert found == size
+    assert f"{(width - 1).bit_length()} bits of columns up to {width - 1} and" in said
+
+
+@pytest.mark.parametrize(
+    ("most", "size"),
+    [
+        (1023, (1024, 768)),
+        (799, (1024, 768)),
+        (1024, (1280, 800)),
+        (1280, (1920, 1080)),
+        (1920, (2048, 1536)),
+    ],
+)
+def test_the_commonest_projector_that_has_the_columns_is_taken(most: int, size: tuple[int, int]) -> None:
+    assert guessed_size([stripes("columns", most.bit_length(), most)])[0] == size
+
+
+@pytest.mark.parametrize(
+    ("rows", "size"), [(479, (854, 480)), (359, (854, 480)), (767, (1024, 768)), (1050, (1920, 1080))]
+)
+def test_rows_alone_find_a_projector_too(rows: int, size: tuple[int, int]) -> None:
+    assert guessed_size([stripes("rows", rows.bit_length(), rows)])[0] == size
+
+
+def test_a_projector_of_no_common_size_has_as_many_pixels_as_numbers() -> None:
+    assert guessed_size([stripes("columns", 7, 100)])[0] == (128, 96)
+    assert guessed_size([stripes("rows", 7, 100)])[0] == (170, 128)
+    assert guessed_size([stripes("columns", 7, 100), stripes("rows", 6, 50)])[0] == (128, 64)
+
+
+def test_sinusoids_say_no_size() -> None:
+    phases = Block("phases", (0, 1, 2, 3), "columns", SINUSOID)
+    size, said = guessed_size([phases, stripes("columns", 5, 20)])
+    assert size == (1024, 768)
+    assert "phases do not say the size" in said
+
+
+@pytest.mark.parametrize(
+    ("length", "bits", "unit"), [(1024, 10, 1), (1025, 10, 2), (1280, 7, 10), (1920, 7, 15), (600, 10, 1)]
+)
+def test_all_stripes_together_just_cover_the_projector(length: int, bits: int, unit: int) -> None:
+    assert _unit(replace(READING, bits=bits), length) == unit
+
+
+@pytest.mark.parametrize(
+    ("axis", "most", "offset"),
+    [("columns", 800, 112), ("columns", 799, 0), ("rows", 600, 212), ("rows", 599, 0)],
+)
+def test_numbers_beyond_the_projector_are_centred_on_it(axis: Axis, most: int, offset: int) -> None:
+    block = stripes(axis, 10, most)
+    assert isinstance(block.reading, StripeReading)
+    part, doubts = _stripes(block, block.reading, [block], (800, 600))
+    assert isinstance(part, StripePictures)
+    assert (part.offset, part.unit_px, part.bits, part.axis) == (offset, 1, 10, axis)
+    assert bool(doubts) == bool(offset)
+
+
+def test_what_is_unsure_of_stripes_is_said() -> None:
+    unsure = stripes("columns", 10, 500, roughness=0.5, rival=0.5)
+    falling = stripes("columns", 10, 500, rises=False)
+    for block, said in ((unsure, "another code or order of digits"), (falling, "fall along the picture")):
+        (doubt,) = part_of(block, [block], (1024, 768), None)[1]  # type: ignore[arg-type]
+        assert said in doubt
+    assert part_of(Block("white", (0,)), [], (4, 3), None) == (WhitePicture(), [])  # type: ignore[arg-type]
