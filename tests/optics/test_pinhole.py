@@ -100,3 +100,12 @@ def test_tangential_distortion_moves_points_across_the_axes() -> None:
     u, v = distort(x, y, (0.0, 0.0, 0.01, 0.02, 0.0))
     assert float(u[0]) == pytest.approx(0.3 + 0.01 * 2 * 0.06 + 0.02 * (0.13 + 2 * 0.09))
     assert float(v[0]) == pytest.approx(0.2 + 0.01 * (0.13 + 2 * 0.04) + 0.02 * 2 * 0.06)
+
+
+@pytest.mark.parametrize("right", [0.2, 0.8])
+@pytest.mark.parametrize("low", [0.3, 0.7])
+def test_any_corner_may_be_the_farthest(right: float, low: float) -> None:
+    middle = {"cx_px": right * (LENS.width_px - 1), "cy_px": low * (LENS.height_px - 1)}
+    lens = LENS.model_copy(update={"distortion": (0.0,) * 5, **middle})
+    x, y = 0.8 * (LENS.width_px - 1) / lens.fx_px, 0.7 * (LENS.height_px - 1) / lens.fy_px
+    assert max_radius_sq(lens) == pytest.approx(1.21 * (x * x + y * y))

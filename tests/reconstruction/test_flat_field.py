@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from typing import Any
+
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
 from dsl_core.model.rig import Rig
 from dsl_core.optics.sensor import relative_gain
+from dsl_core.reconstruction import flat_field
 from dsl_core.reconstruction.flat_field import (
     FlatFit,
     flat_finding,
@@ -84,3 +88,75 @@ def test_too_few_pixels_say_nothing(rig: Rig) -> None:
     level, shading = scene(rig)
     shading[:, 40:] = np.nan
     assert own_flat_field(rig, level, shading) is None
+
+
+@pytest.mark.parametrize(("pairs", "stride"), [(30_000, 1), (800, 3)])
+def test_pixels_a_nineteenth_of_the_width_apart_are_compared(
+    rig: Rig, pairs: int, stride: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(flat_field, "PAIRS", pairs)
+    level, shading = scene(rig)
+    height, width = shading.shape
+    assert (height, width) == (72, 112)
+    far, look = square(rig), np.log(level / shading)
+    wanted = []
+    for down, across in ((0, 6), (6, 0)):
+        for y in range(0, height - down, stride):
+            for x in range(0, width - across, stride):
+                here, there = (y, x), (y + down, x + across)
+                step, light = look[there] - look[here], np.log(shading[there] / shading[here])
+                if abs(step) < 0.06 and abs(light) < 0.1:
+                    quarter = 2 * (y + down / 2 > 36) + (x + across / 2 > 56)
+                    wanted.append((step, far[there] - far[here], light, quarter))
+    found = flat_field._pairs(rig, level, shading)
+    assert len(wanted) > 500
+    for got, values in zip(found, zip(*wanted, strict=True), strict=True):
+        assert got == pytest.approx(np.array(values), abs=1e-12)
+
+
+FOUND = FlatFit(-0.08, 0.002, (-0.08, -0.081, -0.079, -0.08), (-0.08, 0.004))
+
+
+@pytest.mark.parametrize(
+    ("change", "present"),
+    [
+        ({}, True), ({"corner_std": 0.0134}, False), ({"corner_std": 0.0132}, True),
+        ({"quarters": (-0.1, -0.1, -0.0605, -0.0605)}, True),
+        ({"quarters": (-0.1, -0.1, -0.059, -0.059)}, False),
+        ({"beside_shading": (-0.041, 0.004)}, True), ({"beside_shading": (-0.039, 0.004)}, False),
+        ({"beside_shading": (-0.08, 0.026)}, True), ({"beside_shading": (-0.08, 0.027)}, False),
+    ],
+)  # fmt: skip
+def test_a_gain_is_one_that_all_quarters_and_shading_agree_about(
+    change: dict[str, Any], present: bool
+) -> None:
+    assert replace(FOUND, **change).present == present
+
+
+def test_a_gain_matters_from_one_and_a_half_per_cent_on() -> None:
+    for corner, present in ((-0.0151, True), (0.0151, True), (-0.0149, False)):
+        assert FlatFit(corner, 1e-4, (corner,) * 4, (corner, 1e-4)).present == present
+    finding = flat_finding(FOUND)
+    assert finding.value == pytest.approx(np.exp(-0.08) - 1)
+    assert (finding.std, finding.limit, finding.significant) == (0.002, 0.015, True)
+
+
+def test_the_gain_falls_with_the_square_of_the_distance_and_is_unsure_by_its_form(rig: Rig) -> None:
+    assert unsure_gain(rig, FOUND) == pytest.approx(square(rig) * np.hypot(0.002, 0.15 * 0.08))
+    field = with_flat_field(rig, FOUND).flat_field
+    assert field is not None
+    assert (len(field.rows_px), len(field.columns_px)) == (17, 25)
+    assert (field.rows_px[0], field.rows_px[-1], field.columns_px[-1]) == (0.0, 71.0, 111.0)
+    assert np.min(field.gain) == pytest.approx(np.exp(-0.08))
+
+
+@pytest.mark.parametrize(("pixels", "told"), [(200, True), (199, False)])
+def test_two_hundred_pairs_tell_a_slope(pixels: int, told: bool) -> None:
+    rng = np.random.default_rng(1)
+    cause, other = rng.normal(size=(2, pixels))
+    level = 0.3 * cause - 0.2 * other + 0.001 * rng.normal(size=pixels)
+    found = flat_field._slope(level, cause, other)
+    assert (found is not None) == told
+    if found is not None:
+        assert found[0] == pytest.approx(0.3, abs=5 * found[1])
+        assert found[1] == pytest.approx(0.001 / np.sqrt(pixels), rel=0.3)

@@ -157,3 +157,17 @@ def test_wrong_input_is_refused() -> None:
         HdrMerger([1.0, 0.0], [exact_black()] * 2, SENSOR)
     with pytest.raises(DecodeError, match="no black"):
         black_frame([], SENSOR)
+
+
+def test_other_light_at_a_setting_is_another_gain() -> None:
+    """Frames that were exposed to more or less light than their settings say, some of them saturated."""
+    rng = np.random.default_rng(6)
+    raws = shoot(rng.exponential(20.0, SHAPE), rng)
+    raws[0][0, :2] = raws[1][0, :2] = SENSOR.full_scale_dn
+    levels = [0.8, 1.3]
+    found = HdrMerger(GAINS_MS, [exact_black()] * 2, SENSOR).merge(raws, levels=levels)
+    wanted = HdrMerger(GAINS_MS * levels, [exact_black()] * 2, SENSOR).merge(raws)
+    assert wanted.saturated.sum() == 2
+    np.testing.assert_array_equal(found.saturated, wanted.saturated)
+    np.testing.assert_allclose(found.radiance, wanted.radiance, rtol=1e-5)
+    np.testing.assert_allclose(found.variance, wanted.variance, rtol=1e-5)
