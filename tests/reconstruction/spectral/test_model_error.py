@@ -6,11 +6,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.ndimage import gaussian_filter
 
 from dsl_core.reconstruction.spectral.causes import common_error, fit_causes
-from dsl_core.reconstruction.spectral.model_error import MARGIN, model_error, neighbour_contrast
+from dsl_core.reconstruction.spectral.model_error import MARGIN, ModelError, model_error, neighbour_contrast
 from dsl_core.reconstruction.spectral.probing.line_probe import LineProbe
-from dsl_core.reconstruction.spectral.probing.probe import Probe
+from dsl_core.reconstruction.spectral.probing.probe import PRIOR_STD, Probe
 from dsl_core.reconstruction.spectral.probing.probed_light import PARAMETERS
 from dsl_core.reconstruction.spectral.probing.probed_pixels import CELLS
 
@@ -76,3 +77,58 @@ def test_contrast_compares_samples_of_one_colour() -> None:
     contrast = neighbour_contrast(mosaic)
     assert contrast[:, 5:7] == pytest.approx(1.0)
     assert contrast[:, :3].max() == contrast[:, 9:].max() == 0
+
+
+def test_cells_ask_beyond_twice_their_noise_and_neighbours_share_the_answer() -> None:
+    probe = made(0.03, noise=True)
+    probe.chi_square[::3] = 2.0
+    probe.lines.values[:] = 0.01, -0.02
+    squares, level = np.zeros((*CELLS, BANDS)), np.zeros((*CELLS, BANDS))
+    prior = np.diag(np.array(PRIOR_STD[:7]) ** -2.0)
+    for cell in range(CELLS[0] * CELLS[1]):
+        here, place = probe.cell == cell, np.unravel_index(cell, CELLS)
+        weight = 1 / np.where(probe.chi_square[here] > 1, probe.chi_square[here], 1)
+        known = np.einsum("n,npq->pq", weight, probe.normal[here])[:7, :7]
+        asked = np.linalg.solve(known + prior, (weight @ probe.score[here])[:7])
+        inverse = np.linalg.inv(known + prior)
+        for bias, own in zip(probe.bias[here], probe.reflectance[here], strict=True):
+            noise = np.diag(bias[:, :7] @ inverse @ known @ inverse @ bias[:, :7].T)
+            profile = bias[:, [4, 5]] @ probe.lines.values
+            squares[place] += (bias[:, :7] @ asked) ** 2 - 2 * noise + profile**2
+            level[place] += own**2
+    error, light = (gaussian_filter(each, (0.7, 0.7, 1.0), mode="nearest") for each in (squares, level))
+    wanted = np.hypot(1.25 * np.sqrt(error.clip(0) / light), 0.02).transpose(2, 0, 1)
+    assert model_error(probe, 0.02).relative == pytest.approx(wanted)
+
+
+@pytest.mark.parametrize(("few", "found"), [(10, 3.0), (9, 1.0)])
+def test_ten_pixels_with_misfit_say_how_residuals_hang_together(few: int, found: float) -> None:
+    probe = made(0.0, noise=False)
+    probe.chi_square[:few], probe.correlation[:few] = 1.51, 3.0
+    probe.chi_square[few : few + 5], probe.correlation[few : few + 5] = 1.49, 9.0
+    probe.chi_square[20], probe.correlation[20] = 2.0, np.nan
+    assert model_error(probe).correlation == found
+
+
+def test_the_error_of_a_cell_is_in_its_middle() -> None:
+    error = ModelError(np.arange(2.0 * CELLS[0] * CELLS[1]).reshape(2, *CELLS))
+    shape = 10 * CELLS[0], 14 * CELLS[1]
+    # Half way between the middles of four pixels, and beyond the middles of the outermost cells.
+    rows, columns = np.array([24, 25, 0]), np.array([20, 21, 0])
+    found = error.at(rows, columns, shape)
+    place = (rows + 0.5) / 10 - 0.5, (columns + 0.5) / 14 - 0.5
+    plane = place[0].clip(0) * CELLS[1] + place[1].clip(0)
+    assert found == pytest.approx(np.stack([plane, plane + CELLS[0] * CELLS[1]]))
+
+
+def test_contrast_is_half_a_difference_over_the_darkest_and_reaches_one_pixel_further() -> None:
+    level = np.full((12, 12), 4.0, np.float32)
+    level[6, 6] = 6.0
+    contrast = neighbour_contrast(level)
+    assert contrast[6, 6] == pytest.approx(2 / 8)
+    assert contrast[3:10, 3:10] == pytest.approx(2 / 8)
+    assert contrast[2].max() == 0.0
+    # What is dark, or nothing, is not divided by.
+    level[6, 6], level[0, 0] = 0.0, np.nan
+    assert neighbour_contrast(level)[6, 6] == pytest.approx(100.0)
+    assert neighbour_contrast(0 * level).max() == 0.0
