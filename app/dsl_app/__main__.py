@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from dsl_app.shared.display import has_screen
+from dsl_core.solve.threads import share_no_small_matrices
 
 if TYPE_CHECKING:
     from dsl_app.shell.main_window import MainWindow
@@ -26,6 +27,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if not has_screen(sys.platform, os.environ):
         print(NO_SCREEN, file=sys.stderr)
         return 2
+    share_no_small_matrices()
     # superqt looks for this when it is imported.
     os.environ.setdefault("QT_API", "pyside6")
     from dsl_app.composition.window import Composition, StartOptions

@@ -14,6 +14,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run a command line (that of the process if not given) and return its exit code."""
     try:
         # Inside, so that Ctrl-C while it loads ends in a sentence as well.
+        from dsl_core.solve.threads import share_no_small_matrices
+
+        share_no_small_matrices()
         from dsl_core.cli.run import run
 
         return run(list(sys.argv[1:] if arguments is None else arguments))

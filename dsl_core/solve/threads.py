@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -9,6 +10,15 @@ from contextlib import contextmanager
 _lock = threading.Lock()
 #: How deep each thread is in such blocks; how many threads are; and what torch had before the first came.
 _own, _threads, _before = threading.local(), 0, 1
+
+
+def share_no_small_matrices() -> None:
+    """Let numpy and scipy do their linear algebra on the thread that asks; before either is imported.
+
+    Matrices here are small, and threads that wait for a share of one keep the cores from working ones: two
+    and a half times the processor time of a scan on a busy machine. A number that the user has set stays.
+    """
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 
 @contextmanager

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import os
+import subprocess
+import sys
 import threading
 from collections.abc import Callable, Iterator
 
 import pytest
 import torch
 
-from dsl_core.solve.threads import one_kernel_thread
+from dsl_core.solve.threads import one_kernel_thread, share_no_small_matrices
 
 BEFORE = 3
 
@@ -95,3 +98,21 @@ def test_overlapping_blocks_leave_what_was_there_before(first_in_first_out: bool
     last.end()
     assert in_new_thread(torch.get_num_threads) == BEFORE
     assert one.look() == two.look() == BEFORE
+
+
+@pytest.mark.parametrize("start", ["dsl_core.cli", "dsl_app.__main__"])
+def test_what_a_program_starts_with_loads_no_numpy_before_its_threads_are_limited(start: str) -> None:
+    code = (
+        f"import os, sys; import {start}; from dsl_core.solve.threads import share_no_small_matrices;"
+        "assert 'numpy' not in sys.modules; share_no_small_matrices();"
+        "assert os.environ['OPENBLAS_NUM_THREADS'] == '1'"
+    )
+    environment = {k: v for k, v in os.environ.items() if k != "OPENBLAS_NUM_THREADS"}
+    done = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, check=False)
+    assert done.returncode == 0, done.stderr
+
+
+def test_a_number_of_threads_that_the_user_set_stays(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("OPENBLAS_NUM_THREADS", "3")
+    share_no_small_matrices()
+    assert os.environ["OPENBLAS_NUM_THREADS"] == "3"
