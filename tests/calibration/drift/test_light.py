@@ -10,6 +10,7 @@ import pytest
 import torch
 from scipy.ndimage import gaussian_filter1d
 
+from dsl_core.calibration.drift import light
 from dsl_core.calibration.drift.light import PlaneSignals, _film_figures, _shift, film_drift, light_drift
 from dsl_core.errors import CalibrationError
 from dsl_core.model.figure import Figure
@@ -195,3 +196,93 @@ def test_figures_have_limits_on_both_sides() -> None:
     assert (gain.low, gain.high) == (0.95, 1.05)
     assert (shift.value, shift.std, gain.value, gain.std) == (0.05, 0.01, 0.98, 0.02)
     assert "order -1" in shift.name
+
+
+class Expected:
+    """What the calibration expects, as given: the zero order, one first order, and another beside it."""
+
+    def __init__(self, zero: np.ndarray, here: np.ndarray, other: np.ndarray) -> None:
+        self.zero, self.here, self.other = zero, here, other
+
+    def signals(self, orders: tuple[int, ...] = (), shift_px: float = 0.0) -> np.ndarray:
+        if orders == (0,) or not orders:
+            return self.zero
+        return self.other if 0 in orders else self.here * (1 + 0.2 * shift_px)
+
+
+def even_signals(radiance: np.ndarray, std: float = 0.1) -> PlaneSignals:
+    count = radiance.shape[1]
+    none = np.zeros(count)
+    return PlaneSignals(
+        np.arange(count), np.arange(count) % 3, none, none, none[None], radiance, np.full(radiance.shape, std)
+    )
+
+
+def test_the_deviation_of_white_is_that_of_a_median_beside_that_of_the_scale(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    expected = np.full((1, 600), 2.0)
+    expected[0, :96] = 0.39  # below a fifth of the usual light
+    monkeypatch.setattr(light, "_Plane", lambda *_: Expected(expected, expected, expected))
+    ratio = np.tile(np.repeat([0.9, 1.0, 1.1, 1.3], 3), 50)
+    rig = RIG.model_copy(update={"white_scale_rel_std": 0.003})
+    for figure in light_drift(rig, even_signals(ratio * expected), 0.99):
+        assert figure.value == pytest.approx(1.05)
+        # Half of the deviations from the median are within 0.05, the others 0.15 and 0.25.
+        spread = 1.4826 * (0.05 + 0.15) / 2
+        assert figure.std == pytest.approx(np.hypot(1.2533 * spread / np.sqrt(168), 0.003))
+        assert (figure.low, figure.high) == (0.97, 1.03)
+
+
+@pytest.mark.parametrize(("count", "enough"), [(150, True), (147, False)])
+def test_fifty_pixels_of_a_colour_are_needed(
+    count: int, enough: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    expected = np.ones((1, count))
+    monkeypatch.setattr(light, "_Plane", lambda *_: Expected(expected, expected, expected))
+    if enough:
+        assert len(light_drift(RIG, even_signals(expected), 0.99)) == 3
+    else:
+        with pytest.raises(CalibrationError, match="Only 49 red pixels"):
+            light_drift(RIG, even_signals(expected), 0.99)
+
+
+def test_first_orders_are_judged_where_they_are_nearly_all_there_is(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Signals of an order over its largest, and what else is there over the order, at both limits."""
+    count = 1500
+    zero, here, other = np.full((1, count), 4.0), np.zeros((1, count)), np.full((1, count), 1e-4)
+    here[0, :500] = 1.0
+    here[0, 500:550], here[0, 550:600] = 0.019, 0.021
+    other[0, :50], other[0, 50:100] = 0.021, 0.019
+    monkeypatch.setattr(light, "_Plane", lambda *_: Expected(zero, here, other))
+    asked: list[tuple[np.ndarray, ...]] = []
+
+    def noted(*parts: np.ndarray) -> tuple[float, float, float, float]:
+        asked.append(parts)
+        return 0.01, 1.0, 0.001, 0.002
+
+    monkeypatch.setattr(light, "_shift", noted)
+    lines = even_signals(8.0 + np.arange(count)[None] * 1e-3)
+    film_drift(RIG, lines, 0.99)
+    scale = float(np.median(lines.radiance / zero))
+    chosen = np.r_[50:500, 550:600]
+    for data, model, slope, std in asked:
+        assert len(data) == len(chosen)
+        assert model == pytest.approx(here[0, chosen])
+        assert data == pytest.approx(lines.radiance[0, chosen] / scale - other[0, chosen])
+        assert slope == pytest.approx(0.2 * here[0, chosen])
+        assert std == pytest.approx(np.full(len(chosen), 0.1 / scale))
+
+
+def test_signals_far_off_pull_as_those_at_the_limit() -> None:
+    """At the solution the clipped deviations add up to nothing (Huber 1981)."""
+    rng = np.random.default_rng(2)
+    data = 1 + 0.1 * rng.standard_normal(300)
+    data[:60] += 0.5
+    slope = np.tile([1e-3, -1e-3], 150)
+    _, gain, *_ = _shift(data, np.ones(300), slope, np.full(300, 1e-6))
+    off = data - gain
+    scale = 1.4826 * float(np.median(np.abs(off)))
+    pulls = [abs(float(np.clip(off / scale, -limit, limit).mean())) for limit in (1.345, 2.0, 0.9)]
+    assert pulls[0] < 5e-3
+    assert min(pulls[1:]) > 0.02

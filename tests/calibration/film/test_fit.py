@@ -10,6 +10,8 @@ import pytest
 from dsl_core.calibration.film.fit import (
     COMMON_PX,
     FIELDS,
+    SIGNIFICANT,
+    FilterAngle,
     columns_per_share,
     fit_film,
     grating_columns,
@@ -102,3 +104,13 @@ def test_too_few_samples_are_refused() -> None:
     samples = samples_of(small_rig(), NOISE_PX)
     with pytest.raises(CalibrationError, match="found in only 50 tiles"):
         fit_film(small_rig(), samples.only(np.arange(len(samples)) < 50), Film())
+
+
+def test_filters_are_askew_beyond_doubt_or_not_at_all() -> None:
+    askew = FilterAngle((0.25, 0.0, 0.0), (0.25 / (1.01 * SIGNIFICANT), 0.1, 0.1))
+    assert askew.is_significant
+    assert askew.index == pytest.approx((2.0, 0.5 * 8 * askew.std[0]))
+    doubtful = FilterAngle((0.25, 9.0, 9.0), (0.25 / (0.99 * SIGNIFICANT), 0.1, 0.1))
+    assert not doubtful.is_significant
+    assert doubtful.index is None
+    assert not FilterAngle().is_significant

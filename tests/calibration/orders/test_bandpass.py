@@ -9,7 +9,8 @@ import pytest
 
 from dsl_core.calibration.light.chain_equations import LineScan
 from dsl_core.calibration.light.zero_order import ZeroOrderFit
-from dsl_core.calibration.orders.bandpass import SeenFilter, fit_bandpass, profile_scan
+from dsl_core.calibration.orders.bandpass import SeenFilter, _sample, fit_bandpass, profile_scan
+from dsl_core.calibration.orders.filter_check import PlacedFilter
 from dsl_core.calibration.orders.order_light import FilterLight, OrderLight
 from dsl_core.errors import CalibrationError
 from dsl_core.model.calibration.bandpass import BandpassCalibration, apply_bandpass
@@ -135,3 +136,30 @@ def test_no_filters_and_no_target_are_refused() -> None:
     blind = replace(profile, good=np.zeros(len(profile.good), bool))
     with pytest.raises(CalibrationError, match="shows too little of the target"):
         fit_bandpass(RIG, scan, blind, [seen(nm) for nm in CENTRES], REFLECTANCE)
+
+
+def test_a_sample_is_the_weighted_mean_of_the_colours_that_see_an_order() -> None:
+    def of_order(order: int, std: list[float], offset_px: float = 0.25) -> OrderLight:
+        return OrderLight(order, np.array([0.1, 0.2, 0.4]), np.array(std), offset_px, 0.01, 0.5, 3.0, 900)
+
+    orders = {
+        1: of_order(1, [0.01, 0.02, np.inf]),
+        -1: of_order(-1, [np.inf] * 3),
+        2: of_order(2, [0.1] * 3, np.nan),
+    }
+    light = FilterLight(np.array([1.0, np.nan, 3.0]), np.full(3, 0.1), orders, (0.0, 0.0), 0.0)
+    each = SeenFilter(540.0, nominal_filter(540.0), False, light)
+    found = _sample(each, PlacedFilter(540.0, 541.0, False, {}), (542.0, 0.5))
+    assert (found.filter_nm, found.effective_nm, found.found_nm, found.found_std_nm) == (
+        540.0,
+        541.0,
+        542.0,
+        0.5,
+    )
+    assert found.zero_dn_per_ms == (1.0, 0.0, 3.0)
+    (sample,) = found.orders
+    weight = np.array([1e4, 2500.0])
+    assert sample.order == 1
+    assert sample.ratio == pytest.approx(weight @ [0.1, 0.2] / weight.sum())
+    assert sample.ratio_std == pytest.approx(weight.sum() ** -0.5)
+    assert (sample.offset_px, sample.offset_std_px) == (0.25, 0.01)
