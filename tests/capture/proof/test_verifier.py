@@ -122,3 +122,21 @@ def test_dark_scenes_are_not_judged(scene: RenderedScene) -> None:
     for shot in scene.plan.shots():
         pixels = rng.integers(258, 264, (48, 64)).astype(np.uint16)
         assert proof.judge(shot, pixels).verdict is Verdict.UNTOLD
+
+
+@pytest.mark.parametrize(("across", "rises"), [(1.0, True), (-1.0, False)])
+def test_columns_rise_unless_the_projector_is_mirrored(
+    scene: RenderedScene, across: float, rises: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    asked: list[object] = []
+
+    def noted(*parts: object) -> None:
+        asked.append(parts[-2])
+
+    monkeypatch.setattr("dsl_core.capture.proof.verifier.FirstCode", noted)
+    rig = scene.calibration
+    turned = np.diag([across, 1.0, across])
+    pose = rig.pose.model_copy(update={"rotation": tuple(map(tuple, (turned @ rig.pose.matrix).tolist()))})
+    FrameProof(scene.plan, rig.model_copy(update={"pose": pose}))
+    FrameProof(scene.plan, None)
+    assert asked == [rises, None]

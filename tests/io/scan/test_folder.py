@@ -294,3 +294,27 @@ def test_the_manifest_says_what_was_before_the_camera(
     rig.place(Placement(target="spectralon"))
     with ScanWriter.create(tmp_path / "scan.dsl", plan, rig, {"scene": "plane"}) as writer:
         assert writer.manifest.notes["before_camera"] == "spectralon"
+
+
+def test_each_run_of_a_scan_has_its_number(tmp_path: Path, plan: CapturePlan, frame_of: FrameOf) -> None:
+    folder, shots = tmp_path / "scan.dsl", list(plan.shots())
+    with ScanWriter.create(folder, plan) as writer:
+        writer.write(shots[0], frame_of(shots[0]))
+    for shot in shots[1:3]:
+        with ScanWriter.resume(folder) as writer:
+            writer.write(shot, frame_of(shot))
+    assert [ScanReader(folder).entries[shot.index].run for shot in shots[:3]] == [1, 2, 3]
+
+
+def test_what_is_no_scan_gets_no_lock(tmp_path: Path) -> None:
+    with pytest.raises(StoreError, match="is not a scan"):
+        ScanWriter.resume(tmp_path)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_closed_scan_takes_no_frame(tmp_path: Path, plan: CapturePlan, frame_of: FrameOf) -> None:
+    writer = ScanWriter.create(tmp_path / "scan.dsl", plan)
+    shot = next(plan.shots())
+    writer.close()
+    with pytest.raises(StoreError, match="is closed"):
+        writer.write(shot, frame_of(shot))

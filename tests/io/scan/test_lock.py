@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 import pytest
@@ -20,3 +21,16 @@ def test_a_lock_can_be_released_twice_and_taken_again(tmp_path: Path) -> None:
     first.release()
     first.release()
     FolderLock(tmp_path / "lock").release()
+
+
+def test_a_lock_names_its_process_alone(tmp_path: Path) -> None:
+    path = tmp_path / "lock"
+    path.write_text("a number of a process that was killed long ago\n")
+    lock = FolderLock(path)
+    assert path.read_text() == f"{os.getpid()}\n"
+    before = len(os.listdir("/proc/self/fd")) if Path("/proc/self/fd").is_dir() else 0
+    with pytest.raises(StoreError, match=f"number {os.getpid()}"):
+        FolderLock(path)
+    if before:
+        assert len(os.listdir("/proc/self/fd")) == before, "a lock in vain leaves no file open"
+    lock.release()
