@@ -13,7 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from dsl_core.capture.sentinels import moved_between
+from dsl_core.capture.motion import moved_between
+from dsl_core.model.captured_code import CapturedCode
 from dsl_core.model.plan import CapturePlan, Shot
 from dsl_core.model.rig import Sensor
 
@@ -47,23 +48,41 @@ class Diagnosis:
         """Without white, black and code in the plan there is never anything to say."""
         self._sensor = sensor
         self._shots = plan.references()
+        setting = min(plan.code_settings)
+        pair = [s for s in plan.shots() if (s.role, s.setting) == ("code", setting) and s.pattern < 2]
+        # Of codes of other programs, nobody knows what makes a pair.
+        self._pair = [] if isinstance(plan.code, CapturedCode) else pair
         self._kept: dict[int, Mosaic] = {}
 
     def keep(self, shot: Shot, pixels: Mosaic) -> None:
         """Keep a picture that the scan believes, if it is one of a reference."""
-        if shot in self._shots.values():
+        if shot in self._shots.values() or shot in self._pair:
             self._kept[shot.index] = pixels
 
     def sentence(self, take: Callable[[Shot], Mosaic]) -> str:
         """What has changed and what to do, after capturing the references again; empty where nothing shows.
 
-        Raises what ``take`` raises.
+        While the code is captured, its first pair stands in for them. Raises what ``take`` raises.
         """
-        if not self._shots or any(shot.index not in self._kept for shot in self._shots.values()):
+
+        def kept(shot: Shot) -> Mosaic:
+            return self._kept[shot.index]
+
+        if self._shots and all(shot.index in self._kept for shot in self._shots.values()):
+            before, now = (
+                References(**{role: picture(shot) for role, shot in self._shots.items()})
+                for picture in (kept, take)
+            )
+        elif self._pair and all(shot.index in self._kept for shot in self._pair):
+            before, now = (_of_pair(*map(picture, self._pair)) for picture in (kept, take))
+        else:
             return ""
-        before = References(**{role: self._kept[shot.index] for role, shot in self._shots.items()})
-        now = References(**{role: take(shot) for role, shot in self._shots.items()})
         return what_changed(before, now, self._sensor)
+
+
+def _of_pair(one: Mosaic, other: Mosaic) -> References:
+    """White and black as a pattern and its inverse show them."""
+    return References(white=np.maximum(one, other), black=np.minimum(one, other), code=one)
 
 
 def what_changed(before: References, now: References, sensor: Sensor) -> str:

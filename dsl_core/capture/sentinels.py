@@ -1,77 +1,22 @@
 """Whether camera or scene moved during a scan: sentinels, compared with the pictures that they repeat.
 
 White says where the picture is, a frame of the code where the pattern is on it: an object that comes nearer
-hardly moves in the picture, but the stripes on it do.
+hardly moves in the picture, but the stripes on it do. While the code is captured, its own pairs tell.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from dsl_core.capture.motion import Movement, moved_between
+from dsl_core.capture.pair_watch import PairWatch
 from dsl_core.model.frames import FrameSource
 from dsl_core.model.plan import CapturePlan, Shot
 from dsl_core.model.rig import Sensor
-from dsl_core.optics.sensor import raw_variance
-from dsl_core.solve.image_shift import TileShifts, tile_shifts
-
-Floats = NDArray[np.float64]
-Mosaic = NDArray[np.uint16]
-
-#: Tiles of the picture, down and across.
-TILES = (4, 6)
-#: A tile has moved by at least so many camera pixels and deviations; one that changed has lost this share.
-LEAST_PX, SIGMAS, CHANGED = 0.2, 6.0, 0.25
-#: Tiles that tell a shift to this many pixels count; so many of them must have moved, or all but few.
-TELLING_PX, FEWEST = 0.1, 2
-#: From this share of the telling tiles on, all of the picture moved.
-MOST = 0.6
-
-
-@dataclass(frozen=True)
-class Movement:
-    """What moved: ``shift_px`` camera pixels (median of the moved tiles) between two shots of the plan.
-
-    None: the picture changed, but by no shift; as shots: at some time since the scan began.
-    ``is_pattern``: the picture stayed, but the pattern on it moved. ``columns`` and ``rows`` bound what
-    moved, camera pixels; None for all of the picture.
-    """
-
-    after: int | None
-    before: int | None
-    shift_px: float | None
-    std_px: float
-    is_pattern: bool
-    columns: tuple[int, int] | None = None
-    rows: tuple[int, int] | None = None
-
-    @property
-    def sentence(self) -> str:
-        """What moved, by how much and when."""
-        when = "since the scan began"
-        if self.before is not None:
-            when = f"between frame {self.after} and frame {self.before}"
-        part = ""
-        if self.columns is not None and self.rows is not None:
-            part = " in columns {}-{}, rows {}-{} of the picture".format(*self.columns, *self.rows)
-        if self.shift_px is None:
-            return f"The scene changed{part}, {when}, by more than a small motion."
-        size = f"{self.shift_px:.1f} ± {max(self.std_px, 0.1):.1f} px"
-        if self.is_pattern:
-            return (
-                f"The pattern moved by {size} on the scene{part}, {when}: the projector moved, or the"
-                " distance of an object changed."
-            )
-        what = "The camera or the scene" if self.columns is None else "Something"
-        return f"{what} moved by {size}{part}, {when}."
-
-    @property
-    def advice(self) -> str:
-        """What to do about it."""
-        return "Fix camera, projector and scene, and scan again; frames after that do not fit those before."
 
 
 class SentinelWatch:
@@ -81,6 +26,8 @@ class SentinelWatch:
         """Without a ``sensor``, a usual one is assumed."""
         self._sensor = sensor or Sensor()
         self._old = {s.index: plan.original(s) for s in plan.shots() if s.role == "sentinel"}
+        self._compared = frozenset(self._old) | {shot.index for shot in self._old.values()}
+        self._pairs = PairWatch(plan, self._sensor)
         self._kept: dict[int, NDArray[np.uint16]] = {}
         self._black: dict[int, int] = {}
         self._still: dict[str, int] = {}
@@ -89,7 +36,7 @@ class SentinelWatch:
     @property
     def wanted(self) -> frozenset[int]:
         """Indices of the shots that are looked at."""
-        return frozenset(self._old) | {shot.index for shot in self._old.values()}
+        return self._compared | self._pairs.wanted
 
     def learn(self, stored: FrameSource, there: Iterable[Shot]) -> None:
         """Look at frames of earlier runs."""
@@ -100,6 +47,9 @@ class SentinelWatch:
     def add(self, shot: Shot, pixels: NDArray[np.uint16]) -> None:
         """Look at a frame (rows, columns), DN; ``found`` says what moved, first of all."""
         if self.found is not None or shot.index not in self.wanted:
+            return
+        self.found = self._pairs.add(shot, pixels)
+        if self.found is not None or shot.index not in self._compared:
             return
         self._kept[shot.index] = pixels
         old = self._old.get(shot.index)
@@ -129,64 +79,10 @@ class SentinelWatch:
             self.found = replace(self.found, after=since, before=index)
 
 
-def moved_between(
-    before: tuple[Mosaic, Mosaic], now: tuple[Mosaic, Mosaic], sensor: Sensor, is_pattern: bool
-) -> Movement | None:
-    """What moved from one picture to the other, each with a black one (raw mosaics, DN); None: nothing did.
-
-    Light that changes all over the picture, and light of the room, do not matter. ``is_pattern`` says that
-    the pictures show a pattern, white otherwise.
-    """
-    (old, old_variance), (new, variance) = (_light(*pair, sensor) for pair in (before, now))
-    return _movement(tile_shifts(old, new, old_variance + variance, TILES), old.shape, is_pattern)
-
-
-def _light(picture: Mosaic, black: Mosaic, sensor: Sensor) -> tuple[Floats, Floats]:
-    """Light of a picture over its black, means over 2 x 2 pixels, and its variance."""
-    lit, dark = (each.astype(np.float64) for each in (picture, black))
-    noise = sum(raw_variance(sensor, each - sensor.black_level_dn) for each in (lit, dark))
-    variance = np.where(lit < 0.98 * sensor.full_scale_dn, noise, 1e12)
-    return _binned(lit - dark), _binned(np.asarray(variance)) / 4
-
-
-def _movement(found: TileShifts, shape: tuple[int, ...], is_pattern: bool) -> Movement | None:
-    std = np.maximum(found.x_std, found.y_std)
-    telling = 2 * std < TELLING_PX
-    moved = telling & (2 * found.length > LEAST_PX) & (found.sigmas > SIGMAS)
-    moved |= found.change > CHANGED
-    if moved.sum() < FEWEST:
-        return None
-    sure = moved & telling
-    whole = moved.sum() >= MOST * max(int(telling.sum()), FEWEST)
-    rows, columns = (
-        _span(np.asarray(moved.any(axis)), 2 * size) for axis, size in ((1, shape[0]), (0, shape[1]))
-    )
-    return Movement(
-        after=None,
-        before=None,
-        shift_px=float(np.median(2 * found.length[sure])) if sure.any() else None,
-        std_px=float(2 * np.median(std[sure])) if sure.any() else 0.0,
-        is_pattern=is_pattern,
-        columns=None if whole else columns,
-        rows=None if whole else rows,
-    )
-
-
 def movement_of(
     source: FrameSource, sensor: Sensor | None = None, missing: Iterable[int] = ()
 ) -> Movement | None:
-    """What moved during a scan whose frames are all there but those ``missing``; reads sentinels alone."""
+    """What moved during a scan with all frames but those ``missing``; reads its code and sentinels."""
     watch, gone = SentinelWatch(source.plan, sensor), set(missing)
     watch.learn(source, (shot for shot in source.plan.shots() if shot.index not in gone))
     return watch.found
-
-
-def _binned(picture: Floats) -> Floats:
-    rows, columns = (size // 2 for size in picture.shape)
-    whole = picture[: 2 * rows, : 2 * columns].reshape(rows, 2, columns, 2)
-    return np.asarray(whole.mean(axis=(1, 3)))
-
-
-def _span(moved: NDArray[np.bool_], size: int) -> tuple[int, int]:
-    at = np.flatnonzero(moved)
-    return int(at[0] * size / len(moved)), int((at[-1] + 1) * size / len(moved))

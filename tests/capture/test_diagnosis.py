@@ -86,6 +86,8 @@ def later(at: int) -> Callable[[int], int]:
     [
         (Change(exposure=from_shot(60, 1.0, 0.5)), "times what it was when the scan began"),
         (Change(scene=later(60)), "moved by"),
+        (Change(scene=later(9)), "moved by"),
+        (Change(exposure=from_shot(9, 1.0, 0.5)), "times what it was when the scan began"),
         (Change(room=from_shot(60, 1.0, 40.0)), "The light of the room has changed"),
     ],
 )

@@ -1,0 +1,134 @@
+"""What moved from one picture of a scan to another, by how much and where."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dsl_core.model.rig import Sensor
+from dsl_core.optics.sensor import raw_variance
+from dsl_core.solve.image_shift import TileShifts, tile_shifts
+
+Floats = NDArray[np.float64]
+Mosaic = NDArray[np.uint16]
+
+#: Tiles of the picture, down and across.
+TILES = (4, 6)
+#: A tile has moved by at least so many camera pixels and deviations; one that changed has lost this share.
+LEAST_PX, SIGMAS, CHANGED = 0.2, 6.0, 0.25
+#: Tiles that tell a shift to this many pixels count; so many of them must have moved, or all but few.
+TELLING_PX, FEWEST = 0.1, 2
+#: From this share of the telling tiles on, all of the picture moved.
+MOST = 0.6
+
+
+@dataclass(frozen=True)
+class Movement:
+    """What moved: ``shift_px`` camera pixels (median of the moved tiles) between two shots of the plan.
+
+    None: the picture changed, but by no shift; as shots: at some time since the scan began.
+    ``is_pattern``: the picture stayed, but the pattern on it moved. ``columns`` and ``rows`` bound what
+    moved, camera pixels; None for all of the picture.
+    """
+
+    after: int | None
+    before: int | None
+    shift_px: float | None
+    std_px: float
+    is_pattern: bool
+    columns: tuple[int, int] | None = None
+    rows: tuple[int, int] | None = None
+
+    @property
+    def sentence(self) -> str:
+        """What moved, by how much and when."""
+        when = "since the scan began"
+        if self.before is not None:
+            when = f"between frame {self.after} and frame {self.before}"
+        part = ""
+        if self.columns is not None and self.rows is not None:
+            part = " in columns {}-{}, rows {}-{} of the picture".format(*self.columns, *self.rows)
+        if self.shift_px is None:
+            return f"The scene changed{part}, {when}, by more than a small motion."
+        size = f"{self.shift_px:.1f} ± {max(self.std_px, 0.1):.1f} px"
+        if self.is_pattern:
+            return (
+                f"The pattern moved by {size} on the scene{part}, {when}: the projector moved, or the"
+                " distance of an object changed."
+            )
+        what = "The camera or the scene" if self.columns is None else "Something"
+        return f"{what} moved by {size}{part}, {when}."
+
+    @property
+    def advice(self) -> str:
+        """What to do about it."""
+        return "Fix camera, projector and scene, and scan again; frames after that do not fit those before."
+
+
+def moved_between(
+    before: tuple[Mosaic, Mosaic], now: tuple[Mosaic, Mosaic], sensor: Sensor, is_pattern: bool
+) -> Movement | None:
+    """What moved from one picture to the other, each with a black one (raw mosaics, DN); None: nothing did.
+
+    Light that changes all over the picture, and light of the room, do not matter. ``is_pattern`` says that
+    the pictures show a pattern, white otherwise.
+    """
+    (old, old_variance), (new, variance) = (_light(*pair, sensor) for pair in (before, now))
+    return movement_in(old, new, old_variance + variance, 2, is_pattern)
+
+
+def movement_in(
+    old: Floats, new: Floats, variance: Floats, by: int, is_pattern: bool = False, least_px: float = LEAST_PX
+) -> Movement | None:
+    """What moved between pictures averaged over blocks of ``by`` x ``by`` pixels; None: nothing did.
+
+    Their difference has this ``variance``. Parts that move by less than ``least_px`` do not count. Brightness
+    and an offset are free in every part of the picture.
+    """
+    found = tile_shifts(old, new, variance, TILES)
+    return _movement(found, (by * old.shape[0], by * old.shape[1]), by, is_pattern, least_px)
+
+
+def _light(picture: Mosaic, black: Mosaic, sensor: Sensor) -> tuple[Floats, Floats]:
+    """Light of a picture over its black, means over 2 x 2 pixels, and its variance."""
+    lit, dark = (each.astype(np.float64) for each in (picture, black))
+    noise = sum(raw_variance(sensor, each - sensor.black_level_dn) for each in (lit, dark))
+    variance = np.where(lit < 0.98 * sensor.full_scale_dn, noise, 1e12)
+    return binned(lit - dark, 2), binned(np.asarray(variance), 2) / 4
+
+
+def _movement(
+    found: TileShifts, size: tuple[int, int], by: int, is_pattern: bool, least_px: float
+) -> Movement | None:
+    std = np.maximum(found.x_std, found.y_std)
+    telling = by * std < TELLING_PX
+    moved = telling & (by * found.length > least_px) & (found.sigmas > SIGMAS)
+    moved |= found.change > CHANGED
+    if moved.sum() < FEWEST:
+        return None
+    sure = moved & telling
+    whole = moved.sum() >= MOST * max(int(telling.sum()), FEWEST)
+    rows, columns = _span(moved.any(1), size[0]), _span(moved.any(0), size[1])
+    return Movement(
+        after=None,
+        before=None,
+        shift_px=float(np.median(by * found.length[sure])) if sure.any() else None,
+        std_px=float(by * np.median(std[sure])) if sure.any() else 0.0,
+        is_pattern=is_pattern,
+        columns=None if whole else columns,
+        rows=None if whole else rows,
+    )
+
+
+def binned(picture: Floats, by: int) -> Floats:
+    """Means over blocks of ``by`` x ``by`` pixels."""
+    rows, columns = (size // by for size in picture.shape)
+    whole = picture[: by * rows, : by * columns].reshape(rows, by, columns, by)
+    return np.asarray(whole.mean(axis=(1, 3)))
+
+
+def _span(moved: NDArray[np.bool_], size: int) -> tuple[int, int]:
+    at = np.flatnonzero(moved)
+    return int(at[0] * size / len(moved)), int((at[-1] + 1) * size / len(moved))
