@@ -19,7 +19,7 @@ import numpy as np
 import zarr
 from numpy.typing import NDArray
 
-from dsl_core.io.atomic import make_folder, make_safe, store_error, write_atomic
+from dsl_core.io.atomic import PARTIAL_SUFFIX, make_folder, make_safe, store_error, write_atomic
 from dsl_core.io.reading import read_bounded
 from dsl_core.io.result.arrays import PACKINGS, encoded, fits, new_array, stored_as, write_variable
 from dsl_core.io.result.result_file import RESULT_FOLDER, labels_of, opened, seal_folder
@@ -66,6 +66,8 @@ class RowWriter:
         self._height = bands[0].stop - bands[0].start
         key = f"{self._key}\n{shape} {origin} {self._height} {wavelengths_nm.tolist()}".encode()
         if self._is_of(key):
+            for leftover in (self.work / _ARRAYS).rglob("*" + PARTIAL_SUFFIX):
+                leftover.unlink()  # of zarr, which writes beside a file as we do, and was killed
             done = len(list(self.work.glob("rows.*.json")))
             _log.warning("Continued where a run was interrupted: %d of %d bands are there.", done, len(bands))
         else:

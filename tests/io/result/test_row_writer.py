@@ -84,6 +84,17 @@ def test_rows_that_are_there_are_not_asked_for_again(tmp_path: Path) -> None:
     xr.testing.assert_identical(write(target, given), write(tmp_path / "again.zarr", given))
 
 
+def test_what_a_killed_run_left_half_written_is_not_in_the_result(tmp_path: Path) -> None:
+    given, target = maps(), tmp_path / "r.zarr"
+    with RowWriter(target, "a") as writer:
+        begin(writer)
+        writer.put(BANDS[0], some(given, BANDS[0]), "first")
+        for name in ("zarr.3452786f.partial", "depth_mm/zarr.81bd8ef9.partial"):
+            (next(writer.work.glob("*/zarr.json")).parent / name).write_bytes(b"{")
+    write(target, given)
+    assert [path.name for path in target.rglob("*.partial")] == []
+
+
 @pytest.mark.parametrize("change", ["key", "half written"])
 def test_what_is_of_another_result_is_made_anew(tmp_path: Path, change: str) -> None:
     target = tmp_path / "r.zarr"
