@@ -110,7 +110,7 @@ def _movement(
         return None
     sure = moved & telling
     whole = moved.sum() >= MOST * max(int(telling.sum()), FEWEST)
-    rows, columns = _span(moved.any(1), size[0]), _span(moved.any(0), size[1])
+    rows, columns = _span(moved, 1, size[0]), _span(moved, 0, size[1])
     return Movement(
         after=None,
         before=None,
@@ -129,6 +129,6 @@ def binned(picture: Floats, by: int) -> Floats:
     return np.asarray(whole.mean(axis=(1, 3)))
 
 
-def _span(moved: NDArray[np.bool_], size: int) -> tuple[int, int]:
-    at = np.flatnonzero(moved)
-    return int(at[0] * size / len(moved)), int((at[-1] + 1) * size / len(moved))
+def _span(moved: NDArray[np.bool_], axis: int, size: int) -> tuple[int, int]:
+    at, count = np.flatnonzero(moved.any(axis)), moved.shape[1 - axis]
+    return int(at[0] * size / count), int((at[-1] + 1) * size / count)

@@ -76,8 +76,9 @@ class PairWatch:
         """Light of a pattern, that of its inverse, and the variance of their sum, all binned."""
         level, full = self._sensor.black_level_dn, 0.98 * self._sensor.full_scale_dn
         light = [each.astype(np.float64) - level for each in (one, other)]
-        variance = sum(raw_variance(self._sensor, each) for each in light)
-        variance = np.where((one < full) & (other < full), variance, 1e3 * _UNKNOWN)
+        noise = sum(raw_variance(self._sensor, each) for each in light)
+        sound = (one < full) & (other < full)
+        variance = np.asarray(np.where(sound, noise, 1e3 * _UNKNOWN), np.float64)
         return (
             binned(light[0], self._by),
             binned(light[1], self._by),
