@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from dsl_app.calibrate.campaign_status import Kinds
+from dsl_app.calibrate.overall import Overall
 from dsl_app.calibrate.state import CalibrateState
+from dsl_app.calibrate.wizard.background_work import WatchedCamera
 from dsl_app.connection.controller import RIG, RigController
 from dsl_app.shared.jobs.base import Job
-from dsl_core.campaign.common.recipe import Step
+from dsl_app.shared.notify import describe_seconds
+from dsl_core.campaign.assembly import nominal_rig
+from dsl_core.campaign.common.recipe import AnyRecipe, Bench, Step
 from dsl_core.campaign.guide import calibrate_all
 from dsl_core.campaign.products import Products, write_products
 from dsl_core.campaign.session import CalibrationSession
@@ -28,13 +32,26 @@ CANNOT_PLACE = "This rig cannot place its targets itself. Run the calibrations o
 
 
 class CalibrateAll:
-    """Runs one campaign at a time; ``state.everything`` says where it is."""
+    """Runs one campaign at a time; ``state.everything`` says where it is.
+
+    ``begins`` is called when the next calibration begins: the one before it is accepted by then.
+    """
 
     def __init__(
-        self, state: CalibrateState, rig: RigController, kinds: Kinds, store: CalibrationLibrary, ended: Ended
+        self,
+        state: CalibrateState,
+        rig: RigController,
+        kinds: Kinds,
+        store: CalibrationLibrary,
+        ended: Ended,
+        begins: Callable[[], object],
     ) -> None:
         self._state, self._rig, self._kinds, self._store, self._told = state, rig, kinds, store, ended
+        self._begins = begins
         self._job: Job[Products] | None = None
+        self._camera: WatchedCamera | None = None
+        self._overall = Overall({})
+        self._shown = ""
 
     @property
     def is_running(self) -> bool:
@@ -43,7 +60,10 @@ class CalibrateAll:
 
     def run(self, path: Path, devices: DeviceRig, name: str) -> None:
         """Continue a campaign where it stopped; its rig is kept in the library under ``name``."""
-        own = replace(devices)  # scans of a calibration must not change the rig of the window
+        self._camera = WatchedCamera(devices.camera)
+        # Scans of a calibration must not change the rig of the window.
+        own = replace(devices, camera=self._camera)
+        self._overall, self._shown = Overall({}), ""
         job = Job(
             "Calibrate everything",
             lambda progress: self._all(path, own, name, progress),
@@ -51,6 +71,7 @@ class CalibrateAll:
             lambda error: self._ended("", error),
             lambda: self._ended("Stopped. Everything captured is kept; start again to continue."),
             exclusive=RIG,
+            time_left=lambda: self._overall.left_s(),
         )
         self._job = job
         self._state.everything.set("starting")
@@ -58,7 +79,10 @@ class CalibrateAll:
 
     def _all(self, path: Path, devices: DeviceRig, name: str, progress: Progress) -> Products:
         campaign = CampaignFolder.open(path)
-        guide, recipes = UnattendedGuide(progress), self._kinds.recipes(campaign)
+        recipes = self._kinds.recipes(campaign)
+        progress.report("prepare", 0, 0)
+        self._overall = Overall({recipe.name: _parts(recipe, devices, campaign) for recipe in recipes})
+        guide = UnattendedGuide(progress, overall=self._overall)
         rig = calibrate_all(campaign, devices, guide, guide, name, recipes)
         guide.title = "Report"
         guide.report("write", 0, 0)
@@ -75,13 +99,25 @@ class CalibrateAll:
         job = self._job
         if job is None or job.token.is_cancelled:
             return
-        told = job.progress
+        told, overall = job.progress, self._overall
         count = f", {told.done} of {told.total}" if told.total else ""
-        self._state.everything.set(f"{told.stage or 'starting'}{count}")
+        left = overall.left_s()
+        rest = "" if left is None else f"  ·  about {describe_seconds(left)} left for everything"
+        self._state.running.set(overall.name)
+        self._state.everything.set(f"{told.stage or 'starting'}{count}{rest}")
+        seen = None if self._camera is None else self._camera.take_seen()
+        if seen is not None:
+            self._state.seen.set(seen)
+        if overall.name and overall.name != self._shown:
+            # The one before it has been accepted and written by now.
+            self._shown = overall.name
+            self._begins()
 
     def _ended(self, note: str, error: Exception | None = None) -> None:
-        self._job = None
+        self._job = self._camera = None
+        self._state.running.set("")
         self._state.everything.set("")
+        self._state.seen.set(None)
         self._told(note, error)
 
 
@@ -94,14 +130,22 @@ class UnattendedGuide:
 
     progress: Progress
     title: str = ""
+    overall: Overall = field(default_factory=lambda: Overall({}))
+    _is_fitting: bool = False
 
     def report(self, stage: str, done: int, total: int) -> None:
         """Pass a report on under the calibration's title."""
+        if stage.startswith(f"{self.title}:") and not self._is_fitting:
+            # The fit reports under the calibration's own title.
+            self._is_fitting = True
+            self.overall.next_part()
+        self.overall.report(done, total)
         self.progress.report(": ".join(filter(None, (self.title, stage))), done, total)
 
     def begins(self, session: CalibrationSession, missing: int) -> None:
         """Remember which calibration it is."""
-        self.title = session.recipe.title
+        self.title, self._is_fitting = session.recipe.title, False
+        self.overall.begins(session.recipe.name, missing)
 
     def place(self, step: Step) -> None:
         """Raise `CalibrationError`: no person is there to place a target."""
@@ -113,6 +157,7 @@ class UnattendedGuide:
         if wrong:
             advice = " ".join(f"{figure}: {figure.advice}" for figure in wrong)
             raise CalibrationError(f"{self.title}, {step.title}: it does not look right. {advice}")
+        self.overall.next_part()
         return True
 
     def judge(self, fitted: AcceptedCalibration) -> bool:
@@ -121,7 +166,17 @@ class UnattendedGuide:
         if wrong:
             told = "; ".join(f"{figure} ({figure.limits}): {figure.advice}".rstrip(": ") for figure in wrong)
             raise CalibrationError(f"{fitted.title} is outside its limits: {told} Its wizard shows the fit.")
+        self.overall.ends()
         return True
+
+
+def _parts(recipe: AnyRecipe, devices: DeviceRig, campaign: CampaignFolder) -> int:
+    """The steps of a calibration, as far as the nominal rig tells them, and its fit."""
+    try:
+        return len(recipe.steps(Bench(devices, campaign.home(recipe.name), nominal_rig(devices)))) + 1
+    except DslError:
+        # It says what is wrong when its turn comes.
+        return 2
 
 
 def products_text(made: Products) -> str:

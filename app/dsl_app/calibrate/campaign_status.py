@@ -19,6 +19,15 @@ from dsl_core.model.figure import Figure, failures
 
 #: Calibrations older than this are ageing, days.
 AGEING_DAYS = 90
+#: What a person judges a calibration by: beginnings of names of its figures.
+JUDGED_BY = {
+    "selftest": ("linearity", "ramps, rms"),
+    "geometry": ("camera error", "projector error"),
+    "spectralon": ("deviation of white", "unevenness"),
+    "color-checker": ("residual of patches held out",),
+    "bandpass": ("efficiency of order",),
+    "depth-stage": ("held-out error of first orders",),
+}
 #: Makes all recipes of a campaign, in order.
 Recipes = Callable[[CampaignFolder], Sequence[AnyRecipe]]
 
@@ -76,7 +85,7 @@ def _read(
         return Row(name, about, state, reason, has_candidate=waits), ""
     state, reason = judge(accepted, before, conditions, now, ageing)
     reason = f"{reason} {waiting}".strip()
-    row = Row(name, about, state, reason, key_figure(accepted.figures), accepted.accepted, waits)
+    row = Row(name, about, state, reason, key_figure(accepted.figures, name), accepted.accepted, waits)
     return row, accepted.accepted
 
 
@@ -108,10 +117,14 @@ def judge(
     return RowState.GOOD, ""
 
 
-def key_figure(figures: tuple[Figure, ...]) -> Figure | None:
-    """The figure that is furthest beyond its limits, else the one nearest to them."""
+def key_figure(figures: tuple[Figure, ...], name: str = "") -> Figure | None:
+    """The figure that is furthest beyond its limits, else the worst of those that a person judges by.
+
+    For a calibration ``name`` that has none of these, it is the one nearest to its limits.
+    """
     limited = [figure for figure in figures if figure.limits]
-    return max(limited, key=_strain, default=None)
+    judged = [figure for figure in limited if figure.name.startswith(JUDGED_BY.get(name, ()))]
+    return max(failures(tuple(limited)) or judged or limited, key=_strain, default=None)
 
 
 def _strain(figure: Figure) -> float:

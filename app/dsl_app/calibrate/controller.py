@@ -56,7 +56,9 @@ class CalibrateController:
             rig.state.devices.changed.connect(lambda _: self.refresh()),
             rig.state.choice.changed.connect(lambda _: self.refresh()),
         ]
-        self._everything = CalibrateAll(state, rig, self._kinds, self._store, self._ended)
+        self._everything = CalibrateAll(
+            state, rig, self._kinds, self._store, self._ended, begins=self.refresh
+        )
 
     # Campaign --------------------------------------------------------------------------------------
 
@@ -132,6 +134,8 @@ class CalibrateController:
             return
         title = ABOUT[name].title if name in ABOUT else name
         state = WizardState(name, title)
+        state.following = following_of(self.state.rows.value, name)
+        state.following_title = ABOUT[state.following].title if state.following in ABOUT else state.following
         wizard = WizardController(
             state,
             facts.path,
@@ -142,7 +146,7 @@ class CalibrateController:
         )
         self._wizard = wizard
         self.state.opening.set(title)
-        state.closed.connect(lambda _: self._closed())
+        state.closed.connect(lambda _: self._left(state))
 
         def failed(error: Exception) -> None:
             self._closed()
@@ -153,6 +157,11 @@ class CalibrateController:
     def _opened(self, state: WizardState, wizard: WizardController) -> None:
         self.state.opening.set("")
         self.wizard_ready.emit((state, wizard))
+
+    def _left(self, state: WizardState) -> None:
+        self._closed()
+        if state.goes_on:
+            self.run(state.following)
 
     def _closed(self) -> None:
         self._wizard = None
@@ -287,6 +296,13 @@ class CalibrateController:
             self._wizard.leave()
         self.cancel_everything()
         self._lock.close()
+
+
+def following_of(rows: tuple[Row, ...], name: str) -> str:
+    """The calibration after ``name`` that is not accepted yet; empty when there is none."""
+    names = [row.name for row in rows]
+    later = rows[names.index(name) + 1 :] if name in names else ()
+    return next((row.name for row in later if not row.state.is_accepted), "")
 
 
 def library_name(folder: Path) -> str:

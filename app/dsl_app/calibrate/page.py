@@ -15,20 +15,25 @@ from dsl_app.calibrate.campaign_box import CampaignBox
 from dsl_app.calibrate.library_panel import LibraryPanel
 from dsl_app.calibrate.presentation import row_display
 from dsl_app.calibrate.state import CalibrateState, Row
+from dsl_app.calibrate.wizard.step_page import LiveFrameView
 from dsl_app.connection.state import RigState
 from dsl_app.shared.evented import follow_any
+from dsl_app.shared.widgets.deferred import Deferred
 from dsl_app.shared.widgets.forms import Banner, label, push_button, show_parts
-from dsl_app.shared.widgets.layouts import STRETCH, boxed, column_of, scrolled, splitter
+from dsl_app.shared.widgets.layouts import STRETCH, boxed, column_of, row_of, scrolled, splitter
 from dsl_app.shared.widgets.page import PageWidget
 from dsl_app.shared.widgets.ticker import Ticker
 
 if TYPE_CHECKING:
     from dsl_app.calibrate.controller import CalibrateController
+    from dsl_app.calibrate.wizard.state import Seen
 
 #: How often the progress of a calibration of everything is fetched, ms.
 FETCH_MS = 200
 #: Height of the rows, as far as there is room.
 ROWS_PX = 316
+#: Width of what the camera sees while everything is calibrated.
+PICTURE_PX = 236
 _NAME_PX, _STATE_PX, _DATE_PX, _BUTTON_PX = 236, 154, 118, 100
 
 
@@ -49,6 +54,8 @@ class CalibratePage(PageWidget):
         self.rows = {
             row.name: CalibrationRow(row, number, self.run) for number, row in enumerate(state.rows.value, 1)
         }
+        self.picture = Deferred(LiveFrameView)
+        self.picture.setFixedWidth(PICTURE_PX)
         self.library = LibraryPanel(state, commands.library)
         self._timer = Ticker(self, FETCH_MS, commands.take_news)
         self._lay_out()
@@ -57,7 +64,8 @@ class CalibratePage(PageWidget):
     def _lay_out(self) -> None:
         area = scrolled(boxed(column_of(*self.rows.values(), STRETCH, margins=0, spacing=4)))
         area.setFocusPolicy(Qt.FocusPolicy.NoFocus)
-        split = splitter(Qt.Orientation.Vertical, (area, 0), (self.library, 1), sizes=(ROWS_PX, 300))
+        top = boxed(row_of((area, 1), self.picture, margins=0))
+        split = splitter(Qt.Orientation.Vertical, (top, 0), (self.library, 1), sizes=(ROWS_PX, 300))
         column_of(self.banner, self.head, (split, 1), on=self)
 
     def _connect(self) -> None:
@@ -65,7 +73,9 @@ class CalibratePage(PageWidget):
         self.stops = [
             state.trouble.follow(self.banner.say),
             state.foreign.follow(self.banner.action.setVisible),
-            *follow_any(self._show_rows, state.rows, state.opening, state.everything),
+            *follow_any(self._show_rows, state.rows, state.opening, state.everything, state.running),
+            state.everything.follow(lambda progress: self.picture.setVisible(bool(progress))),
+            state.seen.follow(self._show_seen),
             state.everything.follow(lambda progress: self._timer.run_while(bool(progress))),
         ]
 
@@ -78,7 +88,14 @@ class CalibratePage(PageWidget):
     def _show_rows(self) -> None:
         for row in self._state.rows.value:
             if row.name in self.rows:
-                self.rows[row.name].show_row(row, self._state.is_busy)
+                is_running = row.name == self._state.running.value
+                running = self._state.everything.value if is_running else ""
+                self.rows[row.name].show_row(row, self._state.is_busy, running.partition("  ·  ")[0])
+
+    def _show_seen(self, seen: Seen | None) -> None:
+        """Show what is captured just now."""
+        if self.picture.made is not None:
+            self.picture.made.show_seen(seen)
 
     def showEvent(self, event: QShowEvent) -> None:
         """Read campaign and library again: other programs may have changed them."""
@@ -148,7 +165,7 @@ class CalibrationRow(QFrame):
         grid.addWidget(self.run, 0, 4, 2, 1, Qt.AlignmentFlag.AlignVCenter)
         self._purpose.setFixedWidth(_NAME_PX)
 
-    def show_row(self, row: Row, is_busy: bool = False) -> None:
+    def show_row(self, row: Row, is_busy: bool = False, running: str = "") -> None:
         """Show the state of the calibration; while ``is_busy`` its wizard cannot be opened."""
-        show_parts(self, row_display(row, is_busy))
+        show_parts(self, row_display(row, is_busy, running))
         self.setAccessibleName(f"{row.about.title}: {row.state.value}. {row.reason}".strip())

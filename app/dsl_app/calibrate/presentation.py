@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import datetime
 from html import escape
 
@@ -84,15 +84,21 @@ class RowDisplay:
     run: ButtonState
 
 
-def row_display(row: Row, is_busy: bool = False) -> RowDisplay:
-    """A row of the page; while ``is_busy`` no wizard can be opened."""
+def row_display(row: Row, is_busy: bool = False, running: str = "") -> RowDisplay:
+    """A row of the page; while ``is_busy`` no wizard can be opened, ``running`` says what is done for it."""
     title, figure = row.about.title, row.figure
     role = "" if figure is None or figure.passed else "bad"
     begun = row.state is RowState.BEGUN or row.has_candidate
     word = "Continue…" if begun else ("Open…" if row.accepted else "Run…")
     tip = f"Open the wizard of {title}, which continues where it was left"
+    if running:
+        # What was known of it before is about to be replaced.
+        row = replace(row, reason=running, accepted="")
+        figure = None
     return RowDisplay(
-        state=LabelState(f"● {row.state.value}", _ROLES.get(row.state, "warn")),
+        state=LabelState("▶ running", "heading")
+        if running
+        else LabelState(f"● {row.state.value}", _ROLES.get(row.state, "warn")),
         figure=LabelState() if figure is None else LabelState(figure_words(figure), role),
         date=short_date(row.accepted),
         reason=LabelState(row.reason, "muted", row.reason),

@@ -11,6 +11,7 @@ from dsl_app.connection.state import RigChoice
 from dsl_app.shared.evented import Event, Value
 
 if TYPE_CHECKING:
+    from dsl_app.calibrate.wizard.state import Seen
     from dsl_core.io.calibration_library import LibraryLine
     from dsl_core.model.figure import Figure
 
@@ -56,8 +57,8 @@ ABOUT = {
 class Row:
     """One calibration of the campaign.
 
-    ``reason`` explains the state; ``figure`` is the one nearest to its limits, or beyond; ``has_candidate``
-    says that a fit waits to be judged.
+    ``reason`` explains the state; ``figure`` is the one that a person judges by; ``has_candidate`` says that
+    a fit waits to be judged.
     """
 
     name: str
@@ -111,7 +112,8 @@ class CalibrateState:
     ``trouble`` is a sentence on why nothing can be calibrated (empty: nothing is wrong), ``note`` one on what
     was done last. ``foreign`` says that the campaign belongs to another rig; ``opening`` is the title of the
     wizard that is being opened; ``everything`` says how far a calibration of everything is (empty: none
-    runs). ``in_use`` is the library's name that scans use; ``opened`` fires with a file to open in the
+    runs), ``running`` names the calibration that it is at, ``seen`` is what the camera sees of it. ``in_use``
+    is the library's name that scans use; ``opened`` fires with a file to open in the
     system's program.
     """
 
@@ -123,6 +125,8 @@ class CalibrateState:
         self.note = Value("")
         self.opening = Value("")
         self.everything = Value("")
+        self.running = Value("")
+        self.seen: Value[Seen | None] = Value(None)
         self.library: Value[tuple[LibraryLine, ...]] = Value(())
         self.in_use = Value("")
         self.drift: Value[DriftVerdict | None] = Value(None)

@@ -2,8 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
+import pytest
+from dsl_app.calibrate.calibrate_all import UnattendedGuide
+from dsl_app.calibrate.state import RowState
+
+from dsl_core.campaign.common.recipe import Step
+from dsl_core.model.figure import Figure
 from tests.app.calibrate.calibrate_bench import (
     CalibrateBench,
+    states,
 )
 
 
@@ -23,3 +32,27 @@ def test_everything_runs_in_order_and_stops_with_the_reason(bench: CalibrateBenc
     assert "Everything is calibrated" in bench.state.note.value
     assert all(row.state.is_accepted for row in bench.state.rows.value)
     assert bench.library.names() == ("campaign",)
+
+
+def test_rows_are_live_while_everything_is_calibrated(
+    bench: CalibrateBench, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    devices = bench.rig.state.devices.value
+    assert devices is not None
+    devices.place = lambda placement: None
+    seen: list[tuple[str, list[RowState], bool]] = []
+    real = UnattendedGuide.looked
+
+    def looked(self: UnattendedGuide, step: Step, figures: Sequence[Figure]) -> bool:
+        answer = real(self, step, figures)
+        bench.control.take_news()
+        seen.append((bench.state.running.value, states(bench), bench.state.seen.value is not None))
+        return answer
+
+    monkeypatch.setattr(UnattendedGuide, "looked", looked)
+    bench.control.run_everything()
+    assert [name for name, _, _ in seen] == ["selftest", "selftest", "geometry"]
+    assert seen[-1][1] == [RowState.GOOD, RowState.MISSING]
+    assert seen[-1][2]
+    assert bench.state.running.value == ""
+    assert bench.state.seen.value is None

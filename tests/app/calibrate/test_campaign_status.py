@@ -5,9 +5,10 @@ from __future__ import annotations
 from dataclasses import replace
 from datetime import timedelta
 
-from dsl_app.calibrate.campaign_status import key_figure
+from dsl_app.calibrate.campaign_status import JUDGED_BY, key_figure
 from dsl_app.calibrate.state import RowState
 
+from dsl_core.campaign.recipes import recipe_names
 from dsl_core.model.figure import Figure
 from tests.app.calibrate.calibrate_bench import (
     CalibrateBench,
@@ -52,3 +53,17 @@ def test_the_key_figure_is_the_one_nearest_to_its_limits() -> None:
     assert key_figure((easy, tight, between)) is tight
     assert key_figure((tight, beyond)) is beyond
     assert key_figure((figure("free", 1.0),)) is None
+
+
+def test_a_person_judges_a_calibration_by_some_of_its_figures() -> None:
+    used = Figure(name="poses used", value=10, unit="", low=3, high=10)
+    camera = Figure(name="camera error", value=0.05, unit="px", high=0.5)
+    projector = Figure(name="projector error", value=0.08, unit="px", high=0.5)
+    assert key_figure((used, camera, projector), "geometry") is projector
+    lost = Figure(name="poses used", value=2, unit="", low=3, high=10)
+    assert key_figure((lost, camera, projector), "geometry") is lost
+    assert key_figure((used, camera)) is used
+
+
+def test_a_person_judges_by_figures_that_calibrations_have() -> None:
+    assert tuple(JUDGED_BY) == recipe_names()

@@ -125,6 +125,10 @@ def test_a_row_shows_its_figure_and_reason() -> None:
     bad = row_display(replace(ROW, figure=BAD))
     assert bad.figure.role == "bad"
     assert row_display(ROW).figure.text == row_display(ROW).date == ""
+    running = row_display(replace(ROW, figure=GOOD), is_busy=True, running="Self-test: white, 3 of 8")
+    assert running.state.text == "▶ running"
+    assert running.reason.text == "Self-test: white, 3 of 8"
+    assert running.figure.text == ""
 
 
 def test_times_are_shown_to_the_minute() -> None:

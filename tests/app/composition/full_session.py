@@ -118,7 +118,6 @@ class Session:
         click(page.selftest)
         wizard = opened(CalibrationWizard)
         state, buttons = wizard._state, wizard.buttons
-        click(buttons.next)
         # A rig that places targets looks at once.
         if not buttons.check.isChecked():
             click(buttons.check)
@@ -134,6 +133,8 @@ class Session:
         key(KEYS[name], self.window)
         wizard = opened(CalibrationWizard)
         state = wizard._state
+        wizard.steps.setCurrentRow(wizard.steps.count() - 1)
+        wait(lambda: wizard.stack.currentWidget() is wizard.settings, "the settings")
         for field, text in SETTINGS[name].items():
             _set(wizard.settings.fields[field], text)
             wait(lambda: state.doing.value is Doing.IDLE, f"the setting {field}")

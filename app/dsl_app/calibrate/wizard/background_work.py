@@ -12,12 +12,12 @@ import numpy as np
 
 from dsl_app.calibrate.campaign_status import Recipes
 from dsl_app.calibrate.wizard.settings import changed_settings, setting_rows
-from dsl_app.calibrate.wizard.state import Fit, Look, SettingRow
+from dsl_app.calibrate.wizard.state import Fit, Look, Seen, SettingRow
 from dsl_core.campaign.common.recipe import AnyRecipe, Step
 from dsl_core.campaign.guide import calibrated_rig
 from dsl_core.campaign.products import Products, write_products
 from dsl_core.campaign.session import CalibrationSession, StepStatus
-from dsl_core.capture.preview import MANY_SATURATED
+from dsl_core.capture.preview import MANY_SATURATED, quick_picture, statistics
 from dsl_core.devices.base import Camera, CameraInfo, DeviceRig
 from dsl_core.errors import CalibrationError, Cancelled, DslError
 from dsl_core.io.calibration_library import CalibrationLibrary
@@ -218,6 +218,15 @@ class WatchedCamera(Camera):
         with self._lock:
             frame, self._frame = self._frame, None
         return frame
+
+    def take_seen(self) -> Seen | None:
+        """The latest frame since the last call as people look at it; None without one."""
+        frame = self.take_frame()
+        if frame is None:
+            return None
+        full_scale = 2**self.info.bit_depth - 1
+        picture = quick_picture(frame.pixels, self.info.bayer, full_scale, show_saturation=True)
+        return Seen(picture, max(statistics(frame.pixels, self.info.bayer, full_scale).saturated))
 
     def close(self) -> None:
         """Close the camera."""

@@ -10,13 +10,12 @@ from dsl_app.calibrate.calibrate_all import products_text
 from dsl_app.calibrate.campaign_status import Recipes
 from dsl_app.calibrate.wizard.background_work import BackgroundWork, Captured, Opened
 from dsl_app.calibrate.wizard.jobs import WizardJobs
-from dsl_app.calibrate.wizard.state import Doing, Fit, Look, Seen, WizardState
+from dsl_app.calibrate.wizard.state import Doing, Fit, Look, WizardState
 from dsl_app.connection.controller import RigController
 from dsl_app.connection.state import Link
 from dsl_app.shared.jobs.base import JobRunner
 from dsl_app.shared.notify import sentence_of
 from dsl_core.campaign.products import Products
-from dsl_core.capture.preview import quick_picture, statistics
 from dsl_core.devices.base import DeviceRig
 from dsl_core.io.calibration_library import CalibrationLibrary
 
@@ -59,6 +58,8 @@ class WizardController:
 
         def opened(found: Opened) -> None:
             self._take(found)
+            # A rig that places its targets shows what is in front of the camera at once.
+            self.state.is_checking.set(found.places_itself and self.state.status is not None)
             self._unfollow = self._rig.state.devices.changed.connect(self._follow_devices)
             done()
 
@@ -82,8 +83,7 @@ class WizardController:
         state.misfit.set(None)
         state.statuses.set(found.statuses)
         state.fit.set(found.fit)
-        is_new = all(each.state == "missing" for each in found.statuses)
-        state.at.set(0 if is_new else self._next_lacking)
+        state.at.set(self._next_lacking)
 
     @property
     def _next_lacking(self) -> int:
@@ -149,13 +149,9 @@ class WizardController:
             self._look_if_due(self._clock())
 
     def _show_frame(self, work: BackgroundWork) -> None:
-        frame = work.camera.take_frame()
-        if frame is None:
-            return
-        info = work.camera.info
-        full_scale = 2**info.bit_depth - 1
-        picture = quick_picture(frame.pixels, info.bayer, full_scale, show_saturation=True)
-        self.state.seen.set(Seen(picture, max(statistics(frame.pixels, info.bayer, full_scale).saturated)))
+        seen = work.camera.take_seen()
+        if seen is not None:
+            self.state.seen.set(seen)
 
     def _look_if_due(self, now: float) -> None:
         status, work = self.state.status, self._the_work

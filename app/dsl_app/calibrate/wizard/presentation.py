@@ -16,7 +16,10 @@ from dsl_core.model.placement import Placement
 #: A sentence and its role of the style sheet.
 Verdict = tuple[str, str]
 #: The buttons of which one is the main one at any time.
-Main = Literal["next", "all", "capture", "fit", "accept", "leave"]
+Main = Literal["back", "next", "all", "capture", "fit", "accept", "following", "leave"]
+#: The page of the settings, and that of the first step.
+SETTINGS_PAGE, FIRST_PAGE = 0, 1
+ADVANCED_TIP = "Settings of this calibration: the target's size, distances, how much is captured"
 _MARKS: dict[State, str] = {"missing": "○", "captured": "✓", "refused": "✗"}
 _MARK_ROLES = {"✓": "good", "✗": "bad"}
 
@@ -38,26 +41,28 @@ class Buttons:
     discard: ButtonState
     fit: ButtonState
     accept: ButtonState
+    following: ButtonState
 
 
 def buttons(state: WizardState) -> Buttons:
     """The buttons of the current page."""
     doing, fit, main = state.doing.value, state.fit.value, main_button(state)
     on_fit, on_step, idle = state.at.value == state.last, state.status is not None, not doing.is_long
+    on_settings = state.at.value == SETTINGS_PAGE
     can_stop = doing in (Doing.CAPTURING, Doing.FITTING, Doing.STOPPING)
     has_candidate = fit is not None and not fit.is_accepted
     is_done = on_fit and fit is not None and fit.is_accepted
     capture, capture_tip = _capture_text(state)
     return Buttons(
         leave=ButtonState(is_primary=main == "leave", text="&Close" if is_done else "&Leave"),
-        back=ButtonState(is_enabled=state.at.value > 0 and idle),
+        back=ButtonState(is_enabled=state.at.value != FIRST_PAGE and idle, is_primary=main == "back"),
         check=ButtonState(on_step and not can_stop, idle),
         all=ButtonState(
             state.places_itself.value and bool(state.lacking) and not can_stop, idle, main == "all"
         ),
         capture=ButtonState(on_step and not can_stop, idle, main == "capture", capture, capture_tip),
         stop=ButtonState(can_stop, doing is not Doing.STOPPING),
-        next=ButtonState(not on_fit, idle, main == "next"),
+        next=ButtonState(not on_fit and not on_settings, idle, main == "next"),
         discard=ButtonState(on_fit and has_candidate and not can_stop, idle),
         fit=ButtonState(
             on_fit and not can_stop,
@@ -66,6 +71,9 @@ def buttons(state: WizardState) -> Buttons:
             "&Fit" if fit is None else "&Fit again",
         ),
         accept=ButtonState(on_fit and not can_stop, idle and state.may_accept, main == "accept"),
+        following=ButtonState(
+            is_done and bool(state.following), idle, main == "following", f"&Next: {state.following_title}…"
+        ),
     )
 
 
@@ -74,11 +82,21 @@ def main_button(state: WizardState) -> Main:
     status, fit = state.status, state.fit.value
     if status is not None and status.state != "captured":
         return "all" if state.places_itself.value else "capture"
+    if state.at.value == SETTINGS_PAGE:
+        return "back"
     if state.at.value != state.last:
         return "next"
     if fit is None:
         return "fit"
-    return "leave" if fit.is_accepted else "accept"
+    if not fit.is_accepted:
+        return "accept"
+    return "following" if state.following else "leave"
+
+
+def page_before(state: WizardState) -> int:
+    """The page that *Back* shows: that of the work from the settings, else the one before."""
+    at = state.at.value
+    return next(iter(state.lacking), state.last) if at == SETTINGS_PAGE else at - 1
 
 
 def _capture_text(state: WizardState) -> tuple[str, str]:
@@ -124,8 +142,9 @@ def _activity_text(doing: Doing, told: JobProgress) -> str:
 
 @dataclass(frozen=True)
 class PageLine:
-    """A line of the list at the left; ``role`` colours it, empty for plain text."""
+    """A line of the list at the left for a page; ``role`` colours it, empty for plain text."""
 
+    page: int
     text: str
     tip: str
     accessible_text: str
@@ -133,17 +152,20 @@ class PageLine:
 
 
 def page_lines(state: WizardState) -> tuple[PageLine, ...]:
-    """Settings, steps with their state, fit."""
+    """Steps with their state, fit, and last the settings, which few people change."""
     has_fit = state.fit.value is not None
-    lines = [PageLine("⚙  Settings", "Settings", "Settings")]
-    lines += [_line(_MARKS[s.state], s.step.title, s.state, s.reason) for s in state.statuses.value]
+    lines = [
+        _line(page, _MARKS[s.state], s.step.title, s.state, s.reason)
+        for page, s in enumerate(state.statuses.value, FIRST_PAGE)
+    ]
     fitted = "fitted" if has_fit else "not fitted"
-    return (*lines, _line("✓" if has_fit else "○", "Fit and judge", fitted))
+    fit = _line(state.last, "✓" if has_fit else "○", "Fit and judge", fitted)
+    return (*lines, fit, PageLine(SETTINGS_PAGE, "⚙  Advanced", ADVANCED_TIP, "Advanced settings", "muted"))
 
 
-def _line(mark: str, title: str, state: str, reason: str = "") -> PageLine:
+def _line(page: int, mark: str, title: str, state: str, reason: str = "") -> PageLine:
     role = _MARK_ROLES.get(mark, "")
-    return PageLine(f"{mark}  {title}", f"{title}: {reason or state}", f"{title}, {state}", role)
+    return PageLine(page, f"{mark}  {title}", f"{title}: {reason or state}", f"{title}, {state}", role)
 
 
 # A step ----------------------------------------------------------------------------------------------

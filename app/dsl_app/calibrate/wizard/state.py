@@ -104,6 +104,9 @@ class WizardState:
         self.settings_trouble = Value("")
         self.places_itself = Value(False)
         self.is_automatic = Value(False)
+        #: The calibration that comes after this one, and whether a person goes on to it; empty: none.
+        self.following, self.following_title = "", ""
+        self.goes_on = False
         self.closed: Event[None] = Event()
         self.fit.changed.connect(self._forget_allowed)
 

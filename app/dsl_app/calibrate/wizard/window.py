@@ -19,7 +19,14 @@ from PySide6.QtWidgets import (
 )
 
 from dsl_app.calibrate.wizard.fit_page import FitPage
-from dsl_app.calibrate.wizard.presentation import Buttons, PageLine, activity, buttons, page_lines
+from dsl_app.calibrate.wizard.presentation import (
+    Buttons,
+    PageLine,
+    activity,
+    buttons,
+    page_before,
+    page_lines,
+)
 from dsl_app.calibrate.wizard.settings_page import SettingsPage
 from dsl_app.calibrate.wizard.state import Doing, WizardState
 from dsl_app.calibrate.wizard.step_page import StepPage
@@ -62,6 +69,8 @@ class CalibrationWizard(QDialog):
         self._timer = Ticker(self, FETCH_MS, commands.take_news)
         self._lay_out()
         self._connect()
+        # Only a button in its dialog becomes the one that the return key presses.
+        self.buttons.show_state()
         self.apply_theme(theme)
         self._timer.start()
 
@@ -77,6 +86,7 @@ class CalibrationWizard(QDialog):
         self.settings.edited.connect(lambda key, text: commands.change_settings({key: text}))
         self.fit.settings_requested.connect(lambda values: commands.change_settings(values, then_fit=True))
         self.buttons.leave.clicked.connect(self.reject)
+        self.buttons.following.clicked.connect(self._go_on)
         add_help_key(self, HELP)
         self.stops = [
             *follow_any(self._show_steps, state.statuses, state.fit),
@@ -116,6 +126,11 @@ class CalibrationWizard(QDialog):
         self._commands.leave()
         super().reject()
 
+    def _go_on(self) -> None:
+        """Leave for the calibration that comes next."""
+        self._state.goes_on = True
+        self.reject()
+
     def _may_stop(self) -> bool:
         answer = QMessageBox.question(
             self,
@@ -138,7 +153,7 @@ def _fitting(room: QSize) -> QSize:
 
 
 class PageList(QListWidget):
-    """The pages of a wizard: settings, steps, fit; ``chosen`` tells the page that a person chose."""
+    """The pages of a wizard: steps, fit, settings; ``chosen`` tells the page that a person chose."""
 
     chosen = Signal(int)
 
@@ -153,7 +168,7 @@ class PageList(QListWidget):
 
     def _choose(self, row: int) -> None:
         if row >= 0:
-            self.chosen.emit(row)
+            self.chosen.emit(self._lines[row].page)
 
     def show_pages(self, lines: tuple[PageLine, ...]) -> None:
         """Show the state of every step; the current page stays."""
@@ -171,8 +186,9 @@ class PageList(QListWidget):
 
     def mark(self, page: int) -> None:
         """Show a page as the current one."""
+        rows = [row for row, line in enumerate(self._lines) if line.page == page]
         with quiet(self):
-            self.setCurrentRow(page)
+            self.setCurrentRow(rows[0] if rows else -1)
 
     def apply_theme(self, theme: Theme) -> None:
         """Take the colours of a theme."""
@@ -197,6 +213,7 @@ class WizardButtons(QWidget):
         self.discard = _button("&Discard fit", "Discard this fit; captures and what was accepted are kept")
         self.fit = _button("&Fit", "Calibrate from the captures of all steps")
         self.accept = _button("&Accept", "Make this fit the campaign's calibration and write the rig")
+        self.following = _button("&Next", "Close this wizard and open that of the next calibration")
         self._text = label("", "muted", name="Current activity")
         self._bar = named(QProgressBar(), "Progress")
         self._bar.setFixedWidth(BAR_PX)
@@ -210,12 +227,13 @@ class WizardButtons(QWidget):
     def _lay_out(self) -> None:
         work = row_of((self._text, 1), self._bar)
         early = (self.back, self.check, self.discard, self.all, self.stop)
-        row = row_of(self.leave, STRETCH, *early, self.capture, self.fit, self.accept, self.next)
+        late = (self.capture, self.fit, self.accept, self.next, self.following)
+        row = row_of(self.leave, STRETCH, *early, *late)
         column_of(work, row, on=self, margins=0)
 
     def _connect(self) -> None:
         state, commands = self._state, self._commands
-        self.back.clicked.connect(lambda: commands.go_to(state.at.value - 1))
+        self.back.clicked.connect(lambda: commands.go_to(page_before(state)))
         self.next.clicked.connect(lambda: commands.go_to(state.at.value + 1))
         self.check.clicked.connect(commands.check)
         self.all.clicked.connect(commands.capture_all)
@@ -226,12 +244,13 @@ class WizardButtons(QWidget):
         self.accept.clicked.connect(commands.accept)
         shown = (state.at, state.doing, state.statuses, state.fit, state.allowed, state.look)
         self.stops = [
-            *follow_any(self._show, *shown),
+            *follow_any(self.show_state, *shown),
             *follow_any(self._show_activity, state.note, state.progress),
             state.is_checking.follow(self.check.setChecked),
         ]
 
-    def _show(self) -> None:
+    def show_state(self) -> None:
+        """Show the buttons of the current page."""
         shown = buttons(self._state)
         for each in fields(Buttons):
             button, how = getattr(self, each.name), getattr(shown, each.name)

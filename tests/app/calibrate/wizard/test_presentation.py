@@ -12,6 +12,7 @@ from dsl_app.calibrate.wizard.presentation import (
     buttons,
     fit_display,
     main_button,
+    page_before,
     page_lines,
     step_display,
 )
@@ -71,23 +72,23 @@ HALF: tuple[State, State] = ("captured", "missing")
 
 #: A state, its visible buttons, those of them that are enabled, and the main one.
 CASES: dict[str, tuple[WizardState, str, str, str]] = {
-    "settings": (wizard(), "leave back next", "leave next", "next"),
+    "settings": (wizard(), "leave back", "leave back", "back"),
     "a step to capture": (
-        wizard(FIRST), "leave back check capture next", "leave back check capture next", "capture"
+        wizard(FIRST), "leave back check capture next", "leave check capture next", "capture"
     ),
     "a step that the rig places itself": (
         wizard(FIRST, places_itself=True),
         "leave back check all capture next",
-        "leave back check all capture next",
+        "leave check all capture next",
         "all",
     ),
     "a captured step": (
-        wizard(FIRST, HALF), "leave back check capture next", "leave back check capture next", "next"
+        wizard(FIRST, HALF), "leave back check capture next", "leave check capture next", "next"
     ),
     "all is captured, so there is nothing left to capture at once": (
         wizard(FIRST, CAPTURED, places_itself=True),
         "leave back check capture next",
-        "leave back check capture next",
+        "leave check capture next",
         "next",
     ),
     "a refused step": (
@@ -99,7 +100,7 @@ CASES: dict[str, tuple[WizardState, str, str, str]] = {
     "a look does not lock the buttons": (
         wizard(FIRST, doing=Doing.LOOKING),
         "leave back check capture next",
-        "leave back check capture next",
+        "leave check capture next",
         "capture",
     ),
     "reading settings does": (
@@ -153,7 +154,7 @@ CASES: dict[str, tuple[WizardState, str, str, str]] = {
     "a step of an accepted calibration": (
         wizard(FIRST, CAPTURED, fit=fit(GOOD, accepted=True)),
         "leave back check capture next",
-        "leave back check capture next",
+        "leave check capture next",
         "next",
     ),
 }  # fmt: skip
@@ -193,6 +194,23 @@ def test_the_fit_button_and_the_leave_button_follow_the_fit() -> None:
     assert buttons(done).leave.text == "&Leave"
 
 
+def test_the_next_calibration_is_the_main_button_once_this_one_is_accepted() -> None:
+    done = wizard(LAST, CAPTURED, fit=fit(GOOD, accepted=True))
+    assert not buttons(done).following.is_visible
+    assert buttons(done).leave.is_primary
+    done.following, done.following_title = "geometry", "Geometry"
+    shown = buttons(done)
+    assert (shown.following.text, shown.following.is_primary) == ("&Next: Geometry…", True)
+    assert not shown.leave.is_primary
+    assert not buttons(wizard(LAST, CAPTURED, fit=fit(GOOD))).following.is_visible
+
+
+def test_back_leads_from_the_settings_to_the_work() -> None:
+    assert page_before(wizard(states=HALF)) == SECOND
+    assert page_before(wizard(states=CAPTURED)) == LAST
+    assert page_before(wizard(SECOND)) == FIRST
+
+
 def test_the_activity_is_what_runs_else_the_note() -> None:
     idle = wizard(note="Captured.", progress=JobProgress("old", 3, 4))
     assert (activity(idle).text, activity(idle).is_busy) == ("Captured.", False)
@@ -215,13 +233,14 @@ def test_the_activity_is_what_runs_else_the_note() -> None:
 
 def test_the_list_has_a_line_for_every_page() -> None:
     lines = page_lines(wizard(states=("captured", "refused"), fit=None))
-    assert [line.text for line in lines] == ["⚙  Settings", "✓  Step a", "✗  Step b", "○  Fit and judge"]
-    assert [line.role for line in lines] == ["", "good", "bad", ""]
-    assert lines[2].tip == "Step b: it was moved"
-    assert [line.accessible_text for line in lines[1:]] == [
-        "Step a, captured", "Step b, refused", "Fit and judge, not fitted"
+    assert [line.text for line in lines] == ["✓  Step a", "✗  Step b", "○  Fit and judge", "⚙  Advanced"]
+    assert [line.page for line in lines] == [1, 2, 3, 0]
+    assert [line.role for line in lines] == ["good", "bad", "", "muted"]
+    assert lines[1].tip == "Step b: it was moved"
+    assert [line.accessible_text for line in lines] == [
+        "Step a, captured", "Step b, refused", "Fit and judge, not fitted", "Advanced settings"
     ]  # fmt: skip
-    fitted = page_lines(wizard(fit=fit(GOOD)))[-1]
+    fitted = page_lines(wizard(fit=fit(GOOD)))[-2]
     assert (fitted.text, fitted.role, fitted.tip) == ("✓  Fit and judge", "good", "Fit and judge: fitted")
 
 

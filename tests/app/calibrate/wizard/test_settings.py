@@ -6,10 +6,16 @@ from dataclasses import dataclass, field
 from typing import Any, cast
 
 import pytest
-from dsl_app.calibrate.wizard.settings import as_text, changed_settings, setting_rows, setting_title
+from dsl_app.calibrate.wizard.settings import (
+    TITLES,
+    as_text,
+    changed_settings,
+    setting_rows,
+    setting_title,
+)
 
 from dsl_core.campaign.common.recipe import AnyRecipe
-from dsl_core.campaign.recipes import recipe_names
+from dsl_core.campaign.recipes import load_recipe, recipe_names
 from dsl_core.model.board import Board, Checkerboard
 
 
@@ -78,5 +84,11 @@ def test_values_as_the_command_line_takes_them(value: Any, text: str) -> None:
 
 
 def test_titles_name_their_unit() -> None:
-    titles = [setting_title(key) for key in ("filters_nm", "tilt_deg", "poses", "nm")]
-    assert titles == ["Filters (nm)", "Tilt (°)", "Poses", "Nm"]
+    titles = [setting_title(key) for key in ("long_nm", "tilt_deg", "board", "nm")]
+    assert titles == ["Long (nm)", "Tilt (°)", "Board", "Nm"]
+
+
+def test_every_setting_of_every_calibration_has_its_title_in_words() -> None:
+    keys = {row.key for name in recipe_names() for row in setting_rows(load_recipe(name), {})}
+    assert keys - set(TITLES) == {"board"}
+    assert set(TITLES) - keys == set()

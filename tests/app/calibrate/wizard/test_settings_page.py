@@ -16,12 +16,14 @@ from tests.app.calibrate.page_stage import Stage, click
 
 def test_settings_are_typed_and_wrong_ones_explained(stage: Stage) -> None:
     wizard = stage.wizard("selftest")
+    wizard.steps.setCurrentRow(wizard.steps.count() - 1)
+    stage.wait(lambda: wizard.stack.currentWidget() is wizard.settings)
     field = wizard.settings.fields["scale"]
     assert isinstance(field, QLineEdit)
     field.setFocus()
     field.selectAll()
     QTest.keyClicks(field, "much")
-    click(wizard.buttons.next)
+    click(wizard.buttons.back)
     QTest.keyClick(field, Qt.Key.Key_Tab)
     stage.wait(lambda: "scale must be a number" in wizard.settings._trouble.text())
     assert wizard.stack.currentWidget() is wizard.settings

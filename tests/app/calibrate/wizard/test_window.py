@@ -22,8 +22,6 @@ def test_a_calibration_by_mouse_from_placing_to_accepting(stage: Stage) -> None:
     by_hand(stage)
     wizard = stage.wizard("selftest")
     buttons, state = wizard.buttons, stage.bench.wizards[-1][0]
-    assert wizard.stack.currentWidget() is wizard.settings
-    click(buttons.next)
     assert wizard.stack.currentWidget() is wizard.step
     assert wizard.step.instruction.text() == "Place the dim target."
     assert not buttons.all.isVisible()
@@ -42,7 +40,12 @@ def test_a_calibration_by_mouse_from_placing_to_accepting(stage: Stage) -> None:
     click(buttons.accept)
     stage.wait(lambda: "The rig is saved in" in state.note.value)
     assert buttons.leave.text() == "&Close"
-    click(buttons.leave)
+    assert buttons.following.text() == "&Next: Geometry…"
+    assert buttons.following.property("role") == "primary"
+    click(buttons.following)
+    stage.wait(lambda: len(stage.windows) == 2)
+    assert stage.windows[-1].windowTitle() == "Calibrate: Geometry"
+    stage.windows[-1].reject()
     stage.wait(lambda: stage.bench.row("selftest").state is RowState.GOOD)
     row = stage.page.rows["selftest"]
     assert row.accessibleName() == f"{row._title.text()[4:]}: good."
@@ -57,7 +60,6 @@ def test_a_calibration_by_keys_alone(stage: Stage) -> None:
     QTest.keyClick(stage.page.rows["selftest"].run, Qt.Key.Key_Space)
     stage.wait(lambda: bool(stage.windows))
     wizard, state = stage.windows[-1], stage.bench.wizards[-1][0]
-    QTest.keyClick(wizard.steps, Qt.Key.Key_Down)
     assert state.at.value == 1
     for page in (2, 3):
         QTest.keyClick(wizard, Qt.Key.Key_Return)  # captures, the main button of a step
@@ -72,6 +74,20 @@ def test_a_calibration_by_keys_alone(stage: Stage) -> None:
     stage.wait(lambda: stage.bench.row("selftest").state is RowState.GOOD)
 
 
+def test_settings_are_last_and_lead_back_to_the_work(stage: Stage) -> None:
+    by_hand(stage)
+    wizard = stage.wizard("selftest")
+    last = wizard.steps.item(wizard.steps.count() - 1)
+    assert last.text() == "⚙  Advanced"
+    spot = wizard.steps.visualItemRect(last).center()
+    QTest.mouseClick(wizard.steps.viewport(), Qt.MouseButton.LeftButton, pos=spot)
+    assert wizard.stack.currentWidget() is wizard.settings
+    assert not wizard.buttons.next.isVisible()
+    click(wizard.buttons.back)
+    assert wizard.stack.currentWidget() is wizard.step
+    assert not wizard.buttons.back.isEnabled()
+
+
 def test_all_steps_at_once_where_the_rig_places_targets(stage: Stage) -> None:
     wizard = stage.wizard("selftest")
     state = stage.bench.wizards[-1][0]
@@ -79,7 +95,7 @@ def test_all_steps_at_once_where_the_rig_places_targets(stage: Stage) -> None:
     click(wizard.buttons.all)
     stage.wait(lambda: state.fit.value is not None)
     assert [each.state for each in state.statuses.value] == ["captured", "captured"]
-    assert wizard.steps.item(1).text() == "✓  dim picture"
+    assert wizard.steps.item(0).text() == "✓  dim picture"
 
 
 def test_closing_during_a_capture_asks_and_keeps_what_is_there(
@@ -88,7 +104,6 @@ def test_closing_during_a_capture_asks_and_keeps_what_is_there(
     by_hand(stage)
     wizard = stage.wizard("selftest")
     state = stage.bench.wizards[-1][0]
-    click(wizard.buttons.next)
     click(wizard.buttons.capture)
     taken = stage.bench.campaign / "selftest" / "dim" / "scan.dsl"
     stage.wait(taken.is_dir)
@@ -113,8 +128,6 @@ def test_closing_during_a_capture_asks_and_keeps_what_is_there(
     assert taken.is_dir()
     wizard = stage.wizard("selftest")
     state = stage.bench.wizards[-1][0]
-    if state.at.value == 0:
-        click(wizard.buttons.next)
     click(wizard.buttons.capture)
     stage.wait(lambda: state.statuses.value[0].state == "captured")
 
@@ -123,7 +136,6 @@ def test_stop_ends_a_capture_soon(stage: Stage, slow: None) -> None:
     by_hand(stage)
     wizard = stage.wizard("selftest")
     state = stage.bench.wizards[-1][0]
-    click(wizard.buttons.next)
     click(wizard.buttons.capture)
     stage.wait(wizard.buttons.stop.isVisible)
     assert not wizard.buttons.next.isEnabled()
@@ -137,7 +149,6 @@ def test_a_lost_camera_stands_in_the_wizard(stage: Stage, monkeypatch: pytest.Mo
     by_hand(stage)
     wizard = stage.wizard("selftest")
     state = stage.bench.wizards[-1][0]
-    click(wizard.buttons.next)
 
     def silent(self: SimCamera, timeout_ms: float = 0.0) -> Frame:
         raise DeviceError("The camera sent no frame. Check its cable.")
