@@ -58,8 +58,6 @@ class WizardController:
 
         def opened(found: Opened) -> None:
             self._take(found)
-            # A rig that places its targets shows what is in front of the camera at once.
-            self.state.is_checking.set(found.places_itself and self.state.status is not None)
             self._unfollow = self._rig.state.devices.changed.connect(self._follow_devices)
             done()
 
