@@ -62,6 +62,8 @@ class CalibrationWizard(QDialog):
         self.banner = Banner(
             "Connect the rig again", "Open all devices of the rig again and continue here", commands.reconnect
         )
+        # The return key presses the main button of the page, not the first that is in the dialog.
+        self.banner.action.setAutoDefault(False)
         self.steps = PageList()
         self.settings, self.step, self.fit = SettingsPage(), StepPage(state), FitPage(state)
         self.stack = QStackedWidget()
@@ -69,8 +71,6 @@ class CalibrationWizard(QDialog):
         self._timer = Ticker(self, FETCH_MS, commands.take_news)
         self._lay_out()
         self._connect()
-        # Only a button in its dialog becomes the one that the return key presses.
-        self.buttons.show_state()
         self.apply_theme(theme)
         self._timer.start()
 
@@ -244,13 +244,12 @@ class WizardButtons(QWidget):
         self.accept.clicked.connect(commands.accept)
         shown = (state.at, state.doing, state.statuses, state.fit, state.allowed, state.look)
         self.stops = [
-            *follow_any(self.show_state, *shown),
+            *follow_any(self._show, *shown),
             *follow_any(self._show_activity, state.note, state.progress),
             state.is_checking.follow(self.check.setChecked),
         ]
 
-    def show_state(self) -> None:
-        """Show the buttons of the current page."""
+    def _show(self) -> None:
         shown = buttons(self._state)
         for each in fields(Buttons):
             button, how = getattr(self, each.name), getattr(shown, each.name)
