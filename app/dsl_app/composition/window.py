@@ -215,6 +215,7 @@ class Composition(QObject):
 
     def _start_page(self) -> PageWidget:
         from dsl_app.start.page import StartPage
+        from dsl_app.start.unfinished import UnfinishedController
 
         window = self.window
         return StartPage(
@@ -225,7 +226,14 @@ class Composition(QObject):
             lambda: window.open_page("rig"),
             lambda: window.do("open"),
             lambda: window.do("import_captures"),
+            UnfinishedController(self._scan_folders, window.parts.runner, window.open_path),
         )
+
+    def _scan_folders(self) -> list[Path]:
+        """Where scans are saved, and where recent files are."""
+        settings = self.window.parts.settings
+        own = Path(settings.output_folder or Path.home() / "dsl-scans")
+        return [own, *(Path(each).parent for each in settings.recent)]
 
     def _start_live(self) -> None:
         """Show what the simulated rig's camera sees; connects it unless a rig is connected."""

@@ -16,9 +16,10 @@ RECONNECT = "Reconnect the rig, check whether anything has moved, and resume at 
 
 @dataclass(frozen=True)
 class RunControls:
-    """The box that starts a scan; ``renew`` and ``drift`` are for one that was interrupted."""
+    """The box that starts a scan; ``resume``, ``renew`` and ``drift`` are for one that was interrupted."""
 
     start: ButtonState
+    resume: ButtonState
     pause: ButtonState
     cancel: bool
     renew: ButtonState
@@ -54,11 +55,15 @@ def run_controls(
     if session is not None and is_resumable:
         lines.insert(0, session.words)
     is_ready = phase is not Phase.PLANNING or not obstacles
+    can_run, connects = not phase.is_busy and not obstacles, facts is not None and facts.connects
     return RunControls(
-        start=ButtonState(
-            is_enabled=not phase.is_busy and not obstacles,
+        start=ButtonState(session is None, can_run, is_primary=True),
+        resume=ButtonState(
+            session is not None,
+            can_run,
             is_primary=True,
-            text=_start_text(session, facts),
+            text="Connect and &resume" if connects else "&Resume scan",
+            tip=RECONNECT if connects else RESUME,
         ),
         pause=ButtonState(
             is_enabled=phase in (Phase.RUNNING, Phase.PAUSED),
@@ -71,12 +76,6 @@ def run_controls(
         phase=LabelState(f"● {phase.value}" if is_ready else "● not ready", _PHASE_ROLES.get(phase, "muted")),
         remarks=LabelState("\n".join(lines), "warn" if obstacles else "muted"),
     )
-
-
-def _start_text(session: InterruptedScan | None, facts: Facts | None) -> str:
-    if session is None:
-        return "&Start scan"
-    return "Connect and &resume" if facts is not None and facts.connects else "&Resume scan"
 
 
 def banner_controls(reconnection: Reconnection) -> BannerControls:

@@ -15,7 +15,7 @@ from PySide6.QtWidgets import (
 )
 
 from dsl_app.scan.controller import ScanController
-from dsl_app.scan.controls import progress_text, run_controls
+from dsl_app.scan.controls import RESUME, progress_text, run_controls
 from dsl_app.scan.forecast.figures import minutes, volume
 from dsl_app.scan.state import CalibrationChoice, Facts, Phase, ScanState
 from dsl_app.shared.evented import follow_any
@@ -122,6 +122,7 @@ class RunBox(QGroupBox):
         self._state, self._controller = state, controller
         tip = "Capture all frames of the plan; each is saved before the next is captured"
         self.start = push_button("&Start scan", tip, controller.start)
+        self.resume = push_button("&Resume scan", RESUME, controller.start)
         self.pause = push_button("&Pause", "Pause before the next frame; nothing is lost", self.toggle_pause)
         self.cancel = push_button("&Cancel", "Stop after the current frame; the scan can be resumed later")
         self.renew = push_button("Plan a &new scan", "Keep the interrupted scan on disk and plan another")
@@ -155,6 +156,7 @@ class RunBox(QGroupBox):
             self.then,
             self.drift,
             self.start,
+            self.resume,
             buttons,
             self.renew,
             self.again,

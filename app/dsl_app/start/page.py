@@ -7,6 +7,7 @@ from functools import partial
 from pathlib import Path
 
 from PySide6.QtCore import Qt
+from PySide6.QtGui import QShowEvent
 from PySide6.QtWidgets import QFrame, QPushButton
 
 from dsl_app.shared.settings import RecentFiles
@@ -15,6 +16,8 @@ from dsl_app.shared.widgets.layouts import STRETCH, boxed, column_of, row_of, sc
 from dsl_app.shared.widgets.page import PageWidget
 from dsl_app.shared.widgets.recent_list import RecentList
 from dsl_app.start.examples import EXAMPLES
+from dsl_app.start.unfinished import UnfinishedController
+from dsl_app.start.unfinished_list import UnfinishedList
 
 CARD_PX, GAP_PX = 286, 16
 
@@ -31,6 +34,7 @@ class StartPage(PageWidget):
         choose_rig: Callable[[], object],
         choose_file: Callable[[], object],
         import_captures: Callable[[], object],
+        unfinished: UnfinishedController,
     ) -> None:
         super().__init__()
         self.examples = {
@@ -54,7 +58,13 @@ class StartPage(PageWidget):
             import_captures,
         )
         self.files = RecentList(recent, open_path)
+        self.unfinished = UnfinishedList(unfinished)
         self._lay_out()
+
+    def showEvent(self, event: QShowEvent) -> None:
+        """Look for what was interrupted, soon."""
+        super().showEvent(event)
+        self.unfinished.look_soon()
 
     def _lay_out(self) -> None:
         cards = (
@@ -79,6 +89,7 @@ class StartPage(PageWidget):
         )
         width = 3 * CARD_PX + 2 * GAP_PX
         self.files.setFixedWidth(width)
+        self.unfinished.setFixedWidth(width)
         column = column_of(
             STRETCH,
             label("dsl-scan", "title"),
@@ -88,6 +99,7 @@ class StartPage(PageWidget):
             14,
             row_of(self.choose, self.captures, STRETCH),
             8,
+            self.unfinished,
             self.files,
             STRETCH,
             STRETCH,

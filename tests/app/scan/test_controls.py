@@ -53,12 +53,19 @@ def test_obstacles_keep_a_plan_from_starting_but_not_from_being_shown() -> None:
 
 def test_an_interrupted_scan_is_resumed_or_left() -> None:
     shown = run_controls(Phase.LOST, HALF, FREE, "A note.", has_finished=False)
-    assert (shown.start.text, shown.renew.is_visible, shown.again.is_visible) == ("&Resume scan", True, False)
+    assert (shown.resume.text, shown.renew.is_visible, shown.again.is_visible) == (
+        "&Resume scan",
+        True,
+        False,
+    )
+    assert (shown.start.is_visible, shown.resume.is_visible) == (False, True)
+    fresh = run_controls(Phase.PLANNING, None, FREE, "", has_finished=False)
+    assert (fresh.start.is_visible, fresh.resume.is_visible, fresh.start.text) == (True, False, None)
     assert shown.drift == shown.renew
     assert shown.remarks.text == "half: 30 of 76 frames are safe.\nA note."
     assert not run_controls(Phase.RUNNING, HALF, FREE, "", has_finished=False).renew.is_visible
     away = replace(FREE, connects=True)
-    assert run_controls(Phase.PLANNING, HALF, away, "", False).start.text == "Connect and &resume"
+    assert run_controls(Phase.PLANNING, HALF, away, "", False).resume.text == "Connect and &resume"
 
 
 @pytest.mark.parametrize(

@@ -112,12 +112,13 @@ def test_cancel_keeps_frames_and_offers_to_resume(qtbot: QtBot, ready: Bench, sl
     qtbot.waitUntil(lambda: bench.state.status.value.done > 3, timeout=60_000)
     click(page.run.cancel)
     qtbot.waitUntil(in_phase(bench, Phase.STOPPED), timeout=2_000)
-    assert page.run.start.text() == "&Resume scan"
+    assert page.run.resume.text() == "&Resume scan"
+    assert not page.run.start.isVisible()
     assert page.run.renew.isVisible()
     assert page.run.drift.isVisible()
     page.run.drift.setChecked(False)
     assert not bench.state.check_drift.value
-    click(page.run.start)
+    click(page.run.resume)
     qtbot.waitUntil(in_phase(bench, Phase.DONE), timeout=60_000)
     assert not page.run.drift.isVisible()
     assert page.run.drift.isChecked()

@@ -3,9 +3,11 @@ from pathlib import Path
 from dsl_app.shared.settings import RecentFiles, Settings
 from dsl_app.start.examples import EXAMPLES
 from dsl_app.start.page import StartPage
+from dsl_app.start.unfinished import UnfinishedController
 from pytestqt.qtbot import QtBot
 
 from dsl_core.resources import resource_path
+from tests.app.support.doubles import InlineRunner
 
 #: Width of the rail at the left of the window.
 RAIL_PX = 84
@@ -21,6 +23,7 @@ def make_page(qtbot: QtBot, recent: RecentFiles) -> tuple[StartPage, list[object
         lambda: asked.append("rig"),
         lambda: asked.append("file"),
         lambda: asked.append("captures"),
+        UnfinishedController(list, InlineRunner(), asked.append),
     )
     qtbot.addWidget(page)
     page.resize(1200, 700)

@@ -1,0 +1,96 @@
+"""What was interrupted in a folder is found, and a reconstruction is continued as it was begun."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+
+import pytest
+
+from dsl_core import pipeline
+from dsl_core.devices.registry import open_rig
+from dsl_core.io.atomic import write_atomic
+from dsl_core.io.result import row_writer
+from dsl_core.io.result.result_file import load_result
+from dsl_core.io.scan.folder import ScanReader
+from dsl_core.io.scan.lock import FolderLock
+from dsl_core.model.presets import PRESETS
+from dsl_core.pipeline import Options
+from dsl_core.workflows import scans
+from dsl_core.workflows.unfinished import (
+    _options_of,
+    resume_result,
+    unfinished_results,
+    unfinished_scans,
+)
+
+OPTIONS = Options(spectra=False, refine_columns=False, band_rows=16)
+
+
+@pytest.fixture(scope="module")
+def scan(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """To be copied, not changed."""
+    folder = tmp_path_factory.mktemp("scans") / "a.dsl"
+    with open_rig("twin", {"scene": "plane", "size": "48x32"}) as devices:
+        plan = next(p.plan for p in PRESETS if p.key == "quick")
+        pipeline.scan(devices, pipeline.fit_plan(plan, devices), folder)
+    return folder
+
+
+@pytest.fixture
+def killed(scan: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A copy of the scan, whose reconstruction was killed after its first band of rows."""
+    copy = shutil.copytree(scan, tmp_path / "a.dsl")
+    write, notes = write_atomic, list[str]()
+
+    def dies(path: Path, data: bytes) -> None:
+        notes.append(path.name)
+        if len(notes) == 3:
+            raise KeyboardInterrupt
+        write(path, data)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(row_writer, "write_atomic", dies)
+        with pytest.raises(KeyboardInterrupt):
+            scans.reconstruct_to(tmp_path / "a.zarr", copy, None, OPTIONS)
+    return copy
+
+
+def test_an_interrupted_reconstruction_is_found_and_continued(killed: Path, tmp_path: Path) -> None:
+    (found,) = unfinished_results(tmp_path)
+    assert (found.target, found.scan) == (tmp_path / "a.zarr", killed)
+    assert (found.done, found.total, found.options) == (1, 2, OPTIONS)
+    assert resume_result(found) == tmp_path / "a.zarr"
+    assert "depth_mm" in load_result(tmp_path / "a.zarr")
+    assert unfinished_results(tmp_path) == ()
+
+
+def test_one_that_runs_or_whose_scan_is_gone_is_not_offered(killed: Path, tmp_path: Path) -> None:
+    lock = FolderLock(tmp_path / ".a.zarr.unfinished" / "writer.lock")
+    assert unfinished_results(tmp_path) == ()
+    lock.release()
+    assert len(unfinished_results(tmp_path)) == 1
+    shutil.rmtree(killed)
+    assert unfinished_results(tmp_path) == ()
+
+
+def test_a_scan_that_lacks_frames_is_found(scan: Path, tmp_path: Path) -> None:
+    assert unfinished_scans(scan.parent) == ()
+    copy = shutil.copytree(scan, tmp_path / "b.dsl")
+    log = copy / "frames.jsonl"
+    lines = log.read_bytes().splitlines(keepends=True)
+    log.write_bytes(b"".join(lines[:-2]))
+    total = ScanReader(scan).plan.shot_count
+    (found,) = unfinished_scans(tmp_path)
+    assert (found.folder, found.done, found.total) == (copy, total - 2, total)
+    (tmp_path / "c.dsl").mkdir()
+    (tmp_path / "c.dsl" / "manifest.json").write_text("{")
+    assert len(unfinished_scans(tmp_path)) == 1
+
+
+def test_options_are_read_back_only_where_nothing_is_lost() -> None:
+    for options in (Options(), OPTIONS, Options(region_px=(1, 2, 3, 4), solver="published")):
+        assert _options_of(repr(options)) == options
+    for text in ("Options(later=1)", "3", repr(Options()).replace("'auto'", '"auto"')):
+        with pytest.raises((ValueError, TypeError)):
+            _options_of(text)
