@@ -112,7 +112,7 @@ def _options_of(text: str) -> Options:
     """Options from their ``repr``; raises `ValueError` for any that this version would write otherwise."""
     call = ast.parse(text, mode="eval").body
     if not isinstance(call, ast.Call):
-        raise ValueError(f"{text} are no options")
+        raise ValueError(f"{text} cannot be read as options")
     values = {str(each.arg): _value_of(each.value) for each in call.keywords}
     options = Options(**values)
     if repr(options) != text:
