@@ -144,7 +144,7 @@ def fit_first_orders(
         fit = fit_film(here, samples, mounting)
         if round_:
             angled = fit_film(here, samples, mounting, angled=True)
-            fit = angled if angled.angle.is_significant else fit
+            fit = angled if angled.angle.is_of_filters else fit
         here = rig.model_copy(update={"film": fit.film})
         samples = seen_straight(here, samples, fit.angle)
         _require_filters(rig, here, data, samples, WRONG_PX if round_ == 0 else OFF_PX)

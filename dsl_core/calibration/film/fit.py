@@ -49,8 +49,10 @@ MIN_SAMPLES = 100
 #: Deviations of a filter's c, a and b before anything is seen: any index, or no such filter; tilts of some
 #: degrees.
 ANGLE_STD = np.array([0.3, 0.03, 0.03])
-#: The shift is that of filters only where c is so many deviations above nothing.
+#: The shift is that of filters only where c is so many deviations above nothing, and that of an index that
+#: layers of interference filters have: a film bent in its own way shifts colours over the picture, too.
 SIGNIFICANT = 5.0
+FILTER_INDEX = (1.3, 3.0)
 
 
 @dataclass(frozen=True)
@@ -112,14 +114,16 @@ class FilterAngle:
     std: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
     @property
-    def is_significant(self) -> bool:
+    def is_of_filters(self) -> bool:
         """Whether the light seen is shifted as by filters, beyond doubt."""
-        return self.values[0] > SIGNIFICANT * self.std[0]
+        value, std = self.values[0], self.std[0]
+        low, high = (index**-2.0 for index in reversed(FILTER_INDEX))
+        return value > SIGNIFICANT * std and low - 2 * std < value < high + 2 * std
 
     @property
     def index(self) -> tuple[float, float] | None:
         """Effective index with its deviation; None where no shift is seen."""
-        if not self.is_significant:
+        if not self.is_of_filters:
             return None
         value = self.values[0] ** -0.5
         return value, 0.5 * value**3 * self.std[0]

@@ -14,8 +14,6 @@ ALONE = 0.5
 MAX_PULL = 1.8
 #: Bulge of the target at all positions, mm over 300 mm and in its deviations: the larger is allowed.
 MAX_BOW_MM, BOW_SIGMAS = 0.2, 3.0
-#: Effective indices that layers of interference filters have.
-FILTER_INDEX = (1.3, 3.0)
 #: Filters and LEDs may disagree by this much (nm, at a wavelength) or this many deviations, the larger.
 #: The film's line density makes up for filters that are all off by one share; only the LEDs' spectra tell.
 MAX_FILTERS_NM, FILTER_SIGMAS, MIDDLE_NM = 0.8, 3.0, 550.0
@@ -130,10 +128,6 @@ def _filter_index(record: DepthStageCalibration) -> tuple[Figure, ...]:
             value=value,
             unit="",
             std=std,
-            low=FILTER_INDEX[0] - 2 * std,
-            high=FILTER_INDEX[1] + 2 * std,
-            advice="Colours shift over the picture in another way than through filters: calibrate the"
-            " geometry again, and put filters flat in front of the camera's lens.",
         ),
     )
 

@@ -85,8 +85,16 @@ def test_filters_seen_at_an_angle_do_not_bend_the_film(seed: int) -> None:
 
 def test_filters_that_shift_nothing_have_no_index() -> None:
     found = fit_film(mounted(small_rig()), samples_of(small_rig(), NOISE_PX), Film(), angled=True)
-    assert not found.angle.is_significant
+    assert not found.angle.is_of_filters
     assert found.angle.index is None
+
+
+@pytest.mark.parametrize(("index", "is_of_filters"), [(1.9, True), (1.25, False), (5.9, False)])
+def test_a_shift_that_no_filter_has_is_not_taken_for_one(index: float, is_of_filters: bool) -> None:
+    """An S-bent film shifts colours over the picture as a filter of index 5.9 would."""
+    angle = FilterAngle((index**-2, 0.0, 0.0), (0.001, 0.001, 0.001))
+    assert angle.is_of_filters is is_of_filters
+    assert (angle.index is not None) is is_of_filters
 
 
 def test_a_film_that_cannot_be_mounted_is_refused_with_what_was_found_and_wanted() -> None:
@@ -108,9 +116,9 @@ def test_too_few_samples_are_refused() -> None:
 
 def test_filters_are_askew_beyond_doubt_or_not_at_all() -> None:
     askew = FilterAngle((0.25, 0.0, 0.0), (0.25 / (1.01 * SIGNIFICANT), 0.1, 0.1))
-    assert askew.is_significant
+    assert askew.is_of_filters
     assert askew.index == pytest.approx((2.0, 0.5 * 8 * askew.std[0]))
     doubtful = FilterAngle((0.25, 9.0, 9.0), (0.25 / (0.99 * SIGNIFICANT), 0.1, 0.1))
-    assert not doubtful.is_significant
+    assert not doubtful.is_of_filters
     assert doubtful.index is None
-    assert not FilterAngle().is_significant
+    assert not FilterAngle().is_of_filters
