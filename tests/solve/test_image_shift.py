@@ -47,3 +47,38 @@ def test_an_empty_picture_tells_nothing() -> None:
     got = tile_shifts(flat, flat, np.ones_like(flat), (2, 3))
     assert np.isinf(got.x_std).all()
     assert not got.sigmas.any()
+
+
+def test_sigmas_and_lengths_are_those_of_both_directions() -> None:
+    one = np.ones((1, 1))
+    found = TileShifts(3 * one, -4 * one, 0.5 * one, 2 * one, 0 * one, one)
+    assert found.length.item() == 5.0
+    assert found.sigmas.item() == pytest.approx(np.hypot(6, 2))
+
+
+def test_the_rest_that_nothing_explains_is_told_with_the_gain(scene: np.ndarray) -> None:
+    rng = np.random.default_rng(3)
+    grain = 30 * rng.normal(size=scene.shape)
+    found = tile_shifts(scene, 0.7 * scene + 40 + grain, np.full(scene.shape, 10.0**2), (2, 3))
+    assert found.gain == pytest.approx(0.7, rel=0.1)
+    tiles = scene.reshape(2, 24, 3, 24).transpose(0, 2, 1, 3)
+    wanted = np.sqrt(30.0**2 - 10**2) / (0.7 * np.abs(tiles).mean((2, 3)))
+    assert found.change == pytest.approx(wanted, rel=0.12)
+
+
+def test_deviations_are_those_of_least_squares_on_the_gradient(scene: np.ndarray) -> None:
+    found = tile_shifts(scene, scene, np.full(scene.shape, 4.0), (1, 1))
+    gy, gx = np.gradient(scene)
+    design = np.stack([gx.ravel(), gy.ravel(), scene.ravel(), np.ones(scene.size)], 1)
+    std = np.sqrt(4 * np.diag(np.linalg.inv(design.T @ design)))
+    assert (found.x_std.item(), found.y_std.item()) == pytest.approx((std[0], std[1]), rel=0.03)
+    assert (found.x.item(), found.y.item(), found.gain.item()) == pytest.approx((0, 0, 1), abs=1e-6)
+
+
+def test_a_tile_is_followed_two_and_a_half_pixels_beyond_the_others(scene: np.ndarray) -> None:
+    for by, known in ((2.0, True), (4.0, False)):
+        moved = scene.copy()
+        moved[:24, :24] = shift(scene, (0, by), order=3, mode="nearest")[:24, :24]
+        tile = tile_shifts(scene, moved, np.full(scene.shape, 4.0), (2, 3))
+        assert np.isfinite(tile.x_std[0, 0]) == known
+        assert tile.x[0, 0] == pytest.approx(by if known else 0.0, abs=0.2)
