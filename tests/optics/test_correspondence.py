@@ -18,6 +18,8 @@ from dsl_core.optics.correspondence import (
     GridModel,
     HybridModel,
     _closed_form,
+    _linear_matrix,
+    _upsampled,
     chebyshev_nodes,
     correspondence,
     interpolation_matrix,
@@ -256,3 +258,30 @@ def test_rays_of_large_pictures_are_those_of_small_ones(monkeypatch: pytest.Monk
         monkeypatch.setattr(place, "KEPT_PX", 1000)
     for seen, known in zip(zero_order(rig, pixels, depth), wanted, strict=True):
         assert torch.equal(seen, known)
+
+
+@pytest.mark.parametrize(("rows", "columns"), [(2, 3), (3, 2), (4, 5)])
+def test_few_nodes_make_polynomials_of_the_degree_they_allow(rows: int, columns: int) -> None:
+    at_rows, at_columns = np.linspace(0, 11, rows), np.linspace(0, 17, columns)
+
+    def polynomial(y: np.ndarray, x: np.ndarray) -> np.ndarray:
+        return 1 + (y / 5) ** min(3, rows - 1) - 0.3 * (x / 7) ** min(3, columns - 1)
+
+    nodes = polynomial(at_rows[:, None], at_columns[None])
+    grid = CorrespondenceGrid(
+        orders=(-1, 1), wavelengths_nm=(450.0, 650.0), rows_px=tuple(at_rows), columns_px=tuple(at_columns),
+        depth_range_mm=(500.0, 900.0),
+        coefficients=tuple(np.stack([k * nodes for k in range(12)]).reshape(2, 2, 3, rows, columns)
+                           .transpose(0, 1, 3, 4, 2).ravel()),
+    )  # fmt: skip
+    found = _upsampled(grid, 1, 18, 12)
+    wanted = polynomial(np.arange(12)[:, None], np.arange(18)[None]).ravel()
+    for coefficient, wavelength in np.ndindex(3, 2):
+        scale = 6 + 3 * wavelength + coefficient
+        assert found[coefficient, wavelength] == pytest.approx(scale * wanted, rel=1e-5)
+
+
+def test_values_between_nodes_are_linear_and_go_on_beyond_the_last() -> None:
+    nodes, targets = np.array([1.0, 2.0, 4.0]), np.array([0.0, 1.0, 1.25, 2.0, 3.5, 4.0, 5.0])
+    values = np.array([3.0, 5.0, -1.0])
+    assert _linear_matrix(nodes, targets) @ values == pytest.approx([1.0, 3.0, 3.5, 5.0, 0.5, -1.0, -4.0])

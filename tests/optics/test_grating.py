@@ -88,11 +88,14 @@ def test_iteration_has_converged(monkeypatch: pytest.MonkeyPatch) -> None:
     rig = published_rig()
     pixels, depth = sampled(rig)
     few = GratingModel(rig).exact(pixels, depth, 1, BANDS_NM)
+    monkeypatch.setattr(grating, "ITERATIONS", grating.ITERATIONS - 1)
+    fewer = GratingModel(rig).exact(pixels, depth, 1, BANDS_NM)
     monkeypatch.setattr(grating, "ITERATIONS", 60)
     many = GratingModel(rig).exact(pixels, depth, 1, BANDS_NM)
     inside = many.inside(640, 360)
     assert (few.columns - many.columns)[inside].abs().max() < 3e-4
     assert (few.rows - many.rows)[inside].abs().max() < 3e-4
+    assert (fewer.columns - many.columns)[inside].abs().max() > 3e-4, "a step that takes time for nothing"
 
 
 def test_interpolation_over_wavelength_is_exact_to_a_hundredth_column() -> None:
