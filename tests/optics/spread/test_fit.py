@@ -10,8 +10,8 @@ from dsl_core.model.line_spread import LineSpread
 from dsl_core.model.rig import ProjectorResponse
 from dsl_core.optics.lines.profile import zero_order_profile
 from dsl_core.optics.spread.curves import density
-from dsl_core.optics.spread.equations import MIN_PIXELS, Peaks
-from dsl_core.optics.spread.fit import fit_spread
+from dsl_core.optics.spread.equations import MIN_PIXELS, Normal, Peaks
+from dsl_core.optics.spread.fit import PULLS, STRETCHES, _choose, _Family, fit_spread
 
 WIDTH_PX, STEP_PX, RUN = 5, 2, 8
 PLACES = np.arange(-48, 49) / 8
@@ -93,3 +93,63 @@ def test_pixels_with_a_second_light_do_not_count() -> None:
 def test_too_few_pixels_give_no_answer() -> None:
     peaks, column = seen(KNOWN, runs=MIN_PIXELS // RUN - 1)
     assert fit_spread(peaks, column.round(), KNOWN) is None
+
+
+@pytest.mark.parametrize("factor", [0.8, 1.0, 1.3])
+def test_a_family_is_the_known_curve_with_all_its_distances_stretched(factor: float) -> None:
+    family = _Family(SKEWED)
+    known = SKEWED.line_spread
+    assert isinstance(known, LineSpread)
+    shares = family.stretched(factor)
+    assert shares.sum() == pytest.approx(1.0)
+    assert family.centres_px @ shares == pytest.approx(factor * known.lean_px)
+    spread = (family.centres_px**2 @ shares) ** 0.5
+    assert spread == pytest.approx(factor * (known.centres_px**2 @ known.shares) ** 0.5, rel=8e-3)
+    assert family.response(factor).blur_px == pytest.approx(factor * SKEWED.blur_px, rel=0.02)
+    # A Gaussian stays one; the narrow ones that it consists of have a width of their own.
+    own = _Family(KNOWN)
+    width = (own.centres_px**2 @ own.stretched(factor)) ** 0.5
+    assert width == pytest.approx(((factor * 0.6) ** 2 - 0.125**2) ** 0.5, rel=1e-6)
+    assert own.response(factor).blur_px == pytest.approx(factor * 0.6)
+    assert own.response(factor).spread is None
+    assert np.diff(own.centres_px) == pytest.approx(0.125)
+    assert (own.centres_px[0], own.centres_px[-1]) == (-6.0, 6.0)
+
+
+def quadratic(best: float, count: int = 1000) -> Normal:
+    """Squares of a thousand values that grow as the square of the distance from a stretched curve."""
+    wanted = _Family(KNOWN).stretched(best)
+    size = 1e5 * np.eye(len(wanted))
+    return Normal(size, size @ wanted, float(wanted @ size @ wanted) + count, count, 500)
+
+
+def test_the_best_factor_is_the_least_of_squares_and_as_sure_as_they_are_narrow() -> None:
+    family = _Family(KNOWN)
+    for factor in (0.55, 1.0, 1.37):
+        assert family.best(quadratic(factor)) == pytest.approx(factor, abs=4e-4)
+    normal = quadratic(1.1)
+    costs = [normal.cost(family.stretched(1.1 * by)) for by in (0.98, 1.0, 1.02)]
+    curvature = (costs[0] + costs[2] - 2 * costs[1]) / 0.02**2
+    assert family.std(normal, 1.1, 1.7) == pytest.approx((2 * 1.7 / curvature) ** 0.5)
+
+
+def test_half_of_the_pixels_judges_what_the_other_half_asks_for() -> None:
+    family = _Family(KNOWN)
+    same = _choose([quadratic(1.0), quadratic(1.0)], family, shapes=False)
+    assert not same.changed
+    assert (same.before, same.after, same.pixels) == (pytest.approx(1.0), same.before, 1000)
+    wider = _choose([quadratic(1.2), quadratic(1.2)], family, shapes=False)
+    assert wider.changed
+    assert wider.response.blur_px == pytest.approx(0.72, rel=1e-3)
+    assert wider.after == pytest.approx(1.0, rel=1e-3)
+    cost = 2 * quadratic(1.2).cost(family.stretched(1.0))
+    assert wider.before == pytest.approx(cost / 2000)
+    # Halves that contradict each other ask for nothing.
+    assert not _choose([quadratic(1.2), quadratic(0.83)], family, shapes=False).changed
+
+
+def test_pulls_are_decades_and_stretches_reach_from_two_fifths_to_their_inverse() -> None:
+    assert np.log10(PULLS).tolist() == pytest.approx([-7, -6, -5, -4, -3, -2, -1])
+    assert (STRETCHES[0], STRETCHES[-1]) == pytest.approx((0.4, 2.5))
+    assert STRETCHES[len(STRETCHES) // 2] == pytest.approx(1.0)
+    assert np.diff(np.log(STRETCHES)) == pytest.approx(np.log(6.25) / 24)

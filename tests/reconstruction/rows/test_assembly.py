@@ -40,25 +40,25 @@ class Sink:
         self.notes[place.start, place.stop] = note
 
 
-def made(part: tuple[slice, slice]) -> tuple[Assembly, Sink]:
+def made(region_px: tuple[int, int, int, int] | None) -> tuple[Assembly, Sink]:
     sink: Any = Sink()
     geometry: Any = SimpleNamespace(flags=np.zeros((16, 10), np.uint16))
-    options = Options(part=part)
+    options = Options(region_px=region_px)
     return Assembly(published_rig(), CapturePlan(), options, geometry, BANDS, sink), sink
 
 
 def test_a_part_of_a_picture_begins_with_the_bands_that_reach_into_it() -> None:
-    _, sink = made((slice(6, 14), slice(2, 9)))
+    _, sink = made((2, 6, 7, 8))
     shape, corner, nm, places = sink.begun
     assert (shape, corner) == ((8, 7), (6, 2))
     assert nm.tolist() == Options().grid.centres_nm.tolist()
     assert [(place.start, place.stop) for place in places] == [(0, 2), (2, 6), (6, 8)]
-    _, sink = made((slice(None), slice(None)))
+    _, sink = made(None)
     assert [(place.start, place.stop) for place in sink.begun[3]] == [(0, 4), (4, 8), (8, 12), (12, 16)]
 
 
 def test_missing_are_bands_of_the_part_that_have_no_note() -> None:
-    assembly, sink = made((slice(6, 12), slice(None)))
+    assembly, sink = made((0, 6, 10, 6))
     assert [band.rows.start for band in assembly.missing(BANDS)] == [4, 8]
     sink.notes[0, 2] = json.dumps(asdict(SpectralCounts()))
     assert [band.rows.start for band in assembly.missing(BANDS)] == [8]
@@ -74,7 +74,7 @@ def test_of_a_band_the_rows_and_columns_of_the_part_are_put(
         return {"map": numbers[own], "cube": numbers[None, own]}
 
     monkeypatch.setattr(module, "maps_of_rows", maps_of_rows)
-    assembly, sink = made((slice(6, 13), slice(2, 9)))
+    assembly, sink = made((2, 6, 7, 7))
     assembly.put(BANDS[top // 4], None)
     ((where, maps),) = sink.put_into
     assert (where.start, where.stop) == place
