@@ -11,7 +11,7 @@ from dsl_core.model.rig import ProjectorResponse
 from dsl_core.optics.correspondence import triangulate, zero_order
 from dsl_core.optics.lines.line_set import LineSet
 from dsl_core.optics.lines.profile import halo_of_line, zero_order_profile
-from dsl_core.reconstruction.columns.column import dark_offset, refine
+from dsl_core.reconstruction.columns.column import _window, dark_offset, refine
 from dsl_core.simulation.published_rig import published_rig
 
 LINES = LineSet(width_px=5, step_px=2, first_px=2.0, lines=318, frames=318)
@@ -176,3 +176,20 @@ def test_a_saturated_line_is_as_bright_as_its_flanks_say() -> None:
     share = found.amplitude[unsure] / amplitude[unsure]
     assert float(share.median()) > 0.4
     assert torch.isinf(found.amplitude_std[unsure]).all()
+
+
+@pytest.mark.parametrize(("blur_px", "lines_beside"), [(0.6, 3), (0.8, 3), (0.9, 4)])
+def test_lines_count_to_a_column_beyond_three_widths_of_the_blur(blur_px: float, lines_beside: int) -> None:
+    # Half a line of five columns, three blurs and one column, in steps of two: 2.65, 2.95 or 3.1.
+    lines = LineSet(5, 2, 2.0, 40, 40)
+    frames = torch.arange(40.0, dtype=torch.float64)[:, None] * torch.ones(4, dtype=torch.float64)
+    std = torch.full_like(frames, 0.5)
+    std[20, 1], frames[21, 2] = torch.inf, torch.nan
+    coarse = torch.tensor([42.0, 42.9, 41.1, 3.0], dtype=torch.float64)
+    y, variance, centres = _window(coarse, frames, std, lines, blur_px)
+    beside = torch.arange(-lines_beside, lines_beside + 1)[:, None]
+    line = torch.tensor([20, 20, 20, 0]) + beside
+    assert torch.equal(centres, 2.0 + 2.0 * line)
+    known = (line >= 0) & ~((line == 20) & (torch.arange(4) == 1)) & ~((line == 21) & (torch.arange(4) == 2))
+    assert torch.equal(y, torch.where(known, line, 0).double())
+    assert torch.equal(variance, torch.where(known, 0.25, torch.inf).double())
