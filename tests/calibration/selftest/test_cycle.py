@@ -10,12 +10,17 @@ from scipy.stats import chi2
 
 from dsl_core.calibration.selftest.camera import Transfer
 from dsl_core.calibration.selftest.cycle import (
+    _coarse,
+    _cost,
     _cost_of,
     _design,
+    _fine,
+    _nearest,
     _parameters,
     _residual,
     _spreads,
     _step,
+    _worthwhile,
     advised_exposures,
     check_beats,
     find_cycle,
@@ -183,3 +188,53 @@ def test_the_depth_of_a_cycle_is_half_the_height_of_the_strongest_channels_wave(
     found = find_cycle(replace(readings, mean_dn=BLACK_DN + 300 * (light + noise)), BLACK_DN)
     assert found.modulation.value == pytest.approx(0.3, rel=0.02)
     assert found.period_ms is not None
+
+
+def test_frequencies_are_tried_so_closely_that_the_third_harmonic_keeps_its_phase() -> None:
+    inner = np.random.default_rng(5).uniform(-1.0, 1.5, 58)
+    time_s = np.sort(np.append(inner, [-1.0, 1.5]))
+    signal = np.sin(2 * np.pi * 61.0 * time_s[:, None] + np.arange(3))
+    hz, step = _coarse(time_s, signal, float((signal**2).sum()))
+    assert step == pytest.approx(1 / (4 * 3 * 2.5))
+    assert hz == pytest.approx(61.0, abs=step)
+    assert _coarse(time_s / 100, signal, 60.0)[1] == pytest.approx(1 / (12 * 0.1)), (
+        "a tenth of a second at least"
+    )
+
+
+@pytest.mark.parametrize(("frames", "waves", "found"), [(96, 2, 2), (96, 5, 5), (30, 5, 4), (6, 1, 1)])
+def test_harmonics_are_those_that_the_light_justifies(frames: int, waves: int, found: int) -> None:
+    """One for every seven frames at most."""
+    rng = np.random.default_rng(4)
+    time_s = np.sort(rng.uniform(0, 3, frames))
+    phase = 2 * np.pi * 47.0 * time_s[:, None]
+    signal = sum(np.sin(k * phase + k * np.arange(3)) / k for k in range(1, waves + 1))
+    signal = signal + 1e-3 * rng.standard_normal((frames, 3))
+    assert _worthwhile(time_s, signal, 47.0) == found
+
+
+def test_the_deviation_of_a_cycle_is_that_of_eight_fits_without_a_part_each() -> None:
+    readings = short_exposures(60.0, jitter_ms=0.5)
+    signal = readings.mean_dn / readings.mean_dn.mean(0) - 1
+    time_s = readings.timestamp_s - readings.timestamp_s.mean()
+    step = 1 / (12 * np.ptp(time_s))
+    best, std_hz, amplitude = _fine(time_s, signal, 60.0, step)
+    harmonics = _worthwhile(time_s, signal, _nearest(time_s, signal, 60.0, step, 3)[0])
+    assert best == _nearest(time_s, signal, 60.0, step, harmonics)[0]
+    fits = []
+    for part in range(8):
+        kept = np.delete(np.arange(96), np.s_[part::8])
+        fits.append(_nearest(time_s[kept], signal[kept], best, step / 2, harmonics))
+    spread = np.sqrt(7 * np.var(fits, axis=0))
+    assert std_hz >= spread[0]
+    assert std_hz < 2 * spread[0]
+    assert amplitude.std == pytest.approx(spread[1])
+
+
+def test_spreads_of_any_harmonic_are_explained_without_rest() -> None:
+    exposures, counts = np.linspace(3.0, 60.0, 30), np.full(30, 8)
+    for order in (1, 2, 8):
+        spreads = 0.2 * np.sinc(exposures / 1000 * 50.0 * order) ** 2 + 1e-7
+        perfect = _cost_of(spreads, spreads, counts)
+        assert _cost(50.0, exposures, spreads, counts) == pytest.approx(perfect, abs=0.02)
+        assert _cost(53.0, exposures, spreads, counts) > perfect + 0.1
