@@ -28,8 +28,7 @@ from dsl_core.optics.sensor import raw_variance
 
 Array = NDArray[np.float32]
 
-#: Rows merged at a time, so that all buffers stay in the processor's cache; even, to keep the Bayer phase.
-_BLOCK_ROWS = 32
+_NO_VALUES, _NO_BITS = np.empty((0, 0), np.float32), np.empty((0, 0), np.uint16)
 
 
 @dataclass(frozen=True)
@@ -72,7 +71,7 @@ def setting_gains_ms(settings: Sequence[Setting], response: ProjectorResponse) -
 
 
 class HdrMerger:
-    """Merges frame by frame; keeps its buffers, so one merger serves one thread."""
+    """Merges frame by frame, in any thread."""
 
     def __init__(
         self,
@@ -97,19 +96,14 @@ class HdrMerger:
         full_dn = sensor.full_scale_dn
         margin = 0.02 * full_dn if saturation_margin_dn is None else saturation_margin_dn
         self._limit_dn = int(np.ceil(full_dn - margin))
-        self._gain = [np.float32(gain) for gain in gains_ms]
-        self._shot = [gain / np.float32(sensor.electrons_per_dn) for gain in self._gain]
+        self._gains: Array = np.asarray(gains_ms, np.float32)
+        self._shots: Array = self._gains / np.float32(sensor.electrons_per_dn)
         for black in blacks:
             self._check_shape(black.mean)
-        self._black = [black.mean for black in blacks]
-        self._floor = [
-            (raw_variance(sensor, black.mean - sensor.black_level_dn) + black.variance).astype(np.float32)
-            for black in blacks
-        ]
-        block = (_BLOCK_ROWS, self.shape[1])
-        self._signal = [np.empty(block, np.float32) for _ in blacks]
-        self._open = [np.empty(block, np.float32) for _ in blacks]
-        self._work = [np.empty(block, np.float32) for _ in range(4)]
+        self._black: Array = np.stack([black.mean for black in blacks]).astype(np.float32, copy=False)
+        self._floor: Array = np.empty_like(self._black)
+        for floor, black in zip(self._floor, blacks, strict=True):
+            floor[:] = raw_variance(sensor, black.mean - sensor.black_level_dn) + black.variance
 
     def merge(
         self,
@@ -122,65 +116,52 @@ class HdrMerger:
         ``levels`` is the light that each was exposed to, relative to what the gains assume (None: all 1).
         Raises `DecodeError` when a frame is missing, has another size, or is not of whole numbers.
         """
+        if out is None:
+            out = MergedFrame(
+                np.empty(self.shape, np.float32), np.empty(self.shape, np.float32), np.empty(self.shape, bool)
+            )
+        self._merge(raws, levels, out.radiance, out.variance, _NO_BITS, out.saturated)
+        return out
+
+    def merge_std(
+        self,
+        raws: Sequence[NDArray[np.unsignedinteger]],
+        radiance: Array,
+        std: NDArray[np.floating],
+        levels: Sequence[float] | None = None,
+    ) -> None:
+        """The same into ``radiance`` and ``std``, of half or single precision, both (rows, columns)."""
+        saturated = np.empty(self.shape, bool)
+        if std.dtype == np.float16:
+            self._merge(raws, levels, radiance, _NO_VALUES, std.view(np.uint16), saturated)
+        else:
+            self._merge(raws, levels, radiance, std, _NO_BITS, saturated)
+            np.sqrt(std, out=std)
+
+    def _merge(
+        self,
+        raws: Sequence[NDArray[np.unsignedinteger]],
+        levels: Sequence[float] | None,
+        radiance: Array,
+        variance: NDArray[np.floating],
+        halves: NDArray[np.uint16],
+        saturated: NDArray[np.bool_],
+    ) -> None:
+        # Only who merges frames needs compiled code.
+        from dsl_core.reconstruction.hdr_kernels import merge_settings
+
         if len(raws) != len(self._black):
             raise DecodeError(f"The bracket has {len(self._black)} settings, given {len(raws)} frames.")
         for raw in raws:
             self._check_shape(raw)
             if not np.issubdtype(raw.dtype, np.unsignedinteger):
                 raise DecodeError(f"Raw frames contain unsigned whole numbers, not {raw.dtype}.")
-        if out is None:
-            out = MergedFrame(
-                np.empty(self.shape, np.float32), np.empty(self.shape, np.float32), np.empty(self.shape, bool)
-            )
-        light = [np.float32(level) for level in levels or [1.0] * len(raws)]
-        with np.errstate(divide="ignore", invalid="ignore"):
-            for start in range(0, self.shape[0], _BLOCK_ROWS):
-                rows = slice(start, min(start + _BLOCK_ROWS, self.shape[0]))
-                block = MergedFrame(out.radiance[rows], out.variance[rows], out.saturated[rows])
-                self._merge_block([raw[rows] for raw in raws], rows, block, light)
-        return out
-
-    def _merge_block(
-        self, raws: list[NDArray[np.unsignedinteger]], rows: slice, out: MergedFrame, light: list[np.float32]
-    ) -> None:
-        count = rows.stop - rows.start
-        signal, gains = [a[:count] for a in self._signal], [a[:count] for a in self._open]
-        total, weight, term, expected = (a[:count] for a in self._work)
-        total[...] = 0
-        weight[...] = 0
-        for i, raw in enumerate(raws):
-            np.subtract(raw, self._black[i][rows], out=signal[i])
-            # The gain of a saturated value is zero, so that it drops out of every sum.
-            np.multiply(self._gain[i] * light[i], raw < self._limit_dn, out=gains[i])
-            weight += gains[i]
-            np.greater(gains[i], 0, out=term)
-            term *= signal[i]
-            total += term
-        np.equal(weight, 0, out=out.saturated)
-        np.divide(total, weight, out=expected)
-        total[...] = 0
-        # Negative becomes zero, and so does what is saturated everywhere and not a number here.
-        np.fmax(expected, total, out=expected)
-        weight[...] = 0
-        for i in range(len(raws)):
-            np.multiply(expected, self._shot[i] * light[i], out=term)
-            term += self._floor[i][rows]
-            np.divide(gains[i], term, out=term)
-            weight += np.multiply(term, gains[i], out=gains[i])
-            term *= signal[i]
-            total += term
-        np.divide(total, weight, out=out.radiance)
-        np.divide(1, weight, out=out.variance)
-        if out.saturated.any():
-            self._bound(rows, out, light)
-
-    def _bound(self, rows: slice, out: MergedFrame, light: list[np.float32]) -> None:
-        """The least radiance that saturates every setting, where every setting is saturated."""
-        bounds = [
-            (self._limit_dn - black[rows]) / (gain * level)
-            for black, gain, level in zip(self._black, self._gain, light, strict=True)
-        ]
-        np.copyto(out.radiance, np.max(bounds, axis=0), where=out.saturated)
+        light = np.ones(len(raws), np.float32) if levels is None else np.asarray(levels, np.float32)
+        counts = np.stack(raws).astype(np.uint16, copy=False)
+        merge_settings(
+            counts, self._black, self._floor, self._gains * light, self._shots * light, self._limit_dn,
+            radiance, variance, halves, saturated,
+        )  # fmt: skip
 
     def _check_shape(self, image: NDArray[np.generic]) -> None:
         if image.shape != self.shape:

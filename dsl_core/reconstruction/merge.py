@@ -26,6 +26,7 @@ from dsl_core.reconstruction.hdr import BlackFrame, HdrMerger, MergedFrame, blac
 from dsl_core.reconstruction.light.setting_ratios import Ratio, compare_settings
 
 T = TypeVar("T")
+Floats = NDArray[np.float32]
 THREADS = 2
 
 
@@ -42,7 +43,7 @@ class Readout(Protocol):
 
 
 class MergedScan:
-    """Reads the settings of a shot and merges them; one merger and its buffers per thread."""
+    """Reads the settings of a shot and merges them."""
 
     def __init__(
         self,
@@ -69,7 +70,8 @@ class MergedScan:
         self.blacks = [BlackFrame(black.mean, np.zeros_like(black.variance)) for black in blacks]
         self.gains_ms = setting_gains_ms(self.plan.settings, rig.projector_response)
         self.black_std = _merged_std(blacks, self.gains_ms)
-        self._local = threading.local()
+        self._mergers: dict[tuple[int, ...], HdrMerger] = {}
+        self._lock = threading.Lock()
 
     def merge(self, role: Role, pattern: int, out: MergedFrame | None = None) -> MergedFrame:
         """Linear radiance of one pattern, from every setting it was captured with."""
@@ -85,13 +87,31 @@ class MergedScan:
         out: MergedFrame | None = None,
     ) -> MergedFrame:
         """The same from mosaics that were read already, one for each of the pattern's shots."""
+        merger, levels = self._prepare(role, pattern, raws)
+        return merger.merge(raws, out, levels)
+
+    def merge_line(
+        self,
+        index: int,
+        raws: Sequence[NDArray[np.uint16]] | None,
+        radiance: Floats,
+        std: NDArray[np.floating],
+    ) -> None:
+        """Radiance and deviation of a line frame, from mosaics that were read already or are read now."""
+        if raws is None:
+            raws = [self.source.read(shot) for shot in self.shots_of("spectral", index)]
+        merger, levels = self._prepare("spectral", index, raws)
+        merger.merge_std(raws, radiance, std, levels)
+
+    def _prepare(
+        self, role: Role, pattern: int, raws: Sequence[NDArray[np.uint16]]
+    ) -> tuple[HdrMerger, list[float] | None]:
+        """What merges the shots of a pattern, and their light, after they were compared."""
         shots = self.shots_of(role, pattern)
-        settings = [shot.setting for shot in shots]
-        merger = self._merger(tuple(settings))
         if self._compares:
             self.compare(role, pattern, raws)
         levels = None if self._levels is None else [float(self._levels[shot.index]) for shot in shots]
-        return merger.merge(raws, out, levels)
+        return self._merger(tuple(shot.setting for shot in shots)), levels
 
     def compare(self, role: Role, pattern: int, raws: Sequence[NDArray[np.uint16]]) -> None:
         """Put down in ``ratios`` what settings of one pattern say of each other's light."""
@@ -105,11 +125,12 @@ class MergedScan:
         return self._shots[role, pattern]
 
     def _merger(self, settings: tuple[int, ...]) -> HdrMerger:
-        mergers: dict[tuple[int, ...], HdrMerger] = self._local.__dict__.setdefault("mergers", {})
-        if settings not in mergers:
-            gains = [float(self.gains_ms[i]) for i in settings]
-            mergers[settings] = HdrMerger(gains, [self.blacks[i] for i in settings], self.rig.sensor)
-        return mergers[settings]
+        with self._lock:
+            if settings not in self._mergers:
+                gains = [float(self.gains_ms[i]) for i in settings]
+                blacks = [self.blacks[i] for i in settings]
+                self._mergers[settings] = HdrMerger(gains, blacks, self.rig.sensor)
+            return self._mergers[settings]
 
 
 @dataclass(frozen=True)
@@ -185,10 +206,7 @@ def stack_lines(scan: MergedScan, progress: Progress | None = None) -> LineStack
     stack = LineStack(np.empty(shape, np.float32), np.empty(shape, deviation_type(scan)), scan.black_std)
 
     def load(k: int) -> None:
-        buffer = MergedFrame(stack.radiance[k], np.empty(shape[1:], np.float32), np.empty(shape[1:], bool))
-        merged = scan.merge("spectral", k, buffer)
-        np.sqrt(merged.variance, out=merged.variance)
-        stack.std[k] = merged.variance
+        scan.merge_line(k, None, stack.radiance[k], stack.std[k])
 
     in_order(load, shape[0], "line frames", progress)
     return stack

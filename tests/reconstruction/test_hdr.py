@@ -136,6 +136,36 @@ def test_result_may_be_written_into_and_buffers_do_not_leak() -> None:
     )
 
 
+@pytest.mark.parametrize("gain_ms", [1.0, 3e4])
+def test_deviations_in_half_precision_are_those_of_numpy(gain_ms: float) -> None:
+    """From infinity to below the least normal number, rounded to even as numpy does it."""
+    rng = np.random.default_rng(6)
+    raws = [rng.integers(200, 4200, SHAPE).astype(np.uint16) for _ in range(2)]
+    gains = gain_ms * np.array([1.0, 20.0])
+    merger = HdrMerger(gains, [exact_black()] * 2, SENSOR)
+    wanted = merger.merge(raws)
+    radiance = np.empty(SHAPE, np.float32)
+    for kind in (np.float16, np.float32):
+        std = np.empty(SHAPE, kind)
+        merger.merge_std(raws, radiance, std)
+        np.testing.assert_array_equal(std, np.sqrt(wanted.variance).astype(kind))
+        np.testing.assert_array_equal(radiance, wanted.radiance)
+    assert np.isinf(std).any()
+    assert gain_ms == 1.0 or std.min() < np.finfo(np.float16).smallest_normal
+
+
+def test_any_number_of_settings_and_levels_of_light() -> None:
+    rng = np.random.default_rng(7)
+    gains, levels = [5.0, 30.0, 107.0], [1.1, 0.9, 1.05]
+    radiance = rng.uniform(1, 20, SHAPE)
+    raws = [
+        digitise(SENSOR, (g * level * radiance).astype(np.float32), None)
+        for g, level in zip(gains, levels, strict=True)
+    ]
+    merged = HdrMerger(gains, [exact_black()] * 3, SENSOR).merge(raws, levels=levels)
+    np.testing.assert_allclose(merged.radiance, radiance, atol=0.1)
+
+
 def test_gains_of_the_published_settings() -> None:
     gains = setting_gains_ms(CapturePlan().settings, ProjectorResponse(gamma=2.21, black_fraction=0.01))
     assert gains[1] / gains[0] == pytest.approx(2 * 21.4, rel=0.01)

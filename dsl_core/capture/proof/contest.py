@@ -56,7 +56,10 @@ def vote(seen: Floats, wanted: Floats, rival: Floats) -> Contest:
     """
     if seen.size == 0:
         return Contest()
-    votes = np.clip((2 * seen - wanted - rival) / (wanted - rival), -1, 1)
+    votes = 2 * seen - wanted
+    votes -= rival
+    votes /= wanted - rival
+    np.minimum(np.maximum(votes, -1, out=votes), 1, out=votes)
     sums = np.cumsum(votes, dtype=np.float64)
     total = float(sums[-1])
     # What is left after the best beginning is the worst end.

@@ -174,7 +174,7 @@ class FirstCode:
         index = np.flatnonzero(sound)
         if index.size < _FEWEST_LIT:
             return None
-        key = 3 * column[index] + self._channels[index]
+        key = (3 * column[index] + self._channels[index]).astype(np.intp)
         return Lit(index, key, black[index].astype(np.float32), contrast[index], sigma[index])
 
     def _explain(self, pair: Pair, expected: Floats, broken: NDArray[np.bool_]) -> tuple[Verdict, str]:

@@ -8,6 +8,7 @@ exposed. That is a doubt, not a proof: surfaces end as suddenly.
 from __future__ import annotations
 
 from collections import deque
+from statistics import median
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,6 +39,8 @@ class LineNeighbours:
         self._before: tuple[int, Counts] | None = None
         self._changes: deque[Bands] = deque(maxlen=USUAL_OF)
         self._light: deque[float] = deque(maxlen=USUAL_OF)
+        #: A picture of black, the sum of its counts and the deviation of two such sums.
+        self._black: tuple[Counts, float, float] | None = None
 
     def is_doubtful(self, index: int, seen: Counts, black: Counts | None) -> bool:
         """Whether the picture of shot ``index`` is unlike those before it; remembers it for the next."""
@@ -61,22 +64,27 @@ class LineNeighbours:
 
     def change(self, one: Counts, other: Counts) -> Bands:
         """Variance of the difference beyond noise, in units of that of noise, in every part of the height."""
-        step = one.astype(np.float32) - other.astype(np.float32)
-        step2 = np.minimum(step**2 / (self._noise.variance(one) + self._noise.variance(other)), _CLIP**2)
-        rows = step2.reshape(-1, self._columns).mean(1)
+        step2 = np.subtract(one, other, dtype=np.float32)
+        np.square(step2, out=step2)
+        step2 /= self._noise.variance(one) + self._noise.variance(other)
+        np.minimum(step2, np.float32(_CLIP**2), out=step2)
+        rows = step2.reshape(-1, self._columns) @ np.full(self._columns, 1 / self._columns, np.float32)
         return np.array([float(part.mean()) - 1.0 for part in np.array_split(rows, BANDS)])
 
     def _usual(self) -> Bands:
         if len(self._changes) < FEWEST_USUAL:
             return np.zeros(BANDS)
-        return np.asarray(np.median(self._changes, axis=0))
+        return np.array([median(band) for band in zip(*self._changes, strict=True)])
 
     def _has_other_light(self, seen: Counts, black: Counts | None) -> bool:
         if black is None:
             return False
-        light = float(seen.sum(dtype=np.float64) - black.sum(dtype=np.float64))
-        sigma = float(np.sqrt(2 * self._noise.variance(black).sum(dtype=np.float64)))
-        usual = float(np.median(self._light)) if len(self._light) >= FEWEST_USUAL else 0.0
+        if self._black is None or self._black[0] is not black:
+            noise = float(np.sqrt(2 * self._noise.variance(black).sum(dtype=np.float64)))
+            self._black = black, float(black.sum()), noise
+        _, dark, sigma = self._black
+        light = float(seen.sum()) - dark
+        usual = median(self._light) if len(self._light) >= FEWEST_USUAL else 0.0
         self._light.append(light)
         low, high = SAME_LIGHT
         return usual > BRIGHT_SIGMAS * sigma and not low * usual < light < high * usual

@@ -27,7 +27,7 @@ class Lit:
     """Pixels whose column is known, at one setting: flat indices, ``key`` = 3 column + channel, counts."""
 
     index: NDArray[np.intp]
-    key: NDArray[np.int32]
+    key: NDArray[np.intp]
     black: Floats
     contrast: Floats
     sigma: Floats
@@ -50,8 +50,7 @@ def line_profile(plan: CapturePlan, shot: Shot) -> Floats | None:
 
 def contest_of_lines(seen: Counts, lit: Lit, wanted: Floats, rival: Floats) -> Contest:
     """Which of two patterns of columns (`line_profile`) a picture shows."""
-    asked = (np.abs(wanted - rival) > APART)[lit.key]
-    chosen = np.flatnonzero(asked)
+    chosen = np.flatnonzero(np.take(np.abs(wanted - rival) > APART, lit.key))
     chosen = chosen[:: max(chosen.size // PLENTY, 1)]
     black, contrast = lit.black[chosen], lit.contrast[chosen]
     key = lit.key[chosen]
@@ -64,7 +63,7 @@ def contest_of_lines(seen: Counts, lit: Lit, wanted: Floats, rival: Floats) -> C
 
 def brightness_of_lines(seen: Counts, lit: Lit, wanted: Floats, noise: Noise) -> float | None:
     """Light of a picture over that expected where it should be brightest; None where too little is lit."""
-    chosen = np.flatnonzero((wanted > 0.1)[lit.key])
+    chosen = np.flatnonzero(np.take(wanted > 0.1, lit.key))
     chosen = chosen[seen[lit.index[chosen]] < noise.sensor.full_scale_dn]
     counts = seen[lit.index[chosen]]
     light = lit.contrast[chosen] * wanted[lit.key[chosen]]
@@ -93,12 +92,15 @@ def rescaled(picture: Counts, old_black: Counts, new_black: Floats, scale: float
     Noise is scaled as well and may take counts below zero: cut off there, their sum would be too bright.
     """
     factor, full = np.float32(scale), noise.sensor.full_scale_dn
-    light = factor * (picture.astype(np.float32) - old_black.astype(np.float32))
-    counts = np.minimum(new_black + light, np.float32(full))
-    variance = factor**2 * (noise.variance(picture) + noise.variance(old_black))
+    counts = np.subtract(picture, old_black, dtype=np.float32)
+    counts *= factor
+    counts += new_black
+    np.minimum(counts, np.float32(full), out=counts)
+    variance = noise.variance(picture) + noise.variance(old_black)
+    variance *= factor**2
     # Nobody knows how much brighter a saturated pixel was.
-    unknown = (picture >= full) & (counts < full)
-    return Expected(counts, np.where(unknown, np.float32(np.inf), variance))
+    variance[(picture >= full) & (counts < full)] = np.inf
+    return Expected(counts, variance)
 
 
 def contest_of_pictures(
@@ -128,10 +130,18 @@ def contest_of_pictures(
 def _contest(
     seen: Floats, variance: Floats, wanted: Expected, rival: Expected, black: Floats, least: Floats
 ) -> Contest:
-    apart = np.abs(wanted.counts - rival.counts)
-    light = np.maximum(wanted.counts, rival.counts) - black
-    sigma = np.sqrt(variance + wanted.variance + rival.variance)
-    chosen = np.flatnonzero((apart > np.maximum(APART * light, least)) & (apart > SIGMAS * sigma))
+    # In place, as hundreds of pictures are judged, each against several.
+    apart = wanted.counts - rival.counts
+    np.abs(apart, out=apart)
+    light = np.maximum(wanted.counts, rival.counts)
+    light -= black
+    light *= np.float32(APART)
+    asked = apart > np.maximum(light, least, out=light)
+    noise = np.add(variance, wanted.variance, out=light)
+    noise += rival.variance
+    noise *= np.float32(SIGMAS**2)
+    asked &= np.square(apart, out=apart) > noise
+    chosen = np.flatnonzero(asked)
     return vote(seen[chosen], wanted.counts[chosen], rival.counts[chosen])
 
 

@@ -6,7 +6,7 @@ ones, because a line lights only a few pixels of each.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +19,8 @@ Counts = NDArray[np.uint16]
 _ROWS, _PIXELS = 36, 32_000
 #: Pixels of a row at most; wider pictures are thinned.
 _WIDTH = 1024
+#: Pictures whose variance is remembered, as each is compared with several.
+_REMEMBERED = 8
 #: Blocks down and across that stand in for pixels where these are too noisy.
 BLOCKS = 16
 
@@ -37,23 +39,28 @@ class Raster:
         self._mosaic = (self._rows[:, None] % 2) * 2 + np.arange(0, width, self._step)[None, :] % 2
 
     def take(self, pixels: NDArray[np.uint16]) -> Counts:
-        """The compared pixels of a raw mosaic (rows, columns), flat."""
-        return np.ascontiguousarray(pixels[self._rows, :: self._step]).ravel()
+        """The compared pixels of a raw mosaic (rows, columns), flat and not to be changed."""
+        taken = np.ascontiguousarray(pixels[self._rows, :: self._step]).ravel()
+        taken.flags.writeable = False
+        return taken
 
     def pool(self, values: Counts | Floats) -> Floats:
         """Means over blocks of the raster, `BLOCKS` of them down and across, flat."""
-        down, across = (max(size // BLOCKS, 1) for size in self.shape)
+        down, across = self._block
         rows, columns = self.shape[0] // down, self.shape[1] // across
         whole = values.reshape(self.shape)[: rows * down, : columns * across]
-        sums = np.add.reduceat(whole, np.arange(0, rows * down, down), axis=0, dtype=np.float32)
-        sums = np.add.reduceat(sums, np.arange(0, columns * across, across), axis=1)
-        return np.asarray(sums.ravel() / np.float32(down * across), np.float32)
+        sums = whole.reshape(rows, down, -1).sum(1, dtype=np.float32)
+        return sums.reshape(rows * columns, across).sum(1) / np.float32(down * across)
 
     @property
     def pooled(self) -> int:
         """Pixels of a block."""
-        down, across = (max(size // BLOCKS, 1) for size in self.shape)
+        down, across = self._block
         return down * across
+
+    @property
+    def _block(self) -> tuple[int, int]:
+        return max(self.shape[0] // BLOCKS, 1), max(self.shape[1] // BLOCKS, 1)
 
     def channels(self, bayer: str) -> NDArray[np.int8]:
         """Channel of every compared pixel, flat: 0 red, 1 green, 2 blue."""
@@ -66,6 +73,9 @@ class Noise:
     """What a camera's counts are worth."""
 
     sensor: Sensor
+    _known: dict[int, tuple[Counts | Floats, Floats]] = field(
+        default_factory=dict, init=False, repr=False, compare=False
+    )
 
     @classmethod
     def of(cls, sensor: Sensor | None, bit_depth: int) -> Noise:
@@ -84,9 +94,18 @@ class Noise:
         )
 
     def variance(self, counts: Counts | Floats) -> Floats:
-        """Variance of counts, DN^2."""
+        """Variance of counts, DN^2; those of pictures that cannot change are remembered."""
+        known = self._known.get(id(counts))
+        if known is not None and known[0] is counts:
+            return known[1]
         sensor = self.sensor
-        light = np.maximum(counts.astype(np.float32) - np.float32(sensor.black_level_dn), 0)
-        return np.asarray(
-            light / np.float32(sensor.electrons_per_dn) + np.float32(sensor.read_noise_dn**2 + 0.1)
-        )
+        found = np.asarray(np.subtract(counts, np.float32(sensor.black_level_dn), dtype=np.float32))
+        np.maximum(found, 0, out=found)
+        found /= np.float32(sensor.electrons_per_dn)
+        found += np.float32(sensor.read_noise_dn**2 + 0.1)
+        if not counts.flags.writeable:
+            found.flags.writeable = False
+            if len(self._known) >= _REMEMBERED:
+                self._known.pop(next(iter(self._known)))
+            self._known[id(counts)] = counts, found
+        return found

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable
 from dataclasses import replace
+from statistics import median
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,6 +26,7 @@ from dsl_core.capture.proof.prediction import (
     rescaled,
 )
 from dsl_core.capture.proof.raster import Counts, Floats, Noise, Raster
+from dsl_core.capture.proof.recent import Recent
 from dsl_core.capture.proof.sentinel import SentinelProof
 from dsl_core.model.captured_code import CapturedCode
 from dsl_core.model.plan import CapturePlan, NoCode, Shot, describe_shot
@@ -85,6 +87,9 @@ class FrameProof:
         self.reviewed: list[Finding] = []
         self._light: dict[tuple[str, int], deque[float]] = {}
         self._scale: dict[int, float] = {}
+        self._profiles = Recent[Floats | None]()
+        self._rescaled = Recent[Expected]()
+        self._as_floats = Recent[Floats]()
         self._neighbours = LineNeighbours(self._noise, self._raster.shape[1])
 
     def judge(self, shot: Shot, pixels: NDArray[np.uint16]) -> Finding:
@@ -180,12 +185,12 @@ class FrameProof:
 
     def _judge_lines(self, shot: Shot, seen: Counts) -> Finding:
         assert self._code is not None
-        lit, wanted = self._code.lit, line_profile(self._plan, shot)
+        lit, wanted = self._code.lit, self._profile(shot)
         if lit is None or wanted is None:
             return Finding(shot, Verdict.UNTOLD)
         share = brightness_of_lines(seen, lit, wanted, self._noise)
         usual = np.float32(self._usual(shot))
-        rivals = [(verdict, line_profile(self._plan, rival)) for verdict, rival in self._rivals(shot)]
+        rivals = [(verdict, self._profile(rival)) for verdict, rival in self._rivals(shot)]
         rivals += [(Verdict.DARK, np.zeros_like(wanted)), (Verdict.OTHER, np.ones_like(wanted))]
         contests = {
             verdict: contest_of_lines(seen, lit, usual * wanted, usual * rival)
@@ -193,6 +198,10 @@ class FrameProof:
             if rival is not None
         }
         return self._decide(shot, contests, share, lambda: self._line_shown(seen, shot))
+
+    def _profile(self, shot: Shot) -> Floats | None:
+        """The `line_profile` of a shot, which is a rival of its neighbours as well."""
+        return self._profiles.get(shot.index, (), lambda: line_profile(self._plan, shot))
 
     def _rivals(self, shot: Shot) -> list[tuple[Verdict, Shot]]:
         """The shots whose pattern a picture most likely shows instead."""
@@ -215,7 +224,7 @@ class FrameProof:
         weight = np.minimum(count, 10).astype(np.float64)
         best, found = 0.5, None
         for other in self._shots:
-            pattern = line_profile(self._plan, other) if other.setting == shot.setting else None
+            pattern = self._profile(other) if other.setting == shot.setting else None
             if pattern is None or other.role == "sentinel" or not pattern.any():
                 continue
             norm = float(np.sqrt((weight * pattern**2).sum() * (weight * mean**2).sum()))
@@ -224,7 +233,7 @@ class FrameProof:
                 best, found = score, other
         if found is None:
             return None
-        pattern = line_profile(self._plan, found)
+        pattern = self._profile(found)
         light = np.zeros(0) if pattern is None else mean[(pattern > 0.5) & (count > 0)]
         return found if light.size and float(light.mean()) > LEAST_LIGHT else None
 
@@ -239,7 +248,9 @@ class FrameProof:
         if wanted is None or old_black is None or old_white is None:
             return Finding(shot, Verdict.UNTOLD)
         black = self._black(shot, old_black)
-        white = rescaled(old_white, old_black, black, self._scale_of(shot), self._noise)
+        white = self._expected(self._role("white", shot), shot)
+        if white is None:
+            return Finding(shot, Verdict.UNTOLD)
         # Before its own black is there, only what is bright can be relied on.
         has_black = shot.role != "black" and self._blacks[shot.setting] in self._kept
         least = np.float32(0 if has_black else APART) * (white.counts - black)
@@ -281,7 +292,13 @@ class FrameProof:
         black = self._black(shot, old_black)
         if pattern.role == "black":
             return Expected(black, self._noise.variance(old_black))
-        return rescaled(old, old_black, black, self._scale_of(shot), self._noise)
+        # Until its first shots say how strong the light of a setting is, that is taken from the plan.
+        scale = self._scale.get(shot.setting)
+        return self._rescaled.get(
+            pattern.index,
+            (old, old_black, black, scale),
+            lambda: rescaled(old, old_black, black, self._scale_of(shot), self._noise),
+        )
 
     def _role(self, role: str, shot: Shot) -> Shot:
         return Shot(-1, role, 0, shot.setting, shot.exposure_ms, shot.level)  # type: ignore[arg-type]
@@ -295,7 +312,7 @@ class FrameProof:
         own = self._blacks[shot.setting]
         taken = self._kept.get(own) if own != shot.index else None
         if taken is not None:
-            return taken.astype(np.float32)
+            return self._as_floats.get(own, (taken,), lambda: taken.astype(np.float32))
         if self._calibration is None:  # nobody knows how much of it is light
             return old_black.astype(np.float32)
         level = np.float32(self._noise.sensor.black_level_dn)
@@ -356,7 +373,7 @@ class FrameProof:
         """Light of the pictures before relative to their prediction; at first, what a film usually leaves."""
         known = self._light.get((shot.role, shot.setting))
         if known:
-            return min(float(np.median(known)), 1.0)
+            return min(median(known), 1.0)
         return FILM_SHARE if shot.setting == self._first else 1.0
 
     def _judge_exposure(self, shot: Shot, share: float | None) -> Finding:

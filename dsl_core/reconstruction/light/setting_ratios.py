@@ -38,22 +38,25 @@ def compare_settings(
     sensor: Sensor,
 ) -> tuple[Ratio | None, ...]:
     """The light of each mosaic of one pattern relative to the last one's; None where too little is seen."""
+    # Only who merges frames needs compiled code.
+    from dsl_core.reconstruction.hdr_kernels import light_sums
+
     rows = compared_rows(raws[0].shape[0])
-    pictures = [raw[rows].astype(np.float32) for raw in raws]
-    light = [each - black.mean[rows] for each, black in zip(pictures, blacks, strict=True)]
+    pictures = [raw[rows] for raw in raws]
+    darks = [black.mean[rows] for black in blacks]
+    low, high = (share * sensor.full_scale_dn for share in USED)
+    floor = float(raw_variance(sensor, np.zeros(())))
     found: list[Ratio | None] = []
     for i in range(len(raws) - 1):
-        low, high = (share * sensor.full_scale_dn for share in USED)
         # The fainter setting is fitted as a multiple of the brighter one, whose noise hardly matters.
         faint, bright = (i, -1) if gains_ms[i] <= gains_ms[-1] else (-1, i)
-        used = (light[bright] > low) & (pictures[i] < high) & (pictures[-1] < high)
-        x, y = (light[j][used].astype(np.float64) for j in (bright, faint))
         scale = gains_ms[faint] / gains_ms[bright]
-        # Of the frame and of the black taken off it.
-        weight = 1 / (raw_variance(sensor, scale * x) + raw_variance(sensor, 0 * x))
-        power = float((weight * (x**2 - raw_variance(sensor, x))).sum())
-        factor = float((weight * x * y).sum()) / power if power > 0 else 0.0
-        if int(used.sum()) < FEWEST or factor <= 0:
+        count, power, product = light_sums(
+            pictures[faint], pictures[bright], darks[faint], darks[bright],
+            low, high, scale, floor, sensor.electrons_per_dn,
+        )  # fmt: skip
+        factor = product / power if power > 0 else 0.0
+        if count < FEWEST or factor <= 0:
             found.append(None)
             continue
         log = np.log(factor / scale)

@@ -153,8 +153,7 @@ class ScanFrames:
             raws = [self.source.read(shot) for shot in self.shots_of("spectral", k)]
             if few is not None:
                 few.compare("spectral", k, [raw[rows] for raw in raws])
-            merged = scan.merge_raws("spectral", k, [source.of(raw) for raw in raws])
-            radiance[k], std[k] = merged.radiance[0], np.sqrt(merged.variance[0])
+            scan.merge_line(k, [source.of(raw) for raw in raws], radiance[k][None], std[k][None])
 
         in_order(load, len(radiance), "line frames", progress)
         picked = PickedLines(pixels, radiance, std, scan.black_std[0])

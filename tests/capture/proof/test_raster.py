@@ -55,7 +55,12 @@ def test_blocks_are_means_of_sixteen_parts_down_and_across() -> None:
 
 def test_variance_of_counts_is_shot_noise_above_black_read_noise_and_rounding() -> None:
     noise = Noise(Sensor(black_level_dn=260.0, electrons_per_dn=4.0, read_noise_dn=3.0))
-    assert noise.variance(np.array([0, 260, 660], np.uint16)) == pytest.approx([9.1, 9.1, 109.1])
+    counts = np.array([0, 260, 660], np.uint16)
+    assert noise.variance(counts) == pytest.approx([9.1, 9.1, 109.1])
+    counts[0] = 660
+    assert noise.variance(counts)[0] == pytest.approx(109.1)
+    taken = Raster((3, 1)).take(counts[None])
+    assert noise.variance(taken) is noise.variance(taken), "what cannot change is remembered"
 
 
 @pytest.mark.parametrize(
