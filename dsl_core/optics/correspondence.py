@@ -42,8 +42,9 @@ class Footprint(NamedTuple):
     def inside(self, width_px: int, height_px: int, margin_px: float = 0.0) -> Tensor:
         """Whether light comes from inside the projector's frame, or a margin left and right of it; bool."""
         c, r = self
-        low, high = -0.5 - margin_px, width_px - 0.5 + margin_px
-        return (c > low) & (c < high) & (r > -0.5) & (r < height_px - 0.5)
+        found = (c - 0.5 * (width_px - 1)).abs_() < 0.5 * width_px + margin_px
+        found &= (r - 0.5 * (height_px - 1)).abs_() < 0.5 * height_px
+        return found
 
 
 class Correspondence(Protocol):

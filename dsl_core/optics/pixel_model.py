@@ -197,11 +197,12 @@ class PixelModel:
     def frames(self, columns_px: Tensor, inside: Tensor) -> range:
         """Frames of single lines that light any band (bands, pixels) that is inside; empty when none does."""
         assert self.lines is not None
-        columns = columns_px[inside]
-        if len(columns) == 0:
+        if not bool(inside.any()):
             return range(0)
+        low = float(torch.where(inside, columns_px, torch.inf).amin())
+        high = float(torch.where(inside, columns_px, -torch.inf).amax())
         margin = self.lines.width_px / 2 + EDGE_PX
-        return self.lines.near(float(columns.min()) - margin, float(columns.max()) + margin)
+        return self.lines.near(low - margin, high + margin)
 
     def zero_light(self, other: Tensor, blur_px: float = 0.0) -> BlurredProfiles:
         """The zero order's light of all frames, in the precision of another tensor."""

@@ -147,7 +147,7 @@ class LineStack:
     def pick(self, pixels: NDArray[np.intp]) -> PickedLines:
         """The frames of some pixels (flat indices)."""
         flat = (cube.reshape(len(cube), self.black_std.size) for cube in (self.radiance, self.std))
-        radiance, std = (cube[:, pixels] for cube in flat)
+        radiance, std = (np.take(cube, pixels, axis=1) for cube in flat)
         return PickedLines(pixels, radiance, std, self.black_std.ravel()[pixels])
 
 

@@ -23,7 +23,7 @@ from dsl_core.reconstruction.merge import LineStack
 from dsl_core.solve.many import Check, work_through
 from dsl_core.solve.threads import one_kernel_thread
 
-CHUNK = 16384
+CHUNK = 4096
 Floats = NDArray[np.float32]
 Indices = NDArray[np.intp]
 #: Deviation of a column that only a whole pixel is known of.

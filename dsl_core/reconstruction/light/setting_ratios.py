@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,6 +27,7 @@ class Ratio:
     std: float
 
 
+@lru_cache(maxsize=8)
 def compared_rows(height: int) -> NDArray[np.intp]:
     """Rows of a picture of a height that are looked at."""
     return np.unique(np.linspace(0, height - 1, min(height, ROWS)).astype(np.intp))

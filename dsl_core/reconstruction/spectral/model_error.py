@@ -40,14 +40,17 @@ class ModelError:
 
     def at(self, rows: NDArray[np.intp], columns: NDArray[np.intp], shape: tuple[int, ...]) -> Floats:
         """The error at pixels (n,) of a picture of a shape, linear between the cells' centres, (bands, n)."""
-        from scipy.ndimage import map_coordinates
-
-        place = [
-            (at + 0.5) / size * count - 0.5
+        down, across = (
+            _shares((at + 0.5) / size * count - 0.5, count)
             for at, size, count in zip((rows, columns), shape, CELLS, strict=True)
-        ]
-        found = [map_coordinates(band, place, order=1, mode="nearest") for band in self.relative]
-        return np.asarray(found, np.float64)
+        )
+        shares = (down[:, None] * across[None]).reshape(-1, len(rows))
+        return np.asarray(self.relative.reshape(len(self.relative), -1) @ shares)
+
+
+def _shares(place: Floats, count: int) -> Floats:
+    """Share of each node in places (n,) between them, (count, n); those outside are at the outermost."""
+    return np.maximum(1 - np.abs(np.clip(place, 0, count - 1) - np.arange(count)[:, None]), 0)
 
 
 def model_error(probe: Probe, common: float = 0.0) -> ModelError:

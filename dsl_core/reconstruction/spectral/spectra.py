@@ -15,7 +15,7 @@ from dsl_core.model.result import Reach
 from dsl_core.model.rig import Rig
 from dsl_core.model.spectral import WavelengthGrid
 from dsl_core.optics.colour_neighbours import ColourNeighbours, bayer_colours
-from dsl_core.optics.correspondence import Correspondence, like
+from dsl_core.optics.correspondence import Correspondence, Footprint, like
 from dsl_core.optics.lines.equations import LineEquations
 from dsl_core.optics.lines.line_set import LineSet
 from dsl_core.optics.pixel_model import COLOUR_ERROR, DIRECT_ERROR, PixelModel, Traced
@@ -59,7 +59,8 @@ def model_of_plan(
 
 def zero_order_error(rig: Rig, plan: CapturePlan) -> float:
     """Relative error granted to the zero order in frames that light a pixel by several orders at once."""
-    return max(DIRECT_ERROR, rounding_error(rig, plan))
+    # Lines are either dark or fully lit, which no rounding of drive levels changes.
+    return DIRECT_ERROR if LineSet.of(plan) is not None else max(DIRECT_ERROR, rounding_error(rig, plan))
 
 
 @dataclass(frozen=True)
@@ -247,12 +248,13 @@ class SpectralReconstruction:
             check()
             solve = self._banded if self._compiled is None else self._compiled_tile
             spectra, misfit = solve(frames, near, traced, check)
-            traced = traced.part(torch.as_tensor(np.searchsorted(near.flat, frames.flat), device=self.device))
+            own = torch.as_tensor(np.searchsorted(near.flat, frames.flat), device=self.device)
         else:
             traced = self.trace(frames)
             check()
             spectra, misfit = self._dense(frames, traced, check)
-        self._store(spectra, misfit, frames, traced, out, first_row)
+            own = torch.arange(len(frames.flat), device=self.device)
+        self._store(spectra, misfit, frames, (traced, own), out, first_row)
 
     def _compiled_tile(
         self, frames: TileFrames, near: TileFrames, traced: Traced, check: Check
@@ -358,11 +360,14 @@ class SpectralReconstruction:
         spectra: Spectra,
         misfit: Tensor,
         frames: TileFrames,
-        traced: Traced,
+        traced: tuple[Traced, Tensor],
         out: SpectralMaps,
         first_row: int,
     ) -> None:
-        """Put spectra into maps that begin with a row of the picture."""
+        """Put spectra into maps that begin with a row of the picture.
+
+        With the light that was ``traced`` comes which of its pixels they are of.
+        """
         reported = self.bands.reported
         flat, mean = frames.flat, spectra.mean[reported]
         relative = frames.known("shading_rel_std").nan_to_num(nan=0.0)
@@ -388,8 +393,9 @@ class SpectralReconstruction:
         bits = {1: Reach.PLUS_ONE, -1: Reach.MINUS_ONE}
         reach = torch.zeros_like(mean, dtype=torch.uint8)
         for order, bit in bits.items():
-            inside = self.model.inside(traced.orders[order], margin_px=0.0)
-            reach |= inside[reported].to(torch.uint8) * int(bit)
+            footprint = Footprint(*(each[reported] for each in traced[0].orders[order]))
+            inside = self.model.inside(footprint, margin_px=0.0).to(torch.uint8)
+            reach |= inside.index_select(1, traced[1]) * int(bit)
         reach[reach == 0] = int(Reach.ZERO_ONLY)
         out.reach.reshape(len(out.reach), -1)[:, flat] = reach.cpu().numpy()
         out.chi_square.reshape(-1)[flat] = misfit.float().cpu().numpy()
