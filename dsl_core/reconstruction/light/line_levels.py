@@ -67,19 +67,17 @@ def line_levels(
     sound = sound[:: max(len(sound) // PIXELS, 1)]
     if cover is None or len(sound) < FEWEST:
         return None
-    # In the order of columns, so that those near a line are next to each other.
-    sound = sound[np.argsort(column.ravel()[seen.pixels[sound]], kind="stable")]
     picked = seen.pixels[sound]
     flat = column.ravel()[picked]
-    frames = seen.radiance[:, sound].astype(np.float64)
-    variance = np.square(seen.std[:, sound], dtype=np.float64)
+    frames = seen.radiance[:, sound].astype(np.float64).T
+    variance = np.square(seen.std[:, sound], dtype=np.float64).T
     light, light_variance = (each.ravel()[picked].astype(np.float64) for each in white)
     mean = float(cover.mean())
     total = light * (STRAIGHT * cover[flat] + (1 - STRAIGHT) * mean)
     # What black is off by adds up over all frames.
     blacks = len(seen.radiance) * seen.black_std[sound].astype(np.float64)
     # Weights must not know the noise of white: they would prefer pixels whose white is too dark.
-    summed = frames.sum(0) * (total.sum() / frames.sum())
+    summed = frames.sum(1) * (total.sum() / frames.sum())
     usual = np.polyval(np.polyfit(summed, light_variance, 1), summed).clip(light_variance.min())
     noise = (SUM_ERROR * summed) ** 2 + mean**2 * usual + blacks**2
     smooth, smooth_std = _smooth_rows(plan, flat, frames, variance, _pitch(column))
@@ -89,23 +87,23 @@ def line_levels(
 def _solve(
     frames: Floats, variance: Floats, total: Floats, noise: Floats, smooth: Floats, smooth_std: Floats
 ) -> LineLevels:
-    """Levels from frames (frames, pixels), their ``total`` (pixels,) and the ``noise`` of that."""
-    count = len(frames)
+    """Levels from frames (pixels, frames), their ``total`` (pixels,) and the ``noise`` of that."""
+    count = frames.shape[1]
     quick = _quick(smooth, smooth_std)
     spread = max(1.1 * quick, LEAST_SPREAD)
     weight = 1 / noise
     for _ in range(3):
-        heavy = frames * np.sqrt(weight)
+        heavy = frames * np.sqrt(weight)[:, None]
         # A product with itself takes half as long.
-        matrix = heavy @ heavy.T
+        matrix = heavy.T @ heavy
         # Noise in the frames themselves adds its squares, which the sum of light does not have.
-        matrix[np.diag_indices(count)] -= variance @ weight
-        right = frames @ (weight * total)
+        matrix[np.diag_indices(count)] -= weight @ variance
+        right = (weight * total) @ frames
         mean = float(right.sum() / matrix.sum())
         matrix += (smooth.T * (mean * smooth_std) ** -2) @ smooth + np.eye(count) / (spread * mean) ** 2
         inverse = np.linalg.inv(matrix)
         needed = inverse @ (right + 1 / (spread**2 * mean))
-        away = np.abs(needed @ frames - total) / np.sqrt(noise)
+        away = np.abs(frames @ needed - total) / np.sqrt(noise)
         usual = max(float(np.median(away)) / 0.6745, 1e-9)
         weight = np.minimum(1, 2.5 * usual / np.maximum(away, 1e-9)) / noise
     misfit = float(np.median(away * np.sqrt(noise) / total)) / 0.6745
@@ -157,20 +155,25 @@ def _smooth_rows(
 ) -> tuple[Floats, Floats]:
     """Equations (n, frames) that the inverse levels fulfil, and how well; none for several lines a frame.
 
-    ``column`` (pixels,) rises; ``frames`` and ``variance`` are (frames, pixels).
+    ``column`` is (pixels,), ``frames`` and ``variance`` are (pixels, frames).
     """
-    count = len(frames)
+    count = frames.shape[1]
     if not isinstance(plan.spectral, ScanLines) or count < 16:
         return np.zeros((0, count)), np.zeros(0)
     step, width = plan.spectral.step_px, plan.spectral.width_px
     zone = width / 2 + 2 * step + ZERO_PX + 1.5 * pitch
     k = np.arange(2, count - 2)
     centre = k * step + width / 2
-    first, last = np.searchsorted(column, centre - zone), np.searchsorted(column, centre + zone, "right")
+    # In the order of columns, pixels near a line are next to each other.
+    order = np.argsort(column, kind="stable")
+    first, last = (
+        np.searchsorted(column, centre + by, side, order) for by, side in ((-zone, "left"), (zone, "right"))
+    )
 
     def away(values: Floats) -> dict[int, Floats]:
         """Sums (n,) over the pixels away from each line, of its own frame and those around it."""
-        sums = np.pad(np.cumsum(values, axis=1), ((0, 0), (1, 0)))
+        sums = np.zeros((count, len(column) + 1))
+        np.cumsum(values.T[:, order], axis=1, out=sums[:, 1:])
         return {by: sums[k + by, -1] - sums[k + by, last] + sums[k + by, first] for by in (0, *AROUND)}
 
     light, noises = away(frames), away(variance)
