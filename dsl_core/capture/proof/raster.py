@@ -50,7 +50,7 @@ class Raster:
         rows, columns = self.shape[0] // down, self.shape[1] // across
         whole = values.reshape(self.shape)[: rows * down, : columns * across]
         sums = whole.reshape(rows, down, -1).sum(1, dtype=np.float32)
-        return sums.reshape(rows * columns, across).sum(1) / np.float32(down * across)
+        return np.asarray(sums.reshape(rows * columns, across).sum(1) / np.float32(down * across))
 
     @property
     def pooled(self) -> int:

@@ -50,7 +50,8 @@ class ModelError:
 
 def _shares(place: Floats, count: int) -> Floats:
     """Share of each node in places (n,) between them, (count, n); those outside are at the outermost."""
-    return np.maximum(1 - np.abs(np.clip(place, 0, count - 1) - np.arange(count)[:, None]), 0)
+    distance = np.abs(np.clip(place, 0, count - 1) - np.arange(count)[:, None])
+    return np.asarray(np.maximum(1 - distance, 0))
 
 
 def model_error(probe: Probe, common: float = 0.0) -> ModelError:
