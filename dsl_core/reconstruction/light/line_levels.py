@@ -166,9 +166,8 @@ def _smooth_rows(
     centre = k * step + width / 2
     # In the order of columns, pixels near a line are next to each other.
     order = np.argsort(column, kind="stable")
-    first, last = (
-        np.searchsorted(column, centre + by, side, order) for by, side in ((-zone, "left"), (zone, "right"))
-    )
+    first = np.searchsorted(column, centre - zone, sorter=order)
+    last = np.searchsorted(column, centre + zone, "right", sorter=order)
 
     def away(values: Floats) -> dict[int, Floats]:
         """Sums (n,) over the pixels away from each line, of its own frame and those around it."""
