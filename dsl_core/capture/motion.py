@@ -76,19 +76,7 @@ def moved_between(
     the pictures show a pattern, white otherwise.
     """
     (old, old_variance), (new, variance) = (_light(*pair, sensor) for pair in (before, now))
-    return movement_in(old, new, old_variance + variance, 2, is_pattern)
-
-
-def movement_in(
-    old: Floats, new: Floats, variance: Floats, by: int, is_pattern: bool = False, least_px: float = LEAST_PX
-) -> Movement | None:
-    """What moved between pictures averaged over blocks of ``by`` x ``by`` pixels; None: nothing did.
-
-    Their difference has this ``variance``. Parts that move by less than ``least_px`` do not count. Brightness
-    and an offset are free in every part of the picture.
-    """
-    found = tile_shifts(old, new, variance, TILES)
-    return _movement(found, (by * old.shape[0], by * old.shape[1]), by, is_pattern, least_px)
+    return _movement(tile_shifts(old, new, old_variance + variance, TILES), old.shape, is_pattern)
 
 
 def _light(picture: Mosaic, black: Mosaic, sensor: Sensor) -> tuple[Floats, Floats]:
@@ -96,39 +84,38 @@ def _light(picture: Mosaic, black: Mosaic, sensor: Sensor) -> tuple[Floats, Floa
     lit, dark = (each.astype(np.float64) for each in (picture, black))
     noise = sum(raw_variance(sensor, each - sensor.black_level_dn) for each in (lit, dark))
     variance = np.where(lit < 0.98 * sensor.full_scale_dn, noise, 1e12)
-    return binned(lit - dark, 2), binned(np.asarray(variance), 2) / 4
+    return _binned(lit - dark), _binned(np.asarray(variance)) / 4
 
 
-def _movement(
-    found: TileShifts, size: tuple[int, int], by: int, is_pattern: bool, least_px: float
-) -> Movement | None:
+def _movement(found: TileShifts, shape: tuple[int, ...], is_pattern: bool) -> Movement | None:
     std = np.maximum(found.x_std, found.y_std)
-    telling = by * std < TELLING_PX
-    moved = telling & (by * found.length > least_px) & (found.sigmas > SIGMAS)
+    telling = 2 * std < TELLING_PX
+    moved = telling & (2 * found.length > LEAST_PX) & (found.sigmas > SIGMAS)
     moved |= found.change > CHANGED
     if moved.sum() < FEWEST:
         return None
     sure = moved & telling
     whole = moved.sum() >= MOST * max(int(telling.sum()), FEWEST)
-    rows, columns = _span(moved, 1, size[0]), _span(moved, 0, size[1])
+    rows, columns = (
+        _span(np.asarray(moved.any(axis)), 2 * size) for axis, size in ((1, shape[0]), (0, shape[1]))
+    )
     return Movement(
         after=None,
         before=None,
-        shift_px=float(np.median(by * found.length[sure])) if sure.any() else None,
-        std_px=float(by * np.median(std[sure])) if sure.any() else 0.0,
+        shift_px=float(np.median(2 * found.length[sure])) if sure.any() else None,
+        std_px=float(2 * np.median(std[sure])) if sure.any() else 0.0,
         is_pattern=is_pattern,
         columns=None if whole else columns,
         rows=None if whole else rows,
     )
 
 
-def binned(picture: Floats, by: int) -> Floats:
-    """Means over blocks of ``by`` x ``by`` pixels."""
-    rows, columns = (size // by for size in picture.shape)
-    whole = picture[: by * rows, : by * columns].reshape(rows, by, columns, by)
+def _binned(picture: Floats) -> Floats:
+    rows, columns = (size // 2 for size in picture.shape)
+    whole = picture[: 2 * rows, : 2 * columns].reshape(rows, 2, columns, 2)
     return np.asarray(whole.mean(axis=(1, 3)))
 
 
-def _span(moved: NDArray[np.bool_], axis: int, size: int) -> tuple[int, int]:
-    at, count = np.flatnonzero(moved.any(axis)), moved.shape[1 - axis]
-    return int(at[0] * size / count), int((at[-1] + 1) * size / count)
+def _span(moved: NDArray[np.bool_], size: int) -> tuple[int, int]:
+    at = np.flatnonzero(moved)
+    return int(at[0] * size / len(moved)), int((at[-1] + 1) * size / len(moved))

@@ -1,7 +1,7 @@
 """Whether camera or scene moved during a scan: sentinels, compared with the pictures that they repeat.
 
 White says where the picture is, a frame of the code where the pattern is on it: an object that comes nearer
-hardly moves in the picture, but the stripes on it do. While the code is captured, its own pairs tell.
+hardly moves in the picture, but the stripes on it do.
 """
 
 from __future__ import annotations
@@ -13,7 +13,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dsl_core.capture.motion import Movement, moved_between
-from dsl_core.capture.pair_watch import PairWatch
 from dsl_core.model.frames import FrameSource
 from dsl_core.model.plan import CapturePlan, Shot
 from dsl_core.model.rig import Sensor
@@ -26,8 +25,6 @@ class SentinelWatch:
         """Without a ``sensor``, a usual one is assumed."""
         self._sensor = sensor or Sensor()
         self._old = {s.index: plan.original(s) for s in plan.shots() if s.role == "sentinel"}
-        self._compared = frozenset(self._old) | {shot.index for shot in self._old.values()}
-        self._pairs = PairWatch(plan, self._sensor)
         self._kept: dict[int, NDArray[np.uint16]] = {}
         self._black: dict[int, int] = {}
         self._still: dict[str, int] = {}
@@ -36,7 +33,7 @@ class SentinelWatch:
     @property
     def wanted(self) -> frozenset[int]:
         """Indices of the shots that are looked at."""
-        return self._compared | self._pairs.wanted
+        return frozenset(self._old) | {shot.index for shot in self._old.values()}
 
     def learn(self, stored: FrameSource, there: Iterable[Shot]) -> None:
         """Look at frames of earlier runs."""
@@ -47,9 +44,6 @@ class SentinelWatch:
     def add(self, shot: Shot, pixels: NDArray[np.uint16]) -> None:
         """Look at a frame (rows, columns), DN; ``found`` says what moved, first of all."""
         if self.found is not None or shot.index not in self.wanted:
-            return
-        self.found = self._pairs.add(shot, pixels)
-        if self.found is not None or shot.index not in self._compared:
             return
         self._kept[shot.index] = pixels
         old = self._old.get(shot.index)
@@ -82,7 +76,7 @@ class SentinelWatch:
 def movement_of(
     source: FrameSource, sensor: Sensor | None = None, missing: Iterable[int] = ()
 ) -> Movement | None:
-    """What moved during a scan with all frames but those ``missing``; reads its code and sentinels."""
+    """What moved during a scan with all frames but those ``missing``; reads its sentinels."""
     watch, gone = SentinelWatch(source.plan, sensor), set(missing)
     watch.learn(source, (shot for shot in source.plan.shots() if shot.index not in gone))
     return watch.found

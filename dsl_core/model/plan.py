@@ -261,13 +261,13 @@ class CapturePlan(Record):
         if not self.code_count:
             return {}
         setting = min(self.code_settings)
-        wanted: dict[Role, int] = {"white": 0, "black": 0, "code": self.sentinel_code}
+        wanted: dict[Role, int] = {"white": 0, "black": 0, "code": self._sentinel_code}
         of_setting = {(each.role, each.pattern): each for each in self.shots() if each.setting == setting}
         return {role: of_setting[role, pattern] for role, pattern in wanted.items()}
 
     @property
-    def sentinel_code(self) -> int:
-        """Number of the frame of the code that shows a small motion."""
+    def _sentinel_code(self) -> int:
+        """The frame of the code that shows a small motion."""
         return 2 * min(_SENTINEL_BIT, self.code_bits[0] - 1)
 
     def _rounds(self) -> Iterator[tuple[int, tuple[int, ...]]]:
@@ -277,7 +277,7 @@ class CapturePlan(Record):
         first = min(self.code_settings)
         before = sum(count for i in range(first) for _, count in self._roles(i))
         codes, total = self.code_count, self._own_count
-        code = self.sentinel_code
+        code = self._sentinel_code
         white, black, line = before + codes, before + codes + (codes > 0), before + codes + 1 + (codes > 0)
         rounds = max(total // self.sentinels.every, 1)
         for number in range(1, rounds + 1):

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from dsl_core.capture.motion import LEAST_PX, _light, _movement
+from dsl_core.capture.motion import _light, _movement
 from dsl_core.optics.sensor import raw_variance
 from dsl_core.simulation.published_rig import published_rig
 from dsl_core.solve.image_shift import TileShifts
@@ -28,14 +28,14 @@ def tiles(x: float = 0.0, std: float = 0.01, change: float = 0.0, moved: int = 2
     ],
 )  # fmt: skip
 def test_tiles_move_by_a_fifth_of_a_pixel_and_six_deviations(found: TileShifts, is_moved: bool) -> None:
-    assert (_movement(found, (64, 96), 2, False, LEAST_PX) is not None) == is_moved
+    assert (_movement(found, (32, 48), False) is not None) == is_moved
 
 
 def test_a_movement_is_the_median_of_its_tiles_in_pixels_of_the_camera() -> None:
     found = tiles(0.5, 0.02)
     found.x[1, 2:4], found.x[2:] = 0.0, 0.0
     found.x[0, 0], found.x[0, 1] = 0.3, 3.0
-    seen = _movement(found, (64, 96), 2, True, LEAST_PX)
+    seen = _movement(found, (32, 48), True)
     assert seen is not None
     assert (seen.shift_px, seen.std_px, seen.is_pattern) == (1.0, 0.04, True)
     assert (seen.columns, seen.rows) == ((0, 96), (0, 32))
@@ -45,7 +45,7 @@ def test_a_movement_is_the_median_of_its_tiles_in_pixels_of_the_camera() -> None
 def test_what_moved_is_bounded_by_its_tiles() -> None:
     found = tiles()
     found.x[1:3, 2:5] = 0.5
-    seen = _movement(found, (64, 96), 2, False, LEAST_PX)
+    seen = _movement(found, (32, 48), False)
     assert seen is not None
     assert (seen.columns, seen.rows) == ((32, 80), (16, 48))
     assert "Something moved by 1.0 ± 0.1 px in columns 32-80, rows 16-48 of the picture" in seen.sentence
@@ -53,13 +53,13 @@ def test_what_moved_is_bounded_by_its_tiles() -> None:
 
 @pytest.mark.parametrize(("moved", "is_all"), [(14, False), (15, True)])
 def test_from_six_tenths_of_the_tiles_on_all_of_the_picture_moved(moved: int, is_all: bool) -> None:
-    seen = _movement(tiles(0.5, moved=moved), (64, 96), 2, False, LEAST_PX)
+    seen = _movement(tiles(0.5, moved=moved), (32, 48), False)
     assert seen is not None
     assert (seen.columns is None) == (seen.rows is None) == is_all
 
 
 def test_a_scene_that_changed_has_no_shift() -> None:
-    seen = _movement(tiles(std=1.0, change=0.5, moved=2), (64, 96), 2, False, LEAST_PX)
+    seen = _movement(tiles(std=1.0, change=0.5, moved=2), (32, 48), False)
     assert seen is not None
     assert (seen.shift_px, seen.std_px) == (None, 0.0)
     assert seen.columns is None, "of two tiles that tell, at least, both changed"
