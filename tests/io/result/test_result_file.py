@@ -191,3 +191,12 @@ def test_a_path_that_is_no_folder(tmp_path: Path) -> None:
         load_result(tmp_path / "file")
     with pytest.raises(StoreError, match="is a file, not a folder"):
         save_result(small_result(), tmp_path / "file" / "r.zarr")
+
+
+def test_one_file_describes_all_arrays_of_a_result(tmp_path: Path) -> None:
+    import zarr
+
+    path = save_result(small_result(), tmp_path / "result.zarr")
+    described = zarr.open_group(path, mode="r").metadata.consolidated_metadata
+    assert described is not None
+    assert {"depth_mm", "reflectance", "flags"} <= set(described.metadata)
