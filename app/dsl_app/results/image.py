@@ -11,7 +11,7 @@ from PySide6.QtGui import QKeyEvent
 from PySide6.QtWidgets import QLabel, QWidget
 
 from dsl_app.results.controller import ResultsController
-from dsl_app.results.layers import Layer, Layers
+from dsl_app.results.layers import Layer, Layers, materials_table
 from dsl_app.results.outline_box import OutlineBox
 from dsl_app.results.state import Mark, Materials, ResultsState, Tool
 from dsl_app.shared.evented import follow_any
@@ -21,7 +21,6 @@ from dsl_app.shared.widgets.forms import named
 from dsl_app.shared.widgets.layouts import column_of
 from dsl_app.shared.widgets.pictures import PictureView, arrow_step, colour_map
 from dsl_app.shared.widgets.plots import theme_bar
-from dsl_core.analysis.class_table import class_colours
 
 #: Mouse moves are handled at most this often, Hz.
 CURSOR_HZ = 60
@@ -251,18 +250,6 @@ class ResultImage(QWidget):
         self._show_marks(self._state.marks.value)
         self._show_search()
         self.paint()
-
-
-def materials_table(classes: int) -> np.ndarray[Any, np.dtype[np.uint8]]:
-    """Colours (256, 4) of a map of so many classes; what is not judged shows the picture below."""
-    table = np.zeros((256, 4), np.uint8)
-    colours = class_colours(classes)
-    for value, colour in enumerate(colours):
-        table[value] = (*bytes.fromhex(colour[1:]), 215)
-    table[0, 3] = 0
-    # What has no name is fainter than what has.
-    table[len(colours) - 2 : len(colours), 3] = 150
-    return table
 
 
 def rgba_of(mask: np.ndarray[Any, np.dtype[np.bool_]], colour: str, alpha: int) -> Any:

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from dsl_app.results.state import Limits, QualityMap, ResultsState, ResultView
 from dsl_app.shared.widgets.pictures import DEPTH, GREY, SHARE, colour_map, spread_of
+from dsl_core.analysis.class_table import class_colours
 from dsl_core.io.result.result_arrays import ResultArrays
 from dsl_core.model.result import FLAG_COLOURS, FLAG_NAMES, gravest_flag
 
@@ -134,3 +135,22 @@ def rgb_of(layer: Layer) -> NDArray[np.uint8]:
         table = colour_map(layer.colours).getLookupTable(nPts=256)
     index = np.nan_to_num((layer.image - low) * (255 / (high - low))).clip(0, 255).astype(np.uint8)
     return np.ascontiguousarray(np.asarray(table, np.uint8)[index][..., :3])
+
+
+def materials_table(classes: int) -> NDArray[np.uint8]:
+    """Colours (256, 4) of a map of so many classes; what is not judged shows the picture below."""
+    table = np.zeros((256, 4), np.uint8)
+    colours = class_colours(classes)
+    for value, colour in enumerate(colours):
+        table[value] = (*bytes.fromhex(colour[1:]), 215)
+    table[0, 3] = 0
+    # What has no name is fainter than what has.
+    table[len(colours) - 2 : len(colours), 3] = 150
+    return table
+
+
+def tinted_by(colours: NDArray[np.uint8], values: NDArray[np.uint8], classes: int) -> NDArray[np.uint8]:
+    """Colours (points, 3) under the map of so many classes, whose ``values`` (points,) say which each is."""
+    table = materials_table(classes)[values]
+    share = table[:, 3:] / np.float32(255)
+    return np.ascontiguousarray((colours * (1 - share) + table[:, :3] * share + 0.5).astype(np.uint8))

@@ -17,10 +17,14 @@ from dsl_core.progress import Progress
 
 @dataclass(frozen=True)
 class Way:
-    """How spectra are compared with classes."""
+    """How spectra are compared with classes.
+
+    ``library_error`` is the standard deviation of the spectra of a library, as a share of them.
+    """
 
     measure: Measure = Measure.PROBABILITY
     brightness: Brightness = "stated"
+    library_error: float = 0.0
 
 
 #: Reads or makes the classes for a result, with notes.
@@ -55,7 +59,9 @@ class AnswersController:
             from dsl_core.analysis.library import read_library
 
             library = read_library([path], progress=progress)
-            found, left_out = classes_of_library(library, result.wavelengths_nm)
+            found, left_out = classes_of_library(
+                library, result.wavelengths_nm, relative_error=way.library_error
+            )
             return found, (*library.notes, *left_out)
 
         self._start(f"Materials by {path.name}", way, classes)

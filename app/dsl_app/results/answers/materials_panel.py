@@ -15,7 +15,7 @@ from dsl_app.shared.widgets.forms import ChoiceBox, NumberBox, check_box, label,
 from dsl_app.shared.widgets.layouts import STRETCH, column_of, row_of
 from dsl_app.shared.widgets.read_table import RIGHT, ReadTable, cell
 from dsl_app.shared.widgets.save_dialog import ask_target
-from dsl_core.analysis.classify import Limits, Measure
+from dsl_core.analysis.classify import Brightness, Limits, Measure
 from dsl_core.io.spectra.catalogue import suffixes
 
 HINT = (
@@ -56,6 +56,16 @@ class MaterialsPanel(QWidget):
             lambda _: self._new_measure(),
         )
         self.free = check_box("Any brightness", "Compare the shape of spectra and not their level")
+        self.error = NumberBox(
+            "Library error",
+            0,
+            50,
+            0,
+            "%",
+            1,
+            "What spectra of a library may be off by (standard deviation), such as 2 % where another"
+            " instrument measured them; it widens what the probability allows",
+        )
         self.worst = NumberBox("Limit", 0, 1, 0.01, "", 3)
         self.margin = NumberBox("Margin", 0, 1, 0.95, "", 2)
         self.folder = push_button("Folder…", "Classes are the spectra of a folder; its subfolders are groups")
@@ -73,8 +83,9 @@ class MaterialsPanel(QWidget):
         sources = row_of(label("Spectra of"), self.folder, self.file, self.marks, STRETCH)
         ways = row_of(label("By"), (self.measure, 1), self.free)
         limits = row_of(label("Limit"), self.worst, label("Margin"), self.margin, STRETCH)
+        error = row_of(label("Library error"), self.error, STRETCH)
         map_row = row_of(self.write, self.clear, STRETCH)
-        column_of(sources, ways, limits, (self.table, 1), self.text, map_row, on=self, margins=0)
+        column_of(sources, ways, error, limits, (self.table, 1), self.text, map_row, on=self, margins=0)
         self.folder.clicked.connect(self.choose_folder)
         self.file.clicked.connect(self.choose_file)
         self.marks.clicked.connect(lambda: control.from_marks(self.way))
@@ -88,7 +99,8 @@ class MaterialsPanel(QWidget):
     @property
     def way(self) -> Way:
         """How to compare, as it is chosen."""
-        return Way(Measure(self.measure.currentData()), "free" if self.free.isChecked() else "stated")
+        brightness: Brightness = "free" if self.free.isChecked() else "stated"
+        return Way(Measure(self.measure.currentData()), brightness, self.error.value() / 100)
 
     def choose_folder(self) -> None:
         """Ask for the folder of a library."""
@@ -119,6 +131,7 @@ class MaterialsPanel(QWidget):
         """Other limits belong to another measure; a map that is shown keeps its own."""
         measure = Measure(self.measure.currentData())
         self.free.setEnabled(measure is Measure.PROBABILITY)
+        self.error.setEnabled(measure is Measure.PROBABILITY)
         self._offer_limits(measure, Limits.usual(measure))
 
     def _offer_limits(self, measure: Measure, limits: Limits) -> None:

@@ -17,7 +17,7 @@ from dsl_app.results.cloud.picking import HOVER_POINTS, Picking
 from dsl_app.results.cloud.tools import CloudTools
 from dsl_app.results.cloud.views import CloudView, make_cloud_view, normalised, prepare_cloud_view
 from dsl_app.results.controller import ResultsController
-from dsl_app.results.layers import Layers, rgb_of, within
+from dsl_app.results.layers import Layers, rgb_of, tinted_by, within
 from dsl_app.results.state import ResultsState, ResultView, Tool
 from dsl_app.shared.jobs.base import Job, JobRunner
 from dsl_app.shared.spectrum import Pixel
@@ -64,7 +64,14 @@ class CloudPanel(QWidget):
     def _connect(self) -> None:
         state, tools = self._state, self.tools
         state.result.changed.connect(lambda _: self._new_result())
-        for value in (state.cloud_by, state.band, state.quality, state.picture, state.search):
+        for value in (
+            state.cloud_by,
+            state.band,
+            state.quality,
+            state.picture,
+            state.search,
+            state.materials,
+        ):
             value.changed.connect(lambda _: self._later.start())
         state.depth_limits.changed.connect(lambda _: self._limit_points())
         state.cursor.changed.connect(self._show_cursor)
@@ -168,7 +175,10 @@ class CloudPanel(QWidget):
         if layer is None:
             return
         colours = rgb_of(layer).reshape(-1, 3)[self._grid.flat]
-        search = self._state.search.value
+        materials, search = self._state.materials.value, self._state.search.value
+        if materials is not None:
+            shown = materials.found.shown
+            colours = tinted_by(colours, shown.values.ravel()[self._grid.flat], len(shown.names))
         if search is not None:
             colours = colours.copy()
             colours[search.found.ravel()[self._grid.flat]] = tuple(bytes.fromhex(self._theme.accent[1:]))

@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 from dsl_app.results.answers.controller import Way
 from dsl_app.results.answers.materials_panel import HINT, MaterialsPanel, materials_text
-from dsl_app.results.image import materials_table
+from dsl_app.results.layers import materials_table, tinted_by
 from dsl_app.results.state import Materials
 from dsl_app.shared.theme import LIGHT
 from pytestqt.qtbot import QtBot
 
+from dsl_core.analysis import classes
 from dsl_core.analysis.classify import Measure
 from tests.app.support.results_controller import SQUARE, Bench
 from tests.app.support.results_controller import bench as bench
@@ -58,6 +60,34 @@ def test_probability_is_the_usual_way_and_a_library_gives_names(bench: Bench, tm
     assert sum(row.pixels for row in materials.found.rows) == materials.found.shown.values.size
 
 
+def test_what_a_library_may_be_off_by_belongs_to_its_classes(
+    bench: Bench, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    told: list[float] = []
+    real = classes.classes_of_library
+
+    def told_of(library: Any, bands_nm: Any, relative_error: float = 0.0) -> Any:
+        told.append(relative_error)
+        return real(library, bands_nm, relative_error=relative_error)
+
+    monkeypatch.setattr(classes, "classes_of_library", told_of)
+    for way in (Way(), Way(library_error=0.05)):
+        bench.control.answers.from_library(_library(tmp_path), way)
+    assert told == [0.0, 0.05]
+
+
+def test_points_have_the_colour_of_their_class() -> None:
+    colours = np.full((3, 3), 100, np.uint8)
+    table = materials_table(1)
+    shown = tinted_by(colours, np.array([0, 1, 2], np.uint8), 1)
+    assert shown[0].tolist() == [100, 100, 100], "what is not judged keeps its colour"
+    assert (
+        np.abs(shown[1].astype(int) - table[1, :3]).max()
+        < np.abs(colours[1].astype(int) - table[1, :3]).max()
+    )
+    assert shown.dtype == np.uint8
+
+
 def test_a_library_that_does_not_fit_is_told(bench: Bench, tmp_path: Path) -> None:
     (tmp_path / "none").mkdir()
     bench.control.answers.from_library(tmp_path / "none", Way())
@@ -92,6 +122,9 @@ def test_the_panel_is_a_legend_with_areas(qtbot: QtBot, bench: Bench) -> None:
     panel.measure.setCurrentIndex(1)
     panel.measure.activated.emit(1)
     assert panel.worst.suffix() == " rad"
+    assert not panel.error.isEnabled()
+    panel.error.setValue(2.0)
+    assert panel.way.library_error == 0.02
     panel.marks.click()
     assert panel.table.item(0, 0).text() == "pin 1"  # type: ignore[union-attr]
     assert panel.table.rowCount() == 4
