@@ -64,3 +64,12 @@ def test_nothing_makes_an_empty_mesh() -> None:
     mesh = mesh_of_grid(np.full((3, 5, 6), np.nan))
     assert mesh.pixels.size == 0
     assert mesh.triangles.shape == (0, 3)
+
+
+def test_a_square_is_split_where_more_of_it_is_joined_even_if_the_other_way_is_flatter() -> None:
+    # From corner to corner 3 mm one way, which is a flagged jump, and 3.2 mm the other way.
+    points = _points(np.array([[700.0, 698.4], [701.6, 703.0]]))
+    edge = np.array([[True, False], [False, True]])
+    mesh = mesh_of_grid(points, edge=edge)
+    assert sorted(map(sorted, mesh.triangles.tolist())) == [[0, 1, 2], [1, 2, 3]]
+    assert len(mesh_of_grid(points).triangles) == 2

@@ -202,3 +202,18 @@ def test_a_band_outside_the_frame_has_no_part_in_the_equations(outside: int) -> 
     before = system.matrix.clone()
     system.add(1, columns, torch.zeros_like(inside), one, one, 0)
     assert torch.equal(system.matrix, before)
+
+
+@pytest.mark.parametrize("stop", [18, 19, 20])
+def test_bands_that_no_pixel_has_inside_the_frame_stay_without_light(stop: int) -> None:
+    rig = published_rig()
+    bands = Bands.of(rig, WavelengthGrid())
+    lines = LineSet(5, 2, 2.0, 320, 320)
+    columns = 100.0 + 2.5 * torch.arange(bands.count, dtype=torch.float64)[:, None].expand(-1, 2)
+    inside = (torch.arange(bands.count) < stop)[:, None].expand(-1, 2)
+    one = torch.ones((lines.frames, 2), dtype=torch.float64)
+    system = LineEquations(bands, lines, rig.projector_response.blur_px, torch.tensor([1, 1]), columns[0])
+    system.add(1, columns, inside, one, one, 0)
+    full = banded.to_dense(system.matrix)
+    assert not full[:, :, stop:].any()
+    assert (full[:, stop - 2, stop - 1] > 0).all()
