@@ -93,12 +93,12 @@ class ProvenShots:
             raise error
         self._sink.withdraw(untold)
         first, last = untold[0].index, untold[-1].index
-        which, it = f"{len(untold)} frames, {first} to {last}, show", "they"
+        which, them = f"{len(untold)} frames, {first} to {last}, show", "them"
         if len(untold) == 1:
-            which, it = f"Frame {first} shows", "it"
+            which, them = f"Frame {first} shows", "it"
         raise PictureError(
-            f"{error} {which} too little to be judged and may be wrong too; the resumed scan captures"
-            f" {it.replace('they', 'them')} again."
+            f"{error} {which} too little to be judged and may be wrong too; the resumed scan captures {them}"
+            " again."
         ) from error
 
     def _take(self, shot: Shot) -> None:
