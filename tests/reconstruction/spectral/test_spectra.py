@@ -10,6 +10,7 @@ import pytest
 import torch
 
 from dsl_core.model.result import Reach
+from dsl_core.optics.correspondence import Footprint
 from dsl_core.optics.pixel_model import COLOUR_ERROR
 from dsl_core.reconstruction.spectral.solving.solver import Prior, Spectra
 from dsl_core.reconstruction.spectral.spectra import (
@@ -92,16 +93,21 @@ def stored(misfit: list[float], error: Any = None, **more: Any) -> SpectralMaps:
     owner: Any = SimpleNamespace(
         bands=SimpleNamespace(reported=slice(1, 3)), error=error, prior=Prior(), contrast=contrast,
         pixels=SimpleNamespace(valid=np.ones((3, 5), bool)),
-        model=SimpleNamespace(inside=lambda order, margin_px: torch.tensor(inside[order], dtype=torch.bool)),
+        model=SimpleNamespace(inside=lambda footprint, margin_px: footprint.columns > 0),
         _map=lambda values, flat: torch.as_tensor(values.ravel()[flat]).double(),
     )  # fmt: skip
     frames: Any = SimpleNamespace(
         flat=np.arange(6, 10), known=lambda name: relative, place=lambda: (np.full(4, 1), np.arange(1, 5))
     )
     out = SpectralMaps.empty(2, (2, 5))
-    traced: Any = SimpleNamespace(orders={1: 1, -1: -1})
-    own = torch.tensor(misfit, dtype=torch.float64)
-    SpectralReconstruction._store(owner, spectra, own, frames, traced, out, 1)
+    # The light is that of six pixels, of which the four are the last, in another order.
+    columns = {order: torch.tensor(each)[:, [1, 0, 3, 2]] for order, each in inside.items()}
+    beside = torch.ones((BANDS, 2), dtype=torch.int64)
+    orders = {order: torch.cat([beside, each], 1) for order, each in columns.items()}
+    traced: Any = SimpleNamespace(orders={order: Footprint(each, each) for order, each in orders.items()})
+    chi_square = torch.tensor(misfit, dtype=torch.float64)
+    own = torch.tensor([3, 2, 5, 4])
+    SpectralReconstruction._store(owner, spectra, chi_square, frames, (traced, own), out, 1)
     return out
 
 
