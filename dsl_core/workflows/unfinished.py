@@ -52,7 +52,10 @@ class UnfinishedResult:
 
 
 def unfinished_scans(folder: Path) -> tuple[UnfinishedScan, ...]:
-    """Scans of a folder that lack frames and that nobody writes to; unreadable ones are left out."""
+    """Scans of a folder that lack some frames and that nobody writes to; unreadable ones are left out.
+
+    Of one without any frame nothing is safe that a new scan would not have.
+    """
     found = []
     for path in sorted(folder.glob(f"*.dsl/{MANIFEST_NAME}")):
         if _is_in_use(path.parent / "lock"):
@@ -60,7 +63,7 @@ def unfinished_scans(folder: Path) -> tuple[UnfinishedScan, ...]:
         with contextlib.suppress(DslError):
             reader = ScanReader(path.parent)
             total, lacking = reader.plan.shot_count, len(reader.missing())
-            if lacking:
+            if 0 < lacking < total:
                 found.append(UnfinishedScan(path.parent, total - lacking, total))
     return tuple(found)
 

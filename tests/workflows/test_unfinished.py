@@ -83,6 +83,10 @@ def test_a_scan_that_lacks_frames_is_found(scan: Path, tmp_path: Path) -> None:
     total = ScanReader(scan).plan.shot_count
     (found,) = unfinished_scans(tmp_path)
     assert (found.folder, found.done, found.total) == (copy, total - 2, total)
+    log.write_bytes(b"")
+    assert unfinished_scans(tmp_path) == (), "a scan of no frames is as good as a new one"
+    log.write_bytes(lines[0])
+    assert [each.done for each in unfinished_scans(tmp_path)] == [1]
     (tmp_path / "c.dsl").mkdir()
     (tmp_path / "c.dsl" / "manifest.json").write_text("{")
     assert len(unfinished_scans(tmp_path)) == 1

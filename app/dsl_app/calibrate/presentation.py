@@ -62,11 +62,11 @@ def campaign_head(state: CalibrateState, devices: DeviceRig | None) -> CampaignH
         title,
         place,
         LabelState(progress, "warn" if progress == "stopping" else "muted"),
-        new=ButtonState(is_enabled=not is_running),
+        new=ButtonState(is_enabled=not is_running, is_primary=facts is None),
         open=ButtonState(is_enabled=not is_running),
         keep=ButtonState(facts is not None and not is_running, usable and has_accepted),
         cancel=ButtonState(is_running),
-        everything=ButtonState(not is_running, usable and places_itself, is_primary=True),
+        everything=ButtonState(not is_running, usable and places_itself, is_primary=facts is not None),
     )
 
 

@@ -51,6 +51,7 @@ def test_without_a_campaign_only_new_and_open_can_be_used() -> None:
     assert head.open.is_enabled
     assert not head.keep.is_visible
     assert not head.everything.is_enabled
+    assert (head.new.is_primary, head.everything.is_primary) == (True, False)
 
 
 def test_the_head_names_campaign_folder_and_rig() -> None:
@@ -79,7 +80,8 @@ def test_what_can_be_done_with_the_whole_campaign(
     head = campaign_head(page(**values), devices)
     assert (head.keep.is_enabled, head.everything.is_enabled) == (keep, everything)
     assert head.everything.is_visible
-    assert head.everything.is_primary
+    assert head.everything.is_primary is not head.new.is_primary
+    assert head.new.is_primary is ("campaign" in values)
     assert not head.cancel.is_visible
 
 
