@@ -3,6 +3,8 @@
 import os
 import signal
 
+from tests.cases.memory import do_not_wait_for_the_disk
+
 os.environ.setdefault("QT_API", "pyside6")
 os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
 os.environ.setdefault("MPLBACKEND", "Agg")
@@ -12,12 +14,4 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
-
-def _written(fd: object) -> None:
-    """No test pulls the plug, and waiting for the disk would take a tenth of the suite's time.
-
-    The tests that need `os.fsync` to be called or to fail put their own in its place.
-    """
-
-
-os.fsync = _written
+do_not_wait_for_the_disk()

@@ -1,4 +1,4 @@
-"""A folder in memory, since waiting for the disk takes most of the time of small scans."""
+"""Not waiting for the disk, which takes most of the time of small scans."""
 
 from __future__ import annotations
 
@@ -25,3 +25,15 @@ def folder_in_memory(otherwise: Path) -> Iterator[Path]:
         return
     with tempfile.TemporaryDirectory(prefix="dsl-scan-test-", dir=MEMORY) as name:
         yield Path(name)
+
+
+def do_not_wait_for_the_disk() -> None:
+    """Let `os.fsync` do nothing in this process: no test pulls the plug.
+
+    The tests that need it to be called or to fail put their own in its place.
+    """
+    os.fsync = _written
+
+
+def _written(fd: object) -> None:
+    """Take a file for written."""

@@ -47,6 +47,7 @@ from tests.app.composition.person import (
 )
 from tests.app.composition.screen_reader import ScreenReader, screen_of
 from tests.app.support.two_screens import PROJECTOR, plug, unplug
+from tests.cases.memory import do_not_wait_for_the_disk
 
 CONTROL = Qt.KeyboardModifier.ControlModifier
 CAMPAIGN = "room 12"
@@ -56,11 +57,12 @@ SETTINGS: dict[str, dict[str, str]] = {
     "geometry": {"board": "7 5 30", "poses": "4"},
     "spectralon": {},
     "color-checker": {},
-    "bandpass": {"filters_nm": "450,640", "pixels": "3000"},
+    "bandpass": {"filters_nm": "450,640", "line_px": "10", "pixels": "3000"},
     "depth-stage": {
         "positions_mm": "620,740,850",
         "filters_nm": "450,640",
         "code_step_px": "5",
+        "filter_step_px": "32",
         "chain": "false",
     },
 }
@@ -315,6 +317,7 @@ def _reference(path: Path, state: ResultsState) -> Path:
 
 
 def main(home: Path) -> None:
+    do_not_wait_for_the_disk()
     warnings: list[str] = []
     make_application([])
     qInstallMessageHandler(
