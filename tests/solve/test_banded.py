@@ -65,3 +65,8 @@ def test_a_system_that_is_not_positive_is_refused(value: float) -> None:
     matrix[0, 3, 1] = value
     with pytest.raises(ValueError, match="not positive definite"):
         banded.factorise(matrix)
+
+
+def test_a_band_of_nothing_but_the_diagonal_has_its_inverse() -> None:
+    matrix = torch.tensor([[[2.0], [4.0], [0.5]]], dtype=torch.float64)
+    assert banded.inverse_band(banded.factorise(matrix)).tolist() == [[[0.5], [0.25], [2.0]]]

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import threading
+from concurrent.futures import Future, wait
 
 import pytest
 
@@ -45,3 +46,15 @@ def test_the_first_error_stops_the_others() -> None:
     with pytest.raises(ValueError, match="a bad thing"):
         work_through(work, range(50), 2, "wait", NoProgress())
     assert len(begun) <= 4
+
+
+def test_who_waits_is_asked_five_times_a_second(monkeypatch: pytest.MonkeyPatch) -> None:
+    asked = list[float | None]()
+
+    def noted(futures: set[Future[object]], timeout: float | None, until: str) -> object:
+        asked.append(timeout)
+        return wait(futures, timeout, until)
+
+    monkeypatch.setattr("dsl_core.solve.many.wait", noted)
+    work_through(lambda i, check: None, (1,), 1, "once", NoProgress())
+    assert set(asked) == {0.2}

@@ -8,7 +8,16 @@ import numpy as np
 import pytest
 
 from dsl_core.calibration.colour.color_checker import expected_colours
-from dsl_core.calibration.colour.patches import find_chart, orient_chart, patch_samples, patch_signals
+from dsl_core.calibration.colour.patches import (
+    INNER,
+    PatchSamples,
+    _inside,
+    _robust_mean,
+    find_chart,
+    orient_chart,
+    patch_samples,
+    patch_signals,
+)
 from dsl_core.errors import CalibrationError
 from dsl_core.model.rig import BayerPattern
 from dsl_core.optics.charts import chart_reflectance
@@ -109,3 +118,51 @@ def test_dust_does_not_count_and_saturation_is_counted() -> None:
     np.testing.assert_allclose(seen.mean[18], clean.mean[18], rtol=0.01)
     assert (seen.saturated[0] == 1).all()
     assert (seen.saturated[1:] == 0).all()
+
+
+def inside(shape: tuple[int, int], centre: tuple[float, float] = (1.5, 0.5)) -> list[int]:
+    """Pixels of a patch where patches are a hundred pixels apart."""
+    to_picture = np.diag([100.0, 100.0, 1.0])
+    found: list[int] = _inside(to_picture, np.linalg.inv(to_picture), np.array(centre), shape).tolist()
+    return found
+
+
+def test_the_inner_part_of_a_patch_is_a_little_over_a_quarter_to_each_side_of_its_middle() -> None:
+    # From column 122 to 178 and from row 22 to 78, both ends included.
+    assert INNER == 0.28
+    rows, columns = np.divmod(inside((100, 200)), 200)
+    assert (columns.min(), columns.max(), rows.min(), rows.max()) == (122, 178, 22, 78)
+    assert len(rows) == 57 * 57
+
+
+@pytest.mark.parametrize(("shape", "is_in_view"), [((79, 179), True), ((78, 179), False), ((79, 178), False)])
+def test_a_patch_out_of_view_in_part_has_no_pixels(shape: tuple[int, int], is_in_view: bool) -> None:
+    assert bool(inside(shape)) == is_in_view
+
+
+@pytest.mark.parametrize(
+    ("centre", "is_in_view"), [((0.28, 0.5), True), ((0.27, 0.5), False), ((0.5, 0.27), False)]
+)
+def test_a_patch_may_begin_at_the_first_pixel(centre: tuple[float, float], is_in_view: bool) -> None:
+    assert bool(inside((200, 200), centre)) == is_in_view
+
+
+def test_a_mean_is_that_of_values_within_four_deviations_with_its_own_deviation() -> None:
+    values = np.array([9.0, 10.0, 10.0, 11.0, 10.0, 9.0, 11.0, 15.0, 17.0])
+    # The median of distances from 10 is 1, so that 15 is within four deviations of 1.48 and 17 is not.
+    kept = values[:-1]
+    found = _robust_mean(values)
+    assert found == pytest.approx((kept.mean(), kept.std(ddof=1) / 8**0.5, 8))
+    assert _robust_mean(np.full(5, 3.0)) == (3.0, 0.0, 5)
+
+
+def test_channels_with_fewer_than_three_values_have_no_mean() -> None:
+    mosaic, full = np.arange(48.0).reshape(6, 8), np.zeros((6, 8), bool)
+    # Red is at even rows and columns: three of them, of which one is saturated.
+    samples = PatchSamples((np.array([0, 2, 4, 1, 9]), np.array([0, 2, 4, 6])))
+    full[0, 4] = True
+    seen = patch_signals(mosaic, full, "RGGB", samples)
+    assert np.isnan(seen.mean[0]).all()
+    assert seen.mean[1, 0] == pytest.approx(8 / 3)
+    assert seen.count.tolist() == [[0, 0, 0], [3, 0, 0]]
+    assert seen.saturated == pytest.approx(np.array([[1 / 3, 0, 0], [1 / 4, 0, 0]]))

@@ -12,6 +12,7 @@ from dsl_core.calibration.film.fit import (
     FIELDS,
     SIGNIFICANT,
     FilterAngle,
+    _common_offsets,
     columns_per_share,
     fit_film,
     grating_columns,
@@ -122,3 +123,45 @@ def test_filters_are_askew_beyond_doubt_or_not_at_all() -> None:
     assert not doubtful.is_of_filters
     assert doubtful.index is None
     assert not FilterAngle().is_of_filters
+
+
+@pytest.mark.parametrize(
+    ("name", "off"), list(zip(FIELDS, (10.0, 10.0, 10.0, 0.05, 50.0, 20.0), strict=True))
+)
+@pytest.mark.parametrize("sign", [1, -1])
+def test_a_film_is_plausible_within_degrees_centimetres_and_percents(
+    name: str, off: float, sign: int
+) -> None:
+    mounting = Film(distance_mm=40.0)
+    at = getattr(mounting, name)
+    require_plausible(mounting.model_copy(update={name: at + 0.99 * sign * off}), mounting)
+    with pytest.raises(CalibrationError, match="none that can be mounted"):
+        require_plausible(mounting.model_copy(update={name: at + 1.01 * sign * off}), mounting)
+
+
+@pytest.mark.parametrize("name", ["lines_per_mm", "distance_mm"])
+def test_a_film_of_no_lines_or_behind_the_projector_is_no_answer(name: str) -> None:
+    """No rounds at all leave the film that the fit began with."""
+    rig = mounted(small_rig())
+    gone = rig.model_copy(update={"film": rig.film.model_copy(update={name: -1e-3})})
+    with pytest.raises(CalibrationError, match="did not converge"):
+        fit_film(gone, samples_of(small_rig(), NOISE_PX), Film(), rounds=0)
+
+
+def test_filters_that_shift_nothing_do_so_beyond_doubt() -> None:
+    assert FilterAngle() == FilterAngle((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+
+
+def test_samples_of_a_filter_and_order_have_an_offset_and_two_ramps_in_common() -> None:
+    rig, samples = small_rig(), samples_of(small_rig(), 0.0)
+    found = _common_offsets(rig, samples) / COMMON_PX
+    groups = sorted(set(zip(samples.filter.tolist(), samples.order.tolist(), strict=True)))
+    assert found.shape == (len(samples), 3 * len(groups))
+    rows, columns = np.divmod(samples.pixel, rig.camera.width_px)
+    for number, (name, order) in enumerate(groups):
+        mine = (samples.filter == name) & (samples.order == order)
+        own = found[:, 3 * number : 3 * number + 3]
+        assert not own[~mine].any()
+        assert own[mine, 0] == pytest.approx(1.0)
+        assert own[mine, 1] == pytest.approx(3**0.5 * (columns[mine] / (rig.camera.width_px / 2) - 1))
+        assert own[mine, 2] == pytest.approx(3**0.5 * (rows[mine] / (rig.camera.height_px / 2) - 1))

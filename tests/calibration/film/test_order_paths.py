@@ -2,13 +2,19 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from typing import Any
+
 import numpy as np
 import pytest
 import torch
 
 from dsl_core.calibration.film.order_paths import (
     LineFrames,
+    Paths,
+    _middles,
     filter_passband,
+    reach_px,
     thinned,
     trace_paths,
     values_near,
@@ -99,3 +105,47 @@ def test_thinned_pixels_are_whole_cells_of_the_mosaic() -> None:
     assert len(chosen) <= 140_000
     rows, columns = np.divmod(chosen, 1000)
     assert np.bincount(2 * (rows % 2) + columns % 2).tolist() == [len(chosen) // 4] * 4
+
+
+def paths_of(**arrays: list[float]) -> Paths:
+    """Paths of which only some columns are needed."""
+    count = len(next(iter(arrays.values())))
+    names = (
+        "at",
+        "pixels",
+        "tiles",
+        "colour",
+        "depth_mm",
+        "shading",
+        "zero_px",
+        "column_px",
+        "per_nm",
+        "per_nm2",
+    )
+    some: dict[str, Any] = {name: np.zeros(count) for name in names}
+    none = np.zeros(0, np.int64)
+    return Paths(**some | {name: np.array(each) for name, each in arrays.items()}, middle=(none, none))
+
+
+def test_wavelengths_bend_with_the_second_derivative_of_columns() -> None:
+    # 2 d + 0.1 d^2 / 2 = 10 for d = 5 less half of 0.05 * 5^2, to the second order.
+    paths = paths_of(per_nm=[2.0, -2.0], per_nm2=[0.1, 0.1])
+    found = paths.wavelength(np.array([0, 1, 1]), np.array([10.0, 10.0, -10.0]))
+    assert found.tolist() == pytest.approx([4.375, -4.375, 5.625])
+
+
+def test_a_profile_reaches_as_far_as_half_a_line_and_the_wider_side_of_its_filter() -> None:
+    band = replace(passband(RIG, 540.0, 1), centroid_nm=540.0, extent_nm=(520.0, 550.0))
+    assert reach_px(LINES, paths_of(per_nm=[0.4, -0.8]), band) == pytest.approx(2.5 + 20 * 0.6)
+    assert reach_px(LINES, paths_of(per_nm=[]), band) == pytest.approx(2.5 + 20 * 0.5)
+
+
+def test_a_tile_is_where_its_pixel_nearest_to_the_middle_is() -> None:
+    # Tile 3 has the pixels of a row from 10 to 16, tile 5 too few, tile 4 six of two rows.
+    tiles = np.array([3] * 7 + [5] * 5 + [4] * 6)
+    pixels = np.array([*range(10, 17), *range(30, 35), 240, 241, 242, 340, 341, 348])
+    chosen, at = _middles(tiles, pixels, 100)
+    assert chosen.tolist() == [3, 4]
+    # The mean of the second is row 2.5 and column 42: of both nearest pixels the first.
+    assert pixels[at].tolist() == [13, 242]
+    assert [each.tolist() for each in _middles(tiles[:0], pixels[:0], 100)] == [[], []]

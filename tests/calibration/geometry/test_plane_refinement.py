@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import cache
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -11,13 +13,15 @@ import torch
 from numpy.typing import NDArray
 
 from dsl_core.calibration.common.tiles import ColumnSamples
-from dsl_core.calibration.geometry.bundle import CAMERA
+from dsl_core.calibration.geometry.bundle import CAMERA, PROJECTOR
 from dsl_core.calibration.geometry.plane_refinement import (
     PlaneRefinement,
     _gauss_newton,
+    _per_mm,
     _rms,
     lone_plane,
     refine_planes,
+    systematic_std,
 )
 from dsl_core.calibration.geometry.stage_planes import columns_at, plane_of, rays_through, shared_parameters
 from dsl_core.errors import CalibrationError
@@ -252,3 +256,37 @@ def test_numbers_are_those_of_least_squares_with_their_prior() -> None:
 def test_scatter_is_that_of_the_middle_ninety_five_percent() -> None:
     assert _rms(np.r_[np.full(96, -2.0), np.full(4, 100.0)]) == pytest.approx(2.0)
     assert _rms(np.r_[np.full(94, 2.0), np.full(6, 100.0)]) > 20
+
+
+def stand_in(shared: NDArray[np.float64], points: NDArray[np.float64]) -> Any:
+    return SimpleNamespace(shared=lambda _: shared, points_mm=lambda _: points)
+
+
+def test_a_millimetre_of_depth_moves_points_half_of_it_to_either_side() -> None:
+    shared, rig = shared_parameters(small_rig()), small_rig()
+    pixels = np.array([[20.0, 30.0], [110.0, 70.0], [200.0, 120.0]])
+    points = rays_through(shared[CAMERA], pixels) * 700.0
+    found = _per_mm(stand_in(shared, points), np.zeros(0))
+    near, far = (points * (z / 700.0) for z in (699.5, 700.5))
+    assert found == pytest.approx(columns_at(shared, far) - columns_at(shared, near), rel=1e-9)
+    assert (np.abs(found) > 0.01).all()
+    assert rig.camera.width_px == SIZE[0]
+
+
+def test_what_columns_are_off_by_is_off_in_depth_by_their_slope_rms_over_what_is_in_view() -> None:
+    rig = small_rig()
+    shared = shared_parameters(rig)
+    # The second direction moves the projector's principal column by 3 px for one of its deviations of 0.1.
+    shared[PROJECTOR.start + 2] += 200.0
+    root, posterior = np.zeros((24, 24)), np.eye(24) * 25.0
+    root[PROJECTOR.start + 2, 1], posterior[1, 1] = 3.0, 0.01
+    column_std, depth_std = systematic_std(rig, shared, root, posterior)
+    assert column_std == pytest.approx(0.3, rel=1e-6)
+    x, y = np.meshgrid(np.linspace(0, SIZE[0] - 1, 12), np.linspace(0, SIZE[1] - 1, 8))
+    rays, squares = rays_through(shared[CAMERA], np.stack([x.ravel(), y.ravel()], 1)), list[float]()
+    for z in np.linspace(*rig.depth_range_mm, 5):
+        slope = columns_at(shared, rays * (z + 0.5)) - columns_at(shared, rays * (z - 0.5))
+        seen = columns_at(shared, rays * z)
+        squares += ((0.3 / slope) ** 2)[(seen > -0.5) & (seen < rig.projector.width_px - 0.5)].tolist()
+    assert 0 < len(squares) < 5 * 96, "some of it is out of the projector's view"
+    assert depth_std == pytest.approx(np.mean(squares) ** 0.5, rel=1e-6)

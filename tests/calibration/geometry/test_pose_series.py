@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
 
 from dsl_core.calibration.geometry.bundle import rotation_of
 from dsl_core.calibration.geometry.pose_series import (
+    PoseSeries,
     _bent,
     _blurred,
     _check_axes,
@@ -19,6 +22,7 @@ from dsl_core.calibration.geometry.pose_series import (
     exposure_warning,
     largest_angle_deg,
     largest_tilt_deg,
+    observe_series,
     picture_gamma,
 )
 from dsl_core.calibration.geometry.projector_corners import PoseObservation
@@ -241,3 +245,47 @@ def test_both_sides_of_the_tilt_of_the_focal_length_and_of_the_error(found: Geom
     for share, expected in ((0.011, True), (0.009, False)):
         unsure = found.camera_deviation.model_copy(update={"fx_px": share * found.camera.fx_px})
         assert told("focal length of the camera is known only", camera_deviation=unsure) == expected
+
+
+def series(monkeypatch: pytest.MonkeyPatch, *blurs: float | None, gamma: float = 1.0) -> PoseSeries:
+    """Poses of these blurs; None: the board is not seen."""
+    module = "dsl_core.calibration.geometry.pose_series."
+
+    def observed(frames: Any, *_: Any) -> PoseObservation:
+        if frames.blur is None:
+            raise CalibrationError(f"{frames.name} shows no board.")
+        return pose_of(frames.name, frames.blur)
+
+    monkeypatch.setattr(module + "observe_pose", observed)
+    monkeypatch.setattr(module + "picture_gamma", lambda *_: gamma)
+    monkeypatch.setattr(
+        module + "exposure_warning", lambda f, _: "too bright" if f.name == "pose 1" else None
+    )
+    poses: Any = [SimpleNamespace(name=f"pose {k}", blur=blur) for k, blur in enumerate(blurs)]
+    return observe_series(poses, case.BOARD, case.PROJECTOR_PX)
+
+
+def test_poses_without_a_board_are_left_out_and_named_before_all_doubts(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    found = series(monkeypatch, 1.0, 1.0, None, 1.0, 3.0, gamma=0.5)
+    assert [pose.name for pose in found.seen] == ["pose 0", "pose 1", "pose 3", "pose 4"]
+    assert [each.name for each in found.left_out] == ["pose 2"]
+    begin = [
+        "too bright",
+        "pose 2 is left out: pose 2 shows no board.",
+        "pose 4 is blurred",
+        "The pictures are",
+    ]
+    assert len(found.warnings) == 4
+    assert all(each.startswith(words) for each, words in zip(found.warnings, begin, strict=True))
+
+
+def test_fewer_than_three_poses_are_refused_with_the_reasons_where_there_are_any(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    assert len(series(monkeypatch, 1.0, 1.0, None, 1.0).seen) == 3
+    with pytest.raises(CalibrationError, match=r"Only 2 of 3 poses can be used, 3 are needed. pose 1 shows"):
+        series(monkeypatch, 1.0, None, 1.0)
+    # Nobody left anything out: who asked for two says what they lack.
+    assert len(series(monkeypatch, 1.0, 1.0).seen) == 2

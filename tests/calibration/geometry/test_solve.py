@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import re
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from dsl_core.calibration.geometry.bundle import Problem, rotation_of, vector_of
+from dsl_core.calibration.geometry.bundle import Adjustment, Problem, rotation_of, vector_of
 from dsl_core.calibration.geometry.projector_corners import PoseObservation
-from dsl_core.calibration.geometry.solve import calibrate_geometry, initial
+from dsl_core.calibration.geometry.solve import HARMFUL_PX, _fitting, calibrate_geometry, initial
 from dsl_core.errors import CalibrationError
 from dsl_core.model.board import Board
 from dsl_core.model.calibration.geometry import GeometryCalibration, LensDeviation
@@ -192,3 +194,25 @@ def test_a_board_in_one_place_is_said_to_cover_little() -> None:
     assert any(
         f"Corners cover {found.projector_coverage:.0%} of the projector's" in w for w in found.warnings
     )
+
+
+@pytest.mark.parametrize(
+    ("error_px", "lost", "fits"),
+    [
+        # Three times the typical error with a fifth of the corners off, or two fifths of them.
+        (3.1 * HARMFUL_PX, 5, False), (2.9 * HARMFUL_PX, 5, True), (3.1 * HARMFUL_PX, 3, True),
+        (2.0 * HARMFUL_PX, 9, False), (2.0 * HARMFUL_PX, 8, True), (0.9 * HARMFUL_PX, 12, True),
+    ],
+)  # fmt: skip
+@pytest.mark.parametrize("device", [0, 1])
+def test_a_pose_fits_unless_it_is_far_off_or_lost_many_corners_and_does_harm(
+    device: int, error_px: float, lost: int, fits: bool
+) -> None:
+    poses: Any = [SimpleNamespace(ids=range(20))] * 5
+    residuals = np.zeros((2, 100, 2))
+    residuals[device, :, 0] = HARMFUL_PX
+    residuals[device, 40:60, 0] = error_px
+    used = np.ones(100, bool)
+    used[40 : 40 + lost] = False
+    fit = Adjustment(np.zeros(0), np.zeros(0), residuals[0], residuals[1], used)
+    assert _fitting(poses, fit).tolist() == [True, True, fits, True, True]

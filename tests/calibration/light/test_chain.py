@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
 
 from dsl_core.calibration.light.chain import (
+    MIN_PIXELS,
     SCALE_STD,
     UNKNOWNS,
     LineScan,
     _scale,
+    _solve,
     chain_correction,
     largest_correction,
 )
@@ -22,6 +26,7 @@ from dsl_core.model.plan import CapturePlan, GrayCode, LineComb, ScanLines
 from dsl_core.model.rig import Rgb, Rig
 from dsl_core.model.spectral import SpectralCurve
 from dsl_core.optics.spectra import chain_response
+from dsl_core.simulation.published_rig import published_rig
 from dsl_core.solve.smooth_functions import Equations, solve_given
 from tests.cases.twin_scan import MemoryScan, twin_scan
 
@@ -190,3 +195,33 @@ def test_without_data_the_scale_is_as_unsure_as_it_was_before() -> None:
     scale, std = _scale(solve_given(alone, np.eye(n), 1.0), sum(parts[1:], parts[0]), parts)
     assert scale == 0.0
     assert std == pytest.approx(SCALE_STD)
+
+
+def test_chi_square_is_that_of_the_first_orders_with_the_deviation_of_three_colours(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    rng, count = np.random.default_rng(1), UNKNOWNS.count
+    design = rng.standard_normal((400, count + 1))
+    design[:, -1] = 0.0
+    std = rng.uniform(0.5, 2.0, 400)
+    target = design[:, :-1] @ (0.02 * rng.standard_normal(count)) + std * rng.standard_normal(400)
+    none = Equations(np.zeros((count + 1, count + 1)), np.zeros(count + 1), 0.0, 0)
+    module = "dsl_core.calibration.light.chain."
+    halves: Any = [
+        Equations.of(design[part], target[part], std[part]) for part in (slice(200), slice(200, 400))
+    ]
+    monkeypatch.setattr(module + "_parts", lambda *_: [0, 1])
+    monkeypatch.setattr(module + "first_order_equations", lambda rig, part, *_: halves[part])
+    monkeypatch.setattr(module + "zero_order_equations", lambda *_: none)
+    ratio_std = np.array([0.01, 0.02, 0.02])
+    monkeypatch.setattr(module + "_mean_ratios", lambda *_: (np.ones(3), ratio_std))
+    scan: Any = SimpleNamespace(pixels=np.zeros(MIN_PIXELS, int))
+    found = _solve(published_rig(), [scan], None, None)  # type: ignore[arg-type]
+    left = (target - design[:, :-1] @ found.solution.values) / std
+    assert found.chi_square == pytest.approx(float((left**2).mean()))
+    # Three colours of these deviations, each a third of the mean.
+    assert found.ratio_std == pytest.approx(0.03 / 3)
+    assert found.pixels == 50
+    few: Any = SimpleNamespace(pixels=np.zeros(MIN_PIXELS - 1, int))
+    with pytest.raises(CalibrationError, match="49 usable pixels; 50 are needed"):
+        _solve(published_rig(), [few], None, None)  # type: ignore[arg-type]

@@ -102,3 +102,8 @@ def test_steepness_is_the_slope_of_light_by_the_wavelength_of_the_emission() -> 
     assert slope[lit] == pytest.approx(((shorter - longer) / 2e-4)[lit] / light[lit], rel=0.05, abs=0.3)
     assert np.abs(slope[lit]).max() > 5
     assert stretched(RIG, 1.01).emission[0].wavelengths_nm[0] == 1.01 * RIG.emission[0].wavelengths_nm[0]
+
+
+def test_no_frame_is_between_columns_beyond_the_last_line() -> None:
+    part = scan().between(900.0, 950.0)
+    assert (len(part.radiance), part.first_line) == (0, 0)

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 
 from dsl_core.calibration.light.emission import (
     _check_leds,
+    _envelope,
     _variance,
     _with_white,
     measured_emission,
@@ -132,3 +135,87 @@ def test_an_led_of_less_than_a_thousandth_of_the_strongest_is_dark(share: float,
         _check_leds(nm, leds)
         with pytest.raises(CalibrationError, match="out of order"):
             _check_leds(nm, leds[[1, 0, 2]])
+
+
+def test_the_deviation_of_white_over_its_parts_is_that_of_seven_readings(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """White, red, green and blue once and black twice too often, which counts four times."""
+    variances = dict(zip(COLOURS, (1.0, 2.0, 3.0, 4.0, 5.0), strict=True))
+    made = readings(count=1)
+    means = {c: made.readings[c][0].at(NM) for c in COLOURS}
+    stated = {c: np.full(NM.size, variances[c]) for c in COLOURS}
+    monkeypatch.setattr("dsl_core.calibration.light.emission._means", lambda *_: (means, stated))
+    kept = list[Any]()
+    monkeypatch.setattr("dsl_core.calibration.light.emission._smoothed", lambda *parts: kept.append(parts))
+    measured_emission(made, WHITE)
+    white = WHITE.at(NM)
+    step = np.gradient(NM)
+    total = (sum(means[c] - means["black"] for c in ("red", "green", "blue")) / white * step).sum()
+    _, _, std, (additivity, additivity_std), count = kept[0]
+    assert additivity == pytest.approx(((means["white"] - means["black"]) / white * step).sum() / total)
+    miss = (1 + 2 + 3 + 4 + 4 * 5) / white**2
+    assert additivity_std == pytest.approx(float(np.sqrt((miss * step**2).sum()) / total))
+    assert count == 1
+    # White makes each LED surer than its own reading and that of black.
+    assert (std[0] ** 2 < (1 + 5) / white**2).all()
+
+
+@pytest.mark.parametrize(("factor", "is_used"), [(1.009, True), (1.011, False)])
+def test_white_is_used_where_it_is_the_sum_to_a_percent(
+    factor: float, is_used: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    made, used = readings(count=1), list[int]()
+    means = {c: made.readings[c][0].at(NM) for c in COLOURS}
+    parts = sum(means[c] - means["black"] for c in ("red", "green", "blue"))
+    means["white"] = means["black"] + factor * parts
+    stated = {c: np.ones(NM.size) for c in COLOURS}
+    monkeypatch.setattr("dsl_core.calibration.light.emission._means", lambda *_: (means, stated))
+    monkeypatch.setattr("dsl_core.calibration.light.emission._smoothed", lambda *_: None)
+
+    def noted(leds: Any, white: Any, spread: Any, noise: Any) -> Any:
+        used.append(1)
+        return leds, spread
+
+    monkeypatch.setattr("dsl_core.calibration.light.emission._with_white", noted)
+    measured_emission(made, WHITE)
+    assert bool(used) == is_used
+
+
+def test_a_curve_is_the_most_likely_one_of_all_scales_and_lengths() -> None:
+    """Against the evidence of each written out: half, as, twice and four times as large as it looks."""
+    nm = np.arange(500.0, 540.0)
+    noise = np.full(40, 0.05)
+    values = np.sin(nm / 3) + noise * np.random.default_rng(2).standard_normal(40)
+    peak = np.abs(values).max()
+    y, sigma = values / peak, noise / peak
+    envelope = _envelope(nm, y, sigma)
+    best = (-np.inf, np.zeros(40), np.zeros(40))
+    for length in np.geomspace(5.0, 160.0, 14):
+        for scale in (0.5, 1.0, 2.0, 4.0):
+            d = np.sqrt(3.0) * np.abs(nm[:, None] - nm) / length
+            prior = scale**2 * (1 + d) * np.exp(-d) * np.outer(envelope, envelope)
+            total = prior + np.diag(sigma**2)
+            inverse = np.linalg.inv(total)
+            evidence = -0.5 * y @ inverse @ y - 0.5 * np.linalg.slogdet(total)[1]
+            if evidence > best[0]:
+                best = (evidence, prior @ inverse @ y, np.diag(prior - prior @ inverse @ prior))
+    found = smooth_curve(nm, values, noise)
+    assert found.values == pytest.approx(peak * best[1], abs=1e-9)
+    assert found.std == pytest.approx(peak * np.sqrt(best[2]), rel=1e-6)
+
+
+@pytest.mark.parametrize("scale", [0.3, 5.0])
+def test_scales_reach_from_half_to_four_times(scale: float, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of a curve far smaller or larger than its envelope the nearest scale is chosen."""
+    nm = np.arange(500.0, 620.0)
+    monkeypatch.setattr("dsl_core.calibration.light.emission._envelope", lambda *_: np.full(120, 1 / scale))
+    monkeypatch.setattr("dsl_core.calibration.light.emission.LENGTHS_NM", np.array([20.0]))
+    values = np.sin(nm / 10)
+    found = smooth_curve(nm, values, np.full(120, 0.3))
+    nearest = 0.5 if scale < 1 else 4.0
+    peak = np.abs(values).max()
+    d = np.sqrt(3.0) * np.abs(nm[:, None] - nm) / 20.0
+    prior = (nearest / scale) ** 2 * (1 + d) * np.exp(-d)
+    wanted = prior @ np.linalg.solve(prior + np.eye(120) * (0.3 / peak) ** 2, values)
+    assert found.values == pytest.approx(wanted, abs=1e-9)

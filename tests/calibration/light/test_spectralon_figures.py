@@ -5,7 +5,19 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from dsl_core.calibration.light.spectralon_figures import LOOK_UNEVEN_PERCENT, unevenness_of_middle
+from dsl_core.calibration.light.spectralon_figures import (
+    LOOK_UNEVEN_PERCENT,
+    spectralon_figures,
+    unevenness_of_middle,
+)
+from dsl_core.model.calibration.spectralon import (
+    MeasuredEmission,
+    PlaneQuality,
+    SpectralonCalibration,
+    WhiteSignals,
+)
+from dsl_core.model.rig import FlatField
+from dsl_core.model.spectral import SpectralCurve
 from dsl_core.optics.sensor import bayer_channels
 from dsl_core.simulation.published_rig import published_rig
 
@@ -29,3 +41,50 @@ def test_a_shadow_over_a_part_of_the_middle_fails() -> None:
     assert found.value == pytest.approx(40.0, abs=1.0)
     assert found.high == LOOK_UNEVEN_PERCENT
     assert not found.passed
+
+
+def record() -> SpectralonCalibration:
+    """Numbers that differ in every place."""
+    peak = SpectralCurve.of([500.0, 600.0], [2.0, 1.0], std=[0.01, 0.03])
+    sharp = SpectralCurve.of([500.0, 600.0], [1.0, 4.0])
+    return SpectralonCalibration(
+        reflectance=sharp,
+        emission=MeasuredEmission(
+            curves=(peak, sharp, sharp), smoothing_nm=(1.0, 1.0, 1.0), additivity=1.01, additivity_std=0.002,
+            readings=3, end_share=0.015,
+        ),
+        white=WhiteSignals(
+            signal=((1.0, 2.0, 3.0), (1.0, 1.0, 2.0), (5.0, 3.0, 2.0)),
+            rel_std=((0.01, 0.01, 0.0), (0.0, 0.0, 0.005), (0.003, 0.0, 0.0)),
+            white_over_sum=(1.01, 0.97, 1.0),
+        ),
+        plane=PlaneQuality(distance_mm=700.0, tilt_deg=12.0, rms_mm=0.5),
+        saturated_share=0.0005, filled_share=0.95, unevenness=0.004,
+        flat_field=FlatField(rows_px=(0.0, 1.0), columns_px=(0.0, 1.0), gain=((0.9, 1.0), (1.0, 1.15))),
+        flat_field_std=((0.0, 0.0), (0.0, 0.0)),
+        flat_field_chi_square=1.0,
+    )  # fmt: skip
+
+
+def test_a_calibration_is_judged_by_its_figures_and_their_limits() -> None:
+    figures = {each.name: each for each in spectralon_figures(record())}
+    found = {name: (each.value, each.low, each.high, each.unit) for name, each in figures.items()}
+    wanted: dict[str, tuple[float, float | None, float | None, str]] = {
+        "white over red + green + blue": (1.01, 0.97, 1.03, "1"),
+        "deviation of the emission, of its peak": (1.5, None, 1.0, "%"),
+        "emission at the ends of the range, of its peak": (1.5, None, 2.0, "%"),
+        "saturated pixels": (0.05, None, 0.1, "%"),
+        "middle filled by the Spectralon": (95.0, 90.0, None, "%"),
+        "tilt of the Spectralon": (12.0, None, 15.0, "degrees"),
+        "unevenness about the smooth part": (0.4, None, 1.0, "%"),
+        "white over red + green + blue in the pictures, largest difference": (3.0, None, 2.0, "%"),
+        "deviation of white": (100 * np.hypot(0.01, 0.02) / 6, None, 0.5, "%"),
+        "range of the flat field": (25.0, None, None, "%"),
+    }
+    assert set(found) == set(wanted)
+    for name, (value, *limits) in wanted.items():
+        assert found[name][0] == pytest.approx(value), name
+        assert list(found[name][1:]) == limits, name
+    assert figures["white over red + green + blue"].std == 0.002
+    unmet = {name for name, each in figures.items() if not each.passed}
+    assert unmet == {"deviation of the emission, of its peak", *list(wanted)[7:8]}

@@ -2,19 +2,32 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
+import torch
 
 from dsl_core.calibration.light.chain_equations import LineScan
 from dsl_core.calibration.light.zero_order import ZeroOrderFit
-from dsl_core.calibration.orders.bandpass import SeenFilter, _sample, fit_bandpass, profile_scan
+from dsl_core.calibration.orders.bandpass import (
+    SeenFilter,
+    _check,
+    _sample,
+    _second,
+    fit_bandpass,
+    plane_pixels,
+    profile_scan,
+)
 from dsl_core.calibration.orders.filter_check import PlacedFilter
 from dsl_core.calibration.orders.order_light import FilterLight, OrderLight
 from dsl_core.errors import CalibrationError
 from dsl_core.model.calibration.bandpass import BandpassCalibration, apply_bandpass
 from dsl_core.model.plan import ScanLines
+from dsl_core.optics.correspondence import GratingModel
 from dsl_core.optics.filters import FINE_NM, nominal_filter, passed
 from dsl_core.optics.sensor import bayer_channels
 from dsl_core.optics.spectra import chain_response
@@ -163,3 +176,50 @@ def test_a_sample_is_the_weighted_mean_of_the_colours_that_see_an_order() -> Non
     assert sample.ratio == pytest.approx(weight @ [0.1, 0.2] / weight.sum())
     assert sample.ratio_std == pytest.approx(weight.sum() ** -0.5)
     assert (sample.offset_px, sample.offset_std_px) == (0.25, 0.01)
+
+
+def test_pixels_have_their_places_in_the_image_and_whole_orders_where_rows_are_free() -> None:
+    scan, _ = without_filter()
+    found = plane_pixels(RIG, scan, 550.0)
+    rows, columns = np.divmod(scan.pixels, 112)
+    assert found.place == pytest.approx(np.stack([(2 * rows + 1) / 144, (2 * columns + 1) / 224]))
+    assert found.colour.tolist() == bayer_channels(RIG.sensor.bayer, 72, 112).ravel()[scan.pixels].tolist()
+    where = torch.as_tensor(scan.pixels), torch.as_tensor(scan.depth_mm)
+    for order in (1, -1, 2, -2):
+        ends = GratingModel(RIG).trace(*where, order, np.array([535.0, 565.0])).rows.numpy()
+        wanted = (ends.min(0) > 8) & (ends.max(0) < RIG.projector.height_px - 9)
+        assert found.whole[order].tolist() == wanted.tolist()
+    assert not found.whole[1].all()
+
+
+def test_blur_and_halo_are_fitted_to_three_thousand_pixels_at_most() -> None:
+    scan, _ = without_filter()
+    many = scan.at(np.tile(np.arange(len(scan.pixels)), 5))
+    assert len(profile_scan(many).pixels) == 3125, "every fourth of 12500"
+    assert profile_scan(scan).pixels.tolist() == scan.pixels.tolist()
+
+
+@pytest.mark.parametrize(("shift_px", "moved"), [(0.149, False), (0.151, True), (-0.151, True)])
+def test_a_target_has_moved_from_a_seventh_of_a_column_on(shift_px: float, moved: bool) -> None:
+    each = seen(540)
+    each = replace(each, light=replace(each.light, shift_px=(shift_px, 0.0)))
+    place = PlacedFilter(540.0, 540.0, True, {})
+    if moved:
+        with pytest.raises(CalibrationError, match=re.escape(f"zero order is {shift_px:+.2f} columns")):
+            _check([each], [place], [(540.0, 0.1)])
+    else:
+        _check([each], [place], [(540.0, 0.1)])
+
+
+def test_second_orders_are_compared_with_the_first_at_the_same_light() -> None:
+    each, curve = seen(540), RIG.efficiency[1]
+    fits: Any = {1: SimpleNamespace(curve=curve), -1: SimpleNamespace(curve=RIG.efficiency[-1])}
+    light = passed(RIG, nominal_filter(540.0))
+    light[2] = 0.0
+    second = each.light.orders[2]
+    unsure = replace(second, std=np.array([np.inf, 1e-4, 1e-4]))
+    each = replace(each, light=replace(each.light, orders=each.light.orders | {2: unsure}))
+    found = _second([each], [light], fits)
+    assert len(found) == 3, "green of one, red and green of the other"
+    first = float(light[1] @ curve.at(FINE_NM) / light[1].sum())
+    assert found[0] == pytest.approx((second.ratio[1], 1e-4, first))

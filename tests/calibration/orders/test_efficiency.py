@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -15,6 +17,7 @@ from dsl_core.errors import CalibrationError
 from dsl_core.model.spectral import SpectralCurve
 from dsl_core.optics.filters import FINE_NM, nominal_filter, passed
 from dsl_core.simulation.published_rig import published_rig
+from dsl_core.solve.smooth_functions import solve_smooth
 
 NM = np.arange(430.0, 661.0, 5.0)
 
@@ -123,3 +126,40 @@ def test_a_second_order_has_the_deviations_of_share_and_first() -> None:
     second = second_order_curve(first, 0.1, 0.03)
     assert second.values == pytest.approx((0.02, 0.04))
     assert second.std == pytest.approx((np.hypot(0.001, 0.006), np.hypot(0.002, 0.012)))
+
+
+def test_ratios_are_means_of_the_curve_over_their_light_as_smooth_as_they_say(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    asked = list[Any]()
+
+    def noted(*parts: Any, **choices: Any) -> Any:
+        asked.append((*parts, choices))
+        return solve_smooth(*parts, **choices)
+
+    monkeypatch.setattr("dsl_core.calibration.orders.efficiency.solve_smooth", noted)
+    seen = samples(1, 0, range(450, 651, 50))
+    fit_efficiency(1, [*seen, RatioSample(2.9, 1.0, seen[0].light), RatioSample(1.0, np.inf, seen[0].light)])
+    assert len(asked) == 4
+    equations, (function,), choices = asked[-1]
+    assert (function.level_std, function.rise_std) == (4.0, 2.0)
+    # From a curve that hardly bends to one that bends as it likes, by about half decades and by octaves.
+    assert np.log10(choices["amplitudes"]) == pytest.approx([-2.52, -2, -1.52, -1, -0.52], abs=0.01)
+    assert np.log2(choices["lengths"]) == pytest.approx(np.log2(30) + np.arange(4))
+    assert choices["noise_factors"] == (1.0, 1.4, 2.0, 4.0, 8.0)
+    # What is not three deviations above nothing is not used; a level moves every logarithm by as much.
+    assert equations.count == len(seen)
+    level = np.ones(len(equations.right))
+    assert level @ equations.normal @ level == pytest.approx(len(seen) / (1e-3**2 + 8e-4**2), rel=5e-3)
+
+
+def test_a_ratio_counts_from_three_deviations_on() -> None:
+    seen = samples(1, 0, range(450, 651, 100))
+    few = [s for s in seen if round(float(s.light @ FINE_NM / s.light.sum())) < 500]
+    for sigmas, counts in ((3.1, True), (2.9, False)):
+        other = RatioSample(seen[-1].ratio, seen[-1].ratio / sigmas, seen[-1].light)
+        if counts:
+            assert fit_efficiency(1, [few[0], other]).curve.values
+        else:
+            with pytest.raises(CalibrationError, match="through 1 filters"):
+                fit_efficiency(1, [few[0], other])

@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 
-from dsl_core.calibration.common.spectral_nodes import NODES_NM
+from dsl_core.calibration.common.spectral_nodes import NODES_NM, SMOOTHNESS
 from dsl_core.calibration.orders.response import BandSample, _place, _result, _usable, fit_response
 from dsl_core.model.rig import Rgb, Rig
 from dsl_core.model.spectral import SpectralCurve
 from dsl_core.optics.filters import FINE_NM, nominal_filter, passed
 from dsl_core.optics.spectra import chain_response
 from dsl_core.simulation.published_rig import published_rig
-from dsl_core.solve.smooth_functions import SmoothSolution
+from dsl_core.solve.smooth_functions import Equations, SmoothSolution, solve_smooth
 
 CENTRES = range(430, 661, 10)
 NM = np.arange(440.0, 651.0, 10.0)
@@ -126,3 +128,36 @@ def test_a_filters_signal_knows_its_factor_the_drive_level_and_the_scale() -> No
     white = _place(row, 2, 2, None)
     assert white[3 * n :].tolist() == [0, 0, 0, 1]
     assert white[2 * n : 3 * n].tolist() == row.tolist()
+
+
+def test_everything_unknown_has_its_place_and_its_deviation_beforehand(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """A measured filter, a nominal one, the drive level and the white scale, in this order."""
+    asked = list[Any]()
+
+    def noted(equations: Equations, *more: Any, **choices: Any) -> SmoothSolution:
+        asked.append((equations, *more, choices))
+        return solve_smooth(equations, *more, **choices)
+
+    monkeypatch.setattr("dsl_core.calibration.orders.response.solve_smooth", noted)
+    rig, light = published_rig(), passed(published_rig(), nominal_filter(540.0))
+    white = 1.1 * chain_response(rig, 0, FINE_NM).sum((1, 2))
+    filters = [BandSample(1.2 * light.sum(1), 0.01 * light.sum(1), light, known) for known in (True, False)]
+    fit_response(rig, filters, white, 0.02 * white, 1.0)
+    equations, functions, others, choices = asked[0]
+    assert len(asked) == 3
+    assert others == [0.005, 0.15, 0.01, 0.3]
+    assert [(each.level_std, each.rise_std) for each in functions] == [(0.1, 0.1)] * 3
+    assert choices == SMOOTHNESS
+    # Three colours of each filter and of white, by logarithms and relative deviations.
+    used = [_usable(each) for each in filters]
+    assert equations.count == sum(map(len, used)) + 3
+    squares = len(used[0] + used[1]) * np.log(1.2) ** 2 / ((0.01 / 1.2) ** 2 + 1e-6)
+    squares += 3 * np.log(1.1) ** 2 / (0.02**2 + 1e-6)
+    assert equations.square == pytest.approx(squares)
+    # Whatever explains a signal, the white scale is in all of them and the drive level in those of filters.
+    weights = len(used[0] + used[1]) / ((0.01 / 1.2) ** 2 + 1e-6), 3 / (0.02**2 + 1e-6)
+    assert equations.normal[-1, -1] == pytest.approx(sum(weights))
+    assert equations.normal[-2, -2] == pytest.approx(weights[0])
+    assert equations.normal[-3, -3] == pytest.approx(weights[0] / 2)

@@ -122,3 +122,18 @@ def test_a_frame_is_stale_only_if_the_next_is_not() -> None:
     # All first frames late at the longest wait are no stale ones.
     with pytest.raises(DeviceError, match="400 ms after"):
         check_latency(latency_readings(408.0, [400, 100]), 25.0, True, 0.0)
+
+
+def test_when_all_are_late_at_the_longest_wait_it_is_the_wait() -> None:
+    readings = latency_readings(0.0, [400, 100])
+    right = np.ones(len(readings), bool)
+    first = np.flatnonzero(readings.since_show == 0)
+    longest = first[readings.gap_ms[first] == 400]
+    right[longest] = False
+    judged, _, stale = trials(readings, right)
+    assert stale == 0
+    assert set(longest[longest > 5]) <= set(judged)
+    right[longest[-1]] = True
+    _, _, stale = trials(readings, right)
+    assert stale == np.count_nonzero(longest > 5) - 1
+    assert first_failing(readings, right) is None

@@ -142,3 +142,10 @@ def test_of_columns_turned_around_all_pairs_that_leave_them_nearly_as_smooth_are
     assert suspects_of(monkeypatch, {None: (1.0, 0.19), **table}) == (0, 1)
     assert suspects_of(monkeypatch, {None: (1.0, 0.19), **table}, rises=None) == ()
     assert suspects_of(monkeypatch, {None: (1.0, 0.2), **table}) == ()
+
+
+def test_rows_take_as_many_bits_as_their_number_needs() -> None:
+    pairs = dict.fromkeys(range(22), (np.zeros(1, np.uint16), np.zeros(1, np.uint16)))
+    assert _of_columns(GrayCode(rows=True), pairs, (256, 5)) == [*range(8), *range(11, 19)]
+    assert _of_columns(GrayCode(rows=True), pairs, (257, 4)) == [*range(9), *range(11, 20)]
+    assert _of_columns(GrayCode(rows=False), pairs, (256, 5)) == list(range(22))

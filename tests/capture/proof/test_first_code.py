@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from dsl_core.capture.proof.finding import Verdict
+from dsl_core.capture.proof.finding import Finding, Verdict
 from dsl_core.capture.proof.first_code import FirstCode
 from dsl_core.capture.proof.raster import Counts, Noise, Raster
-from dsl_core.model.plan import CapturePlan, GrayCode, LineComb, Setting, Shot
+from dsl_core.model.plan import CapturePlan, GrayCode, LineComb, Role, Setting, Shot
 from dsl_core.model.rig import Sensor
 from dsl_core.optics.sensor import bayer_channels
 from dsl_core.patterns.images import pattern_image
@@ -75,3 +75,109 @@ def test_nothing_is_located_of_few_pixels_or_without_all_pictures() -> None:
     for shot in SHOTS[:-1]:
         part.add(shot, seen(shot), None)
     assert part.lit is None
+
+
+def first_code(at_the_end: bool = False) -> FirstCode:
+    assert isinstance(PLAN.code, GrayCode)
+    return FirstCode(PLAN, PLAN.code, SHOTS, RASTER, Noise(SENSOR), "RGGB", True, at_the_end)
+
+
+def level(share: float) -> Counts:
+    """A picture as bright all over as this share of white."""
+    found = np.full(RASTER.shape[0] * RASTER.shape[1], SENSOR.black_level_dn + 2000 * share)
+    return np.asarray(found, np.uint16)
+
+
+def end(picture: Counts, role: Role = "white", before: Counts | None = None) -> Finding:
+    """What a picture in the place of white or black shows after the whole code."""
+    code = first_code()
+    for shot in SHOTS[:-2]:
+        code.add(shot, seen(shot), None)
+    return code.add(SHOTS[-2] if role == "white" else SHOTS[-1], picture, before)
+
+
+@pytest.mark.parametrize(
+    ("share", "verdict"),
+    [
+        (1.0, Verdict.RIGHT),
+        (0.45, Verdict.OTHER),
+        (0.28, Verdict.OTHER),
+        (0.22, Verdict.DARK),
+        (0.0, Verdict.DARK),
+    ],
+)
+def test_white_is_another_picture_or_dark_by_how_near_it_is_to_black(share: float, verdict: Verdict) -> None:
+    assert end(level(share)).verdict is verdict
+
+
+def test_black_is_never_dark() -> None:
+    assert end(level(0.0), "black").verdict is Verdict.RIGHT
+    assert end(level(1.0), "black").verdict is Verdict.OTHER
+
+
+def test_an_end_that_is_right_above_some_row_is_torn_and_one_like_the_picture_before_late() -> None:
+    torn = level(1.0)
+    torn[-120:] = level(0.0)[-120:]
+    assert end(torn).verdict is Verdict.TORN
+    late = seen(SHOTS[4])
+    found = end(late, before=late)
+    assert found.verdict is Verdict.LATE
+    assert found.again == (SHOTS[-2],)
+    assert found.detail == "like code pattern 4"
+    assert end(late).verdict is not Verdict.LATE
+
+
+def test_pairs_are_judged_by_those_before_from_the_second_on() -> None:
+    code = first_code()
+    verdicts = [code.add(shot, seen(shot), None).verdict for shot in SHOTS[:6]]
+    assert verdicts == [Verdict.UNTOLD] * 3 + [Verdict.RIGHT] + [Verdict.UNTOLD, Verdict.RIGHT]
+    # A pair that breaks the sum; of two nobody knows which is wrong, of three the last is.
+    for before, again in ((2, SHOTS[:4]), (4, SHOTS[4:6])):
+        code = first_code()
+        for shot in SHOTS[:before]:
+            code.add(shot, seen(shot), None)
+        code.add(SHOTS[before], seen(SHOTS[before]), None)
+        found = code.add(SHOTS[before + 1], seen(SHOTS[before]), None)
+        assert found.verdict is Verdict.REPEATED
+        assert found.again == tuple(again)
+        assert before // 2 in code.lacking
+
+
+def test_a_pattern_and_its_inverse_may_come_in_either_order_and_again() -> None:
+    code = first_code()
+    code.add(SHOTS[1], seen(SHOTS[1]), None)
+    assert 0 in code.lacking
+    code.add(SHOTS[0], seen(SHOTS[0]), None)
+    assert 0 not in code.lacking
+    assert code._pairs.pairs[0][0].tolist() == seen(SHOTS[0]).tolist()
+    code.add(SHOTS[0], seen(SHOTS[0]), None)
+    assert 0 in code.lacking, "a pair is taken again as a whole"
+    code.substitute(0, (seen(SHOTS[0]), seen(SHOTS[1])))
+    assert 0 not in code.lacking
+
+
+@pytest.mark.parametrize(("share", "is_located"), [(0.13, True), (0.11, False)])
+def test_a_pixel_is_located_where_all_pairs_differ_by_an_eighth_of_its_contrast(
+    share: float, is_located: bool
+) -> None:
+    code = first_code(at_the_end=True)
+    faint = np.flatnonzero(np.tile(np.arange(32) == 7, RASTER.shape[0]))
+    for shot in SHOTS:
+        picture = seen(shot).astype(float)
+        if shot.role == "code" and shot.pattern < 2:
+            # Pattern and inverse still add up to white and black.
+            middle = SENSOR.black_level_dn + 1000
+            picture[faint] = middle + (picture[faint] - middle) * share
+        code.add(shot, picture.astype(np.uint16), None)
+    assert code.lit is not None
+    assert bool(np.isin(faint, code.lit.index).all()) == is_located
+    assert bool(np.isin(faint, code.lit.index).any()) == is_located
+    assert bool(code._margins()[faint].all()) == is_located
+
+
+@pytest.mark.parametrize(("columns", "enough"), [(4, True), (3, False)])
+def test_sixty_pixels_have_to_be_lit(columns: int, enough: bool) -> None:
+    light = np.zeros((18, 32))
+    light[:, :columns] = 2000.0
+    light[15:, columns - 1] = 0.0
+    assert (judged(light)[0].lit is not None) == enough

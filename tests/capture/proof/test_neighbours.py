@@ -60,3 +60,71 @@ def test_only_pictures_right_after_each_other_are_compared() -> None:
     neighbours = _told()
     assert not neighbours.is_doubtful(20, _picture(28.0, 60), BLACK)
     assert not neighbours.is_doubtful(21, _picture(28.0, 61), BLACK)
+
+
+def flat(value: int, lines: int = 0) -> Counts:
+    """A picture without noise, of which so many columns are a thousand counts brighter."""
+    picture = np.full((ROWS, COLUMNS), value, np.uint16)
+    picture[:, :lines] += 1000
+    return picture.ravel()
+
+
+def told_by(*changes: float) -> LineNeighbours:
+    """What is usual when pictures changed by so much in all parts of their height."""
+    neighbours = LineNeighbours(Noise(SENSOR), COLUMNS)
+    neighbours._changes.extend(np.full(4, each) for each in changes)
+    neighbours._before = (7, flat(100))
+    return neighbours
+
+
+@pytest.mark.parametrize(
+    ("usual", "change", "is_doubtful"),
+    [(2.0, 0.61, False), (2.0, 0.59, True), (0.41, 0.1, True), (0.39, 0.1, False)],
+)
+def test_a_change_by_less_than_three_tenths_of_the_usual_is_doubted_where_that_says_something(
+    usual: float, change: float, is_doubtful: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(LineNeighbours, "change", lambda *_: np.array([9.0, change, 9.0, 9.0]))
+    assert told_by(usual, usual, usual).is_doubtful(8, flat(100), None) == is_doubtful
+    assert not told_by(usual, usual).is_doubtful(8, flat(100), None), "two lines say nothing"
+
+
+@pytest.mark.parametrize(
+    ("usual", "change", "differs"),
+    [(2.0, 1.1, True), (2.0, 0.9, False), (0.5, 0.39, False), (0.39, 9.0, False)],
+)
+def test_two_pictures_of_a_shot_differ_by_half_of_the_usual_change(
+    usual: float, change: float, differs: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(LineNeighbours, "change", lambda *_: np.array([0.0, 0.0, 0.0, change]))
+    assert told_by(usual, usual, usual).differ(flat(100), flat(100)) == differs
+
+
+def test_a_change_is_the_variance_beyond_noise_in_each_part_of_the_height_up_to_ten_deviations() -> None:
+    neighbours = LineNeighbours(Noise(SENSOR), COLUMNS)
+    one, other = flat(100).reshape(ROWS, COLUMNS), flat(100).reshape(ROWS, COLUMNS).copy()
+    # The variance of a count without light is 9.1, of two 18.2.
+    other[:6] -= 6
+    other[6:12, ::2] = 3000
+    found = neighbours.change(one.ravel(), other.ravel())
+    assert found == pytest.approx([36 / 18.2 - 1, 100 / 2 - 1, -1, -1], rel=1e-4)
+
+
+@pytest.mark.parametrize(("light", "is_other"), [(0.61, False), (0.59, True), (1.59, False), (1.61, True)])
+def test_light_is_other_below_six_tenths_and_above_sixteen_of_the_usual(light: float, is_other: bool) -> None:
+    neighbours, black = LineNeighbours(Noise(SENSOR), COLUMNS), flat(100)
+    for _ in range(3):
+        assert not neighbours._has_other_light(flat(200), black)
+    assert neighbours._has_other_light(flat(100 + round(100 * light)), black) == is_other
+    assert not neighbours._has_other_light(flat(0), None), "nobody knows how dark it should be"
+
+
+@pytest.mark.parametrize(("above", "counts"), [(1.02, True), (0.98, False)])
+def test_light_counts_from_twenty_five_deviations_of_two_blacks_on(above: float, counts: bool) -> None:
+    neighbours, black = LineNeighbours(Noise(SENSOR), COLUMNS), flat(100)
+    least = 25 * np.sqrt(2 * 9.1 * ROWS * COLUMNS) * above
+    picture = flat(100).astype(np.int64)
+    picture[: int(least) // 3] += 3
+    for _ in range(3):
+        neighbours._has_other_light(picture.astype(np.uint16), black)
+    assert neighbours._has_other_light(black, black) == counts

@@ -50,3 +50,18 @@ def test_nothing_is_said_without_the_picture_of_before(pictures: dict[str, np.nd
     proof = SentinelProof(Noise.of(None, 12), Raster(SIZE))
     found = proof.judge(SHOT, pictures["line"], None, pictures["black"], [])
     assert found.verdict is Verdict.UNTOLD
+
+
+def test_a_sentinel_is_right_only_where_a_rival_can_be_told_apart(pictures: dict[str, np.ndarray]) -> None:
+    proof = SentinelProof(Noise.of(None, 12), Raster(SIZE))
+    white, black = pictures["white"], pictures["black"]
+    assert proof.judge(SHOT, pictures["again"], white, black, []).verdict is Verdict.UNTOLD
+    assert proof.judge(SHOT, pictures["again"], white, black, [white]).verdict is Verdict.UNTOLD
+    assert proof.judge(SHOT, pictures["again"], white, black, [white, black]).verdict is Verdict.RIGHT
+    assert proof.judge(SHOT, black, white, black, [white, black]).verdict is Verdict.OTHER
+
+
+def test_two_takes_are_refused_and_the_third_is_believed(pictures: dict[str, np.ndarray]) -> None:
+    proof = SentinelProof(Noise.of(None, 12), Raster(SIZE))
+    found = [judge(pictures, pictures["line"], proof) for _ in range(4)]
+    assert found == [Verdict.LATE, Verdict.LATE, Verdict.UNTOLD, Verdict.UNTOLD]

@@ -154,3 +154,10 @@ def test_pulls_are_decades_and_stretches_reach_from_two_fifths_to_their_inverse(
     assert (STRETCHES[0], STRETCHES[-1]) == pytest.approx((0.4, 2.5))
     assert STRETCHES[len(STRETCHES) // 2] == pytest.approx(1.0)
     assert np.diff(np.log(STRETCHES)) == pytest.approx(np.log(6.25) / 24)
+
+
+def test_a_known_curve_narrower_than_a_step_stays_half_a_step_wide() -> None:
+    # (0.5 * 0.1)^2 less the own width of a step is below nothing; a neighbour is two such widths away.
+    shares = _Family(KNOWN.with_gaussian(0.1)).stretched(0.5)
+    middle = len(shares) // 2
+    assert shares[middle + 1] / shares[middle] == pytest.approx(np.exp(-2))

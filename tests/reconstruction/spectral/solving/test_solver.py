@@ -18,6 +18,7 @@ from dsl_core.reconstruction.spectral.solving.solver import (
     gradient,
     parabola_peak,
     roughness,
+    too_faint,
     within_band,
 )
 from dsl_core.solve import banded
@@ -222,3 +223,10 @@ def test_a_peak_is_at_the_better_end_where_samples_only_rise_fall_or_sag() -> No
     positions = torch.tensor([1.0, 2.0, 3.0], dtype=torch.float64)
     samples = torch.tensor([[0.0, 9.0, 3.0, 2.0], [4.0, 4.0, 0.0, 0.0], [9.0, 0.0, 2.0, 3.0]])
     assert parabola_peak(samples.double(), positions).tolist() == [3.0, 1.0, 1.0, 3.0]
+
+
+def test_data_with_less_than_a_hundredth_of_the_tightest_prior_are_too_faint_for_single_precision() -> None:
+    prior = Prior(taus=(0.5, 0.1, 2.0))
+    information = torch.tensor([[0.2, 0.2], [0.9, 1.1]])
+    assert too_faint(information, prior).tolist() == [True, False]
+    assert too_faint(information.double(), prior).tolist() == [False, False]

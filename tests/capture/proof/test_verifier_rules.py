@@ -1,0 +1,287 @@
+"""By which rules pictures are right or wrong: what light is usual, what is expected of a later setting."""
+
+from __future__ import annotations
+
+from collections import deque
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from dsl_core.capture.proof.contest import Contest
+from dsl_core.capture.proof.finding import Finding, Verdict
+from dsl_core.capture.proof.prediction import Lit
+from dsl_core.capture.proof.raster import Counts
+from dsl_core.capture.proof.verifier import FrameProof
+from dsl_core.model.plan import CapturePlan, GrayCode, LineComb, Setting, Shot, describe_shot
+from dsl_core.model.rig import Rig
+from dsl_core.simulation.published_rig import published_rig
+
+#: Shots 0 to 9 are the code, 10 white, 11 black, 12 to 15 lines; from 16 on the same at another setting.
+PLAN = CapturePlan(
+    camera_size_px=(32, 18),
+    projector_size_px=(32, 18),
+    code=GrayCode(rows=False),
+    spectral=LineComb(width_px=2, step_px=2, period_px=8),
+    settings=(Setting(exposure_ms=10.0, level=1.0), Setting(exposure_ms=30.0, level=0.5)),
+)
+SHOTS = tuple(PLAN.shots())
+LINE, LATER_LINE = SHOTS[13], SHOTS[29]
+WON, LOST = Contest(100, 0.9, 0.0), Contest(100, -0.9, -90.0)
+TORN, DOUBTFUL, FEW = Contest(100, 0.6, -9.0), Contest(100, 0.9, -2.0), Contest(11, -1.0, -11.0)
+
+
+def rig() -> Rig:
+    return published_rig()
+
+
+def proof(is_calibrated: bool = True) -> FrameProof:
+    return FrameProof(PLAN, rig() if is_calibrated else None)
+
+
+def counts(value: int) -> Counts:
+    found = np.full(32 * 18, value, np.uint16)
+    found.flags.writeable = False
+    return found
+
+
+def test_light_is_usually_what_a_film_leaves_then_the_median_of_nine_but_never_more_than_one() -> None:
+    judge = proof()
+    assert judge._usual(LINE) == 0.85
+    assert judge._usual(LATER_LINE) == 1.0
+    for share in (0.5, 0.7, 0.6):
+        assert judge._judge_exposure(LINE, share).verdict is Verdict.RIGHT
+    assert judge._usual(LINE) == 0.6
+    for _ in range(9):
+        judge._judge_exposure(LINE, 0.9)
+    assert list(judge._light["spectral", 0]) == [0.9] * 9
+    for _ in range(9):
+        judge._judge_exposure(LINE, 1.2)
+    assert judge._usual(LINE) == 1.0
+    assert judge._usual(SHOTS[10]) == 0.85, "of each role and setting by itself"
+
+
+@pytest.mark.parametrize(
+    ("shot", "before", "share", "is_right"),
+    [
+        (LATER_LINE, None, 0.56, True), (LATER_LINE, None, 0.54, False),
+        (LATER_LINE, None, 1.79, True), (LATER_LINE, None, 1.81, False),
+        (LATER_LINE, 0.5, 0.69 * 0.5, True), (LATER_LINE, 0.5, 0.67 * 0.5, False),
+        (LATER_LINE, 0.5, 1.49 * 0.5, True), (LATER_LINE, 0.5, 1.51 * 0.5, False),
+        (LINE, None, 0.56 * 0.85, True), (LINE, None, 0.54 * 0.85, False),
+        (LINE, None, 2.99 * 0.85, True), (LINE, None, 3.01 * 0.85, False),
+        (LINE, 0.5, 2.99 * 0.5, True), (LINE, 0.5, 0.67 * 0.5, False),
+    ],
+)  # fmt: skip
+def test_light_may_differ_from_what_is_usual_by_so_much(
+    shot: Shot, before: float | None, share: float, is_right: bool
+) -> None:
+    judge = proof()
+    if before is not None:
+        judge._light[shot.role, shot.setting] = deque([before])
+    found = judge._judge_exposure(shot, share)
+    assert (found.verdict is Verdict.RIGHT) == is_right
+    if not is_right:
+        usual = judge._usual(shot)
+        assert found == Finding(
+            shot, Verdict.EXPOSURE, (shot,), f"{share / usual:.2g} times what was expected"
+        )
+    assert (share in judge._light[shot.role, shot.setting]) == is_right, "what is wrong is not usual"
+
+
+def test_without_a_calibration_only_pictures_after_the_first_have_a_wrong_brightness() -> None:
+    judge = proof(is_calibrated=False)
+    assert judge._judge_exposure(LATER_LINE, 0.1).verdict is Verdict.RIGHT
+    assert judge._judge_exposure(LATER_LINE, 0.2).verdict is Verdict.EXPOSURE
+    assert judge._judge_exposure(LATER_LINE, None).verdict is Verdict.RIGHT
+
+
+def test_light_of_a_setting_is_that_of_its_exposure_and_level() -> None:
+    radiance = rig().projector_response.radiance
+    ratio = (radiance(0.5) - radiance(0.0)) / (radiance(1.0) - radiance(0.0))
+    judge = proof()
+    assert judge._scale_of(LATER_LINE) == pytest.approx(3 * float(ratio))
+    assert judge._scale_of(LINE) == pytest.approx(1.0)
+    assert proof(is_calibrated=False)._scale_of(LATER_LINE) == pytest.approx(3 * 0.5**2.2)
+    judge._scale[1] = 1.25
+    assert judge._scale_of(LATER_LINE) == 1.25
+
+
+def test_black_is_as_taken_or_follows_from_the_first_by_the_exposure() -> None:
+    judge, plain = proof(), proof(is_calibrated=False)
+    level, full = rig().sensor.black_level_dn, rig().sensor.full_scale_dn
+    old = counts(round(level) + 7)
+    assert judge._black(LATER_LINE, old) == pytest.approx(np.full(576, level + 3 * (old[0] - level)))
+    assert judge._black(LATER_LINE, counts(int(full))) == pytest.approx(np.full(576, full))
+    assert plain._black(LATER_LINE, old).tolist() == old.tolist(), "nobody knows how much of it is light"
+    for each in (judge, plain):
+        each._kept[27] = counts(333)
+        assert each._black(LATER_LINE, old).tolist() == [333.0] * 576
+    assert judge._black(SHOTS[27], old)[0] != 333.0, "a black is not compared with itself"
+
+
+def nothing() -> Shot | None:
+    return None
+
+
+@pytest.mark.parametrize(
+    ("contests", "share", "verdict"),
+    [
+        ({Verdict.LATE: WON}, 0.8, Verdict.RIGHT),
+        ({Verdict.LATE: WON}, 0.1, Verdict.EXPOSURE),
+        # That it is neither white nor black says nothing; nor do a few pixels.
+        ({Verdict.OTHER: WON, Verdict.DARK: WON}, 0.8, Verdict.UNTOLD),
+        ({Verdict.LATE: FEW, Verdict.DARK: FEW}, 0.8, Verdict.UNTOLD),
+        ({Verdict.OTHER: WON}, 0.1, Verdict.EXPOSURE),
+        ({Verdict.LATE: LOST, Verdict.DARK: WON}, 0.8, Verdict.LATE),
+        ({Verdict.LATE: WON, Verdict.OTHER: TORN}, 0.8, Verdict.TORN),
+        ({Verdict.LATE: LOST, Verdict.OTHER: TORN}, 0.8, Verdict.LATE),
+        # Darker than half of what is expected is nearer to black, and yet not without its pattern.
+        ({Verdict.DARK: LOST, Verdict.LATE: WON}, 0.21 * 0.85, Verdict.EXPOSURE),
+        ({Verdict.DARK: LOST, Verdict.LATE: WON}, 0.19 * 0.85, Verdict.DARK),
+        ({Verdict.DARK: LOST}, None, Verdict.DARK),
+        ({Verdict.DARK: LOST, Verdict.OTHER: LOST}, 0.4, Verdict.DARK),
+    ],
+)
+def test_what_a_picture_is_follows_from_its_contests(
+    contests: dict[Verdict, Contest], share: float | None, verdict: Verdict
+) -> None:
+    found = proof()._decide(LINE, contests, share, nothing)
+    assert found.verdict is verdict
+    assert found.again == (() if verdict in (Verdict.RIGHT, Verdict.UNTOLD) else (LINE,))
+    if verdict is Verdict.EXPOSURE and share is not None:
+        assert found.detail == f"{share / 0.85:.2g} times what was expected"
+    assert not found.is_doubtful
+
+
+def test_a_few_odd_rows_make_a_picture_doubtful_unless_it_is_wrong() -> None:
+    doubtful = {Verdict.LATE: WON, Verdict.OTHER: DOUBTFUL}
+    assert proof()._decide(LINE, doubtful, 0.8, nothing) == Finding(LINE, Verdict.RIGHT, is_doubtful=True)
+    assert not proof()._decide(LINE, doubtful, 0.1, nothing).is_doubtful
+    only = proof()._decide(LINE, {Verdict.OTHER: DOUBTFUL}, 0.8, nothing)
+    assert only.verdict is Verdict.UNTOLD
+
+
+@pytest.mark.parametrize(
+    ("shown", "verdict"),
+    [(12, Verdict.LATE), (14, Verdict.SWAPPED), (15, Verdict.OTHER), (11, Verdict.OTHER)],
+)
+def test_the_line_that_is_shown_names_what_went_wrong(shown: int, verdict: Verdict) -> None:
+    found = proof()._decide(LINE, {Verdict.OTHER: LOST}, 0.8, lambda: SHOTS[shown])
+    assert found == Finding(LINE, verdict, (LINE,), f"that of {describe_shot(SHOTS[shown])}")
+
+
+def test_without_it_the_rival_that_won_most_does_and_late_before_all_that_are_nearly_as_likely() -> None:
+    def named(late: float, other: float, shown: Shot | None = None) -> Verdict:
+        lost = {Verdict.LATE: Contest(100, late), Verdict.OTHER: Contest(100, other)}
+        found = proof()._named(LINE, lost, shown)
+        assert found.again == (LINE,)
+        assert found.detail == ""
+        return found.verdict
+
+    assert named(-0.7, -0.9) is Verdict.LATE
+    assert named(-0.5, -0.9) is Verdict.OTHER
+    assert named(-0.5, -0.9, LINE) is Verdict.OTHER, "its own line says nothing"
+    assert proof()._named(LINE, {Verdict.DARK: LOST, Verdict.OTHER: WON}, None).verdict is Verdict.DARK
+
+
+def test_rivals_are_the_shots_before_and_after() -> None:
+    judge = proof()
+    assert judge._rivals(LINE) == [(Verdict.SWAPPED, SHOTS[14]), (Verdict.LATE, SHOTS[12])]
+    assert judge._rivals(SHOTS[0]) == [(Verdict.SWAPPED, SHOTS[1])]
+    assert judge._rivals(SHOTS[-1]) == [(Verdict.LATE, SHOTS[-2])]
+
+
+def lit_proof(light: Any = 1.0) -> tuple[FrameProof, Any]:
+    """A proof whose pixels all are located, three of each column and colour; what it would see of lines."""
+    judge: Any = proof()
+    key = np.repeat(np.arange(96), 3)
+    black, contrast = np.full(288, 100, np.float32), np.full(288, 1000, np.float32)
+    judge._code = SimpleNamespace(lit=Lit(np.arange(288), key, black, contrast, black))
+
+    def seen(shot: Shot) -> Counts:
+        profile = judge._profile(shot)
+        found = np.zeros(576, np.uint16)
+        found[:288] = 100 + light * 1000 * profile[key]
+        return found
+
+    return judge, seen
+
+
+def test_the_line_that_a_picture_shows_is_the_one_most_like_it_at_the_same_setting() -> None:
+    judge, seen = lit_proof()
+    assert [judge._line_shown(seen(shot), shot) for shot in SHOTS[12:16]] == list(SHOTS[12:16])
+    assert judge._line_shown(seen(SHOTS[12]), SHOTS[29]) == SHOTS[28]
+    assert judge._line_shown(np.full(576, 1100, np.uint16), LINE) == SHOTS[10], "white"
+    assert judge._line_shown(np.full(576, 100, np.uint16), LINE) is None
+    assert proof()._line_shown(counts(100), LINE) is None, "before the first code"
+
+
+@pytest.mark.parametrize(("light", "is_named"), [(0.24, True), (0.2, False)])
+def test_a_line_that_is_nearly_dark_has_no_name(light: float, is_named: bool) -> None:
+    # Of two columns of light each gets 0.85 of it.
+    judge, seen = lit_proof(light)
+    assert (judge._line_shown(seen(LINE), LINE) == LINE) == is_named
+
+
+def test_what_a_wrong_line_was_compared_with_is_taken_again_where_it_was_never_told() -> None:
+    judge = proof()
+    found = Finding(LATER_LINE, Verdict.LATE, (LATER_LINE,))
+    assert judge._with_doubtful(found) is found
+    assert judge._with_doubtful(found).again == (LINE, LATER_LINE), "found wrong twice"
+    judge = proof()
+    judge._untold.add(LINE.index)
+    assert judge._with_doubtful(found).again == (LINE, LATER_LINE)
+    code = Finding(SHOTS[17], Verdict.LATE, (SHOTS[17],))
+    judge._untold.add(1)
+    assert judge._with_doubtful(code) is code
+
+
+def test_nothing_is_expected_of_what_was_not_seen_at_the_first_setting() -> None:
+    judge = proof()
+    assert judge._expected(LATER_LINE, LATER_LINE) is None
+    judge._kept[13] = counts(900)
+    assert judge._expected(LATER_LINE, LATER_LINE) is None
+    judge._kept[11], judge._kept[27], judge._scale[1] = counts(300), counts(310), 0.5
+    found = judge._expected(LATER_LINE, LATER_LINE)
+    assert found is not None
+    assert found.counts.tolist() == [310 + 0.5 * 600] * 576
+    black = judge._expected(SHOTS[27], LATER_LINE)
+    assert black is not None
+    assert black.counts.tolist() == [310.0] * 576
+    noise = judge._noise.variance
+    assert black.variance.tolist() == noise(counts(300)).tolist()
+    assert judge._earlier(SHOTS[29]) is judge._kept[13]
+
+
+def told(verdict: Verdict, again: tuple[Shot, ...] = ()) -> Any:
+    return lambda shot, seen: Finding(shot, verdict, again)
+
+
+def test_wrong_pictures_are_forgotten_and_right_ones_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    judge = proof()
+    judge._neighbours = SimpleNamespace(is_doubtful=lambda *parts: True)  # type: ignore[assignment]
+    monkeypatch.setattr(judge, "_judge", told(Verdict.UNTOLD))
+    assert judge.judge_raster(LINE, counts(5)).is_doubtful, "unlike its neighbours"
+    assert judge.judge_raster(SHOTS[3], counts(6)).is_doubtful is False, "only lines have neighbours"
+    assert (set(judge._kept), judge._untold) == ({13, 3}, {13, 3})
+    monkeypatch.setattr(judge, "_judge", told(Verdict.RIGHT))
+    assert not judge.judge_raster(LINE, counts(7)).is_doubtful, "told is told"
+    assert judge._untold == {3}
+    monkeypatch.setattr(judge, "_judge", told(Verdict.LATE, (LINE, SHOTS[14])))
+    assert judge.judge_raster(SHOTS[14], counts(8)).verdict is Verdict.LATE
+    assert set(judge._kept) == {3}
+    assert judge.judge_raster(SHOTS[14], counts(8)).verdict is Verdict.REPEATED, "pixel by pixel"
+    monkeypatch.setattr(judge, "_judge", told(Verdict.RIGHT))
+    assert judge.judge_raster(SHOTS[15], counts(8)).verdict is Verdict.RIGHT, "only what is wrong is repeated"
+
+
+def test_controls_are_patterns_of_pairs_that_are_both_there() -> None:
+    judge = proof()
+    for at in (0, 1, 4, 6, 7):
+        judge._kept[at] = counts(100 + at)
+    assert set(judge._code_pairs()) == {0, 3}
+    assert judge._code_pairs()[3][1] is judge._kept[7]
+    assert proof().controls() == ()
+    assert judge.first_setting == 0

@@ -1,0 +1,278 @@
+"""Step by step: which pictures are asked for, with which wait, and what is written, noted or withdrawn."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+
+from dsl_core.capture.proof.finding import Finding, Verdict
+from dsl_core.capture.proven import PictureError, ProvenShots
+from dsl_core.errors import Cancelled, DeviceError
+from dsl_core.model.frames import Frame
+from dsl_core.model.plan import CapturePlan, GrayCode, LineComb, Shot
+from dsl_core.progress import CancelToken
+
+PLAN = CapturePlan(
+    camera_size_px=(32, 18),
+    projector_size_px=(32, 18),
+    code=GrayCode(rows=False),
+    spectral=LineComb(width_px=2, step_px=2, period_px=8),
+)
+SHOTS = tuple(PLAN.shots())
+CODE, LINE = SHOTS[3], SHOTS[13]
+Tell = Callable[[Shot], Finding]
+
+
+class Bench:
+    """Parts of a scan that note what they are asked; ``tell`` says what each picture shows."""
+
+    def __init__(self, *tell: Tell, is_as_before: bool = True, differs: bool = False) -> None:
+        self.taken: list[tuple[int, int, float, bool]] = []
+        self.written: dict[int, str] = {}
+        self.kept: list[int] = []
+        self.withdrawn: list[int] = []
+        self._tell, self._same, self._differs = list(tell), is_as_before, differs
+        self.first_setting, self.token = 0, CancelToken()
+        self.cause = ""
+        parts: Any = self
+        self.shots = ProvenShots(parts, parts, parts, parts, self.token)
+
+    def take(self, shot: Shot, attempt: int = 0, settle_ms: float = 0.0, *, twice: bool = False) -> Frame:
+        self.taken.append((shot.index, attempt, settle_ms, twice))
+        return Frame(np.zeros((2, 2), np.uint16), 1.0, 0.0, len(self.taken))
+
+    def judge(self, shot: Shot, pixels: object) -> Finding:
+        return (self._tell.pop(0) if len(self._tell) > 1 else self._tell[0])(shot)
+
+    def differ(self, one: object, other: object) -> bool:
+        return self._differs
+
+    def controls(self) -> tuple[Shot, ...]:
+        return (SHOTS[0], SHOTS[4])
+
+    def is_as_before(self, control: Shot, pixels: object) -> bool:
+        return self._same or control.index == 0
+
+    def write(self, shot: Shot, frame: Frame) -> None:
+        self.written[shot.index] = frame.corrected
+
+    def withdraw(self, shots: list[Shot]) -> None:
+        self.withdrawn = [shot.index for shot in shots]
+
+    def keep(self, shot: Shot, pixels: object) -> None:
+        self.kept.append(shot.index)
+
+    def sentence(self, snap: Callable[[Shot], object]) -> str:
+        if self.cause == "unplugged":
+            raise DeviceError("no camera")
+        return self.cause
+
+
+def is_right(shot: Shot) -> Finding:
+    return Finding(shot, Verdict.RIGHT)
+
+
+def untold(shot: Shot) -> Finding:
+    return Finding(shot, Verdict.UNTOLD)
+
+
+def late(shot: Shot) -> Finding:
+    return Finding(shot, Verdict.LATE, (shot,))
+
+
+def doubtful(shot: Shot) -> Finding:
+    return Finding(shot, Verdict.UNTOLD, is_doubtful=True)
+
+
+def frayed(shot: Shot) -> Finding:
+    return Finding(shot, Verdict.RIGHT, is_doubtful=True)
+
+
+CONTROLS = [(0, 1, 100.0, True), (4, 1, 100.0, True)]
+
+
+def test_a_right_picture_is_taken_once_and_kept() -> None:
+    bench = Bench(is_right)
+    bench.shots.take(LINE)
+    assert bench.taken == [(13, 0, 0.0, False)]
+    assert (bench.written, bench.kept, bench.shots.note) == ({13: ""}, [13], "")
+
+
+def test_wrong_ones_are_taken_again_with_longer_waits() -> None:
+    bench = Bench(late, late, late, is_right)
+    bench.shots.take(LINE)
+    assert bench.taken == [
+        (13, 0, 0.0, False),
+        (13, 1, 100.0, True),
+        (13, 2, 300.0, True),
+        (13, 3, 900.0, True),
+    ]
+    assert bench.written == {13: "it still shows the pattern before"}
+    assert bench.shots.corrected == 1
+    assert bench.shots.note == " 1 was captured again, because a picture did not show its pattern."
+
+
+@pytest.mark.parametrize(
+    ("cause", "reason"),
+    [
+        ("The lamp fails.", "The lamp fails."),
+        ("", "Let the projector settle"),
+        ("unplugged", "Let the projector"),
+    ],
+)
+def test_what_stays_wrong_is_an_error_with_its_cause_or_remedy(cause: str, reason: str) -> None:
+    bench = Bench(late)
+    bench.cause = cause
+    with pytest.raises(PictureError, match=rf"after 4 exposures: it still shows.*{reason}"):
+        bench.shots.take(LINE)
+    assert len(bench.taken) == 4
+    assert bench.written == {}
+
+
+def test_nothing_is_taken_again_after_a_cancel() -> None:
+    bench = Bench(late)
+    bench.token.cancel()
+    with pytest.raises(Cancelled, match="Cancelled: "):
+        bench.shots.take(LINE)
+    assert len(bench.taken) == 1
+
+
+def test_a_second_wrong_one_makes_everything_late() -> None:
+    # Each is right the second time, which does not say that the next will be.
+    bench = Bench(late, is_right, late, is_right, is_right)
+    bench.shots.take(LINE)
+    assert "captured twice" not in bench.shots.note
+    bench.shots.take(SHOTS[14])
+    assert "captured twice" in bench.shots.note
+    assert bench.taken[4:] == CONTROLS
+
+
+def test_what_could_not_be_told_before_devices_were_late_is_taken_again_after_a_control() -> None:
+    bench = Bench(untold, late, is_right, is_right)
+    bench.shots._failures = 1
+    bench.shots.take(SHOTS[12])
+    bench.shots.take(LINE)
+    # The control, and then the untold one.
+    assert bench.taken[3:] == [*CONTROLS, (12, 1, 100.0, True)]
+    assert bench.written == {12: "it may be late", 13: "it still shows the pattern before"}
+    assert bench.shots.corrected == 2
+    assert bench.shots.note.endswith("2 were captured again, because a picture did not show its pattern."
+        " Everything was captured twice, since pictures came one late.")  # fmt: skip
+    bench.shots.take(SHOTS[14])
+    assert bench.taken[-1] == (14, 0, 0.0, True)
+
+
+def test_a_right_picture_ends_a_run_of_wrong_ones() -> None:
+    bench = Bench(is_right)
+    bench.shots._failures, bench.shots._untold = 1, [SHOTS[12]]
+    bench.shots.take(LINE)
+    assert bench.shots._failures == 0
+    assert bench.shots._untold == []
+
+
+def test_only_pictures_that_are_judged_by_themselves_are_untold() -> None:
+    bench = Bench(untold)
+    for shot in (CODE, LINE, SHOTS[10]):
+        bench.shots.take(shot)
+    assert bench.shots._untold == [LINE]
+    bench.first_setting = 1
+    bench.shots.take(CODE)
+    assert bench.shots._untold == [LINE, CODE]
+
+
+def test_a_doubtful_picture_is_taken_a_second_time_and_every_eighth_with_a_control() -> None:
+    bench = Bench(doubtful)
+    for _ in range(9):
+        bench.shots.take(LINE)
+    second = [(13, 0, 0.0, False), (13, 1, 100.0, True)]
+    assert bench.taken[:4] == [*second, *CONTROLS]
+    assert bench.taken[4:18] == second * 7
+    assert bench.taken[18:] == [*second, *CONTROLS]
+    assert (bench.written, bench.shots.corrected) == ({13: ""}, 0)
+
+
+@pytest.mark.parametrize(
+    ("tell", "differs", "reason"),
+    [
+        ((doubtful, doubtful), True, "it was unlike those before it"),
+        ((frayed, is_right), False, "a few rows of it showed another pattern"),
+        ((frayed, frayed), False, ""),
+        ((doubtful, untold), False, ""),
+    ],
+)
+def test_the_second_picture_says_whether_the_first_was_wrong(
+    tell: tuple[Tell, Tell], differs: bool, reason: str
+) -> None:
+    bench = Bench(*tell, differs=differs)
+    bench.shots.take(LINE)
+    assert bench.written == {13: reason}
+    assert bench.shots.corrected == bool(reason)
+
+
+def test_who_is_late_anyway_asks_for_no_second_picture() -> None:
+    bench = Bench(doubtful)
+    bench.shots._is_late = True
+    bench.shots.take(LINE)
+    assert bench.taken == [(13, 0, 0.0, True)]
+
+
+def test_what_could_not_be_told_is_withdrawn_when_a_control_has_changed() -> None:
+    bench = Bench(untold, is_as_before=False)
+    for shot in SHOTS[12:14]:
+        bench.shots.take(shot)
+    with pytest.raises(
+        PictureError, match=r"no longer shows its pattern.*2 frames, 12 to 13, show too little"
+    ):
+        bench.shots.conclude()
+    assert bench.withdrawn == [12, 13]
+    one = Bench(untold, is_as_before=False)
+    one.shots.take(LINE)
+    with pytest.raises(PictureError, match=r"Frame 13 shows too little.* captures it again"):
+        one.shots.conclude()
+    calm = Bench(untold)
+    calm.shots.take(LINE)
+    calm.shots.conclude()
+    assert calm.taken[1:] == CONTROLS
+    calm.shots.conclude()
+    assert len(calm.taken) == 3, "there is nothing left to doubt"
+
+
+def test_two_lines_that_agree_after_a_second_take_are_believed_after_a_control() -> None:
+    both = (SHOTS[12], LINE)
+    bench = Bench(lambda shot: Finding(shot, Verdict.LATE, both), is_right)
+    bench.shots.take(LINE)
+    assert bench.taken[1:] == [(12, 1, 100.0, True), (13, 1, 100.0, True), *CONTROLS]
+    assert set(bench.written) == {12, 13}
+    code = Bench(lambda shot: Finding(shot, Verdict.LATE, (SHOTS[2], CODE)), is_right)
+    code.shots.take(CODE)
+    assert code.taken[1:] == [(2, 1, 100.0, True), (3, 1, 100.0, True)]
+
+
+class Stored:
+    """Frames of an earlier run."""
+
+    plan = PLAN
+
+    def read(self, shot: Shot) -> object:
+        return np.zeros((2, 2), np.uint16)
+
+
+def test_frames_right_before_a_missing_one_are_taken_again_where_nothing_tells_of_them() -> None:
+    bench = Bench(untold)
+    stored: Any = Stored()
+    bench.shots.learn(stored, {15})
+    # Lines 12 to 14; the code is judged together.
+    assert [index for index, *_ in bench.taken] == [12, 13, 14]
+    calm = Bench(*[untold] * 13, is_right, untold)
+    calm.shots.learn(stored, {15})
+    assert [index for index, *_ in calm.taken] == [14], "from the last that was told on"
+    whole = Bench(untold)
+    whole.shots.learn(stored, ())
+    assert whole.taken == []
+    wrong = Bench(*[is_right] * 13, late, is_right)
+    wrong.shots.learn(stored, ())
+    assert wrong.taken == [(13, 1, 100.0, True)]
+    assert 13 in wrong.kept
