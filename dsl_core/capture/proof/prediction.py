@@ -18,6 +18,12 @@ APART, SIGMAS = 0.3, 6.0
 BLUR = 0.15
 #: Brightness is measured if all its pixels together are so many deviations bright, and there are so many.
 BRIGHT_SIGMAS, FEWEST_BRIGHT = 25.0, 12
+#: Unlit pixels that say how much light of the room has changed since black was taken.
+FEWEST_UNLIT = 60
+#: A picture's pixels count as unlit below this share of what is lit beyond doubt.
+UNLIT_SHARE = 0.05
+#: Deviations by which they have to be told from what is lit.
+CHOSEN_SIGMAS = 3.0
 #: Of the pixels that a rival leaves bright or dark, every so many are asked where there are plenty.
 PLENTY = 4000
 
@@ -62,12 +68,22 @@ def contest_of_lines(seen: Counts, lit: Lit, wanted: Floats, rival: Floats) -> C
 
 
 def brightness_of_lines(seen: Counts, lit: Lit, wanted: Floats, noise: Noise) -> float | None:
-    """Light of a picture over that expected where it should be brightest; None where too little is lit."""
+    """Light of a picture over that expected where it should be brightest; None where too little is lit.
+
+    Light that unlit pixels gained since black was taken is the room's and is left out.
+    """
     chosen = np.flatnonzero(np.take(wanted > 0.1, lit.key))
     chosen = chosen[seen[lit.index[chosen]] < noise.sensor.full_scale_dn]
+    unlit = np.flatnonzero(np.take(wanted <= 0, lit.key))
+    room = _of_room(seen[lit.index[unlit]] - lit.black[unlit])
     counts = seen[lit.index[chosen]]
     light = lit.contrast[chosen] * wanted[lit.key[chosen]]
-    return _ratio(counts - lit.black[chosen], light, lit.sigma[chosen] ** 2)
+    return _ratio(counts - lit.black[chosen] - room, light, lit.sigma[chosen] ** 2)
+
+
+def _of_room(gain: Floats) -> np.float32:
+    """What the room's light has gained since black, from what unlit pixels have: their median."""
+    return np.float32(np.median(gain) if gain.size >= FEWEST_UNLIT else 0)
 
 
 def _ratio(seen: Floats, wanted: Floats, variance: Floats) -> float | None:
@@ -146,8 +162,23 @@ def _contest(
 
 
 def brightness_of_picture(seen: Counts, wanted: Expected, black: Floats, noise: Noise) -> float | None:
-    """Light of a picture over that expected; None where too little of it can be measured."""
+    """Light of a picture over that expected; None where too little of it can be measured.
+
+    Light that unlit pixels gained since black was taken is the room's and is left out.
+    """
     full = noise.sensor.full_scale_dn
     sound = (seen < full) & (wanted.counts < 0.9 * full)
-    light = (wanted.counts - black)[sound]
-    return _ratio(seen[sound] - black[sound], light, (wanted.variance + noise.variance(seen))[sound])
+    light, gain = (wanted.counts - black)[sound], (seen - black)[sound]
+    variance = (wanted.variance + noise.variance(seen))[sound]
+    return _ratio(gain - _room_of_picture(gain, light, variance), light, variance)
+
+
+def _room_of_picture(gain: Floats, light: Floats, variance: Floats) -> np.float32:
+    """What a picture has of the room's light that was not there in black, by its unlit pixels."""
+    beyond = light[light > SIGMAS * np.sqrt(variance)]
+    limit = UNLIT_SHARE * float(np.median(beyond)) if beyond.size else 0.0
+    # Chosen by noise rather than by light, unlit pixels would be those that were expected too dark.
+    if limit < CHOSEN_SIGMAS * float(np.sqrt(np.median(variance))):
+        return np.float32(0)
+    unlit = light < limit
+    return _of_room(gain[unlit] - light[unlit])

@@ -219,3 +219,22 @@ def test_noise_that_is_scaled_up_with_a_picture_does_not_make_it_brighter() -> N
     share = brightness_of_picture(seen, wanted, floats(new_black), noise)
     assert share is not None
     assert share == pytest.approx(1.0, abs=0.1)
+
+
+@pytest.mark.parametrize("room", [-4, 0, 7])
+def test_light_of_the_room_that_changed_is_not_taken_for_that_of_a_line(room: int) -> None:
+    wanted = floats(np.r_[np.ones(20), np.zeros(60)])
+    seen = np.full(160, 120 + room, np.uint16)
+    seen[:40:2] += 8
+    assert brightness_of_lines(seen, lit(80, 10.0), wanted, NOISE) == pytest.approx(0.8, rel=1e-3)
+    few = brightness_of_lines(seen[:158], lit(79, 10.0), wanted[:79], NOISE)
+    assert few == pytest.approx((8 + room) / 10, rel=1e-3), "59 unlit pixels say too little"
+
+
+@pytest.mark.parametrize("room", [-9, 0, 40])
+def test_light_of_the_room_that_changed_is_not_taken_for_that_of_a_picture(room: int) -> None:
+    black, light = floats(np.full(160, 110)), floats(np.r_[np.full(100, 500), np.full(60, 20)])
+    wanted = Expected(black + light, floats(np.full(160, 0.01)))
+    seen = (110 + room + np.where(light > 20, 0.8 * light, light)).astype(np.uint16)
+    share = (0.8 * 50_000 + 20 * 60) / (50_000 + 20 * 60)
+    assert brightness_of_picture(seen, wanted, black, NOISE) == pytest.approx(share, rel=1e-3)
