@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
 
 from dsl_core.optics import colour as ours
 from dsl_core.optics.relighting import LIGHTS
@@ -134,3 +135,14 @@ def test_delta_e_of_published_pairs(
 ) -> None:
     actual = ours.delta_e_2000(np.array(first, float), np.array(second, float))
     assert float(actual) == pytest.approx(expected, abs=1e-4)
+
+
+def test_weights_sum_over_every_nanometre_of_the_tables() -> None:
+    """One band of everything, and a hat in the last five nanometres, by the tables' own values there."""
+    nm = np.arange(ours.CIE_NM[0], ours.CIE_NM[-1] + 0.5)
+    power = np.interp(nm, ours.CIE_NM, ours.CIE_D65)
+    matching = CubicSpline(ours.CIE_NM, ours.CIE_1931_XYZ, axis=1)(nm) * power
+    found = ours.observer_weights(np.array([ours.CIE_NM[0], ours.CIE_NM[-2], ours.CIE_NM[-1]]))
+    hat = np.clip((nm - ours.CIE_NM[-2]) / (ours.CIE_NM[-1] - ours.CIE_NM[-2]), 0, 1)
+    assert found[:, 2] == pytest.approx(matching @ hat / matching[1].sum(), rel=1e-9)
+    assert found.sum(1) == pytest.approx(matching.sum(1) / matching[1].sum())

@@ -5,11 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from dsl_core.calibration.common.plane import fit_plane
+from dsl_core.calibration.common.plane import _near_first_plane, fit_plane
 from dsl_core.errors import CalibrationError
 from dsl_core.model.rig import Rig
+from dsl_core.optics.pinhole import pixel_rays
 from dsl_core.optics.shading import Plane
 from dsl_core.simulation.published_rig import published_rig
+from dsl_core.solve.robust import robust_std
 
 #: 700 mm away, turned by some degrees about both axes.
 PLANE = Plane(np.array([0.12, -0.07, 1.0]) / 700.0)
@@ -118,3 +120,42 @@ def test_pixels_have_to_spread_by_a_fiftieth_of_their_extent(rig: Rig, rows: int
     else:
         with pytest.raises(CalibrationError, match="form a line"):
             fit_plane(rig, PLANE.depth_mm(rig), usable)
+
+
+def test_the_search_ends_when_the_same_pixels_are_on_the_plane(
+    rig: Rig, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    asked = list[int]()
+
+    def noted(values: np.ndarray) -> np.ndarray:
+        asked.append(len(values))
+        return np.asarray(robust_std(values))
+
+    monkeypatch.setattr("dsl_core.calibration.common.plane.robust_std", noted)
+    fit_plane(rig, seen(rig), np.ones((72, 112), bool))
+    assert len(asked) == 1, "what is near the first plane stays"
+
+
+def test_a_plane_is_chosen_by_the_median_of_its_judges(rig: Rig) -> None:
+    """Nearly half of all stand elsewhere, all on one other plane, and the first pixel is one of them."""
+    depth = PLANE.depth_mm(rig)
+    depth[:34] *= 0.7
+    near = _near_first_plane(pixel_rays(rig.camera), 1 / depth, np.ones((72, 112), bool))
+    assert near[34:].all()
+    assert not near[:34].any()
+
+
+def test_three_pixels_on_a_line_choose_no_plane(rig: Rig) -> None:
+    """Of two rows and a pixel most triples are on a line; none of these is taken."""
+    on = np.zeros((72, 112), bool)
+    on[30, 20:90] = on[31, 20:90] = True
+    depth = PLANE.depth_mm(rig)
+    near = _near_first_plane(pixel_rays(rig.camera), 1 / depth, on)
+    assert near.all()
+
+
+def test_the_rms_is_that_of_depths_in_millimetres(rig: Rig) -> None:
+    sign = np.where(np.indices((72, 112)).sum(0) % 2, 1.0, -1.0)
+    depth = PLANE.depth_mm(rig) / (1 + 2e-3 * sign)
+    found = fit_plane(rig, depth, np.ones((72, 112), bool))
+    assert found.rms_mm == pytest.approx(2e-3 * np.sqrt(np.mean(depth**2)), rel=1e-3)

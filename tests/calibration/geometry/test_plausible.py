@@ -100,3 +100,12 @@ def test_both_sides_of_how_far_devices_can_be_apart(
 ) -> None:
     pose = found.pose.model_copy(update={"translation_mm": (0.6 * distance_mm, 0.0, 0.8 * distance_mm)})
     assert bool(implausible(found.model_copy(update={"pose": pose}))) == told
+
+
+def test_what_is_plausible_is_said_in_the_sentence() -> None:
+    (focal,) = _of_lens("camera", plain_lens(fx_px=100.0, fy_px=100.0))
+    assert "came out as 0.1 widths of its picture; 0.3 to 10 are plausible" in focal
+    (axis,) = _of_lens("camera", plain_lens(cx_px=-510.0))
+    assert "at -51% of its picture's width and 50% of its height; -50% to 150% are plausible" in axis
+    (bent,) = _of_lens("camera", plain_lens(distortion=(2.0, 0.0, 0.0, 0.0, 0.0)))
+    assert "of its distance from the middle; at most 50% are plausible" in bent

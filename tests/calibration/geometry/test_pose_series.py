@@ -15,6 +15,7 @@ from dsl_core.calibration.geometry.pose_series import (
     _bent,
     _blurred,
     _check_axes,
+    _corner_px,
     board_normal,
     check_poses,
     coverage,
@@ -289,3 +290,38 @@ def test_fewer_than_three_poses_are_refused_with_the_reasons_where_there_are_any
         series(monkeypatch, 1.0, None, 1.0)
     # Nobody left anything out: who asked for two says what they lack.
     assert len(series(monkeypatch, 1.0, 1.0).seen) == 2
+
+
+def test_without_a_covariance_nothing_is_left_open_in_the_corners(found: GeometryCalibration) -> None:
+    unknown = found.model_copy(update={"covariance": None})
+    assert not any("distortion" in each for each in doubts(unknown, 40.0, None))
+    assert _corner_px(unknown, unknown.camera, 0) == 0.0
+
+
+def test_normals_are_judged_by_a_lens_of_one_and_a_half_widths_in_the_middle(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    asked = list[Any]()
+
+    def noted(board: Any, camera: Any, matrix: Any, name: str) -> Any:
+        asked.append(matrix.tolist())
+        return np.array([0.0, 0.0, 1.0])
+
+    monkeypatch.setattr("dsl_core.calibration.geometry.pose_series.board_normal", noted)
+    assert largest_tilt_deg(case.poses_seen()[:1], (401, 201)) == 0.0
+    assert largest_tilt_deg(case.poses_seen()[:1], (101, 201)) == 0.0
+    assert asked[0] == [[601.5, 0, 200], [0, 601.5, 100], [0, 0, 1]]
+    assert asked[1] == [[301.5, 0, 50], [0, 301.5, 100], [0, 0, 1]]
+
+
+@pytest.mark.parametrize(("off", "told"), [(0.09, False), (0.11, True), (-0.09, False), (-0.11, True)])
+def test_lengths_differ_from_ten_percent_on(found: GeometryCalibration, off: float, told: bool) -> None:
+    baseline = float(np.linalg.norm(found.pose.translation_mm)) / (1 + off)
+    assert any("mm apart, but" in each for each in doubts(found, 40.0, baseline)) == told
+
+
+@pytest.mark.parametrize(("share", "told"), [(0.049, False), (0.051, True), (-0.051, True)])
+def test_pixels_are_oblong_from_five_percent_on(found: GeometryCalibration, share: float, told: bool) -> None:
+    lens = found.camera.model_copy(update={"fx_px": (1 + share) * found.camera.fy_px})
+    odd = found.model_copy(update={"camera": lens})
+    assert any("camera seems to have oblong" in each for each in doubts(odd, 40.0, None)) == told

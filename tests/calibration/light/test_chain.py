@@ -14,6 +14,7 @@ from dsl_core.calibration.light.chain import (
     SCALE_STD,
     UNKNOWNS,
     LineScan,
+    _parts,
     _scale,
     _solve,
     chain_correction,
@@ -205,23 +206,39 @@ def test_chi_square_is_that_of_the_first_orders_with_the_deviation_of_three_colo
     design[:, -1] = 0.0
     std = rng.uniform(0.5, 2.0, 400)
     target = design[:, :-1] @ (0.02 * rng.standard_normal(count)) + std * rng.standard_normal(400)
-    none = Equations(np.zeros((count + 1, count + 1)), np.zeros(count + 1), 0.0, 0)
+    zero = Equations.of(rng.standard_normal((3, count + 1)), rng.standard_normal(3), np.full(3, 0.5))
     module = "dsl_core.calibration.light.chain."
     halves: Any = [
         Equations.of(design[part], target[part], std[part]) for part in (slice(200), slice(200, 400))
     ]
     monkeypatch.setattr(module + "_parts", lambda *_: [0, 1])
     monkeypatch.setattr(module + "first_order_equations", lambda rig, part, *_: halves[part])
-    monkeypatch.setattr(module + "zero_order_equations", lambda *_: none)
+    monkeypatch.setattr(module + "zero_order_equations", lambda *_: zero)
     ratio_std = np.array([0.01, 0.02, 0.02])
     monkeypatch.setattr(module + "_mean_ratios", lambda *_: (np.ones(3), ratio_std))
     scan: Any = SimpleNamespace(pixels=np.zeros(MIN_PIXELS, int))
     found = _solve(published_rig(), [scan], None, None)  # type: ignore[arg-type]
     left = (target - design[:, :-1] @ found.solution.values) / std
     assert found.chi_square == pytest.approx(float((left**2).mean()))
+    every = halves[0] + halves[1] + zero
+    alone = Equations(every.normal[:-1, :-1], every.right[:-1], every.square, every.count)
+    again = solve_given(alone, found.solution.prior, found.solution.noise_factor)
+    assert found.solution.values == pytest.approx(again.values)
     # Three colours of these deviations, each a third of the mean.
     assert found.ratio_std == pytest.approx(0.03 / 3)
     assert found.pixels == 50
     few: Any = SimpleNamespace(pixels=np.zeros(MIN_PIXELS - 1, int))
     with pytest.raises(CalibrationError, match="49 usable pixels; 50 are needed"):
         _solve(published_rig(), [few], None, None)  # type: ignore[arg-type]
+
+
+def test_an_image_has_three_parts_down_and_four_across(lines: LineScan) -> None:
+    rig = published_rig()
+    rig = rig.model_copy(update={"camera": rig.camera.resized(112, 72)})
+    parts = _parts(rig, lines)
+    assert len(parts) == 12
+    for number, part in enumerate(parts):
+        rows, columns = np.divmod(part.pixels, 112)
+        assert set((rows // 24).tolist()) == {number // 4}
+        assert set((columns // 28).tolist()) == {number % 4}
+    assert sum(len(part.pixels) for part in parts) == len(lines.pixels)

@@ -2,14 +2,25 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+from typing import Any
+
 import numpy as np
 import pytest
+import torch
 
 from dsl_core.calibration.light.chain_equations import (
     BANDS_NM,
+    CHUNK,
+    MODEL_ERROR,
     STEP_NM,
     LineScan,
     Unknowns,
+    _chunks,
+    _halo,
+    _light,
+    _of_colour,
+    _usable,
     colours_of,
     steepness,
     stretched,
@@ -20,6 +31,7 @@ from dsl_core.calibration.light.chain_equations import (
 )
 from dsl_core.model.plan import ScanLines
 from dsl_core.model.spectral import SpectralCurve
+from dsl_core.optics.lines.profile import ProfileTable
 from dsl_core.optics.spectra import hat_moments
 from dsl_core.simulation.published_rig import published_rig
 
@@ -107,3 +119,67 @@ def test_steepness_is_the_slope_of_light_by_the_wavelength_of_the_emission() -> 
 def test_no_frame_is_between_columns_beyond_the_last_line() -> None:
     part = scan().between(900.0, 950.0)
     assert (len(part.radiance), part.first_line) == (0, 0)
+
+
+@pytest.mark.parametrize("rises", [True, False])
+def test_a_line_lights_the_bands_whose_profile_reaches_it(rises: bool) -> None:
+    lines = scan(6)
+    columns = torch.linspace(100.0, 160.0, len(BANDS_NM), dtype=torch.float64)[:, None] + torch.arange(6.0)
+    columns = columns if rises else columns.flip(0)
+    lit, light = _light(RIG, lines, columns)
+    band_px = 60.0 / (BANDS_NM[-1] - BANDS_NM[0]) * STEP_NM
+    table = ProfileTable(5, RIG.projector_response.line_spread, band_px, columns.device, columns.dtype)
+    away = columns.T[:, None] - torch.as_tensor(lines.centres_px)[:, None]
+    every = (table.at(away) * (away.abs() < table.support_px)).numpy()
+    assert lit.tolist() == (every > 0).any(-1).tolist()
+    assert light == pytest.approx(every[lit], abs=1e-12)
+    assert 10 < lit[0].sum() < 30
+
+
+def test_pixels_are_usable_that_light_reaches_through_rows_of_the_frame() -> None:
+    width, height = RIG.projector.width_px, RIG.projector.height_px
+    inner, beyond = [100.0, 120.0], [-40.0, -20.0]
+    columns = np.array([inner, inner, beyond, [-0.6, -0.4], [width - 0.4, width - 0.6], inner, inner, inner])
+    rows = np.array([[50.0, 60.0]] * 5 + [[-0.1, 5.0], [5.0, height - 0.9], [0.0, height - 1.0]])
+    # What comes from outside does no harm where no light comes from there.
+    columns, rows = np.vstack([columns, [10.0, -5.0]]), np.vstack([rows, [5.0, -9.0]])
+    seen: Any = SimpleNamespace(columns=torch.as_tensor(columns.T), rows=torch.as_tensor(rows.T))
+    assert _usable(seen, RIG).tolist() == [True, True, False, True, True, False, False, True, True]
+
+
+def test_equations_of_a_colour_are_those_of_all_its_lines_written_out() -> None:
+    rng, lines = np.random.default_rng(3), scan(5)
+    bands, nodes = 4, len(UNKNOWNS.nodes_nm)
+    std, offset = 0.1 + rng.random((128, 5)), rng.random(5)
+    std[9, 2] = np.inf
+    lines = LineScan(**{**vars(lines), "std": std, "offset": offset, "radiance": rng.random((128, 5)) * 9})
+    lit = rng.random((5, 128)) < 0.1
+    lit[2, 9] = True
+    light, white = rng.random((int(lit.sum()), bands)), rng.random(bands)
+    changes, scale = rng.standard_normal((bands, nodes + 1)), 1 + rng.random(5)
+    found = _of_colour(RIG, lines, (lit, light), scale, white, changes, UNKNOWNS, -1, 2)
+    x = 0.1 * rng.standard_normal(UNKNOWNS.count + 1)
+    of_nodes = x[UNKNOWNS.efficiency(-1)] + x[UNKNOWNS.response(2)] + x[UNKNOWNS.white]
+    bent = 1 + changes @ np.append(of_nodes, x[UNKNOWNS.scale])
+    halo, total, count = _halo(RIG, lines), 0.0, 0
+    for row, (pixel, frame) in zip(light, np.argwhere(lit), strict=True):
+        if np.isfinite(std[frame, pixel]):
+            seen = lines.radiance[frame, pixel] - offset[pixel] - lines.amplitude[pixel] * halo[frame, pixel]
+            plain = float(row @ white) * scale[pixel]
+            off = seen - scale[pixel] * float((row * white) @ bent)
+            total += off**2 / (std[frame, pixel] ** 2 + (MODEL_ERROR * plain) ** 2)
+            count += 1
+    assert found.count == count == len(light) - 1
+    assert found.square - 2 * x @ found.right + x @ found.normal @ x == pytest.approx(total)
+
+
+def test_pixels_come_in_chunks_of_one_colour_by_their_columns() -> None:
+    rng = np.random.default_rng(1)
+    colours, column = rng.integers(0, 3, 5 * CHUNK), rng.permutation(5 * CHUNK).astype(float)
+    parts = list(_chunks(colours, column))
+    assert sorted(np.concatenate([part for _, part in parts]).tolist()) == list(range(5 * CHUNK))
+    for colour, part in parts:
+        assert len(part) <= CHUNK
+        assert (colours[part] == colour).all()
+        assert (np.diff(column[part]) > 0).all()
+    assert [colour for colour, _ in parts] == sorted(colour for colour, _ in parts)

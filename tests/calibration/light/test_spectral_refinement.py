@@ -13,6 +13,11 @@ from dsl_core.calibration.light.spectral_refinement import (
     WEIGHTS,
     SpectralModel,
     SurfaceSignals,
+    _basis,
+    _prior,
+    _relative_std,
+    _shape_std,
+    _total_std,
     _unit,
     refine,
     refined_curves,
@@ -196,3 +201,67 @@ def test_a_refinement_that_is_cancelled_ends_at_its_next_trial() -> None:
     with pytest.raises(Cancelled, match=f"after 3 of {len(WEIGHTS)} steps"):
         refine(rig, surfaces(rig, 3e-4), None, 0.01, CallbackProgress(hear, token))
     assert len(told) == 3
+
+
+NODES = np.arange(400.0, 701.0, 10.0)
+
+
+def test_a_shift_of_a_curve_is_its_slope_where_it_is_a_fiftieth_of_its_peak() -> None:
+    curve = np.exp(-(((FINE_NM - 550) / 30) ** 2))
+    found = _basis(curve)
+    assert found.shape == (32, 301)
+    assert found[:31] == pytest.approx(np.stack([np.interp(FINE_NM, NODES, unit) for unit in np.eye(31)]))
+    slope = np.gradient(curve)
+    assert found[31] == pytest.approx(-slope / np.maximum(curve, 0.02))
+
+
+def test_what_is_known_beforehand_is_gradients_levels_shifts_and_a_measured_emission() -> None:
+    rig = published_rig()
+    std = 0.05 * np.array(rig.emission[1].values) + 1e-6
+    measured = rig.emission[1].model_copy(update={"std": tuple(std.tolist())})
+    red, _, blue = (curve.model_copy(update={"std": None}) for curve in rig.emission)
+    rig = rig.model_copy(update={"emission": (red, measured, blue)})
+    found = _prior(rig, 0.005, 2e-4)
+    gradient = np.diff(np.eye(31), axis=0)
+    smooth = 0.005 / 2e-4 * gradient.T @ gradient + np.eye(31) / (31 * 0.3**2)
+    wanted = np.zeros((193, 193))
+    for k in range(6):
+        part = slice(32 * k, 32 * k + 31)
+        wanted[part, part] = smooth if k != 4 else np.diag(1 / _relative_std(measured) ** 2)
+        wanted[32 * k + 31, 32 * k + 31] = 1 / 2.0**2 if k != 4 else 1 / 1e-3**2
+    wanted[192, 192] = 1 / 0.02**2
+    assert found == pytest.approx(wanted)
+
+
+def test_a_measured_emission_is_known_to_a_thousandth_at_best_and_not_at_all_at_worst() -> None:
+    curve = SpectralCurve.of(
+        NODES, np.r_[np.full(30, 2.0), 0.0], std=np.r_[0.001, 0.1, np.full(28, 5.0), 1.0]
+    )
+    found = _relative_std(curve)
+    assert found[:3] == pytest.approx([1e-3, 0.05, 1.0])
+    assert found[-1] == 1.0
+
+
+def test_a_datum_is_as_sure_as_its_noise_a_floor_and_the_chart() -> None:
+    signal = np.array([[[10.0, 2.0]], [[5.0, 4.0]]])
+    own = np.array([True, False])
+    data = SurfaceSignals(signal, np.full(signal.shape, 0.01), np.ones((2, 301)), LIGHTS[:2], own)
+    found = _total_std(data, 0.01)
+    for surface, relative in enumerate((0.0002 + 0.01, 0.0002)):
+        white = signal[surface].max()
+        wanted = np.sqrt(0.01**2 + (relative * signal[surface]) ** 2 + (0.1 * relative * white) ** 2)
+        assert found[surface] == pytest.approx(wanted)
+
+
+def test_shapes_are_unsure_by_what_no_common_factor_does() -> None:
+    """Against a covariance of one direction: a change of a node, and a common level, which shows nothing."""
+    model, n = SpectralModel(published_rig()), 32
+    direction = np.zeros(3 * n)
+    direction[n + 12] = 0.1
+    found = _shape_std(model.basis[:3], np.outer(direction, direction), model.response)
+    change = np.zeros((3, FINE_NM.size))
+    change[1] = 0.1 * model.basis[1, 12]
+    common = (model.response * change).sum() / model.response.sum()
+    assert found == pytest.approx(model.response * np.abs(change - common))
+    level = np.concatenate([np.r_[np.ones(31), 0.0]] * 3)
+    assert np.abs(_shape_std(model.basis[:3], np.outer(level, level), model.response)).max() < 1e-6

@@ -5,8 +5,19 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from dsl_core.calibration.light.spectralon import UniformPictures, fit_evenness, measure_white
+from dsl_core.calibration.light.spectralon import (
+    UniformPictures,
+    _between_nodes,
+    _blocks,
+    _mean,
+    _near_course,
+    _roughness,
+    _white_std,
+    fit_evenness,
+    measure_white,
+)
 from dsl_core.errors import CalibrationError
+from dsl_core.model.calibration.spectralon import WhiteSignals
 from dsl_core.model.rig import Sensor
 from dsl_core.optics.sensor import bayer_channels, gain_at_pixels
 
@@ -107,3 +118,77 @@ def test_a_target_that_is_hardly_in_view_is_refused() -> None:
     little = EVERY & (X > 0.98)
     with pytest.raises(CalibrationError, match="pixels of the Spectralon are lit"):
         measure_white(UniformPictures(seen.radiance, seen.saturated, seen.shading, little, seen.sensor))
+
+
+def test_a_flat_field_has_nine_rows_and_thirteen_columns_from_edge_to_edge() -> None:
+    found = fit_evenness(np.ones((72, 112)), np.ones((72, 112), bool)).flat_field
+    assert found.rows_px == pytest.approx(np.linspace(0, 71, 9))
+    assert found.columns_px == pytest.approx(np.linspace(0, 111, 13))
+    assert np.array(found.gain) == pytest.approx(np.ones((9, 13)))
+
+
+def test_blocks_are_means_of_places_and_values_where_a_fifth_of_the_fullest_is_usable() -> None:
+    """Three blocks a node: 27 rows of them, four pixels high, and 39 columns of five."""
+    rng = np.random.default_rng(3)
+    relative, usable = rng.random((108, 195)), np.ones((108, 195), bool)
+    usable[:4, :5], usable[4:8, :5] = False, False
+    usable[0, :4] = True  # four of twenty are a fifth and not more
+    usable[4, :5] = True
+    row, column, value, count = _blocks(relative, usable)
+    assert len(count) == 27 * 39 - 1
+    assert sorted(set(count.tolist())) == [5.0, 20.0]
+    at = int(np.flatnonzero(count == 5)[0])
+    assert (row[at], column[at]) == (4.0, 2.0)
+    assert value[at] == pytest.approx(relative[4, :5].mean())
+    assert (row[0], column[0], value[0]) == pytest.approx((1.5, 7.0, relative[:4, 5:10].mean()))
+
+
+def test_a_mean_is_as_sure_as_blocks_that_hold_a_fifth_of_the_fullest_agree() -> None:
+    block = np.repeat([0, 7, 35, 20], [10, 10, 10, 2])
+    values = np.repeat([1.0, 2.0, 3.0, 50.0], [10, 10, 10, 2])
+    mean, std = _mean(values, block)
+    assert mean == pytest.approx(160 / 32)
+    # Two of ten are a fifth and not more: three blocks are left.
+    scatter = np.mean((np.array([1, 2, 3]) - mean) ** 2)
+    assert std == pytest.approx(np.sqrt(scatter / 2))
+    assert _mean(np.ones(5), np.zeros(5, int)) == (1.0, 0.0)
+
+
+def test_what_is_curved_between_nodes_is_unsure_by_its_second_difference() -> None:
+    down, across = np.indices((9, 13)).astype(float)
+    found = _between_nodes((0.02 * down**2 + 0.05 * across**2).ravel())
+    assert found == pytest.approx(np.hypot(0.04, 0.1) * 0.5 / np.sqrt(180))
+    bend = np.zeros((9, 13))
+    bend[0] = 1.0
+    edge = _between_nodes(bend.ravel()).reshape(9, 13)
+    assert (edge[:2] > 0).all()
+    assert not edge[2:].any()
+
+
+def test_only_what_a_parabola_cannot_do_is_rough() -> None:
+    down, across = np.indices((9, 13)).astype(float)
+    rough = _roughness()
+    assert rough.shape == (6 * 13 + 9 * 10, 117)
+    assert np.abs(rough @ (down**2 + 3 * across - across**2 + down * across).ravel()).max() < 1e-9
+    cubes = rough @ (down**3).ravel()
+    assert sorted(set(np.abs(cubes).round(9).tolist())) == [0.0, 6.0]
+    assert np.count_nonzero(cubes) == 6 * 13
+    assert np.count_nonzero(rough @ (across**3).ravel()) == 9 * 10
+
+
+@pytest.mark.parametrize(("factor", "near"), [(1.19, True), (1.21, False), (0.81, True), (0.79, False)])
+def test_a_pixel_is_dirt_a_fifth_off_the_course_of_its_colour(factor: float, near: bool) -> None:
+    colours = np.indices((40, 50)).sum(0) % 3
+    white = np.array([1.0, 2.0, 5.0])[colours]
+    white[11, 12] *= factor
+    good = np.ones((40, 50), bool)
+    found = _near_course(white, colours, good)
+    assert found[11, 12] == near
+    assert found.sum() == 2000 - (not near)
+
+
+def test_the_deviation_of_white_is_that_of_its_three_lights() -> None:
+    signal = ((1.0, 2.0, 3.0), (1.0, 1.0, 2.0), (5.0, 3.0, 2.0))
+    rel = ((0.01, 0.01, 0.0), (0.0, 0.0, 0.01), (0.003, 0.0, 0.0))
+    found = _white_std(WhiteSignals(signal=signal, rel_std=rel, white_over_sum=(1.0, 1.0, 1.0)))
+    assert found == pytest.approx([np.hypot(0.01, 0.02) / 6, 0.02 / 4, 0.015 / 10])

@@ -188,3 +188,34 @@ def test_pixels_that_see_something_else_hardly_bend_the_field() -> None:
     off = (found.width / exact).log()
     assert float((off - off.mean()).abs().max()) < 0.02
     assert found.std < 0.004
+
+
+def test_what_a_pixel_asks_for_leaves_its_own_amplitude_and_column_free() -> None:
+    """Against least squares of the residuals and of the change of width on profile and slope."""
+    peaks, column, _ = seen(KNOWN, FLAT)
+    peaks = peaks.of(torch.arange(5))
+    column, amplitude = column[:5] + 0.05, torch.linspace(0.5, 1.0, 5, dtype=torch.float64)
+    peaks.variance[0] = torch.inf
+    view = View(peaks, column, column, amplitude)
+    score, information = _single(view, column, amplitude, KNOWN, torch.ones_like(column))
+    distance = column - peaks.centres
+    for p in range(5):
+        at = distance[:, [p]]
+        g, slope = (
+            each.numpy()[:, 0]
+            for each in LineTable(WIDTH_PX, KNOWN, 15.0, column, torch.ones(1, dtype=torch.float64)).at(at)
+        )
+        wide, narrow = (
+            LineTable(WIDTH_PX, KNOWN, 15.0, column, torch.full((1,), math.exp(by), dtype=torch.float64))
+            .at(at)[0]
+            .numpy()[:, 0]
+            for by in (0.01, -0.01)
+        )
+        a = float(amplitude[p])
+        root = 1 / np.sqrt(peaks.variance[:, p].numpy() + (0.0015 * a) ** 2)
+        own = np.stack([g * root, slope * root], 1)
+        change = a * (wide - narrow) / 0.02 * root
+        residual = (peaks.y[:, p].numpy() - a * g) * root
+        change, residual = (each - own @ np.linalg.lstsq(own, each)[0] for each in (change, residual))
+        assert float(information[p]) == pytest.approx(change @ change, rel=1e-2)
+        assert float(score[p]) == pytest.approx(change @ residual, rel=1e-2, abs=2e-3 * float(information[p]))

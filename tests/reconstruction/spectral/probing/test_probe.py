@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -94,3 +95,84 @@ def test_what_is_read_for_a_probe_are_its_pixels_and_the_samples_around_them() -
     assert set(targets) < set(found)
     assert set(found) == set(targets) | set(samples_of(targets, (40, 60), "RGGB")[0])
     assert set(probe_module.probed_pixels(valid, "MONO")) == set(targets)
+
+
+def probed(monkeypatch: pytest.MonkeyPatch, share: float, varied: bool, **model: Any) -> Probe | None:
+    """A probe of a hundred pixels of a camera that is wide by so much of a distance."""
+    spectra = np.tile(RISING, (100, 1))
+    if varied:
+        spectra[:10] = RISING[::-1]
+    asked, count = list[int](), len(PARAMETERS)
+
+    def some(scan: Any, targets: np.ndarray) -> dict[str, np.ndarray]:
+        asked.append(len(targets))
+        number = np.arange(sum(asked) - len(targets), sum(asked))
+        matrix = number[:, None, None] + np.arange(count + 3) / 100 + 0.5 * np.arange(count + 3)[:, None]
+        names = ("chi_square", "correlation", "place", "cell", "pixel")
+        return {
+            "normal": matrix, "score": matrix[:, 0], "bias": matrix, "reflectance": spectra[number],
+        } | dict.fromkeys(names, number)  # fmt: skip
+
+    monkeypatch.setattr(probe_module, "_probe_some", some)
+    monkeypatch.setattr(probe_module, "probe_targets", lambda valid: np.arange(int(valid.sum())))
+    monkeypatch.setattr(probe_module, "widths_at", lambda *_: None)
+    monkeypatch.setattr(probe_module, "probe_lines", lambda *_: None)
+    monkeypatch.setattr(probe_module, "_nm_per_px", lambda *_: 2.0)
+    camera = SimpleNamespace(width_px=1000 * share, fx_px=1000.0)
+    given = {
+        "single": True, "lines": (), "response": lambda _: None, "rig": SimpleNamespace(camera=camera),
+        "bands": SimpleNamespace(step_nm=5.0),
+    }  # fmt: skip
+    size = model.pop("pixels", 100)
+    scan: Any = SimpleNamespace(
+        model=SimpleNamespace(**given | model),
+        pixels=SimpleNamespace(valid=np.ones(size, bool), column_px=np.zeros(size)), radiance=None, std=None,
+    )  # fmt: skip
+    found = probe_module.probe(scan)
+    assert found is None or asked == [48, 48, 4]
+    return found
+
+
+@pytest.mark.parametrize(
+    ("share", "varied", "tells"),
+    [(0.21, False, True), (0.19, False, False), (0.19, True, True), (0.5, True, True)],
+)
+def test_pixels_tell_where_orders_are_in_a_wide_picture_or_one_of_several_colours(
+    share: float, varied: bool, tells: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    found = probed(monkeypatch, share, varied)
+    assert found is not None
+    assert found.places == tells
+
+
+def test_the_parameters_come_first_and_curves_after_them(monkeypatch: pytest.MonkeyPatch) -> None:
+    found, own = probed(monkeypatch, 1.0, True), len(PARAMETERS)
+    assert found is not None
+    assert found.with_curves is not None
+    normal, score = found.with_curves
+    assert (normal.shape, score.shape) == ((100, own + 3, own + 3), (100, own + 3))
+    assert found.normal.tolist() == normal[:, :own, :own].tolist()
+    assert found.score.tolist() == score[:, :own].tolist()
+    assert found.pixel.tolist() == list(range(100))
+    assert (found.nm_per_px, found.step_nm) == (2.0, 5.0)
+
+
+@pytest.mark.parametrize("model", [{"single": False}, {"pixels": 39}])
+def test_other_patterns_and_fewer_than_forty_pixels_say_nothing(
+    model: dict[str, Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert probed(monkeypatch, 1.0, True, **model) is None
+
+
+def test_wavelengths_are_those_between_columns_whichever_way_they_run() -> None:
+    columns = torch.tensor([[100.0, 300.0], [140.0, 260.0], [200.0, 250.0]])
+
+    def trace(where: torch.Tensor, depth: torch.Tensor, orders: tuple[int, ...]) -> Any:
+        assert depth.tolist() == [7.0, 5.0]
+        return SimpleNamespace(orders={order: SimpleNamespace(columns=columns) for order in orders})
+
+    model = SimpleNamespace(trace=trace, bands=SimpleNamespace(centres_nm=np.array([400.0, 500.0, 550.0])))
+    pixels = SimpleNamespace(depth_mm=np.array([[5.0, 6.0], [7.0, 8.0]]))
+    scan: Any = SimpleNamespace(model=model, pixels=pixels)
+    # 150 nm over a hundred columns and over fifty, 75 in the mean.
+    assert probe_module._nm_per_px(scan, np.array([2, 0])) == pytest.approx(2.0)
