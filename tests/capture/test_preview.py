@@ -181,6 +181,10 @@ def test_a_pixel_has_the_colour_of_its_site() -> None:
     assert seen["GRBG"] == ["green", "red", "blue", "green"]
     assert seen["GBRG"] == ["green", "blue", "red", "green"]
     assert site_colour(0, 0, "MONO") == ""
+    names = {"R": "red", "G": "green", "B": "blue"}
+    for bayer in PATTERNS:
+        for y, x in np.ndindex(6, 6):
+            assert site_colour(x, y, bayer) == names[bayer[2 * (y % 2) + x % 2]]
 
 
 def test_cells_of_a_monochrome_camera_keep_their_places() -> None:

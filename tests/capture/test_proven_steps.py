@@ -66,6 +66,8 @@ class Bench:
         self.kept.append(shot.index)
 
     def sentence(self, snap: Callable[[Shot], object]) -> str:
+        if self.cause == "The lamp fails.":
+            snap(SHOTS[10])
         if self.cause == "unplugged":
             raise DeviceError("no camera")
         return self.cause
@@ -128,7 +130,7 @@ def test_what_stays_wrong_is_an_error_with_its_cause_or_remedy(cause: str, reaso
     bench.cause = cause
     with pytest.raises(PictureError, match=rf"after 4 exposures: it still shows.*{reason}"):
         bench.shots.take(LINE)
-    assert len(bench.taken) == 4
+    assert bench.taken[4:] == ([(10, 1, 100.0, True)] if cause == "The lamp fails." else [])
     assert bench.written == {}
 
 
@@ -275,4 +277,12 @@ def test_frames_right_before_a_missing_one_are_taken_again_where_nothing_tells_o
     wrong = Bench(*[is_right] * 13, late, is_right)
     wrong.shots.learn(stored, ())
     assert wrong.taken == [(13, 1, 100.0, True)]
-    assert 13 in wrong.kept
+    assert sorted(wrong.kept) == list(range(len(SHOTS))), "a wrong one only once it is right"
+
+
+def test_thirty_two_frames_before_a_missing_one_are_taken_again_at_most() -> None:
+    bench, stored = Bench(untold), Stored()
+    stored.plan = PLAN.model_copy(update={"spectral": LineComb(width_px=1, step_px=1, period_px=40)})
+    count = len(tuple(stored.plan.shots()))
+    bench.shots.learn(stored, {count - 1})  # type: ignore[arg-type]
+    assert [index for index, *_ in bench.taken] == list(range(count - 33, count - 1))

@@ -4,15 +4,28 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import cache
+from typing import Any
 
 import numpy as np
 import pytest
 
-from dsl_core.calibration.film.depth_stage import StageData, StageFilter, fit_first_orders
-from dsl_core.calibration.film.fit import grating_columns
+from dsl_core.calibration.film.depth_stage import (
+    StageData,
+    StageFilter,
+    _filters,
+    _grid_px,
+    _middle,
+    _require_filters,
+    _shifts_nm,
+    _warnings,
+    fit_first_orders,
+)
+from dsl_core.calibration.film.fit import OrderSamples, grating_columns
+from dsl_core.calibration.film.order_columns import TileColumns
 from dsl_core.calibration.film.order_paths import LineFrames
 from dsl_core.errors import CalibrationError
-from dsl_core.model.rig import Film
+from dsl_core.model.calibration.depth_stage import FilterSeen
+from dsl_core.model.rig import CorrespondenceGrid, Film, Rig
 from dsl_core.optics.filters import nominal_filter
 from dsl_core.progress import NoProgress
 from tests.cases.order_lines import SIZE, TRUE_FILM, line_frames, plane_at, rig_with
@@ -62,3 +75,90 @@ def test_a_wrong_filter_is_named_with_its_wavelength() -> None:
 def test_a_capture_without_first_orders_is_named() -> None:
     with pytest.raises(CalibrationError, match="600 mm, filter of 620 nm: no first orders were found"):
         fit_first_orders(rig_with(Film()), PLANES, stage_data({(0, 2): None}), NoProgress())
+
+
+NONE = StageData(DEPTHS_MM, 0.01, (), stage_data().filters, stage_data().frames, 6)
+
+
+def shifted(nm: dict[tuple[int, int], float]) -> tuple[Rig, OrderSamples]:
+    """Samples of the true film, those of some captures as of light so many nm longer."""
+    rig = TRUTH
+    parts = []
+    for position, name, order in np.ndindex(2, 3, 2):
+        pixels = np.arange(1000, 1060)
+        few = TileColumns(
+            1 - 2 * order, FILTERS_NM[name], pixels, pixels, np.full(60, DEPTHS_MM[position]), np.zeros(60),
+            np.full(60, 0.01),
+        )  # fmt: skip
+        parts.append((position, name, few))
+    samples = OrderSamples.of(parts)
+    columns = grating_columns(rig, samples)
+    per_nm = rig.projector.fx_px * rig.film.lines_per_mm * 1e-6
+    for (position, name), off in nm.items():
+        mine = (samples.position == position) & (samples.filter == name)
+        columns = columns + mine * samples.order * off * per_nm
+        # A few that see something else say nothing.
+        columns[np.flatnonzero(mine)[:40:2]] += 30.0
+    return rig, replace(samples, column_px=columns)
+
+
+def test_light_seems_off_by_the_median_of_both_orders_in_their_own_directions() -> None:
+    rig, samples = shifted({(1, 2): 3.0, (0, 1): -2.0})
+    found = _shifts_nm(rig, NONE, samples)
+    wanted = np.zeros((2, 3))
+    wanted[1, 2], wanted[0, 1] = 3.0, -2.0
+    assert found == pytest.approx(wanted, abs=1e-6)
+    per_nm = rig.projector.fx_px * rig.film.lines_per_mm * 1e-6
+    seen = _filters(rig, NONE, samples)
+    assert [each.filter_nm for each in seen] == list(FILTERS_NM)
+    assert seen[1].shift_px == pytest.approx((-2.0 * per_nm, 0.0), abs=1e-6)
+    assert seen[2].shift_px == pytest.approx((0.0, 3.0 * per_nm), abs=1e-6)
+    assert [each.tiles for each in seen] == [240] * 3
+    assert seen[0].effective_nm == FILTERS_NM[0]
+
+
+def test_a_filter_is_doubtful_from_three_tenths_of_a_pixel_on() -> None:
+    def seen(*shift_px: float) -> FilterSeen:
+        return FilterSeen(filter_nm=540.0, effective_nm=541.0, measured=True, shift_px=shift_px, tiles=9)
+
+    assert _warnings(NONE, [seen(0.29, -0.29)]) == []
+    (first,) = _warnings(NONE, [seen(0.0, 0.31)])
+    assert first.startswith("Through the filter of 540 nm first orders are +0.31 px off at 850 mm")
+    assert len(_warnings(NONE, [seen(-0.31, 0.31), seen(0.4, 0.0)])) == 3
+
+
+@pytest.mark.parametrize(("share", "fits"), [(0.99, True), (1.01, False)])
+def test_a_filter_that_is_off_by_a_limit_is_named_with_how_far(share: float, fits: bool) -> None:
+    rig = TRUTH
+    per_nm = rig.projector.fx_px * rig.film.lines_per_mm * 1e-6
+    rig, samples = shifted({(1, 1): -0.5 * share / per_nm})
+    if fits:
+        _require_filters(rig, rig, NONE, samples, 0.5)
+    else:
+        with pytest.raises(CalibrationError, match=r"850 mm, filter of 540 nm: .* about -1\.\d nm off"):
+            _require_filters(rig, rig, NONE, samples, 0.5)
+
+
+def grid(rows: tuple[float, ...] = (10.0, 30.0), columns: tuple[float, ...] = (20.0, 60.0, 100.0)) -> Any:
+    """Power laws whose coefficients tell their node: alpha is the number of the law, beta 1, gamma 5."""
+    shape = (2, 3, len(rows), len(columns))
+    laws = np.stack([np.arange(np.prod(shape)), np.ones(np.prod(shape)), np.full(np.prod(shape), 5.0)], 1)
+    return CorrespondenceGrid(
+        orders=(1, -1), wavelengths_nm=(450.0, 550.0, 650.0), rows_px=rows, columns_px=columns,
+        depth_unit_mm=500.0, depth_range_mm=(500.0, 1000.0), coefficients=tuple(laws.ravel().tolist()),
+    )  # fmt: skip
+
+
+def test_curves_are_drawn_at_the_node_nearest_to_the_middle_of_the_picture() -> None:
+    assert _middle(TRUTH, None) == (36, 56)  # of rows 0 to 71 and columns 0 to 111
+    assert _middle(TRUTH, grid()) == (30, 60)
+    assert _middle(TRUTH, grid((36.0, 34.0), (54.0, 58.0))) == (36, 54)
+
+
+def test_columns_of_a_grid_are_power_laws_linear_between_wavelengths() -> None:
+    laws, depth = grid(), np.array([500.0, 750.0])
+    # Order -1 is the second of two, of three wavelengths, two rows and three columns each.
+    first = 18 + 6 * np.arange(3) + 3 * 1 + 1
+    for nm, alpha in ((450.0, first[0]), (575.0, first[1] + 0.25 * 6), (650.0, first[2]), (700.0, first[2])):
+        found = _grid_px(laws, depth, -1, nm, (30, 60))
+        assert found == pytest.approx(alpha * depth / 500 + 5)

@@ -12,7 +12,6 @@ import torch
 from dsl_core.calibration.light.chain_equations import (
     BANDS_NM,
     CHUNK,
-    MODEL_ERROR,
     STEP_NM,
     LineScan,
     Unknowns,
@@ -32,6 +31,7 @@ from dsl_core.calibration.light.chain_equations import (
 from dsl_core.model.plan import ScanLines
 from dsl_core.model.spectral import SpectralCurve
 from dsl_core.optics.lines.profile import ProfileTable
+from dsl_core.optics.pixel_model import MODEL_ERROR
 from dsl_core.optics.spectra import hat_moments
 from dsl_core.simulation.published_rig import published_rig
 

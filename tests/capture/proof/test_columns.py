@@ -149,3 +149,11 @@ def test_rows_take_as_many_bits_as_their_number_needs() -> None:
     assert _of_columns(GrayCode(rows=True), pairs, (256, 5)) == [*range(8), *range(11, 19)]
     assert _of_columns(GrayCode(rows=True), pairs, (257, 4)) == [*range(9), *range(11, 20)]
     assert _of_columns(GrayCode(rows=False), pairs, (256, 5)) == list(range(22))
+
+
+def test_only_neighbours_that_are_both_trusted_say_whether_columns_rise() -> None:
+    row, trusted = np.arange(90, dtype=np.int32), np.ones(90, bool)
+    # From the seventieth on every second one is not trusted, and far below its neighbours.
+    row[71::2] -= 15
+    trusted[71::2] = False
+    assert _Neighbours((1, 90), trusted).judge(row) == (0.0, 1.0)

@@ -59,3 +59,23 @@ def test_a_missing_or_empty_file_is_told(store: FrameStore) -> None:
     store.path(1).write_bytes(b"")
     with pytest.raises(ChunkError, match="cut off"):
         store.read_rows(1, slice(0, 2))
+
+
+def test_a_whole_of_one_block_is_that_block(tmp_path: Path) -> None:
+    small = np.arange(600, dtype=np.uint16).reshape(20, 30) % 7
+    made = FrameStore(tmp_path / "few", 1, 20, 30)
+    made.create()
+    made.write(0, small)
+    np.testing.assert_array_equal(made.read_rows(0, slice(3, 9)), small[3:9])
+    part, begins = blocks_of(made.path(0).read_bytes(), 0, 600)
+    assert begins == 0
+    assert HEADER.unpack_from(part)[4] == 1200
+
+
+def test_the_last_block_comes_with_the_one_before_it(store: FrameStore) -> None:
+    # 2.5 blocks of 256 KiB: the last begins at twice as many bytes.
+    part, begins = blocks_of(store.path(0).read_bytes(), 600_000, 660_000)
+    assert begins == 1 << 18
+    assert HEADER.unpack_from(part)[4] == 660_000 - (1 << 18)
+    middle, begins = blocks_of(store.path(0).read_bytes(), 1 << 18, 1 << 19)
+    assert (begins, HEADER.unpack_from(middle)[4]) == (1 << 18, 1 << 18)

@@ -9,7 +9,7 @@ import torch
 from dsl_core.model.plan import CapturePlan, Columns, GrayCode, LineComb, ScanLines, Setting, SpectralSet
 from dsl_core.model.rig import Rig
 from dsl_core.model.spectral import WavelengthGrid
-from dsl_core.optics.correspondence import correspondence
+from dsl_core.optics.correspondence import correspondence, triangulate, zero_order
 from dsl_core.optics.image_formation import BlurredProfiles, one_if_grey
 from dsl_core.optics.lines.line_set import LineSet
 from dsl_core.optics.pixel_model import PixelModel
@@ -253,3 +253,18 @@ def test_amplitudes_are_weighted_least_squares_that_a_ridge_keeps_apart() -> Non
         own = np.linalg.solve(normal, design.T @ (weight[p] * y[p]).numpy())
         assert float(total[p]) == pytest.approx(own.sum())
         assert float(left[p]) == pytest.approx(float(weight[p].numpy() @ (y[p].numpy() - design @ own) ** 2))
+
+
+def test_a_column_that_meets_no_ray_has_no_first_orders_and_harms_no_other() -> None:
+    rig = small_rig()
+    profiles = radiance_profiles(rig, CapturePlan(code=GrayCode(rows=False), spectral=random_columns()))
+    pixels = torch.tensor([40 * 222 + 100, 41 * 222 + 101])
+    column = float(zero_order(rig, pixels[:1], torch.tensor([700.0], dtype=torch.float64))[0])
+    columns = torch.tensor([column, column - 5000.0])
+    depth, _ = triangulate(rig, pixels, columns.double())
+    assert torch.isfinite(depth).tolist() == [True, False]
+    found = first_order_share(rig, profiles, pixels, columns)
+    assert float(found[0].abs().max()) > 0
+    assert not found[1].any()
+    alone = first_order_share(rig, profiles, pixels[:1], columns[:1])
+    assert found[:1].numpy() == pytest.approx(alone.numpy(), rel=1e-5)
