@@ -4,11 +4,14 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import cache
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
+import torch
 
+from dsl_core.calibration.film import depth_stage
 from dsl_core.calibration.film.depth_stage import (
     StageData,
     StageFilter,
@@ -19,6 +22,7 @@ from dsl_core.calibration.film.depth_stage import (
     _shifts_nm,
     _warnings,
     fit_first_orders,
+    stage_curves,
 )
 from dsl_core.calibration.film.fit import OrderSamples, grating_columns
 from dsl_core.calibration.film.order_columns import TileColumns
@@ -26,6 +30,7 @@ from dsl_core.calibration.film.order_paths import LineFrames
 from dsl_core.errors import CalibrationError
 from dsl_core.model.calibration.depth_stage import FilterSeen
 from dsl_core.model.rig import CorrespondenceGrid, Film, Rig
+from dsl_core.optics.correspondence import GratingModel
 from dsl_core.optics.filters import nominal_filter
 from dsl_core.progress import NoProgress
 from tests.cases.order_lines import SIZE, TRUE_FILM, line_frames, plane_at, rig_with
@@ -162,3 +167,35 @@ def test_columns_of_a_grid_are_power_laws_linear_between_wavelengths() -> None:
     for nm, alpha in ((450.0, first[0]), (575.0, first[1] + 0.25 * 6), (650.0, first[2]), (700.0, first[2])):
         found = _grid_px(laws, depth, -1, nm, (30, 60))
         assert found == pytest.approx(alpha * depth / 500 + 5)
+
+
+def test_curves_of_film_and_grid_end_where_light_would_come_from_outside_the_frame(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(depth_stage, "apply_depth_stage", lambda record, rig: rig)
+    monkeypatch.setattr("dsl_core.optics.correspondence.HybridModel", GratingModel)
+    seen = (
+        FilterSeen(filter_nm=540.0, effective_nm=541.0, measured=True, shift_px=(0.1, -0.2), tiles=9),
+        FilterSeen(filter_nm=690.0, effective_nm=690.0, measured=True, shift_px=(0.0, 0.3), tiles=9),
+    )
+    positions = [SimpleNamespace(distance_mm=z) for z in (500.0, 900.0)]
+    record: Any = SimpleNamespace(correspondence=grid(), positions=positions, filters=seen)
+    curves = stage_curves(record, TRUTH)
+    assert [(each.order, each.filter_nm) for each in curves] == [(1, 540), (1, 690), (-1, 540), (-1, 690)]
+    where = torch.full((41,), 30 * 112 + 60)
+    for each, (nm, shift) in zip(curves, [(541.0, (0.1, -0.2)), (690.0, (0.0, 0.3))] * 2, strict=True):
+        assert each.depth_mm == pytest.approx(np.linspace(500, 900, 41))
+        exact = GratingModel(TRUTH).exact(where, torch.as_tensor(each.depth_mm), each.order, np.array([nm]))
+        inside = exact.inside(640, 360)[0].numpy()
+        assert np.isfinite(each.film_px).tolist() == inside.tolist()
+        assert each.film_px[inside] == pytest.approx(exact.columns[0].numpy()[inside])
+        assert each.grid_px is not None
+        laws = _grid_px(grid(), each.depth_mm, each.order, nm, (30, 60))
+        assert np.isfinite(each.grid_px).tolist() == inside.tolist()
+        assert each.grid_px[inside] == pytest.approx(laws[inside])
+        assert each.shift_px == pytest.approx(each.order * np.array(shift))
+        assert each.seen_mm.tolist() == [500.0, 900.0]
+        ends = np.where(inside[[0, 40]], each.film_px[[0, 40]] + each.shift_px, np.nan)
+        assert each.seen_px == pytest.approx(ends, nan_ok=True)
+    plain = SimpleNamespace(**{**vars(record), "correspondence": None})
+    assert stage_curves(plain, TRUTH)[0].grid_px is None  # type: ignore[arg-type]

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -16,6 +19,7 @@ from dsl_core.calibration.geometry.bundle import (
     _solve,
     _summary,
     _weights,
+    adjust,
     flatness,
     move,
     project,
@@ -23,6 +27,7 @@ from dsl_core.calibration.geometry.bundle import (
     vector_of,
 )
 from dsl_core.calibration.geometry.projector_corners import PoseObservation
+from dsl_core.errors import CalibrationError
 from dsl_core.model.board import corner_positions_mm
 from tests.cases import board_poses as case
 
@@ -72,6 +77,7 @@ class Linear:
         rng = np.random.default_rng(seed)
         self.slopes = rng.standard_normal((2, count, 2, 3))
         self.seen = rng.standard_normal((2, count, 2))
+        self.pose_of = np.zeros(count, int)
 
     def evaluate(self, parameters: Floats) -> tuple[Floats, Floats, Floats, Floats]:
         camera, projector = self.slopes @ parameters - self.seen
@@ -137,3 +143,66 @@ def test_sides_are_those_of_squares_whose_corners_were_both_seen() -> None:
     assert np.count_nonzero(sides > 45) == columns * (rows - 1)
     # Without the first corner two sides are missing.
     assert len(_sides(stretched[1:], np.arange(1, len(board)), case.BOARD)) == len(sides) - 2
+
+
+@pytest.mark.parametrize(("corners", "enough"), [(2, False), (3, True)])
+def test_corners_have_to_say_more_than_there_is_to_find(
+    corners: int, enough: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Four numbers a corner, nine unknowns; of six corners some are outliers."""
+    problem = Linear(6)
+    problem.slopes = np.random.default_rng(2).standard_normal((2, 6, 2, 9))
+    problem.seen = problem.slopes @ np.linspace(-1, 1, 9)
+    module = "dsl_core.calibration.geometry.bundle."
+    monkeypatch.setattr(module + "Problem", lambda _: problem)
+    monkeypatch.setattr(module + "_weights", lambda *_: (np.arange(6) < corners).astype(float))
+    if enough:
+        assert adjust([], np.zeros(9)).used.sum() == 3
+    else:
+        with pytest.raises(CalibrationError, match="most corners are outliers"):
+            adjust([], np.zeros(9))
+
+
+def test_corners_far_off_do_not_count_and_those_off_by_little_weigh_less(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    rng, problem = np.random.default_rng(4), Linear(200)
+    truth = np.array([0.3, -0.2, 0.1])
+    problem.seen = problem.slopes @ truth + 0.01 * rng.standard_normal((2, 200, 2))
+    problem.seen[0, :20] += 5.0
+    monkeypatch.setattr("dsl_core.calibration.geometry.bundle.Problem", lambda _: problem)
+    found = adjust([], np.zeros(3))
+    assert not found.used[:20].any()
+    assert found.used[20:].mean() > 0.97
+    assert found.parameters == pytest.approx(truth, abs=0.005)
+    assert found.camera_residual_px == pytest.approx(problem.slopes[0] @ found.parameters - problem.seen[0])
+
+
+def test_weights_are_one_up_to_four_deviations_then_less_and_nothing_where_errors_do_harm() -> None:
+    problem = Linear(100)
+    for spread, far, weight in (
+        # Within four deviations; beyond them and harmless; beyond them and not.
+        (0.01, 0.055, 1.0), (0.01, 0.079, 4 / (0.079 / 0.014826)), (0.01, 0.081, 0.0), (0.05, 0.29, 1.0),
+    ):  # fmt: skip
+        problem.seen[:] = np.where(np.arange(100) % 2, spread, -spread)[:, None]
+        problem.seen[1, 7, 0] = far
+        found = _weights(problem, np.zeros(3), np.ones(100, bool))  # type: ignore[arg-type]
+        assert found[7] == pytest.approx(weight, rel=1e-3)
+        assert np.delete(found, 7) == pytest.approx(1.0)
+
+
+def test_a_fit_that_ends_nowhere_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    asked = list[dict[str, Any]]()
+
+    def lost(residuals: Any, start: Any, **more: Any) -> Any:
+        asked.append(more)
+        return SimpleNamespace(x=np.full(3, np.nan))
+
+    monkeypatch.setattr("scipy.optimize.least_squares", lost)
+    one = np.ones(2)
+    with pytest.raises(CalibrationError, match="did not converge"):
+        _solve(Linear(), np.zeros(3), (one, one), np.ones(40))  # type: ignore[arg-type]
+    # Levenberg and Marquardt, whatever the units of the parameters, within two hundred looks.
+    jacobian = asked[0].pop("jac")(np.zeros(3))
+    assert jacobian.shape == (160, 3)
+    assert asked == [{"method": "lm", "x_scale": "jac", "max_nfev": 200}]

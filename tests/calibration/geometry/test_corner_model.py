@@ -226,3 +226,14 @@ def test_a_corner_without_contrast_or_far_from_where_it_was_sought_is_none() -> 
     assert np.isnan(fitted(corner(4.6), 15.0)[:2]).all()
     assert np.isfinite(fitted(corner(), 15.0, (33.7, 32.3))).all()
     assert np.isnan(fitted(corner(), 15.0, (33.9, 32.6))[:2]).all()
+
+
+def test_a_window_of_nothing_has_levels_of_nothing() -> None:
+    model = np.random.default_rng(1).standard_normal((2, 20, 6))
+    values, usable = np.ones((2, 20)), np.ones((2, 20), bool)
+    usable[1, 3:] = False
+    found = _levels(model, values, usable)
+    assert found[0] == pytest.approx(np.linalg.lstsq(model[0], values[0])[0], rel=1e-5)
+    # Three pixels and six levels: any that explain them will do, and none is far from nothing.
+    assert model[1, :3] @ found[1] == pytest.approx(values[1, :3], abs=1e-4)
+    assert np.abs(found[1]).max() < 10

@@ -290,3 +290,17 @@ def test_what_columns_are_off_by_is_off_in_depth_by_their_slope_rms_over_what_is
         squares += ((0.3 / slope) ** 2)[(seen > -0.5) & (seen < rig.projector.width_px - 0.5)].tolist()
     assert 0 < len(squares) < 5 * 96, "some of it is out of the projector's view"
     assert depth_std == pytest.approx(np.mean(squares) ** 0.5, rel=1e-6)
+
+
+def test_residuals_beyond_two_and_a_half_deviations_pull_as_those_at_it() -> None:
+    rng = np.random.default_rng(8)
+    design = np.ones((400, 3)) * [1.0, 0.0, 0.0]
+    seen = np.hypot(0.01, 0.002) * rng.standard_normal(400)
+    seen[:40] += 0.2
+    stage = LinearStage(design, seen, 0.01)
+    numbers, _ = _gauss_newton(stage, np.zeros(3), np.array([0]), False)  # type: ignore[arg-type]
+    off = stage.residual_px(numbers) / np.hypot(0.01, 0.002)
+    scale = max(1.0, 1.4826 * float(np.median(np.abs(off))))
+    pulls = [abs(float(np.clip(off / scale, -limit, limit).mean())) for limit in (2.5, 3.0, 2.0)]
+    assert pulls[0] < 3e-3
+    assert min(pulls[1:]) > 0.02

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from dsl_core.calibration.geometry.bundle import Adjustment, Problem, rotation_of, vector_of
 from dsl_core.calibration.geometry.projector_corners import PoseObservation
-from dsl_core.calibration.geometry.solve import HARMFUL_PX, _fitting, calibrate_geometry, initial
+from dsl_core.calibration.geometry.solve import HARMFUL_PX, _fitting, calibrate_geometry, initial, without
 from dsl_core.errors import CalibrationError
 from dsl_core.model.board import Board
 from dsl_core.model.calibration.geometry import GeometryCalibration, LensDeviation
@@ -216,3 +216,22 @@ def test_a_pose_fits_unless_it_is_far_off_or_lost_many_corners_and_does_harm(
     used[40 : 40 + lost] = False
     fit = Adjustment(np.zeros(0), np.zeros(0), residuals[0], residuals[1], used)
     assert _fitting(poses, fit).tolist() == [True, True, fits, True, True]
+
+
+@pytest.mark.parametrize(
+    ("matrix", "shift"), [(np.diag([-5.0, 5, 1]), 1.0), (np.diag([np.nan, 5, 1]), 1.0), (np.eye(3), np.inf)]
+)
+def test_a_lens_that_opencv_cannot_find_is_refused(
+    matrix: NDArray[np.float64], shift: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def answer(boards: list[Any], *_: Any, **__: Any) -> Any:
+        return 0.0, matrix, np.zeros(5), [np.zeros(3)] * len(boards), [np.full(3, shift)] * len(boards)
+
+    monkeypatch.setattr("cv2.calibrateCamera", answer)
+    with pytest.raises(CalibrationError, match="camera cannot be calibrated from these poses: no focal"):
+        initial(poses_seen(), CAMERA_PX, PROJECTOR_PX)
+
+
+def test_parameters_without_poses_keep_the_lenses() -> None:
+    parameters = np.arange(24.0 + 18)
+    assert without(parameters, [1]).tolist() == [*range(30), *range(36, 42)]

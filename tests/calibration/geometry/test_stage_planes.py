@@ -21,6 +21,7 @@ from dsl_core.calibration.geometry.stage_planes import (
     require_agreement,
     require_plane,
     require_steps,
+    require_tiles,
     shared_parameters,
 )
 from dsl_core.errors import CalibrationError
@@ -126,3 +127,28 @@ def test_steps_flatness_and_agreement_have_limits() -> None:
     require_agreement(3.9, 1.0, 0.1, 1.0)
     with pytest.raises(CalibrationError, match=r"move by 4\.1 of"):
         require_agreement(4.1, 1.0, 0.1, 1.0)
+
+
+def test_lenses_and_pose_move_along_the_root_of_their_covariance() -> None:
+    root = 1e-3 * np.random.default_rng(1).standard_normal((SHARED, SHARED))
+    stage = problem(root @ root.T)
+    values = numbers()
+    values[3] = 2.0
+    assert stage.shared(values) == pytest.approx(shared_parameters(RIG) + 2.0 * stage.root[:, 3])
+    assert stage.root @ stage.root.T == pytest.approx(root @ root.T)
+    assert problem().shared(values) == pytest.approx(shared_parameters(RIG))
+    assert stage.prior_weight[:SHARED].tolist() == [1.0] * SHARED
+    assert stage.prior_weight[SHARED : SHARED + 3].tolist() == [0.0] * 3
+    assert stage.prior_weight[GAIN:] == pytest.approx([1e4, 100, 100, 100])
+
+
+@pytest.mark.parametrize(("tiles", "enough"), [(30, True), (29, False)])
+def test_a_position_needs_thirty_tiles_and_a_stage_two_positions(tiles: int, enough: bool) -> None:
+    part = ColumnSamples(np.zeros((tiles, 2)), np.zeros(tiles), np.ones(tiles))
+    if enough:
+        require_tiles([600.0, 700.0], [part, part])
+        with pytest.raises(CalibrationError, match="at two or more positions, not 1"):
+            require_tiles([600.0], [part])
+    else:
+        with pytest.raises(CalibrationError, match="position 600 mm only 29 tiles"):
+            require_tiles([600.0, 700.0], [part, part])

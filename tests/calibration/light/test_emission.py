@@ -8,8 +8,10 @@ import numpy as np
 import pytest
 
 from dsl_core.calibration.light.emission import (
+    SmoothCurve,
     _check_leds,
     _envelope,
+    _smoothed,
     _variance,
     _with_white,
     measured_emission,
@@ -219,3 +221,23 @@ def test_scales_reach_from_half_to_four_times(scale: float, monkeypatch: pytest.
     prior = (nearest / scale) ** 2 * (1 + d) * np.exp(-d)
     wanted = prior @ np.linalg.solve(prior + np.eye(120) * (0.3 / peak) ** 2, values)
     assert found.values == pytest.approx(wanted, abs=1e-9)
+
+
+def test_curves_share_a_scale_and_what_is_left_at_their_ends_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    nm = np.arange(500.0, 520.0)
+    leds = np.zeros((3, 20))
+    leds[0, 5:15], leds[1, 5:15], leds[2, 5:15] = 2.0, 3.0, 5.0
+    leds[0, 0], leds[1, -1], leds[1, 1], leds[2, 3] = 0.2, 0.6, 3.0, -1.0
+
+    def same(wavelengths: np.ndarray, values: np.ndarray, std: np.ndarray) -> SmoothCurve:
+        return SmoothCurve(values, std, 10 * values.max())
+
+    monkeypatch.setattr("dsl_core.calibration.light.emission.smooth_curve", same)
+    found = _smoothed(nm, leds, np.full((3, 20), 0.1), (1.02, 0.01), 7)
+    scale = EMISSION_SUM_NM / leds.sum()
+    assert [max(curve.values) for curve in found.curves] == pytest.approx([2 * scale, 3 * scale, 5 * scale])
+    assert found.curves[2].values[3] == 0.0
+    assert found.curves[1].std == pytest.approx([0.1 * scale] * 20)
+    assert found.end_share == pytest.approx(0.2)
+    assert found.smoothing_nm == (20.0, 30.0, 50.0)
+    assert (found.additivity, found.additivity_std, found.readings) == (1.02, 0.01, 7)

@@ -163,3 +163,8 @@ def test_a_ratio_counts_from_three_deviations_on() -> None:
         else:
             with pytest.raises(CalibrationError, match="through 1 filters"):
                 fit_efficiency(1, [few[0], other])
+
+
+def test_a_curve_has_a_value_every_two_nanometres_over_all_nodes() -> None:
+    curve = fit_efficiency(1, samples(1, 0, range(450, 651, 50))).curve
+    assert list(curve.wavelengths_nm) == [400.0 + 2 * k for k in range(151)]

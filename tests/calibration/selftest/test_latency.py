@@ -137,3 +137,16 @@ def test_when_all_are_late_at_the_longest_wait_it_is_the_wait() -> None:
     _, _, stale = trials(readings, right)
     assert stale == np.count_nonzero(longest > 5) - 1
     assert first_failing(readings, right) is None
+
+
+def test_only_frames_after_the_reference_say_how_long_showing_blocks() -> None:
+    """The last of the reference pictures, and what was read before it, are not counted."""
+    readings = latency_readings(0.0, [400, 100])
+    times = readings.timestamp_s.copy()
+    last = int(np.flatnonzero(readings.since_show >= 2).max())
+    plain = check_latency(readings, 25.0, True, 0.0).blocking_ms
+    for row in range(1, last + 1):
+        moved = times.copy()
+        moved[row:] += 0.3
+        found = check_latency(replace(readings, timestamp_s=moved), 25.0, True, 0.0).blocking_ms
+        assert (found.value, found.std) == pytest.approx((plain.value, plain.std), abs=1e-9)

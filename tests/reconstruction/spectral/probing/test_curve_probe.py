@@ -87,3 +87,36 @@ def test_each_colour_has_its_own_place_in_the_equations() -> None:
     found = normal_of_all_curves((changes.mT @ changes)[None], 1)[0]
     assert found.numpy() == pytest.approx((flat.T @ flat).numpy())
     assert of_all_curves(changes.sum(1)[None], 1)[0].numpy() == pytest.approx(flat.sum(0).numpy())
+
+
+def test_differences_known_to_better_than_a_little_over_a_percent_count_without_their_noise() -> None:
+    """Knots that nothing couples, but one to another parameter, whose prior leaves it a part."""
+    std = np.array([0.001, 0.002, 0.004, 0.006, 0.008, 0.0119, 0.0121, 0.02])
+    off = np.array([0.05, -0.04, 0.03, 0.06, -0.05, 0.02, 0.9, -0.9])
+    normal, score = np.diag(np.r_[300.0, std**-2]), np.r_[40.0, off * std**-2]
+    normal[0, 1] = normal[1, 0] = 2000.0
+    own = 300.0 + 1 / 0.1**2
+    first = std[0] ** -2 - 2000.0**2 / own
+    found = np.r_[(score[1] - 2000.0 / own * 40.0) / first, off[1:6]]
+    variance = np.r_[1 / first, std[1:6] ** 2]
+    square = np.mean(found**2 - variance)
+    answer = curve_misfit(normal[None] / 2, score[None] / 2, np.array([2.0]), np.array([0.1]), 4.0)
+    assert answer is not None
+    assert answer.rms == pytest.approx((2 / 3 * (square - 0.014**2)) ** 0.5)
+    assert answer.std == pytest.approx((2 / 3 * square / 12) ** 0.5)
+    # One of six less is too few, and pixels of no weight say nothing.
+    normal[6, 6] = 0.0121**-2
+    assert curve_misfit(normal[None], score[None], np.ones(1), np.array([0.1]), 4.0) is None
+    assert curve_misfit(normal[None], score[None], np.zeros(1), np.array([0.1]), 4.0) is None
+
+
+def test_knots_are_nine_from_blue_to_red() -> None:
+    changes = curve_changes(
+        torch.eye(301, dtype=torch.float64)[None], torch.ones((1, 301)).double(), np.arange(400.0, 701.0)
+    )
+    peaks = changes[0].argmax(0) + 400
+    # Beyond the outermost their curves go on level.
+    assert peaks[1:-1].tolist() == pytest.approx([430 + 28.75 * k for k in range(1, 8)], abs=1)
+    assert changes[0, :31, 0].tolist() == [1.0] * 31
+    assert changes[0, 260:, -1].tolist() == [1.0] * 41
+    assert changes[0, 259, -1] < 1
