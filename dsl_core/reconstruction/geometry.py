@@ -20,6 +20,7 @@ from dsl_core.patterns.gray_code import DecodedCode
 from dsl_core.progress import Progress
 from dsl_core.reconstruction.columns.code_dispute import Settled, has_peak, is_dark, settle
 from dsl_core.reconstruction.columns.column import MODEL_ERROR
+from dsl_core.reconstruction.columns.lateral_colour import material_std_px
 from dsl_core.reconstruction.columns.line_spread import wave_std_px
 from dsl_core.reconstruction.columns.maps import CHUNK, WHOLE_PX_STD, ColumnFinder, ColumnMaps
 from dsl_core.reconstruction.columns.pattern_column import radiance_profiles
@@ -186,7 +187,8 @@ def geometry_of(
     maps, flags = found.maps, found.flags
     waves = wave_std_px(maps.column_px.reshape(shape), maps.refined.reshape(shape), lines)
     common = math.hypot(rig.column_std_px, _zero_std_px(rig)) if shared_errors else 0.0
-    dq = np.hypot(np.hypot(maps.column_std_px, common), waves.ravel())
+    colours = material_std_px(rig, maps.column_px)
+    dq = np.hypot(np.hypot(maps.column_std_px, common), np.hypot(waves.ravel(), colours))
     good = (flags & int(DEPTH_INVALID)) == 0
     # In place, because maps of a large picture are large.
     depth_mm, depth_std = maps.depth_mm.reshape(shape), maps.slope_mm_per_px.reshape(shape)

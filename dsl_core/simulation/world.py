@@ -15,6 +15,7 @@ from dsl_core.optics.sensor import digitise
 from dsl_core.simulation.effects.base import LightPath, PatternView
 from dsl_core.simulation.effects.planner import EffectPlan
 from dsl_core.simulation.foreign.exposure import exposed
+from dsl_core.simulation.foreign.lenses import truth_of_colours
 from dsl_core.simulation.led_cycle import led_weights
 from dsl_core.simulation.rendered_scene import EffectRequest, RenderedScene, SceneInView, Setup
 from dsl_core.simulation.scenes.truth import Scene, SceneTruth
@@ -147,6 +148,14 @@ class World:
     def truth(self) -> SceneTruth:
         """Depth, normals, materials and shadow of the scene as it stands."""
         return self._in_view.truth
+
+    @property
+    def truth_of_colours(self) -> SceneTruth:
+        """The same as each pixel's own colour of the mosaic sees it, through lenses that may differ."""
+        foreign = self.setup.foreign
+        if foreign is None or not foreign.has("lateral-colour"):
+            return self.truth
+        return truth_of_colours(self.setup.true_rig, self.scene, foreign)
 
     def everything(self) -> LightPath:
         """All that happens to light before the scene as it stands."""

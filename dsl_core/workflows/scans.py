@@ -216,7 +216,7 @@ def twin_truth(rig: DeviceRig, grid: WavelengthGrid) -> Truth | None:
 
     if not isinstance(rig.camera, SimCamera):
         return None
-    truth = rig.camera.world.truth
+    truth = rig.camera.world.truth_of_colours
     materials = truth.materials
     return Truth(
         truth.depth_mm,

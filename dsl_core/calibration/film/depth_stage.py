@@ -88,7 +88,8 @@ def calibrate_depth_stage(
     """Refine lenses and pose by planes, and fit the film and its residual to first orders on them.
 
     With ``grid`` the data-driven model of the seed is fitted too. The rig's `geometry_covariance` is the
-    prior of its geometry, which stays as it is without one. Raises `CalibrationError` that names the position
+    prior of its geometry, which stays as it is without one; its `lateral_colour` is part of where first
+    orders are. Raises `CalibrationError` that names the position
     or the filter that does not fit.
     """
     progress.report("planes", 0, 1)
@@ -123,6 +124,7 @@ def calibrate_depth_stage(
         scatter_px=film.scatter_px,
         filter_index=film.angle.index,
         filters=seen,
+        lateral_colour=rig.lateral_colour,
         residual=residual,
         held_out=held_out,
         correspondence=fit_stage_grid(fitted, samples).grid if grid else None,

@@ -73,10 +73,19 @@ def depth_stage_figures(record: DepthStageCalibration) -> tuple[Figure, ...]:
             advice="Use more filters or positions, lines closer together, or longer exposures.",
         ),
         *film,
+        *_colours(record),
         *_filter_index(record),
         *_chain(record.chain),
         doubts("captures in doubt", record.warnings),
     )
+
+
+def _colours(record: DepthStageCalibration) -> tuple[Figure, ...]:
+    """How far the lenses put red and blue apart, where that was measured."""
+    if record.colours_apart_px is None:
+        return ()
+    apart_px, std_px = record.colours_apart_px
+    return (Figure(name="distance of red and blue", value=apart_px, unit="px", std=std_px),)
 
 
 def _plane_advice(record: DepthStageCalibration, worst: StagePosition) -> str:

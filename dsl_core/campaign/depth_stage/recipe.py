@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -39,10 +40,13 @@ from dsl_core.model.frames import FrameSource
 from dsl_core.model.geometry import Lens, Pose
 from dsl_core.model.placement import Placement
 from dsl_core.model.plan import CapturePlan, GrayCode, NoCode, ScanLines, Setting
-from dsl_core.model.result import DEPTH_INVALID
+from dsl_core.model.result import DEPTH_INVALID, Flag
 from dsl_core.model.rig import Rig
 from dsl_core.model.spectral import SpectralCurve
 from dsl_core.progress import Progress
+
+if TYPE_CHECKING:
+    from dsl_core.reconstruction.columns.lateral_colour import ColumnBends
 
 STAGE_NOTE, PLANE_NOTE = "stage.json", "plane.json"
 #: First orders are so much dimmer than white that lines may be exposed longer; the zero order saturates.
@@ -139,15 +143,18 @@ class DepthStageRecipe(Recipe[DepthStageCalibration]):
             [bench.kept(step, STAGE_NOTE, StageNote) for step in plain],
             len(filtered) // len(plain),
         )
+        seen = [self._plain(bench, step, progress) for step in plain]
         data = StageData(
             positions_mm=tuple(note.position_mm for note in notes),
             stage_std_mm=self.stage_std_mm,
-            columns=tuple(self._columns(bench, step, progress) for step in plain),
+            columns=tuple(each.columns for each in seen),
             filters=tuple(_filter_of(bench.kept(step, STAGE_NOTE, StageNote)) for step in filtered[:count]),
             frames=lambda position, name: self._lines(bench, filtered[position * count + name]),
             exposures=sum(bench.scan_of(step).plan.shot_count for step in steps),
         )
-        found = calibrate_depth_stage(bench.rig, data, progress, self.grid)
+        rig, apart_px = with_lateral_colour(bench.rig, seen)
+        found = calibrate_depth_stage(rig, data, progress, self.grid)
+        found = found.model_copy(update={"colours_apart_px": apart_px})
         if not self.chain:
             return found
         return found.model_copy(update={"chain": self._chain(bench, plain, found, progress)})
@@ -217,7 +224,7 @@ class DepthStageRecipe(Recipe[DepthStageCalibration]):
             if (note.camera, note.projector, note.pose) == geometry:
                 return note
         position_mm = bench.kept(step, STAGE_NOTE, StageNote).position_mm
-        columns = self._columns(bench, step, progress)
+        columns = self._plain(bench, step, progress).columns
         with naming(step):
             distance_mm, rms_px = lone_plane(bench.rig, position_mm, columns)
         camera, projector, pose = geometry
@@ -233,9 +240,9 @@ class DepthStageRecipe(Recipe[DepthStageCalibration]):
         bench.keep(step, PLANE_NOTE, note)
         return note
 
-    def _columns(self, bench: Bench, step: Step, progress: Progress) -> ColumnSamples:
+    def _plain(self, bench: Bench, step: Step, progress: Progress) -> SeenPlane:
         with naming(step):
-            return zero_order_columns(bench.scan_of(step), bench.rig, progress)
+            return seen_plane(bench.scan_of(step), bench.rig, progress)
 
     def _lines(self, bench: Bench, step: Step) -> LineFrames:
         with naming(step):
@@ -301,12 +308,40 @@ def _filter_of(note: StageNote) -> StageFilter:
     return StageFilter(note.filter_nm, note.transmission, note.measured)
 
 
-def zero_order_columns(source: FrameSource, rig: Rig, progress: Progress | None = None) -> ColumnSamples:
-    """Tile means of the columns of a scan with code and lines; raises what a reconstruction raises."""
+@dataclass(frozen=True)
+class SeenPlane:
+    """Tile means of the zero order's columns of a plane, and what neighbours say of lateral colour."""
+
+    columns: ColumnSamples
+    bends: ColumnBends | None
+
+
+def seen_plane(source: FrameSource, rig: Rig, progress: Progress | None = None) -> SeenPlane:
+    """The columns of a scan with code and lines; raises what a reconstruction raises."""
+    from dsl_core.reconstruction.columns.lateral_colour import ColumnBends
+
     # What the geometry leaves open is common to neighbouring pixels, and is about to be found.
     _, geometry = scanned_geometry(source, rig, progress, shared_errors=False)
-    invalid = (geometry.flags & int(DEPTH_INVALID)) != 0
-    return tile_columns(np.where(invalid, np.nan, geometry.column_px), geometry.column_std_px)
+    column_px = np.where((geometry.flags & int(DEPTH_INVALID)) != 0, np.nan, geometry.column_px)
+    refined = np.where((geometry.flags & int(Flag.NOT_REFINED)) != 0, np.nan, column_px)
+    return SeenPlane(
+        tile_columns(column_px, geometry.column_std_px), ColumnBends.of(rig, refined.astype(np.float64))
+    )
+
+
+def with_lateral_colour(rig: Rig, seen: Sequence[SeenPlane]) -> tuple[Rig, tuple[float, float] | None]:
+    """The rig with the lateral colour that planes show, if any; how far red and blue are apart, px.
+
+    First orders are seen in one colour each, so that their film would else be fitted to it.
+    """
+    from dsl_core.reconstruction.columns.lateral_colour import fit_lateral_colour
+
+    bends = [each.bends for each in seen if each.bends is not None]
+    if not bends:
+        return rig, None
+    found = fit_lateral_colour(rig, bends)
+    colour = found.colour if found.present else None
+    return rig.model_copy(update={"lateral_colour": colour}), (found.apart_px, found.apart_std_px)
 
 
 def lines_on_plane(source: FrameSource, rig: Rig) -> LineFrames:

@@ -6,6 +6,7 @@ from typing import Literal
 
 from dsl_core.model.base import Record
 from dsl_core.model.calibration.chain import ChainCorrection, apply_chain
+from dsl_core.model.calibration.lateral_colour import LateralColour
 from dsl_core.model.geometry import Lens, Pose
 from dsl_core.model.rig import ColumnResidual, CorrespondenceGrid, Film, Rig
 
@@ -69,8 +70,9 @@ class DepthStageCalibration(Record):
     (None in older records).
     ``film_std`` are deviations by the film's fields, what the geometry leaves open included. ``scatter_px``
     is that of single samples of first orders. ``filter_index`` is the effective index of the filters, with
-    its deviation, by how their light shifts with the angle of view; None where it does not. ``frames`` counts
-    the exposures.
+    its deviation, by how their light shifts with the angle of view; None where it does not.
+    ``lateral_colour`` is that of both lenses, None where none is seen; red and blue light of a line are
+    ``colours_apart_px`` columns from each other, with its deviation. ``frames`` counts the exposures.
     """
 
     schema_version: Literal[1] = 1
@@ -89,6 +91,8 @@ class DepthStageCalibration(Record):
     scatter_px: float
     filter_index: tuple[float, float] | None = None
     filters: tuple[FilterSeen, ...]
+    lateral_colour: LateralColour | None = None
+    colours_apart_px: tuple[float, float] | None = None
     residual: ColumnResidual
     held_out: tuple[HeldOutError, ...]
     correspondence: CorrespondenceGrid | None = None
@@ -115,6 +119,7 @@ def apply_depth_stage(record: DepthStageCalibration, rig: Rig) -> Rig:
             "film": record.film,
             "residual": record.residual,
             "correspondence": record.correspondence,
+            "lateral_colour": record.lateral_colour,
         }
     )
     return known if record.chain is None else apply_chain(record.chain, known)

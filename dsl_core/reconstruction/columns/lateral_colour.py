@@ -8,7 +8,8 @@ colours change places.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
 
 import numpy as np
 from numpy.typing import NDArray
@@ -53,22 +54,63 @@ class LateralFit:
         return self.apart_px > max(MOST_APART_PX, SIGMAS * self.apart_std_px)
 
 
+@dataclass(frozen=True)
+class ColumnBends:
+    """How far columns are from the middle of their neighbours in a row, px, flat over pixels on surfaces.
+
+    With it the sign, +1 where green is on both sides and -1 where it is between; whether the other colour is
+    blue; and the distance from the axes of camera and projector in columns.
+    """
+
+    bend_px: Floats
+    sign: Floats
+    blue: NDArray[np.bool_]
+    camera_px: Floats
+    projector_px: Floats
+
+    @classmethod
+    def of(cls, rig: Rig, column_px: Floats) -> ColumnBends | None:
+        """Those of a map of columns (rows, columns), NaN where not known; None with too few."""
+        height, width = column_px.shape
+        pairs = max(height * width // PIXELS, 1)
+        rows = np.flatnonzero(np.arange(height) // 2 % pairs == 0)
+        q = column_px[rows]
+        colours = bayer_colours(rig.sensor.bayer, rows[:, None], np.arange(width)[None])
+        own, other = colours[:, 1:-1], colours[:, :-2]
+        bend, slope = q[:, 1:-1] - 0.5 * (q[:, :-2] + q[:, 2:]), 0.5 * (q[:, 2:] - q[:, :-2])
+        with np.errstate(invalid="ignore"):
+            good = np.abs(bend) < EDGE_PX
+        if np.count_nonzero(good) < FEWEST:
+            return None
+        camera = (np.arange(1, width - 1) - rig.camera.cx_px) * slope
+        sign = np.where(own == _GREEN, -1.0, 1.0)
+        blue = (own == _BLUE) | (other == _BLUE)
+        projector = q[:, 1:-1] - rig.projector.cx_px
+        return cls(bend[good], sign[good], blue[good], camera[good], projector[good])
+
+
 def own_lateral_colour(
     rig: Rig, lines: LineSet | None, column_px: NDArray[np.floating], refined: NDArray[np.bool_]
 ) -> LateralFit | None:
     """Lateral colour from columns (rows, columns) where lines refined them; None where too few did.
 
     Nor is there any of other patterns, nor of a rig whose calibration holds it.
-
-    Unknown are the camera's magnifications of red and of blue against green, and the projector's per nm.
     """
     if lines is None or not lines.single or rig.lateral_colour is not None:
         return None
+    seen = ColumnBends.of(rig, np.where(refined, column_px, np.nan).astype(np.float64))
+    return None if seen is None else fit_lateral_colour(rig, [seen])
+
+
+def fit_lateral_colour(rig: Rig, seen: Sequence[ColumnBends]) -> LateralFit:
+    """Lateral colour from the columns of one picture or of several.
+
+    Unknown are the camera's magnifications of red and of blue against green, and the projector's per nm.
+    """
     white = white_nm(rig)
-    seen = _bends(rig, np.where(refined, column_px, np.nan).astype(np.float64))
-    if seen is None:
-        return None
-    bend_px, sign, blue, camera_px, projector_px = seen
+    bend_px, sign, blue, camera_px, projector_px = (
+        np.concatenate([getattr(part, field.name) for part in seen]) for field in fields(ColumnBends)
+    )
     step_nm = np.where(blue, white[_BLUE] - white[_GREEN], white[0] - white[_GREEN])
     design = sign[:, None] * np.stack([-camera_px * ~blue, -camera_px * blue, projector_px * step_nm], 1)
     found, inverse, scatter = robust_linear(design, bend_px)
@@ -115,27 +157,3 @@ def lateral_finding(found: LateralFit) -> FitFinding:
         ),
         advice="Use lenses with less lateral colour, or the middle of the picture.",
     )
-
-
-def _bends(rig: Rig, column_px: Floats) -> tuple[Floats, Floats, NDArray[np.bool_], Floats, Floats] | None:
-    """How far columns are from the middle of their neighbours in a row, px, flat over pixels on surfaces.
-
-    With it the sign, +1 where green is on both sides and -1 where it is between; whether the other colour is
-    blue; and the distance from the axes of camera and projector in columns.
-    """
-    height, width = column_px.shape
-    pairs = max(height * width // PIXELS, 1)
-    rows = np.flatnonzero(np.arange(height) // 2 % pairs == 0)
-    q = column_px[rows]
-    colours = bayer_colours(rig.sensor.bayer, rows[:, None], np.arange(width)[None])
-    own, other = colours[:, 1:-1], colours[:, :-2]
-    bend, slope = q[:, 1:-1] - 0.5 * (q[:, :-2] + q[:, 2:]), 0.5 * (q[:, 2:] - q[:, :-2])
-    with np.errstate(invalid="ignore"):
-        good = np.abs(bend) < EDGE_PX
-    if np.count_nonzero(good) < FEWEST:
-        return None
-    camera = (np.arange(1, width - 1) - rig.camera.cx_px) * slope
-    sign = np.where(own == _GREEN, -1.0, 1.0)
-    blue = (own == _BLUE) | (other == _BLUE)
-    projector = q[:, 1:-1] - rig.projector.cx_px
-    return bend[good], sign[good], blue[good], camera[good], projector[good]

@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
 from dsl_core.model.geometry import Lens
+from dsl_core.model.rig import Rig
 from dsl_core.optics.pinhole import pixel_rays
+from dsl_core.optics.sensor import bayer_channels
 from dsl_core.simulation.foreign.variants import Foreign
+from dsl_core.simulation.scenes.truth import Scene, SceneTruth
 
 #: Distance of red and blue at the side of the picture, as a share of half its width: half a pixel of the
 #: published camera (890 px wide) and projector (640 px), whatever the picture's size.
@@ -22,6 +27,25 @@ def camera_of_colour(lens: Lens, channel: int, foreign: Foreign) -> Lens:
         return lens
     ratio = 1 + (0.5, 0.0, -0.5)[channel] * CAMERA_APART
     return lens.model_copy(update={"fx_px": lens.fx_px * ratio, "fy_px": lens.fy_px * ratio})
+
+
+def truth_of_colours(rig: Rig, scene: Scene, foreign: Foreign) -> SceneTruth:
+    """Depth, material and shadow of every pixel as its own colour of the mosaic sees them.
+
+    Beside a jump of depth, colours that lenses magnify differently see other surfaces. The rest is what
+    green sees.
+    """
+    seen = [
+        scene.render(camera_of_colour(rig.camera, colour, foreign), rig.pose.projector_centre_mm)
+        for colour in range(3)
+    ]
+    mosaic = bayer_channels(rig.sensor.bayer, rig.camera.height_px, rig.camera.width_px)
+    return replace(
+        seen[1],
+        depth_mm=np.choose(mosaic, [each.depth_mm for each in seen]),
+        material=np.choose(mosaic, [each.material for each in seen]),
+        lit=np.choose(mosaic, [each.lit for each in seen]),
+    )
 
 
 def projector_magnification(wavelengths_nm: NDArray[np.float64], foreign: Foreign) -> NDArray[np.float64]:

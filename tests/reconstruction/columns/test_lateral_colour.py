@@ -15,7 +15,9 @@ from dsl_core.optics.correspondence import triangulate, zero_order
 from dsl_core.optics.lines.line_set import LineSet
 from dsl_core.reconstruction.columns import lateral_colour
 from dsl_core.reconstruction.columns.lateral_colour import (
+    ColumnBends,
     LateralFit,
+    fit_lateral_colour,
     lateral_finding,
     material_std_px,
     own_lateral_colour,
@@ -124,7 +126,7 @@ def test_a_bend_is_how_far_a_column_is_from_the_middle_of_its_neighbours(
     monkeypatch.setattr(lateral_colour, "FEWEST", 10)
     for pixels, rows in ((60_000, range(8)), (120, (0, 1, 4, 5))):
         monkeypatch.setattr(lateral_colour, "PIXELS", pixels)
-        found = lateral_colour._bends(rig, seen)
+        found = ColumnBends.of(rig, seen)
         assert found is not None
         wanted = []
         for y in rows:
@@ -137,21 +139,21 @@ def test_a_bend_is_how_far_a_column_is_from_the_middle_of_its_neighbours(
                     camera, projector = (x - rig.camera.cx_px) * slope, seen[y, x] - rig.projector.cx_px
                     wanted.append((bend, -1 if green else 1, y % 2 == 1, camera, projector))
         assert rig.sensor.bayer == "RGGB"
-        for got, values in zip(found, zip(*wanted, strict=True), strict=True):
+        for got, values in zip(vars(found).values(), zip(*wanted, strict=True), strict=True):
             assert got == pytest.approx(values)
     monkeypatch.setattr(lateral_colour, "FEWEST", len(wanted))
-    assert lateral_colour._bends(rig, seen) is not None
+    assert ColumnBends.of(rig, seen) is not None
     monkeypatch.setattr(lateral_colour, "FEWEST", len(wanted) + 1)
-    assert lateral_colour._bends(rig, seen) is None
+    assert ColumnBends.of(rig, seen) is None
 
 
 def test_magnifications_are_a_linear_fit_of_bends_and_as_sure_as_those_are_shared(rig: Rig) -> None:
     seen = columns(coloured(rig, 8e-4))
     found = own_lateral_colour(rig, LINES, seen, np.ones(seen.shape, bool))
-    bends = lateral_colour._bends(rig, seen)
+    bends = ColumnBends.of(rig, seen)
     assert found is not None
     assert bends is not None
-    bend, sign, blue, camera, projector = bends
+    bend, sign, blue, camera, projector = vars(bends).values()
     red_nm, green_nm, blue_nm = white_nm(rig)
     assert red_nm > green_nm + 30 > blue_nm + 60
     rows = [
@@ -168,6 +170,17 @@ def test_magnifications_are_a_linear_fit_of_bends_and_as_sure_as_those_are_share
     noise = np.mean(((apart @ inverse) * apart).sum(1)) * scatter**2 * 8 / 3
     assert found.apart_std_px == pytest.approx(np.sqrt(noise))
     assert found.apart_px == pytest.approx(np.sqrt(np.mean((apart @ values) ** 2) - noise))
+
+
+def test_several_pictures_are_fitted_as_one(rig: Rig) -> None:
+    seen = [ColumnBends.of(rig, columns(coloured(rig, strength))) for strength in (4e-4, 12e-4)]
+    assert seen[0] is not None
+    assert seen[1] is not None
+    twice, once = fit_lateral_colour(rig, [seen[0], seen[0]]), fit_lateral_colour(rig, [seen[0]])
+    assert twice.colour.camera == pytest.approx(once.colour.camera)
+    assert twice.apart_std_px == pytest.approx(once.apart_std_px / 2**0.5)
+    both = fit_lateral_colour(rig, [seen[0], seen[1]]).colour
+    assert both.projector_per_nm == pytest.approx(1e-5, rel=0.2), "half way between those of the two"
 
 
 @pytest.mark.parametrize(

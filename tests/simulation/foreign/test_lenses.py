@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from dsl_core.optics.pinhole import pixel_rays
+from dsl_core.optics.sensor import bayer_channels
 from dsl_core.simulation.bandpass_filters import true_transmission
 from dsl_core.simulation.foreign.lenses import (
     BLUE_NM,
@@ -77,3 +78,24 @@ def test_the_first_order_of_a_line_moves_to_columns_of_bluer_light() -> None:
         order = green * (x < 30)
         middle[name] = float((order * x).sum() / order.sum())
     assert abs(middle["filter-angle"] - middle["plain"]) > 0.02
+
+
+def test_truth_beside_a_jump_is_that_of_the_pixels_own_colour() -> None:
+    truths = {}
+    for foreign in ("plain", "lateral-colour"):
+        camera = open_twin({"size": "64x48", "scene": "color-checker", "foreign": foreign}).camera
+        assert isinstance(camera, SimCamera)
+        world = camera.world
+        truths[foreign] = world.truth, world.truth_of_colours
+    assert truths["plain"][0] is truths["plain"][1]
+    green, own = truths["lateral-colour"]
+    moved = ~np.isclose(own.depth_mm, green.depth_mm, atol=5)
+    mosaic = bayer_channels("RGGB", 48, 64)
+    assert 0 < moved.sum() < 60
+    assert not moved[mosaic == 1].any()
+    red = camera_of_colour(world.rig.camera, 0, COLOUR)
+    wanted = world.scene.render(red, world.rig.pose.projector_centre_mm)
+    for name in ("depth_mm", "material", "lit"):
+        assert np.array_equal(
+            getattr(own, name)[mosaic == 0], getattr(wanted, name)[mosaic == 0], equal_nan=name == "depth_mm"
+        )
