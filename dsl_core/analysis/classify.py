@@ -8,6 +8,7 @@ threshold that somebody chooses; the third needs a rate: how many pixels of a kn
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from enum import Enum
@@ -51,11 +52,17 @@ class Limits:
 
     ``worst``: for the probability, the share of pixels of a known class that may be called none of these; for
     the other measures the largest angle (rad) or difference (1). ``margin``: for the probability, that of the
-    class, and for the others by which share the second class must be worse.
+    class, and for the others by which share the second class must be worse. Raises `DecodeError` for limits
+    that are no numbers, or below 0.
     """
 
     worst: float
     margin: float
+
+    def __post_init__(self) -> None:
+        for name, given in (("worst", self.worst), ("margin", self.margin)):
+            if not 0 <= given < math.inf:
+                raise DecodeError(f"The limit {name!r} must be a number of at least 0, not {given:g}.")
 
     @classmethod
     def usual(cls, measure: Measure) -> Limits:

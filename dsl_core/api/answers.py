@@ -140,4 +140,9 @@ def place_mask(result: xr.Dataset, name: str, place: Place) -> NDArray[np.bool_]
         )
     x, y, width, height = (*(int(v) for v in given), 1, 1)[:4]
     inside_y, inside_x = (rows >= y) & (rows < y + height), (columns >= x) & (columns < x + width)
+    if not (inside_y.any() and inside_x.any()):
+        raise DecodeError(
+            f"{name}: the place {place!r} is outside the result, whose x runs from {columns.min()} to"
+            f" {columns.max()} and y from {rows.min()} to {rows.max()}. Choose one inside it."
+        )
     return np.asarray(inside_y[:, None] & inside_x)

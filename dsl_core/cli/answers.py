@@ -104,6 +104,8 @@ def classify(
     output = Output(json)
     if measure not in (names := [each.value for each in Measure]):
         raise PlanError(f"--by must be one of {', '.join(names)}, not {measure!r}.")
+    if library_error and not library:
+        raise PlanError("--library-error is that of spectra from a library. Name it with --library.")
     wrong = [str(each) for each in outputs if each.suffix.lower() not in ENDINGS]
     if wrong:
         raise PlanError(f"{wrong[0]} must end in {', '.join(ENDINGS)}: choose one for --output.")

@@ -188,9 +188,11 @@ def parse_pixels(texts: Sequence[str]) -> list[tuple[int, int]]:
     return [(x, y) for x, y in (_parts("--pixel", text, wanted, int, ",", 2) for text in texts)]
 
 
-def parse_size(name: str, text: str) -> tuple[int, int]:
-    """Width and height from ``890x580``; raises `PlanError`."""
-    width, height = _lengths(name, text, "WIDTHxHEIGHT")
+def parse_size(
+    name: str, text: str, form: str = "WIDTHxHEIGHT", unit: str = "whole pixels"
+) -> tuple[int, int]:
+    """Width and height from ``890x580``, or what else the ``form`` says; raises `PlanError`."""
+    width, height = _lengths(name, text, form, unit)
     return width, height
 
 
@@ -230,9 +232,9 @@ def parse_place(name: str, text: str) -> tuple[str, list[int]]:
     return called, numbers
 
 
-def _lengths(name: str, text: str, form: str) -> list[int]:
-    """Whole pixels separated by x, as many as their ``form`` has."""
-    wanted = f"{form} in whole pixels of at least 1"
+def _lengths(name: str, text: str, form: str, unit: str = "whole pixels") -> list[int]:
+    """Whole numbers separated by x, as many as their ``form`` has."""
+    wanted = f"{form} in {unit} of at least 1"
     return _parts(name, text, wanted, int, "x", form.count("x") + 1, lambda length: length >= 1)
 
 

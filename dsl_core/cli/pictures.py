@@ -29,7 +29,7 @@ def board_of(
         return None
     if text is None or square_mm is None:
         raise CalibrationError("A board needs both --board COLUMNSxROWS and --square-mm. Give both.")
-    columns, rows = parse_size("--board", text)
+    columns, rows = parse_size("--board", text, "COLUMNSxROWS", "whole numbers")
     try:
         if marker_mm is None:
             return Checkerboard(columns=columns, rows=rows, square_mm=square_mm)

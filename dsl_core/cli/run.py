@@ -46,7 +46,7 @@ _PLAIN = {
     r"Invalid value for '(\S+)': Input should be greater than or equal to (\S+)": r"\1 must be at least \2",
     r"Invalid value for '(\S+)': Input should be less than or equal to (\S+)": r"\1 must be at most \2",
     r"Invalid value for '(\S+)': Input should be": r"\1 must be",
-    r"Invalid value for '(\S+)': Value error, (.*) is not one of (.*)": r"\1 must be one of \3, not \2",
+    r"Invalid value for '(\S+)': Value error, (.*) is not one of (.*?)\.?$": r"\1 must be one of \3, not \2",
 }
 
 app = typer.Typer(
@@ -121,7 +121,7 @@ def run(arguments: list[str]) -> int:
         # Click turns a closed pipe into an exit of its own.
         if isinstance(error, BrokenPipeError) or isinstance(error.__context__, BrokenPipeError):
             return _leave_quietly()
-        code, sentence = _judge(error)
+        code, sentence = _judge(error, arguments)
         if debug:
             traceback.print_exc()
         return _complain(code, sentence, type(error).__name__, "--json" in arguments)
@@ -132,8 +132,8 @@ def run(arguments: list[str]) -> int:
     return code or OK
 
 
-def _judge(error: BaseException) -> tuple[int, str]:
-    """Exit code and sentence for anything that was raised."""
+def _judge(error: BaseException, arguments: list[str]) -> tuple[int, str]:
+    """Exit code and sentence for anything that a command line raised."""
     if isinstance(error, Cancelled):
         return STOPPED, str(error)
     if isinstance(error, KeyboardInterrupt | typer.Abort):
@@ -145,7 +145,7 @@ def _judge(error: BaseException) -> tuple[int, str]:
     if isinstance(error, DslError):
         return WRONG_INPUT, str(error)
     if isinstance(error, _WrongUse):
-        return WRONG_INPUT, _usage(error)
+        return WRONG_INPUT, _usage(error, arguments)
     if isinstance(error, OSError):
         return WRONG_INPUT, _of_system(error)
     if isinstance(error, MemoryError):
@@ -161,16 +161,27 @@ def _judge(error: BaseException) -> tuple[int, str]:
     )
 
 
-def _usage(error: BaseException) -> str:
+def _usage(error: BaseException, arguments: list[str]) -> str:
     """What was wrong with the command line, and which help to read."""
     message = " ".join(str(getattr(error, "format_message", error.__str__)()).split())
     for theirs, ours in _PLAIN.items():
         message = re.sub(theirs, ours, message)
-    context = getattr(error, "ctx", None)
-    command = context.command_path if context is not None else "dsl-scan"
     if type(error).__name__ == "NoSuchOption" and getattr(error, "option_name", "") == "-o":
         message = "There is no option -o here; options of a rig are given with -O or --option"
-    return f"{message.rstrip('.')}. See '{command} --help'."
+    message = message or "A command of it is missing"
+    ended = message if message.endswith("?") else f"{message.rstrip('.')}."
+    return f"{ended} See '{_command_of(arguments)} --help'."
+
+
+def _command_of(arguments: list[str]) -> str:
+    """The command that a command line is for, also where the parser no longer says which it was in."""
+    command, path = typer.main.get_command(app), "dsl-scan"
+    for word in arguments:
+        inner = getattr(command, "commands", {}).get(word)
+        if inner is None:
+            break
+        command, path = inner, f"{path} {word}"
+    return path
 
 
 def _of_system(error: OSError) -> str:

@@ -112,7 +112,7 @@ def _cut(shape: tuple[int, ...], region: Region | None) -> tuple[slice, slice]:
     if min(x, y) < 0 or min(width, height) < 1 or x + width > shape[1] or y + height > shape[0]:
         raise DecodeError(
             f"The region {width} x {height} px at column {x}, row {y} is not inside the picture of"
-            f" {shape[1]} x {shape[0]} px. Choose one that does."
+            f" {shape[1]} x {shape[0]} px. Choose one inside it."
         )
     return slice(y, y + height), slice(x, x + width)
 

@@ -98,6 +98,10 @@ def test_the_face_of_python_tells_colours() -> None:
     [
         ({"pins": {"x": (5, 95)}}, "none of its 1 pixels has a spectrum"),
         ({"pins": {"x": (1, 2, 3)}}, "a place is a mask"),
+        (
+            {"pins": {"a": (5, 5), "x": (200, 5)}},
+            r"x: the place .* is outside the result, whose x",
+        ),
         ({}, "given 0"),
         ({"pins": {"x": (5, 5)}, "range_nm": (100, 200)}, "Only 0 bands"),
     ],

@@ -143,3 +143,11 @@ def test_wrong_input_is_told(cube: ChartCube) -> None:
         score(cube.reflectance, None, None, cube.flags, _classes(cube))
     with pytest.raises(DecodeError, match="does not have the 24 bands"):
         score(cube.reflectance, cube.std, None, cube.flags, [SpectralClass("x", (Member.of(np.ones(3)),))])
+
+
+@pytest.mark.parametrize("wrong", [-0.1, float("nan"), float("inf")])
+def test_limits_that_are_no_limits_are_told(wrong: float) -> None:
+    with pytest.raises(DecodeError, match="'worst' must be"):
+        Limits(wrong, 0.1)
+    with pytest.raises(DecodeError, match="'margin' must be"):
+        Limits(0.1, wrong)

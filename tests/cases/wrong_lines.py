@@ -71,7 +71,7 @@ WRONG: dict[str, dict[str, str]] = {
     "time": {"a word": "long", "negative": "-60s", "none": "0s", "endless": "inf", "not a number": "nan"},
     "size": {"one number": "112", "negative": "-112x72", "words": "widexhigh", "none": "0x0"},
     "pixel": {"one number": "1", "outside": "999,999", "words": "a,b", "broken": "1.5,2"},
-    "numbers": {"words": "a,b", "too few": "1", "not a number": "nan,1", "an empty text": ""},
+    "numbers": {"words": "a,b", "too many": "1,2,3", "not a number": "nan,1", "an empty text": ""},
     "region": {"three numbers": "1,2,3", "outside": "900,900,10,10", "empty": "0,0,0,0"},
     "lines": {"one number": "5", "overlapping": "5x9", "none": "0x5", "words": "5xfive"},
     "setting": {"no level": "100", "too bright": "100@2", "not a number": "nan@0.5", "too long": "99999@0.5"},
@@ -80,6 +80,26 @@ WRONG: dict[str, dict[str, str]] = {
     "library name": {"a path": "../nobody", "an empty text": ""},
     "new name": {"two words": "My Lab", "taken": "twin", "an empty text": ""},
     "step setting": {"without a value": "scene", "unknown": "speed=5"},
+    "mesh file": {
+        "another ending": "new.txt",
+        "no ending": "new",
+        "a folder for a file": "folder",
+        "below a file": "text.txt/new.ply",
+        "an empty text": "",
+    },
+    "table": {"another ending": "new.txt", "a folder for a file": "folder", "below a file": "text.txt/a.csv"},
+    "page": {"another ending": "new.txt", "a folder for a file": "folder", "below a file": "text.txt/a.html"},
+    "spectra": {"absent": "absent", "no spectra": "folder", "another kind": "braces.json"},
+    "place": {
+        "without a name": "1,1",
+        "outside": "a=999,999",
+        "words": "a=b,c",
+        "three numbers": "a=1,2,3",
+        "an empty text": "",
+    },
+    "light": {"unknown": "D99", "an empty text": ""},
+    "span": {"backwards": "660:430", "one number": "430", "words": "blue:red", "no band": "100:101"},
+    "tolerance": {"not a number": "nanDN", "negative": "-1DN", "words": "little", "an empty text": ""},
 }
 
 
@@ -97,9 +117,16 @@ class Command:
 
     def mistakes(self) -> Iterator[tuple[str, list[str]]]:
         """Each kind of mistake and the command line with it."""
-        words = [*self.name.split(), *self.always]
+        named = self.name.split()
+        words = [*named, *self.always]
         right = [value for _, value in self.arguments]
         yield "an unknown option", [*words, *right, "--unheard-of"]
+        yield "an unknown letter", [*words, *right, "-z"]
+        yield "a misspelt option", [*words, *right, "--jsno"]
+        yield "a switch with a value", [*words, *right, "--json=yes"]
+        yield "a number for an option", [*words, *right, "-5"]
+        yield "an empty argument", [*words, *right, ""]
+        yield "a misspelt command", [*named[:-1], f"{named[-1]}x", *self.always, *right]
         yield "one argument too many", [*words, *right, "one-more", "and-another"]
         if self.arguments and self.name != "rigs doctor":
             yield "an argument too few", [*words, *right[:-1]]
@@ -115,7 +142,16 @@ class Command:
 RIG = {"--rig": ("rig", "twin"), "-O": ("rig option", "size=112x72")}
 COMMANDS = (
     Command("demo", (), {"--size": ("size", "56x36"), "--effects": ("choice", "all")}),
-    Command("effects", (), {"--plan": ("plan", "plan.json"), "--scene": ("choice", "box")}),
+    Command("scenes"),
+    Command(
+        "effects",
+        (),
+        {
+            "--plan": ("plan", "plan.json"),
+            "--scene": ("choice", "box"),
+            "--tolerance": ("tolerance", "1DN"),
+        },
+    ),
     Command(
         "plan",
         (("new file", "new.json"),),
@@ -167,6 +203,37 @@ COMMANDS = (
         {"--pixel": ("pixel", "1,1")},
     ),
     Command(
+        "mesh",
+        (("result", "scan.zarr"), ("mesh file", "new.ply")),
+        {"--every": ("whole number", "1")},
+    ),
+    Command(
+        "classify",
+        (("result", "scan.zarr"),),
+        {
+            "--library": ("spectra", "spectra.csv"),
+            "--library-error": ("number", "0.02"),
+            "--by": ("choice", "angle"),
+            "--worst": ("number", "0.1"),
+            "--range": ("span", "430:660"),
+            "--at": ("place", "a=28,18"),
+            "-o": ("table", "new.csv"),
+        },
+        always=("--at", "a=28,18"),
+    ),
+    Command(
+        "colours",
+        (("result", "scan.zarr"),),
+        {"--at": ("place", "a=28,18"), "--light": ("light", "D65"), "--to": ("name", "a")}
+        | {"-o": ("table", "new.csv")},
+        always=("--at", "a=28,18"),
+    ),
+    Command(
+        "report",
+        (("result", "scan.zarr"),),
+        {"-o": ("page", "new.html"), "--library": ("spectra", "spectra.csv")},
+    ),
+    Command(
         "import", (("pictures", "folder"),), {"--unit-mm": ("number", "1"), "--mapping": ("plan", "m.json")}
     ),
     Command("info", (("path", "scan.dsl"),)),
@@ -183,21 +250,43 @@ COMMANDS = (
         "calibrate geometry",
         (("pictures", "folder"),),
         {"--board": ("size", "11x7"), "--square-mm": ("number", "20"), "--projector": ("size", "640x360")},
-        always=("--pictures",),
+        always=("--pictures", "--board", "11x7", "--square-mm", "20"),
     ),
     Command("calibrate spectralon", (("new folder", "campaign"),), {"--rig": ("rig", "twin")}, ("--yes",)),
+    Command(
+        "calibrate color-checker",
+        (("new folder", "campaign"),),
+        {"--rig": ("rig", "twin"), "--set": ("step setting", "a=b")},
+        ("--yes",),
+    ),
+    Command(
+        "calibrate bandpass",
+        (("new folder", "campaign"),),
+        {"--rig": ("rig", "twin"), "-O": ("rig option", "size=112x72")},
+        ("--yes",),
+    ),
+    Command(
+        "calibrate depth-stage",
+        (("new folder", "campaign"),),
+        {"--rig": ("rig", "twin"), "--set": ("step setting", "a=b")},
+        ("--yes",),
+    ),
     Command(
         "calibrate all",
         (("new folder", "campaign"),),
         {"--rig": ("rig", "twin"), "--name": ("library name", "a")},
     ),
-    Command("calibrations show", (("name", "lab"),)),
-    Command("calibrations check", (("name", "lab"),)),
+    Command("calibrations list"),
+    Command("calibrations show", (("name", "lab"),), {"-o": ("new file", "new.html")}),
+    Command("calibrations check", (("name", "lab"),), {"--rig": ("rig", "twin")}, ("--yes",)),
     Command("calibrations restore", (("name", "lab"), ("name", "2026"))),
     Command(
         "calibrations export", (("name", "lab"), ("new file", "new.json")), {"--form": ("choice", "rig")}
     ),
     Command("calibrations import", (("calibration", "rig.json"),)),
+    Command("doctor", always=("--no-devices",)),
+    Command("rigs"),
+    Command("rigs drivers"),
     Command("rigs doctor", (("rig", "lab"),)),
     Command("rigs new", (("new name", "my-lab"),)),
     Command("gui", (), {"--theme": ("choice", "dark")}),

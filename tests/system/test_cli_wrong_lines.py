@@ -11,21 +11,25 @@ import pytest
 
 import dsl_core as dsl
 from dsl_core.cli import main
+from dsl_core.io.calibration_library import CalibrationLibrary
 from dsl_core.io.plan_file import save_plan
 from tests.cases.wrong_lines import COMMANDS, wrong_lines
 
-from .conftest import Ending, without_progress
+from .conftest import Ending, Give, without_progress
 
 #: Words of libraries, and of programs that broke.
 FOREIGN = re.compile(
     r"Traceback|This is a bug|Input should|Value error|Field required|Errno|pydantic|None\b|<class"
 )
-#: Of all lines the test gives every fifth; `tests.benchmarks.bench_wrong_lines` gives all.
-STEP = 5
+#: Of all lines the test gives every eleventh; `tests.benchmarks.bench_wrong_lines` gives all.
+STEP = 11
 
 
 def make_desk(home: Path) -> None:
-    """Files of each kind beside a scan and its result in the present folder, for commands to mistake."""
+    """Files of each kind beside a scan and its result in the present folder, for commands to mistake.
+
+    The user's library gets a calibration, ``lab``.
+    """
     save_plan(dsl.load_scan("scan.dsl").plan, home / "plan.json")
     (home / "folder").mkdir()
     (home / "text.txt").write_text("text\n")
@@ -33,6 +37,7 @@ def make_desk(home: Path) -> None:
     calibration = dsl.load_scan("scan.dsl").calibration
     assert calibration is not None
     (home / "rig.json").write_text(calibration.model_dump_json())
+    CalibrationLibrary().store("lab", calibration)
 
 
 def contents(home: Path) -> list[tuple[str, int]]:
@@ -55,8 +60,26 @@ def test_there_are_enough_of_them() -> None:
     lines = wrong_lines()
     assert len(lines) > 250
     for command in COMMANDS:
-        assert len(list(command.mistakes())) >= 5, command.name
+        assert len(list(command.mistakes())) >= 8, command.name
     assert len({tuple(line) for _, line in lines}) > 250
+
+
+@pytest.mark.parametrize(
+    ("line", "told"),
+    [
+        ("calibrate geometry --board", "See 'dsl-scan calibrate geometry --help'."),
+        ("gui --theme magic", "one of 'system', 'light', 'dark', not 'magic'. See 'dsl-scan gui --help'."),
+        ("calibrat", "Did you mean 'calibrate', 'calibrations'? See 'dsl-scan --help'."),
+        ("calibrate", "A command of it is missing. See 'dsl-scan calibrate --help'."),
+        (
+            "calibrate geometry . --pictures --board 9 --square-mm 20",
+            "COLUMNSxROWS in whole numbers of at least 1, not '9'.",
+        ),
+        ("classify scan.zarr --library-error nan --at a=1,1", "Name it with --library."),
+    ],
+)
+def test_the_sentence_names_the_command_and_the_choice(line: str, told: str, give: Give) -> None:
+    assert give(*line.split()).sentence.endswith(told)
 
 
 def test_each_is_answered_in_one_sentence_before_any_work(

@@ -62,7 +62,6 @@ _LAST = (
     "dsl_app.calibrate.evidence.bandpass",
     "dsl_app.calibrate.evidence.depth_stage",
     "matplotlib.figure",
-    "colour",
     "pyvista",
     "pyvista.plotting",
     "vtkmodules.vtkInteractionWidgets",
