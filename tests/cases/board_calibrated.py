@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from dsl_core.calibration.geometry.bundle import rotation_of
+from dsl_core.calibration.geometry.bundle import CAMERA, PROJECTOR, SHARED, STEREO, adjust, rotation_of
 from dsl_core.calibration.geometry.projector_corners import PoseObservation
-from dsl_core.calibration.geometry.solve import calibrate_geometry
+from dsl_core.calibration.geometry.solve import initial, lens_of, pose_of
 from dsl_core.model.board import Checkerboard, corner_positions_mm
 from dsl_core.model.rig import Rig
 from dsl_core.optics.pinhole import project
@@ -52,17 +52,14 @@ def board_calibrated(truth: Rig, start: Rig, seed: int = 0, noise_px: float = 0.
         inside = (camera > 0).all(1) & (camera[:, 0] < lens.width_px) & (camera[:, 1] < lens.height_px)
         inside &= (projector > 0).all(1) & (projector < [light.width_px, light.height_px]).all(1)
         poses.append(seen.only(inside))
-    found = calibrate_geometry(
-        poses,
-        BOARD,
-        (truth.camera.width_px, truth.camera.height_px),
-        (truth.projector.width_px, truth.projector.height_px),
-    )
+    sizes = [(lens.width_px, lens.height_px) for lens in (truth.camera, truth.projector)]
+    # The joint fit alone: what poses say of each other when they are left out in turn is not needed here.
+    found = adjust(poses, initial(poses, *sizes))
     return start.model_copy(
         update={
-            "camera": found.camera,
-            "projector": found.projector,
-            "pose": found.pose,
-            "geometry_covariance": found.covariance,
+            "camera": lens_of(found.parameters[CAMERA], sizes[0]),
+            "projector": lens_of(found.parameters[PROJECTOR], sizes[1]),
+            "pose": pose_of(found.parameters[STEREO]),
+            "geometry_covariance": tuple(found.covariance[:SHARED, :SHARED].ravel().tolist()),
         }
     )
