@@ -10,10 +10,18 @@ import pytest
 
 from dsl_core.errors import DecodeError
 from dsl_core.model.line_spread import LineSpread
+from dsl_core.model.plan import CapturePlan, GrayCode, ScanLines
 from dsl_core.model.result import Flag
+from dsl_core.optics.lines.line_set import LineSet
 from dsl_core.reconstruction import geometry
 from dsl_core.reconstruction.columns.maps import ColumnMaps
-from dsl_core.reconstruction.geometry import FoundColumns, geometry_of, require_light, require_pixels
+from dsl_core.reconstruction.geometry import (
+    ColumnSearch,
+    FoundColumns,
+    geometry_of,
+    require_light,
+    require_pixels,
+)
 from dsl_core.reconstruction.hdr import MergedFrame
 from dsl_core.simulation.published_rig import published_rig
 
@@ -163,3 +171,15 @@ def test_a_white_frame_may_not_be_saturated_all_over(dark: int, fails: bool) -> 
             require_light(white, saturated, "do this")
     else:
         require_light(white, saturated)
+
+
+def test_columns_are_refined_by_lines_unless_somebody_asks_otherwise() -> None:
+    rig = published_rig()
+    lines = CapturePlan(code=GrayCode(rows=False), spectral=ScanLines(step_px=5))
+    search = ColumnSearch(rig, lines)
+    assert search.lines == LineSet.of(lines)
+    assert search._profiles is not None
+    assert search._profiles.shape[0] == lines.spectral_count
+    decoded = ColumnSearch(rig, lines, refine_columns=False)
+    assert decoded.lines is None
+    assert decoded._profiles is None

@@ -146,3 +146,12 @@ def test_what_is_no_number_has_no_weight() -> None:
 
 def test_a_sample_without_a_band_of_its_own_knows_nothing() -> None:
     assert not summed(scene())[2, :, 3].any()
+
+
+@pytest.mark.parametrize("half", [True, False])
+def test_data_count_however_little_they_weigh(half: bool) -> None:
+    made = scene()
+    made.std *= np.float16(50)
+    found = summed(made, half=half)
+    assert_same(found, made)
+    assert float(found[0, BANDS * SIZE + BANDS + 1, 1]) > 5, "of weights below a hundredth"

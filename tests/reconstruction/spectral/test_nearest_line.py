@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+import torch
 
 from dsl_core import pipeline
 from dsl_core.errors import PlanError
 from dsl_core.model.plan import CapturePlan, GrayCode, ScanLines
 from dsl_core.model.spectral import WavelengthGrid
 from dsl_core.planning import references
-from dsl_core.reconstruction.spectral.nearest_line import basis_solution, chart_basis
+from dsl_core.reconstruction.spectral.nearest_line import SMOOTHNESS, _filled, basis_solution, chart_basis
 from dsl_core.simulation.published_rig import published_rig
 from tests.cases.trial import PLACES, Trial, run_trial
 
@@ -38,3 +39,20 @@ def test_the_basis_gives_back_a_grey() -> None:
 def test_an_unknown_solver_is_refused() -> None:
     with pytest.raises(PlanError, match="nearest-line"):
         trial("magic")
+
+
+def test_a_basis_is_fitted_to_colours_with_curvature_over_the_whole_range_as_a_penalty() -> None:
+    """Against least squares with a row for each second difference, in units of the range, mean square."""
+    rng, bands = np.random.default_rng(2), 24
+    moments, basis = rng.random((3, bands)), rng.standard_normal((bands, 5))
+    curvature = np.diff(basis, 2, axis=0) * bands
+    rows = np.concatenate([moments @ basis, np.sqrt(SMOOTHNESS / bands) * curvature])
+    colours = np.concatenate([np.eye(3), np.zeros((bands - 2, 3))])
+    wanted = basis @ np.linalg.lstsq(rows, colours)[0]
+    assert basis_solution(moments, basis) == pytest.approx(wanted, rel=1e-8)
+
+
+def test_bands_that_nothing_tells_of_take_the_nearest_that_is_known() -> None:
+    values = torch.tensor([[1.0, 2.0], [3.0, 4.0], [5.0, 6.0], [7.0, 8.0]])
+    known = torch.tensor([[False, False], [True, False], [False, False], [True, False]])
+    assert _filled(values, known).tolist() == [[3.0, 0.0], [3.0, 0.0], [3.0, 0.0], [7.0, 0.0]]

@@ -171,3 +171,30 @@ def test_the_zero_order_says_something_of_the_colour_where_first_orders_are_not_
     wanted = (0.25 / (variance + (COLOUR_ERROR * colour) ** 2)).sqrt()
     assert found[1].flatten().tolist() == pytest.approx(wanted.flatten().tolist())
     assert roots(1.1e-3) is not None
+
+
+def test_the_zero_order_says_the_colour_where_first_orders_do_not_reach_from_the_first_band_to_the_last() -> (
+    None
+):
+    """Of a picture whose left half both ends of the range reach by one order or the other."""
+    valid = np.ones((20, 60), bool)
+    valid[:, 50:] = False
+    asked = list[list[float]]()
+
+    def reached(order: int, flat: torch.Tensor, depth: torch.Tensor, nm: np.ndarray) -> torch.Tensor:
+        asked.append(nm.tolist())
+        column = flat % 60
+        return (
+            torch.stack([column < 30, column < 40]) if order == 1 else torch.stack([column >= 90, column < 9])
+        )
+
+    owner: Any = SimpleNamespace(
+        pixels=SimpleNamespace(valid=valid), model=SimpleNamespace(reached=reached),
+        bands=SimpleNamespace(centres_nm=np.array([420.0, 430.0, 440.0, 450.0, 460.0]), reported=slice(1, 4)),
+        _pixels_and_depth=lambda flat: (torch.as_tensor(flat), torch.zeros(len(flat))),
+    )  # fmt: skip
+    weight = SpectralReconstruction._colour_weight(owner)
+    assert asked == [[430.0, 450.0]] * 2
+    assert weight[10, :25] == pytest.approx(0.0, abs=1e-6)
+    assert weight[10, 35:45] == pytest.approx(1.0, abs=1e-6)
+    assert weight[10, 55:] == pytest.approx(0.0, abs=1e-6), "what is not measured is not coloured"
