@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -148,6 +149,18 @@ def test_evaluate_finds_the_truth_by_itself(give: Give, finished: Path, tmp_path
         "--truth-rig", "twin", *SMALL_RIG, "-O", "scene=plane", "-O", "depth_mm=800",
     ).json  # fmt: skip
     assert other["figures"]["depth_rmse_mm"] > 50
+
+
+def test_figures_of_the_readme_have_the_names_and_units_that_are_printed(
+    give: Give, finished: Path, tmp_path: Path
+) -> None:
+    readme = ROOT.joinpath("README.md").read_text(encoding="utf-8")
+    shown = re.search(r"It ends like this:\n\n```\n(.*?)\.\.\.\n", readme, re.DOTALL)
+    assert shown is not None
+    printed = give("evaluate", finished / "scan.zarr", "--report", tmp_path / "a.html").out.splitlines()
+    # Figures differ by plan; what stands before and behind them does not.
+    known = {(line[:58], *line[58:].split()[3:]) for line in printed}
+    assert {(line[:58], *line[58:].split()[3:]) for line in shown[1].splitlines()} <= known
 
 
 @pytest.mark.parametrize(
