@@ -28,6 +28,7 @@ class Flag(IntFlag):
     POOR_FIT = 256
     NON_FINITE = 512
     CODES_DISAGREE = 1024
+    UNUSUAL_PEAK = 2048
 
 
 REASONS: dict[Flag, str] = {
@@ -44,6 +45,9 @@ REASONS: dict[Flag, str] = {
     ),
     Flag.NON_FINITE: "the input or an intermediate value was not a finite number",
     Flag.CODES_DISAGREE: "codes disagree: light arrives by another path (reflections between surfaces)",
+    Flag.UNUSUAL_PEAK: (
+        "lines have another shape here than elsewhere (out of focus, an edge, a translucent surface, glare)"
+    ),
 }
 
 #: Flags after which depth, respectively the spectrum, is not given at all (NaN).
@@ -139,7 +143,7 @@ FLAG_COLOURS: dict[Flag, str] = dict(
         (
             "#332288", "#cc3311", "#aa4499", "#882255", "#ddcc77",
             "#999933", "#88ccee", "#44aa99", "#ee7733", "#555555",
-            "#117733",
+            "#117733", "#bbbbbb",
         ),
         strict=True,
     )

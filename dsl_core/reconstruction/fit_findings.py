@@ -31,7 +31,7 @@ from dsl_core.reconstruction.spectral.probing.probe import Probe
 from dsl_core.reconstruction.spectral.self_correction import Followed
 
 #: Shares of pixels above which a scan is not what the twin's scenes lead to expect.
-MOST_POOR, MOST_AT_BOUND, MOST_LOST, MOST_UNDECIDED = 0.4, 0.1, 0.1, 0.5
+MOST_POOR, MOST_AT_BOUND, MOST_LOST, MOST_UNDECIDED, MOST_UNUSUAL = 0.4, 0.1, 0.1, 0.5, 0.02
 #: Bands wider than this many lines leave structure in the data that straight pieces cannot follow.
 WIDEST_BAND = 1.25
 #: Fewer pixels say nothing.
@@ -153,6 +153,17 @@ def share_findings(flags: NDArray[np.integer], spectra: SpectralCounts | None) -
             "Light reaches {0} of the pixels that have no depth.",
             "See the flags: codes that disagree or a depth out of range tell of motion, of surfaces that"
             " light each other, or of another rig's calibration.",
+        )
+    if measured >= FEWEST:
+        yield _share(
+            "profile",
+            "lines of another shape",
+            int(np.count_nonzero((flags & int(Flag.UNUSUAL_PEAK)) != 0)) / measured,
+            MOST_UNUSUAL,
+            "Lines have another shape in {0} of the pixels than in most: surfaces out of focus, translucent"
+            " or glossy ones, or light from surface to surface. Depth is less sure there, as stated, and"
+            " reflectances lack the light that leaves a surface beside the line.",
+            "Look at the flags; narrow the aperture or move the object nearer to the focus.",
         )
     if spectra is None or measured < FEWEST:
         return

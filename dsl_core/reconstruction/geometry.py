@@ -24,6 +24,7 @@ from dsl_core.reconstruction.columns.lateral_colour import material_std_px
 from dsl_core.reconstruction.columns.line_spread import wave_std_px
 from dsl_core.reconstruction.columns.maps import CHUNK, WHOLE_PX_STD, ColumnFinder, ColumnMaps
 from dsl_core.reconstruction.columns.pattern_column import radiance_profiles
+from dsl_core.reconstruction.columns.two_surfaces import two_surfaces_std_px
 from dsl_core.reconstruction.hdr import MergedFrame
 from dsl_core.reconstruction.merge import LineStack
 from dsl_core.reconstruction.rows.bands import some_rows
@@ -188,8 +189,10 @@ def geometry_of(
     waves = wave_std_px(maps.column_px.reshape(shape), maps.refined.reshape(shape), lines)
     common = math.hypot(rig.column_std_px, _zero_std_px(rig)) if shared_errors else 0.0
     colours = material_std_px(rig, maps.column_px)
-    dq = np.hypot(np.hypot(maps.column_std_px, common), np.hypot(waves.ravel(), colours))
     good = (flags & int(DEPTH_INVALID)) == 0
+    seen_px = np.where(good, maps.column_px, np.float32(np.nan)).reshape(shape)
+    doubt = two_surfaces_std_px(seen_px, (maps.unusual & good).reshape(shape)).ravel()
+    dq = np.hypot(np.hypot(maps.column_std_px, common), np.hypot(waves.ravel(), np.hypot(colours, doubt)))
     # In place, because maps of a large picture are large.
     depth_mm, depth_std = maps.depth_mm.reshape(shape), maps.slope_mm_per_px.reshape(shape)
     maps.slope_mm_per_px[:] *= dq
@@ -197,11 +200,12 @@ def geometry_of(
         values[~good] = np.nan
     surface = reconstruct_surface(rig, depth_mm, depth_std, surface_window_px)
     edge = np.where(surface.edge, int(Flag.DEPTH_EDGE), 0).astype(np.uint16)
-    q = np.where(good, maps.column_px, np.float32(np.nan)).reshape(shape)
     std = np.where(good, dq, np.nan).astype(np.float32).reshape(shape)
     light = (maps.amplitude, maps.amplitude_std, maps.offset, maps.offset_std)
     a, da, dark, dark_std = (m.reshape(shape) for m in light)
-    return Geometry(q, std, depth_mm, depth_std, a, da, dark, dark_std, flags.reshape(shape) | edge, surface)
+    return Geometry(
+        seen_px, std, depth_mm, depth_std, a, da, dark, dark_std, flags.reshape(shape) | edge, surface
+    )
 
 
 def _zero_std_px(rig: Rig) -> float:
@@ -263,6 +267,7 @@ def _flags(
         # Nor is a column right whose lines were measured and are dark.
         mark(lit & is_dark(maps, white) & ~settled.straight, Flag.NO_LIGHT)
         mark(lit & ~maps.refined, Flag.NOT_REFINED)
+        mark(lit & maps.unusual, Flag.UNUSUAL_PEAK)
     mark(lit & settled.disagree, Flag.CODES_DISAGREE)
     low, high = rig.depth_range_mm
     mark(lit & ~((maps.depth_mm >= low) & (maps.depth_mm <= high)), Flag.OUT_OF_RANGE)

@@ -49,7 +49,14 @@ def virtual(rig: Rig, window_px: int) -> VirtualPixels:
 
 def column_of(std_px: Tensor) -> Column:
     flat = std_px.flatten()
-    return Column(flat, flat, flat, flat, torch.ones_like(flat, dtype=torch.bool))
+    return Column(
+        flat,
+        flat,
+        flat,
+        flat,
+        torch.ones_like(flat, dtype=torch.bool),
+        torch.zeros_like(flat, dtype=torch.bool),
+    )
 
 
 def test_shading_falls_with_the_square_of_the_distance_and_with_the_slope_of_the_surface() -> None:

@@ -57,10 +57,11 @@ def flags(flag: Flag, share: float) -> np.ndarray[tuple[int, ...], np.dtype[np.u
         (Flag.AT_BOUND, 0.1, "light"),
         (Flag.CODES_DISAGREE, 0.1, "coverage"),
         (Flag.OUT_OF_RANGE, 0.1, "coverage"),
+        (Flag.UNUSUAL_PEAK, 0.02, "profile"),
     ],
 )
 def test_a_flag_is_told_from_the_share_that_is_not_normal(flag: Flag, limit: float, part: str) -> None:
-    below, above = (Fit.of(judged(flags(flag, limit + d))) for d in (-0.02, 0.02))
+    below, above = (Fit.of(judged(flags(flag, limit + d))) for d in (-0.01, 0.02))
     assert below.parts == ()
     assert above.parts == (part,)
     assert f"{limit + 0.02:.0%}" in above.words

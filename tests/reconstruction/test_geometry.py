@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from dsl_core.errors import DecodeError
+from dsl_core.model.calibration.lateral_colour import LateralColour
 from dsl_core.model.line_spread import LineSpread
 from dsl_core.model.plan import CapturePlan, GrayCode, ScanLines
 from dsl_core.model.result import Flag
@@ -60,7 +61,7 @@ def maps_of(**more: Any) -> ColumnMaps:
     made = ColumnMaps.empty(COUNT)
     values = {
         "column_px": 100.0, "column_std_px": 0.03, "amplitude": 5.0, "amplitude_std": 0.1, "offset": 0.0,
-        "offset_std": 0.0, "refined": True, "depth_mm": 700.0, "slope_mm_per_px": 2.0,
+        "offset_std": 0.0, "refined": True, "unusual": False, "depth_mm": 700.0, "slope_mm_per_px": 2.0,
     }  # fmt: skip
     for name, value in (values | more).items():
         getattr(made, name)[:] = value
@@ -84,6 +85,22 @@ def test_depth_is_as_sure_as_the_column_and_what_all_columns_share() -> None:
         assert (found.amplitude[good] == 5.0).all()
         assert found.flags.ravel()[5] & int(Flag.NO_LIGHT)
         np.testing.assert_array_equal((found.flags & int(Flag.DEPTH_EDGE)) > 0, found.surface.edge)
+
+
+def test_depth_is_less_sure_where_a_peak_is_unusual_or_materials_move_it() -> None:
+    rig = published_rig()
+    rig = rig.model_copy(update={"camera": rig.camera.resized(16, 12), "column_std_px": 0.0})
+    unusual = np.zeros(SHAPE, bool)
+    unusual[6, 0] = True
+    maps = maps_of(unusual=unusual.ravel())
+    found = geometry_of(rig, None, FoundColumns(maps, np.zeros(COUNT, np.uint16)), SHAPE, 5)
+    assert found.column_std_px[6, 0] == pytest.approx(np.hypot(0.03, 1.0)), "nothing is known on its left"
+    assert found.column_std_px[~unusual] == pytest.approx(0.03)
+    colour = LateralColour(camera=(0.0, 0.0, 0.0), projector_per_nm=1e-5, white_nm=(610.0, 540.0, 470.0))
+    rig = rig.model_copy(update={"lateral_colour": colour})
+    found = geometry_of(rig, None, FoundColumns(maps_of(), np.zeros(COUNT, np.uint16)), SHAPE, 5)
+    off_px = 15.0 * 1e-5 * abs(100.0 - rig.projector.cx_px)
+    assert found.column_std_px == pytest.approx(np.hypot(0.03, off_px), rel=1e-4)
 
 
 def test_an_uneven_spread_leaves_open_where_its_zero_is() -> None:
@@ -120,6 +137,7 @@ def test_each_pixel_gets_the_reasons_why_it_fails(monkeypatch: pytest.MonkeyPatc
     disagree = int(Flag.CODE_UNSURE | Flag.CODES_DISAGREE)
     assert flagged() == [0, dark, saturated, nan, disagree | refined]
     assert flagged(has_patterns=False) == [0, dark, saturated & ~refined, nan, disagree]
+    assert flagged(unusual=[True, True, False, True, False])[:2] == [int(Flag.UNUSUAL_PEAK), dark]
     low, high = published_rig().depth_range_mm
     far = int(Flag.OUT_OF_RANGE)
     assert flagged(depth_mm=[low, 1, high, 1, high + 1])[4] == disagree | refined | far

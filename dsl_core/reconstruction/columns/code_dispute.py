@@ -20,8 +20,8 @@ from dsl_core.reconstruction.hdr import MergedFrame
 ZERO_ORDER_SHARE = 0.4
 #: What is enough where one of two codes points at the peak: first orders, some 150 columns wide, stay below.
 DISPUTED_SHARE = 0.2
-#: First orders alone bring less than this share in any one line, by so many standard deviations.
-DARK_SHARE, DARK_SIGMAS = 0.1, 3.0
+#: First orders and glare bring less than this share in any one line, by so many standard deviations.
+DARK_SHARE, DARK_SIGMAS = 0.2, 3.0
 #: Of two peaks the higher one counts when it is so many times the other.
 CLEARLY_HIGHER = 2.0
 SAME_PEAK_PX = 0.5

@@ -9,7 +9,7 @@ inverse variance like everything else.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import torch
 from torch import Tensor
@@ -31,17 +31,26 @@ COMB_ERROR = 0.05
 MAX_SHIFT_PX = 2.0
 #: Above this reduced chi-square the profile does not fit (two surfaces in one pixel, motion).
 MAX_CHI_SQUARE = 25.0
+#: Peaks beyond that are fitted again, as wide as surfaces out of focus make them (relative to what is
+#: expected) and with this relative error: pixels see other light as well, of glare or a second surface.
+FOCI, UNUSUAL_ERROR = (1.0, 0.75, 1.35, 1.8, 2.4), 0.03
+#: What fits no better than this then is not one peak.
+UNUSUAL_CHI_SQUARE = 4.0
 
 
 @dataclass(frozen=True)
 class Column:
-    """Refined columns of some pixels and their deviation (px), zero-order amplitude and its deviation."""
+    """Refined columns of some pixels and their deviation (px), zero-order amplitude and its deviation.
+
+    ``unusual`` are those whose peak has another shape than expected.
+    """
 
     column_px: Tensor
     std_px: Tensor
     amplitude: Tensor
     amplitude_std: Tensor
     refined: Tensor
+    unusual: Tensor
 
 
 def refine(
@@ -63,9 +72,14 @@ def refine(
     of the zero order next to them.
     """
     fit = fit_peaks(coarse_px, radiance, std, lines, response, widths, model_error)
+    unusual = (fit.chi_square > MAX_CHI_SQUARE) & (fit.used > 3) & (fit.amplitude > 0)
+    if lines.single:
+        poor = torch.nonzero(unusual).ravel()
+        fit = _any_shape(fit, poor, coarse_px, radiance, std, lines, response, widths)
     q, chi_square = fit.column_px, fit.chi_square
     std_px = torch.sqrt(chi_square.clip(min=1) / fit.information)
-    good = (fit.used > 3) & (fit.amplitude > 0) & (chi_square < MAX_CHI_SQUARE) & (std_px < 1 / math.sqrt(12))
+    limit = torch.where(unusual, UNUSUAL_CHI_SQUARE, MAX_CHI_SQUARE)
+    good = (fit.used > 3) & (fit.amplitude > 0) & (chi_square < limit) & (std_px < 1 / math.sqrt(12))
     good &= ((q - coarse_px).abs() < MAX_SHIFT_PX) & torch.isfinite(q)
     otherwise = torch.where(fit.measured, fit.brightest, torch.maximum(fit.amplitude, fit.brightest))
     return Column(
@@ -74,6 +88,7 @@ def refine(
         torch.where(good, fit.amplitude, otherwise),
         torch.where(good | fit.measured, fit.amplitude_std, torch.inf),
         good,
+        good & unusual,
     )
 
 
@@ -93,6 +108,31 @@ class PeakFit:
     used: Tensor
     brightest: Tensor
     measured: Tensor
+
+
+def _any_shape(
+    fit: PeakFit,
+    poor: Tensor,
+    coarse_px: Tensor,
+    radiance: Tensor,
+    std: Tensor,
+    lines: LineSet,
+    response: ProjectorResponse,
+    widths: Tensor | None,
+) -> PeakFit:
+    """The fit with ``poor`` peaks, by their indices, fitted again, each as wide as suits it best."""
+    if not len(poor):
+        return fit
+    expected = torch.ones(len(poor), dtype=coarse_px.dtype) if widths is None else widths[poor]
+    found = {field.name: getattr(fit, field.name).clone() for field in fields(PeakFit)}
+    for focus in FOCI:
+        other = fit_peaks(
+            coarse_px[poor], radiance[:, poor], std[:, poor], lines, response, focus * expected, UNUSUAL_ERROR
+        )
+        better = other.chi_square < found["chi_square"][poor]
+        for name, values in found.items():
+            values[poor[better]] = getattr(other, name)[better]
+    return PeakFit(**found)
 
 
 def fit_peaks(

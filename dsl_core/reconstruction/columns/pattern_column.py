@@ -122,6 +122,7 @@ def refine_by_profiles(
         amplitude,
         torch.where(good, amplitude.abs() * DIRECT_ERROR, torch.inf),
         good,
+        torch.zeros_like(good),
     )
 
 

@@ -24,7 +24,10 @@ from dsl_core.model.rig import Rig
 from dsl_core.optics.correspondence import zero_order
 from dsl_core.optics.sensor import digitise
 from dsl_core.patterns.images import pattern_image
+from dsl_core.reconstruction.columns.code_dispute import is_dark
+from dsl_core.reconstruction.columns.maps import ColumnMaps
 from dsl_core.reconstruction.geometry import Geometry, reconstruct_geometry
+from dsl_core.reconstruction.hdr import MergedFrame
 from dsl_core.reconstruction.merge import MergedScan, decode_columns, stack_lines
 from dsl_core.simulation.published_rig import published_rig
 from dsl_core.simulation.rendering.pattern_table import PatternTable
@@ -145,3 +148,14 @@ def test_without_lines_an_edge_that_both_codes_name_is_known_better_than_a_colum
     error = (found.column_px.ravel() - wall.column.numpy())[at_edge]
     assert at_edge.sum() > 10
     assert np.sqrt(np.mean(error**2)) < 1.2 * float(found.column_std_px.ravel()[at_edge].mean())
+
+
+def test_lines_are_dark_that_surely_bring_less_than_a_fifth_of_the_white_light() -> None:
+    maps = ColumnMaps.empty(6)
+    maps.amplitude[:] = [1.0, 1.8, 1.0, 1.0, 0.1, 9.0]
+    maps.amplitude_std[:] = [0.3, 0.1, 0.34, 0.3, np.inf, 0.0]
+    maps.refined[:] = [False, False, False, True, False, False]
+    saturated = np.array([False] * 6)
+    white = MergedFrame(np.full(6, 10.0, np.float32), np.ones(6, np.float32), saturated)
+    assert is_dark(maps, white).tolist() == [True, False, False, False, False, False]
+    assert not is_dark(maps, MergedFrame(white.radiance, white.variance, ~saturated)).any()

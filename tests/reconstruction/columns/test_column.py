@@ -68,7 +68,23 @@ def test_every_pixel_is_refined_by_its_own_width_of_the_spread() -> None:
     assert found.refined.all()
     assert (found.column_px - column).abs().max() < 2e-3
     common = refine(column.round(), radiance, std, LINES, RESPONSE)
-    assert (common.column_px - column).abs().max() > 0.02
+    assert (common.column_px - column).abs().max() > 0.01
+
+
+def test_peaks_out_of_focus_or_on_other_light_are_refined_and_said_to_be_unusual() -> None:
+    column, amplitude, _, std = noisy(0.002)
+    radiance = peaks(column, amplitude)
+    blurred = torch.arange(PIXELS) < 1000
+    radiance[:, blurred] = peaks(column, amplitude, RESPONSE.with_gaussian(1.2))[:, blurred]
+    veiled = (torch.arange(PIXELS) >= 1000) & (torch.arange(PIXELS) < 2000)
+    radiance[:, veiled] += 0.05 * amplitude[veiled]
+    found = refine(column.round(), radiance, std, LINES, RESPONSE)
+    assert found.refined.all()
+    assert torch.equal(found.unusual, blurred | veiled)
+    error = (found.column_px - column).abs()
+    assert error.max() < 0.03
+    assert float((error < 1.96 * found.std_px)[found.unusual].float().mean()) > 0.95
+    assert (found.std_px[found.unusual] > 3 * found.std_px[~found.unusual].max()).all()
 
 
 def test_refinement_of_exact_data_is_exact() -> None:
