@@ -162,7 +162,7 @@ def share_findings(flags: NDArray[np.integer], spectra: SpectralCounts | None) -
             MOST_UNUSUAL,
             "Lines have another shape in {0} of the pixels than in most: surfaces out of focus, translucent"
             " or glossy ones, or light from surface to surface. Depth is less sure there, as stated, and"
-            " reflectances lack the light that leaves a surface beside the line.",
+            " reflectances lack the light that leaves a surface next to the line.",
             "Look at the flags; narrow the aperture or move the object nearer to the focus.",
         )
     if spectra is None or measured < FEWEST:
