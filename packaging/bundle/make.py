@@ -8,12 +8,15 @@ and an icon. ``--smoke`` only tries what was made.
 
 from __future__ import annotations
 
+import contextlib
+import filecmp
 import os
 import shutil
 import subprocess
 import sys
 import tempfile
 import time
+from collections.abc import Iterator
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -38,6 +41,8 @@ Description: hyperspectral 3D scanning by dispersed structured light
  a camera, a projector and a diffraction film. Drivers of other packages are found
  in /usr/lib/dsl-scan/drivers.
 """
+#: Libraries whose names of functions, for debuggers, take the most space.
+STRIPPED = ("llvmlite", "torch/lib", "vtkmodules")
 DESKTOP = """[Desktop Entry]
 Type=Application
 Name=dsl-scan
@@ -50,7 +55,7 @@ Terminal=false
 #: A command, and words that its output has to contain.
 SMOKE = (
     (("--version",), "dsl-scan "),
-    (("rigs",), "twin"),
+    (("rigs",), "bundled-lab"),
     (
         (
             "scan",
@@ -69,7 +74,20 @@ SMOKE = (
     (("reconstruct", "a.dsl", "--bands", "430:660:46"), "have a depth"),
     (("export", "a.zarr", "png", "a.png"), "Written"),
     (("doctor", "--no-devices"), "OpenGL"),
+    (("-m", "drawing"), "drawn True"),
 )
+#: A package as `pip install --target` leaves it in the folder for drivers: a rig, and a module to run.
+DRIVER = {
+    "bundled_lab-1.dist-info/METADATA": "Metadata-Version: 2.1\nName: bundled-lab\nVersion: 1\n",
+    "bundled_lab-1.dist-info/entry_points.txt": "[dsl_scan.rigs]\nbundled-lab = drawing:open_lab\n",
+    "drawing.py": """
+import pyvista
+
+plotter = pyvista.Plotter(off_screen=True)
+plotter.add_points(pyvista.Sphere().points, scalars=range(len(pyvista.Sphere().points)))
+print("drawn", plotter.screenshot(return_img=True).std() > 0)
+""",
+}
 
 
 def main() -> int:
@@ -95,6 +113,8 @@ def build() -> int:
     code = subprocess.run(command, check=False).returncode
     if code:
         return code
+    if os.name == "posix":
+        slim()
     (FOLDER / "drivers").mkdir()
     told = "pip install --target here PACKAGE makes its rigs, formats and drivers known to dsl-scan.\n"
     (FOLDER / "drivers" / "README").write_text(told)
@@ -106,9 +126,25 @@ def build() -> int:
     return 0
 
 
+def slim() -> None:
+    """Drop the names of functions from large libraries, and keep both programs as one file of two names.
+
+    Only Windows tells a program with a console from one without.
+    """
+    command, window = FOLDER / "dsl-scan", FOLDER / "dsl-scan-gui"
+    if filecmp.cmp(command, window, shallow=False):
+        window.unlink()
+        window.hardlink_to(command)
+    if shutil.which("strip") and sys.platform == "linux":
+        inside = FOLDER / "_internal"
+        libraries = [path for name in STRIPPED for path in inside.joinpath(name).rglob("*.so*")]
+        subprocess.run(["strip", "--strip-unneeded", *libraries], check=True)
+
+
 def size_of(folder: Path) -> int:
-    """Bytes of all files below a folder, links not counted."""
-    return sum(path.stat().st_size for path in folder.rglob("*") if path.is_file() and not path.is_symlink())
+    """Bytes of all files below a folder; links not counted, nor further names of a file."""
+    files = [path.stat() for path in folder.rglob("*") if path.is_file() and not path.is_symlink()]
+    return sum({(file.st_dev, file.st_ino): file.st_size for file in files}.values())
 
 
 def make_package() -> Path:
@@ -137,17 +173,32 @@ def make_package() -> Path:
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_text(text)
     package = BUILD / f"dsl-scan_{__version__}_{architecture}.deb"
-    command = ["dpkg-deb", "--root-owner-group", "-Zxz", "-z1", "--build", str(root), str(package)]
+    command = ["dpkg-deb", "--root-owner-group", "-Zzstd", "-z12", "--build", str(root), str(package)]
     subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
     shutil.rmtree(root)
     return package
+
+
+@contextlib.contextmanager
+def driver_beside_program() -> Iterator[None]:
+    """Put `DRIVER` into the program's folder for drivers while a block runs."""
+    files = {FOLDER / "drivers" / name: text for name, text in DRIVER.items()}
+    for path, text in files.items():
+        path.parent.mkdir(exist_ok=True)
+        path.write_text(text)
+    try:
+        yield
+    finally:
+        for part in {path.relative_to(FOLDER / "drivers").parts[0] for path in files}:
+            whole = FOLDER / "drivers" / part
+            shutil.rmtree(whole) if whole.is_dir() else whole.unlink()
 
 
 def smoke() -> int:
     """Give the commands of `SMOKE` in an environment without Python; returns how many went wrong."""
     wrong = 0
     program = FOLDER / ("dsl-scan.exe" if os.name == "nt" else "dsl-scan")
-    with tempfile.TemporaryDirectory() as folder:
+    with tempfile.TemporaryDirectory() as folder, driver_beside_program():
         bare = {"HOME": folder, "PATH": "/usr/bin:/bin", "QT_QPA_PLATFORM": "offscreen", "LANG": "C.UTF-8"}
         environment = os.environ | bare if os.name == "nt" else bare
         for arguments, words in SMOKE:
