@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dsl_app.results.answers.controller import AnswersController
+from dsl_app.results.contrast.controller import ContrastController
 from dsl_app.results.export.controller import ExportController
 from dsl_app.results.marks.controller import MarksController
 from dsl_app.results.search.controller import SearchController
@@ -23,6 +24,7 @@ from dsl_app.shared.spectrum import Pixel
 from dsl_app.shared.undo import Change, UndoStack
 from dsl_core.errors import DslError
 from dsl_core.io.result.result_arrays import ResultArrays, load_arrays
+from dsl_core.optics.levels import rgba_of_colours
 from dsl_core.progress import Progress
 from dsl_core.workflows.inspection import FrameBlock, IntensityGraph, intensity_graph, read_block
 
@@ -31,7 +33,7 @@ class ResultsController:
     """Fills a `ResultsState`.
 
     ``marks`` has the pins, regions and references, ``search`` looks for spectra, ``answers``
-    names materials, ``export`` writes files.
+    names materials, ``contrast`` sets bands and levels of pictures, ``export`` writes files.
     ``opened`` fires when a result is open and its views are set, so that listeners can change them.
     """
 
@@ -40,6 +42,7 @@ class ResultsController:
         self.marks = MarksController(state, runner, notifier, undo)
         self.search = SearchController(state, runner, notifier)
         self.answers = AnswersController(state, runner, notifier)
+        self.contrast = ContrastController(state)
         self.export = ExportController(state, runner, notifier)
         self._undo = undo
         self.opened: Event[ResultArrays] = Event()
@@ -114,7 +117,7 @@ class ResultsController:
             if arrays.has_spectra:
                 # Import here what the first comparison of colours needs; later it would block the window.
                 observer_weights(arrays.wavelengths_nm)
-            return arrays, picture_of(arrays["rgb"]) if "rgb" in arrays.arrays else None
+            return arrays, rgba_of_colours(arrays["rgb"]) if "rgb" in arrays.arrays else None
 
         idle = lambda: self.state.busy.set("")  # noqa: E731
         job = Job(title, both, self._opened, exclusive="opening", is_minor=is_minor, on_ended=idle)
@@ -134,6 +137,7 @@ class ResultsController:
         state.light.set(DAYLIGHT)
         state.picture_light.set((DAYLIGHT, state.adapted.value))
         state.depth_limits.set(None)
+        self.contrast.clear()
         state.picture.set(picture)
         # Band 0 exists in both results, while the band shown last may not.
         state.band.set(0)
@@ -215,7 +219,7 @@ class ResultsController:
             from dsl_core.optics.relighting import relight
 
             progress.report("relight", 0, 1)
-            return picture_of(relight(result["reflectance"], result.wavelengths_nm, light, adapted))
+            return rgba_of_colours(relight(result["reflectance"], result.wavelengths_nm, light, adapted))
 
         def done(picture: NDArray[np.uint8]) -> None:
             if request == self._light_request:
@@ -267,13 +271,3 @@ def is_complete(session: Path) -> bool:
         return not ScanReader(session).missing()
     except DslError:
         return True
-
-
-def picture_of(rgb: NDArray[np.float32]) -> NDArray[np.uint8]:
-    """RGBA bytes (rows, columns, 4) of colours (3, rows, columns), 0..1; transparent where they are NaN."""
-    picture = np.empty((*rgb.shape[1:], 4), np.uint8)
-    for channel in range(3):
-        level = np.nan_to_num(rgb[channel]).clip(0, 1)
-        picture[..., channel] = (level * 255 + 0.5).astype(np.uint8)
-    picture[..., 3] = np.where(np.isfinite(rgb[0]), 255, 0)
-    return picture

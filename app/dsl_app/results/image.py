@@ -87,7 +87,7 @@ class ResultImage(QWidget):
         state = self._state
         state.result.follow(self._new_result)
         painted = (state.view, state.cloud_by, state.band, state.quality, state.picture, state.depth_limits)
-        follow_any(self.paint, *painted)
+        follow_any(self.paint, *painted, state.bands, state.levels)
         state.cursor.follow(self._show_cursor)
         state.marks.follow(self._show_marks)
         state.search.follow(lambda _: self._show_search())

@@ -2,17 +2,27 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from dsl_app.results.state import Limits, QualityMap, ResultsState, ResultView
-from dsl_app.shared.widgets.pictures import DEPTH, GREY, SHARE, colour_map, spread_of
+from dsl_app.results.state import (
+    BANDS_KEY,
+    COLOUR_KEY,
+    Limits,
+    QualityMap,
+    ResultsState,
+    ResultView,
+    depth_key,
+)
+from dsl_app.shared.widgets.pictures import DEPTH, GREY, SHARE, colour_map
 from dsl_core.analysis.class_table import class_colours
 from dsl_core.io.result.result_arrays import ResultArrays
 from dsl_core.model.result import FLAG_COLOURS, FLAG_NAMES, gravest_flag
+from dsl_core.optics.levels import Bands, Levels, between, rgba_of_colours, spread_of, three_bands, top_of
 
 #: Which light measured a band: orders +1, -1, both, or only the zero order (with the prior).
 ORDER_TEXTS = {1: "order +1", 2: "order −1", 3: "both first orders", 4: "zero order only"}
@@ -21,8 +31,29 @@ NOTHING = "#8a8f98"
 
 
 @dataclass(frozen=True)
+class Contrast:
+    """The values of a picture before its levels, and both the levels of its own and those on it.
+
+    ``values`` are one map (rows, columns), or three for red, green and blue. Pictures with the same ``key``
+    have the same levels; ``is_bounded`` where nothing can be beyond the levels of its own.
+    """
+
+    key: str
+    label: str
+    values: tuple[NDArray[Any], ...]
+    automatic: Levels
+    levels: Levels
+    is_chosen: bool
+    unit: str = ""
+    is_bounded: bool = False
+
+
+@dataclass(frozen=True)
 class Layer:
-    """An image with levels and a lookup table; ``label`` names the colour bar, ``keys`` a legend instead."""
+    """An image with levels and a lookup table; ``label`` names the colour bar, ``keys`` a legend instead.
+
+    Without ``contrast`` the picture has no levels that could be set.
+    """
 
     image: NDArray[Any]
     levels: tuple[float, float] | None = None
@@ -30,6 +61,7 @@ class Layer:
     table: NDArray[np.uint8] | None = None
     label: str = ""
     keys: tuple[tuple[str, str, float], ...] = ()
+    contrast: Contrast | None = None
 
 
 def within(depth_mm: NDArray[Any], limits: Limits | None) -> NDArray[np.bool_]:
@@ -46,18 +78,22 @@ class Layers:
     def __init__(self, result: ResultArrays) -> None:
         self.result = result
         self._known: dict[str, Any] = {}
+        self._chosen: Mapping[str, Levels] = {}
 
     def layer(self, state: ResultsState) -> Layer | None:
         """The layer of the current view; None where the result has nothing to show."""
         view = state.view.value if state.view.value is not ResultView.CLOUD else state.cloud_by.value
+        self._chosen = state.levels.value
         if view is ResultView.BAND and self.result.has_spectra:
             return self._of_band("reflectance", state.band.value, GREY, "Reflectance")
-        if view is ResultView.DEPTH:
-            return self._depth(state.depth_limits.value)
         if view is ResultView.QUALITY:
             return self._quality(state.quality.value, state.band.value)
-        picture = state.picture.value
-        return Layer(picture) if picture is not None else self._depth(state.depth_limits.value)
+        picture, bands = state.picture.value, state.bands.value
+        if view is ResultView.DEPTH or picture is None:
+            return self._depth(state.depth_limits.value)
+        if bands is not None and self.result.has_spectra:
+            return self._three_bands(bands)
+        return self._true_colours(picture)
 
     def _once(self, name: str, make: Any) -> Any:
         if name not in self._known:
@@ -66,32 +102,64 @@ class Layers:
 
     def _of_band(self, name: str, band: int, colours: str, label: str) -> Layer:
         """A band, with one scale for all bands."""
-        cube = self.result[name]
-        top = self._once(name, lambda: spread_of(cube[:: max(len(cube) // 6, 1)])[1])
-        return Layer(cube[band], (0.0, top), colours, label=label)
+        return self._scaled(name, self.result[name][band], (0.0, self._top(name)), colours, label)
 
-    def _map(self, name: str, colours: str, label: str) -> Layer:
+    def _top(self, name: str) -> float:
+        top: float = self._once(name, lambda: top_of(self.result[name]))
+        return top
+
+    def _scaled(
+        self, key: str, values: NDArray[Any], own: Levels, colours: str, label: str, unit: str = ""
+    ) -> Layer:
+        """Values on a scale of colours, between levels of their own or those that a person set."""
+        levels = self._chosen.get(key, own)
+        contrast = Contrast(key, label, (values,), own, levels, key in self._chosen, unit)
+        return Layer(values, levels, colours, label=label, contrast=contrast)
+
+    def _map(self, name: str, colours: str, label: str, unit: str = "") -> Layer:
         values = self.result[name]
-        return Layer(values, self._once(name, lambda: spread_of(values)), colours, label=label)
+        return self._scaled(name, values, self._once(name, lambda: spread_of(values)), colours, label, unit)
 
     def _depth(self, limits: Limits | None) -> Layer:
-        whole = self._map("depth_mm", DEPTH, "Depth (mm)")
         if limits is None:
-            return whole
-        shown = np.where(within(whole.image, limits), whole.image, np.float32(np.nan))
-        return Layer(shown, limits, DEPTH, label=whole.label)
+            return self._map("depth_mm", DEPTH, "Depth (mm)", "mm")
+        depth = self.result["depth_mm"]
+        shown = np.where(within(depth, limits), depth, np.float32(np.nan))
+        return self._scaled(depth_key(limits), shown, limits, DEPTH, "Depth (mm)", "mm")
+
+    def _three_bands(self, bands: Bands) -> Layer:
+        cube, own = self.result["reflectance"], (0.0, self._top("reflectance"))
+        levels = self._chosen.get(BANDS_KEY, own)
+        picture = rgba_of_colours(three_bands(cube, bands, levels))
+        values = tuple(cube[band] for band in bands)
+        is_chosen = BANDS_KEY in self._chosen
+        return Layer(picture, contrast=Contrast(BANDS_KEY, "Reflectance", values, own, levels, is_chosen))
+
+    def _true_colours(self, picture: NDArray[np.uint8]) -> Layer:
+        own = (0.0, 1.0)
+        levels = self._chosen.get(COLOUR_KEY, own)
+        values = tuple(picture[..., channel] / np.float32(255) for channel in range(3))
+        is_chosen = COLOUR_KEY in self._chosen
+        contrast = Contrast(COLOUR_KEY, "sRGB value", values, own, levels, is_chosen, is_bounded=True)
+        if not is_chosen:
+            return Layer(picture, contrast=contrast)
+        table = (between(np.arange(256) / 255, levels) * 255 + 0.5).astype(np.uint8)
+        return Layer(np.dstack([table[picture[..., :3]], picture[..., 3:]]), contrast=contrast)
 
     def _quality(self, what: QualityMap, band: int) -> Layer | None:
         if what is QualityMap.DEPTH_SPREAD:
-            return self._map("depth_std_mm", DEPTH, "Standard deviation of depth (mm)")
+            return self._map("depth_std_mm", DEPTH, "Standard deviation of depth (mm)", "mm")
         if what is QualityMap.FLAGS or not self.result.has_spectra:
             layer: Layer = self._once("flags", self._flags)
             return layer
         if what is QualityMap.ORDERS:
             return self._orders(band)
         if what is QualityMap.SHARE:
-            return Layer(self.result["data_share"][band], (0.0, 1.0), SHARE, label="Data share")
+            return self._share(band)
         return self._of_band("reflectance_std", band, SHARE, "Standard deviation of reflectance")
+
+    def _share(self, band: int) -> Layer:
+        return self._scaled("data_share", self.result["data_share"][band], (0.0, 1.0), SHARE, "Data share")
 
     def _flags(self) -> Layer:
         classes = gravest_flag(self.result["flags"])

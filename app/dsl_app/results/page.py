@@ -11,6 +11,7 @@ from PySide6.QtWidgets import QDialog, QStackedWidget, QWidget
 from dsl_app.results.answers.colours_panel import ColoursPanel
 from dsl_app.results.answers.materials_panel import MaterialsPanel
 from dsl_app.results.cloud.panel import CloudPanel
+from dsl_app.results.contrast.panel import ContrastPanel
 from dsl_app.results.controller import ResultsController
 from dsl_app.results.export.dialog import ExportDialog
 from dsl_app.results.image import ResultImage
@@ -63,6 +64,8 @@ class ResultsPage(PageWidget):
         self.image = Deferred(lambda: ResultImage(state, control))
         set_help(self.image, "numbers#below-the-picture")
         self.cloud = CloudPanel(state, control, runner)
+        # Made when somebody wants it.
+        self.contrast: ContrastPanel | None = None
         self.pixel_info = PixelInfo(state)
         set_help(self.pixel_info, "hard-cases")
         self.spectra = Deferred(lambda: SpectrumPanel(state))
@@ -121,7 +124,8 @@ class ResultsPage(PageWidget):
     def _content(self) -> QWidget:
         self.pictures = splitter(Qt.Orientation.Horizontal, (self.image, 1), (self.cloud, 1))
         self.pictures.setObjectName("result-pictures")
-        left = boxed(column_of(self.bar, (self.pictures, 1), self.pixel_info, margins=0))
+        self._below = column_of(margins=0)
+        left = boxed(column_of(self.bar, (self.pictures, 1), self._below, self.pixel_info, margins=0))
         tabs = tabs_of(
             "",
             (self.marks, "Pins, regions, references", ""),
@@ -145,6 +149,7 @@ class ResultsPage(PageWidget):
         follow_any(self._show_summary, state.result, state.offer, state.busy)
         state.graph.changed.connect(self._show_graph)
         state.library.changed.connect(self._ask_library)
+        state.contrast.follow(self._show_contrast)
         state.view.follow(lambda view: self.cloud.setVisible(view is ResultView.CLOUD))
 
     # Show ------------------------------------------------------------------------------------------
@@ -167,6 +172,13 @@ class ResultsPage(PageWidget):
                 self._graph.hide()
         elif not self.graph.isVisible():
             self.graph.show()
+
+    def _show_contrast(self, shown: bool) -> None:
+        if shown and self.contrast is None:
+            self.contrast = ContrastPanel(self._state, self._control.contrast)
+            set_help(self.contrast, "numbers#contrast")
+            self.contrast.apply_theme(self._theme)
+            self._below.addWidget(self.contrast)
 
     def _ask_library(self, library: Library | None) -> None:
         if library is not None:

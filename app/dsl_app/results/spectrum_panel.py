@@ -14,10 +14,10 @@ from dsl_app.shared.spectrum import Pixel, Spectrum
 from dsl_app.shared.theme import DARK, Theme
 from dsl_app.shared.widgets.forms import ChoiceBox, check_box, quiet
 from dsl_app.shared.widgets.layouts import STRETCH, column_of, row_of
-from dsl_app.shared.widgets.pictures import spread_of
 from dsl_app.shared.widgets.plots import CalmPlot
 from dsl_app.shared.widgets.spectrum_curve import SpectrumCurve
 from dsl_core.analysis.transforms import Transform, transformed
+from dsl_core.optics.levels import spread_of
 
 #: Higher reflectances are errors or gloss; zooming out shows them.
 TOP = 1.08

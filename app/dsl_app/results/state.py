@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import Enum
 from pathlib import Path
@@ -19,13 +20,21 @@ from dsl_core.evaluation.similarity import Likeness
 from dsl_core.io.result.result_arrays import ResultArrays
 from dsl_core.io.spectra.reference_file import ReferenceFile
 from dsl_core.model.spectral import SpectralCurve
+from dsl_core.optics.levels import Bands, Levels
 from dsl_core.workflows.inspection import IntensityGraph
 
 #: A nearest and a farthest depth, mm.
 Limits = tuple[float, float]
 #: The light that colours are first shown under.
 DAYLIGHT = "D65"
+#: Keys of the levels of true colours, of three bands as colours, and of one band.
+COLOUR_KEY, BANDS_KEY, BAND_KEY = "rgb", "bands", "reflectance"
 _keys = itertools.count(1)
+
+
+def depth_key(limits: Limits | None) -> str:
+    """The key of the depth picture's levels: other limits begin with levels of their own."""
+    return "depth_mm" if limits is None else f"depth_mm {limits[0]:g} {limits[1]:g}"
 
 
 class ResultView(Enum):
@@ -143,8 +152,10 @@ class ResultsState:
     computed for ``picture_light``, which follows the chosen ``light`` and ``adapted`` with a delay.
     ``cloud_by`` is the view that colours the cloud; ``busy`` says what is being opened (empty: nothing).
     ``graph`` is the intensity graph of the pixel inspected last; ``library`` is a file whose spectra the user
-    has to choose from. ``depth_limits`` are the depths shown, mm; None for all. The plot draws a
-    ``transform`` of the spectra, one above the other if ``stacked``.
+    has to choose from. ``depth_limits`` are the depths shown, mm; None for all. ``bands`` are shown as
+    colours; None for true colours. ``levels`` has what a person set by the key of `layers.Contrast`, and
+    ``contrast`` says whether a histogram is shown. The plot draws a ``transform`` of the spectra, one above
+    the other if ``stacked``.
     """
 
     def __init__(self) -> None:
@@ -157,6 +168,9 @@ class ResultsState:
         self.band = Value(0)
         self.quality = Value(QualityMap.FLAGS)
         self.depth_limits: Value[Limits | None] = Value(None)
+        self.bands: Value[Bands | None] = Value(None)
+        self.levels: Value[Mapping[str, Levels]] = Value({})
+        self.contrast = Value(False)
         self.cursor: Value[Pixel | None] = Value(None)
         self.marks: Value[tuple[Mark, ...]] = Value(())
         self.selected = Value(0)

@@ -14,11 +14,11 @@ from dsl_app.shared.theme import Theme
 from dsl_app.shared.widgets.forms import ChoiceBox, NumberBox, check_box, label, named, quiet
 from dsl_app.shared.widgets.icons import icon
 from dsl_app.shared.widgets.layouts import STRETCH, boxed, column_of, row_of
-from dsl_app.shared.widgets.pictures import spread_of
+from dsl_core.optics.levels import spread_of
 from dsl_core.optics.relighting import LIGHTS
 
 VIEWS = (
-    (ResultView.COLOUR, "sRGB", "Colours as the eye sees them under a light source"),
+    (ResultView.COLOUR, "Colour", "Colours as the eye sees them under a light source, or any three bands"),
     (ResultView.BAND, "Band", "Reflectance of one band"),
     (ResultView.DEPTH, "Depth", "Depth along the camera axis"),
     (
@@ -70,6 +70,17 @@ class ViewBar(QWidget):
         self.slider.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self.nm = label("")
         self.nm.setMinimumWidth(self.nm.fontMetrics().horizontalAdvance("000.0 nm"))
+        self.colours = ChoiceBox(
+            "Colours",
+            "True colours are what the eye sees; three bands show any three as red, green and blue",
+            [("True colour", False), ("Three bands", True)],
+            control.contrast.show_three_bands,
+        )
+        self.bands = tuple(self._band_box(place, name) for place, name in enumerate(("Red", "Green", "Blue")))
+        self.contrast = self._button(
+            "Contrast", "Show the histogram of the picture and set its contrast on it"
+        )
+        self.contrast.setText("Contrast")
         lights = [(text, key) for key, text in LIGHTS.items()]
         self.light = ChoiceBox("Light", "The light source that colours are computed for", lights)
         self.adapted = check_box(
@@ -114,6 +125,12 @@ class ViewBar(QWidget):
         button.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         return button
 
+    def _band_box(self, channel: int, colour: str) -> ChoiceBox:
+        tip = f"The band that is shown as {colour.lower()}, in nm"
+        return ChoiceBox(
+            f"{colour} band", tip, do=lambda band: self._control.contrast.choose_band(channel, band)
+        )
+
     def _group(self, buttons: list[QToolButton]) -> QButtonGroup:
         group = QButtonGroup(self)
         for button in buttons:
@@ -123,15 +140,22 @@ class ViewBar(QWidget):
     def _lay_out(self) -> None:
         line = QFrame()
         line.setFrameShape(QFrame.Shape.VLine)
-        top = row_of(*self.views.values(), 6, line, 6, *self.tools.values(), STRETCH, spacing=4)
+        top = row_of(
+            *self.views.values(), 6, line, 6, *self.tools.values(), 6, self.contrast, STRETCH, spacing=4
+        )
         self._light_label, self._cloud_label = QLabel("Light"), QLabel("Colour by")
         self._quality_label = QLabel("Show")
         cloud = (self._cloud_label, self.cloud_by)
         limits = (QLabel("Depth"), self.near, QLabel("to"), self.far, self.automatic)
         light = (self._light_label, self.light, self.adapted)
+        self._band_labels = tuple(label(letter) for letter in "RGB")
+        triples = zip(self._band_labels, self.bands, strict=True)
+        three = (self.colours, 4, *(part for pair in triples for part in pair))
         quality = (self._quality_label, self.quality)
         depth = row_of(*cloud, *limits, STRETCH, margins=0, spacing=8)
-        colours = row_of(*light, *quality, self.nm, (self.slider, 1000), STRETCH, margins=0, spacing=8)
+        colours = row_of(
+            *three, *light, *quality, self.nm, (self.slider, 1000), STRETCH, margins=0, spacing=8
+        )
         for row in (depth, colours):
             # Both have the same height, so that the picture does not move between views.
             row.addStrut(self.light.sizeHint().height())
@@ -144,6 +168,9 @@ class ViewBar(QWidget):
             button.clicked.connect(lambda _checked, view=view: self._show_view(view))
         for tool, button in self.tools.items():
             button.clicked.connect(lambda _checked, tool=tool: state.tool.set(tool))
+        self.contrast.clicked.connect(state.contrast.set)
+        state.contrast.follow(self.contrast.setChecked)
+        state.bands.changed.connect(lambda _: self._show_controls())
         self.slider.valueChanged.connect(state.band.set)
         self.light.activated.connect(lambda _: self._relight())
         self.adapted.clicked.connect(lambda _: self._relight())
@@ -191,6 +218,10 @@ class ViewBar(QWidget):
         result = self._state.result.value
         if result is not None and result.has_spectra:
             self.slider.setRange(0, len(result.wavelengths_nm) - 1)
+            for box in self.bands:
+                box.clear()
+                for band, nm in enumerate(result.wavelengths_nm):
+                    box.addItem(f"{nm:g} nm", band)
         self._show_band()
         self._show_controls()
 
@@ -203,10 +234,16 @@ class ViewBar(QWidget):
     def _show_controls(self) -> None:
         state = self._state
         self.views[state.view.value].setChecked(True)
-        needed = controls_for(state.view.value, state.cloud_by.value, state.quality.value)
+        bands = state.bands.value
+        needed = controls_for(state.view.value, state.cloud_by.value, state.quality.value, bands is not None)
+        self.colours.choose(bands is not None)
+        for box, band in zip(self.bands, bands or (), strict=False):
+            box.choose(band)
         self.cloud_by.choose(state.cloud_by.value)
         self.quality.choose(state.quality.value)
         for widgets, visible in (
+            ((self.colours,), needed.colours),
+            ((*self._band_labels, *self.bands), needed.three_bands),
             ((self._light_label, self.light, self.adapted), needed.light),
             ((self._quality_label, self.quality), needed.quality),
             ((self._cloud_label, self.cloud_by), needed.cloud),
@@ -222,6 +259,8 @@ class ViewBar(QWidget):
 class ViewControls:
     """Which controls a view needs, and which of the two rows they are in."""
 
+    colours: bool
+    three_bands: bool
     light: bool
     quality: bool
     band: bool
@@ -230,13 +269,20 @@ class ViewControls:
     colour_row: bool
 
 
-def controls_for(view: ResultView, cloud_by: ResultView, quality: QualityMap) -> ViewControls:
-    """The controls of a view; the cloud has those of the view that colours it as well."""
+def controls_for(
+    view: ResultView, cloud_by: ResultView, quality: QualityMap, three_bands: bool = False
+) -> ViewControls:
+    """The controls of a view; the cloud has those of the view that colours it as well.
+
+    ``three_bands`` says that the colours are those of three bands, which no light changes.
+    """
     cloud = view is ResultView.CLOUD
     shown = cloud_by if cloud else view
     by_quality = shown is ResultView.QUALITY
     return ViewControls(
-        light=shown is ResultView.COLOUR,
+        colours=shown is ResultView.COLOUR,
+        three_bands=shown is ResultView.COLOUR and three_bands,
+        light=shown is ResultView.COLOUR and not three_bands,
         quality=by_quality,
         band=shown is ResultView.BAND or (by_quality and quality in _NEEDS_BAND),
         cloud=cloud,

@@ -16,6 +16,7 @@ from dsl_core.errors import StoreError
 from dsl_core.io.export.common import plane, provenance, require, require_suffix, wavelengths_nm
 from dsl_core.io.staging import staged
 from dsl_core.model.result import FLAG_COLOURS, FLAG_NAMES, Flag, gravest_flag
+from dsl_core.optics.levels import Levels, between, three_bands
 from dsl_core.optics.relighting import relight
 from dsl_core.solve.many import Check, never
 
@@ -36,13 +37,21 @@ def export_png(
     band_nm: float | None = None,
     light: str = "D65",
     adapted: bool = True,
+    bands_nm: tuple[float, float, float] | None = None,
+    colour_levels: Levels | None = None,
+    bands_levels: Levels = (0.0, 1.0),
+    band_levels: Levels = (0.0, 1.0),
+    depth_levels_mm: Levels | None = None,
     check: Check = never,
 ) -> list[Path]:
     """Write ``NAME_rgb``, ``NAME_depth``, ``NAME_550nm``, ``NAME_flags.png``, as far as the result has them.
 
     ``path`` is ``NAME.png``; ``band_nm`` picks the band (the middle one if not given). Colours under another
-    ``light`` than D65, as of `relight`, are named after it: ``NAME_rgb_A``. Raises `StoreError`, also when
-    the result has no band within half a band's distance of ``band_nm``.
+    ``light`` than D65, as of `relight`, are named after it: ``NAME_rgb_A``. ``bands_nm`` adds three bands as
+    red, green and blue: ``NAME_650_550_450nm``. Levels are the values that become black and white: of true
+    colours 0..1 after their gamma, of bands their reflectance, of depth the ends of its colours in mm (nearly
+    all pixels if not given). Raises `StoreError`, also when the result has no band within half a band's
+    distance of a wavelength asked for.
     """
     require_suffix(path, ".png")
     from PIL import Image
@@ -51,14 +60,21 @@ def export_png(
     pictures: dict[str, Picture] = {}
     if light != "D65" and "reflectance" in result:
         lit = relight(plane(result, "reflectance"), np.array(wavelengths_nm(result)), light, adapted)
-        pictures[f"rgb_{light}" if adapted else f"rgb_{light}_unadapted"] = rgb_picture(lit)
+        name = f"rgb_{light}" if adapted else f"rgb_{light}_unadapted"
+        pictures[name] = rgb_picture(lit, colour_levels)
     elif "rgb" in result:
-        pictures["rgb"] = rgb_picture(plane(result, "rgb"))
+        pictures["rgb"] = rgb_picture(plane(result, "rgb"), colour_levels)
     if "depth_mm" in result:
-        pictures["depth"] = depth_picture(plane(result, "depth_mm"))
+        pictures["depth"] = depth_picture(plane(result, "depth_mm"), depth_levels_mm)
     if "reflectance" in result:
         band, wavelength = nearest_band(result, band_nm)
-        pictures[f"{wavelength:g}nm"] = band_picture(np.asarray(result["reflectance"][band].values))
+        reflectance = np.asarray(result["reflectance"][band].values)
+        pictures[f"{wavelength:g}nm"] = band_picture(reflectance, band_levels)
+        if bands_nm is not None:
+            found = [nearest_band(result, nm) for nm in bands_nm]
+            cube = np.stack([np.asarray(result["reflectance"][place].values) for place, _ in found])
+            name = "_".join(f"{nm:g}" for _, nm in found)
+            pictures[f"{name}nm"] = rgb_picture(three_bands(cube, (0, 1, 2), bands_levels))
     if "flags" in result:
         pictures["flags"] = flags_picture(result["flags"].values)
     if not pictures:
@@ -88,29 +104,31 @@ def nearest_band(result: xr.Dataset, band_nm: float | None) -> tuple[int, float]
     return best, centres[best]
 
 
-def rgb_picture(rgb: NDArray[np.float32]) -> Picture:
-    """SRGB values 0..1, shape (3, rows, columns), as an 8-bit image."""
+def rgb_picture(rgb: NDArray[np.float32], levels: Levels | None = None) -> Picture:
+    """SRGB values 0..1, shape (3, rows, columns), as an 8-bit image, stretched between levels if given."""
     lit: NDArray[np.bool_] = np.asarray(np.isfinite(rgb).all(axis=0))
+    rgb = rgb if levels is None else between(rgb, levels)
     picture = np.rint(np.clip(np.nan_to_num(rgb), 0, 1) * 255).astype(np.uint8)
     return _blank(np.moveaxis(picture, 0, -1), lit)
 
 
-def band_picture(reflectance: NDArray[np.float32]) -> Picture:
-    """Reflectance 0..1 as grey levels, straight (no gamma); no answer is marked dark blue, not grey."""
-    levels = np.rint(np.clip(np.nan_to_num(reflectance), 0, 1) * 255).astype(np.uint8)
-    picture = np.repeat(levels[..., None], 3, axis=-1)
+def band_picture(reflectance: NDArray[np.float32], levels: Levels = (0.0, 1.0)) -> Picture:
+    """Reflectance as grey levels, straight (no gamma); no answer is marked dark blue, not grey."""
+    greys = np.rint(np.nan_to_num(between(reflectance, levels)) * 255).astype(np.uint8)
+    picture = np.repeat(greys[..., None], 3, axis=-1)
     picture[~np.isfinite(reflectance)] = (0, 0, 96)
     return picture
 
 
-def depth_picture(depth_mm: NDArray[np.float32]) -> Picture:
+def depth_picture(depth_mm: NDArray[np.float32], levels_mm: Levels | None = None) -> Picture:
     """Depth in colours (near is red, far is blue), with a bar that says how many mm they mean.
 
-    The bar spans all but the nearest and farthest half percent, so that single outliers leave colours to
-    the rest; what is beyond has the colour of the bar's end.
+    Without levels the bar spans all but the nearest and farthest half percent, so that single outliers
+    leave colours to the rest; what is beyond has the colour of the bar's end.
     """
     lit = np.isfinite(depth_mm)
     near, far = np.percentile(depth_mm[lit], (0.5, 99.5)) if lit.any() else (0.0, 0.0)
+    near, far = levels_mm or (near, far)
     shares = (far - np.where(lit, depth_mm, far)) / max(far - near, 1e-9)
     picture = _blank(_turbo(shares), lit)
     margin = np.full((picture.shape[0], _MARGIN_PX, 3), 255, np.uint8)

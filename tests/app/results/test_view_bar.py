@@ -118,7 +118,7 @@ def test_a_light_that_does_not_come_is_not_claimed(
         for job in bench.runner.waiting:
             job.cancel()
     else:
-        monkeypatch.setattr("dsl_app.results.controller.picture_of", _no_memory)
+        monkeypatch.setattr("dsl_app.results.controller.rgba_of_colours", _no_memory)
     bench.runner.run()
     assert bench.shown == ("A", False)
     bench.runner.run()
@@ -148,7 +148,7 @@ def test_what_eyes_were_adapted_to_comes_back_with_its_tick(
 @pytest.mark.parametrize(
     ("view", "cloud_by", "quality", "shown"),
     [
-        (ResultView.COLOUR, ResultView.BAND, QualityMap.SHARE, {"light", "colour_row"}),
+        (ResultView.COLOUR, ResultView.BAND, QualityMap.SHARE, {"colours", "light", "colour_row"}),
         (ResultView.BAND, ResultView.COLOUR, QualityMap.FLAGS, {"band", "colour_row"}),
         (ResultView.DEPTH, ResultView.COLOUR, QualityMap.SHARE, {"depth_row"}),
         (ResultView.QUALITY, ResultView.COLOUR, QualityMap.FLAGS, {"quality", "colour_row"}),
@@ -158,7 +158,7 @@ def test_what_eyes_were_adapted_to_comes_back_with_its_tick(
             ResultView.CLOUD,
             ResultView.COLOUR,
             QualityMap.SHARE,
-            {"light", "cloud", "depth_row", "colour_row"},
+            {"colours", "light", "cloud", "depth_row", "colour_row"},
         ),
         (ResultView.CLOUD, ResultView.DEPTH, QualityMap.SHARE, {"cloud", "depth_row"}),
     ],

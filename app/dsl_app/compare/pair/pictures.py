@@ -25,9 +25,9 @@ from dsl_app.shared.widgets.pictures import (
     arrow_step,
     colour_map,
     moved_within,
-    spread_of,
 )
 from dsl_app.shared.widgets.plots import theme_bar
+from dsl_core.optics.levels import spread_of
 
 BAND_PX = 260
 

@@ -14,8 +14,9 @@ from dsl_app.shared.evented import follow_any
 from dsl_app.shared.theme import Theme
 from dsl_app.shared.widgets.forms import label, push_button, quiet
 from dsl_app.shared.widgets.layouts import column_of, row_of
-from dsl_app.shared.widgets.pictures import DIFFERENCE, PictureView, RegionBox, colour_map, spread_of
+from dsl_app.shared.widgets.pictures import DIFFERENCE, PictureView, RegionBox, colour_map
 from dsl_app.shared.widgets.plots import theme_bar
+from dsl_core.optics.levels import spread_of
 
 
 class SeriesPicture(QWidget):

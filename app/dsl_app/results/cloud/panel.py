@@ -69,6 +69,8 @@ class CloudPanel(QWidget):
             state.band,
             state.quality,
             state.picture,
+            state.bands,
+            state.levels,
             state.search,
             state.materials,
         ):

@@ -5,12 +5,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
+from typing import Any
 
-from dsl_app.results.state import ResultsState
+from dsl_app.results.state import BAND_KEY, BANDS_KEY, COLOUR_KEY, ResultsState, depth_key
 from dsl_app.shared.jobs.base import Job, JobRunner
 from dsl_app.shared.notify import Notifier
 from dsl_core.io.export.format import Exporter, Format
 from dsl_core.io.result.result_arrays import ResultArrays
+from dsl_core.optics.levels import top_of
 from dsl_core.progress import Progress
 
 
@@ -53,7 +55,7 @@ class ExportController:
     def write(self, targets: dict[str, Path], overwrite: bool) -> None:
         """Write the result to a path per format key.
 
-        Tables hold the pins; pictures show the current band and light.
+        Tables hold the pins; pictures show the current bands, light and contrast.
         """
         state, result = self.state, self.state.result.value
         if result is None or not targets:
@@ -61,6 +63,7 @@ class ExportController:
         pixels = [mark.pixel for mark in state.marks.value if mark.pixel and not mark.trouble]
         band_nm = float(result.wavelengths_nm[state.band.value]) if result.has_spectra else None
         light, adapted = state.picture_light.value
+        look = picture_look(state)
 
         def work(progress: Progress) -> list[Path]:
             from dsl_core.io.export import export_csv, export_png, formats
@@ -69,7 +72,7 @@ class ExportController:
             exporters: dict[str, Exporter] = {
                 **{form.key: form.write for form in formats().values()},
                 "csv": partial(export_csv, pixels=pixels),
-                "png": partial(export_png, band_nm=band_nm, light=light, adapted=adapted),
+                "png": partial(export_png, band_nm=band_nm, light=light, adapted=adapted, **look),
             }
             data, written = load_result(result.path), []
             for done, (form, path) in enumerate(targets.items()):
@@ -88,6 +91,21 @@ class ExportController:
             f"Wrote {len(written)} {files}, {megabytes:.1f} MB, to {written[0].parent}.",
             "\n".join(str(path) for path in written),
         )
+
+
+def picture_look(state: ResultsState) -> dict[str, Any]:
+    """What exported pictures take over from those on the screen: three bands as colours, and levels."""
+    result, bands, levels = state.result.value, state.bands.value, state.levels.value
+    limits = state.depth_limits.value
+    look: dict[str, Any] = {
+        "colour_levels": levels.get(COLOUR_KEY),
+        "band_levels": levels.get(BAND_KEY),
+        "depth_levels_mm": levels.get(depth_key(limits), limits),
+    }
+    if result is not None and bands is not None:
+        look["bands_levels"] = levels.get(BANDS_KEY, (0.0, top_of(result["reflectance"])))
+        look["bands_nm"] = tuple(float(result.wavelengths_nm[band]) for band in bands)
+    return {name: value for name, value in look.items() if value is not None}
 
 
 def expected_files(targets: dict[str, Path], result: ResultArrays) -> list[Path]:

@@ -4,9 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-import numpy as np
 import pyqtgraph as pg
-from numpy.typing import NDArray
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QKeyEvent
 
@@ -38,17 +36,6 @@ class PictureView(pg.GraphicsLayoutWidget):  # type: ignore[misc]
     def apply_theme(self, theme: Theme) -> None:
         """Apply the colours of a theme."""
         self.setBackground(theme.base)
-
-
-def spread_of(values: NDArray[np.floating[Any]], low: float = 0.5, high: float = 99.5) -> tuple[float, float]:
-    """Levels that hold nearly all values, from a thinned copy."""
-    step = max(values.shape[-1] // 200, 1)
-    known = values[..., ::step, ::step]
-    known = known[np.isfinite(known)]
-    if known.size == 0:
-        return 0.0, 1.0
-    bottom, top = (float(v) for v in np.percentile(known, (low, high)))
-    return bottom, max(top, bottom + 1e-6 * max(abs(bottom), 1.0))
 
 
 def colour_map(name: str) -> Any:

@@ -1,0 +1,1 @@
+"""Contrast of the picture shown, and three bands as its colours."""
