@@ -1,4 +1,4 @@
-"""The action that imports captures of other programs, and opens what was made of them."""
+"""Imports captures of other programs, and opens what was made of them."""
 
 from __future__ import annotations
 
@@ -21,10 +21,6 @@ class CapturesAction:
     def __init__(self, window: MainWindow) -> None:
         self._window = window
         self._dialog: CapturesDialog | None = None
-
-    def begin(self) -> None:
-        """Show the dialog without a folder."""
-        self._shown()
 
     def look(self, folder: Path) -> None:
         """Show what a folder of pictures is, which was chosen or dropped."""

@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QFileDialog
 
+from dsl_app.composition.captures import CapturesAction
+from dsl_app.shared.known_files import has_pictures
 from dsl_app.shared.widgets.inside import apply_theme_inside
 from dsl_app.shell.main_window import MainWindow
 
@@ -24,10 +26,14 @@ REPLACED_PAGES = ("results", "scan")
 
 
 class ImportAction:
-    """Imports a folder of another program: asks which and how, and opens what was made of it."""
+    """Imports a folder of another program: asks which and how, and opens what was made of it.
 
-    def __init__(self, window: MainWindow) -> None:
-        self._window = window
+    The dialog depends on the folder: one in the published layout has a table of what is missing or misnamed,
+    and ``captures`` shows what the pictures of any other are taken for.
+    """
+
+    def __init__(self, window: MainWindow, captures: CapturesAction) -> None:
+        self._window, self.captures = window, captures
         self._dialog: ImportDialog | None = None
 
     @cached_property
@@ -43,14 +49,19 @@ class ImportAction:
 
     def begin(self) -> None:
         """Choose a folder and look at it; the dialog follows."""
-        title = "Import a folder of images or a calibration"
+        title = "Import a folder of pictures, or a scan or calibration in the published layout"
         name = QFileDialog.getExistingDirectory(self._window, title, str(self._home))
         if name:
             self.look(Path(name))
 
     def look(self, folder: Path) -> None:
         """Look at a folder that was chosen or dropped; the dialog follows."""
-        self.control.look(folder, self._home)
+        if not has_pictures(folder):
+            self.control.look(folder, self._home if self._dialog is None else self._dialog.folder_to_save_in)
+            return
+        if self._dialog is not None:
+            self._dialog.reject()
+        self.captures.look(folder)
 
     @property
     def _home(self) -> Path:
@@ -65,6 +76,7 @@ class ImportAction:
         self._dialog = dialog = ImportDialog(self.control.state, self.control, self._window)
         dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         apply_theme_inside(dialog, self._window.theme)
+        dialog.other_chosen.connect(self.look)
         dialog.finished.connect(self._forget)
         dialog.open()
 

@@ -92,7 +92,7 @@ class Composition(QObject):
         """What opens files and folders that no page opens, by kind."""
         return {
             Kind.PUBLISHED: lambda path: self.importer.look(path),
-            Kind.PICTURES: lambda path: self.captures.look(path),
+            Kind.PICTURES: lambda path: self.importer.look(path),
         }
 
     @property
@@ -102,7 +102,6 @@ class Composition(QObject):
             "demo": lambda: self.demo.show(),
             "live_demo": lambda: self.demo.scan_live(),
             "import": lambda: self.importer.begin(),
-            "import_captures": lambda: self.captures.begin(),
             "reconstruct_again": lambda: self.reconstruct_again.begin(),
         }
 
@@ -204,12 +203,7 @@ class Composition(QObject):
     @cached_property
     def importer(self) -> ImportAction:
         """Imports folders of other programs."""
-        return ImportAction(self.window)
-
-    @cached_property
-    def captures(self) -> CapturesAction:
-        """Imports pictures of other programs."""
-        return CapturesAction(self.window)
+        return ImportAction(self.window, CapturesAction(self.window))
 
     # Pages -----------------------------------------------------------------------------------------
 
@@ -225,7 +219,7 @@ class Composition(QObject):
             self._start_live,
             lambda: window.open_page("rig"),
             lambda: window.do("open"),
-            lambda: window.do("import_captures"),
+            lambda: window.do("import"),
             UnfinishedController(self._scan_folders, window.parts.runner, window.open_path),
         )
 

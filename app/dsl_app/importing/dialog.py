@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from PySide6.QtCore import Signal
 from PySide6.QtWidgets import (
     QFileDialog,
     QFormLayout,
@@ -32,7 +33,12 @@ _LARGEST_PX = 20000
 
 
 class ImportDialog(JobDialog):
-    """Follows an `ImportState` whose folder has been checked; the controller imports."""
+    """Follows an `ImportState` whose folder has been checked; the controller imports.
+
+    ``other_chosen`` carries a folder that is to be imported instead.
+    """
+
+    other_chosen = Signal(object)
 
     def __init__(self, state: ImportState, commands: ImportController, parent: QWidget) -> None:
         super().__init__(commands.start, commands.command_line, parent)
@@ -54,6 +60,11 @@ class ImportDialog(JobDialog):
             *follow_any(self._judge, state.busy, state.trouble),
         ]
         self.name.setFocus()
+
+    @property
+    def folder_to_save_in(self) -> Path:
+        """Where what is imported is saved."""
+        return Path(self.home.text())
 
     # Make ------------------------------------------------------------------------------------------
 
@@ -167,7 +178,7 @@ class ImportDialog(JobDialog):
         start = "" if found is None else str(found.folder.parent)
         name = QFileDialog.getExistingDirectory(self, "Import a folder", start)
         if name:
-            self._commands.look(Path(name), Path(self.home.text()))
+            self.other_chosen.emit(Path(name))
 
     def _choose_file(self) -> None:
         name, _ = QFileDialog.getOpenFileName(self, "Choose a calibration", "", "Calibrations (*.json)")

@@ -18,8 +18,7 @@ _MARKS = ".marks.json"
 _OPENS = (
     "dsl-scan opens scans (folders NAME.dsl), results (folders NAME.zarr), plans and pattern sets (.json),"
     " campaigns, calibrated rigs, and reference spectra (text, ENVI, ASD, SVC, JCAMP-DX, CGATS and others)."
-    " Use File, Import for folders in the published layout, and File, Import captures for folders of"
-    " pictures."
+    " Use File, Import for folders of pictures, and for scans and calibrations in the published layout."
 )
 
 
@@ -81,6 +80,13 @@ def _has_pictures(folder: Path) -> bool:
         return len(list(islice(pictures, FEWEST))) == FEWEST
     except OSError:
         return False
+
+
+def has_pictures(folder: Path) -> bool:
+    """Whether a folder, or one directly in it, has a capture's pictures; not for the published layout."""
+    if kind_of(folder) is not Kind.UNKNOWN:
+        return kind_of(folder) is Kind.PICTURES
+    return folder.is_dir() and any(each.is_dir() and _has_pictures(each) for each in folder.iterdir())
 
 
 def _kind_of_json(path: Path) -> Kind:

@@ -59,14 +59,7 @@ ACTIONS: tuple[Action, ...] = (
         "&Import…",
         "File",
         "Ctrl+I",
-        "Import a folder of images or a calibration from another program; lists missing and misnamed files",
-    ),
-    Action(
-        "import_captures",
-        "Import captu&res…",
-        "File",
-        "Ctrl+Shift+I",
-        "Import the pictures of any structured-light program; what each picture shows is guessed",
+        "Import a folder of another program: its pictures, or a scan or calibration in the published layout",
     ),
     Action(
         "show_command",

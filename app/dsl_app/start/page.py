@@ -33,7 +33,7 @@ class StartPage(PageWidget):
         start_live: Callable[[], object],
         choose_rig: Callable[[], object],
         choose_file: Callable[[], object],
-        import_captures: Callable[[], object],
+        import_folder: Callable[[], object],
         unfinished: UnfinishedController,
     ) -> None:
         super().__init__()
@@ -53,9 +53,9 @@ class StartPage(PageWidget):
         )
         self.choose = push_button("Open a file…", "Choose the folder of a result or of a scan", choose_file)
         self.captures = push_button(
-            "Import captures…",
-            "Make a scan of pictures that another structured-light program took",
-            import_captures,
+            "Import…",
+            "Make a scan of pictures that another structured-light program took (Ctrl+I)",
+            import_folder,
         )
         self.files = RecentList(recent, open_path)
         self.unfinished = UnfinishedList(unfinished)

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dsl_app.importing.captures import fields, look
+from dsl_app.importing.captures.carry_out import carry_out
 from dsl_app.importing.captures.command_line import command_of
 from dsl_app.importing.captures.state import (
     SUFFIX,
@@ -277,7 +278,7 @@ class CapturesController:
 
         job: Job[Imported] = Job(
             f"Import {stated.mapping.name or request.target.stem}",
-            lambda progress: look.carry_out(request, mapping, self._library, progress),
+            lambda progress: carry_out(request, mapping, self._library, progress),
             state.done.emit,
             lambda error: self._say(Place.TARGET, sentence_of(error)),
             on_ended=ended,

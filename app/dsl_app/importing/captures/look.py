@@ -16,14 +16,13 @@ from dsl_app.importing.captures.state import (
     NONE,
     CaptureRequest,
     Decoded,
-    Imported,
     Listing,
     Place,
     Size,
     Stated,
 )
 from dsl_app.shared.notify import sentence_of
-from dsl_core.errors import CalibrationError, DslError, StoreError
+from dsl_core.errors import CalibrationError, DslError
 from dsl_core.io.pictures.mapping import Mapping
 from dsl_core.progress import NoProgress, Progress
 
@@ -251,43 +250,3 @@ def decoded_of(result: Any) -> Decoded:
     lit = (result["flags"].values & int(Flag.NO_LIGHT)) == 0
     share = float(np.isfinite(column[lit]).mean()) if lit.any() else 0.0
     return Decoded(column, share, float(lit.mean()))
-
-
-# Import --------------------------------------------------------------------------------------------
-
-
-def carry_out(
-    request: CaptureRequest, mapping: Mapping, library: CalibrationLibrary, progress: Progress
-) -> Imported:
-    """Make a scan, complete or not at all, and its depth if there is a calibration; raises `DslError`."""
-    from dsl_core.io.pictures.source import open_pictures
-    from dsl_core.io.staging import staged
-    from dsl_core.workflows.captures import decode_scan, import_pictures
-
-    assert request.folder is not None
-    source = open_pictures(request.folder, mapping)
-    rig, _ = rig_of(request, mapping, source.plan.camera_size_px, library)
-    with staged([request.target]) as (draft,):
-        import_pictures(request.folder, draft, mapping, rig, progress)
-    if rig is None:
-        decoded = decoded_of(decode_scan(request.target, progress))
-        verdict = (
-            f"{decoded.share:.0%} of the lit pixels have a column. There is no depth without a calibration."
-        )
-        return Imported(request.target, None, verdict)
-    return _with_depth(request.target, progress)
-
-
-def _with_depth(scan: Path, progress: Progress) -> Imported:
-    from dsl_core.io.result.result_file import load_result
-    from dsl_core.pipeline import Options
-    from dsl_core.workflows.scans import reconstruct_to
-
-    target = scan.with_suffix(".zarr")
-    if target.exists():
-        raise StoreError(
-            f"{target.name} already exists. The scan is imported; reconstruct it under another name."
-        )
-    reconstruct_to(target, scan, options=Options(spectra=False), progress=progress)
-    share = float(load_result(target)["depth_mm"].notnull().mean())
-    return Imported(scan, target, f"{share:.0%} of the pixels have a depth.")

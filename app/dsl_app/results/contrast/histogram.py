@@ -55,5 +55,6 @@ def histogram_of(layer: Layer | None) -> Histogram | None:
 
 def _thinned(values: NDArray[Any]) -> NDArray[Any]:
     step = max(int(np.sqrt(values.size / COUNTED)), 1)
-    known = values[::step, ::step]
-    return known[np.isfinite(known)]
+    known: NDArray[Any] = values[::step, ::step]
+    known = known[np.isfinite(known)]
+    return known

@@ -8,6 +8,7 @@ import pytest
 from dsl_app.composition.window import Composition, StartOptions
 from dsl_app.importing.captures.dialog import CapturesDialog
 from dsl_app.importing.captures.state import NOMINAL
+from dsl_app.importing.dialog import ImportDialog
 from dsl_app.shell.main_window import MainWindow
 from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
@@ -103,13 +104,14 @@ def test_dropped_pictures_are_corrected_by_mouse_and_become_a_scan(
 def test_a_wrong_folder_and_calibration_are_said_beside_them(
     qtbot: QtBot, window: MainWindow, folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    monkeypatch.setattr(QFileDialog, "getExistingDirectory", lambda *_: str(folder))
     QTest.mouseClick(window.page_of("start").captures, LEFT)  # type: ignore[attr-defined]
     dialog = opened(qtbot, window)
-    assert not dialog.go.isEnabled()
     monkeypatch.setattr(QFileDialog, "getExistingDirectory", lambda *_: str(tmp_path))
     QTest.mouseClick(dialog.choose, LEFT)
     settle(qtbot, dialog)
     assert "contains 0 pictures" in dialog.about_folder.text()
+    assert not dialog.go.isEnabled()
     dialog.open_folder(folder)
     settle(qtbot, dialog)
     QTest.keyClick(dialog.calibration, Qt.Key.Key_Down)
@@ -119,3 +121,24 @@ def test_a_wrong_folder_and_calibration_are_said_beside_them(
     assert dialog.about_calibration.property("role") == "bad"
     QTest.keyClick(dialog, Qt.Key.Key_Escape)
     assert not dialog.isVisible()
+
+
+def test_import_opens_the_dialog_that_fits_the_folder(
+    qtbot: QtBot, window: MainWindow, folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "empty").mkdir()
+    answers = [tmp_path / "empty", folder.parent]
+    monkeypatch.setattr(QFileDialog, "getExistingDirectory", lambda *_: str(answers.pop(0)))
+    window.do("import")
+    published: list[ImportDialog] = []
+
+    def is_open() -> bool:
+        published[:] = [each for each in window.findChildren(ImportDialog) if each.isVisible()]
+        return bool(published)
+
+    qtbot.waitUntil(is_open, timeout=PATIENCE_MS)
+    QTest.mouseClick(published[0].other, Qt.MouseButton.LeftButton)
+    dialog = opened(qtbot, window)
+    assert dialog._state.request.value.folder == folder.parent
+    assert not is_open()
+    dialog.reject()
