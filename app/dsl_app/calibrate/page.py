@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QShowEvent
-from PySide6.QtWidgets import QFrame, QGridLayout, QWidget
+from PySide6.QtWidgets import QBoxLayout, QFrame, QGridLayout, QWidget
 
 from dsl_app.calibrate.campaign_box import CampaignBox
 from dsl_app.calibrate.library_panel import LibraryPanel
@@ -32,8 +32,12 @@ if TYPE_CHECKING:
 FETCH_MS = 200
 #: Height of the rows, as far as there is room.
 ROWS_PX = 316
+#: The most that a row takes where there is more room.
+HIGHEST_PX = 84
 #: Width of what the camera sees while everything is calibrated.
 PICTURE_PX = 236
+#: No limit to a width.
+LARGEST_PX = 16_777_215
 _NAME_PX, _STATE_PX, _DATE_PX, _BUTTON_PX = 236, 154, 118, 100
 
 
@@ -62,11 +66,26 @@ class CalibratePage(PageWidget):
         self._connect()
 
     def _lay_out(self) -> None:
-        area = scrolled(boxed(column_of(*self.rows.values(), STRETCH, margins=0, spacing=4)))
+        # They take the room that there is, up to a height at which they still read as rows.
+        for row in self.rows.values():
+            row.setMaximumHeight(HIGHEST_PX)
+        parts = ((row, 20) for row in self.rows.values())
+        area = scrolled(boxed(column_of(*parts, STRETCH, margins=0, spacing=4)))
         area.setFocusPolicy(Qt.FocusPolicy.NoFocus)
-        top = boxed(row_of((area, 1), self.picture, margins=0))
-        split = splitter(Qt.Orientation.Vertical, (top, 0), (self.library, 1), sizes=(ROWS_PX, 300))
-        column_of(self.banner, self.head, (split, 1), on=self)
+        self._top = row_of((area, 1), self.picture, margins=0)
+        top = boxed(self._top)
+        self._split = splitter(Qt.Orientation.Vertical, (top, 0), (self.library, 1), sizes=(ROWS_PX, 300))
+        column_of(self.banner, self.head, (self._split, 1), on=self)
+
+    def arrange(self) -> None:
+        """Show the library next to the calibrations where there is room, else below them."""
+        self._split.setOrientation(Qt.Orientation.Horizontal if self.is_wide else Qt.Orientation.Vertical)
+        self._split.setSizes([1000, 1000] if self.is_wide else [ROWS_PX, 300])
+        # What the camera sees is below the rows where those are narrow.
+        direction = QBoxLayout.Direction
+        self._top.setDirection(direction.TopToBottom if self.is_wide else direction.LeftToRight)
+        self.picture.setMinimumWidth(0 if self.is_wide else PICTURE_PX)
+        self.picture.setMaximumWidth(LARGEST_PX if self.is_wide else PICTURE_PX)
 
     def _connect(self) -> None:
         state = self._state
@@ -157,12 +176,15 @@ class CalibrationRow(QFrame):
         )
         for column, (widget, width) in enumerate(top):
             widget.setMinimumWidth(width)
-            grid.addWidget(widget, 0, column, Qt.AlignmentFlag.AlignTop)
+            grid.addWidget(widget, 1, column, Qt.AlignmentFlag.AlignTop)
         grid.setColumnStretch(2, 1)
-        grid.addWidget(self._purpose, 1, 0, Qt.AlignmentFlag.AlignTop)
-        grid.addWidget(self.reason, 1, 1, 1, 3, Qt.AlignmentFlag.AlignTop)
+        grid.addWidget(self._purpose, 2, 0, Qt.AlignmentFlag.AlignTop)
+        grid.addWidget(self.reason, 2, 1, 1, 3, Qt.AlignmentFlag.AlignTop)
+        # Both lines stay together in the middle of a high row.
+        for edge in (0, 3):
+            grid.setRowStretch(edge, 1)
         self.run.setFixedWidth(_BUTTON_PX)
-        grid.addWidget(self.run, 0, 4, 2, 1, Qt.AlignmentFlag.AlignVCenter)
+        grid.addWidget(self.run, 0, 4, 4, 1, Qt.AlignmentFlag.AlignVCenter)
         self._purpose.setFixedWidth(_NAME_PX)
 
     def show_row(self, row: Row, is_busy: bool = False, running: str = "") -> None:

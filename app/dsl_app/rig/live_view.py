@@ -14,7 +14,7 @@ from dsl_app.rig.display_row import DisplayRow
 from dsl_app.rig.state import FrameCounts
 from dsl_app.shared.theme import Theme
 from dsl_app.shared.widgets.forms import check_box, label, push_button, set_role
-from dsl_app.shared.widgets.layouts import STRETCH, column_of, row_of
+from dsl_app.shared.widgets.layouts import STRETCH, boxed, column_of, row_of
 from dsl_app.shared.widgets.pictures import PictureView, Region, RegionBox, arrow_step, cut, moved_within
 from dsl_core.capture.preview import BINS, MANY_SATURATED, Statistics, quick_picture, site_colour, statistics
 from dsl_core.devices.base import CameraInfo
@@ -22,6 +22,8 @@ from dsl_core.model.frames import Frame
 
 #: How often figures change, s; the picture follows every frame.
 FIGURES_S = 0.25
+#: Height of the histogram below the picture, and the most that it takes next to it, px.
+LOW_PX, HIGH_PX = 130, 640
 NO_RIG = "No picture yet. Connect a rig and start the live view."
 NO_PICTURE = "No picture yet. Start the live view."
 #: Side of the cell of raw pixels that is shown as one, px.
@@ -66,7 +68,8 @@ class LiveView(QWidget):
         self.logarithmic = check_box("Logarithmic", "Show the histogram's counts on a logarithmic scale")
         self.logarithmic.toggled.connect(self._repaint)
         self._histogram = pg.PlotWidget()
-        self._histogram.setFixedHeight(130)
+        self._histogram.setMinimumHeight(LOW_PX)
+        self._histogram.setMaximumHeight(LOW_PX)
         self._histogram.setMouseEnabled(False, False)
         self._histogram.hideButtons()
         self._histogram.setMenuEnabled(False)
@@ -96,7 +99,17 @@ class LiveView(QWidget):
         switches = row_of(self.saturation, self.logarithmic, self.region_box, self.fit, STRETCH, spacing=6)
         frames = row_of(self._rate, STRETCH, self._counts)
         parts = (self.display, self._pixel, figures, frames, switches, self._histogram)
-        column_of((self.view, 1), *parts, on=self, margins=0)
+        #: What is said and set below the picture; a page with room shows it elsewhere.
+        self.controls = boxed(column_of(*parts[:-1], (self._histogram, 1), STRETCH, margins=0))
+        column_of((self.view, 1), self.controls, on=self, margins=0)
+
+    def place_controls(self, beside: QWidget | None) -> None:
+        """Put what is below the picture on another widget with a layout, or below the picture for None."""
+        self._histogram.setMaximumHeight(LOW_PX if beside is None else HIGH_PX)
+        layout = (self if beside is None else beside).layout()
+        assert layout is not None
+        layout.addWidget(self.controls)
+        self.controls.show()
 
     def set_camera(self, camera: CameraInfo | None) -> None:
         """Show frames of this camera from now on."""

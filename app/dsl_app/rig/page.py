@@ -25,7 +25,8 @@ from dsl_core.devices.base import DeviceRig
 
 #: How often the newest live frame is fetched, ms.
 FETCH_MS = 15
-SIDE_PX = 268
+#: Widths of the columns next to the picture, and of that with its figures in a wide window, px.
+SIDE_PX, WIDE_SIDE_PX = 268, 440
 
 
 class RigPage(PageWidget):
@@ -84,6 +85,8 @@ class RigPage(PageWidget):
     def _make_live(self) -> LiveView:
         state, made = self._live_state, LiveView()
         made.set_camera(self._state.camera)
+        if self.is_wide:
+            made.place_controls(self.beside)
         self.stops += [state.frame.follow(made.show_frame), state.counts.follow(made.show_counts)]
         return made
 
@@ -104,12 +107,27 @@ class RigPage(PageWidget):
         camera_form.addRow("", self.cycles)
         camera_form.addRow("", self.auto)
         camera_form.addRow("", self.live_button)
-        left, right = (
-            boxed(column_of(*boxes, STRETCH, margins=0)) for boxes in ((devices, camera), (self.projector,))
-        )
-        for side in (left, right):
+        # In a wide window the projector is below the camera, and figures are next to the picture.
+        self.beside = QGroupBox("Picture")
+        column_of(on=self.beside)
+        self.beside.hide()
+        self._left = column_of(devices, camera, STRETCH, margins=0)
+        self._right = column_of(self.projector, (self.beside, 20), STRETCH, margins=0)
+        left, self._right_side = boxed(self._left), boxed(self._right)
+        for side in (left, self._right_side):
             side.setFixedWidth(SIDE_PX)
-        row_of(left, (self.live, 1), right, on=self)
+        row_of(left, (self.live, 1), self._right_side, on=self)
+
+    def arrange(self) -> None:
+        """Show controls and figures next to the picture where there is room."""
+        self.beside.setVisible(self.is_wide)
+        self._right_side.setFixedWidth(WIDE_SIDE_PX if self.is_wide else SIDE_PX)
+        if self.is_wide:
+            self._left.insertWidget(2, self.projector)
+        else:
+            self._right.insertWidget(0, self.projector)
+        if self.live.made is not None:
+            self.live.made.place_controls(self.beside if self.is_wide else None)
 
     def _connect(self) -> None:
         state, live, commands = self._state, self._live_state, self._commands

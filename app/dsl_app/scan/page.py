@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
-from PySide6.QtCore import Signal
+from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QShowEvent
-from PySide6.QtWidgets import QFileDialog, QScrollArea, QWidget
+from PySide6.QtWidgets import QFileDialog, QScrollArea, QVBoxLayout, QWidget
 
 from dsl_app.scan.controller import ScanController
 from dsl_app.scan.controls import banner_controls
@@ -24,13 +24,14 @@ from dsl_app.shared.widgets.deferred import Deferred
 from dsl_app.shared.widgets.figure_file import PlotFigure
 from dsl_app.shared.widgets.forms import Banner, show_button
 from dsl_app.shared.widgets.help_window import set_help
-from dsl_app.shared.widgets.layouts import STRETCH, boxed, column_of, row_of, scrolled, tabs_of
+from dsl_app.shared.widgets.layouts import STRETCH, boxed, column_of, row_of, scrolled, splitter, tabs_of
 from dsl_app.shared.widgets.page import PageWidget
 from dsl_app.shared.widgets.ticker import Ticker
 
 #: Interval at which the state of the scan is fetched, ms: ten pictures a second look live.
 FETCH_MS = 100
 LEFT_PX, RIGHT_PX = 276, 292
+FRAMES, FRAMES_TIP = "&Frames", "Frames while the scan runs"
 PLANS = "Plans and pattern sets (*.json)"
 
 
@@ -82,15 +83,32 @@ class ScanPage(PageWidget):
         self.middle = tabs_of(
             "Views of the scan",
             (self.forecast, "&Accuracy against time", "Expected accuracy and capture time of each plan"),
-            (self.view, "&Frames", "Frames while the scan runs"),
+            (self.view, FRAMES, FRAMES_TIP),
             (self.effects, "&Effects", "Effects of light that the simulated rig renders"),
         )
-        row = row_of(
-            _side(LEFT_PX, self.plan),
-            (self.middle, 1),
-            _side(RIGHT_PX, self.calibration, self.target, self.run),
-        )
+        self._left, self._left_area = _side(LEFT_PX, self.plan)
+        self._right, self._right_area = _side(RIGHT_PX, self.calibration, self.target, self.run)
+        self._views = splitter(Qt.Orientation.Horizontal, (self.middle, 1))
+        row = row_of(self._left_area, (self._views, 1), self._right_area)
         column_of(self.banner, (row, 1), on=self)
+
+    def arrange(self) -> None:
+        """Show the frames next to the forecast, and all settings in one column, where there is room."""
+        boxes = (self.calibration, self.target, self.run)
+        column, first = (self._left, 1) if self.is_wide else (self._right, 0)
+        for place, box in enumerate(boxes, first):
+            column.insertWidget(place, box)
+        self._right_area.setVisible(not self.is_wide)
+        self._left_area.setFixedWidth(RIGHT_PX if self.is_wide else LEFT_PX)
+        if self.is_wide:
+            self.middle.removeTab(self.middle.indexOf(self.view))
+            self._views.addWidget(self.view)
+            self._views.setStretchFactor(1, 1)
+            self._views.setSizes([1000, 1000])
+            self.view.show()
+        else:
+            self.middle.insertTab(1, self.view, FRAMES)
+            self.middle.setTabToolTip(1, FRAMES_TIP)
 
     def _connect(self) -> None:
         state, controller = self._state, self._controller
@@ -136,7 +154,7 @@ class ScanPage(PageWidget):
         self.target.setEnabled(not fixed)
         self.calibration.setEnabled(not fixed)
         self.forecast.fix(fixed)
-        if phase is Phase.STARTING:
+        if phase is Phase.STARTING and not self.is_wide:
             self.middle.setCurrentWidget(self.view)
         self._keep_time()
 
@@ -203,7 +221,8 @@ class ScanPage(PageWidget):
         self._controller.close()
 
 
-def _side(width_px: int, *boxes: QWidget) -> QScrollArea:
-    area = scrolled(boxed(column_of(*boxes, STRETCH, margins=(0, 0, 4, 0))))
+def _side(width_px: int, *boxes: QWidget) -> tuple[QVBoxLayout, QScrollArea]:
+    column = column_of(*boxes, STRETCH, margins=(0, 0, 4, 0))
+    area = scrolled(boxed(column))
     area.setFixedWidth(width_px)
-    return area
+    return column, area

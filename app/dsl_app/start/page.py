@@ -19,7 +19,8 @@ from dsl_app.start.examples import EXAMPLES
 from dsl_app.start.unfinished import UnfinishedController
 from dsl_app.start.unfinished_list import UnfinishedList
 
-CARD_PX, GAP_PX = 286, 16
+#: Width of a card, and that in a wide window, px.
+CARD_PX, WIDE_CARD_PX, GAP_PX = 286, 380, 16
 
 
 class StartPage(PageWidget):
@@ -87,9 +88,7 @@ class StartPage(PageWidget):
                 self.connect_rig,
             ),
         )
-        width = 3 * CARD_PX + 2 * GAP_PX
-        self.files.setFixedWidth(width)
-        self.unfinished.setFixedWidth(width)
+        self._cards = cards
         column = column_of(
             STRETCH,
             label("dsl-scan", "title"),
@@ -105,17 +104,25 @@ class StartPage(PageWidget):
             STRETCH,
             margins=0,
         )
-        middle = boxed(column)
-        middle.setFixedWidth(width)
-        content = boxed(row_of(STRETCH, middle, STRETCH, margins=12))
+        self._middle = boxed(column)
+        content = boxed(row_of(STRETCH, self._middle, STRETCH, margins=12))
         column_of(scrolled(content), on=self, margins=0)
+        self.arrange()
+
+    def arrange(self) -> None:
+        """Larger cards where there is room."""
+        card = WIDE_CARD_PX if self.is_wide else CARD_PX
+        for each in self._cards:
+            each.setFixedWidth(card)
+        width = 3 * card + 2 * GAP_PX
+        for part in (self._middle, self.files, self.unfinished):
+            part.setFixedWidth(width)
 
 
 def _card(title: str, text: str, *buttons: QPushButton) -> QFrame:
     """A raised panel: what it is for, and buttons at its lower edge."""
     card = QFrame()
     card.setProperty("role", "card")
-    card.setFixedWidth(CARD_PX)
     about = label(text, wraps=True)
     about.setAlignment(Qt.AlignmentFlag.AlignTop)
     column_of(label(title, "heading"), 4, about, STRETCH, *buttons, on=card, margins=16, spacing=8)

@@ -6,15 +6,33 @@ from collections.abc import Callable
 from pathlib import Path
 
 from PySide6.QtCore import QMimeData
+from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import QWidget
 
 from dsl_app.shared.theme import Theme
 from dsl_app.shared.widgets.figure_file import PlotFigure
 from dsl_app.shared.widgets.inside import apply_theme_inside, stop_following
 
+#: A page of this width, px, has room for views and controls next to each other.
+WIDE_PX = 1600
+
 
 class PageWidget(QWidget):
     """A page. Everything is optional: a page overrides what applies to it."""
+
+    #: Whether the page is laid out for a wide window.
+    is_wide = False
+
+    def arrange(self) -> None:
+        """Lay the page out as `is_wide` says; called when that changes."""
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        """Lay the page out for the width that it has now."""
+        super().resizeEvent(event)
+        is_wide = event.size().width() >= WIDE_PX
+        if is_wide != self.is_wide:
+            self.is_wide = is_wide
+            self.arrange()
 
     def page_actions(self) -> dict[str, Callable[[], object]]:
         """Actions of the table, by key, that the page does while it is open."""

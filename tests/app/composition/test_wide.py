@@ -1,0 +1,48 @@
+"""Pages use the room of a large window, and come back from it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from dsl_app.calibrate.page import CalibratePage
+from dsl_app.composition.window import Composition, StartOptions
+from dsl_app.rig.page import RigPage
+from dsl_app.scan.page import ScanPage
+from dsl_app.shell.main_window import MainWindow
+from pytestqt.qtbot import QtBot
+
+from tests.app.support.real_window import show_window
+
+LARGE, SMALL = (1920, 1080), (1280, 800)
+
+
+@pytest.fixture
+def window(qtbot: QtBot, tmp_path: Path) -> MainWindow:
+    made = Composition(StartOptions()).open_window(tmp_path / "home")
+    show_window(qtbot, made)
+    return made
+
+
+def test_views_are_side_by_side_in_a_large_window_alone(qtbot: QtBot, window: MainWindow) -> None:
+    rig, scan, calibrate = (window.page_of(name) for name in ("rig", "scan", "calibrate"))
+    assert isinstance(rig, RigPage)
+    assert isinstance(scan, ScanPage)
+    assert isinstance(calibrate, CalibratePage)
+    live = rig.live.content
+    for size in (SMALL, LARGE, SMALL):
+        is_large = size == LARGE
+        window.resize(*size)
+        for name in ("rig", "scan", "calibrate"):
+            window.open_page(name)
+            assert window.size().toTuple() == size, f"{name} does not fit"
+            assert window.page_of(name).is_wide == is_large
+        assert (live.controls.parent() is rig.beside) == is_large
+        tabs = [scan.middle.widget(place) for place in range(scan.middle.count())]
+        assert (scan.view not in tabs) == is_large
+        assert scan.run.window() is window
+        beside = calibrate.library.mapTo(calibrate, calibrate.library.rect().topLeft())
+        rows = calibrate.rows["selftest"].mapTo(calibrate, calibrate.rows["selftest"].rect().topRight())
+        assert (beside.x() > rows.x()) == is_large
+    qtbot.waitUntil(lambda: not window.parts.runner.active, timeout=30_000)
+    window.close()
