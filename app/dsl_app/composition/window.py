@@ -15,6 +15,7 @@ from dsl_app.composition.calibrations import CalibrationInUse
 from dsl_app.composition.captures import CapturesAction
 from dsl_app.composition.dialogs import ImportAction, ReconstructAgainAction
 from dsl_app.composition.first_connection import FirstConnection
+from dsl_app.composition.rig_profiles import ProfileAction
 from dsl_app.connection.state import Link, RigChoice, RigState
 from dsl_app.shared.known_files import Kind
 from dsl_app.shared.settings import data_folder
@@ -242,6 +243,9 @@ class Composition(QObject):
 
         page = RigPage(self.live, rig_names())
         self.screens.serve(page)
+        profiles = ProfileAction(self.window, self.rig.state, page.offer_rig)
+        # The signal would not keep the action.
+        page.profile_requested.connect(lambda name: profiles.edit(name))
         page.selftest_requested.connect(lambda: self.window.do("calibrate_selftest"))
         return page
 

@@ -22,6 +22,7 @@ from dsl_app.shared.widgets.layouts import STRETCH, boxed, column_of, row_of
 from dsl_app.shared.widgets.page import PageWidget
 from dsl_app.shared.widgets.ticker import Ticker
 from dsl_core.devices.base import DeviceRig
+from dsl_core.io.rig_profile import profile_path
 
 #: How often the newest live frame is fetched, ms.
 FETCH_MS = 15
@@ -30,9 +31,13 @@ SIDE_PX, WIDE_SIDE_PX = 268, 440
 
 
 class RigPage(PageWidget):
-    """Follows the states of rig and live view; ``selftest_requested`` asks for the self-test's wizard."""
+    """Follows the states of rig and live view; ``selftest_requested`` asks for the self-test's wizard.
+
+    ``profile_requested`` asks to edit the profile of a rig by its name; an empty one begins a new profile.
+    """
 
     selftest_requested = Signal()
+    profile_requested = Signal(str)
 
     def __init__(self, live: LiveController, rigs: Sequence[str]) -> None:
         """``rigs`` are the names of the rigs that are installed."""
@@ -51,6 +56,17 @@ class RigPage(PageWidget):
         self._rig.currentIndexChanged.connect(lambda _: self.options.set_rig(str(self._rig.currentData())))
         self.options.set_rig(str(self._rig.currentData()))
         self.options.chosen.connect(self._change_options)
+        self.new_profile = push_button(
+            "&New…",
+            "Put a rig together from devices that are found, and save it as a profile",
+            lambda: self.profile_requested.emit(""),
+        )
+        self.edit_profile = push_button(
+            "&Edit…",
+            "Change the drivers, addresses and settings of this rig's profile",
+            lambda: self.profile_requested.emit(str(self._rig.currentData())),
+        )
+        self._rig.currentIndexChanged.connect(lambda _: self._show_profile())
         self.connect_button = push_button(
             "Connect", "Open or close the devices of this rig", self._toggle_link, "primary"
         )
@@ -79,6 +95,7 @@ class RigPage(PageWidget):
         )
         self.cycles = label("", wraps=True)
         self._timer = Ticker(self, FETCH_MS, live.fetch_frame)
+        self._show_profile()
         self._lay_out()
         self._connect()
 
@@ -94,6 +111,7 @@ class RigPage(PageWidget):
         devices = QGroupBox("Devices")
         form = QFormLayout(devices)
         form.addRow("Rig", self._rig)
+        form.addRow("", row_of(self.new_profile, self.edit_profile))
         form.addRow(self.options)
         form.addRow("", self.connect_button)
         form.addRow("State", self.link)
@@ -144,6 +162,16 @@ class RigPage(PageWidget):
             state.used_by.follow(self.projector.set_user),
             *follow_any(self._show, state.link, state.trouble, live.is_exposing),
         ]
+
+    def offer_rig(self, name: str) -> None:
+        """Choose a rig, which is added to the list if it is new."""
+        if self._rig.findData(name) < 0:
+            self._rig.addItem(name, name)
+        self._rig.choose(name)
+
+    def _show_profile(self) -> None:
+        """Only rigs of a profile can be edited."""
+        self.edit_profile.setEnabled(profile_path(str(self._rig.currentData())) is not None)
 
     def _toggle_link(self) -> None:
         if self._state.link.value is Link.OPEN:

@@ -1,4 +1,4 @@
-"""What a histogram of the picture shown says: counts of each channel, and the levels on it. No Qt."""
+"""What a histogram of the picture shown says: counts of each channel, and the levels on it."""
 
 from __future__ import annotations
 

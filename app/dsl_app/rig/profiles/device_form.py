@@ -1,0 +1,108 @@
+"""The form of one device: what was found, its driver, and a field for each of the driver's settings."""
+
+from __future__ import annotations
+
+from PySide6.QtWidgets import QFormLayout, QLineEdit, QWidget
+
+from dsl_app.rig.profiles.controller import ProfileController
+from dsl_app.rig.profiles.draft import NEEDED, DraftPart, text_of
+from dsl_app.rig.profiles.state import Found
+from dsl_app.shared.widgets.forms import ChoiceBox, label, named, quiet
+from dsl_app.shared.widgets.layouts import boxed, column_of, scrolled
+from dsl_core.devices.driver_table import Kind, find_driver
+from dsl_core.errors import DeviceError
+
+NOTHING_FOUND = "nothing found"
+
+
+class DeviceForm(QWidget):
+    """Shows a `DraftPart` and asks the controller."""
+
+    def __init__(self, kind: Kind, drivers: tuple[str, ...], commands: ProfileController) -> None:
+        super().__init__()
+        self.kind, self._commands = kind, commands
+        self._shown: DraftPart | None = None
+        self.fields: dict[str, QLineEdit] = {}
+        tip = "Devices that the drivers see now; choosing one fills in its driver and its address"
+        self.found = ChoiceBox(f"Found {kind}", tip, (), self._choose)
+        none = "Choose a driver" if kind in NEEDED else f"No {kind}"
+        choices = [(none, ""), *((name, name) for name in drivers)]
+        tip = f"The driver of the {kind}"
+        self.driver = ChoiceBox(
+            f"Driver of the {kind}", tip, choices, lambda name: commands.set_driver(kind, name)
+        )
+        self.about = label("", "muted", wraps=True)
+        top = QFormLayout()
+        top.addRow("Found", self.found)
+        top.addRow("Driver", self.driver)
+        top.addRow("", self.about)
+        self.form = QFormLayout()
+        area = scrolled(boxed(self.form))
+        column_of(top, (area, 1), on=self)
+        self.show_found(())
+
+    def _choose(self, found: Found | None) -> None:
+        if found is not None:
+            self._commands.choose_device(found)
+
+    def show_found(self, found: tuple[Found, ...]) -> None:
+        """List the devices of this kind."""
+        own = [each for each in found if each.kind == self.kind]
+        with quiet(self.found):
+            self.found.clear()
+            self.found.addItem(f"{len(own)} found: choose one" if own else NOTHING_FOUND, None)
+            for each in own:
+                self.found.addItem(f"{each.device.words} ({each.driver})", each)
+        self.found.setEnabled(bool(own))
+
+    def show_part(self, part: DraftPart) -> None:
+        """Show the device of a draft; fields are made again only for another driver."""
+        self.driver.choose(part.driver)
+        if self._shown is None or part.driver != self._shown.driver:
+            self._make_fields(part.driver)
+        self._shown = part
+        for name, field in self.fields.items():
+            text = part.texts.get(name, "")
+            # What is being typed stays as it is.
+            if field.text() != text:
+                field.setText(text)
+
+    def _make_fields(self, driver: str) -> None:
+        while self.form.rowCount():
+            self.form.removeRow(0)
+        self.fields = {}
+        self.about.clear()
+        if not driver:
+            return
+        try:
+            found = find_driver(self.kind, driver)
+        except DeviceError as error:
+            self.about.setText(str(error))
+            return
+        self.about.setText(found.summary + (f". Needs {found.brings}" if found.brings else ""))
+        for name, setting in found.settings.model_fields.items():
+            field = named(QLineEdit(), name.replace("_", " "), setting.description or name)
+            default = setting.get_default(call_default_factory=True)
+            field.setPlaceholderText(
+                "needed" if setting.is_required() else text_of(default) if default else "not set"
+            )
+            field.textEdited.connect(lambda text, name=name: self._commands.set_text(self.kind, name, text))
+            self.fields[name] = field
+            self.form.addRow(caption(name), field)
+            self.form.addRow("", label(setting.description or "", "muted", wraps=True))
+
+
+#: Endings of names that are units.
+_UNITS = {"ms": "ms", "s": "s", "px": "px", "mm": "mm", "db": "dB", "nm": "nm"}
+
+
+def caption(name: str) -> str:
+    """The name of a setting as words, with its unit.
+
+    >>> caption("frame_wait_s"), caption("gain_db"), caption("id")
+    ('Frame wait (s)', 'Gain (dB)', 'Id')
+    """
+    words, _, end = name.rpartition("_")
+    text = f"{words} ({_UNITS[end]})" if words and end in _UNITS else name
+    text = text.replace("_", " ")
+    return text[0].upper() + text[1:]

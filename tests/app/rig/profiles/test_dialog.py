@@ -1,0 +1,143 @@
+"""A rig profile is made by mouse: found devices are chosen, tried and saved."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from dsl_app.composition.window import Composition, StartOptions
+from dsl_app.rig.page import RigPage
+from dsl_app.rig.profiles import controller
+from dsl_app.rig.profiles.controller import ProfileController
+from dsl_app.rig.profiles.device_form import caption
+from dsl_app.rig.profiles.dialog import ProfileDialog
+from dsl_app.rig.profiles.state import Found, ProfileState, profile_view
+from PySide6.QtCore import Qt
+from PySide6.QtTest import QTest
+from PySide6.QtWidgets import QWidget
+from pytestqt.qtbot import QtBot
+
+from dsl_core.devices import doctor
+from dsl_core.devices.doctor import Finding, Grade
+from dsl_core.devices.driver_table import FoundDevice
+from dsl_core.io.rig_profile import load_profile, profile_names, profiles_folder
+from tests.app.support.doubles import InlineRunner
+from tests.app.support.real_window import show_window
+
+LEFT = Qt.MouseButton.LeftButton
+WEBCAM = Found("camera", "uvc", FoundDevice({"index": 1}, "webcam 1"))
+
+
+class Bench:
+    """The dialog alone; jobs run at once and a rig may be connected."""
+
+    def __init__(self, qtbot: QtBot) -> None:
+        self.state, self.is_connected = ProfileState(), False
+        self.control = ProfileController(self.state, InlineRunner(), lambda: self.is_connected)
+        self.parent = QWidget()
+        qtbot.addWidget(self.parent)
+        self.dialog = ProfileDialog(self.state, self.control, self.parent)
+        self.dialog.show()
+
+    def fill_in(self) -> None:
+        """A webcam that was found, and no projector, by mouse and keys."""
+        dialog = self.dialog
+        QTest.mouseClick(dialog.look, LEFT)
+        QTest.keyClicks(dialog.name, "bench")
+        camera, projector = dialog.forms["camera"], dialog.forms["projector"]
+        camera.found.setFocus()
+        QTest.keyClick(camera.found, Qt.Key.Key_Down)
+        projector.driver.setCurrentIndex(projector.driver.findData("none"))
+        projector.driver.activated.emit(projector.driver.currentIndex())
+
+
+@pytest.fixture
+def bench(qtbot: QtBot, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Bench:
+    monkeypatch.setenv("DSL_SCAN_HOME", str(tmp_path))
+    monkeypatch.setattr(controller, "find_devices", lambda _: (WEBCAM,))
+    return Bench(qtbot)
+
+
+def test_a_profile_is_made_of_what_was_found_and_edited_again(bench: Bench) -> None:
+    saved: list[Path] = []
+    bench.state.saved.connect(saved.append)
+    bench.fill_in()
+    camera = bench.dialog.forms["camera"]
+    assert camera.fields["index"].text() == "1"
+    assert camera.fields["size_px"].placeholderText() == "640, 480"
+    QTest.keyClicks(camera.fields["size_px"], "wide")
+    QTest.mouseClick(bench.dialog.save, LEFT)
+    assert "size_px" in bench.dialog.trouble.text()
+    assert (profile_names(), bench.dialog.isVisible()) == ([], True)
+    camera.fields["size_px"].clear()
+    QTest.keyClicks(camera.fields["size_px"], "1280 x 720")
+    QTest.mouseClick(bench.dialog.save, LEFT)
+    assert not bench.dialog.isVisible()
+    assert saved == [profiles_folder() / "bench.json"]
+    assert load_profile(saved[0]).camera.settings == {"index": 1, "size_px": [1280, 720]}
+    bench.control.open(saved[0])
+    bench.control.change(note="by the window")
+    assert bench.control.save()
+    assert load_profile(saved[0]).note == "by the window"
+    bench.control.open(None)
+    bench.control.change(name="bench")
+    bench.control.choose_device(WEBCAM)
+    bench.control.set_driver("projector", "none")
+    assert not bench.control.save()
+    assert "already. Enter another name" in bench.state.trouble.value
+
+
+def test_trying_says_beside_the_fields_what_works(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
+    said = [Finding("camera uvc", Grade.GOOD, "640 x 480 px"), Finding("projector none", Grade.BAD, "None.")]
+    monkeypatch.setattr(doctor, "examine", lambda profile: said)
+    QTest.mouseClick(bench.dialog.test, LEFT)
+    assert "The name of the rig is ''" in bench.dialog.trouble.text()
+    bench.fill_in()
+    bench.is_connected = True
+    QTest.mouseClick(bench.dialog.test, LEFT)
+    assert "Disconnect it" in bench.dialog.trouble.text()
+    bench.is_connected = False
+    QTest.mouseClick(bench.dialog.test, LEFT)
+    texts = [bench.dialog.findings.item(row, 1) for row in range(bench.dialog.findings.rowCount())]
+    assert [item.text() for item in texts if item is not None] == ["640 x 480 px", "None."]
+    assert bench.dialog.verdict.text() == "1 of 2 findings prevent a scan."
+    bench.control.change(note="new")
+    assert profile_view(bench.state).verdict.startswith("Before the last change: 1 of 2")
+
+
+def test_a_profile_that_cannot_be_read_is_said(bench: Bench, tmp_path: Path) -> None:
+    (tmp_path / "broken.json").write_text("{")
+    bench.control.open(tmp_path / "broken.json")
+    assert "not JSON" in bench.dialog.trouble.text()
+
+
+def test_captions_have_the_unit() -> None:
+    assert [caption(name) for name in ("latency_ms", "size_px", "target_at_zero_mm", "port")] == [
+        "Latency (ms)",
+        "Size (px)",
+        "Target at zero (mm)",
+        "Port",
+    ]
+
+
+def test_a_saved_profile_is_chosen_on_the_rig_page(
+    qtbot: QtBot, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("DSL_SCAN_HOME", str(tmp_path))
+    window = Composition(StartOptions()).open_window(tmp_path)
+    show_window(qtbot, window)
+    page = window.open_page("rig")
+    assert isinstance(page, RigPage)
+    assert not page.edit_profile.isEnabled()
+    QTest.mouseClick(page.new_profile, LEFT)
+    (dialog,) = window.findChildren(ProfileDialog)
+    dialog._commands.change(name="room 12")
+    dialog._commands.choose_device(WEBCAM)
+    dialog._commands.set_driver("projector", "none")
+    QTest.mouseClick(dialog.save, LEFT)
+    assert page.edit_profile.isEnabled()
+    QTest.mouseClick(page.edit_profile, LEFT)
+    again = [each for each in window.findChildren(ProfileDialog) if each.isVisible()]
+    assert [each.name.text() for each in again] == ["room 12"]
+    again[0].reject()
+    window.close()
