@@ -83,13 +83,14 @@ class DeviceForm(QWidget):
         for name, setting in found.settings.model_fields.items():
             field = named(QLineEdit(), name.replace("_", " "), setting.description or name)
             default = setting.get_default(call_default_factory=True)
+            unset = "needed" if setting.is_required() else "not set"
             field.setPlaceholderText(
-                "needed" if setting.is_required() else text_of(default) if default else "not set"
+                unset if default in (None, "", {}) or setting.is_required() else text_of(default)
             )
             field.textEdited.connect(lambda text, name=name: self._commands.set_text(self.kind, name, text))
             self.fields[name] = field
-            self.form.addRow(caption(name), field)
-            self.form.addRow("", label(setting.description or "", "muted", wraps=True))
+            about = label(setting.description or "", "muted", wraps=True)
+            self.form.addRow(caption(name), column_of(field, about, 4, margins=0, spacing=2))
 
 
 #: Endings of names that are units.
