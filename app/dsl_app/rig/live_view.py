@@ -157,6 +157,9 @@ class LiveView(QWidget):
             axis.setPen(theme.line)
             axis.setTextPen(theme.muted)
         self._legend.setLabelTextColor(theme.muted)
+        for _, text in self._legend.items:
+            # Entries that are there already keep their colour otherwise.
+            text.setText(text.text, color=theme.muted)
 
     @property
     def frames_per_second(self) -> float:

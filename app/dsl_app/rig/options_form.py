@@ -9,6 +9,8 @@ from PySide6.QtWidgets import QFormLayout, QLineEdit, QWidget
 
 from dsl_app.shared.widgets.forms import ChoiceBox, named, quiet
 
+#: The longest label of the form around this one.
+LONGEST_LABEL = "Projector"
 #: The rig that scene and size are options of, and its scene if none is chosen.
 SIMULATED, FIRST_SCENE = "twin", "color-checker"
 #: Sizes of the camera's image, by what they are called; an empty one is the camera's own.
@@ -80,6 +82,10 @@ class OptionsForm(QWidget):
         self.form.addRow("Scene", self.scene)
         self.form.addRow("Size", self.size_px)
         self.form.addRow("Options", self.text)
+        # In line with the fields of the form around it.
+        for field in (self.scene, self.size_px, self.text):
+            name = self.form.labelForField(field)
+            name.setMinimumWidth(name.fontMetrics().horizontalAdvance(LONGEST_LABEL))
         self._show()
 
     def set_rig(self, name: str) -> None:

@@ -83,10 +83,10 @@ class DeviceForm(QWidget):
         for name, setting in found.settings.model_fields.items():
             field = named(QLineEdit(), name.replace("_", " "), setting.description or name)
             default = setting.get_default(call_default_factory=True)
-            unset = "needed" if setting.is_required() else "not set"
-            field.setPlaceholderText(
-                unset if default in (None, "", {}) or setting.is_required() else text_of(default)
-            )
+            if setting.is_required() or default in (None, "", {}):
+                field.setPlaceholderText("needed" if setting.is_required() else "not set")
+            else:
+                field.setPlaceholderText(text_of(default))
             field.textEdited.connect(lambda text, name=name: self._commands.set_text(self.kind, name, text))
             self.fields[name] = field
             about = label(setting.description or "", "muted", wraps=True)
