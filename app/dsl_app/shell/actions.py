@@ -147,7 +147,7 @@ ACTIONS: tuple[Action, ...] = (
         Action(f"view_{key}", text, "Results", str(i), tip, page="results")
         for i, (key, text, tip) in enumerate(
             (
-                ("colour", "&Colour", "Colours as seen under a chosen light, or any three bands"),
+                ("colour", "Co&lour", "Colours as seen under a chosen light, or any three bands"),
                 ("band", "&Band", "Reflectance of one band"),
                 ("depth", "&Depth", "Depth along the camera axis"),
                 (
