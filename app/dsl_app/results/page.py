@@ -176,7 +176,7 @@ class ResultsPage(PageWidget):
     def _show_contrast(self, shown: bool) -> None:
         if shown and self.contrast is None:
             self.contrast = ContrastPanel(self._state, self._control.contrast)
-            set_help(self.contrast, "numbers#views")
+            set_help(self.contrast, "numbers#contrast")
             self.contrast.apply_theme(self._theme)
             self._below.addWidget(self.contrast)
 
