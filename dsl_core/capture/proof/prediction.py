@@ -20,10 +20,8 @@ BLUR = 0.15
 BRIGHT_SIGMAS, FEWEST_BRIGHT = 25.0, 12
 #: Unlit pixels that say how much light of the room has changed since black was taken.
 FEWEST_UNLIT = 60
-#: A picture's pixels count as unlit below this share of what is lit beyond doubt.
-UNLIT_SHARE = 0.05
-#: Deviations by which they have to be told from what is lit.
-CHOSEN_SIGMAS = 3.0
+#: Columns count as lit by a pattern above this share of full light.
+LIT_SHARE = 0.1
 #: Of the pixels that a rival leaves bright or dark, every so many are asked where there are plenty.
 PLENTY = 4000
 
@@ -67,18 +65,31 @@ def contest_of_lines(seen: Counts, lit: Lit, wanted: Floats, rival: Floats) -> C
     )
 
 
+@dataclass(frozen=True)
+class Places:
+    """Which pixels of known columns a pattern of columns lights, and which it does not: indices into `Lit`."""
+
+    lit: NDArray[np.intp]
+    unlit: NDArray[np.intp]
+
+    @classmethod
+    def of(cls, lit: Lit, wanted: Floats) -> Places:
+        """Those of a `line_profile`."""
+        light = np.take(wanted, lit.key)
+        return cls(np.flatnonzero(light > LIT_SHARE), np.flatnonzero(light <= 0))
+
+
 def brightness_of_lines(seen: Counts, lit: Lit, wanted: Floats, noise: Noise) -> float | None:
     """Light of a picture over that expected where it should be brightest; None where too little is lit.
 
     Light that unlit pixels gained since black was taken is the room's and is left out.
     """
-    chosen = np.flatnonzero(np.take(wanted > 0.1, lit.key))
-    chosen = chosen[seen[lit.index[chosen]] < noise.sensor.full_scale_dn]
-    unlit = np.flatnonzero(np.take(wanted <= 0, lit.key))
-    room = _of_room(seen[lit.index[unlit]] - lit.black[unlit])
-    counts = seen[lit.index[chosen]]
+    at = Places.of(lit, wanted)
+    chosen = at.lit[seen[lit.index[at.lit]] < noise.sensor.full_scale_dn]
+    room = _of_room(seen[lit.index[at.unlit]] - lit.black[at.unlit])
     light = lit.contrast[chosen] * wanted[lit.key[chosen]]
-    return _ratio(counts - lit.black[chosen] - room, light, lit.sigma[chosen] ** 2)
+    gain = seen[lit.index[chosen]] - lit.black[chosen] - room
+    return _ratio(gain, light, lit.sigma[chosen] ** 2)
 
 
 def _of_room(gain: Floats) -> np.float32:
@@ -161,24 +172,25 @@ def _contest(
     return vote(seen[chosen], wanted.counts[chosen], rival.counts[chosen])
 
 
-def brightness_of_picture(seen: Counts, wanted: Expected, black: Floats, noise: Noise) -> float | None:
+def brightness_of_picture(
+    seen: Counts, wanted: Expected, black: Floats, noise: Noise, lit: Lit | None, profile: Floats | None
+) -> float | None:
     """Light of a picture over that expected; None where too little of it can be measured.
 
-    Light that unlit pixels gained since black was taken is the room's and is left out.
+    With the columns of pixels and the `line_profile` of the pattern, only pixels that it lights count, and
+    what unlit ones have is left out on both sides: light of the room that has changed, however much the
+    prediction scales it, is none of the pattern's. Pixels are chosen by their columns, as noise would choose
+    those that are expected too bright.
     """
     full = noise.sensor.full_scale_dn
+    light, gain = wanted.counts - black, seen - black
     sound = (seen < full) & (wanted.counts < 0.9 * full)
-    light, gain = (wanted.counts - black)[sound], (seen - black)[sound]
+    if lit is not None and profile is not None:
+        at = Places.of(lit, profile)
+        dark = lit.index[at.unlit]
+        light, gain = light - _of_room(light[dark]), gain - _of_room(gain[dark])
+        lights = np.zeros_like(sound)
+        lights[lit.index[at.lit]] = True
+        sound &= lights
     variance = (wanted.variance + noise.variance(seen))[sound]
-    return _ratio(gain - _room_of_picture(gain, light, variance), light, variance)
-
-
-def _room_of_picture(gain: Floats, light: Floats, variance: Floats) -> np.float32:
-    """What a picture has of the room's light that was not there in black, by its unlit pixels."""
-    beyond = light[light > SIGMAS * np.sqrt(variance)]
-    limit = UNLIT_SHARE * float(np.median(beyond)) if beyond.size else 0.0
-    # Chosen by noise rather than by light, unlit pixels would be those that were expected too dark.
-    if limit < CHOSEN_SIGMAS * float(np.sqrt(np.median(variance))):
-        return np.float32(0)
-    unlit = light < limit
-    return _of_room(gain[unlit] - light[unlit])
+    return _ratio(gain[sound], light[sound], variance)

@@ -263,7 +263,7 @@ class FrameProof:
             if rival is not None
         }
         is_judged = has_black or (self._calibration is not None and shot.role != "black")
-        share = None if not is_judged else brightness_of_picture(seen, wanted, black, self._noise)
+        share = self._brightness_again(shot, seen, wanted, black) if is_judged else None
         first_of_role = (shot.role, shot.setting) not in self._light
         found = self._decide(shot, contests, share, lambda: None)
         if found.is_wrong:
@@ -273,6 +273,11 @@ class FrameProof:
             self._scale[shot.setting] = self._scale_of(shot) * share
             self._light[shot.role, shot.setting] = deque([1.0], _REMEMBERED)
         return found
+
+    def _brightness_again(self, shot: Shot, seen: Counts, wanted: Expected, black: Floats) -> float | None:
+        lit = self._code.lit if self._code is not None else None
+        profile = self._profile(shot) if shot.role == "spectral" else None
+        return brightness_of_picture(seen, wanted, black, self._noise, lit, profile)
 
     def _with_doubtful(self, found: Finding) -> Finding:
         """Take the picture that a wrong one was compared with again as well, where it may be that one."""

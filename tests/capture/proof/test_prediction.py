@@ -178,17 +178,21 @@ def test_brightness_of_a_picture_leaves_out_what_is_or_should_be_saturated() -> 
     black = floats(np.full(40, 100))
     wanted = Expected(black + 1000, floats(np.full(40, 1.0)))
     seen = np.full(40, 600, np.uint16)
-    assert brightness_of_picture(seen, wanted, black, NOISE) == pytest.approx(0.5)
+    assert brightness_of_picture(seen, wanted, black, NOISE, None, None) == pytest.approx(0.5)
     seen[0] = 4095
     counts = wanted.counts.copy()
     counts[1] = 3690  # nine tenths of full scale are 3685.5
-    assert brightness_of_picture(seen, Expected(counts, wanted.variance), black, NOISE) == pytest.approx(0.5)
+    assert brightness_of_picture(
+        seen, Expected(counts, wanted.variance), black, NOISE, None, None
+    ) == pytest.approx(0.5)
     counts[1] = 3680
-    assert brightness_of_picture(seen, Expected(counts, wanted.variance), black, NOISE) == pytest.approx(
-        19500 / 41580
-    )
+    assert brightness_of_picture(
+        seen, Expected(counts, wanted.variance), black, NOISE, None, None
+    ) == pytest.approx(19500 / 41580)
     assert (
-        brightness_of_picture(seen[:11], Expected(counts[:11], wanted.variance[:11]), black[:11], NOISE)
+        brightness_of_picture(
+            seen[:11], Expected(counts[:11], wanted.variance[:11]), black[:11], NOISE, None, None
+        )
         is None
     )
 
@@ -198,7 +202,7 @@ def test_brightness_of_a_picture_asks_for_light_beyond_both_noises() -> None:
     # Variance 5.65 of the prediction and 10.35 of the picture: sixteen pixels, a deviation of sixteen.
     for light, is_told in ((24.0, False), (26.0, True)):
         wanted = Expected(black + light, floats(np.full(16, 5.65)))
-        found = brightness_of_picture(np.full(16, 200, np.uint16), wanted, black, NOISE)
+        found = brightness_of_picture(np.full(16, 200, np.uint16), wanted, black, NOISE, None, None)
         assert (found is not None) == is_told
 
 
@@ -216,7 +220,7 @@ def test_noise_that_is_scaled_up_with_a_picture_does_not_make_it_brighter() -> N
     old_black, new_black = picture(dark, 6.0), picture(dark, 12.0)
     wanted = rescaled(picture(true, 6.0), old_black, floats(new_black), 40.0, noise)
     seen = picture(40 * true, 12.0)
-    share = brightness_of_picture(seen, wanted, floats(new_black), noise)
+    share = brightness_of_picture(seen, wanted, floats(new_black), noise, None, None)
     assert share is not None
     assert share == pytest.approx(1.0, abs=0.1)
 
@@ -231,10 +235,16 @@ def test_light_of_the_room_that_changed_is_not_taken_for_that_of_a_line(room: in
     assert few == pytest.approx((8 + room) / 10, rel=1e-3), "59 unlit pixels say too little"
 
 
-@pytest.mark.parametrize("room", [-9, 0, 40])
-def test_light_of_the_room_that_changed_is_not_taken_for_that_of_a_picture(room: int) -> None:
-    black, light = floats(np.full(160, 110)), floats(np.r_[np.full(100, 500), np.full(60, 20)])
-    wanted = Expected(black + light, floats(np.full(160, 0.01)))
-    seen = (110 + room + np.where(light > 20, 0.8 * light, light)).astype(np.uint16)
-    share = (0.8 * 50_000 + 20 * 60) / (50_000 + 20 * 60)
-    assert brightness_of_picture(seen, wanted, black, NOISE) == pytest.approx(share, rel=1e-3)
+@pytest.mark.parametrize(("then", "now"), [(0, 0), (0, 40), (30, 0), (-9, 25)])
+def test_light_of_the_room_that_changed_is_not_taken_for_that_of_a_picture(then: int, now: int) -> None:
+    # A line of an earlier setting, scaled with the room's light of its time, against that of today.
+    pattern, known = floats(np.r_[np.ones(20), np.zeros(60)]), lit(80)
+    light = np.zeros(160)
+    light[:40:2] = 500
+    black = floats(np.full(160, 110))
+    wanted = Expected(floats(black + light + then), floats(np.full(160, 2000.0)))
+    seen = (110 + now + 0.8 * light).astype(np.uint16)
+    assert brightness_of_picture(seen, wanted, black, NOISE, known, pattern) == pytest.approx(0.8, rel=1e-3)
+    share = (0.8 * 10_000 + 160 * now) / (10_000 + 160 * then)
+    quiet = Expected(wanted.counts, floats(np.full(160, 1.0)))
+    assert brightness_of_picture(seen, quiet, black, NOISE, None, pattern) == pytest.approx(share, rel=1e-3)

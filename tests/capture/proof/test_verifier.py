@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 import pytest
 from numpy.typing import NDArray
@@ -102,7 +104,9 @@ def test_half_the_exposure_is_found_and_said(
     rig.projector.show(token_image(scene.plan, shot))
     found = _judge_with(scene, {shot.index: rig.camera.snap().pixels})
     assert [finding.verdict for finding in found] == [Verdict.EXPOSURE]
-    assert "0.5 times" in found[0].sentence or "0.4" in found[0].sentence
+    told = re.search(r"([\d.]+) times", found[0].sentence)
+    assert told is not None
+    assert float(told[1]) == pytest.approx(0.5, abs=0.05)
 
 
 def test_a_picture_given_twice_is_called_repeated(scene: RenderedScene) -> None:
