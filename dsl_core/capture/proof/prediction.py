@@ -67,7 +67,7 @@ def contest_of_lines(seen: Counts, lit: Lit, wanted: Floats, rival: Floats) -> C
 
 @dataclass(frozen=True)
 class Places:
-    """Which pixels of known columns a pattern of columns lights, and which it does not: indices into `Lit`."""
+    """Which pixels of known columns a pattern lights, and which it does not, as indices into a `Lit`."""
 
     lit: NDArray[np.intp]
     unlit: NDArray[np.intp]
