@@ -58,9 +58,12 @@ CHECKS = (
     ("mypy", ("mypy",)),
     ("import contracts", ("lint-imports", "--no-cache")),
 )
-#: Tests of a file share what they prepare and stay together. More processes would cost too much memory.
+#: One process more than there are cores, as a tenth of the time tests wait for devices and other programs.
+#: More than four would cost too much memory.
+PROCESSES = min((os.cpu_count() or 1) + 1, 4)
+#: Tests of a file share what they prepare and stay together.
 #: Files go out in the order of their names: by their numbers of tests, the longest would come last and alone.
-SHARED = ("-n", "logical", "--maxprocesses", "4", "--dist", "loadfile", "--no-loadscope-reorder")
+SHARED = ("-n", str(PROCESSES), "--dist", "loadfile", "--no-loadscope-reorder", "--durations", "10")
 
 
 #: Tests that are quick and reach far, for a look between two changes; mypy keeps what it found.

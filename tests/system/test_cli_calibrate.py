@@ -51,7 +51,7 @@ def test_real_captures(give: Give, tmp_path: Path) -> None:
 
 @pytest.mark.skipif(not REAL.is_dir(), reason=f"the real captures are not in {REAL}")
 def test_a_real_pose_without_a_board_is_left_out_and_said(give: Give, tmp_path: Path) -> None:
-    for pose in range(5):
+    for pose in range(4):
         home = tmp_path / "poses" / f"capture_{pose}"
         home.mkdir(parents=True)
         for picture in (REAL / home.name).iterdir():
@@ -64,7 +64,7 @@ def test_a_real_pose_without_a_board_is_left_out_and_said(give: Give, tmp_path: 
     assert ending.code == 0, ending.err
     found = ending.json["calibration"]
     assert [each["name"] for each in found["left_out"]] == ["capture_2"]
-    assert [pose["name"] for pose in found["poses"]] == [f"capture_{k}" for k in (0, 1, 3, 4)]
+    assert [pose["name"] for pose in found["poses"]] == [f"capture_{k}" for k in (0, 1, 3)]
     assert any("capture_2 is left out: The board" in warning for warning in found["warnings"])
 
 

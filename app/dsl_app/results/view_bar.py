@@ -78,9 +78,8 @@ class ViewBar(QWidget):
         )
         self.bands = tuple(self._band_box(place, name) for place, name in enumerate(("Red", "Green", "Blue")))
         self.contrast = self._button(
-            "Contrast", "Show the histogram of the picture and set its contrast on it"
+            "Contrast", "Contrast. Show the histogram of the picture and set its contrast on it"
         )
-        self.contrast.setText("Contrast")
         lights = [(text, key) for key, text in LIGHTS.items()]
         self.light = ChoiceBox("Light", "The light source that colours are computed for", lights)
         self.adapted = check_box(
@@ -114,8 +113,9 @@ class ViewBar(QWidget):
 
     def apply_theme(self, theme: Theme) -> None:
         """Draw the icons in the colours of a theme."""
-        for tool, button in self.tools.items():
-            button.setIcon(icon(tool.value, theme.text, theme.on_accent))
+        drawn = {tool.value: button for tool, button in self.tools.items()} | {"contrast": self.contrast}
+        for name, button in drawn.items():
+            button.setIcon(icon(name, theme.text, theme.on_accent))
             button.setIconSize(QSize(ICON_PX, ICON_PX))
 
     def _button(self, name: str, tip: str) -> QToolButton:
@@ -141,7 +141,7 @@ class ViewBar(QWidget):
         line = QFrame()
         line.setFrameShape(QFrame.Shape.VLine)
         top = row_of(
-            *self.views.values(), 6, line, 6, *self.tools.values(), 6, self.contrast, STRETCH, spacing=4
+            *self.views.values(), 4, line, 4, *self.tools.values(), 4, self.contrast, STRETCH, spacing=2
         )
         self._light_label, self._cloud_label = QLabel("Light"), QLabel("Colour by")
         self._quality_label = QLabel("Show")

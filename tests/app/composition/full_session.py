@@ -59,7 +59,7 @@ SETTINGS: dict[str, dict[str, str]] = {
     "color-checker": {},
     "bandpass": {"filters_nm": "450,640", "line_px": "10", "pixels": "3000"},
     "depth-stage": {
-        "positions_mm": "620,740,850",
+        "positions_mm": "620,850",
         "filters_nm": "450,640",
         "code_step_px": "5",
         "filter_step_px": "32",
