@@ -58,12 +58,9 @@ CHECKS = (
     ("mypy", ("mypy",)),
     ("import contracts", ("lint-imports", "--no-cache")),
 )
-#: One process more than there are cores, as a tenth of the time tests wait for devices and other programs.
-#: More than four would cost too much memory.
-PROCESSES = min((os.cpu_count() or 1) + 1, 4)
-#: Tests of a file share what they prepare and stay together.
+#: Tests of a file share what they prepare and stay together. More processes would cost too much memory.
 #: Files go out in the order of their names: by their numbers of tests, the longest would come last and alone.
-SHARED = ("-n", str(PROCESSES), "--dist", "loadfile", "--no-loadscope-reorder", "--durations", "10")
+SHARED = ("-n", "logical", "--maxprocesses", "4", "--dist", "loadfile", "--no-loadscope-reorder")
 
 
 #: Tests that are quick and reach far, for a look between two changes; mypy keeps what it found.
@@ -319,7 +316,7 @@ def test(venv: Path, arguments: Sequence[str]) -> int:
     if not arguments or what == "test quick":
         say(f"{what} takes about {max(1, round(expected_s(venv, what) / 60))} min on this computer")
     results: list[tuple[str, int, float]] = []
-    for name, (program, *options) in (*CHECKS, ("pytest", ("pytest", *SHARED, *chosen))):
+    for name, (program, *options) in (*CHECKS, ("pytest", ("pytest", *SHARED, "--durations=10", *chosen))):
         start = time.monotonic()
         say(f"{name} ...")
         code, interrupted = run([str(venv_program(venv, program)), *options], variables, ROOT)

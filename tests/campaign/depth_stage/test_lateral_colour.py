@@ -23,7 +23,7 @@ KNOWN = ("emission", "sensor", "flat_field", "response", "white_scale", "project
 @pytest.fixture(scope="module")
 def bench(module_folder: Path) -> Bench:
     known = (*KNOWN, "camera", "projector", "pose")
-    return take_all(RECIPE, film_bench(module_folder, 1, known, foreign="lateral-colour", size="64x48"))
+    return take_all(RECIPE, film_bench(module_folder, 1, known, foreign="lateral-colour", size="56x36"))
 
 
 @pytest.fixture(scope="module")
