@@ -9,6 +9,7 @@ inverse variance like everything else.
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass, fields
 
 import torch
@@ -73,9 +74,12 @@ def refine(
     """
     fit = fit_peaks(coarse_px, radiance, std, lines, response, widths, model_error)
     unusual = (fit.chi_square > MAX_CHI_SQUARE) & (fit.used > 3) & (fit.amplitude > 0)
-    if lines.single:
-        poor = torch.nonzero(unusual).ravel()
-        fit = _any_shape(fit, poor, coarse_px, radiance, std, lines, response, widths)
+    poor = torch.nonzero(unusual).ravel()
+    if lines.single and len(poor):
+        some = (coarse_px[poor], radiance[:, poor], std[:, poor], lines, response)
+        expected = torch.ones(len(poor), dtype=coarse_px.dtype) if widths is None else widths[poor]
+        again = (fit_peaks(*some, focus * expected, UNUSUAL_ERROR) for focus in FOCI)
+        fit = _best_of(fit, poor, again)
     q, chi_square = fit.column_px, fit.chi_square
     std_px = torch.sqrt(chi_square.clip(min=1) / fit.information)
     limit = torch.where(unusual, UNUSUAL_CHI_SQUARE, MAX_CHI_SQUARE)
@@ -110,25 +114,10 @@ class PeakFit:
     measured: Tensor
 
 
-def _any_shape(
-    fit: PeakFit,
-    poor: Tensor,
-    coarse_px: Tensor,
-    radiance: Tensor,
-    std: Tensor,
-    lines: LineSet,
-    response: ProjectorResponse,
-    widths: Tensor | None,
-) -> PeakFit:
-    """The fit with ``poor`` peaks, by their indices, fitted again, each as wide as suits it best."""
-    if not len(poor):
-        return fit
-    expected = torch.ones(len(poor), dtype=coarse_px.dtype) if widths is None else widths[poor]
+def _best_of(fit: PeakFit, poor: Tensor, again: Iterable[PeakFit]) -> PeakFit:
+    """The fit with ``poor`` peaks, by their indices, taken from those fits of them that suit them best."""
     found = {field.name: getattr(fit, field.name).clone() for field in fields(PeakFit)}
-    for focus in FOCI:
-        other = fit_peaks(
-            coarse_px[poor], radiance[:, poor], std[:, poor], lines, response, focus * expected, UNUSUAL_ERROR
-        )
+    for other in again:
         better = other.chi_square < found["chi_square"][poor]
         for name, values in found.items():
             values[poor[better]] = getattr(other, name)[better]
