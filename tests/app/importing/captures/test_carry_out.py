@@ -10,26 +10,16 @@ import numpy as np
 import pytest
 from dsl_app.importing.captures.carry_out import carry_out
 from dsl_app.importing.captures.fields import first_mapping
-from dsl_app.importing.captures.state import NOMINAL, CaptureRequest
+from dsl_app.importing.captures.state import NOMINAL
 
 from dsl_core.errors import StoreError
 from dsl_core.io.calibration_library import CalibrationLibrary
 from dsl_core.io.result.result_file import load_result
 from dsl_core.io.scan.folder import ScanReader
 from dsl_core.progress import NoProgress
-from tests.app.importing.captures.small_capture import PROJECTOR, make_capture
+from tests.app.importing.captures.small_capture import PROJECTOR, request_for
 
 MAPPING = first_mapping(12, PROJECTOR)
-
-
-@pytest.fixture(scope="module")
-def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """To be read only."""
-    return make_capture(tmp_path_factory.mktemp("capture") / "set")
-
-
-def request_for(folder: Path, tmp_path: Path) -> CaptureRequest:
-    return CaptureRequest(folder, tmp_path / "a.dsl", PROJECTOR)
 
 
 def test_an_import_without_calibration_tells_its_columns(folder: Path, tmp_path: Path) -> None:

@@ -23,21 +23,11 @@ from dsl_core.errors import CalibrationError, StoreError
 from dsl_core.io.calibration_library import CalibrationLibrary
 from dsl_core.io.pictures.source import open_pictures
 from dsl_core.progress import NoProgress
-from tests.app.importing.captures.small_capture import CAMERA, PROJECTOR, make_capture
+from tests.app.importing.captures.small_capture import CAMERA, PROJECTOR, request_for
 from tests.cases.foreign_captures import scene
 from tests.cases.small_rig import small_rig
 
 MAPPING = first_mapping(12, PROJECTOR)
-
-
-@pytest.fixture(scope="module")
-def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """To be read only."""
-    return make_capture(tmp_path_factory.mktemp("capture") / "set")
-
-
-def request_for(folder: Path, tmp_path: Path) -> CaptureRequest:
-    return CaptureRequest(folder, tmp_path / "a.dsl", PROJECTOR)
 
 
 def listed(request: CaptureRequest, tmp_path: Path) -> tuple[str, dict[Place, str]]:
