@@ -7,6 +7,7 @@ spectra - is the engine's own, up to the finished result, in single or double pr
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
@@ -15,7 +16,7 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from dsl_core.model.plan import CapturePlan, GrayCode, LineComb, ScanLines, Shot
+from dsl_core.model.plan import CapturePlan, GrayCode, LineComb, ScanLines
 from dsl_core.model.rig import Rig
 from dsl_core.model.spectral import WavelengthGrid
 from dsl_core.optics.correspondence import GratingModel, correspondence, zero_order
@@ -98,7 +99,7 @@ def scanned(patch: Patch) -> MemoryScan:
     camera = patch.rig.camera
     plan = patch.plan.model_copy(update={"camera_size_px": (camera.width_px, camera.height_px)})
     shots = list(plan.shots())
-    rates = _rates(patch, plan, shots)
+    rates = _rates(patch, plan)
     rng = np.random.default_rng(patch.seed) if patch.noise else None
     frames = [
         digitise(patch.rig.sensor, (rate * shot.exposure_ms).astype(np.float32), rng)
@@ -107,12 +108,18 @@ def scanned(patch: Patch) -> MemoryScan:
     return MemoryScan(plan, tuple(frames))
 
 
-def _rates(patch: Patch, plan: CapturePlan, shots: list[Shot]) -> Floats:
+@functools.cache
+def _drives(plan: CapturePlan) -> Floats:
+    """What the projector shows in every shot, (shots, width, LEDs); most cases have the same plan."""
+    return np.stack([pattern_image(plan, shot)[0] for shot in plan.shots()]) / 255
+
+
+def _rates(patch: Patch, plan: CapturePlan) -> Floats:
     """Expected DN per ms of every shot, (shots, rows, columns)."""
     rig, shape = patch.rig, patch.depth_mm.shape
     pixels = torch.arange(patch.depth_mm.size)
     depth = torch.as_tensor(patch.depth_mm.ravel())
-    drives = np.stack([pattern_image(plan, shot)[0] for shot in shots]) / 255
+    drives = _drives(plan)
     response = rig.projector_response
     light, which = np.unique(response.radiance(drives), axis=0, return_inverse=True)
     column = zero_order(rig, pixels, depth)[0]

@@ -81,7 +81,9 @@ def set_theme(name: str) -> Theme:
     dark = name == "dark" or (name == "system" and hints.colorScheme() == Qt.ColorScheme.Dark)
     theme = DARK if dark else LIGHT
     application.setPalette(_palette(theme))
-    application.setStyleSheet(style_sheet(theme))
+    sheet = style_sheet(theme)
+    if application.styleSheet() != sheet:  # the same one again would cost a look at every widget
+        application.setStyleSheet(sheet)
     return theme
 
 

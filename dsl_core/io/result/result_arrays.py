@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +15,12 @@ from dsl_core.errors import StoreError
 from dsl_core.io.result.result_file import load_result
 from dsl_core.model.result import VARIABLES
 from dsl_core.progress import NoProgress, Progress
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+#: What is read of a variable between two looks at whether the person has cancelled.
+AT_ONCE_BYTES = 16e6
 
 
 @dataclass(frozen=True)
@@ -50,8 +57,14 @@ class ResultArrays:
         return 0 <= pixel[0] < width and 0 <= pixel[1] < height
 
 
+def _parts(variable: xr.DataArray) -> list[slice]:
+    """Slices of the first axis, of as many bands as `AT_ONCE_BYTES` hold: each read has a cost of its own."""
+    each = max(1, int(AT_ONCE_BYTES // max(1, 4 * math.prod(variable.shape[1:]))))
+    return [slice(first, first + each) for first in range(0, len(variable), each)]
+
+
 def load_arrays(path: Path, progress: Progress | None = None) -> ResultArrays:
-    """Read a whole result; never holds more than the result and one band. Raises `StoreError`."""
+    """Read a whole result; never holds much more than it. Raises `StoreError`."""
     progress = progress or NoProgress()
     result = load_result(path)
     if "depth_mm" not in result:
@@ -59,15 +72,13 @@ def load_arrays(path: Path, progress: Progress | None = None) -> ResultArrays:
             f"{path} contains columns of the projector and no depth. Reconstruct its scan with a calibration,"
             " or export the columns with 'dsl-scan export'."
         )
-    names = [name for name in VARIABLES if name in result]
-    total = sum(len(result[name]) if result[name].ndim > 2 else 1 for name in names)
-    done, arrays = 0, {}
-    for name in names:
+    parts = {name: _parts(result[name]) for name in VARIABLES if name in result}
+    total, done, arrays = sum(map(len, parts.values())), 0, {}
+    for name in parts:
         variable = result[name]
         kind = np.float32 if variable.dtype.kind == "f" else variable.dtype
         arrays[name] = np.empty(variable.shape, kind)
-        parts = range(len(variable)) if variable.ndim > 2 else [...]
-        for part in parts:
+        for part in parts[name]:
             progress.report("read the result", done, total)
             arrays[name][part] = variable[part].values
             done += 1

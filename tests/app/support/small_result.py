@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+import atexit
+import functools
+import shutil
+import tempfile
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import xarray as xr
 from numpy.typing import NDArray
 
 from dsl_core.io.result.result_file import save_result
@@ -22,6 +27,18 @@ DARK, UNREACHED = (2, 1), (5, 4)
 
 def write_small_result(folder: Path, spectra: bool = True) -> Path:
     """Save it as ``small.zarr``."""
+    return Path(shutil.copytree(_saved(spectra), folder / "small.zarr"))
+
+
+@functools.cache
+def _saved(spectra: bool) -> Path:
+    """The result on disk, of which each test gets a copy."""
+    folder = tempfile.TemporaryDirectory(prefix="small-result-")
+    atexit.register(folder.cleanup)
+    return save_result(_small(spectra), Path(folder.name) / "small.zarr")
+
+
+def _small(spectra: bool) -> xr.Dataset:
     rows, columns = SHAPE
     y, x = np.mgrid[:rows, :columns].astype(np.float32)
     depth = 700 + 0.5 * x
@@ -47,7 +64,7 @@ def write_small_result(folder: Path, spectra: bool = True) -> Path:
             reach=np.ones(cube.shape, np.uint8),
             rgb=reflectance_to_srgb(cube, NM),
         )
-    return save_result(build_result(arrays, NM, {"rig": "twin"}), folder / "small.zarr")
+    return build_result(arrays, NM, {"rig": "twin"})
 
 
 def write_reference(path: Path, values: NDArray[np.float64]) -> Path:
