@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from dsl_core.cli.guidance import ConsoleGuide, figures_json, opened_campaign, resumed_by, run_guided
-from dsl_core.cli.options import Force, Json, RigOptions, parse_options
+from dsl_core.cli.options import Force, Json, RigOptions, parse_options, tab_rigs
 from dsl_core.cli.output import Output
 from dsl_core.cli.pictures import board_of, calibrate_pictures
 from dsl_core.errors import CalibrationError
@@ -30,7 +30,9 @@ Campaign = Annotated[
 CampaignRig = Annotated[
     str | None,
     typer.Option(
-        "--rig", help="Name of a rig; the default is the campaign's, or the twin for a new campaign."
+        "--rig",
+        help="Name of a rig; the default is the campaign's, or the twin for a new campaign.",
+        autocompletion=tab_rigs,
     ),
 ]
 Set = Annotated[

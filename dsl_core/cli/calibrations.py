@@ -9,7 +9,15 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from dsl_core.cli.guidance import answer, figures_json, print_figures
-from dsl_core.cli.options import Force, Json, OverrideCalibration, RigName, RigOptions, parse_options
+from dsl_core.cli.options import (
+    Force,
+    Json,
+    OverrideCalibration,
+    RigName,
+    RigOptions,
+    parse_options,
+    tab_calibrations,
+)
 from dsl_core.cli.output import Output
 from dsl_core.errors import CalibrationError
 from dsl_core.io.staging import check_targets
@@ -20,7 +28,12 @@ if TYPE_CHECKING:
 
 calibrations = typer.Typer(help="The calibrated rigs on this computer.", no_args_is_help=True)
 
-Name = Annotated[str, typer.Argument(metavar="NAME", help="A calibration's name, or NAME@DATE.")]
+Name = Annotated[
+    str,
+    typer.Argument(
+        metavar="NAME", help="A calibration's name, or NAME@DATE.", autocompletion=tab_calibrations
+    ),
+]
 
 
 @calibrations.command("list")
@@ -67,7 +80,12 @@ def show(
 
 @calibrations.command()
 def check(
-    name: Annotated[str, typer.Argument(metavar="NAME", help="A name in the library, or a rig's file.")],
+    name: Annotated[
+        str,
+        typer.Argument(
+            metavar="NAME", help="A name in the library, or a rig's file.", autocompletion=tab_calibrations
+        ),
+    ],
     rig: RigName = "twin",
     option: RigOptions = [],  # noqa: B006 - typer reads it, nobody changes it
     spectralon: Annotated[
@@ -109,7 +127,7 @@ def check(
 
 @calibrations.command()
 def restore(
-    name: Annotated[str, typer.Argument(metavar="NAME")],
+    name: Annotated[str, typer.Argument(metavar="NAME", autocompletion=tab_calibrations)],
     version: Annotated[str, typer.Argument(metavar="DATE", help="A version, or its first characters.")],
     json: Json = False,
 ) -> None:

@@ -9,7 +9,7 @@ from typing import Annotated
 
 import typer
 
-from dsl_core.cli.options import RigOptions
+from dsl_core.cli.options import RigOptions, tab_rigs
 from dsl_core.errors import DslError
 from dsl_core.extras import missing_package
 
@@ -29,7 +29,9 @@ def gui(
     path: Annotated[
         Path | None, typer.Argument(help="A scan, result, reference or calibration to open.")
     ] = None,
-    rig: Annotated[str | None, typer.Option(help="Rig to connect instead of the last one used.")] = None,
+    rig: Annotated[
+        str | None, typer.Option(help="Rig to connect instead of the last one used.", autocompletion=tab_rigs)
+    ] = None,
     option: RigOptions = [],  # noqa: B006
     demo: Annotated[bool, typer.Option("--demo", help="Open a finished scan of the twin.")] = False,
     theme: Annotated[Colours | None, typer.Option(help="Colours to use instead of the last ones.")] = None,

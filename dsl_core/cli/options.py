@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+import os
+import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -19,10 +21,38 @@ if TYPE_CHECKING:
 T = TypeVar("T")
 N = TypeVar("N", int, float)
 
+
+def tab_rigs(incomplete: str) -> list[str]:
+    """Names of rigs for the Tab key; quick, as no package is loaded."""
+    from dsl_core.devices.registry import rig_names
+
+    return [name for name in rig_names() if name.startswith(incomplete)]
+
+
+def tab_calibrations(incomplete: str) -> list[str]:
+    """Names in the library for the Tab key; where none fits, the shell offers files."""
+    from dsl_core.io.calibration_library import CalibrationLibrary
+
+    names = [name for name in CalibrationLibrary().names() if name.startswith(incomplete)]
+    # Bash inserts what it gets as it is, other shells escape spaces themselves.
+    in_bash = os.environ.get("_DSL_SCAN_COMPLETE") == "complete_bash"
+    return [re.sub(r"([^\w.-])", r"\\\1", name) for name in names] if in_bash else names
+
+
+def tab_codes(incomplete: str) -> list[str]:
+    """Names of binary codes for the Tab key."""
+    from dsl_core.model.presets import CODE_CHOICES
+
+    return [choice.name for choice in CODE_CHOICES if choice.name.startswith(incomplete)]
+
+
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON object instead of text.")]
 Force = Annotated[bool, typer.Option("--force", help="Replace existing files.")]
 Report = Annotated[Path | None, typer.Option("--report", "-o", help="Also write everything as an HTML page.")]
-RigName = Annotated[str, typer.Option("--rig", help="Name of a rig; 'dsl-scan rigs' lists them.")]
+RigName = Annotated[
+    str,
+    typer.Option("--rig", help="Name of a rig; 'dsl-scan rigs' lists them.", autocompletion=tab_rigs),
+]
 RigOptions = Annotated[
     list[str], typer.Option("--option", "-O", help="Option of the rig as key=value; may be repeated.")
 ]
@@ -39,7 +69,11 @@ Tolerance = Annotated[
 ]
 CalibrationName = Annotated[
     str | None,
-    typer.Option("--calibration", help="A calibration: its name in the library, NAME@DATE, or a rig's file."),
+    typer.Option(
+        "--calibration",
+        help="A calibration: its name in the library, NAME@DATE, or a rig's file.",
+        autocompletion=tab_calibrations,
+    ),
 ]
 OverrideCalibration = Annotated[
     bool,
@@ -55,6 +89,7 @@ Code = Annotated[
         help="Binary code: 'full' (columns and rows) or 'columns'; 'xor-04' and 'ensemble-04' for surfaces"
         " that light each other, 'xor-02' and 'ensemble-02' with stripes of 2 px; 'full-xor-04' with"
         " rows.",
+        autocompletion=tab_codes,
     ),
 ]
 Lines = Annotated[

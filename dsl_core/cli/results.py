@@ -17,6 +17,7 @@ from dsl_core.cli.options import (
     parse_bands,
     parse_options,
     parse_pixels,
+    tab_rigs,
 )
 from dsl_core.cli.output import Output
 from dsl_core.errors import PlanError
@@ -139,7 +140,8 @@ def _decode(output: Output, session: Path, target: Path, force: bool) -> None:
 def evaluate(
     path: Result,
     truth_rig: Annotated[
-        str | None, typer.Option(help="Rig that provides the truth; the default is the scan's.")
+        str | None,
+        typer.Option(help="Rig that provides the truth; the default is the scan's.", autocompletion=tab_rigs),
     ] = None,
     option: RigOptions = [],  # noqa: B006 - typer reads it, nobody changes it
     report: Annotated[
@@ -171,6 +173,17 @@ def evaluate(
     output.finish()
 
 
+def _forms() -> tuple[str, ...]:
+    from dsl_core.io.export import formats
+
+    return (*sorted(formats()), "dataset", "calibration")
+
+
+def tab_formats(incomplete: str) -> list[str]:
+    """Formats of exports for the Tab key."""
+    return [form for form in _forms() if form.startswith(incomplete)]
+
+
 def export(
     path: Annotated[
         Path,
@@ -185,6 +198,7 @@ def export(
             metavar="FORMAT",
             help="ply, envi, exr, csv, png, tiff, npy; glb, obj, stl or mesh for the surface; dataset or"
             " calibration.",
+            autocompletion=tab_formats,
         ),
     ],
     target: Annotated[Path, typer.Argument(metavar="TARGET", help="File or folder to write.")],
@@ -222,7 +236,8 @@ def mesh(
 
 def _say_written(output: Output, files: list[Path]) -> None:
     shown = [str(file) for file in files[:10]] + (["..."] if len(files) > 10 else [])
-    output.say(f"Written ({len(files)} files): {', '.join(shown)}")
+    count = "1 file" if len(files) == 1 else f"{len(files)} files"
+    output.say(f"Written ({count}): {', '.join(shown)}")
     output.put(files=[str(file) for file in files])
     output.finish()
 
@@ -232,7 +247,7 @@ def _export(
 ) -> list[Path]:
     from dsl_core.io.calibration_library import load_calibration
     from dsl_core.io.export import export as export_result
-    from dsl_core.io.export import export_csv, formats
+    from dsl_core.io.export import export_csv
     from dsl_core.io.published.calibration import export_calibration
     from dsl_core.io.result.result_file import load_result
     from dsl_core.io.scan.folder import ScanReader
@@ -240,9 +255,8 @@ def _export(
     from dsl_core.workflows.scans import calibration_of
 
     form = form.lower()
-    known = (*sorted(formats()), "dataset", "calibration")
-    if form not in known:
-        raise PlanError(f"There is no export format {form!r}. Choose one of {', '.join(known)}.")
+    if form not in _forms():
+        raise PlanError(f"There is no export format {form!r}. Choose one of {', '.join(_forms())}.")
     if form not in ("dataset", "calibration"):
         check_targets([target], overwrite=True)  # what else a format writes, it checks itself
     if pixels and form != "csv":

@@ -25,6 +25,7 @@ from dsl_core.cli.options import (
     Settings,
     Tolerance,
     parse_options,
+    tab_rigs,
     with_effects,
 )
 from dsl_core.cli.output import Output
@@ -126,7 +127,10 @@ def scan(
 def resume(
     target: Annotated[Path, typer.Argument(metavar="SCAN.dsl", help="Folder of the scan.")],
     rig: Annotated[
-        str | None, typer.Option("--rig", help="Rig to use instead of the one recorded in the scan.")
+        str | None,
+        typer.Option(
+            "--rig", help="Rig to use instead of the one recorded in the scan.", autocompletion=tab_rigs
+        ),
     ] = None,
     option: RigOptions = [],  # noqa: B006
     drift: Annotated[

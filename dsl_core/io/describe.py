@@ -150,4 +150,5 @@ def _sentinel_fact(plan: CapturePlan) -> str:
     shots = [shot.index for shot in plan.shots() if shot.role == "sentinel"]
     rounds = sum(b - a > 1 for a, b in itertools.pairwise(shots)) + bool(shots)
     share = 100 * len(shots) / plan.shot_count
-    return f"{len(shots)} repeats in {rounds} rounds ({share:.1f} %)" if shots else "none"
+    rounds_text = "1 round" if rounds == 1 else f"{rounds} rounds"
+    return f"{len(shots)} repeats in {rounds_text} ({share:.1f} %)" if shots else "none"
