@@ -24,7 +24,7 @@ def live(stage: Stage) -> None:
     rig = stage.composition.live
     rig.show("white", 0.8)
     rig.set_exposure(20.0)
-    stage.press("Start live view")
+    rig.start()
     stage.wait(lambda: rig.state.counts.value.shown > 3)
     page = stage.window.page_of("rig")
     assert isinstance(page, RigPage)

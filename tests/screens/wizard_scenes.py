@@ -51,8 +51,9 @@ class Wizard:
         self.stage.wait(is_drawn)
 
     def go_to(self, page: int) -> None:
-        """Click a page in the list at the left."""
-        self.window.steps.setCurrentRow(page)
+        """Click a page in the list at the left, where that of the settings is the last."""
+        rows = self.window.steps.count()
+        self.window.steps.setCurrentRow((page - 1) % rows)
         self.stage.wait(lambda: self.state.at.value == page)
         self.idle()
 

@@ -14,7 +14,7 @@ from dsl_app.calibrate.state import CalibrateState
 from dsl_app.connection.state import RigState
 from dsl_app.shared.evented import follow_any
 from dsl_app.shared.known_files import first_free
-from dsl_app.shared.widgets.forms import label, push_button, show_parts
+from dsl_app.shared.widgets.forms import label, push_button, set_role, show_parts
 from dsl_app.shared.widgets.layouts import STRETCH, column_of, row_of
 
 if TYPE_CHECKING:
@@ -39,6 +39,7 @@ class NewCampaignDialog(QDialog):
         buttons = QDialogButtonBox(QDialogButtonBox.StandardButton.Cancel)
         self.begin = buttons.addButton("Begin", QDialogButtonBox.ButtonRole.AcceptRole)
         self.begin.setToolTip("Create the folder and start the campaign")
+        set_role(self.begin, "primary")
         buttons.accepted.connect(self.accept)
         buttons.rejected.connect(self.reject)
         row = row_of((self.folder, 1), self.browse)

@@ -247,6 +247,7 @@ class Composition(QObject):
         # The signal would not keep the action.
         page.profile_requested.connect(lambda name: profiles.edit(name))
         page.selftest_requested.connect(lambda: self.window.do("calibrate_selftest"))
+        page.scan_requested.connect(lambda: self.window.open_page("scan"))
         return page
 
     def _calibrate_page(self) -> PageWidget:
@@ -352,6 +353,14 @@ class Composition(QObject):
         controller = PairController(state, parts.runner, toasts)
         series = SeriesController(series_state, parts.runner, toasts, parts.undo)
         self.session.pair, self.session.series = controller, series
+
+        def offer_open_result(_page: str) -> None:
+            results = self.session.results
+            shown = None if results is None else results.state.result.value
+            state.at_hand.set(None if shown is None else shown.path)
+
+        self.window.opened.connect(offer_open_result)
+        offer_open_result("compare")
         return ComparePage(state, controller, series_state, series)
 
 

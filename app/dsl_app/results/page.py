@@ -39,6 +39,9 @@ from dsl_app.shared.widgets.page import PageWidget
 from dsl_app.shared.widgets.save_dialog import ask_target
 from dsl_core.workflows.inspection import IntensityGraph
 
+#: Shares of the width for the picture and for what is next to it, by whether the window is wide.
+SHARES = {False: (5, 3), True: (8, 3)}
+
 
 class ResultsPage(PageWidget):
     """Follows a `ResultsState` and asks its controller.
@@ -94,7 +97,8 @@ class ResultsPage(PageWidget):
         self._report = push_button(
             "Report…", "Write pictures, spectra, colours and materials of the marks as HTML page or PDF"
         )
-        self._export = push_button("Export…", "Write the result in formats of other programs (Ctrl+E)")
+        tip = "Write the result in formats of other programs (Ctrl+E)"
+        self._export = push_button("Export…", tip, role="primary")
         self._lay_out()
         self._connect()
 
@@ -134,7 +138,15 @@ class ResultsPage(PageWidget):
             (self.search, "Search", ""),
         )
         right = splitter(Qt.Orientation.Vertical, (self.spectra, 3), (tabs, 2), sizes=(400, 340))
-        return splitter(Qt.Orientation.Horizontal, (left, 3), (right, 2), sizes=(720, 440))
+        self._sides = splitter(Qt.Orientation.Horizontal, (left, 1), (right, 1))
+        self.arrange()
+        return self._sides
+
+    def arrange(self) -> None:
+        """Give the picture the room of a wide window; spectra and lists have enough with less of it."""
+        for place, share in enumerate(SHARES[self.is_wide]):
+            self._sides.setStretchFactor(place, share)
+        self._sides.setSizes([1000 * share for share in SHARES[self.is_wide]])
 
     def _connect(self) -> None:
         control, state = self._control, self._state

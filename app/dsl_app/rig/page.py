@@ -33,10 +33,12 @@ SIDE_PX, WIDE_SIDE_PX = 268, 440
 class RigPage(PageWidget):
     """Follows the states of rig and live view; ``selftest_requested`` asks for the self-test's wizard.
 
-    ``profile_requested`` asks to edit the profile of a rig by its name; an empty one begins a new profile.
+    ``scan_requested`` asks for the Scan page, ``profile_requested`` to edit the profile of a rig by its name;
+    an empty one begins a new profile.
     """
 
     selftest_requested = Signal()
+    scan_requested = Signal()
     profile_requested = Signal(str)
 
     def __init__(self, live: LiveController, rigs: Sequence[str]) -> None:
@@ -83,6 +85,11 @@ class RigPage(PageWidget):
             "Test camera, projector, timing, focus and room, with advice (F4)",
             self.selftest_requested,
         )
+        self.scan = push_button(
+            "Plan a scan…",
+            "Open the Scan page, which says how long a scan of this scene takes",
+            self.scan_requested,
+        )
         low, high = 0.01, 30_000.0
         self.exposure = NumberBox(
             "Exposure", low, high, live.state.exposure_ms.value, "ms", 2, "Exposure of live frames"
@@ -125,6 +132,7 @@ class RigPage(PageWidget):
         camera_form.addRow("", self.cycles)
         camera_form.addRow("", self.auto)
         camera_form.addRow("", self.live_button)
+        camera_form.addRow("", self.scan)
         # In a wide window the projector is below the camera, and figures are next to the picture.
         self.beside = QGroupBox("Picture")
         column_of(on=self.beside)

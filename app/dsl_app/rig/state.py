@@ -52,15 +52,21 @@ class RigView:
     projector_text: str
     connect_button: ButtonState
     live_button: ButtonState
-    selftest: bool
+    selftest: ButtonState
+    scan: ButtonState
     exposure: bool
     auto: bool
     cycles: LabelState
 
 
 def rig_view(rig: RigState, live: LiveState) -> RigView:
-    """Texts and buttons of the Rig page for what is known now."""
-    link, has_devices = rig.link.value, rig.devices.value is not None
+    """Texts and buttons of the Rig page for what is known now.
+
+    Once the picture is live, the next thing is a scan on a calibrated rig, and the self-test on any other.
+    """
+    link, devices = rig.link.value, rig.devices.value
+    has_devices = devices is not None
+    is_live, is_calibrated = rig.live.value, devices is not None and devices.calibration is not None
     return RigView(
         link=LabelState(f"● {link.value}", _LINK_ROLES[link]),
         trouble=LabelState(rig.trouble.value, "bad"),
@@ -73,10 +79,11 @@ def rig_view(rig: RigState, live: LiveState) -> RigView:
         ),
         live_button=ButtonState(
             is_enabled=has_devices,
-            is_primary=has_devices and not rig.live.value,
-            text="Stop live view" if rig.live.value else "Start live view",
+            is_primary=has_devices and not is_live,
+            text="Stop live view" if is_live else "Start live view",
         ),
-        selftest=has_devices,
+        selftest=ButtonState(is_enabled=has_devices, is_primary=is_live and not is_calibrated),
+        scan=ButtonState(is_enabled=has_devices, is_primary=is_live and is_calibrated),
         exposure=has_devices,
         auto=has_devices and not live.is_exposing.value,
         cycles=LabelState(cycles_text(live.exposure_ms.value, rig.cycle_ms), "muted"),

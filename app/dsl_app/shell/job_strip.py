@@ -6,13 +6,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from PySide6.QtWidgets import QMenu, QProgressBar, QWidget
+from PySide6.QtWidgets import QMenu, QProgressBar, QSizePolicy, QWidget
 
 from dsl_app.shared.jobs.base import Job
 from dsl_app.shared.jobs.qt_runner import QtRunner
 from dsl_app.shared.notify import describe_seconds
 from dsl_app.shared.widgets.forms import label, named, push_button
-from dsl_app.shared.widgets.layouts import row_of
+from dsl_app.shared.widgets.layouts import STRETCH, row_of
 
 
 class JobStrip(QWidget):
@@ -29,7 +29,8 @@ class JobStrip(QWidget):
         self._cancel.clicked.connect(self._stop_shown)
         self._choices = named(QMenu(self), "Job to cancel")
         self._choices.aboutToShow.connect(self._list_choices)
-        row_of(self._text, self._bar, self._cancel, on=self, margins=(0, 0, 4, 0))
+        self._cancel.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Fixed)
+        row_of(STRETCH, self._text, self._bar, self._cancel, on=self, margins=(0, 0, 4, 0))
         runner.changed.connect(self._show)
         self._show()
 

@@ -16,7 +16,7 @@ from dsl_app.shared.known_files import Kind, kind_of, meant_by, refusal
 from dsl_app.shared.settings import RecentFiles, Settings, save_settings
 from dsl_app.shared.theme import DARK, Theme
 from dsl_app.shared.undo import UndoStack
-from dsl_app.shared.widgets.layouts import boxed, row_of
+from dsl_app.shared.widgets.layouts import boxed, column_of, row_of
 from dsl_app.shared.widgets.page import PageWidget, dropped_paths
 from dsl_app.shell.actions import PAGES, Page
 from dsl_app.shell.job_strip import JobStrip
@@ -70,7 +70,7 @@ class PagedWindow(QMainWindow):
         self.setMinimumSize(SMALLEST)
         self.resize(1280, 800)
         self.setAcceptDrops(True)
-        self.toasts = Toasts(self)
+        self.toasts = Toasts(self.statusBar())
         self.rail = Rail([page for page in PAGES if page.key in makers])
         self.rail.chosen.connect(self.open_page)
         self.stack = QStackedWidget()
@@ -82,7 +82,8 @@ class PagedWindow(QMainWindow):
         self._lay_out()
 
     def _lay_out(self) -> None:
-        self.setCentralWidget(boxed(row_of(self.rail, (self.stack, 1), margins=0, spacing=0)))
+        pages = column_of((self.stack, 1), self.toasts.strip, margins=0, spacing=0)
+        self.setCentralWidget(boxed(row_of(self.rail, (boxed(pages), 1), margins=0, spacing=0)))
 
     # Pages -----------------------------------------------------------------------------------------
 

@@ -1,20 +1,22 @@
-"""Messages that appear at the lower right of the window and disappear by themselves."""
+"""Messages below the page, which makes room for them: they never cover what they speak of."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 
-from PySide6.QtCore import QEvent, QObject, Qt, QTimer, Signal
-from PySide6.QtWidgets import QFrame, QMessageBox, QVBoxLayout, QWidget
+from PySide6.QtCore import QObject, Qt, QTimer, Signal
+from PySide6.QtWidgets import QFrame, QMessageBox, QPushButton, QStatusBar, QWidget
 
 from dsl_app.shared.notify import Level
 from dsl_app.shared.widgets.forms import label, push_button
-from dsl_app.shared.widgets.layouts import row_of
+from dsl_app.shared.widgets.layouts import column_of, row_of
 from dsl_app.shared.wording import in_window
 
 #: How long a message is shown, ms; an error stays until it is closed.
 STAY_MS = {"info": 5000, "warning": 9000}
-WIDTH_PX, MARGIN_PX, MOST = 420, 16, 4
+MOST = 4
+#: A message that leaves by itself and is not wider than this, px, is told in the status bar.
+SHORT_PX = 420
 
 
 class Toast(QFrame):
@@ -36,23 +38,26 @@ class Toast(QFrame):
         self.setProperty("level", level)
         self.setAccessibleName(f"{level}: {text}")
         self.level, self.text = level, text
-        words = label(text, wraps=True, can_be_copied=True)
-        buttons = QVBoxLayout()
-        row_of((words, 1), buttons, on=self, margins=(12, 8, 8, 8))
+        self.words = label(text, can_be_copied=True)
+        buttons = []
         for name, do in (offers or {}).items():
             offer = push_button(name, text, self.dismiss)
             offer.clicked.connect(lambda _checked=False, do=do: do())
-            buttons.addWidget(offer)
-        self._add_flat(buttons, "Close", "Close this message", self.dismiss)
+            buttons.append(offer)
         if details:
-            self._add_flat(buttons, "Details", "Show details", lambda: self._show(text, details))
-        buttons.addStretch(1)
+            buttons.append(_flat("Details", "Show details", lambda: self._show(text, details)))
+        buttons.append(_flat("Close", "Close this message", self.dismiss))
+        row_of((self.words, 1), *buttons, on=self, margins=(12, 0, 4, 0))
 
-    @staticmethod
-    def _add_flat(column: QVBoxLayout, text: str, tip: str, do: Callable[[], object]) -> None:
-        button = push_button(text, tip, lambda: do())
-        button.setFlat(True)
-        column.addWidget(button)
+    @property
+    def is_short(self) -> bool:
+        """Whether it is one line that fits into the status bar."""
+        return "\n" not in self.text and self.words.sizeHint().width() <= SHORT_PX
+
+    def be_whole(self) -> None:
+        """Break the lines of a long text, with some room around."""
+        self.words.setWordWrap(True)
+        self.setContentsMargins(0, 4, 0, 4)
 
     def dismiss(self) -> None:
         """Close the message."""
@@ -68,14 +73,26 @@ class Toast(QFrame):
         box.open()
 
 
-class Toasts(QObject):
-    """Shows toasts over a window; a `Notifier`. With more than `MOST`, the oldest is closed."""
+def _flat(text: str, tip: str, do: Callable[[], object]) -> QPushButton:
+    button = push_button(text, tip, lambda: do())
+    button.setFlat(True)
+    return button
 
-    def __init__(self, window: QWidget) -> None:
-        super().__init__(window)
-        self._window = window
+
+class Toasts(QObject):
+    """Shows toasts of a window; a `Notifier`. With more than `MOST`, the oldest is closed.
+
+    What leaves by itself and is short is told in the status ``line``, everything else in the ``strip``, which
+    the window puts below its pages.
+    """
+
+    def __init__(self, line: QStatusBar) -> None:
+        super().__init__(line)
+        self._line = line
+        self.strip = QWidget()
+        self._rows = column_of(on=self.strip, margins=(0, 4, 8, 0), spacing=4)
+        self.strip.hide()
         self._shown: list[Toast] = []
-        window.installEventFilter(self)
 
     @property
     def shown(self) -> tuple[Toast, ...]:
@@ -84,11 +101,11 @@ class Toasts(QObject):
 
     def tell(self, level: Level, text: str, details: str = "") -> None:
         """Show a sentence."""
-        self._show(Toast(level, in_window(text), details, self._window), level in STAY_MS)
+        self._show(Toast(level, in_window(text), details, self.strip), level in STAY_MS)
 
     def offer(self, text: str, offers: Mapping[str, Callable[[], object]]) -> None:
         """Show a sentence with buttons by their texts; it stays until one is used or it is closed."""
-        self._show(Toast("info", text, "", self._window, offers), leaves=False)
+        self._show(Toast("info", text, "", self.strip, offers), leaves=False)
 
     def _show(self, toast: Toast, leaves: bool) -> None:
         if any(other.text == toast.text for other in self._shown):
@@ -100,27 +117,20 @@ class Toasts(QObject):
             old.dismiss()
         if leaves:
             QTimer.singleShot(STAY_MS[toast.level], toast, toast.dismiss)
+        self._place(toast, leaves)
         toast.show()
-        self._settle()
+
+    def _place(self, toast: Toast, leaves: bool) -> None:
+        """Put a toast into the status bar if it belongs there and no other is there yet, else the strip."""
+        is_taken = any(other.parent() is self._line for other in self._shown)
+        if leaves and toast.is_short and not is_taken:
+            self._line.insertPermanentWidget(0, toast)
+        else:
+            toast.be_whole()
+            self._rows.addWidget(toast)
+            self.strip.show()
 
     def _drop(self, toast: Toast) -> None:
         if toast in self._shown:
             self._shown.remove(toast)
-            self._settle()
-
-    def _settle(self) -> None:
-        """Stack the toasts from the lower right upwards."""
-        bottom = self._window.height() - MARGIN_PX - 24
-        for toast in reversed(self._shown):
-            toast.setFixedWidth(min(WIDTH_PX, self._window.width() - 2 * MARGIN_PX))
-            toast.adjustSize()
-            bottom -= toast.height()
-            toast.move(self._window.width() - toast.width() - MARGIN_PX, bottom)
-            bottom -= 8
-            toast.raise_()
-
-    def eventFilter(self, watched: QObject, event: QEvent) -> bool:
-        """Follow the window's size."""
-        if watched is self._window and event.type() == QEvent.Type.Resize:
-            self._settle()
-        return False
+            self.strip.setVisible(any(other.parent() is self.strip for other in self._shown))

@@ -7,13 +7,16 @@ from pathlib import Path
 import pytest
 from dsl_app.calibrate.page import CalibratePage
 from dsl_app.composition.window import Composition, StartOptions
+from dsl_app.results.page import ResultsPage
 from dsl_app.rig.page import RigPage
 from dsl_app.scan.page import ScanPage
 from dsl_app.shell.main_window import MainWindow
 from pytestqt.qtbot import QtBot
 
 from tests.app.support.real_window import show_window
+from tests.app.support.small_result import write_small_result
 
+PAGES = ("rig", "scan", "calibrate", "results")
 LARGE, SMALL = (1920, 1080), (1280, 800)
 
 
@@ -24,16 +27,21 @@ def window(qtbot: QtBot, tmp_path: Path) -> MainWindow:
     return made
 
 
-def test_views_are_side_by_side_in_a_large_window_alone(qtbot: QtBot, window: MainWindow) -> None:
-    rig, scan, calibrate = (window.page_of(name) for name in ("rig", "scan", "calibrate"))
+def test_views_are_side_by_side_in_a_large_window_alone(
+    qtbot: QtBot, window: MainWindow, tmp_path: Path
+) -> None:
+    rig, scan, calibrate, results = (window.page_of(name) for name in PAGES)
     assert isinstance(rig, RigPage)
     assert isinstance(scan, ScanPage)
     assert isinstance(calibrate, CalibratePage)
+    assert isinstance(results, ResultsPage)
+    window.open_path(write_small_result(tmp_path))
+    qtbot.waitUntil(lambda: not window.parts.runner.active, timeout=30_000)
     live = rig.live.content
     for size in (SMALL, LARGE, SMALL):
         is_large = size == LARGE
         window.resize(*size)
-        for name in ("rig", "scan", "calibrate"):
+        for name in PAGES:
             window.open_page(name)
             assert window.size().toTuple() == size, f"{name} does not fit"
             assert window.page_of(name).is_wide == is_large
@@ -44,5 +52,8 @@ def test_views_are_side_by_side_in_a_large_window_alone(qtbot: QtBot, window: Ma
         beside = calibrate.library.mapTo(calibrate, calibrate.library.rect().topLeft())
         rows = calibrate.rows["selftest"].mapTo(calibrate, calibrate.rows["selftest"].rect().topRight())
         assert (beside.x() > rows.x()) == is_large
+        # The picture gets what a wide window has more of.
+        share = results._sides.sizes()[0] / sum(results._sides.sizes())
+        assert (share > 0.7) == is_large
     qtbot.waitUntil(lambda: not window.parts.runner.active, timeout=30_000)
     window.close()

@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+from dataclasses import replace
+
 from dsl_app.connection.controller import RigController
 from dsl_app.connection.state import Link, RigChoice, RigState
 from dsl_app.rig.state import LiveState, cycles_text, panel_view, rig_view
@@ -17,7 +19,8 @@ def test_a_page_without_a_rig_offers_to_connect_one() -> None:
     assert (view.connect_button.text, view.connect_button.is_enabled) == ("Connect", True)
     assert (view.connect_button.is_primary, view.live_button.is_primary) == (True, False)
     assert (view.camera_text, view.projector_text, view.cycles.text) == ("–", "–", "")
-    assert [view.live_button.is_enabled, view.selftest, view.exposure, view.auto] == 4 * [False]
+    buttons = (view.live_button, view.selftest, view.scan)
+    assert [*(button.is_enabled for button in buttons), view.exposure, view.auto] == 5 * [False]
     rig.link.set(Link.OPENING)
     assert not rig_view(rig, live).connect_button.is_enabled
 
@@ -32,7 +35,8 @@ def test_a_page_with_a_rig_names_its_devices_and_offers_to_expose() -> None:
     assert (view.live_button.text, view.live_button.is_enabled) == ("Start live view", True)
     assert (view.connect_button.is_primary, view.live_button.is_primary) == (False, True)
     assert view.camera_text.endswith("64 × 48 px")
-    assert view.selftest
+    assert view.selftest.is_enabled
+    assert not view.selftest.is_primary
     assert view.exposure
     assert view.auto
     assert "LED cycle" in view.cycles.text
@@ -42,6 +46,12 @@ def test_a_page_with_a_rig_names_its_devices_and_offers_to_expose() -> None:
     assert view.live_button.text == "Stop live view"
     assert not view.live_button.is_primary
     assert not view.auto
+    # The twin is calibrated; any other rig is tested first.
+    assert (view.selftest.is_primary, view.scan.is_primary) == (False, True)
+    assert rig.devices.value is not None
+    rig.devices.set(replace(rig.devices.value, calibration=None))
+    view = rig_view(rig, live)
+    assert (view.selftest.is_primary, view.scan.is_primary) == (True, False)
 
 
 def test_a_lost_rig_can_be_connected_again_and_says_why_it_is_lost() -> None:

@@ -13,7 +13,8 @@ from dsl_app.shared.widgets.page import PageWidget
 from dsl_app.shell.actions import ACTIONS, PAGES
 from dsl_app.shell.application import ExceptionHook, make_window, open_first_page
 from dsl_app.shell.main_window import MainWindow
-from PySide6.QtWidgets import QFileDialog, QLabel, QMessageBox, QVBoxLayout
+from PySide6.QtCore import QPoint
+from PySide6.QtWidgets import QApplication, QFileDialog, QLabel, QMessageBox, QVBoxLayout
 from pytestqt.qtbot import QtBot
 
 from tests.app.support.doubles import RecordingNotifier
@@ -142,6 +143,27 @@ def test_toasts_leave_when_closed_and_never_pile_up(window: MainWindow) -> None:
     assert [toast.text for toast in window.toasts.shown] == [f"trouble {i}" for i in range(2, 6)]
     window.toasts.shown[0].dismiss()
     assert len(window.toasts.shown) == 3
+
+
+def test_messages_stand_below_the_page_or_in_the_status_bar_and_cover_nothing(
+    window: MainWindow, qtbot: QtBot
+) -> None:
+    window.show()
+    window.toasts.tell("info", "Written.")
+    window.toasts.tell("warning", "A longer sentence " * 30)
+    window.toasts.offer("Compare both?", {"Compare": lambda: None})
+    QApplication.processEvents()
+    short, *others = window.toasts.shown
+    assert short.parent() is window.statusBar()
+    height = window.stack.height()
+    for toast in others:
+        assert toast.parent() is window.toasts.strip
+        assert toast.mapTo(window, QPoint()).y() >= window.stack.mapTo(window, QPoint(0, height)).y()
+    for toast in others:
+        toast.dismiss()
+    QApplication.processEvents()
+    assert not window.toasts.strip.isVisible()
+    assert window.stack.height() > height
 
 
 @pytest.mark.parametrize(("is_minor", "asked"), [(True, 0), (False, 1)])

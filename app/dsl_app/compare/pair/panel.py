@@ -17,7 +17,7 @@ from dsl_app.shared.theme import Theme
 from dsl_app.shared.widgets.deferred import Deferred
 from dsl_app.shared.widgets.forms import label, push_button, remark_line, show_parts
 from dsl_app.shared.widgets.help_window import set_help
-from dsl_app.shared.widgets.layouts import STRETCH, boxed, column_of, row_of, splitter
+from dsl_app.shared.widgets.layouts import STRETCH, Stretch, boxed, column_of, row_of, splitter
 from dsl_app.shared.widgets.open_dialog import OpenDialog
 from dsl_app.shared.widgets.plots import CalmPlot
 from dsl_app.shared.widgets.spectrum_curve import SpectrumCurve
@@ -35,6 +35,9 @@ class PairPanel(QWidget):
         self.truth = push_button(
             "&Truth as B", "Use the ground truth of A's scene as B; only for scans of the simulated rig"
         )
+        self.at_hand = push_button(
+            "Open result", "Compare the result that is open on the Results page", self._use_at_hand
+        )
         self.swap = push_button("&Swap", "Swap A and B", control.swap)
         self.report = push_button(
             "Write &report…", "Save figures and pictures of A against the ground truth as an HTML page"
@@ -51,6 +54,7 @@ class PairPanel(QWidget):
         head = row_of(
             self.name_a,
             self.open_first,
+            self.at_hand,
             24,
             self.name_b,
             self.open_second,
@@ -60,8 +64,8 @@ class PairPanel(QWidget):
             self.report,
         )
         above = boxed(column_of((self.pictures, 1), self.bar, margins=0))
-        self.parts = splitter(Qt.Orientation.Vertical, (above, 5), (self.figures, 4))
-        column_of(head, self.hint, (self.parts, 1), on=self, margins=(0, 8, 0, 0))
+        self.parts = splitter(Qt.Orientation.Vertical, (above, 1), (self.figures, 1), sizes=(1000, 1000))
+        column_of(head, self.hint, (self.parts, 1), Stretch(0), on=self, margins=(0, 8, 0, 0))
 
     def _connect(self) -> None:
         state, control = self._state, self._control
@@ -69,14 +73,21 @@ class PairPanel(QWidget):
         self.truth.clicked.connect(control.use_truth)
         self.report.clicked.connect(self._choose_report)
         self.stops = [
-            state.pair.follow(lambda pair: self.parts.setEnabled(pair is not None)),
-            *follow_any(self._show, state.first, state.second, state.pair, state.busy, state.trouble),
+            state.pair.follow(lambda pair: self.parts.setVisible(pair is not None)),
+            *follow_any(
+                self._show, state.first, state.second, state.pair, state.busy, state.trouble, state.at_hand
+            ),
         ]
 
     def _choose(self, second: bool) -> None:
         path = OpenDialog.ask(self, f"Open a result as {'B' if second else 'A'}")
         if path is not None:
             self._control.open_side(path, second)
+
+    def _use_at_hand(self) -> None:
+        path = self._state.at_hand.value
+        if path is not None:
+            self._control.open_side(path, second=self._state.first.value is not None)
 
     def _choose_report(self) -> None:
         pair = self._state.pair.value
@@ -110,7 +121,10 @@ class PairFigures(QSplitter):
         self.setChildrenCollapsible(False)
         self.addWidget(self.plot)
         self.addWidget(self.table)
-        self.setStretchFactor(0, 1)
+        # The figures break their lines where they get less than a third.
+        for place, share in enumerate((2, 1)):
+            self.setStretchFactor(place, share)
+        self.setSizes([2000, 1000])
         self.stops = [
             state.pair.follow(self._show_pair),
             state.cursor.follow(lambda _: self._show_cursor()),

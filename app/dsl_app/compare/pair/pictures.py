@@ -30,6 +30,8 @@ from dsl_app.shared.widgets.plots import theme_bar
 from dsl_core.optics.levels import spread_of
 
 BAND_PX = 260
+#: Where the widths of the pictures start from before they share what is left, px.
+EVEN_PX = 200
 
 
 class PairPictures(QWidget):
@@ -68,6 +70,9 @@ class PairPictures(QWidget):
             if i:
                 self.boxes[i].setXLink(self.boxes[0])
                 self.boxes[i].setYLink(self.boxes[0])
+            # Equal widths: the narrowest sets the zoom of all.
+            self.canvas.ci.layout.setColumnPreferredWidth(place, EVEN_PX)
+            self.canvas.ci.layout.setColumnStretchFactor(place, 1)
         column_of(self.canvas, on=self, margins=0)
 
     # Mouse and keys --------------------------------------------------------------------------------

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import Enum
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -11,7 +12,7 @@ from numpy.typing import NDArray
 
 from dsl_app.shared.evented import Value
 from dsl_app.shared.spectrum import Pixel, number_text
-from dsl_app.shared.widget_state import LabelState
+from dsl_app.shared.widget_state import ButtonState, LabelState
 from dsl_core.evaluation.summary import Truth
 from dsl_core.evaluation.verdict import Verdict
 from dsl_core.io.result.result_arrays import ResultArrays
@@ -72,7 +73,7 @@ class PairState:
     """Values that `PairController` sets and the page follows.
 
     ``busy`` says what is being read or compared (empty: nothing), ``trouble`` why two sides cannot be
-    compared.
+    compared. ``at_hand`` is the result that the Results page shows.
     """
 
     def __init__(self) -> None:
@@ -82,6 +83,7 @@ class PairState:
         self.shown = Value(PairQuantity.DEPTH)
         self.band = Value(0)
         self.cursor: Value[Pixel | None] = Value(None)
+        self.at_hand: Value[Path | None] = Value(None)
         self.busy = Value("")
         self.trouble = Value("")
 
@@ -93,11 +95,12 @@ class PairDisplay:
     name_a: str
     name_b: str
     hint: LabelState
-    open_first: bool
-    open_second: bool
+    open_first: ButtonState
+    open_second: ButtonState
+    at_hand: ButtonState
     truth: bool
     swap: bool
-    report: bool
+    report: ButtonState
 
 
 def pair_display(state: PairState) -> PairDisplay:
@@ -106,16 +109,33 @@ def pair_display(state: PairState) -> PairDisplay:
     pair, busy = state.pair.value, state.busy.value
     name_a, name_b = ("–" if side is None else side.name for side in (first, second))
     idle, has_truth = not busy, second is not None and second.truth is not None
+    at_hand = _at_hand(state)
     hint = LabelState(f"{busy}…" if busy else NOTHING if pair is None else "", "muted")
     return PairDisplay(
         name_a=f"A: {name_a}",
         name_b=f"B: {name_b}",
         hint=LabelState(state.trouble.value, "bad") if state.trouble.value else hint,
-        open_first=idle,
-        open_second=idle,
+        open_first=ButtonState(is_enabled=idle, is_primary=first is None and not at_hand.is_visible),
+        open_second=ButtonState(is_enabled=idle, is_primary=first is not None and second is None),
+        at_hand=at_hand,
         truth=idle and first is not None,
         swap=idle and pair is not None and not has_truth,
-        report=idle and pair is not None and has_truth,
+        report=ButtonState(is_enabled=idle and pair is not None and has_truth, is_primary=has_truth),
+    )
+
+
+def _at_hand(state: PairState) -> ButtonState:
+    """The button that takes the result of the Results page for a free side."""
+    first, second, path = state.first.value, state.second.value, state.at_hand.value
+    used = [side.arrays.path for side in (first, second) if side is not None]
+    if path is None or path in used or len(used) == 2:
+        return ButtonState(is_visible=False)
+    side = "A" if first is None else "B"
+    return ButtonState(
+        is_enabled=not state.busy.value,
+        is_primary=first is None,
+        text=f"{path.stem} as {side}",
+        tip=f"Compare {path.stem}, which is open on the Results page",
     )
 
 

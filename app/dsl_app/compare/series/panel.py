@@ -15,9 +15,9 @@ from dsl_app.compare.series.state import SeriesKind, SeriesState, series_display
 from dsl_app.compare.series.table import SeriesTable
 from dsl_app.compare.verdict_table import VerdictTable
 from dsl_app.shared.evented import follow_any
-from dsl_app.shared.widget_state import LabelState
+from dsl_app.shared.widget_state import ButtonState, LabelState
 from dsl_app.shared.widgets.deferred import Deferred
-from dsl_app.shared.widgets.forms import ChoiceBox, push_button, remark_line, show_label
+from dsl_app.shared.widgets.forms import ChoiceBox, push_button, remark_line, show_button, show_label
 from dsl_app.shared.widgets.help_window import set_help
 from dsl_app.shared.widgets.layouts import STRETCH, column_of, row_of, splitter
 from dsl_app.shared.widgets.open_dialog import OpenDialog
@@ -104,7 +104,9 @@ class SeriesPanel(QWidget):
         self.kind.choose(self._state.kind.value)
         self.parts.setVisible(display.has_rows)
         self.remove.setEnabled(display.can_remove)
-        self.report.setEnabled(display.can_report)
+        can = display.can_report
+        show_button(self.add, ButtonState(is_primary=not can))
+        show_button(self.report, ButtonState(is_enabled=can, is_primary=can))
         for widget, is_seen in (
             (self.against, not display.is_stage),
             (self.figure, not display.is_stage),

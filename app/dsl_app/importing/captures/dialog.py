@@ -120,7 +120,6 @@ class CapturesDialog(JobDialog):
             "Make a scan of the pictures, completely or not at all",
             "Close without importing (Escape)",
         )
-        set_role(self.go, "primary")
 
     def _lay_out(self) -> None:
         head = row_of((self.folder, 1), self.set_title, self.set, self.choose)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from PySide6.QtCore import Qt
 from PySide6.QtGui import QColor, QGuiApplication, QIcon, QPixmap, QShowEvent
 from PySide6.QtWidgets import QWidget
 
@@ -34,7 +35,9 @@ class ColoursPanel(QWidget):
         self.table = ReadTable(
             "Colours", "CIELAB relative to the perfect diffuser", ("Mark", "L*", "a*", "b*", "ΔE00")
         )
+        self.table.fill(0)
         self.text = label(EMPTY, "muted", wraps=True)
+        self.text.setAlignment(Qt.AlignmentFlag.AlignTop)
         column_of(
             row_of(label("Light"), (self.light, 1), self.copy, STRETCH), (self.table, 1), self.text,
             on=self, margins=0,

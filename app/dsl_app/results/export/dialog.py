@@ -52,6 +52,7 @@ class ExportDialog(QDialog):
         self.buttons = QDialogButtonBox(QDialogButtonBox.StandardButton.Cancel)
         self.write = self.buttons.addButton("Export", QDialogButtonBox.ButtonRole.AcceptRole)
         self.write.setToolTip("Write the selected formats")
+        set_role(self.write, "primary")
         self.buttons.button(QDialogButtonBox.StandardButton.Cancel).setToolTip("Write nothing (Escape)")
         self.buttons.accepted.connect(self._export)
         self.buttons.rejected.connect(self.reject)

@@ -15,7 +15,7 @@ from PySide6.QtWidgets import (
 
 from dsl_app.results.marks.controller import MarksController
 from dsl_app.results.state import Library
-from dsl_app.shared.widgets.forms import label, named
+from dsl_app.shared.widgets.forms import label, named, set_role
 from dsl_app.shared.widgets.help_window import add_help_key
 from dsl_app.shared.widgets.layouts import column_of
 from dsl_core.io.spectra.reference_file import Reference
@@ -48,6 +48,7 @@ class LibraryDialog(QDialog):
         self.buttons = QDialogButtonBox(QDialogButtonBox.StandardButton.Cancel)
         self.add = self.buttons.addButton("Add", QDialogButtonBox.ButtonRole.AcceptRole)
         self.add.setToolTip("Compare with the selected spectra")
+        set_role(self.add, "primary")
         self.buttons.button(QDialogButtonBox.StandardButton.Cancel).setToolTip("Add none (Escape)")
         column_of(self.filter, self.list, self.text, self.buttons, on=self)
         self.filter.textChanged.connect(lambda _: self._show())

@@ -55,6 +55,7 @@ class JobDialog(QDialog):
         self.text: QLabel = label("", "muted", wraps=True)
         self.buttons = QDialogButtonBox(QDialogButtonBox.StandardButton.Cancel)
         self.go = self.buttons.addButton("", QDialogButtonBox.ButtonRole.AcceptRole)
+        set_role(self.go, "primary")
         self.command = self.buttons.addButton("Show command line", QDialogButtonBox.ButtonRole.ActionRole)
         self.command.setToolTip("Show the command that does the same in a terminal")
         self.command.clicked.connect(lambda: command_window(command_line(), self).open())

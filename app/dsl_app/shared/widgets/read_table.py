@@ -21,7 +21,7 @@ from dsl_app.shared.widgets.forms import quiet
 
 LEFT = Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter
 RIGHT = Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter
-_ROLE = Qt.ItemDataRole.UserRole + 1
+_ROLE, _SIDE = Qt.ItemDataRole.UserRole + 1, Qt.ItemDataRole.TextAlignmentRole
 #: Space between rows with wrapped lines, px: without it two rows look like one.
 ROOM_PX = 6
 #: Least width of a column with wrapped lines, px: a few words.
@@ -69,6 +69,10 @@ class ReadTable(QTableWidget):
         self.fit_rows.timeout.connect(self._fit_wrapped)
         header.sectionResized.connect(lambda *_: self.fit_rows.start(0))
 
+    def fill(self, column: int) -> None:
+        """Let a column take the remaining width, and cut its texts where that is too little."""
+        self.horizontalHeader().setSectionResizeMode(column, QHeaderView.ResizeMode.Stretch)
+
     def resizeEvent(self, event: QResizeEvent) -> None:
         """Fit the wrapped column to the new width."""
         super().resizeEvent(event)
@@ -92,6 +96,9 @@ class ReadTable(QTableWidget):
     def show_rows(self, rows: Sequence[Sequence[QTableWidgetItem]]) -> None:
         """Show other rows; columns and rows are resized once, not after every item."""
         self.setRowCount(len(rows))
+        for column, item in enumerate(rows[0] if rows else ()):
+            # A head stands over its figures.
+            self.horizontalHeaderItem(column).setData(_SIDE, item.data(_SIDE))
         with quiet(self.model()):
             for number, row in enumerate(rows):
                 for column, item in enumerate(row):

@@ -54,7 +54,7 @@ def test_an_empty_page_says_what_to_do(bench: Bench) -> None:
     assert page.hint.isVisible()
     assert not page.truth.isEnabled()
     assert not page.report.isEnabled()
-    assert not page.parts.isEnabled()
+    assert not page.parts.isVisible()
 
 
 def test_figures_pictures_and_spectra_of_a_pair(qtbot: QtBot, bench: Bench, chart: Path) -> None:

@@ -9,7 +9,6 @@ import pytest
 from dsl_app.compare.pair.state import (
     NOTHING,
     Pair,
-    PairDisplay,
     PairQuantity,
     PairState,
     Side,
@@ -60,10 +59,41 @@ def state_of(sides: str, busy: str = "", trouble: str = "") -> PairState:
 def test_buttons_and_hint_follow_the_state(
     state: PairState, names: tuple[str, str], hint: str, usable: str
 ) -> None:
-    assert pair_display(state) == PairDisplay(
-        f"A: {names[0]}", f"B: {names[1]}", LabelState(hint, "muted"), "open" in usable, "open" in usable,
-        "truth" in usable, "swap" in usable, "report" in usable,
-    )  # fmt: skip
+    shown = pair_display(state)
+    assert (shown.name_a, shown.name_b) == (f"A: {names[0]}", f"B: {names[1]}")
+    assert shown.hint == LabelState(hint, "muted")
+    buttons = (shown.open_first, shown.open_second, shown.report)
+    assert [each.is_enabled for each in buttons] == ["open" in usable, "open" in usable, "report" in usable]
+    assert (shown.truth, shown.swap) == ("truth" in usable, "swap" in usable)
+
+
+@pytest.mark.parametrize(
+    ("sides", "at_hand", "following"),
+    [
+        ("", None, "open_first"),
+        ("", "box.zarr", "at_hand"),
+        ("a", "box.zarr", "open_second"),
+        ("a", "chart.zarr", "open_second"),
+        ("at", "box.zarr", "report"),
+        ("ab", None, ""),
+    ],
+)
+def test_the_blue_button_is_what_a_person_does_next(sides: str, at_hand: str | None, following: str) -> None:
+    state = state_of(sides)
+    state.at_hand.set(None if at_hand is None else Path(at_hand))
+    shown = pair_display(state)
+    names = ("open_first", "open_second", "at_hand", "report")
+    assert [name for name in names if getattr(shown, name).is_primary] == [following] * bool(following)
+
+
+def test_the_open_result_is_offered_for_a_free_side_alone() -> None:
+    offers = {}
+    for sides, path in (("", "box.zarr"), ("a", "box.zarr"), ("a", "chart.zarr"), ("at", "box.zarr")):
+        state = state_of(sides)
+        state.at_hand.set(Path(path))
+        button = pair_display(state).at_hand
+        offers[sides, path] = button.text if button.is_visible else ""
+    assert list(offers.values()) == ["box as A", "box as B", "", ""]
 
 
 def test_the_hint_is_what_went_wrong() -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 from dsl_app.shared.theme import DARK, LIGHT
-from dsl_app.shared.widgets.read_table import LEAST_WRAPPED_PX, ReadTable, cell
+from dsl_app.shared.widgets.read_table import LEAST_WRAPPED_PX, RIGHT, ReadTable, cell
 from PySide6.QtCore import Qt
 from pytestqt.qtbot import QtBot
 
@@ -48,3 +48,14 @@ def test_cells_with_a_role_follow_the_theme_and_tell_nobody(qtbot: QtBot) -> Non
     assert late.foreground().color().name() == LIGHT.warn
     assert plain.data(Qt.ItemDataRole.ForegroundRole) is None, "the usual colour, selected or not"
     assert told == []
+
+
+def test_heads_stand_over_their_figures_and_one_column_fills_the_width(qtbot: QtBot) -> None:
+    table = ReadTable("Areas", "", ("Name", "Pixels"))
+    qtbot.addWidget(table)
+    table.fill(0)
+    table.resize(400, 100)
+    table.show_rows([(cell("chart"), cell("12", "", RIGHT))])
+    table.show()
+    assert table.horizontalHeaderItem(1).data(Qt.ItemDataRole.TextAlignmentRole) == RIGHT
+    assert table.columnWidth(0) + table.columnWidth(1) == table.viewport().width()
