@@ -12,19 +12,19 @@ from tests.screens.stage import Stage
 
 def disconnected(stage: Stage) -> None:
     """As it comes up before a rig answers."""
-    stage.open()
+    stage.open(page="rig")
     stage.shoot()
 
 
 def live(stage: Stage) -> None:
     """Connected, with frames that come in while the projector shows a field."""
-    stage.open()
+    stage.open(page="rig")
     stage.connect()
     stage.shoot("connected")
     rig = stage.composition.live
     rig.show("white", 0.8)
     rig.set_exposure(20.0)
-    rig.start()
+    stage.press("Start live view")
     stage.wait(lambda: rig.state.counts.value.shown > 3)
     page = stage.window.page_of("rig")
     assert isinstance(page, RigPage)
@@ -37,7 +37,7 @@ def live(stage: Stage) -> None:
 
 def refused(stage: Stage) -> None:
     """A rig with options that make no sense."""
-    stage.open()
+    stage.open(page="rig")
     rig = stage.composition.rig
     rig.connect(RigChoice("twin", (("scene", "chart"), ("size", "huge"))))
     stage.wait(lambda: rig.state.link.value is Link.CLOSED)

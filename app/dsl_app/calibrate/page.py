@@ -13,7 +13,7 @@ from PySide6.QtWidgets import QBoxLayout, QFrame, QGridLayout, QWidget
 
 from dsl_app.calibrate.campaign_box import CampaignBox
 from dsl_app.calibrate.library_panel import LibraryPanel
-from dsl_app.calibrate.presentation import row_display
+from dsl_app.calibrate.presentation import main_button, row_display
 from dsl_app.calibrate.state import CalibrateState, Row
 from dsl_app.calibrate.wizard.step_page import LiveFrameView
 from dsl_app.connection.state import RigState
@@ -48,7 +48,7 @@ class CalibratePage(PageWidget):
         self, state: CalibrateState, rig: RigState, commands: CalibrateController, home: Path
     ) -> None:
         super().__init__()
-        self._state, self._commands = state, commands
+        self._state, self._rig, self._commands = state, rig, commands
         self.banner = Banner(
             "Connect the campaign's rig",
             "Open the rig that the campaign was begun with",
@@ -92,7 +92,16 @@ class CalibratePage(PageWidget):
         self.stops = [
             state.trouble.follow(self.banner.say),
             state.foreign.follow(self.banner.action.setVisible),
-            *follow_any(self._show_rows, state.rows, state.opening, state.everything, state.running),
+            *follow_any(
+                self._show_rows,
+                state.rows,
+                state.opening,
+                state.everything,
+                state.running,
+                state.campaign,
+                state.foreign,
+                self._rig.devices,
+            ),
             state.everything.follow(lambda progress: self.picture.setVisible(bool(progress))),
             state.seen.follow(self._show_seen),
             state.everything.follow(lambda progress: self._timer.run_while(bool(progress))),
@@ -105,11 +114,13 @@ class CalibratePage(PageWidget):
         self._commands.run(name)
 
     def _show_rows(self) -> None:
+        following = main_button(self._state, self._rig.devices.value)
         for row in self._state.rows.value:
             if row.name in self.rows:
                 is_running = row.name == self._state.running.value
                 running = self._state.everything.value if is_running else ""
-                self.rows[row.name].show_row(row, self._state.is_busy, running.partition("  ·  ")[0])
+                words = running.partition("  ·  ")[0]
+                self.rows[row.name].show_row(row, self._state.is_busy, words, row.name == following)
 
     def _show_seen(self, seen: Seen | None) -> None:
         """Show what is captured just now."""
@@ -187,7 +198,7 @@ class CalibrationRow(QFrame):
         grid.addWidget(self.run, 0, 4, 4, 1, Qt.AlignmentFlag.AlignVCenter)
         self._purpose.setFixedWidth(_NAME_PX)
 
-    def show_row(self, row: Row, is_busy: bool = False, running: str = "") -> None:
+    def show_row(self, row: Row, is_busy: bool = False, running: str = "", is_next: bool = False) -> None:
         """Show the state of the calibration; while ``is_busy`` its wizard cannot be opened."""
-        show_parts(self, row_display(row, is_busy, running))
+        show_parts(self, row_display(row, is_busy, running, is_next))
         self.setAccessibleName(f"{row.about.title}: {row.state.value}. {row.reason}".strip())

@@ -54,7 +54,8 @@ def campaign_head(state: CalibrateState, devices: DeviceRig | None) -> CampaignH
     is_running = bool(progress)
     usable = facts is not None and devices is not None and not state.foreign.value and not is_running
     has_accepted = any(row.state.is_accepted for row in state.rows.value)
-    places_itself = devices is not None and devices.place is not None
+    places_itself = _places_itself(devices)
+    main = main_button(state, devices)
     title, place = "Calibrate", CAMPAIGN_HINT
     if facts is not None:
         title, place = facts.path.name, f"in {breakable(facts.path.parent)}  ·  rig {facts.rig.words}"
@@ -62,12 +63,31 @@ def campaign_head(state: CalibrateState, devices: DeviceRig | None) -> CampaignH
         title,
         place,
         LabelState(progress, "warn" if progress == "stopping" else "muted"),
-        new=ButtonState(is_enabled=not is_running, is_primary=facts is None),
+        new=ButtonState(is_enabled=not is_running, is_primary=main == "new"),
         open=ButtonState(is_enabled=not is_running),
-        keep=ButtonState(facts is not None and not is_running, usable and has_accepted),
+        keep=ButtonState(facts is not None and not is_running, usable and has_accepted, main == "keep"),
         cancel=ButtonState(is_running),
-        everything=ButtonState(not is_running, usable and places_itself, is_primary=facts is not None),
+        everything=ButtonState(not is_running, usable and places_itself, main == "everything"),
     )
+
+
+def main_button(state: CalibrateState, devices: DeviceRig | None) -> str:
+    """What a person does next: new, keep, everything, or the name of a calibration; empty while all run.
+
+    A rig that does not place targets itself is calibrated row by row.
+    """
+    if state.campaign.value is None:
+        return "new"
+    if state.everything.value or state.foreign.value:
+        return ""
+    left = [row.name for row in state.rows.value if not row.state.is_accepted]
+    if not left:
+        return "keep"
+    return "everything" if _places_itself(devices) else left[0]
+
+
+def _places_itself(devices: DeviceRig | None) -> bool:
+    return devices is not None and devices.place is not None
 
 
 # One calibration -------------------------------------------------------------------------------------
@@ -84,8 +104,11 @@ class RowDisplay:
     run: ButtonState
 
 
-def row_display(row: Row, is_busy: bool = False, running: str = "") -> RowDisplay:
-    """A row of the page; while ``is_busy`` no wizard can be opened, ``running`` says what is done for it."""
+def row_display(row: Row, is_busy: bool = False, running: str = "", is_next: bool = False) -> RowDisplay:
+    """A row of the page, which may be what a person does next.
+
+    While ``is_busy`` no wizard can be opened; ``running`` says what is done for it.
+    """
     title, figure = row.about.title, row.figure
     role = "" if figure is None or figure.passed else "bad"
     begun = row.state is RowState.BEGUN or row.has_candidate
@@ -102,7 +125,7 @@ def row_display(row: Row, is_busy: bool = False, running: str = "") -> RowDispla
         figure=LabelState() if figure is None else LabelState(figure_words(figure), role),
         date=short_date(row.accepted),
         reason=LabelState(row.reason, "muted", row.reason),
-        run=ButtonState(is_enabled=not is_busy, text=word, tip=tip, name=f"{word.rstrip('…')} {title}"),
+        run=ButtonState(True, not is_busy, is_next, word, tip, f"{word.rstrip('…')} {title}"),
     )
 
 

@@ -12,6 +12,7 @@ from dsl_app.calibrate.presentation import (
     campaign_head,
     figure_words,
     library_selection,
+    main_button,
     row_display,
     short_date,
     stamp_date,
@@ -80,9 +81,33 @@ def test_what_can_be_done_with_the_whole_campaign(
     head = campaign_head(page(**values), devices)
     assert (head.keep.is_enabled, head.everything.is_enabled) == (keep, everything)
     assert head.everything.is_visible
-    assert head.everything.is_primary is not head.new.is_primary
-    assert head.new.is_primary is ("campaign" in values)
     assert not head.cancel.is_visible
+
+
+ALL_GOOD: dict[str, object] = {"rows": (replace(ROW, state=RowState.GOOD),)}
+
+
+@pytest.mark.parametrize(
+    ("values", "devices", "main"),
+    [
+        ({"campaign": None}, BY_ITSELF, "new"),
+        ({}, BY_ITSELF, "everything"),
+        ({}, BY_HAND, "geometry"),
+        ({}, None, "geometry"),
+        (ALL_GOOD, BY_ITSELF, "keep"),
+        ({"foreign": True}, BY_ITSELF, ""),
+        ({"everything": "Geometry: fit, 2 of 8"}, BY_ITSELF, ""),
+    ],
+)
+def test_the_blue_button_is_what_a_person_does_next(
+    values: dict[str, object], devices: DeviceRig | None, main: str
+) -> None:
+    state = page(**values)
+    assert main_button(state, devices) == main
+    head = campaign_head(state, devices)
+    blue = [name for name in ("new", "keep", "everything") if getattr(head, name).is_primary]
+    assert blue == [main] * (main in ("new", "keep", "everything"))
+    assert row_display(ROW, is_next=main == "geometry").run.is_primary is (main == "geometry")
 
 
 def test_while_everything_runs_it_can_only_be_stopped() -> None:

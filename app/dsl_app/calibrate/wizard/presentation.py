@@ -86,6 +86,8 @@ def main_button(state: WizardState) -> Main:
         return "back"
     if state.at.value != state.last:
         return "next"
+    if fit is None and state.lacking:
+        return "all" if state.places_itself.value else "back"
     if fit is None:
         return "fit"
     if not fit.is_accepted:

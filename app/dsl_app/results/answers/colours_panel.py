@@ -35,7 +35,7 @@ class ColoursPanel(QWidget):
         self.table = ReadTable(
             "Colours", "CIELAB relative to the perfect diffuser", ("Mark", "L*", "a*", "b*", "ΔE00")
         )
-        self.table.fill(0)
+        self.table.widen(0)
         self.text = label(EMPTY, "muted", wraps=True)
         self.text.setAlignment(Qt.AlignmentFlag.AlignTop)
         column_of(

@@ -79,7 +79,7 @@ class MaterialsPanel(QWidget):
             "Materials", "Classes with their pixels and areas", ("Material", "Pixels", "Share", "Area")
         )
         self.table.setMinimumHeight(60)
-        self.table.fill(0)
+        self.table.widen(0)
         self.text = label(HINT, "muted", wraps=True)
         self.text.setAlignment(Qt.AlignmentFlag.AlignTop)
         sources = row_of(label("Spectra of"), self.folder, self.file, self.marks, STRETCH)

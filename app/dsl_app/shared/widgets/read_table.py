@@ -69,7 +69,7 @@ class ReadTable(QTableWidget):
         self.fit_rows.timeout.connect(self._fit_wrapped)
         header.sectionResized.connect(lambda *_: self.fit_rows.start(0))
 
-    def fill(self, column: int) -> None:
+    def widen(self, column: int) -> None:
         """Let a column take the remaining width, and cut its texts where that is too little."""
         self.horizontalHeader().setSectionResizeMode(column, QHeaderView.ResizeMode.Stretch)
 
@@ -98,7 +98,7 @@ class ReadTable(QTableWidget):
         self.setRowCount(len(rows))
         for column, item in enumerate(rows[0] if rows else ()):
             # A head stands over its figures.
-            self.horizontalHeaderItem(column).setData(_SIDE, item.data(_SIDE))
+            self.model().setHeaderData(column, Qt.Orientation.Horizontal, item.data(_SIDE), _SIDE)
         with quiet(self.model()):
             for number, row in enumerate(rows):
                 for column, item in enumerate(row):

@@ -113,7 +113,10 @@ CASES: dict[str, tuple[WizardState, str, str, str]] = {
         wizard(FIRST, doing=Doing.STOPPING), "leave back stop next", "leave", "capture"
     ),
     "a fit that lacks captures": (
-        wizard(LAST, HALF), "leave back fit accept", "leave back", "fit"
+        wizard(LAST, HALF), "leave back fit accept", "leave back", "back"
+    ),
+    "a fit that lacks captures of a rig that places targets itself": (
+        wizard(LAST, HALF, places_itself=True), "leave back all fit accept", "leave back all", "all"
     ),
     "everything captured": (
         wizard(LAST, CAPTURED), "leave back fit accept", "leave back fit", "fit"

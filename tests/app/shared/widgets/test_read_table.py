@@ -53,9 +53,10 @@ def test_cells_with_a_role_follow_the_theme_and_tell_nobody(qtbot: QtBot) -> Non
 def test_heads_stand_over_their_figures_and_one_column_fills_the_width(qtbot: QtBot) -> None:
     table = ReadTable("Areas", "", ("Name", "Pixels"))
     qtbot.addWidget(table)
-    table.fill(0)
+    table.widen(0)
     table.resize(400, 100)
     table.show_rows([(cell("chart"), cell("12", "", RIGHT))])
     table.show()
-    assert table.horizontalHeaderItem(1).data(Qt.ItemDataRole.TextAlignmentRole) == RIGHT
+    side = Qt.ItemDataRole.TextAlignmentRole
+    assert table.model().headerData(1, Qt.Orientation.Horizontal, side) == RIGHT
     assert table.columnWidth(0) + table.columnWidth(1) == table.viewport().width()
