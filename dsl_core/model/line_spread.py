@@ -89,6 +89,11 @@ class LineSpread(Record):
         return self.model_copy(update=sizes)
 
 
+def zero_std_px(lean_px: float) -> float:
+    """Deviation of where columns are counted from: the median of a line's light, as by codes, or its mean."""
+    return abs(lean_px) / math.sqrt(3)
+
+
 #: How a narrow line's light is spread: the rms width of a Gaussian (px), or a measured curve.
 Spread = float | LineSpread
 

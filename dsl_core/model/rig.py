@@ -218,6 +218,7 @@ class Rig(Record):
     ``lateral_colour`` is that of both lenses, None where nothing is known of it.
     ``residual`` corrects the columns of the grating equation; ``correspondence`` is the data-driven model.
     ``geometry_covariance`` is that of the 24 parameters of lenses and pose (see `GeometryCalibration`).
+    ``fitted_lean_px`` is the lean of the lines whose columns they are fitted to, None if these are of a code.
     ``white_scale_rel_std`` and, for each wavelength, ``chain_rel_std`` are relative standard deviations that
     the calibration leaves in every reflectance.
     """
@@ -245,6 +246,7 @@ class Rig(Record):
     flat_field: FlatField | None = None
     lateral_colour: LateralColour | None = None
     geometry_covariance: tuple[float, ...] | None = None
+    fitted_lean_px: float | None = None
     provenance: Provenance = Provenance()
     conditions: CaptureConditions | None = None
     calibrations: tuple[CalibrationNote, ...] = ()

@@ -10,6 +10,7 @@ import torch
 from numpy.typing import NDArray
 
 from dsl_core.errors import DecodeError
+from dsl_core.model.line_spread import zero_std_px
 from dsl_core.model.plan import CapturePlan
 from dsl_core.model.result import DEPTH_INVALID, REASONS, Flag
 from dsl_core.model.rig import Rig
@@ -209,13 +210,9 @@ def geometry_of(
 
 
 def _zero_std_px(rig: Rig) -> float:
-    """Deviation of where an uneven line spread has its zero, px.
-
-    The median, by which columns of a binary code go, or the mean of its light: that depends on how columns
-    were calibrated.
-    """
+    """Deviation of where lines of an uneven spread are counted from, px, unless the geometry has followed."""
     spread = rig.projector_response.spread
-    return 0.0 if spread is None else abs(spread.lean_px) / math.sqrt(3)
+    return zero_std_px((0.0 if spread is None else spread.lean_px) - (rig.fitted_lean_px or 0.0))
 
 
 def _start(code: DecodedCode) -> tuple[NDArray[np.float32], NDArray[np.float32]]:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from dsl_core.model.line_spread import LineSpread
+from dsl_core.model.line_spread import LineSpread, zero_std_px
 from dsl_core.model.rig import ProjectorResponse
 
 STEP_PX = 0.125
@@ -23,6 +23,8 @@ def test_a_curve_is_moved_until_half_of_its_light_is_on_either_side() -> None:
     skewed = LineSpread.of(np.where(PLACES >= 0, np.exp(-PLACES / 0.6), 0.0), STEP_PX)
     # The mean of an exponential is farther along its tail than its median.
     assert skewed.lean_px == pytest.approx(0.6 * (1 - np.log(2)), abs=0.02)
+    # As of a place that is anywhere between minus and plus the lean.
+    assert zero_std_px(-skewed.lean_px) == pytest.approx(skewed.lean_px / np.sqrt(3))
 
 
 def test_the_width_is_that_of_shares_and_core() -> None:

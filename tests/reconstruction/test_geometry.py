@@ -110,6 +110,8 @@ def test_an_uneven_spread_leaves_open_where_its_zero_is() -> None:
     uneven = rig.model_copy(update={"projector_response": rig.projector_response.with_spread(spread)})
     assert geometry._zero_std_px(uneven) == pytest.approx(abs(spread.lean_px) / np.sqrt(3))
     assert spread.lean_px > 0.05
+    fitted = uneven.model_copy(update={"fitted_lean_px": spread.lean_px - 0.01})
+    assert geometry._zero_std_px(fitted) == pytest.approx(0.01 / np.sqrt(3)), "the geometry has followed"
 
 
 def flagged(has_patterns: bool = True, **more: Any) -> list[int]:

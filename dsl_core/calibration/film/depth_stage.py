@@ -23,6 +23,7 @@ from dsl_core.calibration.film.order_columns import fit_columns, search_columns
 from dsl_core.calibration.film.order_paths import LineFrames, filter_passband
 from dsl_core.calibration.film.residual import choose_residual
 from dsl_core.calibration.geometry.plane_refinement import PlaneRefinement, refine_planes
+from dsl_core.calibration.geometry.stage_planes import with_unsure_zero
 from dsl_core.errors import CalibrationError
 from dsl_core.model.calibration.depth_stage import (
     DepthStageCalibration,
@@ -30,6 +31,7 @@ from dsl_core.model.calibration.depth_stage import (
     StagePosition,
     apply_depth_stage,
 )
+from dsl_core.model.line_spread import zero_std_px
 from dsl_core.model.rig import CorrespondenceGrid, Rig
 from dsl_core.model.spectral import SpectralCurve
 from dsl_core.optics.correspondence import GratingModel
@@ -89,13 +91,15 @@ def calibrate_depth_stage(
 
     With ``grid`` the data-driven model of the seed is fitted too. The rig's `geometry_covariance` is the
     prior of its geometry, which stays as it is without one; its `lateral_colour` is part of where first
-    orders are. Raises `CalibrationError` that names the position
-    or the filter that does not fit.
+    orders are, and its `projector_response` is that by which the planes' columns were found. Raises
+    `CalibrationError` that names the position or the filter that does not fit.
     """
     progress.report("planes", 0, 1)
-    covariance = None
+    spread, covariance = rig.projector_response.spread, None
+    lean_px = 0.0 if spread is None else spread.lean_px
     if rig.geometry_covariance is not None:
-        covariance = np.array(rig.geometry_covariance).reshape(24, 24)
+        known = np.array(rig.geometry_covariance).reshape(24, 24)
+        covariance = with_unsure_zero(known, zero_std_px(lean_px))
     planes = refine_planes(rig, data.positions_mm, data.columns, covariance, data.stage_std_mm)
     film, samples = fit_first_orders(planes.rig, planes.planes, data, progress)
     fitted = planes.rig.model_copy(update={"film": film.film})
@@ -116,6 +120,7 @@ def calibrate_depth_stage(
         column_std_px=planes.column_std_px if covariance is not None else rig.column_std_px,
         depth_std_mm=planes.depth_std_mm,
         geometry_pull=planes.pull,
+        lean_px=lean_px,
         bow_mm=planes.bow_mm,
         bow_std_mm=planes.bow_std_mm,
         positions=_positions(data, planes),

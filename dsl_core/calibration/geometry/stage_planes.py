@@ -26,6 +26,8 @@ Floats = NDArray[np.float64]
 
 #: Places of the plane's numbers behind those of the geometry.
 SLOPES, DISTANCE, GAIN, STEPS = slice(SHARED, SHARED + 2), SHARED + 2, SHARED + 3, SHARED + 4
+#: Place of the column of the projector's principal point.
+ZERO = PROJECTOR.start + 2
 #: A stage askew to the camera axis by 0.8 degrees moves a plane by this share too little.
 GAIN_STD = 1e-4
 #: Half of the width over which a bulge is stated.
@@ -151,6 +153,16 @@ def covariance_root(covariance: Floats) -> Floats:
     scale = np.sqrt(np.diag(covariance).clip(1e-300))
     values, vectors = np.linalg.eigh(covariance / np.outer(scale, scale))
     return np.asarray(scale[:, None] * vectors * np.sqrt(values.clip(0)))
+
+
+def with_unsure_zero(covariance: Floats, zero_std_px: float) -> Floats:
+    """The covariance (24, 24) if columns of lines may be counted from another place than those of a board.
+
+    All of them are then off alike, which is as if the projector's principal point were.
+    """
+    unsure = covariance.copy()
+    unsure[ZERO, ZERO] += zero_std_px**2
+    return unsure
 
 
 def require_tiles(positions_mm: Sequence[float], samples: Sequence[ColumnSamples]) -> None:

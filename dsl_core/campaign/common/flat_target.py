@@ -114,11 +114,11 @@ def middle(shape: tuple[int, ...], share: float = 0.5) -> NDArray[np.bool_]:
 
 def scanned_geometry(
     source: FrameSource, rig: Rig, progress: Progress | None = None, *, shared_errors: bool = True
-) -> tuple[LineStack, Geometry]:
-    """The lines of a scan with code and lines, and its geometry; raises what a reconstruction raises.
+) -> tuple[Rig, LineStack, Geometry]:
+    """The rig as a scan with code and lines shows it, its lines, and its geometry.
 
-    As in a reconstruction, columns follow the line spread that the scan itself shows. Deviations contain what
-    all its columns have in common where ``shared_errors`` are wanted.
+    Raises what a reconstruction raises. As in one, columns follow the line spread that the scan itself shows.
+    Deviations contain what all its columns have in common where ``shared_errors`` are wanted.
     """
     from dsl_core.optics.lines.line_set import LineSet
     from dsl_core.reconstruction.columns.line_spread import own_spread, with_own_spread
@@ -135,7 +135,7 @@ def scanned_geometry(
         rig, plan, code, white, stack, shared_errors=shared_errors, progress=progress
     )
     require_pixels(geometry.flags)
-    return stack, geometry
+    return rig, stack, geometry
 
 
 def diffuser_lines(
@@ -149,7 +149,7 @@ def diffuser_lines(
     from dsl_core.reconstruction.scan_result import known_pixels
 
     lines = scan_lines_of(source)
-    stack, geometry = scanned_geometry(source, rig, progress)
+    _, stack, geometry = scanned_geometry(source, rig, progress)
     known = known_pixels(geometry)
     # One plane for all pixels: its shading has none of the noise of normals of single pixels.
     flat = fit_plane(rig, geometry.depth_mm, known.valid)

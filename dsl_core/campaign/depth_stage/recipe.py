@@ -41,7 +41,7 @@ from dsl_core.model.geometry import Lens, Pose
 from dsl_core.model.placement import Placement
 from dsl_core.model.plan import CapturePlan, GrayCode, NoCode, ScanLines, Setting
 from dsl_core.model.result import DEPTH_INVALID, Flag
-from dsl_core.model.rig import Rig
+from dsl_core.model.rig import ProjectorResponse, Rig
 from dsl_core.model.spectral import SpectralCurve
 from dsl_core.progress import Progress
 
@@ -153,6 +153,8 @@ class DepthStageRecipe(Recipe[DepthStageCalibration]):
             exposures=sum(bench.scan_of(step).plan.shot_count for step in steps),
         )
         rig, apart_px = with_lateral_colour(bench.rig, seen)
+        response = seen[len(seen) // 2].response
+        rig = rig.model_copy(update={"projector_response": response})
         found = calibrate_depth_stage(rig, data, progress, self.grid)
         found = found.model_copy(update={"colours_apart_px": apart_px})
         if not self.chain:
@@ -310,9 +312,10 @@ def _filter_of(note: StageNote) -> StageFilter:
 
 @dataclass(frozen=True)
 class SeenPlane:
-    """Tile means of the zero order's columns of a plane, and what neighbours say of lateral colour."""
+    """Tile means of the zero order's columns of a plane, the lines' look, and traces of lateral colour."""
 
     columns: ColumnSamples
+    response: ProjectorResponse
     bends: ColumnBends | None
 
 
@@ -321,11 +324,13 @@ def seen_plane(source: FrameSource, rig: Rig, progress: Progress | None = None) 
     from dsl_core.reconstruction.columns.lateral_colour import ColumnBends
 
     # What the geometry leaves open is common to neighbouring pixels, and is about to be found.
-    _, geometry = scanned_geometry(source, rig, progress, shared_errors=False)
+    shown, _, geometry = scanned_geometry(source, rig, progress, shared_errors=False)
     column_px = np.where((geometry.flags & int(DEPTH_INVALID)) != 0, np.nan, geometry.column_px)
     refined = np.where((geometry.flags & int(Flag.NOT_REFINED)) != 0, np.nan, column_px)
     return SeenPlane(
-        tile_columns(column_px, geometry.column_std_px), ColumnBends.of(rig, refined.astype(np.float64))
+        tile_columns(column_px, geometry.column_std_px),
+        shown.projector_response,
+        ColumnBends.of(rig, refined.astype(np.float64)),
     )
 
 

@@ -119,6 +119,7 @@ class GeometryRecipe(Recipe[GeometryCalibration]):
                 "projector": record.projector,
                 "pose": record.pose,
                 "geometry_covariance": record.covariance,
+                "fitted_lean_px": None,
             }
         )
         return known.model_copy(update={"column_std_px": open_columns_px(known)})

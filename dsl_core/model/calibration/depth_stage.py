@@ -66,6 +66,8 @@ class DepthStageCalibration(Record):
     ``geometry_covariance`` is that of the 24 parameters of lenses and pose (None where it was not known
     before, and the geometry is as it was); ``column_std_px`` and ``depth_std_mm`` are what it leaves open in
     columns of the zero order and in depth; ``geometry_pull`` is how far it moved, in its deviations before.
+    ``lean_px`` is how far the mean of a line's light was from its median (None in older records): columns may
+    be counted from either, and the geometry follows what is seen.
     ``bow_mm`` is by how much the target seems to bulge towards the camera over 300 mm, alike at all positions
     (None in older records).
     ``film_std`` are deviations by the film's fields, what the geometry leaves open included. ``scatter_px``
@@ -83,6 +85,7 @@ class DepthStageCalibration(Record):
     column_std_px: float
     depth_std_mm: float
     geometry_pull: float
+    lean_px: float | None = None
     bow_mm: float | None = None
     bow_std_mm: float = 0.0
     positions: tuple[StagePosition, ...]
@@ -115,6 +118,7 @@ def apply_depth_stage(record: DepthStageCalibration, rig: Rig) -> Rig:
             "projector": record.projector,
             "pose": record.pose,
             "geometry_covariance": record.geometry_covariance,
+            "fitted_lean_px": record.lean_px if record.geometry_covariance is not None else None,
             "column_std_px": record.column_std_px,
             "film": record.film,
             "residual": record.residual,

@@ -23,7 +23,13 @@ from dsl_core.calibration.geometry.plane_refinement import (
     refine_planes,
     systematic_std,
 )
-from dsl_core.calibration.geometry.stage_planes import columns_at, plane_of, rays_through, shared_parameters
+from dsl_core.calibration.geometry.stage_planes import (
+    columns_at,
+    plane_of,
+    rays_through,
+    shared_parameters,
+    with_unsure_zero,
+)
 from dsl_core.errors import CalibrationError
 from dsl_core.model.rig import Rig
 from dsl_core.optics.correspondence import zero_order
@@ -110,6 +116,25 @@ def test_columns_come_nearer_to_the_truth(several: list[tuple[Rig, Rig, PlaneRef
 def test_stated_deviations_cover_the_errors(several: list[tuple[Rig, Rig, PlaneRefinement]]) -> None:
     pulls = [column_error_px(truth, found.rig) / found.column_std_px for truth, _, found in several]
     assert 0.4 < np.sqrt(np.mean(np.square(pulls))) < 1.7
+
+
+def test_lines_that_are_counted_from_elsewhere_take_the_geometry_with_them() -> None:
+    off_px, errors = 0.06, []
+    for seed in range(6, 9):
+        truth, rng = random_rig(seed, small_rig()), np.random.default_rng(seed)
+        board, known = board_said(seed)
+        samples = [seen(truth, distance, rng) for distance in distances_mm(rng)]
+        samples = [replace(part, column_px=part.column_px + off_px) for part in samples]
+        middle = {"cx_px": truth.projector.cx_px + off_px}
+        as_lines = truth.model_copy(update={"projector": truth.projector.model_copy(update=middle)})
+        found = [
+            refine_planes(board, POSITIONS_MM, samples, covariance, STAGE_STD_MM)
+            for covariance in (known, with_unsure_zero(known, 0.05))
+        ]
+        errors.append([column_error_px(as_lines, each.rig) for each in found])
+        assert found[1].column_std_px < 1.05 * found[0].column_std_px, "the stage's steps tell"
+    held, followed = np.sqrt(np.mean(np.square(errors), axis=0))
+    assert followed < 0.6 * held
 
 
 def test_a_bulge_at_all_positions_is_measured(several: list[tuple[Rig, Rig, PlaneRefinement]]) -> None:

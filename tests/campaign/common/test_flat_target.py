@@ -23,8 +23,8 @@ def test_columns_do_not_depend_on_the_blur_that_is_stated(scanned: tuple[Rig, Me
     rig, scan = scanned
     response = rig.projector_response
     wrong = response.with_gaussian(1.25 * response.blur_px)
-    _, right = scanned_geometry(scan, rig)
-    _, found = scanned_geometry(scan, rig.model_copy(update={"projector_response": wrong}))
+    _, _, right = scanned_geometry(scan, rig)
+    _, _, found = scanned_geometry(scan, rig.model_copy(update={"projector_response": wrong}))
     assert np.nanmean(np.abs(found.column_px - right.column_px)) < 0.002
     assert np.nanmedian(found.column_std_px / right.column_std_px) == pytest.approx(1.0, abs=0.02)
 
@@ -34,7 +34,7 @@ def test_errors_that_all_columns_share_are_left_out_where_they_are_not_wanted(
 ) -> None:
     rig, scan = scanned
     unsure = rig.model_copy(update={"column_std_px": 0.5})
-    _, own = scanned_geometry(scan, unsure, shared_errors=False)
-    _, all_of_it = scanned_geometry(scan, unsure)
+    _, _, own = scanned_geometry(scan, unsure, shared_errors=False)
+    _, _, all_of_it = scanned_geometry(scan, unsure)
     assert np.nanmedian(own.column_std_px) < 0.1
     np.testing.assert_allclose(all_of_it.column_std_px, np.hypot(own.column_std_px, 0.5), rtol=1e-5)
