@@ -13,6 +13,8 @@ from dsl_app.shared.widgets.forms import ChoiceBox, named, quiet
 LONGEST_LABEL = "Projector"
 #: The rig that scene and size are options of, and its scene if none is chosen.
 SIMULATED, FIRST_SCENE = "twin", "color-checker"
+#: Options that are chosen from lists.
+CHOSEN = ("scene", "size")
 #: Sizes of the camera's image, by what they are called; an empty one is the camera's own.
 SIZES = (("Full, 890 × 580 px", ""), ("Half, 445 × 290 px", "445x290"), ("Quarter, 222 × 145 px", "222x145"))
 #: Names and descriptions of scenes.
@@ -60,20 +62,22 @@ class SceneBox(ChoiceBox):
 
 
 class OptionsForm(QWidget):
-    """Rows of a form; ``text`` holds all options as the command line takes them, the choices are part of it.
+    """Rows of a form: scene and size of the simulated rig are chosen, ``text`` holds all other options.
 
-    ``chosen`` tells that another scene or size was chosen.
+    Text is as the command line takes it; a scene or size that is typed there counts. ``chosen`` tells that
+    another scene or size was chosen.
     """
 
     chosen = Signal()
 
     def __init__(self, scenes: Callable[[], Scenes] = known_scenes) -> None:
         super().__init__()
+        self._is_simulated, self._picked = True, dict[str, str]()
         self.scene = SceneBox(scenes)
         self.scene.activated.connect(lambda _: self._choose("scene", str(self.scene.currentData())))
         tip = "Size of the simulated camera's image: smaller ones are quicker"
         self.size_px = ChoiceBox("Size", tip, SIZES, lambda size: self._choose("size", size))
-        tip = "All options as name=value, separated by spaces; the help on this page (F1) lists them"
+        tip = "Other options as name=value, separated by spaces; the help on this page (F1) lists them"
         self.text = named(QLineEdit(), "Options of the rig", tip)
         self.text.setPlaceholderText("none")
         self.text.textChanged.connect(lambda _: self._show())
@@ -90,17 +94,23 @@ class OptionsForm(QWidget):
 
     def set_rig(self, name: str) -> None:
         """Show what a rig of this name has."""
+        self._is_simulated = name == SIMULATED
         for box in (self.scene, self.size_px):
-            self.form.setRowVisible(box, name == SIMULATED)
+            self.form.setRowVisible(box, self._is_simulated)
 
     @property
     def options(self) -> tuple[tuple[str, str], ...]:
-        """The options, in their order."""
-        return parse_options(self.text.text())
+        """The options: what is chosen, then what is typed, in its order."""
+        typed = parse_options(self.text.text())
+        picked = self._picked.items() if self._is_simulated else ()
+        return (*(pair for pair in picked if pair[0] not in dict(typed)), *typed)
 
     def show_options(self, options: tuple[tuple[str, str], ...]) -> None:
-        """Show options."""
-        self.text.setText(" ".join(f"{key}={value}" for key, value in options))
+        """Show options, each in one place."""
+        chosen = CHOSEN if self._is_simulated else ()
+        self._picked = {key: value for key, value in sorted(options) if key in chosen}
+        self.text.setText(" ".join(f"{key}={value}" for key, value in options if key not in chosen))
+        self._show()
 
     def _choose(self, key: str, value: str) -> None:
         others = tuple(pair for pair in self.options if pair[0] != key)

@@ -46,9 +46,18 @@ class ProgressText:
 
 
 def run_controls(
-    phase: Phase, session: InterruptedScan | None, facts: Facts | None, note: str, has_finished: bool
+    phase: Phase,
+    session: InterruptedScan | None,
+    facts: Facts | None,
+    note: str,
+    has_finished: bool,
+    then_reconstruct: bool = True,
 ) -> RunControls:
-    """The controls of a scan in a phase; ``note`` is what became of the last one."""
+    """The controls of a scan in a phase; ``note`` is what became of the last one.
+
+    A finished scan whose reconstruction was not asked for is reconstructed next.
+    """
+    is_raw = phase is Phase.DONE and has_finished and not then_reconstruct
     obstacles = () if facts is None or phase.is_busy else facts.obstacles
     is_resumable = session is not None and not phase.is_busy
     lines = [*obstacles, *([note] if note else [])]
@@ -57,7 +66,7 @@ def run_controls(
     is_ready = phase is not Phase.PLANNING or not obstacles
     can_run, connects = not phase.is_busy and not obstacles, facts is not None and facts.connects
     return RunControls(
-        start=ButtonState(session is None, can_run, is_primary=True),
+        start=ButtonState(session is None, can_run, is_primary=not is_raw),
         resume=ButtonState(
             session is not None,
             can_run,
@@ -72,7 +81,11 @@ def run_controls(
         cancel=phase.is_busy and phase is not Phase.STOPPING,
         renew=ButtonState(is_resumable),
         drift=ButtonState(is_resumable),
-        again=ButtonState(has_finished and not phase.is_busy),
+        again=ButtonState(
+            has_finished and not phase.is_busy,
+            is_primary=is_raw,
+            text="Reconstruct…" if is_raw else "Reconstruct a&gain…",
+        ),
         phase=LabelState(f"● {phase.value}" if is_ready else "● not ready", _PHASE_ROLES.get(phase, "muted")),
         remarks=LabelState("\n".join(lines), "warn" if obstacles else "muted"),
     )

@@ -146,7 +146,15 @@ class RunBox(QGroupBox):
         self.stops = [
             state.then_reconstruct.follow(self.then.setChecked),
             state.check_drift.follow(self.drift.setChecked),
-            *follow_any(self._show, state.phase, state.interrupted, state.facts, state.note, state.finished),
+            *follow_any(
+                self._show,
+                state.phase,
+                state.interrupted,
+                state.facts,
+                state.note,
+                state.finished,
+                state.then_reconstruct,
+            ),
             state.status.follow(self._show_status),
         ]
 
@@ -180,6 +188,7 @@ class RunBox(QGroupBox):
             state.facts.value,
             state.note.value,
             state.finished.value is not None,
+            state.then_reconstruct.value,
         )
         show_parts(self, shown)
 

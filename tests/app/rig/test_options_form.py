@@ -24,10 +24,11 @@ def test_choices_and_text_say_the_same(qtbot: QtBot) -> None:
     assert form.size_px.currentText() == "64 × 48 px"
     assert told == [], "typing connects nothing"
     _choose(form.scene, "face")
-    assert form.options == (("scene", "face"), ("seed", "3"), ("size", "64x48"))
+    assert form.options == (("scene", "face"), ("size", "64x48"), ("seed", "3"))
+    assert form.text.text() == "seed=3", "what is chosen is not said twice"
     form.size_px.setCurrentIndex(0)
     form.size_px.activated.emit(0)
-    assert form.text.text() == "scene=face seed=3"
+    assert form.options == (("scene", "face"), ("seed", "3"))
     assert len(told) == 2
 
 
@@ -46,7 +47,10 @@ def test_all_scenes_are_listed_once_with_what_they_show(qtbot: QtBot) -> None:
 def test_other_rigs_have_no_scene(qtbot: QtBot) -> None:
     form = OptionsForm(lambda: SCENES)
     qtbot.addWidget(form)
+    form.show_options((("scene", "face"),))
     form.set_rig("replay")
     assert not form.form.isRowVisible(form.scene)
+    assert form.options == ()
     form.set_rig("twin")
+    assert form.options == (("scene", "face"),)
     assert form.form.isRowVisible(form.scene)

@@ -196,7 +196,8 @@ def test_raw_counts_are_read_by_keys_too(qtbot: QtBot, bench: Bench) -> None:
 
 def test_the_form_shows_a_rig_that_another_page_asked_for(bench: Bench) -> None:
     page, state, _, _ = bench
-    assert page.options.text.text() == "scene=plane size=64x48"
+    assert page.options.options == (("scene", "plane"), ("size", "64x48"))
+    assert page.options.text.text() == ""
     state.choice.set(RigChoice("replay", (("session", "first.dsl"),)))
     assert page._rig.currentText() == "replay"
     assert page.options.text.text() == "session=first.dsl"

@@ -95,3 +95,10 @@ def test_progress_is_empty_until_there_is_some() -> None:
     )
     over = Status(State.FINISHED, done=76, total=76, elapsed_s=41.0)
     assert progress_text(over).time.text == "took 41 s"
+
+
+def test_frames_that_nothing_was_made_of_are_reconstructed_next() -> None:
+    raw = run_controls(Phase.DONE, None, FREE, "", has_finished=True, then_reconstruct=False)
+    assert (raw.start.is_primary, raw.again.is_primary, raw.again.text) == (False, True, "Reconstruct…")
+    done = run_controls(Phase.DONE, None, FREE, "", has_finished=True, then_reconstruct=True)
+    assert (done.start.is_primary, done.again.is_primary) == (True, False)
