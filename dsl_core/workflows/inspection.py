@@ -68,9 +68,14 @@ def session_of(path: Path, attributes: Mapping[Any, Any]) -> Path:
         if (folder / MANIFEST_NAME).is_file() and read_manifest(folder).created == captured:
             return folder
     raise StoreError(
-        f"The scan of {path.name} is not next to it, so its frames cannot be read. Move the scan of"
-        f" {captured or 'this result'} to {path.parent}."
+        f"This needs the frames of the scan, and the scan of {path.name}{_when(captured)} is not next to it."
+        f" Move it to {path.parent}."
     )
+
+
+def _when(captured: object) -> str:
+    """When a scan was captured, in words; empty where that is not known."""
+    return f", captured on {str(captured)[:16].replace('T', ' at ')} UTC," if captured else ""
 
 
 class _Cropped:

@@ -27,7 +27,6 @@ class NewCampaignDialog(QDialog):
     def __init__(self, home: Path, rig: str, parent: QWidget) -> None:
         super().__init__(parent)
         self.setWindowTitle("New campaign")
-        self.resize(540, 200)
         self.name = QLineEdit(first_free(home, f"campaign-{datetime.now():%Y%m%d}").name)
         self.name.setAccessibleName("Name of the campaign")
         self.name.setToolTip("Name of the folder, and of the calibrated rig in the library")
@@ -51,6 +50,7 @@ class NewCampaignDialog(QDialog):
         for field in (self.name, self.folder):
             field.textChanged.connect(lambda _: self._check())
         self.name.selectAll()
+        self.resize(540, self.sizeHint().height())
 
     @property
     def target(self) -> Path:

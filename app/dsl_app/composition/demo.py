@@ -20,6 +20,8 @@ from dsl_core.errors import StoreError
 #: The live scan: a Color Checker, for less than half a minute.
 LIVE_RIG = RigChoice("twin", (("scene", "color-checker"), ("size", "296x194")))
 LIVE_PRESET = "preview"
+#: How long it is said what a finished scan offers, s.
+STAY_S = 30.0
 
 
 class DemoController:
@@ -58,6 +60,7 @@ class DemoController:
             "This is a finished scan of the simulated rig. Point at the picture to see a spectrum; click"
             " to pin it.",
             {"Start a live scan": self.scan_live},
+            STAY_S,
         )
 
     # The live one ----------------------------------------------------------------------------------

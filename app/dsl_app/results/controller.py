@@ -260,7 +260,10 @@ class ResultsController:
                 self._block, graph = found
                 self.state.graph.set(graph)
 
-        self._runner.submit(Job("Intensity graph", work, done, is_minor=True))
+        def failed(error: Exception) -> None:
+            self._notifier.tell("warning", sentence_of(error))
+
+        self._runner.submit(Job("Intensity graph", work, done, failed, is_minor=True))
 
 
 def is_complete(session: Path) -> bool:

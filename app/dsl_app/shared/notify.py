@@ -19,8 +19,11 @@ class Notifier(Protocol):
     def tell(self, level: Level, text: str, details: str = "") -> None:
         """Show a sentence, with ``details`` on request."""
 
-    def offer(self, text: str, offers: Mapping[str, Callable[[], object]]) -> None:
-        """Show a sentence with buttons by their texts; it stays until one is used or it is closed."""
+    def offer(self, text: str, offers: Mapping[str, Callable[[], object]], stay_s: float = 0.0) -> None:
+        """Show a sentence with buttons by their texts until one is used or it is closed.
+
+        With ``stay_s`` it leaves by itself after that time.
+        """
 
 
 def sentence_of(error: Exception) -> str:

@@ -101,13 +101,16 @@ class Toasts(QObject):
 
     def tell(self, level: Level, text: str, details: str = "") -> None:
         """Show a sentence."""
-        self._show(Toast(level, in_window(text), details, self.strip), level in STAY_MS)
+        self._show(Toast(level, in_window(text), details, self.strip), STAY_MS.get(level, 0))
 
-    def offer(self, text: str, offers: Mapping[str, Callable[[], object]]) -> None:
-        """Show a sentence with buttons by their texts; it stays until one is used or it is closed."""
-        self._show(Toast("info", text, "", self.strip, offers), leaves=False)
+    def offer(self, text: str, offers: Mapping[str, Callable[[], object]], stay_s: float = 0.0) -> None:
+        """Show a sentence with buttons by their texts until one is used or it is closed.
 
-    def _show(self, toast: Toast, leaves: bool) -> None:
+        With ``stay_s`` it leaves by itself after that time.
+        """
+        self._show(Toast("info", text, "", self.strip, offers), round(1000 * stay_s))
+
+    def _show(self, toast: Toast, stay_ms: int) -> None:
         if any(other.text == toast.text for other in self._shown):
             toast.deleteLater()
             return
@@ -115,9 +118,9 @@ class Toasts(QObject):
         self._shown.append(toast)
         for old in tuple(self._shown[:-MOST]):
             old.dismiss()
-        if leaves:
-            QTimer.singleShot(STAY_MS[toast.level], toast, toast.dismiss)
-        self._place(toast, leaves)
+        if stay_ms:
+            QTimer.singleShot(stay_ms, toast, toast.dismiss)
+        self._place(toast, bool(stay_ms))
         toast.show()
 
     def _place(self, toast: Toast, leaves: bool) -> None:

@@ -11,12 +11,12 @@ from PySide6.QtGui import QShowEvent
 from PySide6.QtWidgets import QFrame, QPushButton
 
 from dsl_app.shared.settings import RecentFiles
-from dsl_app.shared.widgets.forms import label, push_button
+from dsl_app.shared.widgets.forms import label, push_button, set_role
 from dsl_app.shared.widgets.layouts import STRETCH, boxed, column_of, row_of, scrolled
 from dsl_app.shared.widgets.page import PageWidget
 from dsl_app.shared.widgets.recent_list import RecentList
 from dsl_app.start.examples import EXAMPLES
-from dsl_app.start.unfinished import UnfinishedController
+from dsl_app.start.unfinished import Unfinished, UnfinishedController
 from dsl_app.start.unfinished_list import UnfinishedList
 
 #: Width of a card, and that in a wide window, px.
@@ -60,7 +60,12 @@ class StartPage(PageWidget):
         )
         self.files = RecentList(recent, open_path)
         self.unfinished = UnfinishedList(unfinished)
+        self.stops = [unfinished.found.follow(self._mark_next)]
         self._lay_out()
+
+    def _mark_next(self, found: tuple[Unfinished, ...]) -> None:
+        """What was interrupted comes before an example."""
+        set_role(self.examples[EXAMPLES[0].key], "" if found else "primary")
 
     def showEvent(self, event: QShowEvent) -> None:
         """Look for what was interrupted, soon."""

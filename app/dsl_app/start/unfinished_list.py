@@ -35,15 +35,16 @@ class UnfinishedList(QWidget):
         for line in self._lines:
             self._column.removeWidget(line)
             line.deleteLater()
-        self._lines = [self._line(each) for each in found]
+        self._lines = [self._line(each, place == 0) for place, each in enumerate(found)]
         for line in self._lines:
             self._column.addWidget(line)
         self.setVisible(bool(found))
 
-    def _line(self, what: Unfinished) -> QWidget:
+    def _line(self, what: Unfinished, is_first: bool) -> QWidget:
         words = label(what.words, wraps=True)
         words.setToolTip(str(what.path))
-        button = push_button(what.button, f"Continue {what.path}", partial(self._resume, what))
+        role = "primary" if is_first else ""
+        button = push_button(what.button, f"Continue {what.path}", partial(self._resume, what), role)
         return boxed(row_of((words, 1), button, margins=0))
 
     def _resume(self, what: Unfinished, _: bool = False) -> None:

@@ -73,7 +73,7 @@ BUILT_IN = (
         export_tiff,
         endings=(".tif",),
     ),
-    Format("npy", ".npy", "NumPy – the same as arrays", export_npy),
+    Format("npy", ".npy", "NumPy – depth in mm, deviation and flags as arrays", export_npy),
     Format("png", ".png", "PNG – pictures of colour, depth, the band shown, and flags", export_png),
 )
 

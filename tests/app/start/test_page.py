@@ -3,7 +3,8 @@ from pathlib import Path
 from dsl_app.shared.settings import RecentFiles, Settings
 from dsl_app.start.examples import EXAMPLES
 from dsl_app.start.page import StartPage
-from dsl_app.start.unfinished import UnfinishedController
+from dsl_app.start.unfinished import Unfinished, UnfinishedController
+from PySide6.QtWidgets import QPushButton
 from pytestqt.qtbot import QtBot
 
 from dsl_core.resources import resource_path
@@ -38,6 +39,17 @@ def test_each_button_asks_for_what_it_says(qtbot: QtBot) -> None:
     assert asked == [*(each.key for each in EXAMPLES), "live", "rig", "file", "captures"]
     primary = [b for b in (*page.examples.values(), page.live) if b.property("role") == "primary"]
     assert primary == [page.examples["color-checker"]]
+
+
+def test_what_was_interrupted_comes_before_an_example(qtbot: QtBot) -> None:
+    page, _ = make_page(qtbot, RecentFiles(Settings()))
+    found = page.unfinished._control.found
+    lines = [Unfinished(Path(f"{name}.dsl"), f"{name} was interrupted.", "Resume scan…") for name in "ab"]
+    found.set(tuple(lines))
+    blue = [each for each in page.findChildren(QPushButton) if each.property("role") == "primary"]
+    assert [each.text() for each in blue] == ["Resume scan…"]
+    found.set(())
+    assert page.examples["color-checker"].property("role") == "primary"
 
 
 def test_all_cards_fit_the_smallest_window(qtbot: QtBot) -> None:

@@ -91,7 +91,7 @@ class RecordingNotifier:
         """Keep the sentence."""
         self.told.append((level, text))
 
-    def offer(self, text: str, offers: Mapping[str, Callable[[], object]]) -> None:
+    def offer(self, text: str, offers: Mapping[str, Callable[[], object]], stay_s: float = 0.0) -> None:
         """Keep the sentence and what it offers."""
         self.told.append(("info", text))
         self.offers.update(offers)

@@ -21,6 +21,8 @@ from dsl_app.shared.widgets.layouts import column_of
 from dsl_core.io.spectra.reference_file import Reference
 
 ENTRY = Qt.ItemDataRole.UserRole
+#: Width of the dialog, its height around the list, and the most that the list asks for, px.
+WIDTH_PX, LEAST_PX, MOST_ROWS_PX = 460, 160, 420
 
 
 class LibraryDialog(QDialog):
@@ -30,7 +32,6 @@ class LibraryDialog(QDialog):
         super().__init__(parent)
         self._library, self._control = library, control
         self.setWindowTitle(f"Spectra of {library.path.name}")
-        self.resize(460, 420)
         add_help_key(self, "numbers#pins-regions-references")
         tip = "Lists only spectra whose names contain all of these words"
         self.filter = named(QLineEdit(), "Filter", tip)
@@ -58,6 +59,9 @@ class LibraryDialog(QDialog):
         self.buttons.rejected.connect(self.reject)
         self.finished.connect(self._finish)
         self._show()
+        # As high as the list needs, within bounds.
+        rows = self.list.sizeHintForRow(0) * self.list.count()
+        self.resize(WIDTH_PX, LEAST_PX + min(rows, MOST_ROWS_PX))
 
     @property
     def chosen(self) -> list[Reference]:
