@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from PySide6.QtCore import Signal
+from PySide6.QtCore import QSize, Signal
 from PySide6.QtWidgets import (
     QFileDialog,
     QFormLayout,
@@ -19,7 +19,7 @@ from PySide6.QtWidgets import (
 from dsl_app.importing.state import PUBLISHED, FileRow, Found, ImportRequest, ImportState, import_view
 from dsl_app.shared.evented import follow_any
 from dsl_app.shared.known_files import breakable
-from dsl_app.shared.widgets.dialogs import JobDialog
+from dsl_app.shared.widgets.dialogs import JobDialog, use_room
 from dsl_app.shared.widgets.forms import ChoiceBox, WholeBox, label, named, push_button
 from dsl_app.shared.widgets.help_window import add_help_key
 from dsl_app.shared.widgets.layouts import STRETCH, row_of
@@ -48,7 +48,7 @@ class ImportDialog(JobDialog):
         #: The folder whose request is shown.
         self._shown: Path | None = None
         self.setWindowTitle("Import")
-        self.resize(880, 560)
+        use_room(self, parent, QSize(880, 560))
         add_help_key(self, "importing")
         self._make_folder()
         self._make_target(request)

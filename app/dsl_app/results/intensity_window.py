@@ -5,11 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pyqtgraph as pg
 from numpy.typing import NDArray
-from PySide6.QtCore import Qt
+from PySide6.QtCore import QSize, Qt
 from PySide6.QtWidgets import QDialog, QWidget
 
 from dsl_app.results.state import ResultsState
 from dsl_app.shared.theme import Theme
+from dsl_app.shared.widgets.dialogs import use_room
 from dsl_app.shared.widgets.forms import check_box, label
 from dsl_app.shared.widgets.help_window import add_help_key
 from dsl_app.shared.widgets.layouts import column_of
@@ -29,7 +30,7 @@ class IntensityWindow(QDialog):
         super().__init__(parent)
         self._graph = state.graph.value
         self.setWindowTitle("Intensity graph")
-        self.resize(860, 440)
+        use_room(self, parent, QSize(860, 440))
         add_help_key(self, "reading-an-intensity-graph")
         self.plot = CalmPlot(
             "Intensity graph",

@@ -132,7 +132,7 @@ class ResultsPage(PageWidget):
         left = boxed(column_of(self.bar, (self.pictures, 1), self._below, self.pixel_info, margins=0))
         tabs = tabs_of(
             "",
-            (self.marks, "Pins, regions, references", ""),
+            (self.marks, "Marks", "Pins, regions and references"),
             (self.materials, "Materials", "Which material is where, with areas"),
             (self.colours, "Colours", "Colours of the marks under several lights"),
             (self.search, "Search", ""),

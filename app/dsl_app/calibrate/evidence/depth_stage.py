@@ -67,6 +67,7 @@ class DepthStageEvidence(Evidence[DepthStageCalibration]):
             "RMS distance of the columns seen from those of their plane, by position of the stage.",
             "RMS (px)",
             "Position (mm)",
+            left_width=64,
         )
         self.steps = ChartBox(
             "Error of the stage's steps",

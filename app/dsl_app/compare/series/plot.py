@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pyqtgraph as pg
+from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QWidget
 
 from dsl_app.compare.series.state import SeriesKind, SeriesState
@@ -38,6 +39,7 @@ class SeriesPlot(QWidget):
         )  # fmt: skip
         self.plot.setMouseEnabled(False, False)
         self.legend = label("", "muted", wraps=True)
+        self.legend.setTextFormat(Qt.TextFormat.RichText)
         column_of(self.legend, (self.plot, 1), on=self, margins=0, spacing=2)
         self.stops = follow_any(self.draw, state.rows, state.test, state.kind, state.figure)
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from PySide6.QtCore import QSize
 from PySide6.QtWidgets import QFileDialog, QFormLayout, QLabel, QLineEdit, QSizePolicy, QWidget
 
 from dsl_app.importing.captures.parts_editor import PartsEditor
@@ -12,7 +13,7 @@ from dsl_app.importing.captures.pictures import DecodedPicture, FilesTable
 from dsl_app.importing.captures.state import NOMINAL, NONE, CapturesState, Said, captures_view
 from dsl_app.shared.evented import follow_any
 from dsl_app.shared.known_files import breakable
-from dsl_app.shared.widgets.dialogs import JobDialog
+from dsl_app.shared.widgets.dialogs import JobDialog, use_room
 from dsl_app.shared.widgets.forms import (
     ChoiceBox,
     NumberBox,
@@ -45,7 +46,7 @@ class CapturesDialog(JobDialog):
         super().__init__(commands.start, commands.command_line, parent)
         self._state, self._commands = state, commands
         self.setWindowTitle("Import captures")
-        self.resize(WIDTH_PX, HEIGHT_PX)
+        use_room(self, parent, QSize(WIDTH_PX, HEIGHT_PX))
         add_help_key(self, "importing#pictures-of-other-programs")
         self._make_top()
         self._make_middle()

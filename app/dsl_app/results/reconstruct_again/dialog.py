@@ -28,6 +28,9 @@ LOW_NM, HIGH_NM = 380.0, 780.0
 DEVICES = (("Processor (CPU)", "cpu"), ("Graphics card (CUDA)", "cuda"))
 
 
+WIDTH_PX = 620
+
+
 class ReconstructionDialog(JobDialog):
     """Follows a `ReconstructionState` whose scan has been read; the controller reconstructs."""
 
@@ -39,7 +42,6 @@ class ReconstructionDialog(JobDialog):
         assert source is not None
         self._state, self._control, self._source = state, control, source
         self.setWindowTitle(f"Reconstruct {source.session.name} again")
-        self.resize(620, 420)
         add_help_key(self, "reconstructing-again")
         self._make_parameters(state.request.value)
         self._make_target(state.request.value)
@@ -53,6 +55,7 @@ class ReconstructionDialog(JobDialog):
         ]
         self.name.setFocus()
         self.name.selectAll()
+        self.resize(WIDTH_PX, self.sizeHint().height())
 
     # Make ------------------------------------------------------------------------------------------
 

@@ -4,13 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from PySide6.QtCore import Qt
+from PySide6.QtCore import QSize, Qt
 from PySide6.QtGui import QFontDatabase
 from PySide6.QtWidgets import QApplication, QDialog, QDialogButtonBox, QLabel, QPlainTextEdit, QWidget
 
 from dsl_app.shared.widgets.forms import label, named, push_button, set_role
 from dsl_app.shared.widgets.inside import stop_following
 from dsl_app.shared.widgets.layouts import column_of
+
+#: Share of the window that a dialog of tables or plots takes.
+SHARE = 0.65
 
 
 def text_window(title: str, content: QWidget, parent: QWidget, width: int, height: int) -> QDialog:
@@ -37,6 +40,12 @@ def command_window(command: str, parent: QWidget) -> QDialog:
     assert isinstance(box, QDialogButtonBox)
     box.addButton(copy, QDialogButtonBox.ButtonRole.ActionRole)
     return window
+
+
+def use_room(dialog: QDialog, parent: QWidget, least: QSize) -> None:
+    """Give a dialog of tables or plots most of the window it belongs to, and at least a size."""
+    room = parent.window().size()
+    dialog.resize((room * SHARE).expandedTo(least))
 
 
 class JobDialog(QDialog):

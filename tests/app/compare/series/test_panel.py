@@ -47,6 +47,7 @@ def test_results_dropped_together_become_a_depth_test(qtbot: QtBot, bench: Bench
     assert panel.figures.item(0, 0).text() == "Straightness, slope free (RMS)"  # type: ignore[union-attr]
     assert " ± " in panel.figures.item(2, 1).text()  # type: ignore[union-attr]
     assert "worst" in panel.plot.content.legend.text()
+    assert panel.plot.content.legend.textFormat() is Qt.TextFormat.RichText, "its signs are coloured"
     (low, high), _ = panel.plot.content.plot.getViewBox().viewRange()
     assert low < POSITIONS[0] < POSITIONS[-1] < high
     shown = panel.picture.content.image.image
