@@ -107,6 +107,10 @@ class ScanController:
         if not self._rig.run(self._job):
             self._ended(Phase.PLANNING)
 
+    def connect_rig(self) -> None:
+        """Connect the rig that is chosen."""
+        self._rig.connect(self._rig.state.choice.value)
+
     def resume(self) -> None:
         """Resume the interrupted scan; a lost rig is reconnected first."""
         if self.state.reconnection.value is Reconnection.NONE or self._rig.state.link.value is Link.OPEN:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from dsl_app.scan.state import Facts, InterruptedScan, Phase, Reconnection
-from dsl_app.shared.notify import describe_seconds
+from dsl_app.shared.notify import NO_RIG, describe_seconds
 from dsl_app.shared.widget_state import ButtonState, LabelState
 from dsl_core.capture.runner import Status
 
@@ -18,6 +18,7 @@ RECONNECT = "Reconnect the rig, check whether anything has moved, and resume at 
 class RunControls:
     """The box that starts a scan; ``resume``, ``renew`` and ``drift`` are for one that was interrupted."""
 
+    connect_rig: ButtonState
     start: ButtonState
     resume: ButtonState
     pause: ButtonState
@@ -64,9 +65,11 @@ def run_controls(
     if session is not None and is_resumable:
         lines.insert(0, session.words)
     is_ready = phase is not Phase.PLANNING or not obstacles
+    lacks_rig = NO_RIG in obstacles
     can_run, connects = not phase.is_busy and not obstacles, facts is not None and facts.connects
     return RunControls(
-        start=ButtonState(session is None, can_run, is_primary=not is_raw),
+        connect_rig=ButtonState(lacks_rig, is_primary=True),
+        start=ButtonState(session is None, can_run, is_primary=not (is_raw or lacks_rig)),
         resume=ButtonState(
             session is not None,
             can_run,

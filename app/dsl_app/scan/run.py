@@ -120,6 +120,11 @@ class RunBox(QGroupBox):
     def __init__(self, state: ScanState, controller: ScanController) -> None:
         super().__init__("Scan")
         self._state, self._controller = state, controller
+        self.connect_rig = push_button(
+            "Connect the rig",
+            "Open the devices of the rig that is chosen on the Rig page",
+            controller.connect_rig,
+        )
         tip = "Capture all frames of the plan; each is saved before the next is captured"
         self.start = push_button("&Start scan", tip, controller.start)
         self.resume = push_button("&Resume scan", RESUME, controller.start)
@@ -163,6 +168,7 @@ class RunBox(QGroupBox):
         column_of(
             self.then,
             self.drift,
+            self.connect_rig,
             self.start,
             self.resume,
             buttons,

@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 from dsl_app.scan.controls import RECONNECT, RESUME, banner_controls, progress_text, run_controls
 from dsl_app.scan.state import Facts, InterruptedScan, Phase, Reconnection
+from dsl_app.shared.notify import NO_RIG
 
 from dsl_core.capture.runner import State, Status
 
@@ -102,3 +103,10 @@ def test_frames_that_nothing_was_made_of_are_reconstructed_next() -> None:
     assert (raw.start.is_primary, raw.again.is_primary, raw.again.text) == (False, True, "Reconstruct…")
     done = run_controls(Phase.DONE, None, FREE, "", has_finished=True, then_reconstruct=True)
     assert (done.start.is_primary, done.again.is_primary) == (True, False)
+
+
+def test_without_a_rig_the_next_thing_is_to_connect_it() -> None:
+    shown = run_controls(Phase.PLANNING, None, replace(FREE, obstacles=(NO_RIG,)), "", has_finished=False)
+    assert (shown.connect_rig.is_visible, shown.connect_rig.is_primary) == (True, True)
+    assert (shown.start.is_enabled, shown.start.is_primary) == (False, False)
+    assert not run_controls(Phase.PLANNING, None, FREE, "", has_finished=False).connect_rig.is_visible

@@ -35,7 +35,9 @@ def command_window(command: str, parent: QWidget) -> QDialog:
     text.setReadOnly(True)
     text.setFont(QFontDatabase.systemFont(QFontDatabase.SystemFont.FixedFont))
     window = text_window("Command line", text, parent, 640, 220)
-    copy = push_button("Copy", "Copy the command", lambda: QApplication.clipboard().setText(command))
+    copy = push_button(
+        "Copy", "Copy the command", lambda: QApplication.clipboard().setText(command), "primary"
+    )
     box = window.findChild(QDialogButtonBox)
     assert isinstance(box, QDialogButtonBox)
     box.addButton(copy, QDialogButtonBox.ButtonRole.ActionRole)

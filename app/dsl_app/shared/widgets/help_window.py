@@ -7,7 +7,15 @@ from pathlib import Path
 
 from PySide6.QtCore import QSize, Qt, QUrl
 from PySide6.QtGui import QKeySequence, QShortcut, QTextBlock, QTextCursor
-from PySide6.QtWidgets import QDialog, QListWidget, QListWidgetItem, QPushButton, QTextBrowser, QWidget
+from PySide6.QtWidgets import (
+    QDialog,
+    QLineEdit,
+    QListWidget,
+    QListWidgetItem,
+    QPushButton,
+    QTextBrowser,
+    QWidget,
+)
 
 from dsl_app.shared.widgets.forms import Clicked, named, push_button, quiet
 from dsl_app.shared.widgets.layouts import STRETCH, column_of, row_of, splitter
@@ -15,6 +23,7 @@ from dsl_core.errors import StoreError
 from dsl_core.resources import resource_path
 
 FOLDER = "help"
+SEARCH_PX = 270
 #: The pages in reading order; others follow.
 ORDER = (
     "rig",
@@ -89,6 +98,13 @@ class HelpWindow(QDialog):
         self.back = _button("&Back", "Previous page (Alt+Left)", self.text.backward, "Alt+Left")
         self.forward = _button("&Forward", "Next page (Alt+Right)", self.text.forward, "Alt+Right")
         self.close_button = _button("&Close", "Close the help (Escape)", self.accept)
+        tip = "Lists only pages that contain all of these words; Enter shows where, again the next place"
+        self.search = named(QLineEdit(), "Search the help", tip)
+        self.search.setPlaceholderText("Search")
+        self.search.setClearButtonEnabled(True)
+        self.search.setMaximumWidth(SEARCH_PX)
+        self.search.textChanged.connect(lambda _: self._filter())
+        self.search.returnPressed.connect(self.find_next)
         self._lay_out()
         for page in help_pages():
             item = QListWidgetItem(title_of(page))
@@ -102,7 +118,7 @@ class HelpWindow(QDialog):
             button.setEnabled(False)
 
     def _lay_out(self) -> None:
-        head = row_of(self.back, self.forward, STRETCH, self.close_button)
+        head = row_of((self.search, 1), self.back, self.forward, STRETCH, self.close_button)
         parts = splitter(Qt.Orientation.Horizontal, (self.pages, 0), (self.text, 1), sizes=(270, 690))
         column_of(head, (parts, 1), on=self)
 
@@ -121,6 +137,28 @@ class HelpWindow(QDialog):
             return
         url.setFragment(heading)
         self.text.setSource(url)
+
+    @property
+    def _words(self) -> list[str]:
+        return self.search.text().lower().split()
+
+    def _filter(self) -> None:
+        texts = {page.stem: page.read_text(encoding="utf-8").lower() for page in help_pages()}
+        for i in range(self.pages.count()):
+            item = self.pages.item(i)
+            text = texts[str(item.data(Qt.ItemDataRole.UserRole))]
+            item.setHidden(not all(word in text for word in self._words))
+
+    def find_next(self) -> None:
+        """Show the next place of the first word, on a listed page."""
+        listed = [item for i in range(self.pages.count()) if not (item := self.pages.item(i)).isHidden()]
+        if not listed or not self._words:
+            return
+        if self.pages.currentItem() not in listed:
+            self.pages.setCurrentItem(listed[0])
+        if not self.text.find(self._words[0]):
+            self.text.moveCursor(QTextCursor.MoveOperation.Start)
+            self.text.find(self._words[0])
 
     def _choose(self, item: QListWidgetItem | None) -> None:
         if item is not None and item.data(Qt.ItemDataRole.UserRole) != self.page:

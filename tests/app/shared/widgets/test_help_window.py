@@ -110,3 +110,18 @@ def test_a_page_that_is_not_installed_is_said(window: MainWindow) -> None:
     shown = help_window("no-such-page", window)
     assert "Install dsl-scan again" in shown.text.toPlainText()
     shown.accept()
+
+
+def test_a_search_lists_the_pages_with_all_words_and_shows_where(qtbot: QtBot, window: MainWindow) -> None:
+    made = help_window("rig", window)
+    qtbot.addWidget(made)
+    QTest.keyClicks(made.search, "spectral angle")
+    listed = [item for i in range(made.pages.count()) if not (item := made.pages.item(i)).isHidden()]
+    assert 0 < len(listed) < made.pages.count()
+    QTest.keyClick(made.search, Qt.Key.Key_Return)
+    first = made.text.textCursor()
+    assert first.selectedText().lower() == "spectral"
+    QTest.keyClick(made.search, Qt.Key.Key_Return)
+    assert made.text.textCursor().position() != first.position()
+    made.search.clear()
+    assert not any(made.pages.item(i).isHidden() for i in range(made.pages.count()))
