@@ -29,7 +29,7 @@ from dsl_core.progress import Progress
 class GeometryRecipe(Recipe[GeometryCalibration]):
     """The calibration of both lenses and their pose.
 
-    ``board`` is the printed board, its squares measured; ``poses`` is how many proposed poses to capture.
+    ``board`` is the printed board with its squares as measured; ``poses`` is how many poses to capture.
     ``ratio`` is how many times longer a second exposure is, 1 for none: one exposure covers both paper and
     ink, which reflects a twentieth as much. ``left_out`` are the steps, such as ``pose-03``, that the fit
     leaves out; their captures are kept.

@@ -13,7 +13,7 @@ from PySide6.QtWidgets import QCheckBox, QFormLayout, QHBoxLayout, QLineEdit, QW
 from dsl_app.calibrate.wizard.settings import setting_title
 from dsl_app.calibrate.wizard.state import SettingRow
 from dsl_app.shared.widgets.forms import ChoiceBox, NumberBox, WholeBox, label, named, quiet
-from dsl_app.shared.widgets.layouts import STRETCH, column_of, row_of, scrolled
+from dsl_app.shared.widgets.layouts import STRETCH, boxed, column_of, row_of, scrolled
 from dsl_core.model.board import Board, Charuco, Checkerboard
 
 F = TypeVar("F", bound=QWidget)
@@ -72,10 +72,12 @@ class SettingsPage(QWidget):
             name = setting_title(row.key)
             field = self._field(row, name)
             self.fields[row.key] = field
-            self._form.addRow(name, field)
-            if row.doc:
-                doc = label(row.doc, "muted", wraps=True)
-                self._form.addRow("", doc)
+            if not row.doc:
+                self._form.addRow(name, field)
+                continue
+            # What explains a field stands close to it.
+            doc = label(row.doc, "muted", wraps=True)
+            self._form.addRow(name, boxed(column_of(field, doc, margins=0, spacing=2)))
 
     def _field(self, row: SettingRow, name: str) -> QLineEdit | QCheckBox | BoardEdit:
         tell = partial(self._tell, row.key)

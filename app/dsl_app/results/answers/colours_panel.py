@@ -11,7 +11,7 @@ from dsl_app.results.state import Mark, ResultsState
 from dsl_app.shared.evented import follow_any
 from dsl_app.shared.theme import DARK, Theme
 from dsl_app.shared.widgets.forms import ChoiceBox, label, push_button
-from dsl_app.shared.widgets.layouts import STRETCH, column_of, row_of
+from dsl_app.shared.widgets.layouts import column_of, row_of
 from dsl_app.shared.widgets.read_table import RIGHT, ReadTable, cell
 from dsl_core.analysis.at_bands import at_bands
 from dsl_core.analysis.colours import HEADER, ILLUMINANTS, Colour, colours_of
@@ -39,7 +39,7 @@ class ColoursPanel(QWidget):
         self.text = label(EMPTY, "muted", wraps=True)
         self.text.setAlignment(Qt.AlignmentFlag.AlignTop)
         column_of(
-            row_of(label("Light"), (self.light, 1), self.copy, STRETCH), (self.table, 1), self.text,
+            row_of(label("Light"), (self.light, 1), self.copy), (self.table, 1), self.text,
             on=self, margins=0,
         )  # fmt: skip
         self.light.currentIndexChanged.connect(lambda _: self._show())
