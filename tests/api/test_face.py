@@ -1,5 +1,6 @@
 """The functions and the accessor that scripts use, from a rig to a plot."""
 
+import importlib.util
 import re
 from contextlib import chdir
 from pathlib import Path
@@ -11,6 +12,8 @@ import pytest
 import xarray as xr
 
 import dsl_core as dsl
+from dsl_core.cli.output import Output
+from dsl_core.cli.results import print_figures
 from dsl_core.errors import DecodeError, PlanError, StoreError
 from dsl_core.io.scan.folder import ScanReader
 from dsl_core.resources import resource_path
@@ -146,6 +149,31 @@ def test_results_go_to_disk_and_to_other_readers(result: xr.Dataset, tmp_path: P
     assert dsl.export(loaded, tmp_path / "cloud.ply") == [tmp_path / "cloud.ply"]
     with pytest.raises(StoreError, match="no ending that says its format"):
         dsl.export(loaded, tmp_path / "cloud")
+
+
+def test_the_readme_shows_what_evaluate_prints(
+    result: xr.Dataset, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Its commands make the same scan as the page on scripts; every line, with figures within a tolerance."""
+    folder = Path(__file__).resolve().parents[2]
+    spec = importlib.util.spec_from_file_location("outputs", folder / "packaging" / "outputs.py")
+    assert spec is not None
+    assert spec.loader is not None
+    outputs = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(outputs)
+    shown = outputs.shown((folder / "README.md").read_text(encoding="utf-8"))
+    assert set(shown) == set(outputs.BEFORE)
+    print_figures(Output(False), dsl.evaluate(result))
+    printed = capsys.readouterr().out.splitlines()
+    lines = shown["dsl-scan evaluate small.zarr"]
+    assert outputs.differences(lines, printed) == []
+    assert len(lines) == len(printed)
+    # A changed figure, a missing line and one too many are told.
+    assert len(outputs.differences([lines[0], lines[1].replace("2.4", "2.6"), *lines[2:]], printed)) == 1
+    assert outputs.differences([*lines[:2], *lines[3:]], printed)
+    assert outputs.differences([*lines, "Speckle 0.1 %"], printed) == [
+        "shown: Speckle 0.1 %; printed: nothing"
+    ]
 
 
 def test_a_twins_result_is_compared_with_its_truth(result: xr.Dataset) -> None:
