@@ -98,16 +98,18 @@ class Output:
 
 
 class _Lines:
-    """A line when a few seconds have passed since the last."""
+    """A line when a few seconds have passed since the last, and something has been done."""
 
     def __init__(self) -> None:
         self._last_s = time.monotonic()
+        self._last_line = ""
 
     def report(self, stage: str, done: int, total: int) -> None:
         now_s = time.monotonic()
-        if now_s - self._last_s >= _LINE_EVERY_S:
-            self._last_s = now_s
-            print(f"{stage}: {done} of {total} ({done / max(total, 1):.0%})", file=sys.stderr, flush=True)
+        line = f"{stage}: {done} of {total} ({done / max(total, 1):.0%})"
+        if now_s - self._last_s >= _LINE_EVERY_S and line != self._last_line:
+            self._last_s, self._last_line = now_s, line
+            print(line, file=sys.stderr, flush=True)
 
 
 class _Bars:

@@ -38,6 +38,19 @@ def test_bars_give_way_to_what_is_said_and_asked(
     assert shown.index("step 0") < shown.index("Placed? ") < shown.index("fit")
 
 
+def test_without_a_terminal_a_line_is_not_repeated(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    now_s = iter(range(0, 1000, 10))
+    monkeypatch.setattr("dsl_core.cli.output.time.monotonic", lambda: float(next(now_s)))
+    with Output(False).progress() as progress:
+        for done in (0, 0, 0, 1, 1, 0):
+            progress.report("spectra", done, 2)
+    assert capsys.readouterr().err.splitlines() == [
+        f"spectra: {line}" for line in ("0 of 2 (0%)", "1 of 2 (50%)", "0 of 2 (0%)")
+    ]
+
+
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows has no pipe that breaks")
 @pytest.mark.parametrize(("arguments", "code"), [(["scenes"], 0), (["info", "/no/such/scan"], 2)])
 def test_a_reader_that_leaves_early_causes_no_traceback(arguments: list[str], code: int) -> None:
