@@ -41,6 +41,8 @@ class LiveController:
         self._lock = threading.Lock()
         self._latest: Frame | None = None
         self._counts = FrameCounts()
+        #: The devices that were exposed for since they were connected.
+        self._looked_at: DeviceRig | None = None
         #: What the panel names before anything is chosen on it.
         self._picture: tuple[PictureKind, float, int] = KINDS[0], LEVEL, 0
         self._exposer = AutoExposer(rig.state, self.state, notifier, self.set_exposure, self._dim)
@@ -60,8 +62,19 @@ class LiveController:
     def begin(self) -> None:
         """Project the picture that was asked for last, find the exposure for it and start the live view."""
         if not self.rig.state.used_by.value:
+            self._looked_at = self.rig.state.devices.value
             self.show_again()
             self.expose_automatically(None)
+
+    def look(self) -> None:
+        """Start the live view with the picture that the panel names, exposed for it on devices new to it."""
+        state = self.rig.state
+        if state.devices.value is not self._looked_at and not state.used_by.value:
+            self.begin()
+            return
+        if not state.used_by.value:
+            self.show_again()
+        self.start()
 
     def begin_when_open(self) -> None:
         """`begin` as soon as the rig that is being opened is open; not at all where it cannot be opened."""

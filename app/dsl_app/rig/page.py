@@ -202,7 +202,7 @@ class RigPage(PageWidget):
         if self._state.live.value:
             self._commands.stop()
         else:
-            self._commands.start()
+            self._commands.look()
 
     def _expose(self) -> None:
         self._commands.expose_automatically(self.live.content.region)

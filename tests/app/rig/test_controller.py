@@ -64,6 +64,21 @@ def test_showing_without_a_rig_says_what_to_do() -> None:
     assert len(notifier.told) == 3
 
 
+def test_a_live_view_lights_the_scene_and_is_exposed_for_it_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    live, _ = controller()
+    live.rig.connect(TWIN)
+    shown: list[object] = []
+    monkeypatch.setattr(live.rig, "start_live", lambda _look: live.rig.state.live.set(True))
+    monkeypatch.setattr(live, "show", lambda *picture: shown.append(picture))
+    exposes = []
+    for _ in range(2):
+        live.look()
+        exposes.append(live.state.is_exposing.value)
+        live.rig.state.live.set(False)
+    assert exposes == [True, False], "an exposure that was set by hand stays"
+    assert len(shown) == 2
+
+
 @pytest.fixture
 def start(qtbot: QtBot) -> Start:
     def begin() -> tuple[LiveController, RecordingNotifier, QtRunner]:
