@@ -112,6 +112,7 @@ def reconstruct(
     from dsl_core.reconstruction.geometry import geometry_of, require_light, require_pixels
     from dsl_core.reconstruction.lenses import follow_lenses
     from dsl_core.reconstruction.light.followed import follow_light
+    from dsl_core.reconstruction.light.own_sensor import own_sensor
     from dsl_core.reconstruction.rows.assembly import Assembly
     from dsl_core.reconstruction.rows.bands import bands_of
     from dsl_core.reconstruction.rows.columns import columns_by_rows
@@ -124,8 +125,12 @@ def reconstruct(
     plan, lines = check_source(source, rig), LineSet.of(source.plan)
     if options.spectra:
         check_solver(options.solver, rig, plan, options.correspondence)
-    frames = ScanFrames(source, rig, bands_of(plan, options.band_rows, rows_together(rig, options)))
     findings: list[FitFinding] = []
+    if not options.as_calibrated:
+        sensor, found_of_sensor = own_sensor(source, rig.sensor)
+        rig = rig.model_copy(update={"sensor": sensor})
+        findings += found_of_sensor
+    frames = ScanFrames(source, rig, bands_of(plan, options.band_rows, rows_together(rig, options)))
     with timer.stage("read, merge, decode the binary code"):
         code, white = frames.decode(progress)
         require_light(white.radiance, white.saturated)

@@ -107,18 +107,25 @@ class Film(Record):
 
 
 class Sensor(Record):
-    """How light becomes digital numbers (DN)."""
+    """How light becomes digital numbers (DN).
+
+    ``saturation_dn`` is where values end, None if at the largest number of the bit depth; ``step_dn`` is the
+    distance of neighbouring values.
+    """
 
     bayer: BayerPattern = "RGGB"
     bit_depth: int = Field(default=12, ge=8, le=16)
     black_level_dn: float = Field(default=260.0, ge=0)
     electrons_per_dn: float = Field(default=10.0, gt=0)
     read_noise_dn: float = Field(default=0.5, ge=0)
+    saturation_dn: int | None = Field(default=None, gt=0)
+    step_dn: int = Field(default=1, ge=1)
 
     @property
     def full_scale_dn(self) -> int:
         """Largest digital number; a pixel that reads it is saturated."""
-        return int(2**self.bit_depth - 1)
+        most = int(2**self.bit_depth - 1)
+        return most if self.saturation_dn is None else min(self.saturation_dn, most)
 
 
 class ProjectorResponse(Record):

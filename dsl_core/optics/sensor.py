@@ -25,10 +25,10 @@ def bayer_channels(bayer: BayerPattern, rows: int, columns: int) -> NDArray[np.i
 def raw_variance(sensor: Sensor, signal_dn: NDArray[np.floating]) -> NDArray[np.floating]:
     """Variance (DN^2) of a raw value whose expectation above black is ``signal_dn``.
 
-    Read noise, rounding to whole numbers, and shot noise of the signal (EMVA 1288); the black level is an
-    electronic offset without shot noise.
+    Read noise, rounding to steps, and shot noise of the signal (EMVA 1288); the black level is an electronic
+    offset without shot noise.
     """
-    floor = sensor.read_noise_dn**2 + 1 / 12
+    floor = sensor.read_noise_dn**2 + sensor.step_dn**2 / 12
     return np.asarray(floor + np.maximum(signal_dn, 0) / sensor.electrons_per_dn)
 
 

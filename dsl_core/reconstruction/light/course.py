@@ -3,6 +3,9 @@
 Three witnesses are heard: frames of patterns relative to white, the same pattern at several settings, and
 white taken again. The drift is a smooth curve that starts at zero with the first shot, because the light is
 taken to have been as calibrated when the scan began. Flicker is what is left, frame by frame.
+
+Settings of a camera that is not linear differ as if the light had drifted between them. They are told apart
+by what witnesses say of the time within one setting.
 """
 
 from __future__ import annotations
@@ -22,6 +25,10 @@ NO_DRIFT = 1e-6
 FEWEST = 4
 #: What settings may differ by through the response of the rig, and levels of lines by over the picture.
 SETTING_STD, SLOPE_STD = 0.01, 0.02
+#: The same of settings that are not as calibrated; witnesses must be so much likelier then (chi-square).
+APART_STD, LIKELIER = 0.5, 25.0
+#: Witnesses farther off than so many deviations weigh less.
+HUBER = 2.5
 #: Scatter that remains where nothing flickers.
 QUIET = 0.002
 #: Changes of light below these are left as they are.
@@ -35,7 +42,8 @@ class Witness:
     """The logarithm of the light of one shot over that of another one, and its deviation.
 
     Shots are named by their index; ``against`` None is white as it was merged, of unknown level. ``slope``
-    is what a witness may be wrong by in common with others, as a multiple of one unknown.
+    is what a witness may be wrong by in common with others, as a multiple of one unknown. ``setting`` is the
+    place of the shot's setting if it is compared with the same pattern at the last one.
     """
 
     shot: int
@@ -43,7 +51,7 @@ class Witness:
     log: float
     std: float
     slope: float = 0.0
-    between_settings: bool = False
+    setting: int | None = None
 
 
 @dataclass(frozen=True)
@@ -52,6 +60,9 @@ class LightCourse:
 
     ``white`` is the logarithm of the level of white as it was merged, ``slope`` that unknown of the
     witnesses, ``flicker`` the rms from shot to shot; both kinds of change are zero where they do not matter.
+    ``settings`` are logarithms of the signals of each but the last setting over what its exposure and level
+    say, relative to the last one, in steady light; empty unless they explain what is seen as well as a drift
+    does, or better: then there is no drift.
     """
 
     log: Floats
@@ -62,6 +73,7 @@ class LightCourse:
     drift_std: float
     flicker: float
     flicker_std: float
+    settings: tuple[float, ...] = ()
 
     @property
     def drifts(self) -> bool:
@@ -76,7 +88,7 @@ class LightCourse:
     @property
     def is_steady(self) -> bool:
         """Whether there is nothing to follow."""
-        return not (self.drifts or self.flickers)
+        return not (self.drifts or self.flickers or self.settings)
 
 
 def light_course(witnesses: Sequence[Witness], shots: int) -> LightCourse | None:
@@ -86,17 +98,45 @@ def light_course(witnesses: Sequence[Witness], shots: int) -> LightCourse | None
     """
     if len(witnesses) < FEWEST:
         return None
-    found = _course(witnesses, shots, DRIFT_STD)
-    if found.drifts:
-        return found
-    level = _course(witnesses, shots, (NO_DRIFT, NO_DRIFT))
-    return replace(level, drift=found.drift, drift_std=found.drift_std)
+    nothing = (NO_DRIFT, NO_DRIFT)
+    found, apart = _course(witnesses, shots, DRIFT_STD), _course(witnesses, shots, nothing, APART_STD)
+    flicker = min(found.flicker, apart.flicker)
+    drift_misfit = _misfit(witnesses, shots, flicker, DRIFT_STD, SETTING_STD)
+    if _misfit(witnesses, shots, flicker, nothing, APART_STD) < drift_misfit - LIKELIER:
+        return apart
+    if not found.drifts:
+        level = _course(witnesses, shots, nothing)
+        return replace(level, settings=(), drift=found.drift, drift_std=found.drift_std)
+    others = [each for each in witnesses if each.setting is None]
+    rests_on_settings = len(others) < FEWEST or not _course(others, shots, DRIFT_STD).drifts
+    return replace(found, settings=apart.settings if rests_on_settings else ())
 
 
-def _course(witnesses: Sequence[Witness], shots: int, drift_std: tuple[float, float]) -> LightCourse:
+def _misfit(
+    witnesses: Sequence[Witness],
+    shots: int,
+    flicker: float,
+    drift_std: tuple[float, float],
+    setting_std: float,
+) -> float:
+    """How badly the likeliest course fits all witnesses and what is believed before (robust chi-square)."""
+    values, _, left = _fit(witnesses, shots, flicker, drift_std, setting_std)
+    away = np.abs(left) / np.sqrt(_noise(witnesses, flicker))
+    believed = values / _believed(len(values), drift_std, setting_std)
+    of_witnesses = np.where(away < HUBER, away**2, HUBER * (2 * away - HUBER)).sum()
+    return float(of_witnesses + believed @ believed)
+
+
+def _course(
+    witnesses: Sequence[Witness],
+    shots: int,
+    drift_std: tuple[float, float],
+    setting_std: float = SETTING_STD,
+) -> LightCourse:
+    """The likeliest course under what is believed before."""
     flicker = 0.0
     for _ in range(6):
-        values, covariance, left = _fit(witnesses, shots, flicker, drift_std)
+        values, covariance, left = _fit(witnesses, shots, flicker, drift_std, setting_std)
         flicker, flicker_std = _flicker(witnesses, left)
     time = np.linspace(0, 1, shots)
     terms = np.stack([time, time**2], 1)
@@ -112,32 +152,50 @@ def _course(witnesses: Sequence[Witness], shots: int, drift_std: tuple[float, fl
         drift_std=float(std[furthest]),
         flicker=flicker,
         flicker_std=flicker_std,
+        settings=tuple(values[4:].tolist()),
     )
 
 
 def _fit(
-    witnesses: Sequence[Witness], shots: int, flicker: float, drift_std: tuple[float, float]
+    witnesses: Sequence[Witness],
+    shots: int,
+    flicker: float,
+    drift_std: tuple[float, float],
+    setting_std: float,
 ) -> tuple[Floats, Floats, Floats]:
     """Terms of the drift, level of white, slope, settings; their covariance; what is left of each witness."""
     last = max(shots - 1, 1)
-    design = np.zeros((len(witnesses), 5))
+    settings = 1 + max((each.setting for each in witnesses if each.setting is not None), default=-1)
+    design = np.zeros((len(witnesses), 4 + settings))
     for row, each in zip(design, witnesses, strict=True):
         time, other = each.shot / last, None if each.against is None else each.against / last
         row[:2] = time - (other or 0.0), time**2 - (other or 0.0) ** 2
         row[2] = -1.0 if other is None else 0.0
-        row[3], row[4] = each.slope, float(each.between_settings)
+        row[3] = each.slope
+        if each.setting is not None:
+            row[4 + each.setting] = 1.0
     log = np.array([each.log for each in witnesses])
-    noise = np.array([each.std**2 + QUIET**2 for each in witnesses])
-    noise += np.array([1.0 if each.against is None else 2.0 for each in witnesses]) * flicker**2
-    prior = np.diag(np.array([*drift_std, 1.0, SLOPE_STD, SETTING_STD]) ** -2)
+    noise = _noise(witnesses, flicker)
+    prior = np.diag(_believed(4 + settings, drift_std, setting_std) ** -2)
     weight = 1 / noise
     for _ in range(4):
         covariance = np.linalg.inv((design.T * weight) @ design + prior)
         values = covariance @ (design.T @ (weight * log))
         left = log - design @ values
         away = np.abs(left) / np.sqrt(noise)
-        weight = np.minimum(1, 2.5 / np.maximum(away, 1e-9)) / noise
+        weight = np.minimum(1, HUBER / np.maximum(away, 1e-9)) / noise
     return np.asarray(values), np.asarray(covariance), np.asarray(left)
+
+
+def _noise(witnesses: Sequence[Witness], flicker: float) -> Floats:
+    """Variance of what each witness says, of which those of two shots flicker twice."""
+    own = np.array([each.std**2 + QUIET**2 for each in witnesses])
+    return own + np.array([1.0 if each.against is None else 2.0 for each in witnesses]) * flicker**2
+
+
+def _believed(count: int, drift_std: tuple[float, float], setting_std: float) -> Floats:
+    """Deviations of what is fitted before anything is seen."""
+    return np.array([*drift_std, 1.0, SLOPE_STD, *[setting_std] * (count - 4)])
 
 
 def _flicker(witnesses: Sequence[Witness], left: Floats) -> tuple[float, float]:

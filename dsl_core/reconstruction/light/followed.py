@@ -32,6 +32,8 @@ from dsl_core.reconstruction.merge import PickedLines
 MOST_MISFIT = 0.2
 #: What levels of frames may be wrong by beyond their own deviations: the sum of light is not exact.
 LEVEL_ERROR = 0.004
+#: Settings that differ by more are told.
+LEAST_APART = 0.01
 _CORRECTED = " The frames are corrected for it."
 
 
@@ -106,16 +108,20 @@ def follow_light(
 
 def light_findings(course: LightCourse, with_lines: bool) -> Iterator[FitFinding]:
     """What the course of the light says to a person."""
+    change = float(np.expm1(course.drift))
+    std = (1 + change) * course.drift_std
     drift = FitFinding.judged(
         "light",
         "drift of the light",
-        (course.drift, course.drift_std),
+        (change, std),
         "1",
         LEAST_DRIFT,
-        f"The light drifted by {course.drift:+.1%} (±{course.drift_std:.1%}) during the scan.{_CORRECTED}",
+        f"The light drifted by {change:+.1%} (±{std:.1%}) during the scan.{_CORRECTED}",
         "Let the projector warm up for longer.",
     )
     yield drift.model_copy(update={"significant": course.drifts})
+    if course.settings:
+        yield _settings_finding(course)
     corrected = _CORRECTED if with_lines else " These patterns do not allow a correction."
     flicker = FitFinding.judged(
         "light",
@@ -129,12 +135,32 @@ def light_findings(course: LightCourse, with_lines: bool) -> Iterator[FitFinding
     yield flicker.model_copy(update={"significant": course.flickers})
 
 
+def _settings_finding(course: LightCourse) -> FitFinding:
+    worst = int(np.abs(course.settings).argmax())
+    more = float(np.expm1(course.settings[worst]))
+    drift = " Or the light drifted between them." if course.drifts else " The settings were made to agree."
+    return FitFinding.judged(
+        "response",
+        "settings against each other",
+        more,
+        "1",
+        LEAST_APART,
+        f"Setting {worst + 1} is {abs(more):.1%} {'brighter' if more > 0 else 'darker'} than setting"
+        f" {len(course.settings) + 1}, exposures and drive levels considered: the camera's values are not"
+        f" proportional to the light, or exposures or levels are not as calibrated.{drift}",
+        "Switch off gamma, automatic exposure and gain, store raw values, and repeat the self-test.",
+    )
+
+
 def _of_settings(scan: Pictures) -> Iterator[Witness]:
+    sensor = scan.rig.sensor
+    if sensor.step_dn > 1 and sensor.step_dn > sensor.read_noise_dn * np.sqrt(12):
+        return  # black is rounded too, and that is much of what a faint setting shows
     for (role, pattern), ratios in sorted(scan.ratios.items()):
         shots = scan.shots_of(role, pattern)
-        for shot, ratio in zip(shots[:-1], ratios, strict=False):
+        for place, (shot, ratio) in enumerate(zip(shots[:-1], ratios, strict=False)):
             if ratio is not None:
-                yield Witness(shot.index, shots[-1].index, ratio.log, ratio.std, between_settings=True)
+                yield Witness(shot.index, shots[-1].index, ratio.log, ratio.std, setting=place)
 
 
 def _of_whites(scan: Pictures) -> Iterator[Witness]:
@@ -177,9 +203,10 @@ def _between_settings(scan: Pictures, course: LightCourse) -> NDArray[np.float64
     levels = np.ones(scan.plan.shot_count)
     for (role, pattern), ratios in scan.ratios.items():
         shots = scan.shots_of(role, pattern)
-        for shot, ratio in zip(shots[:-1], ratios, strict=False):
+        for place, (shot, ratio) in enumerate(zip(shots[:-1], ratios, strict=False)):
             drift = course.log[shot.index] - course.log[shots[-1].index]
-            seen = ratio.log if ratio is not None and course.flickers else drift
+            apart = 0.0 if course.drifts or not course.settings else course.settings[place]
+            seen = ratio.log if ratio is not None and course.flickers else drift + apart
             levels[shot.index] = np.exp(seen)
     return levels
 

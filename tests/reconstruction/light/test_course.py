@@ -19,7 +19,7 @@ def witnesses(drift: float, flicker: float, seed: int = 1) -> list[Witness]:
     white = 0.05
     found = [Witness(110 + k, None, log[110 + k] - white + noise[k], 0.003, k / 40 - 1) for k in range(80)]
     found += [
-        Witness(20 + k, 110 + k, log[20 + k] - log[110 + k] + noise[100 + k], 0.003, between_settings=True)
+        Witness(20 + k, 110 + k, log[20 + k] - log[110 + k] + noise[100 + k], 0.003, setting=0)
         for k in range(80)
     ]
     return [*found, Witness(199, 15, log[199] - log[15] + noise[199], 0.001)]
@@ -43,6 +43,36 @@ def test_a_drift_is_measured_from_the_first_shot_on() -> None:
     assert abs(course.drift + 0.1) < 3 * course.drift_std + 0.002
 
 
+def test_settings_that_do_not_agree_are_not_taken_for_drift() -> None:
+    heard = [
+        replace(each, log=each.log + (0.0 if each.setting is None else -0.2)) for each in witnesses(0.0, 0.0)
+    ]
+    course = light_course(heard, SHOTS)
+    assert course is not None
+    assert not course.drifts
+    assert not course.is_steady
+    assert course.settings == pytest.approx((-0.2,), abs=0.002)
+    # Three settings, two of which are off, each by its own.
+    third = [replace(each, setting=1, log=each.log + 0.3) for each in heard if each.setting == 0]
+    course = light_course([*heard, *third], SHOTS)
+    assert course is not None
+    assert course.settings == pytest.approx((-0.2, 0.1), abs=0.002)
+
+
+def test_a_drift_that_other_witnesses_see_too_is_not_taken_for_settings() -> None:
+    for drift in (0.1, -0.3):
+        course = light_course(witnesses(drift, 0.01), SHOTS)
+        assert course is not None
+        assert course.settings == ()
+        assert course.drift == pytest.approx(drift, abs=0.02)
+    # Settings alone cannot tell the two apart.
+    alone = [each for each in witnesses(-0.3, 0.0) if each.setting is not None]
+    course = light_course(alone, SHOTS)
+    assert course is not None
+    assert course.drifts
+    assert course.settings == pytest.approx((0.3 * 90 / 199,), abs=0.01)
+
+
 def test_flicker_is_not_taken_for_drift() -> None:
     course = light_course(witnesses(0.0, 0.06), SHOTS)
     assert course is not None
@@ -60,12 +90,12 @@ def test_terms_are_those_of_weighted_least_squares_with_what_is_believed_before(
     heard = [each for each in witnesses(0.08, 0.02, 4) if each.shot % 3]
     heard[5] = replace(heard[5], log=heard[5].log + 0.3)
     flicker = 0.01
-    values, covariance, left = course_module._fit(heard, SHOTS, flicker, (0.5, 0.3))
+    values, covariance, left = course_module._fit(heard, SHOTS, flicker, (0.5, 0.3), 0.01)
     rows, noise = [], []
     for each in heard:
         t, u = each.shot / 199, 0.0 if each.against is None else each.against / 199
         free = each.against is None
-        rows.append([t - u, t**2 - u**2, -1.0 if free else 0.0, each.slope, float(each.between_settings)])
+        rows.append([t - u, t**2 - u**2, -1.0 if free else 0.0, each.slope, float(each.setting == 0)])
         noise.append(each.std**2 + 0.002**2 + (1 if free else 2) * flicker**2)
     design, sigma = np.array(rows), np.sqrt(noise)
     log = np.array([each.log for each in heard])
@@ -111,7 +141,7 @@ def test_changes_count_beyond_chance_and_beyond_what_nobody_minds(
 def test_the_curve_begins_at_zero_and_its_deviation_is_that_of_its_terms() -> None:
     heard = witnesses(-0.1, 0.0)
     course = course_module._course(heard, SHOTS, (0.5, 0.3))
-    values, covariance, _ = course_module._fit(heard, SHOTS, course.flicker, (0.5, 0.3))
+    values, covariance, _ = course_module._fit(heard, SHOTS, course.flicker, (0.5, 0.3), 0.01)
     time = np.arange(SHOTS) / (SHOTS - 1)
     terms = np.stack([time, time**2])
     assert course.log == pytest.approx(values[:2] @ terms, abs=1e-4)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -52,7 +53,7 @@ def test_lines_witness_the_shot_of_their_last_setting_and_share_a_slope_over_the
     heard = list(followed._of_lines(scan_of(), lines))
     for k, (each, log, std) in enumerate(zip(heard, lines.log, lines.std, strict=True)):
         assert each.shot == shots_of("spectral", k)[-1].index
-        assert (each.against, each.log, each.between_settings) == (None, log, False)
+        assert (each.against, each.log, each.setting) == (None, log, None)
         assert each.std == pytest.approx(np.hypot(std, 0.004))
         assert each.slope == pytest.approx((k + 0.5) / (COUNT / 2) - 1)
     assert list(followed._of_lines(scan_of(), None)) == []
@@ -67,21 +68,41 @@ def test_settings_witness_each_other() -> None:
     (heard,) = followed._of_settings(scan)
     first, last = shots_of("spectral", 1)
     assert (heard.shot, heard.against, heard.log, heard.std) == (first.index, last.index, 0.03, 0.01)
-    assert heard.between_settings
+    assert heard.setting == 0
 
 
 def test_shots_of_a_pattern_agree_with_that_of_its_last_setting() -> None:
     scan = scan_of()
     scan.ratios = {("spectral", k): (Ratio(0.03 + k, 0.01), Ratio(0, 0)) for k in range(COUNT)}
     scan.ratios["spectral", 2] = (None, Ratio(0, 0))
-    for course in (course_of(0.1), course_of(0.1, 0.05)):
+    apart = replace(course_of(), settings=(-0.2,))
+    for course in (course_of(0.1), course_of(0.1, 0.05), apart):
         found = followed._between_settings(scan, course)
         wanted = np.ones(PLAN.shot_count)
         for k in range(COUNT):
             first, last = shots_of("spectral", k)
             drift = course.log[first.index] - course.log[last.index]
+            drift += -0.2 if course.settings else 0.0
             wanted[first.index] = np.exp(0.03 + k if course.flickers and k != 2 else drift)
-        assert found == pytest.approx(wanted)
+        assert found[[shot.index for shot in PLAN.shots() if shot.role == "spectral"]] == pytest.approx(
+            wanted[[shot.index for shot in PLAN.shots() if shot.role == "spectral"]]
+        )
+
+
+def test_settings_that_do_not_agree_are_told_with_the_one_that_is_farthest_off() -> None:
+    apart = replace(course_of(), settings=(0.05, -0.2))
+    told = next(each for each in followed.light_findings(apart, True) if each.part == "response")
+    assert told.significant
+    assert told.value == pytest.approx(np.expm1(-0.2))
+    assert "Setting 2 is 18.1% darker than setting 3" in told.sentence
+    assert "made to agree" in told.sentence
+    either = next(iter(followed.light_findings(replace(apart, drift=0.3), True)))
+    assert either.part == "light"
+    assert any(
+        "Or the light drifted" in each.sentence
+        for each in followed.light_findings(replace(apart, drift=0.3), True)
+    )
+    assert all(each.part == "light" for each in followed.light_findings(course_of(), True))
 
 
 def test_a_drift_is_taken_off_as_it_is() -> None:
@@ -160,15 +181,10 @@ def test_white_is_compared_with_white_less_the_black_next_to_each(monkeypatch: p
 
 def test_findings_say_what_was_corrected() -> None:
     drift, flicker = followed.light_findings(course_of(-0.1, 0.0), True)
-    assert (drift.part, drift.value, drift.std, drift.limit, drift.significant) == (
-        "light",
-        -0.1,
-        0.001,
-        0.006,
-        True,
-    )
+    assert (drift.part, drift.limit, drift.significant) == ("light", 0.006, True)
+    assert (drift.value, drift.std) == pytest.approx((np.expm1(-0.1), 0.001 * np.exp(-0.1)))
     assert (flicker.value, flicker.std, flicker.limit, flicker.significant) == (0.0, 0.001, 0.008, False)
-    assert "-10.0% (±0.1%)" in drift.sentence
+    assert "-9.5% (±0.1%)" in drift.sentence
     drift, flicker = followed.light_findings(course_of(0.0, 0.05), False)
     assert not drift.significant
     assert flicker.significant

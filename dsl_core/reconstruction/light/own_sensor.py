@@ -1,0 +1,132 @@
+"""Where the camera's values end and in which steps they come, as the frames of a scan show.
+
+A camera can saturate below the largest number of its bit depth, and files can have held fewer bits than the
+camera gives. Taken as calibrated, the first makes light out of what was cut off, the second noise that
+nobody expects.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dsl_core.model.fit import FitFinding
+from dsl_core.model.frames import FrameSource
+from dsl_core.model.plan import CapturePlan, Shot
+from dsl_core.model.rig import Sensor
+from dsl_core.optics.sensor import bayer_channels
+from dsl_core.reconstruction.light.setting_ratios import compared_rows
+
+Counts = NDArray[np.int64]
+
+#: Scan lines that are looked at, besides white and black.
+LINES = 8
+#: Where values end, as many pixels have the last one, and so many times as many as those next below it.
+PILE, TIMES = 20, 10.0
+#: The second of the three colours has at least this share of them: noise-free light piles up in one alone.
+OTHER_COLOUR = 0.1
+#: Share of the range that saturation is looked for in, and of the pile that may be above it: hot pixels.
+UPPER, ABOVE = 0.25, 0.01
+#: Values nearer to full scale than this share of it count as saturated anyway.
+MARGIN = 0.02
+#: A value that fewer pixels have says nothing about the step to the next one.
+SEEN = 5
+#: So many steps of one size are no chance.
+ALIKE = 10
+
+
+def own_sensor(source: FrameSource, sensor: Sensor) -> tuple[Sensor, tuple[FitFinding, ...]]:
+    """The sensor with the saturation and the noise of rounding that frames show, and what was found."""
+    counts = _counts(source, sensor)
+    ends_dn, step_dn = saturation_dn(counts, sensor), step_of(counts.sum(0))
+    findings = []
+    if ends_dn is not None:
+        findings.append(_ends(ends_dn, sensor))
+        sensor = sensor.model_copy(update={"saturation_dn": ends_dn})
+    if step_dn > sensor.step_dn:
+        findings.append(_steps(step_dn, sensor))
+        sensor = sensor.model_copy(update={"step_dn": step_dn})
+    return sensor, tuple(findings)
+
+
+def saturation_dn(counts: Counts, sensor: Sensor) -> int | None:
+    """The value at which frames end, from how often each occurs (3, values); None if unseen or at full scale.
+
+    Noise spreads light over neighbouring values, and colours differ: only where values end do many pixels of
+    several colours have the same one.
+    """
+    total = counts.sum(0)
+    low = int(sensor.black_level_dn + UPPER * (sensor.full_scale_dn - sensor.black_level_dn))
+    end = low + int(total[low:].argmax())
+    if end >= (1 - MARGIN) * sensor.full_scale_dn:
+        return None
+    pile, below = int(total[end]), total[max(end - max(end // 100, 8), 0) : end]
+    colours = np.sort(counts[:, end])
+    several = colours[1] >= OTHER_COLOUR * pile or np.count_nonzero(counts.any(1)) == 1
+    if pile < PILE or pile < TIMES * below.mean() or total[end + 1 :].sum() > ABOVE * pile or not several:
+        return None
+    return end
+
+
+def step_of(total: Counts) -> int:
+    """The usual distance between values that occur, from how often each does."""
+    values = np.flatnonzero(total >= SEEN)
+    if values.size < 2:
+        return 1
+    steps, weights = np.diff(values), total[values[:-1]]
+    order = np.argsort(steps)
+    middle = np.searchsorted(np.cumsum(weights[order]), weights.sum() / 2)
+    step = int(steps[order[middle]])
+    # Pictures converted from fewer bits have steps of two neighbouring sizes, such as 16 and 17.
+    return step if np.count_nonzero(np.abs(steps - step) <= 1) >= ALIKE else 1
+
+
+def _counts(source: FrameSource, sensor: Sensor) -> Counts:
+    """How many pixels of each colour have each value, (3, values)."""
+    most = 2**sensor.bit_depth
+    counts = np.zeros((3, most), np.int64)
+    for shot in _looked_at(source.plan):
+        frame = source.read(shot)
+        colours = bayer_channels(sensor.bayer, *frame.shape)
+        rows = compared_rows(frame.shape[0])
+        frame, colours = frame[rows], colours[rows]
+        for colour in np.unique(colours):
+            counts[colour] += np.bincount(np.minimum(frame[colours == colour], most - 1), minlength=most)
+    return counts
+
+
+def _looked_at(plan: CapturePlan) -> Iterator[Shot]:
+    lines = set(np.linspace(0, max(plan.spectral_count - 1, 0), LINES).astype(int).tolist())
+    for shot in plan.shots():
+        if shot.role in ("white", "black") or (shot.role == "spectral" and shot.pattern in lines):
+            yield shot
+
+
+def _ends(ends_dn: int, sensor: Sensor) -> FitFinding:
+    return FitFinding.judged(
+        "response",
+        "saturation of the camera",
+        1 - ends_dn / sensor.full_scale_dn,
+        "1",
+        MARGIN,
+        f"The camera's values end at {ends_dn} DN instead of {sensor.full_scale_dn} DN; pixels that reach it"
+        " count as saturated.",
+        "Check the camera's bit depth and gain, and what converts its frames; then repeat the calibration.",
+    )
+
+
+def _steps(step_dn: int, sensor: Sensor) -> FitFinding:
+    bits = sensor.bit_depth - round(np.log2(step_dn))
+    return FitFinding.judged(
+        "response",
+        "steps of the values",
+        float(step_dn),
+        "DN",
+        # Rounding then adds as much as there is noise.
+        max(float(np.sqrt(12)) * sensor.read_noise_dn, 1.5 * sensor.step_dn),
+        f"The frames' values come in steps of {step_dn} DN, as in pictures of {bits} bits; the camera has"
+        f" {sensor.bit_depth}. Deviations include that; faint light is lost.",
+        f"Store frames with all {sensor.bit_depth} bits of the camera, as raw files or 16-bit PNG or TIFF.",
+    )
