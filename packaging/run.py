@@ -58,9 +58,9 @@ CHECKS = (
     ("mypy", ("mypy",)),
     ("import contracts", ("lint-imports", "--no-cache")),
 )
-#: Tests of a file share what they prepare and stay together. More processes would cost too much memory.
-#: Files go out in the order of their names: by their numbers of tests, the longest would come last and alone.
-SHARED = ("-n", "logical", "--maxprocesses", "4", "--dist", "loadfile", "--no-loadscope-reorder")
+#: Each process gets its part in order, as tests of a file share what they prepare; one that is done takes
+#: tests from another, so that all end together. More processes would cost too much memory.
+SHARED = ("-n", "logical", "--maxprocesses", "4", "--dist", "worksteal")
 
 
 #: Tests that are quick and reach far, for a look between two changes; mypy keeps what it found.

@@ -96,7 +96,8 @@ def _stamp(rig: Rig, latency_ms: float, scene: str) -> str:
 
 def rig_stamp(rig: Rig, latency_ms: float) -> str:
     """A name for a rig as far as predictions depend on it, the same on machines that round otherwise."""
-    known = rig.model_dump(mode="json", exclude={"name", "provenance", "calibrations"})
+    # Without what nobody measured, so that a rig that could know more is still the same.
+    known = rig.model_dump(mode="json", exclude={"name", "provenance", "calibrations"}, exclude_none=True)
     return _digest(json.dumps([latency_ms, _rounded(known)]))
 
 

@@ -40,6 +40,9 @@ class Event(Generic[T]):
             listener(value)
 
 
+_COMPARED = (str, int, float, bool, tuple, frozenset)
+
+
 class Value(Generic[T]):
     """A value with an event; setting an equal value calls no listener."""
 
@@ -56,11 +59,8 @@ class Value(Generic[T]):
         """Change the value and call the listeners."""
         if value is self._value:
             return
-        # Arrays and data sets have no single result of ``==``: setting one always calls the listeners.
-        if (
-            isinstance(value, str | int | float | bool | tuple | frozenset | type(None))
-            and value == self._value
-        ):
+        # Arrays and data sets have no single result of ``==``: setting or replacing one calls the listeners.
+        if isinstance(value, _COMPARED) and isinstance(self._value, _COMPARED) and value == self._value:
             return
         self._value = value
         self.changed.emit(value)

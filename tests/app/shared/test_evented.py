@@ -41,3 +41,10 @@ def test_arrays_are_told_every_time() -> None:
     value.changed.connect(heard.append)
     value.set(np.zeros(2))
     assert len(heard) == 1
+
+
+def test_nothing_can_follow_an_array() -> None:
+    value: Value[object] = Value(np.zeros(2))
+    for each in (None, np.zeros(3), "text", np.zeros(2), 0):
+        value.set(each)
+        assert value.value is each
