@@ -19,11 +19,6 @@ from tests.cases.tiny_campaign import Ending, contents, give, kill_at
 BEGUN, INTERRUPTED = "bandpass/plane/scan.dsl/manifest.json", "bandpass/plane"
 
 
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Put the short one of the files that use the campaign last, so that no process waits for it."""
-    items.sort(key=lambda item: item.path.name == "test_whole_campaign.py")
-
-
 @dataclass(frozen=True)
 class Calibrated:
     """A calibrated campaign's folder, to be read only, its files when it was killed, and how it ended."""

@@ -37,6 +37,8 @@ STRETCHINGS, ROUNDS = 3, 4
 FIELD_ROUNDS = 2
 #: A shape that explains the lines so much worse than it first promised has gone astray.
 WORSE = 1.2
+#: One that explains fewer pixels than this share of those before has only left out what it cannot explain.
+KEPT = 0.98
 #: Factors by which a curve may be stretched, and how often the search among them is repeated, finer.
 STRETCHES, FINER = np.geomspace(0.4, 2.5, 25), 3
 #: Strengths of the pull towards the stretched curve, relative to the data's.
@@ -95,7 +97,10 @@ def fit_spread(
         if settled:
             break
     # Held-out squares of a degree of freedom: a field has few parameters.
-    if found.after - better.after < better.after * CLEARLY / better.pixels:
+    if (
+        better.pixels < KEPT * found.pixels
+        or found.after - better.after < better.after * CLEARLY / better.pixels
+    ):
         return found
     response = better.response.model_copy(update={"field": varies.field})
     return replace(better, response=response, changed=True, field=varies, before=found.before)
@@ -123,7 +128,8 @@ def _fit_curve(view: View, family: _Family) -> SpreadFit | None:
         if halves is None:
             return found
         better = _choose(halves, family, shapes=True)
-    return better if better.after < WORSE * first.after else found
+    kept = better.pixels >= KEPT * found.pixels
+    return better if kept and better.after < WORSE * first.after else found
 
 
 class _Family:

@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import torch
 
 from dsl_core.model.line_spread import LineSpread
 from dsl_core.model.rig import ProjectorResponse
+from dsl_core.model.spread_field import SpreadField
 from dsl_core.optics.lines.profile import zero_order_profile
+from dsl_core.optics.spread import fit
 from dsl_core.optics.spread.curves import density
 from dsl_core.optics.spread.equations import MIN_PIXELS, Normal, Peaks
-from dsl_core.optics.spread.fit import PULLS, STRETCHES, _choose, _Family, fit_spread
+from dsl_core.optics.spread.field import FieldFamily, FieldFit
+from dsl_core.optics.spread.fit import PULLS, STRETCHES, SpreadFit, _choose, _Family, fit_spread
 
 WIDTH_PX, STEP_PX, RUN = 5, 2, 8
 PLACES = np.arange(-48, 49) / 8
@@ -147,6 +152,41 @@ def test_half_of_the_pixels_judges_what_the_other_half_asks_for() -> None:
     assert wider.before == pytest.approx(cost / 2000)
     # Halves that contradict each other ask for nothing.
     assert not _choose([quadratic(1.2), quadratic(0.83)], family, shapes=False).changed
+
+
+@pytest.mark.parametrize(("pixels", "counts"), [(990, True), (970, False)])
+def test_a_field_that_leaves_pixels_out_explains_nothing(
+    pixels: int, counts: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    peaks, column = seen(KNOWN, runs=40)
+    width = torch.ones_like(column)
+    field = SpreadField(centre_px=(300.0, 100.0), half_px=(300.0, 100.0), coefficients=(0.0,) * 6)
+    fields = iter([FieldFit(field, np.eye(6), width, 0.01)] * 2)
+    curves = iter(
+        [SpreadFit(KNOWN, False, 0.01, 1.0, after, n, None) for after, n in ((1, 1000), (0.8, pixels))]
+    )
+    matter = iter([True, False])
+    monkeypatch.setattr(fit, "_fit_curve", lambda view, family: next(curves))
+    monkeypatch.setattr(FieldFamily, "fit", lambda *given: next(fields))
+    monkeypatch.setattr(FieldFit, "matters", lambda *given: next(matter))
+    found = fit.fit_spread(peaks, column, KNOWN, torch.stack([column, column]))
+    assert found is not None
+    assert (found.field is not None) == found.changed == counts
+    assert found.pixels == (pixels if counts else 1000)
+
+
+@pytest.mark.parametrize(("pixels", "counts"), [(990, True), (970, False)])
+def test_a_shape_that_leaves_pixels_out_explains_nothing(
+    pixels: int, counts: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    peaks, column = seen(KNOWN, runs=40)
+    one = SpreadFit(KNOWN, False, 0.01, 1.0, 1.0, 1000)
+    other = SpreadFit(TAILED, True, 0.01, 1.0, 0.8, 1000)
+    last = replace(other, pixels=pixels)
+    chosen = iter([one, one, other, *[last] * fit.ROUNDS])
+    monkeypatch.setattr(fit, "_choose", lambda halves, family, shapes: next(chosen))
+    found = fit.fit_spread(peaks, column, KNOWN)
+    assert found is (last if counts else one)
 
 
 def test_pulls_are_decades_and_stretches_reach_from_two_fifths_to_their_inverse() -> None:
