@@ -95,7 +95,7 @@ def test_with_nothing_foreign_the_light_is_that_of_the_usual_renderer(kind: str,
     The usual renderer leaves out first orders where the zero order would come from beyond the frame, and
     ends sharply at the frame's top and bottom.
     """
-    usual, plain = twin("", scene=scene), twin("plain", scene=scene)
+    usual, plain = twin("", "48x32", scene=scene), twin("plain", "48x32", scene=scene)
     ours, theirs = (picture(world, pattern(world, kind)) for world in (plain, usual))
     lit = (theirs > 1e-6 * theirs.max()) & inside_rows(usual).reshape(theirs.shape)
     ours, theirs = ours[lit], theirs[lit]
