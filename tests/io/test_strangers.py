@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import json
 import os
+import re
 import sys
 import time
 from pathlib import Path
@@ -57,6 +58,26 @@ def test_a_changed_file_is_read_or_refused(sample: Sample, tmp_path: Path) -> No
         assert "\n" not in told.strip()
 
     read_or_refused()
+
+
+@pytest.mark.parametrize(
+    ("sample", "part", "instead"),
+    [
+        ("scan: frames/zarr.json", rb"(?s).*", b"5"),
+        ("result: reflectance/zarr.json", rb'"chunk_shape":\s*\[\s*1,', b'"chunk_shape": [0,'),
+        ("campaign: accepted", rb"(?s).*", b'{"name": "' + b"x" * 300 + b'", "title": "T", "record": {}}'),
+        ("campaign: accepted", rb"(?s).*", b'{"name": "\\u0000", "title": "T", "record": {}}'),
+    ],
+)
+def test_what_was_found_by_chance_is_refused(
+    sample: str, part: bytes, instead: bytes, tmp_path: Path
+) -> None:
+    found = next(each for each in SAMPLES if each.name == sample)
+    found.make(tmp_path)
+    path = tmp_path / found.file
+    path.write_bytes(re.sub(part, lambda _: instead, path.read_bytes(), count=1))
+    with pytest.raises(DslError, match=r"\. |again|Restore|Correct"):
+        found.read(tmp_path)
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="pipes have no place in folders there")

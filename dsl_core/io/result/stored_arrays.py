@@ -16,7 +16,7 @@ from xarray.core import indexing
 from dsl_core.errors import StoreError
 
 #: What zarr, its codecs and the file system raise for damaged chunks.
-FAILURES = (OSError, ValueError, KeyError, RuntimeError, TypeError)
+FAILURES = (OSError, ValueError, KeyError, RuntimeError, TypeError, ArithmeticError)
 #: An array may take this much memory, or that many times its file: few bytes that unpack to more are a trap.
 MOST_BYTES = 1 << 30
 MOST_RATIO = 200

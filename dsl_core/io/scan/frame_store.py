@@ -56,6 +56,8 @@ class FrameStore:
         """Raise `StoreError` unless the metadata on disk describe exactly this array."""
         try:
             found = read_json(self._metadata_path)
+            if not isinstance(found, dict):
+                raise ValueError("not an object")
         except (OSError, ValueError) as error:
             raise StoreError(
                 f"{self._metadata_path} is missing or damaged, so the frames cannot be read."

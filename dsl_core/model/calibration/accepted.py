@@ -14,6 +14,8 @@ from dsl_core.model.figure import Figure, failures
 
 #: Name of the attribute of a result that holds what its rig's calibrations missed, as JSON.
 MISSED_ATTRIBUTE = "calibration_missed"
+#: Names are those of files.
+LONGEST = 100
 
 
 class CalibrationNote(Record):
@@ -73,7 +75,7 @@ class AcceptedCalibration(Record):
     """
 
     schema_version: Literal[1] = 1
-    name: str
+    name: str = Field(min_length=1, max_length=LONGEST, pattern=r"^[^/\\\x00]+$")
     title: str
     accepted: str = ""
     captured: str = ""
