@@ -169,9 +169,10 @@ def read_nodes(path: Path) -> dict[str, Any]:
         return {
             name: node.real() if node.isReal() or node.isInt() else node.mat() for name, node in nodes.items()
         }
-    except (cv2.error, SystemError) as error:
+    except (cv2.error, SystemError, UnicodeDecodeError) as error:
         raise CalibrationError(
             f"{path} is not a calibration that OpenCV can read: it is cut off, or not OpenCV's XML or YAML."
+            " Export the calibration again."
         ) from error
 
 
