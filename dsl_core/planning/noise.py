@@ -11,7 +11,7 @@ from torch import Tensor
 
 from dsl_core.model.plan import CapturePlan
 from dsl_core.model.rig import Rig, Sensor
-from dsl_core.optics.sensor import bayer_channels
+from dsl_core.optics.sensor import bayer_channels, raw_variance
 from dsl_core.reconstruction.hdr import setting_gains_ms
 
 #: As the merger of brackets: a raw value counts as saturated this close to full scale.
@@ -42,7 +42,8 @@ class Bracket:
 
     def _floor(self, black_dn: Tensor) -> Tensor:
         """Read noise, rounding and the shot noise of black."""
-        return self.sensor.read_noise_dn**2 + 1 / 12 + black_dn / self.sensor.electrons_per_dn
+        dark = float(raw_variance(self.sensor, np.zeros(())))
+        return dark + black_dn / self.sensor.electrons_per_dn
 
     def information(self, radiance: Tensor, black: Tensor) -> Tensor:
         """Inverse variance of each setting's own estimate, (settings, ...); zero where saturated."""

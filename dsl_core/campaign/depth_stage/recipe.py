@@ -153,6 +153,7 @@ class DepthStageRecipe(Recipe[DepthStageCalibration]):
             exposures=sum(bench.scan_of(step).plan.shot_count for step in steps),
         )
         rig, apart_px = with_lateral_colour(bench.rig, seen)
+        # Focus changes with distance: what the middle of the range shows is off the least.
         response = seen[len(seen) // 2].response
         rig = rig.model_copy(update={"projector_response": response})
         found = calibrate_depth_stage(rig, data, progress, self.grid)
