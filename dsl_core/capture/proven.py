@@ -9,7 +9,7 @@ from typing import NoReturn
 
 from dsl_core.capture.diagnosis import Diagnosis
 from dsl_core.capture.exposure import ShotTaker
-from dsl_core.capture.proof.finding import Finding, Verdict
+from dsl_core.capture.proof.finding import Finding, Light, Verdict
 from dsl_core.capture.proof.verifier import FrameProof
 from dsl_core.errors import Cancelled, DeviceError
 from dsl_core.model.frames import Frame, FrameSink, FrameSource
@@ -93,12 +93,12 @@ class ProvenShots:
             raise error
         self._sink.withdraw(untold)
         first, last = untold[0].index, untold[-1].index
-        which, them = f"{len(untold)} frames, {first} to {last}, show", "them"
+        which, them = f"{len(untold)} frames, {first} to {last},", "them"
         if len(untold) == 1:
-            which, them = f"Frame {first} shows", "it"
+            which, them = f"Frame {first}", "it"
         raise PictureError(
-            f"{error} {which} too little to be judged and may be wrong too; the resumed scan captures {them}"
-            " again."
+            f"{error} {which} could not be judged in full and may be wrong too; the resumed scan captures"
+            f" {them} again."
         ) from error
 
     def _take(self, shot: Shot) -> None:
@@ -116,8 +116,9 @@ class ProvenShots:
             self._failures += 1
         elif found.verdict is Verdict.RIGHT:
             self._failures = 0
+        if _is_sure(found):
             self._untold.clear()
-        elif self._is_alone(shot):
+        elif not found.is_wrong and self._is_alone(shot):
             self._untold.append(shot)
         self._correct(found, self._proof)
         if self._failures >= FAILURES and not self._is_late:
@@ -134,16 +135,18 @@ class ProvenShots:
         second = self._taker.take(doubt.shot, 1, SETTLE_MS[0], twice=True)
         differs = proof.differ(frame.pixels, second.pixels)
         found = proof.judge(doubt.shot, second.pixels)
-        was_torn = doubt.verdict is Verdict.RIGHT and not found.is_doubtful
-        if differs or was_torn:
+        is_cured = doubt.verdict is Verdict.RIGHT and not found.is_doubtful
+        if differs or is_cured:
             self._failures += 1
             self.corrected += 1
+            was_torn = is_cured and doubt.light is not Light.STEP
             reason = (
                 "a few rows of it showed another pattern" if was_torn else "it was unlike those before it"
             )
             return replace(second, corrected=reason), found
-        if self._doubts % CONTROL_EVERY == 0:
+        if found.light is Light.STEP or self._doubts % CONTROL_EVERY == 0:
             self._require_control(proof)
+            proof.believe_light(doubt.shot)
         self._doubts += 1
         return second, found
 
@@ -243,3 +246,8 @@ class ProvenShots:
                 f" {found.seen}. {reason} Frames before it are saved. If the pictures are right all the same,"
                 " resume without checking that the scene has not moved."
             )
+
+
+def _is_sure(found: Finding) -> bool:
+    """Whether a picture shows its pattern in its usual light: all is well then, and was before it."""
+    return found.verdict is Verdict.RIGHT and found.light is Light.USUAL

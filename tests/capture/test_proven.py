@@ -144,7 +144,7 @@ def test_pictures_at_the_end_that_cannot_be_judged_are_withdrawn_where_a_control
     sink = MemorySink(scene.plan)
     runner, spoiled = _run(scene, sink, PatternFault(kind, 31))
     last = scene.plan.shot_count - 1
-    said = f"captured once more as a control.*{last + 1 - blind} frames, {blind} to {last}, show too little"
+    said = f"captured once more as a control.*{last + 1 - blind} frames, {blind} to {last}, could not be"
     with pytest.raises(DeviceError, match=said):
         runner.run()
     assert spoiled.wrong

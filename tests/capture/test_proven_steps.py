@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from dsl_core.capture.proof.finding import Finding, Verdict
+from dsl_core.capture.proof.finding import Finding, Light, Verdict
 from dsl_core.capture.proven import PictureError, ProvenShots
 from dsl_core.errors import Cancelled, DeviceError
 from dsl_core.model.frames import Frame
@@ -35,6 +35,7 @@ class Bench:
         self.kept: list[int] = []
         self.withdrawn: list[int] = []
         self._tell, self._same, self._differs = list(tell), is_as_before, differs
+        self.believed: list[int] = []
         self.first_setting, self.token = 0, CancelToken()
         self.cause = ""
         parts: Any = self
@@ -59,6 +60,9 @@ class Bench:
     def write(self, shot: Shot, frame: Frame) -> None:
         self.written[shot.index] = frame.corrected
 
+    def believe_light(self, shot: Shot) -> None:
+        self.believed.append(shot.index)
+
     def withdraw(self, shots: list[Shot]) -> None:
         self.withdrawn = [shot.index for shot in shots]
 
@@ -74,6 +78,10 @@ class Bench:
 
 
 def is_right(shot: Shot) -> Finding:
+    return Finding(shot, Verdict.RIGHT, light=Light.USUAL)
+
+
+def of_unknown_light(shot: Shot) -> Finding:
     return Finding(shot, Verdict.RIGHT)
 
 
@@ -91,6 +99,10 @@ def doubtful(shot: Shot) -> Finding:
 
 def frayed(shot: Shot) -> Finding:
     return Finding(shot, Verdict.RIGHT, is_doubtful=True)
+
+
+def stepped(shot: Shot) -> Finding:
+    return Finding(shot, Verdict.RIGHT, is_doubtful=True, light=Light.STEP)
 
 
 CONTROLS = [(0, 1, 100.0, True), (4, 1, 100.0, True)]
@@ -175,6 +187,28 @@ def test_a_right_picture_ends_a_run_of_wrong_ones() -> None:
     assert bench.shots._untold == []
 
 
+def test_a_right_picture_of_unknown_light_may_still_be_too_dark() -> None:
+    bench = Bench(of_unknown_light)
+    bench.shots._failures = 1
+    for shot in (CODE, SHOTS[12], LINE):
+        bench.shots.take(shot)
+    assert bench.shots._failures == 0
+    assert bench.shots._untold == [SHOTS[12], LINE]
+
+
+def test_light_that_has_changed_is_believed_after_a_control_alone() -> None:
+    bench = Bench(stepped)
+    bench.shots._doubts = 3
+    bench.shots.take(LINE)
+    assert bench.taken == [(13, 0, 0.0, False), (13, 1, 100.0, True), *CONTROLS]
+    assert (bench.written, bench.believed) == ({13: ""}, [13])
+    changed = Bench(of_unknown_light, stepped, is_as_before=False)
+    changed.shots.take(SHOTS[12])
+    with pytest.raises(PictureError, match=r"Frame 12 could not be judged"):
+        changed.shots.take(LINE)
+    assert (changed.withdrawn, changed.written) == ([12], {12: ""})
+
+
 def test_only_pictures_that_are_judged_by_themselves_are_untold() -> None:
     bench = Bench(untold)
     for shot in (CODE, LINE, SHOTS[10]):
@@ -202,6 +236,7 @@ def test_a_doubtful_picture_is_taken_a_second_time_and_every_eighth_with_a_contr
         ((doubtful, doubtful), True, "it was unlike those before it"),
         ((frayed, is_right), False, "a few rows of it showed another pattern"),
         ((frayed, frayed), False, ""),
+        ((stepped, is_right), False, "it was unlike those before it"),
         ((doubtful, untold), False, ""),
     ],
 )
@@ -226,13 +261,13 @@ def test_what_could_not_be_told_is_withdrawn_when_a_control_has_changed() -> Non
     for shot in SHOTS[12:14]:
         bench.shots.take(shot)
     with pytest.raises(
-        PictureError, match=r"no longer shows its pattern.*2 frames, 12 to 13, show too little"
+        PictureError, match=r"no longer shows its pattern.*2 frames, 12 to 13, could not be judged"
     ):
         bench.shots.conclude()
     assert bench.withdrawn == [12, 13]
     one = Bench(untold, is_as_before=False)
     one.shots.take(LINE)
-    with pytest.raises(PictureError, match=r"Frame 13 shows too little.* captures it again"):
+    with pytest.raises(PictureError, match=r"Frame 13 could not be judged.* captures it again"):
         one.shots.conclude()
     calm = Bench(untold)
     calm.shots.take(LINE)

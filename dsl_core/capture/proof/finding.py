@@ -23,6 +23,14 @@ class Verdict(StrEnum):
     OTHER = "another picture"
 
 
+class Light(StrEnum):
+    """What a picture says of the light that its pattern gives."""
+
+    UNTOLD = "cannot tell"
+    USUAL = "as in the pictures before"
+    STEP = "unlike the pictures before"
+
+
 _SEEN = {
     Verdict.LATE: "it still shows the pattern before",
     Verdict.REPEATED: "it is the picture before, pixel by pixel",
@@ -51,8 +59,8 @@ class Finding:
 
     ``again`` are the shots to take again, in the order of the plan: more than one where only together they
     are known to be wrong. ``detail`` says what was seen in more words, such as which other shot. A picture
-    ``is_doubtful`` if it cannot be told and is unlike its neighbours, or if a few rows at its upper or lower
-    end do not show its pattern; a second picture says if it was right.
+    ``is_doubtful`` if it cannot be told and is unlike its neighbours, if a few rows at its upper or lower
+    end do not show its pattern, or if its ``light`` has changed; a second picture says if it was right.
     """
 
     shot: Shot
@@ -60,6 +68,7 @@ class Finding:
     again: tuple[Shot, ...] = ()
     detail: str = ""
     is_doubtful: bool = False
+    light: Light = Light.UNTOLD
 
     @property
     def is_wrong(self) -> bool:

@@ -12,8 +12,9 @@ from numpy.typing import NDArray
 
 from dsl_core.capture.proof.contest import Contest
 from dsl_core.capture.proof.control import choose_pairs, is_same
-from dsl_core.capture.proof.finding import Finding, Verdict
+from dsl_core.capture.proof.finding import Finding, Light, Verdict
 from dsl_core.capture.proof.first_code import FirstCode
+from dsl_core.capture.proof.light_steps import LightSteps
 from dsl_core.capture.proof.neighbours import LineNeighbours
 from dsl_core.capture.proof.prediction import (
     APART,
@@ -86,6 +87,7 @@ class FrameProof:
         #: What the last picture said of the pairs of the first code, one by one.
         self.reviewed: list[Finding] = []
         self._light: dict[tuple[str, int], deque[float]] = {}
+        self._steps = LightSteps()
         self._scale: dict[int, float] = {}
         self._profiles = Recent[Floats | None]()
         self._rescaled = Recent[Expected]()
@@ -118,6 +120,10 @@ class FrameProof:
     def differ(self, one: NDArray[np.uint16], other: NDArray[np.uint16]) -> bool:
         """Whether two pictures of one shot of lines, as raw mosaics, show different patterns."""
         return self._neighbours.differ(self._raster.take(one), self._raster.take(other))
+
+    def believe_light(self, shot: Shot) -> None:
+        """Take the light of a shot for usual from now on, though it was unlike the pictures before."""
+        self._steps.believe(shot)
 
     def controls(self) -> tuple[Shot, ...]:
         """Shots that show whether devices and scene are as they were; none before the first code."""
@@ -358,10 +364,14 @@ class FrameProof:
         if any(contest.is_torn for contest in told.values()):
             return Finding(shot, Verdict.TORN, (shot,))
         found = self._judge_exposure(shot, share)
-        if not found.is_wrong and any(contest.is_doubtful for contest in told.values()):
-            found = replace(found, is_doubtful=True)
+        if found.is_wrong:
+            return found
+        light = self._steps.judge(shot, share, contests.get(Verdict.DARK))
+        is_frayed = any(contest.is_doubtful for contest in told.values())
+        if Verdict.LATE in told:
+            return replace(found, is_doubtful=is_frayed or light is Light.STEP, light=light)
         # That a picture is neither white nor black does not say that it is the one wanted.
-        return found if Verdict.LATE in told or found.is_wrong else Finding(shot, Verdict.UNTOLD)
+        return Finding(shot, Verdict.UNTOLD, is_doubtful=light is Light.STEP, light=light)
 
     def _named(self, shot: Shot, lost: dict[Verdict, Contest], shown: Shot | None) -> Finding:
         """What a picture shows that is not the one wanted, from the rivals that won and the line it shows."""

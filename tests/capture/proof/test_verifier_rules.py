@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from dsl_core.capture.proof.contest import Contest
-from dsl_core.capture.proof.finding import Finding, Verdict
+from dsl_core.capture.proof.finding import Finding, Light, Verdict
 from dsl_core.capture.proof.prediction import Lit
 from dsl_core.capture.proof.raster import Counts
 from dsl_core.capture.proof.verifier import FrameProof
@@ -157,10 +157,27 @@ def test_what_a_picture_is_follows_from_its_contests(
 
 def test_a_few_odd_rows_make_a_picture_doubtful_unless_it_is_wrong() -> None:
     doubtful = {Verdict.LATE: WON, Verdict.OTHER: DOUBTFUL}
-    assert proof()._decide(LINE, doubtful, 0.8, nothing) == Finding(LINE, Verdict.RIGHT, is_doubtful=True)
+    assert proof()._decide(LINE, doubtful, 0.8, nothing) == Finding(
+        LINE, Verdict.RIGHT, is_doubtful=True, light=Light.USUAL
+    )
     assert not proof()._decide(LINE, doubtful, 0.1, nothing).is_doubtful
     only = proof()._decide(LINE, {Verdict.OTHER: DOUBTFUL}, 0.8, nothing)
     assert only.verdict is Verdict.UNTOLD
+
+
+@pytest.mark.parametrize(
+    ("contests", "verdict"), [({Verdict.LATE: WON}, Verdict.RIGHT), ({}, Verdict.UNTOLD)]
+)
+def test_a_picture_of_other_light_than_those_before_is_doubtful(
+    contests: dict[Verdict, Contest], verdict: Verdict
+) -> None:
+    judge = proof()
+    for _ in range(3):
+        assert judge._decide(LINE, contests, 0.8, nothing).light is Light.USUAL
+    found = judge._decide(LINE, contests, 1.2, nothing)
+    assert (found.verdict, found.light, found.is_doubtful) == (verdict, Light.STEP, True)
+    judge.believe_light(LINE)
+    assert judge._decide(LINE, contests, 1.2, nothing).light is Light.USUAL
 
 
 @pytest.mark.parametrize(
