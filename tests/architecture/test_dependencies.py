@@ -22,6 +22,7 @@ DISTRIBUTIONS = {
     "PySide6": "pyside6-essentials",
     "cv2": "opencv-contrib-python-headless",
     "serial": "pyserial",
+    "yaml": "pyyaml",
     "zaber_motion": "zaber-motion",
     # The part of PySide that knows which objects are still alive.
     "shiboken6": "pyside6-essentials",

@@ -1,30 +1,27 @@
 """Lenses and pose of camera and projector from files of any program, by the names that are in use.
 
-XML and YAML of OpenCV, and JSON of nested lists or of OpenCV. Names are compared without case, underscores
+XML, YAML and JSON, of OpenCV or with nested lists. Names are compared without case, underscores
 and what they are nested in, so that ``Camera.K``, ``cam_K`` and ``camera_matrix`` are the same. Distortion
 that is absent is zero; a rotation of three numbers is a vector of Rodrigues.
 """
 
 from __future__ import annotations
 
-import json
 import re
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import ValidationError
 
 from dsl_core.errors import CalibrationError
-from dsl_core.io.published.stereo import Size, Stereo, five_coefficients, lens_of, read_nodes
-from dsl_core.io.reading import read_bounded
+from dsl_core.io.published.stereo import Size, Stereo, five_coefficients, lens_of
+from dsl_core.io.published.tree_file import read_nodes
 from dsl_core.model.base import problems_in_words
 from dsl_core.model.geometry import Pose
 from dsl_core.model.rig import Provenance, Rig
 
-_MOST_BYTES, _MOST_NODES = 1 << 20, 2000
 _CAMERA, _PROJECTOR = "(?:camera|cam|c|1)", "(?:projector|proj|prj|p|2)"
 _MATRIX = "(?:matrix|mtx|int|intrinsics?|intrinsicmatrix|k|m|cameramatrix)"
 _DISTORTION = "(?:distortion|dist|distcoeffs?|distortioncoefficients|coeffs|kc|d)"
@@ -59,8 +56,11 @@ def load_any_stereo(
     Raises `CalibrationError` that says which parts are missing, what they may be called, and which names the
     file has.
     """
-    nodes = _json_nodes(path) if path.suffix.lower() == ".json" else read_nodes(path)
-    numbers = {name: found for name, value in nodes.items() if (found := _numbers(value)) is not None}
+    nodes = read_nodes(path)
+    found = {
+        name: np.asarray(value, np.float64).ravel() for name, value in nodes.items() if value is not None
+    }
+    numbers = {name: values for name, values in found.items() if np.isfinite(values).all()}
     names = {part: name for part in _NAMES if (name := _name_of(part, numbers)) is not None}
     lacking = [part for part in _NAMES if part not in names and not part.endswith("distortion")]
     if lacking:
@@ -130,33 +130,3 @@ def _rotation(values: NDArray[np.float64]) -> NDArray[np.float64]:
     import cv2
 
     return values.reshape(3, 3) if values.size == 9 else np.asarray(cv2.Rodrigues(values)[0], np.float64)
-
-
-def _numbers(value: Any) -> NDArray[np.float64] | None:
-    """All numbers of a matrix in a row; None for what is none, or not finite."""
-    try:
-        found = np.asarray(value, np.float64).ravel()
-    except (TypeError, ValueError):
-        return None
-    return found if found.size and np.isfinite(found).all() else None
-
-
-def _json_nodes(path: Path) -> dict[str, Any]:
-    try:
-        content = json.loads(read_bounded(path, _MOST_BYTES))
-    except (OSError, ValueError, RecursionError) as error:
-        raise CalibrationError(f"{path} is not JSON that can be read ({error}). Export it again.") from error
-    nodes: dict[str, Any] = {}
-    _flatten(content, "", nodes, 0)
-    return nodes
-
-
-def _flatten(value: Any, prefix: str, into: dict[str, Any], depth: int) -> None:
-    """Values by the names they are nested in; matrices of OpenCV are their data."""
-    if isinstance(value, dict) and "data" in value:
-        value = value["data"]
-    if isinstance(value, dict) and depth < 5 and len(into) < _MOST_NODES:
-        for key, inner in value.items():
-            _flatten(inner, f"{prefix}.{key}" if prefix else str(key), into, depth + 1)
-    elif prefix:
-        into[prefix] = value

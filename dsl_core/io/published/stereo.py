@@ -9,7 +9,6 @@ coordinates, ``x_p = R x_c + t``; the unit of ``t`` is that of the calibration b
 from __future__ import annotations
 
 import difflib
-import re
 from pathlib import Path
 from typing import Any, Literal
 
@@ -18,7 +17,7 @@ from numpy.typing import NDArray
 from pydantic import ValidationError
 
 from dsl_core.errors import CalibrationError, StoreError
-from dsl_core.io.reading import read_bounded
+from dsl_core.io.published.tree_file import Node, read_nodes
 from dsl_core.io.staging import staged
 from dsl_core.model.base import Record, problems_in_words
 from dsl_core.model.calibration.geometry import GeometryCalibration
@@ -26,11 +25,6 @@ from dsl_core.model.geometry import Lens, Pose
 
 Dialect = Literal["dsl", "procam", "moreno-taubin"]
 Size = tuple[int, int]
-#: A calibration takes a few kilobytes, is nested three deep, and holds matrices of at most 14 numbers.
-_MOST_BYTES, _MOST_NESTED, _MOST_INDENT = 1 << 20, 20, 200
-#: What begins or ends a level in XML, YAML and JSON; declarations, comments and empty elements do neither.
-_NESTING = re.compile(rb"</?[A-Za-z_][^<>]*(?<!/)>|[\[\]{}]")
-_DECLARED = re.compile(rb"(?:rows|cols)\W{1,9}([0-9]+)")
 
 _PROCAM = {
     "camera matrix": "cam_int",
@@ -155,47 +149,7 @@ def fundamental_matrix(stereo: Stereo) -> NDArray[np.float64]:
     return fundamental / last if last else fundamental
 
 
-def read_nodes(path: Path) -> dict[str, Any]:
-    """Every number and matrix at the top of the file, by name."""
-    import cv2
-
-    if not path.is_file():
-        raise CalibrationError(f"{path} does not exist. Give the path of the calibration's XML or YAML file.")
-    _require_modest(path)
-    try:
-        file = cv2.FileStorage(str(path), cv2.FILE_STORAGE_READ)
-        names = file.root().keys()
-        nodes = {name: file.getNode(name) for name in names}
-        return {
-            name: node.real() if node.isReal() or node.isInt() else node.mat() for name, node in nodes.items()
-        }
-    except (cv2.error, SystemError, UnicodeDecodeError) as error:
-        raise CalibrationError(
-            f"{path} is not a calibration that OpenCV can read: it is cut off, or not OpenCV's XML or YAML."
-            " Export the calibration again."
-        ) from error
-
-
-def _require_modest(path: Path) -> None:
-    """Refuse what would crash OpenCV: it nests without limit, and allocates whatever is declared."""
-    try:
-        text = read_bounded(path, _MOST_BYTES)
-    except OSError as error:
-        raise CalibrationError(f"{path} cannot be read ({error.strerror or error}).") from error
-    depth = deepest = 0
-    for token in _NESTING.findall(text):
-        depth += 1 if token[:1] in b"[{" or (token[:1] == b"<" and token[1:2] != b"/") else -1
-        deepest = max(deepest, depth)
-    indented = max((len(found) for found in re.findall(rb"^[ \t-]+", text, re.MULTILINE)), default=0)
-    counts = [number for number in _DECLARED.findall(text) if len(number) > 4]
-    if deepest > _MOST_NESTED or indented > _MOST_INDENT or counts:
-        raise CalibrationError(
-            f"{path} is not the calibration of a camera and a projector: it is nested too deeply, or declares"
-            " matrices that are too large. Export the calibration again."
-        )
-
-
-def _dialect_of(nodes: dict[str, Any], path: Path) -> Dialect:
+def _dialect_of(nodes: dict[str, Node], path: Path) -> Dialect:
     """The dialect all of whose nodes are there; otherwise say what the closest one lacks."""
     lacking = {d: [n for n in names.values() if nodes.get(n) is None] for d, names in _NODES.items()}
     best: Dialect = min(lacking, key=lambda d: len(lacking[d]))
@@ -203,15 +157,18 @@ def _dialect_of(nodes: dict[str, Any], path: Path) -> Dialect:
         return best
     problems = []
     for name in lacking[best]:
+        if name in nodes:
+            problems.append(f"{name} is not a number or a complete matrix")
+            continue
         near = difflib.get_close_matches(name, set(nodes) - set(_NODES[best].values()), n=1, cutoff=0.6)
         problems.append(f"{name} is missing" + (f" (is {near[0]!r} misnamed?)" if near else ""))
     raise CalibrationError(
         f"{path} is not a complete calibration in a known dialect; the closest is {best!r}:"
-        f" {', '.join(problems)}. Correct the names, or export the calibration again."
+        f" {', '.join(problems)}. Correct the file, or export the calibration again."
     )
 
 
-def _shaped(nodes: dict[str, Any], node: str, part: str, path: Path) -> NDArray[np.float64]:
+def _shaped(nodes: dict[str, Node], node: str, part: str, path: Path) -> NDArray[np.float64]:
     values = np.asarray(nodes[node], np.float64)
     if part == "translation":
         values = values.ravel()
@@ -248,7 +205,7 @@ def lens_of(matrix: NDArray[np.float64], distortion: NDArray[np.float64], size_p
     )
 
 
-def _camera_size(nodes: dict[str, Any], given: Size | None, path: Path) -> Size:
+def _camera_size(nodes: dict[str, Node], given: Size | None, path: Path) -> Size:
     stored = nodes.get("img_shape")
     if stored is None:
         if given is None:
@@ -270,6 +227,6 @@ def _camera_size(nodes: dict[str, Any], given: Size | None, path: Path) -> Size:
     return size
 
 
-def _rms(nodes: dict[str, Any]) -> float | None:
+def _rms(nodes: dict[str, Node]) -> float | None:
     value = nodes.get("rms", nodes.get("stereo_error"))
     return float(value) if isinstance(value, int | float) else None

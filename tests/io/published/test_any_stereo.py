@@ -88,5 +88,5 @@ def test_what_is_missing_or_wrong_is_named(tmp_path: Path) -> None:
     with pytest.raises(CalibrationError, match="must be orthonormal and right-handed"):
         load_any_stereo(_json(tmp_path, mirrored), CAMERA, PROJECTOR)
     (tmp_path / "c.json").write_text('{"cam_K": [', encoding="utf-8")
-    with pytest.raises(CalibrationError, match="is not JSON that can be read"):
+    with pytest.raises(CalibrationError, match=r"c\.json is not a calibration that can be read"):
         load_any_stereo(tmp_path / "c.json", CAMERA, PROJECTOR)

@@ -100,8 +100,8 @@ def _edited(tmp_path: Path, old: str, new: str, dialect: Dialect = "dsl") -> Pat
     [
         ("rotation", "rotaton", r"rotation is missing \(is 'rotaton' misnamed\?\)"),
         ("cam_int", "kamera", r"'(dsl|procam)': .*cam_int is missing"),
-        ("<rows>3</rows>", "<rows>1</rows>", "not a calibration that OpenCV can read|has shape"),
-        ("</opencv_storage>", "", "not a calibration that OpenCV can read"),
+        ("<rows>3</rows>", "<rows>1</rows>", "rotation is not a number or a complete matrix"),
+        ("</opencv_storage>", "", "it is cut off or damaged"),
     ],
 )
 def test_wrong_files_name_the_node(tmp_path: Path, old: str, new: str, says: str) -> None:
