@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+from collections import deque
 from collections.abc import Collection
 from dataclasses import replace
 from typing import NoReturn
@@ -22,6 +23,8 @@ SETTLE_MS = (100.0, 300.0, 900.0)
 FAILURES = 2
 #: Of doubtful pictures that come out the same again, every so many are followed by a control.
 CONTROL_EVERY = 8
+#: A change may begin a little before it shows: so many pictures before one that stays wrong are withdrawn.
+JUST_BEFORE = 8
 #: On resuming, so many shots before a missing one are captured again where nothing can be told of them.
 MOST_UNTOLD = 32
 _log = logging.getLogger(__name__)
@@ -48,6 +51,7 @@ class ProvenShots:
         self._failures = 0
         self._is_late = False
         self._untold: list[Shot] = []
+        self._recent: deque[Shot] = deque(maxlen=JUST_BEFORE)
         self._doubts = 0
         #: Shots that were taken again because a picture did not show their pattern.
         self.corrected = 0
@@ -66,7 +70,7 @@ class ProvenShots:
 
         Raises `DeviceError` when it does not show its pattern however often it is taken, `StoreError` when it
         cannot be saved, `Cancelled` when someone requested the end. What could not be judged since a picture
-        last showed its pattern is then withdrawn: it may have been wrong already.
+        last showed its pattern, and the pictures just before, are then withdrawn: they may be wrong already.
         """
         try:
             self._take(shot)
@@ -88,17 +92,19 @@ class ProvenShots:
 
     def _withdraw(self, error: PictureError) -> NoReturn:
         """Remove the pictures that may be wrong for the same reason, and say so."""
-        untold, self._untold = self._untold, []
-        if not untold:
+        withdrawn = sorted({*self._untold, *self._recent}, key=lambda shot: shot.index)
+        self._untold.clear()
+        self._recent.clear()
+        if not withdrawn:
             raise error
-        self._sink.withdraw(untold)
-        first, last = untold[0].index, untold[-1].index
-        which, them = f"{len(untold)} frames, {first} to {last},", "them"
-        if len(untold) == 1:
+        self._sink.withdraw(withdrawn)
+        first, last = withdrawn[0].index, withdrawn[-1].index
+        which, them = f"{len(withdrawn)} frames between {first} and {last}", "them"
+        if len(withdrawn) == 1:
             which, them = f"Frame {first}", "it"
         raise PictureError(
-            f"{error} {which} could not be judged in full and may be wrong too; the resumed scan captures"
-            f" {them} again."
+            f"{error} {which}, captured just before or not judged in full, may be wrong too; the resumed scan"
+            f" captures {them} again."
         ) from error
 
     def _take(self, shot: Shot) -> None:
@@ -112,6 +118,7 @@ class ProvenShots:
         if shot not in found.again:
             self._sink.write(shot, frame)
             self._diagnosis.keep(shot, frame.pixels)
+            self._recent.append(shot)
         if found.is_wrong:
             self._failures += 1
         elif found.verdict is Verdict.RIGHT:
@@ -207,6 +214,7 @@ class ProvenShots:
                 f"{describe_shot(control).capitalize()}, captured once more as a control, no longer shows its"
                 f" pattern. {reason} Frames before are saved."
             )
+        self._recent.clear()
 
     def _explain(self) -> str:
         """What has changed since the scan began, and what to do; empty where that does not show."""

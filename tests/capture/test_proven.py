@@ -12,7 +12,7 @@ from dsl_core.capture.proof import contest
 from dsl_core.capture.proof.finding import Finding, Verdict
 from dsl_core.capture.proof.raster import Counts
 from dsl_core.capture.proof.verifier import FrameProof
-from dsl_core.capture.proven import SETTLE_MS
+from dsl_core.capture.proven import JUST_BEFORE, SETTLE_MS
 from dsl_core.capture.runner import Runner, State
 from dsl_core.errors import DeviceError
 from dsl_core.model.plan import CapturePlan, GrayCode, LineComb, Setting, Shot
@@ -93,7 +93,7 @@ def test_what_stays_wrong_stops_the_scan_and_is_named(scene: RenderedScene, kind
     with pytest.raises(DeviceError, match=f"^Frame 30 .* after {len(SETTLE_MS) + 1} exposures: .*{what}"):
         runner.run()
     assert runner.status.state is State.FAILED
-    assert sorted(sink.frames) == list(range(30))
+    assert sorted(sink.frames) == list(range(30 - JUST_BEFORE))
     assert _wrong(sink, spoiled) == []
 
 
@@ -144,7 +144,7 @@ def test_pictures_at_the_end_that_cannot_be_judged_are_withdrawn_where_a_control
     sink = MemorySink(scene.plan)
     runner, spoiled = _run(scene, sink, PatternFault(kind, 31))
     last = scene.plan.shot_count - 1
-    said = f"captured once more as a control.*{last + 1 - blind} frames, {blind} to {last}, could not be"
+    said = f"captured once more as a control.*{last + 1 - blind} frames between {blind} and {last}"
     with pytest.raises(DeviceError, match=said):
         runner.run()
     assert spoiled.wrong

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -105,6 +105,11 @@ def stepped(shot: Shot) -> Finding:
     return Finding(shot, Verdict.RIGHT, is_doubtful=True, light=Light.STEP)
 
 
+def take_all(bench: Bench, shots: Sequence[Shot]) -> None:
+    for shot in shots:
+        bench.shots.take(shot)
+
+
 CONTROLS = [(0, 1, 100.0, True), (4, 1, 100.0, True)]
 
 
@@ -204,7 +209,7 @@ def test_light_that_has_changed_is_believed_after_a_control_alone() -> None:
     assert (bench.written, bench.believed) == ({13: ""}, [13])
     changed = Bench(of_unknown_light, stepped, is_as_before=False)
     changed.shots.take(SHOTS[12])
-    with pytest.raises(PictureError, match=r"Frame 12 could not be judged"):
+    with pytest.raises(PictureError, match=r"Frame 12, captured just before"):
         changed.shots.take(LINE)
     assert (changed.withdrawn, changed.written) == ([12], {12: ""})
 
@@ -261,13 +266,13 @@ def test_what_could_not_be_told_is_withdrawn_when_a_control_has_changed() -> Non
     for shot in SHOTS[12:14]:
         bench.shots.take(shot)
     with pytest.raises(
-        PictureError, match=r"no longer shows its pattern.*2 frames, 12 to 13, could not be judged"
+        PictureError, match=r"no longer shows its pattern.*2 frames between 12 and 13, captured just before"
     ):
         bench.shots.conclude()
     assert bench.withdrawn == [12, 13]
     one = Bench(untold, is_as_before=False)
     one.shots.take(LINE)
-    with pytest.raises(PictureError, match=r"Frame 13 could not be judged.* captures it again"):
+    with pytest.raises(PictureError, match=r"Frame 13, captured just before.* captures it again"):
         one.shots.conclude()
     calm = Bench(untold)
     calm.shots.take(LINE)
@@ -275,6 +280,18 @@ def test_what_could_not_be_told_is_withdrawn_when_a_control_has_changed() -> Non
     assert calm.taken[1:] == CONTROLS
     calm.shots.conclude()
     assert len(calm.taken) == 3, "there is nothing left to doubt"
+
+
+def test_the_eight_pictures_before_a_wrong_one_are_withdrawn_back_to_the_last_control() -> None:
+    lines = tuple(PLAN.model_copy(update={"spectral": LineComb(width_px=1, step_px=1, period_px=40)}).shots())
+    bench = Bench(*[is_right] * 10, late)
+    with pytest.raises(PictureError, match=r"8 frames between 14 and 21, captured just before"):
+        take_all(bench, lines[12:24])
+    assert bench.withdrawn == list(range(14, 22))
+    bench = Bench(*[is_right] * 8, stepped, stepped, is_right, late)
+    with pytest.raises(PictureError, match=r"2 frames between 20 and 21"):
+        take_all(bench, lines[12:24])
+    assert bench.withdrawn == [20, 21], "from the picture after which all was well"
 
 
 def test_two_lines_that_agree_after_a_second_take_are_believed_after_a_control() -> None:

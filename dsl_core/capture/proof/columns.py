@@ -1,4 +1,4 @@
-"""Columns decoded on the raster, and pairs of a code whose pattern and inverse changed places."""
+"""Columns decoded on the raster: which way they run, and pairs whose pattern and inverse changed places."""
 
 from __future__ import annotations
 
@@ -77,6 +77,22 @@ def exchanged_pairs(
     if rises is None:
         return ()
     return tuple(sorted(number for number, rough in rising.items() if rough <= AS_SMOOTH * best))
+
+
+def run_backwards(
+    code: BinaryCode,
+    size_px: tuple[int, int],
+    pairs: Mapping[int, Pair],
+    trusted: NDArray[np.bool_],
+    shape: tuple[int, int],
+    rises: bool,
+) -> bool:
+    """Whether columns fall where they should rise, or rise where they should fall, nearly everywhere.
+
+    No surface does that, however it is shaped: camera or projector is mirrored.
+    """
+    found = _Neighbours(shape, trusted).judge(decode(code, size_px, pairs)[0])
+    return found is not None and (1.0 if rises else -1.0) * found[1] <= -RISING
 
 
 def _of_columns(code: BinaryCode, pairs: Mapping[int, Pair], size_px: tuple[int, int]) -> list[int]:

@@ -20,6 +20,7 @@ class Verdict(StrEnum):
     EXPOSURE = "wrong exposure"
     SATURATED = "saturated"
     DARK = "dark"
+    MIRRORED = "mirrored"
     OTHER = "another picture"
 
 
@@ -39,6 +40,7 @@ _SEEN = {
     Verdict.EXPOSURE: "its brightness is wrong",
     Verdict.SATURATED: "most of it is saturated",
     Verdict.DARK: "the pattern is missing from it",
+    Verdict.MIRRORED: "columns of the projector run across the picture the wrong way round",
     Verdict.OTHER: "it shows something else",
 }
 _REMEDY = {
@@ -49,6 +51,8 @@ _REMEDY = {
     Verdict.EXPOSURE: "Switch automatic exposure and gain of the camera off, and check the lamp.",
     Verdict.SATURATED: "Check exposure and gain of the camera, and the light of the room.",
     Verdict.DARK: "Check that the projector is on and that nothing stands in its way.",
+    Verdict.MIRRORED: "Camera or projector is mirrored or upside down, or the calibration is of another rig:"
+    " switch mirroring off in the settings of both, or calibrate again.",
     Verdict.OTHER: "Check that camera, target and light have not moved since the scan began.",
 }
 

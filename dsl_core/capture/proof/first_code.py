@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dsl_core.capture.proof.code_pairs import CodePairs, Pair, alike, dominant
-from dsl_core.capture.proof.columns import LEAST_MARGIN, decode, exchanged_pairs
+from dsl_core.capture.proof.columns import LEAST_MARGIN, decode, exchanged_pairs, run_backwards
 from dsl_core.capture.proof.contest import vote
 from dsl_core.capture.proof.finding import Finding, Verdict
 from dsl_core.capture.proof.prediction import Lit
@@ -126,14 +126,17 @@ class FirstCode:
             if broken is not None and expected is not None:
                 verdict, detail = self._explain(pair, expected, broken)
                 self.reviewed.append(Finding(shot, verdict, self._pair_shots(number), detail))
-        if not self.reviewed and not self._is_believed:
-            numbers = self._exchanged()
+        if not self.reviewed:
+            numbers = () if self._is_believed else self._exchanged()
             if numbers:
                 # Taken again with the same result, it is what there is to see.
                 self._is_believed = True
                 again = tuple(each for number in numbers for each in self._pair_shots(number))
                 detail = "pattern and inverse exchanged"
                 self.reviewed.append(Finding(shot, Verdict.SWAPPED, again, detail))
+            elif self._is_mirrored():
+                again = tuple(each for number in self._pairs.pairs for each in self._pair_shots(number))
+                self.reviewed.append(Finding(shot, Verdict.MIRRORED, again))
         if not self.reviewed:
             return None
         for each in self.reviewed:
@@ -147,6 +150,15 @@ class FirstCode:
         size_px, pairs = self._plan.projector_size_px, self._pairs.pairs
         trusted = lit & self._margins()
         return exchanged_pairs(self._code, size_px, pairs, trusted, self._raster.shape, self._rises)
+
+    def _is_mirrored(self) -> bool:
+        if self._rises is None:
+            return False
+        _, _, lit = self._pairs.contrast()
+        size_px, pairs = self._plan.projector_size_px, self._pairs.pairs
+        return run_backwards(
+            self._code, size_px, pairs, lit & self._margins(), self._raster.shape, self._rises
+        )
 
     def substitute(self, number: int, pair: Pair) -> None:
         """Take a pair of another setting for a wrong one: for the columns alone."""

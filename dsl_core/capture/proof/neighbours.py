@@ -87,4 +87,7 @@ class LineNeighbours:
         usual = median(self._light) if len(self._light) >= FEWEST_USUAL else 0.0
         self._light.append(light)
         low, high = SAME_LIGHT
-        return usual > BRIGHT_SIGMAS * sigma and not low * usual < light < high * usual
+        enough = BRIGHT_SIGMAS * sigma
+        # No line takes light away: below black, the exposure was shorter or the room is darker.
+        is_below_black = light < min(usual, 0.0) - enough
+        return is_below_black or (usual > enough and not low * usual < light < high * usual)

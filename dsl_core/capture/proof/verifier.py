@@ -78,7 +78,8 @@ class FrameProof:
         self._first = min(plan.code_settings)
         self._places = {(s.role, s.pattern): s.index for s in self._shots if s.setting == self._first}
         self._blacks = {s.setting: s.index for s in self._shots if s.role == "black"}
-        self._code = self._first_code(at_the_end)
+        self._at_the_end = at_the_end
+        self._code = self._first_code()
         self._sentinels = SentinelProof(self._noise, self._raster)
         self._kept: dict[int, Counts] = {}
         self._untold: set[int] = set()
@@ -102,8 +103,11 @@ class FrameProof:
         """The same of what a `Raster` takes of a mosaic."""
         before = self._last
         found = self._judge(shot, seen)
-        if found.is_wrong and before is not None and np.array_equal(seen, before[1]):
-            found = Finding(shot, Verdict.REPEATED, found.again)
+        if before is not None and np.array_equal(seen, before[1]):
+            if found.is_wrong:
+                found = Finding(shot, Verdict.REPEATED, found.again)
+            elif self._must_differ(before[0], shot) and seen.min() != seen.max():
+                found = Finding(shot, Verdict.REPEATED, (shot,))
         if shot.role == "spectral" and not found.is_wrong:
             black = self._kept.get(self._blacks[shot.setting])
             doubtful = self._neighbours.is_doubtful(shot.index, seen, black)
@@ -116,6 +120,14 @@ class FrameProof:
             self._kept[shot.index] = seen
             (self._untold.discard if found.verdict is Verdict.RIGHT else self._untold.add)(shot.index)
         return found
+
+    def _must_differ(self, before: Shot, shot: Shot) -> bool:
+        """Whether two shots of the first code show patterns whose pictures cannot be equal, noise included.
+
+        Once all pairs are there, they are judged together.
+        """
+        ours = self._code is not None and shot.setting == self._first and not self._at_the_end
+        return ours and before.index != shot.index and {before.role, shot.role} <= {"white", "black", "code"}
 
     def differ(self, one: NDArray[np.uint16], other: NDArray[np.uint16]) -> bool:
         """Whether two pictures of one shot of lines, as raw mosaics, show different patterns."""
@@ -156,14 +168,16 @@ class FrameProof:
         if self._code is not None:
             self._code.substitute(number, pair)
 
-    def _first_code(self, at_the_end: bool) -> FirstCode | None:
+    def _first_code(self) -> FirstCode | None:
         plan = self._plan
         # Codes of other programs are imported, complete or not: no frame can be taken again.
         if isinstance(plan.code, NoCode | CapturedCode):
             return None
         own = [s for s in self._shots if s.setting == self._first and s.role in ("code", "white", "black")]
         rises = None if self._calibration is None else self._calibration.pose.matrix[0, 0] > 0
-        return FirstCode(plan, plan.code, own, self._raster, self._noise, self._bayer, rises, at_the_end)
+        return FirstCode(
+            plan, plan.code, own, self._raster, self._noise, self._bayer, rises, self._at_the_end
+        )
 
     def _judge(self, shot: Shot, seen: Counts) -> Finding:
         before = self._last[1] if self._last is not None else None

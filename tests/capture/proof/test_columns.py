@@ -7,7 +7,7 @@ import pytest
 
 from dsl_core.capture.proof import columns
 from dsl_core.capture.proof.code_pairs import Pair
-from dsl_core.capture.proof.columns import _Neighbours, _of_columns, decode, exchanged_pairs
+from dsl_core.capture.proof.columns import _Neighbours, _of_columns, decode, exchanged_pairs, run_backwards
 from dsl_core.model.plan import GrayCode
 from dsl_core.patterns.gray_code import code_image
 
@@ -60,6 +60,18 @@ def test_a_picture_turned_around_says_nothing_where_nobody_knows_which_way_colum
 
 def judged(row: list[int]) -> tuple[float, float] | None:
     return _Neighbours((1, len(row)), np.ones(len(row), bool)).judge(np.array(row, np.int32))
+
+
+@pytest.mark.parametrize("rises", [True, False])
+def test_columns_that_fall_where_they_should_rise_are_those_of_a_mirrored_picture(rises: bool) -> None:
+    pairs, trusted = _pairs(), np.ones(SHAPE[0] * SHAPE[1], bool)
+    mirrored = {
+        number: tuple(np.ascontiguousarray(one.reshape(SHAPE)[:, ::-1]).ravel() for one in pair)
+        for number, pair in pairs.items()
+    }
+    assert run_backwards(CODE, SIZE, pairs, trusted, SHAPE, rises) == (not rises)
+    assert run_backwards(CODE, SIZE, mirrored, trusted, SHAPE, rises) == rises  # type: ignore[arg-type]
+    assert not run_backwards(CODE, SIZE, mirrored, ~trusted, SHAPE, rises)  # type: ignore[arg-type]
 
 
 def test_neighbours_are_judged_from_sixty_triples_on() -> None:

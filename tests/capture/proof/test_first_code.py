@@ -32,15 +32,26 @@ def seen(shot: Shot, light: np.ndarray | float = 2000.0) -> Counts:
     return RASTER.take((SENSOR.black_level_dn + light * image).astype(np.uint16))
 
 
-def judged(light: np.ndarray | float = 2000.0) -> tuple[FirstCode, list[Verdict]]:
+def judged(light: np.ndarray | float = 2000.0, rises: bool | None = True) -> tuple[FirstCode, list[Verdict]]:
     assert isinstance(PLAN.code, GrayCode)
-    code = FirstCode(PLAN, PLAN.code, SHOTS, RASTER, Noise(SENSOR), "RGGB", True)
+    code = FirstCode(PLAN, PLAN.code, SHOTS, RASTER, Noise(SENSOR), "RGGB", rises)
     verdicts, before = [], None
     for shot in SHOTS:
         picture = seen(shot, light)
         verdicts.append(code.add(shot, picture, before).verdict)
         before = picture
     return code, verdicts
+
+
+def test_a_code_whose_columns_run_the_wrong_way_round_is_of_a_mirrored_picture() -> None:
+    code, verdicts = judged(rises=False)
+    assert verdicts[-1] is Verdict.SWAPPED, "as if the widest pattern had changed places with its inverse"
+    again = [code.add(shot, seen(shot), None) for shot in SHOTS[: PLAN.code_count]]
+    wrong = [found for found in again if found.is_wrong]
+    assert [found.verdict for found in wrong] == [Verdict.MIRRORED]
+    assert set(wrong[0].again) == set(SHOTS[: PLAN.code_count])
+    assert code.lit is None
+    assert set(judged(rises=None)[1]) <= {Verdict.RIGHT, Verdict.UNTOLD}
 
 
 def test_every_column_is_located_with_its_colour_and_contrast() -> None:

@@ -62,6 +62,17 @@ def test_only_pictures_right_after_each_other_are_compared() -> None:
     assert not neighbours.is_doubtful(21, _picture(28.0, 61), BLACK)
 
 
+@pytest.mark.parametrize(("darker", "is_doubtful"), [(6, True), (1, False)])
+def test_a_picture_darker_than_black_is_doubted_until_that_is_usual(darker: int, is_doubtful: bool) -> None:
+    neighbours = LineNeighbours(Noise(SENSOR), COLUMNS)
+    for index in range(4):
+        assert not neighbours.is_doubtful(index, flat(120), flat(120))
+    # Two sums of 1,536 counts with a variance of 12 each differ by 192; 25 times that are 3.1 a pixel.
+    for index in range(4, 7):
+        assert neighbours.is_doubtful(index, flat(120 - darker), flat(120)) == is_doubtful
+    assert not neighbours.is_doubtful(7, flat(120 - darker), flat(120))
+
+
 def flat(value: int, lines: int = 0) -> Counts:
     """A picture without noise, of which so many columns are a thousand counts brighter."""
     picture = np.full((ROWS, COLUMNS), value, np.uint16)

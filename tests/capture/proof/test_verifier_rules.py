@@ -294,6 +294,21 @@ def test_wrong_pictures_are_forgotten_and_right_ones_told(monkeypatch: pytest.Mo
     assert judge.judge_raster(SHOTS[15], counts(8)).verdict is Verdict.RIGHT, "only what is wrong is repeated"
 
 
+def test_two_patterns_of_the_first_code_never_give_the_same_picture(monkeypatch: pytest.MonkeyPatch) -> None:
+    judge = proof()
+    monkeypatch.setattr(judge, "_judge", told(Verdict.UNTOLD))
+    same = counts(8).copy()
+    same[0] = 9
+    assert judge.judge_raster(SHOTS[2], same).verdict is Verdict.UNTOLD
+    assert judge.judge_raster(SHOTS[2], same).verdict is Verdict.UNTOLD, "the same shot, without noise"
+    found = judge.judge_raster(SHOTS[3], same)
+    assert (found.verdict, found.again) == (Verdict.REPEATED, (SHOTS[3],))
+    assert judge.judge_raster(SHOTS[4], counts(8)).verdict is Verdict.UNTOLD
+    assert judge.judge_raster(SHOTS[5], counts(8)).verdict is Verdict.UNTOLD, "dark as a picture can be"
+    judge.judge_raster(LINE, same)
+    assert judge.judge_raster(SHOTS[14], same).verdict is Verdict.UNTOLD, "lines may miss the picture"
+
+
 def test_controls_are_patterns_of_pairs_that_are_both_there() -> None:
     judge = proof()
     for at in (0, 1, 4, 6, 7):
