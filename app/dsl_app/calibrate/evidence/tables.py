@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from PySide6.QtGui import QFont
 from PySide6.QtWidgets import QTableWidgetItem
 
 from dsl_app.shared.widgets.read_table import LEFT, RIGHT, ReadTable, cell
@@ -26,12 +25,8 @@ class NumberTable(ReadTable):
             assert head is not None
             head.setToolTip(tip)
             head.setTextAlignment(LEFT if column in self._words else RIGHT)
-        self.verticalHeader().setDefaultSectionSize(22)
+        self.be_dense()
         self.horizontalHeader().setStretchLastSection(len(heads) - 1 in self._words)
-        self.setStyleSheet("QTableView::item { padding: 0px 6px; }")
-        font = self.font()
-        font.setFeature(QFont.Tag("tnum"), 1)
-        self.setFont(font)
 
     def fill(self, rows: Sequence[Sequence[Cell]]) -> None:
         """Show other rows, with typographic minus signs."""

@@ -22,6 +22,8 @@ HINT = (
     "Name the material of every pixel: choose a folder or file of spectra, or mark known materials and use"
     " those."
 )
+#: As many rows of the legend are seen without scrolling.
+ROWS = 7
 _MEASURES = (
     ("Probability", Measure.PROBABILITY),
     ("Spectral angle", Measure.ANGLE),
@@ -78,16 +80,16 @@ class MaterialsPanel(QWidget):
         self.table = ReadTable(
             "Materials", "Classes with their pixels and areas", ("Material", "Pixels", "Share", "Area")
         )
-        self.table.setMinimumHeight(60)
         self.table.widen(0)
+        self.table.be_dense()
         self.text = label(HINT, "muted", wraps=True)
         self.text.setAlignment(Qt.AlignmentFlag.AlignTop)
-        sources = row_of(label("Spectra of"), self.folder, self.file, self.marks, STRETCH)
+        # The error belongs to folder and file: marks are of this result and have deviations of their own.
+        sources = row_of(self.marks, self.folder, self.file, label("off by"), self.error, STRETCH)
         ways = row_of(label("By"), (self.measure, 1), self.free)
         limits = row_of(label("Limit"), self.worst, label("Margin"), self.margin, STRETCH)
-        error = row_of(label("Library error"), self.error, STRETCH)
         map_row = row_of(self.write, self.clear, STRETCH)
-        column_of(sources, ways, error, limits, (self.table, 1), self.text, map_row, on=self, margins=0)
+        column_of(sources, ways, limits, (self.table, 1), self.text, map_row, on=self, margins=0)
         self.folder.clicked.connect(self.choose_folder)
         self.file.clicked.connect(self.choose_file)
         self.marks.clicked.connect(lambda: control.from_marks(self.way))
@@ -154,7 +156,7 @@ class MaterialsPanel(QWidget):
             button.setEnabled(materials is not None)
         self.table.setVisible(materials is not None)
         self.text.setText(HINT if materials is None else materials_text(materials))
-        self.text.setToolTip("" if materials is None else "\n".join(materials.notes[:20]))
+        self.text.setToolTip("" if materials is None else _method(materials))
         if materials is None:
             return
         with quiet(self.measure):
@@ -167,10 +169,11 @@ class MaterialsPanel(QWidget):
             first = cell(row.label)
             first.setIcon(_swatch(row.colour))
             area = "–" if row.area_mm2 is None else f"{row.area_mm2:,.1f} mm²"
-            share = f"{row.share:.1%}" if row.label != "not judged" else ""
+            share = f"{100 * row.share:.1f} %" if row.label != "not judged" else ""
             figures = (cell(text, "", RIGHT) for text in (f"{row.pixels:,}", share, area))
             rows.append((first, *figures))
         self.table.show_rows(rows)
+        self.table.ask_for_rows(ROWS)
 
     def apply_theme(self, theme: Theme) -> None:
         """Apply the colours of a theme."""
@@ -186,11 +189,16 @@ def _swatch(colour: str) -> QIcon:
 
 
 def materials_text(materials: Materials) -> str:
-    """What the map rests on, in a sentence or two."""
+    """What the map rests on, and what is doubtful of it; short, since the legend needs the room."""
     classes = len(materials.found.shown.names)
     counted = "1 class" if classes == 1 else f"{classes} classes"
-    text = f"{counted} by {materials.name}: {materials.found.method}."
+    text = f"{counted} by {materials.name}."
     if materials.notes:
         more = f" (and {len(materials.notes) - 1} more notes)" if len(materials.notes) > 1 else ""
         text += f" {materials.notes[0]}{more}"
     return text
+
+
+def _method(materials: Materials) -> str:
+    """How the map was made, in whole, and its first notes."""
+    return "\n".join((f"By {materials.name}: {materials.found.method}.", *materials.notes[:20]))

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from itertools import product
 
 from PySide6.QtCore import QModelIndex, QPersistentModelIndex, QSize, Qt, QTimer
-from PySide6.QtGui import QColor, QResizeEvent
+from PySide6.QtGui import QColor, QFont, QResizeEvent
 from PySide6.QtWidgets import (
     QAbstractItemView,
     QHeaderView,
@@ -26,6 +26,8 @@ _ROLE, _SIDE = Qt.ItemDataRole.UserRole + 1, Qt.ItemDataRole.TextAlignmentRole
 ROOM_PX = 6
 #: Least width of a column with wrapped lines, px: a few words.
 LEAST_WRAPPED_PX = 160
+#: Height of a row of figures, px.
+DENSE_PX = 22
 
 
 class _Roomy(QStyledItemDelegate):
@@ -68,6 +70,19 @@ class ReadTable(QTableWidget):
         self.fit_rows.setSingleShot(True)
         self.fit_rows.timeout.connect(self._fit_wrapped)
         header.sectionResized.connect(lambda *_: self.fit_rows.start(0))
+
+    def be_dense(self) -> None:
+        """Show rows of figures close to each other, with digits of equal width."""
+        self.verticalHeader().setDefaultSectionSize(DENSE_PX)
+        self.setStyleSheet("QTableView::item { padding: 0px 6px; }")
+        font = self.font()
+        font.setFeature(QFont.Tag("tnum"), 1)
+        self.setFont(font)
+
+    def ask_for_rows(self, most: int) -> None:
+        """Take the room of its rows, up to ``most``, from what is above and below."""
+        rows = min(self.rowCount(), most) * self.verticalHeader().defaultSectionSize()
+        self.setMinimumHeight(self.horizontalHeader().sizeHint().height() + rows + 2 * self.frameWidth())
 
     def widen(self, column: int) -> None:
         """Let a column take the remaining width, and cut its texts where that is too little."""

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 from dsl_app.results.answers.controller import Way
-from dsl_app.results.answers.materials_panel import HINT, MaterialsPanel, materials_text
+from dsl_app.results.answers.materials_panel import HINT, ROWS, MaterialsPanel, materials_text
 from dsl_app.results.layers import materials_table, tinted_by
 from dsl_app.results.state import Materials
 from dsl_app.shared.theme import LIGHT
@@ -132,9 +132,28 @@ def test_the_panel_is_a_legend_with_areas(qtbot: QtBot, bench: Bench) -> None:
     panel.worst.setValue(1.5)
     assert _shown(bench).found.limits.worst == 1.5
     assert _shown(bench).found.scores is found.scores
-    assert "1 class by marks: spectral angle" in materials_text(_shown(bench))
+    assert "1 class by marks." in materials_text(_shown(bench))
+    assert "By marks: spectral angle" in panel.text.toolTip()
     panel.clear.click()
     assert not panel.write.isEnabled()
+
+
+def test_the_legend_is_seen_whole_at_150_percent(qtbot: QtBot, bench: Bench) -> None:
+    for column in range(2, 26, 4):
+        bench.control.marks.pin((column, 5))
+    panel = MaterialsPanel(bench.state, bench.control.answers)
+    qtbot.addWidget(panel)
+    bench.control.answers.from_marks(ANGLE)
+    # What the page has for it on a screen of 1920 x 1080 px: more is taken from the plot above.
+    panel.resize(436, 100)
+    panel.show()
+    table = panel.table
+    last = table.visualRect(table.model().index(ROWS - 1, 0))
+    assert table.rowCount() == 9
+    assert last.bottom() <= table.viewport().height()
+    assert panel.minimumSizeHint().width() <= 436
+    # On a screen of 614 px half of the page is left for the plot.
+    assert panel.minimumSizeHint().height() <= 360
 
 
 @pytest.mark.parametrize("classes", [1, 24, 250])
