@@ -6,6 +6,9 @@ import math
 
 from dsl_core.model.base import Record
 
+#: No figure has more decimals.
+MOST_DECIMALS = 9
+
 
 class Figure(Record):
     """A value with unit, uncertainty and limits; ``advice`` says what to do when it is outside them.
@@ -25,7 +28,10 @@ class Figure(Record):
     @property
     def passed(self) -> bool:
         """Whether the value is within its limits."""
-        return (self.low is None or self.value >= self.low) and (self.high is None or self.value <= self.high)
+        return self._passes(self.value)
+
+    def _passes(self, value: float) -> bool:
+        return (self.low is None or value >= self.low) and (self.high is None or value <= self.high)
 
     @property
     def limits(self) -> str:
@@ -45,17 +51,59 @@ class Figure(Record):
                 return f"{low:.4g} to {high:.4g}"
 
     def __str__(self) -> str:
-        """The figure as people write it, such as ``gamma 2.210 ± 0.004``."""
-        counted = self.std is None and float(self.value).is_integer()
-        digits = 0 if counted else _decimals(self.std if self.std else abs(self.value) / 100)
-        spread = "" if self.std is None else f" ± {self.std:.{digits}f}"
+        """The figure as people write it, such as ``gamma 2.210 ± 0.004``.
+
+        It has two digits of its deviation; without one three digits, but none below a hundredth of its
+        limits. More are written only where it would seem to be on the other side of a limit.
+
+        >>> print(Figure(name="camera error", value=0.0123456, unit="px", high=0.5))
+        camera error 0.012 px
+        >>> print(Figure(name="camera error", value=0.50004, unit="px", high=0.5))
+        camera error 0.50004 px
+        """
+        digits = 0 if self.std is None and float(self.value).is_integer() else self._decimals
+        while digits < MOST_DECIMALS and self._passes(round(self.value, digits)) is not self.passed:
+            digits += 1
         unit = "" if self.unit in ("", "1") else f" {self.unit}"
-        return f"{self.name} {self.value:.{digits}f}{spread}{unit}"
+        return f"{self.name} {_spread(self.value, self.std, digits)}{unit}"
+
+    @property
+    def _decimals(self) -> int:
+        if self.std:
+            return decimals(self.std)
+        if self.low is not None and self.high is not None and self.low < self.high:
+            return decimals(self.high - self.low, 3)
+        limit, own = self.low or self.high or 0.0, decimals(self.value, 3)
+        return min(own, decimals(limit, 3)) if limit else own
 
 
-def _decimals(step: float) -> int:
-    """Decimals that show two digits of a step."""
-    return 0 if step <= 0 else min(max(1 - math.floor(math.log10(step)), 0), 9)
+def with_std(value: float, std: float | None, most: int = MOST_DECIMALS) -> str:
+    """A value and its deviation with two digits of the deviation, of ``most`` decimals; else three digits.
+
+    >>> with_std(210.8184, 0.0204), with_std(3.0, 0.0), with_std(0.0123456, None), with_std(2.0, 1e-6, 4)
+    ('210.818 ± 0.020', '3', '0.0123', '2.0000 ± 0.0001')
+    """
+    if not std:
+        return f"{value:.0f}" if float(value).is_integer() else _spread(value, None, decimals(value, 3))
+    digits = min(decimals(std), most)
+    return _spread(value, max(std, 10.0**-digits), digits)
+
+
+def decimals(value: float, digits: int = 2) -> int:
+    """Decimals that show so many ``digits`` of a value.
+
+    >>> decimals(0.0204), decimals(0.0123456, 3), decimals(210.8, 3), decimals(0.0), decimals(99.96, 3)
+    (3, 4, 0, 0, 1)
+    """
+    if value == 0 or not math.isfinite(value):
+        return 0
+    return min(max(digits - 1 - math.floor(math.log10(abs(value))), 0), MOST_DECIMALS)
+
+
+def _spread(value: float, std: float | None, digits: int) -> str:
+    # Adding zero makes -0.0 a plain zero.
+    spread = f" ± {std:.{digits}f}" if std else ""
+    return f"{round(value, digits) + 0.0:.{digits}f}{spread}"
 
 
 def doubts(name: str, sentences: tuple[str, ...], between: str = ". ") -> Figure:

@@ -23,14 +23,37 @@ def test_a_figure_without_limits_passes_and_says_none() -> None:
 
 
 @pytest.mark.parametrize(
+    ("value", "low", "high", "text"),
+    [
+        (0.0123456, None, 0.5, "0.012"),
+        (0.0001234, None, 0.5, "0.000"),
+        (-0.0001234, -0.5, 0.5, "0.00"),
+        (32.7643, 8.0, None, "32.8"),
+        (29.99765, 29.85, 30.15, "29.998"),
+        (0.6789, None, 0.0, "0.679"),
+        # Rounded they would be said to be within their limits, or outside.
+        (0.50004, None, 0.5, "0.50004"),
+        (30.1504, 29.85, 30.15, "30.1504"),
+        (0.9996, None, 0.9997, "0.9996"),
+    ],
+)
+def test_without_deviation_digits_follow_the_limits(
+    value: float, low: float | None, high: float | None, text: str
+) -> None:
+    figure = Figure(name="error", value=value, unit="px", low=low, high=high)
+    assert str(figure) == f"error {text} px"
+    assert Figure(name="", value=float(text), unit="", low=low, high=high).passed == figure.passed
+
+
+@pytest.mark.parametrize(
     ("figure", "text"),
     [
         (Figure(name="gamma", value=2.21, std=0.004, unit="1"), "gamma 2.2100 ± 0.0040"),
         (Figure(name="shift", value=-1.25, std=0.3, unit="px"), "shift -1.25 ± 0.30 px"),
         (Figure(name="frames", value=4000, unit=""), "frames 4000"),
         (Figure(name="frames", value=400, unit=""), "frames 400"),
-        (Figure(name="tilt", value=12.3456, unit="degrees"), "tilt 12.35 degrees"),
-        (Figure(name="nothing", value=0.0, std=0.0, unit="px"), "nothing 0 ± 0 px"),
+        (Figure(name="tilt", value=12.3456, unit="degrees"), "tilt 12.3 degrees"),
+        (Figure(name="nothing", value=0.0, std=0.0, unit="px"), "nothing 0 px"),
     ],
 )
 def test_digits_follow_the_deviation(figure: Figure, text: str) -> None:

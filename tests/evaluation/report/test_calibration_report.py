@@ -55,7 +55,7 @@ def test_it_holds_figures_limits_conditions_and_history() -> None:
     assert "2.2100 ± 0.0040" in page
     assert "1.8 to 2.6" in page
     assert "at most 0.3" in page
-    assert "1 of the key figures is outside the limits: Depth-stage: held-out residual 0.4100 px" in page
+    assert "1 of the key figures is outside the limits: Depth-stage: held-out residual 0.410 px" in page
     assert "Capture the stage &lt;anew&gt;." in page
     assert page.count("reached</span>") == page.count("missed</span>") == 1
     for word in ("C-17", "x 10 y 20, 1780 × 1160 px, binning 2", "mode 6500 K", "2025-01-02 03:04", "12.0"):

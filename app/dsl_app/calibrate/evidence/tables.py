@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-import numpy as np
 from PySide6.QtWidgets import QTableWidgetItem
 
 from dsl_app.shared.widgets.read_table import LEFT, RIGHT, ReadTable, cell
+from dsl_core.model.figure import with_std
 
 #: A number or words of a table, alone or with its role: text, good, warn, bad or muted.
 Cell = str | tuple[str, str]
@@ -45,7 +45,4 @@ def with_spread(value: float, std: float) -> str:
     >>> with_spread(210.8184, 0.0204), with_spread(3.0, 0.0)
     ('210.818 ± 0.020', '3')
     """
-    if std <= 0:
-        return f"{value:g}"
-    digits = min(max(1 - int(np.floor(np.log10(std))), 0), 4)
-    return f"{value:.{digits}f} ± {max(std, 10.0**-digits):.{digits}f}"
+    return with_std(value, std, most=4)
