@@ -116,8 +116,8 @@ class CampaignBox(QFrame):
         self.everything.clicked.connect(commands.run_everything)
         self.cancel.clicked.connect(commands.cancel_everything)
         self.keep.clicked.connect(commands.keep)
-        shown = (state.campaign, state.everything, state.rows, state.foreign, self._rig.devices)
-        self.stops = follow_any(self._show, *shown)
+        shown = (state.campaign, state.everything, state.rows, state.foreign, state.library, state.in_use)
+        self.stops = follow_any(self._show, *shown, self._rig.devices)
 
     def ask_new(self) -> bool:
         """Ask for a new campaign; whether one was begun."""

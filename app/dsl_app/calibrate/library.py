@@ -50,7 +50,7 @@ class LibraryController:
     def use(self, key: str) -> None:
         """Scan with a calibration from now on."""
         self._state.in_use.set(key)
-        self._state.note.set(f"Scans use the calibration {key}.")
+        self._state.note.set(f"Scans use the calibration {key} from now on. Plan one on the Scan page.")
 
     def restore(self, name: str, stamp: str) -> None:
         """Make a version the current one; no version is lost."""

@@ -21,11 +21,12 @@ from PySide6.QtWidgets import (
 )
 
 from dsl_app.calibrate.figures_table import FiguresTable
-from dsl_app.calibrate.presentation import library_selection, version_texts
+from dsl_app.calibrate.presentation import kept_version, library_selection, main_button, version_texts
 from dsl_app.calibrate.state import CalibrateState, DriftVerdict
+from dsl_app.shared.evented import follow_any
 from dsl_app.shared.theme import Theme
 from dsl_app.shared.widget_state import LabelState
-from dsl_app.shared.widgets.forms import label, push_button, show_label
+from dsl_app.shared.widgets.forms import label, push_button, set_role, show_label
 from dsl_app.shared.widgets.help_window import add_help_key
 from dsl_app.shared.widgets.layouts import STRETCH, column_of, row_of, splitter
 from dsl_app.shared.widgets.read_table import ReadTable, cell
@@ -54,6 +55,8 @@ class LibraryPanel(QGroupBox):
         super().__init__("Library of calibrations")
         self._state, self._commands = state, commands
         self.table = _table()
+        # The version that was selected as the next one to use.
+        self._offered: LibraryLine | None = None
         self.details = QTextBrowser()
         self.details.setAccessibleName("Details of the calibration")
         self.details.setToolTip("Conditions, dates and figures of the selected calibration")
@@ -84,6 +87,7 @@ class LibraryPanel(QGroupBox):
             state.in_use.changed.connect(lambda _: self._list(state.library.value)),
             state.note.follow(lambda text: show_label(self._note, LabelState(text, "muted"))),
             state.drift.changed.connect(self._show_drift),
+            *follow_any(self._mark_next, state.library, state.rows, state.campaign, state.in_use),
             state.opened.connect(lambda path: QDesktopServices.openUrl(QUrl.fromLocalFile(str(path)))),
         ]
 
@@ -114,6 +118,19 @@ class LibraryPanel(QGroupBox):
             self.table.selectRow(min(selected, len(lines) - 1))
         self._select()
 
+    def _mark_next(self) -> None:
+        """What the campaign has put here is used for scans next: its version is selected, its button blue."""
+        kept = self._next
+        if kept is not None and kept != self._offered:
+            self.table.selectRow(self._state.library.value.index(kept))
+        self._offered = kept
+        self._select()
+
+    @property
+    def _next(self) -> LibraryLine | None:
+        """The version to use for scans next."""
+        return kept_version(self._state) if main_button(self._state, None) == "use" else None
+
     def _items(self, line: LibraryLine) -> list[QTableWidgetItem]:
         items = [cell(text) for text in version_texts(line, self._state.in_use.value)]
         if line.error:
@@ -126,6 +143,7 @@ class LibraryPanel(QGroupBox):
         for button in (self.use, self.report, self.check, self.export):
             button.setEnabled(shown.can_use)
         self.restore.setEnabled(shown.can_restore)
+        set_role(self.use, "primary" if self._next is not None and self.line == self._next else "")
         self.details.setHtml(shown.details)
 
     # Actions ---------------------------------------------------------------------------------------

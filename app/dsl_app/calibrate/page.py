@@ -100,6 +100,8 @@ class CalibratePage(PageWidget):
                 state.running,
                 state.campaign,
                 state.foreign,
+                state.library,
+                state.in_use,
                 self._rig.devices,
             ),
             state.everything.follow(lambda progress: self.picture.setVisible(bool(progress))),

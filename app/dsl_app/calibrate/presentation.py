@@ -72,9 +72,9 @@ def campaign_head(state: CalibrateState, devices: DeviceRig | None) -> CampaignH
 
 
 def main_button(state: CalibrateState, devices: DeviceRig | None) -> str:
-    """What a person does next: new, keep, everything, or the name of a calibration; empty while all run.
+    """What a person does next: new, keep, use, everything, or a calibration's name; empty for nothing here.
 
-    A rig that does not place targets itself is calibrated row by row.
+    A rig that does not place targets itself is calibrated row by row. One that is kept is used for scans.
     """
     if state.campaign.value is None:
         return "new"
@@ -82,8 +82,20 @@ def main_button(state: CalibrateState, devices: DeviceRig | None) -> str:
         return ""
     left = [row.name for row in state.rows.value if not row.state.is_accepted]
     if not left:
-        return "keep"
+        kept = kept_version(state)
+        return "keep" if kept is None else ("" if _is_used(kept, state.in_use.value) else "use")
     return "everything" if _places_itself(devices) else left[0]
+
+
+def kept_version(state: CalibrateState) -> LibraryLine | None:
+    """The version in the library of exactly what the campaign accepted; None before it is kept."""
+    accepted = {row.name: row.accepted for row in state.rows.value if row.state.is_accepted}
+    for line in state.library.value:
+        if line.entry is not None and accepted:
+            notes = {note.name: note.accepted for note in line.entry.rig.calibrations}
+            if notes == accepted:
+                return line
+    return None
 
 
 def _places_itself(devices: DeviceRig | None) -> bool:
@@ -165,9 +177,7 @@ def version_texts(line: LibraryLine, in_use: str) -> tuple[str, ...]:
 
     ``in_use`` is the key of the calibration that scans use.
     """
-    is_named = line.is_current and in_use == line.name
-    used = is_named or in_use == f"{line.name}@{line.stamp}"
-    use = "scans" if used else ("current" if line.is_current else "")
+    use = "scans" if _is_used(line, in_use) else ("current" if line.is_current else "")
     stored = stamp_date(line.stamp)
     if line.entry is None:
         return line.name, stored, use, "damaged", "", ""
@@ -181,6 +191,10 @@ def version_texts(line: LibraryLine, in_use: str) -> tuple[str, ...]:
         rig.provenance.projector_serial or "–",
         ", ".join(missed) or "none",
     )
+
+
+def _is_used(line: LibraryLine, in_use: str) -> bool:
+    return (line.is_current and in_use == line.name) or in_use == f"{line.name}@{line.stamp}"
 
 
 def stamp_date(stamp: str) -> str:

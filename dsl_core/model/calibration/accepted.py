@@ -38,7 +38,7 @@ class CalibrationNote(Record):
         >>> from dsl_core.model.figure import Figure
         >>> error = Figure(name="camera error", value=0.6, unit="px", high=0.5)
         >>> CalibrationNote(name="geometry", title="Geometry", accepted="", figures=(error,)).missed
-        ("This rig's calibration 'Geometry' missed its limit: camera error 0.6000 px (limit: at most 0.5).",)
+        ("This rig's calibration 'Geometry' missed its limit: camera error 0.600 px (limit: at most 0.5).",)
         """
         return tuple(
             f"This rig's calibration {self.title!r} missed its limit: {figure} (limit: {figure.limits})."

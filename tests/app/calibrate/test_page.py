@@ -79,7 +79,11 @@ def test_everything_by_one_button_and_the_library_shows_it(
     click(library.report)
     stage.wait(lambda: bool(shown))
     assert Path(shown[0]).name == "campaign.html"
+    # The campaign is in the library: scans use it next, by the blue button there.
+    assert library.use.property("role") == "primary"
+    assert stage.page.head.keep.property("role") != "primary"
     click(library.use)
+    assert library.use.property("role") != "primary"
     assert stage.bench.state.in_use.value == "campaign"
     assert cell(library.table, 0, 2) == "scans"
     assert not library.restore.isEnabled()

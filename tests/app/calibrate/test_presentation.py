@@ -11,6 +11,7 @@ import pytest
 from dsl_app.calibrate.presentation import (
     campaign_head,
     figure_words,
+    kept_version,
     library_selection,
     main_button,
     row_display,
@@ -23,6 +24,7 @@ from dsl_app.connection.state import RigChoice
 
 from dsl_core.devices.base import DeviceRig
 from dsl_core.io.calibration_library import LibraryEntry, LibraryLine
+from dsl_core.model.calibration.accepted import CalibrationNote
 from dsl_core.model.figure import Figure
 from dsl_core.simulation.published_rig import published_rig
 
@@ -108,6 +110,25 @@ def test_the_blue_button_is_what_a_person_does_next(
     blue = [name for name in ("new", "keep", "everything") if getattr(head, name).is_primary]
     assert blue == [main] * (main in ("new", "keep", "everything"))
     assert row_display(ROW, is_next=main == "geometry").run.is_primary is (main == "geometry")
+
+
+def test_what_is_kept_is_used_for_scans_next() -> None:
+    time = "2026-03-01T10:20:30+00:00"
+    state = page(rows=(replace(ROW, state=RowState.GOOD, accepted=time),))
+    others, own = version(), version()
+    for line, accepted in ((others, "2026-01-01T00:00:00+00:00"), (own, time)):
+        assert line.entry is not None
+        note = CalibrationNote(name="geometry", title="Geometry", accepted=accepted)
+        rig = line.entry.rig.model_copy(update={"calibrations": (note,)})
+        object.__setattr__(line, "entry", line.entry.model_copy(update={"rig": rig}))
+    state.library.set((others,))
+    assert main_button(state, BY_ITSELF) == "keep", "something else is kept by now"
+    state.library.set((others, own))
+    assert kept_version(state) == own
+    assert main_button(state, BY_ITSELF) == "use"
+    assert not campaign_head(state, BY_ITSELF).keep.is_primary
+    state.in_use.set("room-12")
+    assert main_button(state, BY_ITSELF) == "", "what comes next is on the Scan page"
 
 
 def test_while_everything_runs_it_can_only_be_stopped() -> None:
