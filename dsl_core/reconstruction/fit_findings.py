@@ -57,7 +57,7 @@ _CALIBRATE = "Run the drift check; calibrate again the part that it names."
 class SpectralCounts:
     """Of spectra: pixels that measured ``poor`` fits or are ``at_bound``, and what there are of bands.
 
-    ``reached`` are bands of pixels that lines reach, ``undecided`` those of them that the prior decides.
+    Spectra that fit poorly touch bounds as well, as along edges: these count as ``poor`` alone. ``reached`` are bands of pixels that lines reach, ``undecided`` those of them that the prior decides.
     """
 
     poor: int = 0
@@ -81,7 +81,7 @@ def count_spectra(
     poor, at_bound = ((flags & int(flag)) != 0 for flag in (Flag.POOR_FIT, Flag.AT_BOUND))
     return SpectralCounts(
         poor=int(np.count_nonzero(measured & poor)),
-        at_bound=int(np.count_nonzero(measured & at_bound)),
+        at_bound=int(np.count_nonzero(measured & at_bound & ~poor)),
         reached=int(np.count_nonzero(reached)),
         undecided=int(np.count_nonzero(reached & (data_share < 0.5))),
     )

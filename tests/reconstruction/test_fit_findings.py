@@ -67,6 +67,12 @@ def test_a_flag_is_told_from_the_share_that_is_not_normal(flag: Flag, limit: flo
     assert f"{limit + 0.02:.0%}" in above.words
 
 
+def test_spectra_at_a_bound_that_fit_poorly_say_nothing_of_the_light() -> None:
+    both = flags(Flag.POOR_FIT, 0.3) | flags(Flag.AT_BOUND, 0.35)
+    assert Fit.of(judged(both)).parts == ()
+    assert Fit.of(judged(both | flags(Flag.AT_BOUND, 0.45))).parts == ("light",)
+
+
 def test_pixels_in_shadow_are_not_lost_and_depth_alone_has_no_spectra_to_judge() -> None:
     assert Fit.of(judged(flags(Flag.NO_LIGHT, 0.8))).parts == ()
     assert Fit.of(share_findings(flags(Flag.POOR_FIT, 0.8), None)).parts == ()
