@@ -15,7 +15,15 @@ from dsl_app.results.cloud.measuring import Measure, Measured, measure_plane, me
 from dsl_app.results.cloud.overlay import Overlay
 from dsl_app.results.cloud.picking import HOVER_POINTS, Picking
 from dsl_app.results.cloud.tools import CloudTools
-from dsl_app.results.cloud.views import CloudView, make_cloud_view, normalised, prepare_cloud_view
+from dsl_app.results.cloud.views import (
+    BROKEN,
+    CloudView,
+    InteractiveCloud,
+    StaticCloud,
+    make_cloud_view,
+    normalised,
+    prepare_cloud_view,
+)
 from dsl_app.results.controller import ResultsController
 from dsl_app.results.layers import Layers, rgb_of, tinted_by, within
 from dsl_app.results.state import ResultsState, ResultView, Tool
@@ -32,6 +40,10 @@ if TYPE_CHECKING:
 
 #: Delay between the steps that fill a view, ms.
 STEP_MS = 20
+UNPREPARED = (
+    "The 3D view could not be prepared: {}\n\nInstall or update the graphics driver, then switch views to try"
+    " again. Export… writes the points as PLY for another program."
+)
 HINT = "Drag or arrow keys rotate, Shift+drag pans, wheel or +/− zooms."
 
 
@@ -53,7 +65,11 @@ class CloudPanel(QWidget):
         self._hint = label("", "muted", wraps=True, can_be_copied=True)
         self.tools = CloudTools()
         self.section: SectionPlot | None = None
-        self._box = column_of(self.tools, self._hint, on=self, margins=0, spacing=4)
+        #: In the place of the view until it is there: what is done, or why there is none.
+        self.message = label("", "muted", wraps=True, can_be_copied=True)
+        self.message.setAlignment(Qt.AlignmentFlag.AlignCenter)
+        self.message.setMargin(20)
+        self._box = column_of((self.message, 1), self.tools, self._hint, on=self, margins=0, spacing=4)
         self._connect()
         # Colours follow a dragged slider once it rests for a moment.
         self._later = QTimer(self)
@@ -95,13 +111,13 @@ class CloudPanel(QWidget):
 
     def _prepare(self) -> None:
         self._is_preparing = True
-        self._hint.setText("Preparing the 3D view…")
+        self.message.setText("Preparing the 3D view…")
         self._runner.submit(
             Job(
                 "Prepare the 3D view",
                 lambda progress: prepare_cloud_view(),
                 self._make,
-                lambda error: self._give_up(f"The 3D view could not be prepared: {error}"),
+                lambda error: self._give_up(UNPREPARED.format(error)),
                 lambda: self._give_up("The 3D view was cancelled. Switch views to try again."),
                 is_minor=True,
             )
@@ -109,12 +125,32 @@ class CloudPanel(QWidget):
 
     def _give_up(self, sentence: str) -> None:
         self._is_preparing = False
-        self._hint.setText(sentence)
+        self.message.setText(sentence)
 
     def _make(self, can_draw: bool) -> None:
-        self.view = view = make_cloud_view(can_draw, self._picking.view_moved, self._mouse)
+        view = make_cloud_view(can_draw, self._picking.view_moved, self._mouse)
+        if isinstance(view, InteractiveCloud):
+            view.failed.connect(self._fall_back)
+        self._place(view, can_draw)
+
+    def _fall_back(self, reason: str) -> None:
+        """Show a fixed picture where 3D began and then failed; what is wrong and what to do is said there."""
+        broken = self.view
+        if broken is None:
+            return
+        self._is_new = True
+        self._place(StaticCloud(BROKEN.format(reason.rstrip("."))), False)
+        broken.release()
+        broken.deleteLater()
+
+    def _place(self, view: CloudView, can_draw: bool) -> None:
+        if self.view is not None:
+            self._box.removeWidget(self.view)
+            self.view.hide()
+        self.view = view
         view.apply_theme(self._theme)
         self.tools.setEnabled(can_draw)
+        self.message.hide()
         self._box.insertWidget(0, view, 1)
         # The widget gets its size, and with it the camera, in the event loop.
         QTimer.singleShot(STEP_MS, self, self._new_result)
@@ -216,7 +252,7 @@ class CloudPanel(QWidget):
         elif self._draws:
             self._hint.setText("Draw around points with the left button.")
         else:
-            self._hint.setText(HINT)
+            self._hint.setText("" if isinstance(self.view, StaticCloud) else HINT)
 
     # Measure ---------------------------------------------------------------------------------------
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import threading
 import time
 from collections.abc import Callable
@@ -11,6 +12,7 @@ from queue import Empty, SimpleQueue
 from dsl_app.results.cloud.look import Grid, Look, Points
 from dsl_app.results.cloud.render_window import Colours, MouseButton, Place, Rendering, RenderWindow
 
+_log = logging.getLogger(__name__)
 #: Time after the last move until the whole cloud is drawn again, s.
 SETTLE_S = 0.25
 
@@ -22,7 +24,8 @@ class CloudRenderer:
     """Handles requests in its thread, in order, and draws once none is waiting.
 
     The cloud is coarse while it is rotated and while marks move; at rest it grows until pictures get slow.
-    ``drawn`` is called in the thread when there is a picture to `take` and the previous one was taken.
+    ``drawn`` is called in the thread when there is a picture to `take` and the previous one was taken, and
+    when drawing has failed, which `trouble` says.
     """
 
     def __init__(self, drawn: Act) -> None:
@@ -39,6 +42,8 @@ class CloudRenderer:
         self._is_fresh = False
         #: Number of points drawn at rest.
         self.shown = 0
+        #: Why nothing is drawn any more, empty while it is.
+        self.trouble = ""
         self._window: RenderWindow
         self._thread = threading.Thread(target=self._run, name="3d-view", daemon=True)
         self._thread.start()
@@ -117,6 +122,15 @@ class CloudRenderer:
     # In the thread ---------------------------------------------------------------------------------
 
     def _run(self) -> None:
+        try:
+            self._work()
+        except Exception as error:  # of a graphics driver: said in the window, never lost in a thread
+            _log.exception("the 3D view cannot draw")
+            self.trouble = str(error) or type(error).__name__
+            with suppress(RuntimeError):
+                self._drawn()
+
+    def _work(self) -> None:
         self._window = RenderWindow()
         while not self._is_over:
             acts = self._wait()

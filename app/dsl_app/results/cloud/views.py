@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
-from PySide6.QtCore import QEvent, QPointF, Qt, Signal
+from PySide6.QtCore import QEvent, QPointF, Qt, QTimer, Signal
 from PySide6.QtGui import (
     QColor,
     QImage,
@@ -18,7 +18,7 @@ from PySide6.QtGui import (
     QResizeEvent,
     QWheelEvent,
 )
-from PySide6.QtWidgets import QWidget
+from PySide6.QtWidgets import QSizePolicy, QWidget
 
 from dsl_app.results.cloud.look import Grid, Look, Points, Side
 from dsl_app.results.cloud.overlay import Overlay, OverlayPainter
@@ -35,6 +35,15 @@ NO_OPENGL = (
     "OpenGL was not found, so the cloud cannot be rotated here. Export it as PLY to view it in another"
     " program, or install a graphics driver."
 )
+#: Said with the reason where 3D begins and then fails.
+BROKEN = (
+    "3D could not be drawn ({}), so this picture cannot be rotated. Update the graphics driver and start the"
+    " program again. Until then, export the cloud as PLY to view it in another program."
+)
+#: Shown until the first picture of a cloud is there, and what is added after a while.
+DRAWING = "Drawing the first 3D picture…"
+SLOW = "Without a graphics card this can take a minute. Everything else can be used meanwhile."
+SLOW_MS = 3000
 _BUTTONS: dict[Qt.MouseButton, MouseButton] = {
     Qt.MouseButton.LeftButton: "Left",
     Qt.MouseButton.MiddleButton: "Middle",
@@ -104,12 +113,16 @@ def make_cloud_view(
 
     ``moved`` is called when the view changes; ``mouse`` may consume mouse events, which then rotate nothing.
     """
-    return InteractiveCloud(moved, mouse) if can_draw else StaticCloud()
+    return InteractiveCloud(moved, mouse) if can_draw else StaticCloud(NO_OPENGL)
 
 
 class InteractiveCloud(CloudView):
-    """Shows the pictures of a `CloudRenderer` and forwards mouse, wheel and keys to it."""
+    """Shows the pictures of a `CloudRenderer` and forwards mouse, wheel and keys to it.
 
+    ``failed`` holds why nothing can be drawn any more.
+    """
+
+    failed = Signal(str)
     _drawn = Signal()
 
     def __init__(self, moved: Callable[[], object], mouse: Callable[[QMouseEvent], bool]) -> None:
@@ -118,6 +131,9 @@ class InteractiveCloud(CloudView):
         self.image, self._pixels = QImage(), np.empty(0, np.uint8)
         self._theme, self._overlay = DARK, Overlay()
         self._seen: Rendering | None = None
+        #: What is said instead of a picture, until there is one of the cloud.
+        self.waiting = DRAWING
+        QTimer.singleShot(SLOW_MS, self, self.say_more)
         self.setAccessibleName("Point cloud")
         self.setAccessibleDescription("Arrow keys rotate, plus and minus zoom, Home resets the view")
         self.setMouseTracking(True)
@@ -132,6 +148,8 @@ class InteractiveCloud(CloudView):
         self, points: Points, colours: Colours, reset_view: bool = True, grid: Grid | None = None
     ) -> None:
         """Show points with their colours, as many as this computer draws in time."""
+        if not len(points):
+            self.waiting = ""
         self.renderer.show(points, colours, reset_view, grid)
 
     def take_look(self, look: Look) -> None:
@@ -177,8 +195,19 @@ class InteractiveCloud(CloudView):
         """End the render thread."""
         self.renderer.close()
 
+    def say_more(self) -> None:
+        """Say why it takes long, unless there is a picture by now."""
+        if self.waiting:
+            self.waiting = f"{DRAWING}\n{SLOW}"
+            self.update()
+
     def _take(self) -> None:
+        if self.renderer.trouble:
+            self.failed.emit(self.renderer.trouble)
+            return
         picture = self.renderer.take()
+        if self.renderer.shown:
+            self.waiting = ""
         if picture is None:
             return
         before, self._seen = self.projection(), picture
@@ -203,6 +232,10 @@ class InteractiveCloud(CloudView):
             theme = self._theme
             over = OverlayPainter(painter, self.width(), self.height(), theme.text, theme.accent, theme.base)
             over.paint(self._seen, self._overlay)
+        if self.waiting:
+            painter.setPen(QColor(self._theme.muted))
+            centred = Qt.AlignmentFlag.AlignCenter | Qt.TextFlag.TextWordWrap
+            painter.drawText(self.rect().adjusted(20, 20, -20, -20), centred, self.waiting)
         painter.end()
 
     def resizeEvent(self, event: QResizeEvent) -> None:
@@ -270,13 +303,16 @@ def _modifiers(event: QMouseEvent) -> tuple[bool, bool]:
 
 
 class StaticCloud(CloudView):
-    """Without OpenGL: one picture of the cloud, seen slightly from the side, and a hint."""
+    """Where 3D does not work: one picture of the cloud, slightly from the side; ``why`` and what to do."""
 
-    def __init__(self) -> None:
+    def __init__(self, why: str) -> None:
         super().__init__()
         self._picture = label("", name="Picture of the point cloud")
         self._picture.setAlignment(Qt.AlignmentFlag.AlignCenter)
-        column_of((self._picture, 1), label(NO_OPENGL, "muted", wraps=True), on=self, margins=0)
+        # It fits into its room, whatever that is, and asks for none.
+        self._picture.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Ignored)
+        self._whole = QPixmap()
+        column_of((self._picture, 1), label(why, "muted", wraps=True), on=self, margins=0)
         self._background = "#000000"
 
     def show_cloud(
@@ -288,7 +324,18 @@ class StaticCloud(CloudView):
             return
         height, width = picture.shape[:2]
         image = QImage(picture.data, width, height, 3 * width, QImage.Format.Format_RGB888).copy()
-        self._picture.setPixmap(QPixmap.fromImage(image))
+        self._whole = QPixmap.fromImage(image)
+        self._fit()
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        """Fit the picture into the new size."""
+        super().resizeEvent(event)
+        self._fit()
+
+    def _fit(self) -> None:
+        if not self._whole.isNull():
+            keep, smooth = Qt.AspectRatioMode.KeepAspectRatio, Qt.TransformationMode.SmoothTransformation
+            self._picture.setPixmap(self._whole.scaled(self._picture.size(), keep, smooth))
 
     def apply_theme(self, theme: Theme) -> None:
         """Set the colour behind the next picture."""

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import gc
+import threading
 import weakref
 from pathlib import Path
 
 import numpy as np
 import pytest
 from dsl_app.results.cloud import panel as cloud_panel
+from dsl_app.results.cloud.render_window import RenderWindow, graphics_work
+from dsl_app.results.cloud.views import DRAWING, InteractiveCloud, StaticCloud
 from dsl_app.results.state import ResultView, Tool
 from PySide6.QtCore import QPoint, Qt
 from PySide6.QtTest import QTest
@@ -16,7 +19,7 @@ from PySide6.QtWidgets import QLabel
 from pytestqt.qtbot import QtBot
 
 from dsl_core.errors import Cancelled
-from tests.app.results.cloud.test_views import cloud_view, place_of
+from tests.app.results.cloud.test_views import _picture, cloud_view, place_of
 from tests.app.support.results_bench import Bench, move
 from tests.app.support.results_bench import bench as bench
 from tests.app.support.small_result import write_small_result
@@ -33,6 +36,57 @@ def test_without_graphics_the_cloud_is_a_picture_with_a_sentence(
     labels = view.findChildren(QLabel)
     qtbot.waitUntil(lambda: any(not label.pixmap().isNull() for label in labels))
     assert any("cannot be rotated here" in label.text() for label in labels)
+
+
+def test_it_says_what_it_does_until_there_is_a_picture(
+    bench: Bench, qtbot: QtBot, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    if not graphics_work():
+        pytest.skip("nothing draws in 3D here")
+    go, real = threading.Event(), RenderWindow
+
+    def slow() -> RenderWindow:
+        go.wait(5)
+        return real()
+
+    monkeypatch.setattr("dsl_app.results.cloud.renderer.RenderWindow", slow)
+    panel = bench.page.cloud
+    bench.control.show(ResultView.CLOUD)
+    assert panel.message.text() == "Preparing the 3D view…"
+    qtbot.waitUntil(lambda: panel.view is not None)
+    view = panel.view
+    assert isinstance(view, InteractiveCloud)
+    qtbot.waitUntil(lambda: view.isVisible() and not view.grab().isNull())
+    assert view.waiting == DRAWING
+    picture = _picture(view)
+    assert (picture != picture[0, 0]).any(), "it says nothing"
+    view.say_more()
+    assert "graphics card" in view.waiting
+    go.set()
+    qtbot.waitUntil(lambda: not view.waiting, timeout=30_000)
+
+
+def test_3d_that_fails_leaves_a_picture_and_says_what_to_do(
+    bench: Bench, qtbot: QtBot, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def broken() -> RenderWindow:
+        raise RuntimeError("no context for <OpenGL>.")
+
+    monkeypatch.setattr("dsl_app.results.cloud.renderer.RenderWindow", broken)
+    monkeypatch.setattr(cloud_panel, "prepare_cloud_view", lambda: True)
+    panel = bench.page.cloud
+    bench.control.show(ResultView.CLOUD)
+    qtbot.waitUntil(lambda: isinstance(panel.view, StaticCloud))
+    assert panel.view is not None
+    labels = panel.view.findChildren(QLabel)
+    qtbot.waitUntil(lambda: any(not label.pixmap().isNull() for label in labels))
+    said = next(label.text() for label in labels if label.text())
+    assert "no context for <OpenGL>)" in said
+    assert "Update the graphics driver" in said
+    assert not panel.tools.isEnabled()
+    assert "rotate" not in panel._hint.text()
+    # It takes no more than its half from the picture next to it.
+    assert panel.view.minimumSizeHint().width() < 300
 
 
 def test_the_cloud_hides_what_lies_outside_the_limits_and_keeps_its_view(bench: Bench, qtbot: QtBot) -> None:
@@ -90,7 +144,7 @@ def test_a_3d_view_that_was_cancelled_comes_when_it_is_wanted_again(
     panel = bench.page.cloud
     for words in ("was cancelled", "could not be prepared: no vtk"):
         bench.control.show(ResultView.CLOUD)
-        qtbot.waitUntil(lambda words=words: words in panel._hint.text())  # type: ignore[misc]
+        qtbot.waitUntil(lambda words=words: words in panel.message.text())  # type: ignore[misc]
         bench.control.show(ResultView.COLOUR)
     bench.control.show(ResultView.CLOUD)
     qtbot.waitUntil(lambda: panel.view is not None)
