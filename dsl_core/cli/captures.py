@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, Literal
 
 from dsl_core.cli.options import parse_size
 from dsl_core.cli.output import Output
+from dsl_core.errors import PlanError
 
 if TYPE_CHECKING:
+    from dsl_core.io.linearity import Linearity
     from dsl_core.io.pictures.mapping import Mapping
     from dsl_core.model.rig import Rig
 
@@ -27,6 +29,7 @@ class PictureOptions:
     mapping: Path | None
     projector: str | None
     chosen: str | None
+    encoding: str | None
     force: bool
 
     @property
@@ -47,7 +50,10 @@ def import_capture(
     else:
         assert options.mapping is not None
         mapping = captures.load_mapping(options.mapping)
+        if (encoding := encoding_named(options.encoding)) is not None:
+            mapping = mapping.model_copy(update={"encoding": encoding})
         _print(output, mapping, arrange(source, mapping).table)
+    _print_linearity(output, source, mapping)
     if target is not None:
         with output.progress() as progress:
             captures.import_pictures(source, target, mapping, rig, progress)
@@ -68,7 +74,6 @@ class StereoOptions:
 
 def import_stereo(output: Output, source: Path, target: Path | None, options: StereoOptions) -> None:
     """Say which lenses and pose a file contains; make a rig for depth if there is a target."""
-    from dsl_core.errors import PlanError
     from dsl_core.io.published.any_stereo import lenses_on, load_any_stereo
     from dsl_core.io.rig_file import load_rig, save_rig
     from dsl_core.simulation.published_rig import published_rig
@@ -99,13 +104,51 @@ def _guessed(output: Output, source: Path, rig: Rig | None, options: PictureOpti
     if size is None and rig is not None:
         size = (rig.projector.width_px, rig.projector.height_px)
     with output.progress() as progress:
-        guess = guess_mapping(source, size, options.chosen, progress)
+        guess = guess_mapping(source, size, options.chosen, progress, encoding_named(options.encoding))
     _print(output, guess.mapping, guess.table)
     path = options.mapping or Path(f"{source.absolute().name}.mapping.json")
-    write_record(path, guess.mapping, overwrite=options.force)
+    write_record(path, guess.mapping, overwrite=options.force, sealed=False)
     output.say(f"The mapping is saved in {path}; correct it there and use it with --mapping.")
     output.put(mapping=path, others=list(guess.others))
     return guess.mapping
+
+
+def encoding_named(text: str | None) -> Literal["linear", "srgb"] | None:
+    """The encoding that an option names; raises `PlanError`."""
+    match text:
+        case None | "linear" | "srgb":
+            return text
+    raise PlanError(f"--encoding must be linear or srgb, not {text!r}. Leave it out to find it out.")
+
+
+def _print_linearity(output: Output, source: Path, mapping: Mapping) -> None:
+    """Whether values are linear in light, as they are read by the mapping."""
+    from dsl_core.io.pictures.encoding import encoding_of
+    from dsl_core.io.pictures.source import open_pictures
+
+    found, advice = encoding_of(open_pictures(source, mapping))
+    read = ", decoded from sRGB," if mapping.encoding == "srgb" else ""
+    output.say(f"Values{read} are {found.sentence}." if found.figures else f"Values: {found.sentence}.")
+    if found.is_wrong:
+        output.say(f"Warning: {advice}.")
+    output.put(encoding=mapping.encoding, linearity=linearity_facts(found))
+
+
+def linearity_facts(found: Linearity) -> dict[str, Any]:
+    """A verdict and its figures, for one object of JSON."""
+    from math import isfinite
+
+    figures = found.figures
+    if figures is None:
+        return {"verdict": found.verdict}
+    facts = {
+        "excess_share": figures.excess,
+        "excess_std_share": figures.excess_std,
+        "exponent": figures.exponent,
+        "exponent_std": figures.exponent_std,
+    }
+    rounded = {name: round(value, 4) if isfinite(value) else None for name, value in facts.items()}
+    return {"verdict": found.verdict, **rounded, "pairs": figures.pairs, "pixels": figures.pixels}
 
 
 def _print(output: Output, mapping: Mapping, table: tuple[tuple[str, str], ...]) -> None:

@@ -55,6 +55,10 @@ def import_(
     chosen: Annotated[
         str | None, typer.Option("--set", help="Which of several captures in the folder, for --guess.")
     ] = None,
+    encoding: Annotated[
+        str | None,
+        typer.Option("--encoding", help="linear, or srgb for pictures for screens; found out by --guess."),
+    ] = None,
     force: Annotated[
         bool, typer.Option("--force", help="Replace RIG.json or MAPPING.json; a scan is never replaced.")
     ] = False,
@@ -83,7 +87,7 @@ def import_(
         return
     if not source.is_dir():
         raise StoreError(f"{source} is not a folder. Give the folder of a published dataset or calibration.")
-    options = PictureOptions(guess, mapping, projector, chosen, force)
+    options = PictureOptions(guess, mapping, projector, chosen, encoding, force)
     if options.is_asked_for:
         import_capture(output, source, target, load_rig(base) if base else None, options)
         output.finish()
@@ -158,10 +162,11 @@ def info(
 
 
 def _proof_of(path: Path) -> dict[str, Any]:
-    from dsl_core.workflows.scans import moved_during, prove_scan
+    from dsl_core.workflows.scans import linearity_of_scan, moved_during, prove_scan
 
     found, moved = prove_scan(path), list(moved_during(path))
     return {
+        "values": linearity_of_scan(path).sentence,
         "moved": moved or "nothing",
         "wrong_pictures": list(found.sentences),
         "pictures_not_judged": found.not_judged or "none",

@@ -17,12 +17,13 @@ from dsl_core.model.base import Record, problems_in_words
 R = TypeVar("R", bound=Record)
 
 
-def write_record(path: Path, record: Record, *, overwrite: bool = False) -> Path:
-    """Write a record as JSON with its checksum, whole or not at all, and return its path.
+def write_record(path: Path, record: Record, *, overwrite: bool = False, sealed: bool = True) -> Path:
+    """Write a record as JSON, whole or not at all, and return its path.
 
-    Raises `StoreError`.
+    It carries its checksum unless it is not ``sealed``, as a file for people to edit. Raises `StoreError`.
     """
-    return write_text(path, seal(record.model_dump_json(indent=1)).decode(), overwrite=overwrite)
+    text = record.model_dump_json(indent=1)
+    return write_text(path, seal(text).decode() if sealed else f"{text}\n", overwrite=overwrite)
 
 
 def replace_record(path: Path, record: Record) -> None:

@@ -9,6 +9,7 @@ diffuser is white on every grid. The tables are files of the resources.
 from __future__ import annotations
 
 from functools import cache
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +19,7 @@ from dsl_core.resources import resource_path
 Floats = NDArray[np.float64]
 #: Colours computed from float32 cubes stay float32.
 AnyFloats = NDArray[np.float32] | NDArray[np.float64]
+F = TypeVar("F", np.float32, np.float64)
 
 # CIE 1931 2 degree colour matching functions and illuminant D65 at 5 nm, 380 to 780 nm.
 _TABLE: Floats = np.loadtxt(resource_path("colour/cie_1931_d65.csv"), delimiter=",", unpack=True)
@@ -96,6 +98,12 @@ def srgb_encode(linear: Floats) -> Floats:
     return np.where(
         linear <= 0.0031308, 12.92 * linear, 1.055 * np.maximum(linear, 0.0031308) ** (1 / 2.4) - 0.055
     )
+
+
+def srgb_decode(values: NDArray[F]) -> NDArray[F]:
+    """Linear light 0..1 of values of sRGB 0..1 (IEC 61966-2-1)."""
+    steep = ((np.maximum(values, 0.04045) + 0.055) / 1.055) ** 2.4
+    return np.asarray(np.where(values <= 0.04045, values / 12.92, steep), values.dtype)
 
 
 @cache

@@ -141,6 +141,16 @@ def with_own_sensor(reader: ScanReader, rig: Rig) -> Rig:
     return rig if noted is None else rig.model_copy(update={"sensor": Sensor.model_validate_json(noted)})
 
 
+def own_sensor(reader: ScanReader) -> Sensor:
+    """The sensor of imported pictures, of the scan's calibration, or a common one of the camera's bits."""
+    noted, camera = reader.manifest.notes.get(SENSOR), reader.manifest.camera
+    if noted is not None:
+        return Sensor.model_validate_json(noted)
+    if reader.calibration is not None:
+        return reader.calibration.sensor
+    return Sensor() if camera is None else common_sensor(camera.bit_depth)
+
+
 @dataclass(frozen=True)
 class _Readout:
     sensor: Sensor

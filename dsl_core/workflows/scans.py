@@ -19,6 +19,7 @@ from dsl_core.devices.registry import is_built_in, open_rig
 from dsl_core.errors import CalibrationError, DecodeError, DriftError, StoreError
 from dsl_core.evaluation.cost import StageTimer
 from dsl_core.evaluation.summary import Truth
+from dsl_core.io.linearity import Linearity, linearity_of
 from dsl_core.io.scan.check import require_complete
 from dsl_core.io.scan.folder import ScanReader
 from dsl_core.io.scan.manifest import Manifest, read_manifest
@@ -33,7 +34,7 @@ from dsl_core.patterns.images import pattern_image
 from dsl_core.pipeline import Options, reconstruct, scan
 from dsl_core.progress import Progress
 from dsl_core.version import __version__
-from dsl_core.workflows.captures import with_own_sensor
+from dsl_core.workflows.captures import own_sensor, with_own_sensor
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -181,6 +182,18 @@ def prove_scan(folder: Path) -> ProofReport:
     camera = reader.manifest.camera
     settings = (camera.bit_depth, camera.bayer) if camera else ()
     return prove(reader, reader.calibration, *settings)
+
+
+def linearity_of_scan(folder: Path) -> Linearity:
+    """Whether the values of a scan are linear in light, by the sums of its patterns and inverses.
+
+    Imported pictures are judged as their mapping read them. Raises `StoreError`.
+    """
+    reader = ScanReader(folder)
+    sound = set(reader.entries) & reader.store.stored()
+    absent = {shot.index for shot in reader.plan.shots() if shot.index not in sound}
+    sensor = own_sensor(reader)
+    return linearity_of(reader, sensor.full_scale_dn, sensor.black_level_dn, absent)
 
 
 def calibration_of(source: FrameSource, given: Rig | None = None) -> Rig:

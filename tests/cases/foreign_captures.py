@@ -8,8 +8,10 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import uniform_filter
 
 from dsl_core.model.captured_code import CapturedCode, Phases, Stripes
+from dsl_core.optics.colour import srgb_encode
 from dsl_core.patterns.captured_code import captured_levels
 
 PROJECTOR = (128, 96)
@@ -73,6 +75,16 @@ def frames(
     white = seen.picture(np.ones(shape), seed + 5000, bits)
     black = seen.picture(np.zeros(shape), seed + 6000, bits)
     return out, white, black
+
+
+def for_screens(picture: NDArray[np.uint16]) -> NDArray[np.uint16]:
+    """An 8-bit picture through a lens that mixes the light of stripes, stored in sRGB."""
+    return np.asarray(np.rint(srgb_encode(blurred(picture) / 255) * 255), np.uint16)
+
+
+def blurred(picture: NDArray[np.uint16]) -> NDArray[np.uint16]:
+    """A picture through a lens that mixes the light of neighbouring stripes."""
+    return np.asarray(np.rint(uniform_filter(picture.astype(float), 5)), np.uint16)
 
 
 def write(folder: Path, pictures: Mapping[str, NDArray[np.integer]], bits: int = 8) -> Path:

@@ -11,7 +11,7 @@ import pytest
 from dsl_core.cli import main
 from dsl_core.io.result.result_file import load_result
 from dsl_core.model.captured_code import Stripes
-from tests.cases.foreign_captures import CAMERA, PROJECTOR, frames, write
+from tests.cases.foreign_captures import CAMERA, PROJECTOR, for_screens, frames, write
 
 
 def test_pictures_become_columns_and_with_a_calibration_depth(
@@ -62,3 +62,32 @@ def test_a_folder_of_no_capture_ends_in_one_sentence(
     assert "contains 1 pictures" in capsys.readouterr().err
     assert main(["import", str(tmp_path / "few")]) == 2
     assert "Add --guess for pictures of another program." in capsys.readouterr().err
+
+
+def test_values_are_judged_before_and_after_an_import(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    pictures, white, black = frames([("columns", Stripes(bits=7))])
+    named = {f"im{i:02d}.png": for_screens(p) for i, p in enumerate([*pictures, white, black])}
+    write(tmp_path / "set", named)
+
+    def say(*words: str) -> str:
+        assert main(list(words)) == 0
+        return " ".join(capsys.readouterr().out.split())
+
+    said = say("import", "set", "--guess", "--projector", "128x96", "-o", "a.dsl")
+    assert "they are decoded from sRGB" in said
+    assert "Values, decoded from sRGB, are linear in light" in said
+    # A person may correct the mapping in an editor: it carries no checksum.
+    text = Path("set.mapping.json").read_text(encoding="utf-8")
+    Path("set.mapping.json").write_text(text.replace('"srgb"', '"linear"'), encoding="utf-8")
+    said = say("import", "set", "--mapping", "set.mapping.json", "-o", "b.dsl")
+    assert "Warning: set encoding of the mapping to srgb" in said
+    facts = [json.loads(say("info", name, "--verify", "--json"))["values"] for name in ("a.dsl", "b.dsl")]
+    assert facts[0].startswith("linear in light")
+    assert facts[1].startswith("not linear in light but encoded, as sRGB")
+    told = json.loads(say("import", "set", "--mapping", "set.mapping.json", "--encoding", "srgb", "--json"))
+    assert (told["encoding"], told["linearity"]["verdict"]) == ("srgb", "linear")
+    assert main(["import", "set", "--guess", "--encoding", "gamma"]) == 2
+    assert "must be linear or srgb" in capsys.readouterr().err

@@ -243,6 +243,7 @@ def test_info_of_a_scan_and_a_result(give: Give, finished: Path) -> None:
     scan = give("info", finished / "scan.dsl", "--verify", "--json").json
     assert (scan["kind"], scan["complete"], scan["frames_stored"]) == ("session", True, 154)
     assert scan["notes"]["scanned_with"] == "twin"
+    assert scan["values"].startswith("linear in light")
     result = give("info", finished / "scan.zarr", "--json").json
     assert (result["kind"], result["size_px"]) == ("result", [112, 72])
     assert result["bands"] == "24 from 430 to 660 nm"

@@ -18,6 +18,7 @@ from dsl_core.errors import StoreError
 from dsl_core.io.atomic import disk_full, is_full
 from dsl_core.io.export.common import plane, provenance, require, require_suffix, wavelengths_nm
 from dsl_core.io.staging import staged
+from dsl_core.optics.colour import srgb_decode
 from dsl_core.solve.many import Check, never
 
 if TYPE_CHECKING:
@@ -51,7 +52,7 @@ def export_exr(
     }
     if "rgb" in result:
         check()
-        linear = linear_from_srgb(plane(result, "rgb"))
+        linear = srgb_decode(plane(result, "rgb"))
         channels |= {name: np.ascontiguousarray(c) for name, c in zip("RGB", linear, strict=True)}
     if "depth_mm" in result:
         check()
@@ -74,9 +75,3 @@ def export_exr(
                 raise disk_full(path) from error
             raise StoreError(f"{path} could not be written as OpenEXR ({error}).") from error
     return [path]
-
-
-def linear_from_srgb(values: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Linear light of sRGB values, both 0..1 (IEC 61966-2-1)."""
-    steep = ((np.maximum(values, 0.04045) + 0.055) / 1.055) ** 2.4
-    return np.where(values <= 0.04045, values / 12.92, steep).astype(np.float32)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,10 +13,12 @@ from numpy.typing import NDArray
 from dsl_core.errors import StoreError
 from dsl_core.io.pictures.arrange import arrange
 from dsl_core.io.pictures.candidates import Candidate, candidates
+from dsl_core.io.pictures.encoding import guessed_encoding
 from dsl_core.io.pictures.guessed_parts import guessed_size, part_of
 from dsl_core.io.pictures.mapping import Mapping
 from dsl_core.io.pictures.picture_file import load_values
 from dsl_core.model.rig import BayerPattern
+from dsl_core.optics.colour import srgb_decode
 from dsl_core.patterns.recognition.probes import Probes, ProbeTaker
 from dsl_core.patterns.recognition.sequence import Recognised, recognise
 from dsl_core.progress import NoProgress, Progress
@@ -24,6 +27,8 @@ from dsl_core.progress import NoProgress, Progress
 LEAST_LIGHT = 0.02
 #: Readings worse than this make sense, but not much.
 DOUBTFUL = 0.8
+#: Readings worse than this may come from values that are encoded for screens: their stripes look uneven.
+AS_ENCODED = 0.5
 #: Mean values of the four places of a mosaic differ by at least this ratio, its two greens by less.
 MOSAIC_RATIO, GREEN_RATIO = 1.12, 1.05
 Size = tuple[int, int]
@@ -43,6 +48,7 @@ class _Look:
     """What reading all pictures of a candidate showed."""
 
     probes: Probes
+    decoded: Probes
     bit_depth: int | None
     left_aligned: bool
     full_scale: float | None
@@ -55,10 +61,12 @@ def guess_mapping(
     projector_size_px: Size | None = None,
     chosen: str | None = None,
     progress: Progress | None = None,
+    encoding: Literal["linear", "srgb"] | None = None,
 ) -> Guess:
     """Find out from the pictures how they are a capture; ``chosen`` names one of several in the folder.
 
-    Nothing is written. Raises `StoreError` that says what was found when the pictures make no sense.
+    An ``encoding`` of values that is known is not guessed. Nothing is written. Raises `StoreError` that says
+    what was found when the pictures make no sense.
     """
     if not folder.is_dir():
         raise StoreError(f"{folder} is not a folder. Give the folder that contains the pictures.")
@@ -86,7 +94,7 @@ def guess_mapping(
         for picture in candidate.pictures:
             slots.append(None if picture is None else count)
             count += picture is not None
-        found = recognise(look.probes, tuple(slots))
+        found = _recognised(look, tuple(slots))
         if found is not None and (best is None or found.misfit < best[2].misfit):
             best = candidate, look, found
         if best is not None and best[2].misfit < DOUBTFUL and not _absent_next(order, number):
@@ -99,7 +107,16 @@ def guess_mapping(
             " sinusoids lets their positions run steadily. Check that all are of one camera and scene, or"
             " state a mapping."
         )
-    return _guess_of(folder, *best, projector_size_px, names)
+    return _guess_of(folder, *best, projector_size_px, names, encoding)
+
+
+def _recognised(look: _Look, slots: tuple[int | None, ...]) -> Recognised | None:
+    """What the pictures show as they are, or as pictures for screens where that makes more sense."""
+    found = recognise(look.probes, slots)
+    if found is not None and found.misfit < AS_ENCODED:
+        return found
+    decoded = recognise(look.decoded, slots)
+    return min((each for each in (found, decoded) if each), key=lambda each: each.misfit, default=None)
 
 
 def _single_instead(
@@ -111,7 +128,7 @@ def _single_instead(
         look = _look_at(first)
     except StoreError:
         return None
-    found = None if None in first.pictures else recognise(look.probes, tuple(range(len(first.pictures))))
+    found = None if None in first.pictures else _recognised(look, tuple(range(len(first.pictures))))
     if found is None or found.misfit > DOUBTFUL or found.axes != best[2].axes:
         return None
     # Stripes in one folder and the sinusoids that they count in another belong together.
@@ -155,6 +172,7 @@ def _look_at(candidate: Candidate) -> _Look:
     depth, aligned = _depth_of(bits, most, is_wide, floats)
     scale = most if floats else float((1 << (16 if aligned else depth or 8)) - 1)
     probes = taker.finish(max(scale, 1e-9))
+    decoded = taker.finish(max(scale, 1e-9), srgb_decode)
     if probes.range_share < LEAST_LIGHT:
         raise StoreError(
             f"The pictures of {candidate.name} change by {probes.range_share:.1%} of their range: no"
@@ -166,7 +184,7 @@ def _look_at(candidate: Candidate) -> _Look:
         notes.append(
             f"neighbouring pixels look like a colour mosaic; {bayer} is assumed (red and blue unsure)"
         )
-    return _Look(probes, depth, aligned, most if floats else None, bayer, tuple(notes))
+    return _Look(probes, decoded, depth, aligned, most if floats else None, bayer, tuple(notes))
 
 
 def _depth_of(bits: int, most: float, is_wide: bool, floats: bool) -> tuple[int | None, bool]:
@@ -205,6 +223,7 @@ def _guess_of(
     found: Recognised,
     size_px: Size | None,
     names: Sequence[str],
+    encoding: Literal["linear", "srgb"] | None,
 ) -> Guess:
     unsure = list(look.notes)
     size, doubt = (size_px, "") if size_px else guessed_size(found.blocks)
@@ -238,8 +257,12 @@ def _guess_of(
         bit_depth=look.bit_depth,
         left_aligned=look.left_aligned,
         full_scale=look.full_scale,
-        unsure=tuple(unsure),
     )
+    of_values: tuple[str, ...] = ()
+    if encoding is None:
+        mapping, of_values = guessed_encoding(folder, mapping)
+    known = {} if encoding is None else {"encoding": encoding}
+    mapping = mapping.model_copy(update={**known, "unsure": (*unsure, *of_values)})
     return Guess(mapping, arrange(folder, mapping).table, tuple(others))
 
 

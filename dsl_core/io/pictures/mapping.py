@@ -100,7 +100,7 @@ class Mapping(Record):
     ``missing`` are places (from 0) in that order of which there is no picture. Colour pictures become
     ``grey``, the mean of their channels, or one channel; a ``bayer`` mosaic stays as it is. Values have
     ``bit_depth`` bits, at the upper end of 16 where ``left_aligned``; ``full_scale`` is the white of
-    floating-point arrays.
+    floating-point arrays. Values with ``encoding`` "srgb" are made linear in light, channel by channel.
     """
 
     schema_version: Literal[1] = 1
@@ -115,6 +115,7 @@ class Mapping(Record):
     bit_depth: int | None = Field(default=None, ge=8, le=16)
     left_aligned: bool = False
     full_scale: float | None = Field(default=None, gt=0)
+    encoding: Literal["linear", "srgb"] = "linear"
     raw: RawLayout | None = None
     unsure: tuple[str, ...] = ()
 

@@ -16,12 +16,15 @@ from dsl_core.errors import StoreError
 from dsl_core.io.pictures.mapping import MOST_PICTURES, Mapping, RawLayout
 from dsl_core.io.reading import read_array, read_bounded, require_plain
 from dsl_core.model.plan import MOST_PX
+from dsl_core.optics.colour import srgb_decode
 
 PICTURES = {".png", ".tif", ".tiff", ".bmp", ".jpg", ".jpeg", ".pgm", ".ppm"}
 ARRAYS, RAWS = {".npy"}, {".raw", ".bin"}
 #: Larger than any camera's picture, in bytes of its file and in pixels.
 MOST_BYTES, MOST_PIXELS = 1 << 30, 200_000_000
 _FULL = 65535
+#: Bits of frames decoded from sRGB: the steps of dark values are as fine as those of 12 bits.
+DECODED_BITS = 16
 
 
 @dataclass(frozen=True)
@@ -75,15 +78,45 @@ def load_values(picture: Picture, raw: RawLayout | None = None) -> NDArray[Any]:
 
 
 def load_mosaic(picture: Picture, mapping: Mapping, bit_depth: int) -> NDArray[np.uint16]:
-    """A picture as a frame, (rows, columns), DN in ``bit_depth`` bits; raises `StoreError`."""
+    """A picture as a frame, (rows, columns), DN in ``bit_depth`` bits; raises `StoreError`.
+
+    Pictures in sRGB become linear frames of `DECODED_BITS`.
+    """
     values = load_values(picture, mapping.raw)
+    if mapping.encoding == "srgb":
+        return np.asarray(np.rint(_one_channel(_decoded(values, picture, mapping), mapping)), np.uint16)
     is_float = values.dtype.kind == "f"
-    if values.ndim == 3 and mapping.channel == "grey":
-        values = values.mean(axis=2, dtype=np.float64)
-    elif values.ndim == 3:
-        values = values[..., ("red", "green", "blue").index(mapping.channel)]
+    if values.ndim == 3:
+        values = _one_channel(values, mapping)
     if is_float and mapping.full_scale is not None:
         values = values / mapping.full_scale * (2**bit_depth - 1)
+    return _whole(values, picture, mapping, bit_depth)
+
+
+def _one_channel(values: NDArray[Any], mapping: Mapping) -> NDArray[Any]:
+    if values.ndim == 2:
+        return values
+    if mapping.channel != "grey":
+        return np.asarray(values[..., ("red", "green", "blue").index(mapping.channel)])
+    return np.asarray(values.mean(axis=2, dtype=np.float64))
+
+
+def _decoded(values: NDArray[Any], picture: Picture, mapping: Mapping) -> NDArray[np.uint16]:
+    """Values of sRGB as linear ones, of the same shape, by a table of all that their bits allow."""
+    bits = mapping.bit_depth or (8 if values.dtype.itemsize == 1 else 16)
+    if values.dtype.kind == "f":
+        values = values / (mapping.full_scale or 1.0) * (2**bits - 1)
+    return np.asarray(_decoding_table(bits)[_whole(values, picture, mapping, bits)])
+
+
+@lru_cache(maxsize=4)
+def _decoding_table(bits: int) -> NDArray[np.uint16]:
+    light = srgb_decode(np.arange(2**bits) / (2**bits - 1))
+    return np.asarray(np.rint(light * (2**DECODED_BITS - 1)), np.uint16)
+
+
+def _whole(values: NDArray[Any], picture: Picture, mapping: Mapping, bit_depth: int) -> NDArray[np.uint16]:
+    """Values as whole numbers that fit into the bits, at their lower end; raises `StoreError`."""
     if values.dtype.kind == "f":
         values = np.rint(values)
     if not np.isfinite(values).all() or values.min() < 0 or values.max() > _FULL:

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from dsl_core.errors import StoreError
 from dsl_core.io.pictures.arrange import Arrangement, arrange
 from dsl_core.io.pictures.mapping import Mapping
-from dsl_core.io.pictures.picture_file import Picture, load_mosaic, load_values
+from dsl_core.io.pictures.picture_file import DECODED_BITS, Picture, load_mosaic, load_values
 from dsl_core.model.plan import CapturePlan, NoSpectral, Setting, Shot
 
 #: Nobody notes exposures next to pictures; ratios within a capture are all that decoding needs.
@@ -68,7 +68,9 @@ class PictureScan:
 
     def fingerprint(self) -> str:
         """What tells these pictures, mapped like this, from all others."""
-        digest = hashlib.sha256(self.mapping.model_dump_json(exclude={"unsure", "name"}).encode())
+        # Mappings of earlier versions, which had no encoding, keep their fingerprint.
+        told = {"unsure", "name"} | ({"encoding"} if self.mapping.encoding == "linear" else set())
+        digest = hashlib.sha256(self.mapping.model_dump_json(exclude=told).encode())
         for shot in self.plan.shots():
             digest.update(self.read(shot).tobytes())
         return digest.hexdigest()
@@ -88,4 +90,5 @@ def open_pictures(root: Path, mapping: Mapping) -> PictureScan:
         code_settings=(0,),
     )
     stored_bits = 8 if first.dtype.itemsize == 1 else 16
-    return PictureScan(root, mapping, found, plan, mapping.bit_depth or stored_bits)
+    bits = DECODED_BITS if mapping.encoding == "srgb" else mapping.bit_depth or stored_bits
+    return PictureScan(root, mapping, found, plan, bits)

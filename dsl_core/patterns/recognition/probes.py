@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 Floats = NDArray[np.float32]
 Bools = NDArray[np.bool_]
+Decode = Callable[[Floats], Floats]
 #: Lines that are looked at in each direction.
 LINES = 16
 #: Pixels that are enough to know a distribution.
@@ -80,11 +81,15 @@ class ProbeTaker:
         self._across.append(np.asarray(grey[rows], np.float32))
         self._down.append(np.asarray(grey[:, columns].T, np.float32))
 
-    def finish(self, full_scale: float) -> Probes:
-        """The lines of all pictures, which reach up to ``full_scale``."""
-        across, span = _relative(self._across)
-        down, _ = _relative(self._down)
-        return Probes(across, down, span / full_scale)
+    def finish(self, full_scale: float, decode: Decode | None = None) -> Probes:
+        """The lines of all pictures, which reach up to ``full_scale``; ``decode`` makes 0..1 linear light."""
+        across, span = _relative(_decoded(self._across, full_scale, decode))
+        down, _ = _relative(_decoded(self._down, full_scale, decode))
+        return Probes(across, down, span if decode else span / full_scale)
+
+
+def _decoded(pictures: list[Floats], full_scale: float, decode: Decode | None) -> list[Floats]:
+    return pictures if decode is None else [decode(lines / np.float32(full_scale)) for lines in pictures]
 
 
 def _places(length: int) -> NDArray[np.intp]:

@@ -15,11 +15,12 @@ from dsl_core.errors import Cancelled, StoreError
 from dsl_core.io.export import Format, export, export_by_ending, export_csv, export_png, formats
 from dsl_core.io.export.common import provenance_of
 from dsl_core.io.export.envi import export_envi
-from dsl_core.io.export.exr import export_exr, linear_from_srgb
+from dsl_core.io.export.exr import export_exr
 from dsl_core.io.export.ply import export_ply
 from dsl_core.io.export.png import GREY, flags_picture
 from dsl_core.model.fit import ATTRIBUTE, Fit, FitFinding
 from dsl_core.model.result import FLAG_COLOURS, Flag, reasons
+from dsl_core.optics.colour import srgb_decode
 from dsl_core.optics.relighting import relight
 from dsl_core.solve.many import Check, never
 from tests.cases.plugins import added_by_a_package
@@ -162,7 +163,7 @@ def test_exr_in_openexr(tmp_path: Path) -> None:
             np.testing.assert_array_equal(channels[name].pixels, result["reflectance"].values[band])
         np.testing.assert_array_equal(channels["Z"].pixels, result["depth_mm"].values)
         red = result["rgb"].values[0]
-        np.testing.assert_allclose(channels["R"].pixels, linear_from_srgb(red), rtol=1e-6)
+        np.testing.assert_allclose(channels["R"].pixels, srgb_decode(red), rtol=1e-6)
         assert header["spectralLayoutVersion"] == "1.0"
         assert header["dsl_scan_id"] == "2026-05-04-chart"
 
@@ -211,7 +212,7 @@ def test_a_tiff_says_what_it_holds_and_where_it_comes_from(tmp_path: Path) -> No
 def test_linear_light_of_srgb() -> None:
     # IEC 61966-2-1: 0.5 encodes 0.21404, 0.04 lies on the straight piece.
     np.testing.assert_allclose(
-        linear_from_srgb(np.array([0, 0.04, 0.5, 1], np.float32)), [0, 0.04 / 12.92, 0.214041, 1], rtol=1e-5
+        srgb_decode(np.array([0, 0.04, 0.5, 1], np.float32)), [0, 0.04 / 12.92, 0.214041, 1], rtol=1e-5
     )
 
 

@@ -8,14 +8,15 @@ import numpy as np
 import pytest
 
 from dsl_core.io.export.envi import IGNORE_VALUE
-from dsl_core.io.export.exr import export_exr, linear_from_srgb
+from dsl_core.io.export.exr import export_exr
+from dsl_core.optics.colour import srgb_decode
 from tests.cases.small_result import small_result
 
 
 def test_srgb_is_straight_up_to_its_knee_and_a_power_above() -> None:
     values = np.array([0.0, 0.02, 0.04, 0.0404, 0.0405, 0.05, 0.055, 0.5, 1.0], np.float32)
     wanted = [v / 12.92 if v <= 0.04045 else ((v + 0.055) / 1.055) ** 2.4 for v in values.astype(float)]
-    assert linear_from_srgb(values) == pytest.approx(np.array(wanted), rel=1e-6)
+    assert srgb_decode(values) == pytest.approx(np.array(wanted), rel=1e-6)
 
 
 def test_light_in_a_file_is_not_scaled_and_depth_in_millimetres(tmp_path: Path) -> None:

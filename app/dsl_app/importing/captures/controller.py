@@ -133,7 +133,7 @@ class CapturesController:
         if stated is None:
             return
         try:
-            write_record(path, stated.mapping, overwrite=True)
+            write_record(path, stated.mapping, overwrite=True, sealed=False)
         except DslError as error:
             self._say(Place.MAPPING, sentence_of(error))
             return

@@ -93,6 +93,7 @@ class CapturesDialog(JobDialog):
         self.decoded.setMinimumWidth(PICTURE_PX)
         self.about_columns = _sentence(MOST_LINES + 1)
         self.about_mapping = _sentence()
+        self.about_values = _sentence()
 
     def _make_bottom(self) -> None:
         self.calibration = ChoiceBox(
@@ -135,7 +136,7 @@ class CapturesDialog(JobDialog):
         form.addRow("", self.about_calibration)
         form.addRow("Name", row_of((self.name, 1), label("in", "muted"), (self.home, 2), self.browse))
         form.addRow("", self.about_target)
-        for part in (head, self.about_folder, tools, self.about_mapping):
+        for part in (head, self.about_folder, tools, self.about_mapping, self.about_values):
             self.column.addWidget(part) if isinstance(part, QLabel) else self.column.addLayout(part)
         self.column.addLayout(middle, 1)
         self.column.addLayout(form)
@@ -204,6 +205,7 @@ class CapturesDialog(JobDialog):
             (self.about_folder, view.folder),
             (self.about_mapping, view.mapping),
             (self.about_columns, view.columns),
+            (self.about_values, view.values),
             (self.about_calibration, view.calibration),
             (self.about_target, view.target),
         ):

@@ -131,6 +131,9 @@ def picture_fields(mapping: Mapping) -> tuple[Field, ...]:
         Field("bit_depth", "Bit depth", "choice", mapping.bit_depth, "Bits that values really have", depths),
         Field("left_aligned", "Left aligned", "flag", mapping.left_aligned,
               "Values are at the upper end of 16 bits"),
+        Field("encoding", "Encoding", "choice", mapping.encoding,
+              "linear: values are proportional to light; srgb: pictures for screens, made linear when read",
+              _words("linear", "srgb")),
         Field("full_scale", "Full scale", "number", mapping.full_scale or 0.0,
               "The white of floating-point arrays; 0: they hold whole numbers", low=0, high=1e6),
         Field("raw", "Raw files", "flag", mapping.raw is not None,
@@ -192,6 +195,9 @@ def with_field(mapping: Mapping, key: str, value: Any) -> Mapping:
     """The mapping with a field of its files changed; raises `StoreError` when that is not possible."""
     if key == "raw":
         return _changed(mapping, raw=RawLayout(width_px=640, height_px=480) if value else None)
+    if key == "encoding":
+        unsure = tuple(each for each in mapping.unsure if "linear in light" not in each)
+        return _changed(mapping, encoding=value, unsure=unsure)
     head, _, inner = key.partition(".")
     if inner:
         assert mapping.raw is not None

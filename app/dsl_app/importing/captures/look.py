@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -233,13 +233,17 @@ def kept(size: int, step: int) -> NDArray[np.intp]:
 
 def decode(folder: Path, mapping: Mapping, progress: Progress | None = None) -> Decoded:
     """Columns of some of the pixels; raises `StoreError` naming the picture that cannot be used."""
+    from dsl_core.io.pictures.encoding import encoding_of
     from dsl_core.io.pictures.source import open_pictures
     from dsl_core.workflows.captures import decode_columns_of, sensor_of
 
     source = open_pictures(folder, mapping)
     width, height = source.plan.camera_size_px
     step = max(int(np.ceil(np.sqrt(width * height / PREVIEW_PIXELS))), 1)
-    return decoded_of(decode_columns_of(Thinned(source, step), sensor_of(source), progress or NoProgress()))
+    thinned = Thinned(source, step)
+    found = decoded_of(decode_columns_of(thinned, sensor_of(source), progress or NoProgress()))
+    linearity, advice = encoding_of(source, thinned)
+    return replace(found, values=linearity.sentence if linearity.figures else "", advice=advice)
 
 
 def decoded_of(result: Any) -> Decoded:

@@ -62,11 +62,16 @@ class Listing:
 
 @dataclass(frozen=True, eq=False)
 class Decoded:
-    """Columns of the projector that pixels see, NaN where undecided, and the share of lit pixels with one."""
+    """Columns of the projector that pixels see, NaN where undecided, and the share of lit pixels with one.
+
+    ``values`` says whether values are linear in light, ``advice`` what to do if not.
+    """
 
     column_px: NDArray[np.float32]
     share: float
     lit: float
+    values: str = ""
+    advice: str = ""
 
 
 @dataclass(frozen=True)
@@ -144,6 +149,7 @@ class CapturesView:
     calibration: Said
     target: Said
     columns: Said
+    values: Said
     can_guess: bool
     can_change: bool
     can_import: bool
@@ -172,6 +178,7 @@ def captures_view(state: CapturesState) -> CapturesView:
         calibration=said(Place.CALIBRATION, Said(state.listing.value.calibration)),
         target=said(Place.TARGET, Said(f"Creates {request.target.name}{_also(request)}.")),
         columns=_about_columns(state.decoded.value),
+        values=_about_values(state.decoded.value),
         can_guess=request.folder is not None and not importing,
         can_change=stated is not None and not importing,
         can_import=stated is not None and not troubles and not busy,
@@ -216,6 +223,15 @@ def _about_columns(decoded: Decoded | None) -> Said:
     if decoded.share >= FAIR_SHARE:
         return Said(f"{text}. Stripes are too fine or too dark for the others.", "warn")
     return Said(f"{text}. Check the code, the order of its digits and the inverse pictures.", "bad")
+
+
+def _about_values(decoded: Decoded | None) -> Said:
+    """Whether values are linear in light, and what to do if not."""
+    if decoded is None:
+        return Said()
+    advice = f"{decoded.advice[0].upper()}{decoded.advice[1:]}." if decoded.advice else ""
+    values = f"Values are {decoded.values}." if decoded.values else ""
+    return Said(f"{advice} {values}".strip(), "warn" if advice else "muted")
 
 
 def _no_picture(state: CapturesState, troubles: dict[Place, str]) -> str:

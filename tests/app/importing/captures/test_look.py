@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from dsl_app.importing.captures.fields import first_mapping, with_part_field
+from dsl_app.importing.captures.fields import first_mapping, with_field, with_part_field
 from dsl_app.importing.captures.look import (
     Thinned,
     decode,
@@ -22,9 +22,10 @@ from dsl_app.importing.captures.state import NOMINAL, CaptureRequest, Place
 from dsl_core.errors import CalibrationError, StoreError
 from dsl_core.io.calibration_library import CalibrationLibrary
 from dsl_core.io.pictures.source import open_pictures
+from dsl_core.model.captured_code import Stripes
 from dsl_core.progress import NoProgress
 from tests.app.importing.captures.small_capture import CAMERA, PROJECTOR, request_for
-from tests.cases.foreign_captures import scene
+from tests.cases.foreign_captures import for_screens, frames, scene, write
 from tests.cases.small_rig import small_rig
 
 MAPPING = first_mapping(12, PROJECTOR)
@@ -44,8 +45,6 @@ def test_a_guess_is_what_was_captured(folder: Path, tmp_path: Path) -> None:
 
 
 def test_pictures_that_make_no_sense_leave_a_mapping_to_correct(tmp_path: Path) -> None:
-    from tests.cases.foreign_captures import write
-
     noise = np.random.default_rng(1)
     named = {f"{i}.png": noise.integers(0, 255, (24, 32)).astype(np.uint16) for i in range(6)}
     request = request_for(write(tmp_path / "noise", named), tmp_path)
@@ -133,3 +132,14 @@ def test_a_calibration_for_other_sizes_is_refused(folder: Path, tmp_path: Path) 
     camera_px = rig.camera.width_px, rig.camera.height_px
     with pytest.raises(CalibrationError, match="The projector of the mapping is 32 x 24 px"):
         require_sizes(rig, MAPPING, camera_px)
+
+
+def test_values_for_screens_are_named_with_what_to_do(tmp_path: Path) -> None:
+    pictures, white, black = frames([("columns", Stripes(bits=5))], projector=PROJECTOR)
+    named = {f"{k:02d}.png": for_screens(each) for k, each in enumerate([white, black, *pictures])}
+    root = write(tmp_path / "screen", named)
+    found = decode(root, MAPPING)
+    assert found.advice == "set encoding of the mapping to srgb"
+    stated = with_field(MAPPING, "encoding", "srgb")
+    found = decode(root, stated)
+    assert (found.advice, found.values[:15]) == ("", "linear in light")

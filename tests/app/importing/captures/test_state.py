@@ -84,6 +84,18 @@ def test_columns_are_judged(tmp_path: Path, share: float, lit: float, role: str,
     assert words in said.text
 
 
+def test_values_are_told_and_what_to_do_first(tmp_path: Path) -> None:
+    state = state_of(tmp_path)
+    decoded = Decoded(np.array([[3.0, 9.0]], np.float32), 0.97, 0.8, values="linear in light: 1 %")
+    state.decoded.set(decoded)
+    said = captures_view(state).values
+    assert (said.text, said.role) == ("Values are linear in light: 1 %.", "muted")
+    state.decoded.set(replace(decoded, values="not linear", advice="set encoding of the mapping to srgb"))
+    said = captures_view(state).values
+    assert said.text == "Set encoding of the mapping to srgb. Values are not linear."
+    assert said.role == "warn"
+
+
 def test_nothing_that_exists_is_replaced(tmp_path: Path) -> None:
     request = CaptureRequest(tmp_path, tmp_path / "a.dsl")
     assert target_trouble(request) == ""

@@ -1,0 +1,86 @@
+"""Whether the values of a scan are linear in light, asked of the patterns and inverses of its code."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from dataclasses import dataclass
+from math import isfinite
+from typing import Literal
+
+from dsl_core.model.frames import FrameSource
+from dsl_core.optics.additivity import Additivity, MixedLight, additivity, mixed_light
+from dsl_core.patterns.inverse_pairs import inverse_pairs
+
+#: The finest stripes mix most light: so many pairs of each set are read.
+PAIRS_OF_A_SET = 3
+#: Exponents are not better known than this, whatever pairs agree on: projectors sharpen stripes.
+LEAST_STD = 0.1
+_UNKNOWN = "whether values are linear in light is unknown"
+Verdict = Literal["linear", "srgb", "encoded", "darker", "unknown"]
+
+
+@dataclass(frozen=True)
+class Linearity:
+    """A verdict, the figures it comes from (None if unknown), and both as a sentence without its point.
+
+    ``srgb`` means values as in pictures for screens, ``encoded`` another curve of the camera, ``darker`` sums
+    that no camera's curve explains but a curve that was undone, or a projector that scales its patterns.
+    """
+
+    verdict: Verdict
+    figures: Additivity | None
+    sentence: str
+
+    @property
+    def is_wrong(self) -> bool:
+        """Whether the values are known not to be linear."""
+        return self.verdict not in ("linear", "unknown")
+
+
+def linearity_of(
+    source: FrameSource, full_scale_dn: float, black_level_dn: float = 0.0, absent: Collection[int] = ()
+) -> Linearity:
+    """Read white, black and the finest pairs of a scan, and say what their sums tell.
+
+    ``full_scale_dn`` is the value of a saturated pixel; ``absent`` are indices of shots that cannot be read.
+    Raises what reading the others raises.
+    """
+    plan = source.plan
+    setting = min(plan.code_settings)
+    shots = {
+        (shot.role, shot.pattern): shot
+        for shot in plan.shots()
+        if shot.setting == setting and shot.index not in absent
+    }
+    sets = inverse_pairs(plan.code, plan.projector_size_px)
+    if not sets:
+        return Linearity("unknown", None, f"no pattern has an inverse, so {_UNKNOWN}")
+    pairs = [pair for each in sets for pair in each[-PAIRS_OF_A_SET:]]
+    pairs = [pair for pair in pairs if all(("code", number) in shots for number in pair)]
+    if not pairs or ("white", 0) not in shots or ("black", 0) not in shots:
+        return Linearity("unknown", None, f"frames are missing, so {_UNKNOWN}")
+    white, black = source.read(shots["white", 0]), source.read(shots["black", 0])
+
+    def seen(pair: tuple[int, int]) -> MixedLight | None:
+        one, other = (source.read(shots["code", number]) for number in pair)
+        return mixed_light((one, other), white, black, full_scale_dn, black_level_dn)
+
+    return _judged(additivity(map(seen, pairs)))
+
+
+def _judged(found: Additivity | None) -> Linearity:
+    if found is None:
+        words = f"no pixels see bright and dark stripes at once, so {_UNKNOWN}"
+        return Linearity("unknown", None, words)
+    figure = f"pattern and inverse together are {found.figure} white and black together where stripes meet"
+    if isfinite(found.exponent) and not found.is_linear:
+        std = max(found.exponent_std, LEAST_STD)
+        figure += f"; light goes with the value to the power {found.exponent:.1f} ± {std:.1f}"
+    if found.is_linear:
+        return Linearity("linear", found, f"linear in light: {figure}")
+    if found.is_srgb:
+        words = f"not linear in light but encoded, as sRGB for screens is: {figure}"
+        return Linearity("srgb", found, words)
+    if found.excess > 0:
+        return Linearity("encoded", found, f"not linear in light, nor sRGB: {figure}")
+    return Linearity("darker", found, f"not linear in light: {figure}")

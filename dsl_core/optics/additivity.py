@@ -1,0 +1,170 @@
+"""Whether values of pictures are linear in light, from patterns and their inverses.
+
+Light adds up: where the lens or a surface mixes bright and dark stripes, a pattern and its inverse together
+are white and black together. Only linear values keep that. Pictures for screens, such as sRGB, store half
+the light as almost three quarters of the range, so that the sum is too bright by up to half the contrast.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+Counts = NDArray[np.uint16]
+#: Pixels count that white lights by at least this share of the range, and that stay below the upper one.
+LEAST_CONTRAST, SATURATED = 0.08, 0.985
+#: Pattern and inverse differ by less than this share of the contrast where light is mixed, by more than the
+#: other where it is not.
+MIXED, PURE = 0.5, 0.9
+#: Fewer mixed pixels say nothing of a pair; of more than these, some are taken.
+FEWEST, MOST = 60, 8000
+#: So many neighbours see the edge of the same stripe, and are one observation.
+NEIGHBOURS = 9
+#: Exponents that pass for linear: projectors sharpen or scale their pictures, and cameras are not perfect
+#: (real ones: 0.86 to 0.94). A sum is off only by more than this share of the contrast.
+LINEAR, NOTICEABLE = (0.7, 1.3), 0.03
+#: Exponents that pass for sRGB.
+SRGB = (1.6, 3.0)
+#: Exponents that are looked for, and how often their interval is halved.
+_BOUNDS, _HALVINGS = (0.2, 6.0), 16
+#: Standard deviation of a normal distribution for one of its median absolute deviation; the median's for
+#: one of the mean's.
+_MAD, _MEDIAN = 1.4826, 1.2533
+
+
+@dataclass(frozen=True)
+class Additivity:
+    """By how much pattern and inverse together exceed white and black together, of all ``pairs``.
+
+    ``excess`` and ``excess_std`` are shares of the contrast. ``exponent`` is the power of the values that is
+    linear in light (1: they are as they are; sRGB: about 2), NaN if there is none between 0.2 and 6.
+    """
+
+    excess: float
+    excess_std: float
+    exponent: float
+    exponent_std: float
+    pairs: int
+    pixels: int
+
+    @property
+    def is_linear(self) -> bool:
+        """Whether the values may be linear in light."""
+        if abs(self.excess) < NOTICEABLE + 3 * self.excess_std:
+            return True
+        low, high = LINEAR
+        return bool(low - 3 * self.exponent_std < self.exponent < high + 3 * self.exponent_std)
+
+    @property
+    def is_srgb(self) -> bool:
+        """Whether the values are not linear, but would be once decoded from sRGB."""
+        return not self.is_linear and self.excess > 0 and SRGB[0] < self.exponent < SRGB[1]
+
+    @property
+    def figure(self) -> str:
+        """The excess in words.
+
+        >>> Additivity(0.27, 0.01, 2.1, 0.1, 6, 900).figure
+        '27.0 ± 1.0 % of the contrast brighter than'
+        """
+        where = "brighter" if self.excess > 0 else "darker"
+        return f"{100 * abs(self.excess):.1f} ± {100 * self.excess_std:.1f} % of the contrast {where} than"
+
+
+@dataclass(frozen=True)
+class MixedLight:
+    """Pattern, inverse, white and black of a pair, shares of the full scale, shape (4, n).
+
+    ``mixed`` are pixels that see bright and dark stripes at once, ``pure`` those that see one of them.
+    """
+
+    mixed: Floats
+    pure: Floats
+
+
+def mixed_light(
+    pair: tuple[Counts, Counts],
+    white: Counts,
+    black: Counts,
+    full_scale_dn: float,
+    black_level_dn: float = 0.0,
+) -> MixedLight | None:
+    """The pixels of a pair that can tell, of frames (rows, columns) in DN; None if there are too few."""
+    frames = np.stack([frame.ravel() for frame in (*pair, white, black)]).astype(np.float64)
+    sound = frames.max(axis=0) < SATURATED * full_scale_dn
+    values = (frames - black_level_dn) / max(full_scale_dn - black_level_dn, 1.0)
+    contrast = values[2] - values[3]
+    sound &= contrast > LEAST_CONTRAST
+    values, contrast = values[:, sound], contrast[sound]
+    # The noise of a difference says nothing of that of the sum: this choice favours no sums.
+    apart = np.abs(values[0] - values[1]) / contrast
+    mixed = values[:, apart < MIXED]
+    if mixed.shape[1] < FEWEST:
+        return None
+    return MixedLight(_some(mixed), _some(values[:, apart > PURE]))
+
+
+def additivity(pairs: Iterable[MixedLight | None]) -> Additivity | None:
+    """What pairs say together; None when none says anything."""
+    told = [pair for pair in pairs if pair is not None]
+    if not told:
+        return None
+    excesses = np.array([_excess(pair, 1.0) for pair in told])
+    noises = np.array([_noise(pair) for pair in told])
+    exponents = np.array([_exponent(pair) for pair in told])
+    found = exponents[np.isfinite(exponents)]
+    known = 2 * found.size > exponents.size
+    return Additivity(
+        float(excesses.mean()),
+        _deviation(excesses, float(np.sqrt(np.mean(noises**2)))),
+        float(np.mean(found)) if known else float("nan"),
+        _deviation(found, 0.0) if known else float("nan"),
+        len(told),
+        sum(pair.mixed.shape[1] for pair in told),
+    )
+
+
+def _some(values: Floats) -> Floats:
+    step = -(-values.shape[1] // MOST)
+    return values[:, ::step] if step > 1 else values
+
+
+def _sums(values: Floats) -> Floats:
+    pattern, inverse, white, black = values
+    sums: Floats = (pattern + inverse - white - black) / (white - black)
+    return sums
+
+
+def _excess(pair: MixedLight, exponent: float) -> float:
+    """The median sum where light is mixed, relative to where it is not: the lamp's drift is in both."""
+    # Values below the black level have no power.
+    mixed, pure = (np.maximum(values, 1e-6) ** exponent for values in (pair.mixed, pair.pure))
+    reference = float(np.median(_sums(pure))) if pure.shape[1] >= FEWEST else 0.0
+    return float(np.median(_sums(mixed))) - reference
+
+
+def _noise(pair: MixedLight) -> float:
+    sums = _sums(pair.mixed)
+    spread = _MAD * float(np.median(np.abs(sums - np.median(sums))))
+    return float(_MEDIAN * spread / np.sqrt(sums.size / NEIGHBOURS))
+
+
+def _exponent(pair: MixedLight) -> float:
+    """The power of the values that adds up: with higher powers the sum falls."""
+    low, high = _BOUNDS
+    if not _excess(pair, low) > 0 > _excess(pair, high):
+        return float("nan")
+    for _ in range(_HALVINGS):
+        middle = (low * high) ** 0.5
+        low, high = (middle, high) if _excess(pair, middle) > 0 else (low, middle)
+    return float((low * high) ** 0.5)
+
+
+def _deviation(values: Floats, noise: float) -> float:
+    """Standard deviation of the mean of pairs, from their spread and at least their noise."""
+    spread = float(values.std(ddof=1)) if values.size > 1 else 0.0
+    return max(spread, noise) / float(np.sqrt(values.size))

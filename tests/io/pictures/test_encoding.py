@@ -1,0 +1,90 @@
+"""Pictures for screens are found out by their code, decoded when stated, and named when nothing tells."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image, PngImagePlugin
+
+from dsl_core.io.pictures.encoding import encoding_of, noted_encoding
+from dsl_core.io.pictures.guess import guess_mapping
+from dsl_core.io.pictures.mapping import BlackPicture, Mapping, StripePictures, WhitePicture
+from dsl_core.io.pictures.picture_file import Picture, load_mosaic
+from dsl_core.io.pictures.source import open_pictures
+from dsl_core.model.captured_code import Stripes
+from dsl_core.optics.colour import srgb_decode
+from tests.cases.foreign_captures import PROJECTOR, blurred, for_screens, frames, write
+
+MAPPING = Mapping(parts=(StripePictures(bits=7), WhitePicture(), BlackPicture()), projector_size_px=PROJECTOR)
+
+
+@pytest.fixture(scope="module")
+def folders(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
+    """One capture with linear values and with those of sRGB."""
+    pictures, white, black = frames([("columns", Stripes(bits=7))])
+    root, made = tmp_path_factory.mktemp("encoded"), {}
+    for name, change in (("linear", blurred), ("srgb", for_screens)):
+        named = {f"{i:02d}.png": change(p) for i, p in enumerate([*pictures, white, black])}
+        made[name] = write(root / name, named)
+    return made
+
+
+@pytest.mark.parametrize(
+    ("stored", "stated", "verdict", "advice"),
+    [
+        ("linear", "linear", "linear", ""),
+        ("srgb", "srgb", "linear", ""),
+        ("srgb", "linear", "srgb", "set encoding of the mapping to srgb"),
+        ("linear", "srgb", "darker", "set encoding of the mapping to linear, which the files seem"),
+    ],
+)
+def test_what_is_stated_is_compared_with_the_sums_of_the_code(
+    folders: dict[str, Path], stored: str, stated: str, verdict: str, advice: str
+) -> None:
+    mapping = MAPPING.model_copy(update={"encoding": stated})
+    found, said = encoding_of(open_pictures(folders[stored], mapping))
+    assert found.verdict == verdict
+    assert said.startswith(advice)
+    assert bool(said) == bool(advice)
+
+
+def test_a_guess_decodes_pictures_for_screens_and_says_so(folders: dict[str, Path]) -> None:
+    guessed = guess_mapping(folders["srgb"], PROJECTOR).mapping
+    assert guessed.encoding == "srgb"
+    assert any("brighter than white and black together" in each for each in guessed.unsure)
+    assert guess_mapping(folders["linear"], PROJECTOR).mapping.encoding == "linear"
+    stated = guess_mapping(folders["srgb"], PROJECTOR, encoding="linear").mapping
+    assert stated.encoding == "linear"
+    assert not any("white and black" in each for each in stated.unsure)
+
+
+def test_values_for_screens_become_linear_channel_by_channel(tmp_path: Path) -> None:
+    colours = np.zeros((4, 6, 3), np.uint8)
+    colours[:] = (255, 128, 0)
+    Image.fromarray(colours).save(tmp_path / "a.png")
+    mapping = MAPPING.model_copy(update={"encoding": "srgb"})
+    frame = load_mosaic(Picture(tmp_path / "a.png"), mapping, 16)
+    light = (1 + float(srgb_decode(np.array([128 / 255]))[0])) / 3
+    assert frame[0, 0] == pytest.approx(light * 65535, abs=1)
+    green = mapping.model_copy(update={"channel": "green"})
+    assert load_mosaic(Picture(tmp_path / "a.png"), green, 16)[0, 0] == pytest.approx(14146, abs=2)
+
+
+def test_files_that_note_their_encoding_are_named_where_no_inverse_tells(tmp_path: Path) -> None:
+    pictures, white, black = frames([("columns", Stripes(bits=7, inverse=False))])
+    noted = PngImagePlugin.PngInfo()
+    noted.add(b"sRGB", b"\0")
+    for index, picture in enumerate([*pictures, white, black]):
+        Image.fromarray(picture.astype(np.uint8)).save(tmp_path / f"{index:02d}.png", pnginfo=noted)
+    parts = (StripePictures(bits=7, inverse="none"), WhitePicture(), BlackPicture())
+    mapping = Mapping(parts=parts, projector_size_px=PROJECTOR)
+    found, said = encoding_of(open_pictures(tmp_path, mapping))
+    assert found.verdict == "unknown"
+    assert said.startswith("the files note sRGB, and no pattern has an inverse")
+    Image.fromarray(white.astype(np.uint8)).save(tmp_path / "plain.png")
+    Image.fromarray(white.astype(np.uint8)).save(tmp_path / "a.jpg")
+    assert noted_encoding(tmp_path / "plain.png") == ""
+    assert noted_encoding(tmp_path / "a.jpg").startswith("JPEG")
+    assert noted_encoding(tmp_path / "none.png") == ""

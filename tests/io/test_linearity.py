@@ -1,0 +1,46 @@
+"""Scans say whether their values are linear in light, or why they cannot."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from dsl_core.io.linearity import linearity_of
+from dsl_core.io.pictures.mapping import BlackPicture, Mapping, StripePictures, WhitePicture
+from dsl_core.io.pictures.source import open_pictures
+from tests.cases.foreign_captures import PROJECTOR, write
+
+CAPTURES = Path(os.environ.get("DSL_SHARED", "../shared")) / "data" / "procam_checkerboard" / "half_res"
+PARTS = (StripePictures(bits=2), WhitePicture(), BlackPicture())
+
+
+def test_absent_frames_and_sharp_stripes_leave_it_unknown(tmp_path: Path) -> None:
+    half = np.where(np.arange(64) < 32, 200, 10) * np.ones((48, 1))
+    pictures = [half, 210 - half, half, 210 - half, np.full((48, 64), 200), np.full((48, 64), 10)]
+    write(tmp_path, {f"{k}.png": np.asarray(each, np.uint16) for k, each in enumerate(pictures)})
+    scan = open_pictures(tmp_path, Mapping(parts=PARTS, projector_size_px=PROJECTOR))
+    found = linearity_of(scan, 255)
+    assert (found.verdict, found.figures, found.is_wrong) == ("unknown", None, False)
+    assert found.sentence.startswith("no pixels see bright and dark stripes at once")
+    for absent in ({4}, {0, 2}):
+        assert linearity_of(scan, 255, absent=absent).sentence.startswith("frames are missing")
+
+
+@pytest.mark.skipif(not CAPTURES.is_dir(), reason="the real captures of others are not here")
+@pytest.mark.parametrize(("power", "verdict"), [(1.0, "linear"), (1 / 2.2, "srgb")])
+def test_real_pictures_are_linear_until_they_are_encoded(tmp_path: Path, power: float, verdict: str) -> None:
+    names = [*range(14, 20), 40, 41]
+    for place, number in enumerate(names):
+        path = CAPTURES / "capture_0" / f"graycode_{number:02d}.png"
+        values = np.asarray(cv2.imread(str(path), cv2.IMREAD_UNCHANGED)) / 255
+        cv2.imwrite(str(tmp_path / f"{place}.png"), np.rint(values**power * 255))
+    parts = (StripePictures(bits=3), WhitePicture(), BlackPicture())
+    scan = open_pictures(tmp_path, Mapping(parts=parts, projector_size_px=(1024, 768)))
+    found = linearity_of(scan, 255)
+    assert found.verdict == verdict
+    assert found.figures is not None
+    assert found.figures.exponent == pytest.approx(1 / power, rel=0.1)

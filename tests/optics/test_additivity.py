@@ -1,0 +1,87 @@
+"""Sums of patterns and inverses tell linear values from encoded ones."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from dsl_core.optics.additivity import Additivity, MixedLight, additivity, mixed_light
+from dsl_core.optics.colour import srgb_decode, srgb_encode
+
+Floats = NDArray[np.float64]
+Encoding = Callable[[Floats], Floats]
+FULL_DN = 4095
+
+
+def linear(light: Floats) -> Floats:
+    return light
+
+
+def pair(encode: Encoding, period_px: int, lamp: float = 1.0, brightest: float = 0.8) -> MixedLight | None:
+    """A wall under stripes of a period, blurred by the lens; white was taken with another lamp."""
+    width = 240
+    stripes = (np.arange(width) // (period_px // 2) % 2).astype(float)
+    share = np.convolve(np.pad(stripes, 4, "wrap"), np.ones(9) / 9, "valid")
+    albedo = np.linspace(0.4, 1.0, 60)[:, None]
+    rng = np.random.default_rng(period_px)
+
+    def frame(light: Floats) -> NDArray[np.uint16]:
+        values = encode((0.02 + brightest * light).clip(0, 1)) + rng.normal(0, 0.004, (60, width))
+        return np.asarray(np.rint(values.clip(0, 1) * FULL_DN), np.uint16)
+
+    one, other = frame(albedo * share), frame(albedo * (1 - share))
+    white, black = frame(lamp * albedo * np.ones(width)), frame(np.zeros((60, width)))
+    return mixed_light((one, other), white, black, FULL_DN)
+
+
+def told(encode: Encoding, **how: float) -> Additivity:
+    found = additivity(pair(encode, period, **how) for period in (24, 40, 60))
+    assert found is not None
+    return found
+
+
+def test_linear_values_add_up_whatever_the_lamp_does() -> None:
+    for lamp in (1.0, 1.06):
+        found = told(linear, lamp=lamp)
+        assert abs(found.excess) < 0.01 + 3 * found.excess_std
+        assert found.exponent == pytest.approx(1.0, abs=0.05)
+        assert found.is_linear
+        assert not found.is_srgb
+
+
+def test_pictures_for_screens_are_told_by_their_exponent() -> None:
+    found = told(srgb_encode)
+    assert found.excess > 0.1 + 3 * found.excess_std
+    assert found.exponent == pytest.approx(2.2, abs=0.25)
+    assert found.is_srgb
+    assert not found.is_linear
+    assert "brighter than" in found.figure
+    other = told(lambda light: light ** (1 / 1.5))
+    assert other.exponent == pytest.approx(1.5, abs=0.1)
+    assert not other.is_linear
+    assert not other.is_srgb
+
+
+def test_linear_values_that_were_decoded_are_too_dark() -> None:
+    found = told(srgb_decode)
+    assert found.excess < -0.1
+    assert not found.is_linear
+    assert not found.is_srgb
+    assert "darker than" in found.figure
+
+
+def test_saturated_or_unlit_pixels_and_sharp_stripes_say_nothing() -> None:
+    assert pair(linear, 24, brightest=3.0) is None
+    assert pair(linear, 24, brightest=0.01) is None
+    flat = np.full((30, 30), 100, np.uint16)
+    white, black = np.full((30, 30), 3000, np.uint16), np.full((30, 30), 90, np.uint16)
+    assert mixed_light((white, flat), white, black, FULL_DN) is None
+    assert additivity([None]) is None
+
+
+def test_decoding_undoes_encoding() -> None:
+    light = np.linspace(0, 1, 33)
+    np.testing.assert_allclose(srgb_decode(srgb_encode(light)), light, atol=2e-5)
