@@ -66,29 +66,34 @@ class StereoOptions:
     """What a calibration's file does not contain."""
 
     base: Path | None
-    camera_size: str
+    camera_size: str | None
     projector: str | None
     unit_mm: float
+    from_projector: bool
     force: bool
 
 
 def import_stereo(output: Output, source: Path, target: Path | None, options: StereoOptions) -> None:
     """Say which lenses and pose a file contains; make a rig for depth if there is a target."""
-    from dsl_core.io.published.any_stereo import lenses_on, load_any_stereo
+    from dsl_core.io.published.any_stereo import lenses_on, load_any_stereo, placed
     from dsl_core.io.rig_file import load_rig, save_rig
     from dsl_core.simulation.published_rig import published_rig
 
-    if options.projector is None:
-        raise PlanError(f"{source} does not say the size of the projector. Give --projector WIDTHxHEIGHT.")
-    camera = parse_size("--camera-size", options.camera_size)
-    projector = parse_size("--projector", options.projector)
-    found = load_any_stereo(source, camera, projector, options.unit_mm)
+    camera = parse_size("--camera-size", options.camera_size) if options.camera_size else None
+    projector = parse_size("--projector", options.projector) if options.projector else None
+    found = load_any_stereo(source, camera, projector, options.unit_mm, options.from_projector)
     output.table(("part", "called"), list(found.names.items()))
     for sentence in found.assumed:
         output.say(f"Assumed: {sentence}.")
+    for sentence in found.taken:
+        output.say(f"Understood: {sentence}.")
+    output.say(f"Found: {placed(found.stereo)}.")
+    for sentence in found.doubts:
+        output.say(f"Warning: {sentence}.")
     distance_mm = sum(value**2 for value in found.stereo.pose.translation_mm) ** 0.5
-    output.say(f"Camera {camera[0]} x {camera[1]} px; the projector is {distance_mm:.1f} mm from it.")
-    output.put(names=found.names, assumed=list(found.assumed), baseline_mm=round(distance_mm, 3))
+    said = {"assumed": found.assumed, "understood": found.taken, "warnings": found.doubts}
+    output.put(names=found.names, baseline_mm=round(distance_mm, 3))
+    output.put(**{name: list(sentences) for name, sentences in said.items()})
     if target is not None:
         base = load_rig(options.base) if options.base else published_rig()
         save_rig(lenses_on(base, found, source.name), target, overwrite=options.force)

@@ -35,12 +35,17 @@ def import_(
         ),
     ] = None,
     camera_size: Annotated[
-        str, typer.Option("--camera-size", help="Image size of a calibration that does not contain it.")
-    ] = "890x580",
+        str | None,
+        typer.Option("--camera-size", help="Image size of a calibration that does not contain it."),
+    ] = None,
     unit_mm: Annotated[
         float,
         typer.Option("--unit-mm", min=1e-6, help="Unit of lengths in a stereo file, mm: 1000 for metres."),
     ] = 1.0,
+    from_projector: Annotated[
+        bool,
+        typer.Option("--from-projector", help="The pose in a stereo file leads from projector to camera."),
+    ] = False,
     guess: Annotated[
         bool,
         typer.Option("--guess", help="Find out what the pictures show; writes the mapping."),
@@ -82,7 +87,12 @@ def import_(
 
     output = Output(json)
     if source.is_file() and source.suffix.lower() in STEREO_FILES:
-        import_stereo(output, source, target, StereoOptions(base, camera_size, projector, unit_mm, force))
+        import_stereo(
+            output,
+            source,
+            target,
+            StereoOptions(base, camera_size, projector, unit_mm, from_projector, force),
+        )
         output.finish()
         return
     if not source.is_dir():
@@ -96,7 +106,8 @@ def import_(
     if holds_calibration(source):
         _print_files(output, "calibration", check_calibration(source))
         if target is not None:
-            imported = exchange.import_calibration(source, rig, parse_size("--camera-size", camera_size))
+            size = parse_size("--camera-size", camera_size) if camera_size else None
+            imported = exchange.import_calibration(source, rig, size)
             save_rig(imported, target, overwrite=force)
     else:
         _import_dataset(output, source, target, rig)

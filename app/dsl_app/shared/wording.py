@@ -22,6 +22,10 @@ PHRASES = (
     ("or let 'dsl-scan import FOLDER --guess' write one.", "or import the folder without one."),
     (": name one with --set", ""),
     ("; give --projector", ""),
+    ("give --unit-mm 1000", "set their unit to 1000 mm"),
+    ("give --unit-mm", "set their unit"),
+    ("Correct --camera-size, or calibrate with that size.", "Choose the calibration of these pictures."),
+    ("Correct --projector, or calibrate with that size.", "Correct the projector's size."),
 )
 #: The same with what changes in the middle of them.
 PATTERNS = ((r"'dsl-scan calibrate geometry .* --pictures' reads", "the calibration of the geometry reads"),)

@@ -112,12 +112,17 @@ def _of_element(element: ElementTree.Element) -> Any:
 
 
 def _collect(value: Any, name: str, into: dict[str, Node], level: int) -> None:
-    if isinstance(value, Mapping) and "data" not in value and level < _LEVELS:
+    if isinstance(value, Mapping) and not _is_matrix(value) and level < _LEVELS:
         for key, inner in value.items():
             if len(into) < _MOST_NAMES:
                 _collect(inner, f"{name}.{key}" if name else str(key), into, level + 1)
     elif name:
         into[name] = _node(value)
+
+
+def _is_matrix(value: Mapping[str, Any]) -> bool:
+    """Whether a mapping is a matrix with its shape, not a level that happens to be called data."""
+    return "data" in value and not isinstance(value["data"], Mapping)
 
 
 def _node(value: Any) -> Node:

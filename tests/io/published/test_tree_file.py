@@ -68,7 +68,6 @@ def test_files_of_other_programs_nest_names_and_lists(tmp_path: Path) -> None:
         "[1, [2, 3]]",
         "[1, x]",
         "[1_0, 2]",
-        "{data: {data: 1}}",
         "[[[1, {a: 1}]]]",
     ],
 )

@@ -30,7 +30,8 @@ def command_of(request: CaptureRequest, stated: Stated | None, camera_px: Size |
         made = request.target.with_name(f"{request.target.stem}-rig.json")
         unit = "" if request.unit_mm == 1 else f" --unit-mm {request.unit_mm:g}"
         sizes = f"--camera-size {_times(camera_px or (0, 0))} --projector {size}"
-        lines.append(f"dsl-scan import {_quoted(rig)} {sizes}{unit} -o {_quoted(made)}")
+        way = " --from-projector" if request.from_projector else ""
+        lines.append(f"dsl-scan import {_quoted(rig)} {sizes}{unit}{way} -o {_quoted(made)}")
         rig = str(made)
     if rig not in (NONE, NOMINAL):
         lines.append(f"dsl-scan reconstruct {_quoted(request.target)} --calibration {_quoted(rig)}")

@@ -171,6 +171,11 @@ class CapturesController:
         self._request(unit_mm=unit_mm)
         self._check(only_files=True)
 
+    def set_direction(self, from_projector: bool) -> None:
+        """Set whether the pose of another program's calibration leads from the projector to the camera."""
+        self._request(from_projector=from_projector)
+        self._check(only_files=True)
+
     def rename(self, name: str, home: Path) -> None:
         """Save under a name in a folder."""
         plain = name.strip().removesuffix(SUFFIX).replace("/", "-")

@@ -18,6 +18,7 @@ from dsl_app.shared.widgets.forms import (
     ChoiceBox,
     NumberBox,
     WholeBox,
+    check_box,
     label,
     named,
     push_button,
@@ -112,6 +113,9 @@ class CapturesDialog(JobDialog):
         )  # fmt: skip
         tip = "Length of one unit of the file: 1 for millimetres, 1000 for metres"
         self.unit_mm = NumberBox("Unit of lengths", 1e-6, 1e6, 1.0, "mm", 3, tip)
+        self.from_projector = check_box(
+            "From projector", "The pose of the file leads from the projector to the camera, not the usual way"
+        )
         self.about_calibration = _sentence()
         self.name = named(QLineEdit(), "Name", "Name of the imported scan; .dsl is added")
         self.home = named(QLineEdit(), "Folder to save in", "Folder of the imported scan")
@@ -132,7 +136,8 @@ class CapturesDialog(JobDialog):
         right = boxed(column_of((self.decoded, 1), self.about_columns, margins=0))
         middle = row_of(self.editor, (self.files, 3), (right, 2))
         form = QFormLayout()
-        form.addRow("Calibration", row_of((self.calibration, 1), self.rig_file, self.unit_mm))
+        of_file = self.rig_file, self.unit_mm, self.from_projector
+        form.addRow("Calibration", row_of((self.calibration, 1), *of_file))
         form.addRow("", self.about_calibration)
         form.addRow("Name", row_of((self.name, 1), label("in", "muted"), (self.home, 2), self.browse))
         form.addRow("", self.about_target)
@@ -149,6 +154,7 @@ class CapturesDialog(JobDialog):
                 lambda _: commands.set_projector((self.width_px.value(), self.height_px.value()))
             )
         self.unit_mm.valueChanged.connect(commands.set_unit)
+        self.from_projector.toggled.connect(commands.set_direction)
         for field in (self.name, self.home):
             field.textEdited.connect(lambda _: commands.rename(self.name.text(), Path(self.home.text())))
         self.stops = [
@@ -214,6 +220,7 @@ class CapturesDialog(JobDialog):
         for part in (self.set, self.set_title):
             part.setVisible(view.asks_set)
         self.unit_mm.setVisible(view.asks_unit)
+        self.from_projector.setVisible(view.asks_unit)
         self.guess.setEnabled(view.can_guess)
         self.choose.setEnabled(not self._state.is_importing.value)
         self.load.setEnabled(view.can_guess)

@@ -22,6 +22,7 @@ from dsl_app.importing.captures.state import (
     Stated,
 )
 from dsl_app.shared.notify import sentence_of
+from dsl_app.shared.wording import in_window
 from dsl_core.errors import CalibrationError, DslError
 from dsl_core.io.pictures.mapping import Mapping
 from dsl_core.progress import NoProgress, Progress
@@ -123,7 +124,7 @@ def rig_of(
     if chosen == NOMINAL:
         return published_rig(), "The rig of the publication, as it was designed: depth is approximate."
     if Path(chosen).is_file() and not _is_rig(Path(chosen)):
-        return _stereo(Path(chosen), request.unit_mm, camera_px, mapping.projector_size_px)
+        return _stereo(Path(chosen), request, camera_px, mapping.projector_size_px)
     rig = load_calibration(chosen, library)
     return rig, f"{rig.name}: {_distance(rig)}."
 
@@ -138,15 +139,17 @@ def _is_rig(path: Path) -> bool:
     return isinstance(content, dict) and bool({"film", "response", "rig"} & set(content))
 
 
-def _stereo(path: Path, unit_mm: float, camera_px: Size, projector_px: Size) -> tuple[Rig, str]:
-    from dsl_core.io.published.any_stereo import lenses_on, load_any_stereo
+def _stereo(path: Path, request: CaptureRequest, camera_px: Size, projector_px: Size) -> tuple[Rig, str]:
+    from dsl_core.io.published.any_stereo import lenses_on, load_any_stereo, placed
     from dsl_core.simulation.published_rig import published_rig
 
-    found = load_any_stereo(path, camera_px, projector_px, unit_mm)
+    found = load_any_stereo(path, camera_px, projector_px, request.unit_mm, request.from_projector)
     rig = lenses_on(published_rig(), found, path.name)
-    read = ", ".join(found.names.values())
-    assumed = f" Missing, so assumed: {', '.join(found.assumed)}." if found.assumed else ""
-    return rig, f"{path.name}: {read}; {_distance(rig)}.{assumed} For depth alone: it has no curves."
+    said = [f"Check: {in_window(each)}." for each in found.doubts]
+    said.append(f"{path.name}: {placed(found.stereo).partition('; ')[2]}.")
+    said += [f"Missing, so assumed: {', '.join(found.assumed)}."] if found.assumed else []
+    said.append(f"Understood: {'; '.join(found.taken)}.")
+    return rig, " ".join([*said, "For depth alone: it has no curves."])
 
 
 def _distance(rig: Rig) -> str:

@@ -35,7 +35,8 @@ class CaptureRequest:
     """How to import: ``calibration`` is `NONE`, `NOMINAL`, a name of the library or the path of a file.
 
     ``projector_px`` is the size that the guess is told, (0, 0) if it is not known; ``chosen`` is one of
-    several captures in the folder. Lengths of another program's calibration are in units of ``unit_mm``.
+    several captures in the folder. Lengths of another program's calibration are in units of ``unit_mm``,
+    and ``from_projector`` says that its pose leads from the projector to the camera.
     """
 
     folder: Path | None
@@ -44,6 +45,7 @@ class CaptureRequest:
     chosen: str = ""
     calibration: str = NONE
     unit_mm: float = 1.0
+    from_projector: bool = False
 
 
 @dataclass(frozen=True)

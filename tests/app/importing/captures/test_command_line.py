@@ -22,10 +22,11 @@ def test_the_command_does_the_same() -> None:
     saved = Stated(MAPPING, file=Path("m.json"))
     assert command_of(request, saved) == "dsl-scan import in --mapping m.json -o out.dsl"
     assert command_of(request, Stated(MAPPING)).startswith("# Save the mapping first")
-    stereo = replace(request, calibration="s.yml", unit_mm=1000)
+    stereo = replace(request, calibration="s.yml", unit_mm=1000, from_projector=True)
     lines = command_of(stereo, saved, (64, 48)).splitlines()
     assert lines[1:] == [
-        "dsl-scan import s.yml --camera-size 64x48 --projector 32x24 --unit-mm 1000 -o out-rig.json",
+        "dsl-scan import s.yml --camera-size 64x48 --projector 32x24 --unit-mm 1000 --from-projector"
+        " -o out-rig.json",
         "dsl-scan reconstruct out.dsl --calibration out-rig.json",
     ]
     assert command_of(CaptureRequest(None, Path("out.dsl")), None) == ""

@@ -1,0 +1,161 @@
+"""How programs call the parts of a calibration of two devices, and which of their numbers is which part.
+
+Names are compared without case, punctuation and what they are nested in, so that ``Camera.K``, ``cam_K`` and
+``camera_matrix`` are the same; sizes tell apart what differs by case alone, such as ``Kc`` and ``kc``.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+Numbers = Mapping[str, NDArray[np.float64]]
+#: Names of camera and projector, the usual ones first; other pairs are cameras of which one stands for it.
+_PAIRS = (
+    ("camera|cam|c", "projector|proj|prj|p|dlp"),
+    ("(?:cam|camera)0", "(?:cam|camera)1"),
+    ("(?:cam|camera|cameraparameters)?1", "(?:cam|camera|cameraparameters)?2"),
+    ("left|l", "right|r"),
+)
+_MATRIX = r"(?:camera)?(?:matrix|mtx|mat|int|ins?trinsics?|ins?trinsicmatrix|k|kk|m|a)"
+_DISTORTION = r"(?:camera)?(?:distortion|dist|dist(?:ortion)?coeff?(?:icient)?s?|coeffs|kc|k|d)"
+_OF_POSE = r"(?:stereo|extrinsics?|pose|projector|proj|relative|s)?"
+_TO_PROJECTOR = r"(?:cam|camera|c)(?:2|to)(?:proj|projector|p)"
+_TO_CAMERA = r"(?:proj|projector|p)(?:2|to)(?:cam|camera|c)"
+_TURN = r"(?:r|rot|rotation|roration|rmat|rvec|rotationmatrix|rotationvector|om|rp|rotationofcamera2)"
+_SHIFT = r"(?:t|trans|translation|tvec|tmat|translationvector|tp|translationofcamera2)"
+_BOTH = r"(?:tcncnm1|cam1tcncnm1|transform(?:ation)?(?:matrix)?|extrinsics?(?:matrix)?|rt|pose|posecamera2a)"
+#: Numbers of coefficients that OpenCV knows.
+_COEFFICIENTS = {4, 5, 8, 12, 14}
+
+
+@dataclass
+class Parts:
+    """Numbers by what they are, the names that they have in a file, and what was taken for granted.
+
+    Matrices are (3, 3), distortions flat, ``turn`` (3, 3) or (3,), ``shift`` (3,). ``is_inverse`` says that a
+    name tells the pose to lead from the projector to the camera.
+    """
+
+    values: dict[str, NDArray[np.float64]] = field(default_factory=dict)
+    names: dict[str, str] = field(default_factory=dict)
+    taken: list[str] = field(default_factory=list)
+    is_inverse: bool = False
+
+    def add(self, part: str, name: str, values: NDArray[np.float64]) -> None:
+        """Note a part and its name."""
+        self.values[part], self.names[part] = values, name
+
+
+def parts_of(numbers: Numbers) -> Parts:
+    """What a file with these numbers says of two devices; parts that it lacks are absent."""
+    best = max((_of_pair(numbers, *pair) for pair in _PAIRS), key=lambda each: len(each.values))
+    _add_pose(best, numbers)
+    return best
+
+
+def size_of(numbers: Numbers, device: str) -> tuple[int, int] | None:
+    """Width and height in px that a file gives for the camera or the projector; None if it does not."""
+    is_camera = device == "camera"
+    who = "(?:camera|cam|cam0|cameraparameters1|frame|image|img)?" if is_camera else (
+        "(?:projector|proj|cam1|cameraparameters2|screen|screenres)"
+    )  # fmt: skip
+    for rows_first, words in ((False, "(?:imagesize|resolution|size|sizepx)"), (True, "(?:img|image)shape")):
+        name = _named(numbers, rf"{who}{words}", {2})
+        if name is not None:
+            first, second = (int(each) for each in numbers[name].ravel())
+            swapped = rows_first or "cameraparameters" in _plain(name)
+            return (second, first) if swapped else (first, second)
+    sides = [
+        _named(numbers, rf"{who}(?:image|frame)?{words}", {1}) for words in ("(?:width|x)", "(?:height|y)")
+    ]
+    if None in sides:
+        return None
+    width, height = (int(numbers[name].ravel()[0]) for name in sides if name is not None)
+    return width, height
+
+
+def _of_pair(numbers: Numbers, camera: str, projector: str) -> Parts:
+    found = Parts()
+    for device, words in (("camera", camera), ("projector", projector)):
+        who = f"(?:{words})"
+        alone = "|cameramatrix" if device == "camera" and words.startswith("camera|") else ""
+        name = _named(numbers, f"{who}{_MATRIX}|{_MATRIX}{who}{alone}", {9, 4})
+        if name is not None:
+            _add_matrix(found, f"{device} matrix", name, numbers[name].ravel())
+        alone = "|distcoeffs" if alone else ""
+        name = _named(numbers, f"{who}{_DISTORTION}|{_DISTORTION}{who}{alone}", _COEFFICIENTS)
+        if name is not None and name != found.names.get(f"{device} matrix"):
+            found.add(f"{device} distortion", name, numbers[name].ravel())
+        radial = _named(numbers, f"{who}radialdistortion", {2, 3})
+        tangential = _named(numbers, f"{who}tangentialdistortion", {2})
+        if radial is not None and tangential is not None:
+            k, p = numbers[radial].ravel(), numbers[tangential].ravel()
+            found.add(f"{device} distortion", radial, np.r_[k[:2], p, k[2:], np.zeros(3 - k.size)])
+    if camera != _PAIRS[0][0] and len(found.values) > 1:
+        one, other = found.names.get("camera matrix"), found.names.get("projector matrix")
+        found.taken.append(f"{one} is the camera's, {other} the projector's")
+    return found
+
+
+def _add_matrix(found: Parts, part: str, name: str, values: NDArray[np.float64]) -> None:
+    if values.size == 4:
+        fx, fy, cx, cy = values
+        found.add(part, name, np.array([[fx, 0, cx], [0, fy, cy], [0, 0, 1]]))
+        found.taken.append(f"{name} is fx, fy, cx, cy")
+        return
+    matrix = values.reshape(3, 3)
+    if not matrix[:2, 2].any() and matrix[2, :2].any():
+        # MATLAB multiplies rows from the left, and counts pixels from 1.
+        matrix = matrix.T - np.array([[0, 0, 1], [0, 0, 1], [0, 0, 0]])
+        found.taken.append(f"{name} is written as in MATLAB: transposed, with pixels from 1")
+    found.add(part, name, matrix)
+
+
+def _add_pose(found: Parts, numbers: Numbers) -> None:
+    for part, words, sizes in (("rotation", _TURN, {9, 3}), ("translation", _SHIFT, {3})):
+        ways = f"{_OF_POSE}{words}|{words}{_TO_PROJECTOR}|{_TO_PROJECTOR}{words}"
+        back = f"{words}{_TO_CAMERA}|{_TO_CAMERA}{words}"
+        for name, is_inverse in ((_named(numbers, ways, sizes), False), (_named(numbers, back, sizes), True)):
+            if name is not None and part not in found.values:
+                values = numbers[name]
+                values = values.reshape(3, 3) if values.size == 9 else values.ravel()
+                # MATLAB multiplies rows from the left.
+                turned = values.T if _plain(name).endswith("rotationofcamera2") else values
+                found.add(part, name, turned)
+                found.is_inverse |= is_inverse
+    if "rotation" in found.values or "translation" in found.values:
+        return
+    ways = f"(?:projector|proj|stereo)?{_BOTH}|t?{_TO_PROJECTOR}"
+    for words, is_inverse in ((ways, False), (f"t?{_TO_CAMERA}", True)):
+        name = _named(numbers, words, {12, 16})
+        if name is not None and "rotation" not in found.values:
+            matrix = numbers[name].reshape(-1, 4)
+            found.add("rotation", name, matrix[:3, :3])
+            found.add("translation", name, matrix[:3, 3])
+            found.is_inverse |= is_inverse
+
+
+def _named(numbers: Numbers, words: str, sizes: set[int]) -> str | None:
+    """The first name that is one of these words and has one of these sizes, with all that it is nested in."""
+    for name in numbers:
+        if numbers[name].size in sizes and any(re.fullmatch(words, each) for each in _endings(name)):
+            return name
+    return None
+
+
+def _endings(name: str) -> Iterator[str]:
+    """A name with all that it is nested in, then with less; devices are never left out."""
+    levels = name.split(".")
+    for start in range(len(levels)):
+        if start and re.match(r"(?i)cam|proj|left|right", levels[start - 1]):
+            return
+        yield _plain(".".join(levels[start:]))
+
+
+def _plain(name: str) -> str:
+    return re.sub(r"[^a-z0-9]", "", name.lower())
