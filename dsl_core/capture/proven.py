@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 from collections import deque
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 from dataclasses import replace
 from typing import NoReturn
 
@@ -31,7 +31,12 @@ _log = logging.getLogger(__name__)
 
 
 class PictureError(DeviceError):
-    """Pictures do not show their pattern, however often they are taken."""
+    """Pictures do not show their pattern, however often they are taken; ``wrong`` are their shots."""
+
+    def __init__(self, message: str, wrong: tuple[Shot, ...] = ()) -> None:
+        """Keep the sentence and the shots."""
+        super().__init__(message)
+        self.wrong = wrong
 
 
 class ProvenShots:
@@ -75,7 +80,7 @@ class ProvenShots:
         try:
             self._take(shot)
         except PictureError as error:
-            self._withdraw(error)
+            self._withdraw(error, shot)
 
     def conclude(self) -> None:
         """Where the last pictures could not be judged, see that devices and scene are as they were.
@@ -90,9 +95,13 @@ class ProvenShots:
             self._withdraw(error)
         self._untold.clear()
 
-    def _withdraw(self, error: PictureError) -> NoReturn:
-        """Remove the pictures that may be wrong for the same reason, and say so."""
-        withdrawn = sorted({*self._untold, *self._recent}, key=lambda shot: shot.index)
+    def _withdraw(self, error: PictureError, latest: Shot | None = None) -> NoReturn:
+        """Remove the pictures that may be wrong for the same reason, and say so.
+
+        The ``latest`` was not saved.
+        """
+        doubted = {*self._untold, *self._recent, *error.wrong} - {latest}
+        withdrawn = sorted((shot for shot in doubted if shot), key=lambda shot: shot.index)
         self._untold.clear()
         self._recent.clear()
         if not withdrawn:
@@ -104,7 +113,8 @@ class ProvenShots:
             which, them = f"Frame {first}", "it"
         raise PictureError(
             f"{error} {which}, captured just before or not judged in full, may be wrong too; the resumed scan"
-            f" captures {them} again."
+            f" captures {them} again.",
+            error.wrong,
         ) from error
 
     def _take(self, shot: Shot) -> None:
@@ -235,10 +245,12 @@ class ProvenShots:
             _log.warning("%s It is captured again.", found.sentence)
             reason, wrong = found.seen, found.again
             taken: list[tuple[Shot, Frame]] = []
+            again: list[Finding] = []
             for shot in wrong:
                 frame = replace(self._taker.take(shot, earlier + 1, settle_ms, twice=True), corrected=reason)
                 taken.append((shot, frame))
-                found = proof.judge(shot, frame.pixels)
+                again.append(proof.judge(shot, frame.pixels))
+            found = _together(again)
             if len(wrong) > 1 and wrong[0].role == "spectral" and not found.is_wrong:
                 # They agree now; but so do two wrong ones, and the earlier one may have been right.
                 self._require_control(proof)
@@ -252,10 +264,20 @@ class ProvenShots:
             raise PictureError(
                 f"{found.names.capitalize()} does not show its pattern after {len(SETTLE_MS) + 1} exposures:"
                 f" {found.seen}. {reason} Frames before it are saved. If the pictures are right all the same,"
-                " resume without checking that the scene has not moved."
+                " resume without checking that the scene has not moved.",
+                found.again,
             )
 
 
 def _is_sure(found: Finding) -> bool:
     """Whether a picture shows its pattern in its usual light: all is well then, and was before it."""
     return found.verdict is Verdict.RIGHT and found.light is Light.USUAL
+
+
+def _together(findings: Sequence[Finding]) -> Finding:
+    """What pictures taken one after the other show: the last wrong one, with all shots that are wrong."""
+    wrong = [found for found in findings if found.is_wrong]
+    if not wrong:
+        return findings[-1]
+    again = sorted({shot for found in wrong for shot in found.again}, key=lambda shot: shot.index)
+    return replace(wrong[-1], again=tuple(again))

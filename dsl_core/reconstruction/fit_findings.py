@@ -57,7 +57,8 @@ _CALIBRATE = "Run the drift check; calibrate again the part that it names."
 class SpectralCounts:
     """Of spectra: pixels that measured ``poor`` fits or are ``at_bound``, and what there are of bands.
 
-    Spectra that fit poorly touch bounds as well, as along edges: these count as ``poor`` alone. ``reached`` are bands of pixels that lines reach, ``undecided`` those of them that the prior decides.
+    Spectra that fit poorly touch bounds as well, as along edges: these count as ``poor`` alone. ``reached``
+    are bands of pixels that lines reach, ``undecided`` those of them that the prior decides.
     """
 
     poor: int = 0

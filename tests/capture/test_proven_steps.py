@@ -294,6 +294,22 @@ def test_the_eight_pictures_before_a_wrong_one_are_withdrawn_back_to_the_last_co
     assert bench.withdrawn == [20, 21], "from the picture after which all was well"
 
 
+def test_a_shot_found_wrong_on_the_way_is_taken_again_though_the_next_is_right() -> None:
+    both = (SHOTS[12], LINE)
+    bench = Bench(lambda shot: Finding(shot, Verdict.OTHER, both), late, is_right, is_right)
+    bench.shots.take(LINE)
+    assert [index for index, *_ in bench.taken] == [13, 12, 13, 12]
+    assert bench.written == {13: "it shows something else", 12: "it still shows the pattern before"}
+
+
+def test_saved_frames_that_turn_out_wrong_for_good_are_withdrawn() -> None:
+    pair = (SHOTS[2], CODE)
+    bench = Bench(lambda shot: Finding(shot, Verdict.MIRRORED, pair))
+    with pytest.raises(PictureError, match=r"mirrored or upside down.*Frame 2, captured just before"):
+        bench.shots.take(CODE)
+    assert bench.withdrawn == [2], "the latest was not saved"
+
+
 def test_two_lines_that_agree_after_a_second_take_are_believed_after_a_control() -> None:
     both = (SHOTS[12], LINE)
     bench = Bench(lambda shot: Finding(shot, Verdict.LATE, both), is_right)

@@ -89,6 +89,8 @@ class FrameProof:
         self.reviewed: list[Finding] = []
         self._light: dict[tuple[str, int], deque[float]] = {}
         self._steps = LightSteps()
+        #: The picture that came for two patterns, for as long as it comes.
+        self._repeated: Counts | None = None
         self._scale: dict[int, float] = {}
         self._profiles = Recent[Floats | None]()
         self._rescaled = Recent[Expected]()
@@ -107,7 +109,12 @@ class FrameProof:
             if found.is_wrong:
                 found = Finding(shot, Verdict.REPEATED, found.again)
             elif self._must_differ(before[0], shot) and seen.min() != seen.max():
+                self._repeated = seen
+        if self._repeated is not None and not found.is_wrong:
+            if np.array_equal(seen, self._repeated):
                 found = Finding(shot, Verdict.REPEATED, (shot,))
+            else:
+                self._repeated = None
         if shot.role == "spectral" and not found.is_wrong:
             black = self._kept.get(self._blacks[shot.setting])
             doubtful = self._neighbours.is_doubtful(shot.index, seen, black)

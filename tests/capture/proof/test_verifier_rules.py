@@ -303,6 +303,7 @@ def test_two_patterns_of_the_first_code_never_give_the_same_picture(monkeypatch:
     assert judge.judge_raster(SHOTS[2], same).verdict is Verdict.UNTOLD, "the same shot, without noise"
     found = judge.judge_raster(SHOTS[3], same)
     assert (found.verdict, found.again) == (Verdict.REPEATED, (SHOTS[3],))
+    assert judge.judge_raster(SHOTS[3], same).verdict is Verdict.REPEATED, "and so it stays"
     assert judge.judge_raster(SHOTS[4], counts(8)).verdict is Verdict.UNTOLD
     assert judge.judge_raster(SHOTS[5], counts(8)).verdict is Verdict.UNTOLD, "dark as a picture can be"
     judge.judge_raster(LINE, same)
