@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +15,7 @@ from dsl_core.calibration.film.fit import (
     OrderSamples,
     fit_film,
     grating_columns,
+    is_plausible,
     require_plausible,
     seen_straight,
     with_geometry,
@@ -32,7 +33,7 @@ from dsl_core.model.calibration.depth_stage import (
     apply_depth_stage,
 )
 from dsl_core.model.line_spread import zero_std_px
-from dsl_core.model.rig import CorrespondenceGrid, Rig
+from dsl_core.model.rig import CorrespondenceGrid, Film, Rig
 from dsl_core.model.spectral import SpectralCurve
 from dsl_core.optics.correspondence import GratingModel
 from dsl_core.optics.shading import Plane
@@ -110,8 +111,9 @@ def calibrate_depth_stage(
         [f"position {z:g} mm" for z in data.positions_mm],
         [f"filter {each.filter_nm:g} nm" for each in data.filters],
         progress,
+        warped=bool(film.warp_px.any()),
     )
-    seen = _filters(fitted, data, samples)
+    seen = _filters(fitted, data, replace(samples, column_px=samples.column_px - film.warp_px))
     return DepthStageCalibration(
         camera=fitted.camera,
         projector=fitted.projector,
@@ -148,15 +150,26 @@ def fit_first_orders(
     here, mounting = rig, rig.film
     for round_ in range(1 + FINE_ROUNDS):
         samples = _samples(here, planes, data, round_ == 0, progress)
-        fit = fit_film(here, samples, mounting)
-        if round_:
-            angled = fit_film(here, samples, mounting, angled=True)
-            fit = angled if angled.angle.is_of_filters else fit
+        fit = _fit(here, samples, mounting, angled=round_ > 0)
         here = rig.model_copy(update={"film": fit.film})
         samples = seen_straight(here, samples, fit.angle)
-        _require_filters(rig, here, data, samples, WRONG_PX if round_ == 0 else OFF_PX)
+        flat = replace(samples, column_px=samples.column_px - fit.warp_px)
+        _require_filters(rig, here, data, flat, WRONG_PX if round_ == 0 else OFF_PX)
         require_plausible(fit.film, mounting)
     return fit, samples
+
+
+def _fit(rig: Rig, samples: OrderSamples, mounting: Film, angled: bool) -> FilmFit:
+    """The film that fits best: flat or a cylinder, or warped where only a film at an odd place would fit."""
+    found = fit_film(rig, samples, mounting)
+    warped = not is_plausible(found.film, mounting)
+    if warped:
+        found = fit_film(rig.model_copy(update={"film": mounting}), samples, mounting, warped=True)
+    if not angled:
+        return found
+    askew = fit_film(rig, samples, mounting, angled=True, warped=warped)
+    better = askew.angle.is_of_filters and is_plausible(askew.film, mounting)
+    return askew if better else found
 
 
 def _samples(

@@ -40,6 +40,12 @@ WORDS = (
     ("tilt about x", "°"), ("tilt about y", "°"), ("roll", "°"), ("bend", "/mm"), ("density", " lines/mm"),
     ("distance from the projector", " mm"),
 )  # fmt: skip
+#: A film of another shape displaces columns by polynomials of this total degree with coefficients of about so
+#: many columns (px); they are of place, inverse depth, and wavelength from these limits (nm).
+WARP_DEGREE, WARP_STD_PX = 3, 1.0
+MIDDLE_NM, HALF_NM = 545.0, 115.0
+#: So many columns of a film of another shape share what polynomials leave of it.
+WARPED_TOGETHER = 1000.0
 #: Residuals beyond this many deviations weigh less (Huber), and no column is better than this (px).
 HUBER_SIGMAS, FLOOR_PX = 2.5, 0.003
 #: What all columns of a filter and order have in common beyond their noise, px: evenly, and as a ramp in
@@ -138,14 +144,16 @@ class FilmFit:
     """The film, the covariance of `FIELDS`, and the robust scatter of the residuals (px).
 
     ``gain`` (fields, samples) is how far each field moves when a column does. ``angle`` is the shift of the
-    filters with the angle of view, none where it was not fitted.
+    filters with the angle of view, none where it was not fitted, and ``warp_px`` (samples,) what a film of
+    another shape adds to columns.
     """
 
     film: Film
     covariance: Floats
     scatter_px: float
     gain: Floats
-    angle: FilterAngle = NO_SHIFT
+    angle: FilterAngle
+    warp_px: Floats
 
     @property
     def std(self) -> dict[str, float]:
@@ -172,6 +180,30 @@ def shift_terms(rig: Rig, pixels: NDArray[np.int64]) -> Floats:
     return np.stack([-0.5 * (x**2 + y**2), x, y], 1)
 
 
+def warp_terms(rig: Rig, samples: OrderSamples) -> Floats:
+    """What the shape of a film can do to columns, for each order by itself, (n, terms).
+
+    Products of Chebyshev polynomials in place, inverse depth and wavelength. None of them moves all light of
+    a wavelength: that would be another filter.
+    """
+    rows, columns = np.divmod(samples.pixel, rig.camera.width_px)
+    near, far = rig.depth_range_mm
+    axes = (
+        2 * columns / (rig.camera.width_px - 1) - 1,
+        2 * rows / (rig.camera.height_px - 1) - 1,
+        2 * (1 / samples.depth_mm - 1 / far) / (1 / near - 1 / far) - 1,
+        (samples.wavelength_nm - MIDDLE_NM) / HALF_NM,
+    )
+    powers = [np.polynomial.chebyshev.chebvander(axis, WARP_DEGREE) for axis in axes]
+    terms = [
+        powers[0][:, i] * powers[1][:, j] * powers[2][:, k] * powers[3][:, n]
+        for i, j, k, n in np.ndindex((WARP_DEGREE + 1,) * 3 + (2,))
+        if i + j + k + n <= WARP_DEGREE and (i + j or not n)
+    ]
+    own = [samples.order == order for order in np.unique(samples.order)]
+    return np.stack([term * mine for mine in own for term in terms], 1)
+
+
 def seen_straight(rig: Rig, samples: OrderSamples, angle: FilterAngle) -> OrderSamples:
     """The samples as they would be through filters that shift nothing."""
     shift = shift_terms(rig, samples.pixel) @ np.array(angle.values)
@@ -179,11 +211,17 @@ def seen_straight(rig: Rig, samples: OrderSamples, angle: FilterAngle) -> OrderS
 
 
 def fit_film(
-    rig: Rig, samples: OrderSamples, mounting: Film, rounds: int = ROUNDS, angled: bool = False
+    rig: Rig,
+    samples: OrderSamples,
+    mounting: Film,
+    rounds: int = ROUNDS,
+    angled: bool = False,
+    warped: bool = False,
 ) -> FilmFit:
     """Fit the film of ``rig`` by Gauss and Newton, robustly; ``mounting`` is what its prior is about.
 
-    With ``angled`` the filters shift with the angle of view, all alike, by what fits best.
+    With ``angled`` the filters shift with the angle of view, all alike, by what fits best. With ``warped``
+    columns may be off by smooth functions of place and depth, for a film whose shape its numbers cannot say.
     Raises `CalibrationError` with too few samples, or when the fit does not converge.
     """
     if len(samples) < MIN_SAMPLES:
@@ -192,8 +230,9 @@ def fit_film(
             " fit the film. Check that the film is on, the filters, and the exposure."
         )
     count, extra = len(FIELDS), 3 if angled else 0
-    centre, values = (np.pad(_values(film), (0, extra)) for film in (mounting, rig.film))
-    prior_std = np.concatenate([PRIOR_STD, ANGLE_STD[:extra]])
+    warps = warp_terms(rig, samples) if warped else np.empty((len(samples), 0))
+    centre, values = (np.pad(_values(film), (0, extra + warps.shape[1])) for film in (mounting, rig.film))
+    prior_std = np.concatenate([PRIOR_STD, ANGLE_STD[:extra], np.full(warps.shape[1], WARP_STD_PX)])
     sigma = np.hypot(samples.std_px, FLOOR_PX)
     terms = shift_terms(rig, samples.pixel)[:, :extra]
     scale, covariance, gain = 1.0, np.eye(len(values)), np.empty((len(values), len(samples)))
@@ -203,9 +242,12 @@ def fit_film(
         ahead = [grating_columns(_with(rig, values[:count] + step), samples) for step in np.diag(STEPS)]
         by_film = (np.stack(ahead, 1) - here[:, None]) / STEPS
         by_angle = columns_per_share(now, samples)[:, None] * terms if angled else terms
-        residual = samples.column_px - here - by_angle @ values[count:]
-        jacobian = np.concatenate([by_film, by_angle], 1) * prior_std
+        linear = np.concatenate([by_angle, warps], 1)
+        residual = samples.column_px - here - linear @ values[count:]
+        jacobian = np.concatenate([by_film, linear], 1) * prior_std
         weight, scale = huber_weights(residual, sigma, HUBER_SIGMAS)
+        if warped:
+            weight = weight / WARPED_TOGETHER
         information = (jacobian * weight[:, None]).T @ jacobian + np.eye(len(values))
         gradient = jacobian.T @ (weight * residual) + (centre - values) / prior_std
         covariance = np.linalg.inv(information)
@@ -223,9 +265,16 @@ def fit_film(
     spread = covariance * np.outer(prior_std, prior_std) + common @ common.T
     angle = NO_SHIFT
     if angled:
-        std = np.sqrt(np.diag(spread)[count:])
-        angle = FilterAngle(tuple(values[count:].tolist()), tuple(std.tolist()))
-    return FilmFit(film, spread[:count, :count], scale * float(np.median(sigma)), gain[:count], angle)
+        std = np.sqrt(np.diag(spread)[count : count + extra])
+        angle = FilterAngle(tuple(values[count : count + extra].tolist()), tuple(std.tolist()))
+    scatter_px = scale * float(np.median(sigma))
+    warp_px = warps @ values[count + extra :]
+    return FilmFit(film, spread[:count, :count], scatter_px, gain[:count], angle, warp_px)
+
+
+def is_plausible(film: Film, mounting: Film) -> bool:
+    """Whether a film can stand where it was mounted."""
+    return bool((np.abs(_values(film) - _values(mounting)) <= PLAUSIBLE).all())
 
 
 def require_plausible(film: Film, mounting: Film) -> None:

@@ -40,11 +40,12 @@ def choose_residual(
     positions: Sequence[str],
     filters: Sequence[str],
     progress: Progress | None = None,
+    warped: bool = False,
 ) -> tuple[ColumnResidual, tuple[HeldOutError, ...]]:
     """The correction for the film of ``rig``, and the errors on what was left out.
 
-    Film and correction are fitted again without each position, each filter, and a third of the samples;
-    ``positions`` and ``filters`` are their names.
+    Film, ``warped`` or not, and correction are fitted again without each position, each filter, and a third
+    of the samples; ``positions`` and ``filters`` are their names.
     """
     progress = progress or NoProgress()
     folds = list(_folds(samples, positions, filters))
@@ -52,7 +53,7 @@ def choose_residual(
     noise = np.empty(len(folds))
     for i, (_, out) in enumerate(folds):
         progress.report("hold captures out", i, len(folds))
-        film = fit_film(rig, samples.only(~out), rig.film, rounds=3).film
+        film = fit_film(rig, samples.only(~out), rig.film, rounds=3, warped=warped).film
         again = rig.model_copy(update={"film": film})
         inside, outside = samples.only(~out), samples.only(out)
         left = outside.column_px - grating_columns(again, outside)

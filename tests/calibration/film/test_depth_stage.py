@@ -16,6 +16,7 @@ from dsl_core.calibration.film.depth_stage import (
     StageData,
     StageFilter,
     _filters,
+    _fit,
     _grid_px,
     _middle,
     _require_filters,
@@ -24,7 +25,7 @@ from dsl_core.calibration.film.depth_stage import (
     fit_first_orders,
     stage_curves,
 )
-from dsl_core.calibration.film.fit import OrderSamples, grating_columns
+from dsl_core.calibration.film.fit import Floats, OrderSamples, fit_film, grating_columns
 from dsl_core.calibration.film.order_columns import TileColumns
 from dsl_core.calibration.film.order_paths import LineFrames
 from dsl_core.errors import CalibrationError
@@ -33,6 +34,7 @@ from dsl_core.model.rig import CorrespondenceGrid, Film, Rig
 from dsl_core.optics.correspondence import GratingModel
 from dsl_core.optics.filters import nominal_filter
 from dsl_core.progress import NoProgress
+from tests.cases.film_samples import NOISE_PX, mounted, samples_of, small_rig
 from tests.cases.order_lines import SIZE, TRUE_FILM, line_frames, plane_at, rig_with
 
 DEPTHS_MM, FILTERS_NM = (600.0, 850.0), (480.0, 540.0, 620.0)
@@ -70,6 +72,24 @@ def test_the_film_is_found_from_its_data_sheet() -> None:
     assert np.sqrt(np.mean(off**2)) < 0.03
     assert fit.film.lines_per_mm == pytest.approx(TRUE_FILM.lines_per_mm, abs=5 * fit.std["lines_per_mm"])
     assert (samples.pixel < SIZE[0] * SIZE[1]).all()
+
+
+@pytest.mark.parametrize("angled", [False, True])
+def test_a_film_is_warped_only_where_it_would_have_to_be_tilted_like_a_roof(angled: bool) -> None:
+    rig = small_rig()
+    plain = samples_of(rig, NOISE_PX)
+    found = _fit(mounted(rig), plain, Film(), angled)
+    assert not found.warp_px.any()
+    assert found.film == fit_film(mounted(rig), plain, Film()).film
+    bent = replace(plain, column_px=plain.column_px + columns_of_a_saddle(plain))
+    found = _fit(mounted(rig), bent, Film(), angled)
+    assert found.warp_px.any()
+    assert abs(found.film.tilt_x_deg - rig.film.tilt_x_deg) < 3.0
+
+
+def columns_of_a_saddle(samples: OrderSamples) -> Floats:
+    rows, columns = np.divmod(samples.pixel, small_rig().camera.width_px)
+    return np.asarray(2.0 * (2 * columns / 222 - 1) * (2 * rows / 145 - 1))
 
 
 def test_a_wrong_filter_is_named_with_its_wavelength() -> None:

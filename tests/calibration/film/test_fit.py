@@ -12,10 +12,12 @@ from dsl_core.calibration.film.fit import (
     FIELDS,
     SIGNIFICANT,
     FilterAngle,
+    OrderSamples,
     _common_offsets,
     columns_per_share,
     fit_film,
     grating_columns,
+    is_plausible,
     require_plausible,
     seen_straight,
     shift_terms,
@@ -82,6 +84,45 @@ def test_filters_seen_at_an_angle_do_not_bend_the_film(seed: int) -> None:
     assert np.sqrt(np.mean(off**2)) < 0.02
     straight = seen_straight(fitted, askew, found.angle)
     assert np.abs(straight.column_px - samples.column_px).max() < 0.05
+
+
+def saddled(samples: OrderSamples, px: float) -> OrderSamples:
+    """Samples of a film that is bent as its numbers cannot say, by up to about so many columns."""
+    rows, columns = np.divmod(samples.pixel, small_rig().camera.width_px)
+    x, y = 2 * columns / 222 - 1, 2 * rows / 145 - 1
+    more = px * (x * y * (1 + 0.2 * samples.order * (samples.wavelength_nm - 545) / 100) + 0.5 * x**3)
+    return replace(samples, column_px=samples.column_px + more)
+
+
+def test_a_film_of_another_shape_is_not_taken_for_one_that_is_tilted() -> None:
+    rig = small_rig()
+    samples = saddled(samples_of(rig, NOISE_PX), 1.0)
+    assert not is_plausible(fit_film(mounted(rig), samples, Film()).film, Film())
+    found = fit_film(mounted(rig), samples, Film(), warped=True)
+    assert is_plausible(found.film, Film())
+    errors = {name: getattr(found.film, name) - getattr(rig.film, name) for name in FIELDS}
+    assert all(abs(error) < 2 * found.std[name] for name, error in errors.items())
+    assert found.scatter_px == pytest.approx(NOISE_PX, rel=0.1)
+    left = (
+        samples.column_px
+        - found.warp_px
+        - grating_columns(rig.model_copy(update={"film": found.film}), samples)
+    )
+    assert np.abs(np.median(left)) < 0.1 * NOISE_PX
+
+
+def test_the_shape_of_a_film_does_not_explain_a_wrong_filter() -> None:
+    rig = small_rig()
+    samples = samples_of(rig, NOISE_PX)
+    wrong = samples.filter == 1
+    shifted = replace(samples, column_px=samples.column_px + 2.0 * samples.order * wrong)
+    found = fit_film(mounted(rig), shifted, Film(), warped=True)
+    left = (
+        shifted.column_px
+        - found.warp_px
+        - grating_columns(rig.model_copy(update={"film": found.film}), shifted)
+    )
+    assert np.median(left[wrong] * samples.order[wrong]) > 1.0
 
 
 def test_filters_that_shift_nothing_have_no_index() -> None:
