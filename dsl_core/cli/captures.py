@@ -70,12 +70,17 @@ class StereoOptions:
     projector: str | None
     unit_mm: float
     from_projector: bool
+    curves: tuple[Path | None, Path | None]
     force: bool
 
 
 def import_stereo(output: Output, source: Path, target: Path | None, options: StereoOptions) -> None:
-    """Say which lenses and pose a file contains; make a rig for depth if there is a target."""
+    """Say which lenses and pose a file contains; make a rig for depth if there is a target.
+
+    ``curves`` of the options are the tables of the camera and of the LEDs.
+    """
     from dsl_core.io.published.any_stereo import lenses_on, load_any_stereo, placed
+    from dsl_core.io.published.curves import load_curves
     from dsl_core.io.rig_file import load_rig, save_rig
     from dsl_core.simulation.published_rig import published_rig
 
@@ -94,10 +99,23 @@ def import_stereo(output: Output, source: Path, target: Path | None, options: St
     said = {"assumed": found.assumed, "understood": found.taken, "warnings": found.doubts}
     output.put(names=found.names, baseline_mm=round(distance_mm, 3))
     output.put(**{name: list(sentences) for name, sentences in said.items()})
+    curves = [
+        None if path is None else load_curves(path, device)
+        for path, device in zip(options.curves, ("camera", "LEDs"), strict=True)
+    ]
+    for each in curves:
+        if each is not None:
+            output.say(f"Understood: {each.words}.")
     if target is not None:
         base = load_rig(options.base) if options.base else published_rig()
-        save_rig(lenses_on(base, found, source.name), target, overwrite=options.force)
-        output.say(f"Imported to {target}: for depth; its curves are not those of your devices.")
+        save_rig(lenses_on(base, found, source.name, *curves), target, overwrite=options.force)
+        lacking = "its curves are not those of your devices"
+        if all(options.curves):
+            lacking = "film and scales are not those of your devices"
+        elif any(options.curves):
+            other = "camera" if options.curves[1] else "LEDs"
+            lacking = f"curves of the {other} are not those of your devices"
+        output.say(f"Imported to {target}: for depth; {lacking}.")
         output.put(imported=target)
 
 

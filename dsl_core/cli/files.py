@@ -46,6 +46,14 @@ def import_(
         bool,
         typer.Option("--from-projector", help="The pose in a stereo file leads from projector to camera."),
     ] = False,
+    camera_curves: Annotated[
+        Path | None,
+        typer.Option("--camera-curves", help="Table of the camera's curves R, G, B, for a stereo file."),
+    ] = None,
+    led_curves: Annotated[
+        Path | None,
+        typer.Option("--led-curves", help="Table of the LEDs' curves R, G, B, for a stereo file."),
+    ] = None,
     guess: Annotated[
         bool,
         typer.Option("--guess", help="Find out what the pictures show; writes the mapping."),
@@ -91,7 +99,9 @@ def import_(
             output,
             source,
             target,
-            StereoOptions(base, camera_size, projector, unit_mm, from_projector, force),
+            StereoOptions(
+                base, camera_size, projector, unit_mm, from_projector, (camera_curves, led_curves), force
+            ),
         )
         output.finish()
         return

@@ -16,12 +16,14 @@ from numpy.typing import NDArray
 from pydantic import ValidationError
 
 from dsl_core.errors import CalibrationError
+from dsl_core.io.published.curves import FoundCurves
 from dsl_core.io.published.stereo import Size, Stereo, five_coefficients, lens_of
 from dsl_core.io.published.stereo_names import Numbers, Parts, parts_of, size_of
 from dsl_core.io.published.tree_file import read_nodes
 from dsl_core.model.base import problems_in_words
 from dsl_core.model.geometry import Pose
-from dsl_core.model.rig import Provenance, Rig
+from dsl_core.model.rig import Provenance, Rgb, Rig
+from dsl_core.model.spectral import SpectralCurve
 
 _PARTS = (
     "camera matrix", "camera distortion", "projector matrix", "projector distortion",
@@ -197,9 +199,22 @@ def placed(stereo: Stereo) -> str:
     )
 
 
-def lenses_on(base: Rig, found: FoundStereo, source: str) -> Rig:
-    """A rig for depth: these lenses and pose; film, curves and scales of ``base`` mean nothing."""
+def lenses_on(
+    base: Rig,
+    found: FoundStereo,
+    source: str,
+    camera_curves: FoundCurves | None = None,
+    led_curves: FoundCurves | None = None,
+) -> Rig:
+    """A rig for depth: these lenses and pose; film and scales of ``base`` mean nothing, nor do its curves.
+
+    Curves that are given are relative to the largest of them, and are made as large as those of ``base``.
+    """
     stereo = found.stereo
+    given = [each.words for each in (camera_curves, led_curves) if each is not None]
+    notes = f"film and scales from {base.name!r}; {'; '.join(given)}" if len(given) == 2 else (
+        f"film, curves and scales from {base.name!r}: for depth alone{''.join(f'; {each}' for each in given)}"
+    )  # fmt: skip
     distance = float(np.linalg.norm(stereo.pose.vector_mm))
     assumed = f"; assumed: {', '.join(found.assumed)}" if found.assumed else ""
     return Rig(
@@ -208,16 +223,27 @@ def lenses_on(base: Rig, found: FoundStereo, source: str) -> Rig:
         projector=stereo.projector,
         pose=stereo.pose,
         film=base.film,
-        response=base.response,
-        emission=base.emission,
+        response=_as_large(base.response, camera_curves),
+        emission=_as_large(base.emission, led_curves),
         efficiency=base.efficiency,
         white_scale=base.white_scale,
         depth_range_mm=(NEAREST * distance, FARTHEST * distance),
         provenance=Provenance(
             source=f"lenses and pose of {source}",
-            notes=f"film, curves and scales from {base.name!r}: for depth alone{assumed}",
+            notes=f"{notes}{assumed}",
         ),
     )
+
+
+def _as_large(base: Rgb, found: FoundCurves | None) -> Rgb:
+    if found is None:
+        return base
+    most = max(max(curve.values) for curve in base)
+    red, green, blue = (
+        SpectralCurve.of(curve.wavelengths_nm, np.multiply(curve.values, most), base[0].unit)
+        for curve in found.curves
+    )
+    return red, green, blue
 
 
 def _distortion(parts: Parts, who: str, path: Path) -> NDArray[np.float64]:

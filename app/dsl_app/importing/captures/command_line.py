@@ -31,6 +31,8 @@ def command_of(request: CaptureRequest, stated: Stated | None, camera_px: Size |
         unit = "" if request.unit_mm == 1 else f" --unit-mm {request.unit_mm:g}"
         sizes = f"--camera-size {_times(camera_px or (0, 0))} --projector {size}"
         way = " --from-projector" if request.from_projector else ""
+        for option, path in (("camera", request.camera_curves), ("led", request.led_curves)):
+            way += "" if path is None else f" --{option}-curves {_quoted(path)}"
         lines.append(f"dsl-scan import {_quoted(rig)} {sizes}{unit}{way} -o {_quoted(made)}")
         rig = str(made)
     if rig not in (NONE, NOMINAL):

@@ -176,6 +176,11 @@ class CapturesController:
         self._request(from_projector=from_projector)
         self._check(only_files=True)
 
+    def set_curves(self, device: str, path: Path | None) -> None:
+        """Set the table of curves of the ``camera`` or the ``LEDs``, None for none."""
+        self._request(**{"camera_curves" if device == "camera" else "led_curves": path})
+        self._check(only_files=True)
+
     def rename(self, name: str, home: Path) -> None:
         """Save under a name in a folder."""
         plain = name.strip().removesuffix(SUFFIX).replace("/", "-")

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from PySide6.QtCore import QSize
-from PySide6.QtWidgets import QFileDialog, QFormLayout, QLabel, QLineEdit, QSizePolicy, QWidget
+from PySide6.QtWidgets import QFileDialog, QFormLayout, QLabel, QLineEdit, QMenu, QSizePolicy, QWidget
 
 from dsl_app.importing.captures.parts_editor import PartsEditor
 from dsl_app.importing.captures.pictures import DecodedPicture, FilesTable
@@ -37,6 +38,7 @@ EDITOR_PX, PICTURE_PX = 330, 270
 #: Lines that a sentence may take before the rest of it is in its tooltip only.
 MOST_LINES = 2
 MAPPINGS = "Mappings (*.json)"
+CURVES = "Tables of curves (*.csv *.txt *.tsv *.xlsx);;All files (*)"
 RIGS = "Calibrations (*.json *.xml *.yml *.yaml)"
 
 
@@ -116,7 +118,13 @@ class CapturesDialog(JobDialog):
         self.from_projector = check_box(
             "From projector", "The pose of the file leads from the projector to the camera, not the usual way"
         )
-        self.about_calibration = _sentence()
+        self.curves = push_button("C&urves…", "Choose tables of the curves of camera and LEDs (CSV)", None)
+        menu = QMenu(self.curves)
+        for device in ("camera", "LEDs"):
+            menu.addAction(f"Curves of the {device}…").triggered.connect(partial(self._choose_curves, device))
+            menu.addAction(f"No curves of the {device}").triggered.connect(partial(self._no_curves, device))
+        self.curves.setMenu(menu)
+        self.about_calibration = _sentence(MOST_LINES + 2)
         self.name = named(QLineEdit(), "Name", "Name of the imported scan; .dsl is added")
         self.home = named(QLineEdit(), "Folder to save in", "Folder of the imported scan")
         self.browse = push_button("C&hoose…", "Choose the folder to save in", self._choose_home)
@@ -136,7 +144,7 @@ class CapturesDialog(JobDialog):
         right = boxed(column_of((self.decoded, 1), self.about_columns, margins=0))
         middle = row_of(self.editor, (self.files, 3), (right, 2))
         form = QFormLayout()
-        of_file = self.rig_file, self.unit_mm, self.from_projector
+        of_file = self.rig_file, self.unit_mm, self.from_projector, self.curves
         form.addRow("Calibration", row_of((self.calibration, 1), *of_file))
         form.addRow("", self.about_calibration)
         form.addRow("Name", row_of((self.name, 1), label("in", "muted"), (self.home, 2), self.browse))
@@ -221,6 +229,7 @@ class CapturesDialog(JobDialog):
             part.setVisible(view.asks_set)
         self.unit_mm.setVisible(view.asks_unit)
         self.from_projector.setVisible(view.asks_unit)
+        self.curves.setVisible(view.asks_unit)
         self.guess.setEnabled(view.can_guess)
         self.choose.setEnabled(not self._state.is_importing.value)
         self.load.setEnabled(view.can_guess)
@@ -247,6 +256,14 @@ class CapturesDialog(JobDialog):
         name, _ = QFileDialog.getOpenFileName(self, "Choose a calibration", "", RIGS)
         if name:
             self._commands.choose_calibration(name)
+
+    def _choose_curves(self, device: str, _: bool = False) -> None:
+        name, _kind = QFileDialog.getOpenFileName(self, f"Choose the curves of the {device}", "", CURVES)
+        if name:
+            self._commands.set_curves(device, Path(name))
+
+    def _no_curves(self, device: str, _: bool = False) -> None:
+        self._commands.set_curves(device, None)
 
     def _load(self) -> None:
         name, _ = QFileDialog.getOpenFileName(self, "Load a mapping", self.home.text(), MAPPINGS)

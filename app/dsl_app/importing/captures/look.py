@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from dsl_app.importing.captures.fields import first_mapping
 from dsl_app.importing.captures.state import (
+    DOUBT,
     NOMINAL,
     NONE,
     CaptureRequest,
@@ -141,15 +142,19 @@ def _is_rig(path: Path) -> bool:
 
 def _stereo(path: Path, request: CaptureRequest, camera_px: Size, projector_px: Size) -> tuple[Rig, str]:
     from dsl_core.io.published.any_stereo import lenses_on, load_any_stereo, placed
+    from dsl_core.io.published.curves import load_curves
     from dsl_core.simulation.published_rig import published_rig
 
     found = load_any_stereo(path, camera_px, projector_px, request.unit_mm, request.from_projector)
-    rig = lenses_on(published_rig(), found, path.name)
-    said = [f"Check: {in_window(each)}." for each in found.doubts]
+    tables = ("camera", request.camera_curves), ("LEDs", request.led_curves)
+    curves = [None if table is None else load_curves(table, device) for device, table in tables]
+    rig = lenses_on(published_rig(), found, path.name, *curves)
+    said = [f"{DOUBT}{in_window(each)}." for each in found.doubts]
     said.append(f"{path.name}: {placed(found.stereo).partition('; ')[2]}.")
     said += [f"Missing, so assumed: {', '.join(found.assumed)}."] if found.assumed else []
-    said.append(f"Understood: {'; '.join(found.taken)}.")
-    return rig, " ".join([*said, "For depth alone: it has no curves."])
+    taken = [*found.taken, *(each.words for each in curves if each is not None)]
+    said.append(f"Understood: {'; '.join(taken)}.")
+    return rig, " ".join([*said, "For depth alone: it has no curves." if None in curves else "For depth."])
 
 
 def _distance(rig: Rig) -> str:

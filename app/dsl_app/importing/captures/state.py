@@ -16,6 +16,8 @@ from dsl_core.io.pictures.mapping import Mapping
 #: Keys of calibrations that are neither in the library nor files.
 NONE, NOMINAL = "", ":nominal"
 SUFFIX = ".dsl"
+#: Begins what is told of a calibration that may not be meant like that.
+DOUBT = "Check: "
 #: Files of other programs with lenses and pose; rig files of this program end in .json, too.
 STEREO_SUFFIXES = (".xml", ".yml", ".yaml", ".json")
 Size = tuple[int, int]
@@ -37,6 +39,7 @@ class CaptureRequest:
     ``projector_px`` is the size that the guess is told, (0, 0) if it is not known; ``chosen`` is one of
     several captures in the folder. Lengths of another program's calibration are in units of ``unit_mm``,
     and ``from_projector`` says that its pose leads from the projector to the camera.
+    ``camera_curves`` and ``led_curves`` are tables of that calibration's curves.
     """
 
     folder: Path | None
@@ -46,6 +49,8 @@ class CaptureRequest:
     calibration: str = NONE
     unit_mm: float = 1.0
     from_projector: bool = False
+    camera_curves: Path | None = None
+    led_curves: Path | None = None
 
 
 @dataclass(frozen=True)
@@ -177,7 +182,7 @@ def captures_view(state: CapturesState) -> CapturesView:
     return CapturesView(
         folder=said(Place.FOLDER, _about_folder(request, stated, busy, len(state.listing.value.table))),
         mapping=said(Place.MAPPING, _about_mapping(stated)),
-        calibration=said(Place.CALIBRATION, Said(state.listing.value.calibration)),
+        calibration=said(Place.CALIBRATION, _about_calibration(state.listing.value.calibration)),
         target=said(Place.TARGET, Said(f"Creates {request.target.name}{_also(request)}.")),
         columns=_about_columns(state.decoded.value),
         values=_about_values(state.decoded.value),
@@ -209,6 +214,10 @@ def _about_mapping(stated: Stated | None) -> Said:
     return Said(
         "Unsure: " + "; ".join(in_window(f"{each}.")[:-1] for each in stated.mapping.unsure) + ".", "warn"
     )
+
+
+def _about_calibration(told: str) -> Said:
+    return Said(told, "warn" if told.startswith(DOUBT) else "muted")
 
 
 def _about_columns(decoded: Decoded | None) -> Said:

@@ -29,4 +29,6 @@ def test_the_command_does_the_same() -> None:
         " -o out-rig.json",
         "dsl-scan reconstruct out.dsl --calibration out-rig.json",
     ]
+    curves = replace(stereo, camera_curves=Path("c.csv"), led_curves=Path("my leds.csv"))
+    assert " --camera-curves c.csv --led-curves 'my leds.csv' -o" in command_of(curves, saved, (64, 48))
     assert command_of(CaptureRequest(None, Path("out.dsl")), None) == ""

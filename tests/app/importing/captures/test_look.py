@@ -17,7 +17,7 @@ from dsl_app.importing.captures.look import (
     require_sizes,
     small_pictures,
 )
-from dsl_app.importing.captures.state import NOMINAL, CaptureRequest, Place
+from dsl_app.importing.captures.state import DOUBT, NOMINAL, CaptureRequest, Place
 
 from dsl_core.errors import CalibrationError, StoreError
 from dsl_core.io.calibration_library import CalibrationLibrary
@@ -119,6 +119,10 @@ def test_what_a_calibration_lacks_is_named(folder: Path, tmp_path: Path) -> None
     assert not troubles
     assert "the projector is 100 mm from the camera" in told
     assert "Missing, so assumed: no camera distortion, no projector distortion." in told
+    told, _ = listed(replace(given, unit_mm=1.0), tmp_path)
+    assert told.startswith(
+        f"{DOUBT}the projector would be 0.1 mm from the camera; if lengths are in metres, set"
+    )
     file.write_text(json.dumps({key: parts[key] for key in ("cam_K", "R")}))
     assert "lacks projector matrix and translation" in listed(given, tmp_path)[1][Place.CALIBRATION]
     missing = replace(request, calibration=str(tmp_path / "none.json"))
@@ -143,3 +147,22 @@ def test_values_for_screens_are_named_with_what_to_do(tmp_path: Path) -> None:
     stated = with_field(MAPPING, "encoding", "srgb")
     found = decode(root, stated)
     assert (found.advice, found.values[:15]) == ("", "linear in light")
+
+
+def test_curves_complete_a_calibration_or_are_refused_with_the_reason(folder: Path, tmp_path: Path) -> None:
+    matrix = [[50.0, 0, 16], [0, 50.0, 12], [0, 0, 1]]
+    file, table = tmp_path / "stereo.json", tmp_path / "leds.csv"
+    parts = {"cam_K": matrix, "proj_K": matrix, "R": np.eye(3).tolist(), "T": [100, 0, 0]}
+    file.write_text(json.dumps(parts))
+    nm = np.arange(420, 671, 10)
+    peaks = np.exp(-(((nm[:, None] - [620, 530, 460]) / 25) ** 2))
+    np.savetxt(table, np.c_[nm, peaks], "%.4f", ",", header="nm,R,G,B", comments="")
+    request = replace(request_for(folder, tmp_path), calibration=str(file), led_curves=table)
+    told, troubles = listed(request, tmp_path)
+    assert not troubles
+    assert "curves of the LEDs: leds.csv, by their names, centred at R 620 nm, G 530 nm, B 460 nm" in told
+    assert told.endswith("it has no curves.")
+    told, _ = listed(replace(request, camera_curves=table), tmp_path)
+    assert told.endswith("For depth.")
+    np.savetxt(table, np.c_[nm, peaks[:, ::-1]], "%.4f", ",", header="nm,R,G,B", comments="")
+    assert "red must have the longest" in listed(request, tmp_path)[1][Place.CALIBRATION]
