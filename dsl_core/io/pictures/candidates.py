@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 
 from dsl_core.errors import StoreError
@@ -95,6 +96,31 @@ def _variants(folder: Path, group: Sequence[Path], files: Sequence[Path], name: 
     absent = slots.count(None)
     if 0 < absent <= MOST_ABSENT and len(listed) == len(group):
         yield Candidate(name, tuple(slots), globs, left_out)
+
+
+def jump_of(candidate: Candidate) -> str:
+    """Where the numbers of names jump although nothing is taken to be absent, in words; else empty.
+
+    >>> names = (Picture(Path(f"im{number}.png")) for number in (0, 1, 2, 5, 6))
+    >>> jump_of(Candidate("im", tuple(names), ("*",), 0))
+    'the numbers of the names jump from im2.png to im5.png'
+    """
+    paths = [picture.path for picture in candidate.pictures if picture is not None]
+    if candidate.absent:
+        return ""
+    steps: dict[int, list[tuple[str, str]]] = {}
+    for one, other in pairwise(paths):
+        first, second = _number(one), _number(other)
+        if (
+            first is not None
+            and second is not None
+            and one.parent == other.parent
+            and _key(one.parent, one) == _key(one.parent, other)
+        ):
+            steps.setdefault(second - first, []).append((one.name, other.name))
+    usual = max(steps, key=lambda step: len(steps[step]), default=1)
+    odd = [pair for step, pairs in steps.items() if step > usual for pair in pairs]
+    return f"the numbers of the names jump from {odd[0][0]} to {odd[0][1]}" if odd else ""
 
 
 def _globs(folder: Path, group: Sequence[Path]) -> tuple[str, ...]:

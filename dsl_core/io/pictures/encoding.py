@@ -61,7 +61,7 @@ def _advice(found: Linearity, source: PictureScan) -> str:
         case "darker" if stated == "srgb":
             return "set encoding of the mapping to linear, which the files seem to be already"
         case "darker":
-            return "project patterns of the projector's own size, unsharpened, or check which is white"
+            return "give the pictures unfiltered, and project patterns of the projector's own size"
         case "srgb" | "encoded":
             return "capture again with gamma 1 of the camera; columns hold, brightness does not"
         case "unknown" if stated == "linear":

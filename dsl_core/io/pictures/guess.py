@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from dsl_core.errors import StoreError
 from dsl_core.io.pictures.arrange import arrange
-from dsl_core.io.pictures.candidates import Candidate, candidates
+from dsl_core.io.pictures.candidates import FEWEST, Candidate, candidates, jump_of
 from dsl_core.io.pictures.encoding import guessed_encoding
 from dsl_core.io.pictures.guessed_parts import guessed_size, part_of
 from dsl_core.io.pictures.mapping import Mapping
@@ -97,7 +97,7 @@ def guess_mapping(
         found = _recognised(look, tuple(slots))
         if found is not None and (best is None or found.misfit < best[2].misfit):
             best = candidate, look, found
-        if best is not None and best[2].misfit < DOUBTFUL and not _absent_next(order, number):
+        if best is not None and best[2].misfit < DOUBTFUL and not _alike_next(order, number, whole):
             break
     if best is not None and best[0] in whole and len(names) > 1:
         best = _single_instead(best, single) or best
@@ -139,9 +139,12 @@ def _alike(single: Sequence[Candidate]) -> bool:
     return len({len(each.pictures) for each in single}) == 1
 
 
-def _absent_next(order: Sequence[Candidate], number: int) -> bool:
-    """Whether the next candidate is this one with absent pictures."""
-    return number + 1 < len(order) and order[number + 1].files == order[number].files
+def _alike_next(order: Sequence[Candidate], number: int, whole: Sequence[Candidate]) -> bool:
+    """Whether the next candidate is this one with absent pictures, or without files that stand alone."""
+    if number + 1 == len(order):
+        return False
+    this, following = order[number], order[number + 1]
+    return following.files == this.files or (following in whole and following.left_out > this.left_out)
 
 
 def _look_at(candidate: Candidate) -> _Look:
@@ -236,13 +239,22 @@ def _guess_of(
         unsure.append(doubt)
     if found.misfit > DOUBTFUL:
         unsure.append("positions run less steadily than usual; compare the table with what was projected")
-    others = [name for name in names if name != candidate.name] if candidate.left_out else []
+    # Fewer pictures than a capture has are strays, not another set.
+    is_of_several = candidate.left_out >= FEWEST
+    others = [name for name in names if name != candidate.name] if is_of_several else []
+    if jump := jump_of(candidate):
+        unsure.append(f"{jump}: pictures may be missing, or not belong to the capture")
     if candidate.absent:
-        unsure.append(f"by their numbers {len(candidate.absent)} pictures are absent")
+        count = len(candidate.absent)
+        unsure.append(f"by their numbers {count} {'picture is' if count == 1 else 'pictures are'} absent")
     if others:
         unsure.append(f"there are other sets ({_few(others)}): name one with --set")
     elif candidate.left_out:
-        unsure.append(f"{candidate.left_out} pictures do not belong to the code and are not used")
+        one = candidate.left_out == 1
+        words = "picture does not belong to the code and is" if one else (
+            "pictures do not belong to the code and are"
+        )  # fmt: skip
+        unsure.append(f"{candidate.left_out} {words} not used")
     kinds = {block.kind for block in found.blocks}
     lacking = [name for name in ("white", "black") if name not in kinds]
     if lacking:

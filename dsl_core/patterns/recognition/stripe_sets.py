@@ -26,6 +26,8 @@ ROUGH = 0.45
 FEWEST_BITS = 3
 #: Digits vary by this much where they are seen at all, and go together less than this.
 LEAST_VARIANCE, REPEATED = 0.04, 0.93
+#: A digit that is bright, or dark, in all but this share of the pixels is even.
+EVEN = 0.02
 #: Of two readings the second is this many times rougher, or which one it is stays unsure.
 CLEARLY_ROUGHER = 1.5
 #: A blurred digit adds nothing but noise, so rougher readings that only differ in it are as good.
@@ -104,6 +106,8 @@ def _readings(lines: Lines, pictures: Sequence[int | None]) -> Iterator[StripeRe
             continue
         for first in ("most", "least"):
             ordered = digits if first == "most" else digits[::-1]
+            if _is_even(lines, ordered[-1]):
+                continue
             for inverse_first in (False, True):
                 word = _word(lines, ordered, inverse_first)
                 for code, base in _CODES:
@@ -111,6 +115,12 @@ def _readings(lines: Lines, pictures: Sequence[int | None]) -> Iterator[StripeRe
                         continue
                     spec = Stripes(code=code, bits=len(digits), base_bit=base)
                     yield _judged(lines, spec, number_of(spec, word), first, inverse, inverse_first)
+
+
+def _is_even(lines: Lines, digit: NDArray[np.bool_]) -> bool:
+    """Whether a digit is the same everywhere: the finest cannot be, but white with black looks like that."""
+    seen = digit[lines.lit]
+    return seen.size > 0 and not EVEN < float(seen.mean()) < 1 - EVEN
 
 
 def _judged(

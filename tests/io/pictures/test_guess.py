@@ -57,7 +57,29 @@ def test_an_absent_number_is_seen(tmp_path: Path, gray: Pictures) -> None:
     folder = write(tmp_path, {f"im{i}.png": p for i, p in enumerate(gray) if i != 5})
     mapping = guess_mapping(folder, PROJECTOR).mapping
     assert mapping.missing == (5,)
-    assert any("1 pictures are absent" in sentence for sentence in mapping.unsure)
+    assert any("1 picture is absent" in sentence for sentence in mapping.unsure)
+
+
+def test_a_preview_among_the_pictures_is_no_light_of_the_code(tmp_path: Path, gray: Pictures) -> None:
+    named = {f"im{i:02d}.png": each for i, each in enumerate(gray)}
+    guess = guess_mapping(write(tmp_path, {**named, "preview.png": gray[14]}), PROJECTOR)
+    assert guess.table[-1] == ("im15.png", "black")
+    assert guess.mapping.unsure == ("1 picture does not belong to the code and is not used",)
+
+
+def test_white_and_black_are_no_finest_digit(tmp_path: Path, gray: Pictures) -> None:
+    named = {f"im{i:02d}.png": each for i, each in enumerate([*gray, gray[14]])}
+    mapping = guess_mapping(write(tmp_path, named), PROJECTOR).mapping
+    stripes = [part for part in mapping.parts if isinstance(part, StripePictures)]
+    assert [part.bits for part in stripes] == [7]
+
+
+def test_numbers_that_jump_are_told(tmp_path: Path, gray: Pictures) -> None:
+    numbers = [*range(14), 60, 61]
+    named = {f"im{i:02d}.png": p for i, p in zip(numbers, gray, strict=True)}
+    told = guess_mapping(write(tmp_path, named), PROJECTOR).mapping.unsure
+    assert len(told) == 1
+    assert told[0].startswith("the numbers of the names jump from im13.png to im60.png")
 
 
 def test_bit_depth_and_alignment_are_read_from_the_values(tmp_path: Path) -> None:
