@@ -300,6 +300,7 @@ class Composition(QObject):
         self.scans = controller = ScanController(
             state, rig, parts.runner, window.toasts, parts.undo, hidden=_demo_folder()
         )
+        state.wanted.connect(lambda _: window.open_page("scan"))
         self.calibration_in_use.serve_scans(controller)
         self.session.scans = controller
         foreseen = ForecastState()

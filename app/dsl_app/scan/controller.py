@@ -207,7 +207,10 @@ class ScanController:
         safe = f" {session.done} of {session.total} frames are saved in {folder}." if session else ""
         story = f"The scan stopped: {sentence_of(error)}{safe}"
         self.state.trouble.set(story)
-        self._notifier.tell("error", f"The scan {folder.name} was interrupted. The Scan page says why.")
+        if not self.state.is_seen.value:
+            # Its page says why and what to do; nobody is told twice.
+            show = {"Show the scan": lambda: self.state.wanted.emit(None)}
+            self._notifier.offer(f"The scan {folder.name} was interrupted.", show)
         if isinstance(error, DeviceError) and not isinstance(error, DriftError):
             self._rig.lose(sentence_of(error))
             self._reconnector.begin(story)

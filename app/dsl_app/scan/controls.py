@@ -53,16 +53,18 @@ def run_controls(
     note: str,
     has_finished: bool,
     then_reconstruct: bool = True,
+    trouble: str = "",
 ) -> RunControls:
     """The controls of a scan in a phase; ``note`` is what became of the last one.
 
-    A finished scan whose reconstruction was not asked for is reconstructed next.
+    ``trouble`` is said above the page, with how far the scan came; that is not said again. A finished scan
+    whose reconstruction was not asked for is reconstructed next.
     """
     is_raw = phase is Phase.DONE and has_finished and not then_reconstruct
     obstacles = () if facts is None or phase.is_busy else facts.obstacles
     is_resumable = session is not None and not phase.is_busy
     lines = [*obstacles, *([note] if note else [])]
-    if session is not None and is_resumable:
+    if session is not None and is_resumable and not trouble:
         lines.insert(0, session.words)
     is_ready = phase is not Phase.PLANNING or not obstacles
     lacks_rig = NO_RIG in obstacles
@@ -100,7 +102,7 @@ def banner_controls(reconnection: Reconnection) -> BannerControls:
     return BannerControls(
         action=ButtonState(
             is_enabled=reconnection is not Reconnection.RESUMING,
-            text="Reconnect and resume" if is_away else "Resume",
+            text="Connect and resume" if is_away else "Resume",
             tip=RECONNECT if is_away else RESUME,
         ),
         stop=ButtonState(reconnection.is_trying),

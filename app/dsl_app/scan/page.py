@@ -6,7 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from PySide6.QtCore import Qt, Signal
-from PySide6.QtGui import QShowEvent
+from PySide6.QtGui import QHideEvent, QShowEvent
 from PySide6.QtWidgets import QFileDialog, QScrollArea, QVBoxLayout, QWidget
 
 from dsl_app.scan.controller import ScanController
@@ -181,9 +181,15 @@ class ScanPage(PageWidget):
     def showEvent(self, event: QShowEvent) -> None:
         """Refresh what may have changed on disk."""
         super().showEvent(event)
+        self._state.is_seen.set(True)
         if not self._state.phase.value.is_busy:
             self._controller.plans.refresh()
             self._controller.plans.load_library()
+
+    def hideEvent(self, event: QHideEvent) -> None:
+        """What happens from now on is not seen here."""
+        super().hideEvent(event)
+        self._state.is_seen.set(False)
 
     def subject(self) -> Path | None:
         """The scan finished last."""

@@ -92,7 +92,6 @@ class Reconnector:
         self._next_s = self._clock() + RETRY_S
         if self._attempt >= ATTEMPTS:
             self._tell(Reconnection.GIVEN_UP, f"The rig could not be reconnected: {reason}")
-            self._notifier.tell("error", "The rig could not be reconnected. The Scan page says why.")
 
     def stop(self) -> None:
         """Make no further attempt."""

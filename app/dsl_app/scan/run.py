@@ -159,6 +159,7 @@ class RunBox(QGroupBox):
                 state.note,
                 state.finished,
                 state.then_reconstruct,
+                state.trouble,
             ),
             state.status.follow(self._show_status),
         ]
@@ -195,6 +196,7 @@ class RunBox(QGroupBox):
             state.note.value,
             state.finished.value is not None,
             state.then_reconstruct.value,
+            state.trouble.value,
         )
         show_parts(self, shown)
 

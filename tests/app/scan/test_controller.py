@@ -495,7 +495,12 @@ def test_a_lost_rig_is_connected_again_a_few_times_and_no_more(outage: Outage) -
         assert (outage.link, f"attempt {attempt} of" in outage.told) == (Link.LOST, attempt < ATTEMPTS)
     assert outage.reconnection is Reconnection.GIVEN_UP
     assert outage.told.endswith("could not be reconnected: The camera sent no frame. Check its cable.")
-    assert [level for level, _ in bench.notifier.told] == ["error", "error"]
+    # The page tells all of it; one message leads there who is on another page.
+    assert [text for _, text in bench.notifier.told] == ["The scan first.dsl was interrupted."]
+    wanted: list[None] = []
+    bench.state.wanted.connect(wanted.append)
+    bench.notifier.offers["Show the scan"]()
+    assert wanted == [None]
     outage.is_gone = False
     outage.wait(10 * RETRY_S)
     assert outage.reconnection is Reconnection.GIVEN_UP

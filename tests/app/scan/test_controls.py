@@ -73,9 +73,9 @@ def test_an_interrupted_scan_is_resumed_or_left() -> None:
     ("reconnection", "action", "tip", "is_enabled", "can_stop"),
     [
         (Reconnection.NONE, "Resume", RESUME, True, False),
-        (Reconnection.TRYING, "Reconnect and resume", RECONNECT, True, True),
-        (Reconnection.RESUMING, "Reconnect and resume", RECONNECT, False, True),
-        (Reconnection.GIVEN_UP, "Reconnect and resume", RECONNECT, True, False),
+        (Reconnection.TRYING, "Connect and resume", RECONNECT, True, True),
+        (Reconnection.RESUMING, "Connect and resume", RECONNECT, False, True),
+        (Reconnection.GIVEN_UP, "Connect and resume", RECONNECT, True, False),
         (Reconnection.BACK, "Resume", RESUME, True, False),
     ],
 )

@@ -150,9 +150,12 @@ def test_a_lost_camera_is_said_over_the_page(
         qtbot.waitUntil(in_phase(bench, Phase.LOST), timeout=60_000)
         assert page.banner.isVisible()
         assert "Check its cable" in page.banner.text
+        # Told once, where it is seen with what to do.
+        assert not any(level == "error" or "interrupted" in text for level, text in bench.notifier.told)
+        assert "frames are safe" not in page.run.remarks.text()
         # The page itself makes one attempt after another.
         qtbot.waitUntil(lambda: "attempt 1 of" not in page.banner.text, timeout=60_000)
-        assert page.banner.action.text() == "Reconnect and resume"
+        assert page.banner.action.text() == "Connect and resume"
         assert page.stop.isVisible()
         click(page.stop)
         assert not page.stop.isVisible()
