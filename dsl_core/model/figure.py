@@ -53,8 +53,8 @@ class Figure(Record):
     def __str__(self) -> str:
         """The figure as people write it, such as ``gamma 2.210 ± 0.004``.
 
-        It has two digits of its deviation; without one three digits, but none below a hundredth of its
-        limits. More are written only where it would seem to be on the other side of a limit.
+        It has two digits of its deviation, but none far below its limits; without a deviation three digits.
+        More are written only where it would seem to be on the other side of a limit.
 
         >>> print(Figure(name="camera error", value=0.0123456, unit="px", high=0.5))
         camera error 0.012 px
@@ -69,12 +69,13 @@ class Figure(Record):
 
     @property
     def _decimals(self) -> int:
-        if self.std:
-            return decimals(self.std)
+        own = decimals(self.std) if self.std else decimals(self.value, 3)
         if self.low is not None and self.high is not None and self.low < self.high:
-            return decimals(self.high - self.low, 3)
-        limit, own = self.low or self.high or 0.0, decimals(self.value, 3)
-        return min(own, decimals(limit, 3)) if limit else own
+            # Narrow limits are judged by the digits in which they differ.
+            judged = decimals(self.high - self.low, 4 if self.std else 3)
+            return min(own, judged) if self.std else judged
+        limit = self.low or self.high or 0.0
+        return min(own, decimals(limit, 4 if self.std else 3)) if limit else own
 
 
 def with_std(value: float, std: float | None, most: int = MOST_DECIMALS) -> str:
@@ -85,8 +86,7 @@ def with_std(value: float, std: float | None, most: int = MOST_DECIMALS) -> str:
     """
     if not std:
         return f"{value:.0f}" if float(value).is_integer() else _spread(value, None, decimals(value, 3))
-    digits = min(decimals(std), most)
-    return _spread(value, max(std, 10.0**-digits), digits)
+    return _spread(value, std, min(decimals(std), most))
 
 
 def decimals(value: float, digits: int = 2) -> int:
@@ -102,7 +102,8 @@ def decimals(value: float, digits: int = 2) -> int:
 
 def _spread(value: float, std: float | None, digits: int) -> str:
     # Adding zero makes -0.0 a plain zero.
-    spread = f" ± {std:.{digits}f}" if std else ""
+    # A deviation below the last digit is that digit at most.
+    spread = f" ± {max(std, 10.0**-digits):.{digits}f}" if std else ""
     return f"{round(value, digits) + 0.0:.{digits}f}{spread}"
 
 

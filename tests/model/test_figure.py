@@ -50,6 +50,9 @@ def test_without_deviation_digits_follow_the_limits(
     [
         (Figure(name="gamma", value=2.21, std=0.004, unit="1"), "gamma 2.2100 ± 0.0040"),
         (Figure(name="shift", value=-1.25, std=0.3, unit="px"), "shift -1.25 ± 0.30 px"),
+        (Figure(name="black", value=0.000258974, std=4.4e-7, unit="1", high=0.01), "black 0.00026 ± 0.00001"),
+        (Figure(name="gamma", value=2.065826, std=2.4e-5, unit="1", low=1, high=3.5), "gamma 2.066 ± 0.001"),
+        (Figure(name="side", value=30, std=0.044, unit="mm", low=29.8, high=30.2), "side 30.000 ± 0.044 mm"),
         (Figure(name="frames", value=4000, unit=""), "frames 4000"),
         (Figure(name="frames", value=400, unit=""), "frames 400"),
         (Figure(name="tilt", value=12.3456, unit="degrees"), "tilt 12.3 degrees"),

@@ -92,10 +92,15 @@ class LibraryPanel(QGroupBox):
         ]
 
     def _lay_out(self) -> None:
-        split = splitter(Qt.Orientation.Horizontal, (self.table, 3), (self.details, 2))
+        self._split = splitter(Qt.Orientation.Horizontal, (self.table, 3), (self.details, 2))
         row = row_of(self.use, self.report, self.restore, self.check, self.export, STRETCH, self.import_)
         self.table.setMinimumHeight(110)
-        column_of((split, 1), row, self._note, on=self, margins=(0, 4, 0, 0))
+        column_of((self._split, 1), row, self._note, on=self, margins=(0, 4, 0, 0))
+
+    def stack(self, on: bool) -> None:
+        """Show the details below the list, for a panel that is higher than wide, or next to it."""
+        self._split.setOrientation(Qt.Orientation.Vertical if on else Qt.Orientation.Horizontal)
+        self._split.setSizes([1000, 2000] if on else [3000, 2000])
 
     # The list --------------------------------------------------------------------------------------
 

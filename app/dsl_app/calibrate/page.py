@@ -32,6 +32,8 @@ if TYPE_CHECKING:
 FETCH_MS = 200
 #: Height of the rows, as far as there is room.
 ROWS_PX = 316
+#: Shares of a wide window for the rows, whose figures are lines to read, and for the library.
+WIDE_SHARES = (5, 4)
 #: The most that a row takes where there is more room.
 HIGHEST_PX = 84
 #: Width of what the camera sees while everything is calibrated.
@@ -80,7 +82,13 @@ class CalibratePage(PageWidget):
     def arrange(self) -> None:
         """Show the library next to the calibrations where there is room, else below them."""
         self._split.setOrientation(Qt.Orientation.Horizontal if self.is_wide else Qt.Orientation.Vertical)
-        self._split.setSizes([1000, 1000] if self.is_wide else [ROWS_PX, 300])
+        shares = WIDE_SHARES if self.is_wide else (0, 1)
+        for place, share in enumerate(shares):
+            self._split.setStretchFactor(place, share)
+        self._split.setSizes(
+            [self.width() * share // sum(shares) for share in shares] if self.is_wide else [ROWS_PX, 300]
+        )
+        self.library.stack(self.is_wide)
         # What the camera sees is below the rows where those are narrow.
         direction = QBoxLayout.Direction
         self._top.setDirection(direction.TopToBottom if self.is_wide else direction.LeftToRight)

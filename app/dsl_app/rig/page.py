@@ -27,7 +27,7 @@ from dsl_core.io.rig_profile import profile_path
 #: How often the newest live frame is fetched, ms.
 FETCH_MS = 15
 #: Widths of the columns next to the picture, and of that with its figures in a wide window, px.
-SIDE_PX, WIDE_SIDE_PX = 268, 440
+SIDE_PX, WIDE_SIDE_PX, WIDEST_SIDE_PX = 268, 440, 640
 
 
 class RigPage(PageWidget):
@@ -142,12 +142,14 @@ class RigPage(PageWidget):
         left, self._right_side = boxed(self._left), boxed(self._right)
         for side in (left, self._right_side):
             side.setFixedWidth(SIDE_PX)
-        row_of(left, (self.live, 1), self._right_side, on=self)
+        # Of a very wide window the figures get a quarter of what the left side leaves.
+        row_of(left, (self.live, 3), (self._right_side, 1), on=self)
 
     def arrange(self) -> None:
         """Show controls and figures next to the picture where there is room."""
         self.beside.setVisible(self.is_wide)
-        self._right_side.setFixedWidth(WIDE_SIDE_PX if self.is_wide else SIDE_PX)
+        self._right_side.setMinimumWidth(WIDE_SIDE_PX if self.is_wide else SIDE_PX)
+        self._right_side.setMaximumWidth(WIDEST_SIDE_PX if self.is_wide else SIDE_PX)
         if self.is_wide:
             self._left.insertWidget(2, self.projector)
         else:

@@ -17,7 +17,7 @@ from tests.app.support.real_window import show_window
 from tests.app.support.small_result import write_small_result
 
 PAGES = ("rig", "scan", "calibrate", "results")
-LARGE, SMALL = (1920, 1080), (1280, 800)
+HUGE, LARGE, SMALL = (2560, 1440), (1920, 1080), (1280, 800)
 
 
 @pytest.fixture
@@ -38,8 +38,8 @@ def test_views_are_side_by_side_in_a_large_window_alone(
     window.open_path(write_small_result(tmp_path))
     qtbot.waitUntil(lambda: not window.parts.runner.active, timeout=30_000)
     live = rig.live.content
-    for size in (SMALL, LARGE, SMALL):
-        is_large = size == LARGE
+    for size in (SMALL, LARGE, HUGE, SMALL):
+        is_large = size != SMALL
         window.resize(*size)
         for name in PAGES:
             window.open_page(name)
@@ -52,6 +52,12 @@ def test_views_are_side_by_side_in_a_large_window_alone(
         beside = calibrate.library.mapTo(calibrate, calibrate.library.rect().topLeft())
         rows = calibrate.rows["selftest"].mapTo(calibrate, calibrate.rows["selftest"].rect().topRight())
         assert (beside.x() > rows.x()) == is_large
+        # Figures are read in one line next to their calibration, and the histogram grows with the window.
+        if is_large:
+            assert calibrate.library.details.y() > calibrate.library.table.y()
+            assert 1.1 < calibrate.rows["selftest"].width() / calibrate.library.width() < 1.6
+        if size == HUGE:
+            assert rig.beside.width() > 500
         # The picture gets what a wide window has more of.
         share = results._sides.sizes()[0] / sum(results._sides.sizes())
         assert (share > 0.7) == is_large
