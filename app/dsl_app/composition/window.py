@@ -39,6 +39,8 @@ if TYPE_CHECKING:
 
 #: How long the first page is on screen before the rig is connected, ms.
 CONNECT_AFTER_MS = 200
+#: How long the tour is offered, s: who works by then needs the room.
+TOUR_STAYS_S = 20.0
 
 
 @dataclass(frozen=True)
@@ -123,6 +125,7 @@ class Composition(QObject):
             self.window.toasts.offer(
                 "New here? The guided tour shows the window in seven steps. It is also in the Help menu.",
                 {"Take the tour": lambda: self.window.do("tour")},
+                TOUR_STAYS_S,
             )
 
     # What several pages share ----------------------------------------------------------------------

@@ -2,11 +2,13 @@ from __future__ import annotations
 
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 import pytest
 from dsl_app.composition.window import Composition, StartOptions
 from dsl_app.shared.jobs.qt_runner import QtRunner
 from dsl_app.shell.main_window import MainWindow
+from dsl_app.shell.toasts import Toasts
 from dsl_app.shell.tour import STEPS, Tour, next_to
 from PySide6.QtCore import QRect, Qt
 from PySide6.QtTest import QTest
@@ -97,7 +99,17 @@ def test_a_card_stands_where_there_is_room() -> None:
     assert next_to(QRect(100, 600, 850, 190), 360, 200, room).y() < 400
 
 
-def test_a_person_is_offered_the_tour_once(qtbot: QtBot, tmp_path: Path) -> None:
+def test_a_person_is_offered_the_tour_once(
+    qtbot: QtBot, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    stays: list[float] = []
+    offer = Toasts.offer
+
+    def offering(self: Toasts, text: str, offers: dict[str, Any], stay_s: float = 0.0) -> None:
+        stays.append(stay_s)
+        offer(self, text, offers, stay_s)
+
+    monkeypatch.setattr(Toasts, "offer", offering)
     for offered in (True, False):
         composition = Composition(StartOptions(offers_tour=True))
         window = composition.open_window(tmp_path)
@@ -107,5 +119,7 @@ def test_a_person_is_offered_the_tour_once(qtbot: QtBot, tmp_path: Path) -> None
         toasts, runner = window.toasts.shown, window.parts.runner
         buttons = [button.text() for toast in toasts for button in toast.findChildren(QPushButton)]
         assert ("Take the tour" in buttons) is offered
+        # It leaves by itself: the page needs the room.
+        assert all(stay_s > 0 for stay_s in stays)
         qtbot.waitUntil(partial(idle, runner), timeout=60_000)
         window.close()

@@ -16,6 +16,7 @@ from dsl_app.shared.widget_state import ButtonState, LabelState
 from dsl_core.evaluation.summary import Truth
 from dsl_core.evaluation.verdict import Verdict
 from dsl_core.io.result.result_arrays import ResultArrays
+from dsl_core.io.scan.origin import rig_of_notes
 
 Floats = NDArray[np.floating[Any]]
 
@@ -41,6 +42,12 @@ class Side:
     name: str
     arrays: ResultArrays
     truth: Truth | None = None
+
+    @property
+    def is_simulated(self) -> bool:
+        """Whether the simulated rig took it, which knows the truth."""
+        origin = rig_of_notes(self.arrays.attributes)
+        return origin is not None and origin[0] == "twin"
 
 
 @dataclass(frozen=True)
@@ -98,7 +105,7 @@ class PairDisplay:
     open_first: ButtonState
     open_second: ButtonState
     at_hand: ButtonState
-    truth: bool
+    truth: ButtonState
     swap: bool
     report: ButtonState
 
@@ -108,6 +115,9 @@ def pair_display(state: PairState) -> PairDisplay:
     first, second = state.first.value, state.second.value
     pair, busy = state.pair.value, state.busy.value
     name_a, name_b = ("–" if side is None else side.name for side in (first, second))
+    # Where the truth is known, it is what a single result is compared with.
+    lacks_second = first is not None and second is None
+    takes_truth = lacks_second and first is not None and first.is_simulated
     idle, has_truth = not busy, second is not None and second.truth is not None
     at_hand = _at_hand(state)
     hint = LabelState(f"{busy}…" if busy else NOTHING if pair is None else "", "muted")
@@ -116,9 +126,9 @@ def pair_display(state: PairState) -> PairDisplay:
         name_b=f"B: {name_b}",
         hint=LabelState(state.trouble.value, "bad") if state.trouble.value else hint,
         open_first=ButtonState(is_enabled=idle, is_primary=first is None and not at_hand.is_visible),
-        open_second=ButtonState(is_enabled=idle, is_primary=first is not None and second is None),
+        open_second=ButtonState(is_enabled=idle, is_primary=lacks_second and not takes_truth),
         at_hand=at_hand,
-        truth=idle and first is not None,
+        truth=ButtonState(is_enabled=idle and first is not None, is_primary=takes_truth),
         swap=idle and pair is not None and not has_truth,
         report=ButtonState(is_enabled=idle and pair is not None and has_truth, is_primary=has_truth),
     )

@@ -12,6 +12,7 @@ from dsl_core.errors import DslError
 from dsl_core.evaluation.marks import distance_between
 from dsl_core.evaluation.spectral import compare
 from dsl_core.io.result.result_arrays import ResultArrays
+from dsl_core.model.figure import with_std
 
 
 def comparison_html(state: ResultsState, theme: Theme) -> str:
@@ -73,7 +74,7 @@ def distance_table(chosen: Mark, others: list[Mark], result: ResultArrays, theme
         if mark.pixel is None:
             continue
         found = distance_between(here, result.at("points_mm", mark.pixel), spread, _spread(result, mark))
-        text = f"{found.mm:.2f} ± {found.std_mm:.2f} mm" if np.isfinite(found.mm) else "no depth"
+        text = f"{with_std(found.mm, found.std_mm, 3)} mm" if np.isfinite(found.mm) else "no depth"
         rows.append(f"<tr><td>{escape(mark.name)}</td><td align='right'>{text}</td></tr>")
     return _table([f"{escape(chosen.name)} to", "distance"], rows, theme)
 

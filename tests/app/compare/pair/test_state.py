@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -19,6 +20,7 @@ from dsl_app.shared.widget_state import LabelState
 
 from dsl_core.evaluation.summary import Truth
 from dsl_core.io.result.result_arrays import ResultArrays
+from dsl_core.io.scan.origin import rig_notes
 
 
 def side(name: str, depth_mm: float, reflectance: float, truth: Truth | None = None) -> Side:
@@ -64,7 +66,7 @@ def test_buttons_and_hint_follow_the_state(
     assert shown.hint == LabelState(hint, "muted")
     buttons = (shown.open_first, shown.open_second, shown.report)
     assert [each.is_enabled for each in buttons] == ["open" in usable, "open" in usable, "report" in usable]
-    assert (shown.truth, shown.swap) == ("truth" in usable, "swap" in usable)
+    assert (shown.truth.is_enabled, shown.swap) == ("truth" in usable, "swap" in usable)
 
 
 @pytest.mark.parametrize(
@@ -82,8 +84,18 @@ def test_the_blue_button_is_what_a_person_does_next(sides: str, at_hand: str | N
     state = state_of(sides)
     state.at_hand.set(None if at_hand is None else Path(at_hand))
     shown = pair_display(state)
-    names = ("open_first", "open_second", "at_hand", "report")
+    names = ("open_first", "open_second", "truth", "at_hand", "report")
     assert [name for name in names if getattr(shown, name).is_primary] == [following] * bool(following)
+
+
+def test_a_scan_of_the_simulated_rig_is_compared_with_its_truth_next() -> None:
+    state = state_of("a")
+    first = state.first.value
+    assert first is not None
+    notes = rig_notes("twin", {"scene": "color-checker"})
+    state.first.set(replace(first, arrays=replace(first.arrays, attributes=notes)))
+    shown = pair_display(state)
+    assert (shown.truth.is_primary, shown.open_second.is_primary) == (True, False)
 
 
 def test_the_open_result_is_offered_for_a_free_side_alone() -> None:

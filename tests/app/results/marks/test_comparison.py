@@ -30,7 +30,7 @@ def test_a_pin_is_compared_with_references_and_measured_to_other_pins(bench: Ben
     assert "0.0000" in html
     assert "2.000" in html
     # Ten rows of 701.5 mm depth at 1/100 of it each.
-    assert "70.15 ± " in html
+    assert "70.150 ± 0.023 mm" in html
     bench.control.marks.show(bench.state.marks.value[2].key, False)
     assert "double" not in select(bench, 0)
 
