@@ -37,7 +37,7 @@ def in_window(text: str) -> str:
     >>> in_window("The scan contains no calibration. Name one with --calibration FILE.")
     'The scan contains no calibration. Choose one.'
     """
-    if "--" in text:
+    if "--" in text or "'dsl-scan " in text:
         for typed, clicked in PHRASES:
             text = text.replace(typed, clicked)
         for pattern, clicked in PATTERNS:

@@ -4,8 +4,10 @@ import json
 from pathlib import Path
 
 import pytest
-from dsl_app.shared.known_files import Kind, breakable, first_free, kind_of, meant_by, refusal
+from dsl_app.shared.known_files import RESULT_NAME, Kind, breakable, first_free, kind_of, meant_by, refusal
 from dsl_app.shared.settings import RecentFiles, Settings
+
+from dsl_core.io import MANIFEST_NAME
 
 
 @pytest.mark.parametrize(
@@ -55,6 +57,22 @@ def test_every_refusal_says_what_to_do(tmp_path: Path) -> None:
     assert "Open a result first" in refusal(tmp_path / "spectrum.csv")
     assert "dsl-scan opens scans" in refusal(tmp_path / "cat.jpeg")
     assert "no longer exists" in refusal(tmp_path / "gone.zarr")
+
+
+def test_folders_and_files_of_no_use_are_told_in_a_sentence(tmp_path: Path) -> None:
+    said = {}
+    for name in ("empty", "part.dsl", "part.zarr"):
+        (tmp_path / name).mkdir()
+        if name != "empty":
+            (tmp_path / name / "Bläu <b>.txt").touch()
+    (tmp_path / "a.json").write_text('{"a": 1}')
+    for name in ("empty", "part.dsl", "part.zarr", "a.json"):
+        said[name] = refusal(tmp_path / name)
+        assert len(said[name]) < 130, "nobody reads more of a message"
+    assert "empty is empty" in said["empty"]
+    assert f"not a whole scan: it has no {MANIFEST_NAME}" in said["part.dsl"]
+    assert f"not a whole result: it has no {RESULT_NAME}" in said["part.zarr"]
+    assert "neither a plan" in said["a.json"]
 
 
 def test_marks_mean_the_result_beside_them(tmp_path: Path) -> None:

@@ -26,6 +26,8 @@ _ROLE, _SIDE = Qt.ItemDataRole.UserRole + 1, Qt.ItemDataRole.TextAlignmentRole
 ROOM_PX = 6
 #: Least width of a column with wrapped lines, px: a few words.
 LEAST_WRAPPED_PX = 160
+#: Least width of a column that takes what the others leave, px: a short name with its colour.
+LEAST_WIDE_PX = 76
 #: Height of a row of figures, px.
 DENSE_PX = 22
 
@@ -46,6 +48,7 @@ class ReadTable(QTableWidget):
     def __init__(self, name: str, tip: str, heads: Sequence[str], rows: int = 0) -> None:
         super().__init__(rows, len(heads))
         self._wrapped: int | None = None
+        self._widened: int | None = None
         self.theme = DARK
         self.setAccessibleName(name)
         self.setToolTip(tip)
@@ -74,7 +77,7 @@ class ReadTable(QTableWidget):
     def be_dense(self) -> None:
         """Show rows of figures close to each other, with digits of equal width."""
         self.verticalHeader().setDefaultSectionSize(DENSE_PX)
-        self.setStyleSheet("QTableView::item { padding: 0px 6px; }")
+        self.setStyleSheet("QTableView::item { padding: 0px 3px; }")
         font = self.font()
         font.setFeature(QFont.Tag("tnum"), 1)
         self.setFont(font)
@@ -85,14 +88,28 @@ class ReadTable(QTableWidget):
         self.setMinimumHeight(self.horizontalHeader().sizeHint().height() + rows + 2 * self.frameWidth())
 
     def widen(self, column: int) -> None:
-        """Let a column take the remaining width, and cut its texts where that is too little."""
+        """Let a column take the remaining width, but not less than `LEAST_WIDE_PX`; longer texts are cut."""
+        self._widened = column
         self.horizontalHeader().setSectionResizeMode(column, QHeaderView.ResizeMode.Stretch)
 
     def resizeEvent(self, event: QResizeEvent) -> None:
         """Fit the wrapped column to the new width."""
         super().resizeEvent(event)
+        self._fit_widened()
         if self._wrapped is not None:
             self.fit_rows.start(0)
+
+    def _fit_widened(self) -> None:
+        """Scroll sideways if the other columns would leave nothing of the widened one."""
+        if self._widened is None:
+            return
+        header = self.horizontalHeader()
+        others = sum(header.sectionSize(i) for i in range(header.count()) if i != self._widened)
+        if self.viewport().width() - others < LEAST_WIDE_PX:
+            header.setSectionResizeMode(self._widened, QHeaderView.ResizeMode.Fixed)
+            header.resizeSection(self._widened, LEAST_WIDE_PX)
+        else:
+            header.setSectionResizeMode(self._widened, QHeaderView.ResizeMode.Stretch)
 
     def _fit_wrapped(self) -> None:
         """Scroll sideways if the remaining width would hold a word a line only."""
@@ -120,6 +137,7 @@ class ReadTable(QTableWidget):
                     self._colour(item)
                     self.setItem(number, column, item)
         self.model().layoutChanged.emit()
+        self._fit_widened()
         if self._wrapped is not None:
             self._fit_wrapped()
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import pytest
 from dsl_app.results.answers.colours_panel import EMPTY, ColoursPanel
 from dsl_app.shared.theme import LIGHT
+from dsl_app.shared.widgets.read_table import LEAST_WIDE_PX
 from PySide6.QtGui import QGuiApplication
 from pytestqt.qtbot import QtBot
 
@@ -34,3 +35,15 @@ def test_marks_have_colours_and_differences_to_the_selected_one(qtbot: QtBot, be
     lines = QGuiApplication.clipboard().text().splitlines()
     assert lines[0].startswith("place\tlight\tL*")
     assert len(lines) == 1 + 2 * panel.light.count()
+
+
+def test_names_are_read_in_a_narrow_table(qtbot: QtBot, bench: Bench) -> None:
+    panel = ColoursPanel(bench.state)
+    qtbot.addWidget(panel)
+    panel.resize(260, 300)
+    panel.show()
+    for place in ((30, 5), (4, 5)):
+        bench.control.marks.pin(place)
+    assert panel.table.columnWidth(0) >= LEAST_WIDE_PX
+    panel.resize(900, 300)
+    assert panel.table.columnWidth(0) > 2 * LEAST_WIDE_PX
