@@ -71,9 +71,12 @@ def pose_folders(folder: Path) -> list[Path]:
         )
     found = sorted((path for path in folder.iterdir() if path.is_dir() and _pictures(path)), key=_natural)
     if not found:
+        alone = len(_pictures(folder))
+        instead = f" but {alone} pictures" if alone else ""
         raise CalibrationError(
-            f"{folder} contains no folders with pictures. One folder per pose is needed, like capture_0 with"
-            " graycode_00.png and so on."
+            f"{folder} contains no folders with pictures{instead}. One folder per pose is needed, like"
+            " capture_0 with graycode_00.png and so on: the board under every pattern of the code, then white"
+            " and black. Pictures of a board without the code do not say where the projector is."
         )
     return found
 
@@ -107,7 +110,9 @@ def require_one_size(sizes: Mapping[str, tuple[int, int]]) -> None:
 
 
 def _pictures(folder: Path) -> list[Path]:
-    return sorted((path for path in folder.iterdir() if path.suffix.lower() in SUFFIXES), key=_natural)
+    # Files that begin with a point are notes of a system, such as those of macOS on other disks.
+    files = (path for path in folder.iterdir() if not path.name.startswith("."))
+    return sorted((path for path in files if path.suffix.lower() in SUFFIXES), key=_natural)
 
 
 def _check_numbers(folder: Path, pictures: list[Path], wanted: int) -> None:

@@ -67,6 +67,31 @@ def find_corners(grey: NDArray[np.float32], board: Board, name: str) -> Corners:
     return found
 
 
+def other_board(grey: NDArray[np.float32], board: Board) -> str:
+    """Which checkerboard a linear picture shows instead, as a sentence; empty if none nearly as large.
+
+    Squares are often counted in place of corners. Takes some seconds for a large picture.
+    """
+    import cv2
+
+    if isinstance(board, Charuco) or not np.isfinite(grey).all():
+        return ""
+    picture = _eight_bit(grey)
+    columns, rows = board.corner_grid
+    # Larger ones first: a part of a board is found as well.
+    for more in (1, 0, -1):
+        for other in (1, 0, -1):
+            size = columns + more, rows + other
+            if min(size) < 3 or not (more or other):
+                continue
+            if cv2.findChessboardCornersSB(picture, size, flags=cv2.CALIB_CB_NORMALIZE_IMAGE)[0]:
+                return (
+                    f" A board of {size[0]} x {size[1]} inner corners is seen instead: count the places where"
+                    " four squares meet, not the squares."
+                )
+    return ""
+
+
 def _checkerboard(grey: NDArray[np.uint8], board: Checkerboard) -> Corners | None:
     import cv2
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from dsl_core.calibration.geometry.boards import grey_of, saturated
+from dsl_core.calibration.geometry.boards import grey_of, other_board, saturated
 from dsl_core.calibration.geometry.bundle import LENS
 from dsl_core.calibration.geometry.code_model import code_light
 from dsl_core.calibration.geometry.plausible import implausible
@@ -57,20 +57,25 @@ def observe_series(
     """
     found = PoseSeries()
     gammas = []
+    first_out: PoseFrames | None = None
     for frames in poses:
         try:
             pose = observe_pose(frames, board, projector_size_px)
         except CalibrationError as error:
             found.left_out.append(LeftOut(name=frames.name, reason=str(error)))
+            first_out = first_out or frames
             continue
         found.seen.append(pose)
         gammas.append(picture_gamma(frames, projector_size_px))
         found.warnings += [doubt for doubt in [exposure_warning(frames, pose)] if doubt]
     if found.left_out and len(found.seen) < MIN_POSES:
         reasons = " ".join(each.reason for each in found.left_out)
+        instead = ""
+        if first_out is not None and not found.seen:
+            instead = other_board(grey_of(first_out.white, first_out.bayer), board)
         raise CalibrationError(
             f"Only {len(found.seen)} of {len(found.seen) + len(found.left_out)} poses can be used,"
-            f" {MIN_POSES} are needed. {reasons}"
+            f" {MIN_POSES} are needed.{instead} {reasons}"
         )
     found.warnings += [f"{each.name} is left out: {each.reason}" for each in found.left_out]
     found.warnings += _blurred(found.seen) + _bent(np.array(gammas))
@@ -128,17 +133,27 @@ def exposure_warning(frames: PoseFrames, seen: PoseObservation) -> str | None:
     )
 
 
-def check_poses(poses: Sequence[PoseObservation], camera_size_px: Size) -> None:
-    """Raise `CalibrationError` for poses that cannot be calibrated from, saying what to do."""
+def check_poses(poses: Sequence[PoseObservation], camera_size_px: Size, misfits: Sequence[str] = ()) -> None:
+    """Raise `CalibrationError` for poses that cannot be calibrated from, saying what to do.
+
+    ``misfits`` name those that are not among them because they do not fit the others.
+    """
     if len(poses) < MIN_POSES:
+        apart = ""
+        if misfits:
+            apart = (
+                f" {', '.join(misfits)} could be read, but not by the same lenses and pose of the devices as"
+                " the others: something was moved, zoomed or focused, or the pictures were cropped or turned."
+            )
         raise CalibrationError(
-            f"{len(poses)} usable poses of the board are too few: {MIN_POSES} are needed, 10 are good."
+            f"{len(poses)} usable poses of the board are too few: {MIN_POSES} are needed, 10 are good.{apart}"
             " Add poses with the board tilted in different directions."
         )
     for pose in poses:
         if not all(np.isfinite(v).all() for v in (pose.board_mm, pose.camera_px, pose.projector_px)):
             raise CalibrationError(f"{pose.name} has corners that are not finite. Capture the pose again.")
     _check_axes(poses)
+    _require_one_way_up(poses)
     tilt = largest_tilt_deg(poses, camera_size_px)
     if tilt < MIN_TILT_DEG:
         raise CalibrationError(
@@ -164,6 +179,19 @@ def _check_axes(poses: Sequence[PoseObservation]) -> None:
         axis = "left to right" if slopes[mirrored][:, 0, 0].mean() < 0 else "top to bottom"
         cause = f"the projector's picture is mirrored {axis}. Switch off its mirroring (rear or ceiling mode)"
     raise CalibrationError(f"In {names} the images of camera and projector mirror each other: {cause}.")
+
+
+def _require_one_way_up(poses: Sequence[PoseObservation]) -> None:
+    """Devices that do not move keep the same way up; pictures that were turned later do not."""
+    slopes = np.array([_affine(pose.camera_px, pose.projector_px) for pose in poses])
+    turned = (slopes[:, 0, 0] < 0) & (slopes[:, 1, 1] < 0)
+    few = turned if 2 * turned.sum() <= turned.size else ~turned
+    if few.any():
+        names = ", ".join(pose.name for pose, odd in zip(poses, few, strict=True) if odd)
+        raise CalibrationError(
+            f"In {names} the camera's picture is upside down, unlike in the other poses. Turn back those"
+            " pictures, or leave the pose out; the camera must not be turned between poses."
+        )
 
 
 def largest_tilt_deg(poses: Sequence[PoseObservation], camera_size_px: Size) -> float:

@@ -75,7 +75,8 @@ def calibrate_geometry(
     final = fit
     if not kept.all():
         rest = [pose for pose, keep in zip(poses, kept, strict=True) if keep]
-        check_poses(rest, camera_size_px)
+        misfits = [pose.name for pose, keep in zip(poses, kept, strict=True) if not keep]
+        check_poses(rest, camera_size_px, misfits)
         final = adjust(rest, without(fit.parameters, np.flatnonzero(~kept)))
     qualities = _qualities(poses, kept, fit, final, board)
     found = _record(poses, kept, final, qualities, board, camera_size_px, projector_size_px)

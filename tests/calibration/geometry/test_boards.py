@@ -17,6 +17,7 @@ from dsl_core.calibration.geometry.boards import (
     _nearest_known,
     find_corners,
     grey_of,
+    other_board,
     pitches_px,
     refine_corners,
     saturated,
@@ -99,6 +100,15 @@ def test_a_board_that_is_not_there_and_unknown_markers_are_named() -> None:
     odd = Charuco(columns=8, rows=6, square_mm=20.0, marker_mm=15.0, dictionary="DICT_9X9_7")
     with pytest.raises(CalibrationError, match="'DICT_9X9_7'"):
         find_corners(flat, odd, "pose 3")
+
+
+def test_squares_counted_in_place_of_corners_are_told() -> None:
+    squares = np.kron(np.indices((6, 8)).sum(0) % 2, np.ones((24, 24)))
+    picture = np.pad(squares, 30, constant_values=1).astype(np.float32)
+    told = other_board(picture, Checkerboard(columns=8, rows=6, square_mm=10))
+    assert told.startswith(" A board of 7 x 5 inner corners is seen instead: count the places")
+    assert other_board(np.ones((60, 80), np.float32), Checkerboard(columns=8, rows=6, square_mm=10)) == ""
+    assert other_board(picture, Charuco(columns=8, rows=6, square_mm=10, marker_mm=7)) == ""
 
 
 def test_what_is_unknown_is_taken_from_the_nearest_corner_of_the_board() -> None:

@@ -215,6 +215,8 @@ def test_fewer_than_three_poses_and_corners_that_are_not_finite_are_refused() ->
     poses = list(case.poses_seen())
     with pytest.raises(CalibrationError, match="2 usable poses"):
         check_poses(poses[:2], case.CAMERA_PX)
+    with pytest.raises(CalibrationError, match=r"10 are good\. tilted could be read, but not by the"):
+        check_poses(poses[:2], case.CAMERA_PX, ["tilted"])
     bad = replace(poses[1], projector_px=np.full_like(poses[1].projector_px, np.nan))
     with pytest.raises(CalibrationError, match=f"{bad.name} has corners that are not finite"):
         check_poses([poses[0], bad, *poses[2:]], case.CAMERA_PX)

@@ -170,6 +170,20 @@ def test_a_mirrored_projector_is_told(axis: int, words: str) -> None:
         calibrated(poses)
 
 
+def test_a_picture_that_was_turned_later_is_told() -> None:
+    poses = poses_seen()
+    poses[1].camera_px[:] = np.array(CAMERA_PX) - 1 - poses[1].camera_px
+    with pytest.raises(CalibrationError, match="In pose_1 the camera's picture is upside down, unlike"):
+        calibrated(poses)
+
+
+def test_a_camera_that_hangs_upside_down_is_as_good() -> None:
+    poses = poses_seen()
+    for pose in poses:
+        pose.camera_px[:] = np.array(CAMERA_PX) - 1 - pose.camera_px
+    assert calibrated(poses).pose.matrix[0, 0] < -0.9
+
+
 def test_parallel_poses_are_refused() -> None:
     with pytest.raises(CalibrationError, match=r"nearly parallel .* Tilt the board by 20 to 45"):
         calibrated(poses_seen(tilts=[(0.02, 0.0)] * 6))
