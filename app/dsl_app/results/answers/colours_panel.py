@@ -18,6 +18,7 @@ from dsl_core.analysis.colours import HEADER, ILLUMINANTS, Colour, colours_of
 from dsl_core.errors import CalibrationError
 
 EMPTY = "Pin pixels, mark regions or add references; their colours under a light are listed here."
+THIN = chr(0x200A)
 _CHOSEN = "Differences are CIEDE2000 to {}, which is selected among the marks; ± is one deviation."
 _NONE = "Select a mark to see differences to it; ± is one deviation."
 
@@ -36,7 +37,7 @@ class ColoursPanel(QWidget):
             "Colours", "CIELAB relative to the perfect diffuser", ("Mark", "L*", "a*", "b*", "ΔE00")
         )
         self.table.widen(0)
-        self.table.be_dense()
+        self.table.be_dense(padding_px=1)
         self.text = label(EMPTY, "muted", wraps=True)
         self.text.setAlignment(Qt.AlignmentFlag.AlignTop)
         column_of(
@@ -113,7 +114,8 @@ class ColoursPanel(QWidget):
 
 
 def _value(value: float, std: float) -> str:
-    return f"{value:.2f} ± {std:.2f}".replace("-", "−")
+    # Thin spaces: five columns have to fit next to the picture.
+    return f"{value:.2f}{THIN}±{THIN}{std:.2f}".replace("-", "−")
 
 
 def _swatch(colour: str) -> QIcon:

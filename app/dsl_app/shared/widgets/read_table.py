@@ -74,10 +74,10 @@ class ReadTable(QTableWidget):
         self.fit_rows.timeout.connect(self._fit_wrapped)
         header.sectionResized.connect(lambda *_: self.fit_rows.start(0))
 
-    def be_dense(self) -> None:
-        """Show rows of figures close to each other, with digits of equal width."""
+    def be_dense(self, padding_px: int = 6) -> None:
+        """Show rows of figures close to each other, with digits of equal width; ``padding_px`` between."""
         self.verticalHeader().setDefaultSectionSize(DENSE_PX)
-        self.setStyleSheet("QTableView::item { padding: 0px 3px; }")
+        self.setStyleSheet(f"QTableView::item {{ padding: 0px {padding_px}px; }}")
         font = self.font()
         font.setFeature(QFont.Tag("tnum"), 1)
         self.setFont(font)
