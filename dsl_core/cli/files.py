@@ -107,7 +107,14 @@ def import_(
         return
     if not source.is_dir():
         raise StoreError(f"{source} is not a folder. Give the folder of a published dataset or calibration.")
+    if camera_curves or led_curves or from_projector:
+        raise StoreError(
+            f"{source} is a folder; --camera-curves, --led-curves and --from-projector belong to a stereo file."
+            " Leave them out, or name the XML, YAML or JSON file with the lenses."
+        )
     options = PictureOptions(guess, mapping, projector, chosen, encoding, force)
+    if encoding is not None and not options.is_asked_for:
+        raise StoreError("--encoding needs --guess or --mapping: add one of them, or leave it out.")
     if options.is_asked_for:
         import_capture(output, source, target, load_rig(base) if base else None, options)
         output.finish()

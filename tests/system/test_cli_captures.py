@@ -89,5 +89,9 @@ def test_values_are_judged_before_and_after_an_import(
     assert facts[1].startswith("not linear in light but encoded, as sRGB")
     told = json.loads(say("import", "set", "--mapping", "set.mapping.json", "--encoding", "srgb", "--json"))
     assert (told["encoding"], told["linearity"]["verdict"]) == ("srgb", "linear")
+    assert main(["import", "set", "--encoding", "srgb"]) == 2
+    assert "needs --guess or --mapping" in capsys.readouterr().err
+    assert main(["import", "set", "--guess", "--from-projector"]) == 2
+    assert "belong to a stereo file" in capsys.readouterr().err
     assert main(["import", "set", "--guess", "--encoding", "gamma"]) == 2
     assert "must be linear or srgb" in capsys.readouterr().err
