@@ -109,7 +109,7 @@ def import_(
         raise StoreError(f"{source} is not a folder. Give the folder of a published dataset or calibration.")
     if camera_curves or led_curves or from_projector:
         raise StoreError(
-            f"{source} is a folder; --camera-curves, --led-curves and --from-projector belong to a stereo file."
+            f"{source} is a folder; --camera-curves, --led-curves, --from-projector belong to a stereo file."
             " Leave them out, or name the XML, YAML or JSON file with the lenses."
         )
     options = PictureOptions(guess, mapping, projector, chosen, encoding, force)
