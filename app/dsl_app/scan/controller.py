@@ -256,10 +256,12 @@ class ScanController:
             return reconstruct_to(target, session, progress=progress)
 
         def done(path: Path) -> None:
+            self.state.is_reconstructing.set(False)
             self.state.note.set(f"The result is saved in {path}.")
             self.state.result.emit(path)
 
         def ended(how: str) -> None:
+            self.state.is_reconstructing.set(False)
             # Another scan may have set a note of its own meanwhile.
             if self.state.note.value == waiting:
                 retry = f"Open {session.name} on the Results page to reconstruct it."
@@ -270,6 +272,7 @@ class ScanController:
             self._notifier.tell("error", sentence_of(error))
 
         self.state.note.set(waiting)
+        self.state.is_reconstructing.set(True)
         self._runner.submit(
             Job(f"Reconstruct {session.stem}", work, done, failed, lambda: ended("was cancelled"))
         )

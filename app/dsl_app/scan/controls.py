@@ -54,11 +54,12 @@ def run_controls(
     has_finished: bool,
     then_reconstruct: bool = True,
     trouble: str = "",
+    is_reconstructing: bool = False,
 ) -> RunControls:
     """The controls of a scan in a phase; ``note`` is what became of the last one.
 
     ``trouble`` is said above the page, with how far the scan came; that is not said again. A finished scan
-    whose reconstruction was not asked for is reconstructed next.
+    whose reconstruction was not asked for is reconstructed next; while one is, there is only to wait.
     """
     is_raw = phase is Phase.DONE and has_finished and not then_reconstruct
     obstacles = () if facts is None or phase.is_busy else facts.obstacles
@@ -71,7 +72,9 @@ def run_controls(
     can_run, connects = not phase.is_busy and not obstacles, facts is not None and facts.connects
     return RunControls(
         connect_rig=ButtonState(lacks_rig, is_primary=True),
-        start=ButtonState(session is None, can_run, is_primary=not (is_raw or lacks_rig)),
+        start=ButtonState(
+            session is None, can_run, is_primary=not (is_raw or lacks_rig or is_reconstructing)
+        ),
         resume=ButtonState(
             session is not None,
             can_run,

@@ -160,6 +160,7 @@ class RunBox(QGroupBox):
                 state.finished,
                 state.then_reconstruct,
                 state.trouble,
+                state.is_reconstructing,
             ),
             state.status.follow(self._show_status),
         ]
@@ -197,6 +198,7 @@ class RunBox(QGroupBox):
             state.finished.value is not None,
             state.then_reconstruct.value,
             state.trouble.value,
+            state.is_reconstructing.value,
         )
         show_parts(self, shown)
 

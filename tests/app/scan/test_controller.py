@@ -143,11 +143,14 @@ def test_the_graph_of_a_pixel_shows_the_lines_that_are_there(bench: ScanBench) -
 def test_a_result_follows_and_is_told(bench: ScanBench, tmp_path: Path) -> None:
     results: list[Path] = []
     bench.state.result.connect(results.append)
+    working: list[bool] = []
+    bench.state.is_reconstructing.changed.connect(working.append)
     bench.scans.plans.choose_preset("quick")
     bench.state.then_reconstruct.set(True)
     bench.scans.start()
     assert results == [tmp_path / "first.zarr"]
     assert results[0].is_dir()
+    assert working == [True, False]
 
 
 @pytest.mark.parametrize(

@@ -44,6 +44,15 @@ def test_buttons_follow_the_phase(
     assert shown.again.is_visible is not phase.is_busy
 
 
+def test_while_a_scan_is_reconstructed_there_is_only_to_wait() -> None:
+    for is_reconstructing in (True, False):
+        shown = run_controls(
+            Phase.DONE, None, FREE, "", has_finished=True, is_reconstructing=is_reconstructing
+        )
+        assert shown.start.is_enabled
+        assert shown.start.is_primary is not is_reconstructing
+
+
 def test_obstacles_keep_a_plan_from_starting_but_not_from_being_shown() -> None:
     shown = run_controls(Phase.PLANNING, None, BLOCKED, "", has_finished=False)
     assert (shown.start.is_enabled, shown.phase.text, shown.remarks.role) == (False, "● not ready", "warn")
