@@ -84,9 +84,10 @@ class MaterialsPanel(QWidget):
         self.table.be_dense()
         self.text = label(HINT, "muted", wraps=True)
         self.text.setAlignment(Qt.AlignmentFlag.AlignTop)
-        # The error belongs to folder and file: marks are of this result and have deviations of their own.
-        sources = row_of(self.marks, self.folder, self.file, label("off by"), self.error, STRETCH)
-        ways = row_of(label("By"), (self.measure, 1), self.free)
+        self.error.setPrefix("± ")
+        sources = row_of(self.marks, self.folder, self.file, STRETCH)
+        # No labels: the smallest window has no room for them next to its picture.
+        ways = row_of((self.measure, 1), self.error, self.free)
         limits = row_of(label("Limit"), self.worst, label("Margin"), self.margin, STRETCH)
         map_row = row_of(self.write, self.clear, STRETCH)
         column_of(sources, ways, limits, (self.table, 1), self.text, map_row, on=self, margins=0)
