@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -12,12 +12,13 @@ from dsl_core.capture.proof.code_pairs import CodePairs, Pair, alike, dominant
 from dsl_core.capture.proof.columns import LEAST_MARGIN, decode, exchanged_pairs, run_backwards
 from dsl_core.capture.proof.contest import vote
 from dsl_core.capture.proof.finding import Finding, Verdict
+from dsl_core.capture.proof.first_light import FEWEST_LIT, changed_light, is_unlit
 from dsl_core.capture.proof.prediction import Lit
 from dsl_core.capture.proof.raster import Counts, Floats, Noise, Raster
 from dsl_core.model.plan import BinaryCode, CapturePlan, Shot
 
-#: Pixels that have to be lit to tell anything.
-_FEWEST_LIT = 60
+#: A picture with more of its pixels saturated shows no pattern, whatever the scene.
+SATURATED_SHARE = 0.98
 
 
 class FirstCode:
@@ -40,6 +41,8 @@ class FirstCode:
         self._half: dict[int, Counts] = {}
         self._ends: dict[str, Counts] = {}
         self._lit: Lit | None = None
+        #: Pictures of the first two pairs as they were before both were taken again, by pattern.
+        self._disputed: dict[int, Counts] = {}
         self._at_the_end, self._is_believed = at_the_end, False
         #: What the last look at all pairs together found.
         self.reviewed: list[Finding] = []
@@ -58,6 +61,8 @@ class FirstCode:
     def add(self, shot: Shot, seen: Counts, before: Counts | None) -> Finding:
         """Judge a picture, given that of the shot taken before it, and keep it where it may be right."""
         self._lit, self.reviewed = None, []
+        if shot.role != "black" and self._is_saturated(seen):
+            return Finding(shot, Verdict.SATURATED, (shot,))
         if shot.role == "code":
             found = self._add_half(shot, seen, before)
         else:
@@ -66,6 +71,9 @@ class FirstCode:
             return found
         whole = not self._missing and len(self._ends) == 2
         return (self._review(shot) or found) if whole else found
+
+    def _is_saturated(self, seen: Counts) -> bool:
+        return float((seen >= self._noise.sensor.full_scale_dn).mean()) > SATURATED_SHARE
 
     def _add_half(self, shot: Shot, seen: Counts, before: Counts | None) -> Finding:
         number, inverse = divmod(shot.pattern, 2)
@@ -83,12 +91,38 @@ class FirstCode:
                 # Nobody knows which of two is wrong.
                 first = next(iter(self._pairs.pairs))
                 again = (*self._pair_shots(first), *again)
+                self._disputed = self._disputed or self._by_pattern({**self._pairs.pairs, number: pair})
                 self._pairs.pairs.pop(first)
             verdict, detail = self._explain(pair, expected, broken)
             return Finding(shot, verdict, again, detail)
         self._pairs.pairs[number] = pair
-        is_told = expected is not None and int(self._pairs.contrast()[2].sum()) >= _FEWEST_LIT
+        wrong = None if self._at_the_end else self._lost_light(shot)
+        if wrong is not None:
+            for each in wrong.again:
+                self._pairs.pairs.pop(each.pattern // 2, None)
+            return wrong
+        is_told = expected is not None and int(self._pairs.contrast()[2].sum()) >= FEWEST_LIT
         return Finding(shot, Verdict.RIGHT if is_told else Verdict.UNTOLD)
+
+    def _lost_light(self, shot: Shot) -> Finding | None:
+        """Whether the light failed before two pairs were right: both wrong alike, they fit each other."""
+        numbers = list(self._pairs.pairs)
+        if len(numbers) == 2 and all(is_unlit(*pair, self._noise) for pair in self._pairs.pairs.values()):
+            again = tuple(each for number in sorted(numbers) for each in self._pair_shots(number))
+            return Finding(shot, Verdict.DARK, again, "neither it nor its inverse lights anything in view")
+        if not self._disputed or not {pattern // 2 for pattern in self._disputed} <= set(numbers):
+            return None
+        now = self._by_pattern(self._pairs.pairs)
+        ratio = changed_light(self._disputed, now, self._noise)
+        if ratio is None:
+            self._disputed = {}
+            return None
+        again = tuple(self._shots["code", pattern] for pattern in sorted(self._disputed))
+        return Finding(shot, Verdict.EXPOSURE, again, f"{ratio:.2g} times that of the first pictures")
+
+    @staticmethod
+    def _by_pattern(pairs: Mapping[int, Pair]) -> dict[int, Counts]:
+        return {2 * n + inverse: seen for n, pair in pairs.items() for inverse, seen in enumerate(pair)}
 
     def _add_end(self, shot: Shot, seen: Counts, before: Counts | None) -> Finding:
         self._ends.pop(shot.role, None)
@@ -96,7 +130,7 @@ class FirstCode:
             self._ends[shot.role] = seen
             return Finding(shot, Verdict.UNTOLD)
         dark, bright, lit = self._pairs.contrast()
-        if int(lit.sum()) < _FEWEST_LIT:
+        if int(lit.sum()) < FEWEST_LIT:
             self._ends[shot.role] = seen
             return Finding(shot, Verdict.UNTOLD)
         wanted, rival = (bright, dark) if shot.role == "white" else (dark, bright)
@@ -184,7 +218,7 @@ class FirstCode:
         # Where white saturates, nobody knows how bright a line and the blur beside it will be.
         sound &= white < self._noise.sensor.full_scale_dn
         index = np.flatnonzero(sound)
-        if index.size < _FEWEST_LIT:
+        if index.size < FEWEST_LIT:
             return None
         key = (3 * column[index] + self._channels[index]).astype(np.intp)
         return Lit(index, key, black[index].astype(np.float32), contrast[index], sigma[index])

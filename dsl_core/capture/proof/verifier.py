@@ -47,8 +47,6 @@ FILM_SHARE = 0.85
 _REMEMBERED = 9
 #: Projectors without a calibration are taken to have this gamma.
 _USUAL_GAMMA = 2.2
-#: Share of the pixels that may be saturated where they should not be.
-_SATURATED_SHARE = 0.3
 
 
 class FrameProof:

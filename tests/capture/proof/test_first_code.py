@@ -138,6 +138,33 @@ def test_an_end_that_is_right_above_some_row_is_torn_and_one_like_the_picture_be
     assert end(late).verdict is not Verdict.LATE
 
 
+@pytest.mark.parametrize("index", [0, 1, 6, len(SHOTS) - 2])
+def test_a_saturated_picture_is_told_and_right_when_it_is_taken_again(index: int) -> None:
+    code = first_code()
+    for shot in SHOTS:
+        if shot.index == index:
+            found = code.add(shot, np.full_like(seen(shot), SENSOR.full_scale_dn), None)
+            assert found.verdict is Verdict.SATURATED
+            assert found.again == (shot,)
+        assert not code.add(shot, seen(shot), None).is_wrong
+    assert code.lit is not None
+
+
+def test_light_that_fails_for_good_between_the_first_two_pairs_is_told_however_often_they_are_taken() -> None:
+    for light, verdict in ((0.0, Verdict.DARK), (1000.0, Verdict.EXPOSURE)):
+        code = first_code()
+        told = [code.add(shot, seen(shot, light if shot.index > 1 else 2000.0), None) for shot in SHOTS[:4]]
+        assert set(told[-1].again) == set(SHOTS[:4])
+        for _ in range(3):
+            again = [code.add(shot, seen(shot, light), None) for shot in SHOTS[:4]]
+            assert [found.is_wrong for found in again] == [False, False, False, True]
+            assert again[-1].verdict is verdict
+            assert set(again[-1].again) == set(SHOTS[:4])
+        assert code.lacking[:2] == (0, 1)
+        healed = [code.add(shot, seen(shot), None) for shot in SHOTS[:4]]
+        assert not any(found.is_wrong for found in healed)
+
+
 def test_pairs_are_judged_by_those_before_from_the_second_on() -> None:
     code = first_code()
     verdicts = [code.add(shot, seen(shot), None).verdict for shot in SHOTS[:6]]

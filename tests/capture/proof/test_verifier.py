@@ -121,8 +121,18 @@ def test_a_picture_given_twice_is_called_repeated(scene: RenderedScene) -> None:
     assert "pixel by pixel" in found.sentence
 
 
-def test_dark_scenes_are_not_judged(scene: RenderedScene) -> None:
+def test_where_nothing_is_lit_the_second_pair_says_so(scene: RenderedScene) -> None:
     proof, rng = FrameProof(scene.plan, scene.calibration), np.random.default_rng(0)
+    shots = [shot for shot in scene.plan.shots() if shot.index < 4]
+    found = [proof.judge(s, rng.integers(258, 264, (48, 64)).astype(np.uint16)) for s in shots]
+    assert [each.verdict for each in found] == 3 * [Verdict.UNTOLD] + [Verdict.DARK]
+    assert found[-1].again == tuple(shots)
+    assert "nor its inverse lights anything" in found[-1].sentence
+
+
+def test_dark_scenes_are_not_judged_once_all_pictures_are_there(scene: RenderedScene) -> None:
+    proof = FrameProof(scene.plan, scene.calibration, at_the_end=True)
+    rng = np.random.default_rng(0)
     for shot in scene.plan.shots():
         pixels = rng.integers(258, 264, (48, 64)).astype(np.uint16)
         assert proof.judge(shot, pixels).verdict is Verdict.UNTOLD

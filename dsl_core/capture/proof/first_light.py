@@ -1,0 +1,76 @@
+"""Whether the light was as strong as it is now when the first pictures of a scan were taken.
+
+Two pairs of a code that break each other's sum are taken again together, since nobody knows which of them was
+wrong. That they agree then proves little: a lamp that failed for good between them leaves both dark.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from dsl_core.capture.proof.code_pairs import ALIKE, LIT_SIGMAS, SAME_LIGHT
+from dsl_core.capture.proof.raster import Counts, Floats, Noise
+
+#: Pixels that have to be lit to compare the light of two pictures.
+FEWEST_LIT = 60
+#: Of the pictures taken again, so many others with other light than before are no single wrong picture.
+FEWEST_CHANGED = 2
+#: Mean light of a picture, as a share of that of all, from which on it says how strong the light is.
+LEAST_LIGHT = 0.03
+#: Deviation of a picture's light, as a share of its mean, from which on it has bright and dark parts.
+STRUCTURED = 0.3
+#: A picture shows light if its pixels differ from those of the inverse pattern by so many deviations ...
+SEEN_SIGMAS = 5.0
+#: ... and so many of them do, as a share of all.
+SEEN_SHARE = 0.001
+
+
+def changed_light(before: Mapping[int, Counts], now: Mapping[int, Counts], noise: Noise) -> float | None:
+    """By what factor the light of several pictures has changed, the median; None if it has not.
+
+    ``before`` and ``now`` are pictures by the number of their pattern, of which the lowest two were taken
+    first. Pictures that show another pattern than before say nothing of the light.
+    """
+    every = [*before.values(), *now.values()]
+    level = np.float32(noise.sensor.black_level_dn)
+    bright = np.maximum.reduce(every)
+    lit = bright.astype(np.float32) - level > LIT_SIGMAS * np.sqrt(noise.variance(bright))
+    lit &= bright < noise.sensor.full_scale_dn
+    if int(lit.sum()) < FEWEST_LIT:
+        return None
+    enough = LEAST_LIGHT * float((bright[lit] - level).mean())
+    ratios, first = [], sorted(before)[:2]
+    for pattern, old in before.items():
+        one, other = (picture[lit].astype(np.float32) - level for picture in (old, now[pattern]))
+        if float(one.mean()) < enough:
+            continue
+        ratio, left = _scaled(one, other)
+        # An inverse is its pattern times -1.
+        is_same_pattern = ratio > -ALIKE and left < ALIKE * max(ratio, 1.0) * float(one.mean())
+        if is_same_pattern and not SAME_LIGHT[0] < ratio < SAME_LIGHT[1]:
+            ratios.append(ratio)
+        elif pattern in first:
+            return None  # the light is what it was when the scan began
+    if len(ratios) < FEWEST_CHANGED or min(ratios) < 1 < max(ratios):
+        return None
+    return float(np.median(ratios))
+
+
+def _scaled(one: Floats, other: Floats) -> tuple[float, float]:
+    """The factor from one picture to another, and the mean difference that it leaves.
+
+    A gain that changes takes the black level with it, which shows where a pattern has bright and dark parts.
+    """
+    mean = other.mean() if one.std() > STRUCTURED * one.mean() else np.float32(0)
+    centre = one.mean() if mean else np.float32(0)
+    ratio = float((one - centre) @ (other - mean) / ((one - centre) @ (one - centre)))
+    return ratio, float(np.abs(other - mean - ratio * (one - centre)).mean())
+
+
+def is_unlit(one: Counts, other: Counts, noise: Noise) -> bool:
+    """Whether nothing shows a pattern nor its inverse, of which every point in the beam sees one."""
+    apart = np.abs(one.astype(np.float32) - other.astype(np.float32))
+    seen = apart > SEEN_SIGMAS * np.sqrt(noise.variance(one) + noise.variance(other))
+    return float(seen.mean()) < SEEN_SHARE

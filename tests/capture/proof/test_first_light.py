@@ -1,0 +1,58 @@
+"""Pictures taken again of a light that has changed meanwhile."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from dsl_core.capture.proof.first_light import changed_light, is_unlit
+from dsl_core.capture.proof.raster import Counts, Noise
+from dsl_core.model.rig import Sensor
+
+SENSOR = Sensor()
+NOISE = Noise(SENSOR)
+
+
+def pictures(light: float, order: tuple[int, ...] = (0, 1, 2, 3), gain: float = 1.0) -> dict[int, Counts]:
+    """Two pairs of stripes over 400 pixels."""
+    rng, place = np.random.default_rng(0), np.arange(400)
+    stripes = [(place // 40) % 2, 1 - (place // 40) % 2, (place // 20) % 2, 1 - (place // 20) % 2]
+    noise = [rng.normal(0, 0.6, 400) for _ in stripes]
+    return {
+        n: np.clip(gain * (SENSOR.black_level_dn + light * stripes[k] + noise[k]), 0, 4095).astype(np.uint16)
+        for n, k in enumerate(order)
+    }
+
+
+@pytest.mark.parametrize("factor", [0.0, 0.5, 1.9])
+def test_light_that_changed_between_two_pairs_is_told_with_its_factor(factor: float) -> None:
+    before = {**pictures(1000), **{n: p for n, p in pictures(1000 * factor).items() if n > 1}}
+    found = changed_light(before, pictures(1000 * factor), NOISE)
+    assert found == pytest.approx(factor, abs=0.05)
+
+
+def test_a_gain_that_takes_the_black_level_with_it_is_told() -> None:
+    assert changed_light(pictures(800), pictures(800, gain=2.0), NOISE) == pytest.approx(2, abs=0.05)
+
+
+@pytest.mark.parametrize("factor", [0.0, 0.5, 1.9])
+def test_one_wrong_picture_is_no_change_of_the_light(factor: float) -> None:
+    before = pictures(1000)
+    before[2] = pictures(1000 * factor)[2]
+    assert changed_light(before, pictures(1000), NOISE) is None
+
+
+@pytest.mark.parametrize("order", [(0, 2, 1, 3), (0, 0, 2, 3), (0, 0, 1, 2), (0, 1, 1, 3)])
+def test_pictures_of_other_patterns_say_nothing_of_the_light(order: tuple[int, ...]) -> None:
+    assert changed_light(pictures(1000, order), pictures(1000), NOISE) is None
+
+
+def test_little_light_and_drift_are_not_told() -> None:
+    assert changed_light(pictures(8), pictures(0), NOISE) is None
+    assert changed_light(pictures(1000), pictures(1300), NOISE) is None
+
+
+def test_a_pair_is_unlit_if_no_pixel_prefers_the_pattern_or_its_inverse() -> None:
+    dark, lit = pictures(0), pictures(100)
+    assert is_unlit(dark[0], dark[1], NOISE)
+    assert not is_unlit(lit[0], lit[1], NOISE)
