@@ -17,8 +17,8 @@ from dsl_core.capture.proof.prediction import Lit
 from dsl_core.capture.proof.raster import Counts, Floats, Noise, Raster
 from dsl_core.model.plan import BinaryCode, CapturePlan, Shot
 
-#: A picture with more of its pixels saturated shows no pattern, whatever the scene.
-SATURATED_SHARE = 0.98
+#: Share of saturated pixels from which on a picture tells nothing, and up to which other pictures do.
+ALL_SATURATED, SOME_SATURATED = 0.98, 0.7
 
 
 class FirstCode:
@@ -61,8 +61,6 @@ class FirstCode:
     def add(self, shot: Shot, seen: Counts, before: Counts | None) -> Finding:
         """Judge a picture, given that of the shot taken before it, and keep it where it may be right."""
         self._lit, self.reviewed = None, []
-        if shot.role != "black" and self._is_saturated(seen):
-            return Finding(shot, Verdict.SATURATED, (shot,))
         if shot.role == "code":
             found = self._add_half(shot, seen, before)
         else:
@@ -71,9 +69,6 @@ class FirstCode:
             return found
         whole = not self._missing and len(self._ends) == 2
         return (self._review(shot) or found) if whole else found
-
-    def _is_saturated(self, seen: Counts) -> bool:
-        return float((seen >= self._noise.sensor.full_scale_dn).mean()) > SATURATED_SHARE
 
     def _add_half(self, shot: Shot, seen: Counts, before: Counts | None) -> Finding:
         number, inverse = divmod(shot.pattern, 2)
@@ -96,13 +91,25 @@ class FirstCode:
             verdict, detail = self._explain(pair, expected, broken)
             return Finding(shot, verdict, again, detail)
         self._pairs.pairs[number] = pair
-        wrong = None if self._at_the_end else self._lost_light(shot)
+        wrong = None if self._at_the_end else self._blinding(shot) or self._lost_light(shot)
         if wrong is not None:
             for each in wrong.again:
                 self._pairs.pairs.pop(each.pattern // 2, None)
             return wrong
         is_told = expected is not None and int(self._pairs.contrast()[2].sum()) >= FEWEST_LIT
         return Finding(shot, Verdict.RIGHT if is_told else Verdict.UNTOLD)
+
+    def _blinding(self, shot: Shot) -> Finding | None:
+        """Whether the first pair is saturated as the second is not: no other could be judged by it."""
+        if len(self._pairs.pairs) != 2:
+            return None
+        full = self._noise.sensor.full_scale_dn
+        first, second = (
+            max(float((seen >= full).mean()) for seen in pair) for pair in self._pairs.pairs.values()
+        )
+        if first < ALL_SATURATED or second > SOME_SATURATED:
+            return None
+        return Finding(shot, Verdict.SATURATED, self._pair_shots(next(iter(self._pairs.pairs))))
 
     def _lost_light(self, shot: Shot) -> Finding | None:
         """Whether the light failed before two pairs were right: both wrong alike, they fit each other."""

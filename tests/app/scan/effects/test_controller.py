@@ -13,6 +13,7 @@ from dsl_app.scan.effects.state import EffectsState
 from dsl_app.scan.state import Phase
 from dsl_app.shared.theme import LIGHT
 from dsl_app.shared.widgets.inside import apply_theme_to, stop_following
+from numpy.typing import NDArray
 from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
 from pytestqt.qtbot import QtBot
@@ -82,11 +83,17 @@ def test_looking_changes_nothing_in_the_rig(control: EffectsController, bench: S
     assert control.state.in_use.value == "usual"
 
 
+def seen_as_it_is(world: World) -> NDArray[np.float32]:
+    """The pattern that is shown, cut to 64 x 48 pixels."""
+    assert world.image is not None
+    return np.asarray(world.image[:48, :64].mean(-1, dtype=np.float32))
+
+
 def test_a_choice_is_put_in_force_by_options_that_scans_note(
     control: EffectsController, bench: ScanBench, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    # What the frames show does not matter here.
-    monkeypatch.setattr(World, "_light", lambda *_: np.ones((48, 64), np.float32))
+    # What the frames show does not matter here, as long as they follow the pattern.
+    monkeypatch.setattr(World, "_light", lambda world, *_: 100 * seen_as_it_is(world))
     control.apply("auto", Tolerance(0.5, "sigma"))
     assert dict(bench.rig.state.choice.value.options)["tolerance"] == "0.5sigma"
     assert (control.state.in_use.value, control.state.tolerance.value) == ("auto", Tolerance(0.5, "sigma"))
