@@ -50,8 +50,8 @@ _REMEDY = {
     Verdict.TORN: "Let the projector settle for longer (its latency), or expose for whole frames of it.",
     Verdict.EXPOSURE: "Switch automatic exposure and gain of the camera off, and check the lamp.",
     Verdict.SATURATED: "Check exposure and gain of the camera, and the light of the room.",
-    Verdict.DARK: "Check that the projector is on, that nothing stands in its way, and that the exposure is long"
-    " enough.",
+    Verdict.DARK: "Check that the projector is on, that nothing stands in its way, and that the exposure is"
+    " long enough.",
     Verdict.MIRRORED: "Camera or projector is mirrored or upside down, or the calibration is of another rig:"
     " switch mirroring off in the settings of both, or calibrate again.",
     Verdict.OTHER: "Check that camera, target and light have not moved since the scan began.",
