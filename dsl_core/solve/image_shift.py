@@ -23,7 +23,8 @@ class TileShifts:
     """Shifts of tiles, each array (tiles down, tiles across): along x and y with their deviations, px.
 
     ``change`` is the rms of what no shift and no brightness explains, as a share of the tile's light, less
-    noise; ``gain`` the brightness. Tiles without structure have infinite deviations.
+    noise; ``gain`` the brightness. ``better`` is by how much chi-square is lower than without any shift,
+    brightness left free. Tiles without structure have infinite deviations.
     """
 
     x: Floats
@@ -32,6 +33,7 @@ class TileShifts:
     y_std: Floats
     change: Floats
     gain: Floats
+    better: Floats
 
     @property
     def length(self) -> Floats:
@@ -40,8 +42,12 @@ class TileShifts:
 
     @property
     def sigmas(self) -> Floats:
-        """The same in deviations; 0 where nothing is known."""
-        return np.hypot(self.x / self.x_std, self.y / self.y_std)
+        """The same in deviations; 0 where nothing is known.
+
+        Where light fades evenly, a shift and a change of brightness look alike, and steps may end at either:
+        no more deviations than the picture is better explained by the shift.
+        """
+        return np.minimum(np.hypot(self.x / self.x_std, self.y / self.y_std), np.sqrt(self.better))
 
 
 def tile_shifts(old: Floats, new: Floats, variance: Floats, tiles: tuple[int, int]) -> TileShifts:
@@ -53,7 +59,7 @@ def tile_shifts(old: Floats, new: Floats, variance: Floats, tiles: tuple[int, in
     down, across = (
         np.linspace(0, size, count + 1).astype(int) for size, count in zip(old.shape, tiles, strict=True)
     )
-    found = np.full((6, *tiles), np.inf)
+    found = np.full((7, *tiles), np.inf)
     for i in range(tiles[0]):
         for j in range(tiles[1]):
             part = slice(down[i], down[i + 1]), slice(across[j], across[j + 1])
@@ -64,7 +70,7 @@ def tile_shifts(old: Floats, new: Floats, variance: Floats, tiles: tuple[int, in
 def _one_tile(
     old: Floats, new: Floats, variance: Floats, part: tuple[slice, slice], common: tuple[float, float]
 ) -> tuple[float, ...]:
-    lost = (0.0, 0.0, np.inf, np.inf, 0.0, 1.0)
+    lost = (0.0, 0.0, np.inf, np.inf, 0.0, 1.0, 0.0)
     shift = np.array(common)
     weight = 1 / variance[part].ravel()
     seen = new[part].ravel()
@@ -92,7 +98,18 @@ def _one_tile(
     if np.hypot(*(shift - common)) > FURTHEST_PX:
         shift = np.array(common)
         std = np.full(2, np.inf)
-    return shift[0], shift[1], std[0], std[1], change, gain
+    unmoved, moved_by = (_chi_square(old, seen, weight, part, by) for by in (np.zeros(2), shift))
+    better = max(unmoved - moved_by, 0.0)
+    return shift[0], shift[1], std[0], std[1], change, gain, better
+
+
+def _chi_square(old: Floats, seen: Floats, weight: Floats, part: tuple[slice, slice], shift: Floats) -> float:
+    """What is left of a tile after a shift, with brightness and offset fitted."""
+    moved, _, _ = (each.ravel() for each in _moved(old, part, shift))
+    root = np.sqrt(weight)
+    design = np.stack([moved, np.ones_like(moved)], 1) * root[:, None]
+    values = np.linalg.lstsq(design, seen * root)[0]
+    return float(np.sum((seen * root - design @ values) ** 2))
 
 
 def _moved(old: Floats, part: tuple[slice, slice], shift: Floats) -> tuple[Floats, Floats, Floats]:

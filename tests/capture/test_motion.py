@@ -14,7 +14,7 @@ def tiles(x: float = 0.0, std: float = 0.01, change: float = 0.0, moved: int = 2
     is_moved = (np.arange(24) < moved).reshape(4, 6)
     nothing, one = np.zeros((4, 6)), np.ones((4, 6))
     shift, changed = (np.asarray(size * is_moved, np.float64) for size in (x, change))
-    return TileShifts(shift, nothing, std * one, std / 2 * one, changed, one)
+    return TileShifts(shift, nothing, std * one, std / 2 * one, changed, one, 1e9 * one)
 
 
 @pytest.mark.parametrize(

@@ -1,5 +1,7 @@
 """Shifts of tiles between pictures made by hand."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.ndimage import gaussian_filter, shift
@@ -51,9 +53,16 @@ def test_an_empty_picture_tells_nothing() -> None:
 
 def test_sigmas_and_lengths_are_those_of_both_directions() -> None:
     one = np.ones((1, 1))
-    found = TileShifts(3 * one, -4 * one, 0.5 * one, 2 * one, 0 * one, one)
+    found = TileShifts(3 * one, -4 * one, 0.5 * one, 2 * one, 0 * one, one, 100 * one)
     assert found.length.item() == 5.0
     assert found.sigmas.item() == pytest.approx(np.hypot(6, 2))
+    assert replace(found, better=9 * one).sigmas.item() == pytest.approx(3)
+
+
+def test_a_shift_is_told_by_what_it_explains_better_than_brightness_alone(scene: np.ndarray) -> None:
+    moved = found(shift(scene, (0, 0.5), order=3, mode="nearest"), scene)
+    assert moved.better.min() > 1000
+    assert found(0.8 * scene + 20, scene).better.max() < 36
 
 
 def test_the_rest_that_nothing_explains_is_told_with_the_gain(scene: np.ndarray) -> None:
