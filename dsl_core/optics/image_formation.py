@@ -6,7 +6,7 @@ For reflectance H at bands j, colour c, frame k and a pixel of shading s (the pr
 
 ``moment`` is the rig's response to LED l integrated over a band's hat, ``light`` the pattern's radiance at
 the column that lights the pixel through order m, blurred by the projector and, in first orders, by the
-width of a band. The operator comes as products with H and its adjoint, and as matrices.
+width of a band. The operator comes as products with H, and as matrices.
 """
 
 from __future__ import annotations
@@ -105,14 +105,6 @@ class ImageFormation:
             # Response of each LED to the reflectance of these bands, (3, LEDs, pixels).
             seen = torch.einsum("clj,jp->clp", moments, reflectance[bands])
             out += torch.einsum("clp,plf->cfp", seen, light)
-        return out
-
-    def adjoint(self, signals: Tensor) -> Tensor:
-        """The transposed operator: from (3, frames, pixels) to (bands, pixels)."""
-        out = torch.zeros((self.bands, len(self.shading))).to(signals)
-        for bands, light, moments in self.terms():
-            seen = torch.einsum("cfp,plf->clp", signals, light)
-            out[bands] += torch.einsum("clj,clp->jp", moments, seen)
         return out
 
     def matrix(self) -> Tensor:

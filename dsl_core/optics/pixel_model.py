@@ -145,7 +145,7 @@ class PixelModel:
     def operator(
         self, traced: Traced, shading: Tensor, blur_px: float = 0.0, orders: Sequence[int] | None = None
     ) -> ImageFormation:
-        """From reflectance (bands, pixels) to DN per ms (3, frames, pixels): forward, adjoint and matrix.
+        """From reflectance (bands, pixels) to DN per ms (3, frames, pixels): forward and matrix.
 
         ``blur_px`` is that of demosaicing; ``orders`` are by default the zero order and all that were traced.
         """

@@ -66,11 +66,6 @@ def plane_samples(rig: Rig, depth_mm: float = 700.0, grid: tuple[int, int] = GRI
     return _of_plane(rig, depth_mm, _spread(lit, grid), float(lit.mean()))
 
 
-def chosen_samples(rig: Rig, pixels: NDArray[np.int64], depth_mm: float = 700.0) -> SamplePixels:
-    """Chosen pixels (flat indices) of a plane that faces the camera."""
-    return _of_plane(rig, depth_mm, pixels, 1.0)
-
-
 def _plane(depth_mm: float) -> Plane:
     return Plane(np.array([0.0, 0.0, 1.0 / depth_mm]))
 

@@ -21,7 +21,7 @@ from dsl_core.model.rig import Rig
 from dsl_core.model.spectral import SpectralCurve, WavelengthGrid
 from dsl_core.patterns.images import pattern_image
 from dsl_core.planning.references import FINE_NM, References
-from dsl_core.planning.samples import SamplePixels, chosen_samples
+from dsl_core.planning.samples import SamplePixels, _of_plane
 from dsl_core.reconstruction.surface import default_window_px
 from dsl_core.simulation.rendered_scene import Setup
 from dsl_core.simulation.scenes import materials
@@ -129,7 +129,7 @@ def trial_samples(rig: Rig, palette: Palette, depth_mm: float = 700.0) -> Sample
             for y, x in _two_a_column(np.argwhere(inside & (truth.material == material))):
                 pixels.append((top + y) * rig.camera.width_px + left + x)
                 spectra.append(palette.spectra[material])
-    view = chosen_samples(rig, np.array(pixels, np.int64), depth_mm)
+    view = _of_plane(rig, depth_mm, np.array(pixels, np.int64), 1.0)
     return replace(view, spectra=np.array(spectra), wavelengths_nm=FINE_NM)
 
 

@@ -21,7 +21,7 @@ from dsl_core.optics.correspondence import correspondence
 from dsl_core.optics.demosaic import demosaic_variance
 from dsl_core.optics.pixel_model import DEMOSAIC_SPREAD, EDGE_PX, PixelModel, demosaic_blur_px, without_offset
 from dsl_core.optics.spectra import ORDERS, SECOND_ORDERS
-from dsl_core.planning.samples import chosen_samples
+from dsl_core.planning.samples import _of_plane
 from dsl_core.planning.virtual import VirtualPixels
 from dsl_core.reconstruction.spectral.solving.tile_frames import Pixels
 from dsl_core.reconstruction.spectral.spectra import SpectralReconstruction, model_of_plan
@@ -89,7 +89,7 @@ class Readers:
 
     def virtual(self) -> VirtualPixels:
         """The prediction."""
-        view = chosen_samples(self.rig, np.array([self.flat]), DEPTH_MM)
+        view = _of_plane(self.rig, DEPTH_MM, np.array([self.flat]), 1.0)
         return VirtualPixels(self.rig, self.plan, GRID, view, dtype=torch.float64)
 
     @property
@@ -231,16 +231,12 @@ def random(*shape: int) -> Tensor:
 
 
 @pytest.mark.parametrize("spectral", [COMB, COLOURS], ids=["grey", "colours"])
-def test_adjoint_and_matrix_are_those_of_the_forward_model(spectral: LineComb) -> None:
+def test_matrix_is_that_of_the_forward_model(spectral: LineComb) -> None:
     model, pixels, depth = some_model(spectral)
     operator = model.operator(model.trace(pixels, depth), random(5), blur_px=0.3)
-    reflectance, signals = random(model.bands.count, 5), random(3, len(model.profiles), 5)
-    seen = operator.forward(reflectance)
-    assert float((seen * signals).sum()) == pytest.approx(
-        float((reflectance * operator.adjoint(signals)).sum()), rel=1e-12
-    )
+    reflectance = random(model.bands.count, 5)
     by_matrix = torch.einsum("pcfj,jp->cfp", operator.matrix(), reflectance)
-    assert torch.allclose(by_matrix, seen, rtol=1e-12)
+    assert torch.allclose(by_matrix, operator.forward(reflectance), rtol=1e-12)
 
 
 @pytest.mark.parametrize("offset_std", [0.0, 0.2])

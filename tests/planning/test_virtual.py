@@ -14,7 +14,7 @@ from dsl_core.model.rig import Rig
 from dsl_core.model.spectral import WavelengthGrid
 from dsl_core.optics.pinhole import pixel_rays
 from dsl_core.optics.shading import Plane, plane_shading
-from dsl_core.planning.samples import chosen_samples
+from dsl_core.planning.samples import _of_plane
 from dsl_core.planning.virtual import Draw, VirtualPixels, tilt_std
 from dsl_core.reconstruction.columns.column import Column
 from dsl_core.reconstruction.surface import reconstruct_surface
@@ -43,7 +43,7 @@ def steady(size: float) -> Draw:
 
 def virtual(rig: Rig, window_px: int) -> VirtualPixels:
     plan = CapturePlan(code=GrayCode(rows=False), spectral=ScanLines(width_px=8, step_px=8))
-    view = chosen_samples(rig, np.array([290 * 890 + 200, 290 * 890 + 700]))
+    view = _of_plane(rig, 700.0, np.array([290 * 890 + 200, 290 * 890 + 700]), 1.0)
     return VirtualPixels(rig, plan, WavelengthGrid(step_nm=10.0), view, surface_window_px=window_px)
 
 

@@ -113,7 +113,7 @@ def check_camera(
         intercept_dn=Measured(value=float(weight @ intercepts), std=float((stds**-2).sum() ** -0.5)),
         linearity_percent=(red, green, blue),
         useful_dn=float(series.mean_dn[series.unclipped].max()),
-        saturation_dn=_saturation(saturated, sizes),
+        saturation_dn=_saturation(saturated),
         electrons_per_dn=transfer.electrons_per_dn,
         read_noise_dn=transfer.read_noise_dn,
         hot_share=Measured(value=count / total, std=float(np.sqrt(max(count, 1)) / total)),
@@ -179,7 +179,7 @@ def exposure_line(
     return ExposureLine(exposure, value, value - found[0] - found[1] * exposure, std, intercept)
 
 
-def _saturation(saturated: Readings, sizes: RegionSizes) -> Measured:
+def _saturation(saturated: Readings) -> Measured:
     """Where the scale ends: the mean of clipped regions; at least the largest signal if nothing clipped."""
     full = saturated.clipped > 0.98
     values = saturated.mean_dn[full] if full.any() else saturated.mean_dn.max(keepdims=True)

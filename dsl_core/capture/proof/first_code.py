@@ -61,16 +61,13 @@ class FirstCode:
     def add(self, shot: Shot, seen: Counts, before: Counts | None) -> Finding:
         """Judge a picture, given that of the shot taken before it, and keep it where it may be right."""
         self._lit, self.reviewed = None, []
-        if shot.role == "code":
-            found = self._add_half(shot, seen, before)
-        else:
-            found = self._add_end(shot, seen, before)
+        found = self._add_half(shot, seen) if shot.role == "code" else self._add_end(shot, seen, before)
         if found.is_wrong:
             return found
         whole = not self._missing and len(self._ends) == 2
         return (self._review(shot) or found) if whole else found
 
-    def _add_half(self, shot: Shot, seen: Counts, before: Counts | None) -> Finding:
+    def _add_half(self, shot: Shot, seen: Counts) -> Finding:
         number, inverse = divmod(shot.pattern, 2)
         self._pairs.pairs.pop(number, None)  # a pair is taken again as a whole
         other = self._half.pop(2 * number + 1 - inverse, None)
@@ -147,7 +144,9 @@ class FirstCode:
             torn = Verdict.TORN if result.is_torn and not result.is_lost else Verdict.OTHER
             if shot.role == "white" and result.mean < -0.5:
                 torn = Verdict.DARK
-            return Finding(shot, Verdict.LATE if late else torn, (shot,), self._named(seen, shot))
+            return Finding(
+                shot, Verdict.LATE if late else torn, (shot,), self._like(seen, bright - dark, lit)
+            )
         expected, other = self._pairs.sum(), self._ends.get("black" if shot.role == "white" else "white")
         if other is not None and len(self._pairs.pairs) > 2:
             pair = (seen, other)
@@ -241,19 +240,14 @@ class FirstCode:
         dark, bright, lit = self._pairs.contrast([pair])
         if alike(*pair, bright - dark, lit):
             return Verdict.LATE, ""
-        for picture in pair:
-            for number, known in self._pairs.pairs.items():
-                for inverse, other in enumerate(known):
-                    if other is not picture and alike(picture, other, bright - dark, lit):
-                        return Verdict.LATE, f"like code pattern {2 * number + inverse}"
-        return dominant(broken, lit), ""
+        shown = [words for picture in pair if (words := self._like(picture, bright - dark, lit))]
+        return (Verdict.LATE, shown[0]) if shown else (dominant(broken, lit), "")
 
-    def _named(self, seen: Counts, shot: Shot) -> str:
-        dark, bright, lit = self._pairs.contrast()
-        for number, known in self._pairs.pairs.items():
-            for inverse, other in enumerate(known):
-                if alike(seen, other, bright - dark, lit):
-                    return f"like code pattern {2 * number + inverse}"
+    def _like(self, seen: Counts, contrast: Floats, lit: NDArray[np.bool_]) -> str:
+        """Which pattern of the pairs that are right a picture shows, in words; empty if none."""
+        for pattern, other in self._by_pattern(self._pairs.pairs).items():
+            if other is not seen and alike(seen, other, contrast, lit):
+                return f"like code pattern {pattern}"
         return ""
 
     def _pair_shots(self, number: int) -> tuple[Shot, ...]:

@@ -23,7 +23,7 @@ CAUTION = (
     " bits. Use it to try the program; depth will be rough, and spectra from it mean nothing."
 )
 #: Positions of `cv2.CAP_PROP_...`, which are the same in all versions.
-_WIDTH, _HEIGHT, _EXPOSURE, _GAIN, _AUTO_EXPOSURE, _AUTO_WHITE = 3, 4, 15, 14, 21, 44
+_WIDTH, _HEIGHT, _EXPOSURE, _AUTO_EXPOSURE, _AUTO_WHITE = 3, 4, 15, 21, 44
 #: What Linux's driver takes for manual exposure, and its unit of exposure.
 _MANUAL, _UNIT_MS = 1, 0.1
 _MOST_DEVICES = 8

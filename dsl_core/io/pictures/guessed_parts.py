@@ -52,15 +52,13 @@ def guessed_size(blocks: Sequence[Block]) -> tuple[Size, str]:
 def part_of(block: Block, blocks: Sequence[Block], size_px: Size, probes: Probes) -> tuple[Part, list[str]]:
     """The part of a mapping for a block, and sentences about what is unsure."""
     if isinstance(block.reading, StripeReading):
-        return _stripes(block, block.reading, blocks, size_px)
+        return _stripes(block, block.reading, size_px)
     if isinstance(block.reading, PhaseReading):
         return _phases(block, block.reading, blocks, size_px, probes)
     return (WhitePicture() if block.kind == "white" else BlackPicture()), []
 
 
-def _stripes(
-    block: Block, reading: StripeReading, blocks: Sequence[Block], size_px: Size
-) -> tuple[Part, list[str]]:
+def _stripes(block: Block, reading: StripeReading, size_px: Size) -> tuple[Part, list[str]]:
     length = size_px[0] if block.axis == "columns" else size_px[1]
     unit = _unit(reading, length)
     # Several programs put the middle of the numbers in the middle of the projector.

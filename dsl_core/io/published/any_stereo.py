@@ -104,9 +104,7 @@ def load_any_stereo(
         ) from error
     stereo = Stereo(camera=camera, projector=projector, pose=pose)
     assumed = tuple(f"no {part}" for part in _PARTS if part not in names)
-    return FoundStereo(
-        stereo, names, assumed, _taken(parts, unit_mm, inverse), tuple(_doubts(stereo, unit_mm))
-    )
+    return FoundStereo(stereo, names, assumed, _taken(parts, unit_mm, inverse), tuple(_doubts(stereo)))
 
 
 def _require_pinhole(path: Path) -> None:
@@ -156,7 +154,7 @@ def _taken(parts: Parts, unit_mm: float, inverse: bool) -> tuple[str, ...]:
     return (*parts.taken, *turn, told, f"its lengths are in units of {unit_mm:g} mm")
 
 
-def _doubts(stereo: Stereo, unit_mm: float) -> Iterator[str]:
+def _doubts(stereo: Stereo) -> Iterator[str]:
     distance = float(np.linalg.norm(stereo.pose.vector_mm))
     if distance == 0:
         yield "camera and projector are at one place, so nothing has a depth"

@@ -99,11 +99,11 @@ def steps_of_strided(lines: Lines, pictures: Sequence[int]) -> int | None:
 
 
 def read_phase_sets(
-    lines: Lines, pictures: Sequence[int], steps: int, order: Literal["set", "step"], has_stripes: bool
+    lines: Lines, pictures: Sequence[int], steps: int, order: Literal["set", "step"]
 ) -> PhaseReading | None:
     """Fringes, start and direction of sets of pictures; None when they fit no whole fringes.
 
-    With stripes one set is enough, whose fringes are then left to whoever knows the stripes (0).
+    A single set of several fringes has 0 of them: only stripes tell how many.
     """
     sets = len(pictures) // steps
     chosen = [

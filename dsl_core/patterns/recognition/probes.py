@@ -18,8 +18,6 @@ LINES = 16
 SOME = 1000
 #: A pixel is lit when its range reaches this share of the range of bright pixels.
 LIT_SHARE = 0.25
-#: What is seen of a projector's light is at least this many steps of 8 bits.
-LEAST_RANGE = 6 / 255
 
 
 @dataclass(frozen=True)

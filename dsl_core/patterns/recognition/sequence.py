@@ -171,7 +171,7 @@ def _axis_blocks(probes: Probes, axis: Axis, slots: Sequence[int | None]) -> tup
         others.append(_with_phases(lines, axis, present, run))
     strided = steps_of_strided(lines, present)
     if strided is not None:
-        reading = read_phase_sets(lines, present, strided, "step", False)
+        reading = read_phase_sets(lines, present, strided, "step")
         if reading is not None:
             others.append(([Block("phases", tuple(present), axis, reading)], _phase_cost(reading)))
     return min([(found, cost), *others], key=lambda each: each[1])
@@ -185,7 +185,7 @@ def _with_phases(
     if all(rest):
         return [], np.inf
     others = rest[0] or rest[1]
-    reading = read_phase_sets(lines, present[start:end], steps, "set", bool(others))
+    reading = read_phase_sets(lines, present[start:end], steps, "set")
     if reading is None:
         return [], np.inf
     phases = Block("phases", tuple(present[start:end]), axis, reading)

@@ -47,13 +47,6 @@ class PatternTable:
     width_px: int
 
     @classmethod
-    def of_levels(
-        cls, colour: NDArray[np.uint8], response: ProjectorResponse, device: torch.device
-    ) -> PatternTable:
-        """Table of drive levels, (height, width, 3); those of patterns that vary one way only are kept."""
-        return cls.of_strip(without_repeats(colour), colour.shape[:2], response, device)
-
-    @classmethod
     def of_strip(
         cls,
         levels: NDArray[np.uint8],
@@ -61,7 +54,10 @@ class PatternTable:
         response: ProjectorResponse,
         device: torch.device,
     ) -> PatternTable:
-        """The same from levels `without_repeats`, and the size (height, width) of the image."""
+        """Table of drive levels `without_repeats`, (rows, columns, 3), for an image of size (height, width).
+
+        Tables of patterns that vary one way only are kept.
+        """
         if 1 not in levels.shape[:2]:
             return cls.of(_radiance(levels, response), response, device)
         return _of_strip(levels.tobytes(), levels.shape, (size[0], size[1]), response, device)

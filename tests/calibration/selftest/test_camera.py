@@ -175,11 +175,11 @@ def test_the_largest_distance_from_a_line_is_stated_in_percent_of_full_scale() -
 def test_the_scale_ends_where_regions_clip_or_beyond_the_largest_signal() -> None:
     readings = table(np.arange(2.0), np.array([[4090.0, 4000.0, 3000.0], [4094.0, 4095.0, 2000.0]]))
     readings.clipped[:] = [[0.99, 0.97, 0.0], [1.0, 1.0, 0.0]]
-    found = _saturation(readings, SIZES)
+    found = _saturation(readings)
     assert found.value == pytest.approx((4090 + 4094 + 4095) / 3)
     assert found.std == pytest.approx(np.std([4090, 4094, 4095]))
     readings.clipped[:] = 0.0
-    assert _saturation(readings, SIZES).value == 4095.0
+    assert _saturation(readings).value == 4095.0
 
 
 @pytest.mark.parametrize("read_dn", [0.5, 3.0])

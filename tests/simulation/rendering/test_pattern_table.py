@@ -5,11 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import torch
+from numpy.typing import NDArray
 
-from dsl_core.model.rig import Rig
+from dsl_core.model.rig import ProjectorResponse, Rig
 from dsl_core.optics.lines.profile import zero_order_profile
 from dsl_core.simulation.published_rig import published_rig
-from dsl_core.simulation.rendering.pattern_table import PatternTable, between
+from dsl_core.simulation.rendering.pattern_table import PatternTable, between, without_repeats
 
 SIZE = (64, 42)
 
@@ -80,6 +81,10 @@ def test_light_of_rows_falls_off_at_the_sides_of_the_frame() -> None:
     assert across[0] < 0.8 * across[2]
 
 
+def of_levels(colour: NDArray[np.uint8], response: ProjectorResponse, device: torch.device) -> PatternTable:
+    return PatternTable.of_strip(without_repeats(colour), colour.shape[:2], response, device)
+
+
 def test_levels_that_vary_one_way_only_are_tabulated_once() -> None:
     response, device = small_rig().projector_response, torch.device("cpu")
     drawn = np.random.default_rng(0).integers(0, 256, (30, 40, 3)).astype(np.uint8)
@@ -88,16 +93,14 @@ def test_levels_that_vary_one_way_only_are_tabulated_once() -> None:
     for colour in (across, down, across[..., :1].repeat(3, 2), drawn):
         radiance = response.radiance(colour / 255) - response.black_fraction
         kept, own = (
-            PatternTable.of_levels(colour, response, device),
+            of_levels(colour, response, device),
             PatternTable.of(radiance, response, device),
         )
         assert kept.oversample == own.oversample
         for led in range(kept.leds):
             found, expected = (table.at(led, column, row).numpy() for table in (kept, own))
             assert found == pytest.approx(expected, rel=1e-5)
-    assert PatternTable.of_levels(across.copy(), response, device) is PatternTable.of_levels(
-        across, response, device
-    )
+    assert of_levels(across.copy(), response, device) is of_levels(across, response, device)
     wider = small_rig(blur_px=1.5).projector_response
-    again = PatternTable.of_levels(across, wider, device)
-    assert not torch.equal(again.blurred, PatternTable.of_levels(across, response, device).blurred)
+    again = of_levels(across, wider, device)
+    assert not torch.equal(again.blurred, of_levels(across, response, device).blurred)
