@@ -86,11 +86,12 @@ class MaterialsPanel(QWidget):
         self.text.setAlignment(Qt.AlignmentFlag.AlignTop)
         self.error.setPrefix("± ")
         sources = row_of(self.marks, self.folder, self.file, STRETCH)
-        # No labels: the smallest window has no room for them next to its picture.
-        ways = row_of((self.measure, 1), self.error, self.free)
+        # "By" is not written: the smallest window has no room for it next to its picture.
+        ways = row_of((self.measure, 1), self.free)
         limits = row_of(label("Limit"), self.worst, label("Margin"), self.margin, STRETCH)
+        error = row_of(label("Library error"), self.error, STRETCH)
         map_row = row_of(self.write, self.clear, STRETCH)
-        column_of(sources, ways, limits, (self.table, 1), self.text, map_row, on=self, margins=0)
+        column_of(sources, ways, error, limits, (self.table, 1), self.text, map_row, on=self, margins=0)
         self.folder.clicked.connect(self.choose_folder)
         self.file.clicked.connect(self.choose_file)
         self.marks.clicked.connect(lambda: control.from_marks(self.way))

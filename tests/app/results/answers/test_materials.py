@@ -12,6 +12,8 @@ from dsl_app.results.answers.materials_panel import HINT, ROWS, MaterialsPanel, 
 from dsl_app.results.layers import materials_table, tinted_by
 from dsl_app.results.state import Materials
 from dsl_app.shared.theme import LIGHT
+from dsl_app.shared.widgets.forms import NumberBox
+from PySide6.QtWidgets import QLabel
 from pytestqt.qtbot import QtBot
 
 from dsl_core.analysis import classes
@@ -151,9 +153,24 @@ def test_the_legend_is_seen_whole_at_150_percent(qtbot: QtBot, bench: Bench) -> 
     last = table.visualRect(table.model().index(ROWS - 1, 0))
     assert table.rowCount() == 9
     assert last.bottom() <= table.viewport().height()
-    assert panel.minimumSizeHint().width() <= 436
+    assert panel.minimumSizeHint().width() <= 300
     # On a screen of 614 px half of the page is left for the plot.
     assert panel.minimumSizeHint().height() <= 360
+
+
+def test_every_number_of_the_panel_is_named_to_its_left(qtbot: QtBot, bench: Bench) -> None:
+    panel = MaterialsPanel(bench.state, bench.control.answers)
+    qtbot.addWidget(panel)
+    panel.resize(panel.minimumSizeHint())
+    panel.show()
+    for box in panel.findChildren(NumberBox):
+        middle = box.geometry().center().y()
+        named = [
+            each.text()
+            for each in panel.findChildren(QLabel)
+            if each.geometry().right() < box.x() and each.y() <= middle <= each.geometry().bottom()
+        ]
+        assert box.accessibleName() in named
 
 
 @pytest.mark.parametrize("classes", [1, 24, 250])
