@@ -35,20 +35,22 @@ class Figure(Record):
 
     @property
     def limits(self) -> str:
-        """The limits as people write them, empty where there are none.
+        """The limits with their unit as people write them, empty where there are none.
 
         >>> Figure(name="gamma", value=2.2, unit="1", low=1.8, high=2.6).limits
         '1.8 to 2.6'
+        >>> Figure(name="camera error", value=0.01, unit="px", high=0.5).limits
+        'at most 0.5 px'
         """
         match self.low, self.high:
             case None, None:
                 return ""
             case None, high:
-                return f"at most {high:.4g}"
+                return f"at most {high:.4g}{self._unit}"
             case low, None:
-                return f"at least {low:.4g}"
+                return f"at least {low:.4g}{self._unit}"
             case low, high:
-                return f"{low:.4g} to {high:.4g}"
+                return f"{low:.4g} to {high:.4g}{self._unit}"
 
     def __str__(self) -> str:
         """The figure as people write it, such as ``gamma 2.210 ± 0.004``.
@@ -64,8 +66,11 @@ class Figure(Record):
         digits = 0 if self.std is None and float(self.value).is_integer() else self._decimals
         while digits < MOST_DECIMALS and self._passes(round(self.value, digits)) is not self.passed:
             digits += 1
-        unit = "" if self.unit in ("", "1") else f" {self.unit}"
-        return f"{self.name} {_spread(self.value, self.std, digits)}{unit}"
+        return f"{self.name} {_spread(self.value, self.std, digits)}{self._unit}"
+
+    @property
+    def _unit(self) -> str:
+        return "" if self.unit in ("", "1") else f" {self.unit}"
 
     @property
     def _decimals(self) -> int:

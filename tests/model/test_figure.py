@@ -18,8 +18,8 @@ def test_a_figure_without_limits_passes_and_says_none() -> None:
     figure = Figure(name="stage", value=-1e9, unit="mm")
     assert figure.passed
     assert figure.limits == ""
-    assert Figure(name="stage", value=0, unit="mm", low=0.5).limits == "at least 0.5"
-    assert Figure(name="stage", value=0, unit="mm", high=1234.5).limits == "at most 1234"
+    assert Figure(name="stage", value=0, unit="mm", low=0.5).limits == "at least 0.5 mm"
+    assert Figure(name="stage", value=0, unit="mm", high=1234.5).limits == "at most 1234 mm"
 
 
 @pytest.mark.parametrize(

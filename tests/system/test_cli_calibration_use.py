@@ -80,7 +80,9 @@ def test_what_a_calibration_missed_travels_with_the_rig(
     figures = (Figure(name="camera error", value=0.6, unit="px", high=0.5),)
     note = CalibrationNote(name="geometry", title="Geometry", accepted="2026-05-04", figures=figures)
     file = save_rig(calibrated.model_copy(update={"calibrations": (note,)}), tmp_path / "missed.json")
-    told = "This rig's calibration 'Geometry' missed its limit: camera error 0.600 px (limit: at most 0.5)."
+    told = (
+        "This rig's calibration 'Geometry' missed its limit: camera error 0.600 px (limit: at most 0.5 px)."
+    )
     scan = give("scan", tmp_path / "new.dsl", *SMALL_RIG, *QUICK, "--calibration", file)
     assert scan.code == 0, scan.err
     assert told in scan.out

@@ -142,7 +142,7 @@ def row_display(row: Row, is_busy: bool = False, running: str = "", is_next: boo
 
 
 def figure_words(figure: Figure) -> str:
-    """A figure against its limits in one line, such as ``camera error 0.051 px (at most 0.5)``."""
+    """A figure against its limits in one line, such as ``camera error 0.051 px (at most 0.5 px)``."""
     limits = figure.limits.replace("-", "−")
     return f"{figure.name} {value_words(figure)}" + (f"  ({limits})" if limits else "")
 

@@ -182,7 +182,7 @@ class ResultImage(QWidget):
             self.legend.setText(
                 " &nbsp; ".join(
                     f'<span style="color:{colour}">■</span>&nbsp;{name.replace(" ", "&nbsp;")}&nbsp;'
-                    f'<span style="color:{self._theme.muted}">{share:.1%}</span>'
+                    f'<span style="color:{self._theme.muted}">{100 * share:.1f} %</span>'
                     for colour, name, share in layer.keys
                 )
             )

@@ -103,7 +103,7 @@ def test_the_head_tells_size_bands_time_and_path() -> None:
 
 def test_what_the_calibration_missed_stands_before_what_does_not_fit() -> None:
     missed = (
-        "This rig's calibration 'Geometry' missed its limit: camera error 0.60 px (limit: at most 0.5).",
+        "This rig's calibration 'Geometry' missed its limit: camera error 0.60 px (limit: at most 0.5 px).",
     )
     found = summarise(result(calibration_missed=json.dumps(missed)), None, "")
     assert found.warning == found.advice == missed[0]

@@ -126,7 +126,7 @@ def test_what_a_calibration_missed_is_told_and_not_as_provenance(known: Any) -> 
     )
     noted = known.result.assign_attrs(**missed_attributes([missed]))
     text = Page(render_report(report_content("x", noted, known.truth, evaluate(noted, known.truth)))).text
-    assert "'Geometry' missed its limit: camera error 0.600 px (limit: at most 0.5)" in text
+    assert "'Geometry' missed its limit: camera error 0.600 px (limit: at most 0.5 px)" in text
     assert "calibration missed" not in text
 
 

@@ -35,9 +35,8 @@ def carry_out(
         import_pictures(request.folder, draft, mapping, rig, progress)
     if rig is None:
         decoded = decoded_of(decode_scan(request.target, progress))
-        verdict = (
-            f"{decoded.share:.0%} of the lit pixels have a column. There is no depth without a calibration."
-        )
+        share = f"{100 * decoded.share:.0f} %"
+        verdict = f"{share} of the lit pixels have a column. There is no depth without a calibration."
         return Imported(request.target, None, verdict)
     return _with_depth(request.target, progress)
 
@@ -50,4 +49,4 @@ def _with_depth(scan: Path, progress: Progress) -> Imported:
     target = scan.with_suffix(".zarr")
     reconstruct_to(target, scan, options=Options(spectra=False), progress=progress)
     share = float(load_result(target)["depth_mm"].notnull().mean())
-    return Imported(scan, target, f"{share:.0%} of the pixels have a depth.")
+    return Imported(scan, target, f"{100 * share:.0f} % of the pixels have a depth.")

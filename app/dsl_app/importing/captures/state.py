@@ -226,7 +226,7 @@ def _about_columns(decoded: Decoded | None) -> Said:
     if decoded.lit == 0:
         return Said("No pixel is lit: check which pictures are white and black.", "bad")
     known = decoded.column_px[np.isfinite(decoded.column_px)]
-    text = f"{decoded.share:.0%} of the lit pixels have a column"
+    text = f"{100 * decoded.share:.0f} % of the lit pixels have a column"
     if known.size:
         text += f", from {known.min():.0f} to {known.max():.0f}"
     if decoded.share >= GOOD_SHARE:

@@ -82,4 +82,4 @@ def search_text(search: Search | None) -> str:
             f" {search.within_rad:g} rad"
         ),
     }
-    return f"{search.share:.2%} of the pixels with a spectrum {criteria[search.mode]}."
+    return f"{100 * search.share:.2f} % of the pixels with a spectrum {criteria[search.mode]}."

@@ -70,7 +70,7 @@ def test_doubts_are_told_without_options_of_commands(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("share", "lit", "role", "words"),
     [
-        (0.97, 0.8, "good", "97% of the lit pixels have a column, from 3 to 9"),
+        (0.97, 0.8, "good", "97 % of the lit pixels have a column, from 3 to 9"),
         (0.7, 0.8, "warn", "too fine or too dark"),
         (0.2, 0.8, "bad", "the order of its digits"),
         (0.0, 0.0, "bad", "No pixel is lit"),

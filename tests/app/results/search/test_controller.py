@@ -63,12 +63,12 @@ def test_what_was_found_is_said_in_a_sentence(bench: Bench) -> None:
     search = bench.state.search.value
     assert search is not None
     assert search_text(search) == (
-        "50.06% of the pixels with a spectrum have the spectrum of pixel 30, 5 (angle up to 0.05 rad)."
+        "50.06 % of the pixels with a spectrum have the spectrum of pixel 30, 5 (angle up to 0.05 rad)."
     )
     metamers = replace(search, mode=SearchMode.METAMERS, within_rad=0.1)
     assert search_text(metamers) == (
-        "0.00% of the pixels with a spectrum look like pixel 30, 5 (ΔE00 up to 2) but differ by more than 0.1"
-        " rad."
+        "0.00 % of the pixels with a spectrum look like pixel 30, 5 (ΔE00 up to 2) but differ by more than"
+        " 0.1 rad."
     )
     nowhere = replace(search.likeness, angle_rad=np.full_like(search.likeness.angle_rad, np.nan))
     assert search_text(replace(search, likeness=nowhere)) == "No pixel of this result has a spectrum."

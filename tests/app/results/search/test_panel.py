@@ -12,7 +12,7 @@ def test_the_search_is_shown_with_its_share(bench: Bench) -> None:
     bench.control.point_at((30, 5))
     panel = bench.page.search
     panel.start.click()
-    assert "50.06% of the pixels with a spectrum" in panel.text.text()
+    assert "50.06 % of the pixels with a spectrum" in panel.text.text()
     assert bench.page.image.content.overlay.isVisible()
     panel.mode.setCurrentIndex(panel.mode.findData(SearchMode.METAMERS))
     assert "look like pixel 30, 5" in panel.text.text()
