@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-from collections import deque
 from collections.abc import Callable
 from dataclasses import replace
-from statistics import median
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +12,9 @@ from dsl_core.capture.proof.contest import Contest
 from dsl_core.capture.proof.control import choose_pairs, is_same
 from dsl_core.capture.proof.finding import Finding, Light, Verdict
 from dsl_core.capture.proof.first_code import FirstCode
+from dsl_core.capture.proof.later_settings import LaterSettings
 from dsl_core.capture.proof.light_steps import LightSteps
+from dsl_core.capture.proof.line_shown import line_shown
 from dsl_core.capture.proof.neighbours import LineNeighbours
 from dsl_core.capture.proof.prediction import (
     APART,
@@ -24,29 +24,17 @@ from dsl_core.capture.proof.prediction import (
     contest_of_lines,
     contest_of_pictures,
     line_profile,
-    rescaled,
 )
 from dsl_core.capture.proof.raster import Counts, Floats, Noise, Raster
 from dsl_core.capture.proof.recent import Recent
 from dsl_core.capture.proof.sentinel import SentinelProof
+from dsl_core.capture.proof.usual_light import LEAST_LIGHT, UsualLight
 from dsl_core.model.captured_code import CapturedCode
 from dsl_core.model.plan import CapturePlan, NoCode, Shot, describe_shot
 from dsl_core.model.rig import Rig
 
-#: Brightness relative to that of the shots before that is taken for the same exposure.
-SAME_EXPOSURE = (0.68, 1.5)
-#: The same for the first shot of a setting, where only the calibration says how bright it should be.
-FIRST_EXPOSURE = (0.55, 1.8)
-#: How much brighter than expected a line may be.
-MOST_LIGHT = 3.0
-#: With less light than this, as a share of what is expected, a pattern counts as missing.
-LEAST_LIGHT = 0.2
-#: Light of a line relative to what it adds to white: a film sends the rest elsewhere.
-FILM_SHARE = 0.85
-#: Shots whose brightness is remembered.
-_REMEMBERED = 9
-#: Projectors without a calibration are taken to have this gamma.
-_USUAL_GAMMA = 2.2
+#: Where several rivals won, the picture before is blamed if its votes are nearly as many (their mean).
+NEARLY = 0.3
 
 
 class FrameProof:
@@ -85,15 +73,24 @@ class FrameProof:
         self._last: tuple[Shot, Counts] | None = None
         #: What the last picture said of the pairs of the first code, one by one.
         self.reviewed: list[Finding] = []
-        self._light: dict[tuple[str, int], deque[float]] = {}
+        self._usual = UsualLight(self._first, calibration is not None)
+        self._later = LaterSettings(plan, calibration, self._noise, self._kept)
         self._steps = LightSteps()
         #: The picture that came for two patterns, for as long as it comes.
         self._repeated: Counts | None = None
-        self._scale: dict[int, float] = {}
         self._profiles = Recent[Floats | None]()
-        self._rescaled = Recent[Expected]()
-        self._as_floats = Recent[Floats]()
         self._neighbours = LineNeighbours(self._noise, self._raster.shape[1])
+
+    def _first_code(self) -> FirstCode | None:
+        plan = self._plan
+        # Codes of other programs are imported, complete or not: no frame can be taken again.
+        if isinstance(plan.code, NoCode | CapturedCode):
+            return None
+        own = [s for s in self._shots if s.setting == self._first and s.role in ("code", "white", "black")]
+        rises = None if self._calibration is None else self._calibration.pose.matrix[0, 0] > 0
+        return FirstCode(
+            plan, plan.code, own, self._raster, self._noise, self._bayer, rises, self._at_the_end
+        )
 
     def judge(self, shot: Shot, pixels: NDArray[np.uint16]) -> Finding:
         """What the raw mosaic of a shot shows; remembers it for the shots after it, unless it is wrong."""
@@ -101,38 +98,11 @@ class FrameProof:
 
     def judge_raster(self, shot: Shot, seen: Counts) -> Finding:
         """The same of what a `Raster` takes of a mosaic."""
-        before = self._last
-        found = self._judge(shot, seen)
-        if before is not None and np.array_equal(seen, before[1]):
-            if found.is_wrong:
-                found = Finding(shot, Verdict.REPEATED, found.again)
-            elif self._must_differ(before[0], shot) and seen.min() != seen.max():
-                self._repeated = seen
-        if self._repeated is not None and not found.is_wrong:
-            if np.array_equal(seen, self._repeated):
-                found = Finding(shot, Verdict.REPEATED, (shot,))
-            else:
-                self._repeated = None
+        found = self._unless_repeated(self._judge(shot, seen), seen)
         if shot.role == "spectral" and not found.is_wrong:
-            black = self._kept.get(self._blacks[shot.setting])
-            doubtful = self._neighbours.is_doubtful(shot.index, seen, black)
-            doubtful &= found.verdict is Verdict.UNTOLD
-            found = replace(found, is_doubtful=found.is_doubtful or doubtful)
-        self._last = (shot, seen)
-        for wrong in found.again:
-            self._kept.pop(wrong.index, None)
-        if shot not in found.again:
-            self._kept[shot.index] = seen
-            (self._untold.discard if found.verdict is Verdict.RIGHT else self._untold.add)(shot.index)
+            found = self._with_doubt(found, seen)
+        self._remember(found, seen)
         return found
-
-    def _must_differ(self, before: Shot, shot: Shot) -> bool:
-        """Whether two shots of the first code show patterns whose pictures cannot be equal, noise included.
-
-        Once all pairs are there, they are judged together.
-        """
-        ours = self._code is not None and shot.setting == self._first and not self._at_the_end
-        return ours and before.index != shot.index and {before.role, shot.role} <= {"white", "black", "code"}
 
     def differ(self, one: NDArray[np.uint16], other: NDArray[np.uint16]) -> bool:
         """Whether two pictures of one shot of lines, as raw mosaics, show different patterns."""
@@ -152,12 +122,6 @@ class FrameProof:
         before = self._kept[control.index]
         return is_same(self._raster.take(pixels), before, self._code_pairs(), self._noise)
 
-    def _code_pairs(self) -> dict[int, tuple[Counts, Counts]]:
-        """Pattern and inverse of the first code by the number of the pair, as far as both are there."""
-        kept = {n: self._kept.get(at) for (role, n), at in self._places.items() if role == "code"}
-        pairs = {n // 2: (one, kept.get(n + 1)) for n, one in kept.items() if n % 2 == 0}
-        return {n: (one, other) for n, (one, other) in pairs.items() if one is not None and other is not None}
-
     @property
     def first_setting(self) -> int:
         """The setting whose code is judged by itself."""
@@ -173,16 +137,52 @@ class FrameProof:
         if self._code is not None:
             self._code.substitute(number, pair)
 
-    def _first_code(self) -> FirstCode | None:
-        plan = self._plan
-        # Codes of other programs are imported, complete or not: no frame can be taken again.
-        if isinstance(plan.code, NoCode | CapturedCode):
-            return None
-        own = [s for s in self._shots if s.setting == self._first and s.role in ("code", "white", "black")]
-        rises = None if self._calibration is None else self._calibration.pose.matrix[0, 0] > 0
-        return FirstCode(
-            plan, plan.code, own, self._raster, self._noise, self._bayer, rises, self._at_the_end
-        )
+    def _code_pairs(self) -> dict[int, tuple[Counts, Counts]]:
+        """Pattern and inverse of the first code by the number of the pair, as far as both are there."""
+        kept = {n: self._kept.get(at) for (role, n), at in self._places.items() if role == "code"}
+        pairs = {n // 2: (one, kept.get(n + 1)) for n, one in kept.items() if n % 2 == 0}
+        return {n: (one, other) for n, (one, other) in pairs.items() if one is not None and other is not None}
+
+    # What every picture is asked -------------------------------------------------------------------------
+
+    def _unless_repeated(self, found: Finding, seen: Counts) -> Finding:
+        """A finding, or that the picture is one that came before for another pattern."""
+        shot, before = found.shot, self._last
+        if before is not None and np.array_equal(seen, before[1]):
+            if found.is_wrong:
+                found = Finding(shot, Verdict.REPEATED, found.again)
+            elif self._must_differ(before[0], shot) and seen.min() != seen.max():
+                self._repeated = seen
+        if self._repeated is not None and not found.is_wrong:
+            if np.array_equal(seen, self._repeated):
+                return Finding(shot, Verdict.REPEATED, (shot,))
+            self._repeated = None
+        return found
+
+    def _must_differ(self, before: Shot, shot: Shot) -> bool:
+        """Whether two shots of the first code show patterns whose pictures cannot be equal, noise included.
+
+        Once all pairs are there, they are judged together.
+        """
+        ours = self._code is not None and shot.setting == self._first and not self._at_the_end
+        return ours and before.index != shot.index and {before.role, shot.role} <= {"white", "black", "code"}
+
+    def _with_doubt(self, found: Finding, seen: Counts) -> Finding:
+        """A finding on a line; doubtful if it cannot be told and is unlike its neighbours."""
+        black = self._kept.get(self._blacks[found.shot.setting])
+        is_odd = self._neighbours.is_doubtful(found.shot.index, seen, black)
+        is_odd &= found.verdict is Verdict.UNTOLD
+        return replace(found, is_doubtful=found.is_doubtful or is_odd)
+
+    def _remember(self, found: Finding, seen: Counts) -> None:
+        """Keep a picture unless it is wrong, and forget those that it has shown to be wrong."""
+        shot = found.shot
+        self._last = (shot, seen)
+        for wrong in found.again:
+            self._kept.pop(wrong.index, None)
+        if shot not in found.again:
+            self._kept[shot.index] = seen
+            (self._untold.discard if found.verdict is Verdict.RIGHT else self._untold.add)(shot.index)
 
     def _judge(self, shot: Shot, seen: Counts) -> Finding:
         before = self._last[1] if self._last is not None else None
@@ -203,7 +203,7 @@ class FrameProof:
         places = [shot.pattern, self._blacks[self._first], self._places.get(("white", 0), -1)]
         before = self._plan.original(self._shots[shot.index - 1])
         old, black, white = (self._kept.get(place) for place in places)
-        rivals = [self._earlier(before), black, white]
+        rivals = [self._later.earlier(before), black, white]
         return self._sentinels.judge(shot, seen, old, black, [each for each in rivals if each is not None])
 
     # The lines of the first setting: columns, white and black are known ------------------------------
@@ -214,7 +214,7 @@ class FrameProof:
         if lit is None or wanted is None:
             return Finding(shot, Verdict.UNTOLD)
         share = brightness_of_lines(seen, lit, wanted, self._noise)
-        usual = np.float32(self._usual(shot))
+        usual = np.float32(self._usual.share(shot))
         rivals = [(verdict, self._profile(rival)) for verdict, rival in self._rivals(shot)]
         rivals += [(Verdict.DARK, np.zeros_like(wanted)), (Verdict.OTHER, np.ones_like(wanted))]
         contests = {
@@ -238,49 +238,26 @@ class FrameProof:
         return found
 
     def _line_shown(self, seen: Counts, shot: Shot) -> Shot | None:
-        """The shot whose line it is that a picture shows."""
+        """The shot of the same setting whose line it is that a picture shows."""
         lit = self._code.lit if self._code is not None else None
         if lit is None:
             return None
-        share = (seen[lit.index].astype(np.float32) - lit.black) / lit.contrast
-        size = 3 * self._plan.projector_size_px[0]
-        count = np.bincount(lit.key, minlength=size)
-        mean = np.bincount(lit.key, np.clip(share, 0, 1.2), size) / np.maximum(count, 1)
-        weight = np.minimum(count, 10).astype(np.float64)
-        best, found = 0.5, None
-        for other in self._shots:
-            pattern = self._profile(other) if other.setting == shot.setting else None
-            if pattern is None or other.role == "sentinel" or not pattern.any():
-                continue
-            norm = float(np.sqrt((weight * pattern**2).sum() * (weight * mean**2).sum()))
-            score = float((weight * pattern * mean).sum()) / norm if norm > 0 else 0.0
-            if score > best:
-                best, found = score, other
-        if found is None:
-            return None
-        pattern = self._profile(found)
-        light = np.zeros(0) if pattern is None else mean[(pattern > 0.5) & (count > 0)]
-        return found if light.size and float(light.mean()) > LEAST_LIGHT else None
+        own = [s for s in self._shots if s.setting == shot.setting and s.role != "sentinel"]
+        lines = ((each, profile) for each in own if (profile := self._profile(each)) is not None)
+        return line_shown(seen, lit, lines, self._plan.projector_size_px[0])
 
     # Later settings: the same pictures were taken before ------------------------------------------------
 
     def _judge_again(self, shot: Shot, seen: Counts) -> Finding:
-        old_black, old_white = (
-            self._earlier(self._role("black", shot)),
-            self._earlier(self._role("white", shot)),
-        )
-        wanted = self._expected(shot, shot)
-        if wanted is None or old_black is None or old_white is None:
+        later = self._later
+        wanted, white, dark = later.expected(shot, shot), later.white(shot), later.black(shot)
+        if wanted is None or white is None or dark is None:
             return Finding(shot, Verdict.UNTOLD)
-        black = self._black(shot, old_black)
-        white = self._expected(self._role("white", shot), shot)
-        if white is None:
-            return Finding(shot, Verdict.UNTOLD)
+        black = dark.counts
         # Before its own black is there, only what is bright can be relied on.
         has_black = shot.role != "black" and self._blacks[shot.setting] in self._kept
         least = np.float32(0 if has_black else APART) * (white.counts - black)
-        dark = Expected(black, self._noise.variance(old_black))
-        rivals = [(verdict, self._expected(rival, shot)) for verdict, rival in self._rivals(shot)]
+        rivals = [(verdict, later.expected(rival, shot)) for verdict, rival in self._rivals(shot)]
         rivals += [(Verdict.DARK, dark), (Verdict.OTHER, white)]
         contests = {
             verdict: contest_of_pictures(seen, wanted, rival, black, least, self._noise, self._raster)
@@ -289,14 +266,13 @@ class FrameProof:
         }
         is_judged = has_black or (self._calibration is not None and shot.role != "black")
         share = self._brightness_again(shot, seen, wanted, black) if is_judged else None
-        first_of_role = (shot.role, shot.setting) not in self._light
+        first_of_role = not self._usual.knows(shot)
         found = self._decide(shot, contests, share, lambda: None)
         if found.is_wrong:
             return self._with_doubtful(found)
-        if share is not None and first_of_role and shot.setting not in self._scale:
-            # The first shots of a setting say how strong its light is.
-            self._scale[shot.setting] = self._scale_of(shot) * share
-            self._light[shot.role, shot.setting] = deque([1.0], _REMEMBERED)
+        if share is not None and first_of_role and not later.is_measured(shot):
+            later.measure(shot, share)
+            self._usual.begin(shot)
         return found
 
     def _brightness_again(self, shot: Shot, seen: Counts, wanted: Expected, black: Floats) -> float | None:
@@ -313,57 +289,6 @@ class FrameProof:
             return found
         return replace(found, again=(self._shots[old], *found.again))
 
-    def _expected(self, pattern: Shot, shot: Shot) -> Expected | None:
-        """The picture of a pattern at the setting of ``shot``, from that at an earlier setting."""
-        pattern = self._plan.original(pattern)
-        old, old_black = self._earlier(pattern), self._earlier(self._role("black", shot))
-        if old is None or old_black is None:
-            return None
-        black = self._black(shot, old_black)
-        if pattern.role == "black":
-            return Expected(black, self._noise.variance(old_black))
-        # Until its first shots say how strong the light of a setting is, that is taken from the plan.
-        scale = self._scale.get(shot.setting)
-        return self._rescaled.get(
-            pattern.index,
-            (old, old_black, black, scale),
-            lambda: rescaled(old, old_black, black, self._scale_of(shot), self._noise),
-        )
-
-    def _role(self, role: str, shot: Shot) -> Shot:
-        return Shot(-1, role, 0, shot.setting, shot.exposure_ms, shot.level)  # type: ignore[arg-type]
-
-    def _earlier(self, shot: Shot) -> Counts | None:
-        """The picture of the same pattern at the first setting."""
-        return self._kept.get(self._places.get((shot.role, shot.pattern), -1))
-
-    def _black(self, shot: Shot, old_black: Counts) -> Floats:
-        """Black at the setting of a shot: as taken, else what the exposure makes of the first one."""
-        own = self._blacks[shot.setting]
-        taken = self._kept.get(own) if own != shot.index else None
-        if taken is not None:
-            return self._as_floats.get(own, (taken,), lambda: taken.astype(np.float32))
-        if self._calibration is None:  # nobody knows how much of it is light
-            return old_black.astype(np.float32)
-        level = np.float32(self._noise.sensor.black_level_dn)
-        first = self._plan.settings[self._first]
-        ratio = np.float32(shot.exposure_ms / first.exposure_ms)
-        full = np.float32(self._noise.sensor.full_scale_dn)
-        return np.asarray(np.minimum(level + ratio * (old_black.astype(np.float32) - level), full))
-
-    def _scale_of(self, shot: Shot) -> float:
-        """How much stronger light is at the setting of a shot than at the first one."""
-        if shot.setting in self._scale:
-            return self._scale[shot.setting]
-        first = self._plan.settings[self._first]
-        if self._calibration is not None:
-            radiance = self._calibration.projector_response.radiance
-            dark = float(radiance(0.0))
-            ratio = (float(radiance(shot.level)) - dark) / max(float(radiance(first.level)) - dark, 1e-9)
-        else:
-            ratio = (shot.level / first.level) ** _USUAL_GAMMA
-        return shot.exposure_ms / first.exposure_ms * ratio
-
     # What it all says -------------------------------------------------------------------------------------
 
     def _decide(
@@ -375,14 +300,14 @@ class FrameProof:
     ) -> Finding:
         told = {verdict: contest for verdict, contest in contests.items() if contest.is_told}
         lost = {verdict: contest for verdict, contest in told.items() if contest.is_lost}
-        ratio = None if share is None else share / self._usual(shot)
+        ratio = None if share is None else share / self._usual.share(shot)
         if set(lost) == {Verdict.DARK} and ratio is not None and ratio > LEAST_LIGHT:
             return Finding(shot, Verdict.EXPOSURE, (shot,), f"{ratio:.2g} times what was expected")
         if lost:
             return self._named(shot, lost, name())
         if any(contest.is_torn for contest in told.values()):
             return Finding(shot, Verdict.TORN, (shot,))
-        found = self._judge_exposure(shot, share)
+        found = self._usual.judge(shot, share)
         if found.is_wrong:
             return found
         light = self._steps.judge(shot, share, contests.get(Verdict.DARK))
@@ -399,26 +324,6 @@ class FrameProof:
             verdict = near.get(shown.index - shot.index, Verdict.OTHER)
             return Finding(shot, verdict, (shot,), f"that of {describe_shot(shown)}")
         worst = min(lost, key=lambda verdict: lost[verdict].mean)
-        if Verdict.LATE in lost and lost[Verdict.LATE].mean < lost[worst].mean + 0.3:
+        if Verdict.LATE in lost and lost[Verdict.LATE].mean < lost[worst].mean + NEARLY:
             worst = Verdict.LATE
         return Finding(shot, worst, (shot,))
-
-    def _usual(self, shot: Shot) -> float:
-        """Light of the pictures before relative to their prediction; at first, what a film usually leaves."""
-        known = self._light.get((shot.role, shot.setting))
-        if known:
-            return min(median(known), 1.0)
-        return FILM_SHARE if shot.setting == self._first else 1.0
-
-    def _judge_exposure(self, shot: Shot, share: float | None) -> Finding:
-        if share is None:
-            return Finding(shot, Verdict.RIGHT)
-        known = self._light.setdefault((shot.role, shot.setting), deque(maxlen=_REMEMBERED))
-        low, high = SAME_EXPOSURE if known else FIRST_EXPOSURE
-        if shot.setting == self._first:
-            high = MOST_LIGHT  # beside a line is light that its model leaves out
-        ratio = share / self._usual(shot)
-        if not low < ratio < high and (known or self._calibration is not None):
-            return Finding(shot, Verdict.EXPOSURE, (shot,), f"{ratio:.2g} times what was expected")
-        known.append(share)
-        return Finding(shot, Verdict.RIGHT)

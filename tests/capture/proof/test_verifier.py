@@ -109,6 +109,21 @@ def test_half_the_exposure_is_found_and_said(
     assert float(told[1]) == pytest.approx(0.5, abs=0.05)
 
 
+@pytest.mark.parametrize("factor", [0.62, 1.6])
+def test_the_first_picture_of_a_setting_says_how_bright_the_others_are(
+    scene: RenderedScene, factor: float
+) -> None:
+    rig, proof = scene.open(1), FrameProof(scene.plan, scene.calibration)
+    verdicts = []
+    for shot in scene.plan.shots():
+        if shot.role == "spectral" and shot.pattern > 2:
+            continue
+        rig.camera.configure(shot.exposure_ms * (factor if shot.setting else 1))
+        rig.projector.show(token_image(scene.plan, shot))
+        verdicts.append(proof.judge(shot, rig.camera.snap().pixels).verdict)
+    assert set(verdicts) <= {Verdict.RIGHT, Verdict.UNTOLD}
+
+
 def test_a_picture_given_twice_is_called_repeated(scene: RenderedScene) -> None:
     shot, rig = _shot(scene, "spectral", 6, 0), scene.open(3)
     pictures = {s.index: _take(rig, scene, s) for s in scene.plan.shots() if s.index < shot.index}

@@ -1,8 +1,7 @@
-"""By which rules pictures are right or wrong: what light is usual, what is expected of a later setting."""
+"""By which rules pictures are right or wrong, and what is remembered of them, mostly without any picture."""
 
 from __future__ import annotations
 
-from collections import deque
 from types import SimpleNamespace
 from typing import Any
 
@@ -11,9 +10,9 @@ import pytest
 
 from dsl_core.capture.proof.contest import Contest
 from dsl_core.capture.proof.finding import Finding, Light, Verdict
-from dsl_core.capture.proof.prediction import Lit
 from dsl_core.capture.proof.raster import Counts
 from dsl_core.capture.proof.verifier import FrameProof
+from dsl_core.model.geometry import Pose
 from dsl_core.model.plan import CapturePlan, GrayCode, LineComb, Setting, Shot, describe_shot
 from dsl_core.model.rig import Rig
 from dsl_core.simulation.published_rig import published_rig
@@ -44,81 +43,6 @@ def counts(value: int) -> Counts:
     found = np.full(32 * 18, value, np.uint16)
     found.flags.writeable = False
     return found
-
-
-def test_light_is_usually_what_a_film_leaves_then_the_median_of_nine_but_never_more_than_one() -> None:
-    judge = proof()
-    assert judge._usual(LINE) == 0.85
-    assert judge._usual(LATER_LINE) == 1.0
-    for share in (0.5, 0.7, 0.6):
-        assert judge._judge_exposure(LINE, share).verdict is Verdict.RIGHT
-    assert judge._usual(LINE) == 0.6
-    for _ in range(9):
-        judge._judge_exposure(LINE, 0.9)
-    assert list(judge._light["spectral", 0]) == [0.9] * 9
-    for _ in range(9):
-        judge._judge_exposure(LINE, 1.2)
-    assert judge._usual(LINE) == 1.0
-    assert judge._usual(SHOTS[10]) == 0.85, "of each role and setting by itself"
-
-
-@pytest.mark.parametrize(
-    ("shot", "before", "share", "is_right"),
-    [
-        (LATER_LINE, None, 0.56, True), (LATER_LINE, None, 0.54, False),
-        (LATER_LINE, None, 1.79, True), (LATER_LINE, None, 1.81, False),
-        (LATER_LINE, 0.5, 0.69 * 0.5, True), (LATER_LINE, 0.5, 0.67 * 0.5, False),
-        (LATER_LINE, 0.5, 1.49 * 0.5, True), (LATER_LINE, 0.5, 1.51 * 0.5, False),
-        (LINE, None, 0.56 * 0.85, True), (LINE, None, 0.54 * 0.85, False),
-        (LINE, None, 2.99 * 0.85, True), (LINE, None, 3.01 * 0.85, False),
-        (LINE, 0.5, 2.99 * 0.5, True), (LINE, 0.5, 0.67 * 0.5, False),
-    ],
-)  # fmt: skip
-def test_light_may_differ_from_what_is_usual_by_so_much(
-    shot: Shot, before: float | None, share: float, is_right: bool
-) -> None:
-    judge = proof()
-    if before is not None:
-        judge._light[shot.role, shot.setting] = deque([before])
-    found = judge._judge_exposure(shot, share)
-    assert (found.verdict is Verdict.RIGHT) == is_right
-    if not is_right:
-        usual = judge._usual(shot)
-        assert found == Finding(
-            shot, Verdict.EXPOSURE, (shot,), f"{share / usual:.2g} times what was expected"
-        )
-    assert (share in judge._light[shot.role, shot.setting]) == is_right, "what is wrong is not usual"
-
-
-def test_without_a_calibration_only_pictures_after_the_first_have_a_wrong_brightness() -> None:
-    judge = proof(is_calibrated=False)
-    assert judge._judge_exposure(LATER_LINE, 0.1).verdict is Verdict.RIGHT
-    assert judge._judge_exposure(LATER_LINE, 0.2).verdict is Verdict.EXPOSURE
-    assert judge._judge_exposure(LATER_LINE, None).verdict is Verdict.RIGHT
-
-
-def test_light_of_a_setting_is_that_of_its_exposure_and_level() -> None:
-    radiance = rig().projector_response.radiance
-    ratio = (radiance(0.5) - radiance(0.0)) / (radiance(1.0) - radiance(0.0))
-    judge = proof()
-    assert judge._scale_of(LATER_LINE) == pytest.approx(3 * float(ratio))
-    assert judge._scale_of(LINE) == pytest.approx(1.0)
-    assert proof(is_calibrated=False)._scale_of(LATER_LINE) == pytest.approx(3 * 0.5**2.2)
-    judge._scale[1] = 1.25
-    assert judge._scale_of(LATER_LINE) == 1.25
-
-
-def test_black_is_as_taken_or_follows_from_the_first_by_the_exposure() -> None:
-    judge, plain = proof(), proof(is_calibrated=False)
-    level, full = rig().sensor.black_level_dn, rig().sensor.full_scale_dn
-    old = counts(round(level) + 7)
-    assert judge._black(LATER_LINE, old) == pytest.approx(np.full(576, level + 3 * (old[0] - level)))
-    assert judge._black(LATER_LINE, counts(int(full))) == pytest.approx(np.full(576, full))
-    assert plain._black(LATER_LINE, old).tolist() == old.tolist(), "nobody knows how much of it is light"
-    for each in (judge, plain):
-        each._kept[27] = counts(333)
-        assert each._black(LATER_LINE, old).tolist() == [333.0] * 576
-    assert judge._black(SHOTS[27], old)[0] != 333.0, "a black is not compared with itself"
 
 
 def nothing() -> Shot | None:
@@ -210,38 +134,6 @@ def test_rivals_are_the_shots_before_and_after() -> None:
     assert judge._rivals(SHOTS[-1]) == [(Verdict.LATE, SHOTS[-2])]
 
 
-def lit_proof(light: Any = 1.0) -> tuple[FrameProof, Any]:
-    """A proof whose pixels all are located, three of each column and colour; what it would see of lines."""
-    judge: Any = proof()
-    key = np.repeat(np.arange(96), 3)
-    black, contrast = np.full(288, 100, np.float32), np.full(288, 1000, np.float32)
-    judge._code = SimpleNamespace(lit=Lit(np.arange(288), key, black, contrast, black))
-
-    def seen(shot: Shot) -> Counts:
-        profile = judge._profile(shot)
-        found = np.zeros(576, np.uint16)
-        found[:288] = 100 + light * 1000 * profile[key]
-        return found
-
-    return judge, seen
-
-
-def test_the_line_that_a_picture_shows_is_the_one_most_like_it_at_the_same_setting() -> None:
-    judge, seen = lit_proof()
-    assert [judge._line_shown(seen(shot), shot) for shot in SHOTS[12:16]] == list(SHOTS[12:16])
-    assert judge._line_shown(seen(SHOTS[12]), SHOTS[29]) == SHOTS[28]
-    assert judge._line_shown(np.full(576, 1100, np.uint16), LINE) == SHOTS[10], "white"
-    assert judge._line_shown(np.full(576, 100, np.uint16), LINE) is None
-    assert proof()._line_shown(counts(100), LINE) is None, "before the first code"
-
-
-@pytest.mark.parametrize(("light", "is_named"), [(0.24, True), (0.2, False)])
-def test_a_line_that_is_nearly_dark_has_no_name(light: float, is_named: bool) -> None:
-    # Of two columns of light each gets 0.85 of it.
-    judge, seen = lit_proof(light)
-    assert (judge._line_shown(seen(LINE), LINE) == LINE) == is_named
-
-
 def test_what_a_wrong_line_was_compared_with_is_taken_again_where_it_was_never_told() -> None:
     judge = proof()
     found = Finding(LATER_LINE, Verdict.LATE, (LATER_LINE,))
@@ -253,23 +145,6 @@ def test_what_a_wrong_line_was_compared_with_is_taken_again_where_it_was_never_t
     code = Finding(SHOTS[17], Verdict.LATE, (SHOTS[17],))
     judge._untold.add(1)
     assert judge._with_doubtful(code) is code
-
-
-def test_nothing_is_expected_of_what_was_not_seen_at_the_first_setting() -> None:
-    judge = proof()
-    assert judge._expected(LATER_LINE, LATER_LINE) is None
-    judge._kept[13] = counts(900)
-    assert judge._expected(LATER_LINE, LATER_LINE) is None
-    judge._kept[11], judge._kept[27], judge._scale[1] = counts(300), counts(310), 0.5
-    found = judge._expected(LATER_LINE, LATER_LINE)
-    assert found is not None
-    assert found.counts.tolist() == [310 + 0.5 * 600] * 576
-    black = judge._expected(SHOTS[27], LATER_LINE)
-    assert black is not None
-    assert black.counts.tolist() == [310.0] * 576
-    noise = judge._noise.variance
-    assert black.variance.tolist() == noise(counts(300)).tolist()
-    assert judge._earlier(SHOTS[29]) is judge._kept[13]
 
 
 def told(verdict: Verdict, again: tuple[Shot, ...] = ()) -> Any:
@@ -318,3 +193,18 @@ def test_controls_are_patterns_of_pairs_that_are_both_there() -> None:
     assert judge._code_pairs()[3][1] is judge._kept[7]
     assert proof().controls() == ()
     assert judge.first_setting == 0
+
+
+@pytest.mark.parametrize(("turned", "rises"), [(False, True), (True, False)])
+def test_columns_rise_as_the_calibration_says(turned: bool, rises: bool) -> None:
+    turned_rig = rig()
+    if turned:
+        about_the_axis = Pose(rotation=((-1, 0, 0), (0, -1, 0), (0, 0, 1)), translation_mm=(-70, 0, 0))
+        turned_rig = turned_rig.model_copy(update={"pose": about_the_axis})
+    code = FrameProof(PLAN, turned_rig)._code
+    assert code is not None
+    assert code._rises is not None
+    assert bool(code._rises) is rises
+    unknown = proof(is_calibrated=False)._code
+    assert unknown is not None
+    assert unknown._rises is None
