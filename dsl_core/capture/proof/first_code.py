@@ -67,6 +67,17 @@ class FirstCode:
         whole = not self._missing and len(self._ends) == 2
         return (self._review(shot) or found) if whole else found
 
+    def forget(self, shot: Shot) -> None:
+        """Forget the picture of a shot that seemed right; the other one of its pair is kept for the next."""
+        self._lit = None
+        self._ends.pop(shot.role, None)
+        if shot.role == "code":
+            number, inverse = divmod(shot.pattern, 2)
+            pair = self._pairs.pairs.pop(number, None)
+            self._half.pop(shot.pattern, None)
+            if pair is not None:
+                self._half[2 * number + 1 - inverse] = pair[1 - inverse]
+
     def _add_half(self, shot: Shot, seen: Counts) -> Finding:
         number, inverse = divmod(shot.pattern, 2)
         self._pairs.pairs.pop(number, None)  # a pair is taken again as a whole

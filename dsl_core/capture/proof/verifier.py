@@ -155,6 +155,8 @@ class FrameProof:
                 self._repeated = seen
         if self._repeated is not None and not found.is_wrong:
             if np.array_equal(seen, self._repeated):
+                if self._code is not None and shot.setting == self._first:
+                    self._code.forget(shot)
                 return Finding(shot, Verdict.REPEATED, (shot,))
             self._repeated = None
         return found

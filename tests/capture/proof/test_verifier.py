@@ -136,6 +136,18 @@ def test_a_picture_given_twice_is_called_repeated(scene: RenderedScene) -> None:
     assert "pixel by pixel" in found.sentence
 
 
+def test_a_first_picture_given_twice_is_taken_again_and_completes_its_pair(scene: RenderedScene) -> None:
+    rig, proof = scene.open(3), FrameProof(scene.plan, scene.calibration)
+    shots = [shot for shot in scene.plan.shots() if shot.index < 4]
+    pictures = [_take(rig, scene, shot) for shot in shots]
+    proof.judge(shots[0], pictures[0])
+    found = proof.judge(shots[1], pictures[0])
+    assert (found.verdict, found.again) == (Verdict.REPEATED, (shots[1],))
+    for shot, picture in zip(shots[1:], pictures[1:], strict=True):
+        assert not proof.judge(shot, picture).is_wrong
+    assert not {0, 1} & set(proof.lacking_pairs)
+
+
 def test_where_nothing_is_lit_the_second_pair_says_so(scene: RenderedScene) -> None:
     proof, rng = FrameProof(scene.plan, scene.calibration), np.random.default_rng(0)
     shots = [shot for shot in scene.plan.shots() if shot.index < 4]
