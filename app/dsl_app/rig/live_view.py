@@ -26,6 +26,8 @@ FIGURES_S = 0.25
 LOW_PX, HIGH_PX = 130, 640
 NO_RIG = "No picture yet. Connect a rig and start the live view."
 NO_PICTURE = "No picture yet. Start the live view."
+#: A simulated rig of the full size computes for seconds before it has the first one.
+WAITING = "Waiting for the camera's first picture…"
 #: Side of the cell of raw pixels that is shown as one, px.
 CELL_PX = 2
 _CHANNELS = ("R", "G", "B")
@@ -39,6 +41,7 @@ class LiveView(QWidget):
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self._camera: CameraInfo | None = None
+        self._is_live = False
         self._frame: Frame | None = None
         self._times: list[float] = []
         self._figures_at = 0.0
@@ -118,12 +121,20 @@ class LiveView(QWidget):
         self._read = None
         self.region_box.setChecked(False)
         self.region_box.setEnabled(camera is not None)
-        self._empty.setText(NO_RIG if camera is None else NO_PICTURE)
+        self._explain()
         self._empty.setVisible(True)
         for figure in (self._saturated, self._focus, self._rate, self._counts):
             figure.clear()
         if camera is not None:
             self._histogram.setXRange(0, 2**camera.bit_depth, padding=0)
+
+    def set_live(self, is_live: bool) -> None:
+        """Say whether a picture is on its way or has to be asked for."""
+        self._is_live = is_live
+        self._explain()
+
+    def _explain(self) -> None:
+        self._empty.setText(NO_RIG if self._camera is None else WAITING if self._is_live else NO_PICTURE)
 
     def show_frame(self, frame: Frame | None) -> None:
         """Show a frame."""

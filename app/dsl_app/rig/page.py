@@ -111,7 +111,11 @@ class RigPage(PageWidget):
         made.set_camera(self._state.camera)
         if self.is_wide:
             made.place_controls(self.beside)
-        self.stops += [state.frame.follow(made.show_frame), state.counts.follow(made.show_counts)]
+        self.stops += [
+            self._state.live.follow(made.set_live),
+            state.frame.follow(made.show_frame),
+            state.counts.follow(made.show_counts),
+        ]
         return made
 
     def _lay_out(self) -> None:

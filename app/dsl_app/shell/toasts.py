@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Callable, Mapping
 
 from PySide6.QtCore import QObject, Qt, QTimer, Signal
+from PySide6.QtGui import QCursor
 from PySide6.QtWidgets import QFrame, QMessageBox, QPushButton, QStatusBar, QWidget
 
 from dsl_app.shared.notify import Level
@@ -12,8 +14,14 @@ from dsl_app.shared.widgets.forms import label, push_button
 from dsl_app.shared.widgets.layouts import column_of, row_of
 from dsl_app.shared.wording import in_window
 
-#: How long a message is shown, ms; an error stays until it is closed.
+_log = logging.getLogger(__name__)
+_LEVELS = {"info": logging.INFO, "warning": logging.WARNING, "error": logging.ERROR}
+#: How long a message is shown, ms; the log keeps all of them.
 STAY_MS = {"info": 5000, "warning": 9000}
+#: How long an error is shown to a person who is there, ms: until the pointer has moved, nobody may be.
+ERROR_STAYS_MS = 45_000
+#: How often it is looked whether somebody is there, ms.
+LOOK_MS = 500
 MOST = 4
 #: A message that leaves by itself and is not wider than this, px, is told in the status bar.
 SHORT_PX = 420
@@ -59,6 +67,23 @@ class Toast(QFrame):
         self.words.setWordWrap(True)
         self.setContentsMargins(0, 4, 0, 4)
 
+    def leave_once_read(self) -> None:
+        """Close after `ERROR_STAYS_MS` with a person who is not pointing at the message."""
+        unmoved, left_ms = QCursor.pos(), ERROR_STAYS_MS
+        is_there = False
+
+        def look() -> None:
+            nonlocal is_there, left_ms
+            is_there = is_there or QCursor.pos() != unmoved
+            if is_there and not self.underMouse():
+                left_ms -= LOOK_MS
+            if left_ms <= 0:
+                self.dismiss()
+
+        watch = QTimer(self)
+        watch.timeout.connect(look)
+        watch.start(LOOK_MS)
+
     def dismiss(self) -> None:
         """Close the message."""
         self.hide()
@@ -100,7 +125,8 @@ class Toasts(QObject):
         return tuple(self._shown)
 
     def tell(self, level: Level, text: str, details: str = "") -> None:
-        """Show a sentence."""
+        """Show a sentence, and keep it in the log."""
+        _log.log(_LEVELS[level], "%s", in_window(text))
         self._show(Toast(level, in_window(text), details, self.strip), STAY_MS.get(level, 0))
 
     def offer(self, text: str, offers: Mapping[str, Callable[[], object]], stay_s: float = 0.0) -> None:
@@ -120,6 +146,8 @@ class Toasts(QObject):
             old.dismiss()
         if stay_ms:
             QTimer.singleShot(stay_ms, toast, toast.dismiss)
+        elif toast.level == "error":
+            toast.leave_once_read()
         self._place(toast, bool(stay_ms))
         toast.show()
 

@@ -48,6 +48,7 @@ _FIRST = (
     "cv2",
     "torch",
     "dsl_core.simulation.sim_devices",
+    "dsl_core.simulation.rendering.kernels",
     "dsl_core.pipeline",
 )
 #: Calibrations, results and the 3D view.

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import threading
 from collections.abc import Iterator
 
 import numpy as np
@@ -7,6 +8,7 @@ import pytest
 from dsl_app.connection.controller import RigController
 from dsl_app.connection.state import Link, RigChoice, RigState
 from dsl_app.rig.controller import LiveController
+from dsl_app.rig.live_view import NO_RIG, WAITING
 from dsl_app.rig.options_form import parse_options
 from dsl_app.rig.page import RigPage
 from dsl_app.shared.jobs.qt_runner import QtRunner
@@ -17,6 +19,8 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QPushButton
 from pytestqt.qtbot import QtBot
 
+from dsl_core.model.frames import Frame
+from dsl_core.simulation.sim_devices import SimCamera
 from tests.app.support.doubles import RecordingNotifier
 
 Bench = tuple[RigPage, RigState, QtRunner, RecordingNotifier]
@@ -56,6 +60,26 @@ def test_connect_look_and_leave(qtbot: QtBot, bench: Bench) -> None:
     click(page.connect_button)
     qtbot.waitUntil(lambda: runner.active == ())
     assert page.camera_text.text() == "–"
+
+
+def test_the_page_says_that_the_first_picture_is_on_its_way(
+    qtbot: QtBot, bench: Bench, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    page, state, _, _ = bench
+    may_look, snap = threading.Event(), SimCamera.snap
+
+    def slowly(self: SimCamera, timeout_ms: float = 5000.0) -> Frame:
+        may_look.wait()
+        return snap(self, timeout_ms)
+
+    monkeypatch.setattr(SimCamera, "snap", slowly)
+    empty = page.live.content._empty
+    assert empty.text() == NO_RIG
+    connect(qtbot, page, state)
+    qtbot.waitUntil(lambda: state.live.value)
+    assert empty.text() == WAITING
+    may_look.set()
+    qtbot.waitUntil(empty.isHidden, timeout=90_000)
 
 
 def test_connecting_projects_what_the_panel_names_and_exposes_for_it(qtbot: QtBot, bench: Bench) -> None:

@@ -10,10 +10,13 @@ import pytest
 from dsl_app.shared.jobs.base import Job
 from dsl_app.shared.undo import Change
 from dsl_app.shared.widgets.page import PageWidget
+from dsl_app.shell import toasts
 from dsl_app.shell.actions import ACTIONS, PAGES
 from dsl_app.shell.application import ExceptionHook, make_window, open_first_page
 from dsl_app.shell.main_window import MainWindow
 from PySide6.QtCore import QPoint
+from PySide6.QtGui import QCursor
+from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QFileDialog, QLabel, QMessageBox, QVBoxLayout
 from pytestqt.qtbot import QtBot
 
@@ -135,6 +138,29 @@ def test_themes_reach_the_whole_window(window: MainWindow) -> None:
     window.do("theme_dark")
     assert window.theme.name == "dark"
     assert window.palette().window().color().name() == window.theme.window
+
+
+def test_an_error_stays_until_somebody_was_there_to_read_it(
+    window: MainWindow, qtbot: QtBot, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    monkeypatch.setattr(toasts, "ERROR_STAYS_MS", 40)
+    monkeypatch.setattr(toasts, "LOOK_MS", 10)
+    window.show()
+    QCursor.setPos(0, 0)
+    window.toasts.tell("error", "The camera does not answer.")
+    QTest.qWait(80)
+    assert window.toasts.shown
+    (toast,) = window.toasts.shown
+    QCursor.setPos(toast.mapToGlobal(toast.rect().center()))
+    QTest.mouseMove(toast)
+    QTest.qWait(80)
+    assert window.toasts.shown
+    QCursor.setPos(1, 1)
+    QTest.mouseMove(window.stack)
+    qtbot.waitUntil(lambda: not window.toasts.shown)
+    assert not window.toasts.strip.isVisible()
+    # Who was too late reads it in the log.
+    assert ("ERROR", "The camera does not answer.") in [(r.levelname, r.message) for r in caplog.records]
 
 
 def test_toasts_leave_when_closed_and_never_pile_up(window: MainWindow) -> None:

@@ -16,7 +16,7 @@ from dsl_app.shared.widgets.pictures import PictureView
 from dsl_core.capture.preview import MANY_SATURATED
 
 TABLE_PX = 166
-NO_PICTURE = "No picture yet. It appears with the first look."
+NO_PICTURE = "No picture yet. It comes with the first check."
 
 
 class StepPage(QWidget):
@@ -30,7 +30,7 @@ class StepPage(QWidget):
         self.drawing = PlacementDrawing()
         self.picture = LiveFrameView()
         self.verdict = label("", "muted", wraps=True, name="Whether the target is right")
-        self.figures = FiguresTable("What the look found")
+        self.figures = FiguresTable("What the check found")
         self.figures.setFixedHeight(TABLE_PX)
         self._lay_out()
         shown = (state.at, state.statuses, state.look, state.doing, state.is_checking)
