@@ -70,121 +70,6 @@ class ProvenShots:
         late = " Everything was captured twice, since pictures came one late." if self._is_late else ""
         return f" {what} captured again, because a picture did not show its pattern.{late}"
 
-    def take(self, shot: Shot) -> None:
-        """Take a shot and save it.
-
-        Raises `DeviceError` when it does not show its pattern however often it is taken, `StoreError` when it
-        cannot be saved, `Cancelled` when someone requested the end. What could not be judged since a picture
-        last showed its pattern, and the pictures just before, are then withdrawn: they may be wrong already.
-        """
-        try:
-            self._take(shot)
-        except PictureError as error:
-            self._withdraw(error, shot)
-
-    def conclude(self) -> None:
-        """Where the last pictures could not be judged, see that devices and scene are as they were.
-
-        Raises `DeviceError` if they are not, after withdrawing those pictures.
-        """
-        if self._proof is None or not self._untold:
-            return
-        try:
-            self._require_control(self._proof)
-        except PictureError as error:
-            self._withdraw(error)
-        self._untold.clear()
-
-    def _withdraw(self, error: PictureError, latest: Shot | None = None) -> NoReturn:
-        """Remove the pictures that may be wrong for the same reason, and say so.
-
-        The ``latest`` was not saved.
-        """
-        doubted = {*self._untold, *self._recent, *error.wrong} - {latest}
-        withdrawn = sorted((shot for shot in doubted if shot), key=lambda shot: shot.index)
-        self._untold.clear()
-        self._recent.clear()
-        if not withdrawn:
-            raise error
-        self._sink.withdraw(withdrawn)
-        first, last = withdrawn[0].index, withdrawn[-1].index
-        which, them = f"{len(withdrawn)} frames between {first} and {last}", "them"
-        if len(withdrawn) == 1:
-            which, them = f"Frame {first}", "it"
-        raise PictureError(
-            f"{error} {which}, captured just before or not judged in full, may be wrong too; the resumed scan"
-            f" captures {them} again.",
-            error.wrong,
-        ) from error
-
-    def _take(self, shot: Shot) -> None:
-        frame = self._taker.take(shot, twice=self._is_late)
-        if self._proof is None:
-            self._sink.write(shot, frame)
-            return
-        found = self._proof.judge(shot, frame.pixels)
-        if found.is_doubtful and not self._is_late:
-            frame, found = self._ask_again(found, frame, self._proof)
-        if shot not in found.again:
-            self._sink.write(shot, frame)
-            self._diagnosis.keep(shot, frame.pixels)
-            self._recent.append(shot)
-        if found.is_wrong:
-            self._failures += 1
-        elif found.verdict is Verdict.RIGHT:
-            self._failures = 0
-        if _is_sure(found):
-            self._untold.clear()
-        elif not found.is_wrong and self._is_alone(shot):
-            self._untold.append(shot)
-        self._correct(found, self._proof)
-        if self._failures >= FAILURES and not self._is_late:
-            self._be_late(shot, self._proof)
-
-    def _is_alone(self, shot: Shot) -> bool:
-        """Whether a shot is judged by itself: those of the first code are by what they are together."""
-        return shot.role == "spectral" or (
-            self._proof is not None and shot.setting != self._proof.first_setting
-        )
-
-    def _ask_again(self, doubt: Finding, frame: Frame, proof: FrameProof) -> tuple[Frame, Finding]:
-        """A second picture of a shot that may be wrong, and what it shows."""
-        second = self._taker.take(doubt.shot, 1, SETTLE_MS[0], twice=True)
-        differs = proof.differ(frame.pixels, second.pixels)
-        found = proof.judge(doubt.shot, second.pixels)
-        is_cured = doubt.verdict is Verdict.RIGHT and not found.is_doubtful
-        if differs or is_cured:
-            self._failures += 1
-            self.corrected += 1
-            was_torn = is_cured and doubt.light is not Light.STEP
-            reason = (
-                "a few rows of it showed another pattern" if was_torn else "it was unlike those before it"
-            )
-            return replace(second, corrected=reason), found
-        if found.light is Light.STEP or self._doubts % CONTROL_EVERY == 0:
-            self._require_control(proof)
-            proof.believe_light(doubt.shot)
-        self._doubts += 1
-        return second, found
-
-    def _be_late(self, shot: Shot, proof: FrameProof) -> None:
-        """Expect every picture to be late from now on, and so of those before that could not be told."""
-        self._require_control(proof)
-        self._is_late = True
-        _log.warning(
-            "Pictures are wrong one after the other, as if projector or camera were one picture late. From %s"
-            " on, everything is shown and captured twice, and the second picture is kept.",
-            describe_shot(shot),
-        )
-        for each in self._untold:
-            frame = replace(self._taker.take(each, 1, SETTLE_MS[0], twice=True), corrected="it may be late")
-            found = proof.judge(each, frame.pixels)
-            if each not in found.again:
-                self._sink.write(each, frame)
-                self.corrected += 1
-            self._correct(found, proof)
-        self._untold.clear()
-
     def learn(self, stored: FrameSource, missing: Collection[int]) -> None:
         """Judge the frames of earlier runs, all but those ``missing``; wrong ones are taken again.
 
@@ -210,10 +95,140 @@ class ProvenShots:
         for shot in again:
             self.take(shot)
 
+    def take(self, shot: Shot) -> None:
+        """Take a shot and save it.
+
+        Raises `DeviceError` when it does not show its pattern however often it is taken, `StoreError` when it
+        cannot be saved, `Cancelled` when someone requested the end. What could not be judged since a picture
+        last showed its pattern, and the pictures just before, are then withdrawn: they may be wrong already.
+        """
+        try:
+            self._take(shot)
+        except PictureError as error:
+            self._withdraw(error, shot)
+
+    def conclude(self) -> None:
+        """Where the last pictures could not be judged, see that devices and scene are as they were.
+
+        Raises `DeviceError` if they are not, after withdrawing those pictures.
+        """
+        if self._proof is None or not self._untold:
+            return
+        try:
+            self._require_control(self._proof)
+        except PictureError as error:
+            self._withdraw(error)
+        self._untold.clear()
+
+    def _take(self, shot: Shot) -> None:
+        frame = self._taker.take(shot, twice=self._is_late)
+        if self._proof is None:
+            self._sink.write(shot, frame)
+            return
+        found = self._proof.judge(shot, frame.pixels)
+        if found.is_doubtful and not self._is_late:
+            frame, found = self._ask_again(found, frame, self._proof)
+        if shot not in found.again:
+            self._save(shot, frame, found)
+        if found.is_wrong:
+            self._failures += 1
+        elif found.verdict is Verdict.RIGHT:
+            self._failures = 0
+        if _is_sure(found):
+            self._untold.clear()
+        self._correct(found, self._proof)
+        if self._failures >= FAILURES and not self._is_late:
+            self._be_late(shot, self._proof)
+
+    def _again(self, shot: Shot, earlier: int = 0) -> Frame:
+        """Another picture of a shot, shown twice and for longer; ``earlier`` is how often that was done."""
+        return self._taker.take(shot, earlier + 1, SETTLE_MS[earlier], twice=True)
+
+    def _save(self, shot: Shot, frame: Frame, found: Finding) -> None:
+        """Save a picture that was not found wrong, and note if little is known of it."""
+        self._sink.write(shot, frame)
+        self._diagnosis.keep(shot, frame.pixels)
+        self._recent.append(shot)
+        if not _is_sure(found) and self._is_alone(shot) and shot not in self._untold:
+            self._untold.append(shot)
+
+    def _is_alone(self, shot: Shot) -> bool:
+        """Whether a shot is judged by itself: those of the first code are by what they are together."""
+        return shot.role == "spectral" or (
+            self._proof is not None and shot.setting != self._proof.first_setting
+        )
+
+    def _ask_again(self, doubt: Finding, frame: Frame, proof: FrameProof) -> tuple[Frame, Finding]:
+        """A second picture of a shot that may be wrong, and what it shows."""
+        second = self._again(doubt.shot)
+        differs = proof.differ(frame.pixels, second.pixels)
+        found = proof.judge(doubt.shot, second.pixels)
+        is_cured = doubt.verdict is Verdict.RIGHT and not found.is_doubtful
+        if differs or is_cured:
+            self._failures += 1
+            self.corrected += 1
+            was_torn = is_cured and doubt.light is not Light.STEP
+            reason = (
+                "a few rows of it showed another pattern" if was_torn else "it was unlike those before it"
+            )
+            return replace(second, corrected=reason), found
+        if found.light is Light.STEP or self._doubts % CONTROL_EVERY == 0:
+            self._require_control(proof)
+            proof.believe_light(doubt.shot)
+        self._doubts += 1
+        return second, found
+
+    def _correct(self, found: Finding, proof: FrameProof) -> None:
+        for earlier in range(len(SETTLE_MS)):
+            if not found.is_wrong:
+                return
+            if self._token.is_cancelled:
+                raise Cancelled(f"Cancelled: {found.sentence} Frames that do are saved. Resume the scan.")
+            _log.warning("%s It is captured again.", found.sentence)
+            reason, wrong = found.seen, found.again
+            taken: list[tuple[Shot, Frame, Finding]] = []
+            for shot in wrong:
+                frame = replace(self._again(shot, earlier), corrected=reason)
+                taken.append((shot, frame, proof.judge(shot, frame.pixels)))
+            found = _together([each for *_, each in taken])
+            if len(wrong) > 1 and wrong[0].role == "spectral" and not found.is_wrong:
+                # They agree now; but so do two wrong ones, and the earlier one may have been right.
+                self._require_control(proof)
+            for shot, frame, shown in taken:
+                if shot not in found.again:
+                    self._save(shot, frame, shown)
+                    self.corrected += 1
+        if found.is_wrong:
+            reason = self._explain() or f"{found.remedy} Resume the scan afterwards."
+            raise PictureError(
+                f"{found.names.capitalize()} does not show its pattern after {len(SETTLE_MS) + 1} exposures:"
+                f" {found.seen}. {reason} Frames before it are saved. If the pictures are right all the same,"
+                " resume without checking that the scene has not moved.",
+                found.again,
+            )
+
+    def _be_late(self, shot: Shot, proof: FrameProof) -> None:
+        """Expect every picture to be late from now on, and so of those before that could not be told."""
+        self._require_control(proof)
+        self._is_late = True
+        _log.warning(
+            "Pictures are wrong one after the other, as if projector or camera were one picture late. From %s"
+            " on, everything is shown and captured twice, and the second picture is kept.",
+            describe_shot(shot),
+        )
+        for each in tuple(self._untold):
+            frame = replace(self._again(each), corrected="it may be late")
+            found = proof.judge(each, frame.pixels)
+            if each not in found.again:
+                self._save(each, frame, found)
+                self.corrected += 1
+            self._correct(found, proof)
+        self._untold.clear()
+
     def _require_control(self, proof: FrameProof) -> None:
         """Raise `DeviceError` unless a picture of the first code still looks as it did at first."""
         for control in proof.controls():
-            frame = self._taker.take(control, 1, SETTLE_MS[0], twice=True)
+            frame = self._again(control)
             if proof.is_as_before(control, frame.pixels):
                 continue
             reason = self._explain() or (
@@ -229,44 +244,32 @@ class ProvenShots:
     def _explain(self) -> str:
         """What has changed since the scan began, and what to do; empty where that does not show."""
         try:
-            return self._diagnosis.sentence(
-                lambda shot: self._taker.take(shot, 1, SETTLE_MS[0], twice=True).pixels
-            )
+            return self._diagnosis.sentence(lambda shot: self._again(shot).pixels)
         except DeviceError as error:
             _log.warning("No pictures could be taken to see what has changed: %s", error)
             return ""
 
-    def _correct(self, found: Finding, proof: FrameProof) -> None:
-        for earlier, settle_ms in enumerate(SETTLE_MS):
-            if not found.is_wrong:
-                return
-            if self._token.is_cancelled:
-                raise Cancelled(f"Cancelled: {found.sentence} Frames that do are saved. Resume the scan.")
-            _log.warning("%s It is captured again.", found.sentence)
-            reason, wrong = found.seen, found.again
-            taken: list[tuple[Shot, Frame]] = []
-            again: list[Finding] = []
-            for shot in wrong:
-                frame = replace(self._taker.take(shot, earlier + 1, settle_ms, twice=True), corrected=reason)
-                taken.append((shot, frame))
-                again.append(proof.judge(shot, frame.pixels))
-            found = _together(again)
-            if len(wrong) > 1 and wrong[0].role == "spectral" and not found.is_wrong:
-                # They agree now; but so do two wrong ones, and the earlier one may have been right.
-                self._require_control(proof)
-            for shot, frame in taken:
-                if shot not in found.again:
-                    self._sink.write(shot, frame)
-                    self._diagnosis.keep(shot, frame.pixels)
-                    self.corrected += 1
-        if found.is_wrong:
-            reason = self._explain() or f"{found.remedy} Resume the scan afterwards."
-            raise PictureError(
-                f"{found.names.capitalize()} does not show its pattern after {len(SETTLE_MS) + 1} exposures:"
-                f" {found.seen}. {reason} Frames before it are saved. If the pictures are right all the same,"
-                " resume without checking that the scene has not moved.",
-                found.again,
-            )
+    def _withdraw(self, error: PictureError, latest: Shot | None = None) -> NoReturn:
+        """Remove the pictures that may be wrong for the same reason, and say so.
+
+        The ``latest`` is among them if it was saved, because others were wrong.
+        """
+        doubted = {*self._untold, *self._recent, *(shot for shot in error.wrong if shot != latest)}
+        withdrawn = sorted(doubted, key=lambda shot: shot.index)
+        self._untold.clear()
+        self._recent.clear()
+        if not withdrawn:
+            raise error
+        self._sink.withdraw(withdrawn)
+        first, last = withdrawn[0].index, withdrawn[-1].index
+        which, them = f"{len(withdrawn)} frames between {first} and {last}", "them"
+        if len(withdrawn) == 1:
+            which, them = f"Frame {first}", "it"
+        raise PictureError(
+            f"{error} {which}, captured just before or not judged in full, may be wrong too; the resumed scan"
+            f" captures {them} again.",
+            error.wrong,
+        ) from error
 
 
 def _is_sure(found: Finding) -> bool:

@@ -310,6 +310,29 @@ def test_saved_frames_that_turn_out_wrong_for_good_are_withdrawn() -> None:
     assert bench.withdrawn == [2], "the latest was not saved"
 
 
+def test_a_picture_that_was_taken_again_is_withdrawn_with_those_around_it() -> None:
+    bench = Bench(is_right, late, is_right, late)
+    with pytest.raises(PictureError, match="2 frames between 12 and 13"):
+        take_all(bench, SHOTS[12:15])
+    assert bench.withdrawn == [12, 13]
+
+
+def test_a_picture_that_was_saved_before_earlier_ones_turned_out_wrong_is_withdrawn_with_them() -> None:
+    bench = Bench(lambda shot: Finding(shot, Verdict.SATURATED, SHOTS[:2]))
+    with pytest.raises(PictureError, match="3 frames between 0 and 3"):
+        bench.shots.take(CODE)
+    assert bench.written == {3: ""}
+    assert bench.withdrawn == [0, 1, 3]
+
+
+def test_a_line_taken_again_that_cannot_be_told_is_followed_by_a_control_at_the_end() -> None:
+    bench = Bench(late, untold)
+    bench.shots.take(LINE)
+    assert bench.taken == [(13, 0, 0.0, False), (13, 1, 100.0, True)]
+    bench.shots.conclude()
+    assert bench.taken[2:] == CONTROLS
+
+
 def test_two_lines_that_agree_after_a_second_take_are_believed_after_a_control() -> None:
     both = (SHOTS[12], LINE)
     bench = Bench(lambda shot: Finding(shot, Verdict.LATE, both), is_right)
