@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from dsl_core.cli.options import parse_size
 from dsl_core.cli.output import Output
-from dsl_core.errors import PlanError
+from dsl_core.errors import PlanError, StoreError
 
 if TYPE_CHECKING:
     from dsl_core.io.linearity import Linearity
@@ -17,6 +17,8 @@ if TYPE_CHECKING:
 
 #: What is left out of a table between its first and its last lines.
 HEAD_LINES, TAIL_LINES = 30, 10
+#: A mapping that lets fewer of the lit pixels be decoded is likely wrong.
+FAIR_SHARE = 0.5
 #: Endings of files with lenses and pose.
 STEREO_FILES = {".xml", ".yml", ".yaml", ".json"}
 
@@ -54,6 +56,7 @@ def import_capture(
             mapping = mapping.model_copy(update={"encoding": encoding})
         _print(output, mapping, arrange(source, mapping).table)
     _print_linearity(output, source, mapping)
+    _print_decided(output, source, mapping, options)
     if target is not None:
         with output.progress() as progress:
             captures.import_pictures(source, target, mapping, rig, progress)
@@ -129,7 +132,7 @@ def _guessed(output: Output, source: Path, rig: Rig | None, options: PictureOpti
     with output.progress() as progress:
         guess = guess_mapping(source, size, options.chosen, progress, encoding_named(options.encoding))
     _print(output, guess.mapping, guess.table)
-    path = options.mapping or Path(f"{source.absolute().name}.mapping.json")
+    path = _mapping_path(source, options)
     write_record(path, guess.mapping, overwrite=options.force, sealed=False)
     output.say(f"The mapping is saved in {path}; correct it there and use it with --mapping.")
     output.put(mapping=path, others=list(guess.others))
@@ -155,6 +158,35 @@ def _print_linearity(output: Output, source: Path, mapping: Mapping) -> None:
     if found.is_wrong:
         output.say(f"Warning: {advice}.")
     output.put(encoding=mapping.encoding, linearity=linearity_facts(found))
+
+
+def _print_decided(output: Output, source: Path, mapping: Mapping, options: PictureOptions) -> None:
+    """How many lit pixels the mapping decodes; raises `StoreError` where a guess decodes few."""
+    from math import isnan
+
+    from dsl_core.io.pictures.source import open_pictures
+    from dsl_core.workflows.thinned import decided_share
+
+    with output.progress() as progress:
+        share = decided_share(open_pictures(source, mapping), progress)
+    told = "no pixel is lit" if isnan(share) else f"{share:.0%} of the lit pixels have a position"
+    output.say(f"Decoded: {told}.")
+    output.put(decided_share=None if isnan(share) else round(share, 4))
+    if share >= FAIR_SHARE:
+        return
+    advice = "compare its code, order of digits, fringes and inverses with what was projected"
+    if options.guess:
+        path = _mapping_path(source, options)
+        raise StoreError(
+            f"With what was guessed, {told}: it is likely wrong, and nothing was imported. Correct {path}"
+            f" ({advice}), and use it with --mapping instead of --guess."
+        )
+    output.say(f"Warning: the mapping is likely wrong; {advice}.")
+
+
+def _mapping_path(source: Path, options: PictureOptions) -> Path:
+    """Where a guessed mapping is saved."""
+    return options.mapping or Path(f"{source.absolute().name}.mapping.json")
 
 
 def linearity_facts(found: Linearity) -> dict[str, Any]:

@@ -200,5 +200,6 @@ def decode_columns_of(source: FrameSource, sensor: Sensor, progress: Progress | 
         "flags": flags,
     }
     if code.row is not None:
-        arrays["row_px"] = np.where(good & (code.row >= 0), code.row, np.nan).astype(np.float32)
+        # Rows are known also where columns are not, or not coded at all.
+        arrays["row_px"] = np.where(lit & (code.row >= 0), code.row, np.nan).astype(np.float32)
     return build_result(arrays, np.empty(0), {"plan": source.plan.name})

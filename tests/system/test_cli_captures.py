@@ -95,3 +95,20 @@ def test_values_are_judged_before_and_after_an_import(
     assert "belong to a stereo file" in capsys.readouterr().err
     assert main(["import", "set", "--guess", "--encoding", "gamma"]) == 2
     assert "must be linear or srgb" in capsys.readouterr().err
+
+
+def test_a_guess_that_decodes_little_is_kept_but_not_imported(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    pictures, white, black = frames([("columns", Stripes(bits=7))])
+    write(tmp_path / "set", {f"im{i:02d}.png": p for i, p in enumerate([*pictures, white, black])})
+    line = ["import", "set", "--guess", "--projector", "128x96"]
+    assert main([*line, "-o", "a.dsl", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["decided_share"] > 0.95
+    monkeypatch.setattr("dsl_core.cli.captures.FAIR_SHARE", 1.1)
+    assert main([*line, "-o", "b.dsl", "--force"]) == 2
+    assert "nothing was imported. Correct set.mapping.json" in capsys.readouterr().err
+    assert not Path("b.dsl").exists()
+    assert main(["import", "set", "--mapping", "set.mapping.json"]) == 0
+    assert "Warning: the mapping is likely wrong" in " ".join(capsys.readouterr().out.split())

@@ -76,3 +76,14 @@ def test_the_example_of_the_help_page_runs() -> None:
     names: dict[str, Any] = {"pictures": pictures, "white": white, "black": black, "rig": rig}
     exec(example, names)
     assert np.asarray(names["depth_mm"]).shape == (120, 160)
+
+
+def test_rows_alone_are_told() -> None:
+    pictures, white, black = frames([("rows", Stripes(bits=7))])
+    code = CapturedCode(row_sets=(Stripes(bits=7),))
+    result = decode_stack(pictures, code, PROJECTOR, white, black)
+    error = result["row_px"].values - scene().rows
+    known = np.isfinite(error)
+    assert known.mean() > 0.95
+    assert np.percentile(np.abs(error[known]), 97) < 0.55
+    assert not np.isfinite(result["column_px"].values).any()

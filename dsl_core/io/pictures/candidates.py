@@ -10,7 +10,7 @@ from pathlib import Path
 
 from dsl_core.errors import StoreError
 from dsl_core.io.pictures.arrange import natural, picture_files
-from dsl_core.io.pictures.picture_file import ARRAYS, Picture, pictures_in
+from dsl_core.io.pictures.picture_file import ARRAYS, NOT_READ, PAGED, Picture, pictures_in
 
 #: Fewer pictures are no code, more are several captures.
 FEWEST, MOST = 4, 512
@@ -47,14 +47,13 @@ def candidates(folder: Path) -> tuple[list[Candidate], list[Candidate]]:
     files: list[Path] = []
     for patterns in _EVERYTHING:
         files = picture_files(folder, patterns)
-        if len(files) >= FEWEST or any(path.suffix.lower() in ARRAYS for path in files):
+        if len(files) >= FEWEST or any(path.suffix.lower() in ARRAYS | PAGED for path in files):
             break
     pictures = [picture for path in files for picture in pictures_in(path)]
     if len(pictures) < FEWEST:
         raise StoreError(
             f"{folder} contains {len(pictures)} pictures (PNG, TIFF, JPEG, BMP, PGM or NPY); a capture has at"
-            f" least {FEWEST}. Give the folder of one capture, convert camera raw files to TIFF, or state raw"
-            " in a mapping."
+            f" least {FEWEST}. {_advice(folder)}"
         )
     groups: dict[str, list[Path]] = {}
     for path in files:
@@ -75,6 +74,16 @@ def candidates(folder: Path) -> tuple[list[Candidate], list[Candidate]]:
         for candidate in _variants(folder, group, files, _name(folder, group))
     ]
     return whole, single
+
+
+def _advice(folder: Path) -> str:
+    """What to do about a folder without enough pictures, by what else there is in it."""
+    for path in sorted(folder.iterdir()):
+        known = NOT_READ.get(path.suffix.lower())
+        if known is not None and path.is_file():
+            what, advice = known
+            return f"{path.name} is {what}, which is not read. {advice}."
+    return "Give the folder of one capture, convert camera raw files to TIFF, or state raw in a mapping."
 
 
 def _variants(folder: Path, group: Sequence[Path], files: Sequence[Path], name: str) -> Iterator[Candidate]:

@@ -14,7 +14,7 @@ from dsl_core.errors import StoreError
 from dsl_core.io.pictures.arrange import arrange
 from dsl_core.io.pictures.candidates import FEWEST, Candidate, candidates, jump_of
 from dsl_core.io.pictures.encoding import guessed_encoding
-from dsl_core.io.pictures.guessed_parts import guessed_size, part_of
+from dsl_core.io.pictures.guessed_parts import guessed_size, is_turned, part_of
 from dsl_core.io.pictures.mapping import Mapping
 from dsl_core.io.pictures.picture_file import load_values
 from dsl_core.model.rig import BayerPattern
@@ -122,17 +122,30 @@ def _recognised(look: _Look, slots: tuple[int | None, ...]) -> Recognised | None
 def _single_instead(
     best: tuple[Candidate, _Look, Recognised], single: Sequence[Candidate]
 ) -> tuple[Candidate, _Look, Recognised] | None:
-    """The first of several sets where it codes all that they code together, as with two cameras."""
-    first = single[0]
-    try:
-        look = _look_at(first)
-    except StoreError:
-        return None
-    found = None if None in first.pictures else _recognised(look, tuple(range(len(first.pictures))))
-    if found is None or found.misfit > DOUBTFUL or found.axes != best[2].axes:
-        return None
+    """The first of several sets that show the same, as those of two cameras do; None for parts of one."""
     # Stripes in one folder and the sinusoids that they count in another belong together.
-    return (first, look, found) if _alike(single) else None
+    if not _alike(single) or len(single) < 2:
+        return None
+    found = []
+    for each in single[:2]:
+        try:
+            look = _look_at(each)
+        except StoreError:
+            return None
+        read = None if None in each.pictures else _recognised(look, tuple(range(len(each.pictures))))
+        if read is None or read.misfit > DOUBTFUL:
+            return None
+        found.append((each, look, read))
+    # Names with the time of day begin a new set each minute, in the middle of a code.
+    if found[0][2].content != found[1][2].content or _is_split(best[2], found[0][2]):
+        return None
+    return found[0]
+
+
+def _is_split(whole: Recognised, part: Recognised) -> bool:
+    """Whether sets are the pictures and the inverses of one code: as many digits each as together."""
+    together, alone = whole.digits, part.digits
+    return together == alone and whole.has_inverses and not part.has_inverses
 
 
 def _alike(single: Sequence[Candidate]) -> bool:
@@ -230,9 +243,14 @@ def _guess_of(
 ) -> Guess:
     unsure = list(look.notes)
     size, doubt = (size_px, "") if size_px else guessed_size(found.blocks)
-    parts = []
+    parts, turned = [], is_turned(found.blocks, size)
+    if turned:
+        unsure.append(
+            f"numbers fit a projector of {size[0]} x {size[1]} px only where its columns run down the"
+            " picture: the camera is taken to be turned by 90 degrees"
+        )
     for block in found.blocks:
-        part, doubts = part_of(block, found.blocks, size, look.probes)
+        part, doubts = part_of(block, found.blocks, size, look.probes, turned)
         parts.append(part)
         unsure += doubts
     if doubt:

@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from math import gcd
 
 import numpy as np
 
+from dsl_core.errors import StoreError
 from dsl_core.io.pictures.mapping import BlackPicture, Part, PhasePictures, StripePictures, WhitePicture
+from dsl_core.model.captured_code import Axis
 from dsl_core.patterns.recognition.phase_sets import PhaseReading, turns_per_number
 from dsl_core.patterns.recognition.probes import Probes
 from dsl_core.patterns.recognition.sequence import Block
@@ -20,6 +23,8 @@ COMMON_PX = (
 )  # fmt: skip
 #: Phases disagree by so many times more with the next reading, or which one it is stays unsure.
 CLEARLY_WORSE = 2.0
+#: Numbers may exceed the projector by so much, because a few pixels are read wrongly.
+MOST_BEYOND = 1.02
 Size = tuple[int, int]
 
 
@@ -46,35 +51,68 @@ def guessed_size(blocks: Sequence[Block]) -> tuple[Size, str]:
         first, second = (2 ** each[0] if each else None for each in wanted)
         size = first or (second or 768) * 4 // 3, second or (first or 1024) * 3 // 4
     seen = " and ".join(f"{bits} bits of {axis} up to {most}" for axis, (bits, most) in need.items())
-    return size, f"{seen} were seen: a projector of {size[0]} x {size[1]} px is assumed; give --projector"
+    told = f"{seen} were seen: a projector of {size[0]} x {size[1]} px is assumed; give --projector"
+    if size[1] > size[0] or "columns" not in need:
+        told += ", also where the camera is turned by 90 degrees instead"
+    return size, told
 
 
-def part_of(block: Block, blocks: Sequence[Block], size_px: Size, probes: Probes) -> tuple[Part, list[str]]:
-    """The part of a mapping for a block, and sentences about what is unsure."""
+def is_turned(blocks: Sequence[Block], size_px: Size) -> bool:
+    """Whether stripes fit a projector only where its columns run down the picture, turned by 90°."""
+    spans = [
+        (block.axis, block.reading.numbers[1] - block.reading.numbers[0])
+        for block in blocks
+        if isinstance(block.reading, StripeReading)
+    ]
+    fits = [span < (size_px[0] if axis == "columns" else size_px[1]) for axis, span in spans]
+    turned = [span < (size_px[1] if axis == "columns" else size_px[0]) for axis, span in spans]
+    return bool(spans) and all(turned) and not all(fits)
+
+
+def part_of(
+    block: Block, blocks: Sequence[Block], size_px: Size, probes: Probes, turned: bool = False
+) -> tuple[Part, list[str]]:
+    """The part of a mapping for a block, and sentences about what is unsure.
+
+    Raises `StoreError` when there are more numbers than the projector has places, or when sinusoids have
+    several periods and nothing counts them.
+    """
+    axis: Axis = block.axis
+    if turned:
+        axis = "rows" if block.axis == "columns" else "columns"
     if isinstance(block.reading, StripeReading):
-        return _stripes(block, block.reading, size_px)
+        return _stripes(axis, block.reading, size_px)
     if isinstance(block.reading, PhaseReading):
-        return _phases(block, block.reading, blocks, size_px, probes)
+        return _phases(axis, block, block.reading, blocks, size_px, probes)
     return (WhitePicture() if block.kind == "white" else BlackPicture()), []
 
 
-def _stripes(block: Block, reading: StripeReading, size_px: Size) -> tuple[Part, list[str]]:
-    length = size_px[0] if block.axis == "columns" else size_px[1]
+def _stripes(axis: Axis, reading: StripeReading, size_px: Size) -> tuple[Part, list[str]]:
+    length = size_px[0] if axis == "columns" else size_px[1]
     unit = _unit(reading, length)
+    low, high = reading.numbers
+    if (high - low) * unit > MOST_BEYOND * length:
+        raise StoreError(
+            f"The pictures show numbers {low} to {high} of {axis}, more than the {length} of the projector."
+            " Give its right size (--projector)."
+        )
     # Several programs put the middle of the numbers in the middle of the projector.
     spare = 2**reading.bits - -(-length // unit)
     offset = spare // 2 if reading.numbers[1] * unit >= length and spare > 0 else 0
     doubts = []
     if offset:
+        doubts.append(f"numbers of {axis} exceed {length}: they are taken to be centred on the projector")
+    if unit > 1:
         doubts.append(
-            f"numbers of {block.axis} exceed {length}: they are taken to be centred on the projector"
+            f"{reading.bits} bits of {axis} are fewer than {length} px need: stripes are taken to be"
+            f" {unit} px wide"
         )
     if not reading.is_sure:
-        doubts.append(f"{block.axis}: another code or order of digits fits nearly as well")
+        doubts.append(f"{axis}: another code or order of digits fits nearly as well")
     if not reading.rises:
-        doubts.append(f"{block.axis} fall along the picture: camera or projector may be mirrored")
+        doubts.append(f"{axis} fall along the picture: camera or projector may be mirrored")
     part = StripePictures(
-        axis=block.axis,
+        axis=axis,
         code=reading.code,
         bits=reading.bits,
         first=reading.first,
@@ -93,9 +131,9 @@ def _unit(reading: StripeReading, length: int) -> int:
 
 
 def _phases(
-    block: Block, reading: PhaseReading, blocks: Sequence[Block], size_px: Size, probes: Probes
+    axis: Axis, block: Block, reading: PhaseReading, blocks: Sequence[Block], size_px: Size, probes: Probes
 ) -> tuple[Part, list[str]]:
-    length = size_px[0] if block.axis == "columns" else size_px[1]
+    length = size_px[0] if axis == "columns" else size_px[1]
     fringes, start, doubts = reading.fringes, reading.start_deg, []
     stripes = next((b for b in blocks if b.axis == block.axis and isinstance(b.reading, StripeReading)), None)
     pictures = [p for p in block.slots if p is not None]
@@ -106,18 +144,33 @@ def _phases(
         fringes = (length / _unit(stripes.reading, length) * turns,)
         if len(reading.fringes) > 1:
             fringes = tuple(fringes[0] * each / reading.fringes[0] for each in reading.fringes)
+    elif fringes == (0.0,):
+        raise StoreError(
+            f"The {reading.steps} pictures of {axis} are sinusoids of one period, which the picture"
+            " shows more than once, and nothing says which of them a pixel sees. Add pictures of a second"
+            " period or of stripes."
+        )
     elif np.min(fringes) == 1.0:
-        doubts.append(f"the coarsest sinusoid of {block.axis} is taken to be one period over the projector")
+        doubts.append(f"the coarsest sinusoid of {axis} is taken to be one period over the projector")
     else:
         shown = ", ".join(f"{each:g}" for each in fringes)
-        doubts.append(f"{block.axis}: {shown} fringes over the projector fit best, multiples fit as well")
-    if fringes == (0.0,):
-        fringes = (1.0,)
-        doubts.append(f"{block.axis}: one set of sinusoids alone does not say which period a pixel is in")
+        if (times := gcd(*map(int, fringes))) > 1:
+            raise StoreError(
+                f"Sinusoids of {shown} fringes over the {axis} of the projector look the same {times} times,"
+                " and nothing says which of them a pixel sees. Add pictures of a single fringe or of stripes,"
+                " or state other fringes in a mapping."
+            )
+        doubts.append(f"{axis}: {shown} fringes over the projector fit best, multiples fit as well")
+    if stripes is None:
+        way = "to the right" if axis == "columns" else "downwards"
+        doubts.append(
+            f"sinusoids do not say which way {axis} rise: {way} is assumed; where camera or projector is"
+            " mirrored, give direction of the mapping the other sign"
+        )
     if stripes is None and reading.rival_rad < CLEARLY_WORSE * reading.off_rad:
-        doubts.append(f"{block.axis}: where the sinusoids start ({start:g} degrees) is unsure")
+        doubts.append(f"{axis}: where the sinusoids start ({start:g} degrees) is unsure")
     part = PhasePictures(
-        axis=block.axis,
+        axis=axis,
         fringes=fringes,
         steps=reading.steps,
         order=reading.order,

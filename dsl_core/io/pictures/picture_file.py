@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import errno
+import struct
 import warnings
 from dataclasses import dataclass
 from functools import lru_cache
@@ -20,6 +21,26 @@ from dsl_core.optics.colour import srgb_decode
 
 PICTURES = {".png", ".tif", ".tiff", ".bmp", ".jpg", ".jpeg", ".pgm", ".ppm"}
 ARRAYS, RAWS = {".npy"}, {".raw", ".bin"}
+#: Formats whose files may hold several pictures as pages.
+PAGED = {".tif", ".tiff"}
+#: What holds pictures and is not read, and what makes readable ones of it.
+_FRAMES = "Save its frames as pictures without loss, such as PNG"
+NOT_READ = {
+    **dict.fromkeys((".avi", ".mp4", ".mov", ".mkv", ".wmv", ".mjpg", ".gif"), ("a video", _FRAMES)),
+    ".npz": ("an archive of arrays", "Save the array with the pictures as a file .npy"),
+    ".mat": ("a file of MATLAB", "Save its pictures as PNG or as one file .npy"),
+    **dict.fromkeys((".h5", ".hdf5"), ("a file of HDF5", "Save its pictures as PNG or as one file .npy")),
+    **dict.fromkeys(
+        (".cr2", ".cr3", ".nef", ".arw", ".dng", ".raf", ".rw2"),
+        ("camera raw", "Convert it to TIFF of 16 bits without a curve"),
+    ),
+    **dict.fromkeys((".webp", ".heic", ".jxl", ".exr", ".jp2"), ("a picture", "Save it as PNG or TIFF")),
+    **dict.fromkeys((".zip", ".7z", ".rar", ".gz"), ("an archive", "Unpack it")),
+}
+#: What a library raises for the head of a damaged picture.
+_UNREADABLE = (
+    OSError, EOFError, ValueError, SyntaxError, TypeError, LookupError, ArithmeticError, struct.error,
+)  # fmt: skip
 #: Larger than any camera's picture, in bytes of its file and in pixels.
 MOST_BYTES, MOST_PIXELS = 1 << 30, 200_000_000
 _FULL = 65535
@@ -29,7 +50,7 @@ DECODED_BITS = 16
 
 @dataclass(frozen=True)
 class Picture:
-    """A file with a picture, or one picture of an array of several."""
+    """A file with a picture, or one picture of an array or TIFF of several."""
 
     path: Path
     index: int | None = None
@@ -39,14 +60,20 @@ class Picture:
 
 
 def pictures_in(path: Path) -> list[Picture]:
-    """The pictures of a file: one, or all of an array (pictures, rows, columns); raises `StoreError`."""
+    """The pictures of a file: one, all pages of a TIFF, or all of an array (pictures, rows, columns).
+
+    Raises `StoreError` when there are too many, or the file cannot be read.
+    """
+    if path.suffix.lower() in PAGED:
+        count = _page_count(path, _stamp(path))
+        return [Picture(path)] if count == 1 else [Picture(path, index) for index in range(count)]
     if path.suffix.lower() not in ARRAYS:
         return [Picture(path)]
     shape = _array(path, _stamp(path)).shape
     if len(shape) < 3 or (len(shape) == 3 and shape[2] in (3, 4)):
         return [Picture(path)]
     if shape[0] > MOST_PICTURES:
-        raise StoreError(f"{path} holds {shape[0]} pictures; at most {MOST_PICTURES} are possible. Split it.")
+        raise _too_many(path, shape[0])
     return [Picture(path, index) for index in range(shape[0])]
 
 
@@ -62,7 +89,7 @@ def load_values(picture: Picture, raw: RawLayout | None = None) -> NDArray[Any]:
     elif suffix in RAWS:
         values = _raw(path, raw)
     else:
-        values = _image(path)
+        values = _image(path, picture.index)
     if values.ndim == 3 and values.shape[2] == 1:
         values = values[..., 0]
     if values.ndim == 3 and values.shape[2] in (3, 4):
@@ -175,13 +202,43 @@ def _raw(path: Path, layout: RawLayout | None) -> NDArray[Any]:
     return values.reshape(layout.height_px, layout.width_px).astype(kind.newbyteorder("="))
 
 
-def _image(path: Path) -> NDArray[Any]:
+def _too_many(path: Path, count: int) -> StoreError:
+    return StoreError(f"{path} holds {count} pictures; at most {MOST_PICTURES} are possible. Split it.")
+
+
+@lru_cache(maxsize=MOST_PICTURES)
+def _page_count(path: Path, stamp: tuple[int, int]) -> int:
+    """Pages of one size in a file; 1 where a page is a preview, or whoever loads it says what is wrong."""
+    from PIL import Image
+
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", Image.DecompressionBombWarning)
+            with Image.open(path) as head:
+                count, sizes = int(getattr(head, "n_frames", 1)), set()
+                for page in range(count if count <= MOST_PICTURES else 0):
+                    head.seek(page)
+                    sizes.add(head.size)
+    except (*_UNREADABLE, Image.DecompressionBombError):
+        return 1
+    if count > MOST_PICTURES:
+        raise _too_many(path, count)
+    return count if len(sizes) == 1 else 1
+
+
+@lru_cache(maxsize=1)
+def _paged_bytes(path: Path, stamp: tuple[int, int]) -> bytes:
+    """The bytes of a file of several pictures; the last is kept, because each page is asked for."""
+    return _bytes(path)
+
+
+def _image(path: Path, index: int | None = None) -> NDArray[Any]:
     import io
 
     import cv2
     from PIL import Image
 
-    data = _bytes(path)
+    data = _bytes(path) if index is None else _paged_bytes(path, _stamp(path))
     try:
         # The head is read first: a small file may claim a picture that no memory holds.
         with warnings.catch_warnings():
@@ -191,7 +248,12 @@ def _image(path: Path) -> NDArray[Any]:
         if width * height > MOST_PIXELS:
             raise StoreError(f"{path} claims {width} x {height} px, which no camera has. Leave it out.")
         # Through memory, because OpenCV cannot open every path on Windows.
-        found = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED)
+        stored = np.frombuffer(data, np.uint8)
+        if index is None:
+            found = cv2.imdecode(stored, cv2.IMREAD_UNCHANGED)
+        else:
+            pages = cv2.imdecodemulti(stored, cv2.IMREAD_UNCHANGED, None, (index, index + 1))[1]
+            found = pages[0] if pages else None
     except (OSError, ValueError, SyntaxError, cv2.error) as error:
         raise _damaged(path) from error
     except (Warning, Image.DecompressionBombError) as error:

@@ -30,7 +30,14 @@ MOST_FRINGES, OFF_SHARE, OFF = 256, 0.0025, 0.03
 VIRTUAL_PX, SAMPLES, MOST_GUESSES = 1024, 500, 12
 #: Phases that disagree by this much (rms) show no one position, rad.
 MOST_OFF_RAD = 0.35
+#: Where sinusoids start, as they are or counted from another of their steps.
 STARTS_DEG = (0.0, -90.0, 90.0, 180.0)
+#: Readings whose phases disagree by little more than the best's fit as well.
+AS_GOOD, AS_GOOD_RAD = 1.15, 0.01
+#: Of so many pixels one is enough to leave out readings that disagree by this much more.
+FEW, FEW_AS_GOOD, FEW_AS_GOOD_RAD = 8, 1.6, 0.05
+#: A position that jumps within a surface is followed over this share of a line; so many pixels may.
+FOLLOWED_SHARE, MOST_JUMPS = 0.03, 0.01
 Complex = NDArray[np.complex64]
 
 
@@ -119,16 +126,53 @@ def read_phase_sets(
         whole = 1.0 if abs(turns[0]) < ONE_FRINGE else 0.0
         return PhaseReading(steps, order, (whole,), 0.0, direction, 0.0, np.pi)
     samples = _samples(waves, lines.lit)
-    ranked = sorted(
-        (_off(samples, fringes, start, steps, direction), sum(fringes), k, fringes, start)
+    tried = [
+        (sum(fringes), k, fringes, start)
         for fringes in dict.fromkeys(islice(_fringes(np.abs(turns)), MOST_GUESSES))
-        for k, start in enumerate(STARTS_DEG)
+        for k, start in enumerate(_starts(steps))
+    ]
+    # A few pixels tell what is far off.
+    few = [_off(samples[:, ::FEW], *each[2:], steps, direction) for each in tried]
+    near = FEW_AS_GOOD * min(few, default=0.0) + FEW_AS_GOOD_RAD
+    ranked = sorted(
+        (_off(samples, *each[2:], steps, direction) if off <= near else off, *each)
+        for off, each in zip(few, tried, strict=True)
     )
     if not ranked or ranked[0][0] > MOST_OFF_RAD:
         return None
-    off, _, _, fringes, start = ranked[0]
-    rival = ranked[1][0] if len(ranked) > 1 else np.pi
+    best, _, _, fringes, _ = ranked[0]
+    as_good = [each for each in ranked if each[0] <= AS_GOOD * best + AS_GOOD_RAD]
+    coarse = int(np.argmin(fringes))
+    if fringes[coarse] == 1 and len(as_good) > 1:
+        # One fringe over the projector: where it begins again, the picture of the projector ends.
+        wave = waves[coarse]
+        steady = [each for each in as_good if _jumps(wave, lines.lit, each[4], direction) < MOST_JUMPS]
+        if steady:
+            as_good, ranked = steady, [*steady, *(each for each in ranked if each not in as_good)]
+    off, _, _, fringes, start = min(as_good, key=lambda each: (each[1], each[2]))
+    rival = min((each[0] for each in ranked if each[3:] != (fringes, start)), default=np.pi)
     return PhaseReading(steps, order, fringes, start, direction, off, rival)
+
+
+def _starts(steps: int) -> tuple[float, ...]:
+    """Starts that are tried, degrees, the commonest first.
+
+    >>> _starts(3)[:6]
+    (0.0, -90.0, 90.0, 180.0, -120.0, 120.0)
+    """
+    turns = sorted(range(1, steps), key=lambda k: (min(k, steps - k), -k))
+    counted = [360.0 * k / steps + start for start in STARTS_DEG for k in turns]
+    own = [each - 360.0 * np.ceil((each - 180.0) / 360.0) for each in counted]
+    return tuple(dict.fromkeys(round(float(each), 6) for each in (*STARTS_DEG, *own)))
+
+
+def _jumps(wave: Complex, lit: NDArray[np.bool_], start_deg: float, direction: Literal[1, -1]) -> float:
+    """Share of the lit pixels from which a position of one fringe begins again a little further on."""
+    turns = np.mod((np.angle(wave) * direction - np.deg2rad(start_deg)) / TURN, 1.0)
+    far = max(int(FOLLOWED_SHARE * turns.shape[1]), 1)
+    both = lit[:, far:] & lit[:, :-far]
+    change = turns[:, far:] - turns[:, :-far]
+    return float((np.abs(change[both]) > 0.5).mean()) if both.any() else 0.0
 
 
 def turns_per_number(
@@ -193,10 +237,12 @@ def _fringes(turns: NDArray[np.float64]) -> Iterator[tuple[float, ...]]:
         # From coarse to fine each ratio is known better than to one half.
         fringes = np.ones(len(turns))
         for lower, upper in pairwise(order):
-            fringes[upper] = max(np.round(turns[upper] / turns[lower] * fringes[lower]), 1.0)
-        yield tuple(float(f) for f in fringes)
+            ratio = turns[upper] / max(turns[lower], 1e-9)
+            fringes[upper] = max(np.round(ratio * fringes[lower]), 1.0)
+        if fringes.max() <= MOST_FRINGES:
+            yield tuple(float(f) for f in fringes)
     finest = turns[order[-1]]
-    for count in range(int(np.ceil(finest)), MOST_FRINGES):
+    for count in range(int(np.ceil(finest)), MOST_FRINGES + 1):
         scaled = turns / finest * count
         off = np.abs(scaled - np.round(scaled))
         if (off < OFF + OFF_SHARE * count).all() and (np.round(scaled) > 0).all():

@@ -28,6 +28,8 @@ BRIGHT, DARK = 0.9, 0.1
 FROM_END = 2
 #: Splits that are tried, and the share of pictures that must speak for one; what speaking against it costs.
 MOST_SPLITS, LEAST_SUPPORT, AXIS_DOUBT = 5, 0.4, 0.5
+#: Sinusoids of one period agree with nothing, so that any steps fit them.
+UNTESTED = 0.3
 Slots = tuple[int | None, ...]
 
 
@@ -52,9 +54,29 @@ class Recognised:
     misfit: float
 
     @property
-    def axes(self) -> frozenset[Axis]:
-        """What is coded."""
-        return frozenset(block.axis for block in self.blocks if block.reading is not None)
+    def digits(self) -> frozenset[tuple[Axis, int]]:
+        """What is coded: for each axis its digits, or its periods."""
+        return frozenset(
+            (
+                block.axis,
+                block.reading.bits
+                if isinstance(block.reading, StripeReading)
+                else len(block.reading.fringes),
+            )
+            for block in self.blocks
+            if block.reading is not None
+        )
+
+    @property
+    def content(self) -> tuple[tuple[str, Axis, int], ...]:
+        """The kinds of blocks and how many pictures each has, in order."""
+        return tuple((block.kind, block.axis, len(block.slots)) for block in self.blocks)
+
+    @property
+    def has_inverses(self) -> bool:
+        """Whether stripes are followed by their inverses."""
+        readings = [block.reading for block in self.blocks]
+        return any(isinstance(each, StripeReading) and each.inverse != "none" for each in readings)
 
 
 def recognise(probes: Probes, slots: Slots) -> Recognised | None:
@@ -195,7 +217,8 @@ def _with_phases(
     if stripes is None:
         return [], np.inf
     block = Block("stripes", tuple(others), axis, stripes)
-    return ([block, phases] if rest[0] else [phases, block]), _cost(stripes) + _phase_cost(reading)
+    off = reading.off_rad / MOST_OFF_RAD
+    return ([block, phases] if rest[0] else [phases, block]), _cost(stripes) + off
 
 
 def _cost(stripes: StripeReading) -> float:
@@ -203,4 +226,4 @@ def _cost(stripes: StripeReading) -> float:
 
 
 def _phase_cost(phases: PhaseReading) -> float:
-    return phases.off_rad / MOST_OFF_RAD
+    return phases.off_rad / MOST_OFF_RAD + (UNTESTED if len(phases.fringes) == 1 else 0.0)

@@ -152,3 +152,63 @@ def test_a_mosaic_has_two_like_greens_and_unlike_neighbours(
     cells: list[list[int]], bayer: str | None
 ) -> None:
     assert _bayer_of(np.tile(np.array(cells, np.float32), (4, 6))) == bayer
+
+
+def test_names_with_the_time_of_day_are_one_capture(tmp_path: Path, gray: Pictures) -> None:
+    named = {f"Image__12-{33 + (i + 52) // 60}-{(i + 52) % 60:02d}.png": p for i, p in enumerate(gray)}
+    mapping = guess_mapping(write(tmp_path, named), PROJECTOR).mapping
+    assert mapping.files == ("*",)
+    assert mapping.parts == (StripePictures(bits=7), WhitePicture(), BlackPicture())
+
+
+def test_inverses_may_be_in_a_folder_of_their_own(tmp_path: Path, gray: Pictures) -> None:
+    sides = {0: "normal", 1: "turned"}
+    named = {f"{sides[i % 2]}/{i // 2}.png": p for i, p in enumerate(gray[:14])}
+    guess = guess_mapping(write(tmp_path, named), PROJECTOR)
+    assert guess.mapping.parts == (StripePictures(bits=7, inverse="after"),)
+    assert not guess.others
+
+
+def test_columns_may_run_down_the_picture(tmp_path: Path) -> None:
+    pictures, white, black = frames([("columns", Stripes(bits=7))])
+    named = {f"{i:02d}.png": p.T for i, p in enumerate([*pictures, white, black])}
+    folder = write(tmp_path, named)
+    mapping = guess_mapping(folder, (128, 40)).mapping
+    assert mapping.parts[0] == StripePictures(bits=7)
+    assert "turned by 90 degrees" in mapping.unsure[0]
+    assert "turned by 90 degrees" in guess_mapping(folder).mapping.unsure[0]
+
+
+def test_what_no_mapping_can_decode_is_refused(tmp_path: Path, gray: Pictures) -> None:
+    folder = write(tmp_path / "gray", {f"{i:02d}.png": p for i, p in enumerate(gray)})
+    with pytest.raises(StoreError, match=r"numbers \d+ to 12\d of columns, more than the 100 of"):
+        guess_mapping(folder, (100, 96))
+    one = frames([("columns", Phases(periods_px=(16,), steps=4))])[0]
+    with pytest.raises(StoreError, match="sinusoids of one period, which the picture shows more than once"):
+        guess_mapping(write(tmp_path / "one", {f"{i}.png": p for i, p in enumerate(one)}), PROJECTOR)
+    same = frames([("columns", Phases(periods_px=(32, 8), steps=4))])[0]
+    with pytest.raises(StoreError, match=r"4, 16 fringes .* look the same 4 times"):
+        guess_mapping(write(tmp_path / "same", {f"{i}.png": p for i, p in enumerate(same)}), PROJECTOR)
+
+
+def test_sinusoids_leave_their_way_open_and_wide_stripes_are_told(tmp_path: Path) -> None:
+    waves = frames([("columns", Phases(periods_px=(128, 16), steps=4))])[0]
+    told = guess_mapping(write(tmp_path / "w", {f"{i}.png": p for i, p in enumerate(waves)}), PROJECTOR)
+    assert any("which way columns rise: to the right is assumed" in each for each in told.mapping.unsure)
+    wide = frames([("columns", Stripes(bits=5, unit_px=4))])[0]
+    told = guess_mapping(write(tmp_path / "s", {f"{i}.png": p for i, p in enumerate(wide)}), PROJECTOR)
+    assert any("stripes are taken to be 4 px wide" in each for each in told.mapping.unsure)
+
+
+@pytest.mark.parametrize(
+    ("name", "said"),
+    [
+        ("scan.avi", "a video, which is not read. Save its frames as pictures"),
+        ("scan.npz", "an archive of arrays, which is not read. Save the array"),
+        ("IMG_1.CR2", "camera raw, which is not read. Convert it to TIFF"),
+    ],
+)
+def test_what_is_not_read_is_named_with_what_to_do(tmp_path: Path, name: str, said: str) -> None:
+    (tmp_path / name).write_bytes(b"1234")
+    with pytest.raises(StoreError, match=f"{name} is {said}"):
+        guess_mapping(tmp_path)

@@ -90,7 +90,7 @@ def test_all_stripes_together_just_cover_the_projector(length: int, bits: int, u
 def test_numbers_beyond_the_projector_are_centred_on_it(axis: Axis, most: int, offset: int) -> None:
     block = stripes(axis, 10, most)
     assert isinstance(block.reading, StripeReading)
-    part, doubts = _stripes(block, block.reading, (800, 600))
+    part, doubts = _stripes(axis, block.reading, (800, 600))
     assert isinstance(part, StripePictures)
     assert (part.offset, part.unit_px, part.bits, part.axis) == (offset, 1, 10, axis)
     assert bool(doubts) == bool(offset)

@@ -90,3 +90,18 @@ def test_a_small_file_that_claims_a_huge_picture_is_refused_before_it_is_decoded
     (tmp_path / "bomb.png").write_bytes(data)
     with pytest.raises(StoreError, match=r"bomb\.png claims .*camera has"):
         load_values(Picture(tmp_path / "bomb.png"))
+
+
+def test_pages_of_a_tiff_are_pictures_but_a_preview_is_none(tmp_path: Path) -> None:
+    from PIL import Image
+
+    pages = [np.full((6, 8), 40 * k, np.uint16) for k in range(5)]
+    first, *others = [Image.fromarray(page) for page in pages]
+    first.save(tmp_path / "all.tiff", save_all=True, append_images=others)
+    found = pictures_in(tmp_path / "all.tiff")
+    assert [picture.index for picture in found] == [0, 1, 2, 3, 4]
+    for picture, page in zip(found, pages, strict=True):
+        np.testing.assert_array_equal(load_values(picture), page)
+    preview = Image.fromarray(pages[1][:3, :4])
+    first.save(tmp_path / "one.tif", save_all=True, append_images=[preview])
+    assert pictures_in(tmp_path / "one.tif") == [Picture(tmp_path / "one.tif")]

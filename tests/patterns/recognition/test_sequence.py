@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from typing import Literal
 
 import numpy as np
 import pytest
@@ -90,3 +91,30 @@ def test_pictures_of_no_code_make_no_sense() -> None:
     rng = np.random.default_rng(3)
     noise: Sequence[NDArray[np.uint16]] = [rng.integers(0, 255, (48, 64), np.uint16) for _ in range(10)]
     assert _recognised(list(noise)) is None
+
+
+@pytest.mark.parametrize(
+    ("fringes", "steps", "start", "direction"),
+    [((1, 4, 16), 3, -120.0, 1), ((1, 9), 3, 120.0, -1), ((8, 1), 5, 36.0, 1), ((24, 6, 1), 4, 180.0, 1)],
+)
+def test_sinusoids_may_start_anywhere_and_end_with_the_projector(
+    fringes: tuple[int, ...], steps: int, start: float, direction: Literal[1, -1]
+) -> None:
+    periods = tuple(128 / n for n in fringes)
+    code = Phases(periods_px=periods, steps=steps, start_deg=start, direction=direction)
+    found = _recognised(frames([("columns", code)])[0])
+    assert found is not None
+    (block,) = found.blocks
+    assert isinstance(block.reading, PhaseReading)
+    assert (block.axis, block.reading.steps, block.reading.fringes) == ("columns", steps, fringes)
+    assert (block.reading.start_deg, block.reading.direction) == (start, direction)
+
+
+def test_one_fringe_is_not_taken_for_another_axis() -> None:
+    dark = [
+        np.asarray(np.rint(255 * (p / 255) ** (1 / 2.2)), np.uint16)
+        for p in frames([("columns", Phases(periods_px=(128, 16, 8), steps=4))])[0]
+    ]
+    found = _recognised(dark)
+    assert found is not None
+    assert found.digits == {("columns", 3)}

@@ -30,16 +30,12 @@ from dsl_core.progress import NoProgress, Progress
 
 if TYPE_CHECKING:
     from dsl_core.io.calibration_library import CalibrationLibrary
-    from dsl_core.io.pictures.source import PictureScan
-    from dsl_core.model.plan import CapturePlan, Shot
     from dsl_core.model.rig import Rig
 
 #: Small pictures: how many, and how wide, px.
 SMALL_COUNT, SMALL_PX = 24, 56
 #: Name in the table of a picture that there is none of.
 NO_FILE = "-"
-#: Columns are decoded for at most so many pixels, until the import decodes them all.
-PREVIEW_PIXELS = 120_000
 
 
 @dataclass(frozen=True)
@@ -209,46 +205,15 @@ def _bytes(values: NDArray[np.float32], top: float) -> NDArray[np.uint8]:
     return np.ascontiguousarray(colour.astype(np.uint8))
 
 
-@dataclass(frozen=True)
-class Thinned:
-    """A `FrameSource` of every so many blocks of 2 x 2 pixels, so that a mosaic stays one."""
-
-    source: PictureScan
-    step: int
-
-    @property
-    def plan(self) -> CapturePlan:
-        """The plan, for fewer pixels."""
-        plan = self.source.plan
-        width, height = (len(kept(size, self.step)) for size in plan.camera_size_px)
-        return plan.model_copy(update={"camera_size_px": (width, height)})
-
-    def read(self, shot: Shot) -> NDArray[np.uint16]:
-        """A frame of fewer pixels."""
-        frame = self.source.read(shot)
-        height, width = frame.shape
-        return np.ascontiguousarray(frame[kept(height, self.step)][:, kept(width, self.step)])
-
-
-def kept(size: int, step: int) -> NDArray[np.intp]:
-    """Places that are left of a row of so many pixels.
-
-    >>> kept(10, 3).tolist()
-    [0, 1, 6, 7]
-    """
-    return np.flatnonzero(np.arange(size) // 2 % step == 0)
-
-
 def decode(folder: Path, mapping: Mapping, progress: Progress | None = None) -> Decoded:
     """Columns of some of the pixels; raises `StoreError` naming the picture that cannot be used."""
     from dsl_core.io.pictures.encoding import encoding_of
     from dsl_core.io.pictures.source import open_pictures
     from dsl_core.workflows.captures import decode_columns_of, sensor_of
+    from dsl_core.workflows.thinned import thinned as some_pixels
 
     source = open_pictures(folder, mapping)
-    width, height = source.plan.camera_size_px
-    step = max(int(np.ceil(np.sqrt(width * height / PREVIEW_PIXELS))), 1)
-    thinned = Thinned(source, step)
+    thinned = some_pixels(source)
     found = decoded_of(decode_columns_of(thinned, sensor_of(source), progress or NoProgress()))
     linearity, advice = encoding_of(source, thinned)
     return replace(found, values=linearity.sentence if linearity.figures else "", advice=advice)

@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 from dsl_app.importing.captures.fields import first_mapping, with_field, with_part_field
 from dsl_app.importing.captures.look import (
-    Thinned,
     decode,
     guess,
     list_files,
@@ -24,6 +23,7 @@ from dsl_core.io.calibration_library import CalibrationLibrary
 from dsl_core.io.pictures.source import open_pictures
 from dsl_core.model.captured_code import Stripes
 from dsl_core.progress import NoProgress
+from dsl_core.workflows.thinned import Thinned
 from tests.app.importing.captures.small_capture import CAMERA, PROJECTOR, request_for
 from tests.cases.foreign_captures import for_screens, frames, scene, write
 from tests.cases.small_rig import small_rig
@@ -60,7 +60,7 @@ def test_a_folder_without_pictures_has_nothing_to_correct(tmp_path: Path) -> Non
 
 
 def test_columns_are_decoded_from_some_of_the_pixels(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("dsl_app.importing.captures.look.PREVIEW_PIXELS", 64 * 48 // 4)
+    monkeypatch.setattr("dsl_core.workflows.thinned.PREVIEW_PIXELS", 64 * 48 // 4)
     found = decode(folder, MAPPING)
     assert found.column_px.shape == (24, 32)
     assert found.share > 0.9
