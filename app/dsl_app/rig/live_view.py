@@ -161,8 +161,8 @@ class LiveView(QWidget):
     def apply_theme(self, theme: Theme) -> None:
         """Apply the colours of a theme."""
         self.rectangle.apply_theme(theme)
-        for widget in (self.view, self._histogram):
-            widget.setBackground(theme.base)
+        self.view.apply_theme(theme)
+        self._histogram.setBackground(theme.base)
         for side in ("left", "bottom"):
             axis = self._histogram.getAxis(side)
             axis.setPen(theme.line)

@@ -9,14 +9,17 @@ from dataclasses import dataclass
 class Theme:
     """Colours by role, as ``#rrggbb``.
 
-    ``window`` is the background, ``base`` that of data and input, ``line`` separates. ``muted`` is for
-    units and hints. All that is text keeps a contrast of 4.5 to 1 on ``window`` and ``base``. ``pins`` colour
-    spectra one after the other and are told apart by people with any colour vision (after Okabe and Ito).
+    ``window`` is the background, ``base`` that of plots and input, ``surround`` that of pictures, on which
+    white, black and grey areas keep their edges; ``line`` separates. ``muted`` is for units and hints. All
+    that is text keeps a contrast of 4.5 to 1 on ``window`` and ``base``, and ``muted`` on ``surround``, too.
+    ``pins`` colour spectra one after the other and are told apart by people with any colour vision (after
+    Okabe and Ito).
     """
 
     name: str
     window: str
     base: str
+    surround: str
     raised: str
     line: str
     text: str
@@ -33,6 +36,7 @@ LIGHT = Theme(
     name="light",
     window="#f3f4f6",
     base="#ffffff",
+    surround="#dfe2e7",
     raised="#e6e8ec",
     line="#c9cdd4",
     text="#1b1e24",
@@ -48,6 +52,7 @@ DARK = Theme(
     name="dark",
     window="#1d2026",
     base="#14161a",
+    surround="#14161a",
     raised="#2a2e36",
     line="#3b414c",
     text="#e7e9ee",

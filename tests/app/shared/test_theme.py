@@ -21,6 +21,15 @@ def contrast(a: str, b: str) -> float:
 def test_text_is_readable(theme: Theme, role: str) -> None:
     for behind in (theme.window, theme.base):
         assert contrast(getattr(theme, role), behind) >= 4.5
+    # On pictures there are hints.
+    assert contrast(theme.muted, theme.surround) >= 4.5
+    assert contrast(theme.accent, theme.surround) >= 3
+
+
+def test_white_of_a_picture_has_an_edge_in_either_theme() -> None:
+    for theme in (LIGHT, DARK):
+        for colour in ("#ffffff", "#000000"):
+            assert contrast(colour, theme.surround) >= 1.15
 
 
 @pytest.mark.parametrize("theme", [LIGHT, DARK], ids=lambda theme: theme.name)

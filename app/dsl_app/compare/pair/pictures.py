@@ -170,7 +170,7 @@ class PairPictures(QWidget):
     def apply_theme(self, theme: Theme) -> None:
         """Apply the colours of a theme."""
         self._theme = theme
-        self.canvas.setBackground(theme.base)
+        self.canvas.setBackground(theme.surround)
         for cross in self.crosses:
             cross.setPen(pg.mkPen(theme.accent, width=2))
         self._theme_bars()

@@ -180,7 +180,7 @@ class InteractiveCloud(CloudView):
     def apply_theme(self, theme: Theme) -> None:
         """Apply the colours of a theme, also where there is no picture yet."""
         self._theme = theme
-        self.renderer.call(lambda window: window.set_background(theme.base))
+        self.renderer.call(lambda window: window.set_background(theme.surround))
         self.update()
 
     def projection(self) -> NDArray[np.float64]:
@@ -226,12 +226,12 @@ class InteractiveCloud(CloudView):
     def paintEvent(self, event: QPaintEvent) -> None:
         """Paint the latest picture."""
         painter = QPainter(self)
-        painter.fillRect(event.rect(), QColor(self._theme.base))
+        painter.fillRect(event.rect(), QColor(self._theme.surround))
         painter.drawImage(0, 0, self.image)
         if self._seen is not None:
             theme = self._theme
-            over = OverlayPainter(painter, self.width(), self.height(), theme.text, theme.accent, theme.base)
-            over.paint(self._seen, self._overlay)
+            size, inks = (self.width(), self.height()), (theme.text, theme.accent, theme.surround)
+            OverlayPainter(painter, *size, *inks).paint(self._seen, self._overlay)
         if self.waiting:
             painter.setPen(QColor(self._theme.muted))
             centred = Qt.AlignmentFlag.AlignCenter | Qt.TextFlag.TextWordWrap
@@ -314,11 +314,13 @@ class StaticCloud(CloudView):
         self._whole = QPixmap()
         column_of((self._picture, 1), label(why, "muted", wraps=True), on=self, margins=0)
         self._background = "#000000"
+        self._drawn: tuple[Points, Colours] | None = None
 
     def show_cloud(
         self, points: Points, colours: Colours, reset_view: bool = True, grid: Grid | None = None
     ) -> None:
         """Draw points into a picture."""
+        self._drawn = points, colours
         picture = static_picture(points, colours, self._background)
         if picture is None:
             return
@@ -338,8 +340,11 @@ class StaticCloud(CloudView):
             self._picture.setPixmap(self._whole.scaled(self._picture.size(), keep, smooth))
 
     def apply_theme(self, theme: Theme) -> None:
-        """Set the colour behind the next picture."""
-        self._background = theme.base
+        """Set the colour behind and around the picture."""
+        self._background = theme.surround
+        self._picture.setStyleSheet(f"background: {theme.surround}")
+        if self._drawn is not None:
+            self.show_cloud(*self._drawn)
 
 
 def static_picture(points: Points, colours: Colours, background: str) -> NDArray[np.uint8] | None:

@@ -35,7 +35,7 @@ class PictureView(pg.GraphicsLayoutWidget):  # type: ignore[misc]
 
     def apply_theme(self, theme: Theme) -> None:
         """Apply the colours of a theme."""
-        self.setBackground(theme.base)
+        self.setBackground(theme.surround)
 
 
 def colour_map(name: str) -> Any:

@@ -13,6 +13,7 @@ from dsl_app.results.cloud import panel as cloud_panel
 from dsl_app.results.cloud.render_window import RenderWindow, graphics_work
 from dsl_app.results.cloud.views import DRAWING, InteractiveCloud, StaticCloud
 from dsl_app.results.state import ResultView, Tool
+from dsl_app.shared.theme import DARK, LIGHT
 from PySide6.QtCore import QPoint, Qt
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QLabel
@@ -87,6 +88,15 @@ def test_3d_that_fails_leaves_a_picture_and_says_what_to_do(
     assert "rotate" not in panel._hint.text()
     # It takes no more than its half from the picture next to it.
     assert panel.view.minimumSizeHint().width() < 300
+    # The picture goes over into its surroundings in either theme.
+    panel.view.resize(300, 600)
+    for theme in (LIGHT, DARK):
+        panel.view.apply_theme(theme)
+        drawn = next(label for label in labels if not label.pixmap().isNull())
+        seen = drawn.grab().toImage()
+        edge = [seen.pixelColor(seen.width() // 2, y).name() for y in (0, seen.height() - 1)]
+        within = drawn.pixmap().toImage().pixelColor(0, 0).name()
+        assert {*edge, within} == {theme.surround}
 
 
 def test_the_cloud_hides_what_lies_outside_the_limits_and_keeps_its_view(bench: Bench, qtbot: QtBot) -> None:
