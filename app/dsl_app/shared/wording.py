@@ -22,6 +22,7 @@ PHRASES = (
     ("or let 'dsl-scan import FOLDER --guess' write one.", "or import the folder without one."),
     (": name one with --set", ""),
     ("; give --projector", ""),
+    ("Give its right size (--projector).", "Correct the projector's size."),
     ("give --unit-mm 1000", "set their unit to 1000 mm"),
     ("give --unit-mm", "set their unit"),
     ("Correct --camera-size, or calibrate with that size.", "Choose the calibration of these pictures."),
