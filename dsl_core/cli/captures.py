@@ -82,8 +82,10 @@ def import_stereo(output: Output, source: Path, target: Path | None, options: St
 
     ``curves`` of the options are the tables of the camera and of the LEDs.
     """
-    from dsl_core.io.published.any_stereo import lenses_on, load_any_stereo, placed
+    from dsl_core.io.published.any_stereo import load_any_stereo
     from dsl_core.io.published.curves import load_curves
+    from dsl_core.io.published.stereo_rig import lenses_on
+    from dsl_core.io.published.stereo_words import placed
     from dsl_core.io.rig_file import load_rig, save_rig
     from dsl_core.simulation.published_rig import published_rig
 

@@ -51,9 +51,7 @@ def load_curves(path: Path, device: str) -> FoundCurves:
     ordered, order = _ordered(found)
     arrays = [_checked(path, each) for each in ordered]
     most = max(float(each.max()) for each in arrays)
-    centres = [
-        float(np.sum(each.nm * values) / np.sum(values)) for each, values in zip(ordered, arrays, strict=True)
-    ]
+    centres = [_centre_nm(each.nm, values) for each, values in zip(ordered, arrays, strict=True)]
     if not centres[0] >= centres[1] >= centres[2]:
         told = ", ".join(f"{nm:.0f} nm" for nm in centres)
         raise CalibrationError(
@@ -65,6 +63,11 @@ def load_curves(path: Path, device: str) -> FoundCurves:
     )
     told = ", ".join(f"{letter} {nm:.0f} nm" for letter, nm in zip("RGB", centres, strict=True))
     return FoundCurves((red, green, blue), f"curves of the {device}: {path.name}, {order}, centred at {told}")
+
+
+def _centre_nm(nm: NDArray[np.float64], values: NDArray[np.float64]) -> float:
+    """Mean wavelength of the light, however unevenly the wavelengths are spaced."""
+    return float(np.average(nm, weights=values * np.gradient(nm)))
 
 
 def _ordered(found: list[Spectrum]) -> tuple[list[Spectrum], str]:

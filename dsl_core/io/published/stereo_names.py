@@ -80,26 +80,30 @@ def size_of(numbers: Numbers, device: str) -> tuple[int, int] | None:
 
 
 def _of_pair(numbers: Numbers, camera: str, projector: str) -> Parts:
-    found = Parts()
-    for device, words in (("camera", camera), ("projector", projector)):
-        who = f"(?:{words})"
-        alone = "|cameramatrix" if device == "camera" and words.startswith("camera|") else ""
-        name = _named(numbers, f"{who}{_MATRIX}|{_MATRIX}{who}{alone}", {9, 4})
-        if name is not None:
-            _add_matrix(found, f"{device} matrix", name, numbers[name].ravel())
-        alone = "|distcoeffs" if alone else ""
-        name = _named(numbers, f"{who}{_DISTORTION}|{_DISTORTION}{who}{alone}", _COEFFICIENTS)
-        if name is not None and name != found.names.get(f"{device} matrix"):
-            found.add(f"{device} distortion", name, numbers[name].ravel())
-        radial = _named(numbers, f"{who}radialdistortion", {2, 3})
-        tangential = _named(numbers, f"{who}tangentialdistortion", {2})
-        if radial is not None and tangential is not None:
-            k, p = numbers[radial].ravel(), numbers[tangential].ravel()
-            found.add(f"{device} distortion", radial, np.r_[k[:2], p, k[2:], np.zeros(3 - k.size)])
-    if camera != _PAIRS[0][0] and len(found.values) > 1:
+    """The lenses that a file has under one pair of names."""
+    found, is_told = Parts(), (camera, projector) == _PAIRS[0]
+    # Next to a projector with a name, coefficients of nobody are the camera's.
+    _add_lens(found, numbers, "camera", f"(?:{camera})", "|distcoeffs" if is_told else "")
+    _add_lens(found, numbers, "projector", f"(?:{projector})")
+    if not is_told and len(found.values) > 1:
         one, other = found.names.get("camera matrix"), found.names.get("projector matrix")
         found.taken.append(f"{one} is the camera's, {other} the projector's")
     return found
+
+
+def _add_lens(found: Parts, numbers: Numbers, device: str, who: str, alone: str = "") -> None:
+    """Matrix and distortion of a device that is called ``who``; ``alone`` adds names of its distortion."""
+    name = _named(numbers, f"{who}{_MATRIX}|{_MATRIX}{who}", {9, 4})
+    if name is not None:
+        _add_matrix(found, f"{device} matrix", name, numbers[name].ravel())
+    name = _named(numbers, f"{who}{_DISTORTION}|{_DISTORTION}{who}{alone}", _COEFFICIENTS)
+    if name is not None and name != found.names.get(f"{device} matrix"):
+        found.add(f"{device} distortion", name, numbers[name].ravel())
+    radial = _named(numbers, f"{who}radialdistortion", {2, 3})
+    tangential = _named(numbers, f"{who}tangentialdistortion", {2})
+    if radial is not None and tangential is not None:
+        k, p = numbers[radial].ravel(), numbers[tangential].ravel()
+        found.add(f"{device} distortion", radial, np.r_[k[:2], p, k[2:], np.zeros(3 - k.size)])
 
 
 def _add_matrix(found: Parts, part: str, name: str, values: NDArray[np.float64]) -> None:

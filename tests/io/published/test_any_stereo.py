@@ -11,7 +11,8 @@ import numpy as np
 import pytest
 
 from dsl_core.errors import CalibrationError
-from dsl_core.io.published.any_stereo import lenses_on, load_any_stereo
+from dsl_core.io.published.any_stereo import load_any_stereo
+from dsl_core.io.published.stereo_rig import lenses_on
 from tests.cases.small_rig import small_rig
 
 CAMERA, PROJECTOR = (64, 48), (32, 24)
@@ -43,6 +44,13 @@ def _json(tmp_path: Path, content: dict[str, Any]) -> Path:
             "cameraMatrix1": K_CAMERA,
             "distCoeffs1": [0.1, 0, 0, 0],
             "cameraMatrix2": K_PROJECTOR,
+            "R": ROTATION,
+            "T": SHIFT,
+        },
+        {
+            "camera_matrix": K_CAMERA,
+            "dist_coeffs": [0.1, 0, 0, 0],
+            "projector_matrix": K_PROJECTOR,
             "R": ROTATION,
             "T": SHIFT,
         },

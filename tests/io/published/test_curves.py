@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 
 from dsl_core.errors import CalibrationError
-from dsl_core.io.published.any_stereo import FoundStereo, lenses_on
+from dsl_core.io.published.any_stereo import FoundStereo
 from dsl_core.io.published.curves import load_curves
 from dsl_core.io.published.stereo import Stereo
+from dsl_core.io.published.stereo_rig import lenses_on
 from tests.cases.small_rig import small_rig
 
 NM = np.arange(420.0, 671, 5)
@@ -34,6 +35,13 @@ def test_curves_are_told_by_names_or_order(tmp_path: Path) -> None:
     assert "in the order of their columns" in ordered.words
     mono = load_curves(table(tmp_path, PEAKS[:, 1:2], "nm,response"), "camera")
     assert mono.curves[0] == mono.curves[2]
+
+
+def test_a_centre_does_not_depend_on_where_wavelengths_are_dense(tmp_path: Path) -> None:
+    nm = np.r_[np.arange(420, 540, 1.0), np.arange(540, 671, 10.0)]
+    peaks = np.exp(-(((nm[:, None] - [610, 540, 460]) / 30) ** 2))
+    words = load_curves(table(tmp_path, peaks, nm=nm), "camera").words
+    assert words.endswith("centred at R 610 nm, G 540 nm, B 461 nm")
 
 
 @pytest.mark.parametrize(

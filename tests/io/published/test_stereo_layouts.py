@@ -15,7 +15,10 @@ import pytest
 from numpy.typing import NDArray
 
 from dsl_core.errors import CalibrationError
-from dsl_core.io.published.any_stereo import FoundStereo, load_any_stereo, placed
+from dsl_core.io.published.any_stereo import FoundStereo, load_any_stereo
+from dsl_core.io.published.stereo_rig import lenses_on
+from dsl_core.io.published.stereo_words import placed
+from tests.cases.small_rig import small_rig
 
 Floats = NDArray[np.float64]
 CAMERA, PROJECTOR = (1280, 1024), (1024, 768)
@@ -120,6 +123,42 @@ def test_kalibr_chains_are_in_metres_which_is_doubted(tmp_path: Path) -> None:
     path.write_text(kalibr("equidistant"), encoding="utf-8")
     with pytest.raises(CalibrationError, match="describes a lens by the model 'equidistant'"):
         load_any_stereo(path)
+
+
+@pytest.mark.parametrize(
+    ("note", "model"),
+    [
+        ({"model_type": "MEI"}, "MEI"),
+        ({"camera": {"model": "omni"}}, "omni"),
+        ({"lens": "Fisheye"}, "Fisheye"),
+        ({"fisheye": False}, ""),
+        ({"author": "Mei Li", "company": "Omni"}, ""),
+    ],
+)
+def test_other_models_of_lenses_are_refused_but_not_names_of_people(
+    tmp_path: Path, note: dict[str, Any], model: str
+) -> None:
+    path = as_json(tmp_path / "c.json", {**PLAIN, **note})
+    if not model:
+        require_right(load_any_stereo(path, CAMERA, PROJECTOR), False)
+        return
+    with pytest.raises(CalibrationError, match=f"describes a lens by the model '{model}'"):
+        load_any_stereo(path, CAMERA, PROJECTOR)
+
+
+def test_a_part_with_numbers_that_are_not_finite_is_named(tmp_path: Path) -> None:
+    path = as_json(tmp_path / "c.json", {**PLAIN, "cam_K": [[float("nan"), 0, 1], [0, 1, 1], [0, 0, 1]]})
+    with pytest.raises(CalibrationError, match=r"lacks camera matrix; .* \(not finite: cam_K\)"):
+        load_any_stereo(path, CAMERA, PROJECTOR)
+
+
+def test_a_projector_at_the_camera_is_doubted_and_makes_no_rig(tmp_path: Path) -> None:
+    path = as_json(tmp_path / "c.json", {**PLAIN, "T": [0, 0, 0]})
+    found = load_any_stereo(path, CAMERA, PROJECTOR)
+    assert found.doubts == ("camera and projector are at one place, so nothing has a depth",)
+    assert placed(found.stereo).endswith("0 mm from the camera (at the same place)")
+    with pytest.raises(CalibrationError, match=r"In c\.json camera and projector are at one place"):
+        lenses_on(small_rig(), found, "c.json")
 
 
 def test_nested_names_and_vectors(tmp_path: Path) -> None:

@@ -137,8 +137,10 @@ def _is_rig(path: Path) -> bool:
 
 
 def _stereo(path: Path, request: CaptureRequest, camera_px: Size, projector_px: Size) -> tuple[Rig, str]:
-    from dsl_core.io.published.any_stereo import lenses_on, load_any_stereo, placed
+    from dsl_core.io.published.any_stereo import load_any_stereo
     from dsl_core.io.published.curves import load_curves
+    from dsl_core.io.published.stereo_rig import lenses_on
+    from dsl_core.io.published.stereo_words import placed
     from dsl_core.simulation.published_rig import published_rig
 
     found = load_any_stereo(path, camera_px, projector_px, request.unit_mm, request.from_projector)

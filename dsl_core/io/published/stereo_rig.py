@@ -1,0 +1,67 @@
+"""A rig for depth from lenses and pose of another program, with its curves where they are known."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from dsl_core.errors import CalibrationError
+from dsl_core.io.published.any_stereo import FoundStereo
+from dsl_core.io.published.curves import FoundCurves
+from dsl_core.model.rig import Provenance, Rgb, Rig
+from dsl_core.model.spectral import SpectralCurve
+
+#: Depths between these multiples of the distance of camera and projector are believed.
+NEAREST, FARTHEST = 0.5, 50.0
+
+
+def lenses_on(
+    base: Rig,
+    found: FoundStereo,
+    source: str,
+    camera_curves: FoundCurves | None = None,
+    led_curves: FoundCurves | None = None,
+) -> Rig:
+    """A rig for depth: these lenses and pose; film and scales of ``base`` mean nothing, nor do its curves.
+
+    Curves that are given are relative to the largest of them, and are made as large as those of ``base``.
+    Raises `CalibrationError` where camera and projector are at one place.
+    """
+    stereo = found.stereo
+    distance = float(np.linalg.norm(stereo.pose.vector_mm))
+    if distance == 0:
+        raise CalibrationError(
+            f"In {source} camera and projector are at one place (a translation of zero), so nothing has a"
+            " depth. Correct the translation in the file."
+        )
+    given = [each.words for each in (camera_curves, led_curves) if each is not None]
+    notes = f"film and scales from {base.name!r}; {'; '.join(given)}" if len(given) == 2 else (
+        f"film, curves and scales from {base.name!r}: for depth alone{''.join(f'; {each}' for each in given)}"
+    )  # fmt: skip
+    assumed = f"; assumed: {', '.join(found.assumed)}" if found.assumed else ""
+    return Rig(
+        name=source,
+        camera=stereo.camera,
+        projector=stereo.projector,
+        pose=stereo.pose,
+        film=base.film,
+        response=_as_large(base.response, camera_curves),
+        emission=_as_large(base.emission, led_curves),
+        efficiency=base.efficiency,
+        white_scale=base.white_scale,
+        depth_range_mm=(NEAREST * distance, FARTHEST * distance),
+        provenance=Provenance(
+            source=f"lenses and pose of {source}",
+            notes=f"{notes}{assumed}",
+        ),
+    )
+
+
+def _as_large(base: Rgb, found: FoundCurves | None) -> Rgb:
+    if found is None:
+        return base
+    most = max(max(curve.values) for curve in base)
+    red, green, blue = (
+        SpectralCurve.of(curve.wavelengths_nm, np.multiply(curve.values, most), base[0].unit)
+        for curve in found.curves
+    )
+    return red, green, blue
