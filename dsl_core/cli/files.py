@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -94,24 +94,25 @@ def import_(
     from dsl_core.workflows import exchange
 
     output = Output(json)
+    of_pictures = {"--guess": guess, "--mapping": mapping, "--set": chosen, "--encoding": encoding}
+    of_stereo = {
+        "--camera-curves": camera_curves,
+        "--led-curves": led_curves,
+        "--from-projector": from_projector,
+        "--unit-mm": unit_mm != 1.0,
+    }
     if source.is_file() and source.suffix.lower() in STEREO_FILES:
-        import_stereo(
-            output,
-            source,
-            target,
-            StereoOptions(
-                base, camera_size, projector, unit_mm, from_projector, (camera_curves, led_curves), force
-            ),
-        )
+        _refuse(f"{source} is a stereo file", of_pictures, "a folder of pictures. Name that folder")
+        curves = camera_curves, led_curves
+        stereo = StereoOptions(base, camera_size, projector, unit_mm, from_projector, curves, force)
+        import_stereo(output, source, target, stereo)
         output.finish()
         return
     if not source.is_dir():
         raise StoreError(f"{source} is not a folder. Give the folder of a published dataset or calibration.")
-    if camera_curves or led_curves or from_projector:
-        raise StoreError(
-            f"{source} is a folder; --camera-curves, --led-curves, --from-projector belong to a stereo file."
-            " Leave them out, or name the XML, YAML or JSON file with the lenses."
-        )
+    _refuse(
+        f"{source} is a folder", of_stereo, "a stereo file. Name the XML, YAML or JSON file with the lenses"
+    )
     options = PictureOptions(guess, mapping, projector, chosen, encoding, force)
     if encoding is not None and not options.is_asked_for:
         raise StoreError("--encoding needs --guess or --mapping: add one of them, or leave it out.")
@@ -132,6 +133,14 @@ def import_(
         output.say(f"Imported to {target}")
         output.put(imported=target)
     output.finish()
+
+
+def _refuse(what: str, options: Mapping[str, object], instead: str) -> None:
+    """Raise `StoreError` if options were given that a source has no use for; ``instead`` has one."""
+    given = [name for name, value in options.items() if value]
+    if given:
+        belong, them = ("belongs", "it") if len(given) == 1 else ("belong", "them")
+        raise StoreError(f"{what}; {', '.join(given)} {belong} to {instead}, or leave {them} out.")
 
 
 def _import_dataset(output: Output, source: Path, target: Path | None, rig: Rig) -> None:

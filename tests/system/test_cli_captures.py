@@ -91,8 +91,6 @@ def test_values_are_judged_before_and_after_an_import(
     assert (told["encoding"], told["linearity"]["verdict"]) == ("srgb", "linear")
     assert main(["import", "set", "--encoding", "srgb"]) == 2
     assert "needs --guess or --mapping" in capsys.readouterr().err
-    assert main(["import", "set", "--guess", "--from-projector"]) == 2
-    assert "belong to a stereo file" in capsys.readouterr().err
     assert main(["import", "set", "--guess", "--encoding", "gamma"]) == 2
     assert "must be linear or srgb" in capsys.readouterr().err
 
@@ -112,3 +110,35 @@ def test_a_guess_that_decodes_little_is_kept_but_not_imported(
     assert not Path("b.dsl").exists()
     assert main(["import", "set", "--mapping", "set.mapping.json"]) == 0
     assert "Warning: the mapping is likely wrong" in " ".join(capsys.readouterr().out.split())
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (
+            ("set", "--guess", "--from-projector"),
+            "set is a folder; --from-projector belongs to a stereo",
+        ),
+        (("set", "--unit-mm", "1000", "--led-curves", "a.csv"), "--led-curves, --unit-mm belong to a stereo"),
+        (
+            ("c.json", "--encoding", "srgb"),
+            "is a stereo file; --encoding belongs to a folder of",
+        ),
+        (
+            ("c.json", "--guess", "--set", "cam2"),
+            "--guess, --set belong to a folder of pictures. Name",
+        ),
+    ],
+)
+def test_options_of_another_kind_of_source_are_refused(
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    words: tuple[str, ...],
+    said: str,
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("set").mkdir()
+    Path("c.json").write_text("{}", encoding="utf-8")
+    assert main(["import", *words]) == 2
+    assert said in " ".join(capsys.readouterr().err.split())
