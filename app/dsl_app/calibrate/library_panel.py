@@ -35,6 +35,7 @@ from dsl_core.io.calibration_library import LibraryLine
 if TYPE_CHECKING:
     from dsl_app.calibrate.library import LibraryController
 
+LIBRARY = "Library of calibrations"
 _COLUMNS = ("Name", "Stored", "Use", "Camera", "Projector", "Outside limits")
 #: Filters of the export dialog, and the forms they mean.
 FORMS = {
@@ -52,7 +53,7 @@ class LibraryPanel(QGroupBox):
     """Lists every version, describes the selected one, and acts on it."""
 
     def __init__(self, state: CalibrateState, commands: LibraryController) -> None:
-        super().__init__("Library of calibrations")
+        super().__init__(LIBRARY)
         self._state, self._commands = state, commands
         self.table = _table()
         # The version that was selected as the next one to use.
@@ -101,6 +102,19 @@ class LibraryPanel(QGroupBox):
         """Show the details below the list, for a panel that is higher than wide, or next to it."""
         self._split.setOrientation(Qt.Orientation.Vertical if on else Qt.Orientation.Horizontal)
         self._split.setSizes([1000, 2000] if on else [3000, 2000])
+
+    def place_table(self, elsewhere: QWidget | None) -> None:
+        """Put the list on another widget with a layout, or back before the details for None."""
+        self.setTitle("Selected calibration" if elsewhere is not None else LIBRARY)
+        if elsewhere is not None:
+            layout = elsewhere.layout()
+            assert layout is not None
+            layout.addWidget(self.table)
+        elif self.table.parentWidget() is not self._split:
+            self._split.insertWidget(0, self.table)
+            self._split.setStretchFactor(0, 3)
+            self._split.setStretchFactor(1, 2)
+        self.table.show()
 
     # The list --------------------------------------------------------------------------------------
 

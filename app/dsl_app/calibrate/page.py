@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING
 
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QShowEvent
-from PySide6.QtWidgets import QBoxLayout, QFrame, QGridLayout, QWidget
+from PySide6.QtWidgets import QBoxLayout, QFrame, QGridLayout, QGroupBox, QWidget
 
 from dsl_app.calibrate.campaign_box import CampaignBox
-from dsl_app.calibrate.library_panel import LibraryPanel
+from dsl_app.calibrate.library_panel import LIBRARY, LibraryPanel
 from dsl_app.calibrate.presentation import main_button, row_display
 from dsl_app.calibrate.state import CalibrateState, Row
 from dsl_app.calibrate.wizard.step_page import LiveFrameView
@@ -34,8 +34,8 @@ FETCH_MS = 200
 ROWS_PX = 316
 #: Shares of a wide window for the rows, whose figures are lines to read, and for the library.
 WIDE_SHARES = (5, 4)
-#: The most that a row takes where there is more room.
-HIGHEST_PX = 84
+#: The most that a row takes where there is more room, and in a high window.
+HIGHEST_PX, TALL_ROW_PX = 84, 110
 #: Width of what the camera sees while everything is calibrated.
 PICTURE_PX = 236
 #: No limit to a width.
@@ -68,16 +68,17 @@ class CalibratePage(PageWidget):
         self._connect()
 
     def _lay_out(self) -> None:
-        # They take the room that there is, up to a height at which they still read as rows.
-        for row in self.rows.values():
-            row.setMaximumHeight(HIGHEST_PX)
         parts = ((row, 20) for row in self.rows.values())
         area = scrolled(boxed(column_of(*parts, STRETCH, margins=0, spacing=4)))
         area.setFocusPolicy(Qt.FocusPolicy.NoFocus)
         self._top = row_of((area, 1), self.picture, margins=0)
-        top = boxed(self._top)
+        # In a high window the list of calibrations is below the rows, and their details fill the right side.
+        self._listed = QGroupBox(LIBRARY)
+        column_of(on=self._listed)
+        top = boxed(column_of((boxed(self._top), 1), (self._listed, 1), margins=0))
         self._split = splitter(Qt.Orientation.Vertical, (top, 0), (self.library, 1), sizes=(ROWS_PX, 300))
         column_of(self.banner, self.head, (self._split, 1), on=self)
+        self.arrange()
 
     def arrange(self) -> None:
         """Show the library next to the calibrations where there is room, else below them."""
@@ -88,12 +89,17 @@ class CalibratePage(PageWidget):
         self._split.setSizes(
             [self.width() * share // sum(shares) for share in shares] if self.is_wide else [ROWS_PX, 300]
         )
+        self.library.place_table(self._listed if self.is_tall else None)
         self.library.stack(self.is_wide)
-        # What the camera sees is below the rows where those are narrow.
-        direction = QBoxLayout.Direction
-        self._top.setDirection(direction.TopToBottom if self.is_wide else direction.LeftToRight)
-        self.picture.setMinimumWidth(0 if self.is_wide else PICTURE_PX)
-        self.picture.setMaximumWidth(LARGEST_PX if self.is_wide else PICTURE_PX)
+        self._listed.setVisible(self.is_tall)
+        # They take the room that there is, up to a height at which they still read as rows.
+        for row in self.rows.values():
+            row.setMaximumHeight(TALL_ROW_PX if self.is_tall else HIGHEST_PX)
+        # What the camera sees is below the rows where those are narrow and alone.
+        is_below, direction = self.is_wide and not self.is_tall, QBoxLayout.Direction
+        self._top.setDirection(direction.TopToBottom if is_below else direction.LeftToRight)
+        self.picture.setMinimumWidth(0 if is_below else PICTURE_PX)
+        self.picture.setMaximumWidth(LARGEST_PX if is_below else PICTURE_PX)
 
     def _connect(self) -> None:
         state = self._state

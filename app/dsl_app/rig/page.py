@@ -137,17 +137,18 @@ class RigPage(PageWidget):
         camera_form.addRow("", self.auto)
         camera_form.addRow("", self.live_button)
         camera_form.addRow("", self.scan)
-        # In a wide window the projector is below the camera, and figures are next to the picture.
+        # In a wide window the projector is below the camera, and figures are next to the picture; in a high
+        # one they are below the projector.
         self.beside = QGroupBox("Picture")
         column_of(on=self.beside)
         self.beside.hide()
         self._left = column_of(devices, camera, STRETCH, margins=0)
         self._right = column_of(self.projector, (self.beside, 20), STRETCH, margins=0)
-        left, self._right_side = boxed(self._left), boxed(self._right)
-        for side in (left, self._right_side):
+        self._left_side, self._right_side = boxed(self._left), boxed(self._right)
+        for side in (self._left_side, self._right_side):
             side.setFixedWidth(SIDE_PX)
         # Of a very wide window the figures get a quarter of what the left side leaves.
-        row_of(left, (self.live, 3), (self._right_side, 1), on=self)
+        row_of(self._left_side, (self.live, 3), (self._right_side, 1), on=self)
 
     def arrange(self) -> None:
         """Show controls and figures next to the picture where there is room."""
@@ -158,6 +159,11 @@ class RigPage(PageWidget):
             self._left.insertWidget(2, self.projector)
         else:
             self._right.insertWidget(0, self.projector)
+        self._left_side.setFixedWidth(WIDE_SIDE_PX if self.is_tall else SIDE_PX)
+        self._right_side.setVisible(not self.is_tall)
+        column, place = (self._left, 3) if self.is_tall else (self._right, self._right.count() - 1)
+        if self.beside.parentWidget() is not column.parentWidget():
+            column.insertWidget(place, self.beside, 20)
         if self.live.made is not None:
             self.live.made.place_controls(self.beside if self.is_wide else None)
 

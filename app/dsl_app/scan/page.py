@@ -7,7 +7,7 @@ from pathlib import Path
 
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QHideEvent, QShowEvent
-from PySide6.QtWidgets import QFileDialog, QScrollArea, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QFileDialog, QGroupBox, QScrollArea, QVBoxLayout, QWidget
 
 from dsl_app.scan.controller import ScanController
 from dsl_app.scan.controls import banner_controls
@@ -30,7 +30,7 @@ from dsl_app.shared.widgets.ticker import Ticker
 
 #: Interval at which the state of the scan is fetched, ms: ten pictures a second look live.
 FETCH_MS = 100
-LEFT_PX, RIGHT_PX = 276, 292
+LEFT_PX, RIGHT_PX, TALL_PX = 276, 292, 400
 FRAMES, FRAMES_TIP = "&Frames", "Frames while the scan runs"
 PLANS = "Plans and pattern sets (*.json)"
 
@@ -87,6 +87,9 @@ class ScanPage(PageWidget):
             (self.effects, "&Effects", "Effects of light that the simulated rig renders"),
         )
         self._left, self._left_area = _side(LEFT_PX, self.plan)
+        self._figures = QGroupBox("Expected accuracy")
+        column_of(on=self._figures)
+        self._figures.hide()
         self._right, self._right_area = _side(RIGHT_PX, self.calibration, self.target, self.run)
         self._views = splitter(Qt.Orientation.Horizontal, (self.middle, 1))
         row = row_of(self._left_area, (self._views, 1), self._right_area)
@@ -99,7 +102,12 @@ class ScanPage(PageWidget):
         for place, box in enumerate(boxes, first):
             column.insertWidget(place, box)
         self._right_area.setVisible(not self.is_wide)
-        self._left_area.setFixedWidth(RIGHT_PX if self.is_wide else LEFT_PX)
+        width_px = RIGHT_PX if self.is_wide else LEFT_PX
+        self._left_area.setFixedWidth(TALL_PX if self.is_tall else width_px)
+        # In a high window the figures of the plan are in its column, and their curve takes their place.
+        self._figures.setVisible(self.is_tall)
+        self._left.insertWidget(self._left.count() - 1, self._figures)
+        self.forecast.place_table(self._figures if self.is_tall else None)
         if self.is_wide:
             self.middle.removeTab(self.middle.indexOf(self.view))
             self._views.addWidget(self.view)

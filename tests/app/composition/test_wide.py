@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -11,6 +12,7 @@ from dsl_app.results.page import ResultsPage
 from dsl_app.rig.page import RigPage
 from dsl_app.scan.page import ScanPage
 from dsl_app.shell.main_window import MainWindow
+from PySide6.QtWidgets import QWidget
 from pytestqt.qtbot import QtBot
 
 from tests.app.support.real_window import show_window
@@ -39,7 +41,7 @@ def test_views_are_side_by_side_in_a_large_window_alone(
     qtbot.waitUntil(lambda: not window.parts.runner.active, timeout=30_000)
     live = rig.live.content
     for size in (SMALL, LARGE, HUGE, SMALL):
-        is_large = size != SMALL
+        is_large, is_tall = size != SMALL, size == HUGE
         window.resize(*size)
         for name in PAGES:
             window.open_page(name)
@@ -54,12 +56,26 @@ def test_views_are_side_by_side_in_a_large_window_alone(
         assert (beside.x() > rows.x()) == is_large
         # Figures are read in one line next to their calibration, and the histogram grows with the window.
         if is_large:
-            assert calibrate.library.details.y() > calibrate.library.table.y()
+            assert is_tall or calibrate.library.details.y() > calibrate.library.table.y()
             assert 1.1 < calibrate.rows["selftest"].width() / calibrate.library.width() < 1.6
-        if size == HUGE:
-            assert rig.beside.width() > 500
+        # In a high one all that is set and read is in one column, which it fills.
+        assert not is_large or (rig.beside.parentWidget() is rig.projector.parentWidget()) == is_tall
+        tables = (scan.forecast.table, scan.forecast), (calibrate.library.table, calibrate.library)
+        for table, usual in tables:
+            assert usual.isAncestorOf(table) != is_tall
+        if is_tall:
+            lowest = (rig.beside, scan.forecast.table, calibrate.library.table)
+            for name, low in zip(PAGES, lowest, strict=False):
+                window.open_page(name)
+                qtbot.waitUntil(partial(_fills_the_left, window.page_of(name), low))
         # The picture gets what a wide window has more of.
         share = results._sides.sizes()[0] / sum(results._sides.sizes())
         assert (share > 0.7) == is_large
     qtbot.waitUntil(lambda: not window.parts.runner.active, timeout=30_000)
     window.close()
+
+
+def _fills_the_left(page: QWidget, low: QWidget) -> bool:
+    """Whether something is at the left edge of a page and ends near its lower one."""
+    corner = low.mapTo(page, low.rect().bottomLeft())
+    return corner.x() < 0.1 * page.width() and corner.y() > 0.8 * page.height()

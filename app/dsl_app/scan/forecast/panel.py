@@ -73,6 +73,13 @@ class ForecastPanel(QWidget):
             spacing=5,
         )
 
+    def place_table(self, elsewhere: QWidget | None) -> None:
+        """Put the figures on another widget with a layout, or back below the curve for None."""
+        layout = (self if elsewhere is None else elsewhere).layout()
+        assert layout is not None
+        layout.addWidget(self.table)
+        self.table.show()
+
     def _connect(self) -> None:
         state = self._state
         self.scene.activated.connect(self._look)

@@ -15,23 +15,26 @@ from dsl_app.shared.widgets.inside import apply_theme_inside, stop_following
 
 #: A page of this width, px, has room for views and controls next to each other.
 WIDE_PX = 1600
+#: A wide page of this height, px, has room for everything that is set or read in one column.
+TALL_PX = 1200
 
 
 class PageWidget(QWidget):
     """A page. Everything is optional: a page overrides what applies to it."""
 
-    #: Whether the page is laid out for a wide window.
-    is_wide = False
+    #: Whether the page is laid out for a wide window, and for one that is high, too.
+    is_wide = is_tall = False
 
     def arrange(self) -> None:
-        """Lay the page out as `is_wide` says; called when that changes."""
+        """Lay the page out as `is_wide` and `is_tall` say; called when one of them changes."""
 
     def resizeEvent(self, event: QResizeEvent) -> None:
-        """Lay the page out for the width that it has now."""
+        """Lay the page out for the size that it has now."""
         super().resizeEvent(event)
         is_wide = event.size().width() >= WIDE_PX
-        if is_wide != self.is_wide:
-            self.is_wide = is_wide
+        is_tall = is_wide and event.size().height() >= TALL_PX
+        if (is_wide, is_tall) != (self.is_wide, self.is_tall):
+            self.is_wide, self.is_tall = is_wide, is_tall
             self.arrange()
 
     def page_actions(self) -> dict[str, Callable[[], object]]:
