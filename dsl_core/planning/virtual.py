@@ -35,7 +35,8 @@ from dsl_core.reconstruction.columns.column import Column, refine
 from dsl_core.reconstruction.columns.pattern_column import first_order_share, refine_by_profiles
 from dsl_core.reconstruction.geometry import LIT_SIGMAS
 from dsl_core.reconstruction.spectral.solving.dense_solver import solve_dense
-from dsl_core.reconstruction.spectral.solving.solver import Prior, Spectra
+from dsl_core.reconstruction.spectral.solving.prior import Prior
+from dsl_core.reconstruction.spectral.solving.solution import Spectra
 from dsl_core.reconstruction.spectral.spectra import model_of_plan, zero_order_error
 from dsl_core.reconstruction.surface import default_window_px
 

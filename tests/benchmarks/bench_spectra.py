@@ -30,7 +30,7 @@ from dsl_core.optics.correspondence import correspondence
 from dsl_core.reconstruction.geometry import Geometry, reconstruct_geometry
 from dsl_core.reconstruction.merge import LineStack, MergedScan, decode_columns, stack_lines
 from dsl_core.reconstruction.scan_result import known_pixels
-from dsl_core.reconstruction.spectral.solving.solver import Prior
+from dsl_core.reconstruction.spectral.solving.prior import Prior
 from dsl_core.reconstruction.spectral.spectra import SpectralReconstruction
 from dsl_core.simulation.sim_devices import open_twin
 from dsl_core.workflows import scans

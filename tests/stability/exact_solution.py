@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from dsl_core.reconstruction.spectral.solving.solver import Prior
+from dsl_core.reconstruction.spectral.solving.prior import Prior
 from tests.stability.double_double import Floats, Wide
 
 Mask = NDArray[np.bool_]

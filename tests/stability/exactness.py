@@ -9,7 +9,7 @@ import torch
 from numpy.typing import NDArray
 
 from dsl_core.reconstruction.spectral.solving.lane_solver import solve_spectra
-from dsl_core.reconstruction.spectral.solving.solver import Prior
+from dsl_core.reconstruction.spectral.solving.prior import Prior
 from tests.stability.double_double import Floats
 from tests.stability.exact_solution import exact_nodes, exact_tau
 from tests.stability.random_pixels import random_equations, widened

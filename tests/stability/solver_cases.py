@@ -12,7 +12,8 @@ from torch import Tensor
 from dsl_core.reconstruction.scan_result import DECIDED_FROM
 from dsl_core.reconstruction.spectral.solving.dense_solver import solve_dense
 from dsl_core.reconstruction.spectral.solving.lane_solver import solve_spectra
-from dsl_core.reconstruction.spectral.solving.solver import Prior, Spectra
+from dsl_core.reconstruction.spectral.solving.prior import Prior
+from dsl_core.reconstruction.spectral.solving.solution import Spectra
 from tests.stability.case import HONEST_RMS, Case, Outcome
 from tests.stability.double_double import Floats
 from tests.stability.exact_solution import System, exact_nodes, exact_tau

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import torch
 
-from dsl_core.reconstruction.spectral.solving.solver import Prior
+from dsl_core.reconstruction.spectral.solving.prior import Prior
 from tests.stability.double_double import Wide
 from tests.stability.exact_solution import System, exact_nodes
 from tests.stability.exactness import exactness

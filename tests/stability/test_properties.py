@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 
 from dsl_core.model.result import SPECTRUM_INVALID
 from dsl_core.reconstruction.spectral.solving.lane_solver import solve_spectra
-from dsl_core.reconstruction.spectral.solving.solver import Prior
+from dsl_core.reconstruction.spectral.solving.prior import Prior
 from tests.stability.bench import Patch, Staged, comb_plan, grey, lines_plan, staged
 from tests.stability.case import silent_values
 

@@ -29,7 +29,8 @@ from dsl_core.reconstruction.spectral.probing.probed_light import ProbedScan
 from dsl_core.reconstruction.spectral.self_correction import Followed, follow
 from dsl_core.reconstruction.spectral.solving.compiled_tiles import PARAMETERS, CompiledTiles
 from dsl_core.reconstruction.spectral.solving.lane_solver import solve_spectra
-from dsl_core.reconstruction.spectral.solving.solver import Prior, Spectra
+from dsl_core.reconstruction.spectral.solving.prior import Prior
+from dsl_core.reconstruction.spectral.solving.solution import Spectra
 from dsl_core.reconstruction.spectral.solving.tile_frames import Pixels, TileFrames
 from dsl_core.solve.banded import multiply
 from dsl_core.solve.many import Check, work_through

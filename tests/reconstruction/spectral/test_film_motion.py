@@ -18,7 +18,7 @@ from dsl_core.reconstruction.spectral.probing.line_probe import LineProbe
 from dsl_core.reconstruction.spectral.probing.probe import Probe
 from dsl_core.reconstruction.spectral.probing.probed_light import PARAMETERS, ProbedScan
 from dsl_core.reconstruction.spectral.probing.probed_pixels import CELLS, cell_of, sample_pixels
-from dsl_core.reconstruction.spectral.solving.solver import Prior
+from dsl_core.reconstruction.spectral.solving.prior import Prior
 from dsl_core.reconstruction.spectral.solving.tile_frames import Pixels
 from dsl_core.reconstruction.spectral.spectra import model_of_plan
 from dsl_core.simulation.published_rig import published_rig

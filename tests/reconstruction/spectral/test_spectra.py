@@ -12,7 +12,8 @@ import torch
 from dsl_core.model.result import Reach
 from dsl_core.optics.correspondence import Footprint
 from dsl_core.optics.pixel_model import COLOUR_ERROR
-from dsl_core.reconstruction.spectral.solving.solver import Prior, Spectra
+from dsl_core.reconstruction.spectral.solving.prior import Prior
+from dsl_core.reconstruction.spectral.solving.solution import Spectra
 from dsl_core.reconstruction.spectral.spectra import (
     LEAST_TILE,
     TILE,

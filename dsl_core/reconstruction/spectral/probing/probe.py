@@ -33,7 +33,7 @@ from dsl_core.reconstruction.spectral.probing.curve_probe import (
 from dsl_core.reconstruction.spectral.probing.line_probe import LineProbe, probe_lines, sound_pixels
 from dsl_core.reconstruction.spectral.probing.probed_light import PARAMETERS, ProbedScan, solve_pixels
 from dsl_core.reconstruction.spectral.probing.probed_pixels import Indices, cell_of, sample_pixels, samples_of
-from dsl_core.reconstruction.spectral.solving.solver import band_mean
+from dsl_core.reconstruction.spectral.solving.solution import band_mean
 
 Floats = NDArray[np.float64]
 

@@ -22,7 +22,7 @@ from dsl_core.optics.spectra import ORDERS
 from dsl_core.reconstruction.spectral.probing.picked_cube import PickedCube
 from dsl_core.reconstruction.spectral.probing.probed_pixels import Indices, samples_of
 from dsl_core.reconstruction.spectral.solving.dense_solver import solve_dense
-from dsl_core.reconstruction.spectral.solving.solver import Prior, roughness
+from dsl_core.reconstruction.spectral.solving.prior import Prior, roughness
 from dsl_core.reconstruction.spectral.solving.tile_frames import Pixels, weighted
 from dsl_core.solve import banded
 

@@ -22,7 +22,8 @@ from dsl_core.reconstruction.spectral.solving.lane_solver import (
     diagonals_for,
     whole_blocks,
 )
-from dsl_core.reconstruction.spectral.solving.solver import Prior, Spectra
+from dsl_core.reconstruction.spectral.solving.prior import Prior
+from dsl_core.reconstruction.spectral.solving.solution import Spectra
 from dsl_core.reconstruction.spectral.solving.tile_frames import TileFrames
 from dsl_core.solve.compiled import compiled
 from dsl_core.solve.many import Check

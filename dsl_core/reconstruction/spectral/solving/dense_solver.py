@@ -5,19 +5,9 @@ from __future__ import annotations
 import torch
 from torch import Tensor
 
-from dsl_core.reconstruction.spectral.solving.solver import (
-    ACTIVE_SET_ROUNDS,
-    LOCAL_STD,
-    PENALTY,
-    TOLERANCE,
-    Prior,
-    Spectra,
-    band_mean,
-    parabola_peak,
-    roughness,
-    too_faint,
-    within_band,
-)
+from dsl_core.reconstruction.spectral.solving.prior import Prior, parabola_peak, roughness, too_faint
+from dsl_core.reconstruction.spectral.solving.solution import LOCAL_STD, Spectra, band_mean, within_band
+from dsl_core.reconstruction.spectral.solving.solver import ACTIVE_SET_ROUNDS, PENALTY, TOLERANCE
 from dsl_core.solve import banded
 
 
@@ -89,7 +79,7 @@ def _log_diagonal(factor: Tensor) -> Tensor:
 
 
 def _share(data: Tensor) -> Tensor:
-    """As `spectral_solver.data_share`, from full matrices, (pixels, bands)."""
+    """As `solution.data_share`, from full matrices, (pixels, bands)."""
     near = torch.ones_like(data[0]).triu(-2).tril(2)
     local = (data * near).sum(2)
     return local.clip(min=0) / (local.clip(min=0) + LOCAL_STD**-2)

@@ -10,15 +10,12 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
+from dsl_core.reconstruction.spectral.solving.prior import Prior, roughness
+from dsl_core.reconstruction.spectral.solving.solution import LOCAL_STD, WITHIN_BAND, Spectra
 from dsl_core.reconstruction.spectral.solving.solver import (
     ACTIVE_SET_ROUNDS,
-    LOCAL_STD,
     PENALTY,
     TOLERANCE,
-    WITHIN_BAND,
-    Prior,
-    Spectra,
-    roughness,
     solve_tensors,
 )
 from dsl_core.solve import banded

@@ -8,94 +8,125 @@ loose prior and smooth spectra a tight one, from one setting. Bounds follow by a
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields, replace
-
 import torch
 from torch import Tensor
 
+from dsl_core.reconstruction.spectral.solving.prior import Prior, parabola_peak, roughness, too_faint
+from dsl_core.reconstruction.spectral.solving.solution import Spectra, band_mean, data_share, within_band
 from dsl_core.solve import banded
 from dsl_core.solve.many import Check, never
 
-#: Deviation between centre and mean of a band, relative to the differences of its spectrum.
-WITHIN_BAND = 1 / 36
-#: Band step that the candidates of the prior are for, nm.
-STEP_NM = 5.0
-#: Deviation against which local data are weighed in the data share.
-LOCAL_STD = 0.1
 #: How far outside a bound counts, how stiffly a bound holds, and how often bands change sides.
 TOLERANCE, PENALTY, ACTIVE_SET_ROUNDS = 1e-4, 1e4, 5
-#: Data with less than this share of the tightest prior's information are too faint for single precision: the
-#: rounding of that prior would choose the smoothness.
-FAINT = 0.01
 
 
-@dataclass(frozen=True)
-class Prior:
-    """Candidates of the second-difference deviation, the level's mean and deviation, and the bounds.
+def solve_tensors(
+    data: Tensor, right: Tensor, rows: Tensor | None, prior: Prior, check: Check = never
+) -> Spectra:
+    """Posterior of every pixel's spectrum, with tensors, as a GPU needs it.
 
-    The candidates are for bands of `STEP_NM`.
+    ``data`` (bandwidth + 1, bands, pixels) and ``right`` (bands, pixels) are the first orders' normal
+    equations in reflectance; ``rows`` (bands, n, pixels) are weighted broad-band equations whose values are
+    already in ``right``. ``check`` is called where this may stop.
     """
-
-    taus: tuple[float, ...] = (0.002, 0.0085, 0.036, 0.15, 0.6)
-    level: float = 0.4
-    level_std: float = 0.6
-    bounds: tuple[float, float] = (0.0, 1.5)
-
-    def at_step(self, step_nm: float) -> Prior:
-        """The same belief in spectra for other bands.
-
-        Were slopes a random walk over wavelength, second differences would vary as the cube of the step.
-        """
-        scale = (step_nm / STEP_NM) ** 1.5
-        return replace(self, taus=tuple(tau * scale for tau in self.taus))
+    faint = too_faint(data[0], prior)
+    if not bool(faint.any()):
+        return _solve(data, right, rows, prior, check)
+    found = Spectra.empty(right)
+    for where, dtype in ((~faint, data.dtype), (faint, torch.float64)):
+        if bool(where.any()):
+            some_rows = None if rows is None else rows[..., where].to(dtype)
+            some = (data[..., where].to(dtype), right[:, where].to(dtype), some_rows)
+            found.put(where, _solve(*some, prior, check))
+    return found
 
 
-@dataclass(frozen=True)
-class Spectra:
-    """Node values, band means, deviation, data share, bound mask (bands, pixels); chosen tau (pixels,)."""
-
-    nodes: Tensor
-    mean: Tensor
-    std: Tensor
-    data_share: Tensor
-    tau: Tensor
-    at_bound: Tensor
-
-    @classmethod
-    def empty(cls, like: Tensor) -> Spectra:
-        """Spectra to be filled by `put`, for (bands, pixels) as ``like``."""
-        nodes, mean, std, share = (torch.empty_like(like) for _ in range(4))
-        return cls(
-            nodes, mean, std, share, torch.empty_like(like[0]), torch.zeros_like(like, dtype=torch.bool)
-        )
-
-    def to(self, dtype: torch.dtype) -> Spectra:
-        """The same in another precision, masks as they are."""
-        values = (getattr(self, field.name) for field in fields(self))
-        return Spectra(*(v.to(dtype) if v.is_floating_point() else v for v in values))
-
-    def put(self, where: Tensor, other: Spectra) -> None:
-        """Replace the pixels of a mask (pixels,) by other spectra."""
-        for field in fields(self):
-            mine, others = getattr(self, field.name), getattr(other, field.name)
-            mine[..., where] = others.to(mine.dtype)
+def _solve(data: Tensor, right: Tensor, rows: Tensor | None, prior: Prior, check: Check) -> Spectra:
+    """Solve in the precision of the equations."""
+    if data.shape[0] < 3:
+        data = torch.nn.functional.pad(data, (0, 0, 0, 0, 0, 3 - data.shape[0]))
+    shape = roughness(data.shape[1], data)
+    ridge = torch.zeros_like(shape)
+    ridge[0] = prior.level_std**-2
+    right = right + prior.level * prior.level_std**-2
+    tau = _most_probable_tau(data, right, rows, shape, ridge, prior, check)
+    weights = shape[..., None] * tau**-2 + ridge[..., None]
+    posterior = Posterior(data, weights, rows)
+    mean = posterior.solve(right)
+    mean, at_bound = _bounded(data, weights, rows, right, mean, prior.bounds, check)
+    check()
+    std = torch.hypot(posterior.band_mean_variance().clip(min=1e-12).sqrt(), within_band(mean))
+    return Spectra(mean, band_mean(mean), std, data_share(data), tau, at_bound)
 
 
-def roughness(bands: int, like: Tensor) -> Tensor:
-    """``D'D`` of second differences, banded storage (3, bands)."""
-    d = torch.zeros((bands - 2, bands), dtype=torch.float64)
-    for i in range(bands - 2):
-        d[i, i : i + 3] = torch.tensor([1.0, -2.0, 1.0], dtype=torch.float64)
-    full = d.T @ d
-    rows = [torch.nn.functional.pad(torch.diagonal(full, o), (0, o)) for o in range(3)]
-    return torch.stack(rows).to(like)
+def _most_probable_tau(
+    data: Tensor,
+    right: Tensor,
+    rows: Tensor | None,
+    shape: Tensor,
+    ridge: Tensor,
+    prior: Prior,
+    check: Check,
+) -> Tensor:
+    """The second-difference deviation with the largest evidence in each pixel, (pixels,).
+
+    The evidence is a smooth function of log tau: a parabola through the best candidate and its neighbours
+    gives the place of the maximum between the candidates.
+    """
+    evidence = []
+    for tau in prior.taus:
+        check()
+        weights = shape * tau**-2 + ridge
+        posterior = Posterior(data, weights[..., None], rows)
+        volume = banded.factorise(weights[..., None].double()).log_determinant.to(right)
+        evidence.append(volume - posterior.log_determinant + posterior.quadratic_form(right))
+    return parabola_peak(
+        torch.stack(evidence), torch.tensor(prior.taus, dtype=torch.float64).log().to(right)
+    ).exp()
 
 
-def _sum(data: Tensor, prior: Tensor) -> Tensor:
-    """Banded matrix of data and prior together."""
-    matrix = data.clone()
-    matrix[:3] += prior
-    return matrix
+def _bounded(
+    data: Tensor,
+    prior: Tensor,
+    rows: Tensor | None,
+    right: Tensor,
+    mean: Tensor,
+    bounds: tuple[float, float],
+    check: Check,
+) -> tuple[Tensor, Tensor]:
+    """Minimum inside the bounds by an active-set iteration where it is needed, and the active bands."""
+    low, high = bounds
+    x, pinned = mean.clone(), torch.zeros_like(mean, dtype=torch.bool)
+    slope = torch.zeros_like(mean)
+    todo = torch.nonzero(((mean < low - TOLERANCE) | (mean > high + TOLERANCE)).any(0)).ravel()
+    for _ in range(ACTIVE_SET_ROUNDS):
+        check()
+        here, held = x[:, todo], pinned[:, todo]
+        at = torch.where(here < 0.5 * (low + high), low, high)
+        release = held & torch.where(at == low, slope[:, todo] < 0, slope[:, todo] > 0)
+        wanted = (held & ~release) | (here < low - TOLERANCE) | (here > high + TOLERANCE)
+        # Pixels whose bands stay on their sides are done.
+        moved = (wanted != held).any(0)
+        if not bool(moved.any()):
+            break
+        todo, at, wanted = todo[moved], at[:, moved], wanted[:, moved]
+        sub_rows = None if rows is None else rows[..., todo]
+        b, part, weights = right[:, todo], data[..., todo], prior[..., todo]
+        matrix = _sum(part, weights)
+        stiffness = torch.where(wanted, PENALTY * matrix[0], 0.0)
+        weights[0] += stiffness
+        solved = Posterior(part, weights, sub_rows).solve(b + stiffness * at)
+        slope[:, todo] = gradient(matrix, sub_rows, solved, b)
+        x[:, todo], pinned[:, todo] = solved, wanted
+    return x.clip(low, high), pinned
+
+
+def gradient(matrix: Tensor, rows: Tensor | None, x: Tensor, right: Tensor) -> Tensor:
+    """Gradient of the quadratic with a banded matrix and broad-band rows at x, (bands, pixels)."""
+    g = banded.multiply(matrix, x) - right
+    if rows is not None:
+        g += (rows * (rows * x[:, None]).sum(0)).sum(1)
+    return g
 
 
 class Posterior:
@@ -175,172 +206,8 @@ class Posterior:
         return torch.cat([inner[:1], inner, inner[-1:]])
 
 
-def gradient(matrix: Tensor, rows: Tensor | None, x: Tensor, right: Tensor) -> Tensor:
-    """Gradient of the quadratic with a banded matrix and broad-band rows at x, (bands, pixels)."""
-    g = banded.multiply(matrix, x) - right
-    if rows is not None:
-        g += (rows * (rows * x[:, None]).sum(0)).sum(1)
-    return g
-
-
-def solve_tensors(
-    data: Tensor, right: Tensor, rows: Tensor | None, prior: Prior, check: Check = never
-) -> Spectra:
-    """Posterior of every pixel's spectrum, with tensors, as a GPU needs it.
-
-    ``data`` (bandwidth + 1, bands, pixels) and ``right`` (bands, pixels) are the first orders' normal
-    equations in reflectance; ``rows`` (bands, n, pixels) are weighted broad-band equations whose values are
-    already in ``right``. ``check`` is called where this may stop.
-    """
-    faint = too_faint(data[0], prior)
-    if not bool(faint.any()):
-        return _solve(data, right, rows, prior, check)
-    found = Spectra.empty(right)
-    for where, dtype in ((~faint, data.dtype), (faint, torch.float64)):
-        if bool(where.any()):
-            some_rows = None if rows is None else rows[..., where].to(dtype)
-            some = (data[..., where].to(dtype), right[:, where].to(dtype), some_rows)
-            found.put(where, _solve(*some, prior, check))
-    return found
-
-
-def _solve(data: Tensor, right: Tensor, rows: Tensor | None, prior: Prior, check: Check) -> Spectra:
-    """Solve in the precision of the equations."""
-    if data.shape[0] < 3:
-        data = torch.nn.functional.pad(data, (0, 0, 0, 0, 0, 3 - data.shape[0]))
-    shape = roughness(data.shape[1], data)
-    ridge = torch.zeros_like(shape)
-    ridge[0] = prior.level_std**-2
-    right = right + prior.level * prior.level_std**-2
-    tau = _most_probable_tau(data, right, rows, shape, ridge, prior, check)
-    weights = shape[..., None] * tau**-2 + ridge[..., None]
-    posterior = Posterior(data, weights, rows)
-    mean = posterior.solve(right)
-    mean, at_bound = _bounded(data, weights, rows, right, mean, prior.bounds, check)
-    check()
-    std = torch.hypot(posterior.band_mean_variance().clip(min=1e-12).sqrt(), within_band(mean))
-    return Spectra(mean, band_mean(mean), std, data_share(data), tau, at_bound)
-
-
-def too_faint(information: Tensor, prior: Prior) -> Tensor:
-    """Mask (pixels,) of those that single precision cannot solve; none in double.
-
-    ``information`` (bands, pixels) is the diagonal of the data's normal equations.
-    """
-    if information.dtype == torch.float64:
-        return torch.zeros_like(information[0], dtype=torch.bool)
-    return information.amax(0) * min(prior.taus) ** 2 < FAINT
-
-
-def band_mean(nodes: Tensor) -> Tensor:
-    """Mean reflectance over each band's triangle from node values (bands, ...): weights 1/6, 2/3, 1/6.
-
-    Node values of a piecewise linear spectrum describe a narrow peak by overshooting; its means do not.
-    """
-    padded = torch.cat([nodes[:1], nodes, nodes[-1:]])
-    return (padded[:-2] + 4 * padded[1:-1] + padded[2:]) / 6
-
-
-def within_band(nodes: Tensor) -> Tensor:
-    """How far the reflectance at a band's centre may be from its band mean, (bands, pixels).
-
-    A share of the second difference, or of the fourth where that is larger; nothing for a smooth spectrum.
-    The factor was found on lines of 2 to 15 nm under bands of 5 nm. Bands between straight lines cannot say
-    how a line narrower than one is shared out among its neighbours; the fourth difference, unlike the second,
-    tells such a line from a wider one and reaches these neighbours.
-    """
-    second = _second_difference(nodes)
-    fourth = _second_difference(second)
-    return torch.maximum(second.abs(), fourth.abs()) * WITHIN_BAND
-
-
-def _second_difference(values: Tensor) -> Tensor:
-    """Second differences along the bands, the outermost repeated."""
-    inner = values[2:] - 2 * values[1:-1] + values[:-2]
-    return torch.cat([inner[:1], inner, inner[-1:]])
-
-
-def data_share(data: Tensor) -> Tensor:
-    """Share of a band's answer that local data decide against a prior of 0.1, (bands, pixels).
-
-    The data's information on a common change of the bands within two of it, ``i / (i + 1 / 0.1^2)``.
-    """
-    bands = data.shape[1]
-    local = data[0].clone()
-    for o in range(1, min(3, data.shape[0])):
-        local[: bands - o] += data[o, : bands - o]
-        local[o:] += data[o, : bands - o]
-    return local / (local + LOCAL_STD**-2)
-
-
-def _most_probable_tau(
-    data: Tensor,
-    right: Tensor,
-    rows: Tensor | None,
-    shape: Tensor,
-    ridge: Tensor,
-    prior: Prior,
-    check: Check,
-) -> Tensor:
-    """The second-difference deviation with the largest evidence in each pixel, (pixels,).
-
-    The evidence is a smooth function of log tau: a parabola through the best candidate and its neighbours
-    gives the place of the maximum between the candidates.
-    """
-    evidence = []
-    for tau in prior.taus:
-        check()
-        weights = shape * tau**-2 + ridge
-        posterior = Posterior(data, weights[..., None], rows)
-        volume = banded.factorise(weights[..., None].double()).log_determinant.to(right)
-        evidence.append(volume - posterior.log_determinant + posterior.quadratic_form(right))
-    return parabola_peak(
-        torch.stack(evidence), torch.tensor(prior.taus, dtype=torch.float64).log().to(right)
-    ).exp()
-
-
-def parabola_peak(values: Tensor, positions: Tensor) -> Tensor:
-    """Position of the maximum of samples (candidates, pixels) at evenly spaced positions (candidates,)."""
-    best = values.argmax(0).clip(1, len(values) - 2)
-    left, middle, right = (values.gather(0, (best + i)[None])[0] for i in (-1, 0, 1))
-    curvature = (2 * middle - left - right).clip(min=1e-6)
-    shift = (0.5 * (right - left) / curvature).clip(-1, 1)
-    # Where the middle is a minimum of the three, the better end is taken.
-    shift = torch.where(2 * middle - left - right > 0, shift, torch.sign(right - left))
-    return positions[best] + shift * (positions[1] - positions[0])
-
-
-def _bounded(
-    data: Tensor,
-    prior: Tensor,
-    rows: Tensor | None,
-    right: Tensor,
-    mean: Tensor,
-    bounds: tuple[float, float],
-    check: Check,
-) -> tuple[Tensor, Tensor]:
-    """Minimum inside the bounds by an active-set iteration where it is needed, and the active bands."""
-    low, high = bounds
-    x, pinned = mean.clone(), torch.zeros_like(mean, dtype=torch.bool)
-    slope = torch.zeros_like(mean)
-    todo = torch.nonzero(((mean < low - TOLERANCE) | (mean > high + TOLERANCE)).any(0)).ravel()
-    for _ in range(ACTIVE_SET_ROUNDS):
-        check()
-        here, held = x[:, todo], pinned[:, todo]
-        at = torch.where(here < 0.5 * (low + high), low, high)
-        release = held & torch.where(at == low, slope[:, todo] < 0, slope[:, todo] > 0)
-        wanted = (held & ~release) | (here < low - TOLERANCE) | (here > high + TOLERANCE)
-        # Pixels whose bands stay on their sides are done.
-        moved = (wanted != held).any(0)
-        if not bool(moved.any()):
-            break
-        todo, at, wanted = todo[moved], at[:, moved], wanted[:, moved]
-        sub_rows = None if rows is None else rows[..., todo]
-        b, part, weights = right[:, todo], data[..., todo], prior[..., todo]
-        matrix = _sum(part, weights)
-        stiffness = torch.where(wanted, PENALTY * matrix[0], 0.0)
-        weights[0] += stiffness
-        solved = Posterior(part, weights, sub_rows).solve(b + stiffness * at)
-        slope[:, todo] = gradient(matrix, sub_rows, solved, b)
-        x[:, todo], pinned[:, todo] = solved, wanted
-    return x.clip(low, high), pinned
+def _sum(data: Tensor, prior: Tensor) -> Tensor:
+    """Banded matrix of data and prior together."""
+    matrix = data.clone()
+    matrix[:3] += prior
+    return matrix

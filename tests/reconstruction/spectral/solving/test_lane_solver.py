@@ -6,7 +6,8 @@ import pytest
 import torch
 
 from dsl_core.reconstruction.spectral.solving.lane_solver import diagonals_for, solve_spectra, whole_blocks
-from dsl_core.reconstruction.spectral.solving.solver import Prior, solve_tensors
+from dsl_core.reconstruction.spectral.solving.prior import Prior
+from dsl_core.reconstruction.spectral.solving.solver import solve_tensors
 from tests.stability.random_pixels import random_equations
 
 

@@ -11,16 +11,9 @@ from torch import Tensor
 
 from dsl_core.reconstruction.spectral.solving.dense_solver import solve_dense
 from dsl_core.reconstruction.spectral.solving.lane_solver import solve_spectra
-from dsl_core.reconstruction.spectral.solving.solver import (
-    Posterior,
-    Prior,
-    band_mean,
-    gradient,
-    parabola_peak,
-    roughness,
-    too_faint,
-    within_band,
-)
+from dsl_core.reconstruction.spectral.solving.prior import Prior, parabola_peak, roughness, too_faint
+from dsl_core.reconstruction.spectral.solving.solution import band_mean, within_band
+from dsl_core.reconstruction.spectral.solving.solver import Posterior, gradient
 from dsl_core.solve import banded
 
 BANDS, PIXELS, HALF = 30, 5, 3
