@@ -173,6 +173,7 @@ def reconstruct(
         with timer.stage("colour and result", in_parts=True):
             result.put(band, spectra)
     with timer.stage("colour and result", in_parts=True):
+        progress.report("colour and result", 0, 0)
         return result.finish(solver, findings)
 
 

@@ -14,7 +14,10 @@ class Progress(Protocol):
     """What a long computation reports while it runs."""
 
     def report(self, stage: str, done: int, total: int) -> None:
-        """Tell that ``done`` of ``total`` steps of ``stage`` are finished; raises `Cancelled`."""
+        """Tell that ``done`` of ``total`` steps of ``stage`` are finished; raises `Cancelled`.
+
+        A total of 0 means that the end of the stage is not known.
+        """
 
 
 class NoProgress:

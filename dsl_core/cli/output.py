@@ -106,7 +106,7 @@ class _Lines:
 
     def report(self, stage: str, done: int, total: int) -> None:
         now_s = time.monotonic()
-        line = f"{stage}: {done} of {total} ({done / max(total, 1):.0%})"
+        line = f"{stage}: {done} of {total} ({done / total:.0%})" if total else stage
         if now_s - self._last_s >= _LINE_EVERY_S and line != self._last_line:
             self._last_s, self._last_line = now_s, line
             print(line, file=sys.stderr, flush=True)
@@ -123,7 +123,7 @@ class _Bars:
         bars = self._bars or self._open()
         if stage not in self._tasks:
             self._make_room(bars)
-            self._tasks[stage] = bars.add_task(stage, total=total)
+            self._tasks[stage] = bars.add_task(stage, total=total or None)
         bars.update(self._tasks[stage], completed=done)
 
     def close(self) -> None:

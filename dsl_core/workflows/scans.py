@@ -32,7 +32,7 @@ from dsl_core.model.rig import Rig, Sensor
 from dsl_core.model.spectral import WavelengthGrid
 from dsl_core.patterns.images import pattern_image
 from dsl_core.pipeline import Options, reconstruct, scan
-from dsl_core.progress import Progress
+from dsl_core.progress import NoProgress, Progress
 from dsl_core.version import __version__
 from dsl_core.workflows.captures import own_sensor, with_own_sensor
 
@@ -111,8 +111,10 @@ def reconstruct_scan(
         _require_conditions(folder, reader.manifest, calibration)
     rig, options = with_own_sensor(reader, calibration_of(reader, calibration)), options or Options()
     watched = WatchedSource(reader)
+    progress = progress or NoProgress()
     result = reconstruct(watched, rig, options, progress, timer, sink)
     with timer.stage("compare frames with their patterns"):
+        progress.report("compare frames with their patterns", 0, 0)
         proof = watched.report(rig, rig.sensor.bit_depth, rig.sensor.bayer)
         doubts = (*_moved(reader, rig.sensor), *proof.sentences)
     return result.assign_attrs(
@@ -154,9 +156,11 @@ def reconstruct_to(
     rig = calibration_of(reader, calibration)
     facts = [__version__, reader.manifest.model_dump_json(), frames, rig.model_dump_json(), repr(options)]
     with RowWriter(target, json.dumps(facts), overwrite=overwrite) as writer:
+        progress = progress or NoProgress()
         given = folder, calibration, options, progress, timer, override_calibration
         result = reconstruct_scan(*given, sink=writer)
         with timer.stage("save the result"):
+            progress.report("save the result", 0, 0)
             return writer.publish(result.attrs)
 
 

@@ -16,6 +16,7 @@ from dsl_core.io.scan.folder import ScanReader
 from dsl_core.io.scan.lock import FolderLock
 from dsl_core.model.presets import PRESETS
 from dsl_core.pipeline import Options
+from dsl_core.progress import CallbackProgress
 from dsl_core.workflows import scans
 from dsl_core.workflows.unfinished import (
     _options_of,
@@ -63,6 +64,14 @@ def test_an_interrupted_reconstruction_is_found_and_continued(killed: Path, tmp_
     assert resume_result(found) == tmp_path / "a.zarr"
     assert "depth_mm" in load_result(tmp_path / "a.zarr")
     assert unfinished_results(tmp_path) == ()
+
+
+def test_the_last_stages_of_a_reconstruction_are_told(scan: Path, tmp_path: Path) -> None:
+    told: list[str] = []
+    progress = CallbackProgress(lambda stage, _done, _total: told.append(stage))
+    scans.reconstruct_to(tmp_path / "b.zarr", scan, None, OPTIONS, progress)
+    last = list(dict.fromkeys(told))[-3:]
+    assert last == ["colour and result", "compare frames with their patterns", "save the result"]
 
 
 def test_one_that_runs_or_whose_scan_is_gone_is_not_offered(killed: Path, tmp_path: Path) -> None:
