@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -38,6 +39,10 @@ from dsl_core.reconstruction.merge import check_source
 if TYPE_CHECKING:
     import xarray as xr
 
+    from dsl_core.optics.lines.line_set import LineSet
+    from dsl_core.reconstruction.geometry import Geometry
+    from dsl_core.reconstruction.rows.frames import ScanFrames
+
 
 __all__ = ["Options", "evaluate", "fit_plan", "open_scan", "reconstruct", "scan", "write_report"]
 
@@ -63,20 +68,23 @@ def open_scan(
     require_possible(rig, plan)
     with ScanWriter.open(folder, plan, rig, notes) as writer:
         sink: FrameSink = WatchedSink(writer, watch) if watch else writer
-        camera = rig.camera.info
-        proof = FrameProof(plan, rig.calibration, camera.bit_depth, camera.bayer) if prove else None
         stored = ScanReader(folder)
-        sentinels = (
-            SentinelWatch(plan, rig.calibration.sensor if rig.calibration else None) if prove else None
-        )
-        if sentinels is not None:
+        proof, sentinels = None, None
+        if prove:
+            camera = rig.camera.info
+            proof = FrameProof(plan, rig.calibration, camera.bit_depth, camera.bayer)
+            sentinels = SentinelWatch(plan, rig.calibration.sensor if rig.calibration else None)
             missing = {shot.index for shot in writer.missing()}
             sentinels.learn(stored, (shot for shot in plan.shots() if shot.index not in missing))
-            sink = WatchedSink(sink, lambda shot, frame: sentinels.add(shot, frame.pixels))
+            sink = WatchedSink(sink, _told_to(sentinels))
         yield Runner(
             rig, plan, sink, pattern_image, progress=progress, token=token, proof=proof, stored=stored,
             sentinels=sentinels, waits=waits,
         )  # fmt: skip
+
+
+def _told_to(sentinels: SentinelWatch) -> Watch:
+    return lambda shot, frame: sentinels.add(shot, frame.pixels)
 
 
 def scan(
@@ -106,20 +114,12 @@ def reconstruct(
     in memory at once; the result is, unless a ``sink`` takes it.
     """
     from dsl_core.optics.lines.line_set import LineSet
-    from dsl_core.reconstruction.columns.column import MODEL_ERROR
-    from dsl_core.reconstruction.columns.line_spread import own_spread, spread_pixels, with_own_spread
-    from dsl_core.reconstruction.columns.peak_error import own_peak_error
-    from dsl_core.reconstruction.geometry import geometry_of, require_light, require_pixels
-    from dsl_core.reconstruction.lenses import follow_lenses
-    from dsl_core.reconstruction.light.followed import follow_light
     from dsl_core.reconstruction.light.own_sensor import own_sensor
     from dsl_core.reconstruction.rows.assembly import Assembly
     from dsl_core.reconstruction.rows.bands import bands_of
-    from dsl_core.reconstruction.rows.columns import columns_by_rows
     from dsl_core.reconstruction.rows.frames import ScanFrames
     from dsl_core.reconstruction.scan_result import known_pixels
     from dsl_core.reconstruction.spectral.solvers import check_solver, row_solver, rows_together
-    from dsl_core.reconstruction.spread_findings import spread_findings
 
     options, progress, timer = options or Options(), progress or NoProgress(), timer or StageTimer()
     plan, lines = check_source(source, rig), LineSet.of(source.plan)
@@ -131,34 +131,8 @@ def reconstruct(
         rig = rig.model_copy(update={"sensor": sensor})
         findings += found_of_sensor
     frames = ScanFrames(source, rig, bands_of(plan, options.band_rows, rows_together(rig, options)))
-    with timer.stage("read, merge, decode the binary code"):
-        code, white = frames.decode(progress)
-        require_light(white.radiance, white.saturated)
-    with timer.stage("read and merge the line frames"):
-        if options.as_calibrated:
-            frames.look(progress=progress)
-        else:
-            asked = lambda *seen: spread_pixels(lines, *seen)  # noqa: E731
-            code, white, found_of_light = follow_light(frames, code, white, asked, progress)
-            findings += found_of_light
-    with timer.stage("columns, depth, normals"):
-        peak_error = MODEL_ERROR
-        if options.refine_columns and not options.as_calibrated:
-            found = own_spread(rig, lines, code, white, frames)
-            if found is not None:
-                findings += spread_findings(rig.projector_response, found)
-            rig = with_own_spread(rig, found)
-            peak_error = own_peak_error(rig, lines, code, white, frames)
-        columns = columns_by_rows(rig, options, frames, code, white, peak_error, progress)
-        del code, white  # of large pictures they take much of the memory
-        geometry = geometry_of(
-            rig, lines if options.refine_columns else None, columns, frames.shape, options.surface_window_px
-        )
-        del columns
-        require_pixels(geometry.flags)
-        if options.refine_columns and not options.as_calibrated:
-            rig, geometry, found_of_lenses = follow_lenses(rig, lines, geometry, options.surface_window_px)
-            findings += found_of_lenses
+    rig, geometry, found_of_depth = _depth(rig, lines, options, frames, progress, timer)
+    findings += found_of_depth
     solver = None
     if options.spectra:
         with timer.stage("spectra"):
@@ -175,6 +149,61 @@ def reconstruct(
     with timer.stage("colour and result", in_parts=True):
         progress.report("colour and result", 0, 0)
         return result.finish(solver, findings)
+
+
+def _depth(
+    rig: Rig,
+    lines: LineSet | None,
+    options: Options,
+    frames: ScanFrames,
+    progress: Progress,
+    timer: StageTimer,
+) -> tuple[Rig, Geometry, list[FitFinding]]:
+    """Frames -> linear radiance -> columns -> depth -> surface, of the whole picture.
+
+    Unless all is ``as_calibrated``, light, line spread and lenses are followed: the rig as this scan has it,
+    and what was found of them.
+    """
+    from dsl_core.reconstruction.columns.column import MODEL_ERROR
+    from dsl_core.reconstruction.columns.line_spread import own_spread, spread_pixels, with_own_spread
+    from dsl_core.reconstruction.columns.peak_error import own_peak_error
+    from dsl_core.reconstruction.geometry import geometry_of, require_light, require_pixels
+    from dsl_core.reconstruction.lenses import follow_lenses
+    from dsl_core.reconstruction.light.followed import follow_light
+    from dsl_core.reconstruction.rows.columns import columns_by_rows
+    from dsl_core.reconstruction.spread_findings import spread_findings
+
+    findings: list[FitFinding] = []
+    refines_rig = options.refine_columns and not options.as_calibrated
+    with timer.stage("read, merge, decode the binary code"):
+        code, white = frames.decode(progress)
+        require_light(white.radiance, white.saturated)
+    with timer.stage("read and merge the line frames"):
+        if options.as_calibrated:
+            frames.look(progress=progress)
+        else:
+            asked = partial(spread_pixels, lines)
+            code, white, found_of_light = follow_light(frames, code, white, asked, progress)
+            findings += found_of_light
+    with timer.stage("columns, depth, normals"):
+        peak_error = MODEL_ERROR
+        if refines_rig:
+            found = own_spread(rig, lines, code, white, frames)
+            if found is not None:
+                findings += spread_findings(rig.projector_response, found)
+            rig = with_own_spread(rig, found)
+            peak_error = own_peak_error(rig, lines, code, white, frames)
+        columns = columns_by_rows(rig, options, frames, code, white, peak_error, progress)
+        del code, white  # of large pictures they take much of the memory
+        geometry = geometry_of(
+            rig, lines if options.refine_columns else None, columns, frames.shape, options.surface_window_px
+        )
+        del columns
+        require_pixels(geometry.flags)
+        if refines_rig:
+            rig, geometry, found_of_lenses = follow_lenses(rig, lines, geometry, options.surface_window_px)
+            findings += found_of_lenses
+    return rig, geometry, findings
 
 
 def evaluate(result: xr.Dataset, truth: Truth) -> Evaluation:
