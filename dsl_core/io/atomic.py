@@ -127,7 +127,7 @@ def disk_full(path: Path) -> StoreError:
     """The sentence for a disk without space."""
     return StoreError(
         f"The disk is full: {path} could not be written. Nothing saved before is lost;"
-        " free some space and resume."
+        " free some space and try again."
     )
 
 

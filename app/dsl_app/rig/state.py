@@ -66,6 +66,8 @@ def rig_view(rig: RigState, live: LiveState) -> RigView:
     """
     link, devices = rig.link.value, rig.devices.value
     has_devices = devices is not None
+    # Of a rig that is lost, nothing can be asked before it is connected again.
+    can_look = has_devices and link is not Link.LOST
     is_live, is_calibrated = rig.live.value, devices is not None and devices.calibration is not None
     return RigView(
         link=LabelState(f"● {link.value}", _LINK_ROLES[link]),
@@ -78,14 +80,14 @@ def rig_view(rig: RigState, live: LiveState) -> RigView:
             text="Disconnect" if link is Link.OPEN else "Connect",
         ),
         live_button=ButtonState(
-            is_enabled=has_devices,
-            is_primary=has_devices and not is_live,
+            is_enabled=can_look,
+            is_primary=can_look and not is_live,
             text="Stop live view" if is_live else "Start live view",
         ),
-        selftest=ButtonState(is_enabled=has_devices, is_primary=is_live and not is_calibrated),
-        scan=ButtonState(is_enabled=has_devices, is_primary=is_live and is_calibrated),
+        selftest=ButtonState(is_enabled=can_look, is_primary=is_live and not is_calibrated),
+        scan=ButtonState(is_enabled=can_look, is_primary=is_live and is_calibrated),
         exposure=has_devices,
-        auto=has_devices and not live.is_exposing.value,
+        auto=can_look and not live.is_exposing.value,
         cycles=LabelState(cycles_text(live.exposure_ms.value, rig.cycle_ms), "muted"),
     )
 

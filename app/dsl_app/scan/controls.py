@@ -73,7 +73,9 @@ def run_controls(
     return RunControls(
         connect_rig=ButtonState(lacks_rig, is_primary=True),
         start=ButtonState(
-            session is None, can_run, is_primary=not (is_raw or lacks_rig or is_reconstructing)
+            session is None,
+            can_run,
+            is_primary=not (is_raw or lacks_rig or is_reconstructing or phase is Phase.PAUSED),
         ),
         resume=ButtonState(
             session is not None,
@@ -84,6 +86,7 @@ def run_controls(
         ),
         pause=ButtonState(
             is_enabled=phase in (Phase.RUNNING, Phase.PAUSED),
+            is_primary=phase is Phase.PAUSED,
             text="&Continue" if phase is Phase.PAUSED else "&Pause",
         ),
         cancel=phase.is_busy and phase is not Phase.STOPPING,

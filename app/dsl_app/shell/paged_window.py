@@ -191,13 +191,15 @@ class PagedWindow(QMainWindow):
         event.accept()
 
     def _may_stop(self) -> bool:
-        titles = ", ".join(job.title for job in self.parts.runner.active if not job.is_minor)
+        titles = [job.title for job in self.parts.runner.active if not job.is_minor]
         if not titles:
             return True
+        are, them = ("is", "it") if len(titles) == 1 else ("are", "them")
         answer = QMessageBox.question(
             self,
             "Jobs are running",
-            f"{titles} is still running. Stop it and quit? Captured frames are kept and can be resumed.",
+            f"{' and '.join(titles)} {are} still running. Stop {them} and quit? What is saved is kept, and"
+            " scans and reconstructions can be resumed.",
         )
         return answer == QMessageBox.StandardButton.Yes
 

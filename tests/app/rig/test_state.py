@@ -55,12 +55,17 @@ def test_a_page_with_a_rig_names_its_devices_and_offers_to_expose() -> None:
 
 
 def test_a_lost_rig_can_be_connected_again_and_says_why_it_is_lost() -> None:
-    rig, live = RigState(TWIN), LiveState()
+    controller = RigController(RigState(TWIN), InlineRunner(), RecordingNotifier())
+    controller.connect(TWIN)
+    rig, live = controller.state, LiveState()
     rig.link.set(Link.LOST)
     rig.trouble.set("The camera sent no frame.")
     view = rig_view(rig, live)
     assert (view.trouble.text, view.link.role) == ("The camera sent no frame.", "bad")
     assert view.connect_button.text == "Connect"
+    buttons = (view.live_button, view.selftest, view.scan)
+    assert [*(each.is_enabled or each.is_primary for each in buttons), view.auto] == 4 * [False]
+    assert view.connect_button.is_primary
 
 
 def test_parts_of_a_cycle_are_named() -> None:

@@ -41,6 +41,9 @@ def test_buttons_follow_the_phase(
     )
     assert (shown.phase.text, shown.phase.role) == (f"● {phase.value}", role)
     assert shown.pause.text == ("&Continue" if phase is Phase.PAUSED else "&Pause")
+    # What is paused is continued next.
+    assert shown.pause.is_primary == (phase is Phase.PAUSED)
+    assert not (shown.start.is_primary and shown.pause.is_primary)
     assert shown.again.is_visible is not phase.is_busy
 
 

@@ -204,7 +204,7 @@ def test_a_full_disk_loses_nothing_and_is_resumable(
             writer.write(shot, frame_of(shot))
         with monkeypatch.context() as patch:
             _fill_disk(patch, failing)
-            with pytest.raises(StoreError, match=r"The disk is full.*free some space and resume"):
+            with pytest.raises(StoreError, match=r"The disk is full.*free some space and try again"):
                 writer.write(shots[4], frame_of(shots[4]))
     assert not list((folder / "frames").glob("*.partial"))
     assert (folder / "frames.jsonl").read_bytes().count(b"\n") == 4

@@ -173,7 +173,7 @@ def test_a_full_disk_costs_nothing_captured(bench: CalibrateBench, monkeypatch: 
     with monkeypatch.context() as full:
 
         def no_room(*_: object) -> None:
-            raise StoreError("The disk is full: free some space and resume.")
+            raise StoreError("The disk is full: free some space and try again.")
 
         full.setattr("dsl_core.campaign.session.replace_record", no_room)
         control.capture()
