@@ -45,14 +45,20 @@ def import_capture(
 ) -> None:
     """Say what every picture is; write the guessed mapping, and make a scan if there is a target."""
     from dsl_core.io.pictures.arrange import arrange
+    from dsl_core.io.staging import check_targets
     from dsl_core.workflows import captures
 
+    encoding = encoding_named(options.encoding)
+    if options.guess:
+        check_targets([_mapping_path(source, options)], overwrite=options.force)
+    if target is not None and not target.is_dir():
+        check_targets([target], overwrite=False)
     if options.guess:
         mapping = _guessed(output, source, rig, options)
     else:
         assert options.mapping is not None
         mapping = captures.load_mapping(options.mapping)
-        if (encoding := encoding_named(options.encoding)) is not None:
+        if encoding is not None:
             mapping = mapping.model_copy(update={"encoding": encoding})
         _print(output, mapping, arrange(source, mapping).table)
     _print_linearity(output, source, mapping)

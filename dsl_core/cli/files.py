@@ -16,6 +16,9 @@ if TYPE_CHECKING:
     from dsl_core.io.published.layout import FileRecord
     from dsl_core.model.rig import Rig
 
+#: Attributes of a result with more characters are left out for a person.
+LONGEST = 120
+
 
 def import_(
     source: Annotated[
@@ -186,16 +189,34 @@ def info(
     from dsl_core.io.describe import describe
 
     output, facts = Output(json), describe(path, verify)
-    if verify and facts["kind"] == "session":
+    if verify and facts["kind"] == "scan":
         facts |= _proof_of(path)
     for name, value in facts.items():
-        if isinstance(value, dict):
-            value = "; ".join(f"{key}: {item}" for key, item in value.items())
-        elif isinstance(value, list):
-            value = ", ".join(map(str, value)) or "none"
-        output.say(f"{name.replace('_', ' '):18s} {value}")
+        output.say(f"{name.replace('_', ' '):18s} {_in_words(name, value)}")
     output.put(**facts)
     output.finish()
+
+
+def _in_words(name: str, value: Any) -> str:
+    """A fact for a person: what is too long for a line is left to ``--json``."""
+    if isinstance(value, dict):
+        return "; ".join(f"{key}: {_shortened(str(item))}" for key, item in value.items())
+    if isinstance(value, list) and name == "depth_mm":
+        low, middle, high = value
+        return f"{low} to {high}, median {middle}"
+    if isinstance(value, list):
+        return ", ".join(map(str, value)) or "none"
+    return str(value)
+
+
+def _shortened(text: str) -> str:
+    """A text of one line, or how long it is.
+
+    >>> _shortened("twin"), _shortened("a" * 300)
+    ('twin', '(300 characters; --json shows them)')
+    """
+    is_short = len(text) <= LONGEST and "\n" not in text
+    return text if is_short else f"({len(text)} characters; --json shows them)"
 
 
 def _proof_of(path: Path) -> dict[str, Any]:

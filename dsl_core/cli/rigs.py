@@ -102,6 +102,10 @@ def doctor(
         path = profile_path(profile)
         if path is None:
             known = ", ".join(profile_names()) or "none"
+            if Path(profile).exists():
+                raise DeviceError(
+                    f"{profile} is not a rig profile: their names end in .json. Give the path of one."
+                )
             raise DeviceError(
                 f"There is no rig profile {profile!r}; there are: {known}. Give the path of one (NAME.json),"
                 " or one of these names."

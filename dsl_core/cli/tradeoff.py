@@ -18,7 +18,6 @@ if TYPE_CHECKING:
     from dsl_core.devices.base import DeviceRig
     from dsl_core.model.rig import Rig
     from dsl_core.planning.choice import Weighed
-    from dsl_core.planning.samples import SamplePixels
 
 
 def tradeoff(
@@ -42,17 +41,20 @@ def tradeoff(
     """Choose the plan predicted to be most accurate in a time budget, or fastest for an error."""
     from dsl_core.devices.registry import open_rig
     from dsl_core.io.plan_file import save_plan
+    from dsl_core.io.result.result_file import load_result
     from dsl_core.planning.choice import choose, pareto, possible_plans, weigh
+    from dsl_core.planning.samples import scene_samples
     from dsl_core.planning.store import PredictionStore, store_folder
 
     output, budget_s = Output(json), None if budget is None else parse_seconds(budget)
     if error is not None and not 0 < error < math.inf:
         raise PlanError(f"--error must be a number above 0, such as 0.01, not {error:g}.")
     check_targets([path for path in (plan, report) if path is not None], overwrite=force)
+    seen = None if look is None else load_result(look)
     with open_rig(rig, parse_options(option)) as devices:
         known = _calibration(devices, calibration)
         latency_ms, plans = devices.projector.info.latency_ms, possible_plans(devices, known)
-    view = _view(known, look)
+    view = None if seen is None else scene_samples(known, seen)
     with output.progress() as progress:
         limit_s = None if report else budget_s
         store = PredictionStore(store_folder(), known, latency_ms) if view is None else None
@@ -160,15 +162,6 @@ def _calibration(devices: DeviceRig, name: str | None) -> Rig:
             f"The rig {devices.name!r} has no calibration to predict with. Name one with --calibration."
         )
     return known
-
-
-def _view(rig: Rig, look: Path | None) -> SamplePixels | None:
-    if look is None:
-        return None
-    from dsl_core.io.result.result_file import load_result
-    from dsl_core.planning.samples import scene_samples
-
-    return scene_samples(rig, load_result(look))
 
 
 def _tell(output: Output, front: list[Weighed], chosen: Weighed) -> None:

@@ -187,6 +187,9 @@ def load_calibration(text: str, library: CalibrationLibrary | None = None) -> Ri
     if path.is_file():
         entry = read_entry(path)
         return load_rig(path) if entry is None else entry.rig
+    if path.exists():
+        what = "a folder" if path.is_dir() else "a pipe or a device"
+        raise StoreError(f"{text} is {what}. Give the path of a rig's JSON file, or a library's name.")
     if path.suffix.lower() == ".json" or os.sep in text:
         raise StoreError(f"There is no file {text}. Give the path of a rig's JSON file, or a library's name.")
     return (library or CalibrationLibrary()).find(text).rig

@@ -18,6 +18,7 @@ from dsl_core.io.rig_file import load_rig
 from dsl_core.io.scan.check import find_problems
 from dsl_core.io.scan.folder import ScanReader
 from dsl_core.io.sealed import is_sealed
+from dsl_core.model.fit import Fit
 from dsl_core.model.plan import CapturePlan
 
 #: A file by hand, or one of an earlier version.
@@ -31,7 +32,7 @@ def describe(path: Path, verify: bool = False) -> Facts:
     Raises `StoreError` when the path is none of them, and the reader's own error when it is a damaged one.
     """
     if (path / MANIFEST_NAME).is_file():
-        return _session(path, verify)
+        return _scan(path, verify)
     if (path / CAMPAIGN_NAME).is_file():
         return _campaign(CampaignFolder.open(path))
     if (path / "zarr.json").is_file():
@@ -46,12 +47,12 @@ def describe(path: Path, verify: bool = False) -> Facts:
     )
 
 
-def _session(path: Path, verify: bool) -> Facts:
+def _scan(path: Path, verify: bool) -> Facts:
     reader = ScanReader(path)
     manifest = reader.manifest
     problems = find_problems(reader, verify)
     return {
-        "kind": "session",
+        "kind": "scan",
         "created": manifest.created,
         "rig": manifest.rig_name,
         "camera": manifest.camera.model if manifest.camera else None,
@@ -99,6 +100,8 @@ def _result(path: Path) -> Facts:
         facts["pixels_with_depth"] = round(known.size / depth.size, 4)
         if known.size:
             facts["depth_mm"] = [round(float(v), 2) for v in (known.min(), np.median(known), known.max())]
+    if (fit := Fit.read(result.attrs)) is not None:
+        facts["verdict"] = fit.headline
     return {**facts, "attributes": {str(key): value for key, value in result.attrs.items()}}
 
 

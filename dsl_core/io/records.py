@@ -53,8 +53,10 @@ def read_record(
     name = f"{called} {path}".strip()
     try:
         return kind.model_validate_json(unseal(read_bounded(path)).decode())
-    except (OSError, UnicodeDecodeError) as failure:
-        reason = getattr(failure, "strerror", None) or failure
+    except UnicodeDecodeError as failure:
+        raise error(f"{name} cannot be read (it is not a text file). {remedy}") from failure
+    except OSError as failure:
+        reason = failure.strerror or failure
         raise error(f"{name} cannot be read ({reason}). {remedy}") from failure
     except ValidationError as failure:
         raise error(f"{name} {fault}: {_problems(failure, most)}. {remedy}") from failure

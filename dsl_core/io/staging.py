@@ -105,7 +105,8 @@ def check_targets(targets: Sequence[Path], *, overwrite: bool, kind: FolderKind 
     """
     for target in targets:
         _require_room(target)
-    taken = [target for target in targets if target.exists()]
+    # A link to nothing is there, although nothing exists behind it.
+    taken = [target for target in targets if os.path.lexists(target)]
     for target in taken:
         _require_form(target, kind)
     if taken and not overwrite:

@@ -84,6 +84,8 @@ def test_a_calibration_is_found_by_name_or_file(library: CalibrationLibrary, tmp
     assert load_calibration(str(stored)) == entry.rig
     with pytest.raises(StoreError, match=r"There is no file nowhere\.json"):
         load_calibration("nowhere.json")
+    with pytest.raises(StoreError, match=r"is a folder\. Give the path of a rig's"):
+        load_calibration(str(tmp_path))
     (tmp_path / "text.json").write_text("{}")
     with pytest.raises(CalibrationError, match="not valid"):
         load_calibration(str(tmp_path / "text.json"))

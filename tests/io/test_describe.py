@@ -21,7 +21,7 @@ from tests.cases.small_rig import small_rig
 def test_a_scan_says_what_is_stored_and_what_is_wrong(session: Path, plan: CapturePlan) -> None:
     found = describe(session, verify=True)
     assert (found["kind"], found["frames"], found["frames_stored"]) == (
-        "session",
+        "scan",
         plan.shot_count,
         plan.shot_count,
     )

@@ -53,10 +53,12 @@ def test_what_is_wrong_is_named(tmp_path: Path, content: str, says: str) -> None
         )
 
 
-@pytest.mark.parametrize("content", [None, b"\xff\xfe"])
-def test_what_cannot_be_read_is_not_called_damaged(tmp_path: Path, content: bytes | None) -> None:
+@pytest.mark.parametrize(
+    ("content", "says"), [(None, "No such file"), (b"\xff\xfe", "it is not a text file")]
+)
+def test_what_cannot_be_read_is_not_called_damaged(tmp_path: Path, content: bytes | None, says: str) -> None:
     path = tmp_path / "plan.json"
     if content is not None:
         path.write_bytes(content)
-    with pytest.raises(StoreError, match=r"plan\.json cannot be read"):
+    with pytest.raises(StoreError, match=rf"plan\.json cannot be read \({says}"):
         read_record(path, CapturePlan)

@@ -17,7 +17,7 @@ from dsl_core.io.published.dataset import export_dataset
 from dsl_core.io.result.result_file import RESULT_FOLDER, save_result
 from dsl_core.io.scan.folder import ScanReader
 from dsl_core.io.scan.lock import FolderLock
-from dsl_core.io.staging import staged, write_text
+from dsl_core.io.staging import check_targets, staged, write_text
 from dsl_core.io.swap import exchange
 from dsl_core.model.plan import CapturePlan, LineComb, Shot
 from tests.cases.small_result import small_result
@@ -166,6 +166,13 @@ def test_what_came_meanwhile_is_not_replaced(tmp_path: Path) -> None:
         write_slowly()
     assert path.read_text() == "somebody's"
     assert [each.name for each in tmp_path.iterdir()] == ["page.html"]
+
+
+def test_a_link_to_nothing_is_not_replaced_either(tmp_path: Path) -> None:
+    path = tmp_path / "page.html"
+    path.symlink_to("page.html")
+    with pytest.raises(StoreError, match=r"page\.html already exists"):
+        check_targets([path], overwrite=False)
 
 
 def _replace(path: Path, content: str) -> None:

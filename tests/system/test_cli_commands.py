@@ -241,13 +241,18 @@ def test_a_scan_goes_out_and_comes_back_in_the_published_layout(
 
 def test_info_of_a_scan_and_a_result(give: Give, finished: Path) -> None:
     scan = give("info", finished / "scan.dsl", "--verify", "--json").json
-    assert (scan["kind"], scan["complete"], scan["frames_stored"]) == ("session", True, 154)
+    assert (scan["kind"], scan["complete"], scan["frames_stored"]) == ("scan", True, 154)
     assert scan["notes"]["scanned_with"] == "twin"
     assert scan["values"].startswith("linear in light")
     result = give("info", finished / "scan.zarr", "--json").json
     assert (result["kind"], result["size_px"]) == ("result", [112, 72])
     assert result["bands"] == "24 from 430 to 660 nm"
     assert "frames stored      154" in give("info", finished / "scan.dsl").out
+    told = give("info", finished / "scan.zarr").out
+    assert max(map(len, told.splitlines())) < 2000, "long attributes are left to --json"
+    assert result["attributes"]["fit"].startswith("{")
+    assert f"verdict            {result['verdict']}" in told
+    assert f"to {result['depth_mm'][2]}, median {result['depth_mm'][1]}" in told
 
 
 def test_the_demo_leaves_a_report_and_never_writes_over_another(

@@ -38,3 +38,4 @@ def test_the_doctor_tells_all_that_is_wrong_and_a_scan_the_first(give: Give, tmp
 def test_a_profile_that_is_not_there_is_said_in_a_sentence(give: Give, tmp_path: Path) -> None:
     assert "cannot be read" in give("rigs", "doctor", tmp_path / "lost.json").sentence
     assert "There is no rig profile 'lost'" in give("rigs", "doctor", "lost").sentence
+    assert "names end in .json" in give("rigs", "doctor", tmp_path).sentence
