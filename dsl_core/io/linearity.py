@@ -15,7 +15,9 @@ from dsl_core.patterns.inverse_pairs import inverse_pairs
 PAIRS_OF_A_SET = 3
 #: Exponents are not better known than this, whatever pairs agree on: projectors sharpen stripes.
 LEAST_STD = 0.1
-_UNKNOWN = "whether values are linear in light is unknown"
+#: The words by which sentences about this are known.
+LINEAR_WORDS = "linear in light"
+_UNKNOWN = f"whether values are {LINEAR_WORDS} is unknown"
 Verdict = Literal["linear", "srgb", "encoded", "darker", "unknown"]
 
 
@@ -77,10 +79,10 @@ def _judged(found: Additivity | None) -> Linearity:
         std = max(found.exponent_std, LEAST_STD)
         figure += f"; light goes with the value to the power {found.exponent:.1f} ± {std:.1f}"
     if found.is_linear:
-        return Linearity("linear", found, f"linear in light: {figure}")
+        return Linearity("linear", found, f"{LINEAR_WORDS}: {figure}")
     if found.is_srgb:
-        words = f"not linear in light but encoded, as sRGB for screens is: {figure}"
+        words = f"not {LINEAR_WORDS} but encoded, as sRGB for screens is: {figure}"
         return Linearity("srgb", found, words)
     if found.excess > 0:
-        return Linearity("encoded", found, f"not linear in light, nor sRGB: {figure}")
-    return Linearity("darker", found, f"not linear in light: {figure}")
+        return Linearity("encoded", found, f"not {LINEAR_WORDS}, nor sRGB: {figure}")
+    return Linearity("darker", found, f"not {LINEAR_WORDS}: {figure}")

@@ -135,20 +135,25 @@ def _refuse_other_scan(root: Path, target: Path, fingerprint: str) -> None:
         )
 
 
-def with_own_sensor(reader: ScanReader, rig: Rig) -> Rig:
+def with_imported_sensor(reader: ScanReader, rig: Rig) -> Rig:
     """A calibration with the sensor of imported pictures, whose numbers are not those of the rig's camera."""
-    noted = reader.manifest.notes.get(SENSOR)
-    return rig if noted is None else rig.model_copy(update={"sensor": Sensor.model_validate_json(noted)})
+    imported = _imported_sensor(reader)
+    return rig if imported is None else rig.model_copy(update={"sensor": imported})
 
 
-def own_sensor(reader: ScanReader) -> Sensor:
+def sensor_of_scan(reader: ScanReader) -> Sensor:
     """The sensor of imported pictures, of the scan's calibration, or a common one of the camera's bits."""
-    noted, camera = reader.manifest.notes.get(SENSOR), reader.manifest.camera
-    if noted is not None:
-        return Sensor.model_validate_json(noted)
+    imported, camera = _imported_sensor(reader), reader.manifest.camera
+    if imported is not None:
+        return imported
     if reader.calibration is not None:
         return reader.calibration.sensor
     return Sensor() if camera is None else common_sensor(camera.bit_depth)
+
+
+def _imported_sensor(reader: ScanReader) -> Sensor | None:
+    noted = reader.manifest.notes.get(SENSOR)
+    return None if noted is None else Sensor.model_validate_json(noted)
 
 
 @dataclass(frozen=True)
@@ -169,9 +174,7 @@ def decode_scan(folder: Path, progress: Progress | None = None) -> xr.Dataset:
     """
     reader = ScanReader(folder)
     require_complete(reader)
-    noted = reader.manifest.notes.get(SENSOR)
-    sensor = Sensor() if noted is None else Sensor.model_validate_json(noted)
-    result = decode_columns_of(reader, sensor, progress)
+    result = decode_columns_of(reader, _imported_sensor(reader) or Sensor(), progress)
     reason = (
         "No calibration of camera and projector was given, so columns have no depth. Name one with"
         " --calibration to reconstruct depth."

@@ -34,7 +34,7 @@ from dsl_core.patterns.images import pattern_image
 from dsl_core.pipeline import Options, reconstruct, scan
 from dsl_core.progress import NoProgress, Progress
 from dsl_core.version import __version__
-from dsl_core.workflows.captures import own_sensor, with_own_sensor
+from dsl_core.workflows.captures import sensor_of_scan, with_imported_sensor
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -109,7 +109,7 @@ def reconstruct_scan(
     require_complete(reader)
     if calibration is not None and not override_calibration:
         _require_conditions(folder, reader.manifest, calibration)
-    rig, options = with_own_sensor(reader, calibration_of(reader, calibration)), options or Options()
+    rig, options = with_imported_sensor(reader, calibration_of(reader, calibration)), options or Options()
     watched = WatchedSource(reader)
     progress = progress or NoProgress()
     result = reconstruct(watched, rig, options, progress, timer, sink)
@@ -196,7 +196,7 @@ def linearity_of_scan(folder: Path) -> Linearity:
     reader = ScanReader(folder)
     sound = set(reader.entries) & reader.store.stored()
     absent = {shot.index for shot in reader.plan.shots() if shot.index not in sound}
-    sensor = own_sensor(reader)
+    sensor = sensor_of_scan(reader)
     return linearity_of(reader, sensor.full_scale_dn, sensor.black_level_dn, absent)
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +14,7 @@ from dsl_core.io.pictures.arrange import arrange
 from dsl_core.io.pictures.candidates import FEWEST, Candidate, candidates, jump_of
 from dsl_core.io.pictures.encoding import guessed_encoding
 from dsl_core.io.pictures.guessed_parts import guessed_size, is_turned, part_of
-from dsl_core.io.pictures.mapping import Mapping
+from dsl_core.io.pictures.mapping import Encoding, Mapping
 from dsl_core.io.pictures.picture_file import load_values
 from dsl_core.model.rig import BayerPattern
 from dsl_core.optics.colour import srgb_decode
@@ -61,7 +60,7 @@ def guess_mapping(
     projector_size_px: Size | None = None,
     chosen: str | None = None,
     progress: Progress | None = None,
-    encoding: Literal["linear", "srgb"] | None = None,
+    encoding: Encoding | None = None,
 ) -> Guess:
     """Find out from the pictures how they are a capture; ``chosen`` names one of several in the folder.
 
@@ -239,7 +238,7 @@ def _guess_of(
     found: Recognised,
     size_px: Size | None,
     names: Sequence[str],
-    encoding: Literal["linear", "srgb"] | None,
+    encoding: Encoding | None,
 ) -> Guess:
     unsure = list(look.notes)
     size, doubt = (size_px, "") if size_px else guessed_size(found.blocks)
@@ -260,23 +259,7 @@ def _guess_of(
     # Fewer pictures than a capture has are strays, not another set.
     is_of_several = candidate.left_out >= FEWEST
     others = [name for name in names if name != candidate.name] if is_of_several else []
-    if jump := jump_of(candidate):
-        unsure.append(f"{jump}: pictures may be missing, or not belong to the capture")
-    if candidate.absent:
-        count = len(candidate.absent)
-        unsure.append(f"by their numbers {count} {'picture is' if count == 1 else 'pictures are'} absent")
-    if others:
-        unsure.append(f"there are other sets ({_few(others)}): name one with --set")
-    elif candidate.left_out:
-        one = candidate.left_out == 1
-        words = "picture does not belong to the code and is" if one else (
-            "pictures do not belong to the code and are"
-        )  # fmt: skip
-        unsure.append(f"{candidate.left_out} {words} not used")
-    kinds = {block.kind for block in found.blocks}
-    lacking = [name for name in ("white", "black") if name not in kinds]
-    if lacking:
-        unsure.append(f"there is no {' and no '.join(lacking)} picture: extremes of the others stand for it")
+    unsure += _doubts_of_files(candidate, others, found)
     mapping = Mapping(
         name=candidate.name,
         files=candidate.files,
@@ -288,12 +271,33 @@ def _guess_of(
         left_aligned=look.left_aligned,
         full_scale=look.full_scale,
     )
-    of_values: tuple[str, ...] = ()
     if encoding is None:
-        mapping, of_values = guessed_encoding(folder, mapping)
-    known = {} if encoding is None else {"encoding": encoding}
-    mapping = mapping.model_copy(update={**known, "unsure": (*unsure, *of_values)})
+        mapping, doubts_of_values = guessed_encoding(folder, mapping)
+        unsure += doubts_of_values
+    else:
+        mapping = mapping.model_copy(update={"encoding": encoding})
+    mapping = mapping.model_copy(update={"unsure": tuple(unsure)})
     return Guess(mapping, arrange(folder, mapping).table, tuple(others))
+
+
+def _doubts_of_files(candidate: Candidate, others: Sequence[str], found: Recognised) -> list[str]:
+    """What is unsure of which files are the capture: missing ones, those of ``others``, and strays."""
+    doubts = []
+    if jump := jump_of(candidate):
+        doubts.append(f"{jump}: pictures may be missing, or not belong to the capture")
+    if count := len(candidate.absent):
+        doubts.append(f"by their numbers {count} {'picture is' if count == 1 else 'pictures are'} absent")
+    if others:
+        doubts.append(f"there are other sets ({_few(others)}): name one with --set")
+    elif candidate.left_out == 1:
+        doubts.append("1 picture does not belong to the code and is not used")
+    elif candidate.left_out:
+        doubts.append(f"{candidate.left_out} pictures do not belong to the code and are not used")
+    kinds = {block.kind for block in found.blocks}
+    lacking = [name for name in ("white", "black") if name not in kinds]
+    if lacking:
+        doubts.append(f"there is no {' and no '.join(lacking)} picture: extremes of the others stand for it")
+    return doubts
 
 
 def _few(names: Sequence[str]) -> str:

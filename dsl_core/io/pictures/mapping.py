@@ -16,6 +16,8 @@ from dsl_core.model.rig import BayerPattern
 MOST_PICTURES = 4096
 #: File names relative to the folder, with the usual ``*`` and ``?``; a plain name is one too.
 Globs = tuple[str, ...]
+#: How values stand for light: proportional to it, or as pictures for screens store it.
+Encoding = Literal["linear", "srgb"]
 
 
 class WhitePicture(Record):
@@ -115,7 +117,7 @@ class Mapping(Record):
     bit_depth: int | None = Field(default=None, ge=8, le=16)
     left_aligned: bool = False
     full_scale: float | None = Field(default=None, gt=0)
-    encoding: Literal["linear", "srgb"] = "linear"
+    encoding: Encoding = "linear"
     raw: RawLayout | None = None
     unsure: tuple[str, ...] = ()
 

@@ -8,6 +8,7 @@ from typing import Any, Literal, TypeVar
 from pydantic import ValidationError
 
 from dsl_core.errors import StoreError
+from dsl_core.io.linearity import LINEAR_WORDS
 from dsl_core.io.pictures.mapping import (
     MOST_PICTURES,
     BlackPicture,
@@ -196,7 +197,7 @@ def with_field(mapping: Mapping, key: str, value: Any) -> Mapping:
     if key == "raw":
         return _changed(mapping, raw=RawLayout(width_px=640, height_px=480) if value else None)
     if key == "encoding":
-        unsure = tuple(each for each in mapping.unsure if "linear in light" not in each)
+        unsure = tuple(each for each in mapping.unsure if LINEAR_WORDS not in each)
         return _changed(mapping, encoding=value, unsure=unsure)
     head, _, inner = key.partition(".")
     if inner:

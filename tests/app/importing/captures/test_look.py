@@ -144,7 +144,9 @@ def test_values_for_screens_are_named_with_what_to_do(tmp_path: Path) -> None:
     root = write(tmp_path / "screen", named)
     found = decode(root, MAPPING)
     assert found.advice == "set encoding of the mapping to srgb"
-    stated = with_field(MAPPING, "encoding", "srgb")
+    told = MAPPING.model_copy(update={"unsure": ("columns fall", f"values are {found.values}")})
+    stated = with_field(told, "encoding", "srgb")
+    assert stated.unsure == ("columns fall",), "what a person states is not unsure"
     found = decode(root, stated)
     assert (found.advice, found.values[:15]) == ("", "linear in light")
 
