@@ -52,7 +52,32 @@ def test_little_light_and_drift_are_not_told() -> None:
     assert changed_light(pictures(1000), pictures(1300), NOISE) is None
 
 
+def even(*light: float) -> dict[int, Counts]:
+    """Pictures by pattern, each of one brightness all over."""
+    return {n: np.full(400, SENSOR.black_level_dn + each, np.uint16) for n, each in enumerate(light)}
+
+
+def test_light_is_what_exceeds_the_black_level() -> None:
+    found = changed_light(even(1000, 0, 1000, 0), even(500, 0, 500, 0), NOISE)
+    assert found == pytest.approx(0.5, abs=0.01)
+
+
+@pytest.mark.parametrize(("light", "is_told"), [(25, True), (35, False)])
+def test_a_first_picture_with_enough_light_says_that_nothing_has_changed(light: int, is_told: bool) -> None:
+    # Three per cent of the light of all.
+    before, now = even(1000, light, 1000, 0), even(500, light, 500, 0)
+    assert (changed_light(before, now, NOISE) is not None) == is_told
+
+
 def test_a_pair_is_unlit_if_no_pixel_prefers_the_pattern_or_its_inverse() -> None:
     dark, lit = pictures(0), pictures(100)
     assert is_unlit(dark[0], dark[1], NOISE)
     assert not is_unlit(lit[0], lit[1], NOISE)
+
+
+@pytest.mark.parametrize(("sigmas", "pixels", "unlit"), [(6, 1, False), (4, 400, True), (6, 0, True)])
+def test_a_pixel_in_a_thousand_six_deviations_bright_is_lit(sigmas: float, pixels: int, unlit: bool) -> None:
+    one, other = even(2000, 2000).values()
+    bright = round(sigmas * float(np.sqrt(2 * NOISE.variance(one)[0])))
+    one[:pixels] += np.uint16(bright)
+    assert is_unlit(one, other, NOISE) == unlit
