@@ -74,13 +74,19 @@ class Figure(Record):
 
     @property
     def _decimals(self) -> int:
+        """Decimals by the deviation or the value, but none far below what limits can tell apart."""
         own = decimals(self.std) if self.std else decimals(self.value, 3)
-        if self.low is not None and self.high is not None and self.low < self.high:
-            # Narrow limits are judged by the digits in which they differ.
-            judged = decimals(self.high - self.low, 4 if self.std else 3)
-            return min(own, judged) if self.std else judged
-        limit = self.low or self.high or 0.0
-        return min(own, decimals(limit, 4 if self.std else 3)) if limit else own
+        told = self._span or self.low or self.high
+        if not told:
+            return own
+        judged = decimals(told, 4 if self.std else 3)
+        # Narrow limits are judged by the digits in which they differ.
+        return judged if self._span and not self.std else min(own, judged)
+
+    @property
+    def _span(self) -> float:
+        """How far apart two limits are; 0 for a single one."""
+        return 0.0 if self.low is None or self.high is None else max(self.high - self.low, 0.0)
 
 
 def with_std(value: float, std: float | None, most: int = MOST_DECIMALS) -> str:
@@ -106,9 +112,9 @@ def decimals(value: float, digits: int = 2) -> int:
 
 
 def _spread(value: float, std: float | None, digits: int) -> str:
-    # Adding zero makes -0.0 a plain zero.
-    # A deviation below the last digit is that digit at most.
+    # A deviation below the last digit is told as one of that digit, as it is no zero.
     spread = f" ± {max(std, 10.0**-digits):.{digits}f}" if std else ""
+    # Adding zero makes -0.0 a plain zero.
     return f"{round(value, digits) + 0.0:.{digits}f}{spread}"
 
 
