@@ -95,25 +95,28 @@ class RandomPerson:
         return repr(name)
 
     def _click(self) -> str:
-        at = self._spot(self._top)
-        hit = self._top.childAt(at) or self._top
-        kind = type(hit).__name__
-        QTest.mouseMove(hit, hit.mapFrom(self._top, at))
-        QTest.mouseClick(hit, Qt.MouseButton.LeftButton, pos=hit.mapFrom(self._top, at))
+        # Another window may come to the top meanwhile.
+        top = self._top
+        at = self._spot(top)
+        hit = top.childAt(at) or top
+        kind, within = type(hit).__name__, hit.mapFrom(top, at)
+        QTest.mouseMove(hit, within)
+        QTest.mouseClick(hit, Qt.MouseButton.LeftButton, pos=within)
         return f"{at.x()},{at.y()} {kind}"
 
     def _drag(self) -> str:
-        start, end = self._spot(self._top), self._spot(self._top)
-        hit = self._top.childAt(start) or self._top
-        kind = type(hit).__name__
+        top = self._top
+        start, end = self._spot(top), self._spot(top)
+        hit = top.childAt(start) or top
+        kind, pressed = type(hit).__name__, hit.mapFrom(top, start)
         # Marked text that is dragged waits for a button of the real mouse, which nobody lets go.
         drop = QTimer()
         drop.timeout.connect(QDrag.cancel)
         drop.start(DROP_MS)
-        QTest.mousePress(hit, Qt.MouseButton.LeftButton, pos=hit.mapFrom(self._top, start))
+        QTest.mousePress(hit, Qt.MouseButton.LeftButton, pos=pressed)
         for step in (0.3, 0.7, 1.0):
-            QTest.mouseMove(hit, hit.mapFrom(self._top, start + (end - start) * step))
-        QTest.mouseRelease(hit, Qt.MouseButton.LeftButton, pos=hit.mapFrom(self._top, end))
+            QTest.mouseMove(hit, pressed + (end - start) * step)
+        QTest.mouseRelease(hit, Qt.MouseButton.LeftButton, pos=pressed + end - start)
         drop.stop()
         return f"{start.x()},{start.y()} to {end.x()},{end.y()} {kind}"
 

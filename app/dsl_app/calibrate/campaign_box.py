@@ -87,7 +87,7 @@ class CampaignBox(QFrame):
         self.new = push_button("&New campaign…", "Start a campaign for the chosen rig in a new folder")
         self.open = push_button("&Open campaign…", "Continue an existing campaign", self._ask_open)
         self.everything = push_button(
-            "Calibrate &everything",
+            "Calibrate everythin&g",
             "Run all calibrations in order, without questions, on a rig that places targets itself",
         )
         self.cancel = push_button("&Stop", "Stop at the next safe point; everything captured is kept")

@@ -64,7 +64,7 @@ class RigPage(PageWidget):
             lambda: self.profile_requested.emit(""),
         )
         self.edit_profile = push_button(
-            "&Edit…",
+            "E&dit…",
             "Change the drivers, addresses and settings of this rig's profile",
             lambda: self.profile_requested.emit(str(self._rig.currentData())),
         )

@@ -84,7 +84,7 @@ class ScanPage(PageWidget):
             "Views of the scan",
             (self.forecast, "&Accuracy against time", "Expected accuracy and capture time of each plan"),
             (self.view, FRAMES, FRAMES_TIP),
-            (self.effects, "&Effects", "Effects of light that the simulated rig renders"),
+            (self.effects, "Effec&ts", "Effects of light that the simulated rig renders"),
         )
         self._left, self._left_area = _side(LEFT_PX, self.plan)
         self._figures = QGroupBox("Expected accuracy")

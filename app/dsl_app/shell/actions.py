@@ -9,7 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-Menu = Literal["File", "View", "Rig", "Calibrate", "Scan", "Results", "Help"]
+Menu = Literal["File", "Edit", "View", "Rig", "Calibrate", "Scan", "Results", "Help"]
 
 
 @dataclass(frozen=True)
@@ -69,12 +69,9 @@ ACTIONS: tuple[Action, ...] = (
         "Show the command that does the same as this page",
     ),
     Action("quit", "&Quit", "File", "Ctrl+Q", "Quit; asks first while a scan is running", separator=True),
-    Action("undo", "&Undo", "View", "Ctrl+Z", "Undo the last change of pins, regions or settings"),
-    Action("redo", "&Redo", "View", "Ctrl+Shift+Z", "Redo what was undone"),
-    *(
-        Action(f"page_{page.key}", page.title, "View", f"Ctrl+{i}", page.tip, separator=i == 0)
-        for i, page in enumerate(PAGES)
-    ),
+    Action("undo", "&Undo", "Edit", "Ctrl+Z", "Undo the last change of pins, regions or settings"),
+    Action("redo", "&Redo", "Edit", "Ctrl+Shift+Z", "Redo what was undone"),
+    *(Action(f"page_{page.key}", page.title, "View", f"Ctrl+{i}", page.tip) for i, page in enumerate(PAGES)),
     Action("theme_system", "&System theme", "View", checkable=True, separator=True),
     Action("theme_light", "&Light theme", "View", checkable=True),
     Action("theme_dark", "&Dark theme", "View", checkable=True),

@@ -17,7 +17,7 @@ from dsl_app.shell.main_window import MainWindow
 from PySide6.QtCore import QPoint
 from PySide6.QtGui import QCursor
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QApplication, QFileDialog, QLabel, QMessageBox, QVBoxLayout
+from PySide6.QtWidgets import QApplication, QFileDialog, QLabel, QMenu, QMessageBox, QVBoxLayout
 from pytestqt.qtbot import QtBot
 
 from tests.app.support.doubles import RecordingNotifier
@@ -63,6 +63,16 @@ def test_shortcuts_and_mnemonics_are_unique() -> None:
     for menu in {action.menu for action in ACTIONS}:
         letters = [a.text[a.text.index("&") + 1].lower() for a in ACTIONS if a.menu == menu and "&" in a.text]
         assert len(letters) == len(set(letters)), menu
+
+
+def test_what_is_undone_is_where_people_look_for_it(window: MainWindow) -> None:
+    bar = {action.text().replace("&", ""): action.menu() for action in window.menuBar().actions()}
+    assert list(bar)[:3] == ["File", "Edit", "View"]
+    edit, view = bar["Edit"], bar["View"]
+    assert isinstance(edit, QMenu)
+    assert isinstance(view, QMenu)
+    assert edit.actions() == [window.actions_by_key["undo"], window.actions_by_key["redo"]]
+    assert not view.actions()[0].isSeparator()
 
 
 def test_pages_are_made_when_first_opened(window: MainWindow) -> None:
