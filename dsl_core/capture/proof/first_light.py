@@ -63,10 +63,10 @@ def _scaled(one: Floats, other: Floats) -> tuple[float, float]:
 
     A gain that changes takes the black level with it, which shows where a pattern has bright and dark parts.
     """
-    mean = other.mean() if one.std() > STRUCTURED * one.mean() else np.float32(0)
-    centre = one.mean() if mean else np.float32(0)
-    ratio = float((one - centre) @ (other - mean) / ((one - centre) @ (one - centre)))
-    return ratio, float(np.abs(other - mean - ratio * (one - centre)).mean())
+    if one.std() > STRUCTURED * one.mean():
+        one, other = one - one.mean(), other - other.mean()
+    ratio = float(one @ other / (one @ one))
+    return ratio, float(np.abs(other - ratio * one).mean())
 
 
 def is_unlit(one: Counts, other: Counts, noise: Noise) -> bool:
