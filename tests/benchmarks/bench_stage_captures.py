@@ -17,8 +17,8 @@ import torch
 
 from dsl_core.calibration.film.correspondence import fit_stage_grid
 from dsl_core.calibration.film.depth_stage import StageData, StageFilter, fit_first_orders
-from dsl_core.calibration.film.fit import OrderSamples
 from dsl_core.calibration.film.order_paths import LineFrames
+from dsl_core.calibration.film.order_samples import OrderSamples
 from dsl_core.calibration.film.residual import choose_residual
 from dsl_core.campaign.depth_stage.recipe import lines_on_plane
 from dsl_core.errors import CalibrationError

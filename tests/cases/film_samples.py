@@ -9,8 +9,8 @@ import torch
 from numpy.typing import NDArray
 
 from dsl_core.calibration.common.tiles import tile_of_pixels
-from dsl_core.calibration.film.fit import OrderSamples
 from dsl_core.calibration.film.order_columns import TileColumns
+from dsl_core.calibration.film.order_samples import OrderSamples
 from dsl_core.model.rig import Film, Rig
 from dsl_core.optics.correspondence import GratingModel
 from dsl_core.simulation.published_rig import published_rig

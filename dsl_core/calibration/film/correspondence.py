@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dsl_core.calibration.common.tiles import tile_edges
-from dsl_core.calibration.film.fit import OrderSamples, grating_columns
+from dsl_core.calibration.film.order_samples import OrderSamples, grating_columns
 from dsl_core.errors import CalibrationError
 from dsl_core.model.rig import CorrespondenceGrid, Rig
 from dsl_core.solve.robust import robust_std

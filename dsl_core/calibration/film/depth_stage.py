@@ -10,18 +10,11 @@ from numpy.typing import NDArray
 
 from dsl_core.calibration.common.tiles import ColumnSamples
 from dsl_core.calibration.film.correspondence import fit_stage_grid
-from dsl_core.calibration.film.fit import (
-    FilmFit,
-    OrderSamples,
-    fit_film,
-    grating_columns,
-    is_plausible,
-    require_plausible,
-    seen_straight,
-    with_geometry,
-)
+from dsl_core.calibration.film.filter_angle import seen_straight
+from dsl_core.calibration.film.fit import FilmFit, fit_film, is_plausible, require_plausible, with_geometry
 from dsl_core.calibration.film.order_columns import fit_columns, search_columns
 from dsl_core.calibration.film.order_paths import LineFrames, filter_passband
+from dsl_core.calibration.film.order_samples import OrderSamples, grating_columns
 from dsl_core.calibration.film.residual import choose_residual
 from dsl_core.calibration.geometry.plane_refinement import PlaneRefinement, refine_planes
 from dsl_core.calibration.geometry.stage_planes import with_unsure_zero

@@ -2,36 +2,39 @@
 
 All six numbers of `Film` are fitted to all samples; where samples cannot tell them apart (distance and
 bend, or period and distance over few depths) the values of the mounting decide, as a prior. On request the
-shift of filters with the angle of view is fitted as well (`FilterAngle`).
+shift of filters with the angle of view is fitted as well (`FilterAngle`), or a shape of its own (`warp_terms`).
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
 import numpy as np
-import torch
 from numpy.typing import NDArray
 
-from dsl_core.calibration.film.order_columns import TileColumns
+from dsl_core.calibration.film.filter_angle import (
+    ANGLE_STD,
+    NO_SHIFT,
+    FilterAngle,
+    columns_per_share,
+    shift_terms,
+)
+from dsl_core.calibration.film.order_samples import OrderSamples, grating_columns
+from dsl_core.calibration.film.warp import WARP_STD_PX, warp_terms
 from dsl_core.errors import CalibrationError
 from dsl_core.model.rig import Film, Rig
-from dsl_core.optics.correspondence import GratingModel
 from dsl_core.optics.pinhole import pixel_rays
 from dsl_core.optics.shading import Plane
 from dsl_core.progress import NoProgress, Progress
 from dsl_core.solve.robust import huber_weights
 
 Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 #: Fitted fields, how well a mounting is known beforehand (one deviation), and steps of differences.
 FIELDS = ("tilt_x_deg", "tilt_y_deg", "roll_deg", "bend_per_mm", "lines_per_mm", "distance_mm")
 PRIOR_STD = np.array([3.0, 3.0, 3.0, 0.01, 25.0, 3.0])
 STEPS = np.array([1e-3, 1e-3, 1e-3, 1e-6, 1e-2, 1e-2])
-#: Step of differences over the share of a wavelength.
-SHARE_STEP = 1e-3
 ROUNDS = 15
 #: How far from its mounting a film can be, in the unit of each field: a frame holds it within some degrees
 #: and centimetres, one that bends more touches it, and data sheets of gratings are right to a few percent.
@@ -40,10 +43,6 @@ WORDS = (
     ("tilt about x", "°"), ("tilt about y", "°"), ("roll", "°"), ("bend", "/mm"), ("density", " lines/mm"),
     ("distance from the projector", " mm"),
 )  # fmt: skip
-#: A film of another shape displaces columns by polynomials of this total degree with coefficients of about so
-#: many columns (px); they are of place, inverse depth, and wavelength from these limits (nm).
-WARP_DEGREE, WARP_STD_PX = 3, 1.0
-MIDDLE_NM, HALF_NM = 545.0, 115.0
 #: So many columns of a film of another shape share what polynomials leave of it.
 WARPED_TOGETHER = 1000.0
 #: Residuals beyond this many deviations weigh less (Huber), and no column is better than this (px).
@@ -52,91 +51,6 @@ HUBER_SIGMAS, FLOOR_PX = 2.5, 0.003
 #: either direction (seven drawn rigs, whose films are then within 1.0 of their deviations, rms).
 COMMON_PX = 0.0015
 MIN_SAMPLES = 100
-#: Deviations of a filter's c, a and b before anything is seen: any index, or no such filter; tilts of some
-#: degrees.
-ANGLE_STD = np.array([0.3, 0.03, 0.03])
-#: The shift is that of filters only where c is so many deviations above nothing, and that of an index that
-#: layers of interference filters have: a film bent in its own way shifts colours over the picture, too.
-SIGNIFICANT = 5.0
-FILTER_INDEX = (1.3, 3.0)
-
-
-@dataclass(frozen=True)
-class OrderSamples:
-    """Columns of first orders in one table; ``position`` and ``filter`` are indices into a recipe's lists."""
-
-    position: Ints
-    filter: Ints
-    order: Ints
-    wavelength_nm: Floats
-    tile: Ints
-    pixel: Ints
-    depth_mm: Floats
-    column_px: Floats
-    std_px: Floats
-
-    @classmethod
-    def of(cls, parts: Sequence[tuple[int, int, TileColumns]]) -> OrderSamples:
-        """One table of (position, filter, shifts); raises `CalibrationError` when there are none."""
-        if not parts:
-            raise CalibrationError("No first orders were captured. Capture the lines through filters first.")
-        sizes = [len(shifts) for _, _, shifts in parts]
-
-        def numbers(values: list[int]) -> Ints:
-            return np.repeat(np.array(values, np.int64), sizes)
-
-        return cls(
-            position=numbers([position for position, _, _ in parts]),
-            filter=numbers([name for _, name, _ in parts]),
-            order=numbers([shifts.order for _, _, shifts in parts]),
-            wavelength_nm=np.repeat([shifts.wavelength_nm for _, _, shifts in parts], sizes),
-            tile=np.concatenate([shifts.tiles for _, _, shifts in parts]),
-            pixel=np.concatenate([shifts.pixels for _, _, shifts in parts]),
-            depth_mm=np.concatenate([shifts.depth_mm for _, _, shifts in parts]),
-            column_px=np.concatenate([shifts.column_px for _, _, shifts in parts]),
-            std_px=np.concatenate([shifts.std_px for _, _, shifts in parts]),
-        )
-
-    def __len__(self) -> int:
-        return len(self.column_px)
-
-    def only(self, keep: NDArray[np.bool_]) -> OrderSamples:
-        """The samples where ``keep`` is true."""
-        return OrderSamples(*(getattr(self, name)[keep] for name in self.__dataclass_fields__))
-
-
-@dataclass(frozen=True)
-class FilterAngle:
-    """How a bandpass filter passes shorter wavelengths the more askew light goes through it.
-
-    The centre of an interference filter is at ``centre * sqrt(1 - (sin(angle) / index)^2)``, the angle being
-    that to the filter's normal and ``index`` the effective one of its layers, 1.5 to 2.2 (Macleod, Thin-Film
-    Optical Filters). With the direction (x, y, z) of a pixel and a filter tilted by small angles, the
-    relative shift is a constant, which nobody can tell from the film's line density, and
-    ``-c (x^2 + y^2) / 2 + a x + b y`` with ``c = 1 / index^2``: ``values`` and ``std`` are of c, a and b.
-    """
-
-    values: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    std: tuple[float, float, float] = (0.0, 0.0, 0.0)
-
-    @property
-    def is_of_filters(self) -> bool:
-        """Whether the light seen is shifted as by filters, beyond doubt."""
-        value, std = self.values[0], self.std[0]
-        low, high = (index**-2.0 for index in reversed(FILTER_INDEX))
-        return value > SIGNIFICANT * std and low - 2 * std < value < high + 2 * std
-
-    @property
-    def index(self) -> tuple[float, float] | None:
-        """Effective index with its deviation; None where no shift is seen."""
-        if not self.is_of_filters:
-            return None
-        value = self.values[0] ** -0.5
-        return value, 0.5 * value**3 * self.std[0]
-
-
-#: Filters that shift nothing.
-NO_SHIFT = FilterAngle()
 
 
 @dataclass(frozen=True)
@@ -161,55 +75,6 @@ class FilmFit:
         return dict(zip(FIELDS, np.sqrt(np.diag(self.covariance)).tolist(), strict=True))
 
 
-def grating_columns(rig: Rig, samples: OrderSamples) -> Floats:
-    """Columns (px) that the rig's grating equation gives for samples, shape (n,)."""
-    pixels, depth = torch.as_tensor(samples.pixel), torch.as_tensor(samples.depth_mm)
-    return GratingModel(rig).columns_of(pixels, depth, samples.order, samples.wavelength_nm).numpy()
-
-
-def columns_per_share(rig: Rig, samples: OrderSamples) -> Floats:
-    """By how many columns samples move when their wavelengths are all longer by a share, divided by it."""
-    longer = replace(samples, wavelength_nm=samples.wavelength_nm * (1 + SHARE_STEP))
-    return (grating_columns(rig, longer) - grating_columns(rig, samples)) / SHARE_STEP
-
-
-def shift_terms(rig: Rig, pixels: NDArray[np.int64]) -> Floats:
-    """What ``c``, ``a`` and ``b`` do to the relative wavelength at flat pixel indices (n,), shape (n, 3)."""
-    rays = pixel_rays(rig.camera).reshape(3, -1)[:, pixels]
-    x, y, _ = rays / np.linalg.norm(rays, axis=0)
-    return np.stack([-0.5 * (x**2 + y**2), x, y], 1)
-
-
-def warp_terms(rig: Rig, samples: OrderSamples) -> Floats:
-    """What the shape of a film can do to columns, for each order by itself, (n, terms).
-
-    Products of Chebyshev polynomials in place, inverse depth and wavelength. None of them moves all light of
-    a wavelength: that would be another filter.
-    """
-    rows, columns = np.divmod(samples.pixel, rig.camera.width_px)
-    near, far = rig.depth_range_mm
-    axes = (
-        2 * columns / (rig.camera.width_px - 1) - 1,
-        2 * rows / (rig.camera.height_px - 1) - 1,
-        2 * (1 / samples.depth_mm - 1 / far) / (1 / near - 1 / far) - 1,
-        (samples.wavelength_nm - MIDDLE_NM) / HALF_NM,
-    )
-    powers = [np.polynomial.chebyshev.chebvander(axis, WARP_DEGREE) for axis in axes]
-    terms = [
-        powers[0][:, i] * powers[1][:, j] * powers[2][:, k] * powers[3][:, n]
-        for i, j, k, n in np.ndindex((WARP_DEGREE + 1,) * 3 + (2,))
-        if i + j + k + n <= WARP_DEGREE and (i + j or not n)
-    ]
-    own = [samples.order == order for order in np.unique(samples.order)]
-    return np.stack([term * mine for mine in own for term in terms], 1)
-
-
-def seen_straight(rig: Rig, samples: OrderSamples, angle: FilterAngle) -> OrderSamples:
-    """The samples as they would be through filters that shift nothing."""
-    shift = shift_terms(rig, samples.pixel) @ np.array(angle.values)
-    return replace(samples, column_px=samples.column_px - columns_per_share(rig, samples) * shift)
-
-
 def fit_film(
     rig: Rig,
     samples: OrderSamples,
@@ -229,19 +94,24 @@ def fit_film(
             f"First orders were found in only {len(samples)} tiles of the image; {MIN_SAMPLES} are needed to"
             " fit the film. Check that the film is on, the filters, and the exposure."
         )
-    count, extra = len(FIELDS), 3 if angled else 0
     warps = warp_terms(rig, samples) if warped else np.empty((len(samples), 0))
-    centre, values = (np.pad(_values(film), (0, extra + warps.shape[1])) for film in (mounting, rig.film))
-    prior_std = np.concatenate([PRIOR_STD, ANGLE_STD[:extra], np.full(warps.shape[1], WARP_STD_PX)])
+    shifts = shift_terms(rig, samples.pixel)[:, : 3 if angled else 0]
+    # The parameters are those of the film, of the angle and of the warp, one after the other.
+    count = len(FIELDS)
+    of_film, of_angle = slice(count), slice(count, count + shifts.shape[1])
+    linear_count = shifts.shape[1] + warps.shape[1]
+    centre, values = (np.pad(_values(film), (0, linear_count)) for film in (mounting, rig.film))
+    prior_std = np.concatenate(
+        [PRIOR_STD, ANGLE_STD[: shifts.shape[1]], np.full(warps.shape[1], WARP_STD_PX)]
+    )
     sigma = np.hypot(samples.std_px, FLOOR_PX)
-    terms = shift_terms(rig, samples.pixel)[:, :extra]
     scale, covariance, gain = 1.0, np.eye(len(values)), np.empty((len(values), len(samples)))
     for _ in range(rounds):
-        now = _with(rig, values[:count])
+        now = _with(rig, values[of_film])
         here = grating_columns(now, samples)
-        ahead = [grating_columns(_with(rig, values[:count] + step), samples) for step in np.diag(STEPS)]
+        ahead = [grating_columns(_with(rig, values[of_film] + step), samples) for step in np.diag(STEPS)]
         by_film = (np.stack(ahead, 1) - here[:, None]) / STEPS
-        by_angle = columns_per_share(now, samples)[:, None] * terms if angled else terms
+        by_angle = columns_per_share(now, samples)[:, None] * shifts if angled else shifts
         linear = np.concatenate([by_angle, warps], 1)
         residual = samples.column_px - here - linear @ values[count:]
         jacobian = np.concatenate([by_film, linear], 1) * prior_std
@@ -256,20 +126,25 @@ def fit_film(
         values = values + prior_std * step.clip(-1, 1)
         if np.abs(step / np.sqrt(np.diag(covariance))).max() < 1e-2:
             break
-    if not np.isfinite(values).all() or values[4] <= 0 or values[5] <= 0:
+    film = _with(rig, values[of_film]).film
+    if not np.isfinite(values).all() or film.lines_per_mm <= 0 or film.distance_mm <= 0:
         raise CalibrationError(
             "The fit of the film did not converge. Check the filters, and the film's data."
         )
-    film = _with(rig, values[:count]).film
     common = gain @ _common_offsets(rig, samples)
     spread = covariance * np.outer(prior_std, prior_std) + common @ common.T
     angle = NO_SHIFT
     if angled:
-        std = np.sqrt(np.diag(spread)[count : count + extra])
-        angle = FilterAngle(tuple(values[count : count + extra].tolist()), tuple(std.tolist()))
-    scatter_px = scale * float(np.median(sigma))
-    warp_px = warps @ values[count + extra :]
-    return FilmFit(film, spread[:count, :count], scatter_px, gain[:count], angle, warp_px)
+        std = np.sqrt(np.diag(spread)[of_angle])
+        angle = FilterAngle(tuple(values[of_angle].tolist()), tuple(std.tolist()))
+    return FilmFit(
+        film=film,
+        covariance=spread[of_film, of_film],
+        scatter_px=scale * float(np.median(sigma)),
+        gain=gain[of_film],
+        angle=angle,
+        warp_px=warps @ values[of_angle.stop :],
+    )
 
 
 def is_plausible(film: Film, mounting: Film) -> bool:

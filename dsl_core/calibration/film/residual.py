@@ -14,7 +14,8 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from dsl_core.calibration.film.fit import FLOOR_PX, HUBER_SIGMAS, OrderSamples, fit_film, grating_columns
+from dsl_core.calibration.film.fit import FLOOR_PX, HUBER_SIGMAS, fit_film
+from dsl_core.calibration.film.order_samples import OrderSamples, grating_columns
 from dsl_core.errors import CalibrationError
 from dsl_core.model.calibration.depth_stage import HeldOutError
 from dsl_core.model.rig import ColumnResidual, Rig

@@ -25,9 +25,10 @@ from dsl_core.calibration.film.depth_stage import (
     fit_first_orders,
     stage_curves,
 )
-from dsl_core.calibration.film.fit import Floats, OrderSamples, fit_film, grating_columns
+from dsl_core.calibration.film.fit import Floats, fit_film
 from dsl_core.calibration.film.order_columns import TileColumns
 from dsl_core.calibration.film.order_paths import LineFrames
+from dsl_core.calibration.film.order_samples import OrderSamples, grating_columns
 from dsl_core.errors import CalibrationError
 from dsl_core.model.calibration.depth_stage import FilterSeen
 from dsl_core.model.rig import CorrespondenceGrid, Film, Rig

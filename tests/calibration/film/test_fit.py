@@ -7,21 +7,22 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from dsl_core.calibration.film.fit import (
-    COMMON_PX,
-    FIELDS,
+from dsl_core.calibration.film.filter_angle import (
     SIGNIFICANT,
     FilterAngle,
-    OrderSamples,
-    _common_offsets,
     columns_per_share,
-    fit_film,
-    grating_columns,
-    is_plausible,
-    require_plausible,
     seen_straight,
     shift_terms,
 )
+from dsl_core.calibration.film.fit import (
+    COMMON_PX,
+    FIELDS,
+    _common_offsets,
+    fit_film,
+    is_plausible,
+    require_plausible,
+)
+from dsl_core.calibration.film.order_samples import OrderSamples, grating_columns
 from dsl_core.errors import CalibrationError
 from dsl_core.model.rig import Film
 from tests.cases.film_samples import (

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 import torch
 
-from dsl_core.calibration.film.fit import FLOOR_PX, fit_film, grating_columns
+from dsl_core.calibration.film.fit import FLOOR_PX, fit_film
+from dsl_core.calibration.film.order_samples import grating_columns
 from dsl_core.calibration.film.residual import (
     _around,
     _folds,
