@@ -2,7 +2,7 @@
 
 All six numbers of `Film` are fitted to all samples; where samples cannot tell them apart (distance and
 bend, or period and distance over few depths) the values of the mounting decide, as a prior. On request the
-shift of filters with the angle of view is fitted as well (`FilterAngle`), or a shape of its own (`warp_terms`).
+shift of filters with the angle of view is fitted as well (`FilterAngle`), or another shape (`warp_terms`).
 """
 
 from __future__ import annotations
