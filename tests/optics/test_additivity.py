@@ -82,6 +82,38 @@ def test_saturated_or_unlit_pixels_and_sharp_stripes_say_nothing() -> None:
     assert additivity([None]) is None
 
 
+@pytest.mark.parametrize(
+    ("excess", "exponent", "is_linear", "is_srgb"),
+    [
+        (0.029, 2.2, True, False), (0.031, 2.2, False, True), (-0.2, 2.2, False, False),
+        (0.2, 0.69, False, False), (0.2, 0.71, True, False), (0.2, 1.29, True, False),
+        (0.2, 1.31, False, False), (0.2, 1.59, False, False), (0.2, 1.61, False, True),
+        (0.2, 2.99, False, True), (0.2, 3.01, False, False), (0.2, float("nan"), False, False),
+    ],
+)  # fmt: skip
+def test_verdicts_follow_from_excess_and_exponent(
+    excess: float, exponent: float, is_linear: bool, is_srgb: bool
+) -> None:
+    found = Additivity(excess, 0.0, exponent, 0.0, 6, 900)
+    assert (found.is_linear, found.is_srgb) == (is_linear, is_srgb)
+
+
+def test_three_deviations_may_be_linear() -> None:
+    assert Additivity(0.2, 0.0, 1.59, 0.1, 6, 900).is_linear
+    assert Additivity(0.058, 0.01, 2.2, 0.0, 6, 900).is_linear
+    assert not Additivity(0.062, 0.01, 2.2, 0.0, 6, 900).is_linear
+
+
+def test_the_deviation_of_a_single_pair_is_that_of_its_median_over_independent_edges() -> None:
+    rng, pixels, noise = np.random.default_rng(0), 3600, 0.02
+    one, other = 0.5 + rng.normal(0, noise, (2, pixels))
+    mixed = np.stack([one, other, np.ones(pixels), np.zeros(pixels)])
+    found = additivity([MixedLight(mixed, np.empty((4, 0)))])
+    assert found is not None
+    # The median's deviation is 1.25 of the mean's; nine neighbours are one observation.
+    assert found.excess_std == pytest.approx(1.2533 * noise * 2**0.5 / (pixels / 9) ** 0.5, rel=0.05)
+
+
 def test_decoding_undoes_encoding() -> None:
     light = np.linspace(0, 1, 33)
     np.testing.assert_allclose(srgb_decode(srgb_encode(light)), light, atol=2e-5)
