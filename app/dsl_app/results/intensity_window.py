@@ -14,13 +14,15 @@ from dsl_app.shared.widgets.dialogs import use_room
 from dsl_app.shared.widgets.forms import check_box, label
 from dsl_app.shared.widgets.help_window import add_help_key
 from dsl_app.shared.widgets.layouts import column_of
-from dsl_app.shared.widgets.plots import RGB_COLOURS, CalmPlot
+from dsl_app.shared.widgets.plots import RGB_COLOURS, CalmPlot, colour_legend
 from dsl_core.workflows.inspection import IntensityGraph
 
 CHANNELS = ("R", "G", "B")
 #: Wavelengths that are labelled along the first orders, nm.
 LABELLED_NM = 50.0
 ORDER_NAMES = {1: "+1", -1: "−1"}
+#: The upper end of the scale over the brightest signal: the legend stands above the curves.
+HEADROOM = 1.25
 
 
 class IntensityWindow(QDialog):
@@ -42,7 +44,8 @@ class IntensityWindow(QDialog):
         self.item = self.plot.getPlotItem()
         self.item.showAxis("top")
         self.item.getAxis("top").enableAutoSIPrefix(False)
-        self.item.addLegend(offset=(-10, 10))
+        # Measured points above their models, in the room that `_scale` leaves above the curves.
+        self.item.addLegend(offset=(-10, 2), colCount=3, verSpacing=-6)
         self.zero = pg.InfiniteLine(angle=90, movable=False)
         self.item.addItem(self.zero, ignoreBounds=True)
         self.spans = {order: pg.LinearRegionItem(movable=False) for order in ORDER_NAMES}
@@ -98,7 +101,7 @@ class IntensityWindow(QDialog):
         self.item.setXRange(0, graph.measured.shape[1] - 1, padding=0.02)
         top = faint_top(graph) if self.faint.isChecked() else float(np.nanmax(graph.measured))
         self.item.setYRange(
-            min(float(np.nanpercentile(graph.measured, 1)), 0.0), 1.1 * max(top, 1e-6), padding=0
+            min(float(np.nanpercentile(graph.measured, 1)), 0.0), HEADROOM * max(top, 1e-6), padding=0
         )
 
     def apply_theme(self, theme: Theme) -> None:
@@ -106,7 +109,7 @@ class IntensityWindow(QDialog):
         self.plot.apply_theme(theme)
         self.item.getAxis("top").setPen(theme.line)
         self.item.getAxis("top").setTextPen(theme.muted)
-        self.item.legend.setLabelTextColor(theme.text)
+        colour_legend(self.item.legend, theme.text)
         self.zero.setPen(pg.mkPen(theme.text, width=1, style=Qt.PenStyle.DashLine))
         for span in self.spans.values():
             span.setBrush(pg.mkBrush(theme.accent + "22"))

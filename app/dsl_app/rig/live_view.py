@@ -16,6 +16,7 @@ from dsl_app.shared.theme import Theme
 from dsl_app.shared.widgets.forms import check_box, label, push_button, set_role
 from dsl_app.shared.widgets.layouts import STRETCH, boxed, column_of, row_of
 from dsl_app.shared.widgets.pictures import PictureView, Region, RegionBox, arrow_step, cut, moved_within
+from dsl_app.shared.widgets.plots import colour_legend
 from dsl_core.capture.preview import BINS, MANY_SATURATED, Statistics, quick_picture, site_colour, statistics
 from dsl_core.devices.base import CameraInfo
 from dsl_core.model.frames import Frame
@@ -167,10 +168,7 @@ class LiveView(QWidget):
             axis = self._histogram.getAxis(side)
             axis.setPen(theme.line)
             axis.setTextPen(theme.muted)
-        self._legend.setLabelTextColor(theme.muted)
-        for _, text in self._legend.items:
-            # Entries that are there already keep their colour otherwise.
-            text.setText(text.text, color=theme.muted)
+        colour_legend(self._legend, theme.muted)
 
     @property
     def frames_per_second(self) -> float:

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 from dsl_app.results.intensity_window import graph_text, ticks
+from dsl_app.shared.theme import DARK, LIGHT
 
 from dsl_core.workflows.inspection import IntensityGraph
 from tests.app.support.results_bench import Bench
@@ -27,6 +28,14 @@ def test_the_intensity_graph_shows_orders_in_nm(bench: Bench) -> None:
     assert both.startswith("First orders +1 and −1 reach the pixel.")
     assert [text for _, text in ticks(graph)] == ["450", "500", "550", "600", "650", "zero order"]
     assert window.item.viewRange()[1][1] < 5
+    # The legend stands above the brightest signal, in the colour of the theme.
+    place = window.item.legend.mapRectToParent(window.item.legend.boundingRect())
+    room = window.item.vb.boundingRect()
+    share = 2.1 / window.item.viewRange()[1][1]
+    assert place.bottom() < (1 - share) * room.height()
+    for theme in (DARK, LIGHT):
+        window.apply_theme(theme)
+        assert all(theme.text in text.item.toHtml() for _, text in window.item.legend.items)
     window.faint.setChecked(False)
     assert window.item.viewRange()[1][1] > 100
     bench.state.graph.set(replace(graph, model=None, orders={}, zero=None))

@@ -44,6 +44,13 @@ class CalmPlot(pg.PlotWidget):  # type: ignore[misc]
             axis.setLabel(axis.labelText)
 
 
+def colour_legend(legend: Any, colour: str) -> None:
+    """Give the texts of a legend of pyqtgraph a colour, also those that are there already."""
+    legend.setLabelTextColor(colour)
+    for _, text in legend.items:
+        text.setText(text.text, color=colour)
+
+
 def theme_bar(bar: Any, theme: Theme) -> None:
     """Apply the colours of a theme to a colour bar of pyqtgraph."""
     for side in ("left", "right"):
