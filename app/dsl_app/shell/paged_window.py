@@ -9,13 +9,14 @@ from pathlib import Path
 
 from PySide6.QtCore import QByteArray, QObject, QSize, QTimer, Signal
 from PySide6.QtGui import QCloseEvent, QDragEnterEvent, QDropEvent, QPaintEvent
-from PySide6.QtWidgets import QMainWindow, QMessageBox, QStackedWidget
+from PySide6.QtWidgets import QMainWindow, QStackedWidget
 
 from dsl_app.shared.jobs.qt_runner import QtRunner
 from dsl_app.shared.known_files import Kind, kind_of, meant_by, refusal
 from dsl_app.shared.settings import RecentFiles, Settings, save_settings
 from dsl_app.shared.theme import DARK, Theme
 from dsl_app.shared.undo import UndoStack
+from dsl_app.shared.widgets.dialogs import confirm
 from dsl_app.shared.widgets.layouts import boxed, column_of, row_of
 from dsl_app.shared.widgets.page import PageWidget, dropped_paths
 from dsl_app.shell.actions import PAGES, Page
@@ -195,13 +196,14 @@ class PagedWindow(QMainWindow):
         if not titles:
             return True
         are, them = ("is", "it") if len(titles) == 1 else ("are", "them")
-        answer = QMessageBox.question(
+        return confirm(
             self,
             "Jobs are running",
             f"{' and '.join(titles)} {are} still running. Stop {them} and quit? What is saved is kept, and"
             " scans and reconstructions can be resumed.",
+            go="Stop and quit",
+            stay="Keep working",
         )
-        return answer == QMessageBox.StandardButton.Yes
 
 
 class OpenQueue(QObject):

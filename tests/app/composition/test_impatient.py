@@ -24,7 +24,7 @@ from dsl_app.shell.main_window import MainWindow
 from dsl_app.shell.paged_window import SMALLEST
 from PySide6.QtCore import Qt, QTimer
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QAbstractButton, QApplication, QDialog, QFileDialog, QMessageBox, QWidget
+from PySide6.QtWidgets import QAbstractButton, QApplication, QDialog, QFileDialog, QWidget
 from pytestqt.qtbot import QtBot
 from shiboken6 import isValid
 
@@ -149,15 +149,15 @@ def test_clicking_everything_while_a_scan_runs_loses_nothing(
 def test_closing_during_a_scan_asks_and_the_frames_stay(
     bench: Bench, gate: threading.Event, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
-    answers = [QMessageBox.StandardButton.No, QMessageBox.StandardButton.Yes]
+    answers = [False, True]
     asked: list[str] = []
 
-    def answer(_parent: object, _title: str, text: str) -> QMessageBox.StandardButton:
+    def answer(_parent: object, _title: str, text: str, **_buttons: str) -> bool:
         asked.append(text)
         gate.set()
         return answers[len(asked) - 1]
 
-    monkeypatch.setattr(QMessageBox, "question", answer)
+    monkeypatch.setattr("dsl_app.shell.paged_window.confirm", answer)
     page = bench.scan_page()
     state = page._state
     QTest.mouseClick(page.run.start, _LEFT)

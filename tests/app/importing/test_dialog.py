@@ -10,7 +10,7 @@ from dsl_app.importing.dialog import ImportDialog
 from dsl_app.shell.main_window import MainWindow
 from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QApplication, QFileDialog, QMessageBox, QPlainTextEdit
+from PySide6.QtWidgets import QApplication, QFileDialog, QPlainTextEdit
 from pytestqt.qtbot import QtBot
 
 from dsl_core.io.calibration_library import CalibrationLibrary
@@ -32,7 +32,7 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> Folders:
 def window(qtbot: QtBot, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> MainWindow:
     monkeypatch.setenv("DSL_SCAN_HOME", str(tmp_path / "home"))
     # What is still read when the window closes is not asked about.
-    monkeypatch.setattr(QMessageBox, "question", lambda *_: QMessageBox.StandardButton.Yes)
+    monkeypatch.setattr("dsl_app.shell.paged_window.confirm", lambda *_, **__: True)
     composition = Composition(StartOptions())
     made = composition.open_window(tmp_path / "home")
     made.parts.settings.output_folder = str(tmp_path / "scans")

@@ -17,7 +17,7 @@ from dsl_app.shell.main_window import MainWindow
 from PySide6.QtCore import QPoint
 from PySide6.QtGui import QCursor
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QApplication, QFileDialog, QLabel, QMenu, QMessageBox, QVBoxLayout
+from PySide6.QtWidgets import QApplication, QFileDialog, QLabel, QMenu, QVBoxLayout
 from pytestqt.qtbot import QtBot
 
 from tests.app.support.doubles import RecordingNotifier
@@ -208,11 +208,11 @@ def test_only_work_that_somebody_would_miss_keeps_the_window_open(
 ) -> None:
     questions: list[str] = []
 
-    def answer(_parent: object, _title: str, text: str) -> QMessageBox.StandardButton:
+    def answer(_parent: object, _title: str, text: str, **_buttons: str) -> bool:
         questions.append(text)
-        return QMessageBox.StandardButton.Yes
+        return True
 
-    monkeypatch.setattr(QMessageBox, "question", answer)
+    monkeypatch.setattr("dsl_app.shell.paged_window.confirm", answer)
     free = threading.Event()
     window.parts.runner.submit(Job("Long work", lambda progress: free.wait(10), is_minor=is_minor))
     threading.Timer(0.1, free.set).start()

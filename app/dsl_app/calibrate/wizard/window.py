@@ -11,7 +11,6 @@ from PySide6.QtWidgets import (
     QDialog,
     QListWidget,
     QListWidgetItem,
-    QMessageBox,
     QProgressBar,
     QPushButton,
     QStackedWidget,
@@ -32,6 +31,7 @@ from dsl_app.calibrate.wizard.state import Doing, WizardState
 from dsl_app.calibrate.wizard.step_page import StepPage
 from dsl_app.shared.evented import follow_any
 from dsl_app.shared.theme import DARK, Theme
+from dsl_app.shared.widgets.dialogs import confirm
 from dsl_app.shared.widgets.forms import Banner, label, named, push_button, quiet, show_button
 from dsl_app.shared.widgets.help_window import add_help_key
 from dsl_app.shared.widgets.inside import apply_theme_inside, stop_following
@@ -132,13 +132,14 @@ class CalibrationWizard(QDialog):
         self.reject()
 
     def _may_stop(self) -> bool:
-        answer = QMessageBox.question(
+        return confirm(
             self,
             f"{self._state.title} is {self._state.doing.value.value}",
             "Stop it and leave? Frames captured so far are kept, and the wizard continues from here next"
             " time.",
+            go="Stop and leave",
+            stay="Stay",
         )
-        return answer == QMessageBox.StandardButton.Yes
 
     def apply_theme(self, theme: Theme) -> None:
         """Take the colours of a theme."""

@@ -1,4 +1,4 @@
-"""Dialogs that only show text, and the base of those that start long work."""
+"""Dialogs that only show text or ask one question, and the base of those that start long work."""
 
 from __future__ import annotations
 
@@ -6,7 +6,15 @@ from collections.abc import Callable
 
 from PySide6.QtCore import QSize, Qt
 from PySide6.QtGui import QFontDatabase
-from PySide6.QtWidgets import QApplication, QDialog, QDialogButtonBox, QLabel, QPlainTextEdit, QWidget
+from PySide6.QtWidgets import (
+    QApplication,
+    QDialog,
+    QDialogButtonBox,
+    QLabel,
+    QMessageBox,
+    QPlainTextEdit,
+    QWidget,
+)
 
 from dsl_app.shared.widgets.forms import label, named, push_button, set_role
 from dsl_app.shared.widgets.inside import stop_following
@@ -14,6 +22,25 @@ from dsl_app.shared.widgets.layouts import column_of
 
 #: Share of the window that a dialog of tables or plots takes.
 SHARE = 0.65
+
+
+def confirm(parent: QWidget, title: str, text: str, go: str, stay: str) -> bool:
+    """Whether a person wants what ends something: the button ``go``; Enter and Escape mean ``stay``."""
+    box = QMessageBox(parent)
+    box.setIcon(QMessageBox.Icon.Question)
+    box.setWindowTitle(title)
+    box.setTextFormat(Qt.TextFormat.PlainText)
+    box.setText(text)
+    wanted = box.addButton(go, QMessageBox.ButtonRole.AcceptRole)
+    safe = box.addButton(stay, QMessageBox.ButtonRole.RejectRole)
+    box.setDefaultButton(safe)
+    box.setEscapeButton(safe)
+    set_role(safe, "primary")
+    box.exec()
+    chosen = box.clickedButton()
+    # It must not go before its answer is read, nor live as long as its parent.
+    box.deleteLater()
+    return chosen is wanted
 
 
 def text_window(title: str, content: QWidget, parent: QWidget, width: int, height: int) -> QDialog:

@@ -8,7 +8,6 @@ from dsl_app.calibrate.wizard.state import Doing
 from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import (
-    QMessageBox,
     QWidget,
 )
 
@@ -110,18 +109,18 @@ def test_closing_during_a_capture_asks_and_keeps_what_is_there(
     assert state.doing.value is Doing.CAPTURING
     asked: list[str] = []
 
-    def answer(which: QMessageBox.StandardButton) -> None:
-        def ask(parent: QWidget, title: str, text: str) -> QMessageBox.StandardButton:
+    def answer(goes: bool) -> None:
+        def ask(_parent: object, _title: str, text: str, **_buttons: str) -> bool:
             asked.append(text)
-            return which
+            return goes
 
-        monkeypatch.setattr(QMessageBox, "question", ask)
+        monkeypatch.setattr("dsl_app.calibrate.wizard.window.confirm", ask)
 
-    answer(QMessageBox.StandardButton.No)
+    answer(False)
     wizard.close()
     assert wizard.isVisible()
     assert "Frames captured so far are kept" in asked[-1]
-    answer(QMessageBox.StandardButton.Yes)
+    answer(True)
     wizard.close()
     assert not wizard.isVisible()
     stage.idle()

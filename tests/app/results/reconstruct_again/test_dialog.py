@@ -13,7 +13,7 @@ from dsl_app.results.reconstruct_again.dialog import ReconstructionDialog
 from dsl_app.shell.main_window import MainWindow
 from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QApplication, QFileDialog, QMessageBox, QPlainTextEdit, QPushButton
+from PySide6.QtWidgets import QApplication, QFileDialog, QPlainTextEdit, QPushButton
 from pytestqt.qtbot import QtBot
 
 from tests.app.composition.test_names import complaints
@@ -34,7 +34,7 @@ def window(qtbot: QtBot, finished: Path, tmp_path: Path, monkeypatch: pytest.Mon
     """A window with a result of a scan beside it."""
     monkeypatch.setenv("DSL_SCAN_HOME", str(tmp_path / "home"))
     # What is still read when the window closes is not asked about.
-    monkeypatch.setattr(QMessageBox, "question", lambda *_: QMessageBox.StandardButton.Yes)
+    monkeypatch.setattr("dsl_app.shell.paged_window.confirm", lambda *_, **__: True)
     composition = Composition(StartOptions())
     made = composition.open_window(tmp_path / "home")
     show_window(qtbot, made)
