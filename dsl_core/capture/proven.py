@@ -191,7 +191,7 @@ class ProvenShots:
                 frame = replace(self._again(shot, earlier), corrected=reason)
                 taken.append((shot, frame, proof.judge(shot, frame.pixels)))
             found = _together([each for *_, each in taken])
-            if len(wrong) > 1 and wrong[0].role == "spectral" and not found.is_wrong:
+            if len(wrong) > 1 and wrong[-1].role == "spectral" and not found.is_wrong:
                 # They agree now; but so do two wrong ones, and the earlier one may have been right.
                 self._require_control(proof)
             for shot, frame, shown in taken:

@@ -289,7 +289,11 @@ class FrameProof:
         self._contested.add(found.shot.index)
         if found.shot.role != "spectral" or not is_doubtful:
             return found
-        return replace(found, again=(self._shots[old], *found.again))
+        # Where a picture of lines is wrong, the black one before may have changed places with it: nothing tells
+        # black from faint lines at a setting of little light.
+        before = self._shots[old - 1]
+        swapped = (before,) if before.role == "black" else ()
+        return replace(found, again=(*swapped, self._shots[old], *found.again))
 
     # What it all says -------------------------------------------------------------------------------------
 

@@ -142,6 +142,10 @@ def test_what_a_wrong_line_was_compared_with_is_taken_again_where_it_was_never_t
     judge = proof()
     judge._untold.add(LINE.index)
     assert judge._with_doubtful(found).again == (LINE, LATER_LINE)
+    # The first line may have changed places with the black picture before it.
+    judge._untold.add(12)
+    first = judge._with_doubtful(Finding(SHOTS[28], Verdict.LATE, (SHOTS[28],)))
+    assert first.again == (SHOTS[11], SHOTS[12], SHOTS[28])
     code = Finding(SHOTS[17], Verdict.LATE, (SHOTS[17],))
     judge._untold.add(1)
     assert judge._with_doubtful(code) is code
