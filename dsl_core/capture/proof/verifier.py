@@ -289,8 +289,8 @@ class FrameProof:
         self._contested.add(found.shot.index)
         if found.shot.role != "spectral" or not is_doubtful:
             return found
-        # Where a picture of lines is wrong, the black one before may have changed places with it: nothing tells
-        # black from faint lines at a setting of little light.
+        # The black picture just before may have changed places with it: at a setting of little light, nothing
+        # tells black from a faint line.
         before = self._shots[old - 1]
         swapped = (before,) if before.role == "black" else ()
         return replace(found, again=(*swapped, self._shots[old], *found.again))
