@@ -23,6 +23,9 @@ from dsl_core.version import __version__
 if TYPE_CHECKING:
     from dsl_core.api.answers import classify as classify
     from dsl_core.api.answers import colours as colours
+    from dsl_core.api.arrays import decode_stack as decode_stack
+    from dsl_core.api.arrays import depth_of_columns as depth_of_columns
+    from dsl_core.api.arrays import read_spectra as read_spectra
     from dsl_core.api.results import evaluate as evaluate
     from dsl_core.api.results import export as export
     from dsl_core.api.results import load_result as load_result
@@ -38,17 +41,21 @@ if TYPE_CHECKING:
 _SCANS = ("load_calibration", "load_scan", "open_rig", "plan", "reconstruct", "rigs", "scan")
 _RESULTS = ("evaluate", "export", "load_result", "save_result")
 _ANSWERS = ("classify", "colours")
+_ARRAYS = ("decode_stack", "depth_of_columns", "read_spectra")
 #: The module of each public name.
 _HOMES = (
     dict.fromkeys(_SCANS, "dsl_core.api.scans")
     | dict.fromkeys(_RESULTS, "dsl_core.api.results")
     | dict.fromkeys(_ANSWERS, "dsl_core.api.answers")
+    | dict.fromkeys(_ARRAYS, "dsl_core.api.arrays")
 )
 
 __all__ = [
     "__version__",
     "classify",
     "colours",
+    "decode_stack",
+    "depth_of_columns",
     "evaluate",
     "export",
     "load_calibration",
@@ -56,6 +63,7 @@ __all__ = [
     "load_scan",
     "open_rig",
     "plan",
+    "read_spectra",
     "reconstruct",
     "rigs",
     "save_result",
@@ -70,4 +78,5 @@ def __getattr__(name: str) -> object:
 
 
 def __dir__() -> list[str]:
-    return sorted({*globals(), *_HOMES})
+    # What else is here serves the package alone.
+    return sorted({*__all__, *(name for name in globals() if name.startswith("__"))})

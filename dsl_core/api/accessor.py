@@ -40,19 +40,16 @@ class ResultAccessor:
         not in the result, and for a result without spectra.
         """
         self._require_spectra()
-        try:
-            pixel = self._result.sel(x=x, y=y)
-        except KeyError as error:
-            raise DecodeError(f"Pixel x {x}, y {y} is not in the result ({self._extent()}).") from error
-        found = pixel[["reflectance", "reflectance_std", "data_share"]].load()
+        found = self._pixel(x, y)[["reflectance", "reflectance_std", "data_share"]].load()
         return found.assign_attrs(name=f"x {x}, y {y}", reasons=self.reasons(x, y))
 
     def region(self, where: NDArray[np.bool_] | Sequence[int]) -> xr.Dataset:
         """Mean reflectance of a region and its standard deviation over ``wavelength_nm``.
 
-        ``where`` is a mask (rows, columns) or x, y, width, height in pixel coordinates. The deviation is that
-        of the region's pixels, not of their mean. The attribute ``used`` counts the pixels with a spectrum.
-        Raises `DecodeError` for a region without any.
+        ``where`` is a mask (rows, columns) or x, y, width, height in pixel coordinates. ``reflectance_std``
+        is the scatter of the region's pixels (that of their mean is smaller by the root of their number, as
+        far as errors are independent), ``pixel_std`` the mean deviation stated for a single pixel. The
+        attribute ``used`` counts the pixels with a spectrum. Raises `DecodeError` for a region without any.
         """
         self._require_spectra()
         mask = self._mask(where)
@@ -75,8 +72,11 @@ class ResultAccessor:
         )
 
     def reasons(self, x: int, y: int) -> list[str]:
-        """Why a pixel is limited, a sentence each; empty where nothing is."""
-        pixel = self._result.sel(x=x, y=y)
+        """Why a pixel is limited, a sentence each; empty where nothing is.
+
+        Raises `DecodeError` for a pixel that is not in the result.
+        """
+        pixel = self._pixel(x, y)
         share = pixel["data_share"].values if "data_share" in pixel else None
         nm = self._result["wavelength_nm"].values if "wavelength_nm" in self._result else np.empty(0)
         return explain_pixel(int(pixel["flags"]), nm, share, float(pixel["depth_std_mm"]))
@@ -98,9 +98,16 @@ class ResultAccessor:
         stacked = self._result.stack(point=("y", "x"))
         return stacked.isel(point=np.flatnonzero(known.values.ravel())).reset_index("point")
 
-    def export(self, path: FilePath, format: str | None = None, *, overwrite: bool = False) -> list[Path]:
+    def export(
+        self,
+        path: FilePath,
+        format: str | None = None,
+        *,
+        pixels: Sequence[tuple[int, int]] = (),
+        overwrite: bool = False,
+    ) -> list[Path]:
         """As `dsl_core.export`."""
-        return export_by_ending(self._result, Path(path), format, overwrite=overwrite)
+        return export_by_ending(self._result, Path(path), format, pixels=pixels, overwrite=overwrite)
 
     def save(self, path: FilePath, *, overwrite: bool = False) -> Path:
         """As `dsl_core.save_result`."""
@@ -124,6 +131,14 @@ class ResultAccessor:
         axes.set(xlabel="wavelength (nm)", ylabel="reflectance")
         return axes
 
+    def _pixel(self, x: int, y: int) -> xr.Dataset:
+        if "x" not in self._result.dims:
+            raise DecodeError("This is one spectrum, not a result: it has no pixels to choose from.")
+        try:
+            return self._result.sel(x=x, y=y)
+        except KeyError as error:
+            raise DecodeError(f"Pixel x {x}, y {y} is not in the result ({self._extent()}).") from error
+
     def _mask(self, where: Any) -> NDArray[np.bool_]:
         rows, columns = self._result["y"].values, self._result["x"].values
         given = np.asarray(where)
@@ -138,6 +153,11 @@ class ResultAccessor:
             raise DecodeError(f"A region is a mask, or x, y, width and height; given {where!r}.")
         x, y, width, height = (int(value) for value in given)
         inside_y, inside_x = (rows >= y) & (rows < y + height), (columns >= x) & (columns < x + width)
+        if not (inside_y.any() and inside_x.any()):
+            raise DecodeError(
+                f"The region {tuple(int(v) for v in given)} (x, y, width, height) is outside the result"
+                f" ({self._extent()})."
+            )
         return np.asarray(inside_y[:, None] & inside_x)
 
     def _require_spectra(self) -> None:

@@ -59,6 +59,8 @@ def classify(
     from dsl_core.analysis.places import require_spectra
 
     require_spectra(result)
+    if library is None and not pins:
+        raise DecodeError("There is nothing to compare with. Give a library of spectra, pins, or both.")
     if range_nm is not None:
         result = within_nm(result, *range_nm)
     classes: list[SpectralClass] = []
@@ -96,7 +98,7 @@ def classify(
 def colours(
     result: xr.Dataset,
     pins: Mapping[str, Place],
-    lights: Sequence[str] = ("A", "D50", "D65", "FL11", "LED-B3"),
+    lights: str | Sequence[str] = ("A", "D50", "D65", "FL11", "LED-B3"),
     reference: str | None = None,
 ) -> xr.Dataset:
     """CIELAB of places under CIE illuminants, and CIEDE2000 to one of them, each with its deviation.
@@ -111,6 +113,7 @@ def colours(
     from dsl_core.analysis.colours import colours_of
     from dsl_core.analysis.places import spectra_of_masks
 
+    lights = [lights] if isinstance(lights, str) else lights
     masks = {name: place_mask(result, name, place) for name, place in pins.items()}
     spectra = spectra_of_masks(result, masks)
     found = colours_of(spectra, result["wavelength_nm"].values, lights, reference)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -29,14 +30,21 @@ def save_result(result: xr.Dataset, path: FilePath, *, overwrite: bool = False) 
 
 @names_missing_packages
 def export(
-    result: xr.Dataset, path: FilePath, format: str | None = None, *, overwrite: bool = False
+    result: xr.Dataset,
+    path: FilePath,
+    format: str | None = None,
+    *,
+    pixels: Sequence[tuple[int, int]] = (),
+    overwrite: bool = False,
 ) -> list[Path]:
     """Write a result for another program and return the files written.
 
-    ``format`` is csv, envi, exr, npy, ply, png or tiff; by default the ending of the path says it. Raises
-    `StoreError` for an unknown format, an existing file and a disk that fails.
+    ``format`` is csv, envi, exr, glb, npy, obj, ply, png, stl or tiff; by default the ending of the path says
+    it. csv is a table of the spectra of ``pixels``, (x, y) each in the picture; what ``result.dsl.spectrum``
+    and ``result.dsl.region`` return is exported as csv too. Raises `StoreError` for an unknown format, an
+    existing file and a disk that fails.
     """
-    return export_by_ending(result, Path(path), format, overwrite=overwrite)
+    return export_by_ending(result, Path(path), format, pixels=pixels, overwrite=overwrite)
 
 
 @names_missing_packages

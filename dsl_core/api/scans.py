@@ -6,7 +6,10 @@ import os
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from pydantic import ValidationError
 
 from dsl_core.api import FilePath
 from dsl_core.devices.base import DeviceRig
@@ -14,9 +17,10 @@ from dsl_core.devices.registry import open_rig as open_by_texts
 from dsl_core.devices.registry import rig_names
 from dsl_core.errors import PlanError
 from dsl_core.extras import names_missing_packages
-from dsl_core.io import rig_file
+from dsl_core.io import calibration_library
 from dsl_core.io.scan.folder import ScanReader
 from dsl_core.io.scan.origin import rig_notes
+from dsl_core.model.base import problems_in_words
 from dsl_core.model.options import Options
 from dsl_core.model.plan import CapturePlan
 from dsl_core.model.presets import PRESETS
@@ -37,7 +41,8 @@ def rigs() -> list[str]:
 def open_rig(name: str = "twin", **options: object) -> DeviceRig:
     """Open the devices of a rig; use it in a ``with`` statement, so that they are closed.
 
-    ``options`` are those that ``dsl-scan rigs`` lists, as text, numbers or True and False. Raises
+    ``options`` are those that ``dsl-scan rigs`` lists, as text, numbers, True and False, or a size as (width,
+    height). Raises
     `DeviceError` for an unknown rig or option, and for devices that cannot be opened.
     """
     texts = {key: _as_text(value) for key, value in options.items()}
@@ -48,6 +53,8 @@ def open_rig(name: str = "twin", **options: object) -> DeviceRig:
 def _as_text(value: object) -> str:
     if isinstance(value, bool):
         return "on" if value else "off"
+    if isinstance(value, tuple | list):
+        return "x".join(map(str, value))
     return os.fspath(value) if isinstance(value, os.PathLike) else str(value)
 
 
@@ -56,7 +63,7 @@ def plan(rig: DeviceRig, preset: str = "reference", **changes: object) -> Captur
     """What a scan captures: the preset of that name for the picture sizes and exposures of a rig.
 
     ``changes`` replace fields of `CapturePlan`, such as ``settings`` or ``code``. Raises `PlanError` for an
-    unknown preset, and ``pydantic.ValidationError`` for a plan that contradicts itself.
+    unknown preset or field, and for a plan that contradicts itself.
     """
     from dsl_core.capture.preflight import fit_plan
 
@@ -65,7 +72,13 @@ def plan(rig: DeviceRig, preset: str = "reference", **changes: object) -> Captur
         raise PlanError(f"There is no plan {preset!r}; choose {', '.join(known)}.")
     chosen = known[preset]
     if changes:
-        chosen = CapturePlan.model_validate({**dict(chosen), **changes})
+        try:
+            chosen = CapturePlan.model_validate({**dict(chosen), **changes})
+        except ValidationError as error:
+            raise PlanError(
+                f"The plan cannot be changed like this: {problems_in_words(error)}. Its fields are"
+                f" {', '.join(CapturePlan.model_fields)}."
+            ) from error
     return fit_plan(chosen, rig)
 
 
@@ -95,8 +108,12 @@ def load_scan(folder: FilePath) -> ScanReader:
 
 
 def load_calibration(path: FilePath) -> Rig:
-    """The calibrated rig of a JSON file; raises `CalibrationError` naming the fields that are wrong."""
-    return rig_file.load_rig(Path(path))
+    """The calibrated rig of a JSON file, or of a name in this computer's library.
+
+    Names are those that ``dsl-scan calibrations list`` shows. Raises `CalibrationError` naming the fields
+    that are wrong, and `StoreError` where there is no such file or name.
+    """
+    return calibration_library.load_calibration(os.fspath(path))
 
 
 @names_missing_packages
@@ -129,7 +146,7 @@ def reconstruct(
 
     folder = scan.folder if isinstance(scan, ScanReader) else Path(scan)
     rig = calibration if isinstance(calibration, Rig | None) else load_calibration(calibration)
-    first, last, step = bands_nm
+    first, last, step = _bands(bands_nm)
     options = Options(
         grid=WavelengthGrid(start_nm=first, stop_nm=last, step_nm=step),
         correspondence=correspondence,
@@ -141,10 +158,23 @@ def reconstruct(
     return reconstruct_scan(folder, rig, options, progress)
 
 
+def _bands(given: Any) -> tuple[float, float, float]:
+    """First and last centre and their distance, nm."""
+    if isinstance(given, str) or len(given) != 3:
+        shown = repr(given) if isinstance(given, str) else f"{len(given)} values"
+        raise PlanError(
+            f"bands_nm are the centres of the first and of the last band and their distance in nm, such as"
+            f" (430, 660, 5); given {shown}."
+        )
+    first, last, step = given
+    return first, last, step
+
+
 def _region(given: Sequence[int], size_px: tuple[int, int]) -> tuple[int, int, int, int]:
     """The region, which must be a part of a picture of this width and height."""
     if len(given) != 4:
-        raise PlanError(f"A region is x, y, width and height, given {tuple(given)}.")
+        shown = tuple(given) if np.ndim(given) == 1 and len(given) < 9 else f"{np.shape(given)} values"
+        raise PlanError(f"A region is x, y, width and height, given {shown}.")
     x, y, width, height = (int(value) for value in given)
     if x < 0 or y < 0 or width < 1 or height < 1 or x + width > size_px[0] or y + height > size_px[1]:
         raise PlanError(

@@ -180,3 +180,51 @@ def test_a_twins_result_is_compared_with_its_truth(result: xr.Dataset) -> None:
     found = dsl.evaluate(result)
     assert found.depth_calibration is not None
     assert found.depth_calibration.coverage_95 > 0.9
+
+
+def test_spectra_become_tables_that_are_read_again(
+    page: dict[str, Any], result: xr.Dataset, tmp_path: Path
+) -> None:
+    part = result.sel(x=slice(44, 55), y=slice(26, 33))
+    dsl.export(part, tmp_path / "pixels.csv", pixels=[(46, 28), (50, 30)])
+    found = dsl.read_spectra(tmp_path / "pixels.csv")
+    assert list(found) == ["x 46, y 28", "x 50, y 30"]
+    expected = result["reflectance"].sel(x=46, y=28).values
+    np.testing.assert_allclose(found["x 46, y 28"], expected, rtol=1e-6)
+    with pytest.raises(StoreError, match=r"No such pixel: \(3, 4\).*x runs from 44 to 55"):
+        dsl.export(part, tmp_path / "other.csv", pixels=[(3, 4)])
+    with pytest.raises(StoreError, match="Pixels are for csv, not for ply"):
+        dsl.export(part, tmp_path / "a.ply", pixels=[(46, 28)])
+    one = result.dsl.spectrum(50, 30)
+    (path,) = dsl.export(one, tmp_path / "one.csv")
+    np.testing.assert_allclose(dsl.read_spectra(path)["x 50, y 30"], one["reflectance"], rtol=1e-6)
+    with pytest.raises(StoreError, match="A spectrum is exported as csv, not as ply"):
+        dsl.export(one, tmp_path / "one.ply")
+    assert float(abs(page["off"]).max()) < 1e-6
+
+
+def test_what_is_not_in_a_result_is_told(result: xr.Dataset, scan: ScanReader) -> None:
+    with pytest.raises(DecodeError, match="x 999, y 1 is not in the result"):
+        result.dsl.reasons(999, 1)
+    with pytest.raises(DecodeError, match=r"\(900, 900, 5, 5\) .* is outside the result \(x 0 to 111"):
+        result.dsl.region((900, 900, 5, 5))
+    with pytest.raises(DecodeError, match="one spectrum, not a result"):
+        result.dsl.spectrum(50, 30).dsl.spectrum(50, 30)
+    with pytest.raises(PlanError, match=r"bands_nm are .* given 11 values"):
+        dsl.reconstruct(scan, bands_nm=np.arange(450, 651, 20))  # type: ignore[arg-type]
+    with pytest.raises(PlanError, match=r"A region is x, y, width and height, given \(72, 112\) values"):
+        dsl.reconstruct(scan, region_px=np.ones((72, 112), bool))  # type: ignore[arg-type]
+    with pytest.raises(StoreError, match="The library has no calibration 'nobody'"):
+        dsl.reconstruct(scan, "nobody")
+    with pytest.raises(DecodeError, match="Give a library of spectra, pins, or both"):
+        dsl.classify(result)
+    assert dsl.colours(result, {"a": (50, 30)}, "D65").sizes["light"] == 1
+
+
+def test_options_may_be_sizes_and_wrong_fields_of_plans_are_told() -> None:
+    assert {"scan", "read_spectra"} <= set(dir(dsl))
+    assert "import_module" not in dir(dsl)
+    with dsl.open_rig("twin", size=(112, 72)) as rig:
+        assert dsl.plan(rig, "quick").camera_size_px == (112, 72)
+        with pytest.raises(PlanError, match=r"exposure_ms .* Its fields are schema_version, name"):
+            dsl.plan(rig, "quick", exposure_ms=3)

@@ -10,12 +10,13 @@ Packages add formats by the entry-point group ``dsl_scan.exporters``, whose valu
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import cache, partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from dsl_core.errors import StoreError
-from dsl_core.io.export.csv import export_csv
+from dsl_core.io.export.csv import Pixel, export_csv
 from dsl_core.io.export.depth_maps import export_npy, export_tiff
 from dsl_core.io.export.envi import export_envi
 from dsl_core.io.export.exr import export_exr
@@ -23,6 +24,7 @@ from dsl_core.io.export.format import Exporter, Format
 from dsl_core.io.export.mesh.export import export_mesh
 from dsl_core.io.export.ply import export_ply
 from dsl_core.io.export.png import export_png
+from dsl_core.io.export.spectra import export_spectra, named_spectrum
 from dsl_core.io.plugins import load_plugins
 from dsl_core.solve.many import Check, never
 
@@ -97,9 +99,17 @@ def export(
 
 
 def export_by_ending(
-    result: xr.Dataset, path: Path, name: str | None = None, *, overwrite: bool = False
+    result: xr.Dataset,
+    path: Path,
+    name: str | None = None,
+    *,
+    pixels: Sequence[Pixel] = (),
+    overwrite: bool = False,
 ) -> list[Path]:
-    """As `export`, in the format that the ending of the path says unless one is named."""
+    """As `export`, in the format that the ending of the path says unless one is named.
+
+    A table (csv) is of ``pixels``, (x, y) each, or of the spectrum that the result is.
+    """
     ending = path.suffix.lower()
     listed = [each for each in formats().values() if each.listed]
     meant = next((each.key for each in listed if ending in (each.suffix, *each.endings)), ending[1:])
@@ -108,6 +118,15 @@ def export_by_ending(
         raise StoreError(
             f"{path} has no ending that says its format. Add one, or give the format: {_names()}."
         )
+    is_spectrum = "reflectance" in result and result["reflectance"].ndim == 1
+    if is_spectrum and chosen == "csv":
+        return [export_spectra([named_spectrum(result)], path, result.attrs, overwrite=overwrite)]
+    if is_spectrum:
+        raise StoreError(f"A spectrum is exported as csv, not as {chosen}. Choose a name that ends in .csv.")
+    if pixels and chosen != "csv":
+        raise StoreError(f"Pixels are for csv, not for {chosen}. Leave them out, or choose csv.")
+    if pixels:
+        return export_csv(result, path, pixels=pixels, overwrite=overwrite)
     return export(result, path, chosen, overwrite=overwrite)
 
 

@@ -22,7 +22,7 @@ from dsl_core.solve.many import Check, never
 if TYPE_CHECKING:
     import xarray as xr
 
-#: (x, y) of a pixel: column and row, counted from 0.
+#: (x, y) of a pixel: column and row in the whole picture, counted from 0.
 Pixel = tuple[int, int]
 
 HEADER = (
@@ -69,22 +69,33 @@ def export_csv(
 
 
 def _check_pixels(result: xr.Dataset, pixels: Sequence[Pixel]) -> None:
-    width, height = result.sizes["x"], result.sizes["y"]
+    xs, ys = _coordinates(result)
+    width, height = len(xs), len(ys)
     if not pixels:
         raise StoreError(
             f"A table of spectra needs pixels: give at least one as x,y within {width} x {height}."
         )
-    outside = [f"({x}, {y})" for x, y in pixels if not (0 <= x < width and 0 <= y < height)]
+    outside = [f"({x}, {y})" for x, y in pixels if x not in xs or y not in ys]
     if outside:
         raise StoreError(
-            f"No such pixel: {', '.join(outside)}. The image has {width} x {height} pixels: x runs from 0 to"
-            f" {width - 1}, y from 0 to {height - 1}."
+            f"No such pixel: {', '.join(outside)}. The image has {width} x {height} pixels: x runs from"
+            f" {xs[0]} to {xs[-1]}, y from {ys[0]} to {ys[-1]}."
         )
+
+
+def _coordinates(result: xr.Dataset) -> tuple[list[int], list[int]]:
+    """The x and y of a result's pixels in the whole picture, of which it may be a part."""
+    found = [
+        result[axis].values.tolist() if axis in result.coords else list(range(result.sizes[axis]))
+        for axis in ("x", "y")
+    ]
+    return found[0], found[1]
 
 
 def _rows(result: xr.Dataset, pixel: Pixel) -> Iterator[tuple[object, ...]]:
     x, y = pixel
-    spot = result.isel(x=x, y=y).load()
+    xs, ys = _coordinates(result)
+    spot = result.isel(x=xs.index(x), y=ys.index(y)).load()
     flags = int(spot["flags"]) if "flags" in spot else 0
     depth = [_number(spot, "depth_mm"), _number(spot, "depth_std_mm")]
     for band, wavelength in enumerate(wavelengths_nm(result)):

@@ -11,7 +11,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from io import StringIO
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +20,9 @@ from dsl_core.errors import StoreError
 from dsl_core.io.export.common import provenance_of, require_suffix
 from dsl_core.io.spectra.formats.own_table import MEAN, WAVELENGTH
 from dsl_core.io.staging import staged
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 Floats = NDArray[np.floating[Any]]
 #: How the other columns of a spectrum are called behind its name.
@@ -44,6 +47,15 @@ class NamedSpectrum:
     deviation: Floats | None = None
     uncertainty: Floats | None = None
     pixels: int | None = None
+
+
+def named_spectrum(spectrum: xr.Dataset) -> NamedSpectrum:
+    """What the accessor's ``spectrum`` or ``region`` returned, over ``wavelength_nm`` alone."""
+    mean, std = (spectrum[name].values for name in ("reflectance", "reflectance_std"))
+    name, nm = str(spectrum.attrs.get("name", "spectrum")), spectrum["wavelength_nm"].values
+    if "pixel_std" not in spectrum:
+        return NamedSpectrum(name, nm, mean, uncertainty=std)
+    return NamedSpectrum(name, nm, mean, std, spectrum["pixel_std"].values, int(spectrum.attrs["used"]))
 
 
 def export_spectra(
