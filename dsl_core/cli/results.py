@@ -23,6 +23,7 @@ from dsl_core.cli.output import Output
 from dsl_core.errors import PlanError
 from dsl_core.evaluation.cost import StageTimer
 from dsl_core.io.staging import check_targets
+from dsl_core.model.figure import counted
 from dsl_core.reconstruction.torch_device import DEVICES, torch_device
 
 if TYPE_CHECKING:
@@ -236,8 +237,7 @@ def mesh(
 
 def _say_written(output: Output, files: list[Path]) -> None:
     shown = [str(file) for file in files[:10]] + (["..."] if len(files) > 10 else [])
-    count = "1 file" if len(files) == 1 else f"{len(files)} files"
-    output.say(f"Written ({count}): {', '.join(shown)}")
+    output.say(f"Written ({counted(len(files), 'file')}): {', '.join(shown)}")
     output.put(files=[str(file) for file in files])
     output.finish()
 

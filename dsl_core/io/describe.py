@@ -18,6 +18,7 @@ from dsl_core.io.rig_file import load_rig
 from dsl_core.io.scan.check import find_problems
 from dsl_core.io.scan.folder import ScanReader
 from dsl_core.io.sealed import is_sealed
+from dsl_core.model.figure import counted
 from dsl_core.model.fit import Fit
 from dsl_core.model.plan import CapturePlan
 
@@ -153,5 +154,4 @@ def _sentinel_fact(plan: CapturePlan) -> str:
     shots = [shot.index for shot in plan.shots() if shot.role == "sentinel"]
     rounds = sum(b - a > 1 for a, b in itertools.pairwise(shots)) + bool(shots)
     share = 100 * len(shots) / plan.shot_count
-    rounds_text = "1 round" if rounds == 1 else f"{rounds} rounds"
-    return f"{len(shots)} repeats in {rounds_text} ({share:.1f} %)" if shots else "none"
+    return f"{len(shots)} repeats in {counted(rounds, 'round')} ({share:.1f} %)" if shots else "none"

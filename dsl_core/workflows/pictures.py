@@ -16,6 +16,7 @@ from dsl_core.errors import CalibrationError
 from dsl_core.model.board import Board
 from dsl_core.model.calibration.geometry import GeometryCalibration
 from dsl_core.model.calibration.pose_frames import PoseFrames
+from dsl_core.model.figure import counted
 from dsl_core.model.plan import GrayCode
 from dsl_core.model.rig import BayerPattern
 from dsl_core.patterns.gray_code import bit_counts
@@ -72,7 +73,7 @@ def pose_folders(folder: Path) -> list[Path]:
     found = sorted((path for path in folder.iterdir() if path.is_dir() and _pictures(path)), key=_natural)
     if not found:
         alone = len(_pictures(folder))
-        instead = f" but {alone} pictures" if alone else ""
+        instead = f" but {counted(alone, 'picture')}" if alone else ""
         raise CalibrationError(
             f"{folder} contains no folders with pictures{instead}. One folder per pose is needed, like"
             " capture_0 with graycode_00.png and so on: the board under every pattern of the code, then white"

@@ -59,7 +59,7 @@ def test_a_folder_of_no_capture_ends_in_one_sentence(
 ) -> None:
     write(tmp_path / "few", {"a.png": np.zeros((8, 8), np.uint16)})
     assert main(["import", str(tmp_path / "few"), "--guess"]) == 2
-    assert "contains 1 pictures" in capsys.readouterr().err
+    assert "contains 1 picture (" in capsys.readouterr().err
     assert main(["import", str(tmp_path / "few")]) == 2
     assert "Add --guess for pictures of another program." in capsys.readouterr().err
 

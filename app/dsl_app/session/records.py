@@ -7,6 +7,7 @@ from typing import Literal
 
 from pydantic import BaseModel, ConfigDict
 
+from dsl_core.model.figure import counted
 from dsl_core.model.plan import CapturePlan
 
 
@@ -78,8 +79,7 @@ class Session(_Part):
             if sides:
                 found.append(f"the comparison of {' and '.join(sides)}")
         if self.series is not None:
-            count = len(self.series.rows)
-            found.append(f"a series of {count} result{'' if count == 1 else 's'}")
+            found.append(f"a series of {counted(len(self.series.rows), 'result')}")
         return tuple(found)
 
     @property

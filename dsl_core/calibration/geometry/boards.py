@@ -68,9 +68,10 @@ def find_corners(grey: NDArray[np.float32], board: Board, name: str) -> Corners:
 
 
 def other_board(grey: NDArray[np.float32], board: Board) -> str:
-    """Which checkerboard a linear picture shows instead, as a sentence; empty if none nearly as large.
+    """Which checkerboard a linear picture shows instead; empty if none nearly as large.
 
-    Squares are often counted in place of corners. Takes some seconds for a large picture.
+    Squares are often counted in place of corners. The sentence has a space before it, to follow another.
+    Takes some seconds for a large picture.
     """
     import cv2
 

@@ -16,6 +16,7 @@ from dsl_core.io.pictures.encoding import guessed_encoding
 from dsl_core.io.pictures.guessed_parts import guessed_size, is_turned, part_of
 from dsl_core.io.pictures.mapping import Encoding, Mapping
 from dsl_core.io.pictures.picture_file import load_values
+from dsl_core.model.figure import counted
 from dsl_core.model.rig import BayerPattern
 from dsl_core.optics.colour import srgb_decode
 from dsl_core.patterns.recognition.probes import Probes, ProbeTaker
@@ -286,7 +287,7 @@ def _doubts_of_files(candidate: Candidate, others: Sequence[str], found: Recogni
     if jump := jump_of(candidate):
         doubts.append(f"{jump}: pictures may be missing, or not belong to the capture")
     if count := len(candidate.absent):
-        doubts.append(f"by their numbers {count} {'picture is' if count == 1 else 'pictures are'} absent")
+        doubts.append(f"by their numbers {counted(count, 'picture is', 'pictures are')} absent")
     if others:
         doubts.append(f"there are other sets ({_few(others)}): name one with --set")
     elif candidate.left_out == 1:

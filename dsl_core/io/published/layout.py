@@ -27,6 +27,7 @@ from pathlib import Path
 from typing import Literal
 
 from dsl_core.io.reading import require_plain
+from dsl_core.model.figure import counted
 from dsl_core.model.plan import MOST_PX, CapturePlan, Role, Setting
 
 #: ``optional`` is what is not there and need not be.
@@ -94,7 +95,7 @@ class FolderSurvey:
         folder = find_folder(self.root, role, setting, self.plan.settings[setting])
         if folder is None:
             name = f"{folder_name(role, setting)}/"
-            images = "1 image" if count == 1 else f"{count} images"
+            images = counted(count, "image")
             record = FileRecord(name, None, "missing", f"{_loss(role)} ({images})")
             self.add(record)
             self.by_place |= {(role, setting, pattern): record for pattern in range(count)}

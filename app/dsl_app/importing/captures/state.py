@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from dsl_app.shared.evented import Event, Value
 from dsl_app.shared.wording import in_window
 from dsl_core.io.pictures.mapping import Mapping
+from dsl_core.model.figure import counted
 
 #: Keys of calibrations that are neither in the library nor files.
 NONE, NOMINAL = "", ":nominal"
@@ -205,7 +206,7 @@ def _about_folder(request: CaptureRequest, stated: Stated | None, busy: str, pic
         origin = ", mapping guessed from the pictures"
     elif stated is not None and stated.file is not None:
         origin = f", mapping of {stated.file.name}"
-    return Said(f"{pictures} pictures{origin}.")
+    return Said(f"{counted(pictures, 'picture')}{origin}.")
 
 
 def _about_mapping(stated: Stated | None) -> Said:

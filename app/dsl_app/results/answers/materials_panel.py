@@ -17,6 +17,7 @@ from dsl_app.shared.widgets.read_table import RIGHT, ReadTable, cell
 from dsl_app.shared.widgets.save_dialog import ask_target
 from dsl_core.analysis.classify import Brightness, Limits, Measure
 from dsl_core.io.spectra.catalogue import suffixes
+from dsl_core.model.figure import counted
 
 HINT = (
     "Name the material of every pixel: choose a folder or file of spectra, or mark known materials and use"
@@ -193,8 +194,7 @@ def _swatch(colour: str) -> QIcon:
 def materials_text(materials: Materials) -> str:
     """What the map rests on, and what is doubtful of it; short, since the legend needs the room."""
     classes = len(materials.found.shown.names)
-    counted = "1 class" if classes == 1 else f"{classes} classes"
-    text = f"{counted} by {materials.name}."
+    text = f"{counted(classes, 'class', 'classes')} by {materials.name}."
     if materials.notes:
         more = f" (and {len(materials.notes) - 1} more notes)" if len(materials.notes) > 1 else ""
         text += f" {materials.notes[0]}{more}"

@@ -12,6 +12,7 @@ from dsl_app.shared.jobs.base import Job, JobRunner
 from dsl_app.shared.notify import Notifier
 from dsl_core.io.export.format import Exporter, Format
 from dsl_core.io.result.result_arrays import ResultArrays
+from dsl_core.model.figure import counted
 from dsl_core.optics.levels import top_of
 from dsl_core.progress import Progress
 
@@ -85,10 +86,9 @@ class ExportController:
 
     def _exported(self, written: Sequence[Path]) -> None:
         megabytes = sum(path.stat().st_size for path in written if path.is_file()) / 1e6
-        files = "file" if len(written) == 1 else "files"
         self._notifier.tell(
             "info",
-            f"Wrote {len(written)} {files}, {megabytes:.1f} MB, to {written[0].parent}.",
+            f"Wrote {counted(len(written), 'file')}, {megabytes:.1f} MB, to {written[0].parent}.",
             "\n".join(str(path) for path in written),
         )
 

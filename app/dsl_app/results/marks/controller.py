@@ -18,6 +18,7 @@ from dsl_app.shared.spectrum import Pixel
 from dsl_app.shared.undo import Change, UndoStack
 from dsl_core.evaluation.marks import runs_of
 from dsl_core.io.spectra.reference_file import Reference, ReferenceFile, read_references
+from dsl_core.model.figure import counted
 from dsl_core.progress import Progress
 
 Mask = NDArray[np.bool_]
@@ -170,7 +171,10 @@ class MarksController:
         if self.can_export():
             spectra = shown_spectra(self.state.marks.value)
             put(spectra_as_text(spectra))
-            self._notifier.tell("info", f"Copied {_counted(len(spectra))}. Paste them into a spreadsheet.")
+            self._notifier.tell(
+                "info",
+                f"Copied {counted(len(spectra), 'spectrum', 'spectra')}. Paste them into a spreadsheet.",
+            )
 
     def export_spectra(self, path: Path, overwrite: bool) -> None:
         """Write the spectra shown as CSV."""
@@ -186,7 +190,7 @@ class MarksController:
             return export_spectra(spectra, path, result.attributes, overwrite=overwrite)
 
         def done(written: Path) -> None:
-            self._notifier.tell("info", f"Wrote {_counted(len(spectra))} to {written}.")
+            self._notifier.tell("info", f"Wrote {counted(len(spectra), 'spectrum', 'spectra')} to {written}.")
 
         self._runner.submit(Job("Export spectra", work, done))
 
@@ -201,7 +205,3 @@ class MarksController:
     def is_reading(self) -> bool:
         """Whether saved marks are still being read."""
         return self._storage.is_reading
-
-
-def _counted(spectra: int) -> str:
-    return "1 spectrum" if spectra == 1 else f"{spectra} spectra"

@@ -40,7 +40,7 @@ def test_an_empty_dialog_asks_for_a_folder(tmp_path: Path) -> None:
 def test_a_guess_can_be_imported(tmp_path: Path) -> None:
     view = captures_view(state_of(tmp_path))
     assert view.can_import
-    assert view.folder.text == "1 pictures, mapping guessed from the pictures."
+    assert view.folder.text == "1 picture, mapping guessed from the pictures."
     assert (view.mapping.text, view.calibration.text) == ("Nothing is unsure.", "No depth.")
     assert view.target.text == "Creates out.dsl."
 
