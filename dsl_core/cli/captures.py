@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any
 
 from dsl_core.cli.options import parse_size
 from dsl_core.cli.output import Output
@@ -12,7 +12,7 @@ from dsl_core.errors import PlanError, StoreError
 
 if TYPE_CHECKING:
     from dsl_core.io.linearity import Linearity
-    from dsl_core.io.pictures.mapping import Mapping
+    from dsl_core.io.pictures.mapping import Encoding, Mapping
     from dsl_core.model.rig import Rig
 
 #: What is left out of a table between its first and its last lines.
@@ -91,7 +91,7 @@ def import_stereo(output: Output, source: Path, target: Path | None, options: St
     from dsl_core.io.published.any_stereo import load_any_stereo
     from dsl_core.io.published.curves import load_curves
     from dsl_core.io.published.stereo_rig import lenses_on
-    from dsl_core.io.published.stereo_words import placed
+    from dsl_core.io.published.stereo_words import placed, sizes
     from dsl_core.io.rig_file import load_rig, save_rig
     from dsl_core.simulation.published_rig import published_rig
 
@@ -103,7 +103,7 @@ def import_stereo(output: Output, source: Path, target: Path | None, options: St
         output.say(f"Assumed: {sentence}.")
     for sentence in found.taken:
         output.say(f"Understood: {sentence}.")
-    output.say(f"Found: {placed(found.stereo)}.")
+    output.say(f"Found: {sizes(found.stereo)}; {placed(found.stereo)}.")
     for sentence in found.doubts:
         output.say(f"Warning: {sentence}.")
     distance_mm = sum(value**2 for value in found.stereo.pose.translation_mm) ** 0.5
@@ -120,14 +120,19 @@ def import_stereo(output: Output, source: Path, target: Path | None, options: St
     if target is not None:
         base = load_rig(options.base) if options.base else published_rig()
         save_rig(lenses_on(base, found, source.name, *curves), target, overwrite=options.force)
-        lacking = "its curves are not those of your devices"
-        if all(options.curves):
-            lacking = "film and scales are not those of your devices"
-        elif any(options.curves):
-            other = "camera" if options.curves[1] else "LEDs"
-            lacking = f"curves of the {other} are not those of your devices"
-        output.say(f"Imported to {target}: for depth; {lacking}.")
+        output.say(
+            f"Imported to {target}: for depth; {_of_base(*options.curves)} are not those of your devices."
+        )
         output.put(imported=target)
+
+
+def _of_base(camera_curves: Path | None, led_curves: Path | None) -> str:
+    """What a rig has of its base, given the tables that were imported."""
+    if camera_curves is None and led_curves is None:
+        return "its curves"
+    if camera_curves is None:
+        return "curves of the camera"
+    return "curves of the LEDs" if led_curves is None else "film and scales"
 
 
 def _guessed(output: Output, source: Path, rig: Rig | None, options: PictureOptions) -> Mapping:
@@ -147,7 +152,7 @@ def _guessed(output: Output, source: Path, rig: Rig | None, options: PictureOpti
     return guess.mapping
 
 
-def encoding_named(text: str | None) -> Literal["linear", "srgb"] | None:
+def encoding_named(text: str | None) -> Encoding | None:
     """The encoding that an option names; raises `PlanError`."""
     match text:
         case None | "linear" | "srgb":

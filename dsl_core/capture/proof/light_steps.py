@@ -14,9 +14,9 @@ from dsl_core.capture.proof.finding import Light
 from dsl_core.model.plan import Shot
 
 #: Brightness relative to the pictures before that is no step.
-SAME_LIGHT = (0.8, 1.3)
+NO_STEP = (0.8, 1.3)
 #: The same where it is known from votes alone, which say little of more light and blur less.
-SAME_VOTES = (0.9, 1.3)
+NO_STEP_BY_VOTES = (0.9, 1.3)
 #: Two pictures of one shot differ by less than this share of their light, unless one of them was wrong.
 SAME_TWICE = 0.1
 #: Pictures needed before one can be unlike them, and how many are remembered.
@@ -45,7 +45,7 @@ class LightSteps:
             return Light.UNTOLD
         key = (shot.role, shot.setting, share is not None)
         known = self._known.setdefault(key, deque(maxlen=REMEMBERED))
-        low, high = SAME_VOTES if share is None else SAME_LIGHT
+        low, high = NO_STEP_BY_VOTES if share is None else NO_STEP
         is_step = len(known) >= FEWEST and not low < value / max(median(known), 1e-6) < high
         if is_step or self._is_same_step(shot, value):
             self._steps[shot.index] = key, value

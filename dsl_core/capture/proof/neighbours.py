@@ -23,7 +23,7 @@ LEAST_CHANGE = 0.4
 #: A picture changes suddenly less if it changes by this share of the usual.
 LITTLE = 0.3
 #: Light relative to that of the lines before that is no surprise.
-SAME_LIGHT = (0.6, 1.6)
+SAME_LINES = (0.6, 1.6)
 #: Light counts from so many deviations on.
 BRIGHT_SIGMAS = 25.0
 #: Differences count up to so many deviations.
@@ -86,7 +86,7 @@ class LineNeighbours:
         light = float(seen.sum()) - dark
         usual = median(self._light) if len(self._light) >= FEWEST_USUAL else 0.0
         self._light.append(light)
-        low, high = SAME_LIGHT
+        low, high = SAME_LINES
         enough = BRIGHT_SIGMAS * sigma
         # No line takes light away: below black, the exposure was shorter or the room is darker.
         is_below_black = light < min(usual, 0.0) - enough

@@ -54,12 +54,20 @@ def doubts(stereo: Stereo) -> Iterator[str]:
         )
 
 
+def sizes(stereo: Stereo) -> str:
+    """The sizes of both devices."""
+    camera, projector = stereo.camera, stereo.projector
+    return (
+        f"camera {camera.width_px} x {camera.height_px} px, projector {projector.width_px} x"
+        f" {projector.height_px} px"
+    )
+
+
 def placed(stereo: Stereo) -> str:
-    """Sizes, and where the projector stands as seen by the camera, which a wrong direction shows.
+    """Where the projector stands as seen by the camera, which a wrong direction shows.
 
     Right, down and forward, because a camera's axes point there.
     """
-    camera, projector = stereo.camera, stereo.projector
     centre = stereo.pose.projector_centre_mm
     distance = float(np.linalg.norm(centre))
     words = (("right", "left"), ("below", "above"), ("in front", "behind"))
@@ -68,8 +76,5 @@ def placed(stereo: Stereo) -> str:
         for names, mm in zip(words, centre, strict=True)
         if abs(mm) > LEAST_SHARE * distance
     ]
-    return (
-        f"camera {camera.width_px} x {camera.height_px} px, projector {projector.width_px} x"
-        f" {projector.height_px} px; the projector is {distance:.4g} mm from the camera"
-        f" ({', '.join(where) or 'at the same place'})"
-    )
+    there = ", ".join(where) or "at the same place"
+    return f"the projector is {distance:.4g} mm from the camera ({there})"

@@ -148,7 +148,7 @@ def _stereo(path: Path, request: CaptureRequest, camera_px: Size, projector_px: 
     curves = [None if table is None else load_curves(table, device) for device, table in tables]
     rig = lenses_on(published_rig(), found, path.name, *curves)
     said = [f"{DOUBT}{in_window(each)}." for each in found.doubts]
-    said.append(f"{path.name}: {placed(found.stereo).partition('; ')[2]}.")
+    said.append(f"{path.name}: {placed(found.stereo)}.")
     said += [f"Missing, so assumed: {', '.join(found.assumed)}."] if found.assumed else []
     taken = [*found.taken, *(each.words for each in curves if each is not None)]
     said.append(f"Understood: {'; '.join(taken)}.")
