@@ -66,4 +66,4 @@ def test_themes_reach_every_panel(bench: Bench) -> None:
     bench.control.marks.pin((10, 10))
     for theme in (LIGHT, DARK_THEME):
         bench.page.apply_theme(theme)
-        assert bench.page.image.content.canvas.backgroundBrush().color().name() == theme.base
+        assert bench.page.image.content.canvas.backgroundBrush().color().name() == theme.surround
