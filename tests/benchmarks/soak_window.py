@@ -114,9 +114,11 @@ class _Errors(logging.Handler):
         qInstallMessageHandler(self._hear)
 
     def emit(self, record: logging.LogRecord) -> None:
-        """Keep the first that is a fault of the program."""
+        """Keep the first that is a fault of the program, which is no sentence to a person."""
         from dsl_core.errors import DslError
 
+        if record.name == "dsl_app.shell.toasts":
+            return
         error = record.exc_info[1] if record.exc_info else None
         expected = error is not None and isinstance(error, DslError | OSError)
         if not self.told and (record.levelno >= logging.ERROR or error is not None) and not expected:

@@ -13,6 +13,7 @@ from dsl_app.compare.pair.state import PairState
 from dsl_app.compare.series.controller import SeriesController
 from dsl_app.compare.series.panel import SeriesPanel
 from dsl_app.compare.series.state import SeriesState
+from dsl_app.shared.settings import RecentFiles
 from dsl_app.shared.widgets.deferred import Deferred
 from dsl_app.shared.widgets.layouts import column_of, tabs_of
 from dsl_app.shared.widgets.page import PageWidget, dropped_paths
@@ -27,11 +28,12 @@ class ComparePage(PageWidget):
         control: PairController,
         series_state: SeriesState,
         series_control: SeriesController,
+        recent: RecentFiles,
     ) -> None:
         super().__init__()
         self._control, self._series_control = control, series_control
         self.setAcceptDrops(True)
-        self.pair = PairPanel(state, control)
+        self.pair = PairPanel(state, control, recent)
         self.series = Deferred(lambda: SeriesPanel(series_state, series_control))
         self.tabs = tabs_of(
             "Two results or a series",

@@ -365,7 +365,7 @@ class Composition(QObject):
 
         self.window.opened.connect(offer_open_result)
         offer_open_result("compare")
-        return ComparePage(state, controller, series_state, series)
+        return ComparePage(state, controller, series_state, series, parts.recent)
 
 
 def _demo_folder() -> Path:

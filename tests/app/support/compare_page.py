@@ -14,6 +14,7 @@ from dsl_app.compare.series.controller import SeriesController
 from dsl_app.compare.series.panel import SeriesPanel
 from dsl_app.compare.series.state import SeriesState
 from dsl_app.shared.jobs.qt_runner import QtRunner
+from dsl_app.shared.settings import RecentFiles, Settings
 from dsl_app.shared.theme import LIGHT
 from dsl_app.shared.undo import UndoStack
 from PySide6.QtCore import QMimeData, QPoint, QPointF, Qt, QUrl
@@ -69,6 +70,7 @@ def bench(qtbot: QtBot) -> Iterator[Bench]:
         PairController(pair, runner, notifier),
         state,
         SeriesController(state, runner, notifier, undo),
+        RecentFiles(Settings()),
     )
     qtbot.addWidget(page)
     page.apply_theme(LIGHT)

@@ -12,6 +12,7 @@ from dsl_app.compare.pair.pictures import PairControls, PairPictures
 from dsl_app.compare.pair.state import Pair, PairState, pair_display
 from dsl_app.compare.verdict_table import VerdictTable
 from dsl_app.shared.evented import follow_any
+from dsl_app.shared.settings import RecentFiles
 from dsl_app.shared.spectrum import spectrum_of_pixel
 from dsl_app.shared.theme import Theme
 from dsl_app.shared.widgets.deferred import Deferred
@@ -20,15 +21,22 @@ from dsl_app.shared.widgets.help_window import set_help
 from dsl_app.shared.widgets.layouts import STRETCH, Stretch, boxed, column_of, row_of, splitter
 from dsl_app.shared.widgets.open_dialog import OpenDialog
 from dsl_app.shared.widgets.plots import CalmPlot
+from dsl_app.shared.widgets.recent_list import RecentList
 from dsl_app.shared.widgets.spectrum_curve import SpectrumCurve
+
+#: Width of the list of recent results, px.
+RECENT_PX = 560
+RESULT_SUFFIX = ".zarr"
 
 
 class PairPanel(QWidget):
     """Follows a `PairState` and asks its controller."""
 
-    def __init__(self, state: PairState, control: PairController) -> None:
+    def __init__(self, state: PairState, control: PairController, recent: RecentFiles) -> None:
         super().__init__()
         self._state, self._control = state, control
+        self.recent = RecentList(recent, self._use, self._is_free)
+        self.recent.setFixedWidth(RECENT_PX)
         self.name_a, self.name_b = label("", "heading"), label("", "heading")
         self.open_first = push_button("Open &A…", "Choose a result as A", lambda: self._choose(second=False))
         self.open_second = push_button("Open &B…", "Choose a result to compare A with")
@@ -65,7 +73,8 @@ class PairPanel(QWidget):
         )
         above = boxed(column_of((self.pictures, 1), self.bar, margins=0))
         self.parts = splitter(Qt.Orientation.Vertical, (above, 1), (self.figures, 1), sizes=(1000, 1000))
-        column_of(head, self.hint, (self.parts, 1), Stretch(0), on=self, margins=(0, 8, 0, 0))
+        self.empty = boxed(row_of(STRETCH, boxed(column_of(STRETCH, self.recent, Stretch(2))), STRETCH))
+        column_of(head, self.hint, (self.parts, 1), (self.empty, 1), on=self, margins=(0, 8, 0, 0))
 
     def _connect(self) -> None:
         state, control = self._state, self._control
@@ -74,6 +83,8 @@ class PairPanel(QWidget):
         self.report.clicked.connect(self._choose_report)
         self.stops = [
             state.pair.follow(lambda pair: self.parts.setVisible(pair is not None)),
+            state.pair.follow(lambda pair: self.empty.setVisible(pair is None)),
+            *follow_any(self.recent.fill, state.first, state.second),
             *follow_any(
                 self._show, state.first, state.second, state.pair, state.busy, state.trouble, state.at_hand
             ),
@@ -88,6 +99,15 @@ class PairPanel(QWidget):
         path = self._state.at_hand.value
         if path is not None:
             self._control.open_side(path, second=self._state.first.value is not None)
+
+    def _is_free(self, path: Path) -> bool:
+        """Whether a recent file is a result that is not compared yet."""
+        sides = self._state.first.value, self._state.second.value
+        taken = [side.arrays.path for side in sides if side is not None]
+        return path.suffix == RESULT_SUFFIX and path.exists() and path not in taken
+
+    def _use(self, path: Path) -> None:
+        self._control.open_side(path, second=self._state.first.value is not None)
 
     def _choose_report(self) -> None:
         pair = self._state.pair.value

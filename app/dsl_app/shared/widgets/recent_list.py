@@ -17,9 +17,15 @@ from dsl_app.shared.widgets.layouts import column_of
 class RecentList(QWidget):
     """Lists recent files; ``open_path`` opens the one that is chosen."""
 
-    def __init__(self, recent: RecentFiles, open_path: Callable[[Path], object]) -> None:
+    def __init__(
+        self,
+        recent: RecentFiles,
+        open_path: Callable[[Path], object],
+        fits: Callable[[Path], bool] = lambda _: True,
+    ) -> None:
+        """Only files that it ``fits`` are listed."""
         super().__init__()
-        self._recent, self._open_path = recent, open_path
+        self._recent, self._open_path, self._fits = recent, open_path, fits
         self.files = named(QListWidget(), "Recent files", "Double-click or press Enter to open")
         self.files.setVerticalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
         self.files.setTextElideMode(Qt.TextElideMode.ElideMiddle)
@@ -27,11 +33,12 @@ class RecentList(QWidget):
         self.files.itemActivated.connect(self._open)
         self._title = label("Recent", "heading")
         column_of(self._title, self.files, on=self, margins=0)
-        self.stops = [recent.paths.follow(lambda _: self._fill())]
+        self.stops = [recent.paths.follow(lambda _: self.fill())]
 
-    def _fill(self) -> None:
+    def fill(self) -> None:
+        """List the files as they are now."""
         self.files.clear()
-        for path in self._recent.paths.value:
+        for path in filter(self._fits, self._recent.paths.value):
             item = QListWidgetItem(entry_text(path))
             item.setData(Qt.ItemDataRole.UserRole, str(path))
             item.setToolTip(str(path))
@@ -49,4 +56,4 @@ class RecentList(QWidget):
     def showEvent(self, event: QShowEvent) -> None:
         """Update the list, as files may have come or gone."""
         super().showEvent(event)
-        self._fill()
+        self.fill()

@@ -8,6 +8,7 @@ from dsl_app.compare.pair.controller import PairController
 from dsl_app.compare.pair.panel import PairPanel
 from dsl_app.compare.pair.state import NOTHING, PairQuantity, PairState
 from dsl_app.shared.jobs.qt_runner import QtRunner
+from dsl_app.shared.settings import RecentFiles, Settings
 from dsl_app.shared.theme import DARK, LIGHT
 from dsl_app.shared.widgets.inside import apply_theme_to, stop_following
 from PySide6.QtCore import Qt
@@ -15,7 +16,7 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication
 from pytestqt.qtbot import QtBot
 
-from tests.app.support.compare_bench import make_result
+from tests.app.support.compare_bench import make_result, make_variant
 from tests.app.support.doubles import RecordingNotifier
 
 Bench = tuple[PairPanel, PairState, PairController]
@@ -30,7 +31,7 @@ def chart(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def bench(qtbot: QtBot) -> Iterator[Bench]:
     runner, state = QtRunner(), PairState()
     control = PairController(state, runner, RecordingNotifier())
-    page = PairPanel(state, control)
+    page = PairPanel(state, control, RecentFiles(Settings()))
     qtbot.addWidget(page)
     apply_theme_to(page, LIGHT)
     page.resize(1100, 700)
@@ -55,6 +56,22 @@ def test_an_empty_page_says_what_to_do(bench: Bench) -> None:
     assert not page.truth.isEnabled()
     assert not page.report.isEnabled()
     assert not page.parts.isVisible()
+
+
+def test_recent_results_are_compared_by_a_double_click(qtbot: QtBot, bench: Bench, chart: Path) -> None:
+    page, state, _ = bench
+    near = make_variant(chart, "near", 3.0)
+    for path in (near, chart, chart.with_suffix(".dsl"), chart.with_name("gone.zarr")):
+        page.recent._recent.add(path)
+    files = page.recent.files
+    assert [files.item(i).text().split(" ")[0] for i in range(files.count())] == ["chart.zarr", "near.zarr"]
+    assert files.isVisible()
+    files.itemActivated.emit(files.item(0))
+    qtbot.waitUntil(lambda: state.first.value is not None and not state.busy.value, timeout=20_000)
+    assert [files.item(i).text().split(" ")[0] for i in range(files.count())] == ["near.zarr"]
+    files.itemActivated.emit(files.item(0))
+    qtbot.waitUntil(lambda: state.pair.value is not None, timeout=20_000)
+    assert not page.empty.isVisible()
 
 
 def test_figures_pictures_and_spectra_of_a_pair(qtbot: QtBot, bench: Bench, chart: Path) -> None:
