@@ -23,8 +23,8 @@ from dsl_core.cli.output import Output
 from dsl_core.errors import PlanError
 from dsl_core.evaluation.cost import StageTimer
 from dsl_core.io.staging import check_targets
-from dsl_core.model.figure import counted
 from dsl_core.reconstruction.torch_device import DEVICES, torch_device
+from dsl_core.words import counted
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -18,9 +18,9 @@ from dsl_core.io.rig_file import load_rig
 from dsl_core.io.scan.check import find_problems
 from dsl_core.io.scan.folder import ScanReader
 from dsl_core.io.sealed import is_sealed
-from dsl_core.model.figure import counted
 from dsl_core.model.fit import Fit
 from dsl_core.model.plan import CapturePlan
+from dsl_core.words import counted
 
 #: A file by hand, or one of an earlier version.
 _UNCHECKED = "none: damage would not be noticed"

@@ -100,15 +100,6 @@ def with_std(value: float, std: float | None, most: int = MOST_DECIMALS) -> str:
     return _spread(value, std, min(decimals(std), most))
 
 
-def counted(count: int, one: str, many: str = "") -> str:
-    """A number of things as people write it; without ``many``, an s makes the plural of ``one``.
-
-    >>> counted(1, "picture"), counted(3, "picture"), counted(0, "spectrum", "spectra")
-    ('1 picture', '3 pictures', '0 spectra')
-    """
-    return f"{count} {one if count == 1 else many or f'{one}s'}"
-
-
 def decimals(value: float, digits: int = 2) -> int:
     """Decimals that show so many ``digits`` of a value.
 

@@ -16,6 +16,11 @@ def robust_std(residual: NDArray[np.floating], axis: int | None = None) -> Float
     return np.asarray(1.4826 * np.median(np.abs(residual), axis=axis))
 
 
+def rms(values: NDArray[np.floating]) -> float:
+    """Root mean square of all values, in their unit; NaN (with a warning) without any."""
+    return float(np.sqrt(np.mean(values**2)))
+
+
 def huber_weights(residual: Floats, sigma: Floats, limit_sigmas: float) -> tuple[Floats, float]:
     """Inverse variances (n,) with Huber's weights, and how many times ``sigma`` the residuals scatter.
 

@@ -16,11 +16,11 @@ from dsl_core.errors import CalibrationError
 from dsl_core.model.board import Board
 from dsl_core.model.calibration.geometry import GeometryCalibration
 from dsl_core.model.calibration.pose_frames import PoseFrames
-from dsl_core.model.figure import counted
 from dsl_core.model.plan import GrayCode
 from dsl_core.model.rig import BayerPattern
 from dsl_core.patterns.gray_code import bit_counts
 from dsl_core.progress import NoProgress, Progress
+from dsl_core.words import counted
 
 SUFFIXES = {".png", ".tif", ".tiff", ".bmp", ".jpg", ".jpeg", ".pgm"}
 

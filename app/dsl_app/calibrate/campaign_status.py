@@ -16,6 +16,7 @@ from dsl_core.io.campaign_folder import CampaignFolder
 from dsl_core.model.calibration.accepted import AcceptedCalibration
 from dsl_core.model.conditions import CaptureConditions, differences
 from dsl_core.model.figure import Figure, failures
+from dsl_core.words import sentence
 
 #: Calibrations older than this are ageing, days.
 AGEING_DAYS = 90
@@ -103,7 +104,7 @@ def judge(
     if conditions is not None and accepted.conditions is not None:
         found = differences(accepted.conditions, conditions)
         if found:
-            return RowState.OTHER_RIG, f"{_sentence('; '.join(found))} Set it back, or calibrate again."
+            return RowState.OTHER_RIG, f"{sentence('; '.join(found))} Set it back, or calibrate again."
     if accepted.based_on != dict(before):
         newer = [name for name in before if accepted.based_on.get(name) != before[name]]
         names = " and ".join(_title(name) for name in newer) or "what it was fitted on"
@@ -149,7 +150,3 @@ def count_captured(campaign: CampaignFolder, name: str) -> int:
 
 def _title(name: str) -> str:
     return ABOUT[name].title if name in ABOUT else name
-
-
-def _sentence(text: str) -> str:
-    return f"{text[0].upper()}{text[1:]}."

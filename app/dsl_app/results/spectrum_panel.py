@@ -18,6 +18,7 @@ from dsl_app.shared.widgets.plots import CalmPlot
 from dsl_app.shared.widgets.spectrum_curve import SpectrumCurve
 from dsl_core.analysis.transforms import Transform, transformed
 from dsl_core.optics.levels import spread_of
+from dsl_core.words import capitalised
 
 #: Higher reflectances are errors or gloss; zooming out shows them.
 TOP = 1.08
@@ -52,7 +53,7 @@ class SpectrumPanel(QWidget):
         self.transform = ChoiceBox(
             "Draw",
             "What is drawn of the spectra; their deviations are carried along",
-            [(each.value[0].upper() + each.value[1:], each) for each in Transform],
+            [(capitalised(each.value), each) for each in Transform],
             state.transform.set,
         )
         self.stacked = check_box("Offset", "Draw the spectra of marks one above the other")
@@ -99,7 +100,7 @@ class SpectrumPanel(QWidget):
         """Draw all spectra in the chosen transform, and show the range that they fill."""
         transform = self._state.transform.value
         self.transform.choose(transform)
-        self.item.setLabel("left", transform.value[0].upper() + transform.value[1:])
+        self.item.setLabel("left", capitalised(transform.value))
         for _, curve in self._curves.values():
             curve.remove()
         self._curves.clear()

@@ -16,6 +16,7 @@ from dsl_app.shared.widgets.icons import icon
 from dsl_app.shared.widgets.layouts import STRETCH, boxed, column_of, row_of
 from dsl_core.optics.levels import spread_of
 from dsl_core.optics.relighting import LIGHTS
+from dsl_core.words import capitalised
 
 VIEWS = (
     (ResultView.COLOUR, "Colour", "Colours as the eye sees them under a light source, or any three bands"),
@@ -87,7 +88,7 @@ class ViewBar(QWidget):
             "White stays white under any light; if not ticked, colours look as they do to eyes adapted to"
             " daylight",
         )
-        maps = [(each.value[0].upper() + each.value[1:], each) for each in QualityMap]
+        maps = [(capitalised(each.value), each) for each in QualityMap]
         self.quality = ChoiceBox("Quality", "What the quality view shows", maps, state.quality.set)
         tip = "What the points are coloured by"
         self.cloud_by = ChoiceBox("Colour of the cloud", tip, CLOUD_COLOURS, state.cloud_by.set)

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 from dsl_app.connection.state import Link, RigState
 from dsl_app.shared.evented import Value
 from dsl_app.shared.widget_state import ButtonState, LabelState
+from dsl_core.words import counted
 
 if TYPE_CHECKING:
     # The window comes up before numpy.
@@ -108,7 +109,7 @@ def cycles_text(exposure_ms: float, cycle_ms: float | None) -> str:
     whole = round(cycles)
     # The box rounds to a hundredth of a millisecond.
     if whole and abs(exposure_ms - whole * cycle_ms) < 0.006:
-        return f"{whole} LED cycle{'' if whole == 1 else 's'}"
+        return counted(whole, "LED cycle")
     return f"{cycles:.2f} LED cycles: colours vary"
 
 

@@ -33,6 +33,7 @@ from dsl_core.model.presets import PRESETS, on_cycles
 from dsl_core.model.rig import Rig
 from dsl_core.patterns.multiplexed import profile_count
 from dsl_core.progress import Progress
+from dsl_core.words import sentence
 
 KEEPS_ITS_PLAN = (
     "The current scan keeps its plan. Complete it, or click 'Plan a new scan', to change, undo or redo the"
@@ -336,7 +337,7 @@ def _obstacles(
     if calibration is not None and override:
         calibration = calibration.model_copy(update={"conditions": None})
     for clause in find_obstacles(replace(devices, calibration=calibration), plan):
-        yield f"{clause[0].upper()}{clause[1:]}."
+        yield sentence(clause)
 
 
 def _place(target: Path) -> Iterator[str]:

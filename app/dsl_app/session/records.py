@@ -7,8 +7,8 @@ from typing import Literal
 
 from pydantic import BaseModel, ConfigDict
 
-from dsl_core.model.figure import counted
 from dsl_core.model.plan import CapturePlan
+from dsl_core.words import counted
 
 
 class _Part(BaseModel):

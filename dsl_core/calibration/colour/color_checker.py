@@ -29,6 +29,7 @@ from dsl_core.optics.charts import chart_reflectance
 from dsl_core.optics.shading import Plane
 from dsl_core.optics.spectra import chain_response
 from dsl_core.progress import NoProgress, Progress
+from dsl_core.solve.robust import rms
 
 Floats = NDArray[np.float64]
 
@@ -111,7 +112,7 @@ def refine_on_chart(
     found = refine(rig, data, weight=None, progress=progress)
     held_out = _held_out(rig, data, found.weight, found.reflectance_error, progress)
     before = _patch_rms(residuals(rig, data, _unchanged(found)))
-    if _rms(held_out) > _rms(before):
+    if rms(held_out) > rms(before):
         found, held_out = _unchanged(found), before
     response, emission, white_scale = refined_curves(rig, found)
     after = _patch_rms(residuals(rig, data, found))
@@ -141,7 +142,7 @@ def refine_on_chart(
         weight=found.weight,
         reflectance_error=found.reflectance_error,
         chart_level=float(np.expm1(found.chart_level)),
-        published_held_out=_rms(published),
+        published_held_out=rms(published),
         tilt_deg=plane.tilt_deg,
         distance_mm=plane.distance_mm,
     )
@@ -212,10 +213,6 @@ def _unchanged(found: Refinement) -> Refinement:
 
 def _patch_rms(residual: Floats) -> Floats:
     return np.asarray(np.sqrt((residual**2).mean((1, 2))))
-
-
-def _rms(values: Floats) -> float:
-    return float(np.sqrt(np.mean(values**2)))
 
 
 def patch_colours(record: ColorCheckerCalibration, rig: Rig) -> tuple[Floats, Floats]:

@@ -22,6 +22,7 @@ from dsl_core.model.geometry import Row3
 from dsl_core.model.rig import FlatField, Rgb, Rig, Sensor
 from dsl_core.model.spectral import SpectralCurve
 from dsl_core.optics.sensor import bayer_channels, gain_at_pixels
+from dsl_core.solve.robust import rms
 from dsl_core.solve.smooth_functions import hat_functions
 
 Floats = NDArray[np.float64]
@@ -275,7 +276,7 @@ def match_whites(rig: Rig, white: WhiteSignals, reflectance: SpectralCurve) -> R
     red, green, blue = (SpectralCurve.of(FINE_NM, curve / scale) for curve in matched)
     response: Rgb = (red, green, blue)
     # Where white is not the sum of its LEDs, by noise or else, no signal is better known than that.
-    std = float(np.hypot(_white_std(white).mean(), _rms(np.array(white.white_over_sum) - 1)))
+    std = float(np.hypot(_white_std(white).mean(), rms(np.array(white.white_over_sum) - 1)))
     return rig.model_copy(
         update={"response": response, "white_scale": rig.white_scale * scale, "white_scale_rel_std": std}
     )
@@ -285,10 +286,6 @@ def _white_std(white: WhiteSignals) -> Floats:
     """Relative deviation of each channel's signal under all LEDs, shape (3,)."""
     spread = white.array * np.array(white.rel_std)
     return np.asarray(np.linalg.norm(spread, axis=1) / white.array.sum(1))
-
-
-def _rms(values: Floats) -> float:
-    return float(np.sqrt(np.mean(values**2)))
 
 
 def _matched(response: Floats, lights: Floats, wanted: Floats, rel_std: Floats) -> Floats:

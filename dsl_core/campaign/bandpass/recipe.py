@@ -39,6 +39,7 @@ from dsl_core.model.rig import Rig
 from dsl_core.model.spectral import SpectralCurve
 from dsl_core.optics.unlit import first_order_reach_px, unlit_px
 from dsl_core.progress import Progress
+from dsl_core.words import sentence
 
 PLANE = "plane"
 CURVE_NAME = "filter.json"
@@ -255,8 +256,7 @@ def _response_advice(record: BandpassCalibration, done: Collection[str]) -> str:
         "use more filters where this colour is bright",
         "set a second exposure (long_ratio)",
     ]
-    text = ", or ".join(ways)
-    return f"{text[0].upper()}{text[1:]}."
+    return sentence(", or ".join(ways))
 
 
 def _plain(name: str, unit: str, value: float, std: float) -> Figure:

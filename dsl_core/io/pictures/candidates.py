@@ -11,7 +11,7 @@ from pathlib import Path
 from dsl_core.errors import StoreError
 from dsl_core.io.pictures.arrange import natural, picture_files
 from dsl_core.io.pictures.picture_file import ARRAYS, NOT_READ, PAGED, Picture, pictures_in
-from dsl_core.model.figure import counted
+from dsl_core.words import counted
 
 #: Fewer pictures are no code, more are several captures.
 FEWEST, MOST = 4, 512

@@ -16,12 +16,12 @@ from dsl_core.io.pictures.encoding import guessed_encoding
 from dsl_core.io.pictures.guessed_parts import guessed_size, is_turned, part_of
 from dsl_core.io.pictures.mapping import Encoding, Mapping
 from dsl_core.io.pictures.picture_file import load_values
-from dsl_core.model.figure import counted
 from dsl_core.model.rig import BayerPattern
 from dsl_core.optics.colour import srgb_decode
 from dsl_core.patterns.recognition.probes import Probes, ProbeTaker
 from dsl_core.patterns.recognition.sequence import Recognised, recognise
 from dsl_core.progress import NoProgress, Progress
+from dsl_core.words import counted
 
 #: A projector that lights less than this share of the camera's range is as good as off.
 LEAST_LIGHT = 0.02

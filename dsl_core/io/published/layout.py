@@ -27,8 +27,8 @@ from pathlib import Path
 from typing import Literal
 
 from dsl_core.io.reading import require_plain
-from dsl_core.model.figure import counted
 from dsl_core.model.plan import MOST_PX, CapturePlan, Role, Setting
+from dsl_core.words import counted
 
 #: ``optional`` is what is not there and need not be.
 Status = Literal["ok", "missing", "optional", "misnamed", "wrong size", "wrong type", "unreadable", "extra"]

@@ -11,6 +11,7 @@ from dsl_core.simulation.effects.base import Effect, LightPath, Limits
 from dsl_core.simulation.effects.catalogue import EFFECTS, USUAL
 from dsl_core.simulation.effects.cost import PLAIN_MS, PLAIN_NS, slowness
 from dsl_core.simulation.effects.tolerance import ONE_DN, EffectBound, Tolerance
+from dsl_core.words import sentence
 
 
 @dataclass(frozen=True)
@@ -130,17 +131,17 @@ def _weighed(
     for effect in order:
         bound, most = bounds[effect.name], tolerance.of_bound(bounds[effect.name])
         if effect.needed:
-            reasons[effect.name] = (True, _sentence(f"{bound.reason}; cannot be left out"))
+            reasons[effect.name] = (True, sentence(f"{bound.reason}; cannot be left out"))
         elif most == 0:
-            reasons[effect.name] = (False, _sentence(bound.reason))
+            reasons[effect.name] = (False, sentence(bound.reason))
         elif spent + most < tolerance.value:
             spent += most
             reasons[effect.name] = (
-                False, _sentence(f"{bound.reason}; that is at most {most:.2g} of the {tolerance} allowed"),
+                False, sentence(f"{bound.reason}; that is at most {most:.2g} of the {tolerance} allowed"),
             )  # fmt: skip
         else:
             over = "alone" if most >= tolerance.value else "with what is left out already"
-            reasons[effect.name] = (True, _sentence(f"{bound.reason}; {over} more than {tolerance}"))
+            reasons[effect.name] = (True, sentence(f"{bound.reason}; {over} more than {tolerance}"))
     return reasons
 
 
@@ -148,11 +149,7 @@ def _forced(only: Collection[str], bounds: dict[str, EffectBound]) -> dict[str, 
     return {
         name: (
             name in only,
-            _sentence(f"requested; {bound.reason}" if name in only else f"not requested; {bound.reason}"),
+            sentence(f"requested; {bound.reason}" if name in only else f"not requested; {bound.reason}"),
         )
         for name, bound in bounds.items()
     }
-
-
-def _sentence(text: str) -> str:
-    return f"{text[0].upper()}{text[1:]}."

@@ -13,6 +13,7 @@ from pydantic import BaseModel
 
 from dsl_app.calibrate.wizard.state import SettingRow
 from dsl_core.campaign.common.recipe import AnyRecipe
+from dsl_core.words import capitalised
 
 
 def setting_rows(recipe: AnyRecipe, settings: Mapping[str, str]) -> tuple[SettingRow, ...]:
@@ -80,7 +81,7 @@ def _doc(kind: type[Any], name: str) -> str:
         plain = re.sub(r"^(?:is|are)\s+", "", own.replace("``", "").strip(" ,.;"))
         if not plain:
             plain = sentence.replace(f"``{name}``", "this").strip(" ,.;")
-        return f"{plain[0].upper()}{plain[1:]}."
+        return f"{capitalised(plain)}."
     return ""
 
 

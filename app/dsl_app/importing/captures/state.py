@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from dsl_app.shared.evented import Event, Value
 from dsl_app.shared.wording import in_window
 from dsl_core.io.pictures.mapping import Mapping
-from dsl_core.model.figure import counted
+from dsl_core.words import counted, sentence
 
 #: Keys of calibrations that are neither in the library nor files.
 NONE, NOMINAL = "", ":nominal"
@@ -241,7 +241,7 @@ def _about_values(decoded: Decoded | None) -> Said:
     """Whether values are linear in light, and what to do if not."""
     if decoded is None:
         return Said()
-    advice = f"{decoded.advice[0].upper()}{decoded.advice[1:]}." if decoded.advice else ""
+    advice = sentence(decoded.advice) if decoded.advice else ""
     values = f"Values are {decoded.values}." if decoded.values else ""
     return Said(f"{advice} {values}".strip(), "warn" if advice else "muted")
 

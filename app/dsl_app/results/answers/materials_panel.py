@@ -17,7 +17,7 @@ from dsl_app.shared.widgets.read_table import RIGHT, ReadTable, cell
 from dsl_app.shared.widgets.save_dialog import ask_target
 from dsl_core.analysis.classify import Brightness, Limits, Measure
 from dsl_core.io.spectra.catalogue import suffixes
-from dsl_core.model.figure import counted
+from dsl_core.words import counted
 
 HINT = (
     "Name the material of every pixel: choose a folder or file of spectra, or mark known materials and use"

@@ -12,9 +12,9 @@ from dsl_app.shared.jobs.base import Job, JobRunner
 from dsl_app.shared.notify import Notifier
 from dsl_core.io.export.format import Exporter, Format
 from dsl_core.io.result.result_arrays import ResultArrays
-from dsl_core.model.figure import counted
 from dsl_core.optics.levels import top_of
 from dsl_core.progress import Progress
+from dsl_core.words import counted
 
 
 class ExportController:

@@ -18,8 +18,8 @@ from dsl_app.shared.spectrum import Pixel
 from dsl_app.shared.undo import Change, UndoStack
 from dsl_core.evaluation.marks import runs_of
 from dsl_core.io.spectra.reference_file import Reference, ReferenceFile, read_references
-from dsl_core.model.figure import counted
 from dsl_core.progress import Progress
+from dsl_core.words import counted
 
 Mask = NDArray[np.bool_]
 #: Distinct colours; further marks share them.

@@ -8,6 +8,7 @@ from dsl_app.results.search.controller import SearchController
 from dsl_app.results.state import ResultsState, Search, SearchMode
 from dsl_app.shared.widgets.forms import ChoiceBox, NumberBox, label, push_button
 from dsl_app.shared.widgets.layouts import STRETCH, row_of
+from dsl_core.words import capitalised
 
 HINT = "Select a pin, region or reference, or point at a pixel; then search the whole picture for it."
 
@@ -21,7 +22,7 @@ class SearchPanel(QWidget):
         self.mode = ChoiceBox(
             "Search for",
             "The same spectrum, or pixels of the same colour under D65 but another spectrum",
-            [(mode.value[0].upper() + mode.value[1:], mode) for mode in SearchMode],
+            [(capitalised(mode.value), mode) for mode in SearchMode],
         )
         self.angle = NumberBox("Limit of the spectral angle", 0.001, 1.0, 0.05, "rad", 3)
         self.angle.setSingleStep(0.005)

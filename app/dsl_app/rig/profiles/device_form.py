@@ -11,6 +11,7 @@ from dsl_app.shared.widgets.forms import ChoiceBox, label, named, quiet
 from dsl_app.shared.widgets.layouts import boxed, column_of, scrolled
 from dsl_core.devices.driver_table import Kind, find_driver
 from dsl_core.errors import DeviceError
+from dsl_core.words import capitalised
 
 NOTHING_FOUND = "nothing found"
 
@@ -105,5 +106,4 @@ def caption(name: str) -> str:
     """
     words, _, end = name.rpartition("_")
     text = f"{words} ({_UNITS[end]})" if words and end in _UNITS else name
-    text = text.replace("_", " ")
-    return text[0].upper() + text[1:]
+    return capitalised(text.replace("_", " "))

@@ -1,0 +1,30 @@
+"""Numbers of things and clauses as people write them."""
+
+from __future__ import annotations
+
+
+def counted(count: int, one: str, many: str = "") -> str:
+    """A number of things; without ``many``, an s makes the plural of ``one``.
+
+    >>> counted(1, "picture"), counted(3, "picture"), counted(0, "spectrum", "spectra")
+    ('1 picture', '3 pictures', '0 spectra')
+    """
+    return f"{count} {one if count == 1 else many or f'{one}s'}"
+
+
+def capitalised(text: str) -> str:
+    """A text that begins with a capital letter, all others as they are (unlike ``str.capitalize``).
+
+    >>> capitalised("the LED of 450 nm"), capitalised("")
+    ('The LED of 450 nm', '')
+    """
+    return f"{text[:1].upper()}{text[1:]}"
+
+
+def sentence(clause: str) -> str:
+    """A clause as a sentence of its own.
+
+    >>> sentence("the LED of 450 nm is off")
+    'The LED of 450 nm is off.'
+    """
+    return f"{capitalised(clause)}."
