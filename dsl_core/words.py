@@ -1,6 +1,8 @@
-"""Numbers of things and clauses as people write them."""
+"""Numbers of things, clauses and commands as people write them."""
 
 from __future__ import annotations
+
+import shlex
 
 
 def counted(count: int, one: str, many: str = "") -> str:
@@ -28,3 +30,12 @@ def sentence(clause: str) -> str:
     'The LED of 450 nm is off.'
     """
     return f"{capitalised(clause)}."
+
+
+def quoted(word: object) -> str:
+    """A word of a command, such as a path, in quotes where a shell needs them.
+
+    >>> quoted("scan.dsl"), quoted("my scan.dsl")
+    ('scan.dsl', "'my scan.dsl'")
+    """
+    return shlex.quote(str(word))

@@ -9,12 +9,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from importlib.metadata import EntryPoint, entry_points
+from importlib.metadata import EntryPoint
 from typing import Any, Literal, get_args
 
 from pydantic import ValidationError
 
 from dsl_core.devices.base import Camera, Device, Projector, Spectroradiometer, Stage
+from dsl_core.devices.plugin_points import points_of
 from dsl_core.errors import DeviceError, DslError
 from dsl_core.model.base import Record, problems_in_words
 
@@ -157,5 +158,4 @@ def open_device(kind: Kind, name: str, settings: Mapping[str, object]) -> Device
 
 
 def _points() -> list[EntryPoint]:
-    unique = {(point.name, point.value): point for point in (*BUILT_IN, *entry_points(group=GROUP))}
-    return [unique[key] for key in sorted(unique)]
+    return points_of(GROUP, BUILT_IN)

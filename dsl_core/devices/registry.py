@@ -12,7 +12,7 @@ import inspect
 from collections.abc import Callable
 from dataclasses import dataclass
 from importlib import import_module
-from importlib.metadata import EntryPoint, entry_points
+from importlib.metadata import EntryPoint
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +21,7 @@ from pydantic import BaseModel
 from dsl_core.devices.base import DeviceRig
 from dsl_core.devices.device_thread import DeviceThread
 from dsl_core.devices.guard import guarded, open_on
+from dsl_core.devices.plugin_points import points_of
 from dsl_core.errors import DeviceError, DslError
 from dsl_core.extras import missing_package
 from dsl_core.version import __version__
@@ -151,8 +152,7 @@ def _describe_profile(name: str) -> RigEntry:
 
 
 def _points() -> list[EntryPoint]:
-    unique = {(point.name, point.value): point for point in (*BUILT_IN, *entry_points(group=GROUP))}
-    return [unique[key] for key in sorted(unique)]
+    return points_of(GROUP, BUILT_IN)
 
 
 def _package(point: EntryPoint) -> tuple[str, str]:

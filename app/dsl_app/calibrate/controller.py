@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import shlex
 from collections.abc import Callable
 from contextlib import ExitStack
 from pathlib import Path
@@ -28,6 +27,7 @@ from dsl_core.io.calibration_library import CalibrationLibrary
 from dsl_core.io.campaign_folder import CampaignFolder
 from dsl_core.io.scan.lock import FolderLock
 from dsl_core.progress import Progress
+from dsl_core.words import quoted
 
 NO_CAMPAIGN = "No campaign is open. Begin a new one, or open an existing one."
 
@@ -284,7 +284,7 @@ class CalibrateController:
         """
         facts = self.state.campaign.value
         verb = name if name == "selftest" else f"calibrate {name or 'all'}"
-        folder = "CAMPAIGN" if facts is None else shlex.quote(str(facts.path))
+        folder = "CAMPAIGN" if facts is None else quoted(facts.path)
         rig = self._rig.state.choice.value if facts is None else facts.rig
         return f"dsl-scan {verb} {folder} {rig.command}".rstrip()
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shlex
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from itertools import groupby
@@ -11,6 +10,7 @@ from typing import TYPE_CHECKING, Literal
 
 from dsl_app.shared.evented import Event, Value
 from dsl_app.shared.known_files import first_free
+from dsl_core.words import quoted
 
 if TYPE_CHECKING:
     from dsl_core.io.published.layout import FileRecord
@@ -141,16 +141,12 @@ def trouble_of(found: Found, request: ImportRequest) -> str:
 
 def command_of(found: Found, request: ImportRequest) -> str:
     """The command that does the same."""
-    words = ["dsl-scan import", _quoted(request.folder), "-o", _quoted(request.target)]
+    words = ["dsl-scan import", quoted(request.folder), "-o", quoted(request.target)]
     if request.base != PUBLISHED:
-        words.append(f"--calibration {_quoted(request.base)}")
+        words.append(f"--calibration {quoted(request.base)}")
     if found.kind == "calibration" and all(request.camera_px):
         words.append("--camera-size {}x{}".format(*request.camera_px))
     return " ".join(words)
-
-
-def _quoted(text: object) -> str:
-    return shlex.quote(str(text))
 
 
 @dataclass(frozen=True)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shlex
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
@@ -26,6 +25,7 @@ from dsl_core.errors import DslError
 from dsl_core.io.result.result_arrays import ResultArrays, load_arrays
 from dsl_core.optics.levels import rgba_of_colours
 from dsl_core.progress import Progress
+from dsl_core.words import quoted
 from dsl_core.workflows.inspection import FrameBlock, IntensityGraph, intensity_graph, read_block
 
 
@@ -151,11 +151,11 @@ class ResultsController:
     def command_line(self) -> str:
         """The command that reconstructs the offered scan or exports the open result."""
         if self.state.offer.value is not None:
-            return f"dsl-scan reconstruct {shlex.quote(str(self.state.offer.value))}"
+            return f"dsl-scan reconstruct {quoted(self.state.offer.value)}"
         result = self.state.result.value
         if result is None:
             return ""
-        path, points = (shlex.quote(str(each)) for each in (result.path, result.path.with_suffix(".ply")))
+        path, points = (quoted(each) for each in (result.path, result.path.with_suffix(".ply")))
         return f"dsl-scan export {path} ply {points}"
 
     # Look ------------------------------------------------------------------------------------------

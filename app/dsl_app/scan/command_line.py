@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shlex
 from collections.abc import Mapping
 from datetime import datetime
 from pathlib import Path
@@ -13,6 +12,7 @@ from dsl_core.io.scan.folder import SUFFIX
 from dsl_core.io.scan.origin import rig_of_notes
 from dsl_core.model.plan import CapturePlan, LineComb, ScanLines, Sentinels
 from dsl_core.model.presets import name_of
+from dsl_core.words import quoted
 
 
 def plan_words(plan: CapturePlan) -> list[str]:
@@ -43,15 +43,15 @@ def scan_command(
     target: Path, rig: str, plan: CapturePlan, calibration: str, override: bool, file: Path | None = None
 ) -> str:
     """The command that captures this scan; ``rig`` as in `RigChoice.command`, ``file`` holds the plan."""
-    words, first = ["dsl-scan scan", shlex.quote(str(target)), rig], ""
+    words, first = ["dsl-scan scan", quoted(target), rig], ""
     if file is None and needs_file(plan):
         file, first = (
             Path("plan.json"),
             "# First save the plan as plan.json ('Save plan…').\n",
         )
-    words += plan_words(plan) if file is None else [f"--plan {shlex.quote(str(file))}"]
+    words += plan_words(plan) if file is None else [f"--plan {quoted(file)}"]
     if calibration:
-        words.append(f"--calibration {shlex.quote(calibration)}")
+        words.append(f"--calibration {quoted(calibration)}")
     if override:
         words.append("--override-calibration")
     return first + " ".join(words)

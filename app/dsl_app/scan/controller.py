@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shlex
 from collections.abc import Callable
 from datetime import datetime
 from pathlib import Path
@@ -25,6 +24,7 @@ from dsl_core.io import MANIFEST_NAME
 from dsl_core.io.calibration_library import CalibrationLibrary
 from dsl_core.io.scan.origin import rig_notes
 from dsl_core.progress import Progress
+from dsl_core.words import quoted
 
 _PHASES = {State.RUNNING: Phase.RUNNING, State.PAUSED: Phase.PAUSED, State.CANCELLING: Phase.STOPPING}
 _BUSY = "A scan is running. Wait until it ends, or cancel it; frames captured so far are kept."
@@ -336,7 +336,7 @@ class ScanController:
         state = self.state
         if state.interrupted.value is not None:
             skip = "" if state.check_drift.value else " --no-drift-check"
-            return f"dsl-scan resume {shlex.quote(str(state.interrupted.value.folder))}{skip}"
+            return f"dsl-scan resume {quoted(state.interrupted.value.folder)}{skip}"
         rig = self._rig.state.choice.value.command
         return scan_command(
             state.target.value,

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shlex
 from collections import deque
 from collections.abc import Callable
 from pathlib import Path
@@ -19,6 +18,7 @@ from dsl_app.shared.spectrum import Pixel
 from dsl_core.evaluation.summary import Truth
 from dsl_core.io.result.result_arrays import ResultArrays, load_arrays
 from dsl_core.progress import Progress
+from dsl_core.words import quoted
 
 T = TypeVar("T")
 
@@ -199,7 +199,7 @@ class PairController:
         pair = self.state.pair.value
         if pair is None:
             return ""
-        first, second = (shlex.quote(str(side.arrays.path)) for side in (pair.first, pair.second))
+        first, second = (quoted(side.arrays.path) for side in (pair.first, pair.second))
         if pair.second.truth is not None:
             return f"dsl-scan evaluate {first}"
         return f"dsl-scan compare {first} {second}"

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shlex
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -18,6 +17,7 @@ from dsl_core.evaluation.seen_target import Region
 from dsl_core.evaluation.stage_test import stage_test
 from dsl_core.evaluation.time_sweep import SweepFigure, require_sweep
 from dsl_core.progress import Progress
+from dsl_core.words import quoted
 
 if TYPE_CHECKING:
     from dsl_core.workflows.series import ResultReference, TruthReference
@@ -273,10 +273,10 @@ class SeriesController:
         counted = state.counted
         if state.advice.value or not counted:
             return ""
-        paths = " ".join(shlex.quote(str(row.path)) for row in counted)
+        paths = " ".join(quoted(row.path) for row in counted)
         if state.kind.value is SeriesKind.SWEEP:
             against = state.against.value
-            return f"dsl-scan sweep {paths}" + (f" --against {shlex.quote(str(against))}" if against else "")
+            return f"dsl-scan sweep {paths}" + (f" --against {quoted(against)}" if against else "")
         positions = ",".join(f"{row.position_mm:.10g}" for row in counted)
         region = state.region.value
         part = "" if region is None else f" --region {','.join(map(str, region))}"

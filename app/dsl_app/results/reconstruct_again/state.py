@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shlex
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -11,6 +10,7 @@ from dsl_app.shared.known_files import first_free
 from dsl_core.errors import DslError, PlanError
 from dsl_core.model.base import what_is_wrong
 from dsl_core.model.spectral import WavelengthGrid
+from dsl_core.words import quoted
 
 RESULT_SUFFIX = ".zarr"
 #: Bytes of a result per pixel: depth, points, normals, colour and their deviations; and per pixel and band.
@@ -146,7 +146,7 @@ def cost_of(request: ReconstructionRequest, source: ReconstructionSource) -> str
 def command_of(request: ReconstructionRequest, source: ReconstructionSource) -> str:
     """The command that does the same; only options that differ from the defaults."""
     usual = ReconstructionRequest("")
-    parts = ["dsl-scan reconstruct", _quoted(source.session), "-o", _quoted(target_of(request, source))]
+    parts = ["dsl-scan reconstruct", quoted(source.session), "-o", quoted(target_of(request, source))]
     if request.spectra:
         parts.append(f"--bands {request.start_nm:g}:{request.stop_nm:g}:{request.step_nm:g}")
         parts += [
@@ -159,7 +159,7 @@ def command_of(request: ReconstructionRequest, source: ReconstructionSource) -> 
     if not request.refine:
         parts.append("--no-refine")
     if request.calibration != OWN:
-        parts.append(f"--calibration {_quoted(request.calibration)}")
+        parts.append(f"--calibration {quoted(request.calibration)}")
         if request.override:
             parts.append("--override-calibration")
     if request.device != usual.device:
@@ -167,7 +167,3 @@ def command_of(request: ReconstructionRequest, source: ReconstructionSource) -> 
     if request.replace:
         parts.append("--force")
     return " ".join(parts)
-
-
-def _quoted(text: object) -> str:
-    return shlex.quote(str(text))
