@@ -9,9 +9,10 @@ import cv2
 import numpy as np
 import pytest
 
-from dsl_core.io.linearity import linearity_of
+from dsl_core.io.linearity import _judged, linearity_of
 from dsl_core.io.pictures.mapping import BlackPicture, Mapping, StripePictures, WhitePicture
 from dsl_core.io.pictures.source import open_pictures
+from dsl_core.optics.additivity import Additivity
 from tests.cases.foreign_captures import PROJECTOR, write
 
 CAPTURES = Path(os.environ.get("DSL_SHARED", "../shared")) / "data" / "procam_checkerboard" / "half_res"
@@ -28,6 +29,31 @@ def test_absent_frames_and_sharp_stripes_leave_it_unknown(tmp_path: Path) -> Non
     assert found.sentence.startswith("no pixels see bright and dark stripes at once")
     for absent in ({4}, {0, 2}):
         assert linearity_of(scan, 255, absent=absent).sentence.startswith("frames are missing")
+
+
+SUM = "pattern and inverse together are 27.0 ± 1.0 % of the contrast {} than white and black together"
+
+
+@pytest.mark.parametrize(
+    ("excess", "exponent", "std", "verdict", "begins", "ends"),
+    [
+        (0.27, 1.1, 0.05, "linear", "linear in light: ", "where stripes meet"),
+        (0.27, 2.1, 0.03, "srgb", "not linear in light but encoded, as sRGB", "to the power 2.1 ± 0.1"),
+        (0.27, 2.9, 0.3, "srgb", "not linear in light but encoded, as sRGB", "to the power 2.9 ± 0.3"),
+        (0.27, 1.45, 0.03, "encoded", "not linear in light, nor sRGB: ", "to the power 1.4 ± 0.1"),
+        (0.27, float("nan"), float("nan"), "encoded", "not linear in light, nor", "where stripes meet"),
+        (-0.27, 0.5, 0.03, "darker", "not linear in light: ", "to the power 0.5 ± 0.1"),
+    ],
+)
+def test_verdicts_are_sentences_with_their_figures(
+    excess: float, exponent: float, std: float, verdict: str, begins: str, ends: str
+) -> None:
+    found = _judged(Additivity(excess, 0.01, exponent, std, 6, 900))
+    assert found.verdict == verdict
+    assert found.is_wrong == (verdict != "linear")
+    assert found.sentence.startswith(begins)
+    assert SUM.format("brighter" if excess > 0 else "darker") in found.sentence
+    assert found.sentence.endswith(ends)
 
 
 @pytest.mark.skipif(not CAPTURES.is_dir(), reason="the real captures of others are not here")
