@@ -180,6 +180,16 @@ def test_a_pose_from_the_projector_is_turned_round(tmp_path: Path) -> None:
     assert "by its name, the pose leads from projector to camera" in found.taken
 
 
+@pytest.mark.parametrize("name", ["cam2proj", "T_cam_to_proj", "proj2cam", "T_projector_to_camera"])
+def test_a_pose_of_one_matrix_leads_where_its_name_says(tmp_path: Path, name: str) -> None:
+    pose = np.vstack([np.hstack([R, T]), [0, 0, 0, 1]])
+    is_back = name.index("p") < name.index("cam")
+    parts = {"cam_K": K, "proj_K": P, name: np.linalg.inv(pose) if is_back else pose}
+    found = load_any_stereo(as_json(tmp_path / "m.json", parts), CAMERA, PROJECTOR)
+    require_right(found, False)
+    assert ("by its name, the pose leads from projector to camera" in found.taken) == is_back
+
+
 @pytest.mark.parametrize(
     ("change", "words"),
     [
