@@ -11,7 +11,7 @@ import contextlib
 import logging
 import os
 import shutil
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
@@ -65,15 +65,18 @@ class RowWriter:
         self._shape, self._origin, self._nm = shape, origin, wavelengths_nm
         self._height = bands[0].stop - bands[0].start
         key = f"{self._key}\n{shape} {origin} {self._height} {wavelengths_nm.tolist()}".encode()
-        if self._is_of(key):
-            for leftover in (self.work / _ARRAYS).rglob("*" + PARTIAL_SUFFIX):
-                leftover.unlink()  # of zarr, which writes beside a file as we do, and was killed
-            done = len(list(self.work.glob("rows.*.json")))
-            _log.warning("Continued where a run was interrupted: %d of %d bands are there.", done, len(bands))
-        else:
-            self._clear()
-            zarr.create_group(self.work / _ARRAYS, zarr_format=3)
-            write_atomic(self.work / _KEY, key)
+        with self._writing():
+            if self._is_of(key):
+                for leftover in (self.work / _ARRAYS).rglob("*" + PARTIAL_SUFFIX):
+                    leftover.unlink()  # of zarr, which writes beside a file as we do, and was killed
+                done = len(list(self.work.glob("rows.*.json")))
+                _log.warning(
+                    "Continued where a run was interrupted: %d of %d bands are there.", done, len(bands)
+                )
+            else:
+                self._clear()
+                zarr.create_group(self.work / _ARRAYS, zarr_format=3)
+                write_atomic(self.work / _KEY, key)
 
     def note_of(self, rows: slice) -> str | None:
         """The note of rows that are complete; None for others."""
@@ -83,13 +86,11 @@ class RowWriter:
     def put(self, rows: slice, maps: Maps, note: str) -> None:
         """Write the maps (..., rows, columns) of a band of rows; raises `StoreError`."""
         part = build_result(dict(maps), self._nm, {})
-        try:
+        with self._writing():
             for name in maps:
                 self._write(name, part[name].variable, rows)
             # The note comes last, and once all else is safe: rows without one are made again.
             write_atomic(self._note(rows), note.encode())
-        except OSError as error:
-            raise store_error(self._target, error) from error
 
     def _write(self, name: str, part: xr.Variable, rows: slice) -> None:
         packing, values = PACKINGS.get(name), np.asarray(part.values)
@@ -127,7 +128,10 @@ class RowWriter:
         shutil.rmtree(aside)
 
     def finish(self, attributes: dict[str, str | int | float]) -> xr.Dataset:
-        """The whole result, read from the disk when it is used; it is in its place after `publish`."""
+        """The whole result, read from the disk when it is used; it is in its place after `publish`.
+
+        Raises `StoreError`.
+        """
         group = self._group()
         shapes = {name: array.shape for name, array in group.arrays()}
         nothing = np.zeros((), np.int8)
@@ -136,15 +140,19 @@ class RowWriter:
         }
         like = build_result(empty, self._nm, attributes, self._origin)
         self._labels = labels_of(like)
-        for name, variable in like.coords.variables.items():
-            if name not in self._labels and str(name) not in group:
-                write_variable(group, str(name), variable)
+        with self._writing():
+            for name, variable in like.coords.variables.items():
+                if name not in self._labels and str(name) not in group:
+                    write_variable(group, str(name), variable)
         return opened(self.work / _ARRAYS, {**like.attrs, "labels": self._labels})
 
     def publish(self, attributes: Mapping[Any, Any]) -> Path:
         """Move the result to its place, whole or not at all, with its attributes; raises `StoreError`."""
         seal_folder(self.work / _ARRAYS, {**attributes, "labels": self._labels})
-        with staged([self._target], overwrite=self._overwrite, kind=RESULT_FOLDER) as (draft,):
+        with (
+            self._writing(),
+            staged([self._target], overwrite=self._overwrite, kind=RESULT_FOLDER) as (draft,),
+        ):
             os.replace(self.work / _ARRAYS, draft)
         self._clear()
         return self._target
@@ -163,6 +171,14 @@ class RowWriter:
         with contextlib.suppress(OSError):
             if [path.name for path in self.work.iterdir()] == [_LOCK]:
                 shutil.rmtree(self.work)
+
+    @contextlib.contextmanager
+    def _writing(self) -> Iterator[None]:
+        """Say in a sentence what the disk refuses."""
+        try:
+            yield
+        except OSError as error:
+            raise store_error(self._target, error) from error
 
     def _is_of(self, key: bytes) -> bool:
         """Whether what is there is the beginning of the same result."""

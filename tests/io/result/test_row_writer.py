@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import errno
+import os
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -122,3 +125,34 @@ def test_a_result_is_replaced_only_when_that_is_wanted(tmp_path: Path) -> None:
     with pytest.raises(StoreError, match="already exists"):
         RowWriter(target, "a")
     assert float(write(target, maps(0.5), overwrite=True)["reflectance"].max()) == pytest.approx(0.5)
+
+
+def test_a_disk_that_is_full_at_any_step_is_told_and_the_result_is_made_afterwards(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    calls: list[str] = []
+    room = [10**9]
+
+    def limited(name: str) -> None:
+        act = getattr(os, name)
+
+        def instead(*arguments: Any, **more: Any) -> Any:
+            calls.append(name)
+            if len(calls) > room[0]:
+                raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+            return act(*arguments, **more)
+
+        monkeypatch.setattr(os, name, instead)
+
+    for name in ("mkdir", "replace"):
+        limited(name)
+    given = maps()
+    write(tmp_path / "whole.zarr", given)
+    count = len(calls)
+    for after in (0, 1, count - 1):
+        calls.clear()
+        room[0] = after
+        with pytest.raises(StoreError, match="space"):
+            write(tmp_path / f"{after}.zarr", given)
+        room[0] = 10**9
+        assert write(tmp_path / f"{after}.zarr", given).attrs["more"] == "of it"
