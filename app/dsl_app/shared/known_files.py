@@ -20,6 +20,8 @@ _OPENS = (
     " campaigns, calibrated rigs, and reference spectra (text, ENVI, ASD, SVC, JCAMP-DX, CGATS and others)."
     " Use File, Import for folders of pictures, and for scans and calibrations in the published layout."
 )
+#: What folders with these endings are, and the file that none of them lacks.
+_WHOLE = {".dsl": ("scan", MANIFEST_NAME), ".zarr": ("result", RESULT_NAME)}
 
 
 class Kind(Enum):
@@ -102,13 +104,6 @@ def _kind_of_json(path: Path) -> Kind:
     return Kind.CALIBRATION if keys & {"film", "response", "rig"} else Kind.UNKNOWN
 
 
-def _is_empty(path: Path) -> bool:
-    try:
-        return path.is_dir() and not any(path.iterdir())
-    except OSError:
-        return False
-
-
 def meant_by(path: Path) -> Path:
     """The folder of a scan, result or campaign if the path is one of its files, else the path itself."""
     if path.name in (MANIFEST_NAME, RESULT_NAME, CAMPAIGN_NAME):
@@ -127,10 +122,6 @@ def first_free(folder: Path, stem: str, suffix: str = "") -> Path:
 def breakable(path: Path | str) -> str:
     """A path whose lines may break at its slashes, by zero-width spaces."""
     return str(path).replace("/", "/" + chr(0x200B))
-
-
-#: What folders with these endings are, and the file that none of them lacks.
-_PARTS = {".dsl": ("scan", MANIFEST_NAME), ".zarr": ("result", RESULT_NAME)}
 
 
 def refusal(path: Path) -> str:
@@ -154,8 +145,8 @@ def refusal(path: Path) -> str:
             return f"{path.name} has the layout of another program. Use File, Import to import it."
         case Kind.UNKNOWN if _is_empty(path):
             return f"The folder {path.name} is empty. Choose another one, or copy it again from where it was."
-        case Kind.UNKNOWN if path.suffix in _PARTS:
-            what, part = _PARTS[path.suffix]
+        case Kind.UNKNOWN if path.suffix in _WHOLE:
+            what, part = _WHOLE[path.suffix]
             return (
                 f"{path.name} is not a whole {what}: it has no {part}. Copy it again from where it was, with"
                 " everything in it."
@@ -169,3 +160,10 @@ def refusal(path: Path) -> str:
             return f"{path.name} is not a known scan, result, reference spectrum or calibration. {_OPENS}"
         case kind:
             return f"{path.name} is a {kind.value}, but no page could open it. The log says why (Ctrl+L)."
+
+
+def _is_empty(path: Path) -> bool:
+    try:
+        return path.is_dir() and not any(path.iterdir())
+    except OSError:
+        return False

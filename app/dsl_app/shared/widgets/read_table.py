@@ -100,30 +100,25 @@ class ReadTable(QTableWidget):
             self.fit_rows.start(0)
 
     def _fit_widened(self) -> None:
-        """Scroll sideways if the other columns would leave nothing of the widened one."""
-        if self._widened is None:
-            return
-        header = self.horizontalHeader()
-        others = sum(header.sectionSize(i) for i in range(header.count()) if i != self._widened)
-        if self.viewport().width() - others < LEAST_WIDE_PX:
-            header.setSectionResizeMode(self._widened, QHeaderView.ResizeMode.Fixed)
-            header.resizeSection(self._widened, LEAST_WIDE_PX)
-        else:
-            header.setSectionResizeMode(self._widened, QHeaderView.ResizeMode.Stretch)
+        if self._widened is not None:
+            self._stretch(self._widened, LEAST_WIDE_PX)
 
     def _fit_wrapped(self) -> None:
-        """Scroll sideways if the remaining width would hold a word a line only."""
         assert self._wrapped is not None
-        header = self.horizontalHeader()
-        others = sum(header.sectionSize(i) for i in range(header.count()) if i != self._wrapped)
         items = (self.item(row, self._wrapped) for row in range(self.rowCount()))
         has_text = any(item is not None and item.text() for item in items)
-        if has_text and self.viewport().width() - others < LEAST_WRAPPED_PX:
-            header.setSectionResizeMode(self._wrapped, QHeaderView.ResizeMode.Fixed)
-            header.resizeSection(self._wrapped, LEAST_WRAPPED_PX)
-        else:
-            header.setSectionResizeMode(self._wrapped, QHeaderView.ResizeMode.Stretch)
+        self._stretch(self._wrapped, LEAST_WRAPPED_PX if has_text else 0)
         self.resizeRowsToContents()
+
+    def _stretch(self, column: int, least_px: int) -> None:
+        """Give a column what the others leave; if that is too little, scroll sideways."""
+        header = self.horizontalHeader()
+        others = sum(header.sectionSize(i) for i in range(header.count()) if i != column)
+        if least_px and self.viewport().width() - others < least_px:
+            header.setSectionResizeMode(column, QHeaderView.ResizeMode.Fixed)
+            header.resizeSection(column, least_px)
+        else:
+            header.setSectionResizeMode(column, QHeaderView.ResizeMode.Stretch)
 
     def show_rows(self, rows: Sequence[Sequence[QTableWidgetItem]]) -> None:
         """Show other rows; columns and rows are resized once, not after every item."""
