@@ -24,6 +24,8 @@ from dsl_core.resources import resource_path
 
 FOLDER = "help"
 SEARCH_PX = 270
+#: Room right of the titles of pages, px.
+LIST_MARGIN_PX = 16
 #: The pages in reading order; others follow.
 ORDER = (
     "rig",
@@ -105,11 +107,11 @@ class HelpWindow(QDialog):
         self.search.setMaximumWidth(SEARCH_PX)
         self.search.textChanged.connect(lambda _: self._filter())
         self.search.returnPressed.connect(self.find_next)
-        self._lay_out()
         for page in help_pages():
             item = QListWidgetItem(title_of(page))
             item.setData(Qt.ItemDataRole.UserRole, page.stem)
             self.pages.addItem(item)
+        self._lay_out()
         self.pages.currentItemChanged.connect(self._choose)
         self.text.backwardAvailable.connect(self.back.setEnabled)
         self.text.forwardAvailable.connect(self.forward.setEnabled)
@@ -119,7 +121,10 @@ class HelpWindow(QDialog):
 
     def _lay_out(self) -> None:
         head = row_of((self.search, 1), self.back, self.forward, STRETCH, self.close_button)
-        parts = splitter(Qt.Orientation.Horizontal, (self.pages, 0), (self.text, 1), sizes=(270, 690))
+        # The longest title is read whole.
+        width = self.pages.sizeHintForColumn(0) + 4 * self.pages.frameWidth() + LIST_MARGIN_PX
+        sizes = (width, self.width() - width)
+        parts = splitter(Qt.Orientation.Horizontal, (self.pages, 0), (self.text, 1), sizes=sizes)
         column_of(head, (parts, 1), on=self)
 
     @property

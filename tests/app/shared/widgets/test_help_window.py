@@ -91,6 +91,9 @@ def test_without_a_better_one_the_page_is_explained(window: MainWindow) -> None:
 def test_links_and_the_list_lead_on_and_back_leads_back(qtbot: QtBot, window: MainWindow) -> None:
     shown = help_window("numbers", window)
     shown.show()
+    # No title is cut.
+    assert shown.pages.sizeHintForColumn(0) <= shown.pages.viewport().width()
+    shown.show()
     assert not shown.back.isEnabled()
     shown.show_topic("comparing#figures")
     assert shown.pages.currentItem().text() == "Comparing"
