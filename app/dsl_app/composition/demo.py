@@ -20,7 +20,10 @@ from dsl_core.errors import StoreError
 #: The live scan: a Color Checker, for less than half a minute.
 LIVE_RIG = RigChoice("twin", (("scene", "color-checker"), ("size", "296x194")))
 LIVE_PRESET = "preview"
-#: How long it is said what a finished scan offers, s.
+#: What a finished scan offers, and how long it is said on the Results page, s.
+PRESENTED = (
+    "This is a finished scan of the simulated rig. Point at the picture to see a spectrum; click to pin it."
+)
 STAY_S = 30.0
 
 
@@ -56,12 +59,7 @@ class DemoController:
 
     def _present(self, result: Path) -> None:
         self._open_result(result)
-        self._notifier.offer(
-            "This is a finished scan of the simulated rig. Point at the picture to see a spectrum; click"
-            " to pin it.",
-            {"Start a live scan": self.scan_live},
-            STAY_S,
-        )
+        self._notifier.offer(PRESENTED, {"Start a live scan": self.scan_live}, STAY_S)
 
     # The live one ----------------------------------------------------------------------------------
 

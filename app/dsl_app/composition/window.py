@@ -171,9 +171,10 @@ class Composition(QObject):
     @cached_property
     def demo(self) -> DemoController:
         """The demo of the application."""
-        from dsl_app.composition.demo import DemoController
+        from dsl_app.composition.demo import PRESENTED, DemoController
 
         parts, toasts = self.window.parts, self.window.toasts
+        self.window.opened.connect(lambda page: None if page == "results" else toasts.withdraw(PRESENTED))
         return DemoController(
             _demo_folder(), self.rig, parts.runner, toasts, self._show_result, self._open_scan_page
         )

@@ -136,6 +136,12 @@ class Toasts(QObject):
         """
         self._show(Toast("info", text, "", self.strip, offers), round(1000 * stay_s))
 
+    def withdraw(self, text: str) -> None:
+        """Close the message of a text, if it is still shown: it has lost its sense."""
+        for toast in self.shown:
+            if toast.text == text:
+                toast.dismiss()
+
     def _show(self, toast: Toast, stay_ms: int) -> None:
         if any(other.text == toast.text for other in self._shown):
             toast.deleteLater()

@@ -9,9 +9,11 @@ import numpy as np
 import pytest
 from dsl_app.composition import demo
 from dsl_app.composition.demo import DemoController
+from dsl_app.composition.window import Composition, StartOptions
 from dsl_app.connection.state import Link, RigChoice
 from dsl_app.scan.state import Phase
 from dsl_app.start.examples import EXAMPLES, Example
+from pytestqt.qtbot import QtBot
 
 from dsl_core.errors import DeviceError
 from dsl_core.io.result.result_file import load_result
@@ -58,6 +60,20 @@ def test_the_examples_open_from_a_folder_of_the_person(
     assert result.sizes["wavelength_nm"] == 47
     assert float((result["flags"] == 0).mean()) > 0.5
     assert "Start a live scan" in bench.scans.notifier.offers
+
+
+def test_what_is_said_of_a_picture_leaves_with_it(qtbot: QtBot, tmp_path: Path) -> None:
+    composition = Composition(StartOptions())
+    window = composition.open_window(tmp_path)
+    qtbot.addWidget(window)
+    assert composition.demo is not None
+    window.toasts.offer("Another.", {"Do": lambda: None})
+    window.toasts.offer(demo.PRESENTED, {"Start a live scan": lambda: None})
+    window.open_page("results")
+    assert [toast.text for toast in window.toasts.shown] == ["Another.", demo.PRESENTED]
+    window.open_page("start")
+    assert [toast.text for toast in window.toasts.shown] == ["Another."]
+    window.close()
 
 
 def test_a_damaged_example_is_replaced_and_marks_next_to_it_stay(bench: Bench, tmp_path: Path) -> None:
