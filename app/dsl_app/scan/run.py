@@ -161,6 +161,7 @@ class RunBox(QGroupBox):
                 state.then_reconstruct,
                 state.trouble,
                 state.is_reconstructing,
+                state.is_seen,
             ),
             state.status.follow(self._show_status),
         ]
@@ -190,13 +191,16 @@ class RunBox(QGroupBox):
 
     def _show(self) -> None:
         state = self._state
+        finished = state.finished.value
+        # It may have been reconstructed from another page.
+        has_result = finished is not None and finished.with_suffix(".zarr").exists()
         shown = run_controls(
             state.phase.value,
             state.interrupted.value,
             state.facts.value,
             state.note.value,
-            state.finished.value is not None,
-            state.then_reconstruct.value,
+            finished is not None,
+            state.then_reconstruct.value or has_result,
             state.trouble.value,
             state.is_reconstructing.value,
         )

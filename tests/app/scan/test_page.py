@@ -104,6 +104,14 @@ def test_pause_go_on_and_finish(qtbot: QtBot, ready: Bench, slow: None, tmp_path
     assert ScanReader(tmp_path / "first.dsl").missing() == []
     assert page.plan.isEnabled()
     assert f"{SHORT.shot_count} of {SHORT.shot_count}" in page.run.frames.text()
+    # It is to be reconstructed, until that is done, from this page or from another.
+    bench.state.then_reconstruct.set(False)
+    assert page.run.again.property("role") == "primary"
+    page.hide()
+    (tmp_path / "first.zarr").mkdir()
+    page.show()
+    assert page.run.again.property("role") != "primary"
+    assert page.run.start.property("role") == "primary"
 
 
 def test_cancel_keeps_frames_and_offers_to_resume(qtbot: QtBot, ready: Bench, slow: None) -> None:
