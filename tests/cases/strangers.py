@@ -240,7 +240,7 @@ def _make_tables(folder: Path) -> None:
 
 
 def _read_tables(folder: Path) -> object:
-    from dsl_core.io.published.calibration import load_tables
+    from dsl_core.io.published.curve_tables import load_tables
 
     return load_tables(folder)
 

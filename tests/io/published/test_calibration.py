@@ -9,13 +9,8 @@ import pytest
 from numpy.typing import NDArray
 
 from dsl_core.errors import CalibrationError, StoreError
-from dsl_core.io.published.calibration import (
-    check_calibration,
-    export_calibration,
-    load_calibration,
-    load_tables,
-    save_tables,
-)
+from dsl_core.io.published.calibration import check_calibration, export_calibration, load_calibration
+from dsl_core.io.published.curve_tables import load_tables, save_tables
 from dsl_core.model.rig import ColumnResidual, FlatField, Rig
 from dsl_core.model.spectral import SpectralCurve, WavelengthGrid
 from tests.cases.small_rig import small_rig
