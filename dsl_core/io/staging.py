@@ -44,8 +44,7 @@ def staged(
     lock: FolderLock | None = None
     try:
         make_durable(home)
-        room.mkdir()
-        lock = FolderLock(room / _LOCK_NAME)
+        lock = _furnished(room)
         drafts = [room / target.name for target in targets]
         yield drafts
         for draft in drafts:
@@ -63,13 +62,31 @@ def staged(
         _clear(room, targets)
 
 
+def _furnished(room: Path) -> FolderLock:
+    """Make the private folder of a writer, and take its lock."""
+    room.mkdir()
+    try:
+        return FolderLock(room / _LOCK_NAME)
+    except StoreError:
+        if room.is_dir():
+            raise
+    # Another writer took the folder, empty as it was, for left over.
+    room.mkdir()
+    return FolderLock(room / _LOCK_NAME)
+
+
 def clear_leftovers(home: Path) -> None:
     """Remove what writers that were killed left in a folder; what they had moved aside returns to its place.
 
-    A writer holds a lock while it lives. One of an earlier version holds none: its room is left for a day.
+    A writer holds a lock while it lives. One of an earlier version holds none: its room is left for a day,
+    unless it is empty.
     """
     for room in home.glob(f".*{PARTIAL_SUFFIX}"):
-        if not _ROOM.fullmatch(room.name) or not room.is_dir() or _is_in_use(room):
+        if not _ROOM.fullmatch(room.name) or not room.is_dir():
+            continue
+        with contextlib.suppress(OSError):
+            room.rmdir()  # if it is empty: its writer was killed before it had a lock
+        if not room.is_dir() or _is_in_use(room):
             continue
         _log.warning("%s was left by a writer that was killed, and is removed.", room)
         olds = room.glob(f"*{_OLD_SUFFIX}")

@@ -17,7 +17,7 @@ from dsl_core.io.published.dataset import export_dataset
 from dsl_core.io.result.result_file import RESULT_FOLDER, save_result
 from dsl_core.io.scan.folder import ScanReader
 from dsl_core.io.scan.lock import FolderLock
-from dsl_core.io.staging import check_targets, staged, write_text
+from dsl_core.io.staging import check_targets, clear_leftovers, staged, write_text
 from dsl_core.io.swap import exchange
 from dsl_core.model.plan import CapturePlan, LineComb, Shot
 from tests.cases.small_result import small_result
@@ -301,3 +301,26 @@ def test_what_a_killed_writer_left_is_removed_but_not_what_another_is_writing(
     write_text(tmp_path / "b.txt", "b")
     assert sorted(each.name for each in tmp_path.iterdir()) == [".mine.partial", "a.txt", "b.txt"]
     assert "was left by a writer that was killed" in caplog.text
+
+
+def test_a_writer_that_was_killed_before_it_had_a_lock_leaves_nothing(tmp_path: Path) -> None:
+    (tmp_path / ".r.zarr.0123abcd.partial").mkdir()
+    write_text(tmp_path / "a.txt", "a")
+    assert [each.name for each in tmp_path.iterdir()] == ["a.txt"]
+
+
+def test_a_writer_whose_empty_folder_was_taken_for_left_over_makes_it_again(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    taken: list[Path] = []
+
+    def lock(path: Path) -> FolderLock:
+        if not taken:
+            taken.append(path)
+            clear_leftovers(tmp_path)
+            assert not path.parent.exists()
+        return FolderLock(path)
+
+    monkeypatch.setattr(staging, "FolderLock", lock)
+    write_text(tmp_path / "a.txt", "a")
+    assert [each.name for each in tmp_path.iterdir()] == ["a.txt"]
