@@ -101,8 +101,10 @@ def _add_lens(found: Parts, numbers: Numbers, device: str, who: str, alone: str 
         found.add(f"{device} distortion", name, numbers[name].ravel())
     radial = _named(numbers, f"{who}radialdistortion", {2, 3})
     tangential = _named(numbers, f"{who}tangentialdistortion", {2})
-    if radial is not None and tangential is not None:
-        k, p = numbers[radial].ravel(), numbers[tangential].ravel()
+    if radial is not None:
+        if tangential is None:
+            found.taken.append(f"{radial} is without tangential distortion")
+        k, p = numbers[radial].ravel(), np.zeros(2) if tangential is None else numbers[tangential].ravel()
         found.add(f"{device} distortion", radial, np.r_[k[:2], p, k[2:], np.zeros(3 - k.size)])
 
 

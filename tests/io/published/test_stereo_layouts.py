@@ -100,6 +100,20 @@ def test_matlab_writes_matrices_transposed_and_counts_from_one(tmp_path: Path) -
     assert any("as in MATLAB" in each for each in found.taken)
 
 
+def test_radial_coefficients_of_matlab_stand_around_the_tangential_ones(tmp_path: Path) -> None:
+    radial, tangential = [-0.1, 0.02, 0.3], [0.001, -0.002]
+    camera = {"K": K, "RadialDistortion": radial, "TangentialDistortion": tangential}
+    alone = {"K": P, "RadialDistortion": radial}
+    path = as_json(tmp_path / "m.json", {"camera": camera, "projector": alone, "R": R, "T": T})
+    found = load_any_stereo(path, CAMERA, PROJECTOR)
+    assert found.stereo.camera.distortion == (-0.1, 0.02, 0.001, -0.002, 0.3)
+    assert found.stereo.projector.distortion == (-0.1, 0.02, 0.0, 0.0, 0.3)
+    assert (found.assumed, found.taken[0]) == (
+        (),
+        "projector.RadialDistortion is without tangential distortion",
+    )
+
+
 def kalibr(model: str) -> str:
     pose = np.vstack([np.hstack([R, T / 1000]), [0, 0, 0, 1]]).tolist()
     return (
