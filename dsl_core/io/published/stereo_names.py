@@ -29,6 +29,8 @@ _TO_CAMERA = r"(?:proj|projector|p)(?:2|to)(?:cam|camera|c)"
 _TURN = r"(?:r|rot|rotation|roration|rmat|rvec|rotationmatrix|rotationvector|om|rp|rotationofcamera2)"
 _SHIFT = r"(?:t|trans|translation|tvec|tmat|translationvector|tp|translationofcamera2)"
 _BOTH = r"(?:tcncnm1|cam1tcncnm1|transform(?:ation)?(?:matrix)?|extrinsics?(?:matrix)?|rt|pose|posecamera2a)"
+#: Sizes with such names are counted in squares or corners.
+_OF_TARGET = re.compile(r"(?i)board|pattern|target|grid|corner|square")
 #: Numbers of coefficients that OpenCV knows.
 _COEFFICIENTS = {4, 5, 8, 12, 14}
 
@@ -60,6 +62,7 @@ def parts_of(numbers: Numbers) -> Parts:
 
 def size_of(numbers: Numbers, device: str) -> tuple[int, int] | None:
     """Width and height in px that a file gives for the camera or the projector; None if it does not."""
+    numbers = {name: values for name, values in numbers.items() if not _OF_TARGET.search(name)}
     is_camera = device == "camera"
     who = "(?:camera|cam|cam0|cameraparameters1|frame|image|img)?" if is_camera else (
         "(?:projector|proj|cam1|cameraparameters2|screen|screenres)"

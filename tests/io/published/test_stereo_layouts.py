@@ -217,6 +217,13 @@ def test_what_cannot_be_meant_is_refused(tmp_path: Path, change: dict[str, Any],
         load_any_stereo(as_json(tmp_path / "c.json", {**PLAIN, **change}), CAMERA, PROJECTOR)
 
 
+@pytest.mark.parametrize("name", ["size", "image_size"])
+def test_the_size_of_a_board_is_that_of_no_camera(tmp_path: Path, name: str) -> None:
+    parts = {**PLAIN, "board": {name: [9, 6]}, "pattern_size": [9, 6]}
+    found = load_any_stereo(as_json(tmp_path / "c.json", parts), CAMERA, PROJECTOR)
+    require_right(found, False)
+
+
 def test_sizes_are_asked_for_and_doubted(tmp_path: Path) -> None:
     path = as_json(tmp_path / "c.json", PLAIN)
     with pytest.raises(CalibrationError, match=r"does not say the size of the camera\. Give --camera-size"):
