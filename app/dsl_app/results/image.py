@@ -181,7 +181,7 @@ class ResultImage(QWidget):
         if layer.keys:
             self.legend.setText(
                 " &nbsp; ".join(
-                    f'<span style="color:{colour}">■</span>&nbsp;{name.replace(" ", "&nbsp;")}&nbsp;'
+                    f"{_swatch(colour, self._theme.muted)}&nbsp;{name.replace(' ', '&nbsp;')}&nbsp;"
                     f'<span style="color:{self._theme.muted}">{100 * share:.1f} %</span>'
                     for colour, name, share in layer.keys
                 )
@@ -265,3 +265,9 @@ def tinted(mask: np.ndarray[Any, np.dtype[np.bool_]], colour: str, alpha: int, z
     item.setRect(-0.5, -0.5, mask.shape[1], mask.shape[0])
     item.setZValue(z)
     return item
+
+
+def _swatch(colour: str, muted: str) -> str:
+    """A square of a colour of the picture; where that is faint, its outline, which is seen on any theme."""
+    square, ink = ("■", colour) if colour.startswith("#") else ("□", muted)
+    return f'<span style="color:{ink}">{square}</span>'

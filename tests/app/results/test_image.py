@@ -67,7 +67,7 @@ def test_an_ellipse_holds_pi_quarters_of_its_box(bench: Bench) -> None:
 def test_every_view_paints_the_shape_of_the_result(bench: Bench) -> None:
     result = bench.state.result.value
     assert result is not None
-    image = bench.page.image.content
+    image, seen = bench.page.image.content, 0
     for view, quality in itertools.product(ResultView, QualityMap):
         bench.state.quality.set(quality)
         bench.state.view.set(view)
@@ -75,7 +75,12 @@ def test_every_view_paints_the_shape_of_the_result(bench: Bench) -> None:
         assert layer is not None
         assert rgb_of(layer).shape == (24, 36, 3)
         assert image.legend.isVisible() == bool(layer.keys)
+        # What is faint in the picture has an outline in the legend.
+        faint = sum(colour.startswith("rgba") for colour, *_ in layer.keys)
+        assert not layer.keys or image.legend.text().count("□") == faint
+        seen += faint
         assert image.image.image.shape[:2] == (24, 36)
+    assert seen
 
 
 def test_depth_outside_the_limits_is_transparent_and_the_bar_says_them(bench: Bench, qtbot: QtBot) -> None:
