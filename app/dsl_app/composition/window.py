@@ -321,10 +321,23 @@ class Composition(QObject):
         rendered = EffectsState()
         effects = EffectsController(rendered, state, rig, parts.runner, window.toasts)
         page = ScanPage(
-            state, controller, ForecastPanel(foreseen, forecast), rendered, effects, window.open_path
+            state,
+            controller,
+            ForecastPanel(foreseen, forecast),
+            rendered,
+            effects,
+            window.open_path,
+            self._awaits_result,
         )
         page.reconstruct_requested.connect(lambda: window.do("reconstruct_again"))
         return page
+
+    def _awaits_result(self) -> bool:
+        """Whether the Results page is open and has nothing to show."""
+        if self.window.page != "results":
+            return False
+        page = self.window.page_of("results")
+        return page.subject() is None and not page.is_reading
 
     def _remember_folder(self, state: ScanState) -> None:
         folder = state.target.value.parent

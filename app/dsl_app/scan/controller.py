@@ -277,6 +277,11 @@ class ScanController:
             Job(f"Reconstruct {session.stem}", work, done, failed, lambda: ended("was cancelled"))
         )
 
+    def offer_result(self, path: Path, open_result: Callable[[Path], object]) -> None:
+        """Tell a person who works on another page that a result is saved."""
+        show = {"Open the result": lambda: open_result(path)}
+        self._notifier.offer(f"The result {path.stem} is saved.", show)
+
     # Scans on disk --------------------------------------------------------------------------------------
 
     def open(self, path: Path) -> bool:

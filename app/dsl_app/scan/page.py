@@ -38,6 +38,7 @@ PLANS = "Plans and pattern sets (*.json)"
 class ScanPage(PageWidget):
     """Shows a `ScanState` and calls its controller; ``open_result`` shows a finished scan elsewhere.
 
+    ``awaits_result`` says whether a person who is on another page is there to see it.
     ``reconstruct_requested`` asks to reconstruct the finished scan with other parameters.
     """
 
@@ -51,9 +52,11 @@ class ScanPage(PageWidget):
         rendered: EffectsState,
         effects: EffectsController,
         open_result: Callable[[Path], object],
+        awaits_result: Callable[[], bool] = lambda: False,
     ) -> None:
         super().__init__()
         self._state, self._controller, self._open_result = state, controller, open_result
+        self._awaits_result = awaits_result
         self.banner = Banner("Resume", "", controller.resume)
         tip = "Stop reconnecting the rig automatically; saved frames are kept"
         self.stop = self.banner.add_button("Stop reconnecting", tip, controller.stop_reconnecting)
@@ -183,8 +186,10 @@ class ScanPage(PageWidget):
 
     def _show_result(self, path: Path) -> None:
         # Do not interrupt somebody who works on another page.
-        if self.isVisible():
+        if self.isVisible() or self._awaits_result():
             self._open_result(path)
+        else:
+            self._controller.offer_result(path, self._open_result)
 
     def showEvent(self, event: QShowEvent) -> None:
         """Refresh what may have changed on disk."""

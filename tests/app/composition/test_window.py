@@ -17,6 +17,7 @@ from shiboken6 import isValid
 from dsl_core.model.plan import CapturePlan
 from dsl_core.model.rig import Rig
 from tests.app.support.scan_bench import made_up_prediction
+from tests.app.support.small_result import write_small_result
 
 TWIN = RigChoice("twin", (("scene", "plane"), ("size", "64x48")))
 
@@ -47,6 +48,23 @@ def test_every_page_opens_in_both_themes(composed: tuple[Composition, MainWindow
         for key in composition.pages:
             window.do(f"page_{key}")
             assert window.page == key
+
+
+def test_who_waits_on_an_empty_results_page_sees_the_result(
+    qtbot: QtBot, composed: tuple[Composition, MainWindow], tmp_path: Path
+) -> None:
+    composition, window = composed
+    window.open_page("scan")
+    window.open_page("results")
+    assert composition.scans is not None
+    path = write_small_result(tmp_path)
+    composition.scans.state.result.emit(path)
+    results = window.page_of("results")
+    qtbot.waitUntil(lambda: results.subject() == path, timeout=30_000)
+    # The next one is offered to who looks at this one.
+    composition.scans.state.result.emit(tmp_path / "next.zarr")
+    assert window.toasts.shown[-1].text == "The result next is saved."
+    assert results.subject() == path
 
 
 def test_the_rig_is_remembered(

@@ -364,6 +364,22 @@ def test_after_a_scan_its_figures_stand_beside(qtbot: QtBot, ready: Bench) -> No
     assert figures(page, 3)["Capture"] == "–"
 
 
+def test_a_result_does_not_interrupt_work_on_another_page(ready: Bench, tmp_path: Path) -> None:
+    page, bench, opened = ready
+    first, second, third = (tmp_path / f"{name}.zarr" for name in ("first", "second", "third"))
+    bench.state.result.emit(first)
+    assert opened == [first]
+    page.hide()
+    bench.state.result.emit(second)
+    assert opened == [first]
+    assert bench.notifier.told[-1] == ("info", "The result second is saved.")
+    bench.notifier.offers["Open the result"]()
+    assert opened == [first, second]
+    page._awaits_result = lambda: True
+    bench.state.result.emit(third)
+    assert opened == [first, second, third]
+
+
 def test_a_plan_is_saved_and_opened_by_the_buttons(
     qtbot: QtBot, ready: Bench, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
