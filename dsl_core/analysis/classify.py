@@ -65,6 +65,21 @@ class Limits:
                 raise DecodeError(f"The limit {name!r} must be a number of at least 0, not {given:g}.")
 
     @classmethod
+    def chosen(cls, measure: Measure, worst: float | None, margin: float | None) -> Limits:
+        """The usual limits but for those that are given.
+
+        Raises `DecodeError`, also for a share or a probability above 1.
+        """
+        usual = _USUAL[measure]
+        limits = cls(usual.worst if worst is None else worst, usual.margin if margin is None else margin)
+        if measure is Measure.PROBABILITY and max(limits.worst, limits.margin) > 1:
+            raise DecodeError(
+                f"For the probability, 'worst' is a share of pixels and 'margin' a probability, from 0 to 1;"
+                f" given {limits.worst:g} and {limits.margin:g}. Give smaller ones, or another measure."
+            )
+        return limits
+
+    @classmethod
     def usual(cls, measure: Measure) -> Limits:
         """The limits that are used unless others are given."""
         return _USUAL[measure]

@@ -76,8 +76,7 @@ def classify(
     if pins:
         classes += classes_of_masks(result, {name: place_mask(result, name, p) for name, p in pins.items()})
     chosen = Measure(measure)
-    usual = Limits.usual(chosen)
-    limits = Limits(usual.worst if worst is None else worst, usual.margin if margin is None else margin)
+    limits = Limits.chosen(chosen, worst, margin)
     notes = [*(doubt for each in classes if (doubt := doubt_of(each))), *notes]
     made = classify_result(result, classes, chosen, limits, brightness, progress)
     over = ("y", "x")

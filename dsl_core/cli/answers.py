@@ -110,8 +110,7 @@ def classify(
     if wrong:
         raise PlanError(f"{wrong[0]} must end in {', '.join(ENDINGS)}: choose one for --output.")
     check_targets(outputs, overwrite=force)
-    usual = Limits.usual(Measure(measure))
-    limits = Limits(usual.worst if worst is None else worst, usual.margin if margin is None else margin)
+    limits = Limits.chosen(Measure(measure), worst, margin)
     result = load_result(path)
     if span is not None:
         result = within_nm(result, *parse_span("--range", span))

@@ -37,6 +37,8 @@ def gui(
     theme: Annotated[Colours | None, typer.Option(help="Colours to use instead of the last ones.")] = None,
 ) -> None:
     """Open the window: scan, calibrate and read spectra by hand."""
+    if path is not None and not path.exists():
+        raise DslError(f"{path} does not exist. Give a scan, result, reference or calibration, or nothing.")
     words = [] if path is None else [str(path)]
     if rig is not None:
         words += ["--rig", rig]

@@ -14,6 +14,19 @@ _TOLD_BY = {
 }
 
 
+def whose_inside(path: Path) -> str:
+    """The scan or result in whose folder a path would be, as ``the scan FOLDER``; empty for none.
+
+    What is added there is no part of it, and copies or checks of the folder would trip over it.
+    """
+    for above in path.absolute().parents:
+        if (above / MANIFEST_NAME).is_file() and (above / "frames.jsonl").is_file():
+            return f"the scan {above}"
+        if (above / "zarr.json").is_file():
+            return f"{above}, a result or another folder of zarr"
+    return ""
+
+
 def what_is_at(path: Path) -> str:
     """What a path holds, as a clause that follows "PATH is not a scan:"."""
     if not path.exists():

@@ -17,6 +17,7 @@ from pathlib import Path
 from dsl_core.errors import StoreError, TakenError
 from dsl_core.io import CAMPAIGN_NAME, MANIFEST_NAME
 from dsl_core.io.atomic import PARTIAL_SUFFIX, make_durable, make_safe, store_error, sync_folder
+from dsl_core.io.kinds import whose_inside
 from dsl_core.io.scan.lock import FolderLock
 from dsl_core.io.swap import exchange
 
@@ -118,7 +119,7 @@ def check_targets(targets: Sequence[Path], *, overwrite: bool, kind: FolderKind 
     """Raise `StoreError` when a target exists and may not be replaced; asked before long work too.
 
     A file may replace a file, a folder only one of its own ``kind`` with nothing else in it. Nor may what
-    would hold the target be a file, or closed to this user.
+    would hold the target be a file, closed to this user, or a scan or result itself.
     """
     for target in targets:
         _require_room(target)
@@ -135,6 +136,9 @@ def check_targets(targets: Sequence[Path], *, overwrite: bool, kind: FolderKind 
                 f"{target} {why} and is not replaced: only {kind.name} may be replaced by another."
                 " Choose another name."
             )
+    for target in targets:
+        if whose := whose_inside(target):
+            raise StoreError(f"{target} would be inside {whose}. Choose another place.")
 
 
 def _require_room(target: Path) -> None:

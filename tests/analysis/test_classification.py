@@ -102,7 +102,7 @@ def test_the_face_of_python_tells_colours() -> None:
             {"pins": {"a": (5, 5), "x": (200, 5)}},
             r"x: the place .* is outside the result, whose x",
         ),
-        ({}, "given 0"),
+        ({}, "Give a library of spectra, pins, or both"),
         ({"pins": {"x": (5, 5)}, "range_nm": (100, 200)}, "Only 0 bands"),
     ],
 )

@@ -151,3 +151,10 @@ def test_limits_that_are_no_limits_are_told(wrong: float) -> None:
         Limits(wrong, 0.1)
     with pytest.raises(DecodeError, match="'margin' must be"):
         Limits(0.1, wrong)
+
+
+def test_shares_and_probabilities_are_at_most_one() -> None:
+    assert Limits.chosen(Measure.PROBABILITY, None, 0.5) == Limits(0.01, 0.5)
+    assert Limits.chosen(Measure.ANGLE, 1.5, None) == Limits(1.5, 0.1)
+    with pytest.raises(DecodeError, match=r"from 0 to 1; given 7 and 0\.95"):
+        Limits.chosen(Measure.PROBABILITY, 7, None)

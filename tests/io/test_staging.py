@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import shutil
 from collections.abc import Callable
 from pathlib import Path
 
@@ -15,7 +16,7 @@ from dsl_core.errors import StoreError
 from dsl_core.io import staging
 from dsl_core.io.published.dataset import export_dataset
 from dsl_core.io.result.result_file import RESULT_FOLDER, save_result
-from dsl_core.io.scan.folder import ScanReader
+from dsl_core.io.scan.folder import ScanReader, ScanWriter
 from dsl_core.io.scan.lock import FolderLock
 from dsl_core.io.staging import check_targets, clear_leftovers, staged, write_text
 from dsl_core.io.swap import exchange
@@ -77,7 +78,8 @@ def _result_around_a_scan(path: Path) -> None:
 
 def _results_together(path: Path) -> None:
     _save(path)
-    _save(path / "second.zarr")
+    shutil.copytree(path, path.parent / "second.zarr")
+    shutil.move(path.parent / "second.zarr", path)
 
 
 def _dataset_with_notes(path: Path) -> None:
@@ -173,6 +175,16 @@ def test_a_link_to_nothing_is_not_replaced_either(tmp_path: Path) -> None:
     path.symlink_to("page.html")
     with pytest.raises(StoreError, match=r"page\.html already exists"):
         check_targets([path], overwrite=False)
+
+
+def test_nothing_is_written_into_a_scan_or_a_result(session: Path, tmp_path: Path) -> None:
+    (tmp_path / "result.zarr").mkdir()
+    (tmp_path / "result.zarr" / "zarr.json").write_text("{}")
+    for target in (session / "page.html", session / "a" / "page.html", tmp_path / "result.zarr" / "a.csv"):
+        with pytest.raises(StoreError, match=r"would be inside .*Choose another place"):
+            check_targets([target], overwrite=True)
+    with pytest.raises(StoreError, match="would be inside the scan"):
+        ScanWriter.create(session / "inner.dsl", ScanReader(session).plan)
 
 
 def _replace(path: Path, content: str) -> None:

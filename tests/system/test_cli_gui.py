@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from importlib.metadata import EntryPoint
+from pathlib import Path
 
 import pytest
 
@@ -23,7 +24,14 @@ def asked(monkeypatch: pytest.MonkeyPatch) -> list[list[str]]:
     return seen
 
 
-def test_the_window_gets_every_option(give: Give, asked: list[list[str]]) -> None:
+def test_the_window_gets_every_option(
+    give: Give, asked: list[list[str]], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    ending = give("gui", "leaf.zarr")
+    assert (ending.code, asked) == (2, [])
+    assert "leaf.zarr does not exist" in ending.sentence
+    Path("leaf.zarr").mkdir()
     ending = give(
         "gui",
         "leaf.zarr",

@@ -13,6 +13,7 @@ from __future__ import annotations
 import logging
 import warnings
 from collections.abc import Mapping
+from json import JSONDecodeError
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -149,6 +150,11 @@ def read_attributes(path: Path) -> dict[str, Any]:
         version, labels = attributes.get("schema_version"), attributes.get("labels", {})
         if not all(isinstance(names, list) for names in labels.values()):
             raise ValueError("the names along an axis must be a list")
+    except JSONDecodeError as error:
+        raise StoreError(
+            f"{path / 'zarr.json'} is damaged: it is not JSON and may be cut off. Reconstruct the result"
+            " again from the scan's frames."
+        ) from error
     except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
         raise StoreError(
             f"{path / 'zarr.json'} is damaged ({error}). Reconstruct the result again from the scan's frames."

@@ -25,6 +25,7 @@ from dsl_core.devices.base import DeviceRig
 from dsl_core.errors import StoreError
 from dsl_core.io import MANIFEST_NAME
 from dsl_core.io.atomic import make_folder, remove_partials
+from dsl_core.io.kinds import whose_inside
 from dsl_core.io.records import replace_record
 from dsl_core.io.scan.capture_log import CaptureLog, LogEntry, read_log
 from dsl_core.io.scan.estimate import check_space
@@ -161,6 +162,8 @@ class ScanWriter:
             raise StoreError(f"{folder} already contains a scan. Resume it, or choose a new name.")
         if folder.exists() and not _is_unborn(folder):
             raise StoreError(f"{folder} exists and is not a scan. Choose a new name.")
+        if whose := whose_inside(folder):
+            raise StoreError(f"{folder} would be inside {whose}. Choose another place.")
         check_space(folder, plan, plan.shot_count)
         make_folder(folder)
         lock = FolderLock(folder / "lock")
