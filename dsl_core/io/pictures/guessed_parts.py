@@ -25,6 +25,8 @@ COMMON_PX = (
 CLEARLY_WORSE = 2.0
 #: Numbers may exceed the projector by so much, because a few pixels are read wrongly.
 MOST_BEYOND = 1.02
+#: Numbers of rougher readings are too often wrong to say which there are.
+STEADY = 0.2
 Size = tuple[int, int]
 
 
@@ -91,14 +93,15 @@ def _stripes(axis: Axis, reading: StripeReading, size_px: Size) -> tuple[Part, l
     length = size_px[0] if axis == "columns" else size_px[1]
     unit = _unit(reading, length)
     low, high = reading.numbers
-    if (high - low) * unit > MOST_BEYOND * length:
+    is_steady = reading.roughness < STEADY
+    if is_steady and (high - low) * unit > MOST_BEYOND * length:
         raise StoreError(
             f"The pictures show numbers {low} to {high} of {axis}, more than the {length} of the projector."
             " Give its right size (--projector)."
         )
     # Several programs put the middle of the numbers in the middle of the projector.
     spare = 2**reading.bits - -(-length // unit)
-    offset = spare // 2 if reading.numbers[1] * unit >= length and spare > 0 else 0
+    offset = spare // 2 if is_steady and reading.numbers[1] * unit >= length and spare > 0 else 0
     doubts = []
     if offset:
         doubts.append(f"numbers of {axis} exceed {length}: they are taken to be centred on the projector")

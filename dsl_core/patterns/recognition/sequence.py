@@ -24,6 +24,11 @@ from dsl_core.patterns.recognition.stripe_sets import ROUGH, StripeReading, read
 
 #: A picture that is nearly everywhere at the brightest or darkest of its pixels.
 BRIGHT, DARK = 0.9, 0.1
+#: Where noise or room light spreads values, the brightest or darkest picture still reaches this.
+BRIGHTEST, DARKEST = 0.75, 0.25
+#: What speaks against numbers that fall, and against white or black in the middle of digits: both are rare,
+#: and a camera that sees part of a projector may take its coarsest digit for white and black.
+UNLIKELY = 0.02
 #: White and black stand at most this far from an end of a sequence, or from each other.
 FROM_END = 2
 #: Splits that are tried, and the share of pictures that must speak for one; what speaking against it costs.
@@ -97,6 +102,8 @@ def _lights(probes: Probes, slots: Slots) -> Iterator[tuple[int | None, int | No
     near = [i for i in level if min(i, len(slots) - 1 - i) < FROM_END]
     whites = sorted((i for i in near if level[i] > BRIGHT), key=lambda i: -level[i])
     blacks = sorted((i for i in near if level[i] < DARK), key=lambda i: level[i])
+    whites = whites or [i for i in near if level[i] == max(level.values()) and level[i] > BRIGHTEST]
+    blacks = blacks or [i for i in near if level[i] == min(level.values()) and level[i] < DARKEST]
     # White or black alone in the middle, as between columns and rows.
     whites += [i for i in level if level[i] > BRIGHT and i not in near]
     blacks += [i for i in level if level[i] < DARK and i not in near]
@@ -123,8 +130,11 @@ def _without_lights(
                 break
             start = 0
             for block in found:
-                coded.append((run[start], block))
+                own = run[start : start + len(block.slots)]
+                coded.append((own[0], block))
                 start += len(block.slots)
+                if isinstance(block.reading, StripeReading):
+                    total += UNLIKELY * (not block.reading.rises) + UNLIKELY * (len(_joined(own)) > 1)
             total += cost
         if not np.isfinite(total) or (best is not None and total >= best.misfit):
             continue

@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import Literal
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from dsl_core.model.captured_code import Phases, Stripes
+from dsl_core.model.captured_code import CapturedCode, Phases, Stripes
+from dsl_core.patterns.captured_code import captured_levels
 from dsl_core.patterns.recognition.phase_sets import PhaseReading
 from dsl_core.patterns.recognition.probes import ProbeTaker
 from dsl_core.patterns.recognition.sequence import Recognised, Slots, recognise
 from dsl_core.patterns.recognition.stripe_sets import StripeReading
-from tests.cases.foreign_captures import frames
+from tests.cases.foreign_captures import PROJECTOR, frames, scene
 
 Pictures = list[NDArray[np.uint16]]
 Arrange = Callable[[Pictures, NDArray[np.uint16], NDArray[np.uint16]], Pictures]
@@ -118,3 +120,17 @@ def test_one_fringe_is_not_taken_for_another_axis() -> None:
     found = _recognised(dark)
     assert found is not None
     assert found.digits == {("columns", 3)}
+
+
+@pytest.mark.parametrize(("share", "noise"), [(0.45, 0.004), (1.0, 0.1)])
+def test_white_and_black_are_no_coarse_digit_of_a_part_or_among_noise(share: float, noise: float) -> None:
+    whole = scene()
+    seen = replace(whole, columns=share * whole.columns)
+    code = CapturedCode(column_sets=(Stripes(bits=7),))
+    levels = [np.ones((96, 128)), np.zeros((96, 128))]
+    levels += [captured_levels(code, PROJECTOR, index) for index in range(14)]
+    found = _recognised([seen.picture(each, k, 8, noise) for k, each in enumerate(levels)])
+    reading = _stripes(found, "columns")
+    assert (reading.bits, reading.inverse, reading.rises) == (7, "interleaved", True)
+    assert found is not None
+    assert [block.kind for block in found.blocks] == ["white", "black", "stripes"]
