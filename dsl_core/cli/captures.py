@@ -182,7 +182,7 @@ def _print_decided(output: Output, source: Path, mapping: Mapping, options: Pict
 
     with output.progress() as progress:
         share = decided_share(open_pictures(source, mapping), progress)
-    told = "no pixel is lit" if isnan(share) else f"{share:.0%} of the lit pixels have a position"
+    told = "no pixel is lit" if isnan(share) else f"{100 * share:.0f} % of the lit pixels have a position"
     output.say(f"Decoded: {told}.")
     output.put(decided_share=None if isnan(share) else round(share, 4))
     if share >= FAIR_SHARE:

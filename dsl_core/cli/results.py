@@ -131,7 +131,10 @@ def _decode(output: Output, session: Path, target: Path, force: bool) -> None:
         save_result(result, target, overwrite=force)
     share = float(result["column_px"].notnull().mean())
     output.say(str(result.attrs[NO_DEPTH]))
-    output.say(f"{share:.1%} of the pixels have a column. The result is saved in {target}")
+    told, what = share, "column"
+    if share == 0 and "row_px" in result:
+        told, what = float(result["row_px"].notnull().mean()), "row"
+    output.say(f"{100 * told:.1f} % of the pixels have a {what}. The result is saved in {target}")
     output.put(
         result=target, pixels_with_depth=0.0, pixels_with_column=share, no_depth=result.attrs[NO_DEPTH]
     )

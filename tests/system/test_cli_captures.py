@@ -95,6 +95,17 @@ def test_values_are_judged_before_and_after_an_import(
     assert "must be linear or srgb" in capsys.readouterr().err
 
 
+def test_rows_alone_are_imported_and_told(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    pictures, white, black = frames([("rows", Stripes(bits=7))])
+    write(tmp_path / "set", {f"im{i:02d}.png": p for i, p in enumerate([*pictures, white, black])})
+    assert main(["import", "set", "--guess", "--projector", "128x96", "-o", "a.dsl"]) == 0
+    assert main(["reconstruct", "a.dsl"]) == 0
+    assert " % of the pixels have a row." in " ".join(capsys.readouterr().out.split())
+
+
 def test_a_guess_that_decodes_little_is_kept_but_not_imported(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

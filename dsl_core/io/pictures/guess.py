@@ -15,7 +15,7 @@ from dsl_core.io.pictures.candidates import FEWEST, Candidate, candidates, jump_
 from dsl_core.io.pictures.encoding import guessed_encoding
 from dsl_core.io.pictures.guessed_parts import guessed_size, is_turned, part_of
 from dsl_core.io.pictures.mapping import Encoding, Mapping
-from dsl_core.io.pictures.picture_file import load_values
+from dsl_core.io.pictures.picture_file import ARRAYS, load_values
 from dsl_core.model.rig import BayerPattern
 from dsl_core.optics.colour import srgb_decode
 from dsl_core.patterns.recognition.probes import Probes, ProbeTaker
@@ -104,10 +104,22 @@ def guess_mapping(
     if best is None:
         raise trouble or StoreError(
             f"The pictures of {folder} make no sense as a capture: no order of white, black, stripes and"
-            " sinusoids lets their positions run steadily. Check that all are of one camera and scene, or"
-            " state a mapping."
+            f" sinusoids lets their positions run steadily. {_advice(order)}"
         )
     return _guess_of(folder, *best, projector_size_px, names, encoding)
+
+
+def _advice(tried: Sequence[Candidate]) -> str:
+    """What to do about pictures that make no sense."""
+    first = next((each.pictures[0] for each in tried if each.pictures[0] is not None), None)
+    if first is not None and first.path.suffix.lower() in ARRAYS and first.index is not None:
+        count, shape = len(tried[0].pictures), load_values(first).shape
+        if min(shape) < count:
+            return (
+                f"{first.path.name} is taken for {count} pictures of {shape[1]} x {shape[0]} px;"
+                " where its last axis counts the pictures, save numpy.moveaxis(array, -1, 0) instead."
+            )
+    return "Check that all are of one camera and scene, or state a mapping."
 
 
 def _recognised(look: _Look, slots: tuple[int | None, ...]) -> Recognised | None:

@@ -169,6 +169,12 @@ def test_inverses_may_be_in_a_folder_of_their_own(tmp_path: Path, gray: Pictures
     assert not guess.others
 
 
+def test_an_array_whose_last_axis_counts_pictures_is_told(tmp_path: Path, gray: Pictures) -> None:
+    np.save(tmp_path / "all.npy", np.stack(gray, -1).astype(np.uint8))
+    with pytest.raises(StoreError, match=r"all\.npy is taken for 120 pictures of 16 x 160 px; .*moveaxis"):
+        guess_mapping(tmp_path, PROJECTOR)
+
+
 def test_columns_may_run_down_the_picture(tmp_path: Path) -> None:
     pictures, white, black = frames([("columns", Stripes(bits=7))])
     named = {f"{i:02d}.png": p.T for i, p in enumerate([*pictures, white, black])}
