@@ -7,7 +7,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from PySide6.QtCore import Qt
+from PySide6.QtCore import Qt, QTimer
 from PySide6.QtGui import QShowEvent
 from PySide6.QtWidgets import QBoxLayout, QFrame, QGridLayout, QGroupBox, QWidget
 
@@ -69,9 +69,9 @@ class CalibratePage(PageWidget):
 
     def _lay_out(self) -> None:
         parts = ((row, 20) for row in self.rows.values())
-        area = scrolled(boxed(column_of(*parts, STRETCH, margins=0, spacing=4)))
-        area.setFocusPolicy(Qt.FocusPolicy.NoFocus)
-        self._top = row_of((area, 1), self.picture, margins=0)
+        self.area = scrolled(boxed(column_of(*parts, STRETCH, margins=0, spacing=4)))
+        self.area.setFocusPolicy(Qt.FocusPolicy.NoFocus)
+        self._top = row_of((self.area, 1), self.picture, margins=0)
         # In a high window the list of calibrations is below the rows, and their details fill the right side.
         self._listed = QGroupBox(LIBRARY)
         column_of(on=self._listed)
@@ -120,6 +120,8 @@ class CalibratePage(PageWidget):
             ),
             state.everything.follow(lambda progress: self.picture.setVisible(bool(progress))),
             state.seen.follow(self._show_seen),
+            # Once its row has its new words, which may need another line.
+            state.running.follow(lambda name: QTimer.singleShot(0, self, lambda: self._scroll_to(name))),
             state.everything.follow(lambda progress: self._timer.run_while(bool(progress))),
         ]
 
@@ -137,6 +139,11 @@ class CalibratePage(PageWidget):
                 running = self._state.everything.value if is_running else ""
                 words = running.partition("  ·  ")[0]
                 self.rows[row.name].show_row(row, self._state.is_busy, words, row.name == following)
+
+    def _scroll_to(self, name: str) -> None:
+        """Keep the calibration that runs in view."""
+        if name in self.rows:
+            self.area.ensureWidgetVisible(self.rows[name], 0, 0)
 
     def _show_seen(self, seen: Seen | None) -> None:
         """Show what is captured just now."""

@@ -142,9 +142,13 @@ def row_display(row: Row, is_busy: bool = False, running: str = "", is_next: boo
 
 
 def figure_words(figure: Figure) -> str:
-    """A figure against its limits in one line, such as ``camera error 0.051 px (at most 0.5 px)``."""
+    """A figure against its limits in one line, such as ``camera error 0.051 px (at most 0.5 px)``.
+
+    Lines break between the three, never between a number and its unit.
+    """
     limits = figure.limits.replace("-", "−")
-    return f"{figure.name} {value_words(figure)}" + (f"  ({limits})" if limits else "")
+    value, limits = (text.replace(" ", "\N{NO-BREAK SPACE}") for text in (value_words(figure), limits))
+    return f"{figure.name} {value}" + (f"  ({limits})" if limits else "")
 
 
 def value_words(figure: Figure) -> str:

@@ -51,6 +51,25 @@ def test_a_campaign_is_begun_and_opened_from_the_page(
     stage.finish()
 
 
+def test_the_calibration_that_runs_is_in_view(stage: Stage) -> None:
+    page, state = stage.page, stage.bench.state
+    page.resize(1100, 420)
+
+    def is_seen(name: str) -> bool:
+        row, view = page.rows[name], page.area.viewport()
+        top, bottom = (
+            row.mapTo(view, corner).y() for corner in (row.rect().topLeft(), row.rect().bottomLeft())
+        )
+        return bool(top >= 0 and bottom <= view.height())
+
+    names = list(page.rows)
+    stage.wait(lambda: is_seen(names[0]) and not is_seen(names[-1]))
+    for name in (names[-1], names[0]):
+        state.running.set(name)
+        stage.wait(lambda name=name: is_seen(name))  # type: ignore[misc]
+    state.running.set("")
+
+
 def test_another_rigs_campaign_offers_to_connect_its_rig(stage: Stage) -> None:
     other = replace(stage.bench.rig.state.choice.value, options=(("scene", "plane"), ("size", "48x32")))
     stage.bench.rig.connect(other)

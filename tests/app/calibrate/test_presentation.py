@@ -168,7 +168,9 @@ def test_the_button_of_a_row_says_what_the_wizard_does(row: Row, word: str, role
 
 def test_a_row_shows_its_figure_and_reason() -> None:
     good = row_display(replace(ROW, figure=GOOD, reason="2 captured"))
-    assert (good.figure.text, good.figure.role) == ("shift −0.200 ± 0.010 px  (−0.5 to 0.5 px)", "")
+    # A number and its unit stay in one line.
+    kept = "shift −0.200_±_0.010_px  (−0.5_to_0.5_px)".replace("_", "\N{NO-BREAK SPACE}")
+    assert (good.figure.text, good.figure.role) == (kept, "")
     assert good.reason.text == "2 captured"
     bad = row_display(replace(ROW, figure=BAD))
     assert bad.figure.role == "bad"
