@@ -92,12 +92,17 @@ class Figure(Record):
 def with_std(value: float, std: float | None, most: int = MOST_DECIMALS) -> str:
     """A value and its deviation with two digits of the deviation, of ``most`` decimals; else three digits.
 
+    A deviation that is not finite is one that nobody knows.
+
     >>> with_std(210.8184, 0.0204), with_std(3.0, 0.0), with_std(0.0123456, None), with_std(2.0, 1e-6, 4)
     ('210.818 ± 0.020', '3', '0.0123', '2.0000 ± 0.0001')
+    >>> with_std(70.151, float("nan"))
+    '70.2 ± unknown'
     """
-    if not std:
-        return f"{value:.0f}" if float(value).is_integer() else _spread(value, None, decimals(value, 3))
-    return _spread(value, std, min(decimals(std), most))
+    if std and math.isfinite(std):
+        return _spread(value, std, min(decimals(std), most))
+    alone = f"{value:.0f}" if float(value).is_integer() else _spread(value, None, decimals(value, 3))
+    return f"{alone} ± unknown" if std else alone
 
 
 def decimals(value: float, digits: int = 2) -> int:
