@@ -36,9 +36,9 @@ class CalibrationNote(Record):
         """A sentence for each figure that missed its limit and was accepted all the same.
 
         >>> from dsl_core.model.figure import Figure
-        >>> error = Figure(name="camera error", value=0.6, unit="px", high=0.5)
+        >>> error = Figure(name="error", value=0.6, unit="px", high=0.5)
         >>> CalibrationNote(name="geometry", title="Geometry", accepted="", figures=(error,)).missed
-        ("This rig's calibration 'Geometry' missed its limit: camera error 0.600 px (limit: at most 0.5).",)
+        ("This rig's calibration 'Geometry' missed its limit: error 0.600 px (limit: at most 0.5 px).",)
         """
         return tuple(
             f"This rig's calibration {self.title!r} missed its limit: {figure} (limit: {figure.limits})."
