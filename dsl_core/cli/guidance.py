@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING
 from dsl_core.cli.options import parse_options
 from dsl_core.cli.output import Output
 from dsl_core.errors import CalibrationError, Cancelled
-from dsl_core.io.scan.lock import FolderLock
 
 if TYPE_CHECKING:
     from dsl_core.campaign.common.recipe import Step
@@ -97,13 +96,13 @@ def opened_campaign(
 ) -> Iterator[tuple[CampaignFolder, DeviceRig]]:
     """A campaign that no other process writes, and the open devices of its rig."""
     from dsl_core.devices.registry import open_rig
-    from dsl_core.io.campaign_folder import CampaignFolder
+    from dsl_core.io.campaign_folder import CampaignFolder, take_campaign
 
     campaign = CampaignFolder.prepare(folder, rig, options, settings)
     # Devices that do not open must not leave a campaign of theirs behind.
     with open_rig(campaign.info.rig, campaign.info.options) as devices:
         folder.mkdir(parents=True, exist_ok=True)
-        lock = FolderLock(folder / "lock")
+        lock = take_campaign(folder)
         try:
             campaign.save()
             yield campaign, devices

@@ -24,7 +24,9 @@ from pydantic import Field
 
 from dsl_core.errors import StoreError
 from dsl_core.io import CAMPAIGN_NAME
+from dsl_core.io.atomic import PARTIAL_SUFFIX, store_error
 from dsl_core.io.records import read_record, replace_record
+from dsl_core.io.scan.lock import FolderLock
 from dsl_core.model.base import Record
 from dsl_core.model.calibration.accepted import AcceptedCalibration
 
@@ -151,6 +153,22 @@ class CampaignFolder:
 
     def _calibration(self, path: Path) -> AcceptedCalibration | None:
         return read_record(path, AcceptedCalibration) if path.exists() else None
+
+
+def take_campaign(path: Path) -> FolderLock:
+    """The lock of a campaign's folder for whoever writes to it; what a killed writer left half done goes.
+
+    Raises `StoreError` where another process writes to it, or the disk fails.
+    """
+    lock = FolderLock(path / "lock")
+    try:
+        for leftover in path.rglob("*" + PARTIAL_SUFFIX):
+            if leftover.is_file():
+                leftover.unlink()
+    except OSError as error:
+        lock.release()
+        raise store_error(path, error) from error
+    return lock
 
 
 def _is_unborn(path: Path) -> bool:

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from dsl_core.errors import StoreError
-from dsl_core.io.campaign_folder import CampaignFolder, CampaignInfo
+from dsl_core.io.campaign_folder import CampaignFolder, CampaignInfo, take_campaign
 from dsl_core.io.records import read_record
 from dsl_core.model.calibration.accepted import AcceptedCalibration
 
@@ -95,3 +95,16 @@ def test_a_damaged_file_names_its_first_wrong_field(campaign: CampaignFolder) ->
         campaign.accepted("geometry")
     with pytest.raises(StoreError, match="cannot be read"):
         read_record(campaign.path, CampaignInfo)
+
+
+def test_whoever_takes_a_campaign_clears_what_a_killed_writer_left(tmp_path: Path) -> None:
+    step = tmp_path / "geometry" / "pose-1"
+    step.mkdir(parents=True)
+    (step / "capture.json").write_text("{}")
+    (step / "capture.json.partial").write_text("{")
+    lock = take_campaign(tmp_path)
+    assert sorted(each.name for each in step.iterdir()) == ["capture.json"]
+    with pytest.raises(StoreError, match="is being written by another process"):
+        take_campaign(tmp_path)
+    lock.release()
+    take_campaign(tmp_path).release()

@@ -24,8 +24,7 @@ from dsl_core.devices.conditions import current_conditions
 from dsl_core.errors import DslError
 from dsl_core.io import CAMPAIGN_NAME
 from dsl_core.io.calibration_library import CalibrationLibrary
-from dsl_core.io.campaign_folder import CampaignFolder
-from dsl_core.io.scan.lock import FolderLock
+from dsl_core.io.campaign_folder import CampaignFolder, take_campaign
 from dsl_core.progress import Progress
 from dsl_core.words import quoted
 
@@ -271,7 +270,7 @@ class CalibrateController:
             )
             return False
         try:
-            self._lock.callback(FolderLock(path / "lock").release)
+            self._lock.callback(take_campaign(path).release)
         except DslError as error:
             self._notifier.tell("error", str(error))
             return False
