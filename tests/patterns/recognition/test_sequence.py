@@ -97,7 +97,7 @@ def test_pictures_of_no_code_make_no_sense() -> None:
 
 @pytest.mark.parametrize(
     ("fringes", "steps", "start", "direction"),
-    [((1, 4, 16), 3, -120.0, 1), ((1, 9), 3, 120.0, -1), ((8, 1), 5, 36.0, 1), ((24, 6, 1), 4, 180.0, 1)],
+    [((1, 4, 16), 3, -120.0, 1), ((1, 9), 3, 120.0, -1), ((8, 1), 5, 36.0, 1)],
 )
 def test_sinusoids_may_start_anywhere_and_end_with_the_projector(
     fringes: tuple[int, ...], steps: int, start: float, direction: Literal[1, -1]
