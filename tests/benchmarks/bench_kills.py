@@ -31,7 +31,7 @@ from dsl_core.campaign.guide import run_calibration
 from dsl_core.campaign.session import CalibrationSession
 from dsl_core.devices.registry import open_rig
 from dsl_core.errors import DslError, StoreError
-from dsl_core.io.campaign_folder import CampaignFolder
+from dsl_core.io.campaign_folder import CampaignFolder, take_campaign
 from dsl_core.io.export import export
 from dsl_core.io.result.result_file import load_result
 from dsl_core.io.scan.folder import ScanReader
@@ -179,8 +179,10 @@ def _calibrate(folder: Path, progress: NoProgress) -> None:
     with open_rig("twin", TWIN) as rig:
         rig.place = None
         campaign = CampaignFolder.begin(path, "twin", TWIN)
+        lock = take_campaign(path)
         recipe = FakeRecipe()
         run_calibration(CalibrationSession(recipe, rig, campaign, (recipe,)), _Willing(), NoProgress())
+        lock.release()
 
 
 def _calibrated(folder: Path) -> str:
