@@ -54,8 +54,8 @@ class Overall:
         return (finished + current) / max(sum(self._parts.values()), 1)
 
     def left_s(self) -> float | None:
-        """The time left for all of it, s; None while too little is done to tell."""
+        """The time left for all of it, s; None while too little is done to tell, or nothing left to count."""
         share = self.share
-        if share < LEAST_SHARE:
+        if not LEAST_SHARE <= share < 1.0:
             return None
         return (self._clock() - self._since_s) * (1 - share) / share

@@ -55,3 +55,5 @@ def test_a_part_never_goes_back() -> None:
     assert overall.share == 0.0
     overall.report(5, 4)
     assert overall.share == 1.0
+    # The end of the last part is not counted: "0 s left" would be said for as long as it takes.
+    assert overall.left_s() is None
