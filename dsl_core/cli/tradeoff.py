@@ -43,7 +43,6 @@ def tradeoff(
     from dsl_core.io.plan_file import save_plan
     from dsl_core.io.result.result_file import load_result
     from dsl_core.planning.choice import choose, pareto, possible_plans, weigh
-    from dsl_core.planning.samples import scene_samples
     from dsl_core.planning.store import PredictionStore, store_folder
 
     output, budget_s = Output(json), None if budget is None else parse_seconds(budget)
@@ -54,7 +53,11 @@ def tradeoff(
     with open_rig(rig, parse_options(option)) as devices:
         known = _calibration(devices, calibration)
         latency_ms, plans = devices.projector.info.latency_ms, possible_plans(devices, known)
-    view = None if seen is None else scene_samples(known, seen)
+    view = None
+    if seen is not None:
+        from dsl_core.planning.samples import scene_samples  # loads torch, which known predictions need not
+
+        view = scene_samples(known, seen)
     with output.progress() as progress:
         limit_s = None if report else budget_s
         store = PredictionStore(store_folder(), known, latency_ms) if view is None else None
