@@ -1,8 +1,38 @@
-"""Tests of the application run without a screen; those marked ``gl`` want a virtual one."""
+"""Tests of the application run without a screen; those marked ``gl`` want a virtual one.
+
+As in the program, garbage is collected in the window's thread only: a job's thread that came upon widgets
+would delete them there, and wait for Qt while Qt waits for Python.
+"""
 
 from __future__ import annotations
 
+import gc
 import os
+from collections.abc import Generator
+from pathlib import Path
+
+import pytest
 
 os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
 os.environ.setdefault("QT_API", "pyside6")
+
+#: Tests from one full collection to the next, which takes long.
+TESTS_PER_FULL = 100
+_ended = 0
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_runtest_setup() -> None:
+    """Let no thread collect garbage by itself."""
+    gc.disable()
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_teardown(nextitem: pytest.Item | None) -> Generator[None]:
+    """Collect what the test left, and give collection back after the last test of the window."""
+    global _ended
+    yield
+    _ended += 1
+    gc.collect(1 if _ended % TESTS_PER_FULL else 2)
+    if nextitem is None or Path(__file__).parent not in nextitem.path.parents:
+        gc.enable()

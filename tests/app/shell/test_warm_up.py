@@ -19,6 +19,7 @@ def test_modules_are_there_afterwards_and_garbage_is_collected_again() -> None:
     sys.modules.pop("this_is_not_there", None)
     assert importlib.util.find_spec("colorsys") is not None
     sys.modules.pop("colorsys", None)
+    gc.enable()
     warm_up = WarmUp(["this_is_not_there", "colorsys"])
     warm_up.start()
     warm_up._thread.join(30)

@@ -88,3 +88,7 @@ def test_freed_memory_goes_back_to_the_system() -> None:
     trim_memory()
     assert len(last) == 20_000
     assert full - process.memory_info().rss > 60e6
+
+
+def test_no_thread_collects_by_itself_while_windows_are_tested() -> None:
+    assert not gc.isenabled()
