@@ -43,7 +43,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     collect_garbage(window)
     hook = ExceptionHook(window.toasts)
     hook.install()
-    warm_up = WarmUp()
+    warm_up = WarmUp(gives_way=composition.is_awaited)
     _after_first_page(window, composition.start, warm_up.start)
     window.show()
     code = application.exec()

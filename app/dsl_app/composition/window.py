@@ -108,6 +108,15 @@ class Composition(QObject):
             "reconstruct_again": lambda: self.reconstruct_again.begin(),
         }
 
+    def is_awaited(self) -> bool:
+        """Whether a person waits for a job, the rig or its first picture; any thread may ask."""
+        if any(not job.is_minor for job in self.window.parts.runner.active):
+            return True
+        # Asking must make neither.
+        made = vars(self)
+        is_opening = "rig" in made and self.rig.state.link.value is Link.OPENING
+        return is_opening or ("live" in made and self.live.state.is_exposing.value)
+
     def start(self) -> None:
         """Connect the rig and open what was requested, once the window is on screen."""
         QTimer.singleShot(CONNECT_AFTER_MS, self, self._start_now)

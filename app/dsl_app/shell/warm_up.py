@@ -10,7 +10,7 @@ import logging
 import os
 import sys
 import threading
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from itertools import chain
 from pathlib import Path
 
@@ -70,17 +70,21 @@ _LAST = (
     "vtkmodules.vtkInteractionStyle",
 )
 STEPS = tuple(dict.fromkeys((*_LOOK, *_FIRST, *chain.from_iterable(PAGE_MODULES.values()), *_LAST)))
-#: Pause between two steps, s.
-REST_S = 0.05
+#: Pause between two steps, s, and how long all of them may be kept waiting by what a person waits for.
+REST_S, PATIENCE_S = 0.05, 20.0
 #: Large libraries of some packages: while the system loads them, Python's lock is free.
 _BULK = {"torch": "lib/libtorch_cpu.so", "cv2": "cv2.abi3.so"}
 
 
 class WarmUp:
-    """Runs the steps once; `stop` ends after the current step."""
+    """Runs the steps once; `stop` ends after the current step.
 
-    def __init__(self, steps: Sequence[str] = STEPS) -> None:
-        self._steps = steps
+    No step begins while ``gives_way``, called in the thread, says that a person waits for something else:
+    imports keep Python's lock, which would double the time to the first picture of a live view.
+    """
+
+    def __init__(self, steps: Sequence[str] = STEPS, gives_way: Callable[[], bool] = lambda: False) -> None:
+        self._steps, self._gives_way = steps, gives_way
         self._stop = threading.Event()
         self._thread = threading.Thread(target=self._run, name="warm-up")
 
@@ -100,9 +104,14 @@ class WarmUp:
             self._thread.join()
 
     def _run(self) -> None:
+        given_way_s = 0.0
         for name in self._steps:
             if self._stop.wait(REST_S):
                 return
+            while given_way_s < PATIENCE_S and self._gives_way():
+                given_way_s += REST_S
+                if self._stop.wait(REST_S):
+                    return
             try:
                 _import(name)
             except Exception as error:  # the module that needs it fails with a message

@@ -5,6 +5,8 @@ import importlib.util
 import subprocess
 import sys
 
+import pytest
+from dsl_app.shell import warm_up as early
 from dsl_app.shell.warm_up import STEPS, WarmUp
 
 
@@ -36,3 +38,25 @@ def test_it_stops_between_two_steps_and_before_it_began() -> None:
     warm_up.start()
     warm_up.stop()
     assert "colorsys" not in sys.modules
+
+
+def test_it_gives_way_to_what_a_person_waits_for_but_not_for_ever(monkeypatch: pytest.MonkeyPatch) -> None:
+    sys.modules.pop("colorsys", None)
+    asked = []
+
+    def is_awaited() -> bool:
+        asked.append("colorsys" in sys.modules)
+        return len(asked) < 3
+
+    warm_up = WarmUp(["colorsys"], is_awaited)
+    warm_up.start()
+    warm_up._thread.join(30)
+    assert asked == [False] * 3
+    assert "colorsys" in sys.modules
+
+    sys.modules.pop("colorsys", None)
+    monkeypatch.setattr(early, "PATIENCE_S", 2 * early.REST_S)
+    patient = WarmUp(["colorsys"], lambda: True)
+    patient.start()
+    patient._thread.join(30)
+    assert "colorsys" in sys.modules

@@ -15,6 +15,7 @@ from dsl_core.optics.sensor import bayer_channels
 from dsl_core.optics.spectra import chain_response
 from dsl_core.simulation.bandpass_filters import true_transmission
 from dsl_core.simulation.published_rig import published_rig
+from dsl_core.simulation.rendering import order_tables
 from dsl_core.simulation.rendering.renderer import Renderer
 from dsl_core.simulation.rendering.spectral_tables import BROAD, NM, Slicing
 from dsl_core.simulation.scenes.catalogue import make_scene
@@ -182,3 +183,13 @@ def test_slices_behind_a_filter_are_as_narrow_as_its_images(chart: Renderer) -> 
     assert (lines > 0.002 * white.max()).sum() > 50
     assert np.sqrt(((sliced - lines) ** 2).mean()) < 0.02 * np.sqrt((lines**2).mean())
     assert sliced.sum() == pytest.approx(lines.sum(), rel=3e-3)
+
+
+def test_wavelengths_of_columns_are_the_same_whatever_is_worked_on_together(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    # The last chunk is one pixel short of a whole one here.
+    together = renderer(small_rig()).orders[0].inverse
+    monkeypatch.setattr(order_tables, "CHUNK", together.shape[1] // 2 + 1)
+    apart = renderer(small_rig()).orders[0].inverse
+    assert torch.equal(together, apart)
