@@ -10,7 +10,7 @@ import stat
 import tokenize
 from collections.abc import Iterator
 from contextlib import contextmanager
-from mmap import ACCESS_READ, mmap
+from io import FileIO, RawIOBase
 from pathlib import Path
 from typing import Any
 
@@ -31,17 +31,31 @@ def read_bounded(path: Path, most_bytes: int = MOST_BYTES) -> bytes:
         return file.read()
 
 
+class FileParts:
+    """The bytes of a file, of which only those are read that a slice asks for."""
+
+    def __init__(self, file: RawIOBase, size: int) -> None:
+        self._file, self._size = file, size
+
+    def __len__(self) -> int:
+        """The size of the file."""
+        return self._size
+
+    def __getitem__(self, part: slice) -> bytes:
+        """Some bytes in a row."""
+        start, stop, _ = part.indices(self._size)
+        self._file.seek(start)
+        return self._file.read(max(stop - start, 0)) or b""
+
+
 @contextmanager
-def mapped(path: Path, most_bytes: int = MOST_BYTES) -> Iterator[bytes | mmap]:
-    """The same without reading what nobody looks at."""
+def parts_of(path: Path, most_bytes: int = MOST_BYTES) -> Iterator[FileParts]:
+    """The content of a file without reading what nobody looks at; raises as `read_bounded` does."""
     size = require_plain(path)
     if size > most_bytes:
         raise _refusal(path, f"it is larger than {most_bytes / 1e6:.0f} MB, which no file of its kind is")
-    if size == 0:
-        yield b""
-        return
-    with path.open("rb") as file, mmap(file.fileno(), 0, access=ACCESS_READ) as content:
-        yield content
+    with FileIO(path) as file:
+        yield FileParts(file, size)
 
 
 def read_json(path: Path) -> Any:

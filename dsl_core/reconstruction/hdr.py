@@ -15,6 +15,7 @@ values themselves, scatter more and are biased near black by about 0.6 standard 
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -25,10 +26,20 @@ from dsl_core.errors import DecodeError
 from dsl_core.model.plan import Setting
 from dsl_core.model.rig import ProjectorResponse, Sensor
 from dsl_core.optics.sensor import raw_variance
+from dsl_core.reconstruction.room import Room
 
 Array = NDArray[np.float32]
 
 _NO_VALUES, _NO_BITS = np.empty((0, 0), np.float32), np.empty((0, 0), np.uint16)
+#: Memory that a thread uses for one frame after another.
+_rooms = threading.local()
+
+
+def _room() -> Room:
+    if not hasattr(_rooms, "own"):
+        _rooms.own = Room()
+    own: Room = _rooms.own
+    return own
 
 
 @dataclass(frozen=True)
@@ -131,7 +142,7 @@ class HdrMerger:
         levels: Sequence[float] | None = None,
     ) -> None:
         """The same into ``radiance`` and ``std``, of half or single precision, both (rows, columns)."""
-        saturated = np.empty(self.shape, bool)
+        saturated = _room().of(self.shape, bool)
         if std.dtype == np.float16:
             self._merge(raws, levels, radiance, _NO_VALUES, std.view(np.uint16), saturated)
         else:
@@ -157,7 +168,8 @@ class HdrMerger:
             if not np.issubdtype(raw.dtype, np.unsignedinteger):
                 raise DecodeError(f"Raw frames contain unsigned whole numbers, not {raw.dtype}.")
         light = np.ones(len(raws), np.float32) if levels is None else np.asarray(levels, np.float32)
-        counts = np.stack(raws).astype(np.uint16, copy=False)
+        counts = _room().of(self._black.shape, np.uint16)
+        np.stack(raws, out=counts)
         merge_settings(
             counts, self._black, self._floor, self._gains * light, self._shots * light, self._limit_dn,
             radiance, variance, halves, saturated,

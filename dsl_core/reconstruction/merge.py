@@ -7,7 +7,7 @@ from collections import deque
 from collections.abc import Callable, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
-from typing import Protocol, TypeVar
+from typing import Any, Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -200,10 +200,15 @@ def decode_columns(scan: MergedScan, progress: Progress | None = None) -> tuple[
     return decoder.finish(), white
 
 
-def stack_lines(scan: MergedScan, progress: Progress | None = None) -> LineStack:
-    """Read and merge every spectral frame; deviations take half precision wherever it holds them."""
+def stack_lines(
+    scan: MergedScan, progress: Progress | None = None, empty: Callable[..., NDArray[Any]] = np.empty
+) -> LineStack:
+    """Read and merge every spectral frame; deviations take half precision wherever it holds them.
+
+    ``empty`` makes the arrays, of a shape and a type.
+    """
     shape = (scan.plan.spectral_count, *scan.black_std.shape)
-    stack = LineStack(np.empty(shape, np.float32), np.empty(shape, deviation_type(scan)), scan.black_std)
+    stack = LineStack(empty(shape, np.float32), empty(shape, deviation_type(scan)), scan.black_std)
 
     def load(k: int) -> None:
         scan.merge_line(k, None, stack.radiance[k], stack.std[k])

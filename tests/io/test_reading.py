@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from dsl_core.io.reading import read_bounded, read_json, require_plain
+from dsl_core.io.reading import parts_of, read_bounded, read_json, require_plain
 
 
 def test_plain_files_and_links_to_them_are_read(tmp_path: Path) -> None:
@@ -44,3 +44,16 @@ def test_json_that_python_cannot_hold(tmp_path: Path, content: str) -> None:
     (tmp_path / "a.json").write_bytes(content.encode("utf-8", "surrogatepass"))
     with pytest.raises(ValueError, match=r"nested|digits|Expecting|decode"):
         read_json(tmp_path / "a.json")
+
+
+def test_parts_of_a_file_are_those_bytes(tmp_path: Path) -> None:
+    path = tmp_path / "bytes"
+    path.write_bytes(bytes(range(200)))
+    with parts_of(path) as content:
+        assert len(content) == 200
+        assert content[150:160] == bytes(range(150, 160))
+        assert content[:3] == b"\x00\x01\x02"
+        assert content[190:500] == bytes(range(190, 200))
+        assert content[20:10] == b""
+    with pytest.raises(OSError, match="larger than"), parts_of(path, 100):
+        pass

@@ -7,11 +7,12 @@ https://github.com/Blosc/c-blosc/blob/main/README_CHUNK_FORMAT.rst
 from __future__ import annotations
 
 import struct
-from mmap import mmap
 
 import numpy as np
 
-Bytes = bytes | mmap
+from dsl_core.io.reading import FileParts
+
+Bytes = bytes | FileParts
 HEADER = struct.Struct("<BBBBIII")
 _IS_COPY = 0x2
 
@@ -21,7 +22,7 @@ def blocks_of(chunk: Bytes, first: int, last: int) -> tuple[bytes, int]:
 
     With it, where its own first byte is in the whole. Raises ``ValueError`` for one that is not as it says.
     """
-    version, codec, flags, typesize, raw, block, size = HEADER.unpack_from(chunk)
+    version, codec, flags, typesize, raw, block, size = HEADER.unpack(chunk[: HEADER.size])
     if size != len(chunk) or not 0 <= first < last <= raw or not block:
         raise ValueError("its header does not describe it")
     if flags & _IS_COPY:
@@ -29,7 +30,9 @@ def blocks_of(chunk: Bytes, first: int, last: int) -> tuple[bytes, int]:
         head = HEADER.pack(version, codec, flags, typesize, len(part), block, HEADER.size + len(part))
         return head + part, first
     count = -(-raw // block)
-    starts = np.frombuffer(chunk, "<i4", count, HEADER.size).astype(np.int64)
+    starts = np.frombuffer(chunk[HEADER.size : HEADER.size + 4 * count], "<i4").astype(np.int64)
+    if len(starts) < count:
+        raise ValueError("its blocks are not where it says")
     low, high = first // block, -(-last // block)
     if low == count - 1:
         # A last block that is shorter than the others is only understood after one of them.

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from dsl_core.errors import StoreError
 from dsl_core.io.atomic import make_folder, store_error, sync_folder, write_atomic
-from dsl_core.io.reading import mapped, read_bounded, read_json
+from dsl_core.io.reading import parts_of, read_bounded, read_json
 from dsl_core.io.scan.blosc_blocks import HEADER, Bytes, blocks_of
 
 #: Blocks of 256 KiB decompress 1.7 times faster than Blosc's own choice for Zstandard, at the same size.
@@ -131,7 +131,7 @@ class FrameStore:
         from numcodecs import blosc
 
         try:
-            with mapped(self.path(index), self._most_bytes) as chunk:
+            with parts_of(self.path(index), self._most_bytes) as chunk:
                 self._check_header(index, chunk)
                 part, begins = blocks_of(chunk, first * row_bytes, last * row_bytes)
             raw = np.frombuffer(blosc.decompress(part), np.uint8)
@@ -150,7 +150,7 @@ class FrameStore:
         path = self.path(index)
         if len(chunk) < HEADER.size:
             raise ChunkError(f"its file {path} is cut off after {len(chunk)} bytes")
-        _, _, _, typesize, raw_bytes, _, chunk_bytes = HEADER.unpack_from(chunk)
+        _, _, _, typesize, raw_bytes, _, chunk_bytes = HEADER.unpack(chunk[: HEADER.size])
         if chunk_bytes != len(chunk):
             raise ChunkError(f"its file {path} has {len(chunk)} of {chunk_bytes} bytes")
         wanted = self.height_px * self.width_px * _PIXEL.itemsize

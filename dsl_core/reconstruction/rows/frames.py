@@ -25,6 +25,7 @@ from dsl_core.reconstruction.merge import (
     in_order,
     stack_lines,
 )
+from dsl_core.reconstruction.room import Room
 from dsl_core.reconstruction.rows.bands import Band, PixelsOf, RowsOf, all_rows
 
 Indices = NDArray[np.intp]
@@ -46,6 +47,7 @@ class ScanFrames:
         self._whole: MergedScan | None = None
         self._picked: PickedLines | None = None
         self._held: tuple[Band, LineStack] | None = None
+        self._room = Room()
         self._shots: dict[tuple[Role, int], list[Shot]] = {}
         for shot in self.plan.shots():
             self._shots.setdefault((shot.role, shot.pattern), []).append(shot)
@@ -120,13 +122,13 @@ class ScanFrames:
         return self._picked.pick(pixels)
 
     def lines(self, band: Band, progress: Progress | None = None) -> LineStack:
-        """The lines of a band and its neighbours; those of the last band that was asked for are kept."""
+        """The lines of a band and its neighbours, until those of another one are asked for."""
         if self._held is None or self._held[0] != band:
             self._held = None
             scan = self._scan()
             if not self.in_one:
                 scan = MergedScan(RowsOf(self.source, band.near), self.rig, self._levels, compares=False)
-            stack = stack_lines(scan, progress)
+            stack = stack_lines(scan, progress, self._room.of)
             if self._light is not None:
                 self._light.steady(stack)
             self._held = band, stack
@@ -136,6 +138,7 @@ class ScanFrames:
         """Keep no frames in memory until some are asked for."""
         if not self.in_one:
             self._held = None
+            self._room.clear()
 
     def _scan(self) -> MergedScan:
         if self._whole is None:
