@@ -13,7 +13,7 @@ from dsl_core.reconstruction.rows.bands import some_rows
 from dsl_core.reconstruction.rows.frames import ScanFrames
 
 #: With more bands than these, the maps of the picture need the memory more than the frames of the last band.
-FEW_BANDS = 2
+FEW_BANDS = 8
 
 
 def columns_by_rows(
