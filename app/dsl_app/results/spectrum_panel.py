@@ -22,6 +22,8 @@ from dsl_core.words import capitalised
 
 #: Higher reflectances are errors or gloss; zooming out shows them.
 TOP = 1.08
+#: With more marks than this, the bands would cover each other and all spectra: the selected mark keeps its own.
+MOST_BANDS = 12
 #: The range that a transform fills at first; reflectance has that of the result.
 _RANGES = {
     Transform.NORMALISED: (0.0, 2.5),
@@ -39,7 +41,8 @@ class SpectrumPanel(QWidget):
         self.plot = CalmPlot(
             "Spectra",
             "Reflectance with its 95 % band; dashed where the prior decides and not the data. Regions show"
-            " the mean and one standard deviation of their pixels. Drag the line to change the band.",
+            " the mean and one standard deviation of their pixels. Drag the line to change the band. With"
+            f" more than {MOST_BANDS} marks, the selected one alone has its 95 % band.",
             "Reflectance",
             "Wavelength (nm)",
             left_width=48,
@@ -65,6 +68,7 @@ class SpectrumPanel(QWidget):
         state.result.follow(lambda _: self._new_result())
         state.cursor.follow(self._show_cursor)
         state.marks.follow(self._show_marks)
+        state.selected.changed.connect(lambda _: self._show_bands())
         state.band.follow(lambda _: self._show_band())
         state.stacked.follow(self.stacked.setChecked)
         for each in (state.transform, state.stacked):
@@ -139,6 +143,12 @@ class SpectrumPanel(QWidget):
                 self._colour(curve, mark)
                 curve.set_spectrum(self._drawn(mark.spectrum, len(self._curves) + 1))
                 self._curves[key] = (mark, curve)
+        self._show_bands()
+
+    def _show_bands(self) -> None:
+        are_few, selected = len(self._curves) <= MOST_BANDS, self._state.selected.value
+        for key, (_, curve) in self._curves.items():
+            curve.show_band(are_few or key == selected)
 
     def _colour(self, curve: SpectrumCurve, mark: Mark) -> None:
         colour = self._theme.pins[mark.colour % len(self._theme.pins)]

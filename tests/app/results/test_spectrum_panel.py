@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from dsl_app.results.spectrum_panel import MOST_BANDS
 from dsl_app.results.state import ResultView
 
 from tests.app.support.results_bench import Bench
@@ -35,3 +36,20 @@ def test_transforms_are_drawn_with_their_deviations_and_stacked(bench: Bench) ->
     assert (second.getData()[1] > before + 0.5).all()
     bench.control.point_at((30, 5))
     assert np.mean(panel.live.solid.getData()[1]) == pytest.approx(1.0)
+
+
+def test_of_many_marks_the_selected_one_alone_keeps_its_band(bench: Bench) -> None:
+    panel = bench.page.spectra.content
+
+    def with_band() -> list[str]:
+        return [mark.name for mark, curve in panel._curves.values() if curve.band.isVisible()]
+
+    for column in range(MOST_BANDS):
+        bench.control.marks.pin((column + 10, 8))
+    assert len(with_band()) == MOST_BANDS
+    bench.control.marks.pin((30, 5))
+    assert with_band() == [f"pin {MOST_BANDS + 1}"]
+    bench.state.selected.set(bench.state.marks.value[0].key)
+    assert with_band() == ["pin 1"]
+    bench.control.point_at((5, 5))
+    assert panel.live.band.isVisible()

@@ -11,7 +11,7 @@ from typing import Any
 import pyqtgraph as pg
 from PySide6.QtCore import QBuffer, QByteArray, QIODevice, QRectF
 from PySide6.QtGui import QImage, QImageWriter, QPaintDevice, QPainter
-from PySide6.QtWidgets import QGraphicsView
+from PySide6.QtWidgets import QGraphicsItem, QGraphicsView
 
 import dsl_core
 from dsl_app.shared.theme import LIGHT, Theme
@@ -97,5 +97,12 @@ def _draw(plot: QGraphicsView, device: QPaintDevice, target: QRectF) -> None:
     painter = QPainter(device)
     painter.setRenderHint(QPainter.RenderHint.Antialiasing)
     painter.fillRect(target, plot.backgroundBrush())
+    # Axes that the screen keeps as pictures of its resolution are lines and letters in a file.
+    none = QGraphicsItem.CacheMode.NoCache
+    kept = [(item, item.cacheMode()) for item in plot.items() if item.cacheMode() is not none]
+    for item, _ in kept:
+        item.setCacheMode(none)
     plot.render(painter, target, plot.viewport().rect())
+    for item, mode in kept:
+        item.setCacheMode(mode)
     painter.end()

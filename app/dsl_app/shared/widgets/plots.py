@@ -6,6 +6,7 @@ import math
 from typing import Any
 
 import pyqtgraph as pg
+from PySide6.QtWidgets import QGraphicsItem
 
 from dsl_app.shared.theme import Theme
 from dsl_app.shared.widgets.forms import named
@@ -31,6 +32,8 @@ class CalmPlot(pg.PlotWidget):  # type: ignore[misc]
         for side, text in (("left", left), ("bottom", bottom)):
             item.setLabel(side, text)
             item.getAxis(side).enableAutoSIPrefix(False)
+            # Drawn once, and not again with every curve that moves over their grid.
+            item.getAxis(side).setCacheMode(QGraphicsItem.CacheMode.DeviceCoordinateCache)
         item.getAxis("left").setWidth(left_width)
 
     def apply_theme(self, theme: Theme) -> None:

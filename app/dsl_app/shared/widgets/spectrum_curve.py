@@ -9,6 +9,7 @@ import pyqtgraph as pg
 from numpy.typing import NDArray
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QColor
+from PySide6.QtWidgets import QGraphicsItem
 
 from dsl_app.shared.spectrum import Spectrum
 from dsl_core.evaluation.uncertainty import DECIDED_FROM
@@ -42,10 +43,13 @@ class SpectrumCurve:
         if with_band:
             # Limits without a pen must be curve items: a fill between others draws nothing.
             self._low, self._high = (pg.PlotCurveItem(pen=pg.mkPen(None)) for _ in range(2))
+            for limit in (self._low, self._high):
+                limit.setFlag(QGraphicsItem.GraphicsItemFlag.ItemHasNoContents)
             self.band = pg.FillBetweenItem(self._low, self._high)
             self._items = [self._low, self._high, self.band, *self._items]
         for item in self._items:
             plot.addItem(item)
+        self._shows_band = self._has_band = True
 
     def set_colour(self, colour: str, width: float = 1.6, dashed: bool = False) -> None:
         """Draw in a colour (``#rrggbb``); ``dashed`` throughout, as references are."""
@@ -70,12 +74,19 @@ class SpectrumCurve:
         self.dashed.setVisible(bool(np.isfinite(dashed).any()))
         if self.band is None:
             return
-        self.band.setVisible(spectrum.std is not None)
+        self._has_band = spectrum.std is not None
+        self.show_band(self._shows_band)
         if spectrum.std is not None:
             half = np.nan_to_num(spectrum.sigmas * spectrum.std)
             mean = np.nan_to_num(spectrum.mean)
             self._low.setData(spectrum.nm, mean - half)
             self._high.setData(spectrum.nm, mean + half)
+
+    def show_band(self, on: bool) -> None:
+        """Show the band of a spectrum that has one, or hide it."""
+        self._shows_band = on
+        if self.band is not None:
+            self.band.setVisible(on and self._has_band)
 
     def remove(self) -> None:
         """Leave the plot."""
