@@ -22,7 +22,7 @@ from dsl_core.words import capitalised
 
 #: Higher reflectances are errors or gloss; zooming out shows them.
 TOP = 1.08
-#: With more marks than this, the bands would cover each other and all spectra: the selected mark keeps its own.
+#: With more marks than this, bands would cover all spectra: the selected mark alone keeps its own.
 MOST_BANDS = 12
 #: The range that a transform fills at first; reflectance has that of the result.
 _RANGES = {
