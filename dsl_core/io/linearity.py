@@ -72,7 +72,7 @@ def linearity_of(
 
 def _judged(found: Additivity | None) -> Linearity:
     if found is None:
-        words = f"no pixels see bright and dark stripes at once, so {_UNKNOWN}"
+        words = f"too few pixels see bright and dark stripes at once above the noise, so {_UNKNOWN}"
         return Linearity("unknown", None, words)
     figure = f"pattern and inverse together are {found.figure} white and black together where stripes meet"
     if isfinite(found.exponent) and not found.is_linear:

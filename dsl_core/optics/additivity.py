@@ -17,6 +17,8 @@ Floats = NDArray[np.float64]
 Counts = NDArray[np.uint16]
 #: Pixels count that white lights by at least this share of the range, and that stay below the upper one.
 LEAST_CONTRAST, SATURATED = 0.08, 0.985
+#: Noise moves sums of pixels whose contrast is fewer of its deviations: values end at 0, and are divided.
+LEAST_SIGMAS = 12.0
 #: Pattern and inverse differ by less than this share of the contrast where light is mixed, by more than the
 #: other where it is not.
 MIXED, PURE = 0.5, 0.9
@@ -93,7 +95,10 @@ def mixed_light(
     full_scale_dn: float,
     black_level_dn: float = 0.0,
 ) -> MixedLight | None:
-    """The pixels of a pair that can tell, of frames (rows, columns) in DN; None if there are too few."""
+    """The pixels of a pair that can tell, of frames (rows, columns) in DN; None if there are too few.
+
+    Pixels whose contrast noise could have made are left out.
+    """
     frames = np.stack([frame.ravel() for frame in (*pair, white, black)]).astype(np.float64)
     sound = frames.max(axis=0) < SATURATED * full_scale_dn
     values = (frames - black_level_dn) / max(full_scale_dn - black_level_dn, 1.0)
@@ -102,6 +107,8 @@ def mixed_light(
     values, contrast = values[:, sound], contrast[sound]
     # The noise of a difference says nothing of that of the sum: this choice favours no sums.
     apart = np.abs(values[0] - values[1]) / contrast
+    clear = contrast > LEAST_SIGMAS * _noise_of(values[:, apart > PURE])
+    values, apart = values[:, clear], apart[clear]
     mixed = values[:, apart < MIXED]
     if mixed.shape[1] < FEWEST:
         return None
@@ -126,6 +133,17 @@ def additivity(pairs: Iterable[MixedLight | None]) -> Additivity | None:
         len(told),
         sum(pair.mixed.shape[1] for pair in told),
     )
+
+
+def _noise_of(pure: Floats) -> float:
+    """Standard deviation of a value, from sums of four where light is not mixed; 0 of too few pixels.
+
+    Two of the four are dark, and may be cut off at 0: their noise is taken for none.
+    """
+    if pure.shape[1] < FEWEST:
+        return 0.0
+    sums = pure[0] + pure[1] - pure[2] - pure[3]
+    return float(_MAD * np.median(np.abs(sums - np.median(sums))) / np.sqrt(2))
 
 
 def _some(values: Floats) -> Floats:

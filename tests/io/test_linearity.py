@@ -26,7 +26,7 @@ def test_absent_frames_and_sharp_stripes_leave_it_unknown(tmp_path: Path) -> Non
     scan = open_pictures(tmp_path, Mapping(parts=PARTS, projector_size_px=PROJECTOR))
     found = linearity_of(scan, 255)
     assert (found.verdict, found.figures, found.is_wrong) == ("unknown", None, False)
-    assert found.sentence.startswith("no pixels see bright and dark stripes at once")
+    assert found.sentence.startswith("too few pixels see bright and dark stripes at once")
     for absent in ({4}, {0, 2}):
         assert linearity_of(scan, 255, absent=absent).sentence.startswith("frames are missing")
 

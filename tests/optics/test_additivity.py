@@ -20,7 +20,9 @@ def linear(light: Floats) -> Floats:
     return light
 
 
-def pair(encode: Encoding, period_px: int, lamp: float = 1.0, brightest: float = 0.8) -> MixedLight | None:
+def pair(
+    encode: Encoding, period_px: int, lamp: float = 1.0, brightest: float = 0.8, noise: float = 0.004
+) -> MixedLight | None:
     """A wall under stripes of a period, blurred by the lens; white was taken with another lamp."""
     width = 240
     stripes = (np.arange(width) // (period_px // 2) % 2).astype(float)
@@ -29,7 +31,7 @@ def pair(encode: Encoding, period_px: int, lamp: float = 1.0, brightest: float =
     rng = np.random.default_rng(period_px)
 
     def frame(light: Floats) -> NDArray[np.uint16]:
-        values = encode((0.02 + brightest * light).clip(0, 1)) + rng.normal(0, 0.004, (60, width))
+        values = encode((0.02 + brightest * light).clip(0, 1)) + rng.normal(0, noise, (60, width))
         return np.asarray(np.rint(values.clip(0, 1) * FULL_DN), np.uint16)
 
     one, other = frame(albedo * share), frame(albedo * (1 - share))
@@ -80,6 +82,13 @@ def test_saturated_or_unlit_pixels_and_sharp_stripes_say_nothing() -> None:
     white, black = np.full((30, 30), 3000, np.uint16), np.full((30, 30), 90, np.uint16)
     assert mixed_light((white, flat), white, black, FULL_DN) is None
     assert additivity([None]) is None
+
+
+@pytest.mark.parametrize(("brightest", "noise"), [(0.8, 0.03), (0.8, 0.15), (0.3, 0.05), (0.15, 0.03)])
+def test_noise_is_not_taken_for_an_encoding(brightest: float, noise: float) -> None:
+    found = additivity(pair(linear, period, brightest=brightest, noise=noise) for period in (24, 40, 60))
+    assert found is None or found.is_linear
+    assert (found is None) == (noise * 10 > brightest)
 
 
 @pytest.mark.parametrize(
