@@ -18,8 +18,10 @@ from dsl_core.io.pictures.mapping import Encoding, Mapping
 from dsl_core.io.pictures.picture_file import ARRAYS, load_values
 from dsl_core.model.rig import BayerPattern
 from dsl_core.optics.colour import srgb_decode
+from dsl_core.patterns.recognition.odd_pictures import lost_after, odd_pairs, same_in_a_row
 from dsl_core.patterns.recognition.probes import Probes, ProbeTaker
 from dsl_core.patterns.recognition.sequence import Recognised, recognise
+from dsl_core.patterns.recognition.stripe_sets import StripeReading
 from dsl_core.progress import NoProgress, Progress
 from dsl_core.words import counted
 
@@ -83,6 +85,7 @@ def guess_mapping(
     order = [*single, *whole] if len(names) > 2 and _alike(single) else [*whole, *single]
     best: tuple[Candidate, _Look, Recognised] | None = None
     trouble: StoreError | None = None
+    first: tuple[Candidate, _Look] | None = None
     for number, candidate in enumerate(order):
         progress.report("look at the pictures", number, len(order))
         try:
@@ -90,6 +93,7 @@ def guess_mapping(
         except StoreError as error:
             trouble = trouble or error
             continue
+        first = first or (candidate, look)
         slots, count = [], 0
         for picture in candidate.pictures:
             slots.append(None if picture is None else count)
@@ -101,16 +105,18 @@ def guess_mapping(
             break
     if best is not None and best[0] in whole and len(names) > 1:
         best = _single_instead(best, single) or best
+    elif best is not None and len(names) > 1 and not best[2].has_inverses:
+        best = _whole_instead(best, whole) or best
     if best is None:
         raise trouble or StoreError(
             f"The pictures of {folder} make no sense as a capture: no order of white, black, stripes and"
-            f" sinusoids lets their positions run steadily. {_advice(order)}"
+            f" sinusoids lets their positions run steadily. {_advice(order, first)}"
         )
     return _guess_of(folder, *best, projector_size_px, names, encoding)
 
 
-def _advice(tried: Sequence[Candidate]) -> str:
-    """What to do about pictures that make no sense."""
+def _advice(tried: Sequence[Candidate], looked_at: tuple[Candidate, _Look] | None) -> str:
+    """What to do about pictures that make no sense; the first candidate that was looked at may tell."""
     first = next((each.pictures[0] for each in tried if each.pictures[0] is not None), None)
     if first is not None and first.path.suffix.lower() in ARRAYS and first.index is not None:
         count, shape = len(tried[0].pictures), load_values(first).shape
@@ -119,7 +125,42 @@ def _advice(tried: Sequence[Candidate]) -> str:
                 f"{first.path.name} is taken for {count} pictures of {shape[1]} x {shape[0]} px;"
                 " where its last axis counts the pictures, save numpy.moveaxis(array, -1, 0) instead."
             )
-    return "Check that all are of one camera and scene, or state a mapping."
+    if looked_at is not None and (twice := same_in_a_row(looked_at[1].probes.across)):
+        one, other = (_picture_name(looked_at[0], place) for place in twice[0])
+        return (
+            f"{one} and {other} show the same. Keep one picture of each pattern, at one exposure; where the"
+            " projector was late, capture again."
+        )
+    return "Check that all are of one camera and scene and not too noisy, or state a mapping."
+
+
+def _picture_name(candidate: Candidate, place: int) -> str:
+    """The name of a picture by its place among those that are there."""
+    picture = [each for each in candidate.pictures if each is not None][place]
+    return picture.path.name if picture.index is None else f"{picture.path.name}[{picture.index}]"
+
+
+def _doubts_of_digits(candidate: Candidate, probes: Probes, found: Recognised) -> list[str]:
+    """Pictures that are no pattern and inverse; raises `StoreError` where the picture of a digit is lost."""
+    doubts = []
+    for block in found.blocks:
+        if not isinstance(block.reading, StripeReading):
+            continue
+        lines = probes.across if block.axis == "columns" else probes.down
+        if lost := lost_after(lines, block.slots, block.reading):
+            one, other = (_picture_name(candidate, place) for place in lost)
+            raise StoreError(
+                f"The stripes of {block.axis} become four times finer from {one} to {other}: a digit between"
+                " them has no picture, and without it no position is known. Add the picture, or name only"
+                " the pictures of the other axis in a mapping."
+            )
+        for pair in odd_pairs(lines, block.slots, block.reading):
+            one, other = (_picture_name(candidate, place) for place in pair)
+            doubts.append(
+                f"{one} and {other} should be a pattern and its inverse, but one of them shows something"
+                " else, and many positions are wrong: guess again without the wrong one"
+            )
+    return doubts
 
 
 def _recognised(look: _Look, slots: tuple[int | None, ...]) -> Recognised | None:
@@ -154,10 +195,27 @@ def _single_instead(
     return found[0]
 
 
+def _whole_instead(
+    best: tuple[Candidate, _Look, Recognised], whole: Sequence[Candidate]
+) -> tuple[Candidate, _Look, Recognised] | None:
+    """All pictures where they hold the inverses of a set, as names that end in "inv" do; else None."""
+    for each in whole:
+        if None in each.pictures:
+            continue
+        try:
+            look = _look_at(each)
+        except StoreError:
+            continue
+        read = _recognised(look, tuple(range(len(each.pictures))))
+        if read is not None and read.misfit < DOUBTFUL and _is_split(read, best[2]):
+            return each, look, read
+    return None
+
+
 def _is_split(whole: Recognised, part: Recognised) -> bool:
-    """Whether sets are the pictures and the inverses of one code: as many digits each as together."""
+    """Whether sets are pictures or inverses of one code: each has as many digits of an axis as all have."""
     together, alone = whole.digits, part.digits
-    return together == alone and whole.has_inverses and not part.has_inverses
+    return alone <= together and whole.has_inverses and not part.has_inverses
 
 
 def _alike(single: Sequence[Candidate]) -> bool:
@@ -253,7 +311,7 @@ def _guess_of(
     names: Sequence[str],
     encoding: Encoding | None,
 ) -> Guess:
-    unsure = list(look.notes)
+    unsure = [*look.notes, *_doubts_of_digits(candidate, look.probes, found)]
     size, doubt = (size_px, "") if size_px else guessed_size(found.blocks)
     parts, turned = [], is_turned(found.blocks, size)
     if turned:

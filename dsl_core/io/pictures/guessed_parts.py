@@ -23,6 +23,8 @@ COMMON_PX = (
 )  # fmt: skip
 #: Phases disagree by so many times more with the next reading, or which one it is stays unsure.
 CLEARLY_WORSE = 2.0
+#: Phases off by this share of what any fringes give are no agreement.
+BY_CHANCE = 0.6
 #: Numbers may exceed the projector by so much, because a few pixels are read wrongly.
 MOST_BEYOND = 1.02
 #: Numbers of rougher readings are too often wrong to say which there are.
@@ -83,13 +85,30 @@ def part_of(
     if turned:
         axis = "rows" if block.axis == "columns" else "columns"
     if isinstance(block.reading, StripeReading):
-        return _stripes(axis, block.reading, size_px)
+        others = [b.reading for b in blocks if b is not block and isinstance(b.reading, StripeReading)]
+        other_length = size_px[1] if axis == "columns" else size_px[0]
+        centred = [_is_centred(each, other_length) for each in others if each is not block.reading]
+        return _stripes(axis, block.reading, size_px, next((c for c in centred if c is not None), None))
     if isinstance(block.reading, PhaseReading):
         return _phases(axis, block, block.reading, blocks, size_px, probes)
     return (WhitePicture() if block.kind == "white" else BlackPicture()), []
 
 
-def _stripes(axis: Axis, reading: StripeReading, size_px: Size) -> tuple[Part, list[str]]:
+def _is_centred(reading: StripeReading, length: int) -> bool | None:
+    """Whether the middle of the numbers is that of the projector, as in several programs; None: untold."""
+    unit = _unit(reading, length)
+    spare = 2**reading.bits - -(-length // unit)
+    low, high = reading.numbers
+    if spare < 2 or reading.roughness >= STEADY:
+        return False
+    if high * unit >= length:
+        return True
+    return False if low < spare // 2 else None
+
+
+def _stripes(
+    axis: Axis, reading: StripeReading, size_px: Size, other_is_centred: bool | None = None
+) -> tuple[Part, list[str]]:
     length = size_px[0] if axis == "columns" else size_px[1]
     unit = _unit(reading, length)
     low, high = reading.numbers
@@ -99,12 +118,18 @@ def _stripes(axis: Axis, reading: StripeReading, size_px: Size) -> tuple[Part, l
             f"The pictures show numbers {low} to {high} of {axis}, more than the {length} of the projector."
             " Give its right size (--projector)."
         )
-    # Several programs put the middle of the numbers in the middle of the projector.
-    spare = 2**reading.bits - -(-length // unit)
-    offset = spare // 2 if is_steady and reading.numbers[1] * unit >= length and spare > 0 else 0
-    doubts = []
-    if offset:
+    middle, centred = (2**reading.bits - -(-length // unit)) // 2, _is_centred(reading, length)
+    offset, doubts = 0, []
+    if centred:
+        offset = middle
         doubts.append(f"numbers of {axis} exceed {length}: they are taken to be centred on the projector")
+    elif centred is None:
+        offset = middle if other_is_centred else 0
+        as_others = "centred, as those of the other axis" if offset else "counted from 0"
+        doubts.append(
+            f"numbers {low} to {high} of {axis} may be counted from 0 or be centred on the projector (offset"
+            f" {middle}): they are taken to be {as_others}; if not, set offset of the mapping"
+        )
     if unit > 1:
         doubts.append(
             f"{reading.bits} bits of {axis} are fewer than {length} px need: stripes are taken to be"
@@ -141,6 +166,13 @@ def _phases(
     stripes = next((b for b in blocks if b.axis == block.axis and isinstance(b.reading, StripeReading)), None)
     pictures = [p for p in block.slots if p is not None]
     lines = probes.across if block.axis == "columns" else probes.down
+    if len(fringes) > 1 and reading.off_rad > BY_CHANCE * reading.chance_rad:
+        raise StoreError(
+            f"The {len(pictures)} pictures of {axis} are sinusoids whose phases agree with no numbers of"
+            f" fringes: they are off by {reading.off_rad:.2f} rad, {reading.chance_rad:.2f} would be"
+            " chance. The projector's gamma or noise may have changed them. State fringes and start_deg in a"
+            " mapping."
+        )
     if stripes is not None and isinstance(stripes.reading, StripeReading):
         number = numbers_of(lines, stripes.slots, stripes.reading)
         turns, start = turns_per_number(lines, pictures[: reading.steps], reading.direction, number)

@@ -45,7 +45,8 @@ Complex = NDArray[np.complex64]
 class PhaseReading:
     """Sets of ``steps`` pictures each and their fringes.
 
-    ``off_rad`` is by how much phases disagree (rms), ``rival_rad`` that of the best other reading.
+    ``off_rad`` is by how much phases disagree (rms), ``rival_rad`` that of the best other reading, and
+    ``chance_rad`` that of readings taken by chance.
     """
 
     steps: int
@@ -55,6 +56,7 @@ class PhaseReading:
     direction: Literal[1, -1]
     off_rad: float
     rival_rad: float
+    chance_rad: float = np.pi
 
 
 def is_sinusoid(lines: Lines, pictures: Sequence[int]) -> float | None:
@@ -151,7 +153,7 @@ def read_phase_sets(
             as_good, ranked = steady, [*steady, *(each for each in ranked if each not in as_good)]
     off, _, _, fringes, start = min(as_good, key=lambda each: (each[1], each[2]))
     rival = min((each[0] for each in ranked if each[3:] != (fringes, start)), default=np.pi)
-    return PhaseReading(steps, order, fringes, start, direction, off, rival)
+    return PhaseReading(steps, order, fringes, start, direction, off, rival, float(np.median(few)))
 
 
 def _starts(steps: int) -> tuple[float, ...]:

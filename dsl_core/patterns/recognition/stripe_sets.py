@@ -150,10 +150,12 @@ def _judged(
     )  # fmt: skip
 
 
-def _pairs(count: int, inverse: Inverse) -> list[tuple[int, int]]:
+def pairs_of(pictures: Sequence[int | None], inverse: Inverse) -> list[tuple[int | None, int | None]]:
+    """The two pictures of each digit, in their order, where inverses follow as ``inverse`` says."""
+    half = len(pictures) // 2
     if inverse == "interleaved":
-        return [(i, i + 1) for i in range(0, count - 1, 2)]
-    return [(i, i + count // 2) for i in range(count // 2)]
+        return list(zip(pictures[0 : 2 * half : 2], pictures[1::2], strict=True))
+    return list(zip(pictures[:half], pictures[half : 2 * half], strict=True))
 
 
 def _is_inverse(lines: Lines, pictures: Sequence[int | None], inverse: Inverse) -> bool:
@@ -161,8 +163,7 @@ def _is_inverse(lines: Lines, pictures: Sequence[int | None], inverse: Inverse) 
     if len(pictures) % 2 or not pictures:
         return False
     against = total = 0.0
-    for i, j in _pairs(len(pictures), inverse):
-        one, other = pictures[i], pictures[j]
+    for one, other in pairs_of(pictures, inverse):
         if one is None or other is None:
             continue
         a, b = lines.of(one) - 0.5, lines.of(other) - 0.5
@@ -189,8 +190,7 @@ def _digits(lines: Lines, pictures: Sequence[int | None], inverse: Inverse) -> l
             return None
         return [lines.values[p] > 0.5 for p in present]
     found = []
-    for i, j in _pairs(len(pictures), inverse):
-        one, other = pictures[i], pictures[j]
+    for one, other in pairs_of(pictures, inverse):
         if one is not None and other is not None:
             found.append(lines.values[one] > lines.values[other])
         elif one is not None:

@@ -218,3 +218,40 @@ def test_what_is_not_read_is_named_with_what_to_do(tmp_path: Path, name: str, sa
     (tmp_path / name).write_bytes(b"1234")
     with pytest.raises(StoreError, match=f"{name} is {said}"):
         guess_mapping(tmp_path)
+
+
+def test_a_lost_digit_is_refused_with_the_pictures_next_to_it(tmp_path: Path) -> None:
+    pictures, white, black = frames([("columns", Stripes(bits=7, inverse=False))])
+    del pictures[4]
+    named = {f"{i:02d}.png": p for i, p in enumerate([white, black, *pictures])}
+    with pytest.raises(
+        StoreError, match=r"stripes of columns become four times finer from 05\.png to 06\.png"
+    ):
+        guess_mapping(write(tmp_path, named), PROJECTOR)
+
+
+def test_a_pattern_in_the_place_of_an_inverse_is_named(tmp_path: Path, gray: Pictures) -> None:
+    named = {f"{i:02d}.png": p for i, p in enumerate([*gray[:9], gray[2], *gray[10:]])}
+    unsure = guess_mapping(write(tmp_path, named), PROJECTOR).mapping.unsure
+    assert any("08.png and 09.png should be a pattern and its inverse" in each for each in unsure)
+
+
+def test_the_same_picture_twice_is_named_where_nothing_makes_sense(tmp_path: Path) -> None:
+    pictures = frames([("columns", Stripes(bits=7, inverse=False))])[0]
+    again = frames([("columns", Stripes(bits=7, inverse=False))], seed=99)[0]
+    both = [each for pair in zip(pictures, again, strict=True) for each in pair]
+    with pytest.raises(StoreError, match=r"00\.png and 01\.png show the same\. Keep one picture of each"):
+        guess_mapping(write(tmp_path, {f"{i:02d}.png": p for i, p in enumerate(both)}), PROJECTOR)
+
+
+def test_inverses_may_be_told_by_the_ends_of_names(tmp_path: Path) -> None:
+    named: dict[str, NDArray[np.uint16]] = {}
+    for axis in ("columns", "rows"):
+        pictures = frames([(axis, Stripes(bits=7))])[0]
+        named |= {f"{axis}_{i // 2}{'-inv' if i % 2 else ''}.png": p for i, p in enumerate(pictures)}
+    guess = guess_mapping(write(tmp_path, named), PROJECTOR)
+    assert guess.mapping.parts == tuple(
+        StripePictures.model_validate({"axis": axis, "bits": 7, "inverse_first": True})
+        for axis in ("columns", "rows")
+    )
+    assert not guess.others

@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+from contextlib import nullcontext
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
+from dsl_core.errors import StoreError
 from dsl_core.io.pictures.guessed_parts import _stripes, _unit, guessed_size, part_of
 from dsl_core.io.pictures.mapping import StripePictures, WhitePicture
 from dsl_core.model.captured_code import Axis
 from dsl_core.patterns.recognition.phase_sets import PhaseReading
+from dsl_core.patterns.recognition.probes import Lines, Probes
 from dsl_core.patterns.recognition.sequence import Block
 from dsl_core.patterns.recognition.stripe_sets import StripeReading
 
@@ -103,3 +107,32 @@ def test_what_is_unsure_of_stripes_is_said() -> None:
         (doubt,) = part_of(block, [block], (1024, 768), None)[1]  # type: ignore[arg-type]
         assert said in doubt
     assert part_of(Block("white", (0,)), [], (4, 3), None) == (WhitePicture(), [])  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ("low", "rows", "offset", "said"),
+    [
+        (5, (250, 700), 0, ""),  # numbers that a centred count does not have
+        (150, (250, 700), 112, "centred, as those of the other axis"),
+        (150, (5, 300), 0, "counted from 0"),
+        (150, (250, 500), 0, "counted from 0"),
+    ],
+)
+def test_numbers_of_a_part_may_be_centred_as_those_of_the_other_axis(
+    low: int, rows: tuple[int, int], offset: int, said: str
+) -> None:
+    across = Block("stripes", (), "columns", replace(READING, numbers=(low, 700)))
+    down = Block("stripes", (), "rows", replace(READING, numbers=rows))
+    part, doubts = part_of(across, [across, down], (800, 600), None)  # type: ignore[arg-type]
+    assert isinstance(part, StripePictures)
+    assert part.offset == offset
+    assert [said in doubt for doubt in doubts] == [True] * bool(said)
+
+
+def test_sinusoids_that_agree_no_better_than_by_chance_are_refused() -> None:
+    lines = Lines(np.zeros((9, 2, 4), np.float32), np.ones((2, 4), np.bool_))
+    for off_rad, is_refused in ((0.02, False), (0.14, True)):
+        reading = PhaseReading(3, "set", (1.0, 6.0, 36.0), 0.0, 1, off_rad, 0.2, 0.16)
+        block = Block("phases", tuple(range(9)), "columns", reading)
+        with pytest.raises(StoreError, match=r"off by 0\.14 rad, 0\.16") if is_refused else nullcontext():
+            assert part_of(block, [block], (512, 384), Probes(lines, lines, 1.0))[0].kind == "phases"

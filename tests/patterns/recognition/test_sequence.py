@@ -81,6 +81,7 @@ def test_sinusoids_are_told_by_their_steps_and_their_fringes() -> None:
     assert isinstance(block.reading, PhaseReading)
     assert (block.reading.steps, block.reading.fringes, block.reading.order) == (3, (12.0, 11.0, 10.0), "set")
     assert (block.reading.start_deg, block.reading.direction) == (-90.0, 1)
+    assert block.reading.off_rad < 0.3 * block.reading.chance_rad
     pictures = frames([("columns", Phases(periods_px=(128, 32, 8), steps=4, direction=-1))])[0]
     strided = _recognised([pictures[s * 4 + k] for k in range(4) for s in range(3)])
     assert strided is not None
