@@ -36,7 +36,7 @@ from dsl_core.reconstruction.spectral.spectra import SpectralReconstruction
 from dsl_core.workflows import scans
 from tests.cases.twin_scan import solver_input, twin_scan
 
-SIZE = "222x145"
+SIZE = "445x290"
 #: Nearer to its column than this, the frames of a pixel show the zero order.
 ZERO_ORDER_PX = 12.0
 FIGURES = ("rmse", "rmse_scaled", "angle_rad", "pixel_rmse", "pixel_angle_rad")
