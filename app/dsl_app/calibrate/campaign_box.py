@@ -90,7 +90,7 @@ class CampaignBox(QFrame):
             "Calibrate everythin&g",
             "Run all calibrations in order, without questions, on a rig that places targets itself",
         )
-        self.cancel = push_button("&Stop", "Stop at the next safe point; everything captured is kept")
+        self.cancel = push_button("Sto&p", "Stop at the next safe point; everything captured is kept")
         self.keep = push_button(
             "&Keep in library", "Assemble the rig as far as it is calibrated and save it in the library"
         )

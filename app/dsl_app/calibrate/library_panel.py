@@ -62,10 +62,10 @@ class LibraryPanel(QGroupBox):
         self.details.setAccessibleName("Details of the calibration")
         self.details.setToolTip("Conditions, dates and figures of the selected calibration")
         self._note = label("", "muted", wraps=True)
-        self.use = push_button("&Use for scans", "Scan with this calibration from now on")
-        self.report = push_button("Show &report", "Open its report in the browser")
+        self.use = push_button("Use for sc&ans", "Scan with this calibration from now on")
+        self.report = push_button("Show repor&t", "Open its report in the browser")
         self.restore = push_button(
-            "Ma&ke current", "Make this older version the current one; no version is lost", self._restore
+            "&Make current", "Make this older version the current one; no version is lost", self._restore
         )
         self.check = push_button(
             "Check for &drift…",

@@ -37,8 +37,8 @@ class ComparePage(PageWidget):
         self.series = Deferred(lambda: SeriesPanel(series_state, series_control))
         self.tabs = tabs_of(
             "Two results or a series",
-            (self.pair, "T&wo results", "Compare two results, or one with its ground truth, pixel by pixel"),
-            (self.series, "S&eries", "Depth over stage positions, or accuracy over time"),
+            (self.pair, "Tw&o results", "Compare two results, or one with its ground truth, pixel by pixel"),
+            (self.series, "Ser&ies", "Depth over stage positions, or accuracy over time"),
         )
         column_of(self.tabs, on=self)
 

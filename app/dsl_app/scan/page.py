@@ -31,7 +31,7 @@ from dsl_app.shared.widgets.ticker import Ticker
 #: Interval at which the state of the scan is fetched, ms: ten pictures a second look live.
 FETCH_MS = 100
 LEFT_PX, RIGHT_PX, TALL_PX = 276, 292, 400
-FRAMES, FRAMES_TIP = "&Frames", "Frames while the scan runs"
+FRAMES, FRAMES_TIP = "Fra&mes", "Frames while the scan runs"
 PLANS = "Plans and pattern sets (*.json)"
 
 
@@ -85,7 +85,7 @@ class ScanPage(PageWidget):
     def _lay_out(self) -> None:
         self.middle = tabs_of(
             "Views of the scan",
-            (self.forecast, "&Accuracy against time", "Expected accuracy and capture time of each plan"),
+            (self.forecast, "Accurac&y against time", "Expected accuracy and capture time of each plan"),
             (self.view, FRAMES, FRAMES_TIP),
             (self.effects, "Effec&ts", "Effects of light that the simulated rig renders"),
         )

@@ -53,7 +53,7 @@ class PlanEditor(QGroupBox):
         tip = "Open a plan or pattern set, saved here or by dsl-scan plan, tradeoff or design"
         self.open = push_button("&Open plan…", tip, self.open_requested)
         tip = "Save this plan to a file, for this page or for the command line"
-        self.save = push_button("Sa&ve plan…", tip, self.save_requested)
+        self.save = push_button("S&ave plan…", tip, self.save_requested)
         self._lay_out()
         self._connect()
 

@@ -126,11 +126,11 @@ class RunBox(QGroupBox):
             controller.connect_rig,
         )
         tip = "Capture all frames of the plan; each is saved before the next is captured"
-        self.start = push_button("&Start scan", tip, controller.start)
-        self.resume = push_button("&Resume scan", RESUME, controller.start)
+        self.start = push_button("Start sca&n", tip, controller.start)
+        self.resume = push_button("Resume sca&n", RESUME, controller.start)
         self.pause = push_button("&Pause", "Pause before the next frame; nothing is lost", self.toggle_pause)
-        self.cancel = push_button("&Cancel", "Stop after the current frame; the scan can be resumed later")
-        self.renew = push_button("Plan a &new scan", "Keep the interrupted scan on disk and plan another")
+        self.cancel = push_button("Cance&l", "Stop after the current frame; the scan can be resumed later")
+        self.renew = push_button("Plan a ne&w scan", "Keep the interrupted scan on disk and plan another")
         self.again = QPushButton("Reconstruct a&gain…")
         self.again.setToolTip("Reconstruct the finished scan with other parameters, without scanning again")
         self.drift = check_box(

@@ -11,6 +11,9 @@ from PySide6.QtWidgets import QMainWindow, QMenu, QWidget
 from dsl_app.shared.settings import RecentFiles, entry_text
 from dsl_app.shell.actions import Action
 
+#: Titles of menus whose first letter with Alt opens another one.
+_TITLES = {"Results": "Res&ults"}
+
 
 class Menus:
     """Makes a Qt action for each one of the table; ``do`` gets the key of the triggered one."""
@@ -24,7 +27,7 @@ class Menus:
 
     def _add(self, record: Action) -> None:
         if record.menu not in self._menus:
-            menu = self._window.menuBar().addMenu(f"&{record.menu}")
+            menu = self._window.menuBar().addMenu(_TITLES.get(record.menu, f"&{record.menu}"))
             menu.setToolTipsVisible(True)
             self._menus[record.menu] = menu
         if record.separator:

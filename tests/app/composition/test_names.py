@@ -114,7 +114,32 @@ def where(widget: QWidget) -> str:
 
 @pytest.mark.parametrize("key", [page.key for page in PAGES])
 def test_every_control_of_a_page_has_a_name_and_a_tooltip(window: MainWindow, key: str) -> None:
-    assert complaints(window.open_page(key)) == []
+    page = window.open_page(key)
+    assert complaints(page) == []
+    assert given_twice(window, page) == []
+
+
+def given_twice(window: MainWindow, page: QWidget) -> list[str]:
+    """Letters that Alt gives to a menu and to a part of a page, or to two parts that are seen at once."""
+    menus = {letter(action.text()): action.text() for action in window.menuBar().actions()}
+    seen, found = dict(menus), []
+    assert len(menus) == len(window.menuBar().actions()), "two menus have one letter"
+    texts: list[tuple[QWidget, str]] = [(each, each.text()) for each in page.findChildren(QAbstractButton)]
+    texts += [(bar, bar.tabText(i)) for bar in page.findChildren(QTabBar) for i in range(bar.count())]
+    for widget, text in texts:
+        key = letter(text)
+        owner = (seen if widget.isVisible() else menus).get(key) if key else None
+        if owner is not None and owner != text:
+            found.append(f"{text} and {owner}")
+        if key and widget.isVisible():
+            seen[key] = text
+    return found
+
+
+def letter(text: str) -> str:
+    """The letter that acts with Alt; empty for none."""
+    marked = text.replace("&&", "").partition("&")[2]
+    return marked[:1].lower()
 
 
 def test_every_control_around_the_pages_has_a_name_and_a_tooltip(window: MainWindow) -> None:

@@ -40,7 +40,7 @@ def test_buttons_follow_the_phase(
         can_cancel,
     )
     assert (shown.phase.text, shown.phase.role) == (f"● {phase.value}", role)
-    assert shown.pause.text == ("&Continue" if phase is Phase.PAUSED else "&Pause")
+    assert shown.pause.text == ("Cont&inue" if phase is Phase.PAUSED else "&Pause")
     # What is paused is continued next.
     assert shown.pause.is_primary == (phase is Phase.PAUSED)
     assert not (shown.start.is_primary and shown.pause.is_primary)
@@ -67,7 +67,7 @@ def test_obstacles_keep_a_plan_from_starting_but_not_from_being_shown() -> None:
 def test_an_interrupted_scan_is_resumed_or_left() -> None:
     shown = run_controls(Phase.LOST, HALF, FREE, "A note.", has_finished=False)
     assert (shown.resume.text, shown.renew.is_visible, shown.again.is_visible) == (
-        "&Resume scan",
+        "Resume sca&n",
         True,
         False,
     )
@@ -78,7 +78,7 @@ def test_an_interrupted_scan_is_resumed_or_left() -> None:
     assert shown.remarks.text == "half: 30 of 76 frames are safe.\nA note."
     assert not run_controls(Phase.RUNNING, HALF, FREE, "", has_finished=False).renew.is_visible
     away = replace(FREE, connects=True)
-    assert run_controls(Phase.PLANNING, HALF, away, "", False).resume.text == "Connect and &resume"
+    assert run_controls(Phase.PLANNING, HALF, away, "", False).resume.text == "Co&nnect and resume"
 
 
 @pytest.mark.parametrize(

@@ -98,7 +98,7 @@ def test_pause_go_on_and_finish(qtbot: QtBot, ready: Bench, slow: None, tmp_path
     assert not page.plan.isEnabled()
     click(page.run.pause)
     qtbot.waitUntil(in_phase(bench, Phase.PAUSED), timeout=60_000)
-    assert page.run.pause.text() == "&Continue"
+    assert page.run.pause.text() == "Cont&inue"
     click(page.run.pause)
     qtbot.waitUntil(in_phase(bench, Phase.DONE), timeout=60_000)
     assert ScanReader(tmp_path / "first.dsl").missing() == []
@@ -120,7 +120,7 @@ def test_cancel_keeps_frames_and_offers_to_resume(qtbot: QtBot, ready: Bench, sl
     qtbot.waitUntil(lambda: bench.state.status.value.done > 3, timeout=60_000)
     click(page.run.cancel)
     qtbot.waitUntil(in_phase(bench, Phase.STOPPED), timeout=2_000)
-    assert page.run.resume.text() == "&Resume scan"
+    assert page.run.resume.text() == "Resume sca&n"
     assert not page.run.start.isVisible()
     assert page.run.renew.isVisible()
     assert page.run.drift.isVisible()

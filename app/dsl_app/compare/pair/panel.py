@@ -46,9 +46,9 @@ class PairPanel(QWidget):
         self.at_hand = push_button(
             "Open result", "Compare the result that is open on the Results page", self._use_at_hand
         )
-        self.swap = push_button("&Swap", "Swap A and B", control.swap)
+        self.swap = push_button("S&wap", "Swap A and B", control.swap)
         self.report = push_button(
-            "Write &report…", "Save figures and pictures of A against the ground truth as an HTML page"
+            "Write re&port…", "Save figures and pictures of A against the ground truth as an HTML page"
         )
         self.hint = remark_line()
         # Slow to make: made when they are first seen.

@@ -44,7 +44,7 @@ class SeriesPanel(QWidget):
         figures = [(figure.words, figure) for figure in FIGURES]
         self.figure = ChoiceBox("Error", "The error that the plot shows", figures, control.show_figure)
         tip = "Save table, figures, plot and pictures as an HTML page"
-        self.report = push_button("Write &report…", tip, self._choose_report)
+        self.report = push_button("Write re&port…", tip, self._choose_report)
         self.hint = remark_line()
         self.hint.setAlignment(Qt.AlignmentFlag.AlignTop)
         self.table = SeriesTable(state, control)
