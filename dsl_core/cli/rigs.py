@@ -93,9 +93,9 @@ def doctor(
     json: Json = False,
 ) -> None:
     """Try every device of a rig profile, and say all that is wrong and what to do; nothing is moved."""
-    from dsl_core.devices.doctor import Grade, examine, survey
+    from dsl_core.devices.doctor import Grade, survey
     from dsl_core.errors import DeviceError
-    from dsl_core.io.rig_profile import load_profile, profile_names, profile_path
+    from dsl_core.io.rig_profile import examine_profile, profile_names, profile_path
 
     output = Output(json)
     if profile:
@@ -110,13 +110,14 @@ def doctor(
                 f"There is no rig profile {profile!r}; there are: {known}. Give the path of one (NAME.json),"
                 " or one of these names."
             )
-        found = examine(load_profile(path))
+        found = examine_profile(path)
     else:
         found = survey()
     output.table(("device", "", "what was found"), [(f.device, f.grade.value, f.text) for f in found])
     broken = sum(f.grade is Grade.BAD for f in found)
     if profile:
-        output.say(f"{broken} of {len(found)} findings prevent a scan." if broken else "Every device works.")
+        prevent = f"{broken} of {len(found)} findings {'prevents' if broken == 1 else 'prevent'} a scan."
+        output.say(prevent if broken else "Every device works.")
     output.put(findings=[{"device": f.device, "grade": f.grade.value, "text": f.text} for f in found])
     output.put(broken=broken)
     output.finish()

@@ -13,7 +13,15 @@ from numpy.typing import NDArray
 
 from dsl_core.devices.base import Camera, Device, Projector, Spectroradiometer, Stage
 from dsl_core.devices.device_thread import DeviceThread, DriverError, HangingError
-from dsl_core.devices.driver_table import Driver, FoundDevice, Kind, find_driver, list_drivers, open_device
+from dsl_core.devices.driver_table import (
+    Driver,
+    FoundDevice,
+    Kind,
+    find_driver,
+    list_drivers,
+    open_device,
+    read_settings,
+)
 from dsl_core.devices.plausible import require_frame, require_spectrum
 from dsl_core.devices.profile import DevicePart, RigProfile
 from dsl_core.errors import DeviceError, DslError
@@ -56,12 +64,17 @@ def survey() -> list[Finding]:
             notes.add(Grade.BAD, entry.error)
         elif entry.driver.find is not None:
             _look(entry.driver.find, notes)
+        elif entry.driver.brings:
+            notes.add(
+                Grade.WARNING,
+                f"It is not looked for: state its settings in a profile. It needs {entry.driver.brings}.",
+            )
     return found
 
 
 def examine(profile: RigProfile) -> list[Finding]:
     """Open and try every device of a profile, whatever the others do; nothing is moved."""
-    found: list[Finding] = []
+    found = _shared_ports(profile)
     opened: dict[Kind, Device] = {}
     notes = {kind: _Notes(f"{kind} {part.driver}", found) for kind, part in profile.parts().items()}
     for kind, part in profile.parts().items():
@@ -89,8 +102,10 @@ class _Notes:
     def add(self, grade: Grade, text: str) -> None:
         self._found.append(Finding(self.name, grade, text))
 
-    def ask(self, action: Callable[[], T], patience_s: float, more: Callable[[], str] = str) -> T | None:
-        """What an action returns; None when it fails, which is noted together with what ``more`` says."""
+    def ask(
+        self, action: Callable[[], T], patience_s: float, more: Callable[[str], str] = lambda text: ""
+    ) -> T | None:
+        """What an action returns; None when it fails, noted together with what ``more`` says of it."""
         try:
             return self.thread.call(self.name, action, patience_s)
         except HangingError as error:
@@ -103,7 +118,7 @@ class _Notes:
             text = str(cause)
             if not isinstance(cause, DslError):
                 text = f"Its driver failed ({type(cause).__name__}: {cause}). Check its cable and settings."
-        self.add(Grade.BAD, f"{text} {more()}".strip())
+        self.add(Grade.BAD, f"{text} {more(text)}".strip())
         return None
 
 
@@ -123,12 +138,34 @@ def _look(find: Callable[[], list[FoundDevice]], notes: _Notes) -> None:
     notes.thread.end()
 
 
-def _seen_instead(kind: Kind, part: DevicePart) -> str:
-    """Which devices the driver sees, for one that cannot be opened; empty where that cannot be said."""
+def _shared_ports(profile: RigProfile) -> list[Finding]:
+    """A finding for each serial port that several devices name."""
+    users: dict[str, list[str]] = {}
+    for kind, part in profile.parts().items():
+        port = part.settings.get("port")
+        if isinstance(port, str) and port:
+            users.setdefault(port, []).append(kind)
+    return [
+        Finding(
+            " and ".join(kinds),
+            Grade.BAD,
+            f"Both name the port {port}, and only one can be there. Give each its own.",
+        )
+        for port, kinds in users.items()
+        if len(kinds) > 1
+    ]
+
+
+def _seen_instead(kind: Kind, part: DevicePart, trouble: str) -> str:
+    """Which devices the driver sees, for one that cannot be opened; empty where ``trouble`` says so."""
     try:
+        read_settings(kind, part.driver, part.settings)
         driver: Driver = find_driver(kind, part.driver)
         devices = driver.find() if driver.find is not None else []
     except DeviceError:
+        return ""
+    named = [str(value) for each in devices for value in each.settings.values()]
+    if any(name and name in trouble for name in named):
         return ""
     return f"The driver sees: {'; '.join(each.words for each in devices)}." if devices else ""
 
@@ -206,8 +243,9 @@ def _try_projector(projector: Projector, notes: _Notes) -> None:
     if notes.ask(lambda: projector.show(black) or True, ANSWER_S):
         notes.add(
             Grade.GOOD,
-            f"{info.model} {info.serial}: {info.width_px} x {info.height_px} px, {info.frame_period_ms:.2f}"
-            f" ms a frame, visible after {info.latency_ms:g} ms; the self-test measures that",
+            f"{f'{info.model} {info.serial}'.strip()}: {info.width_px} x {info.height_px} px,"
+            f" {info.frame_period_ms:.2f} ms a frame, visible after {info.latency_ms:g} ms; the self-test"
+            " measures that",
         )
 
 

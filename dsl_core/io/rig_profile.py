@@ -5,8 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 
 from dsl_core.devices.base import DeviceRig
+from dsl_core.devices.doctor import Finding, Grade, examine
 from dsl_core.devices.profile import RigProfile, open_parts
-from dsl_core.errors import DeviceError
+from dsl_core.errors import DeviceError, DslError
 from dsl_core.io.calibration_library import library_home
 from dsl_core.io.records import read_record, write_record
 from dsl_core.io.rig_file import load_rig
@@ -37,7 +38,7 @@ def load_profile(path: Path) -> RigProfile:
     return read_record(
         path,
         RigProfile,
-        "Correct the file; the help on adding a rig has an example.",
+        "Correct the file; the help page on connecting devices has an example.",
         called="The rig profile",
         fault="is not valid",
         error=DeviceError,
@@ -48,6 +49,18 @@ def load_profile(path: Path) -> RigProfile:
 def save_profile(profile: RigProfile, path: Path, *, overwrite: bool = False) -> Path:
     """Write a profile, whole or not at all, and return its path; raises `StoreError`."""
     return write_record(path, profile, overwrite=overwrite)
+
+
+def examine_profile(path: Path) -> list[Finding]:
+    """Try the devices of a profile, and read its file ``nominal``; raises `DeviceError` for the profile."""
+    profile = load_profile(path)
+    found = examine(profile)
+    if profile.nominal:
+        try:
+            load_rig(path.parent / profile.nominal)
+        except DslError as error:
+            found.append(Finding("nominal", Grade.BAD, str(error)))
+    return found
 
 
 def open_profile(path: Path) -> DeviceRig:

@@ -95,7 +95,8 @@ def _cannot_find() -> list[FoundDevice]:
 
 
 CAMERA = Driver("an eye", Trouble, TryCamera, _find)
-PROJECTOR = Driver("a lamp", Trouble, TryProjector)
+SEEN = Driver("an eye", Trouble, TryCamera, lambda: [FoundDevice({"id": "P3"}, "eye on port 3")])
+PROJECTOR = Driver("a lamp", Trouble, TryProjector, brings="a lamp's library")
 STAGE = Driver("a stage", Trouble, TryStage, lambda: [])
 INSTRUMENT = Driver("an instrument", Trouble, TryInstrument, _cannot_find)
 
@@ -104,6 +105,7 @@ INSTRUMENT = Driver("an instrument", Trouble, TryInstrument, _cannot_find)
 def _drivers(monkeypatch: pytest.MonkeyPatch) -> None:
     values = {
         "camera.try": "CAMERA",
+        "camera.seen": "SEEN",
         "projector.try": "PROJECTOR",
         "stage.try": "STAGE",
         "spectroradiometer.try": "INSTRUMENT",
@@ -199,4 +201,21 @@ def test_without_a_profile_drivers_say_what_they_see_or_lack() -> None:
     assert found["camera try"].text == "eye 7 on port 3; settings {'trouble': ''}"
     assert found["stage try"].grade is Grade.WARNING
     assert "Install it" in found["spectroradiometer try"].text
-    assert "projector try" not in found
+    assert found["projector try"].text.endswith("state its settings in a profile. It needs a lamp's library.")
+
+
+def test_devices_on_one_port_are_told() -> None:
+    both = {"driver": "try", "settings": {"port": "COM4"}}
+    found = examine(profile(stage=both, spectroradiometer=both))
+    assert found[0].device == "stage and spectroradiometer"
+    assert found[0].text.startswith("Both name the port COM4")
+    alone = examine(profile(stage=both))
+    assert not any("Both name" in each.text for each in alone)
+
+
+def test_what_the_driver_sees_is_said_once_and_only_of_devices_that_cannot_be_opened() -> None:
+    wrong = DevicePart(driver="seen", settings={"x": 1})
+    assert doctor._seen_instead("camera", wrong, "x is not a field of it.") == ""
+    part = DevicePart(driver="seen")
+    assert doctor._seen_instead("camera", part, "No camera.") == "The driver sees: eye on port 3."
+    assert doctor._seen_instead("camera", part, "No camera; there is P3.") == ""

@@ -10,7 +10,13 @@ from dsl_core.devices.driver_table import driver_names, read_settings
 from dsl_core.devices.profile import DevicePart, RigProfile
 from dsl_core.devices.registry import is_built_in, list_rigs, open_rig, rig_names
 from dsl_core.errors import CalibrationError, DeviceError
-from dsl_core.io.rig_profile import load_profile, profile_path, profiles_folder, save_profile
+from dsl_core.io.rig_profile import (
+    examine_profile,
+    load_profile,
+    profile_path,
+    profiles_folder,
+    save_profile,
+)
 from dsl_core.io.scan.origin import rig_notes, rig_of_notes
 from dsl_core.resources import resource_path
 
@@ -62,6 +68,14 @@ def test_a_missing_nominal_rig_is_named(home: Path) -> None:
     path = save_profile(profile(nominal="sheet.json"), home / "lab.json")
     with pytest.raises(CalibrationError, match=r"sheet\.json"):
         open_rig(str(path))
+
+
+def test_the_doctor_tells_of_a_missing_nominal_rig_with_all_else(home: Path) -> None:
+    path = save_profile(profile(nominal="sheets.json"), home / "lab.json")
+    found = {each.device: each for each in examine_profile(path)}
+    assert "no driver 'absent'" in found["camera absent"].text
+    assert found["nominal"].grade == "bad"
+    assert "sheets.json cannot be read" in found["nominal"].text
 
 
 def test_a_scan_remembers_its_profile_from_any_folder(home: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -158,8 +158,9 @@ def _choose(library: Any, identifier: str) -> Any:
     there = "; ".join(str(each.GetFriendlyName()) for each in seen) or "none"
     if matching:
         raise DeviceError(f"Several Basler cameras are connected: {there}. Say which in the profile, by id.")
+    which = f"No Basler camera {identifier!r} is connected; connected: {there}."
     raise DeviceError(
-        f"No Basler camera {identifier!r} is connected; connected: {there}. Check cable, power and network."
+        f"{which if identifier else 'No Basler camera is connected.'} Check cable, power and network."
     )
 
 

@@ -193,7 +193,10 @@ def _choose(harvester: Any, identifier: str) -> tuple[int, Any]:
     there = "; ".join(f"{name} (serial number {serial})" for name, serial in names) or "none"
     if matching:
         raise DeviceError(f"Several cameras are connected: {there}. Say which in the profile, by id.")
-    raise DeviceError(f"No camera {identifier!r} is connected; connected: {there}. Check cable and power.")
+    which = f"No camera {identifier!r} is connected; connected: {there}."
+    raise DeviceError(
+        f"{which if identifier else 'The producer sees no camera.'} Check cable, power and network."
+    )
 
 
 def find_cameras() -> list[FoundDevice]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import errno
+import os
 import time
 from collections.abc import Callable
 from functools import partial
@@ -131,11 +132,18 @@ def open_line(port: str, name: str, baud: int, rtscts: bool = False) -> SerialLi
         if rtscts:
             _hand_shake(found)
     except (OSError, ValueError) as error:
+        code = getattr(error, "errno", None)
         raise DeviceError(
-            f"{name} cannot be opened on the port {port!r} ({error}). Check the address, the cable, and that"
-            " no other program uses it; on Linux, that you may use serial ports (group dialout)."
+            f"{name} cannot be opened: {os.strerror(code) if code else error}. {_ports_in_words()} Check port"
+            " and cable, and that no other program uses it; on Linux, that you may use serial ports (group"
+            " dialout)."
         ) from error
     return SerialLine(found, name)
+
+
+def _ports_in_words() -> str:
+    there = ", ".join(address for address, _ in serial_ports())
+    return f"This computer's serial ports are: {there}." if there else "This computer has no serial port."
 
 
 def _hand_shake(port: Any) -> None:

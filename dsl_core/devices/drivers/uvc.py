@@ -127,7 +127,14 @@ def open_camera(settings: UvcSettings) -> UvcCamera:
     """Open a webcam; raises `DeviceError`."""
     import cv2
 
-    return UvcCamera(settings, cv2.VideoCapture(settings.index))
+    # OpenCV writes lines of its own to the terminal about each way in which it could not open a webcam.
+    level = cv2.utils.logging.getLogLevel()
+    cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_ERROR)
+    try:
+        capture = cv2.VideoCapture(settings.index)
+    finally:
+        cv2.utils.logging.setLogLevel(level)
+    return UvcCamera(settings, capture)
 
 
 DRIVER = Driver(f"webcams, for trials only. {CAUTION}", UvcSettings, open_camera, find_cameras)
