@@ -14,17 +14,19 @@ from dsl_core.io.scan.folder import ScanReader
 class ReplayOptions(BaseModel):
     """What ``replay`` can be asked for."""
 
-    session: str = Field(description="folder of the scan to play back")
+    scan: str = Field(description="folder of the scan to play back")
 
 
 @with_options(ReplayOptions)
 def open_replay(options: dict[str, str]) -> DeviceRig:
-    """Plays a saved scan back; option ``session`` is its folder.
+    """Plays a saved scan back; option ``scan`` is its folder.
 
     Raises `DeviceError` for other options, `StoreError` when the folder is not a scan.
     """
-    if set(options) != {"session"}:
+    # Notes of scans that were replayed before call it by its earlier name.
+    if set(options) not in ({"scan"}, {"session"}):
         given = ", ".join(sorted(options)) or "none"
-        raise DeviceError(f"The rig 'replay' takes one option, session=NAME.dsl; given: {given}.")
-    reader = ScanReader(options["session"])
+        raise DeviceError(f"The rig 'replay' takes one option, scan=NAME.dsl; given: {given}.")
+    (folder,) = options.values()
+    reader = ScanReader(folder)
     return replay_rig(reader, reader.calibration)

@@ -114,7 +114,7 @@ def test_the_rigs_of_this_package_are_listed() -> None:
         assert all(option.meaning for option in found[name].options)
     twin = {option.name: option for option in found["twin"].options}
     assert (twin["noise"].default, twin["tolerance"].default, twin["truth"].default) == ("on", "1DN", "")
-    assert [option.name for option in found["replay"].options] == ["session"]
+    assert [option.name for option in found["replay"].options] == ["scan"]
 
 
 def test_a_rig_of_another_package_is_listed_and_scanned(install: Install) -> None:

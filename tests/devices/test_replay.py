@@ -56,8 +56,9 @@ def test_a_stored_scan_is_replayed_by_name(tmp_path: Path) -> None:
     with ScanWriter.create(folder, PLAN) as writer:
         Runner(replay_rig(original), PLAN, writer, pattern_image).run()
     again = MemorySink(PLAN)
-    with open_rig("replay", {"session": str(folder)}) as rig:
+    with open_rig("replay", {"scan": str(folder)}) as rig:
         Runner(rig, PLAN, again, pattern_image).run()
+    open_rig("replay", {"session": str(folder)}).close()  # as notes of earlier scans have it
     reader = ScanReader(folder)
     for shot in PLAN.shots():
         np.testing.assert_array_equal(again.read(shot), original.read(shot))
@@ -65,9 +66,9 @@ def test_a_stored_scan_is_replayed_by_name(tmp_path: Path) -> None:
 
 
 def test_replay_says_what_it_needs(tmp_path: Path) -> None:
-    with pytest.raises(DeviceError, match=r"takes one option, session=NAME.dsl; given: none"):
+    with pytest.raises(DeviceError, match=r"takes one option, scan=NAME.dsl; given: none"):
         open_rig("replay")
     with pytest.raises(StoreError, match="is not a scan"):
-        open_rig("replay", {"session": str(tmp_path)})
+        open_rig("replay", {"scan": str(tmp_path)})
     with pytest.raises(DeviceError, match="shot 99 is not one of them"):
         replay_rig(_scan()).camera.prepare(99)

@@ -17,7 +17,8 @@ _CALIBRATION, _CORRESPONDENCE = "calibration_digest", "correspondence"
 def rig_notes(name: str, options: Mapping[str, str]) -> dict[str, str]:
     """Notes of a scan from which its rig can be opened again; paths are made absolute."""
     # A path is relative to where the scan was started, and a resume may start elsewhere.
-    fixed = {key: str(Path(v).absolute()) if key == "session" else v for key, v in options.items()}
+    is_path = {"scan", "session"} if name == "replay" else set()
+    fixed = {key: str(Path(v).absolute()) if key in is_path else v for key, v in options.items()}
     # A rig that is named by the path of its profile, likewise.
     name = str(Path(name).absolute()) if name.endswith(".json") else name
     return {_RIG: name, _OPTIONS: json.dumps(fixed, sort_keys=True), _COMPUTER: _this_computer()}

@@ -222,9 +222,9 @@ def test_the_form_shows_a_rig_that_another_page_asked_for(bench: Bench) -> None:
     page, state, _, _ = bench
     assert page.options.options == (("scene", "plane"), ("size", "64x48"))
     assert page.options.text.text() == ""
-    state.choice.set(RigChoice("replay", (("session", "first.dsl"),)))
+    state.choice.set(RigChoice("replay", (("scan", "first.dsl"),)))
     assert page._rig.currentText() == "replay"
-    assert page.options.text.text() == "session=first.dsl"
+    assert page.options.text.text() == "scan=first.dsl"
 
 
 def test_a_scan_has_the_projector_for_itself(qtbot: QtBot, bench: Bench) -> None:

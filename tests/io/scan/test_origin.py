@@ -21,9 +21,9 @@ def test_the_rig_of_a_scan_is_found_again_wherever_it_is_resumed(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    notes = rig_notes("replay", {"session": "scans/a.dsl", "speed": "2"})
+    notes = rig_notes("replay", {"scan": "scans/a.dsl", "speed": "2"})
     monkeypatch.chdir(tmp_path.parent)
-    assert rig_of_notes(notes) == ("replay", {"session": str(tmp_path / "scans/a.dsl"), "speed": "2"})
+    assert rig_of_notes(notes) == ("replay", {"scan": str(tmp_path / "scans/a.dsl"), "speed": "2"})
 
 
 @pytest.mark.parametrize(
