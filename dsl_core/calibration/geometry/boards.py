@@ -23,6 +23,8 @@ MIN_CORNERS = 12
 SATURATED_SHARE = 0.998
 #: Edges within this share of the distance between corners refine a corner (less where markers are near).
 REACH, ARUCO_REACH, MAX_REACH_PX = 0.35, 0.12, 11
+#: Pictures of so many pixels are enlarged as well, in which squares of six pixels and less are found.
+ENLARGED_PX = 1 << 20
 #: Red, green and blue in the grey picture, as a mosaic samples them.
 _GREY = np.array([0.25, 0.5, 0.25], np.float32)
 #: Colours of a mosaic are made even over so many squares, of which half are black.
@@ -98,12 +100,17 @@ def _checkerboard(grey: NDArray[np.uint8], board: Checkerboard) -> Corners | Non
 
     # Duda and Frese (BMVC 2018): finds and refines in one; does not bend at squares of few pixels.
     thorough = cv2.CALIB_CB_ACCURACY | cv2.CALIB_CB_NORMALIZE_IMAGE | cv2.CALIB_CB_EXHAUSTIVE
-    half = cv2.resize(grey, None, fx=0.5, fy=0.5, interpolation=cv2.INTER_AREA)
-    # Noise of a dark surrounding, or squares of many pixels, hide a board from one attempt but not from all.
-    for picture, flags in ((grey, cv2.CALIB_CB_ACCURACY), (half, thorough), (grey, thorough)):
+    # Noise of a dark surrounding, or squares of many or few pixels, hide a board from some attempts.
+    attempts = [(1.0, cv2.CALIB_CB_ACCURACY), (0.5, thorough), (1.0, thorough)]
+    if grey.size <= ENLARGED_PX:
+        attempts.insert(1, (2.0, cv2.CALIB_CB_ACCURACY))
+    for scale, flags in attempts:
+        how = cv2.INTER_AREA if scale < 1 else cv2.INTER_CUBIC
+        picture = grey if scale == 1 else cv2.resize(grey, None, fx=scale, fy=scale, interpolation=how)
         ok, points = cv2.findChessboardCornersSB(picture, board.corner_grid, flags=flags)
         if ok and points is not None:
-            at = points.reshape(-1, 2) if picture is grey else points.reshape(-1, 2) * 2 + 0.5
+            # The corner of the first pixel, at -0.5 px, stays where it is.
+            at = (points.reshape(-1, 2) + 0.5) / scale - 0.5
             return Corners(np.arange(len(at)), _refined(grey, at))
     return None
 

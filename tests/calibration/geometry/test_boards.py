@@ -193,3 +193,29 @@ def test_edges_bend_by_the_curvature_of_three_corners() -> None:
     assert found[inner, 0] == pytest.approx((1 / 500) / (1 + slope**2) ** 1.5, rel=1e-6)
     assert found[:, 1] == pytest.approx(np.zeros(len(ids)), abs=1e-12)
     assert np.isfinite(found).all()
+
+
+def test_a_board_in_a_small_picture_is_found_with_squares_of_four_pixels() -> None:
+    import cv2
+
+    board, fine = Checkerboard(columns=11, rows=7, square_mm=20.0), 16
+    drawn = np.kron(np.indices((10, 14)).sum(0) % 2, np.ones((fine, fine)))
+    drawn[:fine] = drawn[-fine:] = 1
+    drawn[:, :fine] = drawn[:, -fine:] = 1
+    # Tilted, and drawn eight times as large first.
+    corners = np.array([[9.8, 5.6], [68.6, 11.9], [64.4, 51.8], [6.3, 56.0]], np.float32)
+    size = np.array(drawn.shape[::-1], np.float32)
+    outline = np.array([[0, 0], [size[0], 0], size, [0, size[1]]], np.float32) - 0.5
+    to_picture = cv2.getPerspectiveTransform(outline, corners)
+    enlarged = np.array([[8.0, 0, 3.5], [0, 8, 3.5], [0, 0, 1]]) @ to_picture
+    large = cv2.warpPerspective(drawn.astype(np.float32), enlarged, (8 * 80, 8 * 64), borderValue=1.0)
+    small = cv2.resize(cv2.GaussianBlur(large, (0, 0), 5), (80, 64), interpolation=cv2.INTER_AREA)
+    grey = (100 + 900 * small + np.random.default_rng(0).normal(0, 8, small.shape)).astype(np.float32)
+
+    places = (
+        np.stack(np.meshgrid(np.arange(2, 13), np.arange(2, 9)), -1).reshape(-1, 1, 2) * float(fine) - 0.5
+    )
+    true = cv2.perspectiveTransform(places, to_picture)[:, 0]
+    found = find_corners(grey, board, "the picture").points_px
+    off = min(np.abs(found - each).max() for each in (true, true[::-1]))
+    assert off < 0.4
