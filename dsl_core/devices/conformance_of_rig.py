@@ -40,6 +40,12 @@ class RigParts:
                 )
                 field = lens.width_px / lens.fx_px
                 require(0.02 < field < 6, f"the nominal {what} has a focal length of {lens.fx_px:g} px")
+            told = (known.sensor.bayer, known.sensor.bit_depth)
+            require(
+                told == (camera.bayer, camera.bit_depth),
+                f"the nominal sensor is {told[0]} of {told[1]} bits, the camera {camera.bayer} of"
+                f" {camera.bit_depth} bits",
+            )
             orders = set(known.efficiency)
             require(bool(orders & {1, -1}), f"the nominal orders {sorted(orders)} include neither 1 nor -1")
             if 0 in orders:

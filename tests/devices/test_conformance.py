@@ -69,7 +69,7 @@ class GoodCamera(Camera):
             pixels = pixels.T
         if self.fault == "type":
             pixels = pixels.astype(np.uint8)
-        number = 1 if self.fault == "count" else self.count
+        number = {"count": 1, "wraps": self.count % 128}.get(self.fault, self.count)
         time_s = -float(self.count) if self.fault == "clock" else float(self.count)
         return Frame(pixels, 3.0 if self.fault == "says" else self.exposure_ms, time_s, number)
 
@@ -156,6 +156,8 @@ def _nominal(fault: str) -> Rig:
     }
     if fault == "second order":
         changes["efficiency"] = {2: known.efficiency[1]}
+    if fault == "10 bits":
+        changes["sensor"] = known.sensor.model_copy(update={"bit_depth": 10})
     if fault == "metres":
         changes["film"] = known.film.model_copy(update={"lines_per_mm": 0.48})
     if fault == "no light":
@@ -222,6 +224,7 @@ def test_a_good_rig_passes() -> None:
         ("camera", "shape", "test_camera_delivers_the_raw_mosaic"),
         ("camera", "type", "test_camera_delivers_the_raw_mosaic"),
         ("camera", "count", "test_camera_counts_frames"),
+        ("camera", "wraps", "test_camera_counts_frames"),
         ("camera", "clock", "test_camera_counts_frames"),
         ("camera", "buffer", "test_camera_frames_stay_as_they_are"),
         ("camera", "close", "test_camera_closes_twice"),
@@ -238,6 +241,7 @@ def test_a_good_rig_passes() -> None:
         ("rig", "other shape", "test_rig_nominal_describes_its_devices"),
         ("rig", "second order", "test_rig_nominal_describes_its_devices"),
         ("rig", "metres", "test_rig_nominal_describes_its_devices"),
+        ("rig", "10 bits", "test_rig_nominal_describes_its_devices"),
         ("rig", "no light", "test_rig_nominal_describes_its_devices"),
         ("rig", "percent", "test_rig_filters_are_transmissions"),
         ("rig", "keeps", "test_rig_places_targets_and_puts_them_back"),

@@ -32,7 +32,7 @@ class Webcam:
         self.taken += 1
         if self.taken > self.broken_after:
             return False, None
-        return True, np.full((*self.size, 3), self.taken, np.uint8)
+        return True, np.full((*self.size, 3), self.taken % 256, np.uint8)
 
     def release(self) -> None:
         self.opened = False
