@@ -164,6 +164,7 @@ def _depth(
     Unless all is ``as_calibrated``, light, line spread and lenses are followed: the rig as this scan has it,
     and what was found of them.
     """
+    from dsl_core.reconstruction.code_agreement import code_agreement
     from dsl_core.reconstruction.columns.column import MODEL_ERROR
     from dsl_core.reconstruction.columns.line_spread import own_spread, spread_pixels, with_own_spread
     from dsl_core.reconstruction.columns.peak_error import own_peak_error
@@ -194,7 +195,7 @@ def _depth(
             rig = with_own_spread(rig, found)
             peak_error = own_peak_error(rig, lines, code, white, frames)
         columns = columns_by_rows(rig, options, frames, code, white, peak_error, progress)
-        del code, white  # of large pictures they take much of the memory
+        del white  # of large pictures it takes much of the memory
         geometry = geometry_of(
             rig, lines if options.refine_columns else None, columns, frames.shape, options.surface_window_px
         )
@@ -203,6 +204,10 @@ def _depth(
         if refines_rig:
             rig, geometry, found_of_lenses = follow_lenses(rig, lines, geometry, options.surface_window_px)
             findings += found_of_lenses
+            geometry, found_of_code = code_agreement(
+                rig, frames.plan, code, geometry, options.surface_window_px
+            )
+            findings += found_of_code
     return rig, geometry, findings
 
 

@@ -1,0 +1,196 @@
+"""Whether the binary code agrees with refined columns, and its rows with depth, lenses and pose.
+
+Depth follows from columns alone, so a lens or a pose that is not as calibrated displaces surfaces without a
+trace in any column. Rows of the code are a second witness: with the depth that its column gives, a pixel
+must be lit from the row that its code names. And lines are scanned long after the code: if projector, camera
+or scene move meanwhile, refined columns are displaced from those of the code. A code names whole pixels,
+but many pixels together tell a displacement to some hundredths.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dsl_core.model.fit import FitFinding
+from dsl_core.model.plan import BinaryCode, CapturePlan, EnsembleCode, GrayCode, XorCode
+from dsl_core.model.result import Flag
+from dsl_core.model.rig import Rig
+from dsl_core.patterns.gray_code import DecodedCode
+from dsl_core.reconstruction.geometry import Geometry
+from dsl_core.reconstruction.named_rows import named_rows
+
+Floats = NDArray[np.float64]
+
+#: Tiles of the picture, down and across, whose rows are compared; columns of the projector compared together.
+TILES, COLUMNS_PX = (4, 6), 8
+#: Pixels that a group must have, groups that tell something, and how well a group must tell it (px).
+FEWEST, FEWEST_GROUPS, TELLING_PX = 60, 4, 0.1
+#: Pixels whose rows are compared, about.
+MOST_PIXELS = 12_000
+#: Displacements that are tried, px, and how finely.
+MOST_PX, STEP_PX = 8.0, 0.02
+#: Deviation of where a stripe of the code ends (px), and the share of pixels that may say anything.
+EDGE_PX, STRAY = 0.08, 0.02
+#: What a group is unsure of however many pixels it has: its pixels are wrong together.
+GROUP_STD_PX = 0.02
+#: Rms displacements that matter, px: of lines, whose light is not shaped as a stripe's edge, and of rows.
+MOST_APART_PX, MOST_ROWS_PX = 0.1, 0.05
+#: Share of the error of columns that is seen in rows: pictures are wider than high, and depth follows rows.
+ROWS_TELL = 0.5
+#: Pixels that say nothing: their column is not that of one surface, or is not refined.
+_DOUBTFUL = Flag.NOT_REFINED | Flag.UNUSUAL_PEAK | Flag.DEPTH_EDGE
+
+
+@dataclass(frozen=True)
+class Disagreement:
+    """By how much groups of pixels are off, with deviations, px: (groups,)."""
+
+    shift_px: Floats
+    std_px: Floats
+
+    @classmethod
+    def of(cls, shift_px: Floats, std_px: Floats) -> Disagreement | None:
+        """Of the groups that tell something; None if these are too few."""
+        with np.errstate(invalid="ignore"):
+            telling = std_px < TELLING_PX
+        return cls(shift_px[telling], std_px[telling]) if telling.sum() >= FEWEST_GROUPS else None
+
+    @property
+    def rms_px(self) -> float:
+        """Root mean square of the shifts, less what their deviations explain."""
+        return math.sqrt(max(float(np.mean(self.shift_px**2 - self.std_px**2)), 0.0))
+
+    @property
+    def rms_std_px(self) -> float:
+        """Deviation of the root mean square."""
+        return float(np.sqrt(np.mean(self.std_px**2) / len(self.std_px)))
+
+    @property
+    def worst_px(self) -> float:
+        """The largest shift, with its sign."""
+        return float(self.shift_px[np.abs(self.shift_px).argmax()])
+
+
+def code_agreement(
+    rig: Rig, plan: CapturePlan, code: DecodedCode, geometry: Geometry, window_px: int | None = None
+) -> tuple[Geometry, list[FitFinding]]:
+    """Geometry whose deviations hold what the code disagrees by, and what was found.
+
+    Codes of other programs, which may name parts of a pixel, are not asked. ``window_px`` is that of
+    `reconstruct_geometry`.
+    """
+    if not isinstance(plan.code, GrayCode | XorCode | EnsembleCode):
+        return geometry, []
+    usable = np.isfinite(geometry.depth_mm) & ((geometry.flags & int(_DOUBTFUL)) == 0)
+    findings, error_px = [], 0.0
+    for found in (_of_columns(code, geometry, usable), _of_rows(rig, plan.code, code, geometry, usable)):
+        if found is not None:
+            findings.append(found)
+            share = ROWS_TELL if found.part == "geometry" else 1.0
+            error_px = math.hypot(error_px, found.value / share if found.significant else 0.0)
+    if error_px > 0:
+        geometry = geometry.by(rig, np.full(geometry.depth_mm.shape, np.float32(error_px)), window_px)
+    return geometry, findings
+
+
+def displacement(
+    named_px: NDArray[np.integer], exact_px: Floats, group: NDArray[np.integer], groups: int
+) -> tuple[Floats, Floats]:
+    """By how much ``exact_px`` must be moved to agree with the pixels that a code names, group by group.
+
+    The first three are (n,); the displacement of each group and its deviation are (groups,), px, NaN where
+    a group has too few pixels. A pixel says that the place is within half a pixel of the named one, and
+    nothing about where: groups that see all of their pixels at one phase tell little, and their deviation
+    says so.
+    """
+    # An odd number of places, so that none is preferred.
+    most = round((MOST_PX + 1) / STEP_PX)
+    centres = STEP_PX * np.arange(-most, most + 1, dtype=np.float64)
+    edges = np.append(centres - STEP_PX / 2, centres[-1] + STEP_PX / 2)
+    log_likelihood = np.log(_named(centres))
+    tried = centres[np.abs(centres) < MOST_PX - 0.5]
+    away = named_px - exact_px
+    shifts, stds = np.full((2, groups), np.nan)
+    for each in range(groups):
+        seen, _ = np.histogram(away[group == each], edges)
+        if seen.sum() < FEWEST:
+            continue
+        score = _correlated(seen.astype(np.float64), log_likelihood, len(tried))
+        weight = np.exp(score - score.max())
+        weight /= weight.sum()
+        shifts[each] = weight @ tried
+        stds[each] = math.hypot(math.sqrt(float(weight @ (tried - shifts[each]) ** 2)), GROUP_STD_PX)
+    return shifts, stds
+
+
+def _named(away_px: Floats) -> Floats:
+    """Probability that a code names a pixel whose centre is so far from the place that it sees."""
+    from scipy.special import ndtr
+
+    inside = ndtr((away_px + 0.5) / EDGE_PX) - ndtr((away_px - 0.5) / EDGE_PX)
+    return np.asarray((1 - STRAY) * inside + STRAY / (2 * MOST_PX))
+
+
+def _correlated(seen: Floats, log_likelihood: Floats, tried: int) -> Floats:
+    """Log likelihood of each displacement that is tried, (tried,)."""
+    from scipy.signal import fftconvolve
+
+    floor = float(log_likelihood.min())
+    # Beyond the table there is nothing but stray pixels: the same floor.
+    score = fftconvolve(seen, (log_likelihood - floor)[::-1], mode="same")
+    first = (len(seen) - tried) // 2
+    return np.asarray(score[first : first + tried])
+
+
+def _of_columns(code: DecodedCode, geometry: Geometry, usable: NDArray[np.bool_]) -> FitFinding | None:
+    usable = usable & (code.column >= 0)
+    column = geometry.column_px[usable].astype(np.float64)
+    group = (column.clip(0) / COLUMNS_PX).astype(int)
+    groups = int(group.max(initial=0)) + 1
+    found = Disagreement.of(*displacement(code.column[usable], column, group, groups))
+    if found is None:
+        return None
+    return FitFinding.judged(
+        "motion",
+        "lines against the binary code",
+        (found.rms_px, found.rms_std_px),
+        "px",
+        MOST_APART_PX,
+        f"Lines lie {found.rms_px:.2f} columns (rms, at most {-found.worst_px:+.2f}) from where the binary"
+        " code saw the same points: the projector's picture, the camera or the scene moved between them."
+        " Deviations of depth contain it.",
+        "Let projector and camera warm up, fix them and the scene, and scan again.",
+    )
+
+
+def _of_rows(
+    rig: Rig, kind: BinaryCode, code: DecodedCode, geometry: Geometry, usable: NDArray[np.bool_]
+) -> FitFinding | None:
+    if code.row is None:
+        return None
+    pixels = np.flatnonzero(usable & (code.row >= 0))
+    # An odd number keeps all colours of the mosaic.
+    pixels = pixels[:: len(pixels) // MOST_PIXELS | 1]
+    exact, expected = named_rows(rig, kind, pixels, geometry.depth_mm.ravel()[pixels])
+    height, width = geometry.depth_mm.shape
+    tile = pixels // width * TILES[0] // height * TILES[1] + pixels % width * TILES[1] // width
+    usual, unsure = displacement(expected, exact, tile, TILES[0] * TILES[1])
+    shift, std = displacement(code.row.ravel()[pixels], exact, tile, TILES[0] * TILES[1])
+    found = Disagreement.of(shift - usual, np.hypot(std, unsure))
+    if found is None:
+        return None
+    return FitFinding.judged(
+        "geometry",
+        "rows of the binary code",
+        (found.rms_px, found.rms_std_px),
+        "px",
+        MOST_ROWS_PX,
+        f"Rows of the projector lie {found.rms_px:.2f} px (rms, at most {found.worst_px:+.2f}) from where"
+        " lenses, pose and depth place them: a lens or the pose is not as calibrated, and depth is wrong with"
+        " them. Its deviations contain what rows can tell of that.",
+        "Check focus, zoom and mounts of camera and projector, and calibrate the geometry again.",
+    )

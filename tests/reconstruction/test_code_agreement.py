@@ -1,0 +1,132 @@
+"""What the binary code says of lines that moved, and of lenses and a pose that are not as calibrated."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from dsl_core import pipeline
+from dsl_core.devices.base import DeviceRig
+from dsl_core.evaluation.summary import Evaluation
+from dsl_core.model.fit import Fit, FitFinding
+from dsl_core.model.geometry import Pose
+from dsl_core.model.plan import BinaryCode, CapturePlan, EnsembleCode, GrayCode, ScanLines, Setting, XorCode
+from dsl_core.model.rig import Rig
+from dsl_core.model.spectral import WavelengthGrid
+from dsl_core.reconstruction.code_agreement import displacement
+from dsl_core.reconstruction.named_rows import named_rows
+from dsl_core.workflows import scans
+from tests.cases.small_rig import small_rig
+from tests.cases.twin_scan import MemoryScan, twin_scan
+
+
+@pytest.fixture(scope="module")
+def scanned() -> tuple[DeviceRig, MemoryScan]:
+    """A plane seen in 80 x 52 pixels, by one setting and few lines."""
+    plan = CapturePlan(
+        spectral=ScanLines(step_px=4), settings=(Setting(exposure_ms=20.0, level=0.8),), code_settings=(0,)
+    )
+    return twin_scan(plan, size="80x52", scene="color-checker")
+
+
+def findings(
+    scanned: tuple[DeviceRig, MemoryScan], rig: Rig, scan: MemoryScan
+) -> tuple[dict[str, FitFinding], Evaluation]:
+    result = pipeline.reconstruct(scan, rig, pipeline.Options(spectra=False))
+    fit = Fit.read(result.attrs)
+    truth = scans.twin_truth(scanned[0], WavelengthGrid())
+    assert fit is not None
+    assert truth is not None
+    return {f.part: f for f in fit.findings if "binary code" in f.name}, pipeline.evaluate(result, truth)
+
+
+def calibration_of(devices: DeviceRig) -> Rig:
+    assert devices.calibration is not None
+    return devices.calibration
+
+
+def turned(rig: Rig, degrees: float) -> Rig:
+    """The rig with the projector turned about the vertical."""
+    c, s = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
+    turn = np.array([[c, 0, s], [0, 1, 0], [-s, 0, c]])
+    rotation, translation = turn @ rig.pose.matrix, turn @ rig.pose.vector_mm
+    a, b, c3 = (tuple(row) for row in rotation.tolist())
+    return rig.model_copy(update={"pose": Pose(rotation=(a, b, c3), translation_mm=tuple(translation))})
+
+
+def held(evaluation: Evaluation) -> float:
+    assert evaluation.depth_calibration is not None
+    return evaluation.depth_calibration.coverage_95
+
+
+def test_nothing_is_found_where_all_is_as_calibrated(scanned: tuple[DeviceRig, MemoryScan]) -> None:
+    found, _ = findings(scanned, calibration_of(scanned[0]), scanned[1])
+    assert found["geometry"].value < 0.02
+    assert found["motion"].value < 0.03
+    assert not any(each.significant for each in found.values())
+
+
+def test_a_projector_turned_since_calibration_is_told_and_depth_says_how_unsure_it_is(
+    scanned: tuple[DeviceRig, MemoryScan],
+) -> None:
+    found, evaluation = findings(scanned, turned(calibration_of(scanned[0]), 0.05), scanned[1])
+    assert evaluation.depth is not None
+    assert abs(evaluation.depth.bias_mm) > 3.0
+    assert found["geometry"].significant
+    assert not found["motion"].significant
+    assert held(evaluation) > 0.9
+
+
+def test_lines_that_moved_after_the_code_are_told(scanned: tuple[DeviceRig, MemoryScan]) -> None:
+    devices, scan = scanned
+    lines = [shot.index for shot in scan.plan.shots() if shot.role == "spectral"]
+    moved = list(scan.frames)
+    for now, after in pairwise(lines):
+        # A mean of two lines, one step of 4 columns apart, is displaced.
+        moved[now] = np.round(0.86 * scan.frames[now] + 0.14 * scan.frames[after]).astype(np.uint16)
+    found, evaluation = findings(scanned, calibration_of(devices), MemoryScan(scan.plan, tuple(moved)))
+    assert found["motion"].significant
+    assert 0.1 < found["motion"].value < 0.5
+    assert held(evaluation) > 0.9
+
+
+@pytest.mark.parametrize("code", [GrayCode(), XorCode(), EnsembleCode()])
+def test_rows_are_named_to_a_pixel_whatever_the_code(code: BinaryCode) -> None:
+    shift, std = off(small_rig(), code)
+    assert shift == pytest.approx(0, abs=0.03)
+    assert std < 0.05
+
+
+def test_light_of_the_first_orders_moves_the_ends_of_stripes_by_less_than_a_row() -> None:
+    pixels, depth = np.arange(0, 890 * 580, 211), np.full(2447, 700.0)
+    exact, rows = named_rows(small_rig(), GrayCode(), pixels, depth)
+    plain = named_rows(small_rig().model_copy(update={"efficiency": {}}), GrayCode(), pixels, depth)[1]
+    inside = (exact > 1) & (exact < 358) & (rows >= 0) & (plain >= 0)
+    assert 0.02 < (rows != plain)[inside].mean() < 0.3
+    assert (np.abs(rows - plain)[inside] <= 1).all()
+    assert (plain[inside] == np.round(exact[inside])).mean() > 0.95
+
+
+def off(rig: Rig, code: BinaryCode) -> tuple[float, float]:
+    """By how much the rows that a code names are off where they are from 120 to 220, and the deviation."""
+    pixels = np.arange(0, 890 * 580, 211)
+    exact, rows = named_rows(rig, code, pixels, np.full(pixels.size, 700.0))
+    inside = (exact > 120) & (exact < 220) & (rows >= 0)
+    shift, std = displacement(rows[inside], exact[inside], np.zeros(inside.sum(), int), 1)
+    return float(shift[0]), float(std[0])
+
+
+def test_a_displacement_is_found_below_a_pixel_and_unknown_at_one_phase() -> None:
+    rng = np.random.default_rng(0)
+    exact = rng.uniform(0, 100, 600)
+    group = np.repeat([0, 1, 2], 200)
+    exact[group == 1] = np.floor(exact[group == 1])
+    named = np.round(exact + 0.3).astype(np.int32)
+    named[::17] = 3
+    shift, std = displacement(named, exact, group, 4)
+    assert shift[[0, 2]] == pytest.approx(0.3, abs=0.05)
+    assert (std[[0, 2]] < 0.05).all()
+    assert std[1] > 0.15
+    assert np.isnan(shift[3])
