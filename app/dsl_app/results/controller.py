@@ -22,6 +22,7 @@ from dsl_app.shared.notify import Notifier, sentence_of
 from dsl_app.shared.spectrum import Pixel
 from dsl_app.shared.undo import Change, UndoStack
 from dsl_core.errors import DslError
+from dsl_core.io.result.completed import completed
 from dsl_core.io.result.result_arrays import ResultArrays, load_arrays
 from dsl_core.optics.levels import rgba_of_colours
 from dsl_core.progress import Progress
@@ -113,7 +114,7 @@ class ResultsController:
         def both(progress: Progress) -> tuple[ResultArrays, NDArray[np.uint8] | None]:
             from dsl_core.optics.colour import observer_weights
 
-            arrays = work(progress)
+            arrays = completed(work(progress))
             if arrays.has_spectra:
                 # Import here what the first comparison of colours needs; later it would block the window.
                 observer_weights(arrays.wavelengths_nm)

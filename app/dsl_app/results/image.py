@@ -147,8 +147,13 @@ class ResultImage(QWidget):
             self.fit()
 
     def fit(self) -> None:
-        """Show the whole image."""
-        self.canvas.fit()
+        """Show the whole image; also where its view has nothing to show."""
+        result = self._state.result.value
+        if self.image.image is None and result is not None:
+            height, width = result.shape
+            self.box.setRange(xRange=(-0.5, width - 0.5), yRange=(-0.5, height - 0.5), padding=0.01)
+        else:
+            self.canvas.fit()
 
     def paint(self) -> None:
         """Paint the view of the state."""
@@ -156,7 +161,9 @@ class ResultImage(QWidget):
         if layer is None:
             self.image.clear()
             self.bar.hide()
-            self.legend.hide()
+            lacks = "" if self._layers is None else self._layers.lacks(self._state.quality.value)
+            self.legend.setText(lacks)
+            self.legend.setVisible(bool(lacks))
             return
         levels = layer.levels if layer.levels is not None else (0, 255)
         table = layer.table

@@ -28,6 +28,15 @@ from dsl_core.optics.levels import Bands, Levels, between, rgba_of_colours, spre
 ORDER_TEXTS = {1: "order +1", 2: "order −1", 3: "both first orders", 4: "zero order only"}
 ORDER_COLOURS = {1: "#4477aa", 2: "#ee6677", 3: "#228833", 4: "#ccbb44"}
 NOTHING = "#8a8f98"
+#: The variable of a result that each map of the quality shows; those of bands.
+_SHOWN_OF = {
+    QualityMap.FLAGS: "flags",
+    QualityMap.ORDERS: "reach",
+    QualityMap.SHARE: "data_share",
+    QualityMap.SPREAD: "reflectance_std",
+    QualityMap.DEPTH_SPREAD: "depth_std_mm",
+}
+_OF_BANDS = (QualityMap.ORDERS, QualityMap.SHARE, QualityMap.SPREAD)
 
 
 @dataclass(frozen=True)
@@ -147,6 +156,8 @@ class Layers:
         return Layer(np.dstack([table[picture[..., :3]], picture[..., 3:]]), contrast=contrast)
 
     def _quality(self, what: QualityMap, band: int) -> Layer | None:
+        if self.lacks(what):
+            return None
         if what is QualityMap.DEPTH_SPREAD:
             return self._map("depth_std_mm", DEPTH, "Standard deviation of depth (mm)", "mm")
         if what is QualityMap.FLAGS or not self.result.has_spectra:
@@ -157,6 +168,11 @@ class Layers:
         if what is QualityMap.SHARE:
             return self._share(band)
         return self._of_band("reflectance_std", band, SHARE, "Standard deviation of reflectance")
+
+    def lacks(self, what: QualityMap) -> str:
+        """Why there is nothing to show of the quality; empty where there is."""
+        name = _SHOWN_OF[what] if self.result.has_spectra or what not in _OF_BANDS else "flags"
+        return f"This result has no {what.value}." if name in self.result.missing else ""
 
     def _share(self, band: int) -> Layer:
         return self._scaled("data_share", self.result["data_share"][band], (0.0, 1.0), SHARE, "Data share")

@@ -41,7 +41,9 @@ def limits_text(result: ResultArrays, pixel: Pixel) -> str:
     share = result.at("data_share", pixel) if "data_share" in result.arrays else None
     spread = float(result.at("depth_std_mm", pixel)) if "depth_std_mm" in result.arrays else None
     sentences = explain_pixel(int(result.at("flags", pixel)), result.wavelengths_nm, share, spread)
-    return f"Limited: {'; '.join(sentences)}." if sentences else "This pixel has no flags."
+    if sentences:
+        return f"Limited: {'; '.join(sentences)}."
+    return "This result has no flags." if "flags" in result.missing else "This pixel has no flags."
 
 
 class PixelInfo(QFrame):

@@ -7,10 +7,12 @@ from dataclasses import dataclass
 from enum import IntEnum
 from pathlib import Path
 
+from dsl_core.io.result.completed import missing_text
 from dsl_core.io.result.result_arrays import ResultArrays
 from dsl_core.model.calibration.accepted import read_missed
 from dsl_core.model.fit import Fit
 from dsl_core.model.rendered_effects import RenderedEffects
+from dsl_core.words import counted
 
 
 class Content(IntEnum):
@@ -53,12 +55,13 @@ def summarise(result: ResultArrays | None, offer: Path | None, busy: str) -> Sum
     if result is None:
         return Summary(content, message=message, can_reconstruct=can_reconstruct)
     height, width = result.shape
-    bands = f" · {len(result.wavelengths_nm)} bands" if result.has_spectra else " · depth only"
+    bands = f" · {counted(len(result.wavelengths_nm), 'band')}" if result.has_spectra else " · depth only"
     captured = str(result.attributes.get("captured", ""))[:16].replace("T", " ")
     effects, details = effects_text(result.attributes)
     fit = Fit.read(result.attributes)
     missed = read_missed(result.attributes)
     doubted = fit if fit is not None and fit.significant else None
+    lacks = [text] if (text := missing_text(result)) else []
     parts = (f"{width} × {height} px{bands}", captured, effects, str(result.path))
     return Summary(
         content,
@@ -70,8 +73,8 @@ def summarise(result: ResultArrays | None, offer: Path | None, busy: str) -> Sum
         message=message,
         can_reconstruct=can_reconstruct,
         has_result=True,
-        warning=" ".join([*missed, *([doubted.headline] if doubted else [])]),
-        advice="\n".join([*missed, *([doubted.words] if doubted else [])]),
+        warning=" ".join([*missed, *([doubted.headline] if doubted else []), *lacks]),
+        advice="\n".join([*missed, *([doubted.words] if doubted else []), *lacks]),
     )
 
 

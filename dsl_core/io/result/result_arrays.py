@@ -25,12 +25,16 @@ AT_ONCE_BYTES = 16e6
 
 @dataclass(frozen=True)
 class ResultArrays:
-    """The arrays of a result by the names of `VARIABLES`; what the result does not hold is missing."""
+    """The arrays of a result by the names of `VARIABLES`; what the result does not hold is not there.
+
+    ``missing`` names what `completed` put in its place as unknown.
+    """
 
     path: Path
     wavelengths_nm: NDArray[np.float64]
     arrays: Mapping[str, NDArray[Any]]
     attributes: Mapping[str, Any] = field(default_factory=dict)
+    missing: tuple[str, ...] = ()
 
     @property
     def shape(self) -> tuple[int, int]:
@@ -46,6 +50,10 @@ class ResultArrays:
     def __getitem__(self, name: str) -> NDArray[Any]:
         """The array of a name; raises ``KeyError``."""
         return self.arrays[name]
+
+    def known(self, name: str) -> NDArray[Any] | None:
+        """The array of a name; None where the result does not hold it itself."""
+        return None if name in self.missing else self.arrays.get(name)
 
     def at(self, name: str, pixel: tuple[int, int]) -> NDArray[Any]:
         """Everything that a variable holds for a pixel ``(x, y)``: one value, or one per band or axis."""
@@ -63,11 +71,37 @@ def _parts(variable: xr.DataArray) -> list[slice]:
     return [slice(first, first + each) for first in range(0, len(variable), each)]
 
 
+def _ordered(result: xr.Dataset, path: Path) -> xr.Dataset:
+    """The same with axes and bands in the order that is relied on."""
+    for name in VARIABLES:
+        axes = VARIABLES[name][0]
+        if name in result and set(result[name].dims) != set(axes):
+            has = ", ".join(str(axis) for axis in result[name].dims)
+            raise StoreError(
+                f"{path} has {name} along the axes ({has}); ({', '.join(axes)}) are needed. Rename them where"
+                " the result was made."
+            )
+        if name in result:
+            result[name] = result[name].transpose(*axes)
+    if "reflectance" not in result:
+        return result
+    nm = result["wavelength_nm"].values if "wavelength_nm" in result.coords else np.empty(0)
+    if not nm.size or not np.isfinite(nm).all() or len(np.unique(nm)) < nm.size:
+        raise StoreError(
+            f"{path} has a reflectance, but not one wavelength for each of its bands. Add the coordinate"
+            " wavelength_nm, in nm."
+        )
+    return result if (np.diff(nm) > 0).all() else result.isel(wavelength_nm=np.argsort(nm))
+
+
 def load_arrays(path: Path, progress: Progress | None = None) -> ResultArrays:
-    """Read a whole result; never holds much more than it. Raises `StoreError`."""
+    """Read a whole result, with its bands rising; never holds much more than it.
+
+    Raises `StoreError`, also for a result of another program whose arrays have other axes.
+    """
     progress = progress or NoProgress()
-    result = load_result(path)
-    if "depth_mm" not in result:
+    result = _ordered(load_result(path), path)
+    if not {"depth_mm", "reflectance"} & set(result):
         raise StoreError(
             f"{path} contains columns of the projector and no depth. Reconstruct its scan with a calibration,"
             " or export the columns with 'dsl-scan export'."
@@ -83,4 +117,8 @@ def load_arrays(path: Path, progress: Progress | None = None) -> ResultArrays:
             arrays[name][part] = variable[part].values
             done += 1
     nm = result["wavelength_nm"].values if "wavelength_nm" in result.coords else np.empty(0)
+    if "depth_mm" not in arrays:
+        # Where pixels are is unknown; their spectra can be looked at all the same.
+        arrays["depth_mm"] = np.full(arrays["reflectance"].shape[1:], np.nan, np.float32)
+        return ResultArrays(path, np.asarray(nm, np.float64), arrays, dict(result.attrs), ("depth_mm",))
     return ResultArrays(path, np.asarray(nm, np.float64), arrays, dict(result.attrs))

@@ -167,7 +167,10 @@ def _check_version(version: object, path: Path) -> None:
     if version == SCHEMA_VERSION:
         return
     if version is None:
-        raise StoreError(f"{path}: a dataset without schema_version is not a result of this program.")
+        raise StoreError(
+            f"{path}: a dataset without schema_version is not a result of this program. If its arrays"
+            f" are named like those of one, add the attribute schema_version with the value {SCHEMA_VERSION}."
+        )
     raise StoreError(
         f"{path} is a result of schema version {version}; this program supports version {SCHEMA_VERSION}."
         " Use the version of the program that wrote it, or reconstruct the scan again."

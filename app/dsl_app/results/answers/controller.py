@@ -81,18 +81,18 @@ class AnswersController:
             from dsl_core.analysis.classify import score
 
             found, notes = classes(result, progress)
-            held = result.arrays
             scores = score(
                 result["reflectance"],
-                held.get("reflectance_std"),
-                held.get("data_share"),
+                result.known("reflectance_std"),
+                result.known("data_share"),
                 result["flags"],
                 found,
                 way.measure,
                 way.brightness,
                 progress,
             )
-            areas = pixel_areas_mm2(result["points_mm"], held.get("normals")) if "points_mm" in held else None
+            points = result.known("points_mm")
+            areas = None if points is None else pixel_areas_mm2(points, result.known("normals"))
             made = Classification.of(scores, brightness=way.brightness, areas_mm2=areas)
             doubts = tuple(doubt for each in found if (doubt := doubt_of(each)))
             return Materials(title.removeprefix("Materials by "), made, (*doubts, *notes))
@@ -169,8 +169,12 @@ def classes_of_marks(result: ResultArrays, marks: list[Mark]) -> tuple[SpectralC
     from dsl_core.errors import CalibrationError, DecodeError
     from dsl_core.evaluation.marks import mask_of_outline, mask_of_runs
 
-    if "reflectance_std" not in result.arrays:
-        raise DecodeError("The result states no deviations. Reconstruct the scan again.")
+    std = result.known("reflectance_std")
+    if std is None:
+        raise DecodeError(
+            "The result states no deviations of its spectra. Reconstruct the scan again, or name materials"
+            " from a library by spectral angle."
+        )
     classes = []
     for mark in marks:
         if mark.curve is not None:
@@ -187,6 +191,6 @@ def classes_of_marks(result: ResultArrays, marks: list[Mark]) -> tuple[SpectralC
             mask = mask_of_runs(mark.runs, result.shape)
         else:
             mask = mask_of_outline(mark.outline_px, result.shape)
-        cubes = (result["reflectance"], result["reflectance_std"])
+        cubes = (result["reflectance"], std)
         classes.append(class_of_pixels(mark.name, *cubes, mask, result["flags"]))
     return tuple(classes)

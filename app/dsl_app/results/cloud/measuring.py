@@ -36,15 +36,15 @@ class Measured:
 def measure_points(result: ResultArrays, kind: Measure, first: Pixel, last: Pixel) -> Measured:
     """The distance or section between two pixels that have points."""
     a, b = (np.asarray(result.at("points_mm", pixel), np.float64) for pixel in (first, last))
-    has_std = "depth_std_mm" in result.arrays
+    std = result.known("depth_std_mm")
     a_std, b_std = (
-        float(np.nan_to_num(result.at("depth_std_mm", pixel))) if has_std else 0.0 for pixel in (first, last)
+        0.0 if std is None else float(np.nan_to_num(std[pixel[1], pixel[0]])) for pixel in (first, last)
     )
     distance = distance_between(a, b, a_std, b_std)
     text = f"Distance {_with_deviation(distance.mm, distance.std_mm)} mm"
     if kind is Measure.DISTANCE:
         return Measured(text, (a, b))
-    cut = section(result["points_mm"], result["depth_std_mm"] if has_std else None, first, last)
+    cut = section(result["points_mm"], std, first, last)
     if cut is None:
         return Measured("There is no section between these two points: choose two that are apart.")
     low, high = np.nanmin(cut.height_mm), np.nanmax(cut.height_mm)
@@ -65,8 +65,8 @@ def _with_deviation(value: float, std: float) -> str:
 
 def measure_plane(result: ResultArrays, mask: NDArray[np.bool_]) -> Measured:
     """The plane through the points of the pixels of a mask (rows, columns)."""
-    std = result["depth_std_mm"][mask] if "depth_std_mm" in result.arrays else None
-    fit = fit_plane(result["points_mm"][:, mask].T, std)
+    std = result.known("depth_std_mm")
+    fit = fit_plane(result["points_mm"][:, mask].T, None if std is None else std[mask])
     if fit is None:
         return Measured("No plane fits: at least four points that are not in a line are needed.")
     return Measured(_plane_text(fit))

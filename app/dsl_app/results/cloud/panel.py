@@ -195,11 +195,11 @@ class CloudPanel(QWidget):
 
     def _choose_points(self, result: ResultArrays) -> None:
         """Choose the points within the limits; the others can neither be seen nor pointed at."""
-        points, arrays = result["points_mm"], result.arrays
+        points, std, normals = result["points_mm"], result.known("depth_std_mm"), result.known("normals")
         flat = np.flatnonzero(within(points[2], self._state.depth_limits.value))
         self._picking.take(np.ascontiguousarray(points.reshape(3, -1)[:, flat].T), flat, result.shape[1])
-        edge = (arrays["flags"] & int(Flag.DEPTH_EDGE)) != 0 if "flags" in arrays else None
-        self._grid = Grid(result.shape, flat, arrays.get("depth_std_mm"), edge, arrays.get("normals"))
+        edge = (result["flags"] & int(Flag.DEPTH_EDGE)) != 0
+        self._grid = Grid(result.shape, flat, std, edge, normals)
 
     def _show_result(self) -> None:
         self._paint()

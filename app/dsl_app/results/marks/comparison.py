@@ -81,4 +81,4 @@ def distance_table(chosen: Mark, others: list[Mark], result: ResultArrays, theme
 
 def _spread(result: ResultArrays, mark: Mark) -> float:
     assert mark.pixel is not None
-    return float(result.at("depth_std_mm", mark.pixel)) if "depth_std_mm" in result.arrays else 0.0
+    return 0.0 if result.known("depth_std_mm") is None else float(result.at("depth_std_mm", mark.pixel))

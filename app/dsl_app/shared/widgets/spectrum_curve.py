@@ -15,6 +15,8 @@ from dsl_app.shared.spectrum import Spectrum
 from dsl_core.evaluation.uncertainty import DECIDED_FROM
 
 Floats = NDArray[np.floating[Any]]
+#: To either side of a single band, its value is drawn so far, nm.
+SINGLE_NM = 4.0
 
 
 def split_by_share(mean: Floats, share: Floats | None) -> tuple[Floats, Floats]:
@@ -30,6 +32,13 @@ def split_by_share(mean: Floats, share: Floats | None) -> tuple[Floats, Floats]:
     undecided[1:] |= ~decided[:-1]
     undecided[:-1] |= ~decided[1:]
     return np.where(decided, values, np.nan), np.where(undecided, values, np.nan)
+
+
+def _widened(spectrum: Spectrum) -> Spectrum:
+    """A spectrum of one band as a level line, as a curve through one point draws nothing."""
+    std, share = (None if each is None else np.repeat(each, 2) for each in (spectrum.std, spectrum.share))
+    nm = spectrum.nm[0] + np.array([-SINGLE_NM, SINGLE_NM])
+    return Spectrum(nm, np.repeat(spectrum.mean, 2), std, share, spectrum.sigmas)
 
 
 class SpectrumCurve:
@@ -67,6 +76,8 @@ class SpectrumCurve:
             item.setVisible(spectrum is not None)
         if spectrum is None:
             return
+        if len(spectrum.nm) == 1:
+            spectrum = _widened(spectrum)
         solid, dashed = split_by_share(spectrum.mean, spectrum.share)
         self.solid.setData(spectrum.nm, solid)
         self.dashed.setData(spectrum.nm, dashed)
