@@ -23,6 +23,7 @@ from dsl_core.version import __version__
 if TYPE_CHECKING:
     from dsl_core.api.answers import classify as classify
     from dsl_core.api.answers import colours as colours
+    from dsl_core.api.arrays import calibrate_geometry as calibrate_geometry
     from dsl_core.api.arrays import decode_stack as decode_stack
     from dsl_core.api.arrays import depth_of_columns as depth_of_columns
     from dsl_core.api.arrays import read_spectra as read_spectra
@@ -41,7 +42,7 @@ if TYPE_CHECKING:
 _SCANS = ("load_calibration", "load_scan", "open_rig", "plan", "reconstruct", "rigs", "scan")
 _RESULTS = ("evaluate", "export", "load_result", "save_result")
 _ANSWERS = ("classify", "colours")
-_ARRAYS = ("decode_stack", "depth_of_columns", "read_spectra")
+_ARRAYS = ("calibrate_geometry", "decode_stack", "depth_of_columns", "read_spectra")
 #: The module of each public name.
 _HOMES = (
     dict.fromkeys(_SCANS, "dsl_core.api.scans")
@@ -52,6 +53,7 @@ _HOMES = (
 
 __all__ = [
     "__version__",
+    "calibrate_geometry",
     "classify",
     "colours",
     "decode_stack",

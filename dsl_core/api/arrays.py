@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -15,8 +15,10 @@ if TYPE_CHECKING:
     import numpy as np
     import xarray as xr
 
+    from dsl_core.model.board import Board
+    from dsl_core.model.calibration.geometry import GeometryCalibration
     from dsl_core.model.plan import CodeSet
-    from dsl_core.model.rig import Rig
+    from dsl_core.model.rig import BayerPattern, Rig
 
 
 @names_missing_packages
@@ -47,11 +49,46 @@ def decode_stack(
 
 
 @names_missing_packages
-def depth_of_columns(calibration: Rig, column_px: ArrayLike) -> NDArray[np.float64]:
+def calibrate_geometry(
+    poses: Iterable[Sequence[ArrayLike]],
+    board: Board,
+    projector_size_px: tuple[int, int],
+    *,
+    bayer: BayerPattern | None = None,
+    camera_binning: float = 1.0,
+    baseline_mm: float | None = None,
+    hold: Collection[str] = (),
+) -> GeometryCalibration:
+    """Lenses of camera and projector, and their pose, from pictures of a printed board under Gray code.
+
+    ``poses`` holds for each pose of the board its pictures, arrays (rows, columns) of values linear in light:
+    pattern and inverse of every bit of the projector's columns, then of its rows, then white and black.
+    ``board`` is a `Checkerboard` or `Charuco` of `dsl_core.model.board`, ``projector_size_px`` (width,
+    height), ``bayer`` the mosaic of the camera, ``camera_binning`` how many pixels of the sensor a pixel
+    spans, ``baseline_mm`` a measured distance of the devices that checks the printed size. ``hold`` names
+    terms of distortion that are zero in both lenses, of k1, k2, k3 and tangential: few poses do not determine
+    all::
+
+        found = dsl.calibrate_geometry(poses, Checkerboard(columns=11, rows=7, square_mm=20), (640, 360))
+        depth_mm = dsl.depth_of_columns(found, columns)
+
+    The record has ``camera``, ``projector`` (px), ``pose`` (mm), each with its deviation, ``rms_px``, a line
+    for each of the ``poses``, and ``warnings``: sentences on what is doubtful. Poses that cannot be read are
+    left out. Raises `CalibrationError` when fewer than three are left, or pictures are missing or differ in
+    size.
+    """
+    from dsl_core.workflows import stacks
+
+    return stacks.calibrate_stacks(poses, board, projector_size_px, bayer, camera_binning, baseline_mm, hold)
+
+
+@names_missing_packages
+def depth_of_columns(calibration: Rig | GeometryCalibration, column_px: ArrayLike) -> NDArray[np.float64]:
     """Depth along the camera's axis, mm, of the columns (px) that all pixels see; NaN where there is none.
 
-    ``calibration`` is what `load_calibration` returns; ``column_px`` (rows, columns) has the camera's size.
-    Each camera ray meets the plane of its projector column. Raises `DecodeError` for another size.
+    ``calibration`` is what `load_calibration` or `calibrate_geometry` returns; ``column_px`` (rows, columns)
+    has the camera's size. Each camera ray meets the plane of its projector column. Raises `DecodeError` for
+    another size.
     """
     from dsl_core.workflows import stacks
 

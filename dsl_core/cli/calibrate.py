@@ -97,6 +97,17 @@ def geometry(
         float | None,
         typer.Option(help="Pictures: distance from camera to projector, to check the printed size."),
     ] = None,
+    guess: Annotated[
+        bool, typer.Option("--guess", help="Pictures: find out what each shows; else graycode order.")
+    ] = False,
+    mapping: Annotated[
+        Path | None,
+        typer.Option(help="Pictures: what each shows, as 'dsl-scan import --guess' writes it."),
+    ] = None,
+    hold: Annotated[
+        list[str],
+        typer.Option(help="Pictures: distortion held at zero: k1, k2, k3, tangential; may be repeated."),
+    ] = [],  # noqa: B006
     target: Annotated[
         Path | None, typer.Option("--output", "-o", help="Pictures: GEOMETRY.json to write.")
     ] = None,
@@ -108,12 +119,15 @@ def geometry(
     if pictures:
         printed = board_of(board, square_mm, marker_mm, dictionary)
         files = (target, xml)
+        layout = (guess, mapping)
         calibrate_pictures(
-            Output(json), folder, printed, projector, binning, bayer, baseline_mm, files, force
+            Output(json), folder, printed, projector, binning, bayer, baseline_mm, files, layout, hold, force
         )
         return
-    if target is not None or xml is not None:
-        raise CalibrationError("--output and --xml need --pictures; 'calibrate all' writes the rig.")
+    if target is not None or xml is not None or guess or mapping is not None or hold:
+        raise CalibrationError(
+            "--output, --xml, --guess, --mapping and --hold need --pictures; 'calibrate all' writes the rig."
+        )
     found = board_of(board, square_mm, marker_mm, dictionary)
     own = [] if found is None else [f"board={found.model_dump_json()}"]
     run_guided("geometry", folder, rig, option, [*own, *set_], yes, json, redo, accept_failed)

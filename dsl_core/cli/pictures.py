@@ -11,6 +11,7 @@ from dsl_core.errors import CalibrationError
 from dsl_core.io.staging import check_targets
 
 if TYPE_CHECKING:
+    from dsl_core.io.pictures.mapping import Mapping
     from dsl_core.model.board import Charuco, Checkerboard
     from dsl_core.model.calibration.geometry import GeometryCalibration, PoseQuality
     from dsl_core.model.rig import BayerPattern
@@ -49,11 +50,15 @@ def calibrate_pictures(
     bayer: str | None,
     baseline_mm: float | None,
     targets: tuple[Path | None, Path | None],
+    layout: tuple[bool, Path | None],
+    hold: list[str],
     force: bool,
 ) -> None:
     """Calibrate from a folder of pose folders, print what was found and write the files requested.
 
-    ``targets`` are those of the record and of the published XML or YAML.
+    ``targets`` are those of the record and of the published XML or YAML. ``layout`` says whether what the
+    pictures show is to be guessed, and names a mapping that says it. Terms of distortion in ``hold`` are
+    zero.
     """
     from dsl_core.io.published.stereo import save_stereo, stereo_of
     from dsl_core.io.records import write_record
@@ -65,8 +70,11 @@ def calibrate_pictures(
     if board is None:
         raise CalibrationError("Pictures need --board COLUMNSxROWS and --square-mm of the printed board.")
     size, mosaic = parse_size("--projector", projector), _bayer(bayer)
+    mapping = _mapping_of(output, folder, size, *layout)
+    if mapping is not None:
+        size = mapping.projector_size_px
     with output.progress() as progress:
-        found = calibrate_geometry(folder, board, size, mosaic, binning, baseline_mm, progress)
+        found = calibrate_geometry(folder, board, size, mosaic, binning, baseline_mm, progress, mapping, hold)
     if record is not None:
         write_record(record, found, overwrite=force)
     if xml is not None:
@@ -77,6 +85,48 @@ def calibrate_pictures(
     )
     output.put(calibration=found.model_dump(mode="json"), files=[str(path) for path in files])
     output.finish()
+
+
+def _mapping_of(
+    output: Output, folder: Path, size_px: tuple[int, int], guess: bool, path: Path | None
+) -> Mapping | None:
+    """What the pictures of each pose show, None for the usual order; says what was guessed."""
+    from dsl_core.workflows.captures import load_mapping
+    from dsl_core.workflows.mapped_poses import guess_poses
+    from dsl_core.workflows.pictures import pose_folders
+
+    if guess and path is not None:
+        raise CalibrationError("--guess finds out what --mapping states. Give one of them.")
+    if path is not None:
+        return load_mapping(path)
+    if not guess:
+        return None
+    folders = pose_folders(folder)
+    mapping = guess_poses(folders, size_px).mapping
+    output.say(f"Guessed from {folders[0].name}: {words_of(mapping)}.")
+    for sentence in mapping.unsure:
+        output.say(f"Unsure: {sentence}.")
+    output.put(mapping=mapping.model_dump(mode="json"))
+    return mapping
+
+
+def words_of(mapping: Mapping) -> str:
+    """The parts of a mapping in their order, in a few words each."""
+    words = []
+    for part in mapping.parts:
+        match part.kind:
+            case "stripes":
+                inverse = "" if part.inverse == "none" else f", inverses {part.inverse}"
+                words.append(
+                    f"{part.bits} bits of {part.axis} ({part.code}, {part.first} significant first{inverse})"
+                )
+            case "phases":
+                words.append(f"{len(part.fringes)} sinusoids of {part.axis} in {part.steps} steps")
+            case "skip":
+                words.append(f"{part.count} not used")
+            case _:
+                words.append(part.kind)
+    return "; ".join(words)
 
 
 def _bayer(text: str | None) -> BayerPattern | None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from dsl_core.calibration.geometry.pose_series import observe_series
 from dsl_core.calibration.geometry.solve import calibrate_geometry as calibrate
 from dsl_core.errors import CalibrationError
+from dsl_core.io.pictures.mapping import Mapping as PictureMapping
 from dsl_core.model.board import Board
 from dsl_core.model.calibration.geometry import GeometryCalibration
 from dsl_core.model.calibration.pose_frames import PoseFrames
@@ -21,6 +22,7 @@ from dsl_core.model.rig import BayerPattern
 from dsl_core.patterns.gray_code import bit_counts
 from dsl_core.progress import NoProgress, Progress
 from dsl_core.words import counted
+from dsl_core.workflows.mapped_poses import read_mapped_pose
 
 SUFFIXES = {".png", ".tif", ".tiff", ".bmp", ".jpg", ".jpeg", ".pgm"}
 
@@ -33,34 +35,62 @@ def calibrate_geometry(
     camera_binning: float = 1.0,
     baseline_mm: float | None = None,
     progress: Progress | None = None,
+    mapping: PictureMapping | None = None,
+    hold: Collection[str] = (),
 ) -> GeometryCalibration:
     """Lenses and pose of camera and projector from folders of pictures, one per board pose, film off.
 
-    Leaves out poses whose board or code cannot be read, and says so. Raises `CalibrationError` that
-    names the picture that is missing, or the poses that are wrong when too few are left.
+    Pictures are numbered in the order of the Gray code, with white and black last, unless a ``mapping`` says
+    what each of them shows. Terms of distortion in ``hold`` (k1, k2, k3, tangential) are zero. Leaves out
+    poses whose board or code cannot be read, and says so. Raises `CalibrationError` that names the picture
+    that is missing, or the poses that are wrong when too few are left, and `StoreError` for pictures that do
+    not fit the mapping.
     """
     bits, progress = bit_counts(GrayCode(), projector_size_px), progress or NoProgress()
-    sizes: dict[str, tuple[int, int]] = {}
     folders = pose_folders(folder)
 
     def pictures() -> Iterator[PoseFrames]:
         for index, pose_folder in enumerate(folders):
             progress.report("find the board", index, len(folders))
-            frames = read_pose(pose_folder, bits, bayer)
+            if mapping is None:
+                yield read_pose(pose_folder, bits, bayer)
+            else:
+                yield read_mapped_pose(pose_folder, mapping, bayer)
+
+    return calibrate_poses(pictures(), board, projector_size_px, camera_binning, baseline_mm, hold)
+
+
+def calibrate_poses(
+    poses: Iterable[PoseFrames],
+    board: Board,
+    projector_size_px: tuple[int, int],
+    camera_binning: float = 1.0,
+    baseline_mm: float | None = None,
+    hold: Collection[str] = (),
+) -> GeometryCalibration:
+    """Lenses and pose from the pictures of board poses, taken one by one; see `calibrate_geometry`.
+
+    Raises `CalibrationError`.
+    """
+    sizes: dict[str, tuple[int, int]] = {}
+
+    def of_one_size() -> Iterator[PoseFrames]:
+        for frames in poses:
             sizes[frames.name] = (frames.white.shape[1], frames.white.shape[0])
             require_one_size(sizes)
             yield frames
 
-    series = observe_series(pictures(), board, projector_size_px)
+    series = observe_series(of_one_size(), board, projector_size_px)
     return calibrate(
         series.seen,
         board,
-        sizes[folders[0].name],
+        next(iter(sizes.values()), (0, 0)),
         projector_size_px,
         camera_binning=camera_binning,
         baseline_mm=baseline_mm,
         left_out=series.left_out,
         warnings=series.warnings,
+        hold=hold,
     )
 
 

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from dsl_core.errors import DecodeError
+from dsl_core.errors import CalibrationError, DecodeError
+from dsl_core.model.board import Board
+from dsl_core.model.calibration.geometry import GeometryCalibration
+from dsl_core.model.calibration.pose_frames import PoseFrames
 from dsl_core.model.plan import CapturePlan, CodeSet, NoSpectral, Setting, Shot
-from dsl_core.model.rig import Rig, Sensor
+from dsl_core.model.rig import BayerPattern, Rig, Sensor
 from dsl_core.workflows.captures import common_sensor, decode_columns_of
 
 if TYPE_CHECKING:
@@ -76,7 +79,47 @@ def decode_stack(
     return decode_columns_of(_Stack(plan, frames.astype(np.uint16)), sensor)
 
 
-def depth_of_columns(rig: Rig, column_px: ArrayLike) -> NDArray[np.float64]:
+def calibrate_stacks(
+    poses: Iterable[Sequence[ArrayLike]],
+    board: Board,
+    projector_size_px: tuple[int, int],
+    bayer: BayerPattern | None = None,
+    camera_binning: float = 1.0,
+    baseline_mm: float | None = None,
+    hold: Collection[str] = (),
+) -> GeometryCalibration:
+    """Lenses and pose from pictures (rows, columns) of board poses under Gray code, film off.
+
+    Each pose has pattern and inverse of every bit of columns, then of rows, then white and black. Raises
+    `CalibrationError` naming the pose, counted from 1, whose pictures are too few or of mixed sizes, and for
+    too few poses.
+    """
+    from dsl_core.workflows.pictures import calibrate_poses
+
+    def frames() -> Iterator[PoseFrames]:
+        for number, pose in enumerate(poses, 1):
+            if len(pose) < 3:
+                raise CalibrationError(
+                    f"Pose {number} has {len(pose)} pictures; pattern and inverse of every bit, white and"
+                    " black are needed. Give all in this order."
+                )
+            *pairs, white, black = (np.asarray(picture) for picture in pose)
+            yield PoseFrames(f"pose {number}", pairs, white, black, bayer)
+
+    return calibrate_poses(frames(), board, projector_size_px, camera_binning, baseline_mm, hold)
+
+
+def _rig_for_depth(found: GeometryCalibration) -> Rig:
+    """Lenses and pose as a rig; all else of it means nothing."""
+    from dsl_core.io.published.any_stereo import FoundStereo
+    from dsl_core.io.published.stereo import stereo_of
+    from dsl_core.io.published.stereo_rig import lenses_on
+    from dsl_core.simulation.published_rig import published_rig
+
+    return lenses_on(published_rig(), FoundStereo(stereo_of(found), {}, ()), "pictures of a board")
+
+
+def depth_of_columns(calibration: Rig | GeometryCalibration, column_px: ArrayLike) -> NDArray[np.float64]:
     """Depth (mm) along the camera's axis of columns (rows, columns) of all pixels, NaN where there is none.
 
     Each camera ray meets the plane of its projector column. Raises `DecodeError` when the columns are not of
@@ -86,6 +129,7 @@ def depth_of_columns(rig: Rig, column_px: ArrayLike) -> NDArray[np.float64]:
 
     from dsl_core.optics.correspondence import triangulate
 
+    rig = calibration if isinstance(calibration, Rig) else _rig_for_depth(calibration)
     column = np.asarray(column_px, np.float64)
     if column.shape != (rig.camera.height_px, rig.camera.width_px):
         raise DecodeError(

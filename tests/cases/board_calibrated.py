@@ -54,7 +54,7 @@ def board_calibrated(truth: Rig, start: Rig, seed: int = 0, noise_px: float = 0.
         poses.append(seen.only(inside))
     sizes = [(lens.width_px, lens.height_px) for lens in (truth.camera, truth.projector)]
     # The joint fit alone: what poses say of each other when they are left out in turn is not needed here.
-    found = adjust(poses, initial(poses, *sizes))
+    found = adjust(poses, initial(poses, sizes[0], sizes[1]))
     return start.model_copy(
         update={
             "camera": lens_of(found.parameters[CAMERA], sizes[0]),

@@ -8,10 +8,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from dsl_core.errors import DecodeError
+from dsl_core.errors import CalibrationError, DecodeError
 from dsl_core.model.captured_code import CapturedCode, Stripes
 from dsl_core.resources import resource_path
-from dsl_core.workflows.stacks import decode_stack, depth_of_columns
+from dsl_core.workflows.stacks import calibrate_stacks, decode_stack, depth_of_columns
+from tests.cases import board_sets
 from tests.cases.foreign_captures import PROJECTOR, frames, scene
 from tests.cases.small_rig import small_rig
 
@@ -69,13 +70,25 @@ def test_what_cannot_be_a_stack_is_refused() -> None:
 def test_the_example_of_the_help_page_runs() -> None:
     page = resource_path("help/importing.md").read_text(encoding="utf-8")
     (example,) = re.findall(r"```python\n(.*?)```", page, re.DOTALL)
-    pictures, white, black = frames([("columns", Stripes(bits=7, inverse=False))])
-    lens = {"width_px": 160, "height_px": 120}
-    rig = small_rig()
-    rig = rig.model_copy(update={"camera": rig.camera.model_copy(update=lens)})
-    names: dict[str, Any] = {"pictures": pictures, "white": white, "black": black, "rig": rig}
+    size = board_sets.CAMERA_PX
+    pictures, white, black = frames([("columns", Stripes(bits=7, inverse=False))], camera=size)
+    names: dict[str, Any] = {"pictures": pictures, "white": white, "black": black}
+    names["poses"] = board_sets.board_set()
     exec(example, names)
-    assert np.asarray(names["depth_mm"]).shape == (120, 160)
+    assert np.asarray(names["depth_mm"]).shape == size[::-1]
+    rig = names["rig"]
+    assert rig.rms_px < 0.1
+    assert rig.camera.fx_px == pytest.approx(board_sets.CAMERA_FX_PX, rel=0.005)
+    assert rig.projector.fx_px == pytest.approx(board_sets.PROJECTOR_FX_PX, rel=0.02)
+    assert rig.camera.distortion == rig.projector.distortion == (0.0,) * 5
+    depth = depth_of_columns(rig, board_sets.column_of_wall(600.0))
+    assert np.nanmedian(depth) == pytest.approx(600.0, rel=0.005)
+
+
+def test_poses_without_all_their_pictures_are_named() -> None:
+    short = [np.zeros((4, 6))] * 2
+    with pytest.raises(CalibrationError, match="Pose 1 has 2 pictures"):
+        calibrate_stacks([short], board_sets.BOARD, board_sets.PROJECTOR_PX)
 
 
 def test_rows_alone_are_told() -> None:

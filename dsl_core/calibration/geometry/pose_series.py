@@ -15,7 +15,7 @@ from dsl_core.calibration.geometry.plausible import implausible
 from dsl_core.calibration.geometry.projector_corners import PoseObservation, observe_pose
 from dsl_core.errors import CalibrationError
 from dsl_core.model.board import Board
-from dsl_core.model.calibration.geometry import GeometryCalibration, LeftOut
+from dsl_core.model.calibration.geometry import GeometryCalibration, LeftOut, LensDeviation
 from dsl_core.model.calibration.pose_frames import PoseFrames
 from dsl_core.model.geometry import Lens
 
@@ -267,8 +267,8 @@ def doubts(found: GeometryCalibration, tilt_deg: float, baseline_mm: float | Non
         corner_px = _corner_px(found, lens, 0 if what == "camera" else LENS)
         if corner_px > MAX_CORNER_PX:
             sentences.append(
-                f"The distortion of the {what} is poorly known beyond the board (k3 {lens.distortion[4]:.2f}"
-                f" ± {deviation.distortion[4]:.2f}): {corner_px:.1f} px in a corner of its picture."
+                f"The distortion of the {what} is poorly known beyond the board{_k3(lens, deviation)}:"
+                f" {corner_px:.1f} px in a corner of its picture."
                 " Add poses near the edges."
             )
         if abs(lens.fx_px / lens.fy_px - 1) > 0.05:
@@ -286,6 +286,12 @@ def doubts(found: GeometryCalibration, tilt_deg: float, baseline_mm: float | Non
             f"The board was tilted by {tilt_deg:.0f} degrees at most. Tilt it by {GOOD_TILT_DEG:.0f} to 45."
         )
     return sentences + implausible(found) + _size_doubt(found, baseline_mm)
+
+
+def _k3(lens: Lens, deviation: LensDeviation) -> str:
+    """The term that is known least, in words; empty where it is held at zero."""
+    std = deviation.distortion[4]
+    return f" (k3 {lens.distortion[4]:.2f} ± {std:.2f})" if std else ""
 
 
 def _corner_px(found: GeometryCalibration, lens: Lens, first: int) -> float:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +12,7 @@ from dsl_core.calibration.geometry.bundle import (
     PROJECTOR,
     SHARED,
     STEREO,
+    TERMS,
     Adjustment,
     adjust,
     flatness,
@@ -61,24 +62,27 @@ def calibrate_geometry(
     baseline_mm: float | None = None,
     left_out: Sequence[LeftOut] = (),
     warnings: Sequence[str] = (),
+    hold: Collection[str] = (),
 ) -> GeometryCalibration:
     """Calibrate both lenses and their pose; sizes are (width, height).
 
     Starts from OpenCV's calibration of each device, refines everything jointly, leaves out poses that do not
     fit, and then checks itself with each pose left out in turn. ``baseline_mm``, the distance of the devices
     measured by hand, lets a wrong printed size be noticed. ``left_out`` and ``warnings`` are passed on.
-    Raises `CalibrationError` for poses no calibration can come from.
+    Terms of distortion in ``hold`` (see `TERMS`) are zero in both lenses: few poses do not determine all.
+    Raises `CalibrationError` for poses no calibration can come from, and terms that there are not.
     """
+    held = _places_of(hold)
     check_poses(poses, camera_size_px)
-    fit = adjust(poses, initial(poses, camera_size_px, projector_size_px))
+    fit = adjust(poses, initial(poses, camera_size_px, projector_size_px, hold), held)
     kept = _fitting(poses, fit)
     final = fit
     if not kept.all():
         rest = [pose for pose, keep in zip(poses, kept, strict=True) if keep]
         misfits = [pose.name for pose, keep in zip(poses, kept, strict=True) if not keep]
         check_poses(rest, camera_size_px, misfits)
-        final = adjust(rest, without(fit.parameters, np.flatnonzero(~kept)))
-    qualities = _qualities(poses, kept, fit, final, board)
+        final = adjust(rest, without(fit.parameters, np.flatnonzero(~kept)), held)
+    qualities = _qualities(poses, kept, fit, final, board, held)
     found = _record(poses, kept, final, qualities, board, camera_size_px, projector_size_px)
     found = found.model_copy(update={"camera_binning": camera_binning, "left_out": tuple(left_out)})
     normals = [rotation_of(motion[:3])[:, 2] for motion in final.parameters[SHARED:].reshape(-1, 6)]
@@ -86,10 +90,25 @@ def calibrate_geometry(
     return found.model_copy(update={"warnings": (*warnings, *doubts(found, tilt, baseline_mm))})
 
 
-def initial(poses: Sequence[PoseObservation], camera_size_px: Size, projector_size_px: Size) -> Floats:
+def _places_of(hold: Collection[str]) -> list[int]:
+    """Numbers of the parameters of both lenses that are held at zero; raises `CalibrationError`."""
+    unknown = [term for term in hold if term not in TERMS]
+    if unknown:
+        raise CalibrationError(
+            f"{', '.join(unknown)} cannot be held at zero; terms of the distortion are {', '.join(TERMS)}."
+        )
+    return [lens.start + place for lens in (CAMERA, PROJECTOR) for term in hold for place in TERMS[term]]
+
+
+def initial(
+    poses: Sequence[PoseObservation],
+    camera_size_px: Size,
+    projector_size_px: Size,
+    hold: Collection[str] = (),
+) -> Floats:
     """Start of the joint fit: each device for itself, then the median of the poses between them."""
-    camera, camera_boards = _alone(poses, "camera", camera_size_px)
-    projector, projector_boards = _alone(poses, "projector", projector_size_px)
+    camera, camera_boards = _alone(poses, "camera", camera_size_px, hold)
+    projector, projector_boards = _alone(poses, "projector", projector_size_px, hold)
     between = []
     for ours, theirs in zip(camera_boards, projector_boards, strict=True):
         turn = rotation_of(theirs[:3]) @ rotation_of(ours[:3]).T
@@ -97,10 +116,14 @@ def initial(poses: Sequence[PoseObservation], camera_size_px: Size, projector_si
     return np.concatenate([camera, projector, np.median(between, 0), camera_boards.ravel()])
 
 
-def _alone(poses: Sequence[PoseObservation], device: str, size_px: Size) -> tuple[Floats, Floats]:
+def _alone(
+    poses: Sequence[PoseObservation], device: str, size_px: Size, hold: Collection[str]
+) -> tuple[Floats, Floats]:
     """Lens (9,) and board poses (poses, 6) of one device by OpenCV; k3 is left to the joint fit."""
     import cv2
 
+    fixed = {"k1": cv2.CALIB_FIX_K1, "k2": cv2.CALIB_FIX_K2, "tangential": cv2.CALIB_ZERO_TANGENT_DIST}
+    flags = cv2.CALIB_FIX_K3 | sum(flag for term, flag in fixed.items() if term in hold)
     seen = [pose.camera_px if device == "camera" else pose.projector_px for pose in poses]
     try:
         _, matrix, distortion, turns, shifts = cv2.calibrateCamera(
@@ -109,7 +132,7 @@ def _alone(poses: Sequence[PoseObservation], device: str, size_px: Size) -> tupl
             size_px,
             np.eye(3),
             np.zeros(5),
-            flags=cv2.CALIB_FIX_K3,
+            flags=flags,
         )
     except cv2.error as error:
         raise CalibrationError(
@@ -158,6 +181,7 @@ def _qualities(
     first: Adjustment,
     final: Adjustment,
     board: Board,
+    held: Collection[int],
 ) -> list[PoseQuality]:
     """Figures of each pose: of one that was left out, those of the fit that it did not fit."""
     positions = np.cumsum(kept) - 1
@@ -173,7 +197,7 @@ def _qualities(
         left_out = None
         if kept[index] and len(kept_poses) >= MIN_POSES_TO_LEAVE_OUT:
             rest = [other for i, other in enumerate(kept_poses) if i != at]
-            unseen = refit(rest, without(final.parameters, [at]))
+            unseen = refit(rest, without(final.parameters, [at]), held)
             left_out = _measured(unseen, pose.only(used), motion, board)
         found.append(
             PoseQuality(

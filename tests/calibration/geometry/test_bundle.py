@@ -154,7 +154,7 @@ def test_corners_have_to_say_more_than_there_is_to_find(
     problem.slopes = np.random.default_rng(2).standard_normal((2, 6, 2, 9))
     problem.seen = problem.slopes @ np.linspace(-1, 1, 9)
     module = "dsl_core.calibration.geometry.bundle."
-    monkeypatch.setattr(module + "Problem", lambda _: problem)
+    monkeypatch.setattr(module + "Problem", lambda *_: problem)
     monkeypatch.setattr(module + "_weights", lambda *_: (np.arange(6) < corners).astype(float))
     if enough:
         assert adjust([], np.zeros(9)).used.sum() == 3
@@ -170,7 +170,7 @@ def test_corners_far_off_do_not_count_and_those_off_by_little_weigh_less(
     truth = np.array([0.3, -0.2, 0.1])
     problem.seen = problem.slopes @ truth + 0.01 * rng.standard_normal((2, 200, 2))
     problem.seen[0, :20] += 5.0
-    monkeypatch.setattr("dsl_core.calibration.geometry.bundle.Problem", lambda _: problem)
+    monkeypatch.setattr("dsl_core.calibration.geometry.bundle.Problem", lambda *_: problem)
     found = adjust([], np.zeros(3))
     assert not found.used[:20].any()
     assert found.used[20:].mean() > 0.97

@@ -249,3 +249,17 @@ def test_a_lens_that_opencv_cannot_find_is_refused(
 def test_parameters_without_poses_keep_the_lenses() -> None:
     parameters = np.arange(24.0 + 18)
     assert without(parameters, [1]).tolist() == [*range(30), *range(36, 42)]
+
+
+def test_terms_that_are_held_are_zero_and_known() -> None:
+    found = calibrate_geometry(poses_seen(), BOARD, CAMERA_PX, PROJECTOR_PX, hold=("k3", "tangential"))
+    for lens, deviation in (
+        (found.camera, found.camera_deviation),
+        (found.projector, found.projector_deviation),
+    ):
+        for term in (2, 3, 4):
+            assert lens.distortion[term] == deviation.distortion[term] == 0
+        assert lens.distortion[0] != 0
+        assert deviation.distortion[0] > 0
+    with pytest.raises(CalibrationError, match=r"k9 cannot be held at zero; terms .* k1, k2, tangential, k3"):
+        calibrate_geometry(poses_seen(), BOARD, CAMERA_PX, PROJECTOR_PX, hold=("k9",))

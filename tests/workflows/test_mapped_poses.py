@@ -1,0 +1,64 @@
+"""Pictures of a board in a stranger's order are those of the Gray code."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from dsl_core.errors import CalibrationError
+from dsl_core.io.pictures.mapping import BlackPicture, Mapping, StripePictures, WhitePicture
+from dsl_core.workflows.mapped_poses import guess_poses, read_mapped_pose
+from tests.cases.board_sets import PROJECTOR_PX, board_set
+from tests.cases.foreign_captures import write
+
+ROWS_FIRST = (
+    WhitePicture(),
+    BlackPicture(),
+    StripePictures(axis="rows", bits=7, inverse="none"),
+    StripePictures(bits=7, inverse="none"),
+)
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    """White and black first, rows before columns, no inverses."""
+    pose = board_set()[1]
+    return write(
+        tmp_path / "a", {f"{i}.bmp": p for i, p in enumerate([*pose[28:], *pose[14:28:2], *pose[:14:2]])}
+    )
+
+
+def test_the_first_pose_tells_the_order_of_all(folder: Path) -> None:
+    assert guess_poses([folder], PROJECTOR_PX).mapping.parts == ROWS_FIRST
+
+
+def test_a_lacking_inverse_is_what_white_leaves(folder: Path) -> None:
+    frames = read_mapped_pose(folder, Mapping(parts=ROWS_FIRST, projector_size_px=PROJECTOR_PX))
+    pose = board_set()[1]
+    assert len(frames.pairs) == 28
+    assert np.array_equal(frames.white, pose[28])
+    assert np.array_equal(frames.black, pose[29])
+    for found, known in zip(frames.pairs, pose[:28], strict=True):
+        assert np.abs(found - known.astype(float)).max() <= 2
+
+
+def test_inverses_that_are_there_are_read(tmp_path: Path) -> None:
+    pose = board_set()[1]
+    turned = [p for k in range(0, 28, 2) for p in (pose[k + 1], pose[k])]
+    folder = write(tmp_path, {f"{i:02d}.png": p for i, p in enumerate([*turned, *pose[28:]])})
+    parts = [StripePictures(axis=a, bits=7, inverse_first=True) for a in ("columns", "rows")]
+    mapping = Mapping(parts=(*parts, WhitePicture(), BlackPicture()), projector_size_px=PROJECTOR_PX)
+    frames = read_mapped_pose(folder, mapping)
+    assert all(np.array_equal(f, k) for f, k in zip(frames.pairs, pose[:28], strict=True))
+
+
+def test_columns_alone_do_not_say_where_the_projector_is(folder: Path) -> None:
+    mapping = Mapping(
+        files=("0.bmp", "1.bmp", "9.bmp", "1?.bmp"),
+        parts=(WhitePicture(), BlackPicture(), ROWS_FIRST[3]),
+        projector_size_px=PROJECTOR_PX,
+    )
+    with pytest.raises(CalibrationError, match="not a Gray code of all 128 columns and 96 rows"):
+        read_mapped_pose(folder, mapping)
