@@ -14,6 +14,8 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from dsl_core.capture.preflight import fit_plan, require_possible
 from dsl_core.capture.proof.verifier import FrameProof
 from dsl_core.capture.runner import Runner, Status
@@ -30,7 +32,7 @@ from dsl_core.model.fit import FitFinding
 from dsl_core.model.frames import FrameSink, FrameSource
 from dsl_core.model.options import Options
 from dsl_core.model.plan import CapturePlan
-from dsl_core.model.result_sink import MemorySink, ResultSink
+from dsl_core.model.result_sink import MemorySink, ResultSink, SeenDepth
 from dsl_core.model.rig import Rig
 from dsl_core.patterns.images import pattern_image
 from dsl_core.progress import CancelToken, NoProgress, Progress
@@ -107,11 +109,13 @@ def reconstruct(
     progress: Progress | None = None,
     timer: StageTimer | None = None,
     sink: ResultSink | None = None,
+    seen_depth: SeenDepth | None = None,
 ) -> xr.Dataset:
     """Frames -> linear radiance -> columns -> depth -> surface -> spectra -> colour -> result.
 
     Frames are read, and the result is made, by bands of rows, so that those of a large picture need not be
-    in memory at once; the result is, unless a ``sink`` takes it.
+    in memory at once; the result is, unless a ``sink`` takes it. ``seen_depth`` is given the depth, mm
+    (rows, columns), as soon as it is known: spectra take much longer.
     """
     from dsl_core.optics.lines.line_set import LineSet
     from dsl_core.reconstruction.light.own_sensor import own_sensor
@@ -133,6 +137,8 @@ def reconstruct(
     frames = ScanFrames(source, rig, bands_of(plan, options.band_rows, rows_together(rig, options)))
     rig, geometry, found_of_depth = _depth(rig, lines, options, frames, progress, timer)
     findings += found_of_depth
+    if seen_depth is not None:
+        seen_depth(geometry.depth_mm.astype(np.float32))
     solver = None
     if options.spectra:
         with timer.stage("spectra"):

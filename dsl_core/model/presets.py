@@ -60,7 +60,8 @@ PRESETS: tuple[Preset, ...] = (
     Preset(
         "preview",
         "Preview",
-        "Sixteen combs of lines at two short settings: a first look at depth and spectra in ten seconds.",
+        "Sixteen combs of lines at two short settings: a first look at depth and spectra, captured in ten"
+        " seconds.",
         # One setting alone takes 8 s, but where it spares the zero order its first orders drown in noise.
         _plan("preview", _COARSE_COMB, _setting(4, 0.2), _setting(6, 0.8)),
     ),

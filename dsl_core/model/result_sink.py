@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
@@ -14,6 +14,8 @@ if TYPE_CHECKING:
     import xarray as xr
 
 Maps = Mapping[str, NDArray[np.generic]]
+#: Is given the depth of a result, mm (rows, columns), before its spectra are computed.
+SeenDepth = Callable[[NDArray[np.float32]], object]
 
 
 class ResultSink(Protocol):

@@ -27,7 +27,7 @@ from dsl_core.io.scan.origin import is_of_this_computer, model_notes, rig_of_not
 from dsl_core.model.conditions import differences
 from dsl_core.model.frames import FrameSource
 from dsl_core.model.plan import CapturePlan
-from dsl_core.model.result_sink import ResultSink
+from dsl_core.model.result_sink import ResultSink, SeenDepth
 from dsl_core.model.rig import Rig, Sensor
 from dsl_core.model.spectral import WavelengthGrid
 from dsl_core.patterns.images import pattern_image
@@ -99,11 +99,13 @@ def reconstruct_scan(
     timer: StageTimer | None = None,
     override_calibration: bool = False,
     sink: ResultSink | None = None,
+    seen_depth: SeenDepth | None = None,
 ) -> xr.Dataset:
     """The result of a complete scan, with its origin and the cost of each stage among its attributes.
 
-    It is in memory, unless a ``sink`` takes it. Raises `CalibrationError` when the scan was taken with other
-    settings than the calibration given, unless that is overridden.
+    It is in memory, unless a ``sink`` takes it; ``seen_depth`` is given the depth before the spectra. Raises
+    `CalibrationError` when the scan was taken with other settings than the calibration given, unless that is
+    overridden.
     """
     reader, timer = ScanReader(folder), timer or StageTimer()
     require_complete(reader)
@@ -112,7 +114,7 @@ def reconstruct_scan(
     rig, options = with_imported_sensor(reader, calibration_of(reader, calibration)), options or Options()
     watched = WatchedSource(reader)
     progress = progress or NoProgress()
-    result = reconstruct(watched, rig, options, progress, timer, sink)
+    result = reconstruct(watched, rig, options, progress, timer, sink, seen_depth)
     with timer.stage("compare frames with their patterns"):
         progress.report("compare frames with their patterns", 0, 0)
         proof = watched.report(rig, rig.sensor.bit_depth, rig.sensor.bayer)
@@ -142,10 +144,12 @@ def reconstruct_to(
     *,
     override_calibration: bool = False,
     overwrite: bool = False,
+    seen_depth: SeenDepth | None = None,
 ) -> Path:
     """Reconstruct a complete scan into a folder, by rows, so that neither has to fit into memory.
 
-    One that was interrupted continues where it was if scan, calibration and options are the same. Raises
+    One that was interrupted continues where it was if scan, calibration and options are the same.
+    ``seen_depth`` is given the depth, mm (rows, columns), before the spectra are computed. Raises
     what `reconstruct_scan` does, and `StoreError` when the target exists (unless ``overwrite``) or the disk
     fails.
     """
@@ -158,7 +162,7 @@ def reconstruct_to(
     with RowWriter(target, json.dumps(facts), overwrite=overwrite) as writer:
         progress = progress or NoProgress()
         given = folder, calibration, options, progress, timer, override_calibration
-        result = reconstruct_scan(*given, sink=writer)
+        result = reconstruct_scan(*given, sink=writer, seen_depth=seen_depth)
         with timer.stage("save the result"):
             progress.report("save the result", 0, 0)
             return writer.publish(result.attrs)

@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     from dsl_app.rig.controller import LiveController
     from dsl_app.rig.projector_screens import ProjectorScreens
     from dsl_app.scan.controller import ScanController
+    from dsl_app.scan.reconstruction_time import Pace
     from dsl_app.scan.state import ScanState
     from dsl_app.session.restore import SessionRestore
     from dsl_core.devices.base import Projector
@@ -311,7 +312,7 @@ class Composition(QObject):
             lambda phase: self._remember_folder(state) if phase is Phase.DONE else None
         )
         self.scans = controller = ScanController(
-            state, rig, parts.runner, window.toasts, parts.undo, hidden=_demo_folder()
+            state, rig, parts.runner, window.toasts, parts.undo, hidden=_demo_folder(), pace=self._pace
         )
         state.wanted.connect(lambda _: window.open_page("scan"))
         self.calibration_in_use.serve_scans(controller)
@@ -340,6 +341,18 @@ class Composition(QObject):
         )
         page.reconstruct_requested.connect(lambda: window.do("reconstruct_again"))
         return page
+
+    @property
+    def _pace(self) -> Pace:
+        """How fast this computer reconstructs, kept between sessions."""
+        from dsl_app.scan.reconstruction_time import Pace
+
+        settings = self.window.parts.settings
+
+        def keep(us_per_px: float) -> None:
+            settings.reconstruct_us_per_px = us_per_px
+
+        return Pace(settings.reconstruct_us_per_px, keep)
 
     def _awaits_result(self) -> bool:
         """Whether the Results page is open and has nothing to show."""

@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable
 from datetime import datetime
 from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
 
 from dsl_app.connection.controller import RIG, RigController
 from dsl_app.connection.state import Link
@@ -12,6 +16,7 @@ from dsl_app.scan.command_line import fresh_target, rig_of_scan, scan_command
 from dsl_app.scan.job import ScanJob, ScanRequest
 from dsl_app.scan.plan import ScanPlanController
 from dsl_app.scan.reconnect import Reconnector
+from dsl_app.scan.reconstruction_time import Pace, about
 from dsl_app.scan.state import InterruptedScan, Phase, Reconnection, ScanState
 from dsl_app.shared.jobs.base import Job, JobRunner, JobState
 from dsl_app.shared.known_files import Kind, kind_of
@@ -46,9 +51,15 @@ class ScanController:
         library: CalibrationLibrary | None = None,
         clock: Callable[[], datetime] = datetime.now,
         hidden: Path | None = None,
+        pace: Pace | None = None,
     ) -> None:
         self.state, self._rig, self._runner, self._notifier = state, rig, runner, notifier
-        self._clock, self._hidden = clock, hidden
+        self._clock, self._hidden, self._pace = clock, hidden, pace or Pace()
+        #: The depth of the reconstruction that runs, from its thread; news until it is in the state.
+        self._seen_depth: NDArray[np.float32] | None = None
+        self._stop_expecting = state.plan.follow(
+            lambda plan: state.reconstruction_s.set(self._pace.expected_s(plan.camera_size_px))
+        )
         #: Where the person saves scans.
         self._folder = state.target.value.parent
         self._stop_following = state.target.changed.connect(self._keep_folder)
@@ -145,6 +156,9 @@ class ScanController:
     def take_news(self) -> None:
         """Copy what the job reported since the last call to the state; called by a timer."""
         self._reconnector.take_news()
+        seen, self._seen_depth = self._seen_depth, None
+        if seen is not None:
+            self.state.depth.set(seen)
         scan = self._scan
         if scan is None:
             return
@@ -248,20 +262,33 @@ class ScanController:
     def reconstruct(self, session: Path) -> None:
         """Reconstruct a complete scan, save the result next to it and report it."""
         target, before = session.with_suffix(".zarr"), self.state.note.value
-        waiting = f"{before} Reconstructing…".strip()
+        expected_s = self._pace.expected_s(self.state.plan.value.camera_size_px)
+        waiting = f"{before} Reconstructing, {about(expected_s)}; the depth is shown first.".strip()
+
+        size_px, since_s = self.state.plan.value.camera_size_px, time.monotonic()
+
+        def see(depth_mm: NDArray[np.float32]) -> None:
+            self._seen_depth = depth_mm
 
         def work(progress: Progress) -> Path:
             from dsl_core.workflows.scans import reconstruct_to
 
-            return reconstruct_to(target, session, progress=progress)
+            return reconstruct_to(target, session, progress=progress, seen_depth=see)
+
+        def finish() -> None:
+            self._seen_depth = None
+            self.state.is_reconstructing.set(False)
+            self.state.depth.set(None)
 
         def done(path: Path) -> None:
-            self.state.is_reconstructing.set(False)
+            finish()
+            self._pace.learn(size_px, time.monotonic() - since_s)
+            self.state.reconstruction_s.set(self._pace.expected_s(self.state.plan.value.camera_size_px))
             self.state.note.set(f"The result is saved in {path}.")
             self.state.result.emit(path)
 
         def ended(how: str) -> None:
-            self.state.is_reconstructing.set(False)
+            finish()
             # Another scan may have set a note of its own meanwhile.
             if self.state.note.value == waiting:
                 retry = f"Open {session.name} on the Results page to reconstruct it."
@@ -355,5 +382,6 @@ class ScanController:
     def close(self) -> None:
         """Disconnect from the rig's state."""
         self._stop_following()
+        self._stop_expecting()
         self._reconnector.close()
         self.plans.close()

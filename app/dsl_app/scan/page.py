@@ -132,6 +132,7 @@ class ScanPage(PageWidget):
             *follow_any(self._show_plan, state.plan, state.period_ms),
             state.interrupted.follow(lambda _: self._show_phase(state.phase.value)),
             state.phase.follow(self._show_phase),
+            state.is_reconstructing.changed.connect(lambda _: self._keep_time()),
             state.trouble.follow(self.banner.say),
             state.reconnection.follow(self._show_reconnection),
             state.result.connect(self._show_result),
@@ -178,7 +179,8 @@ class ScanPage(PageWidget):
     def _keep_time(self) -> None:
         """Fetch the state of the scan while it may change."""
         state = self._state
-        self._timer.run_while(state.phase.value.is_busy or state.reconnection.value.is_trying)
+        is_waiting = state.reconnection.value.is_trying or state.is_reconstructing.value
+        self._timer.run_while(state.phase.value.is_busy or is_waiting)
 
     def _offer_effects(self, on: bool) -> None:
         """Show the Effects tab for simulated rigs only."""

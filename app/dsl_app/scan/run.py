@@ -17,6 +17,7 @@ from PySide6.QtWidgets import (
 from dsl_app.scan.controller import ScanController
 from dsl_app.scan.controls import RESUME, progress_text, run_controls
 from dsl_app.scan.forecast.figures import minutes, volume
+from dsl_app.scan.reconstruction_time import about
 from dsl_app.scan.state import CalibrationChoice, Facts, Phase, ScanState
 from dsl_app.shared.evented import follow_any
 from dsl_app.shared.known_files import breakable
@@ -74,17 +75,26 @@ class TargetBox(QGroupBox):
         self.name = named(QLineEdit(), "Name of the scan", "Name of the scan's folder, NAME.dsl")
         self.folder = push_button("Folder…", "Choose the folder in which scans are saved", self._browse)
         self._where = label("", "muted", wraps=True)
-        self._frames, self._time, self._disk = label("–"), label("–"), label("–")
+        self._frames, self._time, self._then, self._disk = label("–"), label("–"), label(""), label("–")
         self._split = label("", "muted")
         row = row_of((self.name, 1), self.folder)
         form = QFormLayout(self)
         form.addRow(row)
         form.addRow(self._where)
-        for title, widget in (("Frames", self._frames), ("Time", self._time), ("Disk", self._disk)):
+        for title, widget in (
+            ("Frames", self._frames),
+            ("Time", self._time),
+            ("", self._then),
+            ("Disk", self._disk),
+        ):
             form.addRow(title, widget)
         form.addRow("", self._split)
         self.name.editingFinished.connect(self._rename)
-        self.stops = [state.target.follow(self._show_target), state.facts.follow(self._show_facts)]
+        self.stops = [
+            state.target.follow(self._show_target),
+            state.facts.follow(self._show_facts),
+            *follow_any(self._show_then, state.reconstruction_s, state.then_reconstruct),
+        ]
 
     def _rename(self) -> None:
         text = self.name.text().strip()
@@ -101,6 +111,10 @@ class TargetBox(QGroupBox):
     def _show_target(self, target: Path) -> None:
         self.name.setText(target.stem)
         self._where.setText(f"in {breakable(target.parent)}")
+
+    def _show_then(self) -> None:
+        expected_s, follows = self._state.reconstruction_s.value, self._state.then_reconstruct.value
+        self._then.setText(f"then {about(expected_s)} to reconstruct" if expected_s and follows else "")
 
     def _show_facts(self, facts: Facts | None) -> None:
         if facts is None:

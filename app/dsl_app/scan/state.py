@@ -133,8 +133,9 @@ class ScanState:
     ``plan_file`` is the file that holds exactly the current plan, if there is one. ``check_drift`` compares
     two old frames before an interrupted scan resumes. ``period_ms`` is the LED cycle
     of the rig's projector. ``finished`` is the scan that was completed last, ``result`` fires with each new
-    result; ``is_reconstructing`` says that one is being made. ``is_seen`` says that the page is on screen,
-    where everything is said; ``wanted`` asks for it.
+    result; ``is_reconstructing`` says that one is being made, and ``depth`` is that of it, mm, while its
+    spectra are computed; ``reconstruction_s`` is how long one of the plan is expected to take.
+    ``is_seen`` says that the page is on screen, where everything is said; ``wanted`` asks for it.
     """
 
     def __init__(self, plan: CapturePlan, target: Path) -> None:
@@ -161,6 +162,8 @@ class ScanState:
         self.graph: Value[BlockGraph | None] = Value(None)
         self.result: Event[Path] = Event()
         self.is_reconstructing = Value(False)
+        self.depth: Value[NDArray[np.float32] | None] = Value(None)
+        self.reconstruction_s: Value[float | None] = Value(None)
         self.is_seen = Value(False)
         self.wanted: Event[None] = Event()
 

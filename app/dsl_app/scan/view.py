@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pyqtgraph as pg
+from numpy.typing import NDArray
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QKeyEvent
 from PySide6.QtWidgets import QSplitter, QWidget
@@ -15,10 +16,11 @@ from dsl_app.scan.state import LivePicture, ScanState
 from dsl_app.shared.widgets.forms import label
 from dsl_app.shared.widgets.help_window import set_help
 from dsl_app.shared.widgets.layouts import column_of
-from dsl_app.shared.widgets.pictures import PictureView, arrow_step
+from dsl_app.shared.widgets.pictures import DEPTH, PictureView, arrow_step, colour_map
 from dsl_app.shared.widgets.plots import CalmPlot
 from dsl_core.capture.preview import BlockGraph
 from dsl_core.model.plan import CapturePlan, Shot
+from dsl_core.optics.levels import between, spread_of
 
 #: Red, green and blue of the camera: they are data and the same in every theme.
 CHANNEL_COLOURS = ("#d94545", "#3fa34d", "#3f7fd9")
@@ -62,6 +64,20 @@ class FramePicture(QWidget):
         self._text.setText(f"Frame {shown.shot.index + 1} of {plan.shot_count}: {words_of(shown.shot, plan)}")
         if before is None or covered_px(before) != covered_px(shown):
             self.view.fit()
+
+    def show_depth(self, depth_mm: NDArray[np.float32]) -> None:
+        """Show the depth of a reconstruction, mm (rows, columns), whose spectra are being computed."""
+        low, high = spread_of(depth_mm)
+        table = np.asarray(colour_map(DEPTH).getLookupTable(nPts=256, alpha=False), np.uint8)
+        known = np.isfinite(depth_mm)
+        picture = table[(255 * between(np.where(known, depth_mm, low), (low, high))).astype(np.uint8)]
+        picture[~known] = 0
+        self.view.image.setImage(picture, autoLevels=False, levels=None)
+        self.view.image.setRect(0, 0, *depth_mm.shape[::-1])
+        self.view.fit()
+        self._text.setText(
+            f"Depth, {low:.0f} mm (dark) to {high:.0f} mm (bright). Spectra are being computed."
+        )
 
     def show_cursor(self, pixel: tuple[int, int] | None) -> None:
         """Mark a pixel of the camera."""
@@ -111,9 +127,17 @@ class ScanView(QSplitter):
         self.picture.pointed.connect(controller.point_at)
         self.stops = [
             state.picture.follow(lambda shown: self.picture.show_picture(shown, state.plan.value)),
+            state.depth.follow(lambda depth: self._show_depth(state, depth)),
             state.cursor.follow(self.picture.show_cursor),
             state.graph.follow(self.graph.show_graph),
         ]
+
+    def _show_depth(self, state: ScanState, depth_mm: NDArray[np.float32] | None) -> None:
+        """Show the depth, and afterwards the last frame again."""
+        if depth_mm is not None:
+            self.picture.show_depth(depth_mm)
+        else:
+            self.picture.show_picture(state.picture.value, state.plan.value)
 
 
 class GraphPlot(QWidget):

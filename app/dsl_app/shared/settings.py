@@ -41,6 +41,8 @@ class Settings(BaseModel):
     window_geometry: str = ""
     window_state: str = ""
     tour_seen: bool = False
+    #: What a pixel of the last reconstruction took, µs; 0 before there was one.
+    reconstruct_us_per_px: float = Field(default=0.0, ge=0.0)
 
     def remember(self, path: Path) -> None:
         """Put a file first among the recent ones."""

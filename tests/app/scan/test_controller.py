@@ -6,12 +6,14 @@ from collections import namedtuple
 from dataclasses import dataclass, field
 from pathlib import Path
 
+import numpy as np
 import pytest
 from dsl_app.connection.state import Link, RigChoice
 from dsl_app.scan.job import ScanJob
 from dsl_app.scan.plan import connect_first
 from dsl_app.scan.reconnect import ATTEMPTS, RETRY_S
 from dsl_app.scan.state import CalibrationChoice, InterruptedScan, Phase, Reconnection
+from numpy.typing import NDArray
 
 from dsl_core.capture.runner import State, Status
 from dsl_core.cli.options import PlanChoice
@@ -22,6 +24,8 @@ from dsl_core.io.scan.folder import ScanReader, ScanWriter
 from dsl_core.model.frames import Frame
 from dsl_core.model.plan import LineComb, Shot
 from dsl_core.model.presets import PRESETS
+from dsl_core.model.result_sink import SeenDepth
+from dsl_core.progress import Progress
 from dsl_core.simulation.sim_devices import SimCamera
 from dsl_core.workflows import scans
 from tests.app.support.scan_bench import (
@@ -140,7 +144,24 @@ def test_the_graph_of_a_pixel_shows_the_lines_that_are_there(bench: ScanBench) -
     assert (brightest.max(0) > brightest.min(0) + 20).all()
 
 
-def test_a_result_follows_and_is_told(bench: ScanBench, tmp_path: Path) -> None:
+def test_a_result_follows_and_is_told(
+    bench: ScanBench, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    depths: list[tuple[str, int, float]] = []
+    real = scans.reconstruct_to
+
+    def watched(target: Path, session: Path, *, seen_depth: SeenDepth, progress: Progress) -> Path:
+        def see(depth_mm: NDArray[np.float32]) -> None:
+            seen_depth(depth_mm)
+            bench.scans.take_news()
+            shown = bench.state.depth.value
+            assert shown is not None
+            depths.append((bench.state.note.value, shown.size, float(np.nanmedian(shown))))
+
+        return real(target, session, progress=progress, seen_depth=see)
+
+    monkeypatch.setattr(scans, "reconstruct_to", watched)
+    expected_s = bench.state.reconstruction_s.value
     results: list[Path] = []
     bench.state.result.connect(results.append)
     working: list[bool] = []
@@ -151,6 +172,12 @@ def test_a_result_follows_and_is_told(bench: ScanBench, tmp_path: Path) -> None:
     assert results == [tmp_path / "first.zarr"]
     assert results[0].is_dir()
     assert working == [True, False]
+    ((note, pixels, middle_mm),) = depths
+    assert note.endswith("Reconstructing, a few seconds; the depth is shown first.")
+    assert pixels == 64 * 48
+    assert 600 < middle_mm < 800
+    assert bench.state.depth.value is None
+    assert bench.state.reconstruction_s.value != expected_s
 
 
 @pytest.mark.parametrize(
@@ -167,7 +194,7 @@ def test_a_reconstruction_that_does_not_end_well_is_not_announced_for_ever(
     bench.scans.start()
     note = bench.state.note.value
     assert note.startswith(f"All {FRAMES} frames are saved in ")
-    assert "Reconstructing…" not in note
+    assert "Reconstructing" not in note
     assert f"The reconstruction {how}. Open first.dsl on the Results page" in note
 
 
