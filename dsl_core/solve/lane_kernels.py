@@ -338,7 +338,7 @@ def gradient(
 
 @compiled
 def solve_blocks(
-    equations: Array, neighbours: bool, green: Array, index: Array, shading: Array, offsets: bool,
+    equations: Array, neighbours: bool, shares: Array, index: Array, shading: Array, offsets: bool,
     rows: Array, levels: Array, prior: Array, volumes: Array, taus: Array, bounds: Array, level: float,
     uneven: float, local: float, parameters: float, diagonals: tuple[int, ...],
     work: tuple[Array, ...], solutions: tuple[Array, ...], candidates: Array, marks: tuple[Array, ...],
@@ -347,11 +347,11 @@ def solve_blocks(
     """Solve pixels from the sums of their samples' equations; False where a system is not positive definite.
 
     ``equations`` are (rows, channels, columns), see `dsl_core.optics.lines.sums`. With ``neighbours`` they
-    have one more sample on every side, of which a ``green`` pixel takes four and another eight. ``index`` is
-    the pixel's place in the results, negative where none is wanted. ``rows`` (rows, bands, 3, columns) are
-    broad-band equations of values ``levels`` (rows, 3, columns), both empty where there are none. ``prior``
-    (4, bands) are the diagonals of squared second differences and of the level. Results are (bands, pixels),
-    ``tau`` and ``misfit`` (pixels,).
+    have one more sample on every side, of which pixels take ``shares`` (rows, 8, columns), in the order of
+    `dsl_core.optics.colour_neighbours.AROUND`. ``index`` is the pixel's place in the results, negative where
+    none is wanted. ``rows`` (rows, bands, 3, columns) are broad-band equations of values ``levels`` (rows, 3,
+    columns), both empty where there are none. ``prior`` (4, bands) are the diagonals of squared second
+    differences and of the level. Results are (bands, pixels), ``tau`` and ``misfit`` (pixels,).
     """
     band, count = len(diagonals), prior.shape[1]
     size = band + 1
@@ -376,11 +376,15 @@ def solve_blocks(
                     for i in range(LANES):
                         p = x0 + i
                         total = np.float64(equations[y + 1, c, p + 1])
-                        total += equations[y + 1, c, p] + equations[y + 1, c, p + 2]
-                        total += equations[y, c, p + 1] + equations[y + 2, c, p + 1]
-                        corners = np.float64(equations[y, c, p]) + equations[y, c, p + 2]
-                        corners += equations[y + 2, c, p] + equations[y + 2, c, p + 2]
-                        sums[c * LANES + i] = total + (0.0 if green[y, p] else corners)
+                        total += shares[y, 0, p] * equations[y + 1, c, p]
+                        total += shares[y, 1, p] * equations[y + 1, c, p + 2]
+                        total += shares[y, 2, p] * equations[y, c, p + 1]
+                        total += shares[y, 3, p] * equations[y + 2, c, p + 1]
+                        total += shares[y, 4, p] * equations[y, c, p]
+                        total += shares[y, 5, p] * equations[y, c, p + 2]
+                        total += shares[y, 6, p] * equations[y + 2, c, p]
+                        total += shares[y, 7, p] * equations[y + 2, c, p + 2]
+                        sums[c * LANES + i] = total
                 else:
                     for i in range(LANES):
                         sums[c * LANES + i] = equations[y, c, x0 + i]

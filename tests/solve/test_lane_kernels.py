@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from dsl_core.optics.colour_neighbours import AROUND
 from tests.solve.plain import plain
 
 Floats = NDArray[np.float64]
@@ -84,7 +85,7 @@ class Scene:
         shape = self.rows + margin, self.columns + margin
         self.equations = np.stack([np.stack([self.sample(rng) for _ in range(shape[1])], 1)
                                    for _ in range(shape[0])])  # fmt: skip
-        self.green = rng.random((self.rows, self.columns)) < 0.5
+        self.shares = rng.uniform(0.0, 1.0, (self.rows, 8, self.columns)).round(1)
         self.shading = rng.uniform(0.4, 1.6, (self.rows, self.columns))
         # The last block has no pixel, and nothing that could be solved; some others of its row have none.
         self.equations[-1, : BANDS * size : size, self.columns - 3] = -1e9
@@ -121,9 +122,10 @@ class Scene:
         """What is known of a pixel: its own sample, or those around it."""
         if not self.neighbours:
             return np.asarray(self.equations[y, :, x])
-        around = [(0, 1), (1, 0), (1, 1), (1, 2), (2, 1)]
-        around += [] if self.green[y, x] else [(0, 0), (0, 2), (2, 0), (2, 2)]
-        return np.asarray(sum(self.equations[y + dy, :, x + dx] for dy, dx in around))
+        total = self.equations[y + 1, :, x + 1].copy()
+        for share, (dy, dx) in zip(self.shares[y, :, x], AROUND, strict=True):
+            total += share * self.equations[y + 1 + dy, :, x + 1 + dx]
+        return np.asarray(total)
 
     def found(self) -> SimpleNamespace:
         """The kernels' results."""
@@ -145,7 +147,7 @@ class Scene:
         out |= {"at_bound": np.zeros((BANDS, self.pixels), bool)}
         out |= {name: np.full(self.pixels, np.nan) for name in names[5:]}
         sound = kernels.solve_blocks(
-            self.equations, self.neighbours, self.green, self.index, self.shading, self.offsets,
+            self.equations, self.neighbours, self.shares, self.index, self.shading, self.offsets,
             self.broad if self.has_broad else np.zeros((0, 0, 0, 0)),
             self.levels, PRIOR, VOLUMES, TAUS, BOUNDS, LEVEL, UNEVEN, LOCAL, self.parameters, (0,) * band,
             (*nan(*sizes), np.zeros(ROWS * margin * LANES)), tuple(solutions),

@@ -273,9 +273,7 @@ class SpectralReconstruction:
         """Spectra and reduced chi-square of a tile from the samples ``near`` it, whose light was traced."""
         shading = frames.known("shading")
         system, offset = self._samples(near, traced, check)
-        gather = ColourNeighbours(
-            self.rig.sensor.bayer, frames.rows, frames.columns, near.place(), frames.place()
-        )
+        gather = ColourNeighbours(frames.rows, frames.columns, near.place(), frames.place(), frames.shares())
         matrix, right, square, samples = (
             gather.sum(values)
             for values in (system.positive_matrix(), system.right, system.square, system.samples)

@@ -80,8 +80,7 @@ class CompiledTiles:
         offsets = bool((near.known("offset_std") > 0).any())
         solver = self._solver(model.bands.count, diagonals)
         shading = on_grid(frames.known("shading").numpy(), pixels)
-        rows, columns = np.mgrid[frames.rows, frames.columns.start : frames.columns.start + wide]
-        green = None if margin == 0 else np.ascontiguousarray(bayer_colours(bayer, rows, columns) == 1)
+        shares = None if margin == 0 else np.ascontiguousarray(frames.shares(wide).swapaxes(0, 1))
         found = Found.empty(model.bands.count, len(frames.flat))
         equations = np.zeros((STRIP + 2 * margin, solver.channels(offsets), samples.shape[1]))
         done = 0
@@ -96,9 +95,8 @@ class CompiledTiles:
             done = stop + 2 * margin
             part = slice(start, stop)
             broad = None if colour is None else _broad(model, colour, shading[part], pixels[part])
-            solver.solve(
-                equations, pixels[part], shading[part], None if green is None else green[part], broad, found
-            )
+            own = None if shares is None else shares[part]
+            solver.solve(equations, pixels[part], shading[part], own, broad, found)
             if margin:
                 # The last rows are needed again by the next strip.
                 equations[: 2 * margin] = equations[stop - start : stop - start + 2 * margin].copy()

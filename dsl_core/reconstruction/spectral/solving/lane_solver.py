@@ -140,18 +140,18 @@ class LaneSolver:
         equations: Floats,
         index: NDArray[np.int64],
         shading: Floats,
-        green: NDArray[np.bool_] | None,
+        shares: Floats | None,
         broad: tuple[Floats, Floats] | None,
         found: Found,
     ) -> None:
         """Solve a grid (rows, columns) of whole blocks into ``found``, at the places that ``index`` says.
 
-        With a mask of ``green`` pixels ``equations`` are those of samples with a margin of one, otherwise of
-        the pixels themselves. Raises `ValueError` where a system is not positive definite.
+        With ``shares`` (rows, 8, columns) ``equations`` are those of samples with a margin of one, otherwise
+        those of the pixels themselves. Raises `ValueError` where a system is not positive definite.
         """
         rows, levels = broad or (np.zeros((0, 0, 0, 0)), np.zeros((0, 0, 0)))
         sound = solve_blocks(
-            equations, green is not None, np.zeros((1, 1), bool) if green is None else green, index, shading,
+            equations, shares is not None, np.zeros((0, 0, 0)) if shares is None else shares, index, shading,
             equations.shape[1] == self.channels(True), rows, levels, self._prior, self._volumes, self._taus,
             self._bounds, self._level, WITHIN_BAND, LOCAL_STD**-2, self._parameters, self._diagonals,
             *self._work, found.nodes, found.mean, found.std, found.data_share, found.at_bound, found.tau,

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from dsl_core.model.rig import Rig
+from dsl_core.optics.colour_neighbours import shares_on_a_surface, usual_shares
 from dsl_core.optics.demosaic import demosaic, demosaic_variance
 from dsl_core.optics.lines.line_set import LineSet
 from dsl_core.optics.lines.profile import halo_of_line
@@ -64,6 +65,7 @@ class TileFrames:
         self.flat = y * self.width + x
         near = np.s_[max(rows.start - 2, 0) : rows.stop + 2, max(columns.start - 2, 0) : columns.stop + 2]
         there = slice(near[0].start - first_row, near[0].stop - first_row), near[1]
+        self._corner = near[0].start, near[1].start
         self._radiance, self._std = radiance[:, *there], std[:, *there]
         self._near = Pixels(**{name: values[near] for name, values in vars(pixels).items()})
         at = (y - near[0].start) * self._near.valid.shape[1] + x - near[1].start
@@ -103,6 +105,22 @@ class TileFrames:
         count = len(images)
         flat = images.reshape(count * 3, -1).index_select(1, self.at)
         return flat.reshape(count, 3, -1).permute(1, 0, 2).contiguous()
+
+    def shares(self, width: int | None = None) -> NDArray[np.float64]:
+        """How much samples around the tile's pixels count, (8, rows, columns), see `shares_on_a_surface`.
+
+        With a ``width`` there are so many columns; those beyond the tile's own are zero.
+        """
+        usual = usual_shares(self.bayer, self.rows, self.columns)
+        height, own = usual.shape[1:]
+        # Two pixels on every side, also beyond the picture.
+        amplitude, std = np.full((2, height + 4, own + 4), np.nan)
+        top, left = self._corner[0] - self.rows.start + 2, self._corner[1] - self.columns.start + 2
+        there = np.s_[top : top + self._near.valid.shape[0], left : left + self._near.valid.shape[1]]
+        amplitude[there], std[there] = self._near.amplitude, self._near.amplitude_std
+        found = np.zeros((8, height, width or own))
+        found[..., :own] = shares_on_a_surface(usual, amplitude, std)
+        return found
 
     def offset_variance(self) -> Tensor:
         """Variance of what all frames may be off in three colours, (3, pixels)."""
