@@ -29,6 +29,8 @@ _IN_COMMON = 0.05
 BAND_SHARE = 0.25
 #: A class that varies by more than this share of its reflectance is doubted.
 WIDE = 0.2
+#: A class whose spectrum is known to no better than both, a share of it and a reflectance, is left out.
+UNKNOWN_SHARE, UNKNOWN = 0.5, 0.05
 #: Pixels with these flags get no class: their spectrum is absent, cut off, or that of two materials.
 NOT_JUDGED = SPECTRUM_INVALID | Flag.SATURATED | Flag.POOR_FIT
 
@@ -167,6 +169,29 @@ def doubt_of(each: SpectralClass) -> str:
                 " materials. Mark a smaller region, or group the library otherwise."
             )
     return ""
+
+
+def known_classes(classes: Sequence[SpectralClass]) -> tuple[tuple[SpectralClass, ...], tuple[str, ...]]:
+    """Classes whose spectra are known, and notes on those left out and on those in doubt.
+
+    A pin on the edge of a patch may have a deviation of several times its reflectance: it would be as likely
+    as any other name everywhere. Raises `DecodeError` where no class is left.
+    """
+    kept: list[SpectralClass] = []
+    notes: list[str] = []
+    for each in classes:
+        std = min(float(member.std.mean()) for member in each.members)
+        level = float(each.mean.mean())
+        if std > UNKNOWN and std > UNKNOWN_SHARE * level:
+            notes.append(
+                f"{each.name} is left out: its reflectance of {level:.2f} is known to ±{std:.2f} only"
+                " and would explain nearly anything. Mark another place."
+            )
+        else:
+            kept.append(each)
+    if classes and not kept:
+        raise DecodeError(" ".join(notes))
+    return tuple(kept), (*notes, *(doubt for each in kept if (doubt := doubt_of(each))))
 
 
 def shared_names(classes: Sequence[SpectralClass]) -> tuple[SpectralClass, ...]:

@@ -52,7 +52,7 @@ def classify(
     """
     import xarray as xr
 
-    from dsl_core.analysis.classes import classes_of_library, doubt_of
+    from dsl_core.analysis.classes import classes_of_library, known_classes
     from dsl_core.analysis.classification import classes_of_masks, classify_result, within_nm
     from dsl_core.analysis.classify import Limits, Measure
     from dsl_core.analysis.library import read_library
@@ -77,8 +77,9 @@ def classify(
         classes += classes_of_masks(result, {name: place_mask(result, name, p) for name, p in pins.items()})
     chosen = Measure(measure)
     limits = Limits.chosen(chosen, worst, margin)
-    notes = [*(doubt for each in classes if (doubt := doubt_of(each))), *notes]
-    made = classify_result(result, classes, chosen, limits, brightness, progress)
+    known, doubts = known_classes(classes)
+    notes = [*doubts, *notes]
+    made = classify_result(result, known, chosen, limits, brightness, progress)
     over = ("y", "x")
     rows = {row.label: row for row in made.rows}
     labels = list(made.shown.labels)

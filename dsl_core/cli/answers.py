@@ -167,7 +167,7 @@ def _classes(
     progress: Progress,
 ) -> tuple[list[SpectralClass], list[str]]:
     """The classes that the options name, and notes on the library."""
-    from dsl_core.analysis.classes import classes_of_library, doubt_of
+    from dsl_core.analysis.classes import classes_of_library, known_classes
     from dsl_core.analysis.classification import classes_of_masks
     from dsl_core.analysis.library import read_library
     from dsl_core.analysis.places import require_spectra
@@ -188,7 +188,8 @@ def _classes(
     masks = _masks(path, result, pins, at)
     if masks:
         classes += classes_of_masks(result, masks)
-    return classes, [*(doubt for each in classes if (doubt := doubt_of(each))), *notes]
+    known, doubts = known_classes(classes)
+    return list(known), [*doubts, *notes]
 
 
 def colours(

@@ -1,7 +1,14 @@
 import numpy as np
 import pytest
 
-from dsl_core.analysis.classes import Member, SpectralClass, class_of_pixels, doubt_of, summed_up
+from dsl_core.analysis.classes import (
+    Member,
+    SpectralClass,
+    class_of_pixels,
+    doubt_of,
+    known_classes,
+    summed_up,
+)
 from dsl_core.analysis.classify import ClassMap, Limits, Measure, score
 from dsl_core.errors import DecodeError
 from dsl_core.model.result import Flag
@@ -116,6 +123,20 @@ def test_a_region_of_two_materials_is_doubted_and_flagged_pixels_define_nothing(
     flags = np.where(cube.material == 0, np.uint16(Flag.POOR_FIT), cube.flags)
     kept = class_of_pixels("kept", cube.reflectance, cube.std, cube.material < 2, flags)
     assert kept.mean == pytest.approx(one.mean)
+
+
+def test_a_pin_whose_spectrum_is_not_known_names_nothing(cube: ChartCube) -> None:
+    dark = SpectralClass("dark", (Member.of(np.full(24, 0.01), np.full(24, 0.02)),))
+    edge = SpectralClass("edge", (Member.of(np.full(24, 0.1), np.full(24, 0.4)),))
+    sure = class_of_pixels("sure", cube.reflectance, cube.std, cube.material == 1)
+    kept, notes = known_classes([edge, sure, dark])
+    assert [each.name for each in kept] == ["sure", "dark"]
+    assert notes == (
+        "edge is left out: its reflectance of 0.10 is known to ±0.40 only and would explain nearly anything."
+        " Mark another place.",
+    )
+    with pytest.raises(DecodeError, match="edge is left out"):
+        known_classes([edge])
 
 
 def test_few_members_stay_and_many_are_summed_up(cube: ChartCube) -> None:

@@ -13,7 +13,7 @@ from PySide6.QtWidgets import QLabel, QWidget
 from dsl_app.results.controller import ResultsController
 from dsl_app.results.layers import Layer, Layers, materials_table
 from dsl_app.results.outline_box import OutlineBox
-from dsl_app.results.state import Mark, Materials, ResultsState, Tool
+from dsl_app.results.state import Mark, ResultsState, ResultView, Tool
 from dsl_app.shared.evented import follow_any
 from dsl_app.shared.spectrum import Pixel
 from dsl_app.shared.theme import DARK, Theme
@@ -91,7 +91,7 @@ class ResultImage(QWidget):
         state.cursor.follow(self._show_cursor)
         state.marks.follow(self._show_marks)
         state.search.follow(lambda _: self._show_search())
-        state.materials.follow(self._show_materials)
+        follow_any(self._show_materials, state.materials, state.view)
         state.tool.follow(self._take_tool)
 
     # Mouse and keys --------------------------------------------------------------------------------
@@ -237,8 +237,11 @@ class ResultImage(QWidget):
             height, width = search.likeness.delta_e.shape
             self.overlay.setRect(-0.5, -0.5, width, height)
 
-    def _show_materials(self, materials: Materials | None) -> None:
-        self.materials.setVisible(materials is not None)
+    def _show_materials(self) -> None:
+        """Lay the map over colours; over a band, depth or reasons it would hide what was asked for."""
+        materials = self._state.materials.value
+        is_over = self._state.view.value in (ResultView.COLOUR, ResultView.CLOUD)
+        self.materials.setVisible(materials is not None and is_over)
         if materials is not None:
             shown = materials.found.shown
             table = materials_table(len(shown.names))

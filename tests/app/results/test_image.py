@@ -109,3 +109,15 @@ def test_depth_outside_the_limits_is_transparent_and_the_bar_says_them(bench: Be
     assert image.bar.levels() == automatic
     bench.window.do("undo")
     assert (bar.near.value(), bar.automatic.isChecked()) == (705.0, False)
+
+
+def test_a_class_map_lies_over_colours_and_hides_no_other_view(bench: Bench) -> None:
+    layer = bench.page.image.content.materials
+    bench.control.marks.pin((30, 5))
+    bench.control.answers.from_marks(bench.page.materials.way)
+    assert layer.isVisible()
+    for view in (ResultView.BAND, ResultView.DEPTH, ResultView.QUALITY):
+        bench.control.show(view)
+        assert not layer.isVisible()
+    bench.control.show(ResultView.COLOUR)
+    assert layer.isVisible()

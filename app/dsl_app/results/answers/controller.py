@@ -76,11 +76,12 @@ class AnswersController:
 
         def work(progress: Progress) -> Materials:
             from dsl_core.analysis.areas import pixel_areas_mm2
-            from dsl_core.analysis.classes import doubt_of
+            from dsl_core.analysis.classes import known_classes
             from dsl_core.analysis.classification import Classification
             from dsl_core.analysis.classify import score
 
-            found, notes = classes(result, progress)
+            asked, notes = classes(result, progress)
+            found, doubts = known_classes(asked)
             scores = score(
                 result["reflectance"],
                 result.known("reflectance_std"),
@@ -94,7 +95,6 @@ class AnswersController:
             points = result.known("points_mm")
             areas = None if points is None else pixel_areas_mm2(points, result.known("normals"))
             made = Classification.of(scores, brightness=way.brightness, areas_mm2=areas)
-            doubts = tuple(doubt for each in found if (doubt := doubt_of(each)))
             return Materials(title.removeprefix("Materials by "), made, (*doubts, *notes))
 
         def done(materials: Materials) -> None:
