@@ -150,9 +150,9 @@ def _doubts_of_digits(candidate: Candidate, probes: Probes, found: Recognised) -
         if lost := lost_after(lines, block.slots, block.reading):
             one, other = (_picture_name(candidate, place) for place in lost)
             raise StoreError(
-                f"The stripes of {block.axis} become four times finer from {one} to {other}: a digit between"
-                " them has no picture, and without it no position is known. Add the picture, or name only"
-                " the pictures of the other axis in a mapping."
+                f"The stripes of {block.axis} become four times finer from {one} to {other}: the picture of a"
+                " digit between them is lost, or pictures are exchanged, so that no position is known."
+                " Correct that, or name only the pictures of the other axis in a mapping."
             )
         for pair in odd_pairs(lines, block.slots, block.reading):
             one, other = (_picture_name(candidate, place) for place in pair)

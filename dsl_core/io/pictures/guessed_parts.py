@@ -24,7 +24,7 @@ COMMON_PX = (
 #: Phases disagree by so many times more with the next reading, or which one it is stays unsure.
 CLEARLY_WORSE = 2.0
 #: Phases off by this share of what any fringes give are no agreement.
-BY_CHANCE = 0.6
+BY_CHANCE = 0.65
 #: Numbers may exceed the projector by so much, because a few pixels are read wrongly.
 MOST_BEYOND = 1.02
 #: Numbers of rougher readings are too often wrong to say which there are.
@@ -167,11 +167,12 @@ def _phases(
     pictures = [p for p in block.slots if p is not None]
     lines = probes.across if block.axis == "columns" else probes.down
     if len(fringes) > 1 and reading.off_rad > BY_CHANCE * reading.chance_rad:
+        shown = ", ".join(f"{each:g}" for each in fringes)
         raise StoreError(
             f"The {len(pictures)} pictures of {axis} are sinusoids whose phases agree with no numbers of"
-            f" fringes: they are off by {reading.off_rad:.2f} rad, {reading.chance_rad:.2f} would be"
-            " chance. The projector's gamma or noise may have changed them. State fringes and start_deg in a"
-            " mapping."
+            f" fringes: with {shown}, the best, they are off by {reading.off_rad:.2f} rad, and"
+            f" {reading.chance_rad:.2f} would be chance. The projector's gamma or noise may have changed"
+            " them. State fringes and start_deg in a mapping."
         )
     if stripes is not None and isinstance(stripes.reading, StripeReading):
         number = numbers_of(lines, stripes.slots, stripes.reading)

@@ -32,10 +32,10 @@ VIRTUAL_PX, SAMPLES, MOST_GUESSES = 1024, 500, 12
 MOST_OFF_RAD = 0.35
 #: Where sinusoids start, as they are or counted from another of their steps.
 STARTS_DEG = (0.0, -90.0, 90.0, 180.0)
-#: Readings whose phases disagree by little more than the best's fit as well.
-AS_GOOD, AS_GOOD_RAD = 1.15, 0.01
-#: Of so many pixels one is enough to leave out readings that disagree by this much more.
-FEW, FEW_AS_GOOD, FEW_AS_GOOD_RAD = 8, 1.6, 0.05
+#: Readings are compared by their share of what chance gives; those little above the best's fit as well.
+AS_GOOD, AS_GOOD_SHARE = 1.15, 0.04
+#: Of so many pixels one is enough to leave out readings whose share is this much larger.
+FEW, FEW_AS_GOOD, FEW_AS_GOOD_SHARE = 8, 1.6, 0.2
 #: A position that jumps within a surface is followed over this share of a line; so many pixels may.
 FOLLOWED_SHARE, MOST_JUMPS = 0.03, 0.01
 Complex = NDArray[np.complex64]
@@ -45,8 +45,8 @@ Complex = NDArray[np.complex64]
 class PhaseReading:
     """Sets of ``steps`` pictures each and their fringes.
 
-    ``off_rad`` is by how much phases disagree (rms), ``rival_rad`` that of the best other reading, and
-    ``chance_rad`` that of readings taken by chance.
+    ``off_rad`` is by how much phases disagree (rms), ``chance_rad`` by how much those of unrelated pixels do,
+    and ``rival_rad`` is what the best other reading would have with the same chance.
     """
 
     steps: int
@@ -128,22 +128,24 @@ def read_phase_sets(
         whole = 1.0 if abs(turns[0]) < ONE_FRINGE else 0.0
         return PhaseReading(steps, order, (whole,), 0.0, direction, 0.0, np.pi)
     samples = _samples(waves, lines.lit)
+    guesses = list(dict.fromkeys(islice(_fringes(np.abs(turns)), MOST_GUESSES)))
+    # Many fringes fit anything: readings are compared with what they make of phases of unrelated pixels.
+    mixed = _by_chance(samples, int(np.argmax(np.abs(turns))))
+    chance = {fringes: max(_off(mixed, fringes, 0.0, steps, direction), 1e-3) for fringes in guesses}
     tried = [
-        (sum(fringes), k, fringes, start)
-        for fringes in dict.fromkeys(islice(_fringes(np.abs(turns)), MOST_GUESSES))
-        for k, start in enumerate(_starts(steps))
+        (sum(fringes), k, fringes, start) for fringes in guesses for k, start in enumerate(_starts(steps))
     ]
     # A few pixels tell what is far off.
-    few = [_off(samples[:, ::FEW], *each[2:], steps, direction) for each in tried]
-    near = FEW_AS_GOOD * min(few, default=0.0) + FEW_AS_GOOD_RAD
+    few = [_off(samples[:, ::FEW], *each[2:], steps, direction) / chance[each[2]] for each in tried]
+    near = FEW_AS_GOOD * min(few, default=0.0) + FEW_AS_GOOD_SHARE
     ranked = sorted(
-        (_off(samples, *each[2:], steps, direction) if off <= near else off, *each)
-        for off, each in zip(few, tried, strict=True)
+        (_off(samples, *each[2:], steps, direction) / chance[each[2]] if share <= near else share, *each)
+        for share, each in zip(few, tried, strict=True)
     )
-    if not ranked or ranked[0][0] > MOST_OFF_RAD:
+    if not ranked or ranked[0][0] * chance[ranked[0][3]] > MOST_OFF_RAD:
         return None
     best, _, _, fringes, _ = ranked[0]
-    as_good = [each for each in ranked if each[0] <= AS_GOOD * best + AS_GOOD_RAD]
+    as_good = [each for each in ranked if each[0] <= AS_GOOD * best + AS_GOOD_SHARE]
     coarse = int(np.argmin(fringes))
     if fringes[coarse] == 1 and len(as_good) > 1:
         # One fringe over the projector: where it begins again, the picture of the projector ends.
@@ -151,9 +153,20 @@ def read_phase_sets(
         steady = [each for each in as_good if _jumps(wave, lines.lit, each[4], direction) < MOST_JUMPS]
         if steady:
             as_good, ranked = steady, [*steady, *(each for each in ranked if each not in as_good)]
-    off, _, _, fringes, start = min(as_good, key=lambda each: (each[1], each[2]))
-    rival = min((each[0] for each in ranked if each[3:] != (fringes, start)), default=np.pi)
-    return PhaseReading(steps, order, fringes, start, direction, off, rival, float(np.median(few)))
+    share, _, _, fringes, start = min(as_good, key=lambda each: (each[1], each[2]))
+    most = chance[fringes]
+    # Multiples of the fringes fit in any case, and are another question.
+    ratios = {each[3]: np.divide(each[3], fringes) for each in ranked}
+    others = (each for each in ranked if each[4] != start or np.ptp(ratios[each[3]]) > 1e-9)
+    rival = min((each[0] for each in others), default=np.pi / most)
+    return PhaseReading(steps, order, fringes, start, direction, share * most, rival * most, most)
+
+
+def _by_chance(samples: Complex, kept: int) -> Complex:
+    """Samples (sets, pixels) of which each set but one comes from other pixels than the rest."""
+    rng = np.random.default_rng(0)
+    mixed = [each if k == kept else rng.permutation(each) for k, each in enumerate(samples)]
+    return np.asarray(mixed, np.complex64)
 
 
 def _starts(steps: int) -> tuple[float, ...]:

@@ -135,3 +135,14 @@ def test_white_and_black_are_no_coarse_digit_of_a_part_or_among_noise(share: flo
     assert (reading.bits, reading.inverse, reading.rises) == (7, "interleaved", True)
     assert found is not None
     assert [block.kind for block in found.blocks] == ["white", "black", "stripes"]
+
+
+def test_noisy_sinusoids_are_not_taken_for_finer_ones_that_fit_anything() -> None:
+    seen, code = scene(), Phases(periods_px=(128, 8), steps=8)
+    levels = [captured_levels(CapturedCode(column_sets=(code,)), PROJECTOR, k) for k in range(16)]
+    found = _recognised([seen.picture(each, k, 8, 0.03) for k, each in enumerate(levels)])
+    assert found is not None
+    (reading,) = [block.reading for block in found.blocks]
+    assert isinstance(reading, PhaseReading)
+    assert (reading.fringes, reading.start_deg) == ((1.0, 16.0), 0.0)
+    assert reading.rival_rad > 1.1 * reading.off_rad
