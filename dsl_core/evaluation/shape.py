@@ -103,7 +103,7 @@ class Section:
 
     ``along_mm`` runs along the straight line between the two points, from 0 to its length; ``height_mm`` is
     how far the surface is from that line, towards the camera; ``std_mm`` the deviation of that height by the
-    deviation of depth. NaN where the surface has no point.
+    deviations of depth, those of the two points among them. NaN where the surface has no point.
     """
 
     along_mm: NDArray[np.float64]
@@ -135,7 +135,19 @@ def section(
     across /= size
     moved = points - ends[0][:, None]
     rays = points / points[2]
-    return Section(along @ moved, across @ moved, np.abs(across @ rays) * std)
+    own = np.abs(across @ rays) * std
+    return Section(along @ moved, across @ moved, _with_ends(own, along @ moved / length))
+
+
+def _with_ends(own: NDArray[np.float64], share: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Deviations (samples,) of heights over a line between two points that are uncertain themselves.
+
+    ``own`` are those of the points alone, ``share`` how far along the line each is. The ends are on it.
+    """
+    first, last = np.nan_to_num(own[[0, -1]])
+    total = np.asarray(np.sqrt(own**2 + ((1 - share) * first) ** 2 + (share * last) ** 2))
+    total[[0, -1]] = np.where(np.isfinite(own[[0, -1]]), 0.0, np.nan)
+    return total
 
 
 def _on_line(

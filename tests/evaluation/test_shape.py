@@ -58,7 +58,22 @@ def test_a_section_of_a_step_shows_its_height_and_length() -> None:
     assert cut.along_mm[-1] == pytest.approx(59 * 700 / FOCAL_PX)
     assert cut.height_mm[0] == pytest.approx(0)
     assert cut.height_mm[30] == pytest.approx(10.0, abs=1e-3)
-    np.testing.assert_allclose(cut.std_mm, 0.2, rtol=0.01)
+
+
+def test_heights_of_a_section_vary_as_stated_with_the_ends_of_its_line() -> None:
+    rng, points, std = np.random.default_rng(0), _tilted(20.0), np.full(SHAPE, 0.3)
+    heights = []
+    for _ in range(400):
+        noisy = section(points * (1 + rng.normal(0, std) / points[2]), std, (4, 24), (60, 24))
+        assert noisy is not None
+        heights.append(noisy.height_mm)
+    cut = section(points, std, (4, 24), (60, 24))
+    assert cut is not None
+    stated = cut.std_mm
+    # Near the ends of the line it is uncertain by two points, in its middle by one and a half.
+    assert stated[1] > 1.1 * stated[28]
+    assert stated[[0, -1]].tolist() == [0.0, 0.0]
+    np.testing.assert_allclose(np.std(heights, axis=0)[1:-1], stated[1:-1], rtol=0.2)
 
 
 @pytest.mark.parametrize("last", [(60, 40), (9, 44), (60, 3)])
