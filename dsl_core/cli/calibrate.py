@@ -12,7 +12,7 @@ import typer
 from dsl_core.cli.guidance import ConsoleGuide, figures_json, opened_campaign, resumed_by, run_guided
 from dsl_core.cli.options import Force, Json, RigOptions, parse_options, tab_rigs
 from dsl_core.cli.output import Output
-from dsl_core.cli.pictures import board_of, calibrate_pictures
+from dsl_core.cli.pictures import board_of, calibrate_camera_pictures, calibrate_pictures
 from dsl_core.errors import CalibrationError
 from dsl_core.evaluation.cost import StageCost, StageTimer
 
@@ -104,6 +104,10 @@ def geometry(
         Path | None,
         typer.Option(help="Pictures: what each shows, as 'dsl-scan import --guess' writes it."),
     ] = None,
+    camera_only: Annotated[
+        bool,
+        typer.Option("--camera-only", help="Pictures: the camera's lens alone; no code needed."),
+    ] = False,
     hold: Annotated[
         list[str],
         typer.Option(help="Pictures: distortion held at zero: k1, k2, k3, tangential; may be repeated."),
@@ -118,15 +122,21 @@ def geometry(
     """Find the lenses and the pose of camera and projector from a board under Gray code, film off."""
     if pictures:
         printed = board_of(board, square_mm, marker_mm, dictionary)
+        if camera_only:
+            if target is not None or xml is not None or guess or mapping is not None:
+                raise CalibrationError("--camera-only prints a lens; leave out files, --guess and --mapping.")
+            calibrate_camera_pictures(Output(json), folder, printed, bayer, hold)
+            return
         files = (target, xml)
         layout = (guess, mapping)
         calibrate_pictures(
             Output(json), folder, printed, projector, binning, bayer, baseline_mm, files, layout, hold, force
         )
         return
-    if target is not None or xml is not None or guess or mapping is not None or hold:
+    if target is not None or xml is not None or guess or mapping is not None or hold or camera_only:
         raise CalibrationError(
-            "--output, --xml, --guess, --mapping and --hold need --pictures; 'calibrate all' writes the rig."
+            "--output, --xml, --guess, --mapping, --hold and --camera-only need --pictures; 'calibrate all'"
+            " writes the rig."
         )
     found = board_of(board, square_mm, marker_mm, dictionary)
     own = [] if found is None else [f"board={found.model_dump_json()}"]

@@ -87,6 +87,45 @@ def calibrate_pictures(
     output.finish()
 
 
+def calibrate_camera_pictures(
+    output: Output,
+    folder: Path,
+    board: Checkerboard | Charuco | None,
+    bayer: str | None,
+    hold: list[str],
+) -> None:
+    """Find the lens of a camera alone from pictures of a board, and print it."""
+    from dsl_core.workflows.pictures import calibrate_camera_alone
+
+    if board is None:
+        raise CalibrationError("Pictures need --board COLUMNSxROWS and --square-mm of the printed board.")
+    with output.progress() as progress:
+        found = calibrate_camera_alone(folder, board, _bayer(bayer), hold, progress)
+    lens, deviation = found.lens, found.deviation
+    names = ("fx_px", "fy_px", "cx_px", "cy_px")
+    values = [(name, getattr(lens, name), getattr(deviation, name)) for name in names]
+    terms = zip(("k1", "k2", "p1", "p2", "k3"), lens.distortion, deviation.distortion, strict=True)
+    output.table(
+        ("camera", "value", "deviation"),
+        [(name.replace("_", " "), f"{value:.2f}", f"{std:.2f}") for name, value, std in values]
+        + [(name, f"{value:.4f}", f"{std:.4f}") for name, value, std in terms],
+    )
+    output.table(
+        ("picture", "corners", "error px"),
+        [(name, corners, f"{error:.3f}") for name, corners, error in found.pictures],
+    )
+    output.say(f"Reprojection {found.rms_px:.3f} px RMS; corners cover {found.coverage:.0%} of the picture.")
+    for warning in found.warnings:
+        output.say(f"Warning: {warning}")
+    output.put(
+        camera=lens.model_dump(mode="json"),
+        camera_deviation=deviation.model_dump(mode="json"),
+        rms_px=round(found.rms_px, 4),
+        warnings=list(found.warnings),
+    )
+    output.finish()
+
+
 def _mapping_of(
     output: Output, folder: Path, size_px: tuple[int, int], guess: bool, path: Path | None
 ) -> Mapping | None:

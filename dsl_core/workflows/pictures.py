@@ -10,6 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from dsl_core.calibration.geometry.boards import grey_of
+from dsl_core.calibration.geometry.camera_alone import CameraAlone, calibrate_camera
 from dsl_core.calibration.geometry.pose_series import observe_series
 from dsl_core.calibration.geometry.solve import calibrate_geometry as calibrate
 from dsl_core.errors import CalibrationError
@@ -94,6 +96,34 @@ def calibrate_poses(
     )
 
 
+def calibrate_camera_alone(
+    folder: Path,
+    board: Board,
+    bayer: BayerPattern | None = None,
+    hold: Collection[str] = (),
+    progress: Progress | None = None,
+) -> CameraAlone:
+    """The lens of a camera from pictures of a board in a folder, or the brightest of each pose folder.
+
+    Terms of distortion in ``hold`` are zero. Raises `CalibrationError`.
+    """
+    progress = progress or NoProgress()
+    if not folder.is_dir():
+        raise CalibrationError(f"{folder} is not a folder. Give the folder that contains the pictures.")
+    found = [[path] for path in _pictures(folder)] or [_pictures(each) for each in pose_folders(folder)]
+
+    def greys() -> Iterator[tuple[str, NDArray[np.float32]]]:
+        for index, paths in enumerate(found):
+            progress.report("find the board", index, len(found))
+            frame = max((_read(path) for path in paths), key=lambda picture: float(np.mean(picture)))
+            yield (
+                str(paths[0].relative_to(folder) if len(paths) == 1 else paths[0].parent.name),
+                grey_of(frame, bayer),
+            )
+
+    return calibrate_camera(greys(), board, hold)
+
+
 def pose_folders(folder: Path) -> list[Path]:
     """The folders of poses below a folder, by number; raises `CalibrationError` when there is none."""
     if not folder.is_dir():
@@ -107,7 +137,8 @@ def pose_folders(folder: Path) -> list[Path]:
         raise CalibrationError(
             f"{folder} contains no folders with pictures{instead}. One folder per pose is needed, like"
             " capture_0 with graycode_00.png and so on: the board under every pattern of the code, then white"
-            " and black. Pictures of a board without the code do not say where the projector is."
+            " and black. Pictures of a board without the code do not say where the projector is; they give"
+            " the camera's lens (--camera-only)."
         )
     return found
 

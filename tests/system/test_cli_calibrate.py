@@ -6,15 +6,19 @@ import os
 import shutil
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
 import pytest
 
+from dsl_core.errors import CalibrationError
 from dsl_core.io.published.stereo import load_stereo
 from dsl_core.io.sealed import unseal
 from dsl_core.model.calibration.geometry import GeometryCalibration
+from tests.cases import board_sets
 from tests.cases.board_poses import board_frames
+from tests.cases.foreign_captures import write
 
 from .conftest import Give
 
@@ -138,3 +142,28 @@ def test_an_impossible_board_and_mosaic_are_told(give: Give, pictures: Path) -> 
     assert "Correct the projector's size" in give(
         "calibrate", "geometry", pictures, *SMALL, "--projector", "640x360"
     ).sentence  # fmt: skip
+
+
+def test_pictures_of_a_board_in_any_order_are_guessed_and_give_the_camera_alone(
+    give: Give, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for k, pose in enumerate(board_sets.board_set()):
+        named = [*pose[28:], *pose[14:28], *pose[:14]]
+        write(tmp_path / f"pose{k}", {f"{i}.bmp": picture for i, picture in enumerate(named)})
+    board = ["--pictures", "--board", "6x5", "--square-mm", 30, "--hold", "k3"]
+    alone = give("calibrate", "geometry", tmp_path, *board, "--camera-only", "--json")
+    assert alone.json["camera"]["fx_px"] == pytest.approx(board_sets.CAMERA_FX_PX, rel=0.03)
+    assert alone.json["camera"]["distortion"][4] == 0
+
+    def told(*given: Any) -> None:
+        *_, mapping, hold = given
+        raise CalibrationError(f"{[part.kind for part in mapping.parts]} {hold}")
+
+    monkeypatch.setattr("dsl_core.workflows.pictures.calibrate_geometry", told)
+    guessed = give("calibrate", "geometry", tmp_path, *board, "--projector", "128x96", "--guess")
+    assert "Guessed from pose0: white; black; 7 bits of rows (gray, most significant first" in guessed.out
+    assert guessed.sentence == "['white', 'black', 'stripes', 'stripes'] ['k3']"
+    both = give("calibrate", "geometry", tmp_path, *board, "--guess", "--mapping", "m.json")
+    assert "--guess finds out what --mapping states" in both.sentence
+    files = give("calibrate", "geometry", tmp_path, *board, "--camera-only", "-o", "m.json")
+    assert "--camera-only prints a lens" in files.sentence

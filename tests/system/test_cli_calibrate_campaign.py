@@ -188,7 +188,7 @@ def test_captures_of_another_rig_are_named(give: Give, tmp_path: Path) -> None:
         ),
         (["selftest", "c", "--rig", "nothing"], "There is no rig 'nothing'"),
         (["selftest", "c", "-O", "size=1x1"], "The twin's size must be"),
-        (["calibrate", "geometry", "c", "--output", "x.json"], "--mapping and --hold need --pictures"),
+        (["calibrate", "geometry", "c", "--output", "x.json"], "--hold and --camera-only need --pictures"),
         (["calibrate", "geometry", "c", "--board", "9x7"], "A board needs both"),
         (["calibrate", "all", "c", "--set", "scale=3"], "like bandpass.line_px=5, not scale=3"),
         (["calibrate", "all", "c", "--set", "geometry.colour=3"], "geometry has no setting colour"),

@@ -90,6 +90,15 @@ def calibrate_geometry(
     return found.model_copy(update={"warnings": (*warnings, *doubts(found, tilt, baseline_mm))})
 
 
+def opencv_flags(hold: Collection[str]) -> int:
+    """Flags of OpenCV's calibration that hold terms at zero, but for k3; raises `CalibrationError`."""
+    import cv2
+
+    _places_of(hold)
+    fixed = {"k1": cv2.CALIB_FIX_K1, "k2": cv2.CALIB_FIX_K2, "tangential": cv2.CALIB_ZERO_TANGENT_DIST}
+    return sum(flag for term, flag in fixed.items() if term in hold)
+
+
 def _places_of(hold: Collection[str]) -> list[int]:
     """Numbers of the parameters of both lenses that are held at zero; raises `CalibrationError`."""
     unknown = [term for term in hold if term not in TERMS]
@@ -122,8 +131,7 @@ def _alone(
     """Lens (9,) and board poses (poses, 6) of one device by OpenCV; k3 is left to the joint fit."""
     import cv2
 
-    fixed = {"k1": cv2.CALIB_FIX_K1, "k2": cv2.CALIB_FIX_K2, "tangential": cv2.CALIB_ZERO_TANGENT_DIST}
-    flags = cv2.CALIB_FIX_K3 | sum(flag for term, flag in fixed.items() if term in hold)
+    flags = cv2.CALIB_FIX_K3 | opencv_flags(hold)
     seen = [pose.camera_px if device == "camera" else pose.projector_px for pose in poses]
     try:
         _, matrix, distortion, turns, shifts = cv2.calibrateCamera(
