@@ -23,8 +23,10 @@ COMMON_PX = (
 )  # fmt: skip
 #: Phases disagree by so many times more with the next reading, or which one it is stays unsure.
 CLEARLY_WORSE = 2.0
-#: Phases off by this share of what any fringes give are no agreement.
+#: Phases off by this share of what chance gives do not agree.
 BY_CHANCE = 0.65
+#: The same, where one fringe over the projector makes the others' numbers known to about a tenth.
+NO_BETTER = 0.8
 #: Numbers may exceed the projector by so much, because a few pixels are read wrongly.
 MOST_BEYOND = 1.02
 #: Numbers of rougher readings are too often wrong to say which there are.
@@ -168,11 +170,19 @@ def _phases(
     lines = probes.across if block.axis == "columns" else probes.down
     if len(fringes) > 1 and reading.off_rad > BY_CHANCE * reading.chance_rad:
         shown = ", ".join(f"{each:g}" for each in fringes)
-        raise StoreError(
-            f"The {len(pictures)} pictures of {axis} are sinusoids whose phases agree with no numbers of"
-            f" fringes: with {shown}, the best, they are off by {reading.off_rad:.2f} rad, and"
-            f" {reading.chance_rad:.2f} would be chance. The projector's gamma or noise may have changed"
-            " them. State fringes and start_deg in a mapping."
+        figures = (
+            f"with {shown}, the best, they are off by {reading.off_rad:.2f} rad, and {reading.chance_rad:.2f}"
+            " would be chance"
+        )
+        if min(fringes) > 1 or reading.off_rad > NO_BETTER * reading.chance_rad:
+            raise StoreError(
+                f"The {len(pictures)} pictures of {axis} are sinusoids whose phases agree with no numbers of"
+                f" fringes: {figures}. The projector's gamma or noise may have changed them. State fringes"
+                " and start_deg in a mapping."
+            )
+        doubts.append(
+            f"phases of {axis} hardly agree with any numbers of fringes, as where a projector has a gamma:"
+            f" {figures}"
         )
     if stripes is not None and isinstance(stripes.reading, StripeReading):
         number = numbers_of(lines, stripes.slots, stripes.reading)

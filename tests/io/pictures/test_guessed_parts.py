@@ -129,14 +129,27 @@ def test_numbers_of_a_part_may_be_centred_as_those_of_the_other_axis(
     assert [said in doubt for doubt in doubts] == [True] * bool(said)
 
 
-def test_sinusoids_that_agree_no_better_than_by_chance_are_refused() -> None:
+@pytest.mark.parametrize(
+    ("fringes", "off_rad", "ends"),
+    [
+        ((1.0, 6.0, 36.0), 0.02, "well"),
+        ((1.0, 6.0, 36.0), 0.11, "doubtful"),
+        ((2.0, 11.0, 65.0), 0.11, "refused"),
+        ((1.0, 6.0, 36.0), 0.14, "refused"),
+    ],
+)
+def test_sinusoids_that_agree_no_better_than_by_chance_are_refused(
+    fringes: tuple[float, ...], off_rad: float, ends: str
+) -> None:
     lines = Lines(np.zeros((9, 2, 4), np.float32), np.ones((2, 4), np.bool_))
-    for off_rad, is_refused in ((0.02, False), (0.14, True)):
-        reading = PhaseReading(3, "set", (1.0, 6.0, 36.0), 0.0, 1, off_rad, 0.2, 0.16)
-        block = Block("phases", tuple(range(9)), "columns", reading)
-        with (
-            pytest.raises(StoreError, match=r"1, 6, 36, the best, .* 0\.14 rad, and 0\.16")
-            if is_refused
-            else nullcontext()
-        ):
-            assert part_of(block, [block], (512, 384), Probes(lines, lines, 1.0))[0].kind == "phases"
+    block = Block(
+        "phases", tuple(range(9)), "columns", PhaseReading(3, "set", fringes, 0.0, 1, off_rad, 0.3, 0.16)
+    )
+    with (
+        pytest.raises(StoreError, match=r", the best, they are off by 0\.1\d rad, and 0\.16 would be chance")
+        if ends == "refused"
+        else nullcontext()
+    ):
+        part, doubts = part_of(block, [block], (512, 384), Probes(lines, lines, 1.0))
+        assert part.kind == "phases"
+        assert any("hardly agree" in doubt for doubt in doubts) == (ends == "doubtful")
