@@ -18,8 +18,11 @@ if TYPE_CHECKING:
 ORDERS = (1, -1)
 #: Orders of a few percent of the first: lines are too far away to mix with them, free patterns are not.
 SECOND_ORDERS = (2, -2)
-#: Internal bands beyond each end of the grid.
-PAD_NM = 15.0
+#: Internal bands beyond each end of the grid: at least so far, and as far as there is light of the first
+#: orders, as a share of the brightest.
+PAD_NM, LEAST_LIGHT = 15.0, 0.015
+#: What is added where light goes farther than that, so that it ends within the bands.
+FADING_NM = 8.0
 #: Bands are as wide in columns as their dispersion to this, px per nm, so that pixels share tables of light.
 SLOPE_STEP = 0.02
 #: Light this far beyond the bands still counts in the zero order.
@@ -75,6 +78,36 @@ def _beyond(rig: Rig, end_nm: float, side: int, step_nm: float) -> NDArray[np.fl
     return np.asarray((chain_response(rig, 0, end_nm + side * distance_nm) * outside).sum(-1) * 0.25)
 
 
+def pads_nm(rig: Rig, grid: WavelengthGrid) -> tuple[float, float]:
+    """How far below and above a grid first orders bring light that a model must know, nm.
+
+    Lines light a pixel through these wavelengths as well, whether they are asked for or not: without a band
+    there, their light is taken for that of others.
+    """
+    ends = [
+        (min(curve.wavelengths_nm[0] for curve in rgb), max(curve.wavelengths_nm[-1] for curve in rgb))
+        for rgb in (rig.response, rig.emission)
+    ]
+    # Beyond its last sample a curve is said to stay as it is, which is no light that anybody measured.
+    known = np.arange(max(low for low, _ in ends), min(high for _, high in ends) + 0.5)
+    light = _first_order_light(rig, known)
+    bright = known[light > LEAST_LIGHT * light.max(initial=0)]
+    below = grid.start_nm - bright.min(initial=grid.start_nm)
+    above = bright.max(initial=grid.stop_nm) - grid.stop_nm
+    return _pad_nm(float(below)), _pad_nm(float(above))
+
+
+def _pad_nm(light_nm: float) -> float:
+    """How far bands must reach where light reaches so far beyond the grid."""
+    return PAD_NM if light_nm <= PAD_NM else light_nm + FADING_NM
+
+
+def _first_order_light(rig: Rig, wavelengths_nm: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The most that a colour of the camera sees of white through a first order, at each wavelength."""
+    light = [chain_response(rig, order, wavelengths_nm).sum(1) for order in ORDERS]
+    return np.asarray(np.max(light, axis=(0, 1)))
+
+
 @dataclass(frozen=True)
 class Bands:
     """Internal bands of a forward model and the response of each order there."""
@@ -88,13 +121,13 @@ class Bands:
     @classmethod
     def of(cls, rig: Rig, grid: WavelengthGrid) -> Bands:
         """Extend a grid and integrate the rig's response over its bands."""
-        pad = math.ceil(PAD_NM / grid.step_nm)
         step = grid.step_nm
-        centres = np.asarray(grid.start_nm + step * np.arange(-pad, grid.count + pad), np.float64)
+        below, above = (math.ceil(pad / step) for pad in pads_nm(rig, grid))
+        centres = np.asarray(grid.start_nm + step * np.arange(-below, grid.count + above), np.float64)
         moments, centroids = {}, {}
         for order in (0, *ORDERS, *SECOND_ORDERS):
             moments[order], centroids[order] = hat_moments(rig, order, centres, step)
-        return cls(centres, step, slice(pad, pad + grid.count), moments, centroids)
+        return cls(centres, step, slice(below, below + grid.count), moments, centroids)
 
     @property
     def count(self) -> int:

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 import torch
 
-from dsl_core.model.spectral import WavelengthGrid
-from dsl_core.optics.spectra import Bands, chain_response, hat_moments
+from dsl_core.model.spectral import SpectralCurve, WavelengthGrid
+from dsl_core.optics.spectra import FADING_NM, Bands, chain_response, hat_moments, pads_nm
 from dsl_core.simulation.published_rig import published_rig
 
 RIG = published_rig()
@@ -60,6 +60,24 @@ def test_bands_go_fifteen_nanometres_beyond_the_grid(step_nm: float, pad: int) -
     moments, centroids = hat_moments(RIG, -1, bands.centres_nm, step_nm)
     assert bands.moments[-1] == pytest.approx(moments)
     assert bands.centroids_nm[-1] == pytest.approx(centroids)
+
+
+def test_bands_go_as_far_beyond_a_narrow_grid_as_there_is_light() -> None:
+    grid = WavelengthGrid(start_nm=480.0, stop_nm=600.0)
+    bands = Bands.of(RIG, grid)
+    assert bands.centres_nm[bands.reported] == pytest.approx(grid.centres_nm)
+    nm = np.arange(390.0, 711.0)
+    light = chain_response(RIG, 1, nm).sum(1).max(0)
+    outside = (nm < bands.centres_nm[0]) | (nm > bands.centres_nm[-1])
+    assert light[outside].max() < 0.02 * light.max()
+    assert bands.centres_nm[0] > 395
+    assert bands.centres_nm[-1] < 700
+
+
+def test_bands_end_where_the_curves_of_a_lamp_were_no_longer_measured() -> None:
+    flat = SpectralCurve.of([400, 700], [1, 1])
+    lamp = RIG.model_copy(update={"emission": (flat,) * 3, "response": (flat,) * 3})
+    assert pads_nm(lamp, WavelengthGrid()) == pytest.approx((30 + FADING_NM, 40 + FADING_NM))
 
 
 def test_second_orders_count_where_the_rig_knows_them() -> None:

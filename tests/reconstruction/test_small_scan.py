@@ -55,6 +55,19 @@ def evaluate(scanned: tuple[DeviceRig, MemoryScan], cube: NDArray[np.float32]) -
     return pipeline.evaluate(build_result({"reflectance": cube}, GRID.centres_nm, {}), truth)
 
 
+def test_light_outside_the_bands_asked_for_is_not_blamed_on_the_rig(
+    scanned: tuple[DeviceRig, MemoryScan],
+) -> None:
+    devices, scan = scanned
+    grid = WavelengthGrid(start_nm=500.0, stop_nm=600.0, step_nm=10.0)
+    result = pipeline.reconstruct(scan, calibration_of(devices), pipeline.Options(grid))
+    fit, truth = Fit.read(result.attrs), scans.twin_truth(devices, grid)
+    assert fit is not None
+    assert truth is not None
+    assert not {"film", "response", "profile"} & set(fit.parts)
+    assert pipeline.evaluate(result, truth).mean("rmse") < 0.012
+
+
 def test_both_correspondence_models_give_the_same_spectra(scanned: tuple[DeviceRig, MemoryScan]) -> None:
     devices, scan = scanned
     assert devices.calibration is not None
