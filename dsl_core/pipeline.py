@@ -170,7 +170,7 @@ def _depth(
     Unless all is ``as_calibrated``, light, line spread and lenses are followed: the rig as this scan has it,
     and what was found of them.
     """
-    from dsl_core.reconstruction.code_agreement import code_agreement
+    from dsl_core.reconstruction.code_agreement import NamedPlaces, code_agreement
     from dsl_core.reconstruction.columns.column import MODEL_ERROR
     from dsl_core.reconstruction.columns.line_spread import own_spread, spread_pixels, with_own_spread
     from dsl_core.reconstruction.columns.peak_error import own_peak_error
@@ -201,7 +201,8 @@ def _depth(
             rig = with_own_spread(rig, found)
             peak_error = own_peak_error(rig, lines, code, white, frames)
         columns = columns_by_rows(rig, options, frames, code, white, peak_error, progress)
-        del white  # of large pictures it takes much of the memory
+        named = NamedPlaces.of(code)
+        del code, white  # of large pictures they take much of the memory
         geometry = geometry_of(
             rig, lines if options.refine_columns else None, columns, frames.shape, options.surface_window_px
         )
@@ -211,7 +212,7 @@ def _depth(
             rig, geometry, found_of_lenses = follow_lenses(rig, lines, geometry, options.surface_window_px)
             findings += found_of_lenses
             geometry, found_of_code = code_agreement(
-                rig, frames.plan, code, geometry, options.surface_window_px
+                rig, frames.plan, named, geometry, options.surface_window_px
             )
             findings += found_of_code
     return rig, geometry, findings

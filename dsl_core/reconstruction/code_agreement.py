@@ -46,6 +46,22 @@ _DOUBTFUL = Flag.NOT_REFINED | Flag.UNUSUAL_PEAK | Flag.DEPTH_EDGE
 
 
 @dataclass(frozen=True)
+class NamedPlaces:
+    """Columns and rows of the projector that a code names, (rows, columns), -1 where it names none.
+
+    What is kept of a decoded code until there is a depth. ``row`` is None where rows are not coded.
+    """
+
+    column: NDArray[np.int32]
+    row: NDArray[np.int32] | None
+
+    @classmethod
+    def of(cls, code: DecodedCode) -> NamedPlaces:
+        """Those of a decoded code."""
+        return cls(code.column, code.row)
+
+
+@dataclass(frozen=True)
 class Disagreement:
     """By how much groups of pixels are off, with deviations, px: (groups,)."""
 
@@ -76,7 +92,7 @@ class Disagreement:
 
 
 def code_agreement(
-    rig: Rig, plan: CapturePlan, code: DecodedCode, geometry: Geometry, window_px: int | None = None
+    rig: Rig, plan: CapturePlan, code: NamedPlaces, geometry: Geometry, window_px: int | None = None
 ) -> tuple[Geometry, list[FitFinding]]:
     """Geometry whose deviations hold what the code disagrees by, and what was found.
 
@@ -146,7 +162,7 @@ def _correlated(seen: Floats, log_likelihood: Floats, tried: int) -> Floats:
     return np.asarray(score[first : first + tried])
 
 
-def _of_columns(code: DecodedCode, geometry: Geometry, usable: NDArray[np.bool_]) -> FitFinding | None:
+def _of_columns(code: NamedPlaces, geometry: Geometry, usable: NDArray[np.bool_]) -> FitFinding | None:
     usable = usable & (code.column >= 0)
     column = geometry.column_px[usable].astype(np.float64)
     group = (column.clip(0) / COLUMNS_PX).astype(int)
@@ -168,7 +184,7 @@ def _of_columns(code: DecodedCode, geometry: Geometry, usable: NDArray[np.bool_]
 
 
 def _of_rows(
-    rig: Rig, kind: BinaryCode, code: DecodedCode, geometry: Geometry, usable: NDArray[np.bool_]
+    rig: Rig, kind: BinaryCode, code: NamedPlaces, geometry: Geometry, usable: NDArray[np.bool_]
 ) -> FitFinding | None:
     if code.row is None:
         return None
