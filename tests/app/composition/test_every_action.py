@@ -142,8 +142,13 @@ def test_it_is_noticed(qtbot: QtBot, window: MainWindow, chosen: list[str], acti
         return
     before = notice(window, chosen)
     # A question that waits for an answer is given up.
-    QTimer.singleShot(1500, lambda: tidy(window))
+    give_up = QTimer(window)
+    give_up.setSingleShot(True)
+    give_up.timeout.connect(lambda: tidy(window))
+    give_up.start(1500)
     made.trigger()
+    # Later, it would close the dialogs of other tests.
+    give_up.stop()
     noticed: list[bool] = []
 
     def is_noticed() -> bool:
