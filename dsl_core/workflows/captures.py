@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from dsl_core.devices.base import DeviceRig
 from dsl_core.devices.replay import ReplayCamera, ReplayProjector
@@ -19,7 +20,9 @@ from dsl_core.io.scan.check import require_complete
 from dsl_core.io.scan.folder import ScanReader, ScanWriter
 from dsl_core.io.scan.frame_store import checksum
 from dsl_core.io.scan.manifest import read_manifest
+from dsl_core.model.captured_code import CapturedCode, Stripes
 from dsl_core.model.frames import Frame, FrameSource
+from dsl_core.model.plan import CapturePlan, GrayCode, Shot, XorCode
 from dsl_core.model.result import Flag, build_result
 from dsl_core.model.rig import ProjectorResponse, Rig, Sensor
 from dsl_core.progress import NoProgress, Progress
@@ -184,11 +187,39 @@ def decode_scan(folder: Path, progress: Progress | None = None) -> xr.Dataset:
     )
 
 
+@dataclass(frozen=True)
+class _Captured:
+    """Frames under another plan of the same shots."""
+
+    plan: CapturePlan
+    source: FrameSource
+
+    def read(self, shot: Shot) -> NDArray[np.uint16]:
+        """The frame of a shot."""
+        return self.source.read(shot)
+
+
+def _as_captured(source: FrameSource) -> FrameSource:
+    """Frames of our own stripes as those of other programs, whose deviations follow from blur and noise."""
+    plan, code = source.plan, source.plan.code
+    if not isinstance(code, GrayCode | XorCode):
+        return source
+    base_bit = (code.base_px.bit_length() - 2) if isinstance(code, XorCode) else 0
+    sets = [
+        Stripes(code=code.kind, bits=(length - 1).bit_length(), base_bit=base_bit)
+        for length in plan.projector_size_px
+    ]
+    rows = (sets[1],) if code.rows else ()
+    captured = CapturedCode(column_sets=(sets[0],), row_sets=rows)
+    return _Captured(plan.model_copy(update={"code": captured}), source)
+
+
 def decode_columns_of(source: FrameSource, sensor: Sensor, progress: Progress | None = None) -> xr.Dataset:
     """Decoded columns (px, NaN where undecided) of any frames, their deviations, rows and flags."""
     from dsl_core.reconstruction.merge import MergedScan, decode_columns
 
-    code, white = decode_columns(MergedScan(source, _Readout(sensor, ProjectorResponse())), progress)
+    readout = _Readout(sensor, ProjectorResponse())
+    code, white = decode_columns(MergedScan(_as_captured(source), readout), progress)
     lit = (white.radiance > LIT_SIGMAS * np.sqrt(white.variance)) | white.saturated
     flags = np.where(lit, 0, int(Flag.NO_LIGHT)).astype(np.uint16)
     flags[lit & code.undecided] |= np.uint16(int(Flag.CODE_UNSURE))

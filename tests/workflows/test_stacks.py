@@ -7,9 +7,11 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.ndimage import gaussian_filter
 
 from dsl_core.errors import CalibrationError, DecodeError
 from dsl_core.model.captured_code import CapturedCode, Stripes
+from dsl_core.model.plan import GrayCode
 from dsl_core.resources import resource_path
 from dsl_core.workflows.stacks import calibrate_stacks, decode_stack, depth_of_columns
 from tests.cases import board_sets
@@ -100,3 +102,19 @@ def test_rows_alone_are_told() -> None:
     assert known.mean() > 0.95
     assert np.percentile(np.abs(error[known]), 97) < 0.55
     assert not np.isfinite(result["column_px"].values).any()
+
+
+def test_dim_pictures_of_our_own_code_have_deviations_that_hold() -> None:
+    rng = np.random.default_rng(1)
+    captured, bright, dark = frames([("columns", Stripes(bits=7))])
+    *pictures, white, black = (
+        np.rint(0.05 * gaussian_filter(each.astype(float), 1) + 2 + rng.normal(0, 1.2, each.shape)).clip(0)
+        for each in (*captured, bright, dark)
+    )
+    result = decode_stack(pictures, GrayCode(rows=False), PROJECTOR, white, black)
+    std = result["column_std_px"].values
+    off = np.abs(result["column_px"].values - scene().columns) / std
+    known = np.isfinite(off)
+    assert known.mean() > 0.55
+    assert np.median(std[known]) > 0.3
+    assert (off[known] > 3).mean() < 0.015
