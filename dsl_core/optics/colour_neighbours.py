@@ -60,8 +60,9 @@ def shares_on_a_surface(
         far = np.s_[2 + 2 * y : 2 + 2 * y + height, 2 + 2 * x : 2 + 2 * x + width]
         noise = NOISE * np.hypot(own_std, std[far])
         apart = np.abs(own - amplitude[far])
-        contrast = (apart - noise).clip(0) / (np.abs(own) + np.abs(amplitude[far]) + noise)
-        share[:] = 1 / (1 + (np.nan_to_num(contrast, nan=0.0) / HALF_CONTRAST) ** 4)
+        both = np.abs(own) + np.abs(amplitude[far]) + noise
+        contrast = np.divide((apart - noise).clip(0), both, out=np.zeros_like(both), where=both > 0)
+        share[:] = 1 / (1 + (np.nan_to_num(contrast) / HALF_CONTRAST) ** 4)
     is_green = usual[4] == 0
     best = found[:4].max(0)
     for pair in (slice(0, 2), slice(2, 4)):

@@ -107,6 +107,13 @@ class ImageFormation:
             out += torch.einsum("clp,plf->cfp", seen, light)
         return out
 
+    def matrix_of(self, colour: Tensor) -> Tensor:
+        """The operator of one colour of each pixel, (pixels, frames, bands): ``colour`` (pixels,), 0 to 2."""
+        out = torch.zeros((len(self.shading), self.frames, self.bands)).to(self.shading)
+        for bands, light, moments in self.terms():
+            out[..., bands] += torch.einsum("plf,plj->pfj", light, moments[colour])
+        return out
+
     def matrix(self) -> Tensor:
         """The operator of each pixel, (pixels, 3, frames, bands)."""
         out = torch.zeros((len(self.shading), 3, self.frames, self.bands)).to(self.shading)

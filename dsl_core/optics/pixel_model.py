@@ -161,20 +161,20 @@ class PixelModel:
         return ImageFormation(self.response(blur_px), self.profiles, paths, shading)
 
     def equations(
-        self, traced: Traced, radiance: Tensor, weight: Tensor, offset_variance: Tensor, blur_px: float = 0.0
+        self, traced: Traced, colour: Tensor, radiance: Tensor, weight: Tensor, offset_variance: Tensor
     ) -> tuple[Tensor, Tensor, Tensor]:
-        """Normal equations of unit shading for any pattern set, all orders together.
+        """Normal equations of unit shading for any pattern set, all orders together, of one colour each.
 
-        Full matrix (pixels, bands, bands), right side (pixels, bands) and weighted sum of squares (pixels,).
-        ``radiance`` and ``weight`` are (3, frames, pixels), ``offset_variance`` (3, pixels) that of an offset
-        which the frames of a colour share.
+        Full matrix (bands, bands, pixels), right side (bands, pixels) and weighted sum of squares (pixels,).
+        ``colour`` (pixels,) is that of their filters, 0 to 2; ``radiance`` and ``weight`` are (frames,
+        pixels), ``offset_variance`` (pixels,) that of an offset which all frames share.
         """
-        model = self.operator(traced, torch.ones_like(traced.column_px), blur_px).matrix()
-        w, y = (values.permute(2, 0, 1)[..., None] for values in (weight, radiance))
-        flat, y = (without_offset(values, w, offset_variance.T).flatten(1, 2) for values in (model, y))
-        w = w.flatten(1, 2)
-        weighted = flat * w
-        return weighted.mT @ flat, (weighted.mT @ y)[..., 0], (w * y * y).sum((1, 2))
+        model = self.operator(traced, torch.ones_like(traced.column_px)).matrix_of(colour)
+        w, y = (values.T[..., None] for values in (weight, radiance))
+        model, y = (without_offset(values, w, offset_variance) for values in (model, y))
+        weighted = model * w
+        matrix, right = weighted.mT @ model, (weighted.mT @ y)[..., 0]
+        return matrix.permute(1, 2, 0), right.T, (w * y * y).sum((1, 2))
 
     def line_equations(self, colour: Tensor, other: Tensor, offsets: bool = False) -> LineEquations:
         """Banded normal equations of unit shading, to which the orders of single lines are added.

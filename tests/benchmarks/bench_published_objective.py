@@ -21,14 +21,15 @@ from dataclasses import replace
 import numpy as np
 import torch
 from numpy.typing import NDArray
+from scipy.ndimage import binary_dilation
 from scipy.optimize import lsq_linear, nnls
 
 from dsl_core import pipeline
 from dsl_core.evaluation.summary import Evaluation, Truth
 from dsl_core.model.result import build_result
 from dsl_core.model.spectral import WavelengthGrid
+from dsl_core.optics.colour_neighbours import AROUND, bayer_colours
 from dsl_core.optics.correspondence import correspondence
-from dsl_core.optics.lines.profile import halo_of_line
 from dsl_core.reconstruction.spectral.nearest_line import NearestLine
 from dsl_core.reconstruction.spectral.published_objective import AdamOptions, PublishedReconstruction
 from dsl_core.reconstruction.spectral.solving.tile_frames import Pixels
@@ -85,34 +86,46 @@ def single(cube: NDArray[np.float32], where: NDArray[np.bool_], truth: Truth) ->
 
 
 def rows_of_pixels(
-    solver: SpectralReconstruction,
+    solver: SpectralReconstruction, wanted: NDArray[np.bool_]
 ) -> Iterator[tuple[int, NDArray[np.float64], NDArray[np.float64]]]:
-    """Flat index of each pixel, its weighted equations (rows, bands), and their values (rows,)."""
-    for tile in solver._tiles(slice(0, solver.pixels.valid.shape[0])):
-        if not solver.pixels.valid[tile].any():
-            continue
-        frames = solver.frames(*tile)
-        radiance, weight = (each.permute(2, 0, 1).numpy().astype(float) for each in frames.colours())
-        # Zero order and first orders are told apart by the frame: first orders alone are solved for.
-        operator = solver.model.operator(
-            solver.trace(frames), frames.known("shading"), frames.blur_px(), solver.model.orders
+    """Flat index of each wanted pixel, its weighted equations (rows, bands), and their values (rows,)."""
+    height, width = solver.pixels.valid.shape
+    lines = solver.model.lines
+    assert lines is not None
+    for rows, columns in solver._tiles(slice(0, height)):
+        tile = solver.frames(rows, columns)
+        near = solver.frames(
+            slice(max(rows.start - 1, 0), min(rows.stop + 1, height)),
+            slice(max(columns.start - 1, 0), min(columns.stop + 1, width)),
         )
-        amplitude = frames.zero_order_colour()[0].T.numpy()[..., None]
-        lines = solver.model.lines
-        assert lines is not None
-        distance = frames.known("column_px")[:, None] - lines.centre_px(torch.arange(lines.lines))
-        halo = halo_of_line(distance, lines.width_px, solver.rig.projector_response).numpy()[:, None]
-        far = np.abs(distance.numpy())[:, None] > ZERO_ORDER_PX
-        root = np.sqrt(weight) * far
-        matrices = operator.matrix().numpy() * root[..., None]
-        values = (radiance - amplitude * halo) * root
-        for at, matrix, value in zip(frames.flat, matrices, values, strict=True):
-            lit = np.abs(matrix).max(2) > 0
-            yield int(at), matrix[lit].astype(float), value[lit]
+        if not wanted[rows, columns].any():
+            continue
+        colour = torch.as_tensor(bayer_colours(near.bayer, *near.place()))
+        operator = solver.model.operator(solver.trace(near), near.known("shading"), 0.0, solver.model.orders)
+        y, weight = near.samples(range(lines.lines), lines)
+        far = (near.known("column_px") - lines.centre_px(torch.arange(lines.lines)[:, None])).abs()
+        root = (weight * (far > ZERO_ORDER_PX)).sqrt().T
+        matrices = (operator.matrix_of(colour) * root[..., None]).numpy()
+        values, shares = (y.T * root).numpy(), tile.shares()
+        for at, row, column in zip(tile.flat, *tile.place(), strict=True):
+            if not wanted[row, column]:
+                continue
+            own = [(0, 0, 1.0)]
+            of_pixel = shares[:, row - rows.start, column - columns.start]
+            own += [(*place, share) for place, share in zip(AROUND, of_pixel, strict=True)]
+            parts = []
+            for down, right, share in own:
+                flat = (row + down) * width + column + right
+                s = np.searchsorted(near.flat, flat)
+                if share > 0 and s < len(near.flat) and near.flat[s] == flat:
+                    lit = np.abs(matrices[s]).max(1) > 0
+                    parts.append((share**0.5 * matrices[s, lit], share**0.5 * values[s, lit]))
+            rows_, data = (np.concatenate(each).astype(float) for each in zip(*parts, strict=True))
+            yield int(at), rows_, data
 
 
 def scipy_solutions(
-    solver: SpectralReconstruction, shape: tuple[int, int]
+    solver: SpectralReconstruction, wanted: NDArray[np.bool_]
 ) -> dict[str, tuple[NDArray[np.float32], float]]:
     """Cubes (bands, rows, columns) of SciPy's solvers, and microseconds a pixel."""
     reported = solver.bands.reported
@@ -120,17 +133,17 @@ def scipy_solutions(
     smooth = np.diff(np.eye(bands), 2, axis=0) / solver.prior.taus[2]
     level = np.eye(bands) / solver.prior.level_std
     prior = np.vstack([smooth, level])
-    wanted = np.concatenate(
+    believed = np.concatenate(
         [np.zeros(bands - 2), np.full(bands, solver.prior.level / solver.prior.level_std)]
     )
     names = ("scipy nnls, no prior", "scipy lsq_linear, smooth and bounded")
-    cubes = {name: np.full((bands, *shape), np.nan, np.float32) for name in names}
+    cubes = {name: np.full((bands, *wanted.shape), np.nan, np.float32) for name in names}
     spent, count = dict.fromkeys(names, 0.0), 0
-    for at, matrix, value in rows_of_pixels(solver):
+    for at, matrix, value in rows_of_pixels(solver, wanted):
         start = time.process_time()
         free = nnls(matrix, value, maxiter=30 * bands)[0]
         middle = time.process_time()
-        held = lsq_linear(np.vstack([matrix, prior]), np.append(value, wanted), solver.prior.bounds).x
+        held = lsq_linear(np.vstack([matrix, prior]), np.append(value, believed), solver.prior.bounds).x
         end = time.process_time()
         for name, found, seconds in zip(names, (free, held), (middle - start, end - middle), strict=True):
             cubes[name].reshape(bands, -1)[:, at] = found
@@ -169,7 +182,8 @@ def compare(scene: str, thin: int, steps: int) -> None:
         line = NearestLine(*inputs, pixels).run()
     print(f"{scene}: {pixels.valid.sum()} pixels, {few.valid.sum()} of them by the published objective")
     with torch.inference_mode():
-        others = scipy_solutions(SpectralReconstruction(*inputs, few, as_calibrated=True), few.valid.shape)
+        around = replace(pixels, valid=pixels.valid & binary_dilation(few.valid, np.ones((3, 3), bool)))
+        others = scipy_solutions(SpectralReconstruction(*inputs, around, as_calibrated=True), few.valid)
     for name, cube, cpu_us in (
         ("banded solver", banded.reflectance, ours.cpu_us),
         (f"published objective, {steps} steps", published.reflectance, theirs.cpu_us),

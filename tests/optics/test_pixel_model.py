@@ -18,7 +18,6 @@ from dsl_core.model.spectral import WavelengthGrid
 from dsl_core.model.spread_field import SpreadField
 from dsl_core.optics.colour_neighbours import bayer_colours
 from dsl_core.optics.correspondence import correspondence
-from dsl_core.optics.demosaic import demosaic_variance
 from dsl_core.optics.pixel_model import DEMOSAIC_SPREAD, EDGE_PX, PixelModel, demosaic_blur_px, without_offset
 from dsl_core.optics.spectra import ORDERS, SECOND_ORDERS
 from dsl_core.planning.samples import _of_plane
@@ -166,7 +165,8 @@ def test_solver_prediction_and_graph_expect_the_same_frames(readers: Readers) ->
     frames = solver.frames(slice(0, 16), slice(0, 40))
     traced = solver.trace(frames)
     shading = frames.known("shading")
-    solved = solver.model.operator(traced, shading, frames.blur_px()).forward(nodes[:, None])[..., 0]
+    blur_px = demosaic_blur_px(columns_px(readers.column))
+    solved = solver.model.operator(traced, shading, blur_px).forward(nodes[:, None])[..., 0]
     both = virtual.matrices.first[0] + virtual.matrices.zero[0]
     predicted = (both @ nodes) * readers.shading
     drawn = readers.graph(spectrum(GRID.centres_nm))
@@ -174,7 +174,7 @@ def test_solver_prediction_and_graph_expect_the_same_frames(readers: Readers) ->
     assert np.abs(drawn - solved.numpy()).max() < tolerance
     assert float((predicted - solved).abs().max()) < tolerance
     # First orders are a few percent of the zero order: alone, they agree as well.
-    first = solver.model.operator(traced, shading, frames.blur_px(), solver.model.orders)
+    first = solver.model.operator(traced, shading, blur_px, solver.model.orders)
     alone = first.forward(nodes[:, None])[..., 0]
     calm = (virtual.matrices.first[0] @ nodes) * readers.shading
     assert float((calm - alone).abs().max()) < 1e-6 * float(alone.abs().max())
@@ -184,7 +184,7 @@ class Seen(Exception):
     """Ends a run that has shown enough."""
 
 
-def test_the_solvers_equations_are_those_of_the_predictions_operator(
+def test_the_solvers_equations_are_those_of_the_operator(
     readers: Readers, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """What the solver really solves, on frames whose weights are known."""
@@ -196,22 +196,18 @@ def test_the_solvers_equations_are_those_of_the_predictions_operator(
 
     for solve in ("solving.dense_solver.solve_dense", "spectra.solve_spectra"):
         monkeypatch.setattr(f"dsl_core.reconstruction.spectral.{solve}", watched)
-    solver, virtual = readers.solver(), readers.virtual()
+    solver = readers.solver()
     with pytest.raises(Seen):
         solver.run(threads=1)
     (data,) = given
     single = solver.model.single
-    mosaic = np.ones(SIZE[::-1])
-    weight = 1 / demosaic_variance(mosaic, readers.rig.sensor.bayer)[:, readers.pixel[1], readers.pixel[0]]
-    operator = virtual.matrices.first[0] + (0 if single else virtual.matrices.zero[0])
-    if single:
-        # Without neighbours a pixel has its own sample only, where it is: no mean of columns blurs it.
-        traced = solver.trace(solver.frames(slice(0, 16), slice(0, 40)))
-        one = torch.ones(1, dtype=torch.float64)
-        operator = solver.model.operator(traced, one, 0.0, solver.model.orders).matrix()[0]
-        colour = bayer_colours(readers.rig.sensor.bayer, *(np.array([i]) for i in readers.pixel[::-1]))
-        weight = np.eye(3)[colour[0]]
-    wanted = torch.einsum("c,cfi,cfj->ij", torch.as_tensor(weight), operator, operator) * readers.shading**2
+    # Without neighbours a pixel has its own sample only, where it is: no mean of columns blurs it.
+    traced = solver.trace(solver.frames(slice(0, 16), slice(0, 40)))
+    one = torch.ones(1, dtype=torch.float64)
+    orders = solver.model.orders if single else None
+    colour = bayer_colours(readers.rig.sensor.bayer, *(np.array([i]) for i in readers.pixel[::-1]))
+    operator = solver.model.operator(traced, one, 0.0, orders).matrix()[0, colour[0]]
+    wanted = torch.einsum("fi,fj->ij", operator, operator) * readers.shading**2
     found = banded.to_dense(data)[0] if single else data[0]
     assert torch.equal(found.diagonal() > 0, wanted.diagonal() > 0), "other bands belong to the model"
     assert float((found - wanted).abs().max()) < readers.tolerance * float(wanted.abs().max())
@@ -243,20 +239,18 @@ def test_matrix_is_that_of_the_forward_model(spectral: LineComb) -> None:
 def test_dense_equations_are_those_of_the_matrix_with_correlated_noise(offset_std: float) -> None:
     model, pixels, depth = some_model()
     traced = model.trace(pixels, depth)
-    radiance, weight = random(3, len(model.profiles), 5), 1 + random(3, len(model.profiles), 5)
-    variance = torch.full((3, 5), offset_std**2, dtype=torch.float64)
-    matrix, right, square = model.equations(traced, radiance, weight, variance, 0.3)
-    full = model.operator(traced, torch.ones_like(depth), 0.3).matrix()
-    for p in range(5):
-        wanted = torch.zeros_like(matrix[0])
-        side, squares = torch.zeros_like(right[0]), 0.0
-        for c in range(3):
-            inverse = torch.linalg.inv(torch.diag(1 / weight[c, :, p]) + offset_std**2)
-            wanted += full[p, c].T @ inverse @ full[p, c]
-            side += full[p, c].T @ inverse @ radiance[c, :, p]
-            squares += float(radiance[c, :, p] @ inverse @ radiance[c, :, p])
-        assert torch.allclose(matrix[p], wanted, rtol=1e-8, atol=1e-10 * float(wanted.abs().max()))
-        assert torch.allclose(right[p], side, rtol=1e-8, atol=1e-10 * float(side.abs().max()))
+    radiance, weight = random(len(model.profiles), 5), 1 + random(len(model.profiles), 5)
+    variance = torch.full((5,), offset_std**2, dtype=torch.float64)
+    colour = torch.tensor([0, 1, 2, 1, 0])
+    matrix, right, square = model.equations(traced, colour, radiance, weight, variance)
+    full = model.operator(traced, torch.ones_like(depth)).matrix()
+    for p, c in enumerate(colour.tolist()):
+        inverse = torch.linalg.inv(torch.diag(1 / weight[:, p]) + offset_std**2)
+        wanted = full[p, c].T @ inverse @ full[p, c]
+        side = full[p, c].T @ inverse @ radiance[:, p]
+        squares = float(radiance[:, p] @ inverse @ radiance[:, p])
+        assert torch.allclose(matrix[..., p], wanted, rtol=1e-8, atol=1e-10 * float(wanted.abs().max()))
+        assert torch.allclose(right[:, p], side, rtol=1e-8, atol=1e-10 * float(side.abs().max()))
         assert float(square[p]) == pytest.approx(squares, rel=1e-10)
 
 

@@ -40,8 +40,8 @@ from dsl_core.solve.threads import one_kernel_thread
 TILE, TILE_BANDS, LEAST_TILE = (64, 96), 60, (16, 24)
 #: Pixels whose light is traced at a time, where all are.
 CHUNK = 1 << 18
-#: Pixels whose full matrices are solved at a time.
-DENSE_PIXELS = 512
+#: Pixels whose full matrices are solved at a time, and rows of a tile whose matrices are in memory at once.
+DENSE_PIXELS, DENSE_ROWS = 512, 16
 #: Chi-square that noise alone does not reach: what exceeds it is misfit that neighbouring lines share.
 SURE_MISFIT = 1.3
 #: Chi-square from which a pixel may see several surfaces, and the most that it is then unsure by.
@@ -196,6 +196,7 @@ class SpectralReconstruction:
     def _tiles(self, of: slice) -> Iterator[tuple[slice, slice]]:
         width = self.pixels.valid.shape[1]
         rows, columns = tile_shape(self.bands.count)
+        rows = rows if self.model.single else min(rows, DENSE_ROWS)
         for y in range(of.start, of.stop, rows):
             for x in range(0, width, columns):
                 yield slice(y, min(y + rows, of.stop)), slice(x, min(x + columns, width))
@@ -232,29 +233,25 @@ class SpectralReconstruction:
         if not self.pixels.valid[rows, columns].any():
             return
         frames = self.frames(rows, columns)
-        if self.model.single:
-            # The samples of pixels just outside the tile belong to pixels inside it.
-            height, width = self.pixels.valid.shape
-            near = (
-                frames
-                if self.rig.sensor.bayer == "MONO"
-                else self.frames(
-                    *(
-                        slice(max(part.start - 1, 0), min(part.stop + 1, size))
-                        for part, size in ((rows, height), (columns, width))
-                    )
+        # The samples of pixels just outside the tile belong to pixels inside it.
+        height, width = self.pixels.valid.shape
+        near = (
+            frames
+            if self.rig.sensor.bayer == "MONO"
+            else self.frames(
+                *(
+                    slice(max(part.start - 1, 0), min(part.stop + 1, size))
+                    for part, size in ((rows, height), (columns, width))
                 )
             )
-            traced = self.trace(near)
-            check()
+        )
+        traced = self.trace(near)
+        check()
+        solve = self._dense
+        if self.model.single:
             solve = self._banded if self._compiled is None else self._compiled_tile
-            spectra, misfit = solve(frames, near, traced, check)
-            own = torch.as_tensor(np.searchsorted(near.flat, frames.flat), device=self.device)
-        else:
-            traced = self.trace(frames)
-            check()
-            spectra, misfit = self._dense(frames, traced, check)
-            own = torch.arange(len(frames.flat), device=self.device)
+        spectra, misfit = solve(frames, near, traced, check)
+        own = torch.as_tensor(np.searchsorted(near.flat, frames.flat), device=self.device)
         self._store(spectra, misfit, frames, (traced, own), out, first_row)
 
     def _compiled_tile(
@@ -273,7 +270,7 @@ class SpectralReconstruction:
         """Spectra and reduced chi-square of a tile from the samples ``near`` it, whose light was traced."""
         shading = frames.known("shading")
         system, offset = self._samples(near, traced, check)
-        gather = ColourNeighbours(frames.rows, frames.columns, near.place(), frames.place(), frames.shares())
+        gather = self._gather(frames, near)
         matrix, right, square, samples = (
             gather.sum(values)
             for values in (system.positive_matrix(), system.right, system.square, system.samples)
@@ -324,32 +321,49 @@ class SpectralReconstruction:
         colour, variance = frames.zero_order_colour()
         return colour, (kappa / (variance + (COLOUR_ERROR * colour) ** 2)).sqrt()
 
-    def _dense(self, frames: TileFrames, traced: Traced, check: Check) -> tuple[Spectra, Tensor]:
+    def _dense(
+        self, frames: TileFrames, near: TileFrames, traced: Traced, check: Check
+    ) -> tuple[Spectra, Tensor]:
+        """As `_banded`, for patterns that couple distant bands."""
         from dsl_core.reconstruction.spectral.solving.dense_solver import solve_dense
 
-        shading, blur = frames.known("shading"), frames.blur_px()
-        radiance, weight = frames.colours()
-        colour, _ = frames.zero_order_colour()
-        light = self.model.zero_light(shading, blur)
-        direct = self.model.direct_light(light, traced.column_px, colour)
-        weight = 1 / (1 / weight + (self.direct_error * direct) ** 2)
-        freedom = ((weight > 0).sum((0, 1)) - PARAMETERS).clip(min=1)
-        offset_variance = frames.offset_variance()
-        found, misfit = [], []
+        parts: list[tuple[Tensor, ...]] = []
+        samples = self._dense_samples(near, traced)
         # Full matrices take long: a part of the pixels at a time, so that a cancel need not wait.
-        for start in range(0, len(shading), DENSE_PIXELS):
-            part = slice(start, start + DENSE_PIXELS)
+        for start in range(0, len(near.flat), DENSE_PIXELS):
             check()
-            matrix, right, square = self.model.equations(
-                traced.part(part), radiance[..., part], weight[..., part], offset_variance[:, part], blur
-            )
-            lit = shading[part]
-            spectra = solve_dense(matrix * (lit**2)[:, None, None], right * lit[:, None], self.prior)
+            part = slice(start, start + DENSE_PIXELS)
+            colour, radiance, weight, variance = (each[..., part] for each in samples)
+            made = self.model.equations(traced.part(part), colour, radiance, weight, variance)
+            parts.append((*made, (weight > 0).sum(0).to(radiance)))
+        gather = self._gather(frames, near)
+        matrix, right, square, number = (gather.sum(torch.cat(each, -1)) for each in zip(*parts, strict=True))
+        shading, freedom = frames.known("shading"), (number - PARAMETERS).clip(min=1)
+        found, misfit = [], []
+        for start in range(0, len(shading), DENSE_PIXELS):
+            check()
+            part = slice(start, start + DENSE_PIXELS)
+            lit, own, side = shading[part], matrix[..., part].permute(2, 0, 1), right[:, part].T
+            spectra = solve_dense(own * (lit**2)[:, None, None], side * lit[:, None], self.prior)
             found.append(spectra)
             nodes = (spectra.nodes * lit).T
-            explained = (nodes * (2 * right - (matrix @ nodes[..., None])[..., 0])).sum(1)
-            misfit.append((square - explained) / freedom[part])
+            explained = (nodes * (2 * side - (own @ nodes[..., None])[..., 0])).sum(1)
+            misfit.append((square[part] - explained) / freedom[part])
         return _joined(found), torch.cat(misfit)
+
+    def _dense_samples(self, near: TileFrames, traced: Traced) -> tuple[Tensor, Tensor, Tensor, Tensor]:
+        """Own colours (samples,), radiance and weight (frames, samples), variance of offsets (samples,)."""
+        colour = torch.as_tensor(bayer_colours(self.rig.sensor.bayer, *near.place()), device=self.device)
+        radiance, weight = near.own()
+        light = self.model.zero_light(near.known("shading"))
+        direct = self.model.direct_light(light, traced.column_px, near.zero_order_colour()[0])
+        direct = direct.gather(0, colour.expand(1, len(radiance), -1))[0]
+        weight = 1 / (1 / weight + (self.direct_error * direct) ** 2)
+        return colour, radiance, weight, near.known("offset_std") ** 2
+
+    def _gather(self, frames: TileFrames, near: TileFrames) -> ColourNeighbours:
+        """Sums over the samples that belong to a tile's pixels."""
+        return ColourNeighbours(frames.rows, frames.columns, near.place(), frames.place(), frames.shares())
 
     def _map(self, values: NDArray[np.float32], flat: NDArray[np.intp]) -> Tensor:
         return torch.as_tensor(values.ravel()[flat], device=self.device, dtype=self.dtype)

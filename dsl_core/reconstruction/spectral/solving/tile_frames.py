@@ -14,7 +14,7 @@ from dsl_core.optics.colour_neighbours import shares_on_a_surface, usual_shares
 from dsl_core.optics.demosaic import demosaic, demosaic_variance
 from dsl_core.optics.lines.line_set import LineSet
 from dsl_core.optics.lines.profile import halo_of_line
-from dsl_core.optics.pixel_model import MODEL_ERROR, demosaic_blur_px
+from dsl_core.optics.pixel_model import MODEL_ERROR
 
 
 @dataclass(frozen=True)
@@ -78,33 +78,29 @@ class TileFrames:
     def _tensor(self, values: NDArray[np.floating]) -> Tensor:
         return torch.as_tensor(np.ascontiguousarray(values), device=self.like.device).to(self.like.dtype)
 
-    def blur_px(self) -> float:
-        """Spread of the projector columns that demosaicing averages, px."""
-        return demosaic_blur_px(self._near.column_px)
+    def own(self) -> tuple[Tensor, Tensor]:
+        """Radiance of all frames without offset, and its weight, of the pixels' own colour.
 
-    def colours(self) -> tuple[Tensor, Tensor]:
-        """Radiance of all frames without offset, in three colours, and its weight, (3, frames, pixels)."""
-        y = self._tensor(self._radiance) - self._tensor(self._near.offset)
-        rgb = self._pick(demosaic(y, self.bayer))
-        return weighted(rgb, self._pick(demosaic_variance(self._tensor(self._std) ** 2, self.bayer)))
+        Each has shape (frames, pixels).
+        """
+        y, std = self._samples(slice(None))
+        return weighted(y - self.known("offset"), std**2)
+
+    def _samples(self, frames: slice) -> tuple[Tensor, Tensor]:
+        """Radiance of frames, and its deviation, at the tile's pixels, (frames, pixels)."""
+        y, std = (self._tensor(values[frames]).flatten(1) for values in (self._radiance, self._std))
+        return y[:, self.at], std[:, self.at]
 
     def samples(self, frames: range, lines: LineSet) -> tuple[Tensor, Tensor]:
         """Radiance without offset and halo of lines, and weight, of the pixels' own colour.
 
         Each has shape (frames, pixels).
         """
-        part = slice(frames.start, frames.stop)
-        y, std = (self._tensor(values[part]).flatten(1)[:, self.at] for values in (self._radiance, self._std))
+        y, std = self._samples(slice(frames.start, frames.stop))
         index = torch.arange(frames.start, frames.stop, device=y.device)[:, None]
         distance = self.known("column_px") - lines.centre_px(index).to(y.dtype)
         halo = halo_of_line(distance, lines.width_px, self.response)
         return weighted(y - self.known("offset") - self.known("amplitude") * halo, std**2)
-
-    def _pick(self, images: Tensor) -> Tensor:
-        """The tile's pixels of colour images (frames, 3, rows, columns), as (3, frames, pixels)."""
-        count = len(images)
-        flat = images.reshape(count * 3, -1).index_select(1, self.at)
-        return flat.reshape(count, 3, -1).permute(1, 0, 2).contiguous()
 
     def shares(self, width: int | None = None) -> NDArray[np.float64]:
         """How much samples around the tile's pixels count, (8, rows, columns), see `shares_on_a_surface`.
@@ -121,10 +117,6 @@ class TileFrames:
         found = np.zeros((8, height, width or own))
         found[..., :own] = shares_on_a_surface(usual, amplitude, std)
         return found
-
-    def offset_variance(self) -> Tensor:
-        """Variance of what all frames may be off in three colours, (3, pixels)."""
-        return self._variance(self._near.offset_std)
 
     def zero_order_colour(self) -> tuple[Tensor, Tensor]:
         """Zero-order amplitude in three colours and its variance, each (3, pixels)."""
