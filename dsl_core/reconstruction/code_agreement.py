@@ -39,6 +39,8 @@ EDGE_PX, STRAY = 0.08, 0.02
 GROUP_STD_PX = 0.02
 #: Rms displacements that matter, px: of lines, whose light is not shaped as a stripe's edge, and of rows.
 MOST_APART_PX, MOST_ROWS_PX = 0.1, 0.05
+#: The most that a film that has moved displaces rows by, px.
+MOST_BY_FILM_PX = 0.1
 #: Share of the error of columns that is seen in rows: pictures are wider than high, and depth follows rows.
 ROWS_TELL = 0.5
 #: Pixels that say nothing: their column is not that of one surface, or is not refined.
@@ -199,6 +201,8 @@ def _of_rows(
     found = Disagreement.of(shift - usual, np.hypot(std, unsure))
     if found is None:
         return None
+    # A film that was turned moves the ends of stripes, but by no more.
+    film = ", or the film," if found.rms_px < MOST_BY_FILM_PX else ""
     return FitFinding.judged(
         "geometry",
         "rows of the binary code",
@@ -206,7 +210,7 @@ def _of_rows(
         "px",
         MOST_ROWS_PX,
         f"Rows of the projector lie {found.rms_px:.2f} px (rms, at most {found.worst_px:+.2f}) from where"
-        " lenses, pose and depth place them: a lens or the pose is not as calibrated, and depth is wrong with"
-        " them. Its deviations contain what rows can tell of that.",
+        f" lenses, pose and depth place them: a lens or the pose{film} is not as calibrated. Deviations of"
+        " depth contain what rows can tell of that.",
         "Check focus, zoom and mounts of camera and projector, and calibrate the geometry again.",
     )

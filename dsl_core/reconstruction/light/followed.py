@@ -34,6 +34,8 @@ MOST_MISFIT = 0.2
 LEVEL_ERROR = 0.004
 #: Settings that differ by more are told.
 LEAST_APART = 0.01
+#: Changes of black that matter: first orders of dark surfaces are a few numbers bright.
+MOST_BLACK_DN = 0.5
 _CORRECTED = " The frames are corrected for it."
 
 
@@ -85,6 +87,11 @@ def follow_light(
         return pixels
 
     pixels = look()
+    black = black_wander(frames)
+    of_black = (black,) if black is not None and black.significant else ()
+    if of_black:
+        # Dim settings show the change of black rather than that of the light.
+        frames.ratios = {}
     before = light_course([*_of_settings(frames), *_of_whites(frames)], frames.plan.shot_count)
     if before is not None and not before.is_steady:
         frames.expose(_between_settings(frames, before))
@@ -98,12 +105,36 @@ def follow_light(
     witnesses = [*_of_settings(frames), *_of_whites(frames), *_of_lines(frames, lines)]
     course = light_course(witnesses, frames.plan.shot_count)
     if course is None:
-        return code, white, ()
+        return code, white, of_black
     if not course.is_steady:
         light = _steady(frames, course, lines)
         frames.follow(light)
         white = light.steady_white(white)
-    return code, white, tuple(light_findings(course, lines is not None))
+    return code, white, (*of_black, *light_findings(course, lines is not None))
+
+
+def black_wander(scan: Pictures) -> FitFinding | None:
+    """By how much black pictures that a scan took again differ from the first ones; None without any."""
+    plan = scan.plan
+    changes = []
+    for shot in plan.shots():
+        old = plan.original(shot)
+        if shot.role == "sentinel" and old.role == "black":
+            more = scan.source.read(shot).astype(np.float32) - scan.source.read(old)
+            changes.append((float(more.mean()), float(more.std() / np.sqrt(more.size))))
+    if not changes:
+        return None
+    means, stds = np.array(changes).T
+    return FitFinding.judged(
+        "light",
+        "black taken again",
+        (float(np.sqrt(np.mean(means**2))), float(np.sqrt(np.mean(stds**2)))),
+        "DN",
+        MOST_BLACK_DN,
+        f"Black pictures changed by up to {means[np.abs(means).argmax()]:+.1f} DN during the scan: the black"
+        " level of the camera drifts, or the light of the room changes. All frames are off by as much.",
+        "Let the camera warm up, switch on its black-level correction, and keep the light of the room away.",
+    )
 
 
 def light_findings(course: LightCourse, with_lines: bool) -> Iterator[FitFinding]:
