@@ -16,6 +16,8 @@ Floats = NDArray[np.float64]
 
 #: Steps of the least squares, and the furthest that tiles are followed beyond the common shift, px.
 STEPS, FURTHEST_PX = 4, 2.5
+#: After a step as short as this, the next one would change nothing that matters, px.
+SHORT_PX = 0.02
 
 
 @dataclass(frozen=True)
@@ -88,8 +90,9 @@ def _one_tile(
         gain = values[2]
         if not 0.05 < gain < 20:
             return lost
-        shift = shift + values[:2] / gain
-        if np.hypot(*(shift - common)) > FURTHEST_PX:
+        step = values[:2] / gain
+        shift = shift + step
+        if np.hypot(*(shift - common)) > FURTHEST_PX or np.hypot(*step) < SHORT_PX:
             break
     std = np.sqrt(np.diag(covariance)[:2]) / gain
     left = seen - design @ values
@@ -98,8 +101,10 @@ def _one_tile(
     if np.hypot(*(shift - common)) > FURTHEST_PX:
         shift = np.array(common)
         std = np.full(2, np.inf)
-    unmoved, moved_by = (_chi_square(old, seen, weight, part, by) for by in (np.zeros(2), shift))
-    better = max(unmoved - moved_by, 0.0)
+    better = 0.0
+    if np.hypot(*shift) > SHORT_PX:
+        unmoved, moved_by = (_chi_square(old, seen, weight, part, by) for by in (np.zeros(2), shift))
+        better = max(unmoved - moved_by, 0.0)
     return shift[0], shift[1], std[0], std[1], change, gain, better
 
 
