@@ -254,7 +254,9 @@ def kill_campaign(folder: Path, rng: np.random.Generator) -> tuple[int, str]:
         if code != -signal.SIGKILL:
             return kills, f"ended with {code}" if code else " ".join(left_over(folder))
         kills += 1
-        captured = {name: data for name, data in found.items() if Path(name).match("[!c]*.json")}
+        # Candidates are fitted again, with a new date, until they are accepted.
+        kept = (name for name in found if Path(name).match("[!c]*.json") and "candidates" not in name)
+        captured = {name: found[name] for name in kept}
 
 
 def _command(arguments: list[str]) -> None:
