@@ -132,7 +132,7 @@ CASES = (
         "look at pose 2",
         _redo("geometry", "pose-02"),
         r"board of 7 x 5 inner corners was not found in the test shot of Pose 2 .* whole board is in view",
-        {"board_shift_mm": "120"},
+        {"board_shift_mm": "160"},
     ),
     BadInput(
         "blurred pose",

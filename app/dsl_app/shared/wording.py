@@ -21,6 +21,7 @@ PHRASES = (
     (" Name a twin of it with --truth-rig twin and --option.", ""),
     ("or let 'dsl-scan import FOLDER --guess' write one.", "or import the folder without one."),
     (": name one with --set", ""),
+    ("; they give the camera's lens (--camera-only).", "."),
     ("; give --projector", ""),
     ("Give its right size (--projector).", "Correct the projector's size."),
     ("give --unit-mm 1000", "set their unit to 1000 mm"),
