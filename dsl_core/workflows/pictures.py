@@ -16,6 +16,7 @@ from dsl_core.calibration.geometry.pose_series import observe_series
 from dsl_core.calibration.geometry.solve import calibrate_geometry as calibrate
 from dsl_core.errors import CalibrationError
 from dsl_core.io.pictures.mapping import Mapping as PictureMapping
+from dsl_core.io.png_parts import declares_too_much
 from dsl_core.model.board import Board
 from dsl_core.model.calibration.geometry import GeometryCalibration
 from dsl_core.model.calibration.pose_frames import PoseFrames
@@ -194,8 +195,10 @@ def _read(path: Path) -> NDArray[Any]:
     import cv2
 
     # Through memory, because OpenCV cannot open every path on Windows.
-    data = np.frombuffer(path.read_bytes(), np.uint8)
-    picture = cv2.imdecode(data, cv2.IMREAD_UNCHANGED) if data.size else None
+    data = path.read_bytes()
+    picture = None
+    if data and not declares_too_much(data):
+        picture = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED)
     if picture is None:
         raise CalibrationError(f"{path} cannot be read as a picture. Copy it again, or leave its pose out.")
     return np.asarray(picture[..., :3] if picture.ndim == 3 else picture)

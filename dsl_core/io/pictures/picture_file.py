@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from dsl_core.errors import StoreError
 from dsl_core.io.pictures.mapping import MOST_PICTURES, Mapping, RawLayout
+from dsl_core.io.png_parts import declares_too_much
 from dsl_core.io.reading import read_array, read_bounded, require_plain
 from dsl_core.model.plan import MOST_PX
 from dsl_core.optics.colour import srgb_decode
@@ -239,6 +240,8 @@ def _image(path: Path, index: int | None = None) -> NDArray[Any]:
     from PIL import Image
 
     data = _bytes(path) if index is None else _paged_bytes(path, _stamp(path))
+    if declares_too_much(data):
+        raise _damaged(path)
     try:
         # The head is read first: a small file may claim a picture that no memory holds.
         with warnings.catch_warnings():

@@ -26,7 +26,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal
 
-from dsl_core.io.reading import require_plain
+from dsl_core.io.png_parts import SIGNATURE, declares_too_much
+from dsl_core.io.reading import parts_of, require_plain
 from dsl_core.model.plan import MOST_PX, CapturePlan, Role, Setting
 from dsl_core.words import counted
 
@@ -230,9 +231,10 @@ def _loss(role: Role) -> str:
     return losses[role]
 
 
-_SIGNATURE = b"\x89PNG\r\n\x1a\n"
 _END = b"\0\0\0\0IEND\xaeB`\x82"
 _MOST_PIXELS = 200_000_000
+#: More than a PNG of so many pixels takes.
+MOST_PNG_BYTES = 1 << 31
 _CHANNELS = {0: 1, 2: 3, 3: 1, 4: 2, 6: 4}
 
 
@@ -254,12 +256,16 @@ def probe_png(path: Path) -> PngInfo | str:
             head = file.read(33)
             file.seek(max(size - len(_END), 0))
             tail = file.read()
+        with parts_of(path, MOST_PNG_BYTES) as content:
+            too_much = declares_too_much(content)
     except OSError as error:
         return f"cannot be read ({error.strerror})"
-    if len(head) < 33 or not head.startswith(_SIGNATURE) or head[12:16] != b"IHDR":
+    if len(head) < 33 or not head.startswith(SIGNATURE) or head[12:16] != b"IHDR":
         return "is not a PNG image"
     if tail != _END:
         return "is cut off"
+    if too_much:
+        return "is damaged: a part of it declares more bytes than it has"
     width, height, bits, colour = struct.unpack(">IIBB", head[16:26])
     if not (0 < width <= MOST_PX and 0 < height <= MOST_PX and width * height <= _MOST_PIXELS):
         return f"declares {width} x {height} px, which no camera has"

@@ -218,6 +218,10 @@ def _camera_size(nodes: dict[str, Node], given: Size | None, path: Path) -> Size
         raise CalibrationError(
             f"{path}: img_shape contains {len(shape)} number(s), rows and columns are needed."
         )
+    if not np.isfinite(shape[:2]).all():
+        raise CalibrationError(
+            f"{path}: img_shape contains {shape[:2].tolist()}, rows and columns are needed."
+        )
     size = (int(shape[1]), int(shape[0]))
     if given is not None and given != size:
         raise CalibrationError(

@@ -140,7 +140,8 @@ def _node(value: Any) -> Node:
             return None
         if len(wanted) == 1:
             wanted.append(numbers.size / max(wanted[0], 1))
-        if wanted[0] * wanted[1] != numbers.size or min(wanted) < 1:
+        whole = all(count == int(count) for count in wanted)
+        if not whole or wanted[0] * wanted[1] != numbers.size or min(wanted) < 1:
             return None
         return numbers.reshape(int(wanted[0]), int(wanted[1]))
     return float(numbers.ravel()[0]) if not isinstance(value, list) or _is_lone(value) else numbers

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 from pathlib import Path
 
 import cv2
@@ -173,6 +174,16 @@ def test_sizes_are_checked_and_asked_for(tmp_path: Path) -> None:
         load_stereo(path, (640, 360))
     with pytest.raises(CalibrationError, match="does not exist"):
         load_stereo(tmp_path / "c.xml", (640, 360))
+
+
+def test_a_size_that_is_no_number_is_told(tmp_path: Path) -> None:
+    text = save_stereo(_stereo("dsl"), tmp_path / "calibration.xml").read_text()
+    node = re.search(r"<img_shape.*?<data>(.*?)</data>", text, re.DOTALL)
+    assert node is not None
+    path = tmp_path / "infinite.xml"
+    path.write_text(text[: node.start(1)] + ".Inf 8." + text[node.end(1) :])
+    with pytest.raises(CalibrationError, match=r"img_shape contains .*inf"):
+        load_stereo(path, (640, 360))
 
 
 def test_writing_is_careful(tmp_path: Path) -> None:

@@ -64,6 +64,7 @@ def test_files_of_other_programs_nest_names_and_lists(tmp_path: Path) -> None:
         "{rows: 99999999999999999999, cols: 1, data: [1]}",
         "{rows: two, cols: 1, data: [1, 2]}",
         "{rows: 3, data: [1, 2]}",
+        "{rows: 1.5, cols: 2, data: [1, 2, 3]}",
         "[[1, 2], [3]]",
         "[1, [2, 3]]",
         "[1, x]",
