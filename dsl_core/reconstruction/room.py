@@ -1,4 +1,4 @@
-"""Memory that is used for one band after another: what the system gives anew, it has to clear first."""
+"""Memory that is used for one band after another: the system has to clear whatever else it hands out."""
 
 from __future__ import annotations
 
