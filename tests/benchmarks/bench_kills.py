@@ -248,15 +248,20 @@ def kill_campaign(folder: Path, rng: np.random.Generator) -> tuple[int, str]:
     while True:
         code = doomed(lambda: _command(command), str(rng.choice(FAULTS[:2])), int(rng.integers(50, 1500)))
         found = tiny_campaign.contents(folder) if folder.exists() else {}
-        lost = [name for name, data in captured.items() if found.get(name) != data]
+        lost = [
+            name for name, data in captured.items() if found.get(name) != data and not _taken(name, found)
+        ]
         if lost:
             return kills, f"changed: {lost[:3]}"
         if code != -signal.SIGKILL:
             return kills, f"ended with {code}" if code else " ".join(left_over(folder))
         kills += 1
-        # Candidates are fitted again, with a new date, until they are accepted.
-        kept = (name for name in found if Path(name).match("[!c]*.json") and "candidates" not in name)
-        captured = {name: found[name] for name in kept}
+        captured = {name: data for name, data in found.items() if Path(name).match("[!c]*.json")}
+
+
+def _taken(name: str, found: dict[str, bytes]) -> bool:
+    """Whether a candidate is gone because it was accepted, which deletes it."""
+    return name.startswith("candidates/") and name not in found and Path(name).name in found
 
 
 def _command(arguments: list[str]) -> None:
