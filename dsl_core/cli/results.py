@@ -35,7 +35,7 @@ Result = Annotated[Path, typer.Argument(metavar="RESULT.zarr", help="A result of
 
 
 def reconstruct(
-    session: Annotated[Path, typer.Argument(metavar="SCAN.dsl", help="A complete scan.")],
+    scan: Annotated[Path, typer.Argument(metavar="SCAN.dsl", help="A complete scan.")],
     target: Annotated[
         Path | None, typer.Option("--output", "-o", help="Folder to write; the default is SCAN.zarr.")
     ] = None,
@@ -69,15 +69,15 @@ def reconstruct(
     _require_one_of("--device", device, DEVICES)
     grid = parse_bands(bands)
     if target is None:
-        target = session.with_suffix(".zarr")
+        target = scan.with_suffix(".zarr")
         if target.exists():
-            read_manifest(session)  # that it is no scan is told before that its result exists
+            read_manifest(scan)  # that it is no scan is told before that its result exists
     check_targets([target], overwrite=force, kind=RESULT_FOLDER)
     rig = load_calibration(calibration) if calibration else None
-    if rig is None and _tells_columns_only(session):
-        _decode(output, session, target, force)
+    if rig is None and _tells_columns_only(scan):
+        _decode(output, scan, target, force)
         return
-    if _is_import(session):
+    if _is_import(scan):
         # Pictures of other programs have no frames of spectral patterns.
         depth_only = True
     options = Options(
@@ -91,7 +91,7 @@ def reconstruct(
     )
     with output.progress() as progress:
         reconstruct_to(
-            target, session, rig, options, progress, timer, override_calibration=override, overwrite=force
+            target, scan, rig, options, progress, timer, override_calibration=override, overwrite=force
         )
     result = load_result(target)
     output.costs(timer.stages)
@@ -108,26 +108,26 @@ def reconstruct(
     output.finish()
 
 
-def _is_import(session: Path) -> bool:
+def _is_import(scan: Path) -> bool:
     from dsl_core.io.scan.folder import ScanReader
     from dsl_core.workflows.captures import is_import
 
-    return is_import(ScanReader(session))
+    return is_import(ScanReader(scan))
 
 
-def _tells_columns_only(session: Path) -> bool:
+def _tells_columns_only(scan: Path) -> bool:
     """Whether a scan was made of another program's pictures, and nobody said where its devices stand."""
     from dsl_core.io.scan.folder import ScanReader
 
-    return _is_import(session) and ScanReader(session).calibration is None
+    return _is_import(scan) and ScanReader(scan).calibration is None
 
 
-def _decode(output: Output, session: Path, target: Path, force: bool) -> None:
+def _decode(output: Output, scan: Path, target: Path, force: bool) -> None:
     from dsl_core.io.result.result_file import save_result
     from dsl_core.workflows.captures import NO_DEPTH, decode_scan
 
     with output.progress() as progress:
-        result = decode_scan(session, progress)
+        result = decode_scan(scan, progress)
         save_result(result, target, overwrite=force)
     share = float(result["column_px"].notnull().mean())
     output.say(str(result.attrs[NO_DEPTH]))

@@ -214,5 +214,5 @@ def _done(output: Output, target: Path, status: Status) -> None:
     if status.warning:
         output.say(status.warning)
         output.put(warning=status.warning)
-    output.put(session=target, frames=status.total, seconds=round(status.elapsed_s, 2), state="finished")
+    output.put(scan=target, frames=status.total, seconds=round(status.elapsed_s, 2), state="finished")
     output.finish()

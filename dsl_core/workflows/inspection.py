@@ -56,12 +56,12 @@ class IntensityGraph:
     wavelengths_nm: Floats
 
 
-def find_session(result: ResultArrays) -> Path:
+def find_scan(result: ResultArrays) -> Path:
     """The scan that a result was made from, next to it; raises `StoreError` when it is not there."""
-    return session_of(result.path, result.attributes)
+    return scan_of(result.path, result.attributes)
 
 
-def session_of(path: Path, attributes: Mapping[Any, Any]) -> Path:
+def scan_of(path: Path, attributes: Mapping[Any, Any]) -> Path:
     """The scan next to a result with these attributes; raises `StoreError` when it is not there."""
     captured = attributes.get("captured")
     for folder in sorted(path.parent.glob("*.dsl")):
@@ -115,7 +115,7 @@ class FrameBlock:
 
 def read_block(result: ResultArrays, pixel: tuple[int, int], progress: Progress | None = None) -> FrameBlock:
     """Read the frames around a pixel (x, y) of a result's scan; raises `StoreError`, `CalibrationError`."""
-    progress, reader = progress or NoProgress(), ScanReader(find_session(result))
+    progress, reader = progress or NoProgress(), ScanReader(find_scan(result))
     require_complete(reader)
     rig, plan = _calibration(reader, result), reader.plan
     width, height = plan.camera_size_px

@@ -1,4 +1,4 @@
-"""Pictures and columns as arrays: decode a stack, and triangulate columns, without any files."""
+"""Pictures and columns as arrays, without any files; `dsl_core.api.arrays` says what goes in and out."""
 
 from __future__ import annotations
 
@@ -41,11 +41,9 @@ def decode_stack(
     black: ArrayLike | None = None,
     sensor: Sensor | None = None,
 ) -> xr.Dataset:
-    """Columns, rows, deviations (px) and flags of grey pictures (rows, columns) in the order of a code.
+    """What `dsl_core.api.arrays.decode_stack` says, with the noise of a ``sensor``.
 
-    Values are whole numbers as the camera gave them; without a ``sensor`` those of a common one, of 8 bits
-    or, where values are larger, 16. Without white or black the extremes of the pictures stand for it. Raises
-    `DecodeError` when pictures differ in size, or their number is not that of the code.
+    Without one, noise is that of a common sensor of 8 bits or, where values are larger, 16.
     """
     arrays = [np.asarray(each) for each in pictures]
     if not arrays or any(each.ndim != 2 or each.shape != arrays[0].shape for each in arrays):
@@ -88,12 +86,7 @@ def calibrate_stacks(
     baseline_mm: float | None = None,
     hold: Collection[str] = (),
 ) -> GeometryCalibration:
-    """Lenses and pose from pictures (rows, columns) of board poses under Gray code, film off.
-
-    Each pose has pattern and inverse of every bit of columns, then of rows, then white and black. Raises
-    `CalibrationError` naming the pose, counted from 1, whose pictures are too few or of mixed sizes, and for
-    too few poses.
-    """
+    """What `dsl_core.api.arrays.calibrate_geometry` says; errors name poses by numbers from 1."""
     from dsl_core.workflows.pictures import calibrate_poses
 
     def frames() -> Iterator[PoseFrames]:
@@ -120,11 +113,7 @@ def _rig_for_depth(found: GeometryCalibration) -> Rig:
 
 
 def depth_of_columns(calibration: Rig | GeometryCalibration, column_px: ArrayLike) -> NDArray[np.float64]:
-    """Depth (mm) along the camera's axis of columns (rows, columns) of all pixels, NaN where there is none.
-
-    Each camera ray meets the plane of its projector column. Raises `DecodeError` when the columns are not of
-    the camera's size.
-    """
+    """What `dsl_core.api.arrays.depth_of_columns` says."""
     import torch
 
     from dsl_core.optics.correspondence import triangulate

@@ -1,7 +1,7 @@
 """Scans on request, each in a process of its own that may be killed.
 
 Reads lines ``[folder, frames, seconds]`` from standard input; for each, forks a child that creates or
-resumes the session and scans, kills it when so many frames are stored and that time has passed since, and
+resumes the scan, kills it when so many frames are stored and that time has passed since, and
 prints how it ended. Frames are null for a scan that may end. The rig is opened once.
 """
 
@@ -52,7 +52,7 @@ def make(kind: str) -> tuple[CapturePlan, DeviceRig]:
 
 
 def wait_for_frames(folder: Path, frames: int, child: int) -> None:
-    """Return when a session has so many frames, or when its process has ended."""
+    """Return when a scan has so many frames, or when its process has ended."""
     log = folder / "frames.jsonl"
     while not log.exists() or log.read_bytes().count(b"\n") < frames:
         if os.waitid(os.P_PID, child, os.WEXITED | os.WNOHANG | os.WNOWAIT) is not None:

@@ -78,7 +78,8 @@ def test_an_interrupted_scan_says_how_to_resume_and_does(
     assert f"Resume with: dsl-scan resume {scan}" in complaint
     assert lines <= FRAMES - len(ScanReader(scan).missing()) < FRAMES
     assert give("reconstruct", scan).code == 2
-    assert give("resume", scan, "--json").json["state"] == "finished"
+    resumed = give("resume", scan, "--json").json
+    assert (resumed["state"], resumed["scan"]) == ("finished", str(scan))
     whole, mended = ScanReader(unbroken), ScanReader(scan)
     assert whole.plan.shot_count == FRAMES
     for shot in whole.plan.shots():

@@ -73,7 +73,7 @@ def _frames(folder: Path) -> NDArray[np.uint16]:
 
 
 def _frames_left(folder: Path) -> int:
-    """Missing frames; -1 when the scan was killed before its session existed."""
+    """Missing frames; -1 when the scan was killed before its folder existed."""
     try:
         return len(ScanReader(folder).missing())
     except StoreError:

@@ -15,7 +15,7 @@ from dsl_core.io.scan.folder import ScanReader
 from dsl_core.io.scan.origin import model_notes, rig_notes
 from dsl_core.model.plan import CapturePlan, GrayCode, Setting
 from dsl_core.model.spectral import WavelengthGrid
-from dsl_core.workflows.inspection import find_session, intensity_graph, read_block
+from dsl_core.workflows.inspection import find_scan, intensity_graph, read_block
 from dsl_core.workflows.scans import reconstruct_scan
 
 
@@ -68,14 +68,14 @@ def test_a_pixel_at_the_corner_has_a_graph_too(result: ResultArrays) -> None:
 def test_a_scan_that_is_elsewhere_is_asked_for(result: ResultArrays, tmp_path: Path) -> None:
     moved = ResultArrays(tmp_path / "b.zarr", result.wavelengths_nm, result.arrays, result.attributes)
     with pytest.raises(StoreError, match="not next to it"):
-        find_session(moved)
+        find_scan(moved)
 
 
 def test_the_model_is_that_of_the_calibration_of_the_result(
     result: ResultArrays, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv(HOME_VARIABLE, str(tmp_path))
-    own = ScanReader(find_session(result)).calibration
+    own = ScanReader(find_scan(result)).calibration
     assert own is not None
     other = own.model_copy(update={"white_scale": own.white_scale * 1.5})
     attributes = {**result.attributes, **model_notes(other, "grating")}

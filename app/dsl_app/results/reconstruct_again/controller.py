@@ -140,25 +140,25 @@ def read_source(path: Path, library: tuple[str, ...]) -> ReconstructionSource:
     from dsl_core.io.scan.folder import ScanReader
     from dsl_core.model.plan import NoSpectral
     from dsl_core.reconstruction.torch_device import has_cuda
-    from dsl_core.workflows.inspection import session_of
+    from dsl_core.workflows.inspection import scan_of
 
     match kind_of(path):
         case Kind.RESULT:
             before: Path | None = path
-            session = session_of(path, load_result(path).attrs)
+            scan = scan_of(path, load_result(path).attrs)
         case Kind.SCAN:
-            before, session = path.with_suffix(RESULT_SUFFIX), path
+            before, scan = path.with_suffix(RESULT_SUFFIX), path
         case _:
             raise StoreError(
                 f"{path.name} is not a scan. Choose a folder NAME.dsl with all of its frames, or open its"
                 " result first."
             )
-    reader = ScanReader(session)
+    reader = ScanReader(scan)
     require_complete(reader)
     if before is None or kind_of(before) is not Kind.RESULT:
         before = None
     return ReconstructionSource(
-        session,
+        scan,
         reader.plan.camera_size_px,
         reader.calibration.name if reader.calibration is not None else "",
         library,
