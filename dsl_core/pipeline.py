@@ -8,30 +8,36 @@ command line starts at once.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import logging
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from dsl_core.capture.preflight import fit_plan, require_possible
+from dsl_core.capture.proof.report import SeenFrames
+from dsl_core.capture.proof.report import prove as prove_frames
 from dsl_core.capture.proof.verifier import FrameProof
-from dsl_core.capture.runner import Runner, Status
+from dsl_core.capture.runner import Runner, State, Status
 from dsl_core.capture.sentinels import SentinelWatch
 from dsl_core.capture.sink import Watch, WatchedSink
 from dsl_core.devices.base import DeviceRig
+from dsl_core.errors import StoreError
 from dsl_core.evaluation import summary
 from dsl_core.evaluation.cost import StageTimer
 from dsl_core.evaluation.report.scan_report import ReportContent, render_report
 from dsl_core.evaluation.summary import Evaluation, Truth
 from dsl_core.io.scan.folder import ScanReader, ScanWriter
+from dsl_core.io.scan.proof_file import read_proof, save_proof
 from dsl_core.io.staging import write_text
 from dsl_core.model.fit import FitFinding
 from dsl_core.model.frames import FrameSink, FrameSource
 from dsl_core.model.options import Options
-from dsl_core.model.plan import CapturePlan
+from dsl_core.model.plan import CapturePlan, Shot
 from dsl_core.model.result_sink import MemorySink, ResultSink, SeenDepth
 from dsl_core.model.rig import Rig
 from dsl_core.patterns.images import pattern_image
@@ -46,6 +52,7 @@ if TYPE_CHECKING:
     from dsl_core.reconstruction.rows.frames import ScanFrames
 
 
+_log = logging.getLogger(__name__)
 __all__ = ["Options", "evaluate", "fit_plan", "open_scan", "reconstruct", "scan", "write_report"]
 
 
@@ -71,22 +78,38 @@ def open_scan(
     with ScanWriter.open(folder, plan, rig, notes) as writer:
         sink: FrameSink = WatchedSink(writer, watch) if watch else writer
         stored = ScanReader(folder)
-        proof, sentinels = None, None
+        proof, sentinels, seen = None, None, SeenFrames(plan)
         if prove:
             camera = rig.camera.info
             proof = FrameProof(plan, rig.calibration, camera.bit_depth, camera.bayer)
             sentinels = SentinelWatch(plan, rig.calibration.sensor if rig.calibration else None)
             missing = {shot.index for shot in writer.missing()}
             sentinels.learn(stored, (shot for shot in plan.shots() if shot.index not in missing))
-            sink = WatchedSink(sink, _told_to(sentinels))
-        yield Runner(
+            sink = WatchedSink(WatchedSink(sink, _told_to(sentinels.add)), _told_to(seen.keep))
+        runner = Runner(
             rig, plan, sink, pattern_image, progress=progress, token=token, proof=proof, stored=stored,
             sentinels=sentinels, waits=waits,
         )  # fmt: skip
+        yield runner
+        if prove and runner.status.state is State.FINISHED:
+            _keep_proof(ScanReader(folder), seen)
 
 
-def _told_to(sentinels: SentinelWatch) -> Watch:
-    return lambda shot, frame: sentinels.add(shot, frame.pixels)
+def _keep_proof(reader: ScanReader, seen: SeenFrames) -> None:
+    """Judge the pictures of a finished scan once and for all; without a calibration, each result does."""
+    if reader.calibration is None or read_proof(reader, reader.calibration) is not None:
+        return
+    seen.read_missing(reader)
+    sensor = reader.calibration.sensor
+    found = prove_frames(reader, seen, reader.calibration, sensor.bit_depth, sensor.bayer)
+    try:
+        save_proof(reader, reader.calibration, found)
+    except StoreError as error:
+        _log.warning("The scan is complete; what its pictures show could not be kept with it: %s", error)
+
+
+def _told_to(watcher: Callable[[Shot, NDArray[np.uint16]], None]) -> Watch:
+    return lambda shot, frame: watcher(shot, frame.pixels)
 
 
 def scan(

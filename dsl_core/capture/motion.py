@@ -81,10 +81,18 @@ def moved_between(
 
 def _light(picture: Mosaic, black: Mosaic, sensor: Sensor) -> tuple[Floats, Floats]:
     """Light of a picture over its black, means over 2 x 2 pixels, and its variance."""
-    lit, dark = (each.astype(np.float64) for each in (picture, black))
-    noise = sum(raw_variance(sensor, each - sensor.black_level_dn) for each in (lit, dark))
-    variance = np.where(lit < 0.98 * sensor.full_scale_dn, noise, 1e12)
-    return _binned(lit - dark), _binned(np.asarray(variance)) / 4
+    lit, dark = (np.add.reduce(_quarters(each), dtype=np.float64) / 4 for each in (picture, black))
+    # The noise of counts is linear in light, so that of four is known by their mean.
+    levels = (raw_variance(sensor, each - sensor.black_level_dn) for each in (lit, dark))
+    noise = np.add.reduce(list(levels)) / 4
+    clipped = np.maximum.reduce(_quarters(picture)) >= 0.98 * sensor.full_scale_dn
+    return np.asarray(lit - dark), np.where(clipped, 1e12, noise)
+
+
+def _quarters(picture: Mosaic) -> list[Mosaic]:
+    """The pixels of every block of 2 x 2, one array (rows / 2, columns / 2) for each place in it."""
+    rows, columns = (size // 2 * 2 for size in picture.shape)
+    return [picture[down:rows:2, across:columns:2] for down in (0, 1) for across in (0, 1)]
 
 
 def _movement(found: TileShifts, shape: tuple[int, ...], is_pattern: bool) -> Movement | None:
@@ -108,12 +116,6 @@ def _movement(found: TileShifts, shape: tuple[int, ...], is_pattern: bool) -> Mo
         columns=None if whole else columns,
         rows=None if whole else rows,
     )
-
-
-def _binned(picture: Floats) -> Floats:
-    rows, columns = (size // 2 for size in picture.shape)
-    whole = picture[: 2 * rows, : 2 * columns].reshape(rows, 2, columns, 2)
-    return np.asarray(whole.mean(axis=(1, 3)))
 
 
 def _span(moved: NDArray[np.bool_], size: int) -> tuple[int, int]:

@@ -220,12 +220,12 @@ def _shortened(text: str) -> str:
 
 
 def _proof_of(path: Path) -> dict[str, Any]:
-    from dsl_core.workflows.scans import linearity_of_scan, moved_during, prove_scan
+    from dsl_core.workflows.scans import linearity_of_scan, prove_scan
 
-    found, moved = prove_scan(path), list(moved_during(path))
+    found = prove_scan(path)
     return {
         "values": linearity_of_scan(path).sentence,
-        "moved": moved or "nothing",
-        "wrong_pictures": list(found.sentences),
+        "moved": list(found.moved) or "nothing",
+        "wrong_pictures": list(found.wrong),
         "pictures_not_judged": found.not_judged or "none",
     }

@@ -141,4 +141,5 @@ def _common_shift(old: Floats, new: Floats) -> tuple[float, float]:
 
 def _edges(picture: Floats) -> Floats:
     gy, gx = np.gradient(picture)
-    return np.asarray(np.hypot(gx, gy) - np.hypot(gx, gy).mean())
+    size = np.hypot(gx, gy)
+    return np.asarray(size - size.mean())

@@ -9,10 +9,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from dsl_core.capture.movement import check_movement, pick_reference_shots
-from dsl_core.capture.proof.finding import ProofReport
-from dsl_core.capture.proof.report import WatchedSource, prove
+from dsl_core.capture.proof.report import SeenFrames, WatchedSource, prove
 from dsl_core.capture.runner import Status
-from dsl_core.capture.sentinels import movement_of
 from dsl_core.devices.base import DeviceRig
 from dsl_core.devices.conditions import conditions_of
 from dsl_core.devices.registry import is_built_in, open_rig
@@ -24,11 +22,13 @@ from dsl_core.io.scan.check import require_complete
 from dsl_core.io.scan.folder import ScanReader
 from dsl_core.io.scan.manifest import Manifest, read_manifest
 from dsl_core.io.scan.origin import is_of_this_computer, model_notes, rig_of_notes
+from dsl_core.io.scan.proof_file import read_proof
 from dsl_core.model.conditions import differences
 from dsl_core.model.frames import FrameSource
 from dsl_core.model.plan import CapturePlan
 from dsl_core.model.result_sink import ResultSink, SeenDepth
-from dsl_core.model.rig import Rig, Sensor
+from dsl_core.model.rig import Rig
+from dsl_core.model.scan_proof import ScanProof
 from dsl_core.model.spectral import WavelengthGrid
 from dsl_core.patterns.images import pattern_image
 from dsl_core.pipeline import Options, reconstruct, scan
@@ -112,16 +112,19 @@ def reconstruct_scan(
     if calibration is not None and not override_calibration:
         _require_conditions(folder, reader.manifest, calibration)
     rig, options = with_imported_sensor(reader, calibration_of(reader, calibration)), options or Options()
+    proof = read_proof(reader, rig)
     watched = WatchedSource(reader)
     progress = progress or NoProgress()
-    result = reconstruct(watched, rig, options, progress, timer, sink, seen_depth)
-    with timer.stage("compare frames with their patterns"):
-        progress.report("compare frames with their patterns", 0, 0)
-        proof = watched.report(rig, rig.sensor.bit_depth, rig.sensor.bayer)
-        doubts = (*_moved(reader, rig.sensor), *proof.sentences)
+    result = reconstruct(
+        watched if proof is None else reader, rig, options, progress, timer, sink, seen_depth
+    )
+    if proof is None:
+        with timer.stage("compare frames with their patterns"):
+            progress.report("compare frames with their patterns", 0, 0)
+            proof = prove(reader, watched.seen, rig, rig.sensor.bit_depth, rig.sensor.bayer)
     return result.assign_attrs(
         {
-            **({DOUBTS: json.dumps(doubts)} if doubts else {}),
+            **({DOUBTS: json.dumps(proof.doubts)} if proof.doubts else {}),
             **({NOT_JUDGED: proof.not_judged} if proof.untold else {}),
             **reader.manifest.notes,
             **model_notes(rig, options.correspondence),
@@ -168,28 +171,19 @@ def reconstruct_to(
             return writer.publish(result.attrs)
 
 
-def _moved(reader: ScanReader, sensor: Sensor | None) -> tuple[str, ...]:
-    """What moved during a scan, by its sentinels."""
-    sound = set(reader.entries) & reader.store.stored()
-    found = movement_of(reader, sensor, (s.index for s in reader.plan.shots() if s.index not in sound))
-    return () if found is None else (f"{found.sentence} {found.advice}",)
-
-
-def moved_during(folder: Path) -> tuple[str, ...]:
-    """What moved during a scan, as a sentence; empty if nothing did. Raises `StoreError`."""
+def prove_scan(folder: Path) -> ScanProof:
+    """What the pictures of a scan show but damaged ones, and what moved in it; raises `StoreError`."""
     reader = ScanReader(folder)
-    return _moved(reader, None if reader.calibration is None else reader.calibration.sensor)
-
-
-def prove_scan(folder: Path) -> ProofReport:
-    """Which pictures of a scan do not show their pattern, and of how many nothing can be told.
-
-    Raises `StoreError`.
-    """
-    reader = ScanReader(folder)
+    seen = SeenFrames(reader.plan)
+    seen.read_missing(reader)
     camera = reader.manifest.camera
-    settings = (camera.bit_depth, camera.bayer) if camera else ()
-    return prove(reader, reader.calibration, *settings)
+    settings = (camera.bit_depth, camera.bayer) if camera else (12, "RGGB")
+    return prove(reader, seen, reader.calibration, *settings, missing=_absent(reader))
+
+
+def _absent(reader: ScanReader) -> set[int]:
+    sound = set(reader.entries) & reader.store.stored()
+    return {shot.index for shot in reader.plan.shots() if shot.index not in sound}
 
 
 def linearity_of_scan(folder: Path) -> Linearity:
@@ -198,10 +192,8 @@ def linearity_of_scan(folder: Path) -> Linearity:
     Imported pictures are judged as their mapping read them. Raises `StoreError`.
     """
     reader = ScanReader(folder)
-    sound = set(reader.entries) & reader.store.stored()
-    absent = {shot.index for shot in reader.plan.shots() if shot.index not in sound}
     sensor = sensor_of_scan(reader)
-    return linearity_of(reader, sensor.full_scale_dn, sensor.black_level_dn, absent)
+    return linearity_of(reader, sensor.full_scale_dn, sensor.black_level_dn, _absent(reader))
 
 
 def calibration_of(source: FrameSource, given: Rig | None = None) -> Rig:

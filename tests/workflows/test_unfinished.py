@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import shutil
 from pathlib import Path
 
@@ -14,7 +15,9 @@ from dsl_core.io.result import row_writer
 from dsl_core.io.result.result_file import load_result
 from dsl_core.io.scan.folder import ScanReader
 from dsl_core.io.scan.lock import FolderLock
+from dsl_core.io.scan.proof_file import PROOF_NAME, read_proof, save_proof
 from dsl_core.model.presets import PRESETS
+from dsl_core.model.scan_proof import ScanProof
 from dsl_core.pipeline import Options
 from dsl_core.progress import CallbackProgress
 from dsl_core.workflows import scans
@@ -66,12 +69,34 @@ def test_an_interrupted_reconstruction_is_found_and_continued(killed: Path, tmp_
     assert unfinished_results(tmp_path) == ()
 
 
-def test_the_last_stages_of_a_reconstruction_are_told(scan: Path, tmp_path: Path) -> None:
+@pytest.mark.parametrize("is_judged", [True, False])
+def test_the_last_stages_of_a_reconstruction_are_told(scan: Path, tmp_path: Path, is_judged: bool) -> None:
+    copy = shutil.copytree(scan, tmp_path / "a.dsl")
+    if not is_judged:
+        (copy / PROOF_NAME).unlink()
     told: list[str] = []
     progress = CallbackProgress(lambda stage, _done, _total: told.append(stage))
-    scans.reconstruct_to(tmp_path / "b.zarr", scan, None, OPTIONS, progress)
-    last = list(dict.fromkeys(told))[-3:]
-    assert last == ["colour and result", "compare frames with their patterns", "save the result"]
+    scans.reconstruct_to(tmp_path / "b.zarr", copy, None, OPTIONS, progress)
+    judging = [] if is_judged else ["compare frames with their patterns"]
+    assert list(dict.fromkeys(told))[-2 - len(judging) :] == [
+        "colour and result",
+        *judging,
+        "save the result",
+    ]
+
+
+def test_a_finished_scan_knows_what_its_pictures_show(scan: Path, tmp_path: Path) -> None:
+    copy = shutil.copytree(scan, tmp_path / "a.dsl")
+    reader = ScanReader(copy)
+    assert reader.calibration is not None
+    assert read_proof(reader, reader.calibration) == scans.prove_scan(copy)
+    kept = ScanProof(judged=9, untold=2, wrong=("Frame 7 is late.",))
+    save_proof(reader, reader.calibration, kept)
+    result = scans.reconstruct_scan(copy, None, OPTIONS)
+    assert json.loads(result.attrs[scans.DOUBTS]) == ["Frame 7 is late."]
+    assert result.attrs[scans.NOT_JUDGED] == "2 of 9"
+    (copy / PROOF_NAME).unlink()
+    assert scans.DOUBTS not in scans.reconstruct_scan(copy, None, OPTIONS).attrs
 
 
 def test_one_that_runs_or_whose_scan_is_gone_is_not_offered(killed: Path, tmp_path: Path) -> None:

@@ -118,8 +118,3 @@ class ProofReport:
     def sentences(self) -> tuple[str, ...]:
         """A sentence for everything that is wrong."""
         return tuple(each.sentence for each in self.wrong)
-
-    @property
-    def not_judged(self) -> str:
-        """Of how many pictures nothing can be told, such as ``26 of 150``; empty if of none."""
-        return f"{self.untold} of {self.judged}" if self.untold else ""

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import threading
+from collections.abc import Iterable
+from contextlib import suppress
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,41 +12,39 @@ from numpy.typing import NDArray
 from dsl_core.capture.proof.finding import Finding, ProofReport, Verdict
 from dsl_core.capture.proof.raster import Counts, Raster
 from dsl_core.capture.proof.verifier import FrameProof
+from dsl_core.capture.sentinels import movement_of
 from dsl_core.errors import StoreError
 from dsl_core.model.frames import FrameSource, read_rows
 from dsl_core.model.plan import CapturePlan, Shot
 from dsl_core.model.rig import Rig
+from dsl_core.model.scan_proof import ScanProof
 
 
-class WatchedSource:
-    """A `FrameSource` that keeps a little of every frame it is asked for, to judge them afterwards."""
+class SeenFrames:
+    """A little of every frame of a scan, to judge them all at its end; may be used from several threads."""
 
-    def __init__(self, source: FrameSource) -> None:
-        """The source stays the caller's."""
-        self._source = source
-        self._raster = Raster(source.plan.camera_size_px)
+    def __init__(self, plan: CapturePlan) -> None:
+        """Of no frame yet."""
+        self.plan = plan
+        self._raster = Raster(plan.camera_size_px)
         self._seen: dict[int, Counts] = {}
         self._lock = threading.Lock()
 
-    @property
-    def plan(self) -> CapturePlan:
-        """The plan the frames belong to."""
-        return self._source.plan
-
-    def read(self, shot: Shot) -> NDArray[np.uint16]:
-        """The raw mosaic of a shot, shape (rows, columns); raises `StoreError` when it is not there."""
-        pixels = self._source.read(shot)
+    def keep(self, shot: Shot, pixels: NDArray[np.uint16]) -> None:
+        """Keep a little of a frame, shape (rows, columns), in place of an earlier one of this shot."""
         seen = self._raster.take(pixels)
         with self._lock:
             self._seen[shot.index] = seen
-        return pixels
 
-    def read_rows(self, shot: Shot, rows: slice) -> NDArray[np.uint16]:
-        """Some rows of a mosaic, of which nothing is kept; raises `StoreError`."""
-        return read_rows(self._source, shot, rows)
+    def read_missing(self, source: FrameSource) -> None:
+        """Read every frame of which nothing is kept yet; damaged ones are left out."""
+        for shot in self.plan.shots():
+            if shot.index not in self._seen:
+                with suppress(StoreError):
+                    self.keep(shot, source.read(shot))
 
     def report(self, calibration: Rig | None, bit_depth: int = 12, bayer: str = "RGGB") -> ProofReport:
-        """What the frames read so far show."""
+        """What the frames kept so far show."""
         proof = FrameProof(self.plan, calibration, bit_depth, bayer, at_the_end=True)
         wrong: list[Finding] = []
         judged = untold = 0
@@ -75,14 +75,48 @@ class WatchedSource:
         return None
 
 
+class WatchedSource:
+    """A `FrameSource` that keeps a little of every frame it is asked for in ``seen``."""
+
+    def __init__(self, source: FrameSource) -> None:
+        """The source stays the caller's."""
+        self._source = source
+        self.seen = SeenFrames(source.plan)
+
+    @property
+    def plan(self) -> CapturePlan:
+        """The plan the frames belong to."""
+        return self._source.plan
+
+    def read(self, shot: Shot) -> NDArray[np.uint16]:
+        """The raw mosaic of a shot, shape (rows, columns); raises `StoreError` when it is not there."""
+        pixels = self._source.read(shot)
+        self.seen.keep(shot, pixels)
+        return pixels
+
+    def read_rows(self, shot: Shot, rows: slice) -> NDArray[np.uint16]:
+        """Some rows of a mosaic, of which nothing is kept; raises `StoreError`."""
+        return read_rows(self._source, shot, rows)
+
+
 def prove(
-    source: FrameSource, calibration: Rig | None = None, bit_depth: int = 12, bayer: str = "RGGB"
-) -> ProofReport:
-    """Read all frames of a scan, complete or not, and judge them; damaged ones are left out."""
-    watched = WatchedSource(source)
-    for shot in source.plan.shots():
-        try:
-            watched.read(shot)
-        except StoreError:
-            continue
-    return watched.report(calibration, bit_depth, bayer)
+    source: FrameSource,
+    seen: SeenFrames,
+    calibration: Rig | None = None,
+    bit_depth: int = 12,
+    bayer: str = "RGGB",
+    missing: Iterable[int] = (),
+) -> ScanProof:
+    """What the frames ``seen`` of a scan show, and what moved in it.
+
+    Reads the sentinels, and what they repeat, from the ``source``, which has all frames but those
+    ``missing``. Raises `StoreError`.
+    """
+    found = seen.report(calibration, bit_depth, bayer)
+    moved = movement_of(source, None if calibration is None else calibration.sensor, missing)
+    return ScanProof(
+        judged=found.judged,
+        untold=found.untold,
+        wrong=found.sentences,
+        moved=() if moved is None else (f"{moved.sentence} {moved.advice}",),
+    )

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from itertools import islice
+
 import pytest
 
-from dsl_core.capture.proof.finding import Verdict
-from dsl_core.capture.proof.report import prove
+from dsl_core.capture.proof.finding import ProofReport, Verdict
+from dsl_core.capture.proof.report import SeenFrames, prove
 from dsl_core.model.plan import describe_shot
 from tests.cases.memory_sink import MemorySink
 from tests.cases.rendered_rig import RenderedScene, token_image
@@ -28,14 +30,20 @@ def _with(frames: MemorySink, changes: dict[int, int]) -> MemorySink:
     return changed
 
 
+def _judged(scene: RenderedScene, frames: MemorySink) -> ProofReport:
+    seen = SeenFrames(frames.plan)
+    seen.read_missing(frames)
+    return seen.report(scene.calibration)
+
+
 def test_a_sound_scan_has_no_wrong_pictures(scene: RenderedScene, frames: MemorySink) -> None:
-    report = prove(frames, scene.calibration)
+    report = _judged(scene, frames)
     assert (report.judged, report.wrong) == (scene.plan.shot_count, ())
 
 
 def test_pictures_in_the_places_of_others_are_named(scene: RenderedScene, frames: MemorySink) -> None:
     shots = list(scene.plan.shots())
-    report = prove(_with(frames, {7: 6, 26: 27, 27: 26}), scene.calibration)
+    report = _judged(scene, _with(frames, {7: 6, 26: 27, 27: 26}))
     named = [shot.index for finding in report.wrong for shot in finding.again]
     assert named == [6, 7, 26, 27]
     assert report.sentences[0].startswith(
@@ -44,7 +52,20 @@ def test_pictures_in_the_places_of_others_are_named(scene: RenderedScene, frames
 
 
 def test_one_wrong_pair_leaves_the_lines_to_be_judged(scene: RenderedScene, frames: MemorySink) -> None:
-    sound, spoiled = prove(frames, scene.calibration), prove(_with(frames, {0: 5}), scene.calibration)
+    sound, spoiled = _judged(scene, frames), _judged(scene, _with(frames, {0: 5}))
     assert [shot.index for finding in spoiled.wrong for shot in finding.again] == [0, 1]
     assert spoiled.untold <= sound.untold + 3
     assert spoiled.wrong[0].verdict is not Verdict.RIGHT
+
+
+def test_a_proof_says_what_frames_show_that_were_kept_while_they_were_taken(
+    scene: RenderedScene, frames: MemorySink
+) -> None:
+    spoiled = _with(frames, {7: 6})
+    seen = SeenFrames(frames.plan)
+    for shot in islice(scene.plan.shots(), 20):
+        seen.keep(shot, spoiled.read(shot))
+    seen.read_missing(frames)
+    found = prove(frames, seen, scene.calibration)
+    assert found.wrong == found.doubts == _judged(scene, spoiled).sentences
+    assert (found.judged, found.moved) == (scene.plan.shot_count, ())
