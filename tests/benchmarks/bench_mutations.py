@@ -3,7 +3,8 @@
 ``python -m tests.benchmarks.bench_mutations --seed 1 --count 60`` copies the tree, puts one fault at a time
 into the copy, runs the tests of the fault's folder until one fails, and lists which faults were caught. A
 fault swaps an operator or a comparison, changes a number, or leaves out a statement. What cannot change a
-result is not drawn: annotations, texts of errors and of the log, code for other systems. Takes about an hour.
+result is not drawn: annotations, texts of errors and of the log, code for other systems, seeds of random
+numbers. Takes about an hour.
 """
 
 from __future__ import annotations
@@ -112,7 +113,7 @@ def faults_of(path: str, source: str) -> Iterator[Fault]:
 
 
 def _without_effect(tree: ast.AST) -> Iterator[ast.AST]:
-    """Annotations, decorators, texts of errors and of the log, other systems, `strict` of equal parts."""
+    """Annotations, decorators, texts of errors and of the log, other systems, `strict`, seeds of chance."""
     for node in ast.walk(tree):
         if isinstance(node, ast.If) and (here := _is_here(node.test)) is not None:
             yield from node.orelse if here else node.body
@@ -126,6 +127,8 @@ def _without_effect(tree: ast.AST) -> Iterator[ast.AST]:
             yield from node.decorator_list
         if isinstance(node, ast.FunctionDef) and node.returns is not None:
             yield node.returns
+        if isinstance(node, ast.Call) and ast.unparse(node.func).endswith("default_rng"):
+            yield from node.args
         if isinstance(node, ast.keyword) and node.arg == "strict":
             yield node.value
 

@@ -98,6 +98,7 @@ def test_residuals_say_which_samples_were_used(samples: GridSamples) -> None:
     ("change", "words"),
     [
         ({"depths_mm": np.array([500.0, 500.0, 500.0, 500.0, 501.0])}, "three or more different depths"),
+        ({"depths_mm": np.array([500.0, 506.0, 512.0, 518.0, 525.0])}, "three or more different depths"),
         ({"wavelengths_nm": np.array(SPREAD_NM)[::-1]}, "rising order"),
         ({"rows_px": np.array([0.0])}, "2 x 2"),
         ({"columns_px": np.full((2, 7, 5, 48, 85), np.nan)}, r"Order \+1 at 430 nm"),
@@ -108,6 +109,11 @@ def test_samples_that_do_not_suffice_are_refused(
 ) -> None:
     with pytest.raises(CalibrationError, match=words):
         fit_grid(replace(samples, **change))  # type: ignore[arg-type]
+
+
+def test_depths_a_twentieth_of_the_distance_apart_are_enough(samples: GridSamples) -> None:
+    near = replace(samples, depths_mm=np.array([500.0, 507.0, 514.0, 521.0, 527.0]))
+    assert fit_grid(near).grid is not None
 
 
 def test_models_have_one_interface(samples: GridSamples) -> None:

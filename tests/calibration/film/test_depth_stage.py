@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import nullcontext
 from dataclasses import replace
 from functools import cache
 from types import SimpleNamespace
@@ -20,6 +21,7 @@ from dsl_core.calibration.film.depth_stage import (
     _grid_px,
     _middle,
     _require_filters,
+    _samples,
     _shifts_nm,
     _warnings,
     fit_first_orders,
@@ -141,6 +143,29 @@ def test_light_seems_off_by_the_median_of_both_orders_in_their_own_directions() 
     assert seen[2].shift_px == pytest.approx((0.0, 3.0 * per_nm), abs=1e-6)
     assert [each.tiles for each in seen] == [240] * 3
     assert seen[0].effective_nm == FILTERS_NM[0]
+
+
+@pytest.mark.parametrize(("second", "found"), [(20, True), (19, False)])
+def test_forty_tiles_of_both_orders_are_enough(
+    monkeypatch: pytest.MonkeyPatch, second: int, found: bool
+) -> None:
+    lengths = iter([20, second])
+    taken: list[Any] = []
+
+    def find(*_: object) -> list[int]:
+        return [0] * next(lengths)
+
+    monkeypatch.setattr(depth_stage, "filter_passband", lambda *_: None)
+    monkeypatch.setattr(depth_stage, "fit_columns", find)
+    monkeypatch.setattr(depth_stage, "OrderSamples", SimpleNamespace(of=taken.extend))
+    data: Any = SimpleNamespace(
+        filters=[SimpleNamespace(transmission=None)],
+        frames=lambda *_: None,
+        name=lambda position, name: f"{position} {name}",
+    )
+    with nullcontext() if found else pytest.raises(CalibrationError, match="no first orders were found"):
+        _samples(TRUTH, PLANES[:1], data, False, NoProgress())
+    assert len(taken) == 2 * found
 
 
 def test_a_filter_is_doubtful_from_three_tenths_of_a_pixel_on() -> None:

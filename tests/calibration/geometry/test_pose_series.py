@@ -135,6 +135,19 @@ def test_the_gamma_is_that_of_bright_places_where_stripes_cross_a_pixel(gamma: f
     assert picture_gamma(frames, case.SMALL_PROJECTOR_PX) == pytest.approx(gamma, abs=0.06)
 
 
+def test_pictures_that_lose_the_light_of_stripes_have_a_gamma_of_eleven() -> None:
+    linear = case.board_frames()
+    finest = (case.SMALL_PROJECTOR_PX[0] - 1).bit_length() - 1
+    pairs = list(linear.pairs)
+    # Pattern and inverse together are no brighter than black.
+    pairs[2 * finest : 2 * finest + 2] = [
+        linear.black + 0.01 * (linear.white - linear.black),
+        0 * linear.black,
+    ]
+    lost = replace(linear, pairs=pairs)
+    assert picture_gamma(lost, case.SMALL_PROJECTOR_PX) == pytest.approx(1 + np.log2(1000), abs=0.01)
+
+
 @pytest.mark.parametrize(("tilt_deg", "enough"), [(4.0, False), (7.0, True)])
 def test_poses_five_degrees_apart_are_enough(tilt_deg: float, enough: bool) -> None:
     turn = np.radians(tilt_deg)

@@ -14,12 +14,14 @@ from dsl_core.calibration.light.chain import (
     SCALE_STD,
     UNKNOWNS,
     LineScan,
+    _mean_ratios,
     _parts,
     _scale,
     _solve,
     chain_correction,
     largest_correction,
 )
+from dsl_core.calibration.light.chain_equations import ZERO_ORDER_ERROR
 from dsl_core.campaign.common.flat_target import diffuser_lines
 from dsl_core.errors import CalibrationError
 from dsl_core.model.calibration.chain import ChainCorrection, apply_chain
@@ -196,6 +198,20 @@ def test_without_data_the_scale_is_as_unsure_as_it_was_before() -> None:
     scale, std = _scale(solve_given(alone, np.eye(n), 1.0), sum(parts[1:], parts[0]), parts)
     assert scale == 0.0
     assert std == pytest.approx(SCALE_STD)
+
+
+def test_a_colour_that_no_part_of_the_image_shows_is_taken_as_known_to_no_more_than_itself(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    module = "dsl_core.calibration.light.chain."
+    monkeypatch.setattr(module + "_parts", lambda _rig, scan: scan)
+    monkeypatch.setattr(module + "zero_order_ratios", lambda _rig, part, _target: np.array(part, float))
+    monkeypatch.setattr(module + "colours_of", lambda *_: np.array([0, 0, 2]))
+    parts: Any = [[0.9, 0.9, 2.0], [1.1, 1.1, 2.0]]
+    target: Any = None
+    mean, std = _mean_ratios(published_rig(), [parts], target)
+    assert mean == pytest.approx([1.0, 1.0, 2.0])
+    assert std == pytest.approx(np.hypot([0.1 / np.sqrt(2), 1.0, 0.0], ZERO_ORDER_ERROR))
 
 
 def test_chi_square_is_that_of_the_first_orders_with_the_deviation_of_three_colours(

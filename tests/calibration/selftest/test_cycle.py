@@ -67,6 +67,7 @@ def test_steady_light_is_steady_and_its_bound_holds() -> None:
     found = find_cycle(short_exposures(60.0, depth=0.0), BLACK_DN)
     assert found.is_steady
     assert 3e-4 < found.modulation.value < 3e-3
+    assert found.modulation.value == pytest.approx(3 * found.modulation.std)
     assert not find_cycle(short_exposures(60.0, depth=0.02), BLACK_DN).is_steady
 
 

@@ -105,6 +105,18 @@ def test_stripes_count_the_periods_of_a_sinusoid(tmp_path: Path) -> None:
     assert (phases.fringes, phases.start_deg) == ((8.0,), -90.0)
 
 
+def test_stripes_count_the_periods_of_every_sinusoid(tmp_path: Path) -> None:
+    sets: list[tuple[str, Stripes | Phases]] = [
+        ("columns", Stripes(bits=4, inverse=False, unit_px=8)),
+        ("columns", Phases(periods_px=(32.0, 16.0), steps=4)),
+    ]
+    pictures, white, black = frames(sets)
+    named = {f"{i}.png": p for i, p in enumerate([white, black, *pictures])}
+    phases = guess_mapping(write(tmp_path, named), PROJECTOR).mapping.parts[3]
+    assert isinstance(phases, PhasePictures)
+    assert phases.fringes == (4.0, 8.0)
+
+
 def test_folders_of_no_capture_end_in_a_sentence(tmp_path: Path) -> None:
     empty = tmp_path / "empty"
     empty.mkdir()

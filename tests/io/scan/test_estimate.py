@@ -47,8 +47,8 @@ def test_only_the_missing_frames_need_room(
 
 
 def test_an_estimate_is_said_in_minutes_and_megabytes() -> None:
-    found = Estimate(frames=340, seconds=90.0, needed_bytes=1_234_000_000, free_bytes=5_000_000_000)
-    assert str(found) == "340 frames, 1.5 min on the rig, 1234 MB of 5000 MB free"
+    found = Estimate(frames=340, seconds=4530.0, needed_bytes=1_234_000_000, free_bytes=5_000_000_000)
+    assert str(found) == "340 frames, 75.5 min on the rig, 1234 MB of 5000 MB free"
 
 
 def test_frames_are_compressed_to_three_fifths_beside_a_margin_of_64_mib(plan: CapturePlan) -> None:

@@ -44,6 +44,11 @@ def test_the_tile_has_its_valid_pixels_where_they_are_in_the_picture() -> None:
     assert not ((rows == 5) & (columns == 8)).any()
 
 
+def test_of_frames_that_begin_at_a_later_row_the_rows_near_the_tile_are_used() -> None:
+    whole = tile(LEVEL, 1.0)
+    assert whole._radiance.shape == (FRAMES, 8, 10)
+
+
 @pytest.mark.parametrize("std", [0.5, 3.0])
 def test_a_mean_of_neighbours_is_surer_than_one_of_them(std: float) -> None:
     frames = tile(LEVEL, std)
