@@ -38,7 +38,7 @@ from dsl_core.model.fit import FitFinding
 from dsl_core.model.frames import FrameSink, FrameSource
 from dsl_core.model.options import Options
 from dsl_core.model.plan import CapturePlan, Shot
-from dsl_core.model.result_sink import MemorySink, ResultSink, SeenDepth
+from dsl_core.model.result_sink import MemorySink, ResultSink, SeenGeometry
 from dsl_core.model.rig import Rig
 from dsl_core.patterns.images import pattern_image
 from dsl_core.progress import CancelToken, NoProgress, Progress
@@ -132,20 +132,20 @@ def reconstruct(
     progress: Progress | None = None,
     timer: StageTimer | None = None,
     sink: ResultSink | None = None,
-    seen_depth: SeenDepth | None = None,
+    seen_geometry: SeenGeometry | None = None,
 ) -> xr.Dataset:
     """Frames -> linear radiance -> columns -> depth -> surface -> spectra -> colour -> result.
 
     Frames are read, and the result is made, by bands of rows, so that those of a large picture need not be
-    in memory at once; the result is, unless a ``sink`` takes it. ``seen_depth`` is given the depth, mm
-    (rows, columns), as soon as it is known: spectra take much longer.
+    in memory at once; the result is, unless a ``sink`` takes it. ``seen_geometry`` is given depth, points
+    and normals as soon as they are known: spectra take much longer.
     """
     from dsl_core.optics.lines.line_set import LineSet
     from dsl_core.reconstruction.light.own_sensor import own_sensor
     from dsl_core.reconstruction.rows.assembly import Assembly
     from dsl_core.reconstruction.rows.bands import bands_of
     from dsl_core.reconstruction.rows.frames import ScanFrames
-    from dsl_core.reconstruction.scan_result import known_pixels
+    from dsl_core.reconstruction.scan_result import known_pixels, maps_without_spectra
     from dsl_core.reconstruction.spectral.solvers import check_solver, row_solver, rows_together
 
     options, progress, timer = options or Options(), progress or NoProgress(), timer or StageTimer()
@@ -160,8 +160,8 @@ def reconstruct(
     frames = ScanFrames(source, rig, bands_of(plan, options.band_rows, rows_together(rig, options)))
     rig, geometry, found_of_depth = _depth(rig, lines, options, frames, progress, timer)
     findings += found_of_depth
-    if seen_depth is not None:
-        seen_depth(geometry.depth_mm.astype(np.float32))
+    if seen_geometry is not None:
+        seen_geometry(maps_without_spectra(rig, options, geometry))
     solver = None
     if options.spectra:
         with timer.stage("spectra"):

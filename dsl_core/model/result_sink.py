@@ -14,8 +14,8 @@ if TYPE_CHECKING:
     import xarray as xr
 
 Maps = Mapping[str, NDArray[np.generic]]
-#: Is given the depth of a result, mm (rows, columns), before its spectra are computed.
-SeenDepth = Callable[[NDArray[np.float32]], object]
+#: Is given the maps of a result by the names of `VARIABLES`, all but the spectra, before these are computed.
+SeenGeometry = Callable[[Maps], object]
 
 
 class ResultSink(Protocol):

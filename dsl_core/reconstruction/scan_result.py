@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from dsl_core.model.calibration.accepted import missed_attributes
 from dsl_core.model.fit import ATTRIBUTE, Fit
+from dsl_core.model.options import Options
 from dsl_core.model.plan import CapturePlan
 from dsl_core.model.result import SPECTRUM_INVALID, Flag
 from dsl_core.model.rig import Rig
@@ -66,6 +67,14 @@ def maps_of_rows(
         )
     arrays["flags"] = flags
     return arrays
+
+
+def maps_without_spectra(rig: Rig, options: Options, geometry: Geometry) -> dict[str, NDArray[np.generic]]:
+    """The variables of a result, but for spectra, of the part of the picture that the options ask for."""
+    rows, columns = options.part
+    top, bottom, _ = rows.indices(len(geometry.flags))
+    maps = maps_of_rows(rig, options.grid, geometry, slice(top, bottom), None)
+    return {name: values[..., columns] for name, values in maps.items()}
 
 
 def attributes_of(rig: Rig, plan: CapturePlan, fit: Fit) -> dict[str, str | int | float]:

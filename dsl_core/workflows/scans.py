@@ -26,7 +26,7 @@ from dsl_core.io.scan.proof_file import read_proof
 from dsl_core.model.conditions import differences
 from dsl_core.model.frames import FrameSource
 from dsl_core.model.plan import CapturePlan
-from dsl_core.model.result_sink import ResultSink, SeenDepth
+from dsl_core.model.result_sink import ResultSink, SeenGeometry
 from dsl_core.model.rig import Rig
 from dsl_core.model.scan_proof import ScanProof
 from dsl_core.model.spectral import WavelengthGrid
@@ -99,13 +99,13 @@ def reconstruct_scan(
     timer: StageTimer | None = None,
     override_calibration: bool = False,
     sink: ResultSink | None = None,
-    seen_depth: SeenDepth | None = None,
+    seen_geometry: SeenGeometry | None = None,
 ) -> xr.Dataset:
     """The result of a complete scan, with its origin and the cost of each stage among its attributes.
 
-    It is in memory, unless a ``sink`` takes it; ``seen_depth`` is given the depth before the spectra. Raises
-    `CalibrationError` when the scan was taken with other settings than the calibration given, unless that is
-    overridden.
+    It is in memory, unless a ``sink`` takes it; ``seen_geometry`` is given depth and points before the
+    spectra. Raises `CalibrationError` when the scan was taken with other settings than the calibration given,
+    unless that is overridden.
     """
     reader, timer = ScanReader(folder), timer or StageTimer()
     require_complete(reader)
@@ -116,7 +116,7 @@ def reconstruct_scan(
     watched = WatchedSource(reader)
     progress = progress or NoProgress()
     result = reconstruct(
-        watched if proof is None else reader, rig, options, progress, timer, sink, seen_depth
+        watched if proof is None else reader, rig, options, progress, timer, sink, seen_geometry
     )
     if proof is None:
         with timer.stage("compare frames with their patterns"):
@@ -147,12 +147,12 @@ def reconstruct_to(
     *,
     override_calibration: bool = False,
     overwrite: bool = False,
-    seen_depth: SeenDepth | None = None,
+    seen_geometry: SeenGeometry | None = None,
 ) -> Path:
     """Reconstruct a complete scan into a folder, by rows, so that neither has to fit into memory.
 
     One that was interrupted continues where it was if scan, calibration and options are the same.
-    ``seen_depth`` is given the depth, mm (rows, columns), before the spectra are computed. Raises
+    ``seen_geometry`` is given depth, points and normals before the spectra are computed. Raises
     what `reconstruct_scan` does, and `StoreError` when the target exists (unless ``overwrite``) or the disk
     fails.
     """
@@ -165,7 +165,7 @@ def reconstruct_to(
     with RowWriter(target, json.dumps(facts), overwrite=overwrite) as writer:
         progress = progress or NoProgress()
         given = folder, calibration, options, progress, timer, override_calibration
-        result = reconstruct_scan(*given, sink=writer, seen_depth=seen_depth)
+        result = reconstruct_scan(*given, sink=writer, seen_geometry=seen_geometry)
         with timer.stage("save the result"):
             progress.report("save the result", 0, 0)
             return writer.publish(result.attrs)

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import json
 import shutil
+from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from dsl_core import pipeline
@@ -17,6 +19,7 @@ from dsl_core.io.scan.folder import ScanReader
 from dsl_core.io.scan.lock import FolderLock
 from dsl_core.io.scan.proof_file import PROOF_NAME, read_proof, save_proof
 from dsl_core.model.presets import PRESETS
+from dsl_core.model.result_sink import Maps
 from dsl_core.model.scan_proof import ScanProof
 from dsl_core.pipeline import Options
 from dsl_core.progress import CallbackProgress
@@ -83,6 +86,15 @@ def test_the_last_stages_of_a_reconstruction_are_told(scan: Path, tmp_path: Path
         *judging,
         "save the result",
     ]
+
+
+def test_geometry_is_seen_before_the_spectra_of_the_part_asked_for(scan: Path) -> None:
+    seen: list[Maps] = []
+    options = replace(OPTIONS, region_px=(8, 4, 20, 12))
+    result = scans.reconstruct_scan(scan, None, options, seen_geometry=seen.append)
+    (maps,) = seen
+    for name in ("depth_mm", "depth_std_mm", "points_mm", "normals", "flags"):
+        np.testing.assert_array_equal(maps[name], result[name].values)
 
 
 def test_a_finished_scan_knows_what_its_pictures_show(scan: Path, tmp_path: Path) -> None:

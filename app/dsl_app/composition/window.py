@@ -396,7 +396,7 @@ class Composition(QObject):
 
         def offer_open_result(_page: str) -> None:
             results = self.session.results
-            shown = None if results is None else results.state.result.value
+            shown = None if results is None else results.state.saved_result
             state.at_hand.set(None if shown is None else shown.path)
 
         self.window.opened.connect(offer_open_result)

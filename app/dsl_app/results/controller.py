@@ -16,7 +16,7 @@ from dsl_app.results.marks.controller import MarksController
 from dsl_app.results.search.controller import SearchController
 from dsl_app.results.state import DAYLIGHT, Limits, ResultsState, ResultView
 from dsl_app.shared.evented import Event
-from dsl_app.shared.jobs.base import Job, JobRunner
+from dsl_app.shared.jobs.base import Job, JobRunner, JobState
 from dsl_app.shared.known_files import RESULT_NAME, Kind, kind_of
 from dsl_app.shared.notify import Notifier, sentence_of
 from dsl_app.shared.spectrum import Pixel
@@ -24,6 +24,7 @@ from dsl_app.shared.undo import Change, UndoStack
 from dsl_core.errors import DslError
 from dsl_core.io.result.completed import completed
 from dsl_core.io.result.result_arrays import ResultArrays, load_arrays
+from dsl_core.model.result_sink import Maps
 from dsl_core.optics.levels import rgba_of_colours
 from dsl_core.progress import Progress
 from dsl_core.words import quoted
@@ -51,6 +52,10 @@ class ResultsController:
         #: Counts requests for a light, so that only the last one is shown.
         self._light_request = 0
         self._loading: Job[tuple[ResultArrays, NDArray[np.uint8] | None]] | None = None
+        #: What a reconstruction has found before its spectra, from its thread; news until it is in the state.
+        self._found_first: ResultArrays | None = None
+        #: What was open before that was shown: its picture, and the light of that.
+        self._before: tuple[ResultArrays, NDArray[np.uint8] | None, tuple[str, bool]] | None = None
 
     # Open ------------------------------------------------------------------------------------------
 
@@ -82,7 +87,7 @@ class ResultsController:
             self.state.offer.set(session)
 
     def reconstruct(self) -> None:
-        """Reconstruct the offered scan, save the result next to it and open it."""
+        """Reconstruct the offered scan, save the result next to it and open it; depth is shown at once."""
         session = self.state.offer.value
         if session is None:
             return
@@ -96,7 +101,11 @@ class ResultsController:
 
             # Pictures of other programs have no frames of spectral patterns.
             options = Options(spectra=not is_import(ScanReader(session)))
-            return load_arrays(reconstruct_to(target, session, None, options, progress), progress)
+            made = reconstruct_to(target, session, None, options, progress, seen_geometry=see)
+            return load_arrays(made, progress)
+
+        def see(maps: Maps) -> None:
+            self._found_first = completed(ResultArrays(target, np.empty(0), maps))
 
         self._start(f"Reconstruct {session.name}", work)
 
@@ -120,25 +129,69 @@ class ResultsController:
                 observer_weights(arrays.wavelengths_nm)
             return arrays, rgba_of_colours(arrays["rgb"]) if "rgb" in arrays.arrays else None
 
-        idle = lambda: self.state.busy.set("")  # noqa: E731
-        job = Job(title, both, self._opened, exclusive="opening", is_minor=is_minor, on_ended=idle)
+        def ended() -> None:
+            self._found_first = None
+            if job.state is not JobState.DONE:
+                self._withdraw_first()
+            self._before = None
+            self.state.busy.set("")
+
+        job = Job(title, both, self._opened, exclusive="opening", is_minor=is_minor, on_ended=ended)
         self._loading = job if is_minor else None
         self._runner.submit(job)
 
+    def take_news(self) -> None:
+        """Show depth and points that a reconstruction has found by now; called by a timer."""
+        first, self._found_first = self._found_first, None
+        if first is None:
+            return
+        state = self.state
+        if state.result.value is not None:
+            self._before = state.result.value, state.picture.value, state.picture_light.value
+        state.is_begun.set(True)
+        self._show_result(first, None)
+
+    def _withdraw_first(self) -> None:
+        """Close what a reconstruction showed that has come to nothing, for what was open before it."""
+        if not self.state.is_begun.value:
+            return
+        self.state.is_begun.set(False)
+        if self._before is None:
+            self.state.cursor.set(None)
+            self.state.result.set(None)
+            self.marks.load()
+        else:
+            arrays, picture, light = self._before
+            self._show_result(arrays, picture)
+            self._choose_light(*light)
+            self.state.picture_light.set(light)
+
     def _opened(self, opened: tuple[ResultArrays, NDArray[np.uint8] | None]) -> None:
         arrays, picture = opened
+        self.state.offer.set(None)
+        is_the_rest = self.state.is_begun.value
+        self.state.is_begun.set(False)
+        self._show_result(arrays, picture, is_the_rest)
+        if is_the_rest and picture is not None:
+            self._notifier.tell("info", f"The spectra of {arrays.path.stem} are there. Key 1 shows colours.")
+        self.opened.emit(arrays)
+
+    def _show_result(
+        self, arrays: ResultArrays, picture: NDArray[np.uint8] | None, is_the_rest: bool = False
+    ) -> None:
+        """Show a result; cursor and depth limits are kept if it ``is_the_rest`` of the one that is open."""
         state = self.state
-        state.offer.set(None)
         state.search.set(None)
         self.answers.clear()
         state.graph.set(None)
         self._block = None
-        state.cursor.set(None)
         self._light_request += 1
         state.light.set(DAYLIGHT)
         state.picture_light.set((DAYLIGHT, state.adapted.value))
-        state.depth_limits.set(None)
-        self.contrast.clear()
+        if not is_the_rest:
+            state.cursor.set(None)
+            state.depth_limits.set(None)
+            self.contrast.clear()
         state.picture.set(picture)
         # Band 0 exists in both results, while the band shown last may not.
         state.band.set(0)
@@ -147,7 +200,6 @@ class ResultsController:
         if not arrays.has_spectra and state.view.value in (ResultView.COLOUR, ResultView.BAND):
             state.view.set(ResultView.DEPTH)
         self.marks.load()
-        self.opened.emit(arrays)
 
     def command_line(self) -> str:
         """The command that reconstructs the offered scan or exports the open result."""
@@ -165,9 +217,12 @@ class ResultsController:
         """Switch the view; says why where the result has nothing to show."""
         result = self.state.result.value
         if result is not None and not result.has_spectra and view in (ResultView.COLOUR, ResultView.BAND):
-            self._notifier.tell(
-                "info", "This result has depth only. Reconstruct the scan with spectra to see colours."
+            what = (
+                "The spectra are still being computed. Colours can be seen then."
+                if self.state.is_begun.value
+                else "This result has depth only. Reconstruct the scan with spectra to see colours."
             )
+            self._notifier.tell("info", what)
             return
         self.state.view.set(view)
 
@@ -246,7 +301,7 @@ class ResultsController:
 
     def inspect(self) -> None:
         """Show what the pixel under the cursor received in each frame; needs the scan next to the result."""
-        result, pixel, block = self.state.result.value, self.state.cursor.value, self._block
+        result, pixel, block = self.state.saved_result, self.state.cursor.value, self._block
         if result is None or pixel is None:
             self._notifier.tell("info", "Point at a pixel to see its intensity graph.")
             return

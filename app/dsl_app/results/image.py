@@ -21,6 +21,7 @@ from dsl_app.shared.widgets.forms import named
 from dsl_app.shared.widgets.layouts import column_of
 from dsl_app.shared.widgets.pictures import PictureView, arrow_step, colour_map
 from dsl_app.shared.widgets.plots import theme_bar
+from dsl_core.io.result.result_arrays import ResultArrays
 
 #: Mouse moves are handled at most this often, Hz.
 CURSOR_HZ = 60
@@ -140,10 +141,11 @@ class ResultImage(QWidget):
 
     # Paint -----------------------------------------------------------------------------------------
 
-    def _new_result(self, result: Any) -> None:
+    def _new_result(self, result: ResultArrays | None) -> None:
+        before = None if self._layers is None else self._layers.result.picture
         self._layers = None if result is None else Layers(result)
         self.paint()
-        if result is not None:
+        if result is not None and result.picture != before:
             self.fit()
 
     def fit(self) -> None:

@@ -37,8 +37,11 @@ from dsl_app.shared.widgets.layouts import boxed, column_of, row_of, splitter, t
 from dsl_app.shared.widgets.open_dialog import OpenDialog
 from dsl_app.shared.widgets.page import PageWidget
 from dsl_app.shared.widgets.save_dialog import ask_target
+from dsl_app.shared.widgets.ticker import Ticker
 from dsl_core.workflows.inspection import IntensityGraph
 
+#: How often to ask for what a reconstruction has found, ms.
+FETCH_MS = 100
 #: Shares of the width for the picture and for what is next to it, by whether the window is wide.
 SHARES = {False: (5, 3), True: (8, 3)}
 
@@ -158,7 +161,9 @@ class ResultsPage(PageWidget):
         self.offer.reconstruct.clicked.connect(control.reconstruct)
         for button in (self.reconstruct_again, self.offer.otherwise):
             button.clicked.connect(self.reconstruct_again_requested)
-        follow_any(self._show_summary, state.result, state.offer, state.busy)
+        follow_any(self._show_summary, state.result, state.offer, state.busy, state.is_begun)
+        news = Ticker(self, FETCH_MS, control.take_news)
+        state.busy.follow(lambda busy: news.run_while(bool(busy)))
         state.graph.changed.connect(self._show_graph)
         state.library.changed.connect(self._ask_library)
         state.contrast.follow(self._show_contrast)
@@ -168,7 +173,7 @@ class ResultsPage(PageWidget):
 
     def _show_summary(self) -> None:
         state = self._state
-        summary = summarise(state.result.value, state.offer.value, state.busy.value)
+        summary = summarise(state.result.value, state.offer.value, state.busy.value, state.is_begun.value)
         self.stack.setCurrentIndex(summary.content)
         self.offer.show_offer(summary.message, summary.can_reconstruct)
         for button in (self.reconstruct_again, self._inspect, self._report, self._export):
@@ -231,13 +236,13 @@ class ResultsPage(PageWidget):
 
     def export(self) -> None:
         """Open the export dialog."""
-        result = self._state.result.value
+        result = self._state.saved_result
         if result is not None:
             self._open_dialog(ExportDialog(result, self._control.export, self))
 
     def report(self) -> None:
         """Ask for a file and write a report about what is marked."""
-        result = self._state.result.value
+        result = self._state.saved_result
         if result is None:
             return
         draft = str(result.path.with_name(f"{result.path.stem}_report.html"))

@@ -148,8 +148,9 @@ class Materials:
 class ResultsState:
     """Values that the controllers of results set and the page follows.
 
-    ``offer`` is a complete scan that could be reconstructed. ``picture`` is the colour image as RGBA bytes,
-    computed for ``picture_light``, which follows the chosen ``light`` and ``adapted`` with a delay.
+    ``is_begun`` says that the ``result`` is the depth of one whose spectra are being computed, and is on no
+    disk yet. ``offer`` is a complete scan that could be reconstructed. ``picture`` is the colour image as
+    RGBA bytes, computed for ``picture_light``, which follows the chosen ``light`` and ``adapted`` later.
     ``cloud_by`` is the view that colours the cloud; ``busy`` says what is being opened (empty: nothing).
     ``graph`` is the intensity graph of the pixel inspected last; ``library`` is a file whose spectra the user
     has to choose from. ``depth_limits`` are the depths shown, mm; None for all. ``bands`` are shown as
@@ -160,6 +161,7 @@ class ResultsState:
 
     def __init__(self) -> None:
         self.result: Value[ResultArrays | None] = Value(None)
+        self.is_begun = Value(False)
         self.offer: Value[Path | None] = Value(None)
         self.busy = Value("")
         self.view = Value(ResultView.COLOUR)
@@ -184,6 +186,11 @@ class ResultsState:
         self.stacked = Value(False)
         self.graph: Value[IntensityGraph | None] = Value(None)
         self.library: Value[Library | None] = Value(None)
+
+    @property
+    def saved_result(self) -> ResultArrays | None:
+        """The open result, unless it has only begun and cannot be written, marked or compared yet."""
+        return None if self.is_begun.value else self.result.value
 
     @property
     def selected_mark(self) -> Mark | None:

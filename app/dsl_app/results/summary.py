@@ -43,19 +43,25 @@ class Summary:
     advice: str = ""
 
 
-def summarise(result: ResultArrays | None, offer: Path | None, busy: str) -> Summary:
-    """The summary of a result, of an offered scan, or of what is being opened."""
+def summarise(result: ResultArrays | None, offer: Path | None, busy: str, is_begun: bool = False) -> Summary:
+    """The summary of a result, of an offered scan, or of what is being opened.
+
+    Of a result that has only begun, the depth is shown; there is nothing to be done with it yet.
+    """
     content = Content.WELCOME if result is None else Content.RESULT
     message = ""
-    if busy:
+    if busy and not is_begun:
         content, message = Content.OFFER, f"{busy}…"
-    elif offer is not None:
+    elif offer is not None and not is_begun:
         content, message = Content.OFFER, f"{offer.name} has no result yet. Reconstruct it now?"
     can_reconstruct = offer is not None and not busy
     if result is None:
         return Summary(content, message=message, can_reconstruct=can_reconstruct)
     height, width = result.shape
     bands = f" · {counted(len(result.wavelengths_nm), 'band')}" if result.has_spectra else " · depth only"
+    if is_begun:
+        text = f"{width} × {height} px · depth; the spectra are being computed"
+        return Summary(content, title=result.path.stem, about=text, details=str(result.path))
     captured = str(result.attributes.get("captured", ""))[:16].replace("T", " ")
     effects, details = effects_text(result.attributes)
     fit = Fit.read(result.attributes)

@@ -28,6 +28,7 @@ from dsl_core.errors import DeviceError, DriftError, DslError
 from dsl_core.io import MANIFEST_NAME
 from dsl_core.io.calibration_library import CalibrationLibrary
 from dsl_core.io.scan.origin import rig_notes
+from dsl_core.model.result_sink import Maps
 from dsl_core.progress import Progress
 from dsl_core.words import quoted
 
@@ -267,13 +268,13 @@ class ScanController:
 
         size_px, since_s = self.state.plan.value.camera_size_px, time.monotonic()
 
-        def see(depth_mm: NDArray[np.float32]) -> None:
-            self._seen_depth = depth_mm
+        def see(maps: Maps) -> None:
+            self._seen_depth = np.asarray(maps["depth_mm"], np.float32)
 
         def work(progress: Progress) -> Path:
             from dsl_core.workflows.scans import reconstruct_to
 
-            return reconstruct_to(target, session, progress=progress, seen_depth=see)
+            return reconstruct_to(target, session, progress=progress, seen_geometry=see)
 
         def finish() -> None:
             self._seen_depth = None

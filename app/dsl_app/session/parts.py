@@ -28,7 +28,7 @@ _FIRST_PLAN = "reference"
 
 def results_part(state: ResultsState) -> ResultsPart | None:
     """The result that is open and its views."""
-    result = state.result.value
+    result = state.saved_result
     if result is None:
         return None
     return ResultsPart(

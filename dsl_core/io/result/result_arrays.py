@@ -59,6 +59,11 @@ class ResultArrays:
         """Everything that a variable holds for a pixel ``(x, y)``: one value, or one per band or axis."""
         return self.arrays[name][..., pixel[1], pixel[0]]
 
+    @property
+    def picture(self) -> tuple[Path, tuple[int, int]]:
+        """Path and shape: the same for a result and for what becomes of it, which is seen in the same way."""
+        return self.path, self.shape
+
     def holds(self, pixel: tuple[int, int]) -> bool:
         """Whether a pixel ``(x, y)`` is in the image."""
         height, width = self.shape

@@ -13,7 +13,6 @@ from dsl_app.scan.job import ScanJob
 from dsl_app.scan.plan import connect_first
 from dsl_app.scan.reconnect import ATTEMPTS, RETRY_S
 from dsl_app.scan.state import CalibrationChoice, InterruptedScan, Phase, Reconnection
-from numpy.typing import NDArray
 
 from dsl_core.capture.runner import State, Status
 from dsl_core.cli.options import PlanChoice
@@ -24,7 +23,7 @@ from dsl_core.io.scan.folder import ScanReader, ScanWriter
 from dsl_core.model.frames import Frame
 from dsl_core.model.plan import LineComb, Shot
 from dsl_core.model.presets import PRESETS
-from dsl_core.model.result_sink import SeenDepth
+from dsl_core.model.result_sink import Maps, SeenGeometry
 from dsl_core.progress import Progress
 from dsl_core.simulation.sim_devices import SimCamera
 from dsl_core.workflows import scans
@@ -150,15 +149,15 @@ def test_a_result_follows_and_is_told(
     depths: list[tuple[str, int, float]] = []
     real = scans.reconstruct_to
 
-    def watched(target: Path, session: Path, *, seen_depth: SeenDepth, progress: Progress) -> Path:
-        def see(depth_mm: NDArray[np.float32]) -> None:
-            seen_depth(depth_mm)
+    def watched(target: Path, session: Path, *, seen_geometry: SeenGeometry, progress: Progress) -> Path:
+        def see(maps: Maps) -> None:
+            seen_geometry(maps)
             bench.scans.take_news()
             shown = bench.state.depth.value
             assert shown is not None
             depths.append((bench.state.note.value, shown.size, float(np.nanmedian(shown))))
 
-        return real(target, session, progress=progress, seen_depth=see)
+        return real(target, session, progress=progress, seen_geometry=see)
 
     monkeypatch.setattr(scans, "reconstruct_to", watched)
     expected_s = bench.state.reconstruction_s.value

@@ -57,8 +57,8 @@ class CloudPanel(QWidget):
         self.view: CloudView | None = None
         self._layers: Layers | None = None
         self._picking, self._grid = Picking(), Grid((0, 0), np.empty(0, np.intp))
-        #: Whether the points are of another result than those on screen.
-        self._is_new = True
+        #: The picture (`ResultArrays.picture`) whose points are on screen.
+        self._shown: object = None
         self._lasso: list[tuple[float, float]] = []
         self._press: tuple[float, float] | None = None
         self._measure, self._picked = Measure.NOTHING, list[Pixel]()
@@ -138,7 +138,7 @@ class CloudPanel(QWidget):
         broken = self.view
         if broken is None:
             return
-        self._is_new = True
+        self._shown = None
         self._place(StaticCloud(BROKEN.format(reason.rstrip("."))), False)
         broken.release()
         broken.deleteLater()
@@ -169,7 +169,6 @@ class CloudPanel(QWidget):
             return
         if self._layers is None:
             self._layers = Layers(result)
-            self._is_new = True
             self._choose_points(result)
         self._show_hint()
         QTimer.singleShot(STEP_MS, self, self._show_result)
@@ -220,8 +219,9 @@ class CloudPanel(QWidget):
         if search is not None:
             colours = colours.copy()
             colours[search.found.ravel()[self._grid.flat]] = tuple(bytes.fromhex(self._theme.accent[1:]))
-        self.view.show_cloud(self._picking.points, colours, self._is_new, self._grid)
-        self._is_new = False
+        picture = self._layers.result.picture
+        self.view.show_cloud(self._picking.points, colours, picture != self._shown, self._grid)
+        self._shown = picture
         self._picking.view_moved()
 
     def _show_cursor(self, pixel: Pixel | None) -> None:
