@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import itertools
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -54,10 +55,14 @@ class Member:
 
 @dataclass(frozen=True)
 class SpectralClass:
-    """A class by its name: one or several spectra, any of which a pixel may have."""
+    """A class by its name: one or several spectra, any of which a pixel may have.
+
+    ``colour`` is the index in `mark_colours` of the mark that it comes from; None for one without a mark.
+    """
 
     name: str
     members: tuple[Member, ...]
+    colour: int | None = None
 
     @property
     def mean(self) -> Floats:
@@ -197,6 +202,20 @@ def known_classes(classes: Sequence[SpectralClass]) -> tuple[tuple[SpectralClass
 def shared_names(classes: Sequence[SpectralClass]) -> tuple[SpectralClass, ...]:
     """Classes of which those of one name are one."""
     by_name: dict[str, list[Member]] = {}
+    colours: dict[str, int | None] = {}
     for each in classes:
         by_name.setdefault(each.name, []).extend(each.members)
-    return tuple(SpectralClass(name, tuple(members)) for name, members in by_name.items())
+        if colours.get(each.name) is None:
+            colours[each.name] = each.colour
+    return tuple(SpectralClass(name, tuple(members), colours[name]) for name, members in by_name.items())
+
+
+def marked_by(classes: Sequence[SpectralClass], marks: Mapping[str, int]) -> tuple[SpectralClass, ...]:
+    """Classes with the colours of ``marks`` (indices by name), and others with colours that no mark has."""
+    known = {index for each in classes if (index := marks.get(each.name, each.colour)) is not None}
+    free = (index for index in itertools.count() if index not in known | set(marks.values()))
+    colours = (marks.get(each.name, each.colour) for each in classes)
+    return tuple(
+        replace(each, colour=next(free) if colour is None else colour)
+        for each, colour in zip(classes, colours, strict=True)
+    )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import astuple, dataclass
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dsl_core.analysis.areas import pixel_areas_mm2
-from dsl_core.analysis.class_table import ClassRow, class_colours, class_table
+from dsl_core.analysis.class_table import ClassRow, class_table
 from dsl_core.analysis.classes import SpectralClass, class_of_pixels
 from dsl_core.analysis.classify import FEWEST_BANDS, Brightness, ClassMap, Limits, Measure, Scores, score
 from dsl_core.analysis.places import Mask, require_spectra
@@ -140,14 +140,14 @@ def write_classification(
 ) -> list[Path]:
     """Write the map as the ending of the path says, one of `ENDINGS`; raises `StoreError`."""
     require_suffix(path, *ENDINGS)
-    rows = [astuple(row) for row in found.rows]
+    shown = found.shown
+    colours = shown.palette()
     if path.suffix.lower() == ".csv":
         header = ("class", "colour", "pixels", "share_of_judged", "area_mm2")
+        rows = [(row.label, colours[row.value], row.pixels, row.share, row.area_mm2) for row in found.rows]
         return export_table(result, header, rows, {"method": found.method}, path, overwrite=overwrite)
-    shown, names = found.shown, found.shown.labels
     scores = found.scores
-    colours = class_colours(len(shown.names))
-    made = Classified(shown.values, names, colours, scores.fit, scores.margin, found.method)
+    made = Classified(shown.values, shown.labels, colours, scores.fit, scores.margin, found.method)
     if path.suffix.lower() == ".ply":
         return export_class_ply(result, made, path, overwrite=overwrite)
     return export_class_envi(result, made, path, overwrite=overwrite)

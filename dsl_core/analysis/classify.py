@@ -18,10 +18,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dsl_core.analysis.band_noise import band_correlation, usual_correlation
-from dsl_core.analysis.classes import NOT_JUDGED, SpectralClass, shared_names
+from dsl_core.analysis.classes import NOT_JUDGED, SpectralClass, marked_by, shared_names
 from dsl_core.analysis.likelihood import Block, class_fit
 from dsl_core.errors import DecodeError
 from dsl_core.evaluation.uncertainty import DECIDED_FROM
+from dsl_core.model.mark_colours import Ground, mark_colour
 from dsl_core.progress import NoProgress, Progress
 
 Cube = NDArray[np.float32] | NDArray[np.float64]
@@ -34,6 +35,7 @@ Brightness = Literal["stated", "free"]
 _AT_ONCE = 8192
 #: Classes of a map that ENVI, and a colour table, can hold.
 MOST_CLASSES = 250
+NOT_JUDGED_COLOUR, NONE_COLOUR, UNSURE_COLOUR = "#000000", "#777777", "#c8c8c8"
 #: Fewer bands than this decide nothing.
 FEWEST_BANDS = 3
 
@@ -94,7 +96,7 @@ _USUAL = {
 
 @dataclass(frozen=True)
 class Scores:
-    """How each pixel (rows, columns) compares with the classes.
+    """How each pixel (rows, columns) compares with the classes, by ``names`` and indices of `mark_colours`.
 
     ``best`` and ``second`` are indices into ``names``, -1 where nothing was judged. ``fit`` is, of the best
     class, the share of its own pixels that fit worse (probability), else its angle (rad) or difference;
@@ -103,6 +105,7 @@ class Scores:
 
     measure: Measure
     names: tuple[str, ...]
+    colours: tuple[int, ...]
     best: NDArray[np.int16]
     second: NDArray[np.int16]
     fit: Map
@@ -117,6 +120,7 @@ class ClassMap:
     """
 
     names: tuple[str, ...]
+    colours: tuple[int, ...]
     values: NDArray[np.uint8]
 
     @classmethod
@@ -132,7 +136,7 @@ class ClassMap:
         values[judged & unsure] = len(scores.names) + 2
         values[judged & none] = len(scores.names) + 1
         values[~judged] = 0
-        return cls(scores.names, values)
+        return cls(scores.names, scores.colours, values)
 
     @property
     def none(self) -> int:
@@ -148,6 +152,11 @@ class ClassMap:
     def labels(self) -> tuple[str, ...]:
         """A name for every value of the map."""
         return ("not judged", *self.names, "none of these", "undecided")
+
+    def palette(self, ground: Ground = "light") -> tuple[str, ...]:
+        """A colour ``#rrggbb`` for every value of the map: of a class, that of the mark it comes from."""
+        classes = (mark_colour(index, ground) for index in self.colours)
+        return (NOT_JUDGED_COLOUR, *classes, NONE_COLOUR, UNSURE_COLOUR)
 
 
 def score(
@@ -166,7 +175,7 @@ def score(
     for the probability in no pixel. Raises `DecodeError` for too few classes or other bands, and for a
     probability without deviations.
     """
-    classes = shared_names(classes)
+    classes = marked_by(shared_names(classes), {})
     _check(reflectance, std, classes, measure)
     judged = ((flags & int(NOT_JUDGED)) == 0) & np.isfinite(reflectance).all(0)
     progress = progress or NoProgress()
@@ -174,6 +183,7 @@ def score(
     scores = Scores(
         measure,
         names,
+        tuple(each.colour or 0 for each in classes),
         best=np.full(flags.shape, -1, np.int16),
         second=np.full(flags.shape, -1, np.int16),
         fit=np.full(flags.shape, np.nan, np.float32),
@@ -260,13 +270,11 @@ def _of_bands(each: SpectralClass, bands: Mask) -> SpectralClass:
     """A class at some of its bands."""
     if bands.all():
         return each
-    return SpectralClass(
-        each.name,
-        tuple(
-            replace(m, mean=m.mean[bands], std=m.std[bands], components=m.components[:, bands])
-            for m in each.members
-        ),
+    members = (
+        replace(m, mean=m.mean[bands], std=m.std[bands], components=m.components[:, bands])
+        for m in each.members
     )
+    return replace(each, members=tuple(members))
 
 
 def _by_probability(

@@ -45,6 +45,15 @@ def masks_of_marks(marks: Annotations, shape: tuple[int, int]) -> dict[str, Mask
     return masks
 
 
+def colours_of_marks(marks: Annotations) -> dict[str, int]:
+    """The indices in `mark_colours` of all marks, by name."""
+    return {
+        **{each.name: each.colour for each in marks.references},
+        **{each.name: each.colour for each in marks.regions},
+        **{each.name: each.colour for each in marks.pins},
+    }
+
+
 def spectra_of_masks(result: xr.Dataset, masks: Mapping[str, Mask]) -> dict[str, tuple[Floats, Floats]]:
     """Mean reflectance (bands,) of each place and its deviation, by name.
 

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dsl_core.analysis.class_table import class_colours
 from dsl_core.analysis.classification import Classification
 from dsl_core.analysis.colours import Colour, colours_of
 from dsl_core.analysis.places import Floats, masks_of_marks, spectra_of_masks
@@ -80,11 +79,11 @@ def colour_table(colours: list[Colour]) -> ReportTable:
 
 def _materials(found: Classification) -> tuple[ReportPicture, ReportTable]:
     shown = found.shown
-    colours = class_colours(len(shown.names))
+    colours = shown.palette()
     table = np.zeros((len(colours), 4), np.uint8)
     for value, colour in enumerate(colours):
         table[value] = (*bytes.fromhex(colour[1:]), 255 if value else 0)
-    keys = tuple(Key(row.colour, row.label, row.share) for row in found.rows[:-1] if row.pixels)
+    keys = tuple(Key(colours[row.value], row.label, row.share) for row in found.rows[:-1] if row.pixels)
     picture = ReportPicture("Materials", f"by {found.method}", png_uri(table[shown.values]), keys=keys)
     rows = tuple(
         (

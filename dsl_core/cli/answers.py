@@ -140,11 +140,12 @@ def classify(
         )
     if files:
         output.say(f"Written: {', '.join(str(file) for file in files)}")
+    palette = found.shown.palette()
     output.put(
         result=path,
         method=found.method,
         notes=list(notes),
-        classes=[row.__dict__ for row in found.rows],
+        classes=[row.__dict__ | {"colour": palette[row.value]} for row in found.rows],
         files=[str(file) for file in files],
     )
     output.finish()
@@ -167,10 +168,11 @@ def _classes(
     progress: Progress,
 ) -> tuple[list[SpectralClass], list[str]]:
     """The classes that the options name, and notes on the library."""
-    from dsl_core.analysis.classes import classes_of_library, known_classes
+    from dsl_core.analysis.classes import classes_of_library, known_classes, marked_by
     from dsl_core.analysis.classification import classes_of_masks
     from dsl_core.analysis.library import read_library
-    from dsl_core.analysis.places import require_spectra
+    from dsl_core.analysis.places import colours_of_marks, require_spectra
+    from dsl_core.io.result.annotations_file import load_annotations
 
     if not (library or pins or at):
         raise PlanError("Say what to look for: --library FOLDER, --pins, or --at NAME=X,Y.")
@@ -188,6 +190,8 @@ def _classes(
     masks = _masks(path, result, pins, at)
     if masks:
         classes += classes_of_masks(result, masks)
+    if pins:
+        classes = list(marked_by(classes, colours_of_marks(load_annotations(path))))
     known, doubts = known_classes(classes)
     return list(known), [*doubts, *notes]
 

@@ -15,6 +15,7 @@ from dsl_core.cli import main
 from dsl_core.errors import DecodeError, StoreError
 from dsl_core.io.result.annotations_file import Annotations, PinRecord, RegionRecord, save_annotations
 from dsl_core.io.result.result_file import load_result, save_result
+from dsl_core.model.mark_colours import mark_colour
 from dsl_core.optics.charts import chart_reflectance
 from tests.cases.chart_cube import NM, chart_cube, chart_result
 
@@ -120,7 +121,7 @@ def test_a_result_of_depth_alone_is_told() -> None:
 def test_the_command_names_pins_and_writes_files(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path = save_result(chart_result(), tmp_path / "chart.zarr")
     marks = Annotations(
-        pins=(PinRecord(name="sky", pixel=(9, 40)),),
+        pins=(PinRecord(name="sky", pixel=(9, 40), colour=5),),
         regions=(RegionRecord(name="skin", outline_px=((0, 17), (20, 17), (20, 30), (0, 30))),),
     )
     save_annotations(marks, path)
@@ -128,6 +129,7 @@ def test_the_command_names_pins_and_writes_files(tmp_path: Path, capsys: pytest.
     assert main(["classify", str(path), "--pins", "-o", str(target), "--json"]) == 0
     told = json.loads(capsys.readouterr().out)
     assert [row["label"] for row in told["classes"]][:3] == ["sky", "skin", "none of these"]
+    assert [row["colour"] for row in told["classes"]][:2] == [mark_colour(5), mark_colour(0)]
     assert target.is_file()
     assert load_result(path).sizes["y"] == 96
     for wrong, words in (

@@ -208,7 +208,7 @@ class ResultImage(QWidget):
         self._mark_items = []
         spots = []
         for mark in marks:
-            colour = self._theme.pins[mark.colour % len(self._theme.pins)]
+            colour = self._theme.pin(mark.colour)
             if not mark.shown or mark.trouble:
                 continue
             if mark.pixel is not None:
@@ -246,7 +246,7 @@ class ResultImage(QWidget):
         self.materials.setVisible(materials is not None and is_over)
         if materials is not None:
             shown = materials.found.shown
-            table = materials_table(len(shown.names))
+            table = materials_table(shown, self._theme.ground)
             self.materials.setImage(shown.values, levels=(0, 255), lut=table, autoLevels=False)
             height, width = shown.values.shape
             self.materials.setRect(-0.5, -0.5, width, height)
@@ -261,6 +261,7 @@ class ResultImage(QWidget):
         theme_bar(self.bar, theme)
         self._show_marks(self._state.marks.value)
         self._show_search()
+        self._show_materials()
         self.paint()
 
 

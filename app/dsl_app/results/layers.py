@@ -19,8 +19,9 @@ from dsl_app.results.state import (
     depth_key,
 )
 from dsl_app.shared.widgets.pictures import DEPTH, GREY, SHARE, colour_map
-from dsl_core.analysis.class_table import class_colours
+from dsl_core.analysis.classify import ClassMap
 from dsl_core.io.result.result_arrays import ResultArrays
+from dsl_core.model.mark_colours import Ground
 from dsl_core.model.result import FLAG_COLOURS, FLAG_NAMES, gravest_flag
 from dsl_core.optics.levels import Bands, Levels, between, rgba_of_colours, spread_of, three_bands, top_of
 
@@ -221,10 +222,10 @@ def rgb_of(layer: Layer) -> NDArray[np.uint8]:
     return np.ascontiguousarray(np.asarray(table, np.uint8)[index][..., :3])
 
 
-def materials_table(classes: int) -> NDArray[np.uint8]:
-    """Colours (256, 4) of a map of so many classes; what is not judged shows the picture below."""
+def materials_table(shown: ClassMap, ground: Ground) -> NDArray[np.uint8]:
+    """Colours (256, 4) of the values of a map; what is not judged shows the picture below."""
     table = np.zeros((256, 4), np.uint8)
-    colours = class_colours(classes)
+    colours = shown.palette(ground)
     for value, colour in enumerate(colours):
         table[value] = (*bytes.fromhex(colour[1:]), 215)
     table[0, 3] = 0
@@ -233,8 +234,10 @@ def materials_table(classes: int) -> NDArray[np.uint8]:
     return table
 
 
-def tinted_by(colours: NDArray[np.uint8], values: NDArray[np.uint8], classes: int) -> NDArray[np.uint8]:
-    """Colours (points, 3) under the map of so many classes, whose ``values`` (points,) say which each is."""
-    table = materials_table(classes)[values]
+def tinted_by(
+    colours: NDArray[np.uint8], values: NDArray[np.uint8], table: NDArray[np.uint8]
+) -> NDArray[np.uint8]:
+    """Colours (points, 3) under those (256, 4) of a map whose ``values`` (points,) say which each is."""
+    table = table[values]
     share = table[:, 3:] / np.float32(255)
     return np.ascontiguousarray((colours * (1 - share) + table[:, :3] * share + 0.5).astype(np.uint8))

@@ -151,7 +151,7 @@ class SpectrumPanel(QWidget):
             curve.show_band(are_few or key == selected)
 
     def _colour(self, curve: SpectrumCurve, mark: Mark) -> None:
-        colour = self._theme.pins[mark.colour % len(self._theme.pins)]
+        colour = self._theme.pin(mark.colour)
         curve.set_colour(colour, dashed=mark.kind == "reference")
 
     @property

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from dsl_core.model.mark_colours import FIRST, Ground, mark_colour
+
 
 @dataclass(frozen=True)
 class Theme:
@@ -12,8 +14,7 @@ class Theme:
     ``window`` is the background, ``base`` that of plots and input, ``surround`` that of pictures, on which
     white, black and grey areas keep their edges; ``line`` separates. ``muted`` is for units and hints. All
     that is text keeps a contrast of 4.5 to 1 on ``window`` and ``base``, and ``muted`` on ``surround``, too.
-    ``pins`` colour spectra one after the other and are told apart by people with any colour vision (after
-    Okabe and Ito).
+    ``ground`` says which of the two sets of colours marks, curves and classes have.
     """
 
     name: str
@@ -29,7 +30,16 @@ class Theme:
     good: str
     warn: str
     bad: str
-    pins: tuple[str, ...]
+    ground: Ground
+
+    @property
+    def pins(self) -> tuple[str, ...]:
+        """The first colours of marks."""
+        return FIRST[self.ground]
+
+    def pin(self, index: int) -> str:
+        """The colour of the mark with an index, and of the class that is made from it."""
+        return mark_colour(index, self.ground)
 
 
 LIGHT = Theme(
@@ -46,7 +56,7 @@ LIGHT = Theme(
     good="#1a7f37",
     warn="#8a5a00",
     bad="#c02626",
-    pins=("#0072b2", "#d55e00", "#009e73", "#b8568a", "#7a6a00", "#1787bd", "#5b3fa0", "#a02020"),
+    ground="light",
 )
 DARK = Theme(
     name="dark",
@@ -62,7 +72,7 @@ DARK = Theme(
     good="#4cc46a",
     warn="#e0a63a",
     bad="#ff6b6b",
-    pins=("#56b4e9", "#e69f00", "#2fc79a", "#e59ac2", "#f0e442", "#5c9dff", "#b39ddb", "#ff8a80"),
+    ground="dark",
 )
 
 

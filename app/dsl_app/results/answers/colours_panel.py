@@ -68,7 +68,7 @@ class ColoursPanel(QWidget):
         rows = []
         for each in found:
             first = cell(each.name)
-            first.setIcon(_swatch(self._theme.pins[marks[each.name].colour % len(self._theme.pins)]))
+            first.setIcon(_swatch(self._theme.pin(marks[each.name].colour)))
             texts = [_value(v, s) for v, s in zip(each.lab, each.lab_std, strict=True)]
             texts.append("" if each.delta_e is None else _value(each.delta_e, each.delta_e_std or 0.0))
             rows.append((first, *(cell(text, "", RIGHT) for text in texts)))

@@ -73,15 +73,16 @@ class AnswersController:
             return
         self._request += 1
         request = self._request
+        colours = {mark.name: mark.colour for mark in self.state.marks.value}
 
         def work(progress: Progress) -> Materials:
             from dsl_core.analysis.areas import pixel_areas_mm2
-            from dsl_core.analysis.classes import known_classes
+            from dsl_core.analysis.classes import known_classes, marked_by
             from dsl_core.analysis.classification import Classification
             from dsl_core.analysis.classify import score
 
             asked, notes = classes(result, progress)
-            found, doubts = known_classes(asked)
+            found, doubts = known_classes(marked_by(asked, colours))
             scores = score(
                 result["reflectance"],
                 result.known("reflectance_std"),

@@ -10,7 +10,7 @@ from PySide6.QtWidgets import QFileDialog, QWidget
 
 from dsl_app.results.answers.controller import AnswersController, Way
 from dsl_app.results.state import Materials, ResultsState
-from dsl_app.shared.theme import Theme
+from dsl_app.shared.theme import DARK, Theme
 from dsl_app.shared.widgets.forms import ChoiceBox, NumberBox, check_box, label, push_button, quiet
 from dsl_app.shared.widgets.layouts import STRETCH, column_of, row_of
 from dsl_app.shared.widgets.read_table import RIGHT, ReadTable, cell
@@ -50,7 +50,7 @@ class MaterialsPanel(QWidget):
 
     def __init__(self, state: ResultsState, control: AnswersController) -> None:
         super().__init__()
-        self._state, self._control = state, control
+        self._state, self._control, self._theme = state, control, DARK
         self.measure = ChoiceBox(
             "By",
             "How spectra are compared: the probability by the deviations of the bands, the spectral angle, or"
@@ -165,12 +165,12 @@ class MaterialsPanel(QWidget):
         with quiet(self.measure):
             self.measure.choose(materials.found.scores.measure)
         self._offer_limits(materials.found.scores.measure, materials.found.limits)
-        rows = []
+        rows, colours = [], materials.found.shown.palette(self._theme.ground)
         for row in materials.found.rows:
             if not row.pixels and len(materials.found.rows) > 20:
                 continue
             first = cell(row.label)
-            first.setIcon(_swatch(row.colour))
+            first.setIcon(_swatch(colours[row.value] if row.value else None))
             area = "–" if row.area_mm2 is None else f"{row.area_mm2:,.1f} mm²"
             share = f"{100 * row.share:.1f} %" if row.label != "not judged" else ""
             figures = (cell(text, "", RIGHT) for text in (f"{row.pixels:,}", share, area))
@@ -180,14 +180,14 @@ class MaterialsPanel(QWidget):
 
     def apply_theme(self, theme: Theme) -> None:
         """Apply the colours of a theme."""
+        self._theme = theme
         self.table.apply_theme(theme)
+        self._show(self._state.materials.value)
 
 
-def _swatch(colour: str) -> QIcon:
+def _swatch(colour: str | None) -> QIcon:
     picture = QPixmap(14, 14)
-    picture.fill(QColor(colour))
-    if colour == "#000000":
-        picture.fill(Qt.GlobalColor.transparent)
+    picture.fill(Qt.GlobalColor.transparent if colour is None else QColor(colour))
     return QIcon(picture)
 
 

@@ -25,7 +25,7 @@ from dsl_app.results.cloud.views import (
     prepare_cloud_view,
 )
 from dsl_app.results.controller import ResultsController
-from dsl_app.results.layers import Layers, rgb_of, tinted_by, within
+from dsl_app.results.layers import Layers, materials_table, rgb_of, tinted_by, within
 from dsl_app.results.state import ResultsState, ResultView, Tool
 from dsl_app.shared.jobs.base import Job, JobRunner
 from dsl_app.shared.spectrum import Pixel
@@ -215,7 +215,8 @@ class CloudPanel(QWidget):
         materials, search = self._state.materials.value, self._state.search.value
         if materials is not None:
             shown = materials.found.shown
-            colours = tinted_by(colours, shown.values.ravel()[self._grid.flat], len(shown.names))
+            table = materials_table(shown, self._theme.ground)
+            colours = tinted_by(colours, shown.values.ravel()[self._grid.flat], table)
         if search is not None:
             colours = colours.copy()
             colours[search.found.ravel()[self._grid.flat]] = tuple(bytes.fromhex(self._theme.accent[1:]))
@@ -240,7 +241,7 @@ class CloudPanel(QWidget):
         for mark in self._state.marks.value:
             if mark.shown and mark.pixel is not None and not mark.trouble:
                 spots.append(result.at("points_mm", mark.pixel))
-                colour = self._theme.pins[mark.colour % len(self._theme.pins)]
+                colour = self._theme.pin(mark.colour)
                 colours.append(tuple(bytes.fromhex(colour[1:])))
         points = np.array(spots, np.float32).reshape(-1, 3)
         known = np.isfinite(points).all(1)
@@ -375,6 +376,7 @@ class CloudPanel(QWidget):
             self.view.apply_theme(theme)
         if self._state.view.value is ResultView.CLOUD:
             self._show_pins()
+            self._later.start()
 
     def release(self) -> None:
         """Release the graphics."""

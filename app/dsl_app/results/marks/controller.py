@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable, Iterable
 from dataclasses import replace
 from pathlib import Path
@@ -22,8 +23,6 @@ from dsl_core.progress import Progress
 from dsl_core.words import counted
 
 Mask = NDArray[np.bool_]
-#: Distinct colours; further marks share them.
-COLOURS = 8
 
 
 class MarksController:
@@ -151,9 +150,9 @@ class MarksController:
         return next(name for i in range(1, len(taken) + 2) if (name := f"{kind} {i}") not in taken)
 
     def _colour(self) -> int:
-        """The colour that the fewest marks use."""
-        used = [mark.colour for mark in self.state.marks.value]
-        return min(range(COLOURS), key=used.count)
+        """The first colour that no mark has."""
+        used = {mark.colour for mark in self.state.marks.value}
+        return next(index for index in itertools.count() if index not in used)
 
     # Copy and export -------------------------------------------------------------------------------
 

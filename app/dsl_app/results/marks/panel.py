@@ -155,7 +155,7 @@ class MarksPanel(QWidget):
 
     def _swatch(self, mark: Mark) -> QIcon:
         picture = QPixmap(14, 14)
-        picture.fill(QColor(self._theme.pins[mark.colour % len(self._theme.pins)]))
+        picture.fill(QColor(self._theme.pin(mark.colour)))
         return QIcon(picture)
 
     def _item_changed(self, item: QTreeWidgetItem, column: int) -> None:

@@ -11,17 +11,20 @@ from dsl_app.results.answers.controller import Way
 from dsl_app.results.answers.materials_panel import HINT, ROWS, MaterialsPanel, materials_text
 from dsl_app.results.layers import materials_table, tinted_by
 from dsl_app.results.state import Materials
-from dsl_app.shared.theme import LIGHT
+from dsl_app.shared.theme import DARK, LIGHT
 from dsl_app.shared.widgets.forms import NumberBox
 from PySide6.QtWidgets import QLabel
 from pytestqt.qtbot import QtBot
 
 from dsl_core.analysis import classes
-from dsl_core.analysis.classify import Measure
+from dsl_core.analysis.classify import ClassMap, Measure
+from tests.app.support.results_bench import Bench as Window
+from tests.app.support.results_bench import bench as window
 from tests.app.support.results_controller import SQUARE, Bench
 from tests.app.support.results_controller import bench as bench
 from tests.app.support.small_result import BLUE, NM
 
+__all__ = ["bench", "window"]
 ANGLE = Way(Measure.ANGLE)
 
 
@@ -80,8 +83,8 @@ def test_what_a_library_may_be_off_by_belongs_to_its_classes(
 
 def test_points_have_the_colour_of_their_class() -> None:
     colours = np.full((3, 3), 100, np.uint8)
-    table = materials_table(1)
-    shown = tinted_by(colours, np.array([0, 1, 2], np.uint8), 1)
+    table = materials_table(ClassMap(("a",), (0,), np.zeros((1, 1), np.uint8)), "dark")
+    shown = tinted_by(colours, np.array([0, 1, 2], np.uint8), table)
     assert shown[0].tolist() == [100, 100, 100], "what is not judged keeps its colour"
     assert (
         np.abs(shown[1].astype(int) - table[1, :3]).max()
@@ -175,8 +178,55 @@ def test_every_number_of_the_panel_is_named_to_its_left(qtbot: QtBot, bench: Ben
 
 @pytest.mark.parametrize("classes", [1, 24, 250])
 def test_every_class_has_a_colour_and_what_is_not_judged_none(classes: int) -> None:
-    table = materials_table(classes)
+    made = ClassMap(("a",) * classes, tuple(range(classes)), np.zeros((1, 1), np.uint8))
+    table = materials_table(made, "light")
     assert table[0, 3] == 0
     assert (table[1 : classes + 3, 3] > 0).all()
-    if classes == 24:
-        assert len(np.unique(table[1 : classes + 1], axis=0)) == classes
+    assert len(np.unique(table[1 : classes + 1], axis=0)) == classes
+
+
+def test_a_class_has_the_colour_of_its_mark_wherever_it_is_shown(
+    window: Window, qtbot: QtBot, tmp_path: Path
+) -> None:
+    state, control = window.state, window.control
+    for pixel in ((3, 5), (6, 5), (30, 5)):
+        control.marks.pin(pixel)
+    control.marks.remove(window.marks[1].key)
+    control.answers.from_marks(ANGLE)
+    names = {"pin 1": 0, "pin 3": 2}
+    assert {mark.name: mark.colour for mark in window.marks} == names
+    materials = state.materials.value
+    assert materials is not None
+    assert dict(zip(materials.found.shown.names, materials.found.shown.colours, strict=True)) == names
+    image, panel = window.page.image.content, window.page.materials
+    for theme in (DARK, LIGHT):
+        window.page.apply_theme(theme)
+        lookup = image.materials.lut
+        for row, (name, index) in enumerate(names.items()):
+            wanted = [*bytes.fromhex(theme.pin(index)[1:])]
+            assert lookup[row + 1, :3].tolist() == wanted
+            cell = panel.table.item(row, 0)
+            assert cell is not None
+            assert cell.text() == name
+            assert cell.icon().pixmap(14, 14).toImage().pixelColor(7, 7).name() == theme.pin(index)
+            assert theme.pin(index) in [spot.brush().color().name() for spot in image.pins.points()]
+    control.answers.write(tmp_path / "map.csv")
+    control.answers.write(tmp_path / "map.hdr")
+    lines = (tmp_path / "map.csv").read_text().splitlines()
+    for name, index in names.items():
+        assert any(line.startswith(f"{name},{LIGHT.pin(index)},") for line in lines)
+        levels = ", ".join(str(level) for level in bytes.fromhex(LIGHT.pin(index)[1:]))
+        assert levels.replace(" ", "") in (tmp_path / "map.hdr").read_text().replace(" ", "")
+
+
+def test_classes_of_a_library_have_the_colours_of_references_of_their_names_or_new_ones(
+    bench: Bench, tmp_path: Path
+) -> None:
+    bench.control.marks.pin((30, 5))
+    library = _library(tmp_path)
+    bench.control.answers.from_library(library, ANGLE)
+    (name,) = _shown(bench).found.shown.names
+    assert _shown(bench).found.shown.colours == (1,), "the colour of the pin is another class"
+    bench.control.marks.rename(bench.state.marks.value[0].key, name)
+    bench.control.answers.from_library(library, ANGLE)
+    assert _shown(bench).found.shown.colours == (0,)
