@@ -20,9 +20,9 @@ from numpy.typing import NDArray
 from dsl_core.analysis.band_noise import band_correlation, usual_correlation
 from dsl_core.analysis.classes import NOT_JUDGED, SpectralClass, marked_by, shared_names
 from dsl_core.analysis.likelihood import Block, class_fit
+from dsl_core.analysis.mark_colours import Ground, mark_colour
 from dsl_core.errors import DecodeError
 from dsl_core.evaluation.uncertainty import DECIDED_FROM
-from dsl_core.model.mark_colours import Ground, mark_colour
 from dsl_core.progress import NoProgress, Progress
 
 Cube = NDArray[np.float32] | NDArray[np.float64]

@@ -10,12 +10,12 @@ import spectral
 import dsl_core as dsl
 from dsl_core.analysis.classes import Member, SpectralClass
 from dsl_core.analysis.classification import classify_result, write_classification
+from dsl_core.analysis.mark_colours import mark_colour
 from dsl_core.analysis.places import masks_of_marks
 from dsl_core.cli import main
 from dsl_core.errors import DecodeError, StoreError
 from dsl_core.io.result.annotations_file import Annotations, PinRecord, RegionRecord, save_annotations
 from dsl_core.io.result.result_file import load_result, save_result
-from dsl_core.model.mark_colours import mark_colour
 from dsl_core.optics.charts import chart_reflectance
 from tests.cases.chart_cube import NM, chart_cube, chart_result
 

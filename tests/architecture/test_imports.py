@@ -1,4 +1,4 @@
-"""The rules of ARCHITECTURE.md on imports hold, and the command line starts without heavy libraries."""
+"""Imports keep the rules of ARCHITECTURE.md, folders stay small, and the command line starts light."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ import importlib.util
 import json
 import subprocess
 import sys
+from collections import Counter
 from pathlib import Path
 
 import grimp
@@ -30,6 +31,14 @@ HEAVY = (
     "xarray",
     "zarr",
 )
+#: Files of Python that a reader takes in at a glance.
+MOST_IN_A_FOLDER = 20
+
+
+def test_folders_can_be_taken_in_at_a_glance() -> None:
+    modules = (path for part in ("app", "dsl_core") for path in (ROOT / part).rglob("*.py"))
+    counted = Counter(path.parent.relative_to(ROOT).as_posix() for path in modules)
+    assert [folder for folder, count in counted.items() if count > MOST_IN_A_FOLDER] == []
 
 
 def test_import_contracts_hold() -> None:

@@ -20,8 +20,8 @@ from dsl_app.results.state import (
 )
 from dsl_app.shared.widgets.pictures import DEPTH, GREY, SHARE, colour_map
 from dsl_core.analysis.classify import ClassMap
+from dsl_core.analysis.mark_colours import Ground
 from dsl_core.io.result.result_arrays import ResultArrays
-from dsl_core.model.mark_colours import Ground
 from dsl_core.model.result import FLAG_COLOURS, FLAG_NAMES, gravest_flag
 from dsl_core.optics.levels import Bands, Levels, between, rgba_of_colours, spread_of, three_bands, top_of
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from dsl_core.model.mark_colours import FIRST, Ground, mark_colour
+from dsl_core.analysis.mark_colours import FIRST, Ground, mark_colour
 
 
 @dataclass(frozen=True)
