@@ -6,7 +6,14 @@ import numpy as np
 import pytest
 
 from dsl_core.errors import StoreError
-from dsl_core.optics.levels import between, natural_bands, rgba_of_colours, three_bands, top_of
+from dsl_core.optics.levels import (
+    between,
+    natural_bands,
+    rgba_of_colours,
+    spread_of,
+    three_bands,
+    top_of,
+)
 
 
 def test_values_between_levels_become_shares_and_what_is_unknown_stays_so() -> None:
@@ -32,3 +39,7 @@ def test_one_bright_pixel_does_not_darken_all_bands() -> None:
     cube = np.full((6, 20, 50), 0.5, np.float32)
     cube[:, 0, 0] = 40.0
     assert top_of(cube) == pytest.approx(0.5, rel=1e-5)
+
+
+def test_a_picture_of_which_nothing_is_known_is_shown_from_none_to_all_of_the_light() -> None:
+    assert spread_of(np.full((2, 3), np.nan)) == (0.0, 1.0)
