@@ -162,3 +162,11 @@ def test_four_witnesses_are_enough_and_a_drift_by_chance_is_told_but_not_followe
     alone = light_course([Witness(0, None, 0.01, 0.01)] * 4, 1)
     assert alone is not None
     assert alone.log.tolist() == [0.0]
+
+
+def test_a_witness_far_off_counts_by_its_distance_and_not_by_its_square() -> None:
+    std = 0.003
+    sigma = float(np.hypot(std, course_module.QUIET))
+    steady = [Witness(0, 0, away * sigma, std) for away in (1.0, -2.0, 10.0)]  # nothing is fitted to them
+    misfit = course_module._misfit(steady, SHOTS, 0.0, course_module.DRIFT_STD, course_module.SETTING_STD)
+    assert misfit == pytest.approx(1 + 4 + 2.5 * (2 * 10 - 2.5))
