@@ -59,8 +59,7 @@ class SentinelWatch:
 
     def _judge(self, index: int, black: int, old_black: int) -> None:
         old = self._old.get(index)
-        needed = (black, old_black, index, -1 if old is None else old.index)
-        if old is None or any(each not in self._kept for each in needed):
+        if old is None or not {black, old_black, index, old.index} <= self._kept.keys():
             return
         kept = self._kept
         self.found = moved_between(
