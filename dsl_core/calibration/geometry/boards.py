@@ -108,7 +108,7 @@ def _checkerboard(grey: NDArray[np.uint8], board: Checkerboard) -> Corners | Non
         how = cv2.INTER_AREA if scale < 1 else cv2.INTER_CUBIC
         picture = grey if scale == 1 else cv2.resize(grey, None, fx=scale, fy=scale, interpolation=how)
         ok, points = cv2.findChessboardCornersSB(picture, board.corner_grid, flags=flags)
-        if ok and points is not None:
+        if ok:
             # The corner of the first pixel, at -0.5 px, stays where it is.
             at = (points.reshape(-1, 2) + 0.5) / scale - 0.5
             return Corners(np.arange(len(at)), _refined(grey, at))
