@@ -16,7 +16,7 @@ from dsl_core.io.published.layout import (
     probe_png,
     survey,
 )
-from dsl_core.model.plan import CapturePlan, GrayCode, LineComb, Role, Setting
+from dsl_core.model.plan import MOST_PX, CapturePlan, GrayCode, LineComb, Role, Setting
 
 
 def test_what_is_optional_may_be_absent_and_everything_else_is_wanted() -> None:
@@ -52,6 +52,11 @@ def test_a_head_says_size_bits_and_channels(tmp_path: Path) -> None:
     assert channels == [PngInfo(30, 20, 8, count) for count in (1, 3, 1, 2, 4)]
     assert "declares 0 x 20 px" in str(probe_png(png(tmp_path / "none.png", 0, 20)))
     assert "declares 30 x 0 px" in str(probe_png(png(tmp_path / "flat.png", 30, 0)))
+    assert probe_png(png(tmp_path / "least.png", 1, 1)) == PngInfo(1, 1, 16, 3)
+    widest = png(tmp_path / "widest.png", MOST_PX, 1), png(tmp_path / "highest.png", 1, MOST_PX)
+    assert [probe_png(path) for path in widest] == [PngInfo(MOST_PX, 1, 16, 3), PngInfo(1, MOST_PX, 16, 3)]
+    for size in ((MOST_PX + 1, 1), (1, MOST_PX + 1), (MOST_PX, MOST_PX)):
+        assert "px, which no camera has" in str(probe_png(png(tmp_path / "more.png", *size)))
     whole = png(tmp_path / "a.png").read_bytes()
     for content, why in (
         (whole[:-1], "is cut off"), (b"x" + whole[1:], "is not a PNG image"),

@@ -235,6 +235,26 @@ def test_sizes_are_asked_for_and_doubted(tmp_path: Path) -> None:
     ]
 
 
+@pytest.mark.parametrize(
+    ("camera", "projector", "doubted"),
+    [
+        ((0.5, 0.5), (0.5, 900.0), []),
+        ((1279.5, 1023.5), (1023.5, -5.0), []),
+        ((0.0, 500.0), (0.0, 380.0), ["camera", "projector"]),
+        ((1280.0, 500.0), (1024.0, 380.0), ["camera", "projector"]),
+        ((640.0, 0.0), (500.0, 380.0), ["camera"]),
+        ((640.0, 1024.0), (500.0, 380.0), ["camera"]),
+    ],
+)
+def test_a_principal_point_is_doubted_from_the_edge_of_the_picture_on(
+    tmp_path: Path, camera: tuple[float, float], projector: tuple[float, float], doubted: list[str]
+) -> None:
+    lenses = {"cam_K": K.copy(), "proj_K": P.copy()}
+    lenses["cam_K"][:2, 2], lenses["proj_K"][:2, 2] = camera, projector
+    found = load_any_stereo(as_json(tmp_path / "c.json", PLAIN | lenses), (1280, 1024), (1024, 768))
+    assert [each.split("'")[0].removeprefix("the ") for each in found.doubts] == doubted
+
+
 def test_a_camera_of_ros_alone_is_no_pair(tmp_path: Path) -> None:
     path = tmp_path / "head.yaml"
     data = f"{{rows: 3, cols: 3, data: {K.ravel().tolist()}}}"

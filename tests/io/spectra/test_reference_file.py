@@ -67,8 +67,11 @@ def test_byte_order_offset_scale_and_falling_wavelengths_are_understood(tmp_path
     np.testing.assert_allclose(read_reference(path, "Grass").values, GRASS[::-1], rtol=1e-6)
     path = write_library(tmp_path / "c.sli", {"reflectance scale factor": 10})
     np.testing.assert_allclose(read_reference(path, "Grass").values, GRASS / 10, rtol=1e-6)
+    path = write_library(tmp_path / "d.sli", {"reflectance scale factor": 0.01})  # percent
+    np.testing.assert_allclose(read_reference(path, "Grass").values, GRASS, rtol=1e-6)
     header = (tmp_path / "c.hdr").read_text("utf-8").replace("Grass", "Grün")
     (tmp_path / "c.hdr").write_bytes(header.replace("\n", "\r\n").encode("latin-1"))
+    path = tmp_path / "c.sli"
     assert read_references(path).references[0].name == "Grün"
 
 
