@@ -27,6 +27,7 @@ def test_rising_wavelengths_stay_and_falling_ones_are_turned() -> None:
         ([500.0, 510.0, 510.0], "510 comes after 510 nm"),
         ([500.0, 510.0, 505.0, 520.0], "505 comes after 510 nm"),
         ([520.0, 510.0, 515.0], "510 comes after 520 nm"),
+        ([500.0, 500.5, 510.0, 505.0], "505 comes after 510 nm"),
     ],
 )
 def test_other_orders_are_refused_with_their_place(nm: list[float], said: str) -> None:
