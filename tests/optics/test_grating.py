@@ -47,6 +47,14 @@ def test_flat_film_and_far_point_obey_the_grating_equation(order: int) -> None:
     assert (length - 1).abs().max() < 1e-9
 
 
+@pytest.mark.parametrize("order", [1, -1])
+def test_orders_that_cannot_leave_the_film_come_at_grazing_incidence(order: int) -> None:
+    frame = FilmFrame.of(Film(lines_per_mm=2500.0))  # 1.1 to 1.7 wavelengths a period
+    direction = incoming_direction(frame, point(0.0, 0.0, 800.0), order, NM)
+    assert direction.x.numpy() == pytest.approx(order * 0.999)
+    assert (direction.z > 0).all()
+
+
 def test_order_plus_one_comes_from_columns_right_of_the_zero_order() -> None:
     rig = published_rig()
     pixels, depth = sampled(rig)
