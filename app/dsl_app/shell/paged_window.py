@@ -26,7 +26,9 @@ from dsl_app.shell.rail import Rail
 from dsl_app.shell.toasts import Toasts
 
 _log = logging.getLogger(__name__)
-SMALLEST = QSize(1024, 700)
+SMALLEST, USUAL = QSize(1024, 640), QSize(1280, 800)
+#: What a desktop draws around a window, px: its frame is known only once the window is on screen.
+FRAME = QSize(8, 40)
 #: Increased when docks change, so that a layout of an older version is not restored.
 LAYOUT_VERSION = 1
 
@@ -69,7 +71,7 @@ class PagedWindow(QMainWindow):
         self._makers, self._made = makers, dict[str, PageWidget]()
         self.setWindowTitle("dsl-scan")
         self.setMinimumSize(SMALLEST)
-        self.resize(1280, 800)
+        self.resize(first_size(self.screen().availableSize()))
         self.setAcceptDrops(True)
         self.toasts = Toasts(self.statusBar())
         self.rail = Rail([page for page in PAGES if page.key in makers])
@@ -232,6 +234,11 @@ class OpenQueue(QObject):
                 self._open_path(self._waiting.pop(0))
         finally:
             self._is_opening = False
+
+
+def first_size(room: QSize) -> QSize:
+    """The size of a window that was never opened: with its frame it fits into the room of the screen."""
+    return USUAL.boundedTo(room - FRAME).expandedTo(SMALLEST)
 
 
 def restore_layout(window: QMainWindow, settings: Settings) -> None:

@@ -14,7 +14,8 @@ from dsl_app.shell import toasts
 from dsl_app.shell.actions import ACTIONS, PAGES
 from dsl_app.shell.application import ExceptionHook, make_window, open_first_page
 from dsl_app.shell.main_window import MainWindow
-from PySide6.QtCore import QPoint
+from dsl_app.shell.paged_window import first_size
+from PySide6.QtCore import QPoint, QSize
 from PySide6.QtGui import QCursor
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QFileDialog, QLabel, QMenu, QVBoxLayout
@@ -73,6 +74,13 @@ def test_what_is_undone_is_where_people_look_for_it(window: MainWindow) -> None:
     assert isinstance(view, QMenu)
     assert edit.actions() == [window.actions_by_key["undo"], window.actions_by_key["redo"]]
     assert not view.actions()[0].isSeparator()
+
+
+@pytest.mark.parametrize(
+    ("room", "wanted"), [((1280, 800), (1272, 760)), ((1920, 1050), (1280, 800)), ((853, 533), (1024, 640))]
+)
+def test_the_first_window_fits_with_its_frame(room: tuple[int, int], wanted: tuple[int, int]) -> None:
+    assert first_size(QSize(*room)) == QSize(*wanted)
 
 
 def test_pages_are_made_when_first_opened(window: MainWindow) -> None:
