@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Callable, Iterable
 from dataclasses import replace
@@ -238,7 +237,7 @@ class ForecastController:
         status, plan = self._scan.status.value, self._scan.plan.value
         seconds = None if self._is_faster_than_real else status.elapsed_s
         name = self._scan.target.value.stem
-        self.state.measured.set(MeasuredScan(name, plan, status.total, seconds, plan.raw_bytes))
+        self.state.measured.set(MeasuredScan(name, plan, status.total, seconds))
 
     @property
     def _is_faster_than_real(self) -> bool:
@@ -277,19 +276,17 @@ class ForecastController:
 
 
 def measure(scan: MeasuredScan, result: Path) -> MeasuredScan:
-    """The scan with the duration of its reconstruction and, where the truth is known, its errors."""
+    """The scan with its errors where the truth is known."""
     from dsl_core.evaluation.summary import evaluate
     from dsl_core.io.result.result_file import load_result
     from dsl_core.workflows.scans import truth_of
 
     found = load_result(result)
-    costs = json.loads(str(found.attrs.get("stage_costs", "[]")))
-    known = replace(scan, computing_s=sum(float(cost["seconds"]) for cost in costs) or None)
     try:
         truth = truth_of(found)
     except DslError:  # a real rig, whose scene is unknown
-        return known
-    return _with_errors(known, evaluate(found, truth))
+        return scan
+    return _with_errors(scan, evaluate(found, truth))
 
 
 def _with_errors(scan: MeasuredScan, found: Evaluation) -> MeasuredScan:

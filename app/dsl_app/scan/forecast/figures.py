@@ -113,13 +113,6 @@ FIGURES: tuple[ForecastFigure, ...] = (
         "Exposures and the projector's latency. Not measured on a simulated rig, which does not wait",
         minutes,
     ),
-    ForecastFigure(
-        "computing_s",
-        "Computing",
-        "Reconstruction time; expected on a machine like the one measured",
-        minutes,
-    ),
-    ForecastFigure("raw_bytes", "Raw data", "Frames before compression", volume),
 )
 
 #: Figures that the curve can show; that of single pixels is shown first.

@@ -55,8 +55,6 @@ class MeasuredScan:
     plan: CapturePlan
     frames: int
     seconds: float | None
-    raw_bytes: int
-    computing_s: float | None = None
     rmse: float | None = None
     pixel_rmse: float | None = None
     pixel_angle_rad: float | None = None

@@ -225,8 +225,6 @@ def test_after_a_scan_what_it_was_stands_beside_what_was_expected(
     found = control.state.measured.value
     assert found is not None
     assert (found.name, found.frames, found.seconds) == ("first", 154, None)
-    assert found.raw_bytes == bench.state.plan.value.raw_bytes
-    assert found.computing_s is not None
     assert found.depth_rmse_mm is not None
     assert found.coverage is not None
     assert found.coverage > 0.5
