@@ -72,6 +72,7 @@ class CalibrateAll:
             lambda: self._ended("Stopped. Everything captured is kept; start again to continue."),
             exclusive=RIG,
             time_left=lambda: self._overall.left_s(),
+            share=lambda: self._overall.share,
         )
         self._job = job
         self._state.everything.set("starting")

@@ -94,7 +94,7 @@ class CampaignBox(QFrame):
         self.keep = push_button(
             "&Keep in library", "Assemble the rig as far as it is calibrated and save it in the library"
         )
-        self.progress = label("", name="Progress of calibrating everything")
+        self.progress = label("", wraps=True, name="Progress of calibrating everything")
         self._lay_out()
         self._connect()
 
@@ -116,8 +116,8 @@ class CampaignBox(QFrame):
         self.everything.clicked.connect(commands.run_everything)
         self.cancel.clicked.connect(commands.cancel_everything)
         self.keep.clicked.connect(commands.keep)
-        shown = (state.campaign, state.everything, state.rows, state.foreign, state.library, state.in_use)
-        self.stops = follow_any(self._show, *shown, self._rig.devices)
+        shown = (state.campaign, state.everything, state.outcome, state.rows, state.foreign)
+        self.stops = follow_any(self._show, *shown, state.library, state.in_use, self._rig.devices)
 
     def ask_new(self) -> bool:
         """Ask for a new campaign; whether one was begun."""

@@ -92,6 +92,7 @@ class CalibrateController:
         info = campaign.info
         rig = RigChoice(info.rig, tuple(info.options.items()))
         self.state.note.set("")
+        self.state.outcome.set("")
         self.state.campaign.set(CampaignFacts(campaign.path.absolute(), rig))
         self.refresh()
 
@@ -197,12 +198,12 @@ class CalibrateController:
 
     def _ended(self, note: str, error: Exception | None) -> None:
         self._lock.close()
-        self.state.note.set(note)
+        self.state.outcome.set(note)
         self.refresh()
         self.library.load()
         if error is not None:
             text = f"Calibrating everything stopped: {sentence_of(error)}"
-            self.state.note.set(text)
+            self.state.outcome.set(text)
             self._notifier.tell("error", text)
 
     # The rig so far --------------------------------------------------------------------------------

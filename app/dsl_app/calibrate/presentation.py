@@ -36,7 +36,7 @@ _ROLES = {
 
 @dataclass(frozen=True)
 class CampaignHead:
-    """The head of the page: which campaign is open, how far everything is, and the buttons."""
+    """The head of the page: which campaign is open, how far everything is or how that ended, buttons."""
 
     title: str
     place: str
@@ -62,7 +62,7 @@ def campaign_head(state: CalibrateState, devices: DeviceRig | None) -> CampaignH
     return CampaignHead(
         title,
         place,
-        LabelState(progress, "warn" if progress == "stopping" else "muted"),
+        LabelState(progress or state.outcome.value, "warn" if progress == "stopping" else "muted"),
         new=ButtonState(is_enabled=not is_running, is_primary=main == "new"),
         open=ButtonState(is_enabled=not is_running),
         keep=ButtonState(facts is not None and not is_running, usable and has_accepted, main == "keep"),

@@ -110,11 +110,11 @@ class CalibrateState:
     """Values that the calibrations' controllers set and the page follows.
 
     ``trouble`` is a sentence on why nothing can be calibrated (empty: nothing is wrong), ``note`` one on what
-    was done last. ``foreign`` says that the campaign belongs to another rig; ``opening`` is the title of the
-    wizard that is being opened; ``everything`` says how far a calibration of everything is (empty: none
-    runs), ``running`` names the calibration that it is at, ``seen`` is what the camera sees of it. ``in_use``
-    is the library's name that scans use; ``opened`` fires with a file to open in the
-    system's program.
+    was done last in the library, ``outcome`` one on how calibrating everything ended. ``foreign`` says that
+    the campaign belongs to another rig; ``opening`` is the title of the wizard that is being opened;
+    ``everything`` says how far a calibration of everything is (empty: none runs), ``running`` names the
+    calibration that it is at, ``seen`` is what the camera sees of it. ``in_use`` is the library's name that
+    scans use; ``opened`` fires with a file to open in the system's program.
     """
 
     def __init__(self) -> None:
@@ -123,6 +123,7 @@ class CalibrateState:
         self.foreign = Value(False)
         self.trouble = Value("")
         self.note = Value("")
+        self.outcome = Value("")
         self.opening = Value("")
         self.everything = Value("")
         self.running = Value("")

@@ -51,8 +51,9 @@ class JobStrip(QWidget):
             return
         self._shown = view.job
         self._text.setText(view.text)
-        self._bar.setRange(0, view.job.progress.total)
-        self._bar.setValue(view.job.progress.done)
+        done, total = view.job.extent
+        self._bar.setRange(0, total)
+        self._bar.setValue(done)
         self._offer_choices(view.asks_which)
         self._cancel.setEnabled(view.can_cancel)
 

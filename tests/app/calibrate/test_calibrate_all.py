@@ -29,7 +29,7 @@ def test_everything_runs_in_order_and_stops_with_the_reason(bench: CalibrateBenc
     assert bench.row("selftest").has_candidate
     bench.wrong = {}
     bench.control.run_everything()
-    assert "Everything is calibrated" in bench.state.note.value
+    assert "Everything is calibrated" in bench.state.outcome.value
     assert all(row.state.is_accepted for row in bench.state.rows.value)
     assert bench.library.names() == ("campaign",)
 
@@ -41,18 +41,24 @@ def test_rows_are_live_while_everything_is_calibrated(
     assert devices is not None
     devices.place = lambda placement: None
     seen: list[tuple[str, list[RowState], bool]] = []
+    shares: list[float] = []
     real = UnattendedGuide.looked
 
     def looked(self: UnattendedGuide, step: Step, figures: Sequence[Figure]) -> bool:
         answer = real(self, step, figures)
         bench.control.take_news()
         seen.append((bench.state.running.value, states(bench), bench.state.seen.value is not None))
+        job = bench.control._everything._job
+        assert job is not None
+        shares.append(job.extent[0] / job.extent[1])
         return answer
 
     monkeypatch.setattr(UnattendedGuide, "looked", looked)
     bench.control.run_everything()
     assert [name for name, _, _ in seen] == ["selftest", "selftest", "geometry"]
     assert seen[-1][1] == [RowState.GOOD, RowState.MISSING]
+    # Two steps and a fit, a step and a fit: the bar is of all of them.
+    assert shares == pytest.approx([0.0, 0.2, 0.6], abs=0.001)
     assert seen[-1][2]
     assert bench.state.running.value == ""
     assert bench.state.seen.value is None

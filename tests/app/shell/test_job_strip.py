@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import threading
+import time
 from collections.abc import Iterator
 
 import pytest
@@ -73,6 +74,19 @@ def test_the_time_left_says_of_what(is_whole: bool, words: str, monkeypatch: pyt
 def test_a_job_that_knows_better_is_believed() -> None:
     job = Job("Scan leaf", lambda progress: None, time_left=lambda: 90.0)
     assert job.left == TimeLeft(90.0, True)
+
+
+def test_the_bar_is_of_the_whole_job_where_reports_are_of_a_step(bench: Bench) -> None:
+    def work(progress: Progress) -> None:
+        while True:
+            progress.report("Pose 4: scan", 40, 40)
+            time.sleep(0.01)
+
+    job = bench.runner.submit(Job("Calibrate everything", work, share=lambda: 0.125))
+    bench.strip._show()
+    bar = bench.strip._bar
+    assert bar.value() / bar.maximum() == 0.125
+    job.cancel()
 
 
 def test_work_that_runs_by_itself_can_be_cancelled_where_it_is_alone(bench: Bench) -> None:

@@ -62,7 +62,7 @@ class LiveFrameView(QWidget):
         self.view = PictureView("Camera picture", tip)
         self.view.setMinimumSize(220, 150)
         self.view.box.setMouseEnabled(False, False)
-        self._text = label(NO_PICTURE, "muted")
+        self._text = label(NO_PICTURE, "muted", wraps=True)
         column_of((self.view, 1), self._text, on=self, margins=0)
 
     def show_seen(self, seen: Seen | None) -> None:

@@ -14,6 +14,8 @@ from dsl_core.progress import CallbackProgress, CancelToken, Progress
 
 T = TypeVar("T")
 _log = logging.getLogger(__name__)
+#: Parts in which the share of a job is counted.
+SHARES = 1000
 #: How long the stages of jobs took in this session, by kind.
 _courses: dict[str, Course] = {}
 
@@ -49,7 +51,8 @@ class Job(Generic[T]):
 
     ``work`` runs in a worker thread and reports to the `Progress` it is given; the callbacks run in the
     window's thread. ``exclusive`` names something that only one job may use at a time, such as the rig.
-    ``time_left`` tells the time left where the work knows it better than its reports say.
+    ``time_left`` tells the time left where the work knows it better than its reports say, and ``share`` what
+    part of it is done, 0 to 1, where reports are of a step.
     ``is_minor`` jobs are stopped without a question when the window closes. ``on_accepted`` is called when
     the runner has accepted the job, before the work begins; ``on_ended`` before the other callbacks, however
     the job ends. Without ``on_failed`` the runner tells the person what went wrong.
@@ -68,6 +71,7 @@ class Job(Generic[T]):
     progress: JobProgress = JobProgress()
     error: Exception | None = None
     time_left: Callable[[], float | None] | None = None
+    share: Callable[[], float] | None = None
     token: CancelToken = field(default_factory=CancelToken)
 
     def __post_init__(self) -> None:
@@ -82,6 +86,13 @@ class Job(Generic[T]):
     def cancel(self) -> None:
         """Ask the work to stop at its next report."""
         self.token.cancel()
+
+    @property
+    def extent(self) -> tuple[int, int]:
+        """How much of how much is done, for a bar; the whole is 0 while it is not known."""
+        if self.share is None:
+            return self.progress.done, self.progress.total
+        return int(SHARES * self.share()), SHARES
 
     @property
     def left(self) -> TimeLeft | None:
