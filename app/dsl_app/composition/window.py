@@ -311,6 +311,7 @@ class Composition(QObject):
         state.phase.changed.connect(
             lambda phase: self._remember_folder(state) if phase is Phase.DONE else None
         )
+        state.finished.changed.connect(self._remember_scan)
         self.scans = controller = ScanController(
             state, rig, parts.runner, window.toasts, parts.undo, hidden=_demo_folder(), pace=self._pace
         )
@@ -365,6 +366,11 @@ class Composition(QObject):
         folder = state.target.value.parent
         if folder != _demo_folder():
             self.window.parts.settings.output_folder = str(folder)
+
+    def _remember_scan(self, finished: Path | None) -> None:
+        """List a scan as recent once its frames are complete: its result may fail, or not be wanted yet."""
+        if finished is not None and finished.parent != _demo_folder():
+            self.window.parts.recent.add(finished)
 
     def _results_page(self) -> PageWidget:
         from dsl_app.results.controller import ResultsController

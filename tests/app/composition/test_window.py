@@ -67,6 +67,16 @@ def test_who_waits_on_an_empty_results_page_sees_the_result(
     assert results.subject() == path
 
 
+def test_a_finished_scan_is_a_recent_file_before_it_has_a_result(
+    composed: tuple[Composition, MainWindow], tmp_path: Path
+) -> None:
+    composition, window = composed
+    window.open_page("scan")
+    assert composition.scans is not None
+    composition.scans.state.finished.set(tmp_path / "leaf.dsl")
+    assert window.parts.recent.paths.value == (tmp_path / "leaf.dsl",)
+
+
 def test_the_rig_is_remembered(
     qtbot: QtBot, composed: tuple[Composition, MainWindow], tmp_path: Path
 ) -> None:
