@@ -16,7 +16,7 @@ from dsl_app.scan.command_line import fresh_target, rig_of_scan, scan_command
 from dsl_app.scan.job import ScanJob, ScanRequest
 from dsl_app.scan.plan import ScanPlanController
 from dsl_app.scan.reconnect import Reconnector
-from dsl_app.scan.reconstruction_time import Pace, about
+from dsl_app.scan.reconstruction_time import Pace
 from dsl_app.scan.state import InterruptedScan, Phase, Reconnection, ScanState
 from dsl_app.shared.jobs.base import Job, JobRunner, JobState
 from dsl_app.shared.known_files import Kind, kind_of
@@ -263,9 +263,8 @@ class ScanController:
     def reconstruct(self, session: Path) -> None:
         """Reconstruct a complete scan, save the result next to it and report it."""
         target, before = session.with_suffix(".zarr"), self.state.note.value
-        expected_s = self._pace.expected_s(self.state.plan.value.camera_size_px)
-        waiting = f"{before} Reconstructing, {about(expected_s)}; the depth is shown first.".strip()
-
+        # How long it takes was said before; from now on the job's own clock tells what is left.
+        waiting = f"{before} Reconstructing; the depth is shown first.".strip()
         size_px, since_s = self.state.plan.value.camera_size_px, time.monotonic()
 
         def see(maps: Maps) -> None:

@@ -93,7 +93,7 @@ def run_controls(
         renew=ButtonState(is_resumable),
         drift=ButtonState(is_resumable),
         again=ButtonState(
-            has_finished and not phase.is_busy,
+            has_finished and not phase.is_busy and session is None,
             is_primary=is_raw,
             text="Reconstruct…" if is_raw else "Reconstruct a&gain…",
         ),

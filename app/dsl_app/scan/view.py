@@ -24,6 +24,7 @@ from dsl_core.optics.levels import between, spread_of
 
 #: Red, green and blue of the camera: they are data and the same in every theme.
 CHANNEL_COLOURS = ("#d94545", "#3fa34d", "#3f7fd9")
+NO_PIXEL = "Intensity graph: point at a pixel of the picture"
 HINT = "No frame yet. Start a scan, then point at the picture to plot the intensity of a pixel."
 #: Columns of the published projector: the range of the empty axis.
 PUBLISHED_COLUMNS = 640
@@ -151,7 +152,7 @@ class GraphPlot(QWidget):
             " order, the first orders are on either side.",
             "Raw counts (DN)", "First column of the line (px)",
         )  # fmt: skip
-        self._title = label("Intensity graph", "heading")
+        self._title = label(NO_PIXEL, "heading")
         self._curves: list[Any] = []
         self.plot.setXRange(0, PUBLISHED_COLUMNS, padding=0.02)
         self.plot.setYRange(0, 1000, padding=0.02)
@@ -160,7 +161,7 @@ class GraphPlot(QWidget):
     def show_graph(self, graph: BlockGraph | None) -> None:
         """Draw a graph, as far as captured."""
         if graph is None:
-            self._title.setText("Intensity graph")
+            self._title.setText(NO_PIXEL)
             for curve in self._curves:
                 curve.setData([], [])
             return

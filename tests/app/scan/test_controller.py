@@ -172,7 +172,7 @@ def test_a_result_follows_and_is_told(
     assert results[0].is_dir()
     assert working == [True, False]
     ((note, pixels, middle_mm),) = depths
-    assert note.endswith("Reconstructing, a few seconds; the depth is shown first.")
+    assert note.endswith("Reconstructing; the depth is shown first.")
     assert pixels == 64 * 48
     assert 600 < middle_mm < 800
     assert bench.state.depth.value is None

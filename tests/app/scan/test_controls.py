@@ -72,6 +72,8 @@ def test_an_interrupted_scan_is_resumed_or_left() -> None:
         False,
     )
     assert (shown.start.is_visible, shown.resume.is_visible) == (False, True)
+    # What was finished before is not what the buttons below speak of.
+    assert not run_controls(Phase.STOPPED, HALF, FREE, "", has_finished=True).again.is_visible
     fresh = run_controls(Phase.PLANNING, None, FREE, "", has_finished=False)
     assert (fresh.start.is_visible, fresh.resume.is_visible, fresh.start.text) == (True, False, None)
     assert shown.drift == shown.renew
