@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 DARKEST, BRIGHTEST = 0.5, 99.8
 #: A logarithmic tone shows shares from one over this to one in equal steps of their ratio.
 LOG_REACH = 1000.0
-#: White balance changes a channel by at most this factor: a picture of one colour has no white.
-MOST_BALANCE = 6.0
+#: The most by which means of colours differ where white can be told: a picture of one colour has none.
+MOST_BALANCE = 5.0
 #: A stretch uses each so-manieth row and column of cells: enough for percentiles.
 EACH = 4
 Levels = tuple[float, float]
@@ -38,8 +38,9 @@ class Display:
     balance: bool = False
 
 
-#: As frames are shown if nothing else is chosen.
+#: As frames are shown if nothing else is chosen, and as a person sees them first: black and grey as such.
 PLAIN = Display()
+FIRST = Display(stretch=True, balance=True)
 
 
 def display_tables(
@@ -48,7 +49,8 @@ def display_tables(
     """Brightness of each count, 0 to ``full_scale_dn``, for red, green and blue: bytes (counts,).
 
     ``channels`` are those of the frame, (rows, columns) each. A stretch puts the same counts to black and
-    white in all of them; white balance makes their means equal (grey world), saturated pixels left out.
+    white in all of them; white balance makes their means equal (grey world), saturated pixels left out,
+    unless they differ by more than `MOST_BALANCE`: red light is to look red.
     """
     thin = [values[::EACH, ::EACH] for values in channels]
     low, high = _levels(thin) if display.stretch else (0.0, float(full_scale_dn))
@@ -69,7 +71,9 @@ def _balance(channels: Sequence[NDArray[np.uint16]], low: float, full_scale_dn: 
     known = np.all([values < full_scale_dn for values in channels], axis=0)
     means = [max(float((values[known] - low).mean()), 1.0) if known.any() else 1.0 for values in channels]
     middle = float(np.median(means))
-    return tuple(min(max(middle / mean, 1 / MOST_BALANCE), MOST_BALANCE) for mean in means)
+    if max(means) > MOST_BALANCE * min(means):
+        return (1.0,) * len(means)
+    return tuple(middle / mean for mean in means)
 
 
 def _toned(share: NDArray[np.float64], tone: Tone) -> NDArray[np.uint8]:

@@ -83,17 +83,23 @@ def test_a_logarithmic_tone_reaches_down_to_a_thousandth() -> None:
     assert table[41] == round(255 * np.log1p(1000 * 41 / FULL) / np.log1p(1000))
 
 
-def test_white_balance_makes_means_above_black_equal_within_a_factor_of_six() -> None:
+def test_white_balance_makes_means_above_black_equal_where_there_is_white() -> None:
     def shown(levels: tuple[int, int, int], at: tuple[int, int, int], **how: bool) -> list[int]:
         tables = display_tables(Display(Tone.LINEAR, balance=True, **how), _levelled(*levels), FULL)
         return [int(table[count]) for table, count in zip(tables, at, strict=True)]
 
     assert shown((1000, 2000, 500), (1000, 2000, 500)) == [62, 62, 62]
-    # The darkest colour is brightened sixfold at most, and the brightest darkened as far.
-    assert shown((100, 1000, 2000), (100, 1000, 2000)) == [37, 62, 62]
-    assert shown((300, 300, 3600), (300, 300, 3600)) == [19, 19, 37]
+    # Up to a factor of five; light of one colour keeps it.
+    assert shown((400, 1000, 2000), (400, 1000, 2000)) == [62, 62, 62]
+    assert shown((399, 1000, 2000), (399, 1000, 2000)) == [25, 62, 125]
+    assert shown((300, 300, 3600), (300, 300, 3600)) == [19, 19, 224]
     # A channel at black, and one with no pixel below saturation, is one count bright.
     assert shown((0, 1, 3), (1000, 1000, 1000)) == [62, 62, 21]
     assert shown((FULL, 200, 300), (100, 100, 100)) == [6, 6, 6]
-    # What a stretch puts at black does not count.
-    assert shown((400, 600, 1000), (450, 600, 600), stretch=True) == [128, 85, 28]
+
+
+def test_what_a_stretch_puts_at_black_does_not_count_for_white() -> None:
+    channels = [200 + values for values in _channels(1000, 2000, 500)]
+    tables = display_tables(Display(Tone.LINEAR, stretch=True, balance=True), channels, FULL)
+    shown = [int(table[count]) for table, count in zip(tables, (700, 1200, 450), strict=True)]
+    assert max(shown) - min(shown) <= 2

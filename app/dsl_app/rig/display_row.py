@@ -9,7 +9,7 @@ from PySide6.QtWidgets import QSlider, QWidget
 
 from dsl_app.shared.widgets.forms import ChoiceBox, check_box, label, named
 from dsl_app.shared.widgets.layouts import STRETCH, column_of, row_of
-from dsl_core.capture.display import PLAIN, Display, Tone
+from dsl_core.capture.display import FIRST, Display, Tone
 
 #: Steps of the gain's slider for a factor of two, and the highest gain in factors of two.
 STEPS, DOUBLINGS = 4, 6
@@ -22,13 +22,18 @@ class DisplayRow(QWidget):
 
     def __init__(self) -> None:
         super().__init__()
-        self.display: Display = PLAIN
+        self.display: Display = FIRST
         tip = "How counts become brightness: a logarithm shows the first orders of a line next to its zeroth"
         self.tone = ChoiceBox(
             "Tone", tip, [(tone.value, tone) for tone in Tone], lambda tone: self._be(tone=tone)
         )
         self.stretch = check_box("Stretch", "Fit black and white to the darkest and brightest pixels shown")
-        self.balance = check_box("White balance", "Make the means of red, green and blue equal, for the eye")
+        self.balance = check_box(
+            "White balance",
+            "Make the means of red, green and blue equal, for the eye; light of one colour keeps it",
+        )
+        self.stretch.setChecked(FIRST.stretch)
+        self.balance.setChecked(FIRST.balance)
         self.gain = named(QSlider(Qt.Orientation.Horizontal), "Gain", "Brighten the picture, up to 64 times")
         self.gain.setRange(0, STEPS * DOUBLINGS)
         self.gain.setFixedWidth(90)
