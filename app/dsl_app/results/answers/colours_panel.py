@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 from PySide6.QtCore import Qt
-from PySide6.QtGui import QColor, QGuiApplication, QIcon, QPixmap, QShowEvent
+from PySide6.QtGui import QGuiApplication, QShowEvent
 from PySide6.QtWidgets import QWidget
 
 from dsl_app.results.state import Mark, ResultsState
 from dsl_app.shared.evented import follow_any
 from dsl_app.shared.theme import DARK, Theme
 from dsl_app.shared.widgets.forms import ChoiceBox, label, push_button
+from dsl_app.shared.widgets.icons import swatch
 from dsl_app.shared.widgets.layouts import column_of, row_of
 from dsl_app.shared.widgets.read_table import RIGHT, ReadTable, cell
 from dsl_core.analysis.at_bands import at_bands
@@ -68,7 +69,7 @@ class ColoursPanel(QWidget):
         rows = []
         for each in found:
             first = cell(each.name)
-            first.setIcon(_swatch(self._theme.pin(marks[each.name].colour)))
+            first.setIcon(swatch(self._theme.pin(marks[each.name].colour)))
             texts = [_value(v, s) for v, s in zip(each.lab, each.lab_std, strict=True)]
             texts.append("" if each.delta_e is None else _value(each.delta_e, each.delta_e_std or 0.0))
             rows.append((first, *(cell(text, "", RIGHT) for text in texts)))
@@ -116,9 +117,3 @@ class ColoursPanel(QWidget):
 def _value(value: float, std: float) -> str:
     # Thin spaces: five columns have to fit next to the picture.
     return f"{value:.2f}{THIN}±{THIN}{std:.2f}".replace("-", "−")
-
-
-def _swatch(colour: str) -> QIcon:
-    picture = QPixmap(14, 14)
-    picture.fill(QColor(colour))
-    return QIcon(picture)

@@ -5,13 +5,13 @@ from __future__ import annotations
 from pathlib import Path
 
 from PySide6.QtCore import Qt
-from PySide6.QtGui import QColor, QIcon, QPixmap
 from PySide6.QtWidgets import QFileDialog, QWidget
 
 from dsl_app.results.answers.controller import AnswersController, Way
 from dsl_app.results.state import Materials, ResultsState
 from dsl_app.shared.theme import DARK, Theme
 from dsl_app.shared.widgets.forms import ChoiceBox, NumberBox, check_box, label, push_button, quiet
+from dsl_app.shared.widgets.icons import swatch
 from dsl_app.shared.widgets.layouts import STRETCH, column_of, row_of
 from dsl_app.shared.widgets.read_table import RIGHT, ReadTable, cell
 from dsl_app.shared.widgets.save_dialog import ask_target
@@ -170,7 +170,7 @@ class MaterialsPanel(QWidget):
             if not row.pixels and len(materials.found.rows) > 20:
                 continue
             first = cell(row.label)
-            first.setIcon(_swatch(colours[row.value] if row.value else None))
+            first.setIcon(swatch(colours[row.value] if row.value else "transparent"))
             area = "–" if row.area_mm2 is None else f"{row.area_mm2:,.1f} mm²"
             share = f"{100 * row.share:.1f} %" if row.label != "not judged" else ""
             figures = (cell(text, "", RIGHT) for text in (f"{row.pixels:,}", share, area))
@@ -183,12 +183,6 @@ class MaterialsPanel(QWidget):
         self._theme = theme
         self.table.apply_theme(theme)
         self._show(self._state.materials.value)
-
-
-def _swatch(colour: str | None) -> QIcon:
-    picture = QPixmap(14, 14)
-    picture.fill(Qt.GlobalColor.transparent if colour is None else QColor(colour))
-    return QIcon(picture)
 
 
 def materials_text(materials: Materials) -> str:

@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from PySide6.QtCore import QModelIndex, QSize, Qt
-from PySide6.QtGui import QColor, QGuiApplication, QIcon, QKeySequence, QPixmap, QShortcut
+from PySide6.QtGui import QColor, QGuiApplication, QKeySequence, QShortcut
 from PySide6.QtWidgets import (
     QAbstractItemView,
     QFileDialog,
@@ -23,6 +23,7 @@ from dsl_app.results.marks.controller import MarksController
 from dsl_app.results.state import Mark, ResultsState
 from dsl_app.shared.theme import DARK, Theme
 from dsl_app.shared.widgets.forms import label, named, push_button, quiet
+from dsl_app.shared.widgets.icons import SWATCH_PX, swatch
 from dsl_app.shared.widgets.layouts import STRETCH, column_of, row_of
 from dsl_app.shared.widgets.save_dialog import ask_target
 from dsl_core.io.spectra.catalogue import formats, suffixes
@@ -59,7 +60,7 @@ class MarksPanel(QWidget):
         self.tree.setHeaderLabels(["Spectrum", "Where", "Pixels"])
         self.tree.setRootIsDecorated(False)
         self.tree.setUniformRowHeights(True)
-        self.tree.setIconSize(QSize(14, 14))
+        self.tree.setIconSize(QSize(SWATCH_PX, SWATCH_PX))
         self.tree.setSelectionMode(QAbstractItemView.SelectionMode.SingleSelection)
         self.tree.setEditTriggers(
             QAbstractItemView.EditTrigger.EditKeyPressed | QAbstractItemView.EditTrigger.DoubleClicked
@@ -143,7 +144,7 @@ class MarksPanel(QWidget):
     def _item(self, mark: Mark) -> QTreeWidgetItem:
         item = QTreeWidgetItem([mark.name, where(mark), count(mark)])
         item.setData(0, KEY, mark.key)
-        item.setIcon(0, self._swatch(mark))
+        item.setIcon(0, swatch(self._theme.pin(mark.colour)))
         item.setFlags(item.flags() | Qt.ItemFlag.ItemIsEditable | Qt.ItemFlag.ItemIsUserCheckable)
         item.setCheckState(0, Qt.CheckState.Checked if mark.shown else Qt.CheckState.Unchecked)
         if mark.trouble:
@@ -152,11 +153,6 @@ class MarksPanel(QWidget):
                 item.setToolTip(i, mark.trouble)
         item.setTextAlignment(2, Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
         return item
-
-    def _swatch(self, mark: Mark) -> QIcon:
-        picture = QPixmap(14, 14)
-        picture.fill(QColor(self._theme.pin(mark.colour)))
-        return QIcon(picture)
 
     def _item_changed(self, item: QTreeWidgetItem, column: int) -> None:
         if column != 0:

@@ -5,13 +5,15 @@ from __future__ import annotations
 from functools import lru_cache
 
 from PySide6.QtCore import QByteArray, QRectF, Qt
-from PySide6.QtGui import QIcon, QPainter, QPixmap
+from PySide6.QtGui import QColor, QIcon, QPainter, QPixmap
 from PySide6.QtSvg import QSvgRenderer
 
 from dsl_core.resources import resource_path
 
 #: Pixels a side; Qt scales down to what a control needs.
 SIZE_PX = 96
+#: Side of the colour in front of a line of a list, px.
+SWATCH_PX = 14
 
 
 @lru_cache(maxsize=64)
@@ -20,6 +22,23 @@ def icon(name: str, colour: str, checked_colour: str = "") -> QIcon:
     made = QIcon(_picture(name, colour))
     if checked_colour:
         made.addPixmap(_picture(name, checked_colour), QIcon.Mode.Normal, QIcon.State.On)
+    return made
+
+
+def swatch(colour: str) -> QIcon:
+    """The colour in front of a line of a list; on a selected line it has an edge, and keeps its colour.
+
+    Without a picture of its own for that, Qt tints it by the colour of the selection.
+    """
+    picture = QPixmap(SWATCH_PX, SWATCH_PX)
+    picture.fill(QColor(colour))
+    made = QIcon(picture)
+    edged = QPixmap(picture)
+    painter = QPainter(edged)
+    painter.setPen(Qt.GlobalColor.white)
+    painter.drawRect(0, 0, SWATCH_PX - 1, SWATCH_PX - 1)
+    painter.end()
+    made.addPixmap(edged, QIcon.Mode.Selected)
     return made
 
 
