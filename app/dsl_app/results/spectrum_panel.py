@@ -22,6 +22,8 @@ from dsl_core.words import capitalised
 
 #: Higher reflectances are errors or gloss; zooming out shows them.
 TOP = 1.08
+#: Room below and above the values, as a share of the range: the number of the lowest line is not cut.
+PADDING = 0.02
 #: With more marks than this, bands would cover all spectra: the selected mark alone keeps its own.
 MOST_BANDS = 12
 #: The range that a transform fills at first; reflectance has that of the result.
@@ -40,15 +42,14 @@ class SpectrumPanel(QWidget):
         self._state, self._theme, self._top = state, DARK, TOP
         self.plot = CalmPlot(
             "Spectra",
-            "Reflectance with its 95 % band; dashed where the prior decides and not the data. Regions show"
-            " the mean and one standard deviation of their pixels. Drag the line to change the band. With"
-            f" more than {MOST_BANDS} marks, the selected one alone has its 95 % band.",
+            f"Reflectance with its 95 % band (above {MOST_BANDS} marks, of the selected one), dashed where"
+            " the prior decides; regions: mean ± deviation of pixels. Drag the line to change the band.",
             "Reflectance",
             "Wavelength (nm)",
             left_width=48,
         )
         self.item = self.plot.getPlotItem()
-        self.item.setYRange(0, 1, padding=0.02)
+        self.item.setYRange(0, 1, padding=PADDING)
         self.band_line = pg.InfiniteLine(angle=90, movable=True)
         self.item.addItem(self.band_line, ignoreBounds=True)
         self.live = SpectrumCurve(self.item)
@@ -115,7 +116,7 @@ class SpectrumPanel(QWidget):
             high += len(self._curves) * high / 4
         # Old limits would cut the new range.
         self.item.getViewBox().setLimits(yMin=min(-0.5, 4 * low), yMax=max(3.0, 4 * high))
-        self.item.setYRange(low, high, padding=0)
+        self.item.setYRange(low, high, padding=PADDING)
 
     def _show_band(self) -> None:
         result = self._state.result.value

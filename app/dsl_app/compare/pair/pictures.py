@@ -22,6 +22,7 @@ from dsl_app.shared.widgets.pictures import (
     DEPTH,
     DIFFERENCE,
     GREY,
+    Canvas,
     arrow_step,
     colour_map,
     moved_within,
@@ -41,9 +42,8 @@ class PairPictures(QWidget):
         super().__init__()
         self._state, self._control, self._theme = state, control, DARK
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
-        self.canvas = pg.GraphicsLayoutWidget()
-        self.canvas.setAccessibleName("A, B and their difference")
-        self.canvas.setToolTip("A, B and A minus B. Drag to pan, wheel to zoom; arrow keys move the cursor.")
+        tip = "A, B and A minus B. Drag to pan, wheel to zoom; arrow keys move the cursor."
+        self.canvas = Canvas("A, B and their difference", tip)
         self.canvas.setFocusProxy(self)
         self.titles = [pg.LabelItem(text, justify="left") for text in ("A", "B", "A − B")]
         self.boxes = [pg.ViewBox(lockAspect=True, invertY=True, enableMenu=False) for _ in range(3)]

@@ -5,11 +5,11 @@ from __future__ import annotations
 from typing import Any
 
 import pyqtgraph as pg
-from PySide6.QtCore import Qt
+from PySide6.QtCore import QEvent, Qt
 from PySide6.QtGui import QKeyEvent
 
 from dsl_app.shared.theme import Theme
-from dsl_app.shared.widgets.forms import named
+from dsl_app.shared.widgets.hints import hint, is_said_below
 
 #: Perceptually uniform maps of pyqtgraph: grey for a band, colours for quantities that are not light.
 GREY, DEPTH, SHARE = "CET-L1", "viridis", "cividis"
@@ -17,13 +17,24 @@ GREY, DEPTH, SHARE = "CET-L1", "viridis", "cividis"
 DIFFERENCE = "CET-D1A"
 
 
-class PictureView(pg.GraphicsLayoutWidget):  # type: ignore[misc]
+class Canvas(pg.GraphicsLayoutWidget):  # type: ignore[misc]
+    """What pictures and plots are drawn on; what can be done with them is said in the status line."""
+
+    def __init__(self, name: str, tip: str = "") -> None:
+        super().__init__()
+        hint(self, name, tip)
+
+    def event(self, event: QEvent) -> bool:
+        """Leave out a tooltip that the status line has already."""
+        return False if is_said_below(self, event) else bool(super().event(event))
+
+
+class PictureView(Canvas):
     """A picture with square pixels, its first row at the top, on a background of the theme."""
 
     def __init__(self, name: str, tip: str = "", box: pg.ViewBox | None = None) -> None:
         """``box`` holds the picture; the default one pans and zooms."""
-        super().__init__()
-        named(self, name, tip)
+        super().__init__(name, tip)
         self.box = box or pg.ViewBox(lockAspect=True, invertY=True, enableMenu=False)
         self.addItem(self.box, 0, 0)
         self.image = pg.ImageItem(axisOrder="row-major")

@@ -6,10 +6,11 @@ import math
 from typing import Any
 
 import pyqtgraph as pg
+from PySide6.QtCore import QEvent
 from PySide6.QtWidgets import QGraphicsItem
 
 from dsl_app.shared.theme import Theme
-from dsl_app.shared.widgets.forms import named
+from dsl_app.shared.widgets.hints import hint, is_said_below
 
 Ticks = list[tuple[float, str]]
 #: Seconds that are marked, as far as they are in view.
@@ -25,7 +26,7 @@ class CalmPlot(pg.PlotWidget):  # type: ignore[misc]
 
     def __init__(self, name: str, tip: str, left: str, bottom: str, left_width: int = 52) -> None:
         super().__init__(enableMenu=False)
-        named(self, name, tip)
+        hint(self, name, tip)
         item = self.getPlotItem()
         item.hideButtons()
         item.showGrid(x=True, y=True, alpha=0.18)
@@ -35,6 +36,10 @@ class CalmPlot(pg.PlotWidget):  # type: ignore[misc]
             # Drawn once, and not again with every curve that moves over their grid.
             item.getAxis(side).setCacheMode(QGraphicsItem.CacheMode.DeviceCoordinateCache)
         item.getAxis("left").setWidth(left_width)
+
+    def event(self, event: QEvent) -> bool:
+        """Leave out a tooltip that the status line has already."""
+        return False if is_said_below(self, event) else bool(super().event(event))
 
     def apply_theme(self, theme: Theme) -> None:
         """Apply the colours of a theme to background and axes."""
