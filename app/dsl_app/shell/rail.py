@@ -39,7 +39,9 @@ class Rail(QFrame):
         return button
 
     def mark(self, key: str) -> None:
-        """Mark a page as open."""
+        """Mark a page as open; the keyboard goes on from it if it was at another one."""
+        if any(button.hasFocus() for button in self._buttons.values()):
+            self._buttons[key].setFocus()
         self._buttons[key].setChecked(True)
 
     def paint_icons(self, theme: Theme) -> None:

@@ -91,6 +91,17 @@ def test_pages_are_made_when_first_opened(window: MainWindow) -> None:
     assert window.windowTitle().startswith("Results")
 
 
+def test_the_keyboard_goes_on_from_the_page_that_is_opened(window: MainWindow) -> None:
+    first, last = (window.rail._buttons[key] for key in (window.pages[0], window.pages[-1]))
+    first.setFocus()
+    window.open_page(window.pages[-1])
+    assert window.focusWidget() is last
+    # Somewhere else it stays.
+    window.menuBar().setFocus()
+    window.open_page(window.pages[0])
+    assert window.focusWidget() is window.menuBar()
+
+
 def test_the_open_page_is_remembered(window: MainWindow, tmp_path: Path) -> None:
     window.open_page("scan")
     window.close()
