@@ -29,6 +29,7 @@ from dsl_app.shared.evented import follow_any
 from dsl_app.shared.jobs.base import JobRunner
 from dsl_app.shared.theme import DARK, Theme
 from dsl_app.shared.widget_state import LabelState
+from dsl_app.shared.widgets.clipped_label import ClippedLabel
 from dsl_app.shared.widgets.deferred import Deferred
 from dsl_app.shared.widgets.figure_file import PlotFigure
 from dsl_app.shared.widgets.forms import label, push_button, show_label
@@ -86,7 +87,7 @@ class ResultsPage(PageWidget):
         self.search = SearchPanel(state, control.search)
         set_help(self.search, "numbers#search")
         self._graph: IntensityWindow | None = None
-        self.title, self.about = label("Results", "title"), label("", "muted", can_be_copied=True)
+        self.title, self.about = label("Results", "title"), ClippedLabel()
         self.warning = label("", "warn", wraps=True)
         self.reconstruct_again = push_button(
             "Reconstruct again…",
@@ -116,9 +117,6 @@ class ResultsPage(PageWidget):
     # Lay out ---------------------------------------------------------------------------------------
 
     def _lay_out(self) -> None:
-        self.about.setSizePolicy(
-            self.about.sizePolicy().Policy.Ignored, self.about.sizePolicy().verticalPolicy()
-        )
         buttons = (self.reconstruct_again, self._inspect, self._open, self._report, self._export)
         head = row_of(self.title, 10, (self.about, 1), *buttons)
         greeting = boxed(column_of((self.welcome, 0, Qt.AlignmentFlag.AlignCenter)))
