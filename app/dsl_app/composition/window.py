@@ -18,7 +18,7 @@ from dsl_app.composition.first_connection import FirstConnection
 from dsl_app.composition.rig_profiles import ProfileAction
 from dsl_app.connection.state import Link, RigChoice, RigState
 from dsl_app.shared.known_files import Kind
-from dsl_app.shared.settings import data_folder
+from dsl_app.shared.settings import data_folder, demo_folder
 from dsl_app.shared.widgets.page import PageWidget
 from dsl_app.shell.application import make_window, open_first_page
 from dsl_app.shell.main_window import MainWindow
@@ -186,7 +186,7 @@ class Composition(QObject):
         parts, toasts = self.window.parts, self.window.toasts
         self.window.opened.connect(lambda page: None if page == "results" else toasts.withdraw(PRESENTED))
         return DemoController(
-            _demo_folder(), self.rig, parts.runner, toasts, self._show_result, self._open_scan_page
+            demo_folder(), self.rig, parts.runner, toasts, self._show_result, self._open_scan_page
         )
 
     def _show_result(self, path: Path) -> None:
@@ -313,7 +313,7 @@ class Composition(QObject):
         )
         state.finished.changed.connect(self._remember_scan)
         self.scans = controller = ScanController(
-            state, rig, parts.runner, window.toasts, parts.undo, hidden=_demo_folder(), pace=self._pace
+            state, rig, parts.runner, window.toasts, parts.undo, hidden=demo_folder(), pace=self._pace
         )
         state.wanted.connect(lambda _: window.open_page("scan"))
         self.calibration_in_use.serve_scans(controller)
@@ -364,12 +364,12 @@ class Composition(QObject):
 
     def _remember_folder(self, state: ScanState) -> None:
         folder = state.target.value.parent
-        if folder != _demo_folder():
+        if folder != demo_folder():
             self.window.parts.settings.output_folder = str(folder)
 
     def _remember_scan(self, finished: Path | None) -> None:
         """List a scan as recent once its frames are complete: its result may fail, or not be wanted yet."""
-        if finished is not None and finished.parent != _demo_folder():
+        if finished is not None and finished.parent != demo_folder():
             self.window.parts.recent.add(finished)
 
     def _results_page(self) -> PageWidget:
@@ -408,7 +408,3 @@ class Composition(QObject):
         self.window.opened.connect(offer_open_result)
         offer_open_result("compare")
         return ComparePage(state, controller, series_state, series, parts.recent)
-
-
-def _demo_folder() -> Path:
-    return data_folder() / "demo"

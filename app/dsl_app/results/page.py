@@ -27,6 +27,7 @@ from dsl_app.results.view_bar import ViewBar
 from dsl_app.results.welcome import Offer, Welcome
 from dsl_app.shared.evented import follow_any
 from dsl_app.shared.jobs.base import JobRunner
+from dsl_app.shared.settings import folder_for
 from dsl_app.shared.theme import DARK, Theme
 from dsl_app.shared.widget_state import LabelState
 from dsl_app.shared.widgets.clipped_label import ClippedLabel
@@ -243,7 +244,7 @@ class ResultsPage(PageWidget):
         result = self._state.saved_result
         if result is None:
             return
-        draft = str(result.path.with_name(f"{result.path.stem}_report.html"))
+        draft = str(folder_for(result.path) / f"{result.path.stem}_report.html")
         kinds = "HTML page (*.html);;PDF (*.pdf)"
         target = ask_target(self, "Write a report", draft, kinds)
         if target is not None:

@@ -97,6 +97,16 @@ def data_folder() -> Path:
     return user_data_path("dsl-scan", appauthor=False)
 
 
+def demo_folder() -> Path:
+    """Folder of the examples and of live demos, in which nobody looks for files of their own."""
+    return data_folder() / "demo"
+
+
+def folder_for(path: Path) -> Path:
+    """Where a person looks for what is written of a scan or result: next to it, at home for an example."""
+    return Path.home() if path.parent == demo_folder() else path.parent
+
+
 def load_settings(path: Path) -> tuple[Settings, str]:
     """Settings and a sentence on what was wrong with the file (empty: nothing).
 

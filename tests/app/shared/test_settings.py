@@ -3,7 +3,14 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
-from dsl_app.shared.settings import RECENT_COUNT, Settings, load_settings, save_settings
+from dsl_app.shared.settings import (
+    RECENT_COUNT,
+    Settings,
+    demo_folder,
+    folder_for,
+    load_settings,
+    save_settings,
+)
 
 
 def test_settings_come_back(tmp_path: Path) -> None:
@@ -47,3 +54,8 @@ def test_recent_files_are_unique_and_few(tmp_path: Path) -> None:
     assert len(settings.recent) == RECENT_COUNT
     assert settings.recent[0].endswith("5.dsl")
     assert len(set(settings.recent)) == RECENT_COUNT
+
+
+def test_files_of_an_example_are_offered_at_home_and_others_next_to_their_result(tmp_path: Path) -> None:
+    assert folder_for(tmp_path / "leaf.zarr") == tmp_path
+    assert folder_for(demo_folder() / "face.zarr") == Path.home()

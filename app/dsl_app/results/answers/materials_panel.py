@@ -9,6 +9,7 @@ from PySide6.QtWidgets import QFileDialog, QWidget
 
 from dsl_app.results.answers.controller import AnswersController, Way
 from dsl_app.results.state import Materials, ResultsState
+from dsl_app.shared.settings import folder_for
 from dsl_app.shared.theme import DARK, Theme
 from dsl_app.shared.widgets.forms import ChoiceBox, NumberBox, check_box, label, push_button, quiet
 from dsl_app.shared.widgets.icons import swatch
@@ -128,7 +129,7 @@ class MaterialsPanel(QWidget):
         result = self._state.result.value
         if result is None:
             return
-        draft = str(result.path.with_name(f"{result.path.stem}_materials.hdr"))
+        draft = str(folder_for(result.path) / f"{result.path.stem}_materials.hdr")
         kinds = "ENVI classification (*.hdr);;Points with their class (*.ply);;Table of areas (*.csv)"
         target = ask_target(self, "Write the map of materials", draft, kinds)
         if target is not None:

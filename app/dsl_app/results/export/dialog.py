@@ -16,6 +16,7 @@ from PySide6.QtWidgets import (
 )
 
 from dsl_app.results.export.controller import ExportController
+from dsl_app.shared.settings import folder_for
 from dsl_app.shared.widgets.forms import check_box, label, named, push_button, set_role
 from dsl_app.shared.widgets.help_window import add_help_key
 from dsl_app.shared.widgets.layouts import STRETCH, column_of, row_of
@@ -35,7 +36,7 @@ class ExportDialog(QDialog):
         self.setWindowTitle("Export")
         self.resize(560, 360)
         add_help_key(self, "exporting")
-        self.folder = named(QLineEdit(str(result.path.parent)), "Folder", "Where to write the files")
+        self.folder = named(QLineEdit(str(folder_for(result.path))), "Folder", "Where to write the files")
         tip = "Each format adds its own suffix"
         self.name = named(QLineEdit(result.path.stem), "Name without suffix", tip)
         browse = push_button("Choose…", "Choose the folder to write to", self._browse)

@@ -21,6 +21,7 @@ from PySide6.QtWidgets import (
 from dsl_app.results.marks.comparison import comparison_html
 from dsl_app.results.marks.controller import MarksController
 from dsl_app.results.state import Mark, ResultsState
+from dsl_app.shared.settings import folder_for
 from dsl_app.shared.theme import DARK, Theme
 from dsl_app.shared.widgets.forms import label, named, push_button, quiet
 from dsl_app.shared.widgets.icons import SWATCH_PX, swatch
@@ -129,7 +130,7 @@ class MarksPanel(QWidget):
         result = self._state.result.value
         if result is None or not self._control.can_export():
             return
-        draft = str(result.path.with_name(f"{result.path.stem}_spectra.csv"))
+        draft = str(folder_for(result.path) / f"{result.path.stem}_spectra.csv")
         target = ask_target(self, "Export spectra", draft, "Spectra (*.csv)")
         if target is not None:
             self._control.export_spectra(target[0], overwrite=target[1])
