@@ -68,8 +68,8 @@ def scan_of(path: Path, attributes: Mapping[Any, Any]) -> Path:
         if (folder / MANIFEST_NAME).is_file() and read_manifest(folder).created == captured:
             return folder
     raise StoreError(
-        f"This needs the frames of the scan, and the scan of {path.name}{_when(captured)} is not next to it."
-        f" Move it to {path.parent}."
+        f"This needs the frames of the scan, and the scan of {path.name}{_when(captured)} is not in"
+        f" {path.parent}. Put it there; the examples of the program come without their frames."
     )
 
 

@@ -181,7 +181,7 @@ def test_what_is_not_a_complete_scan_is_told(bench: Bench) -> None:
     assert "lacks 3 of" in bench.notifier.told[-1][1]
     shutil.rmtree(bench.folder / "small.dsl")
     bench.prepare("small.zarr")
-    assert "is not next to it" in bench.notifier.told[-1][1]
+    assert "Put it there; the examples of the program come without" in bench.notifier.told[-1][1]
 
 
 def test_the_cost_is_said_in_bands_and_bytes(bench: Bench) -> None:
