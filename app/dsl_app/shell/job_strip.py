@@ -103,7 +103,7 @@ def _words_of(job: Job[Any], others: int) -> list[str]:
     parts = [job.title]
     if job.token.is_cancelled:
         parts.append("stopping")
-    elif job.progress.stage:
+    elif job.progress.stage.casefold() not in job.title.casefold():
         parts.append(job.progress.stage)
     left = job.left
     if left is not None and left.seconds >= 2 and not job.token.is_cancelled:

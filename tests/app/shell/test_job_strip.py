@@ -71,6 +71,17 @@ def test_the_time_left_says_of_what(is_whole: bool, words: str, monkeypatch: pyt
     assert view.text.split(" · ")[-1] == words
 
 
+@pytest.mark.parametrize(
+    ("stage", "words"),
+    [("", []), ("Pose 2", []), ("pose 2", []), ("scan", ["scan"]), ("Pose 2: scan", ["Pose 2: scan"])],
+)
+def test_a_stage_that_the_title_names_is_not_said_again(stage: str, words: list[str]) -> None:
+    job = Job("Geometry: Capture Pose 2", lambda progress: None, progress=JobProgress(stage))
+    view = strip_view([job])
+    assert view is not None
+    assert view.text.split(" · ") == [job.title, *words]
+
+
 def test_a_job_that_knows_better_is_believed() -> None:
     job = Job("Scan leaf", lambda progress: None, time_left=lambda: 90.0)
     assert job.left == TimeLeft(90.0, True)
