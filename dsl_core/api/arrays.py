@@ -59,10 +59,11 @@ def calibrate_geometry(
     baseline_mm: float | None = None,
     hold: Collection[str] = (),
 ) -> GeometryCalibration:
-    """Lenses of camera and projector, and their pose, from pictures of a printed board under Gray code.
+    """Lenses of camera and projector, and their pose, from pictures of a board under Gray code.
 
     ``poses`` holds for each pose of the board its pictures, arrays (rows, columns) of values linear in light:
-    pattern and inverse of every bit of the projector's columns, then of its rows, then white and black.
+    pattern and inverse of every bit of the projector's columns, then of its rows if there are any, then white
+    and black. Without rows the record is ``columns_only``: fy, cy and ty of the projector are assumed.
     ``board`` is a `Checkerboard` or `Charuco` of `dsl_core.model.board`, ``projector_size_px`` (width,
     height), ``bayer`` the mosaic of the camera, ``camera_binning`` how many pixels of the sensor a pixel
     spans, ``baseline_mm`` a measured distance of the devices that checks the printed size. ``hold`` names

@@ -188,6 +188,8 @@ def print_geometry(output: Output, found: GeometryCalibration) -> None:
         (what, *(f"{getattr(lens, name):.2f} ± {getattr(deviation, name):.2f}" for name in names))
         for what, lens, deviation in lenses
     ]
+    if found.columns_only:
+        rows[1] = (*rows[1][:2], f"{rows[1][2]} assumed", rows[1][3], f"{rows[1][4]} assumed")
     output.table(("lens", "fx px", "fy px", "cx px", "cy px"), rows)
     headings = (
         "pose",

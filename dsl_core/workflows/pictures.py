@@ -44,13 +44,16 @@ def calibrate_geometry(
     """Lenses and pose of camera and projector from folders of pictures, one per board pose, film off.
 
     Pictures are numbered in the order of the Gray code, with white and black last, unless a ``mapping`` says
-    what each of them shows. Terms of distortion in ``hold`` (k1, k2, k3, tangential) are zero. Leaves out
+    what each of them shows. Where the first pose has as many as columns alone need, rows are done without,
+    see `GeometryCalibration`. Terms of distortion in ``hold`` (k1, k2, k3, tangential) are zero. Leaves out
     poses whose board or code cannot be read, and says so. Raises `CalibrationError` that names the picture
     that is missing, or the poses that are wrong when too few are left, and `StoreError` for pictures that do
     not fit the mapping.
     """
-    bits, progress = bit_counts(GrayCode(), projector_size_px), progress or NoProgress()
+    progress = progress or NoProgress()
     folders = pose_folders(folder)
+    columns, rows = bit_counts(GrayCode(), projector_size_px)
+    bits = (columns, 0 if len(_pictures(folders[0])) == 2 * columns + 2 else rows)
 
     def pictures() -> Iterator[PoseFrames]:
         for index, pose_folder in enumerate(folders):

@@ -1,4 +1,4 @@
-"""Small pictures of a board in several poses before a known camera and projector, under Gray code."""
+"""Small pictures of a board in several poses before a known camera and projector, under several codes."""
 
 from __future__ import annotations
 
@@ -9,7 +9,9 @@ from numpy.typing import NDArray
 
 from dsl_core.calibration.geometry.bundle import rotation_of
 from dsl_core.model.board import Checkerboard
+from dsl_core.model.captured_code import CapturedCode, Phases
 from dsl_core.model.plan import GrayCode
+from dsl_core.patterns.captured_code import captured_levels
 from tests.cases.code_frames import code_images
 
 BOARD = Checkerboard(columns=6, rows=5, square_mm=30.0)
@@ -22,10 +24,37 @@ _FINE = 2
 Floats = NDArray[np.float64]
 
 
+Pictures = tuple[NDArray[np.uint8], ...]
+
+
 @cache
-def board_set() -> tuple[tuple[NDArray[np.uint8], ...], ...]:
+def board_set() -> tuple[Pictures, ...]:
     """For each pose all pictures in the order of the Gray code, then white and black."""
-    return tuple(_pictures(tilt, 520.0 + 20 * k) for k, tilt in enumerate(_TILTS))
+    return _set(code_images(GrayCode(), PROJECTOR_PX))
+
+
+@cache
+def columns_set() -> tuple[Pictures, ...]:
+    """The same under the Gray code of columns alone."""
+    return tuple((*pose[:14], *pose[28:]) for pose in board_set())
+
+
+@cache
+def phase_set(*axes: str) -> tuple[Pictures, ...]:
+    """The same under eight steps of sinusoids of 1, 4 and 16 fringes along each of the axes, then lights."""
+    sets = {
+        axis: (Phases(periods_px=tuple(size / count for count in (1, 4, 16)), steps=8),)
+        for axis, size in zip(("columns", "rows"), PROJECTOR_PX, strict=True)
+        if axis in axes
+    }
+    code = CapturedCode(column_sets=sets.get("columns", ()), row_sets=sets.get("rows", ()))
+    levels = [captured_levels(code, PROJECTOR_PX, index) for index in range(code.frame_count)]
+    lights = [np.full(PROJECTOR_PX[::-1], value) for value in (1.0, 0.0)]
+    return _set(np.rint(255 * np.stack([*levels, *lights])).astype(np.uint8))
+
+
+def _set(patterns: NDArray[np.uint8]) -> tuple[Pictures, ...]:
+    return tuple(_pictures(tilt, 520.0 + 20 * k, patterns) for k, tilt in enumerate(_TILTS))
 
 
 def column_of_wall(depth_mm: float) -> Floats:
@@ -48,7 +77,7 @@ def _on_projector(points_mm: Floats) -> Floats:
     return np.asarray(PROJECTOR_FX_PX * there[..., :2] / there[..., 2:] + middle)
 
 
-def _pictures(tilt: tuple[float, float, float], depth_mm: float) -> tuple[NDArray[np.uint8], ...]:
+def _pictures(tilt: tuple[float, float, float], depth_mm: float, patterns: NDArray[np.uint8]) -> Pictures:
     turn, rays = rotation_of(np.array(tilt)), _rays(_FINE)
     centre = np.array([0.0, 0.0, depth_mm])
     points = rays * ((centre @ turn[:, 2]) / (rays @ turn[:, 2]))[..., None]
@@ -59,7 +88,7 @@ def _pictures(tilt: tuple[float, float, float], depth_mm: float) -> tuple[NDArra
     at = np.rint(_on_projector(points)).astype(int)
     width, height = CAMERA_PX
     pictures = []
-    for pattern in code_images(GrayCode(), PROJECTOR_PX):
+    for pattern in patterns:
         lit = albedo * pattern[at[..., 1].clip(0, 95), at[..., 0].clip(0, 127)] * 0.8 + 4
         pictures.append(lit.reshape(height, _FINE, width, _FINE).mean((1, 3)).round().astype(np.uint8))
     return tuple(pictures)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -54,15 +55,31 @@ class Adjustment:
     used: NDArray[np.bool_]
 
 
-class Problem:
-    """Corners of all poses in one array each, and their residuals with derivatives."""
+class Prior(NamedTuple):
+    """What is known of the parameter of a number before any corner is seen: its value and deviation."""
 
-    def __init__(self, poses: Sequence[PoseObservation], held: Collection[int] = ()) -> None:
+    number: int
+    value: float
+    std: float
+
+
+class Problem:
+    """Corners of all poses in one array each, and their residuals with derivatives.
+
+    Rows of the projector that are not known (NaN) have no residual.
+    """
+
+    def __init__(
+        self, poses: Sequence[PoseObservation], held: Collection[int] = (), priors: Sequence[Prior] = ()
+    ) -> None:
         """Collect the corners; parameters of the numbers ``held`` keep their value."""
         self._held = list(held)
+        self.priors = tuple(priors)
         self.board_mm = np.concatenate([pose.board_mm for pose in poses])
         self.camera_px = np.concatenate([pose.camera_px for pose in poses])
-        self.projector_px = np.concatenate([pose.projector_px for pose in poses])
+        seen_px = np.concatenate([pose.projector_px for pose in poses])
+        self._unseen = np.isnan(seen_px)
+        self.projector_px = np.where(self._unseen, 0.0, seen_px)
         self.slopes = np.concatenate([pose.slopes for pose in poses])
         self.pose_of = np.repeat(np.arange(len(poses)), [len(pose.ids) for pose in poses])
 
@@ -90,6 +107,7 @@ class Problem:
         projector_residual = projector - self.projector_px - self.carried(camera_residual)
         projector_jac -= np.einsum("nij,njp->nip", self.slopes, camera_jac)
         camera_jac[:, :, self._held] = projector_jac[:, :, self._held] = 0
+        projector_residual[self._unseen] = projector_jac[self._unseen] = 0
         return camera_residual, projector_residual, camera_jac, projector_jac
 
     def carried(self, camera_residual: Floats) -> Floats:
@@ -144,14 +162,19 @@ def project(lens: Floats, points: Floats) -> tuple[Floats, Floats, Floats]:
     return np.asarray(pixels, np.float64).reshape(-1, 2), jacobian[:, :, 6:15], jacobian[:, :, 3:6]
 
 
-def adjust(poses: Sequence[PoseObservation], start: Floats, held: Collection[int] = ()) -> Adjustment:
+def adjust(
+    poses: Sequence[PoseObservation],
+    start: Floats,
+    held: Collection[int] = (),
+    priors: Sequence[Prior] = (),
+) -> Adjustment:
     """Minimise the weighted squares of all corners, first with robust weights, then without the outliers.
 
-    Parameters of the numbers ``held`` stay as in ``start``, with no deviation. Camera and projector are
-    weighted by their own noise, estimated from the residuals. Raises `CalibrationError` when the fit does not
-    converge.
+    Parameters of the numbers ``held`` stay as in ``start``, with no deviation; ``priors`` draw theirs. Camera
+    and projector are weighted by their own noise, estimated from the residuals. Raises `CalibrationError`
+    when the fit does not converge.
     """
-    problem = Problem(poses, held)
+    problem = Problem(poses, held, priors)
     parameters, one = start, np.ones(2)
     for _ in range(ROBUST_ROUNDS):
         far, _ = _farthest(problem, parameters, np.ones(len(problem.pose_of), bool))
@@ -172,9 +195,14 @@ def adjust(poses: Sequence[PoseObservation], start: Floats, held: Collection[int
     return _summary(problem, parameters, weights, sigmas)
 
 
-def refit(poses: Sequence[PoseObservation], start: Floats, held: Collection[int] = ()) -> Floats:
+def refit(
+    poses: Sequence[PoseObservation],
+    start: Floats,
+    held: Collection[int] = (),
+    priors: Sequence[Prior] = (),
+) -> Floats:
     """Parameters for other poses of the same rig, without their outliers, from a start that is close."""
-    problem = Problem(poses, held)
+    problem = Problem(poses, held, priors)
     everything = np.ones(len(problem.pose_of), bool)
     sigmas = _noises(problem, start, everything)
     return _solve(problem, start, sigmas, _weights(problem, start, everything))
@@ -185,6 +213,9 @@ def _solve(problem: Problem, start: Floats, sigmas: tuple[Floats, Floats], weigh
     from scipy.optimize import least_squares
 
     root = np.sqrt(weights)[:, None]
+    known = np.zeros((len(problem.priors), len(start)))
+    for row, prior in zip(known, problem.priors, strict=True):
+        row[prior.number] = 1 / prior.std
 
     # MINPACK asks for the derivatives where it last asked for the residuals.
     last: dict[bytes, tuple[Floats, Floats, Floats, Floats]] = {}
@@ -198,13 +229,15 @@ def _solve(problem: Problem, start: Floats, sigmas: tuple[Floats, Floats], weigh
 
     def residuals(parameters: Floats) -> Floats:
         camera, projector, _, _ = evaluated(parameters)
-        return np.concatenate([(camera * root / sigmas[0]).ravel(), (projector * root / sigmas[1]).ravel()])
+        off = [(parameters[prior.number] - prior.value) / prior.std for prior in problem.priors]
+        both = [(camera * root / sigmas[0]).ravel(), (projector * root / sigmas[1]).ravel()]
+        return np.concatenate([*both, off])
 
     def jacobian(parameters: Floats) -> Floats:
         _, _, camera, projector = evaluated(parameters)
         scales = [root[:, None] / sigma[:, None] for sigma in sigmas]
         both = [camera * scales[0], projector * scales[1]]
-        return np.concatenate(both).reshape(-1, len(parameters))
+        return np.concatenate([np.concatenate(both).reshape(-1, len(parameters)), known])
 
     fit = least_squares(residuals, start, jac=jacobian, method="lm", x_scale="jac", max_nfev=200)
     if not np.isfinite(fit.x).all():
@@ -247,16 +280,20 @@ def _summary(
     slopes = np.concatenate([camera_jac / sigmas[0][:, None], projector_jac / sigmas[1][:, None]], 1)[used]
     slopes *= root[:, None, None]
     rows = slopes.reshape(-1, len(parameters))
-    scale = np.linalg.norm(rows, axis=0)
+    stated = np.zeros(len(parameters))
+    for prior in problem.priors:
+        stated[prior.number] = prior.std**-2
+    scale = np.sqrt((rows**2).sum(0) + stated)
     is_held = scale == 0
     scale[is_held] = 1
-    inverse = np.linalg.pinv((rows / scale).T @ (rows / scale), hermitian=True) / np.outer(scale, scale)
+    square = (rows / scale).T @ (rows / scale) + np.diag(stated / scale**2)
+    inverse = np.linalg.pinv(square, hermitian=True) / np.outer(scale, scale)
     inverse[is_held] = inverse[:, is_held] = 0
     # A corner draws the fit towards itself: without it, its errors would be larger (Bell and McCaffrey 2002).
     leverage = slopes @ inverse @ slopes.swapaxes(1, 2)
     unseen = np.linalg.solve((1 + 1e-6) * np.eye(4) - leverage, errors[..., None])[..., 0]
     pulls = np.einsum("nk,nkp->np", unseen, slopes)
-    covariance = MARGIN**2 * inverse @ (pulls.T @ pulls) @ inverse
+    covariance = inverse @ (MARGIN**2 * (pulls.T @ pulls) + np.diag(stated)) @ inverse
     return Adjustment(parameters, covariance, camera, projector + problem.carried(camera), used)
 
 
@@ -281,6 +318,8 @@ def triangulate(shared: Floats, seen: PoseObservation, start_mm: Floats) -> Floa
         turn = move(stereo[:3], np.eye(3))[0] - shared[STEREO][3:]
         slope = np.concatenate([camera_slope, projector_slope @ turn.T], 1)
         error = np.concatenate([camera - seen.camera_px, projector - seen.projector_px], 1)
+        unseen = np.isnan(error)
+        error[unseen] = slope[unseen] = 0
         square = np.swapaxes(slope, 1, 2)
         step = np.linalg.solve(square @ slope, square @ error[:, :, None])[:, :, 0]
         points = points - step

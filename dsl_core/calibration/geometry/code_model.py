@@ -54,9 +54,14 @@ class CodeLight:
     signs: Floats
 
 
-def code_light(frames: PoseFrames, projector_size_px: tuple[int, int]) -> tuple[CodeLight, CodeLight]:
-    """The finest bits of columns and of rows."""
-    columns, _ = bit_counts(GrayCode(), projector_size_px)
+def gray_code_of(frames: PoseFrames, projector_size_px: tuple[int, int]) -> GrayCode:
+    """The Gray code of a pose, which has rows unless there are pictures for the bits of columns only."""
+    return GrayCode(rows=len(frames.pairs) != 2 * (projector_size_px[0] - 1).bit_length())
+
+
+def code_light(frames: PoseFrames, projector_size_px: tuple[int, int]) -> list[CodeLight]:
+    """The finest bits of columns, and of rows if they are coded."""
+    bits_of = bit_counts(gray_code_of(frames, projector_size_px), projector_size_px)
     black = grey_of(frames.black)
     white = grey_of(frames.white)
     light = np.maximum(white - black, 0)
@@ -67,13 +72,14 @@ def code_light(frames: PoseFrames, projector_size_px: tuple[int, int]) -> tuple[
         weight = np.where(usable, light**2 / variance, 0).astype(np.float32)
     weight[~np.isfinite(weight)] = 0
     found = []
-    for first, size in ((0, projector_size_px[0]), (columns, projector_size_px[1])):
-        bits = (size - 1).bit_length()
+    for first, bits, size in zip((0, bits_of[0]), bits_of, projector_size_px, strict=True):
+        if not bits:
+            continue
         pairs = range(first + max(bits - FINEST_BITS, 0), first + bits)
         contrast = np.stack([_contrast(frames, pair, black) for pair in pairs])
         signs = np.stack([2.0 * gray_bit(size, first + bits - 1 - pair) - 1 for pair in pairs])
         found.append(CodeLight(contrast, weight, signs))
-    return found[0], found[1]
+    return found
 
 
 def _contrast(frames: PoseFrames, pair: int, black: NDArray[np.float32]) -> NDArray[np.float32]:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from dsl_core.calibration.geometry.boards import grey_of, other_board, saturated
 from dsl_core.calibration.geometry.bundle import LENS
 from dsl_core.calibration.geometry.code_model import code_light
+from dsl_core.calibration.geometry.columns_only import of_columns_only, require_columns
 from dsl_core.calibration.geometry.plausible import implausible
 from dsl_core.calibration.geometry.projector_corners import PoseObservation, observe_pose
 from dsl_core.errors import CalibrationError
@@ -96,9 +97,11 @@ def picture_gamma(frames: PoseFrames, projector_size_px: tuple[int, int]) -> flo
     """From light to the value of a pixel: the exponent, 1 for a linear camera; NaN where unknown.
 
     Where the edges of the finest stripes cross a pixel, it gets half of white's light from the pattern and
-    from its inverse, so that their sum over white is ``2 * 0.5**gamma``.
+    from its inverse, so that their sum over white is ``2 * 0.5**gamma``. Codes that came decoded do not tell.
     """
-    columns, _ = code_light(frames, projector_size_px)
+    if not frames.pairs:
+        return float("nan")
+    columns = code_light(frames, projector_size_px)[0]
     pair = (projector_size_px[0] - 1).bit_length() - 1
     one, other, white, black = (
         grey_of(p) for p in (frames.pairs[2 * pair], frames.pairs[2 * pair + 1], frames.white, frames.black)
@@ -150,10 +153,14 @@ def check_poses(poses: Sequence[PoseObservation], camera_size_px: Size, misfits:
             " Add poses with the board tilted in different directions."
         )
     for pose in poses:
-        if not all(np.isfinite(v).all() for v in (pose.board_mm, pose.camera_px, pose.projector_px)):
+        seen = pose.projector_px[:, 0] if pose.columns_only else pose.projector_px
+        if not all(np.isfinite(v).all() for v in (pose.board_mm, pose.camera_px, seen)):
             raise CalibrationError(f"{pose.name} has corners that are not finite. Capture the pose again.")
-    _check_axes(poses)
-    _require_one_way_up(poses)
+    if of_columns_only(poses):
+        require_columns(poses)
+    else:
+        _check_axes(poses)
+        _require_one_way_up(poses)
     tilt = largest_tilt_deg(poses, camera_size_px)
     if tilt < MIN_TILT_DEG:
         raise CalibrationError(
@@ -232,11 +239,11 @@ def _affine(source: NDArray[np.float64], target: NDArray[np.float64]) -> NDArray
     return np.asarray(fit.T)
 
 
-def coverage(points_px: NDArray[np.float64], size_px: Size) -> float:
-    """Share of the cells of a grid over the picture that hold a corner."""
+def coverage(points_px: NDArray[np.float64], size_px: Sequence[int]) -> float:
+    """Share of the cells of a grid over the picture that hold a corner; points (n, axes), as many sizes."""
     cells = np.floor((points_px + 0.5) / np.array(size_px) * CELLS).astype(int)
     inside = ((cells >= 0) & (cells < CELLS)).all(1)
-    return len(np.unique(cells[inside], axis=0)) / CELLS**2
+    return len(np.unique(cells[inside], axis=0)) / CELLS ** len(size_px)
 
 
 def doubts(found: GeometryCalibration, tilt_deg: float, baseline_mm: float | None) -> list[str]:

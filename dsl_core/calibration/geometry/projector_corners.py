@@ -3,7 +3,8 @@
 Moreno and Taubin, "Simple, accurate, and robust projector-camera calibration" (3DIMPVT 2012): a corner is a
 point where four squares meet, where no pixel decodes well; but around it, on the plane of the board, the map
 from camera to projector pixels is smooth, and many decoded pixels determine it well below one pixel. Here
-that map is quadratic, and fitted to the grey values of the code instead of decoded whole numbers.
+that map is quadratic, and fitted to the grey values of the code instead of decoded whole numbers. Codes of
+columns alone give the columns of the corners; codes other than Gray come decoded.
 """
 
 from __future__ import annotations
@@ -15,12 +16,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dsl_core.calibration.geometry.boards import Corners, find_corners, grey_of, pitches_px, refine_corners
-from dsl_core.calibration.geometry.code_model import MIN_PIXELS, CornerWindow, code_light, refine_maps
+from dsl_core.calibration.geometry.code_model import (
+    MIN_PIXELS,
+    CornerWindow,
+    code_light,
+    gray_code_of,
+    refine_maps,
+)
 from dsl_core.errors import CalibrationError
 from dsl_core.model.board import Board, corner_positions_mm
 from dsl_core.model.calibration.pose_frames import PoseFrames
 from dsl_core.model.plan import GrayCode
-from dsl_core.patterns.gray_code import DecodedCode, GrayDecoder, bit_counts, frame_count, lit_mask
+from dsl_core.patterns.gray_code import DecodedCode, GrayDecoder, bit_counts, lit_mask
 
 Floats = NDArray[np.float64]
 
@@ -29,8 +36,10 @@ MIN_READ = 0.4
 #: Pixels within this share of the distance between corners are used for a corner (into all four squares
 #: around it), at most so far away, where lenses are still nearly quadratic.
 REACH, MIN_REACH_PX, MAX_REACH_PX = 0.8, 4.0, 24.0
-#: Residual (projector px) beyond which a pixel is decoded wrongly.
-INLIER_PX = 1.5
+#: Residual (projector px) beyond which a pixel is decoded wrongly, or in deviations of coarse codes.
+INLIER_PX, INLIER_SIGMAS = 1.5, 3.0
+#: Steps of the fit by least absolute residuals, which wrong pixels do not draw.
+ROBUST_ROUNDS = 10
 #: A bit counts when it differs from its inverse by this share of the light on its pixel.
 MIN_MARGIN = 0.05
 #: Pixels with less light than this share of the brightest ones are in shadow.
@@ -43,7 +52,8 @@ MAX_OUTSIDE = 0.02
 class PoseObservation:
     """Corners of one pose as both devices see them; arrays have one row a corner.
 
-    ``board_mm`` (x, y, 0) on the board, ``camera_px`` and ``projector_px`` (column, row). ``slope`` (corners,
+    ``board_mm`` (x, y, 0) on the board, ``camera_px`` and ``projector_px`` (column, row; all rows are NaN
+    where only columns are coded). ``slope`` (corners,
     2, 2) is how the projector's place changes with the camera's on the board: the code was looked up at
     ``camera_px``, so that an error there enters ``projector_px`` times the slope; None counts as
     zero. ``blur_px`` is that of the edges in the camera's picture (deviation, median of the corners).
@@ -64,6 +74,12 @@ class PoseObservation:
         return PoseObservation(self.name, *chosen, slope, self.blur_px)
 
     @property
+    def columns_only(self) -> bool:
+        """Whether the code does not say which row of the projector lights a corner."""
+        columns, rows = self.projector_px.T
+        return bool(np.isfinite(columns).all() and np.isnan(rows).all())
+
+    @property
     def slopes(self) -> Floats:
         """`slope`, zero where it is not known, shape (corners, 2, 2)."""
         return np.zeros((len(self.ids), 2, 2)) if self.slope is None else self.slope
@@ -78,15 +94,19 @@ def observe_pose(frames: PoseFrames, board: Board, projector_size_px: tuple[int,
     check_frames(frames, projector_size_px)
     corners = find_corners(grey_of(frames.white, frames.bayer), board, f"the white picture of {frames.name}")
     corners, blur_px = refine_corners(frames, corners, board)
-    code = decode_pose(frames, projector_size_px)
-    projector_px, slope = corners_on_projector(code, corners, frames, projector_size_px)
+    if frames.places_px is None:
+        code = decode_pose(frames, projector_size_px)
+        projector_px, slope = corners_on_projector(places_of(code), corners, frames, projector_size_px)
+    else:
+        projector_px, slope = corners_on_projector(frames.places_px, corners, frames, projector_size_px)
     known = np.isfinite(projector_px[:, 0])
     if known.sum() < max(6, MIN_READ * len(known)):
         raise CalibrationError(
             f"{frames.name}: the board was found ({len(known)} corners), but the projector's code can be"
             f" read around only {known.sum()} of them. {explain(frames, corners, projector_size_px)}"
         )
-    check_projector_size(code, frames.name, projector_size_px)
+    if frames.places_px is None:
+        check_projector_size(code, frames.name, projector_size_px)
     seen = PoseObservation(
         frames.name,
         corners.ids,
@@ -100,35 +120,52 @@ def observe_pose(frames: PoseFrames, board: Board, projector_size_px: tuple[int,
 
 
 def corners_on_projector(
-    code: DecodedCode, corners: Corners, frames: PoseFrames, projector_size_px: tuple[int, int]
+    places_px: NDArray[np.floating],
+    corners: Corners,
+    frames: PoseFrames,
+    projector_size_px: tuple[int, int],
 ) -> tuple[Floats, Floats]:
     """Column and row (px) of every corner on the projector, (corners, 2), and their slopes (corners, 2, 2).
 
-    NaN where too few pixels decode; see `PoseObservation` for the slopes.
+    ``places_px`` is what pixels decoded to, see `PoseFrames`. NaN where too few pixels decode, and for rows
+    that are not coded; see `PoseObservation` for the slopes.
     """
-    windows = windows_around(code, corners)
-    starts = [decoded_maps(code, window) for window in windows]
+    windows = windows_around(places_px[0].shape, corners)
+    starts = [decoded_maps(places_px, window, frames.places_std_px) for window in windows]
     known = [k for k, start in enumerate(starts) if start is not None]
-    places, slopes = np.full((len(windows), 2), np.nan), np.zeros((len(windows), 2, 2))
+    found, slopes = np.full((len(windows), 2), np.nan), np.zeros((len(windows), 2, 2))
     if not known:
-        return places, slopes
+        return found, slopes
     chosen = [windows[k] for k in known]
-    for axis, light in enumerate(code_light(frames, projector_size_px)):
-        maps = refine_maps(light, chosen, np.array([start[axis] for start in starts if start is not None]))
-        places[known, axis] = maps[:, 0]
+    by_axis = np.stack([start for start in starts if start is not None], 1)
+    if frames.places_px is None:
+        # Grey values of pictures tell more than their digits.
+        lights = code_light(frames, projector_size_px)
+        by_axis = np.stack(
+            [refine_maps(light, chosen, maps) for light, maps in zip(lights, by_axis, strict=True)]
+        )
+    for axis, maps in enumerate(by_axis):
+        found[known, axis] = maps[:, 0]
         slopes[known, axis] = maps[:, 1:3] / np.array([each.radius_px for each in chosen])[:, None]
-    return places, slopes
+    return found, slopes
+
+
+def places_of(code: DecodedCode) -> Floats:
+    """Columns, and rows if they are coded, of all pixels as `PoseFrames` has them."""
+    axes = [code.column] if code.row is None else [code.column, code.row]
+    return np.where(code.undecided, np.nan, np.stack(axes).astype(float))
 
 
 def check_frames(frames: PoseFrames, projector_size_px: tuple[int, int]) -> None:
     """Raise `CalibrationError` when the pictures of a pose are incomplete, of mixed sizes or exchanged."""
-    wanted = frame_count(GrayCode(), projector_size_px) - 2
-    if len(frames.pairs) != wanted:
-        width, height = projector_size_px
+    width, height = projector_size_px
+    columns, rows = bit_counts(GrayCode(), projector_size_px)
+    decoded = frames.places_px is not None
+    if not decoded and len(frames.pairs) not in (2 * columns, 2 * (columns + rows)):
         raise CalibrationError(
             f"{frames.name} has {len(frames.pairs)} pattern pictures; a projector of {width} x {height} px"
-            f" needs {wanted} (pattern and inverse of every bit). Correct the projector's size or capture the"
-            " pose again."
+            f" needs {2 * (columns + rows)} (pattern and inverse of every bit), or {2 * columns} for columns"
+            " alone. Correct the projector's size or capture the pose again."
         )
     shapes = {np.shape(picture) for picture in (*frames.pairs, frames.white, frames.black)}
     if len(shapes) > 1:
@@ -152,7 +189,7 @@ def decode_pose(frames: PoseFrames, projector_size_px: tuple[int, int]) -> Decod
 
     A mosaic is decoded pixel by pixel, since a pixel is compared with itself only.
     """
-    decoder = GrayDecoder(GrayCode(), projector_size_px)
+    decoder = GrayDecoder(gray_code_of(frames, projector_size_px), projector_size_px)
     light = grey_of(frames.white) - grey_of(frames.black)
     bright = float(np.quantile(light, 0.99))
     # Noise of a bit over the light it is made of: the limit is a share, so each pixel has its own scale.
@@ -177,36 +214,64 @@ def check_projector_size(code: DecodedCode, name: str, projector_size_px: tuple[
 
 def readable_share(code: DecodedCode, corners: Corners) -> float:
     """Share of the corners around which the code can be read."""
-    maps = [decoded_maps(code, window) for window in windows_around(code, corners)]
+    places = places_of(code)
+    maps = [decoded_maps(places, window) for window in windows_around(code.undecided.shape, corners)]
     return sum(each is not None for each in maps) / max(len(maps), 1)
 
 
-def windows_around(code: DecodedCode, corners: Corners) -> list[CornerWindow]:
-    """The pixels used for each corner."""
+def windows_around(shape: tuple[int, ...], corners: Corners) -> list[CornerWindow]:
+    """The pixels used for each corner of a picture of a shape."""
     radii = np.clip(REACH * pitches_px(corners.points_px), MIN_REACH_PX, MAX_REACH_PX)
     return [
-        CornerWindow.around(point, radius, code.undecided.shape)
+        CornerWindow.around(point, radius, shape)
         for point, radius in zip(corners.points_px, radii, strict=True)
     ]
 
 
-def decoded_maps(code: DecodedCode, window: CornerWindow) -> Floats | None:
-    """Quadratic maps (2, 6) to column and row through most of the decoded pixels; None for too few."""
-    import cv2
+def decoded_maps(
+    places_px: NDArray[np.floating], window: CornerWindow, std_px: NDArray[np.floating] | None = None
+) -> Floats | None:
+    """Quadratic maps (axes, 6) to column and row through most of the decoded pixels; None for too few.
 
-    assert code.row is not None
-    read = ~code.undecided[window.rows, window.columns]
-    near = window.terms[read][:, 1:3]
-    if len(near) < MIN_PIXELS or not _surrounds(near):
+    Pixels weigh by their deviations ``std_px``, of the shape of ``places_px`` (axes, rows, columns).
+    """
+    seen = places_px[:, window.rows, window.columns].astype(float)
+    read = np.isfinite(seen).all(0)
+    terms = window.terms[read]
+    if len(terms) < MIN_PIXELS or not _surrounds(terms[:, 1:3]):
         return None
-    pixels = (window.rows[read], window.columns[read])
-    seen = np.stack([code.column[pixels], code.row[pixels]], 1).astype(float)
-    homography, used = cv2.findHomography(near, seen, cv2.RANSAC, INLIER_PX)
-    if homography is None or used.sum() < max(MIN_PIXELS, 0.5 * len(near)):
+    stds = np.ones_like(seen) if std_px is None else std_px[:, window.rows, window.columns].astype(float)
+    limits = np.full_like(seen, INLIER_PX) if std_px is None else np.maximum(INLIER_PX, INLIER_SIGMAS * stds)
+    maps = [
+        _map_of_most(terms, values, std, limit)
+        for values, std, limit in zip(seen[:, read], stds[:, read], limits[:, read], strict=True)
+    ]
+    return None if any(each is None for each in maps) else np.array(maps)
+
+
+def _map_of_most(terms: Floats, values: Floats, std: Floats, limit: Floats) -> Floats | None:
+    """The quadratic map (6,) from which most values are off by less than a limit; None if most are not."""
+    agree = off_most(terms, values, limit) < limit
+    if agree.sum() < max(MIN_PIXELS, 0.5 * len(values)):
         return None
-    agree = used.ravel() > 0
-    maps, *_ = np.linalg.lstsq(window.terms[read][agree], seen[agree], rcond=None)
-    return np.asarray(maps.T)
+    return _weighted_map(terms, values, agree / std**2)
+
+
+def off_most(terms: Floats, values: Floats, limit: Floats | float = INLIER_PX) -> Floats:
+    """How far values (n,) are from the linear map of ``terms`` (n, k) with the least absolute residuals.
+
+    Residuals below ``limit`` count squared.
+    """
+    weights = off = np.ones_like(values)
+    for _ in range(ROBUST_ROUNDS):
+        off = np.abs(values - terms @ _weighted_map(terms, values, weights))
+        weights = 1 / np.maximum(off, limit)
+    return off
+
+
+def _weighted_map(terms: Floats, values: Floats, weights: Floats) -> Floats:
+    root = np.sqrt(weights)
+    return np.asarray(np.linalg.lstsq(terms * root[:, None], values * root, rcond=None)[0])
 
 
 def _surrounds(near: Floats) -> bool:
@@ -216,8 +281,9 @@ def _surrounds(near: Floats) -> bool:
 
 def explain(frames: PoseFrames, corners: Corners, projector_size_px: tuple[int, int]) -> str:
     """Why a code cannot be read: another order of the pictures that can, or else how they are lit."""
-    bits = bit_counts(GrayCode(), projector_size_px)
-    for words, pairs in _other_orders(list(frames.pairs), bits[0]):
+    bits = bit_counts(gray_code_of(frames, projector_size_px), projector_size_px)
+    orders = _other_orders(list(frames.pairs), bits[0]) if frames.places_px is None else []
+    for words, pairs in orders:
         code = decode_pose(replace(frames, pairs=pairs), projector_size_px)
         read = readable_share(code, corners)
         if read > 0.8:

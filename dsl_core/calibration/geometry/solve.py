@@ -14,6 +14,7 @@ from dsl_core.calibration.geometry.bundle import (
     STEREO,
     TERMS,
     Adjustment,
+    Prior,
     adjust,
     flatness,
     move,
@@ -21,6 +22,13 @@ from dsl_core.calibration.geometry.bundle import (
     rotation_of,
     triangulate,
     vector_of,
+)
+from dsl_core.calibration.geometry.columns_only import (
+    columns_only_doubts,
+    of_columns_only,
+    priors_of,
+    start_from_columns,
+    with_assumed_rows,
 )
 from dsl_core.calibration.geometry.pose_series import (
     GOOD_RMS_PX,
@@ -74,20 +82,32 @@ def calibrate_geometry(
     """
     held = _places_of(hold)
     check_poses(poses, camera_size_px)
-    fit = adjust(poses, initial(poses, camera_size_px, projector_size_px, hold), held)
+    columns_only = of_columns_only(poses)
+    start = initial(poses, camera_size_px, projector_size_px, hold)
+    priors = [each for each in priors_of(start) if each.number not in held] if columns_only else []
+    fit = adjust(poses, start, held, priors)
     kept = _fitting(poses, fit)
     final = fit
     if not kept.all():
         rest = [pose for pose, keep in zip(poses, kept, strict=True) if keep]
         misfits = [pose.name for pose, keep in zip(poses, kept, strict=True) if not keep]
         check_poses(rest, camera_size_px, misfits)
-        final = adjust(rest, without(fit.parameters, np.flatnonzero(~kept)), held)
-    qualities = _qualities(poses, kept, fit, final, board, held)
+        final = adjust(rest, without(fit.parameters, np.flatnonzero(~kept)), held, priors)
+    if columns_only:
+        final = with_assumed_rows(final, projector_size_px)
+    qualities = _qualities(poses, kept, fit, final, board, held, priors)
     found = _record(poses, kept, final, qualities, board, camera_size_px, projector_size_px)
-    found = found.model_copy(update={"camera_binning": camera_binning, "left_out": tuple(left_out)})
+    found = found.model_copy(
+        update={
+            "camera_binning": camera_binning,
+            "left_out": tuple(left_out),
+            "columns_only": columns_only,
+        }
+    )
     normals = [rotation_of(motion[:3])[:, 2] for motion in final.parameters[SHARED:].reshape(-1, 6)]
     tilt = largest_angle_deg(np.array(normals))
-    return found.model_copy(update={"warnings": (*warnings, *doubts(found, tilt, baseline_mm))})
+    unseen = columns_only_doubts(found, poses) if columns_only else []
+    return found.model_copy(update={"warnings": (*unseen, *warnings, *doubts(found, tilt, baseline_mm))})
 
 
 def opencv_flags(hold: Collection[str]) -> int:
@@ -115,8 +135,14 @@ def initial(
     projector_size_px: Size,
     hold: Collection[str] = (),
 ) -> Floats:
-    """Start of the joint fit: each device for itself, then the median of the poses between them."""
+    """Start of the joint fit: each device for itself, then the median of the poses between them.
+
+    Where only columns are seen, the projector follows from the boards that the camera's fit has placed.
+    """
     camera, camera_boards = _alone(poses, "camera", camera_size_px, hold)
+    if of_columns_only(poses):
+        projector, stereo = start_from_columns(poses, camera_boards, projector_size_px)
+        return np.concatenate([camera, projector, stereo, camera_boards.ravel()])
     projector, projector_boards = _alone(poses, "projector", projector_size_px, hold)
     between = []
     for ours, theirs in zip(camera_boards, projector_boards, strict=True):
@@ -190,6 +216,7 @@ def _qualities(
     final: Adjustment,
     board: Board,
     held: Collection[int],
+    priors: Sequence[Prior],
 ) -> list[PoseQuality]:
     """Figures of each pose: of one that was left out, those of the fit that it did not fit."""
     positions = np.cumsum(kept) - 1
@@ -205,7 +232,7 @@ def _qualities(
         left_out = None
         if kept[index] and len(kept_poses) >= MIN_POSES_TO_LEAVE_OUT:
             rest = [other for i, other in enumerate(kept_poses) if i != at]
-            unseen = refit(rest, without(final.parameters, [at]), held)
+            unseen = refit(rest, without(final.parameters, [at]), held, priors)
             left_out = _measured(unseen, pose.only(used), motion, board)
         found.append(
             PoseQuality(
@@ -243,6 +270,7 @@ def _record(
     camera_size_px: Size,
     projector_size_px: Size,
 ) -> GeometryCalibration:
+    axes = 1 if of_columns_only(poses) else 2
     values, deviations = fit.parameters, np.sqrt(np.diag(fit.covariance).clip(0))
     camera, projector = _rms_px(fit, slice(None))
     chosen = [pose for pose, keep in zip(poses, kept, strict=True) if keep]
@@ -264,7 +292,7 @@ def _record(
         rms_with_outliers_px=float(np.sqrt(np.square(_rms_px(fit, slice(None), only_used=False)).mean())),
         camera_coverage=coverage(np.concatenate([pose.camera_px for pose in chosen]), camera_size_px),
         projector_coverage=coverage(
-            np.concatenate([pose.projector_px for pose in chosen]), projector_size_px
+            np.concatenate([pose.projector_px[:, :axes] for pose in chosen]), projector_size_px[:axes]
         ),
         squares=Flatness(
             square_mm=mean,

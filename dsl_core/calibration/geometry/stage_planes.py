@@ -17,6 +17,7 @@ from dsl_core.calibration.common.tiles import ColumnSamples
 from dsl_core.calibration.geometry.bundle import CAMERA, PROJECTOR, SHARED, STEREO, rotation_of, vector_of
 from dsl_core.calibration.geometry.solve import lens_of
 from dsl_core.errors import CalibrationError
+from dsl_core.model.calibration.geometry import GeometryCalibration
 from dsl_core.model.geometry import Lens
 from dsl_core.model.rig import Rig
 from dsl_core.optics.pinhole import distort, rays_at
@@ -47,8 +48,8 @@ NO_PLANE_PX = 0.5
 MAX_PULL = 4.0
 
 
-def shared_parameters(rig: Rig) -> Floats:
-    """The 24 numbers of a rig's lenses and pose, in the order of `GeometryCalibration.covariance`."""
+def shared_parameters(rig: Rig | GeometryCalibration) -> Floats:
+    """The 24 numbers of lenses and pose, in the order of `GeometryCalibration.covariance`."""
 
     def numbers(lens: Lens) -> list[float]:
         return [lens.fx_px, lens.fy_px, lens.cx_px, lens.cy_px, *lens.distortion]

@@ -72,11 +72,15 @@ class GeometryCalibration(Record):
     how many sensor pixels a camera pixel spans along a side: errors times it are errors at full resolution.
     Coverage is the share of an 8 x 8 grid of image cells that hold a corner. ``squares`` sums up all used
     poses; ``left_out`` are those whose board or code could not be read, or that a person left out.
+    ``columns_only``: rows of the projector were not seen; fy, cy and ty of the projector are assumed, their
+    deviations are those of the assumption, errors of the projector are those of columns, and its coverage is
+    that of 8 strips.
     ``covariance``, row by row, is that of 24 parameters: fx, fy, cx, cy, k1, k2, p1, p2, k3 of the camera and
     of the projector, then rotation vector (rad) and translation (mm) of the pose; None where it is not known.
     """
 
     schema_version: Literal[1] = 1
+    columns_only: bool = False
     board: Board
     camera: Lens
     projector: Lens

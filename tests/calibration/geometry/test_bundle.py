@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -13,6 +14,8 @@ from dsl_core.calibration.geometry.bundle import (
     PROJECTOR,
     SHARED,
     STEREO,
+    Prior,
+    Problem,
     _farthest,
     _noise,
     _sides,
@@ -72,6 +75,8 @@ def test_a_bent_board_is_measured() -> None:
 
 class Linear:
     """Corners whose errors in both pictures are linear in the parameters, in the place of a bundle."""
+
+    priors: tuple[Prior, ...] = ()
 
     def __init__(self, count: int = 40, seed: int = 1) -> None:
         rng = np.random.default_rng(seed)
@@ -206,3 +211,35 @@ def test_a_fit_that_ends_nowhere_is_refused(monkeypatch: pytest.MonkeyPatch) -> 
     jacobian = asked[0].pop("jac")(np.zeros(3))
     assert jacobian.shape == (160, 3)
     assert asked == [{"method": "lm", "x_scale": "jac", "max_nfev": 200}]
+
+
+def test_what_is_known_before_counts_like_one_more_measurement_and_scatters_as_it_says() -> None:
+    problem = Linear(60)
+    # Nothing is measured of the last number but what is stated of it.
+    problem.slopes[..., 2] = 0
+    problem.seen = problem.slopes @ np.array([0.3, -0.2, 0.0])
+    problem.priors = (Prior(2, 5.0, 0.25),)
+    one = np.ones(2)
+    found = _solve(problem, np.zeros(3), (one, one), np.ones(60))  # type: ignore[arg-type]
+    np.testing.assert_allclose(found, [0.3, -0.2, 5.0], atol=1e-9)
+    problem.seen += 0.01 * np.random.default_rng(5).standard_normal((2, 60, 2))
+    summary = _summary(problem, found, np.ones(60), (one, one))  # type: ignore[arg-type]
+    assert np.sqrt(summary.covariance[2, 2]) == pytest.approx(0.25)
+    problem.priors = ()
+    assert _summary(problem, found, np.ones(60), (one, one)).covariance[2, 2] == 0  # type: ignore[arg-type]
+
+
+def test_rows_that_are_not_known_have_no_residual_and_do_not_place_points() -> None:
+    seen, shared = case.poses_seen(noise_px=0.0)[1], _truth()
+    columns = replace(seen, projector_px=np.where([True, False], seen.projector_px, np.nan))
+    problem = Problem([columns])
+    parameters = np.append(shared, [0.1, 0.2, 0.0, 0.0, 0.0, 900.0])
+    _, residual, _, slope = problem.evaluate(parameters)
+    _, full, _, full_slope = Problem([seen]).evaluate(parameters)
+    assert not residual[:, 1].any()
+    assert not slope[:, 1].any()
+    np.testing.assert_array_equal(residual[:, 0], full[:, 0])
+    np.testing.assert_array_equal(slope[:, 0], full_slope[:, 0])
+    start = np.tile([0.0, 0.0, 900.0], (len(seen.ids), 1))
+    points, known = (triangulate(shared, each, start) for each in (columns, seen))
+    np.testing.assert_allclose(points, known, atol=1e-6)

@@ -11,7 +11,12 @@ import pytest
 
 from dsl_core.calibration.geometry.boards import Corners, find_corners, grey_of
 from dsl_core.calibration.geometry.pose_series import exposure_warning
-from dsl_core.calibration.geometry.projector_corners import corners_on_projector, decode_pose, observe_pose
+from dsl_core.calibration.geometry.projector_corners import (
+    corners_on_projector,
+    decode_pose,
+    observe_pose,
+    places_of,
+)
 from dsl_core.errors import CalibrationError
 from dsl_core.model.board import Charuco
 from dsl_core.model.calibration.pose_frames import PoseFrames
@@ -48,7 +53,8 @@ def test_undecided_pixels_are_done_without(frames: PoseFrames) -> None:
         code, undecided=code.undecided | lost, column=np.where(wrong, code.column ^ 64, code.column)
     )
     points = _true_corners()
-    found, _ = corners_on_projector(damaged, Corners(np.arange(20), points), frames, SMALL_PROJECTOR_PX)
+    corners = Corners(np.arange(20), points)
+    found, _ = corners_on_projector(places_of(damaged), corners, frames, SMALL_PROJECTOR_PX)
     assert np.abs(found - np.stack(on_projector(points), 1)).max() < 0.2
 
 
@@ -146,3 +152,20 @@ def test_part_of_a_charuco_board_is_enough() -> None:
 def test_the_grey_of_an_even_mosaic_is_even() -> None:
     mosaic = np.tile([[100.0, 200.0], [200.0, 40.0]], (6, 8))
     np.testing.assert_allclose(grey_of(mosaic, "RGGB"), 0.25 * 100 + 0.5 * 200 + 0.25 * 40)
+
+
+def test_columns_alone_are_found_as_with_rows(frames: PoseFrames) -> None:
+    known = observe_pose(frames, SMALL_BOARD, SMALL_PROJECTOR_PX)
+    alone = observe_pose(replace(frames, pairs=frames.pairs[:14]), SMALL_BOARD, SMALL_PROJECTOR_PX)
+    assert alone.columns_only
+    assert not known.columns_only
+    assert np.abs(alone.projector_px[:, 0] - known.projector_px[:, 0]).max() < 0.05
+    assert np.abs(alone.slopes[:, 0] - known.slopes[:, 0]).max() < 0.05
+    assert not alone.slopes[:, 1].any()
+
+
+def test_a_code_of_columns_that_does_not_reach_the_board_is_told(frames: PoseFrames) -> None:
+    dark = [np.where(np.arange(240) < 80, picture, 4) for picture in frames.pairs[:14]]
+    lit = np.where(np.arange(240) < 80, frames.white, 0.5 * frames.white)
+    with pytest.raises(CalibrationError, match=r"can be read around only \d+ of them\. Check that the"):
+        observe_pose(replace(frames, pairs=dark, white=lit), SMALL_BOARD, SMALL_PROJECTOR_PX)
