@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -212,6 +212,42 @@ def _as_captured(source: FrameSource) -> FrameSource:
     rows = (sets[1],) if code.rows else ()
     captured = CapturedCode(column_sets=(sets[0],), row_sets=rows)
     return _Captured(plan.model_copy(update={"code": captured}), source)
+
+
+@dataclass(frozen=True)
+class _OneAxis:
+    """The frames of one axis of a code as if they were its columns."""
+
+    plan: CapturePlan
+    source: FrameSource
+    first: int
+
+    def read(self, shot: Shot) -> NDArray[np.uint16]:
+        """The frame of a shot."""
+        if shot.role != "code":
+            return self.source.read(shot)
+        return self.source.read(replace(shot, pattern=self.first + shot.pattern))
+
+
+def decode_axes(source: FrameSource, sensor: Sensor) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Columns, and rows if they are coded, of all pixels with their deviations, px, (axes, rows, columns).
+
+    NaN where undecided. Unlike those of `decode_columns_of`, rows are as fine as the code tells them.
+    """
+    captured = _as_captured(source)
+    plan, code = captured.plan, captured.plan.code
+    assert isinstance(code, CapturedCode)
+    places, stds, first = [], [], 0
+    size_px = plan.projector_size_px
+    for sets, size in ((code.column_sets, size_px), (code.row_sets, size_px[::-1])):
+        if not sets:
+            continue
+        alone = plan.model_copy(update={"code": CapturedCode(column_sets=sets), "projector_size_px": size})
+        found = decode_columns_of(_OneAxis(alone, captured, first), sensor)
+        places.append(found["column_px"].values.astype(np.float64))
+        stds.append(found["column_std_px"].values.astype(np.float64))
+        first += CapturedCode(column_sets=sets).frame_count
+    return np.stack(places), np.stack(stds)
 
 
 def decode_columns_of(source: FrameSource, sensor: Sensor, progress: Progress | None = None) -> xr.Dataset:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +16,7 @@ from dsl_core.model.calibration.pose_frames import PoseFrames
 from dsl_core.model.captured_code import CapturedCode, Stripes
 from dsl_core.model.plan import GrayCode
 from dsl_core.model.rig import BayerPattern
+from dsl_core.workflows.captures import decode_axes, sensor_of
 
 
 def guess_poses(folders: list[Path], projector_size_px: tuple[int, int]) -> Guess:
@@ -29,34 +30,41 @@ def guess_poses(folders: list[Path], projector_size_px: tuple[int, int]) -> Gues
 def read_mapped_pose(folder: Path, mapping: Mapping, bayer: BayerPattern | None = None) -> PoseFrames:
     """Pictures of one pose in the order of the Gray code, DN; a lacking inverse is what white leaves of it.
 
-    Raises `StoreError` naming pictures that are missing or wrong, and `CalibrationError` for another code
-    than Gray code of all columns and rows.
+    Any other code, such as shifted sinusoids, is decoded. Raises `StoreError` naming pictures that are
+    missing or wrong, and `CalibrationError` for a code of rows alone.
     """
     source = open_pictures(folder, mapping)
-    frames = [source.read(shot) for shot in source.plan.shots() if shot.role == "code"]
     white, black = (
         next(source.read(shot) for shot in source.plan.shots() if shot.role == role)
         for role in ("white", "black")
     )
+    bayer = bayer or mapping.bayer
+    kind = _kind(source)
+    if kind == "decoded":
+        places_px, std_px = decode_axes(source, sensor_of(source))
+        return PoseFrames(folder.name, [], white, black, bayer, places_px=places_px, places_std_px=std_px)
+    frames = [source.read(shot) for shot in source.plan.shots() if shot.role == "code"]
     pairs: list[NDArray[Any]] = list(frames)
-    if not _has_inverses(source):
+    if kind == "without inverse":
         whole = white.astype(np.float32) + black
         pairs = [each for frame in frames for each in (frame.astype(np.float32), whole - frame)]
-    return PoseFrames(folder.name, pairs, white, black, bayer or mapping.bayer)
+    return PoseFrames(folder.name, pairs, white, black, bayer)
 
 
-def _has_inverses(source: PictureScan) -> bool:
-    """Whether each picture of the Gray code is followed by its inverse; raises `CalibrationError`."""
+def _kind(source: PictureScan) -> Literal["pairs", "without inverse", "decoded"]:
+    """How a pose is read: Gray code by its grey values, any other decoded; raises `CalibrationError`."""
     code, size_px = source.plan.code, source.plan.projector_size_px
-    if isinstance(code, GrayCode) and code.rows:
-        return True
-    if isinstance(code, CapturedCode) and len(code.column_sets) == len(code.row_sets) == 1:
-        sets = (*code.column_sets, *code.row_sets)
-        plain = [Stripes(bits=(length - 1).bit_length(), inverse=False, lacking=()) for length in size_px]
-        if sets == tuple(plain):
-            return False
-    raise CalibrationError(
-        f"The pictures of {source.root} are not a Gray code of all {size_px[0]} columns and {size_px[1]} rows"
-        " with every picture there, from which lenses and pose are calibrated. Capture the board under such a"
-        " code, or correct the mapping."
-    )
+    if isinstance(code, GrayCode):
+        return "pairs"
+    if not isinstance(code, CapturedCode):
+        return "decoded"
+    if not code.column_sets:
+        raise CalibrationError(
+            f"The pictures of {source.root} show rows of the projector alone; lenses and pose are calibrated"
+            " from columns, or from columns and rows. Capture vertical stripes too, or correct the mapping if"
+            " these are columns."
+        )
+    plain = [(Stripes(bits=(length - 1).bit_length(), inverse=False, lacking=()),) for length in size_px]
+    if code.column_sets == plain[0] and code.row_sets in ((), plain[1]):
+        return "without inverse"
+    return "decoded"

@@ -167,3 +167,17 @@ def test_pictures_of_a_board_in_any_order_are_guessed_and_give_the_camera_alone(
     assert "--guess finds out what --mapping states" in both.sentence
     files = give("calibrate", "geometry", tmp_path, *board, "--camera-only", "-o", "m.json")
     assert "--camera-only prints a lens" in files.sentence
+
+
+def test_sinusoids_of_columns_alone_are_guessed_and_what_is_assumed_is_printed(
+    give: Give, tmp_path: Path
+) -> None:
+    for k, pose in enumerate(board_sets.phase_set("columns")):
+        write(tmp_path / f"pose{k}", {f"{i:02d}.png": picture for i, picture in enumerate(pose)})
+    holds = [word for term in ("k1", "k2", "k3", "tangential") for word in ("--hold", term)]
+    board = ["--pictures", "--board", "6x5", "--square-mm", 30, "--projector", "128x96", "--guess", *holds]
+    ending = give("calibrate", "geometry", tmp_path, *board)
+    assert ending.code == 0, ending.err
+    assert "3 sinusoids of columns in 8 steps" in ending.out
+    assert ending.out.count("assumed") >= 2
+    assert "Only columns of the projector were seen. Assumed of its rows: square pixels" in ending.out
