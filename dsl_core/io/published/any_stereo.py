@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from pydantic import ValidationError
 
 from dsl_core.errors import CalibrationError
-from dsl_core.io.published.stereo import Size, Stereo, five_coefficients, lens_of
+from dsl_core.io.published.stereo import COLUMNS_ONLY, Size, Stereo, five_coefficients, lens_of
 from dsl_core.io.published.stereo_names import Numbers, Parts, parts_of, size_of
 from dsl_core.io.published.stereo_words import doubts, understood
 from dsl_core.io.published.tree_file import read_nodes
@@ -99,7 +99,7 @@ def load_any_stereo(
         raise CalibrationError(
             f"{path} is not a valid calibration: {problems_in_words(error)}. Correct the file."
         ) from error
-    stereo = Stereo(camera=camera, projector=projector, pose=pose)
+    stereo = Stereo(camera=camera, projector=projector, pose=pose, columns_only=COLUMNS_ONLY in nodes)
     assumed = tuple(f"no {part}" for part in _PARTS if part not in parts.names)
     taken = understood(parts, unit_mm, inverse)
     return FoundStereo(stereo, parts.names, assumed, taken, tuple(doubts(stereo)))

@@ -23,6 +23,8 @@ from dsl_core.model.base import Record, problems_in_words
 from dsl_core.model.calibration.geometry import GeometryCalibration
 from dsl_core.model.geometry import Lens, Pose
 
+#: Node of a calibration from columns alone.
+COLUMNS_ONLY = "columns_only"
 Dialect = Literal["dsl", "procam", "moreno-taubin"]
 Size = tuple[int, int]
 
@@ -55,12 +57,16 @@ _SHAPES = {
 
 
 class Stereo(Record):
-    """What a calibration file says of camera and projector; ``rms_px`` is the reprojection error."""
+    """What a calibration file says of camera and projector; ``rms_px`` is the reprojection error.
+
+    ``columns_only``: what it says of the projector's rows is assumed, see `GeometryCalibration`.
+    """
 
     camera: Lens
     projector: Lens
     pose: Pose
     rms_px: float | None = None
+    columns_only: bool = False
     dialect: Dialect = "dsl"
 
 
@@ -82,6 +88,7 @@ def load_stereo(path: Path, projector_size_px: Size, camera_size_px: Size | None
                 translation_mm=tuple(values["translation"].tolist()),
             ),
             rms_px=_rms(nodes),
+            columns_only=COLUMNS_ONLY in nodes,
             dialect=dialect,
         )
     except ValidationError as error:
@@ -93,7 +100,13 @@ def load_stereo(path: Path, projector_size_px: Size, camera_size_px: Size | None
 
 def stereo_of(found: GeometryCalibration) -> Stereo:
     """Lenses and pose of a geometric calibration in the published dialect."""
-    return Stereo(camera=found.camera, projector=found.projector, pose=found.pose, rms_px=found.rms_px)
+    return Stereo(
+        camera=found.camera,
+        projector=found.projector,
+        pose=found.pose,
+        rms_px=found.rms_px,
+        columns_only=found.columns_only,
+    )
 
 
 def save_stereo(stereo: Stereo, path: Path, *, overwrite: bool = False) -> Path:
@@ -126,6 +139,7 @@ def _nodes_of(stereo: Stereo) -> dict[str, Any]:
         "translation": pose.vector_mm[:, None],
     }
     nodes: dict[str, Any] = {_NODES[stereo.dialect][part]: value for part, value in parts.items()}
+    nodes |= {COLUMNS_ONLY: 1.0} if stereo.columns_only else {}
     rms = {} if stereo.rms_px is None else {"rms": stereo.rms_px}
     if stereo.dialect == "moreno-taubin":
         return nodes | ({} if stereo.rms_px is None else {"stereo_error": stereo.rms_px})

@@ -39,6 +39,11 @@ def doubts(stereo: Stereo) -> Iterator[str]:
     elif not USUAL_MM[0] <= distance <= USUAL_MM[1]:
         hint = "metres, give --unit-mm 1000" if distance < USUAL_MM[0] else "a smaller unit, give --unit-mm"
         yield f"the projector would be {distance:.3g} mm from the camera; if lengths are in {hint}"
+    if stereo.columns_only:
+        yield (
+            "only columns of the projector were seen: its rows (fy, cy and ty) are assumed, so depth holds,"
+            " but spectra through a film do not; calibrate with rows before you measure these"
+        )
     lens = stereo.camera
     if not (0 < lens.cx_px < lens.width_px and 0 < lens.cy_px < lens.height_px):
         yield (

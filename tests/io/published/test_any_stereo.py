@@ -12,6 +12,7 @@ import pytest
 
 from dsl_core.errors import CalibrationError
 from dsl_core.io.published.any_stereo import load_any_stereo
+from dsl_core.io.published.stereo import Stereo, load_stereo, save_stereo
 from dsl_core.io.published.stereo_rig import lenses_on
 from tests.cases.small_rig import small_rig
 
@@ -98,3 +99,17 @@ def test_what_is_missing_or_wrong_is_named(tmp_path: Path) -> None:
     (tmp_path / "c.json").write_text('{"cam_K": [', encoding="utf-8")
     with pytest.raises(CalibrationError, match=r"c\.json is not a calibration that can be read"):
         load_any_stereo(tmp_path / "c.json", CAMERA, PROJECTOR)
+
+
+@pytest.mark.parametrize("columns_only", [False, True])
+def test_a_file_says_that_rows_were_not_seen(tmp_path: Path, columns_only: bool) -> None:
+    rig = small_rig()
+    stereo = Stereo(
+        camera=rig.camera, projector=rig.projector, pose=rig.pose, rms_px=0.1, columns_only=columns_only
+    )
+    path = save_stereo(stereo, tmp_path / "stereo.yml")
+    size = (rig.projector.width_px, rig.projector.height_px)
+    found = load_any_stereo(path, projector_size_px=size)
+    assert load_stereo(path, size).columns_only == found.stereo.columns_only == columns_only
+    told = [sentence for sentence in found.doubts if "spectra through a film do not" in sentence]
+    assert len(told) == columns_only
