@@ -43,6 +43,7 @@ from dsl_core.model.rig import Rig
 from dsl_core.patterns.images import pattern_image
 from dsl_core.progress import CancelToken, NoProgress, Progress
 from dsl_core.reconstruction.merge import check_source
+from dsl_core.solve.threads import one_kernel_thread
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -125,6 +126,7 @@ def scan(
         return runner.run()
 
 
+@one_kernel_thread()
 def reconstruct(
     source: FrameSource,
     rig: Rig,
@@ -138,7 +140,8 @@ def reconstruct(
 
     Frames are read, and the result is made, by bands of rows, so that those of a large picture need not be
     in memory at once; the result is, unless a ``sink`` takes it. ``seen_geometry`` is given depth, points
-    and normals as soon as they are known: spectra take much longer.
+    and normals as soon as they are known: spectra take much longer. Threads have whole pictures or tiles to
+    work on, never parts of one tensor: see `one_kernel_thread`.
     """
     from dsl_core.optics.lines.line_set import LineSet
     from dsl_core.reconstruction.light.own_sensor import own_sensor

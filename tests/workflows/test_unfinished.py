@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import torch
 
 from dsl_core import pipeline
 from dsl_core.devices.registry import open_rig
@@ -95,6 +96,21 @@ def test_geometry_is_seen_before_the_spectra_of_the_part_asked_for(scan: Path) -
     (maps,) = seen
     for name in ("depth_mm", "depth_std_mm", "points_mm", "normals", "flags"):
         np.testing.assert_array_equal(maps[name], result[name].values)
+
+
+def test_no_stage_divides_tensors_among_threads_that_wait_for_each_other(scan: Path) -> None:
+    used: list[int] = []
+    progress = CallbackProgress(lambda _stage, _done, _total: used.append(torch.get_num_threads()))
+    before = torch.get_num_threads()
+    torch.set_num_threads(2)
+    try:
+        scans.reconstruct_scan(
+            scan, None, OPTIONS, progress, seen_geometry=lambda _: used.append(torch.get_num_threads())
+        )
+        after = torch.get_num_threads()
+    finally:
+        torch.set_num_threads(before)
+    assert (set(used), after) == ({1}, 2)
 
 
 def test_a_finished_scan_knows_what_its_pictures_show(scan: Path, tmp_path: Path) -> None:
