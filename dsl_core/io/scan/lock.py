@@ -37,6 +37,15 @@ class FolderLock:
             os.ftruncate(self._descriptor, 0)
             write_all(self._descriptor, f"{os.getpid()}\n".encode())
 
+    def is_of(self, path: Path) -> bool:
+        """Whether the file of that name is still the one that is locked, and no other of its name."""
+        try:
+            return self._descriptor is not None and os.path.samestat(
+                os.fstat(self._descriptor), os.stat(path)
+            )
+        except OSError:
+            return False
+
     def release(self) -> None:
         """Give the lock back; a second call does nothing."""
         if self._descriptor is not None:
