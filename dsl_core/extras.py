@@ -17,6 +17,8 @@ EXTRA_OF = {
     "torch": "reconstruct",
     "numba": "reconstruct",
     "cv2": "reconstruct",
+    "distributed": "cluster",
+    "obstore": "s3",
     "PySide6": "gui",
     "pyqtgraph": "gui",
     "pyvista": "gui",
@@ -28,6 +30,8 @@ EXTRA_OF = {
 _PURPOSE = {
     "reconstruct": "depth and spectra from frames, the twin, calibration, planning",
     "gui": "the window",
+    "cluster": "batches on a cluster of Dask",
+    "s3": "scans and results in an object store",
 }
 
 

@@ -1,0 +1,49 @@
+"""Where something is in an object store."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from dsl_core.errors import StoreError
+
+_SCHEME = "s3:/"
+
+
+@dataclass(frozen=True)
+class Address:
+    """A bucket, and a name in it that all objects of a scan or result begin with."""
+
+    bucket: str
+    name: str
+
+    def __str__(self) -> str:
+        return f"s3://{self.bucket}/{self.name}"
+
+
+def address_of(path: Path) -> Address | None:
+    """The address that a path of the command line stands for; None for a path of this computer.
+
+    A path keeps one slash of two. Raises `StoreError` for an address that lacks a name, or holds a secret.
+
+    >>> str(address_of(Path("s3://bucket/2026/leaf.dsl")))
+    's3://bucket/2026/leaf.dsl'
+    """
+    text = path.as_posix()
+    if not text.startswith(_SCHEME):
+        return None
+    bucket, _, name = text.removeprefix(_SCHEME).lstrip("/").partition("/")
+    if "@" in bucket:
+        # Not repeated: what is before the @ may be a secret.
+        raise StoreError(
+            "An address of an object store must not contain a user or a password. Give s3://BUCKET/NAME, and"
+            " the credentials as AWS_ACCESS_KEY_ID and AWS_SECRET_ACCESS_KEY in the environment."
+        )
+    if not bucket or not name:
+        raise StoreError(f"{text.replace(_SCHEME, 's3://')} names no object. Give s3://BUCKET/NAME.")
+    return Address(bucket, name)
+
+
+def shown(path: Path) -> str:
+    """A path as a person writes it, addresses with both slashes."""
+    return str(address_of(path) or path)

@@ -1,0 +1,65 @@
+"""Who works on a result that belongs in an object store: an object that its owner renews while it lives."""
+
+from __future__ import annotations
+
+import contextlib
+import threading
+from pathlib import PurePosixPath
+from typing import Self
+
+from dsl_core.errors import StoreError
+from dsl_core.io.claims import BEAT_S, LAPSE_S, ClaimedError, Owner
+from dsl_core.io.objects.address import Address
+from dsl_core.io.objects.store import ObjectFolder
+
+
+class ObjectClaim:
+    """Held from construction to `release`, or as a ``with`` block."""
+
+    def __init__(self, target: Address, beat_s: float = BEAT_S, lapse_s: float = LAPSE_S) -> None:
+        """Claim an address; raises `ClaimedError` that names its owner, `StoreError` if the store fails."""
+        name = PurePosixPath(target.name)
+        self._folder = ObjectFolder(Address(target.bucket, f"{name.parent}/.claims"))
+        self._name = f"{name.name}.claim"
+        self._content = Owner.this().model_dump_json().encode()
+        #: Whose claim was taken over, as a sentence; empty where there was none.
+        self.taken_over = ""
+        if not self._folder.create(self._name, self._content):
+            self._take_over(target, lapse_s)
+        self._ended = threading.Event()
+        self._thread = threading.Thread(target=self._beat, args=(beat_s,), daemon=True, name="claim")
+        self._thread.start()
+
+    def _take_over(self, target: Address, lapse_s: float) -> None:
+        owner = self._folder.get(self._name)
+        who = "another process" if owner is None else str(Owner.model_validate_json(owner))
+        # By the clock of the store, which a new object of ours tells.
+        probe = f"{self._name}.now"
+        self._folder.put(probe, b"")
+        known = self._folder.listed()
+        self._folder.remove([probe])
+        held = known.get(self._name)
+        if held is not None and (known[probe].written - held.written).total_seconds() < lapse_s:
+            raise ClaimedError(f"{target} is being made by {who}. Wait until it ends, or end it.")
+        self._folder.remove([self._name])
+        if not self._folder.create(self._name, self._content):  # another one was quicker
+            raise ClaimedError(f"{target} is being made by another process. Wait until it ends, or end it.")
+        self.taken_over = f"{target} was begun by {who}, which died; it is made again."
+
+    def _beat(self, beat_s: float) -> None:
+        while not self._ended.wait(beat_s):
+            with contextlib.suppress(StoreError):
+                self._folder.put(self._name, self._content)
+
+    def release(self) -> None:
+        """Let others work on it."""
+        self._ended.set()
+        self._thread.join()
+        with contextlib.suppress(StoreError):  # it lapses
+            self._folder.remove([self._name])
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *failure: object) -> None:
+        self.release()

@@ -1,0 +1,65 @@
+"""Folders of this computer for what is worked on and belongs in an object store."""
+
+from __future__ import annotations
+
+import hashlib
+import shutil
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from platformdirs import user_cache_path
+
+from dsl_core.extras import require_package
+from dsl_core.io.claims import Claim
+from dsl_core.io.objects.address import Address, address_of
+from dsl_core.io.objects.copies import fetch, publish, published_as, taken
+from dsl_core.io.objects.store import ObjectFolder
+from dsl_core.progress import Progress
+
+
+def room_of(address: Address) -> Path:
+    """Where a folder of a store is kept here until it is no longer needed."""
+    digest = hashlib.sha256(str(address).encode()).hexdigest()[:16]
+    return user_cache_path("dsl-scan") / "objects" / digest / Path(address.name).name
+
+
+@contextmanager
+def brought(
+    path: Path, progress: Progress | None = None, wanted: Callable[[str], bool] = lambda name: True
+) -> Iterator[Path]:
+    """A folder with what is at a path: the path itself, or a copy of what is at its address.
+
+    The copy is removed when the block ends well; one that was interrupted is completed the next time. Raises
+    `StoreError`, and `MissingPackageError` without the extra.
+    """
+    address = address_of(path)
+    if address is None:
+        yield path
+        return
+    require_package("obstore")
+    room = room_of(address)
+    with Claim(room):
+        fetch(ObjectFolder(address), room, progress, wanted)
+        yield room
+        shutil.rmtree(room.parent, ignore_errors=True)
+
+
+@contextmanager
+def published(path: Path, *, overwrite: bool = False, progress: Progress | None = None) -> Iterator[Path]:
+    """A path for a result that is in its place when the block ends well, also where that is in a store.
+
+    A result that could not be published is kept here, and published by the next block for the same path.
+    """
+    address = address_of(path)
+    if address is None:
+        yield path
+        return
+    require_package("obstore")
+    objects, room = ObjectFolder(address), room_of(address)
+    if not overwrite and published_as(objects, "schema_version") is not None:
+        raise taken(objects)
+    with Claim(room):
+        yield room
+        publish(room, objects, overwrite=overwrite, progress=progress)
+        shutil.rmtree(room.parent, ignore_errors=True)
