@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -187,10 +188,15 @@ def info(
 ) -> None:
     """Show what a folder or file contains and whether it is complete."""
     from dsl_core.io.describe import describe
+    from dsl_core.io.objects.rooms import brought
 
-    output, facts = Output(json), describe(path, verify)
-    if verify and facts["kind"] == "scan":
-        facts |= _proof_of(path)
+    output = Output(json)
+    with ExitStack() as stack:
+        with output.progress() as progress:
+            folder = stack.enter_context(brought(path, progress))
+        facts = describe(folder, verify)
+        if verify and facts["kind"] == "scan":
+            facts |= _proof_of(folder)
     for name, value in facts.items():
         output.say(f"{name.replace('_', ' '):18s} {_in_words(name, value)}")
     output.put(**facts)

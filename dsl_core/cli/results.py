@@ -2,28 +2,23 @@
 
 from __future__ import annotations
 
-from json import loads
+from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from dsl_core.cli.options import (
-    CalibrationName,
     Force,
     Json,
-    OverrideCalibration,
     RigOptions,
-    parse_bands,
     parse_options,
     parse_pixels,
     tab_rigs,
 )
 from dsl_core.cli.output import Output
 from dsl_core.errors import PlanError
-from dsl_core.evaluation.cost import StageTimer
 from dsl_core.io.staging import check_targets
-from dsl_core.reconstruction.torch_device import DEVICES, torch_device
 from dsl_core.words import counted
 
 if TYPE_CHECKING:
@@ -32,113 +27,6 @@ if TYPE_CHECKING:
     from dsl_core.evaluation.summary import Evaluation
 
 Result = Annotated[Path, typer.Argument(metavar="RESULT.zarr", help="A result of 'reconstruct'.")]
-
-
-def reconstruct(
-    scan: Annotated[Path, typer.Argument(metavar="SCAN.dsl", help="A complete scan.")],
-    target: Annotated[
-        Path | None, typer.Option("--output", "-o", help="Folder to write; the default is SCAN.zarr.")
-    ] = None,
-    calibration: CalibrationName = None,
-    override: OverrideCalibration = False,
-    bands: Annotated[str, typer.Option(help="START:STOP:STEP in nm.")] = "430:660:5",
-    model: Annotated[str, typer.Option(help="Correspondence: auto, grating, hybrid or grid.")] = "auto",
-    solver: Annotated[str, typer.Option(help="best, published, nearest-line or colour-basis.")] = "best",
-    refine: Annotated[
-        bool, typer.Option("--refine/--no-refine", help="Find columns to a fraction of a pixel.")
-    ] = True,
-    depth_only: Annotated[bool, typer.Option("--depth-only", help="Leave out the spectra.")] = False,
-    as_calibrated: Annotated[
-        bool, typer.Option("--as-calibrated", help="Correct nothing by what the scan itself shows.")
-    ] = False,
-    device: Annotated[str, typer.Option(help="cpu, cuda, or auto: cuda if available.")] = "cpu",
-    force: Force = False,
-    json: Json = False,
-) -> None:
-    """Turn frames into depth, points, normals, reflectance and their uncertainty."""
-    from dsl_core.io.calibration_library import load_calibration
-    from dsl_core.io.result.result_file import RESULT_FOLDER, load_result
-    from dsl_core.io.scan.manifest import read_manifest
-    from dsl_core.model.options import MODELS, SOLVERS, names
-    from dsl_core.pipeline import Options
-    from dsl_core.workflows.scans import DOUBTS, NOT_JUDGED, reconstruct_to
-
-    output, timer = Output(json), StageTimer()
-    _require_one_of("--model", model, names(MODELS))
-    _require_one_of("--solver", solver, names(SOLVERS))
-    _require_one_of("--device", device, DEVICES)
-    grid = parse_bands(bands)
-    if target is None:
-        target = scan.with_suffix(".zarr")
-        if target.exists():
-            read_manifest(scan)  # that it is no scan is told before that its result exists
-    check_targets([target], overwrite=force, kind=RESULT_FOLDER)
-    rig = load_calibration(calibration) if calibration else None
-    if rig is None and _tells_columns_only(scan):
-        _decode(output, scan, target, force)
-        return
-    if _is_import(scan):
-        # Pictures of other programs have no frames of spectral patterns.
-        depth_only = True
-    options = Options(
-        grid,
-        model,
-        refine,
-        not depth_only,
-        torch_device(device),
-        solver=solver,
-        as_calibrated=as_calibrated,
-    )
-    with output.progress() as progress:
-        reconstruct_to(
-            target, scan, rig, options, progress, timer, override_calibration=override, overwrite=force
-        )
-    result = load_result(target)
-    output.costs(timer.stages)
-    doubts = loads(result.attrs.get(DOUBTS, "[]"))
-    for sentence in doubts:
-        output.say(f"{sentence} The result may be wrong; scan again, or see 'dsl-scan info --verify'.")
-    not_judged = result.attrs.get(NOT_JUDGED, "")
-    if not_judged:
-        output.say(f"{not_judged} pictures show too little to be compared with their pattern.")
-    share = coverage(result)
-    print_fit(output, result)
-    output.say(f"{share:.1%} of the pixels have a depth. The result is saved in {target}")
-    output.put(result=target, pixels_with_depth=share, wrong_pictures=doubts, pictures_not_judged=not_judged)
-    output.finish()
-
-
-def _is_import(scan: Path) -> bool:
-    from dsl_core.io.scan.folder import ScanReader
-    from dsl_core.workflows.captures import is_import
-
-    return is_import(ScanReader(scan))
-
-
-def _tells_columns_only(scan: Path) -> bool:
-    """Whether a scan was made of another program's pictures, and nobody said where its devices stand."""
-    from dsl_core.io.scan.folder import ScanReader
-
-    return _is_import(scan) and ScanReader(scan).calibration is None
-
-
-def _decode(output: Output, scan: Path, target: Path, force: bool) -> None:
-    from dsl_core.io.result.result_file import save_result
-    from dsl_core.workflows.captures import NO_DEPTH, decode_scan
-
-    with output.progress() as progress:
-        result = decode_scan(scan, progress)
-        save_result(result, target, overwrite=force)
-    share = float(result["column_px"].notnull().mean())
-    output.say(str(result.attrs[NO_DEPTH]))
-    told, what = share, "column"
-    if share == 0 and "row_px" in result:
-        told, what = float(result["row_px"].notnull().mean()), "row"
-    output.say(f"{100 * told:.1f} % of the pixels have a {what}. The result is saved in {target}")
-    output.put(
-        result=target, pixels_with_depth=0.0, pixels_with_column=share, no_depth=result.attrs[NO_DEPTH]
-    )
-    output.finish()
 
 
 def evaluate(
@@ -211,8 +99,14 @@ def export(
     json: Json = False,
 ) -> None:
     """Export a result for other programs, or a scan or rig in the published layout."""
+    from dsl_core.io.objects.rooms import brought
+
     output = Output(json)
-    _say_written(output, _export(output, path, form, target, parse_pixels(pixel), force))
+    with ExitStack() as stack:
+        with output.progress() as progress:
+            path = stack.enter_context(brought(path, progress))
+        files = _export(output, path, form, target, parse_pixels(pixel), force)
+    _say_written(output, files)
 
 
 def mesh(
@@ -302,8 +196,3 @@ def print_fit(output: Output, result: xr.Dataset) -> None:
     if fit is not None:
         output.say(fit.words)
         output.put(fit={"words": fit.words, "findings": [f.model_dump() for f in fit.findings]})
-
-
-def _require_one_of(option: str, given: str, choices: tuple[str, ...]) -> None:
-    if given not in choices:
-        raise PlanError(f"{option} must be one of {', '.join(choices)}, not {given!r}.")

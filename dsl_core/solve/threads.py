@@ -21,6 +21,16 @@ def share_no_small_matrices() -> None:
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 
+def share_cores(threads: int) -> None:
+    """Let the kernels of this process use so many threads; before torch or numba are imported.
+
+    For one of several processes that share the cores. A number that the user has set stays.
+    """
+    share_no_small_matrices()
+    for name in ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"):
+        os.environ.setdefault(name, str(threads))
+
+
 @contextmanager
 def one_kernel_thread() -> Iterator[None]:
     """Run each torch kernel of a block on the thread that calls it.

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import asdict, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -43,6 +44,8 @@ if TYPE_CHECKING:
 DOUBTS = "frames_in_doubt"
 #: Attribute of a result: how many frames show too little to be judged by their pattern, as "26 of 150".
 NOT_JUDGED = "frames_not_judged"
+#: Attribute of a result: a digest of all that it depends on.
+MADE_OF = "made_of"
 
 
 def reopen_rig(folder: Path) -> DeviceRig:
@@ -148,27 +151,66 @@ def reconstruct_to(
     override_calibration: bool = False,
     overwrite: bool = False,
     seen_geometry: SeenGeometry | None = None,
+    seen_rows: Callable[[int, int], object] | None = None,
 ) -> Path:
     """Reconstruct a complete scan into a folder, by rows, so that neither has to fit into memory.
 
     One that was interrupted continues where it was if scan, calibration and options are the same.
-    ``seen_geometry`` is given depth, points and normals before the spectra are computed. Raises
-    what `reconstruct_scan` does, and `StoreError` when the target exists (unless ``overwrite``) or the disk
-    fails.
+    ``seen_geometry`` is given depth, points and normals before the spectra are computed, ``seen_rows`` how
+    many rows are finished, and of how many. Raises what `reconstruct_scan` does, and `StoreError` when the
+    target exists (unless ``overwrite``) or the disk fails.
     """
     from dsl_core.io.result.row_writer import RowWriter
 
     reader, options, timer = ScanReader(folder), options or Options(), timer or StageTimer()
-    frames = {str(shot): entry.crc32 for shot, entry in sorted(reader.entries.items())}
-    rig = calibration_of(reader, calibration)
-    facts = [__version__, reader.manifest.model_dump_json(), frames, rig.model_dump_json(), repr(options)]
-    with RowWriter(target, json.dumps(facts), overwrite=overwrite) as writer:
+    facts = _facts_of_result(reader, calibration, options)
+    with RowWriter(target, facts, overwrite=overwrite, seen_rows=seen_rows) as writer:
         progress = progress or NoProgress()
         given = folder, calibration, options, progress, timer, override_calibration
         result = reconstruct_scan(*given, sink=writer, seen_geometry=seen_geometry)
         with timer.stage("save the result"):
             progress.report("save the result", 0, 0)
-            return writer.publish(result.attrs)
+            return writer.publish({**result.attrs, MADE_OF: _digest(facts)})
+
+
+def _facts_of_result(reader: ScanReader, calibration: Rig | None, options: Options) -> str:
+    """All that a result depends on, as a text."""
+    frames = {str(shot): entry.crc32 for shot, entry in sorted(reader.entries.items())}
+    rig = calibration_of(reader, calibration)
+    return json.dumps(
+        [__version__, reader.manifest.model_dump_json(), frames, rig.model_dump_json(), repr(options)]
+    )
+
+
+def _digest(facts: str) -> str:
+    return hashlib.sha256(facts.encode()).hexdigest()
+
+
+def key_of_result(reader: ScanReader, calibration: Rig | None, options: Options) -> str:
+    """What a result of a scan has as its attribute `MADE_OF`; raises `CalibrationError`.
+
+    Frames, plan, calibration, options and the version of the program decide about it.
+    """
+    return _digest(_facts_of_result(reader, calibration, options))
+
+
+def is_made_of(target: Path, key: str) -> bool:
+    """Whether a result is there, complete, and of this key; raises `StoreError` where it is damaged."""
+    from dsl_core.io.result.inventory import check_inventory
+    from dsl_core.io.result.result_file import read_attributes
+
+    if not (target / "zarr.json").is_file():
+        return False
+    attributes = read_attributes(target)
+    return attributes.get(MADE_OF) == key and check_inventory(target, attributes)
+
+
+def doubts_of(result: xr.Dataset) -> list[str]:
+    """Sentences about pictures that did not show their pattern, and what to do."""
+    return [
+        f"{doubt} The result may be wrong; scan again, or see 'dsl-scan info --verify'."
+        for doubt in json.loads(result.attrs.get(DOUBTS, "[]"))
+    ]
 
 
 def prove_scan(folder: Path) -> ScanProof:

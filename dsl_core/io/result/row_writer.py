@@ -11,7 +11,7 @@ import contextlib
 import logging
 import os
 import shutil
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
@@ -38,13 +38,22 @@ _KEY, _LOCK, _ARRAYS = "key.json", "writer.lock", "result.zarr"
 class RowWriter:
     """A `ResultSink` on disk. Used in a ``with`` block, after which nothing is locked."""
 
-    def __init__(self, target: Path, key: str, *, overwrite: bool = False) -> None:
+    def __init__(
+        self,
+        target: Path,
+        key: str,
+        *,
+        overwrite: bool = False,
+        seen_rows: Callable[[int, int], object] | None = None,
+    ) -> None:
         """Nothing is written before `begin`. ``key`` is all that the result depends on, as a text.
 
-        Raises `StoreError` where the target exists (unless ``overwrite``, and it is a result too).
+        ``seen_rows`` is told how many rows are there, and of how many, whenever there are more. Raises
+        `StoreError` where the target exists (unless ``overwrite``, and it is a result too).
         """
         check_targets([target], overwrite=overwrite, kind=RESULT_FOLDER)
         self._target, self._key, self._overwrite = target, key, overwrite
+        self._seen_rows, self._rows_there = seen_rows, 0
         self.work = target.with_name(f".{target.name}.unfinished")
         self._lock: FolderLock | None = None
         self._labels: dict[str, list[str]] = {}
@@ -81,7 +90,10 @@ class RowWriter:
     def note_of(self, rows: slice) -> str | None:
         """The note of rows that are complete; None for others."""
         path = self._note(rows)
-        return read_bounded(path).decode() if path.is_file() else None
+        if not path.is_file():
+            return None
+        self._count(rows)
+        return read_bounded(path).decode()
 
     def put(self, rows: slice, maps: Maps, note: str) -> None:
         """Write the maps (..., rows, columns) of a band of rows; raises `StoreError`."""
@@ -91,6 +103,12 @@ class RowWriter:
                 self._write(name, part[name].variable, rows)
             # The note comes last, and once all else is safe: rows without one are made again.
             write_atomic(self._note(rows), note.encode())
+        self._count(rows)
+
+    def _count(self, rows: slice) -> None:
+        self._rows_there += rows.stop - rows.start
+        if self._seen_rows is not None:
+            self._seen_rows(self._rows_there, self._shape[0])
 
     def _write(self, name: str, part: xr.Variable, rows: slice) -> None:
         packing, values = PACKINGS.get(name), np.asarray(part.values)
@@ -121,7 +139,7 @@ class RowWriter:
         self._create(name, part, fitting=False)
         for start in range(0, self._shape[0], self._height):
             rows = slice(start, min(start + self._height, self._shape[0]))
-            if self.note_of(rows) is not None:
+            if self._note(rows).is_file():
                 steps = np.asarray(old[..., rows, :])
                 values = steps.astype(np.float32) * np.float32(packing.step)
                 self._array(name)[..., rows, :] = np.where(steps == packing.fill, np.float32(np.nan), values)

@@ -1,0 +1,1 @@
+"""Many scans reconstructed, in processes of this computer or on a cluster."""

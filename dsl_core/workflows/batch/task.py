@@ -1,0 +1,172 @@
+"""One scan of a batch: reconstructed unless its result is there, and told as a few figures."""
+
+from __future__ import annotations
+
+import contextlib
+import time
+import traceback
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+
+from dsl_core.errors import DslError, TakenError
+from dsl_core.evaluation.cost import StageTimer
+from dsl_core.extras import names_missing_packages, require_package
+from dsl_core.io.claims import Claim, ClaimedError
+from dsl_core.io.objects.address import address_of
+from dsl_core.io.objects.claim import ObjectClaim
+from dsl_core.io.objects.copies import published_as
+from dsl_core.io.objects.rooms import brought, published
+from dsl_core.io.objects.store import ObjectFolder
+from dsl_core.io.scan.folder import ScanReader
+from dsl_core.model.fit import Fit
+from dsl_core.model.options import Options
+from dsl_core.model.rig import Rig
+from dsl_core.workflows.captures import is_import
+from dsl_core.workflows.scans import MADE_OF, is_made_of, key_of_result, reconstruct_to
+
+#: Is told how many rows of a scan's picture are finished, and of how many.
+SeenRows = Callable[[int, int], object]
+State = Literal["made", "kept", "claimed", "failed"]
+
+
+@dataclass(frozen=True)
+class ScanTask:
+    """A scan, where its result belongs, and how to make it; may be done any number of times."""
+
+    scan: Path
+    target: Path
+    calibration: Rig | None = None
+    options: Options = field(default_factory=Options)
+    override_calibration: bool = False
+    overwrite: bool = False
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What became of a scan: its result was made, kept as it was, is claimed by another process, or failed.
+
+    ``sentence`` says why it failed or who works on it; ``remarks`` are of a result that is there. Costs are
+    those of making it now: processor seconds, seconds, largest memory of the process in bytes.
+    """
+
+    scan: Path
+    target: Path
+    state: State
+    sentence: str = ""
+    remarks: tuple[str, ...] = ()
+    verdict: str = ""
+    pixels_with_depth: float = float("nan")
+    cpu_s: float = 0.0
+    seconds: float = 0.0
+    peak_bytes: int = 0
+
+
+def do_task(task: ScanTask, seen_rows: SeenRows | None = None) -> Outcome:
+    """Reconstruct a scan, unless its result is complete and of the same frames, calibration and options.
+
+    Never raises for what is wrong with the scan: that is the outcome. A run that was killed is continued.
+    """
+    failed = Outcome(task.scan, task.target, "failed")
+    try:
+        return names_missing_packages(_done)(task, seen_rows)
+    except ClaimedError as error:
+        return replace(failed, state="claimed", sentence=str(error))
+    except (DslError, OSError) as error:
+        return replace(failed, sentence=str(error))
+    except MemoryError:
+        return replace(failed, sentence="There is not enough memory. Use fewer jobs, or another machine.")
+    except Exception as error:
+        where = traceback.extract_tb(error.__traceback__)[-1]
+        told = f"{type(error).__name__}: {error}, in {Path(where.filename).name}, line {where.lineno}"
+        return replace(failed, sentence=f"This is a bug in dsl-scan ({told}). Report it.")
+
+
+def _done(task: ScanTask, seen_rows: SeenRows | None) -> Outcome:
+    if address_of(task.scan) is None and address_of(task.target) is None:
+        return _done_here(task, seen_rows)
+    target, claim = address_of(task.target), None
+    with contextlib.ExitStack() as stack:
+        if target is not None:
+            require_package("obstore")
+            with brought(task.scan, wanted=lambda name: not name.startswith("frames/c.")) as folder:
+                reader = ScanReader(folder)
+                key = key_of_result(reader, task.calibration, _options_for(reader, task.options))
+            claim = stack.enter_context(ObjectClaim(target))
+            if published_as(ObjectFolder(target), MADE_OF) == key:
+                return Outcome(task.scan, task.target, "kept")
+        draft = stack.enter_context(published(task.target, overwrite=task.overwrite))
+        folder = stack.enter_context(brought(task.scan))
+        # A draft is our own.
+        inner = replace(task, scan=folder, target=draft, overwrite=task.overwrite or target is not None)
+        outcome = _done_here(inner, seen_rows)
+    taken_over = (claim.taken_over,) if claim is not None and claim.taken_over else ()
+    state = outcome.state if target is None else "made"
+    return replace(
+        outcome,
+        scan=task.scan,
+        target=task.target,
+        state=state,
+        remarks=(*taken_over, *outcome.remarks),
+    )
+
+
+def _options_for(reader: ScanReader, options: Options) -> Options:
+    """Pictures of other programs have no frames of spectral patterns."""
+    return replace(options, spectra=False) if is_import(reader) else options
+
+
+def _done_here(task: ScanTask, seen_rows: SeenRows | None) -> Outcome:
+    reader = ScanReader(task.scan)
+    options = _options_for(reader, task.options)
+    with Claim(task.target) as claim:
+        outcome = Outcome(task.scan, task.target, "kept")
+        if not is_made_of(task.target, key_of_result(reader, task.calibration, options)):
+            if task.target.exists() and not task.overwrite:
+                raise TakenError(
+                    f"{task.target} already exists, made of other frames or with another calibration, options"
+                    " or version. Choose another folder for results, or allow it to be replaced."
+                )
+            outcome = _made(task, options, seen_rows)
+        remarks = (claim.taken_over,) if claim.taken_over else ()
+    return _with_figures(replace(outcome, remarks=remarks))
+
+
+def _made(task: ScanTask, options: Options, seen_rows: SeenRows | None) -> Outcome:
+    timer, began_s, began_cpu_s = StageTimer(), time.perf_counter(), time.process_time()
+    reconstruct_to(
+        task.target,
+        task.scan,
+        task.calibration,
+        options,
+        timer=timer,
+        override_calibration=task.override_calibration,
+        overwrite=task.overwrite,
+        seen_rows=seen_rows,
+    )
+    return Outcome(
+        task.scan,
+        task.target,
+        "made",
+        cpu_s=time.process_time() - began_cpu_s,
+        seconds=time.perf_counter() - began_s,
+        peak_bytes=max(stage.peak_bytes for stage in timer.stages),
+    )
+
+
+def _with_figures(outcome: Outcome) -> Outcome:
+    """The outcome with what the result says of itself."""
+    from dsl_core.io.result.result_file import load_result
+    from dsl_core.workflows.scans import doubts_of
+
+    result = load_result(outcome.target)
+    fit = Fit.read({str(name): value for name, value in result.attrs.items()})
+    return replace(
+        outcome,
+        remarks=(*outcome.remarks, *doubts_of(result)),
+        verdict="" if fit is None else fit.headline,
+        pixels_with_depth=float(np.isfinite(result["depth_mm"].values).mean()),
+    )

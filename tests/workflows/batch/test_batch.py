@@ -1,0 +1,207 @@
+"""Many scans as one batch: found, skipped where complete, failures told, stopped and waited for."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Generator, Mapping
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from dsl_core import pipeline
+from dsl_core.devices.registry import open_rig
+from dsl_core.errors import Cancelled, StoreError
+from dsl_core.io.atomic import write_atomic
+from dsl_core.io.claims import Claim
+from dsl_core.io.result import row_writer
+from dsl_core.io.result.result_file import load_result
+from dsl_core.io.scan.folder import ScanReader
+from dsl_core.model.presets import PRESETS
+from dsl_core.pipeline import Options
+from dsl_core.progress import CallbackProgress, NoProgress
+from dsl_core.workflows.batch.batch import PIXEL_BYTES, find_scans, needed_bytes, run_batch, tasks_of
+from dsl_core.workflows.batch.report import batch_page, batch_sentences, batch_table, is_batch_page
+from dsl_core.workflows.batch.runner import Ended, Rows
+from dsl_core.workflows.batch.task import Outcome, ScanTask, do_task
+
+OPTIONS = Options(spectra=False, refine_columns=False, band_rows=16)
+
+
+class Here:
+    """A runner in this process."""
+
+    def __init__(self) -> None:
+        self.done = list[str]()
+
+    def run(self, tasks: Mapping[int, ScanTask]) -> Generator[Rows | Ended, None, None]:
+        for number, task in tasks.items():
+            self.done.append(task.scan.name)
+            rows = list[int]()
+            outcome = do_task(task, lambda done, total, rows=rows: rows.append(done))  # type: ignore[misc]
+            yield from (Rows(number, done) for done in rows)
+            yield Ended(number, outcome)
+
+
+@pytest.fixture(scope="module")
+def scan(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """To be copied, not changed."""
+    folder = tmp_path_factory.mktemp("scans") / "a.dsl"
+    with open_rig("twin", {"scene": "plane", "size": "48x32"}) as devices:
+        plan = next(p.plan for p in PRESETS if p.key == "quick")
+        pipeline.scan(devices, pipeline.fit_plan(plan, devices), folder)
+    return folder
+
+
+@pytest.fixture
+def folder(scan: Path, tmp_path: Path) -> Path:
+    """Two scans, and one without its frames."""
+    for name in ("a", "b", "c"):
+        shutil.copytree(scan, tmp_path / "scans" / f"{name}.dsl")
+    shutil.rmtree(tmp_path / "scans" / "b.dsl" / "frames")
+    return tmp_path / "scans"
+
+
+def _batch(folder: Path, runner: Here | None = None, **how: object) -> dict[str, Outcome]:
+    tasks = tasks_of(find_scans(folder), options=OPTIONS, **how)  # type: ignore[arg-type]
+    report = run_batch(tasks, runner or Here(), NoProgress())
+    return {each.scan.stem: each for each in report.outcomes}
+
+
+def test_scans_are_found_in_folders_and_lists(folder: Path, tmp_path: Path) -> None:
+    listed = tmp_path / "some.txt"
+    listed.write_text("# the good ones\nscans/c.dsl\n\nscans/a.dsl\nscans/c.dsl\n")
+    assert [path.name for path in find_scans(folder)] == ["a.dsl", "b.dsl", "c.dsl"]
+    assert find_scans(listed) == [tmp_path / "scans/c.dsl", tmp_path / "scans/a.dsl"]
+    assert find_scans(folder / "a.dsl") == [folder / "a.dsl"]
+    listed.write_text("#\n")
+    for nothing, why in ((listed, "names no scan"), (tmp_path / "none", "does not exist")):
+        with pytest.raises(StoreError, match=why):
+            find_scans(nothing)
+    with pytest.raises(StoreError, match="contains no scan"):
+        find_scans(folder / "a.dsl" / "frames")
+
+
+def test_two_scans_never_have_one_result(folder: Path, tmp_path: Path) -> None:
+    shutil.copytree(folder / "a.dsl", folder / "more" / "a.dsl")
+    assert len(tasks_of(find_scans(folder))) == 4
+    with pytest.raises(StoreError, match="would both become"):
+        tasks_of(find_scans(folder), tmp_path / "results")
+
+
+def test_a_failed_scan_does_not_stop_the_others_and_is_told(folder: Path) -> None:
+    found = _batch(folder)
+    assert {name: each.state for name, each in found.items()} == {"a": "made", "b": "failed", "c": "made"}
+    assert "zarr.json is missing or damaged" in found["b"].sentence
+    assert found["a"].pixels_with_depth > 0.05
+    assert found["a"].cpu_s > 0
+    assert found["a"].peak_bytes > 0
+    assert sorted(path.name for path in folder.iterdir() if path.suffix != ".dsl") == ["a.zarr", "c.zarr"]
+
+
+def test_complete_results_of_the_same_frames_and_options_are_kept(folder: Path) -> None:
+    _batch(folder)
+    before = (folder / "a.zarr" / "zarr.json").read_bytes()
+    again = _batch(folder)
+    assert again["a"].state == again["c"].state == "kept"
+    assert again["a"].pixels_with_depth > 0.05
+    assert (folder / "a.zarr" / "zarr.json").read_bytes() == before
+
+    other = tasks_of([folder / "a.dsl"], options=Options(spectra=False, refine_columns=False))[0]
+    assert "with another calibration, options or version" in do_task(other).sentence
+    forced = tasks_of([folder / "a.dsl"], options=Options(spectra=False), overwrite=True)[0]
+    assert do_task(forced).state == "made"
+    assert do_task(forced).state == "kept"
+
+
+def test_a_damaged_result_is_not_taken_for_complete(folder: Path) -> None:
+    _batch(folder)
+    chunk = next(path for path in (folder / "a.zarr" / "depth_mm").rglob("*") if path.name != "zarr.json")
+    shutil.rmtree(chunk) if chunk.is_dir() else chunk.unlink()
+    assert "is damaged" in _batch(folder)["a"].sentence
+
+
+def test_a_batch_that_was_killed_continues_and_ends_the_same(
+    folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    write, notes = write_atomic, list[str]()
+
+    def dies(path: Path, data: bytes) -> None:
+        notes.append(path.name)
+        if len(notes) == 3:
+            raise KeyboardInterrupt
+        write(path, data)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(row_writer, "write_atomic", dies)
+        with pytest.raises(Cancelled, match="0 of 3 results are complete"):
+            _batch(folder)
+    assert len(list(folder.glob(".a.zarr.unfinished/rows.*.json"))) == 1
+    _batch(folder)
+    whole = tmp_path / "whole"
+    _batch(folder, results=whole)
+    continued, once = (load_result(where / "a.zarr") for where in (folder, whole))
+    assert continued.attrs["made_of"] == once.attrs["made_of"]
+    for name in once.data_vars:
+        np.testing.assert_array_equal(continued[name].values, once[name].values)
+
+
+def test_results_of_another_batch_are_waited_for_and_kept(folder: Path) -> None:
+    runner, waits = Here(), list[float]()
+    other = Claim(folder / "a.zarr")
+
+    def wait(seconds: float) -> None:
+        waits.append(seconds)
+        other.release()
+        do_task(tasks_of([folder / "a.dsl"], options=OPTIONS)[0])
+
+    tasks = tasks_of(find_scans(folder), options=OPTIONS)
+    report = run_batch(tasks, runner, NoProgress(), wait)
+    assert runner.done == ["a.dsl", "b.dsl", "c.dsl", "a.dsl"]
+    assert len(waits) == 1
+    assert [each.state for each in report.outcomes] == ["kept", "failed", "made"]
+
+
+def test_progress_is_one_bar_of_all_rows_and_cancels(folder: Path) -> None:
+    told = list[tuple[str, int, int]]()
+    progress = CallbackProgress(lambda *report: told.append(report))
+    run_batch(tasks_of(find_scans(folder), options=OPTIONS), Here(), progress)
+    assert {stage for stage, _, _ in told} == {"rows of 3 scans"}
+    # Two bands of 16 rows, once as they come and once when the scan has ended; one scan cannot be read.
+    assert [done for _, done, _ in told] == [0, 16, 32, 32, 64, 80, 96, 96]
+    assert told[-1][2] == 96
+    progress.token.cancel()
+    with pytest.raises(Cancelled):
+        run_batch(tasks_of(find_scans(folder), options=OPTIONS), Here(), progress)
+
+
+def test_memory_grows_with_the_picture(folder: Path) -> None:
+    small = needed_bytes(ScanTask(folder / "a.dsl", folder / "a.zarr"))
+    none = needed_bytes(ScanTask(folder / "none.dsl", folder / "a.zarr"))
+    assert small - none == PIXEL_BYTES * 48 * 32
+
+
+def test_the_report_tells_every_scan(folder: Path, tmp_path: Path) -> None:
+    report = run_batch(tasks_of(find_scans(folder), options=OPTIONS), Here(), NoProgress())
+    assert report.words == "3 scans: 2 reconstructed, 1 failed."
+    rows = {Path(row[0]).name: row[1:] for row in batch_table(report).rows}
+    assert rows["b.dsl"] == ("failed", "", "", "", "", "")
+    assert rows["a.dsl"][0] == "reconstructed"
+    assert float(rows["a.dsl"][1]) > 5
+    assert len(batch_sentences(report)) == 1
+    page = tmp_path / "batch.html"
+    assert not is_batch_page(page)
+    page.write_text(batch_page(report))
+    assert "1 failed" in page.read_text()
+    assert is_batch_page(page)
+    page.write_text("<title>Another page</title>")
+    assert not is_batch_page(page)
+
+
+def test_a_bug_is_the_outcome_of_its_scan_alone(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def breaks(self: ScanReader, folder: Path) -> None:
+        raise ZeroDivisionError("division by zero")
+
+    monkeypatch.setattr(ScanReader, "__init__", breaks)
+    sentence = do_task(tasks_of([folder / "a.dsl"])[0]).sentence
+    assert "This is a bug in dsl-scan (ZeroDivisionError: division by zero, in test_batch.py" in sentence
