@@ -28,6 +28,7 @@ GUIDE = {
         "calibrating",
         "scanning",
         "reconstructing-again",
+        "collections",
         "comparing",
         "exporting",
         "importing",

@@ -35,6 +35,7 @@ ORDER = (
     "designed-patterns",
     "effects-of-the-twin",
     "reconstructing-again",
+    "collections",
     "numbers",
     "materials",
     "hard-cases",
