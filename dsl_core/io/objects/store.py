@@ -17,8 +17,8 @@ from dsl_core.errors import StoreError
 from dsl_core.io.objects.address import Address
 
 #: A store that is slower than this is told as one that does not answer.
-_CLIENT = {"connect_timeout": "10s", "timeout": "120s", "allow_http": True}
-_RETRY = {"max_retries": 4, "retry_timeout": timedelta(seconds=60)}
+_CLIENT: Any = {"connect_timeout": "10s", "timeout": "120s", "allow_http": True}
+_RETRY: Any = {"max_retries": 4, "retry_timeout": timedelta(seconds=60)}
 
 
 @dataclass(frozen=True)
