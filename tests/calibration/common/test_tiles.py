@@ -19,6 +19,7 @@ def test_tiles_fill_the_image_and_are_numbered_row_by_row() -> None:
     assert np.bincount(tiles.ravel()).tolist() == [16] * (16 * 24)
     assert tiles[0, 4] == 1
     assert tiles[4, 0] == 24
+    assert tuple(len(edges) - 1 for edges in tile_edges((890, 580))) == (32, 48), "smooth maps need no more"
     # Images of few pixels still have tiles of some.
     assert tile_of_pixels((3, 2)).max() == 0
 

@@ -151,6 +151,11 @@ def test_a_mean_is_as_sure_as_blocks_that_hold_a_fifth_of_the_fullest_agree() ->
     # Two of ten are a fifth and not more: three blocks are left.
     scatter = np.mean((np.array([1, 2, 3]) - mean) ** 2)
     assert std == pytest.approx(np.sqrt(scatter / 2))
+    # Three of ten are more.
+    block, values = np.append(block, 20), np.append(values, 50.0)
+    mean, std = _mean(values, block)
+    scatter = np.average((np.array([1, 2, 3, 50]) - mean) ** 2, weights=[10, 10, 10, 3])
+    assert std == pytest.approx(np.sqrt(scatter / 3))
     assert _mean(np.ones(5), np.zeros(5, int)) == (1.0, 0.0)
 
 

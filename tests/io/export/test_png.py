@@ -32,6 +32,7 @@ def test_the_nearest_band_is_at_most_half_the_widest_gap_away() -> None:
     assert nearest_band(bands(550.0), 550.4) == (0, 550.0)
     with pytest.raises(StoreError, match=r"no band at 550\.6"):
         nearest_band(bands(550.0), 550.6)
+    assert nearest_band(bands(450.0, 470.0), 479.9) == (1, 470.0)
     assert nearest_band(bands(550.0, 550.2), 550.6) == (1, 550.2), "half a nanometre at least"
 
 
