@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import pytest
@@ -87,7 +87,9 @@ def test_rows_alone_are_refused(folder: Path) -> None:
 
 
 @pytest.mark.parametrize("axes", [("columns",), ("columns", "rows")])
-def test_sinusoids_are_decoded_along_each_axis(tmp_path: Path, axes: tuple[str, ...]) -> None:
+def test_sinusoids_are_decoded_along_each_axis(
+    tmp_path: Path, axes: tuple[Literal["columns", "rows"], ...]
+) -> None:
     pictures = phase_set(*axes)[0]
     folder = write(tmp_path, {f"{i:02d}.png": picture for i, picture in enumerate(pictures)})
     parts = [PhasePictures(axis=axis, fringes=(1, 4, 16), steps=8) for axis in axes]

@@ -243,7 +243,7 @@ def coverage(points_px: NDArray[np.float64], size_px: Sequence[int]) -> float:
     """Share of the cells of a grid over the picture that hold a corner; points (n, axes), as many sizes."""
     cells = np.floor((points_px + 0.5) / np.array(size_px) * CELLS).astype(int)
     inside = ((cells >= 0) & (cells < CELLS)).all(1)
-    return len(np.unique(cells[inside], axis=0)) / CELLS ** len(size_px)
+    return float(len(np.unique(cells[inside], axis=0)) / CELLS ** len(size_px))
 
 
 def doubts(found: GeometryCalibration, tilt_deg: float, baseline_mm: float | None) -> list[str]:
