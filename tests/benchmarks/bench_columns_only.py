@@ -130,7 +130,9 @@ def pulls(seeds: int) -> dict[str, float]:
                 "pose": board_poses.POSE,
             }
         )
-        std = np.sqrt(np.diag(np.reshape(found.covariance, (24, 24))))
+        assert found.covariance is not None
+        covariance = np.asarray(found.covariance, np.float64).reshape(24, 24)
+        std = np.sqrt(covariance.diagonal())
         off.append((shared_parameters(found) - shared_parameters(truth)) / std)
     rms = np.sqrt(np.mean(np.square(off), 0))
     return dict(zip(NAMES, rms.tolist(), strict=True))
