@@ -36,11 +36,11 @@ MOST_POOR, MOST_AT_BOUND, MOST_LOST, MOST_UNDECIDED, MOST_UNUSUAL = 0.4, 0.1, 0.
 WIDEST_BAND = 1.25
 #: Fewer pixels say nothing.
 FEWEST = 50
-#: What matters of blur and tail of the lines.
+#: Blur and tail of the lines below which neither is worth a finding.
 MOST_BLUR, MOST_TAIL = 0.03, 0.004
 #: Chi-square of most pixels above which no cause explains the frames.
 MOST_CHI_SQUARE = 1.5
-#: Said of what spectra already follow.
+#: Added to findings whose effect the spectra of the result already allow for.
 CORRECTED = " The spectra of this result are corrected for it."
 #: Words, decimals and unit of the numbers of a film, as in `FIELDS`.
 _MOTIONS = (

@@ -110,7 +110,7 @@ def largest_correction(before: Rig, after: Rig) -> float:
     """Largest relative change of the chain, orders apart, at wavelengths that are bright enough to matter.
 
     Of response, efficiency and white scale only the product counts, and where a colour is dark its factor
-    takes up stray light, however large it gets.
+    absorbs stray light and can grow without limit.
     """
     largest = 0.0
     for order in ORDERS:
