@@ -315,8 +315,8 @@ def _gains(causes: Causes, corrected: bool) -> Iterator[FitFinding]:
         (float(plus - minus), causes.difference_std),
         "1",
         MOST_GAIN,
-        f"Order +1 is {plus:+.1%} and order -1 {minus:+.1%} brighter than the zero order lets expect."
-        + CORRECTED * corrected,
+        f"The brightness of order +1 differs by {plus:+.1%} and that of order -1 by {minus:+.1%} from what"
+        " the zero order predicts." + CORRECTED * corrected,
         "Calibrate the efficiency of the orders again with the bandpass filters.",
     )
     yield FitFinding.judged(
@@ -325,8 +325,8 @@ def _gains(causes: Causes, corrected: bool) -> Iterator[FitFinding]:
         (common, causes.common_std),
         "1",
         MOST_GAIN,
-        f"Both first orders are {common:+.1%} brighter than the zero order lets expect: the response to level"
-        " or exposure is not as calibrated.",
+        f"The brightness of both first orders differs by {common:+.1%} from what the zero order predicts: the"
+        " response to level or exposure is not as calibrated.",
         "Repeat the self-test.",
     )
 
@@ -339,8 +339,9 @@ def _profile(name: str, value: float, std: float) -> FitFinding:
         (value, std),
         "1",
         MOST_BLUR if blur else MOST_TAIL,
-        f"Lines are {value:+.1%} more blurred than the calibration says."
+        f"The blur of lines differs by {value:+.1%} from that of the calibration."
         if blur
-        else f"{abs(value):.1%} of the light of a line lies {'' if value > 0 else 'less '}in its tails.",
+        else f"The tails of lines hold {abs(value):.1%} {'more' if value > 0 else 'less'} of their light than"
+        " the calibration says.",
         "Repeat the self-test with the projector in focus.",
     )
