@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -91,12 +92,20 @@ class Spread:
 
     def pixel(self, width: float = 1.0) -> Floats:
         """Light of a lit pixel, one wide, at the same samples: 1 inside wide bands of lit pixels."""
-        box = np.ones(FINE + 1)
-        box[[0, -1]] = 0.5
-        return np.convolve(self.point(width), box, "same")
+        return _pixel(self, width)
 
     def width_at(self, columns_px: Floats, rows_px: Floats, size_px: tuple[int, int]) -> Floats:
         """Relative width at places of a frame of a size (width, height): square law up to the corners."""
         w, h = size_px
         x, y = (columns_px - (w - 1) / 2) / (w / 2), (rows_px - (h - 1) / 2) / (h / 2)
         return np.asarray(1 + (CORNER_RATIO - 1) * np.clip((x**2 + y**2) / 2, 0, 1))
+
+
+@lru_cache(maxsize=64)
+def _pixel(spread: Spread, width: float) -> Floats:
+    """See `Spread.pixel`: asked for over and over again."""
+    box = np.ones(FINE + 1)
+    box[[0, -1]] = 0.5
+    light = np.convolve(spread.point(width), box, "same")
+    light.setflags(write=False)
+    return light

@@ -135,15 +135,18 @@ class Frame:
             here = self._widths_of(first, grid.shape[1], across, axis)
             step = widths[1] - widths[0]
             found = torch.zeros((len(light), own), device=light.device)
+            narrowest, widest = float(here.amin()), float(here.amax())
             for width in widths:
-                found += self._collected(grid * (1 - (here - width).abs() / step).clip(min=0), own, width)
+                if narrowest - step < width < widest + step:
+                    share = (1 - (here - width).abs_().div_(step)).clip_(min=0)
+                    found += self._collected(share.mul_(grid), own, width)
         # A line beyond the frame on each side takes what is not there.
         at = (first.long()[:, None] + torch.arange(own, device=light.device)).clip(-1, lines) + 1
         return torch.zeros((len(light), lines + 2), device=light.device).scatter_add_(1, at, found)[:, 1:-1]
 
     def _widths_of(self, first: Tensor, cells: int, across: Tensor, axis: Axis) -> Tensor:
         """Relative width of the spread at every cell of a grid, (parts, cells)."""
-        at = first[:, None].cpu().numpy() + (np.arange(cells) - self.spread.reach) / FINE
+        at = first[:, None].cpu().numpy() + (np.arange(cells, dtype=np.float32) - self.spread.reach) / FINE
         middle = across.median(1).values.cpu().numpy()[:, None]
         columns, rows = (at, middle) if axis == "columns" else (middle, at)
         width = self.spread.width_at(columns, rows, self.size_px)
@@ -160,10 +163,11 @@ class Frame:
         pieces = torch.as_tensor(window, dtype=torch.float32, device=grid.device)
         # The last piece holds the window's last sample, in cells beyond those that hold light.
         blocks = torch.nn.functional.pad(grid, (0, FINE)).reshape(len(grid), -1, FINE)
-        products = blocks @ pieces.T
+        # Lines last, so that what is added up lies side by side in memory.
+        products = pieces @ blocks.mT
         total = torch.zeros((len(grid), lines), device=grid.device)
         for k in range(len(pieces)):
-            total += products[:, k : k + lines, k]
+            total += products[:, k, k : k + lines]
         return total
 
 
