@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from typing import Protocol
 
 import numpy as np
@@ -32,8 +32,8 @@ from dsl_core.reconstruction.merge import PickedLines
 MOST_MISFIT = 0.2
 #: What levels of frames may be wrong by beyond their own deviations: the sum of light is not exact.
 LEVEL_ERROR = 0.004
-#: Settings that differ by more are told.
-LEAST_APART = 0.01
+#: Settings that differ by more are told, and what that is called.
+LEAST_APART, APART = 0.01, "settings against each other"
 #: Changes of black that matter: first orders of dark surfaces are a few numbers bright.
 MOST_BLACK_DN = 0.5
 _CORRECTED = " The frames are corrected for it."
@@ -166,13 +166,33 @@ def light_findings(course: LightCourse, with_lines: bool) -> Iterator[FitFinding
     yield flicker.model_copy(update={"significant": course.flickers})
 
 
+def unsure_level(plan: CapturePlan, findings: Iterable[FitFinding]) -> float:
+    """Relative deviation of the level of all light, where settings disagree about it.
+
+    Which of them is right no scan can tell. A projector whose gamma is off by as much as makes settings of
+    two drive levels disagree has, at the last of them, another share of its full light as well.
+    """
+    apart = next((f for f in findings if f.significant and f.name == APART), None)
+    levels = [setting.level for setting in plan.settings]
+    if apart is None or levels[-1] == levels[0]:
+        return 0.0
+    gamma = float(np.log1p(apart.value) / np.log(levels[-1] / levels[0]))
+    return abs(gamma * float(np.log(levels[-1])))
+
+
 def _settings_finding(course: LightCourse) -> FitFinding:
     worst = int(np.abs(course.settings).argmax())
     more = float(np.expm1(course.settings[worst]))
-    drift = " Or the light drifted between them." if course.drifts else " The settings were made to agree."
+    drift = (
+        " Or the light drifted between them."
+        if course.drifts
+        else (
+            " The settings were made to agree; deviations of reflectance hold what the level may be off by."
+        )
+    )
     return FitFinding.judged(
         "response",
-        "settings against each other",
+        APART,
         more,
         "1",
         LEAST_APART,

@@ -105,6 +105,18 @@ def test_settings_that_do_not_agree_are_told_with_the_one_that_is_farthest_off()
     assert all(each.part == "light" for each in followed.light_findings(course_of(), True))
 
 
+def test_settings_that_do_not_agree_leave_the_level_unsure_as_a_wrong_gamma_does() -> None:
+    """Light of levels 0.2 and 0.8 under a gamma of 2.4 instead of 2.2."""
+    apart = (0.8 / 0.2) ** -0.2
+    course = replace(course_of(), settings=(float(np.log(apart)),))
+    two = PLAN.model_copy(update={"settings": CapturePlan().settings})
+    unsure = followed.unsure_level(two, followed.light_findings(course, True))
+    assert unsure == pytest.approx(1 - 0.8**0.2, rel=0.03)
+    assert followed.unsure_level(two, followed.light_findings(course_of(), True)) == 0.0
+    once = two.model_copy(update={"settings": (two.settings[1], two.settings[1])})
+    assert followed.unsure_level(once, followed.light_findings(course, True)) == 0.0
+
+
 def test_a_drift_is_taken_off_as_it_is() -> None:
     course = course_of(0.1)
     lasts = [shots_of("spectral", k)[-1].index for k in range(COUNT)]
