@@ -196,13 +196,14 @@ def _depth(
     Unless all is ``as_calibrated``, light, line spread and lenses are followed: the rig as this scan has it,
     and what was found of them.
     """
+    from dsl_core.reconstruction.camera_spot import follow_spot, spot_finding
     from dsl_core.reconstruction.code_agreement import NamedPlaces, code_agreement
     from dsl_core.reconstruction.columns.column import MODEL_ERROR
     from dsl_core.reconstruction.columns.line_spread import own_spread, spread_pixels, with_own_spread
     from dsl_core.reconstruction.columns.peak_error import own_peak_error
     from dsl_core.reconstruction.geometry import geometry_of, require_light, require_pixels
     from dsl_core.reconstruction.lenses import follow_lenses
-    from dsl_core.reconstruction.light.followed import follow_light
+    from dsl_core.reconstruction.light.followed import follow_light, unsure_level
     from dsl_core.reconstruction.rows.columns import columns_by_rows
     from dsl_core.reconstruction.spread_findings import spread_findings
 
@@ -218,12 +219,13 @@ def _depth(
             asked = partial(spread_pixels, lines)
             code, white, found_of_light = follow_light(frames, code, white, asked, progress)
             findings += found_of_light
+            unsure = float(np.hypot(rig.white_scale_rel_std, unsure_level(frames.plan, found_of_light)))
+            rig = rig.model_copy(update={"white_scale_rel_std": unsure})
     with timer.stage("columns, depth, normals"):
         peak_error = MODEL_ERROR
         if refines_rig:
             found = own_spread(rig, lines, code, white, frames)
-            if found is not None:
-                findings += spread_findings(rig.projector_response, found)
+            calibrated = rig.projector_response
             rig = with_own_spread(rig, found)
             peak_error = own_peak_error(rig, lines, code, white, frames)
         columns = columns_by_rows(rig, options, frames, code, white, peak_error, progress)
@@ -237,6 +239,10 @@ def _depth(
         if refines_rig:
             rig, geometry, found_of_lenses = follow_lenses(rig, lines, geometry, options.surface_window_px)
             findings += found_of_lenses
+            geometry, spot = follow_spot(rig, lines, geometry, options.surface_window_px)
+            findings += [] if spot is None else [spot_finding(spot)]
+            if found is not None:
+                findings += spread_findings(calibrated, found, 0.0 if spot is None else spot.columns_px)
             geometry, found_of_code = code_agreement(
                 rig, frames.plan, named, geometry, options.surface_window_px
             )

@@ -27,6 +27,7 @@ Part = Literal[
     "lateral colour",
     "curves",
     "flat field",
+    "focus",
 ]
 
 #: How many deviations of its own a figure must be away from zero.
@@ -47,6 +48,7 @@ PARTS: dict[Part, str] = {
     "lateral colour": "the lateral colour of the lenses",
     "curves": "the curves of camera and projector",
     "flat field": "the flat field of the camera",
+    "focus": "the focus of the camera",
 }
 
 

@@ -103,7 +103,9 @@ def fit_of(
 
     ``followed`` is what its scan says of the model, where it can say anything, and ``error`` what is left.
     """
-    findings = [*earlier, *share_findings(flags, spectra)]
+    findings = [*earlier]
+    blurred = any(finding.significant and finding.part == "focus" for finding in findings)
+    findings += share_findings(flags, spectra, blurred)
     width_nm = line_width_nm(rig, plan, grid, depth_mm)
     if spectra is not None and width_nm is not None:
         findings += band_findings(grid.step_nm, width_nm, spectra)
@@ -142,8 +144,13 @@ def _lit_and_measured(flags: NDArray[np.integer]) -> tuple[NDArray[np.bool_], ND
     return lit, lit & ((flags & int(DEPTH_INVALID)) == 0)
 
 
-def share_findings(flags: NDArray[np.integer], spectra: SpectralCounts | None) -> Iterator[FitFinding]:
-    """Findings from the flags (rows, columns) of a result, and from what was counted of its spectra."""
+def share_findings(
+    flags: NDArray[np.integer], spectra: SpectralCounts | None, blurred: bool = False
+) -> Iterator[FitFinding]:
+    """Findings from the flags (rows, columns) of a result, and from what was counted of its spectra.
+
+    Where the camera is known to be ``blurred``, lines of another shape along edges are no news.
+    """
     lit, measured = (int(np.count_nonzero(where)) for where in _lit_and_measured(flags))
     if lit >= FEWEST:
         yield _share(
@@ -156,7 +163,7 @@ def share_findings(flags: NDArray[np.integer], spectra: SpectralCounts | None) -
             " light each other, or of another rig's calibration.",
         )
     if measured >= FEWEST:
-        yield _share(
+        shape = _share(
             "profile",
             "lines of another shape",
             int(np.count_nonzero((flags & int(Flag.UNUSUAL_PEAK)) != 0)) / measured,
@@ -166,6 +173,7 @@ def share_findings(flags: NDArray[np.integer], spectra: SpectralCounts | None) -
             " reflectances lack the light that leaves a surface next to the line.",
             "Look at the flags; narrow the aperture or move the object nearer to the focus.",
         )
+        yield shape.model_copy(update={"significant": shape.significant and not blurred})
     if spectra is None or measured < FEWEST:
         return
     yield _share(
@@ -258,10 +266,10 @@ def cause_findings(
     usual = float(np.median(probe.chi_square))
     yield FitFinding.judged(
         "profile",
-        "chi-square of most pixels",
-        usual,
-        "1",
-        MOST_CHI_SQUARE,
+        "misfit of most pixels",
+        float(np.sqrt(usual)),
+        "deviations",
+        MOST_CHI_SQUARE**0.5,
         f"Frames of most pixels differ from the model by {np.sqrt(usual):.1f} times their noise.",
         _CALIBRATE,
     )

@@ -52,7 +52,11 @@ _ADVICE = {
 
 @dataclass(frozen=True)
 class Geometry:
-    """Maps (rows, columns) of columns, depths, zero-order amplitudes, dark offsets, deviations, and flags."""
+    """Maps (rows, columns) of columns, depths, zero-order amplitudes, dark offsets, deviations, and flags.
+
+    Where light comes from beside a pixel's centre, its column is ``displaced_px`` from that of the pixel, and
+    depth is that of the pixel; ``seen_depth_mm`` is what the column alone leads to.
+    """
 
     column_px: NDArray[np.float32]
     column_std_px: NDArray[np.float32]
@@ -64,6 +68,8 @@ class Geometry:
     offset_std: NDArray[np.float32]
     flags: NDArray[np.uint16]
     surface: Surface
+    displaced_px: NDArray[np.float32] | None = None
+    seen_depth_mm: NDArray[np.float64] | None = None
 
     def by(self, rig: Rig, column_error_px: NDArray[np.floating], window_px: int | None = None) -> Geometry:
         """Depth and surface from the same columns with another rig.
@@ -77,6 +83,8 @@ class Geometry:
         for start in range(0, good.size, CHUNK):
             some = good[start : start + CHUNK]
             column = torch.as_tensor(self.column_px.ravel()[some], dtype=torch.float64)
+            if self.displaced_px is not None:
+                column -= torch.as_tensor(self.displaced_px.ravel()[some])
             found, slope = (v.numpy() for v in triangulate(rig, torch.as_tensor(some), column))
             depth.ravel()[some], depth_std.ravel()[some] = found, slope * std_px.ravel()[some]
         surface = reconstruct_surface(rig, depth, depth_std, window_px)
@@ -90,9 +98,24 @@ class Geometry:
             flags=(self.flags & ~np.uint16(int(Flag.DEPTH_EDGE))) | edge,
         )
 
+    def displaced(
+        self,
+        rig: Rig,
+        displaced_px: NDArray[np.float32],
+        column_error_px: NDArray[np.floating],
+        window_px: int | None = None,
+    ) -> Geometry:
+        """Depth and surface where columns are those of places beside the pixels; arguments as for `by`."""
+        seen = replace(self, displaced_px=displaced_px, seen_depth_mm=self.depth_mm)
+        return seen.by(rig, column_error_px, window_px)
+
     def of_rows(self, rows: slice) -> Geometry:
         """That of some rows of the picture."""
-        maps = {name: values[rows] for name, values in vars(self).items() if name != "surface"}
+        maps = {
+            name: None if values is None else values[rows]
+            for name, values in vars(self).items()
+            if name != "surface"
+        }
         return Geometry(**maps, surface=some_rows(self.surface, rows))
 
     def points_mm(self, rig: Rig, rows: slice) -> NDArray[np.float32]:

@@ -26,10 +26,11 @@ POOR_FIT_FROM = 3.0
 def known_pixels(geometry: Geometry) -> Pixels:
     """What the spectral solver needs to know of each pixel."""
     surface = geometry.surface
+    depth_mm = geometry.depth_mm if geometry.seen_depth_mm is None else geometry.seen_depth_mm
     valid = ((geometry.flags & int(SPECTRUM_INVALID)) == 0) & np.isfinite(surface.shading)
     return Pixels(
         geometry.column_px,
-        geometry.depth_mm.astype(np.float32),
+        depth_mm.astype(np.float32),
         surface.shading.astype(np.float32),
         surface.shading_rel_std.astype(np.float32),
         geometry.amplitude,

@@ -29,9 +29,17 @@ CONTRASTS: tuple[tuple[Places, str, Places, str], ...] = (
 )
 
 
-def spread_findings(calibrated: ProjectorResponse, found: SpreadFit) -> Iterator[FitFinding]:
-    """What the scan says about the line spread that it was calibrated with."""
-    yield _curve_finding(calibrated, found)
+def spread_findings(
+    calibrated: ProjectorResponse, found: SpreadFit, spot_px: float = 0.0
+) -> Iterator[FitFinding]:
+    """What the scan says about the line spread that it was calibrated with.
+
+    ``spot_px`` is the rms width in columns of what a pixel of the camera sees: as far as that explains wider
+    lines, they are not the projector's.
+    """
+    wider_px2 = found.response.blur_px**2 - calibrated.blur_px**2
+    by_spot_px = min(max(wider_px2, 0.0) ** 0.5, spot_px)
+    yield _curve_finding(calibrated.blurred(by_spot_px) if by_spot_px > 0 else calibrated, found)
     if found.field is not None:
         yield _field_finding(found.field)
 

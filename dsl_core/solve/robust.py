@@ -9,11 +9,20 @@ Floats = NDArray[np.float64]
 
 #: Rounds of a linear fit with weights from its own residuals.
 ROUNDS = 6
+#: Standard deviation of normal values over the median of their sizes.
+NORMAL = 1.4826
 
 
 def robust_std(residual: NDArray[np.floating], axis: int | None = None) -> Floats:
     """Standard deviation of residuals about zero by their median size (scaled as normal ones need it)."""
-    return np.asarray(1.4826 * np.median(np.abs(residual), axis=axis))
+    return np.asarray(NORMAL * np.median(np.abs(residual), axis=axis))
+
+
+def weighted_median(values: NDArray[np.floating], weight: NDArray[np.floating]) -> float:
+    """The value with half of the weight on either side, of values (n,) with weights (n,)."""
+    order = np.argsort(values)
+    total = np.cumsum(weight[order], dtype=np.float64)
+    return float(values[order][np.searchsorted(total, total[-1] / 2)])
 
 
 def rms(values: NDArray[np.floating]) -> float:

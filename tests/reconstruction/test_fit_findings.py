@@ -67,6 +67,12 @@ def test_a_flag_is_told_from_the_share_that_is_not_normal(flag: Flag, limit: flo
     assert f"{limit + 0.02:.0%}" in above.words
 
 
+def test_lines_of_another_shape_are_no_news_where_the_camera_is_out_of_focus() -> None:
+    made = flags(Flag.UNUSUAL_PEAK, 0.3)
+    assert Fit.of(share_findings(made, None)).parts == ("profile",)
+    assert Fit.of(share_findings(made, None, blurred=True)).parts == ()
+
+
 def test_spectra_at_a_bound_that_fit_poorly_say_nothing_of_the_light() -> None:
     both = flags(Flag.POOR_FIT, 0.3) | flags(Flag.AT_BOUND, 0.35)
     assert Fit.of(judged(both)).parts == ()

@@ -50,3 +50,11 @@ def test_small_and_uncertain_differences_do_not_matter() -> None:
 def test_nothing_is_said_of_a_field_that_was_not_looked_at() -> None:
     found = SpreadFit(KNOWN, False, 0.001, 1.0, 1.0, 4000)
     assert [finding.name for finding in spread_findings(KNOWN, found)] == ["line spread"]
+
+
+def test_what_the_camera_explains_is_not_the_projectors() -> None:
+    found = SpreadFit(KNOWN.with_gaussian(1.0), True, 0.001, 2.0, 1.0, 4000)
+    (alone,), (explained,), (half,) = (list(spread_findings(KNOWN, found, spot)) for spot in (0.0, 0.9, 0.5))
+    assert alone.significant
+    assert explained.value == pytest.approx(0, abs=1e-6)
+    assert explained.value < half.value < alone.value
