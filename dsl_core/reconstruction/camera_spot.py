@@ -1,7 +1,7 @@
 """The spot of the scene that a pixel of the camera sees, measured and taken out of depth.
 
 A pixel sees its own area through the blur of the lens. Where the surface is brighter on one side of that
-spot, its light comes from there, and its column is that of a place beside the pixel. For a spot of variance
+spot, its light comes from there, and its column is that of a place next to the pixel. For a spot of variance
 ``s^2`` that place is ``s^2`` times the gradient of the logarithm of the picture away: exactly so for a
 Gaussian (Robbins, An Empirical Bayes Approach to Statistics, 1956), whatever the surface looks like. So
 columns across edges of brightness say how large the spot is, and then by how much each column is displaced.

@@ -54,7 +54,7 @@ _ADVICE = {
 class Geometry:
     """Maps (rows, columns) of columns, depths, zero-order amplitudes, dark offsets, deviations, and flags.
 
-    Where light comes from beside a pixel's centre, its column is ``displaced_px`` from that of the pixel, and
+    Where light comes from next to a pixel's centre, its column is ``displaced_px`` from that of the pixel, and
     depth is that of the pixel; ``seen_depth_mm`` is what the column alone leads to.
     """
 
@@ -105,7 +105,7 @@ class Geometry:
         column_error_px: NDArray[np.floating],
         window_px: int | None = None,
     ) -> Geometry:
-        """Depth and surface where columns are those of places beside the pixels; arguments as for `by`."""
+        """Depth and surface where columns are those of places next to pixels; arguments as for `by`."""
         seen = replace(self, displaced_px=displaced_px, seen_depth_mm=self.depth_mm)
         return seen.by(rig, column_error_px, window_px)
 
