@@ -11,6 +11,7 @@ Spectra are not concerned: all orders of a pixel come from the same place.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -75,12 +76,12 @@ class CameraSpot:
     @property
     def rms_px(self) -> float:
         """Rms width, px of the camera."""
-        return max(self.variance_px2, 0.0) ** 0.5
+        return math.sqrt(max(self.variance_px2, 0.0))
 
     @property
     def rms_std_px(self) -> float:
         """Deviation of the rms width."""
-        return self.std_px2 / (2 * max(self.rms_px, self.std_px2**0.5))
+        return self.std_px2 / (2 * max(self.rms_px, math.sqrt(self.std_px2)))
 
 
 def follow_spot(

@@ -54,8 +54,8 @@ _ADVICE = {
 class Geometry:
     """Maps (rows, columns) of columns, depths, zero-order amplitudes, dark offsets, deviations, and flags.
 
-    Where light comes from next to a pixel's centre, its column is ``displaced_px`` from that of the pixel, and
-    depth is that of the pixel; ``seen_depth_mm`` is what the column alone leads to.
+    Where light comes from next to a pixel's centre, its column is ``displaced_px`` from that of the pixel,
+    and depth is that of the pixel; ``seen_depth_mm`` is what the column alone leads to.
     """
 
     column_px: NDArray[np.float32]
@@ -112,9 +112,9 @@ class Geometry:
     def of_rows(self, rows: slice) -> Geometry:
         """That of some rows of the picture."""
         maps = {
-            name: None if values is None else values[rows]
+            name: values[rows]
             for name, values in vars(self).items()
-            if name != "surface"
+            if name != "surface" and values is not None
         }
         return Geometry(**maps, surface=some_rows(self.surface, rows))
 
