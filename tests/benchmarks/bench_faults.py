@@ -4,11 +4,13 @@
 
 The rig is a package of its own, installed into a temporary folder, around the twin. Every scan is held
 against the clean one of the same scene, plan and seed: its frames, and where one looks different, its result.
+Told are scans whose result is other than it should be, and says so, by what it says of fit and pictures.
 A scan that stopped is resumed with sound devices and judged again, so that wrong frames kept before show.
 """
 
 from __future__ import annotations
 
+import json
 import logging
 import re
 import shutil
@@ -16,12 +18,13 @@ import sys
 import tempfile
 from collections import Counter, defaultdict
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cache
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import xarray as xr
 from numpy.typing import NDArray
 
 from dsl_core import pipeline
@@ -31,14 +34,16 @@ from dsl_core.devices.base import DeviceRig
 from dsl_core.devices.registry import open_rig
 from dsl_core.errors import DslError
 from dsl_core.io.scan.folder import ScanReader
-from dsl_core.model.options import Options
+from dsl_core.model.fit import Fit
 from dsl_core.model.placement import Placement
-from dsl_core.model.plan import CapturePlan, GrayCode, ScanLines, Setting
+from dsl_core.model.plan import CapturePlan, GrayCode, ScanLines, Sentinels, Setting
 from dsl_core.progress import NoProgress
 from dsl_core.simulation.scenes.catalogue import scene_catalogue
+from dsl_core.workflows.scans import DOUBTS, reconstruct_scan
 from tests.benchmarks.common import options, print_table, write_json
 from tests.cases.faulty_lab import CAMERA, OTHER, PROJECTOR, SPECTRUM, STAGE, installed
 from tests.cases.pattern_faults import LASTING, SINGLE
+from tests.cases.spoiled_pictures import SPOILED
 
 #: Pixels that differ from the clean frame by so many deviations, and how many of them make a frame different.
 DIFFERENT_SIGMAS, DIFFERENT_PIXELS = 6.0, 12
@@ -67,6 +72,11 @@ REASONS = {
     "stage overshoots": "was sent to",
     "stage says NaN": "nan",
 }
+#: Changes that only old shots taken again tell from a scene: in scans of these, sentinels are taken.
+CHANGES = (*SPOILED, "projector shifts by 1", "projector squares its picture")
+#: Faults of the beginning of a scan, and between the last picture of the code and the first line.
+EARLY, AT_LINES = ("counter wraps", "lamp warms up"), ("swapped at the lines",)
+BAD = ("told", "WRONG", "reason?", "not resumed")
 _PICTURES = r"does not show its pattern|delivered the picture of the previous|captured once more as a control"
 _SPECTRUM = "spectrum|measure"
 
@@ -79,6 +89,7 @@ class Case:
     size: str
     seed: int
     plan_kind: int
+    has_sentinels: bool = False
 
     @property
     def options(self) -> dict[str, str]:
@@ -92,6 +103,7 @@ class Case:
             spectral=ScanLines(step_px=5),
             settings=settings,
             code_settings=tuple(range(len(settings))),
+            sentinels=Sentinels() if self.has_sentinels else None,
         )
 
 
@@ -102,10 +114,16 @@ class Work:
     folder: Path
     count: int = 0
     clean: dict[Case, Path] = field(default_factory=dict)
+    results: dict[Case, xr.Dataset] = field(default_factory=dict)
 
     def new(self) -> Path:
         self.count += 1
         return self.folder / f"{self.count}.dsl"
+
+    def clean_result(self, case: Case) -> xr.Dataset:
+        if case not in self.results:
+            self.results[case] = reconstruct_scan(self.clean[case])
+        return self.results[case]
 
 
 def open_lab(case: Case, kind: str = "", at: int = 0, tear: float = 0.5, plan_file: str = "") -> DeviceRig:
@@ -125,7 +143,7 @@ def _remember_pictures(rig: DeviceRig, case: Case) -> None:
     camera: Any = rig.camera
     while not hasattr(camera, "world"):
         camera = getattr(camera, "_camera", None) or camera.camera
-    world, known = camera.world, _pictures(case)
+    world, known = camera.world, _pictures(replace(case, has_sentinels=False))
     render = world.rate
 
     def rate() -> NDArray[np.float32]:
@@ -143,9 +161,8 @@ def _remember_pictures(rig: DeviceRig, case: Case) -> None:
 
 def judge_scan(work: Work, case: Case, kind: str, at: int, tear: float) -> tuple[str, str]:
     """How a scan with a fault ended, and what it said."""
-    clean, folder = work.clean[case], work.new()
-    plan = ScanReader(clean).plan
-    plan_file = work.folder / f"plan{case.plan_kind}.json"
+    folder, plan = work.new(), ScanReader(work.clean[case]).plan
+    plan_file = work.folder / f"plan{case.plan_kind}{case.has_sentinels}.json"
     plan_file.write_text(plan.model_dump_json())
     said, corrected = "", 0
     try:
@@ -169,14 +186,16 @@ def judge_scan(work: Work, case: Case, kind: str, at: int, tear: float) -> tuple
                 runner.run()
         except DslError as error:
             return "not resumed", f"{said} || {error}"
-    wrong = _wrong(clean, folder)
+    wrong, told = _wrong(work, case, folder)
     shutil.rmtree(folder)
+    if wrong and told:
+        return "told", f"{wrong} {told} {said}"
     return ("WRONG", f"{wrong} {said}") if wrong else (end, said)
 
 
-def _wrong(clean: Path, folder: Path) -> str:
-    """What differs from the clean scan's result; empty if nothing that matters does."""
-    ours, theirs = ScanReader(folder), ScanReader(clean)
+def _wrong(work: Work, case: Case, folder: Path) -> tuple[str, str]:
+    """What differs from the clean scan's result, empty if nothing that matters does; what the result says."""
+    ours, theirs = ScanReader(folder), ScanReader(work.clean[case])
     calibration = theirs.calibration
     assert calibration is not None
     different = []
@@ -188,20 +207,29 @@ def _wrong(clean: Path, folder: Path) -> str:
         if int((np.abs(one - other) > DIFFERENT_SIGMAS * (sigma + 0.3)).sum()) >= DIFFERENT_PIXELS:
             different.append(shot.index)
     if not different:
-        return ""
+        return "", ""
     names = f"{len(different)} frames differ, {different[:6]}"
+    wanted = work.clean_result(case)
     try:
-        result, wanted = (pipeline.reconstruct(each, calibration, Options()) for each in (ours, theirs))
+        result = reconstruct_scan(folder)
     except DslError as error:
-        return f"{names}; {error}"
+        return f"{names}; no result", str(error)
+    told = " ".join(sorted(_sentences(result) - _sentences(wanted)))
     depth = np.abs(result["depth_mm"].values - wanted["depth_mm"].values)
     known = np.isfinite(wanted["depth_mm"].values)
     bad = float((~(depth[known] < DEPTH_MM)).mean())
     apart = result["reflectance"].values - wanted["reflectance"].values
     spectra = float(np.sqrt(np.nanmean(apart**2)))
     if bad > DEPTH_SHARE or spectra > REFLECTANCE:
-        return f"{names}; depth of {bad:.1%} wrong, reflectance off by {spectra:.3f}"
-    return ""
+        return f"{names}; depth of {bad:.1%} wrong, reflectance off by {spectra:.3f}.", told
+    return "", told
+
+
+def _sentences(result: xr.Dataset) -> set[str]:
+    """What a result says of its pictures and of the fit of its model."""
+    fit = Fit.read(result.attrs)
+    found = () if fit is None else tuple(finding.sentence for finding in fit.significant)
+    return {*found, *json.loads(result.attrs.get(DOUBTS, "[]"))}
 
 
 def judge_stage(case: Case, kind: str) -> tuple[str, str]:
@@ -239,11 +267,16 @@ def judge_spectrum(case: Case, kind: str, folder: Path) -> tuple[str, str]:
 def run(chosen_kinds: Sequence[str], cases: Sequence[Case], work: Work) -> dict[str, Counter[str]]:
     """All kinds over all cases."""
     table: dict[str, Counter[str]] = defaultdict(Counter)
-    for case in cases:
+    for plain in cases:
         for number, kind in enumerate(chosen_kinds):
+            case = replace(plain, has_sentinels=kind in CHANGES)
             rng = np.random.default_rng((case.seed, number))
-            count = ScanReader(work.clean[case]).plan.shot_count
-            at = 2 if kind in ("counter wraps",) else int(rng.integers(2, count - 2))
+            shots = list(ScanReader(work.clean[case]).plan.shots())
+            at = int(rng.integers(2, len(shots) - 2))
+            if kind in EARLY:
+                at = 2
+            elif kind in AT_LINES:
+                at = next(shot.index for shot in shots if shot.role == "spectral") - 1
             if kind in STAGE:
                 end, said = judge_stage(case, kind)
             elif kind in SPECTRUM:
@@ -251,8 +284,8 @@ def run(chosen_kinds: Sequence[str], cases: Sequence[Case], work: Work) -> dict[
             else:
                 end, said = judge_scan(work, case, kind, at, float(rng.uniform(0.1, 0.9)))
             table[kind][end] += 1
-            if end in ("WRONG", "reason?", "not resumed"):
-                print(f"  {case} {kind} at {at} of {count}: {end}: {said[:420]}", flush=True)
+            if end in BAD:
+                print(f"  {case} {kind} at {at} of {len(shots)}: {end}: {said[:420]}", flush=True)
     return table
 
 
@@ -287,7 +320,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("--clean", type=int, default=0, help="further clean scans, to count false alarms")
     chosen = parser.parse_args(arguments)
     logging.disable(logging.CRITICAL)
-    every = (*SINGLE, *LASTING, *CAMERA, *PROJECTOR, *OTHER, *STAGE, *SPECTRUM)
+    every = (*SINGLE, *AT_LINES, *LASTING, *CAMERA, *PROJECTOR, *OTHER, *STAGE, *SPECTRUM)
     kinds = chosen.kinds.split(",") if chosen.kinds else every[::7] if chosen.quick else every
     scenes = [entry.name for entry in scene_catalogue()]
     with tempfile.TemporaryDirectory() as spare:
@@ -297,14 +330,16 @@ def main(arguments: Sequence[str] | None = None) -> None:
             Case(scenes[seed % len(scenes)], chosen.size, seed, seed % 3)
             for seed in range(chosen.first, chosen.first + chosen.seeds)
         ]
-        alarms = scan_clean(cases, work)
-        print(f"{len(cases)} clean scans: {alarms} false alarms", flush=True)
+        both = [replace(case, has_sentinels=has) for case in cases for has in (False, True)]
+        alarms = scan_clean(both, work)
+        print(f"{len(both)} clean scans: {alarms} false alarms", flush=True)
         table: dict[str, Counter[str]] = defaultdict(Counter)
         for case in cases:
             for kind, ends in run(kinds, [case], work).items():
                 table[kind] += ends
             _pictures.cache_clear()
-        columns = ("right", "corrected", "stopped", "reason?", "not resumed", "WRONG")
+            work.results.clear()
+        columns = ("right", "corrected", "stopped", "told", "reason?", "not resumed", "WRONG")
         rows = [(kind, *(row[end] for end in columns)) for kind, row in table.items()]
         print_table(("fault", *columns), rows)
         total = sum(table.values(), Counter())

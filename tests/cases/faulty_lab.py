@@ -31,6 +31,7 @@ from dsl_core.model.spectral import SpectralCurve
 from dsl_core.patterns.images import pattern_image
 from dsl_core.simulation.sim_devices import open_twin
 from tests.cases.pattern_faults import LASTING, SINGLE, PatternFault, PatternFaults
+from tests.cases.spoiled_pictures import SPOILED, Spoil, squared
 
 Change = Callable[[Frame, "LabCamera"], object]
 
@@ -56,6 +57,8 @@ def open_lab(options: dict[str, str]) -> DeviceRig:
     if kind == "cannot be opened":
         raise OSError(19, "No such device")
     rig = open_twin(rest)
+    if kind == "swapped at the lines":
+        kind = "swapped"
     if kind in (*SINGLE, *LASTING):
         plan = CapturePlan.model_validate_json(Path(plan_file).read_text())
         rig = PatternFaults(rig, plan, pattern_image, (PatternFault(kind, at, tear),)).rig
@@ -67,7 +70,8 @@ def open_lab(options: dict[str, str]) -> DeviceRig:
         place=None,
         put_back=None,
         standing=None,
-        patience=Patience(answer_s=1.5 if "hangs" in kind else 60.0),
+        # On a busy machine, the twin may take minutes for what it should return at once.
+        patience=Patience(answer_s=1.5 if "hangs" in kind else 900.0),
     )
     assert rig.stage is not None
     assert rig.spectroradiometer is not None
@@ -137,6 +141,10 @@ def _pixels(change: Callable[[NDArray[np.uint16]], NDArray[np.generic]]) -> Chan
     return lambda frame, camera: replace(frame, pixels=change(frame.pixels))  # type: ignore[arg-type]
 
 
+def _spoiled(spoil: Spoil) -> Change:
+    return lambda frame, camera: replace(frame, pixels=spoil(frame.pixels, camera.happened - 1))
+
+
 def _fill(frame: Frame, camera: LabCamera) -> object:
     if camera.buffer is None:
         camera.buffer = frame.pixels.copy()
@@ -180,7 +188,9 @@ CAMERA: dict[str, tuple[bool, Change]] = {
     "clock jumps back": (False, lambda frame, camera: replace(frame, timestamp_s=frame.timestamp_s - 1e4)),
     "no clock": (False, lambda frame, camera: replace(frame, timestamp_s=float("nan"))),
     "exposure told": (False, lambda frame, camera: replace(frame, exposure_ms=frame.exposure_ms / 2)),
+    "clock in ms": (False, lambda frame, camera: replace(frame, timestamp_s=1e3 * frame.timestamp_s)),
     "memory used again": (False, _fill),
+    **{kind: (is_single, _spoiled(spoil)) for kind, (is_single, spoil) in SPOILED.items()},
 }
 
 
@@ -214,6 +224,10 @@ class LabProjector(Projector):
                     image = image[:, ::-1].copy()
                 case "projector shifts by 8":
                     image = np.roll(image, 8, 1)
+                case "projector shifts by 1":
+                    image = np.roll(image, 1, 1)
+                case "projector squares its picture":
+                    image = squared(image)
                 case "projector dims":
                     image = (0.75 * image).astype(np.uint8)
         self.projector.show(image)
@@ -299,6 +313,8 @@ PROJECTOR = (
     "projector inverts",
     "projector mirrors",
     "projector shifts by 8",
+    "projector shifts by 1",
+    "projector squares its picture",
     "projector dims",
 )
 #: Faults of the whole of a scan, that need no shot.
