@@ -4,7 +4,7 @@
 
 The rig is a package of its own, installed into a temporary folder, around the twin. Every scan is held
 against the clean one of the same scene, plan and seed: its frames, and where one looks different, its result.
-Told are scans whose result is other than it should be, and says so, by what it says of fit and pictures.
+Told are scans whose result is other than it should be and names a change of light, black level or place.
 A scan that stopped is resumed with sound devices and judged again, so that wrong frames kept before show.
 """
 
@@ -76,6 +76,8 @@ REASONS = {
 CHANGES = (*SPOILED, "projector shifts by 1", "projector squares its picture")
 #: Faults of the beginning of a scan, and between the last picture of the code and the first line.
 EARLY, AT_LINES = ("counter wraps", "lamp warms up"), ("swapped at the lines",)
+#: What a result says of such a change; other sentences on its fit do not count, nor do any of other faults.
+TOLD = r"Black pictures changed|The light (drifted|flickered|has changed)|(scene|Something|pattern) moved by"
 BAD = ("told", "WRONG", "reason?", "not resumed")
 _PICTURES = r"does not show its pattern|delivered the picture of the previous|captured once more as a control"
 _SPECTRUM = "spectrum|measure"
@@ -188,9 +190,9 @@ def judge_scan(work: Work, case: Case, kind: str, at: int, tear: float) -> tuple
             return "not resumed", f"{said} || {error}"
     wrong, told = _wrong(work, case, folder)
     shutil.rmtree(folder)
-    if wrong and told:
+    if wrong and kind in CHANGES and re.search(TOLD, told):
         return "told", f"{wrong} {told} {said}"
-    return ("WRONG", f"{wrong} {said}") if wrong else (end, said)
+    return ("WRONG", f"{wrong} {told} {said}") if wrong else (end, said)
 
 
 def _wrong(work: Work, case: Case, folder: Path) -> tuple[str, str]:
