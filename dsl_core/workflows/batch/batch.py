@@ -74,6 +74,12 @@ def find_scans(source: Path) -> list[Path]:
     found = [_listed(source.parent, line) for line in lines if line and not line.startswith("#")]
     if not found:
         raise StoreError(f"{source} names no scan. Write a path of a scan on each line.")
+    # A scan that is missing fails by itself; a file of which no line is a path is another kind of file.
+    if not any(address_of(scan) is not None or scan.exists() for scan in found):
+        raise StoreError(
+            f"{source} is not a list of scans: nothing is at {found[0]}, the first path in it. Give a text"
+            " file with a path on each line."
+        )
     return list(dict.fromkeys(found))
 
 

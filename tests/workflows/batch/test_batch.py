@@ -75,7 +75,13 @@ def test_scans_are_found_in_folders_and_lists(folder: Path, tmp_path: Path) -> N
     assert find_scans(listed) == [tmp_path / "scans/c.dsl", tmp_path / "scans/a.dsl"]
     assert find_scans(folder / "a.dsl") == [folder / "a.dsl"]
     listed.write_text("#\n")
-    for nothing, why in ((listed, "names no scan"), (tmp_path / "none", "does not exist")):
+    plan = tmp_path / "plan.json"
+    plan.write_text('{\n"kind": "gray"\n}\n')
+    for nothing, why in (
+        (listed, "names no scan"),
+        (plan, r"plan\.json is not a list of scans: nothing is at .*\{, the first path"),
+        (tmp_path / "none", "does not exist"),
+    ):
         with pytest.raises(StoreError, match=why):
             find_scans(nothing)
     with pytest.raises(StoreError, match="contains no scan"):
