@@ -37,8 +37,6 @@ MOST_PX, STEP_PX = 8.0, 0.02
 EDGE_PX, STRAY = 0.08, 0.02
 #: What a group is unsure of however many pixels it has: its pixels are wrong together.
 GROUP_STD_PX = 0.02
-#: Blur (px, rms) that leaves a tenth of the contrast of stripes two pixels wide, the finest of a code.
-WASHED_OUT_PX = 4 / math.pi * math.sqrt(math.log(10) / 2)
 #: Rms displacements that matter, px: of lines, whose light is not shaped as a stripe's edge, and of rows.
 MOST_APART_PX, MOST_ROWS_PX = 0.1, 0.05
 #: The most that a film that has moved displaces rows by, px.
@@ -100,12 +98,10 @@ def code_agreement(
 ) -> tuple[Geometry, list[FitFinding]]:
     """Geometry whose deviations hold what the code disagrees by, and what was found.
 
-    Codes of other programs, which may name parts of a pixel, are not asked; nor are codes whose finest
-    stripes are blurred away, which name no whole pixel. ``window_px`` is that of `reconstruct_geometry`.
+    Codes of other programs, which may name parts of a pixel, are not asked. ``window_px`` is that of
+    `reconstruct_geometry`.
     """
     if not isinstance(plan.code, GrayCode | XorCode | EnsembleCode):
-        return geometry, []
-    if rig.projector_response.blur_px > WASHED_OUT_PX:
         return geometry, []
     usable = np.isfinite(geometry.depth_mm) & ((geometry.flags & int(_DOUBTFUL)) == 0)
     findings, error_px = [], 0.0

@@ -15,9 +15,7 @@ from dsl_core.model.geometry import Pose
 from dsl_core.model.plan import BinaryCode, CapturePlan, EnsembleCode, GrayCode, ScanLines, Setting, XorCode
 from dsl_core.model.rig import Rig
 from dsl_core.model.spectral import WavelengthGrid
-from dsl_core.reconstruction.code_agreement import NamedPlaces, code_agreement, displacement
-from dsl_core.reconstruction.geometry import reconstruct_geometry
-from dsl_core.reconstruction.merge import MergedScan, decode_columns, stack_lines
+from dsl_core.reconstruction.code_agreement import displacement
 from dsl_core.reconstruction.named_rows import named_rows
 from dsl_core.workflows import scans
 from tests.cases.small_rig import small_rig
@@ -92,20 +90,6 @@ def test_lines_that_moved_after_the_code_are_told(scanned: tuple[DeviceRig, Memo
     assert found["motion"].significant
     assert 0.1 < found["motion"].value < 0.5
     assert held(evaluation) > 0.9
-
-
-def test_a_code_whose_stripes_are_blurred_away_is_not_asked(scanned: tuple[DeviceRig, MemoryScan]) -> None:
-    rig, plan = calibration_of(scanned[0]), scanned[1].plan
-    merged = MergedScan(scanned[1], rig)
-    code, white = decode_columns(merged)
-    geometry = reconstruct_geometry(rig, plan, code, white, stack_lines(merged))
-
-    def said_of(blur_px: float) -> list[FitFinding]:
-        wide = rig.model_copy(update={"projector_response": rig.projector_response.with_gaussian(blur_px)})
-        return code_agreement(wide, plan, NamedPlaces.of(code), geometry)[1]
-
-    assert len(said_of(1.3)) == 2
-    assert said_of(1.4) == []
 
 
 @pytest.mark.parametrize("code", [GrayCode(), XorCode(), EnsembleCode()])
