@@ -67,7 +67,7 @@ def test_a_pixel_at_the_corner_has_a_graph_too(result: ResultArrays) -> None:
 
 def test_a_scan_that_is_elsewhere_is_asked_for(result: ResultArrays, tmp_path: Path) -> None:
     moved = ResultArrays(tmp_path / "b.zarr", result.wavelengths_nm, result.arrays, result.attributes)
-    with pytest.raises(StoreError, match="not next to it"):
+    with pytest.raises(StoreError, match="Put it there"):
         find_scan(moved)
 
 

@@ -49,4 +49,4 @@ def test_without_its_scan_a_graph_is_refused_in_words(bench: Bench) -> None:
     assert "Point at a pixel" in bench.window.toasts.shown[-1].text
     bench.control.point_at((3, 3))
     bench.window.do("intensity_graph")
-    assert "not next to it" in bench.window.toasts.shown[-1].text
+    assert "is not in" in bench.window.toasts.shown[-1].text
