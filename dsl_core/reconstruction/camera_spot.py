@@ -139,8 +139,10 @@ def column_slopes(column_px: NDArray[np.floating]) -> Map:
         high, low = ([slice(None), slice(None)] for _ in range(2))
         high[axis], low[axis] = slice(2, None), slice(None, -2)
         step[tuple(middle)] = 0.5 * (column_px[tuple(high)] - column_px[tuple(low)])
+        finite = step[np.isfinite(step)]
+        usual = float(np.median(finite)) if finite.size else np.nan
         with np.errstate(invalid="ignore"):
-            known = np.isfinite(step) & (np.abs(step - np.nanmedian(step)) < LONGEST_PX)
+            known = np.isfinite(step) & (np.abs(step - usual) < LONGEST_PX)
         size = (SLOPE_WINDOW_PX, SLOPE_WINDOW_PX)
         total, count = (
             cv2.boxFilter(values, cv2.CV_64F, size, normalize=False, borderType=cv2.BORDER_CONSTANT)
