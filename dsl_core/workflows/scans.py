@@ -205,14 +205,6 @@ def is_made_of(target: Path, key: str) -> bool:
     return attributes.get(MADE_OF) == key and check_inventory(target, attributes)
 
 
-def doubts_of(result: xr.Dataset) -> list[str]:
-    """Sentences about pictures that did not show their pattern, and what to do."""
-    return [
-        f"{doubt} The result may be wrong; scan again, or see 'dsl-scan info --verify'."
-        for doubt in json.loads(result.attrs.get(DOUBTS, "[]"))
-    ]
-
-
 def prove_scan(folder: Path) -> ScanProof:
     """What the pictures of a scan show but damaged ones, and what moved in it; raises `StoreError`."""
     reader = ScanReader(folder)

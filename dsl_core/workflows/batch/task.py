@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import contextlib
+import json
 import time
 import traceback
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
@@ -26,7 +27,10 @@ from dsl_core.model.fit import Fit
 from dsl_core.model.options import Options
 from dsl_core.model.rig import Rig
 from dsl_core.workflows.captures import is_import
-from dsl_core.workflows.scans import MADE_OF, is_made_of, key_of_result, reconstruct_to
+from dsl_core.workflows.scans import DOUBTS, MADE_OF, is_made_of, key_of_result, reconstruct_to
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 #: Is told how many rows of a scan's picture are finished, and of how many.
 SeenRows = Callable[[int, int], object]
@@ -160,7 +164,6 @@ def _made(task: ScanTask, options: Options, seen_rows: SeenRows | None) -> Outco
 def _with_figures(outcome: Outcome) -> Outcome:
     """The outcome with what the result says of itself."""
     from dsl_core.io.result.result_file import load_result
-    from dsl_core.workflows.scans import doubts_of
 
     result = load_result(outcome.target)
     fit = Fit.read({str(name): value for name, value in result.attrs.items()})
@@ -170,3 +173,11 @@ def _with_figures(outcome: Outcome) -> Outcome:
         verdict="" if fit is None else fit.headline,
         pixels_with_depth=float(np.isfinite(result["depth_mm"].values).mean()),
     )
+
+
+def doubts_of(result: xr.Dataset) -> list[str]:
+    """Sentences about pictures that did not show their pattern, and what to do."""
+    return [
+        f"{doubt} The result may be wrong; scan again, or see 'dsl-scan info --verify'."
+        for doubt in json.loads(result.attrs.get(DOUBTS, "[]"))
+    ]

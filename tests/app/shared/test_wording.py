@@ -29,6 +29,7 @@ COMMANDS = (
     "dsl_core/campaign/products.py",
     "dsl_core/cli/",
     "dsl_core/devices/drivers/screen.py",
+    "dsl_core/workflows/batch/",
     "resources/",
     "README.md",
 )
