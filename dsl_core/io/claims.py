@@ -18,7 +18,7 @@ from typing import Self
 from dsl_core.errors import StoreError
 from dsl_core.io.atomic import make_folder
 from dsl_core.io.records import read_record, replace_record
-from dsl_core.io.scan.lock import FolderLock
+from dsl_core.io.scan.lock import FolderLock, LockedError
 from dsl_core.model.base import Record
 
 #: The owner's file is touched this often, seconds, and not believed after so long.
@@ -69,11 +69,9 @@ class Claim:
         while True:
             try:
                 lock = FolderLock(self._path)
-            except StoreError as error:
+            except LockedError as error:
                 if not self._path.is_file():
-                    if self._path.parent.is_dir() and os.access(self._path.parent, os.W_OK):
-                        continue  # its owner has just released it
-                    raise
+                    continue  # its owner has just released it
                 raise self._claimed(target, self._owner()) from error
             if lock.is_of(self._path):
                 return lock

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import subprocess
 import sys
@@ -61,6 +62,22 @@ def test_an_owner_touches_its_file(tmp_path: Path) -> None:
             if owner.stat().st_mtime > 1.0:
                 break
         assert owner.stat().st_mtime > 1.0
+
+
+def test_a_disk_without_room_for_a_lock_is_told_and_not_asked_again(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    asked = []
+
+    def full(path: Path, *rest: object) -> int:
+        asked.append(path)
+        if len(asked) > 1:
+            pytest.fail("It was asked again.")
+        raise OSError(errno.ENOSPC, "No space left on device", str(path))
+
+    monkeypatch.setattr(os, "open", full)
+    with pytest.raises(StoreError, match="full"):
+        Claim(tmp_path / "a.zarr")
 
 
 def test_a_folder_that_cannot_be_made_is_told(tmp_path: Path) -> None:

@@ -14,11 +14,15 @@ from dsl_core.io.atomic import store_error, write_all
 _LOCK_BYTE = 1 << 20
 
 
+class LockedError(StoreError):
+    """Another process holds the lock."""
+
+
 class FolderLock:
     """Held from construction to `release`; a lock left by a killed process is free at once."""
 
     def __init__(self, path: Path) -> None:
-        """Take the lock; raises `StoreError` that names the process holding it, or why there is no file."""
+        """Take the lock; raises `LockedError` that names who holds it, `StoreError` without a file."""
         try:
             self._descriptor: int | None = os.open(path, os.O_RDWR | os.O_CREAT, 0o644)
         except OSError as error:
@@ -29,7 +33,7 @@ class FolderLock:
             owner = os.read(self._descriptor, 32).decode(errors="replace").strip() or "unknown"
             os.close(self._descriptor)
             self._descriptor = None
-            raise StoreError(
+            raise LockedError(
                 f"{path.parent} is being written by another process (number {owner})."
                 " Wait until it ends, or end it, and try again."
             ) from error
