@@ -155,11 +155,9 @@ def _named(away_px: Floats) -> Floats:
 
 def _correlated(seen: Floats, log_likelihood: Floats, tried: int) -> Floats:
     """Log likelihood of each displacement that is tried, (tried,)."""
-    from scipy.signal import fftconvolve
-
     floor = float(log_likelihood.min())
     # Beyond the table there is nothing but stray pixels: the same floor.
-    score = fftconvolve(seen, (log_likelihood - floor)[::-1], mode="same")
+    score = np.correlate(seen, log_likelihood - floor, mode="same")
     first = (len(seen) - tried) // 2
     return np.asarray(score[first : first + tried])
 
