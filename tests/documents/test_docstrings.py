@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import doctest
+import linecache
 from importlib import import_module
 from pathlib import Path
 
@@ -19,6 +20,8 @@ MODULES = [
 
 @pytest.mark.parametrize("name", MODULES)
 def test_examples_give_what_they_say(name: str, capsys: pytest.CaptureFixture[str]) -> None:
+    # For each docstring, doctest looks at every file whose lines are kept: after many tests, thousands.
+    linecache.clearcache()
     found = doctest.testmod(import_module(name))
     assert found.attempted
     assert not found.failed, capsys.readouterr().out
