@@ -62,7 +62,7 @@ def real_boards() -> Iterator[tuple[str, ...]]:
     if not root.is_dir():
         print(f"{root} is not there: real boards are left out.")
         return
-    folders = sorted(root.iterdir())
+    folders = sorted(root.resolve().iterdir())
     with tempfile.TemporaryDirectory() as home:
         for folder in folders:
             (Path(home) / f"{folder.name}.png").symlink_to(folder / "graycode_40.png")
