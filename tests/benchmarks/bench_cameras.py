@@ -1,11 +1,12 @@
 """A whole plan through real camera libraries: is every stored frame the twin's own, bit by bit?
 
-``python -m tests.benchmarks.bench_cameras [--quick] [--size 112x72] [--library pylon] [--json FILE]``
+``python -m tests.benchmarks.bench_cameras [--quick] [--size 112x72] [--library pylon] [--minutes 10]``
 
 The twin is scanned once by itself. Then its pictures are what Aravis' own GigE Vision camera on loopback
 delivers; the scan is killed three times and resumed from the disk, and the camera is killed three times more
 and started again. Then the same plan goes through pylon's emulator, with 50 bad buffers forced between its
-frames. What is not installed is left out, and said so.
+frames. What is not installed is left out, and said so. With ``--minutes``, Aravis' camera is instead asked
+for one new picture after the other for so long.
 """
 
 from __future__ import annotations
@@ -292,16 +293,54 @@ def installed() -> list[str]:
     return found
 
 
+def at_full_rate(size: str, minutes: float) -> dict[str, object]:
+    """Frames of noise, each a new one, as fast as the camera gives them."""
+    width, height = map(int, size.split("x"))
+    noise, asked, wrong, lost = np.random.default_rng(0), 0, 0, 0
+    with tempfile.TemporaryDirectory() as home:
+        file = Path(home) / "picture.raw"
+        np.zeros((height, width), np.uint16).tofile(file)
+        picture = np.memmap(file, np.uint16, "r+", shape=(height, width))
+        command = [sys.executable, str(SERVER), SERIAL, str(file), *size.split("x")]
+        with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE) as server:
+            assert server.stdout is not None
+            server.stdout.readline()
+            camera = aravis.open_camera(settings(size).model_copy(update={"id": SERIAL}))
+            camera.configure(1.0)
+            start = time.monotonic()
+            while time.monotonic() < start + 60 * minutes:
+                shown = noise.integers(0, 1 << 12, picture.shape, np.uint16)
+                picture[:] = shown << _SHIFT
+                asked += 1
+                try:
+                    wrong += not np.array_equal(camera.snap().pixels, shown)
+                except DeviceError:
+                    lost += 1
+            seconds = time.monotonic() - start
+            camera.close()
+            server.kill()
+    return {
+        "minutes": round(seconds / 60, 2), "frames asked": asked, "wrong": wrong, "lost": lost,
+        "frames per s": round(asked / seconds, 1),
+    }  # fmt: skip
+
+
 def main() -> None:
     """Measure all that is installed."""
     parser = options(__doc__)
     parser.add_argument("--size", default="112x72", help="picture size (default 112x72)")
     parser.add_argument("--library", choices=LIBRARIES, help="only this one")
+    parser.add_argument("--minutes", type=float, help="how long to ask for frames at full rate")
     parser.add_argument("--work", nargs=3, help=argparse.SUPPRESS)
     arguments = parser.parse_args()
     if arguments.work:
         library, folder, file = arguments.work
         work(library, arguments.size, arguments.quick, Path(folder), Path(file))
+        return
+    if arguments.minutes:
+        row = at_full_rate(arguments.size, arguments.minutes)
+        print_table(list(row), [list(row.values())])
+        write_json(arguments.json, row)
         return
     libraries = [name for name in installed() if arguments.library in (None, name)]
     with tempfile.TemporaryDirectory() as made:
