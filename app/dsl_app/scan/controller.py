@@ -291,7 +291,7 @@ class ScanController:
             finish()
             # Another scan may have set a note of its own meanwhile.
             if self.state.note.value == waiting:
-                retry = f"Open {session.name} on the Results page to reconstruct it."
+                retry = "Press Reconstruct… to begin again; the frames are kept."
                 self.state.note.set(f"{before} The reconstruction {how}. {retry}".strip())
 
         def failed(error: Exception) -> None:

@@ -52,16 +52,17 @@ def run_controls(
     facts: Facts | None,
     note: str,
     has_finished: bool,
-    then_reconstruct: bool = True,
+    has_result: bool = True,
     trouble: str = "",
     is_reconstructing: bool = False,
 ) -> RunControls:
     """The controls of a scan in a phase; ``note`` is what became of the last one.
 
     ``trouble`` is said above the page, with how far the scan came; that is not said again. A finished scan
-    whose reconstruction was not asked for is reconstructed next; while one is, there is only to wait.
+    without a result is reconstructed next, whatever kept it from having one; while one is, there is only to
+    wait.
     """
-    is_raw = phase is Phase.DONE and has_finished and not then_reconstruct
+    is_raw = phase is Phase.DONE and has_finished and not (has_result or is_reconstructing)
     obstacles = () if facts is None or phase.is_busy else facts.obstacles
     is_resumable = session is not None and not phase.is_busy
     lines = [*obstacles, *([note] if note else [])]

@@ -172,7 +172,6 @@ class RunBox(QGroupBox):
                 state.facts,
                 state.note,
                 state.finished,
-                state.then_reconstruct,
                 state.trouble,
                 state.is_reconstructing,
                 state.is_seen,
@@ -214,7 +213,7 @@ class RunBox(QGroupBox):
             state.facts.value,
             state.note.value,
             finished is not None,
-            state.then_reconstruct.value or has_result,
+            has_result,
             state.trouble.value,
             state.is_reconstructing.value,
         )

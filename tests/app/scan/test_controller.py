@@ -194,7 +194,7 @@ def test_a_reconstruction_that_does_not_end_well_is_not_announced_for_ever(
     note = bench.state.note.value
     assert note.startswith(f"All {FRAMES} frames are saved in ")
     assert "Reconstructing" not in note
-    assert f"The reconstruction {how}. Open first.dsl on the Results page" in note
+    assert f"The reconstruction {how}. Press Reconstruct… to begin again" in note
 
 
 def test_a_lost_camera_keeps_all_frames_and_the_scan_goes_on_later(

@@ -113,10 +113,14 @@ def test_progress_is_empty_until_there_is_some() -> None:
 
 
 def test_frames_that_nothing_was_made_of_are_reconstructed_next() -> None:
-    raw = run_controls(Phase.DONE, None, FREE, "", has_finished=True, then_reconstruct=False)
+    raw = run_controls(Phase.DONE, None, FREE, "", has_finished=True, has_result=False)
     assert (raw.start.is_primary, raw.again.is_primary, raw.again.text) == (False, True, "Reconstruct…")
-    done = run_controls(Phase.DONE, None, FREE, "", has_finished=True, then_reconstruct=True)
+    done = run_controls(Phase.DONE, None, FREE, "", has_finished=True, has_result=True)
     assert (done.start.is_primary, done.again.is_primary) == (True, False)
+    made = run_controls(
+        Phase.DONE, None, FREE, "", has_finished=True, has_result=False, is_reconstructing=True
+    )
+    assert (made.start.is_primary, made.again.is_primary) == (False, False)
 
 
 def test_without_a_rig_the_next_thing_is_to_connect_it() -> None:

@@ -104,8 +104,12 @@ def test_pause_go_on_and_finish(qtbot: QtBot, ready: Bench, slow: None, tmp_path
     assert ScanReader(tmp_path / "first.dsl").missing() == []
     assert page.plan.isEnabled()
     assert f"{SHORT.shot_count} of {SHORT.shot_count}" in page.run.frames.text()
-    # It is to be reconstructed, until that is done, from this page or from another.
-    bench.state.then_reconstruct.set(False)
+    # It is to be reconstructed, until that is done, from this page or from another; however that ended.
+    assert page.run.again.property("role") == "primary"
+    bench.state.then_reconstruct.set(True)
+    bench.state.is_reconstructing.set(True)
+    assert page.run.again.property("role") != "primary"
+    bench.state.is_reconstructing.set(False)
     assert page.run.again.property("role") == "primary"
     page.hide()
     (tmp_path / "first.zarr").mkdir()
