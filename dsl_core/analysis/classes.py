@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from dsl_core.analysis.at_bands import Shape, at_bands
 from dsl_core.analysis.library import SpectralLibrary
@@ -32,6 +32,8 @@ BAND_SHARE = 0.25
 WIDE = 0.2
 #: A class whose spectrum is known to no better than both, a share of it and a reflectance, is left out.
 UNKNOWN_SHARE, UNKNOWN = 0.5, 0.05
+#: So is one beyond both of these, if it is so many times less certain than the pixels that it would name.
+VAGUE_SHARE, VAGUE, VAGUE_RATIO = 0.1, 0.03, 3.0
 #: Pixels with these flags get no class: their spectrum is absent, cut off, or that of two materials.
 NOT_JUDGED = SPECTRUM_INVALID | Flag.SATURATED | Flag.POOR_FIT
 
@@ -176,27 +178,41 @@ def doubt_of(each: SpectralClass) -> str:
     return ""
 
 
-def known_classes(classes: Sequence[SpectralClass]) -> tuple[tuple[SpectralClass, ...], tuple[str, ...]]:
+def known_classes(
+    classes: Sequence[SpectralClass], pixel_std: ArrayLike | None = None
+) -> tuple[tuple[SpectralClass, ...], tuple[str, ...]]:
     """Classes whose spectra are known, and notes on those left out and on those in doubt.
 
     A pin on the edge of a patch may have a deviation of several times its reflectance: it would be as likely
-    as any other name everywhere. Raises `DecodeError` where no class is left.
+    as any other name everywhere. One that is far less certain than the pixels, whose deviations
+    ``pixel_std`` (bands, rows, columns) are, takes whole patches of other materials that no class describes.
+    Raises `DecodeError` where no class is left.
     """
+    usual = 0.0 if pixel_std is None else _usual(np.asarray(pixel_std))
     kept: list[SpectralClass] = []
     notes: list[str] = []
     for each in classes:
         std = min(float(member.std.mean()) for member in each.members)
         level = float(each.mean.mean())
-        if std > UNKNOWN and std > UNKNOWN_SHARE * level:
+        is_unknown = std > UNKNOWN and std > UNKNOWN_SHARE * level
+        is_vague = std > max(VAGUE, VAGUE_RATIO * usual) and std > VAGUE_SHARE * level
+        if is_unknown or is_vague:
             notes.append(
                 f"{each.name} is left out: its reflectance of {level:.2f} is known to ±{std:.2f} only"
-                " and would explain nearly anything. Mark another place."
+                " and would explain other materials as well. Mark another place."
             )
         else:
             kept.append(each)
     if classes and not kept:
         raise DecodeError(" ".join(notes))
     return tuple(kept), (*notes, *(doubt for each in kept if (doubt := doubt_of(each))))
+
+
+def _usual(pixel_std: Cube) -> float:
+    """The deviation that pixels usually have; every fourth row and column tells it."""
+    some = pixel_std[:, ::4, ::4]
+    known = some[np.isfinite(some)]
+    return float(np.median(known)) if known.size else 0.0
 
 
 def shared_names(classes: Sequence[SpectralClass]) -> tuple[SpectralClass, ...]:

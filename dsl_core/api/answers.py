@@ -77,7 +77,7 @@ def classify(
         classes += classes_of_masks(result, {name: place_mask(result, name, p) for name, p in pins.items()})
     chosen = Measure(measure)
     limits = Limits.chosen(chosen, worst, margin)
-    known, doubts = known_classes(classes)
+    known, doubts = known_classes(classes, result.get("reflectance_std"))
     notes = [*doubts, *notes]
     made = classify_result(result, known, chosen, limits, brightness, progress)
     over = ("y", "x")

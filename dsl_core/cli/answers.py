@@ -192,7 +192,7 @@ def _classes(
         classes += classes_of_masks(result, masks)
     if pins:
         classes = list(marked_by(classes, colours_of_marks(load_annotations(path))))
-    known, doubts = known_classes(classes)
+    known, doubts = known_classes(classes, result.get("reflectance_std"))
     return list(known), [*doubts, *notes]
 
 

@@ -132,11 +132,23 @@ def test_a_pin_whose_spectrum_is_not_known_names_nothing(cube: ChartCube) -> Non
     kept, notes = known_classes([edge, sure, dark])
     assert [each.name for each in kept] == ["sure", "dark"]
     assert notes == (
-        "edge is left out: its reflectance of 0.10 is known to ±0.40 only and would explain nearly anything."
-        " Mark another place.",
+        "edge is left out: its reflectance of 0.10 is known to ±0.40 only and would explain other materials"
+        " as well. Mark another place.",
     )
     with pytest.raises(DecodeError, match="edge is left out"):
         known_classes([edge])
+
+
+def test_a_pin_that_is_far_less_certain_than_the_pixels_takes_no_other_material(cube: ChartCube) -> None:
+    first = cube.reflectance[:, cube.material == 1].mean(1).astype(np.float64)
+    vague = SpectralClass("vague", (Member.of(first, np.full(24, 0.25 * first.mean())),))
+    sure = class_of_pixels("sure", cube.reflectance, cube.std, cube.material == 1)
+    kept, notes = known_classes([vague, sure], cube.std)
+    assert [each.name for each in kept] == ["sure"]
+    assert notes[0].startswith("vague is left out")
+    # Where all pixels are as uncertain, a pin can be no better than they are.
+    noisy = np.full_like(cube.std, 0.2 * first.mean())
+    assert len(known_classes([vague, sure], noisy)[0]) == 2
 
 
 def test_few_members_stay_and_many_are_summed_up(cube: ChartCube) -> None:

@@ -82,10 +82,11 @@ class AnswersController:
             from dsl_core.analysis.classify import score
 
             asked, notes = classes(result, progress)
-            found, doubts = known_classes(marked_by(asked, colours))
+            std = result.known("reflectance_std")
+            found, doubts = known_classes(marked_by(asked, colours), std)
             scores = score(
                 result["reflectance"],
-                result.known("reflectance_std"),
+                std,
                 result.known("data_share"),
                 result["flags"],
                 found,
