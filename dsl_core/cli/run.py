@@ -42,6 +42,8 @@ _WrongUse: type[BaseException] = typer.BadParameter.__mro__[2]
 
 #: What the parser's checks say, and how this program says it.
 _PLAIN = {
+    # An option with a letter is called by its name alone, as the others are.
+    r"'(--[\w-]+)' / '-\w'": r"'\1'",
     r"Invalid value for '(\S+)': Input should be a valid number.*": r"\1 must be a number.",
     r"Invalid value for '(\S+)': Input should be a valid integer.*": r"\1 must be a whole number.",
     r"Invalid value for '(\S+)': Input should be greater than or equal to (\S+)": r"\1 must be at least \2",

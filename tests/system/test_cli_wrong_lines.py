@@ -75,6 +75,8 @@ def test_there_are_enough_of_them() -> None:
             "calibrate geometry . --pictures --board 9 --square-mm 20",
             "COLUMNSxROWS in whole numbers of at least 1, not '9'.",
         ),
+        ("batch . --jobs 0", "--jobs must be at least 1. See 'dsl-scan batch --help'."),
+        ("batch . -j few", "--jobs must be a whole number. See 'dsl-scan batch --help'."),
         ("classify scan.zarr --library-error nan --at a=1,1", "Name it with --library."),
     ],
 )
