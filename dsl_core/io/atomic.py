@@ -10,6 +10,7 @@ from itertools import chain, count
 from pathlib import Path
 
 from dsl_core.errors import StoreError
+from dsl_core.io.objects.address import require_local
 
 PARTIAL_SUFFIX = ".partial"
 _DISK_FULL = {errno.ENOSPC, getattr(errno, "EDQUOT", errno.ENOSPC)}
@@ -86,11 +87,17 @@ def set_aside(path: Path) -> str:
 
 def make_folder(folder: Path) -> None:
     """Make a folder and those above it, to be there also after a power cut; raises `StoreError`."""
+    require_local(folder)
     try:
         make_durable(folder)
     except OSError as error:
         if error.errno in _DISK_FULL:
             raise store_error(folder, error) from error
+        if isinstance(error, NotADirectoryError | FileExistsError):
+            raise StoreError(
+                f"The folder {folder} cannot be created: a file is where a folder is needed."
+                " Choose another place."
+            ) from error
         raise StoreError(
             f"The folder {folder} cannot be created ({error.strerror}). Check its parent folder's"
             " permissions."

@@ -18,6 +18,7 @@ from dsl_core.errors import StoreError, TakenError
 from dsl_core.io import CAMPAIGN_NAME, MANIFEST_NAME
 from dsl_core.io.atomic import PARTIAL_SUFFIX, make_durable, make_safe, store_error, sync_folder
 from dsl_core.io.kinds import whose_inside
+from dsl_core.io.objects.address import require_local
 from dsl_core.io.scan.lock import FolderLock
 from dsl_core.io.swap import exchange
 
@@ -119,9 +120,10 @@ def check_targets(targets: Sequence[Path], *, overwrite: bool, kind: FolderKind 
     """Raise `StoreError` when a target exists and may not be replaced; asked before long work too.
 
     A file may replace a file, a folder only one of its own ``kind`` with nothing else in it. Nor may what
-    would hold the target be a file, closed to this user, or a scan or result itself.
+    would hold the target be a file, closed to this user, a scan or result itself, or an object store.
     """
     for target in targets:
+        require_local(target)
         _require_room(target)
     # A link to nothing is there, although nothing exists behind it.
     taken = [target for target in targets if os.path.lexists(target)]

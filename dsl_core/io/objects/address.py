@@ -44,6 +44,16 @@ def address_of(path: Path) -> Address | None:
     return Address(bucket, name)
 
 
+def require_local(path: Path) -> None:
+    """Raise `StoreError` for an address: as a path, it would make folders named ``s3:`` on this computer."""
+    address = address_of(path)
+    if address is not None:
+        raise StoreError(
+            f"{address} is an address of an object store; this is written on this computer only."
+            " Give a path of this computer."
+        )
+
+
 def shown(path: Path) -> str:
     """A path as a person writes it, addresses with both slashes."""
     return str(address_of(path) or path)
