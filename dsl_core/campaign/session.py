@@ -149,6 +149,7 @@ class CalibrationSession:
     def _capture(self, step: Step, progress: Progress) -> None:
         folder = self._folder(step)
         note = read_note(folder) or CaptureNote(conditions=current_conditions(self.devices), started=now())
+        note = note.model_copy(update={"steps": len(self.steps)})
         replace_record(folder / NOTE_NAME, note)
         self.campaign.discard(self.recipe.name)
         self._place_again(step)

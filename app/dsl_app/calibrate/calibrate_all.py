@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from dsl_app.calibrate.campaign_status import Kinds
-from dsl_app.calibrate.overall import Overall
+from dsl_app.calibrate.overall import LEAST_SHARE, Overall
 from dsl_app.calibrate.state import CalibrateState
 from dsl_app.calibrate.wizard.background_work import WatchedCamera
 from dsl_app.connection.controller import RIG, RigController
@@ -104,6 +104,8 @@ class CalibrateAll:
         count = f", {told.done} of {told.total}" if told.total else ""
         left = overall.left_s()
         rest = "" if left is None else f"  ·  about {describe_seconds(left)} left for everything"
+        if overall.is_early:
+            rest = f"  ·  the time left is told from {100 * LEAST_SHARE:.0f} % of everything on"
         self._state.running.set(overall.name)
         self._state.everything.set(f"{told.stage or 'starting'}{count}{rest}")
         seen = None if self._camera is None else self._camera.take_seen()

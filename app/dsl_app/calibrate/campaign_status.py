@@ -75,13 +75,14 @@ def _read(
     about = ABOUT.get(name, About(name, ""))
     try:
         accepted, waits = campaign.accepted(name), campaign.candidate(name) is not None
-        captured = count_captured(campaign, name)
+        captured, steps = count_captured(campaign, name)
     except DslError as error:
         return Row(name, about, RowState.DAMAGED, str(error)), ""
     waiting = "A fit has not been judged yet." if waits else ""
     if accepted is None:
         begun = captured > 0 or waits
-        reason = waiting or (f"{captured} captured" if captured else "")
+        count = f"{captured} of {steps}" if steps else str(captured)
+        reason = waiting or (f"{count} captured" if captured else "")
         state = RowState.BEGUN if begun else RowState.MISSING
         return Row(name, about, state, reason, has_candidate=waits), ""
     state, reason = judge(accepted, before, conditions, now, ageing)
@@ -139,13 +140,18 @@ def _strain(figure: Figure) -> float:
     return max(ratio, 1.001) if not figure.passed else min(max(ratio, 0.0), 1.0)
 
 
-def count_captured(campaign: CampaignFolder, name: str) -> int:
-    """How many steps of a calibration were captured to their end; raises `StoreError`."""
+def count_captured(campaign: CampaignFolder, name: str) -> tuple[int, int]:
+    """How many steps of a calibration were captured to their end, and of how many; raises `StoreError`.
+
+    It had as many as when the last of them was captured; 0 is unknown.
+    """
     home = campaign.home(name)
     if not home.is_dir():
-        return 0
-    notes = (read_note(folder) for folder in sorted(home.iterdir()) if folder.is_dir())
-    return sum(note is not None and bool(note.finished) and not note.refused for note in notes)
+        return 0, 0
+    notes = (read_note(folder) for folder in home.iterdir() if folder.is_dir())
+    done = [note for note in notes if note is not None and note.finished and not note.refused]
+    last = max(done, key=lambda note: note.finished, default=None)
+    return len(done), 0 if last is None else last.steps
 
 
 def _title(name: str) -> str:

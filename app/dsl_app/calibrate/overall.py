@@ -53,6 +53,11 @@ class Overall:
         current = max(self._done, 0) + self._within if self.name else 0.0
         return (finished + current) / max(sum(self._parts.values()), 1)
 
+    @property
+    def is_early(self) -> bool:
+        """Whether a calibration runs, but too little is done to tell the time left."""
+        return bool(self.name) and self.share < LEAST_SHARE
+
     def left_s(self) -> float | None:
         """The time left for all of it, s; None while too little is done to tell, or nothing left to count."""
         share = self.share

@@ -29,12 +29,16 @@ _ASIDE = ".replaced"
 
 
 class CaptureNote(Record):
-    """What a session writes next to the captures of a step; ``refused`` is the reason, empty for none."""
+    """What a session writes next to the captures of a step; ``refused`` is the reason, empty for none.
+
+    ``steps`` is how many the calibration had when this one was captured; 0 is unknown.
+    """
 
     conditions: CaptureConditions
     started: str
     finished: str = ""
     refused: str = ""
+    steps: int = 0
 
 
 def read_note(folder: Path) -> CaptureNote | None:

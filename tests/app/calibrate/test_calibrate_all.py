@@ -42,12 +42,14 @@ def test_rows_are_live_while_everything_is_calibrated(
     devices.place = lambda placement: None
     seen: list[tuple[str, list[RowState], bool]] = []
     shares: list[float] = []
+    texts: list[str] = []
     real = UnattendedGuide.looked
 
     def looked(self: UnattendedGuide, step: Step, figures: Sequence[Figure]) -> bool:
         answer = real(self, step, figures)
         bench.control.take_news()
         seen.append((bench.state.running.value, states(bench), bench.state.seen.value is not None))
+        texts.append(bench.state.everything.value)
         job = bench.control._everything._job
         assert job is not None
         shares.append(job.extent[0] / job.extent[1])
@@ -59,6 +61,9 @@ def test_rows_are_live_while_everything_is_calibrated(
     assert seen[-1][1] == [RowState.GOOD, RowState.MISSING]
     # Two steps and a fit, a step and a fit: the bar is of all of them.
     assert shares == pytest.approx([0.0, 0.2, 0.6], abs=0.001)
+    # Why no time left is told is told.
+    assert texts[0].endswith("the time left is told from 4 % of everything on")
+    assert texts[1].endswith("left for everything")
     assert seen[-1][2]
     assert bench.state.running.value == ""
     assert bench.state.seen.value is None

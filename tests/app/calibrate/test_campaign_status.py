@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import replace
 from datetime import timedelta
 
 from dsl_app.calibrate.campaign_status import JUDGED_BY, key_figure
 from dsl_app.calibrate.state import RowState
 
+from dsl_core.campaign.common.captures import NOTE_NAME
 from dsl_core.campaign.recipes import recipe_names
+from dsl_core.io.campaign_folder import CampaignFolder
 from dsl_core.model.figure import Figure
 from tests.app.calibrate.calibrate_bench import (
     CalibrateBench,
@@ -42,6 +45,20 @@ def test_rows_say_why_a_calibration_is_not_good(bench: CalibrateBench) -> None:
     (bench.campaign / "selftest.json").write_text("{")
     bench.control.refresh()
     assert bench.row("selftest").state is RowState.DAMAGED
+
+
+def test_a_row_says_how_many_of_its_steps_are_captured(bench: CalibrateBench) -> None:
+    state, control = bench.wizard("selftest")
+    control.go_to(state.lacking[0])
+    control.capture()
+    control.leave()
+    assert bench.row("selftest").reason == "1 of 2 captured"
+    # Captures of an earlier version do not say how many there are.
+    for path in CampaignFolder.open(bench.campaign).home("selftest").glob(f"*/{NOTE_NAME}"):
+        note = json.loads(path.read_text())
+        path.write_text(json.dumps({key: note[key] for key in note if key not in ("steps", "checksum")}))
+    bench.control.refresh()
+    assert bench.row("selftest").reason == "1 captured"
 
 
 def test_the_key_figure_is_the_one_nearest_to_its_limits() -> None:
