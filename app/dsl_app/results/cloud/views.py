@@ -228,7 +228,8 @@ class InteractiveCloud(CloudView):
         painter = QPainter(self)
         painter.fillRect(event.rect(), QColor(self._theme.surround))
         painter.drawImage(0, 0, self.image)
-        if self._seen is not None:
+        # An empty view has no scale that a bar could tell.
+        if self._seen is not None and not self.waiting:
             theme = self._theme
             size, inks = (self.width(), self.height()), (theme.text, theme.accent, theme.surround)
             OverlayPainter(painter, *size, *inks).paint(self._seen, self._overlay)

@@ -8,9 +8,10 @@ import time
 import numpy as np
 import pytest
 from dsl_app.results.cloud import points as cloud_points
+from dsl_app.results.cloud.overlay import OverlayPainter
 from dsl_app.results.cloud.render_window import graphics_work
 from dsl_app.results.cloud.renderer import SETTLE_S
-from dsl_app.results.cloud.views import InteractiveCloud, static_picture
+from dsl_app.results.cloud.views import DRAWING, InteractiveCloud, static_picture
 from dsl_app.results.state import ResultView
 from dsl_app.shared.spectrum import Pixel
 from numpy.typing import NDArray
@@ -96,6 +97,19 @@ def test_the_view_is_turned_and_looks_as_the_camera_again(bench: Bench, qtbot: Q
     qtbot.waitUntil(lambda: view.renderer.is_at_rest and not _looks_alike(view.projection(), first))
     QTest.keyClick(view, Qt.Key.Key_Home)
     qtbot.waitUntil(lambda: view.renderer.is_at_rest and _looks_alike(view.projection(), first))
+
+
+def test_no_scale_is_told_before_there_is_a_picture_of_the_cloud(
+    bench: Bench, qtbot: QtBot, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    view, painted = cloud_view(bench, qtbot), list[object]()
+    monkeypatch.setattr(OverlayPainter, "paint", lambda _, seen, __: painted.append(seen))
+    view.waiting = DRAWING
+    view.grab()
+    assert painted == []
+    view.waiting = ""
+    view.grab()
+    assert painted == [view._seen]
 
 
 def test_pictures_follow_the_size_of_the_window(bench: Bench, qtbot: QtBot) -> None:
