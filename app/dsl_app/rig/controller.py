@@ -9,7 +9,7 @@ from dataclasses import replace
 
 from dsl_app.connection.controller import RigController
 from dsl_app.connection.state import Link, RigState
-from dsl_app.rig.state import LEVEL, FrameCounts, LiveState
+from dsl_app.rig.state import LEVEL, Drawn, FrameCounts, LiveState
 from dsl_app.shared.notify import Notifier
 from dsl_core.capture.auto_exposure import ExposureSearch
 from dsl_core.devices.base import DeviceRig
@@ -39,7 +39,7 @@ class LiveController:
     def __init__(self, rig: RigController, notifier: Notifier) -> None:
         self.rig, self.state, self._notifier = rig, LiveState(), notifier
         self._lock = threading.Lock()
-        self._latest: Frame | None = None
+        self._latest: tuple[Frame, Drawn | None] | None = None
         self._counts = FrameCounts()
         #: The devices that were exposed for since they were connected.
         self._looked_at: DeviceRig | None = None
@@ -97,8 +97,9 @@ class LiveController:
     def fetch_frame(self) -> None:
         """Publish the newest frame to the page; called by the window's clock."""
         with self._lock:
-            frame, self._latest = self._latest, None
-        if frame is not None:
+            latest, self._latest = self._latest, None
+        if latest is not None:
+            frame, self.state.drawn = latest
             self.state.frame.set(frame)
             self.state.counts.set(self._counts)
             self._exposer.judge(frame)
@@ -122,10 +123,12 @@ class LiveController:
             time.sleep(max(LIVE_PERIOD_S - (time.monotonic() - start), 0))
 
     def _post(self, frame: Frame) -> None:
-        """Keep a frame for `fetch_frame`; one that was not fetched meanwhile is skipped."""
+        """Keep a frame and its picture for `fetch_frame`; one that was not fetched meanwhile is skipped."""
+        draw = self.state.draw.value
+        drawn = None if draw is None else (draw, draw(frame.pixels))
         with self._lock:
             skipped = int(self._latest is not None)
-            self._latest = frame
+            self._latest = frame, drawn
         counts = self._counts
         self._counts = replace(counts, shown=counts.shown + 1 - skipped, skipped=counts.skipped + skipped)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from functools import partial
 
 import numpy as np
 import pyqtgraph as pg
@@ -11,7 +12,8 @@ from PySide6.QtGui import QKeyEvent
 from PySide6.QtWidgets import QCheckBox, QWidget
 
 from dsl_app.rig.display_row import DisplayRow
-from dsl_app.rig.state import FrameCounts
+from dsl_app.rig.state import Draw, Drawn, FrameCounts
+from dsl_app.shared.evented import Value
 from dsl_app.shared.theme import Theme
 from dsl_app.shared.widgets.forms import check_box, label, push_button, set_role
 from dsl_app.shared.widgets.layouts import STRETCH, boxed, column_of, row_of
@@ -37,11 +39,15 @@ _COLOURS = ("#d94545", "#3fa34d", "#3f7fd9")
 
 
 class LiveView(QWidget):
-    """Shows frames of a camera; what it shows never changes what is saved."""
+    """Shows frames of a camera; what it shows never changes what is saved.
+
+    ``draw`` is how it makes a picture of a frame now, for a thread that does so before the frame is shown.
+    """
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self._camera: CameraInfo | None = None
+        self.draw: Value[Draw | None] = Value(None)
         self._is_live = False
         self._frame: Frame | None = None
         self._times: list[float] = []
@@ -60,11 +66,11 @@ class LiveView(QWidget):
         self.rectangle.sigRegionChangeFinished.connect(self._repaint)
         self.view.scene().sigMouseMoved.connect(self._hover)
         self.display = DisplayRow()
-        self.display.changed.connect(self._repaint)
+        self.display.changed.connect(self._redraw)
         self.saturation = QCheckBox("Saturation")
         self.saturation.setToolTip("Mark in red the cells that contain a raw pixel at full scale")
         self.saturation.setChecked(True)
-        self.saturation.toggled.connect(self._repaint)
+        self.saturation.toggled.connect(self._redraw)
         self.region_box = QCheckBox("Region")
         self.region_box.setToolTip("Limit histogram, figures and auto exposure to a rectangle; drag it")
         self.region_box.toggled.connect(self._show_region)
@@ -118,6 +124,7 @@ class LiveView(QWidget):
     def set_camera(self, camera: CameraInfo | None) -> None:
         """Show frames of this camera from now on."""
         self._camera, self._frame, self._times = camera, None, []
+        self._choose_draw()
         self._item.clear()
         self._read = None
         self.region_box.setChecked(False)
@@ -137,15 +144,15 @@ class LiveView(QWidget):
     def _explain(self) -> None:
         self._empty.setText(NO_RIG if self._camera is None else WAITING if self._is_live else NO_PICTURE)
 
-    def show_frame(self, frame: Frame | None) -> None:
-        """Show a frame."""
+    def show_frame(self, frame: Frame | None, drawn: Drawn | None = None) -> None:
+        """Show a frame; ``drawn`` is its picture if somebody has made one, and how."""
         if frame is None or self._camera is None:
             return
         first = self._frame is None
         self._frame = frame
         now = time.monotonic()
         self._times = [*self._times[-29:], now]
-        self._paint()
+        self._paint(drawn)
         if first:
             self._empty.setVisible(False)
             self.show_all()
@@ -182,17 +189,30 @@ class LiveView(QWidget):
             self._paint()
             self._show_figures()
 
-    def _paint(self) -> None:
-        assert self._camera is not None
-        assert self._frame is not None
-        full_scale = 2**self._camera.bit_depth - 1
-        picture = quick_picture(
-            self._frame.pixels,
-            self._camera.bayer,
-            full_scale,
-            self.saturation.isChecked(),
-            self.display.display,
+    def _redraw(self) -> None:
+        self._choose_draw()
+        self._repaint()
+
+    def _choose_draw(self) -> None:
+        camera = self._camera
+        if camera is None:
+            self.draw.set(None)
+            return
+        draw = partial(
+            quick_picture,
+            bayer=camera.bayer,
+            full_scale_dn=2**camera.bit_depth - 1,
+            show_saturation=self.saturation.isChecked(),
+            display=self.display.display,
         )
+        self.draw.set(draw)
+
+    def _paint(self, drawn: Drawn | None = None) -> None:
+        draw = self.draw.value
+        assert draw is not None
+        assert self._frame is not None
+        # A picture that was made before a setting changed is made again.
+        picture = drawn[1] if drawn is not None and drawn[0] is draw else draw(self._frame.pixels)
         self._item.setImage(picture, autoLevels=False, levels=None)
 
     def _show_figures(self) -> None:

@@ -113,7 +113,8 @@ class RigPage(PageWidget):
             made.place_controls(self.beside)
         self.stops += [
             self._state.live.follow(made.set_live),
-            state.frame.follow(made.show_frame),
+            made.draw.follow(state.draw.set),
+            state.frame.follow(lambda frame: made.show_frame(frame, state.drawn)),
             state.counts.follow(made.show_counts),
         ]
         return made

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeAlias
 
 from dsl_app.connection.state import Link, RigState
 from dsl_app.shared.evented import Value
@@ -12,9 +13,16 @@ from dsl_core.words import counted
 
 if TYPE_CHECKING:
     # The window comes up before numpy.
+    import numpy as np
+    from numpy.typing import NDArray
+
     from dsl_core.devices.base import CameraInfo, ProjectorInfo
     from dsl_core.model.frames import Frame
 
+#: From the mosaic of a frame to a picture (rows, columns, 3) of bytes; runs in any thread.
+Draw: TypeAlias = "Callable[[NDArray[np.uint16]], NDArray[np.uint8]]"
+#: How a picture was drawn, and the picture.
+Drawn: TypeAlias = "tuple[Draw, NDArray[np.uint8]]"
 #: Drive level of the first trial picture.
 LEVEL = 0.8
 _LINK_ROLES = {Link.OPEN: "good", Link.OPENING: "warn", Link.LOST: "bad", Link.CLOSED: "muted"}
@@ -32,11 +40,14 @@ class FrameCounts:
 class LiveState:
     """Values of the live view: the latest frame, its exposure, and whether an exposure is being searched.
 
-    ``level`` is the drive level of the trial picture.
+    ``draw`` is how the page shows frames (None before it does), and ``drawn`` the picture of ``frame``, made
+    in the thread of the camera. ``level`` is the drive level of the trial picture.
     """
 
     def __init__(self) -> None:
         self.frame: Value[Frame | None] = Value(None)
+        self.draw: Value[Draw | None] = Value(None)
+        self.drawn: Drawn | None = None
         self.exposure_ms = Value(1000.0 / 6.0)
         self.counts = Value(FrameCounts())
         self.is_exposing = Value(False)

@@ -13,6 +13,7 @@ from dsl_app.rig.controller import LOST_AFTER, LiveController
 from dsl_app.rig.state import FrameCounts
 from dsl_app.shared.jobs.base import Job
 from dsl_app.shared.jobs.qt_runner import QtRunner
+from numpy.typing import NDArray
 from pytestqt.qtbot import QtBot
 
 from dsl_core.errors import DeviceError
@@ -189,6 +190,28 @@ def test_frames_that_were_not_fetched_are_counted_as_skipped() -> None:
     frame = live.state.frame.value
     assert frame is not None
     assert frame.frame_id == 2
+
+
+def test_the_picture_of_a_frame_is_made_in_the_thread_that_took_it(qtbot: QtBot, start: Start) -> None:
+    live, _, runner = start()
+    threads: list[int] = []
+
+    def draw(pixels: NDArray[np.uint16]) -> NDArray[np.uint8]:
+        threads.append(threading.get_ident())
+        return np.full((1, 1, 3), pixels[0, 0] % 256, np.uint8)
+
+    live.state.draw.set(draw)
+    live.start()
+    qtbot.waitUntil(lambda: len(threads) > 1, timeout=60_000)
+    live.stop()
+    live.fetch_frame()
+    drawn, frame = live.state.drawn, live.state.frame.value
+    assert threading.get_ident() not in threads
+    assert drawn is not None
+    assert frame is not None
+    assert drawn[0] is draw
+    assert drawn[1][0, 0, 0] == frame.pixels[0, 0] % 256
+    runner.shut_down()
 
 
 def test_no_picture_reaches_the_projector_while_a_job_has_the_rig(qtbot: QtBot) -> None:

@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import numpy as np
 from dsl_app.rig.live_view import LiveView
 from dsl_app.shared.theme import DARK, LIGHT
 from pytestqt.qtbot import QtBot
+
+from dsl_core.devices.base import CameraInfo
+from dsl_core.model.frames import Frame
 
 
 def test_the_legend_can_be_read_in_either_theme(qtbot: QtBot) -> None:
@@ -14,3 +18,20 @@ def test_the_legend_can_be_read_in_either_theme(qtbot: QtBot) -> None:
         view.apply_theme(theme)
         names = [text.item.toHtml() for _, text in view._legend.items]
         assert [theme.muted in name for name in names] == [True] * 3
+
+
+def test_a_picture_that_was_made_is_shown_unless_settings_have_changed(qtbot: QtBot) -> None:
+    view = LiveView()
+    qtbot.addWidget(view)
+    assert view.draw.value is None
+    view.set_camera(CameraInfo("test", "1", 16, 12, "RGGB", 12, (0.01, 1000.0)))
+    draw = view.draw.value
+    assert draw is not None
+    frame = Frame(np.full((12, 16), 64, np.uint16), 10.0, 0.0)
+    made = np.full((6, 8, 3), 77, np.uint8)
+    view.show_frame(frame, (draw, made))
+    assert (view._item.image == made).all()
+    view.display.stretch.setChecked(False)
+    assert view.draw.value is not draw
+    view.show_frame(frame, (draw, made))
+    assert view._item.image.max() < 77
