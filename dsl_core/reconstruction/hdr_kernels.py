@@ -1,7 +1,9 @@
 """Loops over the pixels of a bracket's mosaics, compiled: merging them, and comparing their light.
 
 Both go row by row, setting by setting, so that sums of a row stay in the processor's cache and the loops over
-columns become vector instructions. What is computed is explained where these are called from.
+columns become vector instructions. For that a loop may use few arrays, whose overlap has to be ruled out
+before it, and whole numbers must not grow to 64 bits. What is computed is explained where these are called
+from.
 """
 
 from __future__ import annotations
@@ -27,18 +29,20 @@ def merge_settings(
     ``variance``; the array that is not wanted is empty.
     """
     settings, rows, columns = raws.shape
+    limit, u32 = np.uint16(limit_dn), np.uint32
     zero, one = np.float32(0), np.float32(1)
     total, weight = np.empty(columns, np.float32), np.empty(columns, np.float32)
-    expected, least = np.empty(columns, np.float32), np.empty(columns, np.float32)
-    bits, small = expected.view(np.uint32), least.view(np.uint32)
+    expected, heavy = np.empty(columns, np.float32), np.empty(columns, np.float32)
+    bits, small = expected.view(np.uint32), heavy.view(np.uint32)
     for y in range(rows):
         for x in range(columns):
             total[x], weight[x] = zero, zero
         for s in range(settings):
+            own = gains[s]
             for x in range(columns):
                 # A saturated value drops out of every sum.
-                used = raws[s, y, x] < limit_dn
-                weight[x] += gains[s] if used else zero
+                used = raws[s, y, x] < limit
+                weight[x] += own if used else zero
                 total[x] += np.float32(raws[s, y, x]) - black[s, y, x] if used else zero
         shut = False
         for x in range(columns):
@@ -49,11 +53,12 @@ def merge_settings(
             shut |= weight[x] == zero
             total[x], weight[x] = zero, zero
         for s in range(settings):
+            own, shot = gains[s], shots[s]
             for x in range(columns):
-                gain = gains[s] if raws[s, y, x] < limit_dn else zero
-                heavy = gain / (expected[x] * shots[s] + floor[s, y, x])
-                weight[x] += heavy * gain
-                total[x] += heavy * (np.float32(raws[s, y, x]) - black[s, y, x])
+                heavy[x] = (own if raws[s, y, x] < limit else zero) / (expected[x] * shot + floor[s, y, x])
+            for x in range(columns):
+                weight[x] += heavy[x] * own
+                total[x] += heavy[x] * (np.float32(raws[s, y, x]) - black[s, y, x])
         for x in range(columns):
             radiance[y, x] = total[x] / weight[x]
         if shut:
@@ -68,11 +73,12 @@ def merge_settings(
             for x in range(columns):
                 std = np.sqrt(one / weight[x])
                 # Added to a half, numbers below the least normal one of half precision round as they should.
-                expected[x], least[x] = std, std + np.float32(0.5)
+                expected[x], heavy[x] = std, std + np.float32(0.5)
             for x in range(columns):
-                normal = (bits[x] + np.uint32(0xFFF) + ((bits[x] >> 13) & 1)) >> 13
-                half = min(normal - np.uint32(112 << 10), np.uint32(0x7C00))
-                halves[y, x] = half if bits[x] >= np.uint32(113 << 23) else small[x] - np.uint32(126 << 23)
+                odd = u32(u32(bits[x] >> u32(13)) & u32(1))
+                normal = u32(u32(bits[x] + u32(0xFFF) + odd) >> u32(13))
+                half = min(u32(normal - u32(112 << 10)), u32(0x7C00))
+                halves[y, x] = half if bits[x] >= u32(113 << 23) else u32(small[x] - u32(126 << 23))
         else:
             for x in range(columns):
                 variance[y, x] = one / weight[x]
