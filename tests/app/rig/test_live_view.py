@@ -23,7 +23,8 @@ def test_the_legend_can_be_read_in_either_theme(qtbot: QtBot) -> None:
 def test_a_picture_that_was_made_is_shown_unless_settings_have_changed(qtbot: QtBot) -> None:
     view = LiveView()
     qtbot.addWidget(view)
-    assert view.draw.value is None
+    without_camera = view.draw.value
+    assert without_camera is None
     view.set_camera(CameraInfo("test", "1", 16, 12, "RGGB", 12, (0.01, 1000.0)))
     draw = view.draw.value
     assert draw is not None
