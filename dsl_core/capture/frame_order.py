@@ -9,6 +9,7 @@ from dataclasses import replace
 
 from dsl_core.errors import DeviceError
 from dsl_core.model.frames import Frame
+from dsl_core.words import counted
 
 #: Where counters of frames start again, and how near to it both numbers are then.
 WRAPS, NEAR_WRAP = (2**8, 2**16, 2**32, 2**64), 32
@@ -72,7 +73,7 @@ class FrameOrder:
     def _note_gap(self, frame: Frame, last: Frame) -> None:
         skipped = frame.frame_id - last.frame_id - 1
         if skipped > 0 and self._unbroken >= FRAMES_WITHOUT_GAP:
-            self._tell("gap", f"the camera lost {skipped} frames before number {frame.frame_id}")
+            self._tell("gap", f"the camera lost {counted(skipped, 'frame')} before number {frame.frame_id}")
         self._unbroken = self._unbroken + 1 if skipped == 0 else 0
 
     def _note_clock(self, frame: Frame, last: Frame, passed_s: float) -> None:

@@ -94,6 +94,7 @@ def doctor(
 ) -> None:
     """Try every device of a rig profile, and say all that is wrong and what to do; nothing is moved."""
     from dsl_core.devices.doctor import Grade, survey
+    from dsl_core.devices.registry import rig_names
     from dsl_core.errors import DeviceError
     from dsl_core.io.rig_profile import examine_profile, profile_names, profile_path
 
@@ -102,6 +103,11 @@ def doctor(
         path = profile_path(profile)
         if path is None:
             known = ", ".join(profile_names()) or "none"
+            if profile in rig_names():
+                raise DeviceError(
+                    f"{profile} is a rig that is opened by code of its own, not by a profile. Try its devices"
+                    f" with 'dsl-scan selftest --rig {profile}', or by the tests that came with it."
+                )
             if Path(profile).exists():
                 raise DeviceError(
                     f"{profile} is not a rig profile: their names end in .json. Give the path of one."

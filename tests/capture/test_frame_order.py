@@ -122,7 +122,7 @@ def test_a_gap_is_worth_a_word_after_eight_frames_without_one(
     for k in range(numbers):
         order.take(_frame(first + k, 1.0 + k))
     order.take(_frame(first + numbers + 1, 99.0))
-    assert ("the camera lost 1 frames" in caplog.text) == is_told
+    assert ("the camera lost 1 frame before" in caplog.text) == is_told
 
 
 @pytest.mark.parametrize(

@@ -39,3 +39,4 @@ def test_a_profile_that_is_not_there_is_said_in_a_sentence(give: Give, tmp_path:
     assert "cannot be read" in give("rigs", "doctor", tmp_path / "lost.json").sentence
     assert "There is no rig profile 'lost'" in give("rigs", "doctor", "lost").sentence
     assert "names end in .json" in give("rigs", "doctor", tmp_path).sentence
+    assert "selftest --rig twin" in give("rigs", "doctor", "twin").sentence
