@@ -60,11 +60,15 @@ class GoodCamera(Camera):
 
     def snap(self, timeout_ms: float = 5000.0) -> Frame:
         self.count += 1
+        if self.fault == "loses" and self.count % 5 in (0, 1):
+            raise DeviceError("The frame did not arrive; ask for the next one.")
         image = self.light.before if self.fault == "early" else self.light.now
         pixels = self.buffer if self.fault == "buffer" else np.zeros((4, 6), np.uint16)
         pixels[:] = self.count + int(10 * image.mean())
         if self.fault == "left":
             pixels <<= 12
+        if self.fault == "upper":
+            pixels <<= 4
         if self.fault == "shape":
             pixels = pixels.T
         if self.fault == "type":
@@ -212,6 +216,10 @@ def test_a_good_rig_passes() -> None:
     assert _failing(Everything()) == []
 
 
+def test_frames_that_are_lost_are_asked_for_again() -> None:
+    assert _failing(Everything("camera", "loses")) == []
+
+
 @pytest.mark.parametrize(
     ("device", "fault", "test"),
     [
@@ -221,6 +229,7 @@ def test_a_good_rig_passes() -> None:
         ("camera", "says", "test_camera_returns_the_exposure_in_force"),
         ("camera", "lenient", "test_camera_refuses_exposures_out_of_range"),
         ("camera", "left", "test_camera_delivers_the_raw_mosaic"),
+        ("camera", "upper", "test_camera_delivers_the_raw_mosaic"),
         ("camera", "shape", "test_camera_delivers_the_raw_mosaic"),
         ("camera", "type", "test_camera_delivers_the_raw_mosaic"),
         ("camera", "count", "test_camera_counts_frames"),
