@@ -6,6 +6,7 @@ to the comment before it, which names its command. Needs the environment of the 
 
 from __future__ import annotations
 
+import argparse
 import re
 import shlex
 import subprocess
@@ -84,11 +85,14 @@ def run(command: str, text: str, folder: Path) -> list[str]:
 
 def main() -> int:
     """Run every command whose output is shown; write it, or compare."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--check", action="store_true", help="compare, and write nothing")
+    checks = parser.parse_args().check
     text, code = README.read_text(encoding="utf-8"), 0
     for command, lines in shown(text).items():
         with tempfile.TemporaryDirectory() as folder:
             printed = run(command, text, Path(folder))
-        if "--check" in sys.argv:
+        if checks:
             wrong = differences(lines, printed)
             print(*(wrong or [f"{command}: as shown"]), sep="\n")
             code = max(code, int(bool(wrong)))
@@ -96,7 +100,7 @@ def main() -> int:
             head = f"<!-- printed by: {command} -->\n\n```\n"
             old, new = ("\n".join(part) for part in (lines, excerpt(lines, printed)))
             text = text.replace(f"{head}{old}\n", f"{head}{new}\n")
-    if "--check" not in sys.argv:
+    if not checks:
         README.write_text(text, encoding="utf-8")
     return code
 
