@@ -74,7 +74,7 @@ def test_a_wizard_goes_on_where_it_was_left(bench: CalibrateBench) -> None:
     control.capture()
     control.leave()
     assert bench.row("selftest").state is RowState.BEGUN
-    assert bench.row("selftest").reason == "1 captured"
+    assert bench.row("selftest").reason == "1 of 2 captured"
     state, control = bench.wizard("selftest")
     assert page(state) == 2
     assert [each.state for each in state.statuses.value] == ["captured", "missing"]
