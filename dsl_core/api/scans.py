@@ -23,7 +23,7 @@ from dsl_core.io.scan.origin import rig_notes
 from dsl_core.model.base import problems_in_words
 from dsl_core.model.options import Options
 from dsl_core.model.plan import CapturePlan
-from dsl_core.model.presets import PRESETS
+from dsl_core.model.presets import PRESETS, preset_plan
 from dsl_core.model.rig import Rig
 from dsl_core.model.spectral import WavelengthGrid
 from dsl_core.progress import Progress
@@ -67,10 +67,10 @@ def plan(rig: DeviceRig, preset: str = "reference", **changes: object) -> Captur
     """
     from dsl_core.capture.preflight import fit_plan
 
-    known = {"reference": CapturePlan(), **{each.key: each.plan for each in PRESETS}}
-    if preset not in known:
-        raise PlanError(f"There is no plan {preset!r}; choose {', '.join(known)}.")
-    chosen = known[preset]
+    chosen = preset_plan(preset)
+    if chosen is None:
+        known = ", ".join(each.key for each in PRESETS)
+        raise PlanError(f"There is no plan {preset!r}; choose {known}.")
     if changes:
         try:
             chosen = CapturePlan.model_validate({**dict(chosen), **changes})

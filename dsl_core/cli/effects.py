@@ -7,7 +7,16 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from dsl_core.cli.options import Effects, Json, PlanFile, RigOptions, Tolerance, parse_options, with_effects
+from dsl_core.cli.options import (
+    Effects,
+    Json,
+    PlanSource,
+    RigOptions,
+    Tolerance,
+    parse_options,
+    plan_of,
+    with_effects,
+)
 from dsl_core.cli.output import Output
 from dsl_core.errors import DeviceError
 
@@ -31,12 +40,11 @@ def effects(
     option: RigOptions = [],  # noqa: B006 - typer reads it, nobody changes it
     effects: Effects = "auto",
     tolerance: Tolerance = None,
-    plan: PlanFile = None,
+    plan: PlanSource = None,
     json: Json = False,
 ) -> None:
     """Show which effects of light a scene needs, and why: how much each changes at most, and its cost."""
     from dsl_core.devices.registry import open_rig
-    from dsl_core.io.plan_file import load_plan
     from dsl_core.model.plan import CapturePlan
     from dsl_core.simulation.effects.planner import describe
     from dsl_core.simulation.sim_devices import SimCamera
@@ -48,7 +56,7 @@ def effects(
         options["scene"] = scene
     if "effects" not in options:
         options = with_effects(options, effects, None)
-    captured = load_plan(plan) if plan else CapturePlan()
+    captured = plan_of(plan) if plan else CapturePlan()
     with open_rig("twin", with_effects(options, None, tolerance)) as rig:
         assert isinstance(rig.camera, SimCamera)
         world = rig.camera.world

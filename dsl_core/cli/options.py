@@ -46,6 +46,13 @@ def tab_codes(incomplete: str) -> list[str]:
     return [choice.name for choice in CODE_CHOICES if choice.name.startswith(incomplete)]
 
 
+def tab_plans(incomplete: str) -> list[str]:
+    """Names of presets for the Tab key; where none fits, the shell offers files."""
+    from dsl_core.model.presets import PRESETS
+
+    return [preset.key for preset in PRESETS if preset.key.startswith(incomplete)]
+
+
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON object instead of text.")]
 Force = Annotated[bool, typer.Option("--force", help="Replace existing files.")]
 Report = Annotated[Path | None, typer.Option("--report", "-o", help="Also write everything as an HTML page.")]
@@ -81,7 +88,15 @@ OverrideCalibration = Annotated[
         "--override-calibration", help="Use the calibration although camera or projector settings differ."
     ),
 ]
-PlanFile = Annotated[Path | None, typer.Option("--plan", help="A plan written by 'dsl-scan plan'.")]
+PlanSource = Annotated[
+    str | None,
+    typer.Option(
+        "--plan",
+        help="A file written by 'dsl-scan plan', or preview, comb, quick, coarse, balanced, columns or"
+        " reference.",
+        autocompletion=tab_plans,
+    ),
+]
 Code = Annotated[
     str | None,
     typer.Option(
@@ -116,16 +131,20 @@ Sentinel = Annotated[
 class PlanChoice:
     """The plan that the options of a command describe."""
 
-    file: Path | None = None
+    source: str | None = None
     code: str | None = None
     lines: str | None = None
     comb: str | None = None
     settings: Sequence[str] = ()
     sentinels: bool | None = None
 
+    @property
+    def is_written(self) -> bool:
+        """Whether a file says exactly what to capture; any other plan is fitted to the rig."""
+        return self.source is not None and not _is_preset(self.source)
+
     def build(self) -> CapturePlan:
         """The plan; raises `PlanError` when the choices contradict each other or are impossible."""
-        from dsl_core.io.plan_file import load_plan
         from dsl_core.model.plan import CapturePlan
 
         details = {
@@ -136,10 +155,10 @@ class PlanChoice:
             "--sentinels or --no-sentinels": self.sentinels,
         }
         given = [name for name, value in details.items() if value is not None]
-        if self.file is not None:
+        if self.source is not None:
             if given:
                 raise PlanError(f"--plan gives the whole plan; leave out {', '.join(given)}, or --plan.")
-            return load_plan(self.file)
+            return plan_of(self.source)
         return _checked("plan", lambda: CapturePlan.model_validate(self._fields()))
 
     def _fields(self) -> dict[str, object]:
@@ -171,6 +190,28 @@ class PlanChoice:
             width, step, period = _lengths("--comb", self.comb, "WIDTHxSTEPxPERIOD")
             return _checked("--comb", lambda: LineComb(width_px=width, step_px=step, period_px=period))
         return None
+
+
+def plan_of(source: str) -> CapturePlan:
+    """The plan in a file, or of a preset where no file has that name; raises `PlanError`."""
+    from dsl_core.io.plan_file import load_plan
+    from dsl_core.model.presets import PRESETS, preset_plan
+
+    preset = preset_plan(source) if _is_preset(source) else None
+    if preset is not None:
+        return preset
+    if not Path(source).suffix and not Path(source).exists():
+        known = ", ".join(preset.key for preset in PRESETS)
+        raise PlanError(
+            f"There is no plan {source!r}; give a file written by 'dsl-scan plan', or one of {known}."
+        )
+    return load_plan(Path(source))
+
+
+def _is_preset(source: str) -> bool:
+    from dsl_core.model.presets import preset_plan
+
+    return preset_plan(source) is not None and not Path(source).exists()
 
 
 def parse_options(texts: Sequence[str]) -> dict[str, str]:

@@ -18,7 +18,7 @@ from dsl_core.cli.options import (
     Lines,
     OverrideCalibration,
     PlanChoice,
-    PlanFile,
+    PlanSource,
     RigName,
     RigOptions,
     Sentinel,
@@ -89,7 +89,7 @@ def scan(
     target: Annotated[Path, typer.Argument(metavar="SCAN.dsl", help="New folder for the frames.")],
     rig: RigName = "twin",
     option: RigOptions = [],  # noqa: B006
-    plan: PlanFile = None,
+    plan: PlanSource = None,
     code: Code = None,
     lines: Lines = None,
     comb: Comb = None,
@@ -107,7 +107,8 @@ def scan(
     from dsl_core.io.scan.origin import rig_notes
 
     output, options = Output(json), with_effects(parse_options(option), effects, tolerance)
-    choice = PlanChoice(plan, code, lines, comb, setting, sentinels).build()
+    choice = PlanChoice(plan, code, lines, comb, setting, sentinels)
+    made = choice.build()
     if (target / MANIFEST_NAME).exists():
         raise StoreError(
             f"{target} already contains a scan."
@@ -115,7 +116,7 @@ def scan(
         )
     with open_rig(rig, options) as devices:
         calibrated, overridden = _calibrate(output, devices, calibration, override)
-        fitted = choice if plan else pipeline.fit_plan(choice, calibrated)
+        fitted = made if choice.is_written else pipeline.fit_plan(made, calibrated)
         _require_patterns(fitted)
         _state(output, fitted, target, calibrated)
         notes = rig_notes(rig, options) | overridden

@@ -104,6 +104,15 @@ PRESETS: tuple[Preset, ...] = (
 )
 
 
+def preset_plan(name: str) -> CapturePlan | None:
+    """The plan of a preset, for the published projector; None for a name that no preset has.
+
+    >>> preset_plan("quick").settings[0].level
+    0.4
+    """
+    return next((preset.plan for preset in PRESETS if preset.key == name), None)
+
+
 def whole_cycles(exposure_ms: float, period_ms: float) -> int:
     """Whole LED cycles nearest to an exposure, at least one.
 

@@ -12,10 +12,12 @@ import pytest
 
 import dsl_core
 from dsl_core.cli.options import PlanChoice
-from dsl_core.io.plan_file import load_plan
+from dsl_core.errors import PlanError
+from dsl_core.io.plan_file import load_plan, save_plan
 from dsl_core.io.result.result_file import load_result
 from dsl_core.io.scan.folder import ScanReader
 from dsl_core.model.plan import EnsembleCode, GrayCode, LineComb, Setting, XorCode
+from dsl_core.model.presets import preset_plan
 
 from .conftest import SMALL_PLAN, SMALL_RIG, Give
 
@@ -253,6 +255,21 @@ def test_info_of_a_scan_and_a_result(give: Give, finished: Path) -> None:
     assert result["attributes"]["fit"].startswith("{")
     assert f"verdict            {result['verdict']}" in told
     assert f"to {result['depth_mm'][2]}, median {result['depth_mm'][1]}" in told
+
+
+def test_a_plan_is_a_preset_by_name_or_a_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    quick = preset_plan("quick")
+    assert quick is not None
+    assert PlanChoice("quick").build() == quick
+    assert not PlanChoice("quick").is_written, "it is fitted to the rig"
+    save_plan(quick.model_copy(update={"name": "mine"}), tmp_path / "quick")
+    assert PlanChoice("quick").build().name == "mine", "a file wins"
+    assert PlanChoice("quick").is_written
+    with pytest.raises(PlanError, match=r"no plan 'quik'; give a file .* or one of preview, comb, quick"):
+        PlanChoice("quik").build()
+    with pytest.raises(PlanError, match="--plan gives the whole plan; leave out --code"):
+        PlanChoice("comb", code="columns").build()
 
 
 def test_the_demo_leaves_a_report_and_never_writes_over_another(

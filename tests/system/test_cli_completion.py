@@ -18,6 +18,7 @@ CASES = [
     (("scan", "a.dsl", "--rig", "t"), ["twin"]),
     (("resume", "a.dsl", "--rig", "re"), ["replay"]),
     (("plan", "a.json", "--code", "full-e"), ["full-ensemble-04", "full-ensemble-02"]),
+    (("scan", "a.dsl", "--plan", "pre"), ["preview"]),
     (("export", "a.zarr", "ti"), ["tiff"]),
 ]
 
