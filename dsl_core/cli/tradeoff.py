@@ -82,7 +82,9 @@ def tradeoff(
 
 def design(
     target: Annotated[Path, typer.Argument(metavar="SET.json", help="File to write.")],
-    frames: Annotated[int, typer.Option("--frames", help="Number of patterns, 8 to 160.")] = 32,
+    frames: Annotated[
+        int, typer.Option("--frames", help="Number of patterns, 8 to 160.", min=8, max=160)
+    ] = 32,
     rig: RigName = "twin",
     option: RigOptions = [],  # noqa: B006
     calibration: CalibrationName = None,
