@@ -81,12 +81,15 @@ def scene_samples(rig: Rig, result: xr.Dataset, grid: tuple[int, int] = (12, 8))
 
     Raises `PlanError` when the look has no spectra, another size, or no valid pixel.
     """
-    shape = (rig.camera.height_px, rig.camera.width_px)
-    if "reflectance" not in result or result["depth_mm"].shape != shape:
+    height, width = result["depth_mm"].shape
+    if (height, width) != (rig.camera.height_px, rig.camera.width_px):
         raise PlanError(
-            f"A quick look must have spectra at {shape[1]} x {shape[0]} pixels, the image size of the rig"
-            f" {rig.name!r}. Scan and reconstruct with this rig."
+            f"The quick look is {width} x {height} pixels; rig {rig.name!r} takes pictures of"
+            f" {rig.camera.width_px} x {rig.camera.height_px}. Name the rig, with the options, that it was"
+            " scanned with, or scan with this rig."
         )
+    if "reflectance" not in result:
+        raise PlanError("The quick look has no spectra. Reconstruct its scan with spectra.")
     valid = (result["flags"].values & int(SPECTRUM_INVALID)) == 0
     valid &= np.isfinite(result["reflectance"].values).all(0) & np.isfinite(result["shading"].values)
     if not valid.any():
