@@ -99,7 +99,9 @@ class LaneSolver:
 
     def __init__(self, prior: Prior, bands: int, diagonals: int, parameters: float = 0.0) -> None:
         """``parameters`` are the degrees of freedom that a spectrum takes from its data."""
-        self.bands, self.size, self._parameters = bands, diagonals + 1, parameters
+        self.bands, self.size = bands, diagonals + 1
+        # Always of one type: the loops would be compiled once more for a whole number.
+        self._parameters = float(parameters)
         self._diagonals = (0,) * diagonals
         ridge = prior.level_std**-2
         shape = roughness(bands, torch.zeros(1, dtype=torch.float64))
