@@ -72,7 +72,7 @@ def test_plans_by_name_and_with_changes() -> None:
         changed = dsl.plan(rig, "balanced", name="mine")
         assert changed.name == "mine"
         assert changed.camera_size_px == (112, 72)
-        with pytest.raises(PlanError, match="no plan 'best'; choose preview, comb, .*reference"):
+        with pytest.raises(PlanError, match=r"no plan 'best'; choose preview, comb, .*reference"):
             dsl.plan(rig, "best")
 
 
