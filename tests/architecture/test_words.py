@@ -42,14 +42,9 @@ def faults(text: Text, phrase: str) -> bool:
     return re.search(phrase, NAMES.sub("", text.text), re.IGNORECASE) is not None
 
 
-@pytest.fixture(scope="module")
-def everything() -> list[Text]:
-    return list(texts_now())
-
-
 @pytest.mark.parametrize("phrase", INSTEAD)
-def test_no_text_holds_it(everything: list[Text], phrase: str) -> None:
-    found = [f"{each.path}:{each.line}: {each.text.strip()}" for each in everything if faults(each, phrase)]
+def test_no_text_holds_it(phrase: str) -> None:
+    found = [f"{each.path}:{each.line}: {each.text.strip()}" for each in texts_now() if faults(each, phrase)]
     assert found == [], f"write: {INSTEAD[phrase]}"
 
 

@@ -10,6 +10,7 @@ import argparse
 import ast
 import subprocess
 from collections.abc import Callable, Iterator
+from functools import cache
 from pathlib import Path
 from typing import NamedTuple
 
@@ -70,14 +71,15 @@ def texts(paths: list[str], read: Callable[[str], str]) -> Iterator[Text]:
                     yield Text(path, number, line)
 
 
-def texts_now() -> Iterator[Text]:
-    """The text of the working tree."""
+@cache
+def texts_now() -> tuple[Text, ...]:
+    """The text of the working tree, as it was at first."""
     paths = [
         str(path.relative_to(ROOT).as_posix())
         for folder in ("app", "dsl_core", "resources")
         for path in sorted((ROOT / folder).rglob("*.*"))
     ]
-    return texts([*paths, "README.md"], lambda path: (ROOT / path).read_text(encoding="utf-8"))
+    return tuple(texts([*paths, "README.md"], lambda path: (ROOT / path).read_text(encoding="utf-8")))
 
 
 def texts_at(revision: str) -> Iterator[Text]:
@@ -97,7 +99,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description="List the text that users read.")
     parser.add_argument("since", nargs="?", help="revision of git to compare with")
     since = parser.parse_args().since
-    now = list(texts_now())
+    now = texts_now()
     if since is None:
         for each in now:
             print(f"{each.path}:{each.line}: {each.text.strip()}")

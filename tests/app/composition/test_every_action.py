@@ -141,11 +141,10 @@ def test_it_is_noticed(qtbot: QtBot, window: MainWindow, chosen: list[str], acti
         assert action.key in ("undo", "redo")
         return
     before = notice(window, chosen)
-    # A question that waits for an answer is given up.
+    # A question that waits for an answer is given up, as soon as it is there.
     give_up = QTimer(window)
-    give_up.setSingleShot(True)
     give_up.timeout.connect(lambda: tidy(window))
-    give_up.start(1500)
+    give_up.start(100)
     made.trigger()
     # Later, it would close the dialogs of other tests.
     give_up.stop()

@@ -33,7 +33,7 @@ from dsl_core.simulation.published_rig import published_rig
 from dsl_core.simulation.rendering.pattern_table import PatternTable
 from tests.cases.twin_scan import MemoryScan
 
-SIZE, DEPTH_MM = (96, 62), 700.0
+SIZE, DEPTH_MM = (64, 42), 700.0
 SETTING = Setting(exposure_ms=100.0, level=1.0)
 BOTH, GRAY = EnsembleCode(rows=False), GrayCode(rows=False)
 #: DN per ms that a pixel gets straight from white, and from a place so many columns further on.
