@@ -19,8 +19,11 @@ Results = Annotated[list[Path], typer.Argument(metavar="RESULT.zarr...", help="R
 
 
 def compare(
-    first: Annotated[Path, typer.Argument(help="A result, NAME.zarr.")],
-    second: Annotated[Path, typer.Argument(help="The result to compare it with, of the same camera.")],
+    first: Annotated[Path, typer.Argument(metavar="FIRST.zarr", help="A result.")],
+    second: Annotated[
+        Path,
+        typer.Argument(metavar="SECOND.zarr", help="The result to compare it with, of the same camera."),
+    ],
     json: Json = False,
 ) -> None:
     """Compare two results: FIRST minus SECOND over the pixels and bands that both have."""

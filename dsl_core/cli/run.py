@@ -50,6 +50,10 @@ _PLAIN = {
     r"Invalid value for '(\S+)': Input should be less than or equal to (\S+)": r"\1 must be at most \2",
     r"Invalid value for '(\S+)': Input should be": r"\1 must be",
     r"Invalid value for '(\S+)': Value error, (.*) is not one of (.*?)\.?$": r"\1 must be one of \3, not \2",
+    r"Got unexpected extra argument(?:\(s\)|s)? \((.*)\)": r"Too many arguments: \1",
+    r"Option '(\S+)' requires an argument": r"\1 needs a value",
+    r"No such (command|option):? ": r"There is no \1 ",
+    r" \(Possible options: (.*)\)": r". Did you mean \1?",
 }
 
 app = typer.Typer(
@@ -170,6 +174,10 @@ def _usage(error: BaseException, arguments: list[str]) -> str:
     message = " ".join(str(getattr(error, "format_message", error.__str__)()).split())
     for theirs, ours in _PLAIN.items():
         message = re.sub(theirs, ours, message)
+    missing = re.fullmatch(r"Missing (?:argument|option) '(.+?)'\.?", message)
+    if missing:
+        meaning = getattr(getattr(error, "param", None), "help", None)
+        message = f"{missing[1]} is missing" + (f": {meaning}" if meaning else "")
     if type(error).__name__ == "NoSuchOption" and getattr(error, "option_name", "") == "-o":
         message = "There is no option -o here; options of a rig are given with -O or --option"
     message = message or "A command of it is missing"

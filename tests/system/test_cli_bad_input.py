@@ -192,9 +192,9 @@ def test_frames_that_show_nothing(
     ("command", "sentence"),
     [
         ("", "Missing command"),
-        ("scna", "No such command 'scna'"),
-        ("scan", "Missing argument 'SCAN.dsl'"),
-        ("scan a.dsl --rigg twin", "No such option: --rigg"),
+        ("scna", "There is no command 'scna'"),
+        ("scan", "SCAN.dsl is missing: New folder for the frames. See"),
+        ("scan a.dsl --rigg twin", "There is no option --rigg. Did you mean --rig?"),
         ("scan a.dsl --rig twinn", "no rig 'twinn'; installed rigs: "),
         ("scan a.dsl -O scene", "must be key=value"),
         ("scan a.dsl -O scene=plane -O scene=box", "is given twice"),

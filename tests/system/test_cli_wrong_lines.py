@@ -67,9 +67,15 @@ def test_there_are_enough_of_them() -> None:
 @pytest.mark.parametrize(
     ("line", "told"),
     [
-        ("calibrate geometry --board", "See 'dsl-scan calibrate geometry --help'."),
         ("gui --theme magic", "one of 'system', 'light', 'dark', not 'magic'. See 'dsl-scan gui --help'."),
         ("calibrat", "Did you mean 'calibrate', 'calibrations'? See 'dsl-scan --help'."),
+        ("info one two", "Too many arguments: two. See 'dsl-scan info --help'."),
+        ("calibrate geometry --board", "--board needs a value. See 'dsl-scan calibrate geometry --help'."),
+        (
+            "compare a.zarr",
+            "SECOND.zarr is missing: The result to compare it with, of the same camera."
+            " See 'dsl-scan compare --help'.",
+        ),
         ("calibrate", "A command of it is missing. See 'dsl-scan calibrate --help'."),
         (
             "calibrate geometry . --pictures --board 9 --square-mm 20",
