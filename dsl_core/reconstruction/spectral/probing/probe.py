@@ -9,7 +9,7 @@ model as it is.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -176,22 +176,30 @@ def _probe_some(scan: ProbedScan, targets: Indices) -> dict[str, NDArray[Any]]:
         "bias": band_mean(bias[..., :others].transpose(0, 1))[reported].transpose(0, 1).numpy(),
         "reflectance": solved.mean[reported].T.numpy(),
         "chi_square": solved.chi_square.numpy(),
-        "correlation": _correlation(solved.residual * weight.sqrt(), solved.gather).numpy(),
+        "correlation": _correlation(
+            (solved.residual * weight.sqrt()).split(light.sizes, 1), solved.gather
+        ).numpy(),
         "place": np.stack([2 * y / shape[0] - 1, 2 * x / shape[1] - 1], 1),
         "cell": cell_of(y, x, shape),
         "pixel": targets,
     }
 
 
-def _correlation(standard: Tensor, gather: Callable[[Tensor], Tensor]) -> Tensor:
-    """By how much sums of residuals (samples, rows) over lines vary more than independent ones: at least 1.
+def _correlation(orders: Sequence[Tensor], gather: Callable[[Tensor], Tensor]) -> Tensor:
+    """By how much sums of residuals over lines vary more than independent ones: at least 1.
 
-    ``1 + 2 sum(rho)`` of the autocorrelation up to the lag where it first vanishes.
+    ``orders`` holds the residuals (samples, lines) of each order. ``1 + 2 sum(rho)`` of the autocorrelation
+    up to the lag where it first vanishes.
     """
-    total = gather((standard * standard).sum(1)).clip(min=1e-12)
+
+    def products(lag: int) -> Tensor:
+        parts = [(each[:, lag:] * each[:, : -lag or None]).sum(1) for each in orders]
+        return gather(torch.stack(parts).sum(0))
+
+    total = products(0).clip(min=1e-12)
     factor, open_ = torch.ones_like(total), torch.ones_like(total, dtype=torch.bool)
     for lag in range(1, 9):
-        rho = gather((standard[:, lag:] * standard[:, :-lag]).sum(1)) / total
+        rho = products(lag) / total
         open_ &= rho > 0.02
         factor += 2 * torch.where(open_, rho, 0.0)
     return factor

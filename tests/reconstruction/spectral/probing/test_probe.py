@@ -40,12 +40,15 @@ def test_neighbouring_residuals_that_go_together_count_until_they_first_do_not()
     def gather(values: torch.Tensor) -> torch.Tensor:
         return torch.zeros(2, dtype=values.dtype).index_add_(0, owner, values)
 
-    assert probe_module._correlation(rows, gather).tolist() == pytest.approx([1 + 2 * (2 / 3 + 1 / 3), 1.0])
+    assert probe_module._correlation([rows], gather).tolist() == pytest.approx([1 + 2 * (2 / 3 + 1 / 3), 1.0])
+    # The last line of one order is no neighbour of the first one of another.
+    two = [torch.tensor([[0.0, 1.0]]), torch.tensor([[1.0, 0.0]])]
+    assert probe_module._correlation(two, lambda values: values).tolist() == [1.0]
     # Nothing divides by nothing, and only eight lags count.
     long = torch.ones((1, 30), dtype=torch.float64)
     wanted = 1 + 2 * sum(1 - lag / 30 for lag in range(1, 9))
-    assert probe_module._correlation(long, lambda values: values).tolist() == pytest.approx([wanted])
-    assert probe_module._correlation(0 * long, lambda values: values).tolist() == [1.0]
+    assert probe_module._correlation([long], lambda values: values).tolist() == pytest.approx([wanted])
+    assert probe_module._correlation([0 * long], lambda values: values).tolist() == [1.0]
 
 
 def probe_of(**more: Any) -> Probe:
