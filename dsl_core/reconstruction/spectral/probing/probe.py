@@ -22,11 +22,13 @@ from dsl_core.model.rig import BayerPattern
 from dsl_core.optics.spectra import ORDERS
 from dsl_core.optics.spread.field import widths_at
 from dsl_core.reconstruction.spectral.probing.curve_probe import (
+    USUAL_STEEPNESS,
     CurveMisfit,
     curve_changes,
     curve_misfit,
     normal_of_all_curves,
     of_all_curves,
+    steepness_per_nm,
     tells_of_curves,
     variety,
 )
@@ -64,8 +66,9 @@ class Probe:
     ``cell`` (n,) the cell of `CELLS`, ``pixel`` (n,) the flat index. ``with_curves`` are ``normal`` and
     ``score`` of these parameters and of the curves after them, None where nobody asked. ``lines`` is what the
     zero order of the same pixels says, ``nm_per_px`` how far apart columns of the first orders are,
-    ``step_nm`` bands. ``places`` is whether pixels can tell where the orders are: on a small piece of one
-    colour an error of its spectrum looks like a shift.
+    ``step_nm`` bands; ``steepness`` is by how much the logarithm of the light changes along 1 nm. ``places``
+    is whether pixels can tell where the orders are: on a small piece of one colour an error of its spectrum
+    looks like a shift.
     """
 
     normal: Floats
@@ -81,6 +84,7 @@ class Probe:
     nm_per_px: float
     places: bool = True
     step_nm: float = 5.0
+    steepness: float = USUAL_STEEPNESS
     with_curves: tuple[Floats, Floats] | None = None
 
     @property
@@ -98,7 +102,8 @@ class Probe:
         """How far curves of camera and projector are off by what colours say; None where they say nothing."""
         if self.with_curves is None or not tells_of_curves(self.reflectance[self.sound]):
             return None
-        return curve_misfit(*self.with_curves, self.weight, np.array(PRIOR_STD), self.step_nm)
+        known = np.array(PRIOR_STD), self.step_nm, self.steepness
+        return curve_misfit(*self.with_curves, self.weight, *known)
 
 
 def probe_targets(valid: NDArray[np.bool_]) -> Indices:
@@ -135,10 +140,18 @@ def probe(scan: ProbedScan) -> Probe | None:
         normal=whole[0][:, :own, :own],
         score=whole[1][:, :own],
         step_nm=scan.model.bands.step_nm,
+        steepness=_steepness(scan),
         with_curves=whole,
         lines=probe_lines(lines, response, scan.pixels, scan.radiance, scan.std, targets, widths),
         nm_per_px=_nm_per_px(scan, targets),
     )
+
+
+def _steepness(scan: ProbedScan) -> float:
+    """By how much the logarithm of the light of the first orders changes along 1 nm."""
+    bands = scan.model.bands
+    white = np.stack([bands.moments[order].sum(1)[:, bands.reported] for order in ORDERS])
+    return steepness_per_nm(white, bands.step_nm)
 
 
 def _nm_per_px(scan: ProbedScan, targets: Indices) -> float:

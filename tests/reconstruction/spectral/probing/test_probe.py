@@ -121,6 +121,7 @@ def probed(monkeypatch: pytest.MonkeyPatch, share: float, varied: bool, **model:
     monkeypatch.setattr(probe_module, "widths_at", lambda *_: None)
     monkeypatch.setattr(probe_module, "probe_lines", lambda *_: None)
     monkeypatch.setattr(probe_module, "_nm_per_px", lambda *_: 2.0)
+    monkeypatch.setattr(probe_module, "_steepness", lambda *_: 0.1)
     camera = SimpleNamespace(width_px=1000 * share, fx_px=1000.0)
     given = {
         "single": True, "lines": (), "response": lambda _: None, "rig": SimpleNamespace(camera=camera),
@@ -157,7 +158,7 @@ def test_the_parameters_come_first_and_curves_after_them(monkeypatch: pytest.Mon
     assert found.normal.tolist() == normal[:, :own, :own].tolist()
     assert found.score.tolist() == score[:, :own].tolist()
     assert found.pixel.tolist() == list(range(100))
-    assert (found.nm_per_px, found.step_nm) == (2.0, 5.0)
+    assert (found.nm_per_px, found.step_nm, found.steepness) == (2.0, 5.0, 0.1)
 
 
 @pytest.mark.parametrize("model", [{"single": False}, {"pixels": 39}])
