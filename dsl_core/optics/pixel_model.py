@@ -194,6 +194,15 @@ class PixelModel:
         typical = relative_width(field, footprint.columns[inside], footprint.rows[inside]).log().mean()
         return math.exp(round(float(typical) / WIDTH_STEP) * WIDTH_STEP)
 
+    def widths(self, footprint: Footprint, inside: Tensor) -> Tensor:
+        """How much wider than the usual one lines are where the inside bands of each pixel lie, (pixels,)."""
+        field = self.rig.projector_response.field
+        if field is None:
+            return torch.ones_like(footprint.columns[0])
+        each = relative_width(field, footprint.columns, footprint.rows).log()
+        typical = torch.where(inside, each, 0.0).sum(0) / inside.sum(0).clip(min=1)
+        return ((typical / WIDTH_STEP).round() * WIDTH_STEP).exp()
+
     def frames(self, columns_px: Tensor, inside: Tensor) -> range:
         """Frames of single lines that light any band (bands, pixels) that is inside; empty when none does."""
         assert self.lines is not None

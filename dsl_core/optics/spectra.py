@@ -144,3 +144,9 @@ class Bands:
         span_nm = float(self.centres_nm[-1] - self.centres_nm[0])
         slope = float((columns_px[-1] - columns_px[0]).abs().mean()) / span_nm
         return max(round(slope / SLOPE_STEP), 1) * SLOPE_STEP * self.step_nm
+
+    def half_widths_px(self, columns_px: Tensor) -> Tensor:
+        """The same of each pixel by its own columns (bands, pixels), (pixels,)."""
+        span_nm = float(self.centres_nm[-1] - self.centres_nm[0])
+        slope = (columns_px[-1] - columns_px[0]).abs() / span_nm
+        return (slope / SLOPE_STEP).round().clip(min=1) * (SLOPE_STEP * self.step_nm)

@@ -8,7 +8,7 @@ from dataclasses import astuple, dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from dsl_core.model.fit import SIGMAS, Fit, FitFinding, Part
+from dsl_core.model.fit import SIGMAS, Fit, FitFinding, Part, matters
 from dsl_core.model.plan import CapturePlan
 from dsl_core.model.result import DEPTH_INVALID, Flag, Reach
 from dsl_core.model.rig import Rig
@@ -26,6 +26,7 @@ from dsl_core.reconstruction.spectral.causes import (
 )
 from dsl_core.reconstruction.spectral.film_motion import LEAST_MOTION_PX, FilmMotion, coarseness
 from dsl_core.reconstruction.spectral.model_error import ModelError
+from dsl_core.reconstruction.spectral.probing.curve_probe import USUAL_STEEPNESS, CurveMisfit
 from dsl_core.reconstruction.spectral.probing.line_probe import PROFILE
 from dsl_core.reconstruction.spectral.probing.probe import Probe
 from dsl_core.reconstruction.spectral.self_correction import Followed
@@ -263,6 +264,7 @@ def cause_findings(
             f" by about {probe.curves.rms:.1%}, and so are spectra.",
             "Calibrate the curves on this rig; those of data sheets are typically off by 5 %.",
         )
+        yield _wide_bands(probe, probe.curves)
     usual = float(np.median(probe.chi_square))
     yield FitFinding.judged(
         "profile",
@@ -273,6 +275,25 @@ def cause_findings(
         f"Frames of most pixels differ from the model by {np.sqrt(usual):.1f} times their noise.",
         _CALIBRATE,
     )
+
+
+def _wide_bands(probe: Probe, curves: CurveMisfit) -> FitFinding:
+    """Whether colours disagree because the light changes much from one band to the next."""
+    fine_nm = probe.step_nm * USUAL_STEEPNESS / probe.steepness
+    found = FitFinding.judged(
+        "bands",
+        "disagreement of the colours by bands",
+        (curves.whole_rms, curves.std),
+        "1",
+        MOST_CURVES,
+        f"The light of this rig's LEDs changes {probe.steepness / USUAL_STEEPNESS:.1f} times as fast with the"
+        f" wavelength as is usual. Bands of {probe.step_nm:g} nm are coarse for it: where there is little"
+        f" light, spectra are off by about {curves.whole_rms:.1%}, as stated.",
+        f"Reconstruct with bands of at most {fine_nm:.2g} nm.",
+    )
+    # What no width of bands explains is told of the curves.
+    by_curves = matters(curves.rms, curves.std, MOST_CURVES)
+    return found.model_copy(update={"significant": found.significant and not by_curves})
 
 
 def _motion(motion: FilmMotion, probe: Probe) -> FitFinding:

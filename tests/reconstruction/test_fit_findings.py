@@ -214,6 +214,17 @@ def test_bands_must_be_narrow_to_tell_a_small_displacement(scanned: tuple[Device
     np.testing.assert_allclose(limits, [MOST_SHIFT_PX, MOST_SHIFT_PX, 4 * MOST_SHIFT_PX])
 
 
+def test_colours_that_disagree_about_light_which_changes_fast_tell_of_wide_bands(
+    scanned: tuple[DeviceRig, MemoryScan],
+) -> None:
+    devices, scan = scanned
+    assert devices.calibration is not None
+    found = probed(wavy_curves(devices.calibration), scan)
+    fit = Fit.of(cause_findings(replace(found, steepness=2 * found.steepness)))
+    assert fit.parts[:1] == ("bands",)
+    assert "Reconstruct with bands of at most 5 nm." in fit.words
+
+
 def test_the_gain_of_an_order_is_found_by_its_size(scanned: tuple[DeviceRig, MemoryScan]) -> None:
     devices, scan = scanned
     assert devices.calibration is not None

@@ -65,9 +65,13 @@ class Causes:
 
 
 def common_error(probe: Probe, causes: Causes) -> float:
-    """Relative error of all reflectance that no pixel sees by itself: curves, and the level of the light."""
+    """Relative error of all reflectance that no pixel sees by itself: curves, and the level of the light.
+
+    With what bands leave that are wide for the light of the rig.
+    """
     curves = probe.curves
-    share = curves.rms if curves is not None and matters(curves.rms, curves.std, MOST_CURVES) else 0.0
+    off = curves is not None and matters(curves.whole_rms, curves.std, MOST_CURVES)
+    share = curves.whole_rms if curves is not None and off else 0.0
     return float(np.hypot(share, SINCE_START * causes.drift if causes.drifts else 0.0))
 
 

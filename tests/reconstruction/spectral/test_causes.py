@@ -99,7 +99,7 @@ def test_curves_and_drift_add_to_what_no_pixel_sees() -> None:
     seen, chance, small = ((0.016, 0.001), (0.016, 0.02), (0.014, 0.001))
     drift = 0.015 / np.sqrt(3)
     for (rms, std), share in ((seen, 0.016), (chance, 0.0), (small, 0.0)):
-        found = common_error(probe(SimpleNamespace(rms=rms, std=std)), CAUSES)
+        found = common_error(probe(SimpleNamespace(rms=0.0, whole_rms=rms, std=std)), CAUSES)
         assert found == pytest.approx(np.hypot(share, drift))
     assert common_error(probe(None), CAUSES) == pytest.approx(drift)
     assert common_error(probe(None), replace(CAUSES, drift=0.001)) == 0.0

@@ -21,9 +21,12 @@ Floats = NDArray[np.float64]
 KNOTS_NM = np.linspace(430.0, 660.0, 9)
 #: Differences between colours that are known better than this count.
 KNOWN_STD = 0.012
-#: What curves seem to be off that are right, as spectra are straight between bands: of bands of 5 nm, and as
-#: the square of their width.
+#: What curves seem to be off that are right, as spectra are straight between bands and the light of a band
+#: counts as a triangle: of bands of 5 nm, and as the square of their width.
 FLOOR, FLOOR_NM = 0.014, 5.0
+#: Logarithm by which the light changes along 1 nm in a usual rig, root mean square, where it has at least
+#: this share of the brightest. What triangles leave grows with the square of it.
+USUAL_STEEPNESS, BRIGHT = 0.068, 0.05
 #: So many shapes, each with this share of the level, are those of many materials (a whole Color Checker has
 #: four, three patches of it have three), and second differences of straight spectra.
 MANY_SHAPES, LEAST_SHAPE, STRAIGHT = 4, 0.03, 0.05
@@ -44,6 +47,18 @@ def tells_of_curves(reflectance: Floats) -> bool:
     straight = np.sqrt(np.mean(bend**2) / np.mean(reflectance**2)) < STRAIGHT
     strengths = np.linalg.svd(_shapes(reflectance), compute_uv=False) / np.sqrt(reflectance.size)
     return bool(straight and np.count_nonzero(strengths > LEAST_SHAPE) >= MANY_SHAPES)
+
+
+def steepness_per_nm(white: Floats, step_nm: float) -> float:
+    """Logarithm by which light (..., bands), ``step_nm`` apart, changes along 1 nm where it is bright (rms).
+
+    No less than the usual one.
+    """
+    lit = white > BRIGHT * white.max(-1, keepdims=True)
+    light = np.log(np.where(lit, white, 1.0))
+    changes = np.diff(light)[lit[..., 1:] & lit[..., :-1]]
+    found = float(np.sqrt(np.mean(changes**2))) / step_nm if changes.size else 0.0
+    return max(found, USUAL_STEEPNESS)
 
 
 def variety(reflectance: Floats) -> float:
@@ -84,19 +99,30 @@ def normal_of_all_curves(values: Tensor, others: int) -> Tensor:
 
 @dataclass(frozen=True)
 class CurveMisfit:
-    """Relative deviation of curves (rms) by which colours disagree, with its deviation."""
+    """Relative deviation of curves (rms) by which colours disagree, with its deviation.
+
+    ``whole_rms`` holds also what colours disagree by because the light changes faster from band to band than
+    in a usual rig: spectra are off by that, too, but no curve is.
+    """
 
     rms: float
     std: float
+    whole_rms: float
 
 
 def curve_misfit(
-    normal: Floats, score: Floats, weight: Floats, prior_std: Floats, step_nm: float
+    normal: Floats,
+    score: Floats,
+    weight: Floats,
+    prior_std: Floats,
+    step_nm: float,
+    steepness: float = USUAL_STEEPNESS,
 ) -> CurveMisfit | None:
     """How far curves are off, from equations of pixels (n, p + c, p + c) and (n, p + c) without the spectrum.
 
     First come p other parameters, which may take what they explain; ``prior_std`` (p,) is theirs.
-    ``step_nm`` is the width of bands. None where colours say too little.
+    ``step_nm`` is the width of bands, ``steepness`` by how much the logarithm of the light changes along
+    1 nm. None where colours say too little.
     """
     used = weight > 0
     information, asked = np.tensordot(weight[used], normal[used], 1), weight[used] @ score[used]
@@ -111,5 +137,7 @@ def curve_misfit(
     found = (vectors[:, known].T @ (asked[others:] - taken @ asked[:others])) / values[known]
     square = float(np.mean(found**2 - 1 / values[known]))
     floor = FLOOR * max(step_nm / FLOOR_NM, 1.0) ** 2
-    rms = (BETWEEN * max(square - floor**2, 0.0)) ** 0.5
-    return CurveMisfit(rms, (BETWEEN * max(square, 0.0) / (2 * np.count_nonzero(known))) ** 0.5)
+    steep = floor * (steepness / USUAL_STEEPNESS) ** 2
+    rms, whole_rms = ((BETWEEN * max(square - each**2, 0.0)) ** 0.5 for each in (steep, floor))
+    std = (BETWEEN * max(square, 0.0) / (2 * np.count_nonzero(known))) ** 0.5
+    return CurveMisfit(rms, std, whole_rms)

@@ -9,7 +9,7 @@ model as it is.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -22,11 +22,13 @@ from dsl_core.model.rig import BayerPattern
 from dsl_core.optics.spectra import ORDERS
 from dsl_core.optics.spread.field import widths_at
 from dsl_core.reconstruction.spectral.probing.curve_probe import (
+    USUAL_STEEPNESS,
     CurveMisfit,
     curve_changes,
     curve_misfit,
     normal_of_all_curves,
     of_all_curves,
+    steepness_per_nm,
     tells_of_curves,
     variety,
 )
@@ -64,8 +66,9 @@ class Probe:
     ``cell`` (n,) the cell of `CELLS`, ``pixel`` (n,) the flat index. ``with_curves`` are ``normal`` and
     ``score`` of these parameters and of the curves after them, None where nobody asked. ``lines`` is what the
     zero order of the same pixels says, ``nm_per_px`` how far apart columns of the first orders are,
-    ``step_nm`` bands. ``places`` is whether pixels can tell where the orders are: on a small piece of one
-    colour an error of its spectrum looks like a shift.
+    ``step_nm`` bands; ``steepness`` is by how much the logarithm of the light changes along 1 nm. ``places``
+    is whether pixels can tell where the orders are: on a small piece of one colour an error of its spectrum
+    looks like a shift.
     """
 
     normal: Floats
@@ -81,6 +84,7 @@ class Probe:
     nm_per_px: float
     places: bool = True
     step_nm: float = 5.0
+    steepness: float = USUAL_STEEPNESS
     with_curves: tuple[Floats, Floats] | None = None
 
     @property
@@ -98,7 +102,8 @@ class Probe:
         """How far curves of camera and projector are off by what colours say; None where they say nothing."""
         if self.with_curves is None or not tells_of_curves(self.reflectance[self.sound]):
             return None
-        return curve_misfit(*self.with_curves, self.weight, np.array(PRIOR_STD), self.step_nm)
+        known = np.array(PRIOR_STD), self.step_nm, self.steepness
+        return curve_misfit(*self.with_curves, self.weight, *known)
 
 
 def probe_targets(valid: NDArray[np.bool_]) -> Indices:
@@ -135,10 +140,18 @@ def probe(scan: ProbedScan) -> Probe | None:
         normal=whole[0][:, :own, :own],
         score=whole[1][:, :own],
         step_nm=scan.model.bands.step_nm,
+        steepness=_steepness(scan),
         with_curves=whole,
         lines=probe_lines(lines, response, scan.pixels, scan.radiance, scan.std, targets, widths),
         nm_per_px=_nm_per_px(scan, targets),
     )
+
+
+def _steepness(scan: ProbedScan) -> float:
+    """By how much the logarithm of the light of the first orders changes along 1 nm."""
+    bands = scan.model.bands
+    white = np.stack([bands.moments[order].sum(1)[:, bands.reported] for order in ORDERS])
+    return steepness_per_nm(white, bands.step_nm)
 
 
 def _nm_per_px(scan: ProbedScan, targets: Indices) -> float:
@@ -176,22 +189,30 @@ def _probe_some(scan: ProbedScan, targets: Indices) -> dict[str, NDArray[Any]]:
         "bias": band_mean(bias[..., :others].transpose(0, 1))[reported].transpose(0, 1).numpy(),
         "reflectance": solved.mean[reported].T.numpy(),
         "chi_square": solved.chi_square.numpy(),
-        "correlation": _correlation(solved.residual * weight.sqrt(), solved.gather).numpy(),
+        "correlation": _correlation(
+            (solved.residual * weight.sqrt()).split(light.sizes, 1), solved.gather
+        ).numpy(),
         "place": np.stack([2 * y / shape[0] - 1, 2 * x / shape[1] - 1], 1),
         "cell": cell_of(y, x, shape),
         "pixel": targets,
     }
 
 
-def _correlation(standard: Tensor, gather: Callable[[Tensor], Tensor]) -> Tensor:
-    """By how much sums of residuals (samples, rows) over lines vary more than independent ones: at least 1.
+def _correlation(orders: Sequence[Tensor], gather: Callable[[Tensor], Tensor]) -> Tensor:
+    """By how much sums of residuals over lines vary more than independent ones: at least 1.
 
-    ``1 + 2 sum(rho)`` of the autocorrelation up to the lag where it first vanishes.
+    ``orders`` holds the residuals (samples, lines) of each order. ``1 + 2 sum(rho)`` of the autocorrelation
+    up to the lag where it first vanishes.
     """
-    total = gather((standard * standard).sum(1)).clip(min=1e-12)
+
+    def products(lag: int) -> Tensor:
+        parts = [(each[:, lag:] * each[:, : -lag or None]).sum(1) for each in orders]
+        return gather(torch.stack(parts).sum(0))
+
+    total = products(0).clip(min=1e-12)
     factor, open_ = torch.ones_like(total), torch.ones_like(total, dtype=torch.bool)
     for lag in range(1, 9):
-        rho = gather((standard[:, lag:] * standard[:, :-lag]).sum(1)) / total
+        rho = products(lag) / total
         open_ &= rho > 0.02
         factor += 2 * torch.where(open_, rho, 0.0)
     return factor

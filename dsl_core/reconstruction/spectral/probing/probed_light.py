@@ -7,11 +7,13 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 import torch
 from numpy.typing import NDArray
 from torch import Tensor
+from torch.nn.functional import pad
 
 from dsl_core.model.line_spread import Spread, stretched
 from dsl_core.optics.colour_neighbours import bayer_colours
@@ -91,21 +93,44 @@ class OrderLight:
     frame: Tensor
 
 
-def _changed_profiles(width_px: float, spread: Spread, band_px: float, like: Tensor) -> Tensor:
+@lru_cache(maxsize=256)
+def _changed_profiles(width_px: float, spread: Spread, band_px: float) -> Tensor:
     """Profiles of a line on a band at even distances, `SAMPLES` a column, zero at both ends: (distances, 4).
 
     As it is, and what it gains per column of shift, per share of blur and per share of light in the tail.
     """
     own, blurred, tail = (
-        ProfileTable(width_px, stretched(spread, by), band_px, like.device, like.dtype).values
+        ProfileTable(width_px, stretched(spread, by), band_px, torch.device("cpu"), torch.float64).values
         for by in (1.0, 1 + BLUR_STEP, TAIL_BLUR)
     )
-    own, blurred = (
-        torch.nn.functional.pad(each, ((len(tail) - len(each)) // 2,) * 2) for each in (own, blurred)
-    )
+    own, blurred = (pad(each, ((len(tail) - len(each)) // 2,) * 2) for each in (own, blurred))
     step = round(SHIFT_PX * SAMPLES)
     shifted = (own.roll(-step) - own.roll(step)) * (SAMPLES / (2 * step))
     return torch.stack([own, shifted, (blurred - own) / BLUR_STEP, tail - own], 1)
+
+
+class _Profiles:
+    """`_changed_profiles` of samples, each by the width of its own bands and lines.
+
+    So what is found of a pixel does not depend on those that are worked out together with it.
+    """
+
+    def __init__(self, width_px: float, spread: Spread, halves_px: Tensor, widths: Tensor) -> None:
+        """Half widths of bands (samples,) and widths of the spread relative to the usual one (samples,)."""
+        kinds, self._kind = torch.stack([halves_px, widths]).unique(dim=1, return_inverse=True)
+        tables = [_changed_profiles(width_px, stretched(spread, by), half) for half, by in kinds.T.tolist()]
+        self._size = max(len(table) for table in tables)
+        # Zeros at both ends change nothing.
+        same = [pad(table, (0, 0, *2 * ((self._size - len(table)) // 2,))) for table in tables]
+        self._values = torch.cat(same)
+        #: Distance (px) beyond which no sample's line lights a band.
+        self.reach_px = (self._size - 1) / 2 / SAMPLES
+
+    def at(self, distance_px: Tensor) -> Tensor:
+        """Profiles at distances (samples, bands, n) of bands from lines, (samples, bands, n, 4)."""
+        at = ((distance_px + self.reach_px) * SAMPLES).add_(0.5).clip_(0, self._size - 1).long()
+        at += self._kind[:, None, None] * self._size
+        return self._values.index_select(0, at.reshape(-1)).reshape(*at.shape, -1)
 
 
 class ProbedLight:
@@ -140,15 +165,20 @@ class ProbedLight:
             1,
         )
         self.weight = self.weight.nan_to_num(0.0, 0.0, 0.0)
+        #: How many values belong to each order.
+        self.sizes = [order.values.shape[1] for order in self._orders] + [1]
 
     def _order(self, order: int, footprint: Footprint) -> OrderLight:
         scan, lines = self._scan, self._scan.model.lines
         assert lines is not None
         columns, inside = footprint.columns, scan.model.inside(footprint)
-        half = scan.model.bands.half_width_px(columns)
-        spread = stretched(scan.model.response(0.0).line_spread, scan.model.width(footprint, inside))
-        table = _changed_profiles(lines.width_px, spread, half, columns)
-        reach = (len(table) - 1) / 2 / SAMPLES
+        profiles = _Profiles(
+            lines.width_px,
+            scan.model.response(0.0).line_spread,
+            scan.model.bands.half_widths_px(columns),
+            scan.model.widths(footprint, inside),
+        )
+        reach = profiles.reach_px
         low = torch.where(inside, columns, torch.inf).amin(0)
         high = torch.where(inside, columns, -torch.inf).amax(0)
         any_inside = inside.any(0)
@@ -161,8 +191,7 @@ class ProbedLight:
         near = (lines.position(columns.T - reach).ceil().long() - first[:, None])[..., None]
         near = near + torch.arange(math.floor(2 * reach / lines.step_px) + 1)
         distance = columns.T[..., None] - lines.centre_px(near + first[:, None, None]).to(columns)
-        at = ((distance + reach) * SAMPLES).add_(0.5).clip_(0, len(table) - 1).int()
-        light = table.index_select(0, at.reshape(-1)).reshape(*at.shape, -1)
+        light = profiles.at(distance)
         near = near.clip_(0, index.shape[1] - 1)
         own = columns.new_zeros((*white.shape, index.shape[1]))
         own.scatter_add_(2, near, light[..., 0] * white[..., None])

@@ -8,10 +8,12 @@ import torch
 
 from dsl_core.reconstruction.spectral.probing.curve_probe import (
     KNOTS_NM,
+    USUAL_STEEPNESS,
     curve_changes,
     curve_misfit,
     normal_of_all_curves,
     of_all_curves,
+    steepness_per_nm,
     tells_of_curves,
 )
 
@@ -46,6 +48,26 @@ def test_curves_are_off_by_what_colours_disagree() -> None:
     coarse = curve_misfit(*equations(0.04), prior, 10.0)
     assert coarse is not None
     assert coarse.rms == 0
+
+
+def test_light_that_changes_twice_as_fast_leaves_four_times_as_much() -> None:
+    normal, score, weight = equations(0.04)
+    known = normal, score, weight, np.full(OTHERS, 0.2), 5.0
+    usual, steep = (curve_misfit(*known, by * USUAL_STEEPNESS) for by in (1.0, 2.0))
+    assert usual is not None
+    assert steep is not None
+    assert usual.rms == usual.whole_rms == steep.whole_rms
+    assert (steep.rms, steep.std) == (0.0, usual.std)
+
+
+def test_light_is_as_steep_as_its_logarithm_where_it_is_bright() -> None:
+    nm = np.arange(430.0, 661.0, 5.0)
+    rising = np.exp(0.1 * (nm - 660))
+    # What is below a twentieth of the brightest does not count.
+    light = np.where(nm > 630, rising, np.where(nm % 10 > 0, 0.0, 0.01))
+    assert steepness_per_nm(np.stack([light, 3 * light]), 5.0) == pytest.approx(0.1)
+    assert steepness_per_nm(rising**0.5, 5.0) == USUAL_STEEPNESS
+    assert steepness_per_nm(np.zeros(47), 5.0) == USUAL_STEEPNESS
 
 
 def test_colours_that_know_too_little_say_nothing() -> None:

@@ -40,12 +40,15 @@ def test_neighbouring_residuals_that_go_together_count_until_they_first_do_not()
     def gather(values: torch.Tensor) -> torch.Tensor:
         return torch.zeros(2, dtype=values.dtype).index_add_(0, owner, values)
 
-    assert probe_module._correlation(rows, gather).tolist() == pytest.approx([1 + 2 * (2 / 3 + 1 / 3), 1.0])
+    assert probe_module._correlation([rows], gather).tolist() == pytest.approx([1 + 2 * (2 / 3 + 1 / 3), 1.0])
+    # The last line of one order is no neighbour of the first one of another.
+    two = [torch.tensor([[0.0, 1.0]]), torch.tensor([[1.0, 0.0]])]
+    assert probe_module._correlation(two, lambda values: values).tolist() == [1.0]
     # Nothing divides by nothing, and only eight lags count.
     long = torch.ones((1, 30), dtype=torch.float64)
     wanted = 1 + 2 * sum(1 - lag / 30 for lag in range(1, 9))
-    assert probe_module._correlation(long, lambda values: values).tolist() == pytest.approx([wanted])
-    assert probe_module._correlation(0 * long, lambda values: values).tolist() == [1.0]
+    assert probe_module._correlation([long], lambda values: values).tolist() == pytest.approx([wanted])
+    assert probe_module._correlation([0 * long], lambda values: values).tolist() == [1.0]
 
 
 def probe_of(**more: Any) -> Probe:
@@ -118,6 +121,7 @@ def probed(monkeypatch: pytest.MonkeyPatch, share: float, varied: bool, **model:
     monkeypatch.setattr(probe_module, "widths_at", lambda *_: None)
     monkeypatch.setattr(probe_module, "probe_lines", lambda *_: None)
     monkeypatch.setattr(probe_module, "_nm_per_px", lambda *_: 2.0)
+    monkeypatch.setattr(probe_module, "_steepness", lambda *_: 0.1)
     camera = SimpleNamespace(width_px=1000 * share, fx_px=1000.0)
     given = {
         "single": True, "lines": (), "response": lambda _: None, "rig": SimpleNamespace(camera=camera),
@@ -154,7 +158,7 @@ def test_the_parameters_come_first_and_curves_after_them(monkeypatch: pytest.Mon
     assert found.normal.tolist() == normal[:, :own, :own].tolist()
     assert found.score.tolist() == score[:, :own].tolist()
     assert found.pixel.tolist() == list(range(100))
-    assert (found.nm_per_px, found.step_nm) == (2.0, 5.0)
+    assert (found.nm_per_px, found.step_nm, found.steepness) == (2.0, 5.0, 0.1)
 
 
 @pytest.mark.parametrize("model", [{"single": False}, {"pixels": 39}])

@@ -29,7 +29,7 @@ def test_a_stretch_rises_from_the_first_reported_band_to_the_last() -> None:
 
 def test_profiles_gain_as_they_are_shifted_blurred_and_given_a_tail() -> None:
     like = torch.zeros(1, dtype=torch.float64)
-    table = probed_light._changed_profiles(5, 0.6, 2.4, like).numpy()
+    table = probed_light._changed_profiles(5, 0.6, 2.4).numpy()
     tail = ProfileTable(5, stretched(0.6, 4.0), 2.4, like.device, like.dtype)
     assert len(table) == len(tail.values)
     x = (np.arange(len(table)) - len(table) // 2) / SAMPLES
@@ -44,6 +44,17 @@ def test_profiles_gain_as_they_are_shifted_blurred_and_given_a_tail() -> None:
     assert table[inner, 2] == pytest.approx(((light(x, 1.05) - light(x)) / 0.05)[inner], abs=1e-6)
     assert table[1:-1, 3] == pytest.approx(tail.values.numpy()[1:-1] - table[1:-1, 0])
     assert not table[[0, -1]].any()
+
+
+def test_each_sample_has_the_profile_of_its_own_widths() -> None:
+    halves, widths = torch.tensor([2.4, 3.6, 2.4]).double(), torch.tensor([1.0, 1.0, 1.5]).double()
+    distance = torch.linspace(-30, 30, 3 * 2 * 40).double().reshape(3, 2, 40)
+    found = probed_light._Profiles(5, 0.6, halves, widths).at(distance)
+    for i, (half, width) in enumerate(zip(halves.tolist(), widths.tolist(), strict=True)):
+        alone = probed_light._Profiles(5, 0.6, halves[i : i + 1], widths[i : i + 1])
+        assert found[i].tolist() == alone.at(distance[i : i + 1])[0].tolist()
+        light = band_profile(distance[i].numpy(), 5, 0.6 * width, half)
+        assert found[i, ..., 0].numpy() == pytest.approx(light, abs=2e-3)
 
 
 def order_light(generator: torch.Generator) -> OrderLight:
