@@ -133,6 +133,33 @@ def refused(stage: Stage) -> None:
     stage.shoot("capture")
 
 
+def by_hand(stage: Stage) -> None:
+    """A board that a person brings into its outline: elsewhere, then in place, then captured by itself."""
+    campaign = stage.copied(stage.material.half)
+    _forget(campaign, "geometry")
+    wizard = Wizard(stage, "geometry", stage.material.half)
+    devices = stage.composition.rig.state.devices.value
+    assert devices is not None
+    assert devices.place is not None
+    wizard.state.places_itself.set(False)
+    wizard.state.at.set(1)
+    stage.shoot("begin")
+    statuses = wizard.state.statuses.value
+    place, devices.place = devices.place, None
+    wizard.window._commands._the_work._devices.place = None
+    wizard.window._commands._the_work.session.devices.place = None
+    place(statuses[1].step.placement)
+    wizard.press("Check")
+    stage.wait(lambda: wizard.state.look.value is not None)
+    stage.shoot("elsewhere")
+    place(statuses[0].step.placement)
+    stage.wait(lambda: bool(wizard.state.covered.value))
+    stage.wait(lambda: wizard.state.look.value is not None)
+    stage.shoot("next")
+    wizard.press("Check")
+    wizard.stop()
+
+
 def _forget(campaign: Path, name: str) -> None:
     """Take a calibration's captures away."""
     folder = CampaignFolder.open(campaign)
@@ -156,5 +183,6 @@ SCENES: dict[str, Callable[[Stage], None]] = {
     "wizard-fresh": fresh,
     "wizard-lacking": lacking,
     "wizard-refused": refused,
+    "wizard-by-hand": by_hand,
     "wizard-leaving": leaving,
 }

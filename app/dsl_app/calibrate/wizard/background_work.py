@@ -11,12 +11,14 @@ from pathlib import Path
 import numpy as np
 
 from dsl_app.calibrate.campaign_status import Recipes
+from dsl_app.calibrate.wizard.ghost import PointsPx, as_points, ghost, shared_part
 from dsl_app.calibrate.wizard.settings import changed_settings, setting_rows
 from dsl_app.calibrate.wizard.state import Fit, Look, Seen, SettingRow
 from dsl_core.campaign.common.recipe import AnyRecipe, Step
 from dsl_core.campaign.guide import calibrated_rig
 from dsl_core.campaign.products import Products, write_products
 from dsl_core.campaign.session import CalibrationSession, StepStatus
+from dsl_core.capture.display import Display
 from dsl_core.capture.preview import MANY_SATURATED, quick_picture, statistics
 from dsl_core.devices.base import Camera, CameraInfo, DeviceRig
 from dsl_core.errors import CalibrationError, Cancelled, DslError
@@ -30,6 +32,8 @@ from dsl_core.progress import Progress
 DARK_SHARE = 0.5
 #: How long the brightest frame is remembered, s.
 MEMORY_S = 3.0
+#: How frames are shown: white targets are white; what is brighter and what is not stays to be judged.
+AS_SEEN = Display(balance=True)
 
 
 @dataclass(frozen=True)
@@ -40,6 +44,7 @@ class Opened:
     settings: tuple[SettingRow, ...]
     fit: Fit | None
     places_itself: bool
+    outlines: Mapping[str, PointsPx]
 
 
 @dataclass(frozen=True)
@@ -93,7 +98,9 @@ class BackgroundWork:
         self._session, self._all = session, recipes
         settings = setting_rows(recipe, campaign.info.settings.get(self._name, {}))
         places = self._devices.place is not None
-        return Opened(statuses, settings, self._found(), places)
+        camera = session.bench.rig.camera
+        outlines = {each.key: ghost(each.placement, camera) for each in session.steps}
+        return Opened(statuses, settings, self._found(), places, outlines)
 
     def _recipe(self, recipes: Sequence[AnyRecipe]) -> AnyRecipe:
         return next(recipe for recipe in recipes if recipe.name == self._name)
@@ -120,10 +127,14 @@ class BackgroundWork:
         """Look once; a target that cannot be measured is part of the look, a lost device is an error."""
         progress.report(step.title, 0, 0)
         self.place(step)
+        seen: list[PointsPx] = []
         try:
-            return Look(step.key, self.session.look(step))
+            figures = self.session.look(step, lambda points_px: seen.append(as_points(points_px)))
         except CalibrationError as error:
             return Look(step.key, (), str(error))
+        points_px = seen[-1] if seen else ()
+        wanted = ghost(step.placement, self.session.bench.rig.camera)
+        return Look(step.key, figures, "", points_px, shared_part(wanted, points_px))
 
     def capture(self, step: Step, again: bool, is_checked: bool, progress: Progress) -> Captured:
         """Capture a step, or capture it ``again``; ``is_checked`` looks first and refuses what is not right.
@@ -225,7 +236,7 @@ class WatchedCamera(Camera):
         if frame is None:
             return None
         full_scale = 2**self.info.bit_depth - 1
-        picture = quick_picture(frame.pixels, self.info.bayer, full_scale, show_saturation=True)
+        picture = quick_picture(frame.pixels, self.info.bayer, full_scale, True, AS_SEEN)
         return Seen(picture, max(statistics(frame.pixels, self.info.bayer, full_scale).saturated))
 
     def close(self) -> None:
