@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
@@ -24,8 +25,20 @@ class Wizard:
     """A wizard that is open, and what a person does in it."""
 
     def __init__(self, stage: Stage, name: str, campaign: Path) -> None:
-        self.stage = stage
         page: CalibratePage = open_campaign(stage, campaign)
+        self._open(stage, page, name)
+
+    @classmethod
+    def again(cls, stage: Stage, name: str) -> Wizard:
+        """Open a wizard of the campaign that is open."""
+        page = stage.window.page_of("calibrate")
+        assert isinstance(page, CalibratePage)
+        made = cls.__new__(cls)
+        made._open(stage, page, name)
+        return made
+
+    def _open(self, stage: Stage, page: CalibratePage, name: str) -> None:
+        self.stage = stage
         stage.click(page.rows[name].run)
         self.window = stage.dialog(CalibrationWizard)
         self.state: WizardState = self.window._state
@@ -141,20 +154,21 @@ def by_hand(stage: Stage) -> None:
     devices = stage.composition.rig.state.devices.value
     assert devices is not None
     assert devices.place is not None
-    wizard.state.places_itself.set(False)
-    wizard.state.at.set(1)
-    stage.shoot("begin")
     statuses = wizard.state.statuses.value
+    wizard.stop()
+    wizard.window.reject()
     place, devices.place = devices.place, None
-    wizard.window._commands._the_work._devices.place = None
-    wizard.window._commands._the_work.session.devices.place = None
     place(statuses[1].step.placement)
+    wizard = Wizard.again(stage, "geometry")
+    stage.shoot("begin")
     wizard.press("Check")
     stage.wait(lambda: wizard.state.look.value is not None)
     stage.shoot("elsewhere")
+    wizard.press("Check")
+    wizard.idle()
     place(statuses[0].step.placement)
-    stage.wait(lambda: bool(wizard.state.covered.value))
-    stage.wait(lambda: wizard.state.look.value is not None)
+    wizard.press("Check")
+    stage.wait(lambda: bool(wizard.state.covered.value) and wizard.state.look.value is not None)
     stage.shoot("next")
     wizard.press("Check")
     wizard.stop()
@@ -163,8 +177,7 @@ def by_hand(stage: Stage) -> None:
 def _forget(campaign: Path, name: str) -> None:
     """Take a calibration's captures away."""
     folder = CampaignFolder.open(campaign)
-    for note in folder.home(name).rglob("*.json"):
-        note.unlink()
+    shutil.rmtree(folder.home(name))
     (campaign / f"{name}.json").unlink()
 
 

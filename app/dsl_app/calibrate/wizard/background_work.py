@@ -30,6 +30,8 @@ from dsl_core.progress import Progress
 
 #: Frames darker than this share of the brightest recent one are those between patterns; they would flicker.
 DARK_SHARE = 0.5
+#: Frames darker than this share even of a saturated one are black.
+BLACK_SHARE = 0.1
 #: How long the brightest frame is remembered, s.
 MEMORY_S = 3.0
 #: How frames are shown: white targets are white; what is brighter and what is not stays to be judged.
@@ -192,7 +194,7 @@ class WatchedCamera(Camera):
         self._camera, self._clock = camera, clock
         self._lock = threading.Lock()
         self._frame: Frame | None = None
-        self._best, self._best_at = 0.0, 0.0
+        self._best, self._best_at, self._brightest_dn = 0.0, 0.0, 0.0
 
     @property
     def info(self) -> CameraInfo:
@@ -210,19 +212,27 @@ class WatchedCamera(Camera):
     def snap(self, timeout_ms: float = 5000.0) -> Frame:
         """Take a frame and keep it to be shown."""
         frame = self._camera.snap(timeout_ms)
-        worth, now = self._worth(frame), self._clock()
+        now = self._clock()
+        is_old = now - self._best_at > MEMORY_S
+        if is_old:
+            self._brightest_dn = 0.0
+        worth = self._worth(frame)
         with self._lock:
-            if worth > self._best or now - self._best_at > MEMORY_S:
+            if worth > self._best or is_old:
                 self._best, self._best_at = worth, now
             if worth >= DARK_SHARE * self._best:
                 self._frame = frame
         return frame
 
     def _worth(self, frame: Frame) -> float:
-        """How well a frame shows the target: bright, but not saturated."""
+        """How well a frame shows the target: bright, but not saturated; black shows nothing."""
         thin = frame.pixels[::7, ::7]
         saturated = float(np.mean(thin >= 2**self.info.bit_depth - 1))
-        return float(np.mean(thin)) * (0.01 if saturated > MANY_SATURATED else 1.0)
+        mean_dn = float(np.mean(thin))
+        self._brightest_dn = max(self._brightest_dn, mean_dn)
+        if mean_dn < BLACK_SHARE * self._brightest_dn:
+            return 0.0
+        return mean_dn * (0.01 if saturated > MANY_SATURATED else 1.0)
 
     def take_frame(self) -> Frame | None:
         """The latest frame since the last call; None without one."""
