@@ -23,6 +23,7 @@ from dsl_app.shell.actions import PAGES, Page
 from dsl_app.shell.job_strip import JobStrip
 from dsl_app.shell.log import LogRecords
 from dsl_app.shell.rail import Rail
+from dsl_app.shell.status_line import StatusLine
 from dsl_app.shell.toasts import Toasts
 
 _log = logging.getLogger(__name__)
@@ -73,6 +74,7 @@ class PagedWindow(QMainWindow):
         self.setMinimumSize(SMALLEST)
         self.resize(first_size(self.screen().availableSize()))
         self.setAcceptDrops(True)
+        self.setStatusBar(StatusLine())
         self.toasts = Toasts(self.statusBar())
         self.rail = Rail([page for page in PAGES if page.key in makers])
         self.rail.chosen.connect(self.open_page)
