@@ -298,6 +298,24 @@ def test_another_rig_that_is_connected_makes_way_for_that_of_the_scan(
     assert other.rig.state.choice.value == TWIN
 
 
+def test_a_click_while_another_rig_is_connected_is_not_forgotten(
+    bench: ScanBench, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    with monkeypatch.context() as lost:
+        fail_from(lost, 10)
+        bench.scans.start()
+    other = make_bench(tmp_path)
+    other.state.then_reconstruct.set(False)
+    assert other.scans.open(tmp_path / "first.dsl")
+    other.rig.state.link.set(Link.OPENING)
+    other.scans.start()
+    other.scans.start()
+    assert phase(other) is Phase.PLANNING
+    other.rig.state.link.set(Link.CLOSED)
+    assert phase(other) is Phase.DONE
+    assert other.rig.state.choice.value == TWIN
+
+
 def test_a_rig_is_the_same_whatever_the_order_of_its_options(tmp_path: Path) -> None:
     rig = RigChoice("twin", (("scene", "plane"), ("size", "32x24")))
     session = InterruptedScan(tmp_path / "first.dsl", 3, 76, rig, may_open=True)
