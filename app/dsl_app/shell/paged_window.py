@@ -13,7 +13,7 @@ from PySide6.QtWidgets import QMainWindow, QStackedWidget
 
 from dsl_app.shared.jobs.qt_runner import QtRunner
 from dsl_app.shared.known_files import Kind, kind_of, meant_by, refusal
-from dsl_app.shared.settings import RecentFiles, Settings, save_settings
+from dsl_app.shared.settings import RecentFiles, Settings, save_early, save_settings
 from dsl_app.shared.theme import DARK, Theme
 from dsl_app.shared.undo import UndoStack
 from dsl_app.shared.widgets.dialogs import confirm
@@ -138,6 +138,7 @@ class PagedWindow(QMainWindow):
             for key in (self.page, *(key for key in self._makers if key != self.page)):
                 if self.page_of(key).open_path(path):
                     self.parts.recent.add(path)
+                    self.save_early()
                     self.open_page(key)
                     return
         if kind is Kind.MISSING:
@@ -178,6 +179,12 @@ class PagedWindow(QMainWindow):
         """Write the settings, including the layout."""
         save_layout(self, self.parts.settings)
         trouble = save_settings(self.parts.settings, self.parts.settings_path)
+        if trouble:
+            _log.warning("%s", trouble)
+
+    def save_early(self) -> None:
+        """Write what must outlive a crash."""
+        trouble = save_early(self.parts.settings, self.parts.settings_path)
         if trouble:
             _log.warning("%s", trouble)
 

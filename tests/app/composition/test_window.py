@@ -46,10 +46,12 @@ def test_a_program_that_is_killed_remembers_its_rig(
     composed: tuple[Composition, MainWindow], tmp_path: Path
 ) -> None:
     composition, window = composed
+    window.open_page("scan")
     composition.rig.state.choice.set(RigChoice("twin", (("scene", "sphere"),)))
     # Nothing is closed.
     settings, trouble = load_settings(window.parts.settings_path)
     assert (settings.rig, settings.rig_options, trouble) == ("twin", {"scene": "sphere"}, "")
+    assert settings.page == "start", "the page where unfinished scans are offered"
 
 
 def test_every_page_opens_in_both_themes(composed: tuple[Composition, MainWindow]) -> None:
