@@ -18,7 +18,7 @@ _log = logging.getLogger(__name__)
 RECENT_COUNT = 12
 #: Names another folder for settings, for tests and for portable installations.
 HOME_VARIABLE = "DSL_SCAN_HOME"
-#: What a program that is killed must know next time. Which page was open is left to the next session to offer.
+#: What a program that is killed must know next time; the page that was open is offered again.
 EARLY = ("rig", "rig_options", "recent", "tour_seen")
 
 
