@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from itertools import zip_longest
-
 import pyqtgraph as pg
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QWidget
@@ -113,7 +111,7 @@ class LiveFrameView(QWidget):
             (self._covered, shown.covered, theme.muted),
         ):
             item.setData(*_in_cells(points), pen=pg.mkPen("#000000", width=1), brush=pg.mkBrush(colour))
-        for line, (words, role) in zip_longest(self.legend, shown.legend, fillvalue=("", "")):
+        for line, (words, role) in zip(self.legend, (*shown.legend, *[("", "")] * 3), strict=False):
             line.setText(words)
             set_role(line, role)
             line.setVisible(bool(words))
