@@ -8,7 +8,7 @@ new one resumes where it stopped.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Literal
@@ -30,7 +30,7 @@ from dsl_core.campaign.common.captures import (
     replacing,
     scan_settings,
 )
-from dsl_core.campaign.common.recipe import AnyRecipe, Bench, Step
+from dsl_core.campaign.common.recipe import AnyRecipe, Bench, Found, Step
 from dsl_core.campaign.recipes import campaign_recipes
 from dsl_core.devices.base import DeviceRig
 from dsl_core.devices.conditions import current_conditions
@@ -125,10 +125,13 @@ class CalibrationSession:
         if self._stood != self._standing():
             self.place(step)
 
-    def look(self, step: Step) -> tuple[Figure, ...]:
-        """Check with a few frames whether the target is right; nothing is kept."""
+    def look(self, step: Step, found: Found | None = None) -> tuple[Figure, ...]:
+        """Check with a few frames whether the target is right; nothing is kept.
+
+        ``found`` is told where points of the target are, such as the corners of a board.
+        """
         self._place_again(step)
-        return self.recipe.look(self.bench, step)
+        return self.recipe.look(self.bench if found is None else replace(self.bench, found=found), step)
 
     def capture(self, step: Step, progress: Progress | None = None) -> None:
         """Capture a step, or resume it; refused captures are replaced.

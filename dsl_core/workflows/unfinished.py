@@ -16,6 +16,7 @@ from dsl_core.io.reading import read_bounded
 from dsl_core.io.scan.folder import ScanReader
 from dsl_core.io.scan.lock import FolderLock
 from dsl_core.io.scan.manifest import read_manifest
+from dsl_core.io.scan.origin import rig_of_notes
 from dsl_core.model.rig import Rig
 from dsl_core.model.spectral import WavelengthGrid
 from dsl_core.pipeline import Options
@@ -29,11 +30,15 @@ _LAYOUT = re.compile(r"\((\d+), \d+\) \(\d+, \d+\) (\d+) \[")
 
 @dataclass(frozen=True)
 class UnfinishedScan:
-    """A scan whose first ``done`` of ``total`` frames are safe."""
+    """A scan whose first ``done`` of ``total`` frames are safe.
+
+    ``rig`` is the name of the rig that took them, with its options; None where the scan does not say.
+    """
 
     folder: Path
     done: int
     total: int
+    rig: tuple[str, dict[str, str]] | None = None
 
 
 @dataclass(frozen=True)
@@ -64,7 +69,8 @@ def unfinished_scans(folder: Path) -> tuple[UnfinishedScan, ...]:
             reader = ScanReader(path.parent)
             total, lacking = reader.plan.shot_count, len(reader.missing())
             if 0 < lacking < total:
-                found.append(UnfinishedScan(path.parent, total - lacking, total))
+                rig = rig_of_notes(reader.manifest.notes)
+                found.append(UnfinishedScan(path.parent, total - lacking, total, rig))
     return tuple(found)
 
 

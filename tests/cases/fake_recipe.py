@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Collection
 from dataclasses import dataclass, field
 
+import numpy as np
+
 from dsl_core.campaign.common.recipe import Bench, Recipe, Step
 from dsl_core.errors import CalibrationError
 from dsl_core.model.base import Record
@@ -35,6 +37,9 @@ class FakeRecipe(Recipe[Brightness]):
     largest_dn: float = 4000.0
     good_look: int = 1
     bad_steps: set[str] = field(default_factory=set)
+    placement: Placement = field(default_factory=lambda: Placement(target="as it is"))
+    #: What looks find, the first first; the last one is found from then on.
+    points_px: tuple[tuple[tuple[float, float], ...], ...] = ()
     looks: list[str] = field(default_factory=list)
     captured: list[str] = field(default_factory=list)
     done_before: tuple[str, ...] = ()
@@ -42,13 +47,14 @@ class FakeRecipe(Recipe[Brightness]):
     def steps(self, bench: Bench) -> tuple[Step, ...]:
         """One a key."""
         return tuple(
-            Step(key, f"{key} picture", f"Place the {key} target.", Placement(target="as it is"))
-            for key in self.keys
+            Step(key, f"{key} picture", f"Place the {key} target.", self.placement) for key in self.keys
         )
 
     def look(self, bench: Bench, step: Step) -> tuple[Figure, ...]:
         """Count the looks; it takes ``good_look`` of them to see the target right."""
         self.looks.append(step.key)
+        if self.points_px:
+            bench.found(np.array(self.points_px[min(len(self.looks), len(self.points_px)) - 1]))
         advice = "Move the target closer."
         return (Figure(name="looks", value=len(self.looks), unit="", low=self.good_look, advice=advice),)
 

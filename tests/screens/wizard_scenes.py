@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
@@ -24,8 +25,20 @@ class Wizard:
     """A wizard that is open, and what a person does in it."""
 
     def __init__(self, stage: Stage, name: str, campaign: Path) -> None:
-        self.stage = stage
         page: CalibratePage = open_campaign(stage, campaign)
+        self._open(stage, page, name)
+
+    @classmethod
+    def again(cls, stage: Stage, name: str) -> Wizard:
+        """Open a wizard of the campaign that is open."""
+        page = stage.window.page_of("calibrate")
+        assert isinstance(page, CalibratePage)
+        made = cls.__new__(cls)
+        made._open(stage, page, name)
+        return made
+
+    def _open(self, stage: Stage, page: CalibratePage, name: str) -> None:
+        self.stage = stage
         stage.click(page.rows[name].run)
         self.window = stage.dialog(CalibrationWizard)
         self.state: WizardState = self.window._state
@@ -133,11 +146,38 @@ def refused(stage: Stage) -> None:
     stage.shoot("capture")
 
 
+def by_hand(stage: Stage) -> None:
+    """A board that a person brings into its outline: elsewhere, then in place, then captured by itself."""
+    campaign = stage.copied(stage.material.half)
+    _forget(campaign, "geometry")
+    wizard = Wizard(stage, "geometry", stage.material.half)
+    devices = stage.composition.rig.state.devices.value
+    assert devices is not None
+    assert devices.place is not None
+    statuses = wizard.state.statuses.value
+    wizard.stop()
+    wizard.window.reject()
+    place, devices.place = devices.place, None
+    place(statuses[1].step.placement)
+    wizard = Wizard.again(stage, "geometry")
+    stage.shoot("begin")
+    wizard.press("Check")
+    stage.wait(lambda: wizard.state.look.value is not None)
+    stage.shoot("elsewhere")
+    wizard.press("Check")
+    wizard.idle()
+    place(statuses[0].step.placement)
+    wizard.press("Check")
+    stage.wait(lambda: bool(wizard.state.covered.value) and wizard.state.look.value is not None)
+    stage.shoot("next")
+    wizard.press("Check")
+    wizard.stop()
+
+
 def _forget(campaign: Path, name: str) -> None:
     """Take a calibration's captures away."""
     folder = CampaignFolder.open(campaign)
-    for note in folder.home(name).rglob("*.json"):
-        note.unlink()
+    shutil.rmtree(folder.home(name))
     (campaign / f"{name}.json").unlink()
 
 
@@ -156,5 +196,6 @@ SCENES: dict[str, Callable[[Stage], None]] = {
     "wizard-fresh": fresh,
     "wizard-lacking": lacking,
     "wizard-refused": refused,
+    "wizard-by-hand": by_hand,
     "wizard-leaving": leaving,
 }

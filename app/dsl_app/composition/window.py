@@ -132,6 +132,7 @@ class Composition(QObject):
         if self._options.offers_tour and not self.window.parts.settings.tour_seen:
             # Offered once; the Help menu always has it.
             self.window.parts.settings.tour_seen = True
+            self.window.save_early()
             self.window.toasts.offer(
                 "New here? The guided tour shows the window in seven steps. It is also in the Help menu.",
                 {"Take the tour": lambda: self.window.do("tour")},
@@ -161,6 +162,7 @@ class Composition(QObject):
     def _remember_rig(self, choice: RigChoice) -> None:
         settings = self.window.parts.settings
         settings.rig, settings.rig_options = choice.name, dict(choice.options)
+        self.window.save_early()
 
     @cached_property
     def screens(self) -> ProjectorScreens:

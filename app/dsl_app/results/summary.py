@@ -55,8 +55,12 @@ def summarise(result: ResultArrays | None, offer: Path | None, busy: str, is_beg
     elif offer is not None and not is_begun:
         content, message = Content.OFFER, f"{offer.name} has no result yet. Reconstruct it now?"
     can_reconstruct = offer is not None and not busy
+    if offer is not None and not is_begun:
+        # What was open before is not shown, and nothing can be done with it here.
+        head = offer.stem, str(offer), str(offer)
+        return Summary(content, *head, message=message, can_reconstruct=can_reconstruct)
     if result is None:
-        return Summary(content, message=message, can_reconstruct=can_reconstruct)
+        return Summary(content, message=message)
     height, width = result.shape
     bands = f" · {counted(len(result.wavelengths_nm), 'band')}" if result.has_spectra else " · depth only"
     if is_begun:
@@ -77,7 +81,6 @@ def summarise(result: ResultArrays | None, offer: Path | None, busy: str, is_beg
             part for part in (str(result.path), "\n".join(missed), fit.words if fit else "", details) if part
         ),
         message=message,
-        can_reconstruct=can_reconstruct,
         has_result=True,
         warning=" ".join([*missed, *([doubted.headline] if doubted else []), *lacks]),
         advice="\n".join([*missed, *([doubted.words] if doubted else []), *lacks]),

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
-from dsl_app.connection.state import RigState
+from dsl_app.connection.state import RigChoice, RigState
 from dsl_app.scan.state import (
     OWN_CALIBRATION,
     CalibrationChoice,
@@ -28,6 +28,7 @@ from dsl_core.io.calibration_library import CalibrationLibrary
 from dsl_core.io.plan_file import save_plan
 from dsl_core.io.scan.estimate import estimate
 from dsl_core.io.scan.folder import SUFFIX
+from dsl_core.io.scan.origin import rig_notes, rig_of_notes
 from dsl_core.model.plan import CapturePlan, GrayCode
 from dsl_core.model.presets import PRESETS, on_cycles
 from dsl_core.model.rig import Rig
@@ -154,7 +155,8 @@ class ScanPlanController:
             self._devices, state.plan.value, state.target.value, self.calibration, state.override.value
         )
         if session is not None:
-            connects = self._devices is None and session.rig_to_open is not None
+            is_there = self._devices is not None and was_taken_with(session, self._rig.choice.value)
+            connects = not is_there and session.rig_to_open is not None
             needs = () if self._devices or connects else (connect_first(session),)
             facts = replace(facts, obstacles=needs, remarks=(), connects=connects)
         state.facts.set(facts)
@@ -270,6 +272,14 @@ class ScanPlanController:
         """Disconnect from the rig's state."""
         for stop in self._stops:
             stop()
+
+
+def was_taken_with(session: InterruptedScan, choice: RigChoice) -> bool:
+    """Whether a scan was captured with this rig and its options; taken for so where the scan names none."""
+    if session.rig is None:
+        return True
+    named = rig_of_notes(rig_notes(choice.name, dict(choice.options)))
+    return named == (session.rig.name, dict(session.rig.options))
 
 
 def connect_first(session: InterruptedScan) -> str:

@@ -32,11 +32,21 @@ class Reconnector:
         self._resume, self._clock = resume, clock
         self._story, self._choice = "", rig.state.choice.value
         self._attempt, self._next_s, self._resumes = 0, 0.0, False
+        self._waits_for: InterruptedScan | None = None
         self._unfollow = rig.state.link.changed.connect(self._take_link)
 
     def open_rig_of(self, session: InterruptedScan) -> None:
-        """Connect the rig that an interrupted scan was captured with, once, and resume the scan."""
+        """Connect the rig that an interrupted scan was captured with, once, and resume the scan.
+
+        While another rig is being connected it waits: a click is not forgotten.
+        """
         assert session.rig is not None
+        link = self._rig.state.link
+        if link.value is Link.OPENING:
+            if self._waits_for != session:
+                self._waits_for = session
+                link.changed.once(lambda _: self._go_on(), lambda now: now is not Link.OPENING)
+            return
 
         def failed(reason: str) -> None:
             name = session.folder.name
@@ -47,6 +57,12 @@ class Reconnector:
                 self._resume()
 
         self._rig.reconnect(session.rig, connected, failed)
+
+    def _go_on(self) -> None:
+        """Resume the scan that waited, if it is still the one to resume."""
+        session, self._waits_for = self._waits_for, None
+        if session is not None and self._state.interrupted.value == session:
+            self._resume()
 
     def begin(self, story: str) -> None:
         """Start to reconnect the rig that a scan lost; ``story`` says how it was lost."""

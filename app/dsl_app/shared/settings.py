@@ -18,6 +18,8 @@ _log = logging.getLogger(__name__)
 RECENT_COUNT = 12
 #: Names another folder for settings, for tests and for portable installations.
 HOME_VARIABLE = "DSL_SCAN_HOME"
+#: What a program that is killed must know next time; the page that was open is offered again.
+EARLY = ("rig", "rig_options", "recent", "tour_seen")
 
 
 class Settings(BaseModel):
@@ -145,3 +147,12 @@ def _tolerant(content: dict[str, Any], path: Path) -> tuple[Settings, str]:
             f"These fields of the settings {path} are invalid and were reset to their defaults:"
             f" {', '.join(sorted(wrong))}."
         )
+
+
+def save_early(settings: Settings, path: Path) -> str:
+    """Write what must outlive a crash now; the rest stays as it was saved. Returns what went wrong."""
+    saved, trouble = load_settings(path)
+    if trouble:
+        return trouble
+    early = {name: getattr(settings, name) for name in EARLY}
+    return save_settings(saved.model_copy(update=early), path)

@@ -92,7 +92,7 @@ QLabel[role="heading"] {{ font-weight: 600; }}
 QLabel[role="good"] {{ color: {t.good}; }}
 QLabel[role="warn"] {{ color: {t.warn}; }}
 QLabel[role="bad"] {{ color: {t.bad}; }}
-QFrame[role="card"] {{ background: {t.base}; border: 1px solid {t.line}; border-radius: 6px; }}
+QLabel[role="accent"] {{ color: {t.accent}; }}
 QFrame#rail {{ background: {t.raised}; border-right: 1px solid {t.line}; }}
 QFrame#rail QToolButton {{ border: none; padding: 8px 4px; color: {t.muted};
   border-left: 3px solid transparent; }}

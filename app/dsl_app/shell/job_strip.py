@@ -68,6 +68,8 @@ class JobStrip(QWidget):
     def _list_choices(self) -> None:
         self._choices.clear()
         for job in _major(self._runner.active):
+            if job.is_told_elsewhere:
+                continue
             action = self._choices.addAction(job.title.replace("&", "&&"))
             action.setEnabled(not job.token.is_cancelled)
             action.triggered.connect(lambda _checked=False, job=job: self._stop(job))
@@ -84,7 +86,11 @@ class StripView:
 
 
 def strip_view(jobs: Sequence[Job[Any]]) -> StripView | None:
-    """The oldest job that a person waits for, else the oldest; None when none is active."""
+    """The oldest job that a person waits for, else the oldest; None when none is active.
+
+    Jobs that a dialog tells of are left out: two bars of one job are one too many.
+    """
+    jobs = [job for job in jobs if not job.is_told_elsewhere]
     if not jobs:
         return None
     major = _major(jobs)

@@ -13,7 +13,7 @@ from PySide6.QtWidgets import QMainWindow, QStackedWidget
 
 from dsl_app.shared.jobs.qt_runner import QtRunner
 from dsl_app.shared.known_files import Kind, kind_of, meant_by, refusal
-from dsl_app.shared.settings import RecentFiles, Settings, save_settings
+from dsl_app.shared.settings import RecentFiles, Settings, save_early, save_settings
 from dsl_app.shared.theme import DARK, Theme
 from dsl_app.shared.undo import UndoStack
 from dsl_app.shared.widgets.dialogs import confirm
@@ -23,6 +23,7 @@ from dsl_app.shell.actions import PAGES, Page
 from dsl_app.shell.job_strip import JobStrip
 from dsl_app.shell.log import LogRecords
 from dsl_app.shell.rail import Rail
+from dsl_app.shell.status_line import StatusLine
 from dsl_app.shell.toasts import Toasts
 
 _log = logging.getLogger(__name__)
@@ -73,6 +74,7 @@ class PagedWindow(QMainWindow):
         self.setMinimumSize(SMALLEST)
         self.resize(first_size(self.screen().availableSize()))
         self.setAcceptDrops(True)
+        self.setStatusBar(StatusLine())
         self.toasts = Toasts(self.statusBar())
         self.rail = Rail([page for page in PAGES if page.key in makers])
         self.rail.chosen.connect(self.open_page)
@@ -136,6 +138,7 @@ class PagedWindow(QMainWindow):
             for key in (self.page, *(key for key in self._makers if key != self.page)):
                 if self.page_of(key).open_path(path):
                     self.parts.recent.add(path)
+                    self.save_early()
                     self.open_page(key)
                     return
         if kind is Kind.MISSING:
@@ -176,6 +179,12 @@ class PagedWindow(QMainWindow):
         """Write the settings, including the layout."""
         save_layout(self, self.parts.settings)
         trouble = save_settings(self.parts.settings, self.parts.settings_path)
+        if trouble:
+            _log.warning("%s", trouble)
+
+    def save_early(self) -> None:
+        """Write what must outlive a crash."""
+        trouble = save_early(self.parts.settings, self.parts.settings_path)
         if trouble:
             _log.warning("%s", trouble)
 

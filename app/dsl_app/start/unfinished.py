@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from dsl_app.connection.state import RigChoice
 from dsl_app.shared.evented import Value
 from dsl_app.shared.jobs.base import Job, JobRunner
 
@@ -106,10 +107,19 @@ def unfinished_in(folders: Iterable[Path]) -> tuple[Unfinished, ...]:
     scans = [
         Unfinished(
             each.folder,
-            f"The scan {each.folder.stem} was interrupted: {each.done} of {each.total} frames are safe.",
+            f"The scan {each.folder.stem} was interrupted: {each.done} of {each.total} frames are safe."
+            f"{_words_of(each.rig)}",
             "Resume scan…",
         )
         for folder in folders
         for each in unfinished_scans(folder)
     ]
     return (*results, *scans)
+
+
+def _words_of(rig: tuple[str, dict[str, str]] | None) -> str:
+    """With which rig a scan was taken, as a sentence; empty where that is not known."""
+    if rig is None:
+        return ""
+    name, options = rig
+    return f" Rig: {RigChoice(name, tuple(options.items())).words}."

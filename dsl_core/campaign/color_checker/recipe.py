@@ -82,6 +82,7 @@ class ColorCheckerRecipe(Recipe[ColorCheckerCalibration]):
         white = shoot_white(bench)
         pose = self._pose(white.picture.astype(np.float32), bench.rig, f"the test shot of {step.title}")
         patch_samples(pose.corners_px, (white.picture.shape[0], white.picture.shape[1]))
+        bench.found(np.asarray(pose.corners_px, float))
         return (
             Figure(name="patches found", value=24, unit="", low=24, high=24),
             Figure(

@@ -13,6 +13,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Generic, TypeVar
 
+import numpy as np
+from numpy.typing import NDArray
+
 from dsl_core.devices.base import DeviceRig
 from dsl_core.errors import CalibrationError, Cancelled, DslError, StoreError
 from dsl_core.io import MANIFEST_NAME
@@ -29,6 +32,12 @@ from dsl_core.progress import Progress
 SCAN_NAME = "scan.dsl"
 
 RecordT = TypeVar("RecordT", bound=Record)
+#: Told where points of a target are in the camera's picture: columns and rows, px, shape (points, 2).
+Found = Callable[[NDArray[np.float64]], object]
+
+
+def _ignore(points_px: NDArray[np.float64]) -> None:
+    """Nobody watches."""
 
 
 @dataclass(frozen=True)
@@ -50,12 +59,14 @@ class Bench:
     """What a recipe works with.
 
     ``rig`` is what is known so far, nominal where nothing has been measured yet. ``folder`` is the recipe's
-    own; each step has a folder in it, with at most one scan and records next to it.
+    own; each step has a folder in it, with at most one scan and records next to it. ``found`` is told by a
+    look where it found points of the target.
     """
 
     devices: DeviceRig
     folder: Path
     rig: Rig
+    found: Found = _ignore
 
     def step_folder(self, step: Step) -> Path:
         """The folder of a step's captures; it need not exist."""

@@ -6,6 +6,7 @@ import numpy as np
 
 from dsl_core.calibration.geometry.boards import find_corners, grey_of, refine_corners
 from dsl_core.calibration.geometry.pose_series import GOOD_RMS_PX, MIN_POSES, board_normal
+from dsl_core.campaign.common.recipe import Found
 from dsl_core.campaign.common.white_shot import WhiteLevel, other_light
 from dsl_core.model.board import Board, corner_positions_mm
 from dsl_core.model.calibration.geometry import GeometryCalibration
@@ -23,8 +24,11 @@ LEAST_VIEW = 8.0
 PLANE_SHARE, SQUARE_SHARE, COVERAGE = 5e-4, 0.005, 0.35
 
 
-def look_at_board(white: WhiteLevel, board: Board, rig: Rig, title: str) -> tuple[Figure, ...]:
-    """Figures of a white picture of a board; raises `CalibrationError` when the board is not found."""
+def look_at_board(white: WhiteLevel, board: Board, rig: Rig, title: str, found: Found) -> tuple[Figure, ...]:
+    """Figures of a white picture of a board; raises `CalibrationError` when the board is not found.
+
+    ``found`` is told where its corners are.
+    """
     import cv2
 
     picture = np.asarray(white.picture, np.float32)
@@ -32,6 +36,7 @@ def look_at_board(white: WhiteLevel, board: Board, rig: Rig, title: str) -> tupl
     corners = find_corners(grey_of(picture, rig.sensor.bayer), board, what)
     frames = PoseFrames(what, [], picture, np.zeros_like(picture), rig.sensor.bayer)
     corners, blur_px = refine_corners(frames, corners, board)
+    found(corners.points_px)
     hull = cv2.convexHull(corners.points_px.astype(np.float32))
     view = 100 * float(cv2.contourArea(hull)) / picture.size
     normal = board_normal(corner_positions_mm(board)[corners.ids], corners.points_px, rig.camera.matrix, what)
@@ -79,11 +84,11 @@ def geometry_figures(record: GeometryCalibration) -> tuple[Figure, ...]:
     used = sum(pose.used for pose in record.poses)
     more = "Add poses that fill the picture, tilted in all directions, sharp and evenly lit."
     return (
-        Figure(name="poses used", value=used, unit="", low=MIN_POSES, high=len(record.poses), advice=more),
         Figure(name="camera error", value=record.camera_rms_px, unit="px", high=GOOD_RMS_PX, advice=more),
         Figure(
             name="projector error", value=record.projector_rms_px, unit="px", high=GOOD_RMS_PX, advice=more
         ),
+        Figure(name="poses used", value=used, unit="", low=MIN_POSES, high=len(record.poses), advice=more),
         Figure(
             name="side of a square",
             value=squares.square_mm,

@@ -55,7 +55,7 @@ class GeometryRecipe(Recipe[GeometryCalibration]):
     def look(self, bench: Bench, step: Step) -> tuple[Figure, ...]:
         """Whether the board is whole, sharp and not over-exposed, how it stands, and the room's light."""
         white = shoot_white(bench)
-        return look_at_board(white, self.board, bench.rig, step.title)
+        return look_at_board(white, self.board, bench.rig, step.title, bench.found)
 
     def capture(self, bench: Bench, step: Step, progress: Progress) -> None:
         """Choose an exposure by a test shot and capture the code; a scan that was begun continues.

@@ -9,6 +9,7 @@ import pytest
 from dsl_app.composition.window import Composition, StartOptions
 from dsl_app.connection.state import Link, RigChoice
 from dsl_app.scan.page import ScanPage
+from dsl_app.shared.settings import load_settings
 from dsl_app.shell.main_window import MainWindow
 from PySide6.QtCore import Qt
 from pytestqt.qtbot import QtBot
@@ -39,6 +40,18 @@ def test_the_rig_is_connected_once_the_window_is_there(
     rig = composition.rig
     assert rig.state.link.value is Link.CLOSED
     qtbot.waitUntil(lambda: rig.state.link.value is Link.OPEN, timeout=30_000)
+
+
+def test_a_program_that_is_killed_remembers_its_rig(
+    composed: tuple[Composition, MainWindow], tmp_path: Path
+) -> None:
+    composition, window = composed
+    window.open_page("scan")
+    composition.rig.state.choice.set(RigChoice("twin", (("scene", "sphere"),)))
+    # Nothing is closed.
+    settings, trouble = load_settings(window.parts.settings_path)
+    assert (settings.rig, settings.rig_options, trouble) == ("twin", {"scene": "sphere"}, "")
+    assert settings.page == "start", "the page where unfinished scans are offered"
 
 
 def test_every_page_opens_in_both_themes(composed: tuple[Composition, MainWindow]) -> None:

@@ -78,9 +78,9 @@ def result(**attributes: object) -> ResultArrays:
     [
         (False, None, "", Content.WELCOME, "", False),
         (True, None, "", Content.RESULT, "", False),
-        (False, "leaf.dsl", "", Content.OFFER, "leaf.dsl has no result yet. Reconstruct it now?", True),
-        (True, "leaf.dsl", "", Content.OFFER, "leaf.dsl has no result yet. Reconstruct it now?", True),
-        (True, "leaf.dsl", "Open leaf", Content.OFFER, "Open leaf…", False),
+        (False, "cup.dsl", "", Content.OFFER, "cup.dsl has no result yet. Reconstruct it now?", True),
+        (True, "cup.dsl", "", Content.OFFER, "cup.dsl has no result yet. Reconstruct it now?", True),
+        (True, "cup.dsl", "Open cup", Content.OFFER, "Open cup…", False),
         (False, None, "Open leaf", Content.OFFER, "Open leaf…", False),
     ],
 )
@@ -89,8 +89,9 @@ def test_the_page_shows_a_result_an_offer_or_the_welcome(
 ) -> None:
     found = summarise(result() if has_result else None, None if offer is None else Path(offer), busy)
     assert (found.content, found.message, found.can_reconstruct) == (content, message, can_reconstruct)
-    assert found.has_result == has_result
-    assert found.title == ("leaf" if has_result else "Results")
+    # What is open behind an offer can be neither seen nor exported.
+    assert found.has_result == (has_result and offer is None)
+    assert found.title == ("cup" if offer else "leaf" if has_result else "Results")
 
 
 def test_the_head_tells_size_bands_time_and_path() -> None:

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from dsl_app.connection.state import Link, RigChoice
 from dsl_app.scan.job import ScanJob
-from dsl_app.scan.plan import connect_first
+from dsl_app.scan.plan import connect_first, was_taken_with
 from dsl_app.scan.reconnect import ATTEMPTS, RETRY_S
 from dsl_app.scan.state import CalibrationChoice, InterruptedScan, Phase, Reconnection
 
@@ -239,6 +239,8 @@ def test_a_scene_that_moved_meanwhile_is_refused(
         bench.scans.start()
     told = len(bench.notifier.told)
     bench.rig.connect(TWIN.__class__("twin", (("scene", "box"), ("size", "64x48"))))
+    # It is the same rig, with another thing before it.
+    bench.rig.state.choice.set(TWIN)
     bench.scans.start()
     assert phase(bench) is Phase.LOST
     assert "changed since the scan stopped" in bench.state.trouble.value
@@ -276,6 +278,51 @@ def test_an_interrupted_session_is_offered_and_a_complete_one_is_not(
     assert other.rig.state.choice.value == TWIN
     assert not other.scans.open(tmp_path / "first.dsl")
     assert not other.scans.open(tmp_path)
+
+
+def test_another_rig_that_is_connected_makes_way_for_that_of_the_scan(
+    bench: ScanBench, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    with monkeypatch.context() as lost:
+        fail_from(lost, 10)
+        bench.scans.start()
+    other = make_bench(tmp_path)
+    other.rig.connect(SMALL)
+    other.state.then_reconstruct.set(False)
+    assert other.scans.open(tmp_path / "first.dsl")
+    facts = other.state.facts.value
+    assert facts is not None
+    assert facts.connects, "frames of another size would be asked for again and again"
+    other.scans.start()
+    assert phase(other) is Phase.DONE
+    assert other.rig.state.choice.value == TWIN
+
+
+def test_a_click_while_another_rig_is_connected_is_not_forgotten(
+    bench: ScanBench, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    with monkeypatch.context() as lost:
+        fail_from(lost, 10)
+        bench.scans.start()
+    other = make_bench(tmp_path)
+    other.state.then_reconstruct.set(False)
+    assert other.scans.open(tmp_path / "first.dsl")
+    other.rig.state.link.set(Link.OPENING)
+    other.scans.start()
+    other.scans.start()
+    assert phase(other) is Phase.PLANNING
+    other.rig.state.link.set(Link.CLOSED)
+    assert phase(other) is Phase.DONE
+    assert other.rig.state.choice.value == TWIN
+
+
+def test_a_rig_is_the_same_whatever_the_order_of_its_options(tmp_path: Path) -> None:
+    rig = RigChoice("twin", (("scene", "plane"), ("size", "32x24")))
+    session = InterruptedScan(tmp_path / "first.dsl", 3, 76, rig, may_open=True)
+    assert was_taken_with(session, RigChoice("twin", rig.options[::-1]))
+    assert not was_taken_with(session, RigChoice("twin", rig.options[:1]))
+    assert not was_taken_with(session, RigChoice("lab", rig.options))
+    assert was_taken_with(InterruptedScan(tmp_path / "first.dsl", 3, 76), rig)
 
 
 @pytest.mark.parametrize("named", [True, False])

@@ -9,6 +9,7 @@ from dsl_app.shared.settings import (
     demo_folder,
     folder_for,
     load_settings,
+    save_early,
     save_settings,
 )
 
@@ -39,6 +40,15 @@ def test_one_wrong_field_costs_only_itself(tmp_path: Path) -> None:
     assert (settings.theme, settings.rig) == ("system", "bench")
     assert "theme" in trouble
     assert "future" not in trouble
+
+
+def test_what_must_outlive_a_crash_is_written_alone(tmp_path: Path) -> None:
+    path = tmp_path / "settings.json"
+    save_settings(Settings(theme="dark", page="results"), path)
+    now = Settings(theme="light", page="scan", rig="bench", rig_options={"port": "3"}, tour_seen=True)
+    assert save_early(now, path) == ""
+    expected = Settings(theme="dark", page="results", rig="bench", rig_options={"port": "3"}, tour_seen=True)
+    assert load_settings(path) == (expected, "")
 
 
 def test_a_folder_that_cannot_be_written_is_told(tmp_path: Path) -> None:

@@ -82,6 +82,15 @@ def test_a_stage_that_the_title_names_is_not_said_again(stage: str, words: list[
     assert view.text.split(" · ") == [job.title, *words]
 
 
+def test_a_job_that_its_dialog_tells_of_is_not_told_twice() -> None:
+    told = Job("Geometry: Capture Pose 2", lambda progress: None, is_told_elsewhere=True)
+    assert strip_view([told]) is None
+    other = Job("Export leaf", lambda progress: None)
+    view = strip_view([told, other])
+    assert view is not None
+    assert (view.job, view.text, view.asks_which) == (other, "Export leaf", False)
+
+
 def test_a_job_that_knows_better_is_believed() -> None:
     job = Job("Scan leaf", lambda progress: None, time_left=lambda: 90.0)
     assert job.left == TimeLeft(90.0, True)

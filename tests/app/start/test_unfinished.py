@@ -16,7 +16,7 @@ from dsl_core.workflows.unfinished import UnfinishedResult, UnfinishedScan
 from tests.app.support.doubles import InlineRunner, ManualRunner
 from tests.cases.small_rig import small_rig
 
-SCAN = UnfinishedScan(Path("x/leaf.dsl"), 383, 716)
+SCAN = UnfinishedScan(Path("x/leaf.dsl"), 383, 716, ("twin", {"scene": "sphere"}))
 RESULT = UnfinishedResult(Path("x/cup.zarr"), Path("x/cup.dsl"), 3, 8, small_rig(), Options())
 
 
@@ -31,7 +31,9 @@ def found(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 def test_what_was_interrupted_is_said_in_words(found: Path) -> None:
     result, scan = unfinished_in([found])
-    assert scan.words == "The scan leaf was interrupted: 383 of 716 frames are safe."
+    assert scan.words == (
+        "The scan leaf was interrupted: 383 of 716 frames are safe. Rig: twin, scene sphere."
+    )
     assert result.words == "The reconstruction of cup was interrupted: 3 of 8 parts are safe."
     assert (result.button, scan.button) == ("Resume reconstruction", "Resume scan…")
 

@@ -119,9 +119,12 @@ def test_a_look_tells_how_the_board_stands(bench: Bench) -> None:
     step = RECIPE.steps(bench)[1]
     assert bench.devices.place is not None
     bench.devices.place(step.placement)
-    figures = {figure.name: figure for figure in RECIPE.look(bench, step)}
+    seen: list[NDArray[np.float64]] = []
+    figures = {figure.name: figure for figure in RECIPE.look(replace(bench, found=seen.append), step)}
     assert all(figure.passed for figure in figures.values())
     assert figures["corners found"].value == 54
+    assert [points_px.shape for points_px in seen] == [(54, 2)]
+    assert ((seen[0] > 0) & (seen[0] < (222, 145))).all()
     tilts = [float(step.placement.options[f"tilt_{axis}_deg"]) for axis in "xy"]
     cosine = np.cos(np.radians(tilts[0])) * np.cos(np.radians(tilts[1]))
     assert figures["tilt"].value == pytest.approx(np.degrees(np.arccos(cosine)), abs=3)

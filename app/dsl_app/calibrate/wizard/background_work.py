@@ -11,12 +11,14 @@ from pathlib import Path
 import numpy as np
 
 from dsl_app.calibrate.campaign_status import Recipes
+from dsl_app.calibrate.wizard.ghost import PointsPx, as_points, ghost, shared_part
 from dsl_app.calibrate.wizard.settings import changed_settings, setting_rows
 from dsl_app.calibrate.wizard.state import Fit, Look, Seen, SettingRow
 from dsl_core.campaign.common.recipe import AnyRecipe, Step
 from dsl_core.campaign.guide import calibrated_rig
 from dsl_core.campaign.products import Products, write_products
 from dsl_core.campaign.session import CalibrationSession, StepStatus
+from dsl_core.capture.display import Display
 from dsl_core.capture.preview import MANY_SATURATED, quick_picture, statistics
 from dsl_core.devices.base import Camera, CameraInfo, DeviceRig
 from dsl_core.errors import CalibrationError, Cancelled, DslError
@@ -28,8 +30,12 @@ from dsl_core.progress import Progress
 
 #: Frames darker than this share of the brightest recent one are those between patterns; they would flicker.
 DARK_SHARE = 0.5
+#: Frames darker than this share even of a saturated one are black.
+BLACK_SHARE = 0.1
 #: How long the brightest frame is remembered, s.
 MEMORY_S = 3.0
+#: How frames are shown: white targets are white; what is brighter and what is not stays to be judged.
+AS_SEEN = Display(balance=True)
 
 
 @dataclass(frozen=True)
@@ -40,6 +46,7 @@ class Opened:
     settings: tuple[SettingRow, ...]
     fit: Fit | None
     places_itself: bool
+    outlines: Mapping[str, PointsPx]
 
 
 @dataclass(frozen=True)
@@ -93,7 +100,9 @@ class BackgroundWork:
         self._session, self._all = session, recipes
         settings = setting_rows(recipe, campaign.info.settings.get(self._name, {}))
         places = self._devices.place is not None
-        return Opened(statuses, settings, self._found(), places)
+        camera = session.bench.rig.camera
+        outlines = {each.key: ghost(each.placement, camera) for each in session.steps}
+        return Opened(statuses, settings, self._found(), places, outlines)
 
     def _recipe(self, recipes: Sequence[AnyRecipe]) -> AnyRecipe:
         return next(recipe for recipe in recipes if recipe.name == self._name)
@@ -120,10 +129,14 @@ class BackgroundWork:
         """Look once; a target that cannot be measured is part of the look, a lost device is an error."""
         progress.report(step.title, 0, 0)
         self.place(step)
+        seen: list[PointsPx] = []
         try:
-            return Look(step.key, self.session.look(step))
+            figures = self.session.look(step, lambda points_px: seen.append(as_points(points_px)))
         except CalibrationError as error:
             return Look(step.key, (), str(error))
+        points_px = seen[-1] if seen else ()
+        wanted = ghost(step.placement, self.session.bench.rig.camera)
+        return Look(step.key, figures, "", points_px, shared_part(wanted, points_px))
 
     def capture(self, step: Step, again: bool, is_checked: bool, progress: Progress) -> Captured:
         """Capture a step, or capture it ``again``; ``is_checked`` looks first and refuses what is not right.
@@ -181,7 +194,7 @@ class WatchedCamera(Camera):
         self._camera, self._clock = camera, clock
         self._lock = threading.Lock()
         self._frame: Frame | None = None
-        self._best, self._best_at = 0.0, 0.0
+        self._best, self._best_at, self._brightest_dn = 0.0, 0.0, 0.0
 
     @property
     def info(self) -> CameraInfo:
@@ -199,19 +212,27 @@ class WatchedCamera(Camera):
     def snap(self, timeout_ms: float = 5000.0) -> Frame:
         """Take a frame and keep it to be shown."""
         frame = self._camera.snap(timeout_ms)
-        worth, now = self._worth(frame), self._clock()
+        now = self._clock()
+        is_old = now - self._best_at > MEMORY_S
+        if is_old:
+            self._brightest_dn = 0.0
+        worth = self._worth(frame)
         with self._lock:
-            if worth > self._best or now - self._best_at > MEMORY_S:
+            if worth > self._best or is_old:
                 self._best, self._best_at = worth, now
             if worth >= DARK_SHARE * self._best:
                 self._frame = frame
         return frame
 
     def _worth(self, frame: Frame) -> float:
-        """How well a frame shows the target: bright, but not saturated."""
+        """How well a frame shows the target: bright, but not saturated; black shows nothing."""
         thin = frame.pixels[::7, ::7]
         saturated = float(np.mean(thin >= 2**self.info.bit_depth - 1))
-        return float(np.mean(thin)) * (0.01 if saturated > MANY_SATURATED else 1.0)
+        mean_dn = float(np.mean(thin))
+        self._brightest_dn = max(self._brightest_dn, mean_dn)
+        if mean_dn < BLACK_SHARE * self._brightest_dn:
+            return 0.0
+        return mean_dn * (0.01 if saturated > MANY_SATURATED else 1.0)
 
     def take_frame(self) -> Frame | None:
         """The latest frame since the last call; None without one."""
@@ -225,7 +246,7 @@ class WatchedCamera(Camera):
         if frame is None:
             return None
         full_scale = 2**self.info.bit_depth - 1
-        picture = quick_picture(frame.pixels, self.info.bayer, full_scale, show_saturation=True)
+        picture = quick_picture(frame.pixels, self.info.bayer, full_scale, True, AS_SEEN)
         return Seen(picture, max(statistics(frame.pixels, self.info.bayer, full_scale).saturated))
 
     def close(self) -> None:

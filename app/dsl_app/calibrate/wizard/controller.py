@@ -9,6 +9,7 @@ from pathlib import Path
 from dsl_app.calibrate.calibrate_all import products_text
 from dsl_app.calibrate.campaign_status import Recipes
 from dsl_app.calibrate.wizard.background_work import BackgroundWork, Captured, Opened
+from dsl_app.calibrate.wizard.ghost import keeps_still
 from dsl_app.calibrate.wizard.jobs import WizardJobs
 from dsl_app.calibrate.wizard.state import Doing, Fit, Look, WizardState
 from dsl_app.connection.controller import RigController
@@ -47,6 +48,7 @@ class WizardController:
         self._jobs = WizardJobs(state, rig, runner)
         self._devices: DeviceRig | None = None
         self._looked_at = 0.0
+        self._is_hands_free = False
         self._unfollow: Callable[[], None] = lambda: None
 
     # Open and leave --------------------------------------------------------------------------------
@@ -77,6 +79,7 @@ class WizardController:
         """Show what was read from disk, at the first page where something is to be done."""
         state = self.state
         state.places_itself.set(found.places_itself)
+        state.outlines.set(found.outlines)
         state.settings.set(found.settings)
         state.misfit.set(None)
         state.statuses.set(found.statuses)
@@ -161,9 +164,23 @@ class WizardController:
 
     def _looked(self, look: Look) -> None:
         self._looked_at = self._clock()
-        status = self.state.status
-        if status is not None and status.step.key == look.key:
-            self.state.look.set(look)
+        state, status, before = self.state, self.state.status, self.state.look.value
+        if status is None or status.step.key != look.key:
+            return
+        state.look.set(look)
+        if before is not None and self._is_still_right(before, look):
+            self._begin_capture(hands_free=True)
+
+    def _is_still_right(self, before: Look, look: Look) -> bool:
+        """Whether a person holds the target where it is wanted, and has since the look before."""
+        state = self.state
+        is_asked = state.is_checking.value and state.captures_itself.value and state.waits_for_person
+        is_right = look.is_good and look.is_in_place
+        return is_asked and is_right and keeps_still(before.points_px, look.points_px)
+
+    def capture_itself(self, on: bool) -> None:
+        """Whether a target that is right and still is captured without a click."""
+        self.state.captures_itself.set(on)
 
     # Capture ---------------------------------------------------------------------------------------
 
@@ -171,11 +188,16 @@ class WizardController:
         """Capture the step that is shown, or capture it again."""
         if self.state.doing.value is Doing.LOOKING:
             self.state.note.set("The capture starts as soon as the current look has ended.")
+        self._begin_capture(hands_free=False)
+
+    def _begin_capture(self, hands_free: bool) -> None:
+        self._is_hands_free = hands_free
         self._jobs.after_look(self._capture)
 
     def capture_all(self) -> None:
         """Capture every step that lacks captures and fit, where the rig places targets itself."""
         if self.state.places_itself.value:
+            self._is_hands_free = False
             self._jobs.after_look(self._continue_automatically)
 
     def _continue_automatically(self) -> None:
@@ -203,11 +225,13 @@ class WizardController:
         )
 
     def _captured(self, found: Captured, title: str) -> None:
-        state = self.state
+        state, goes_on, look = self.state, self._is_hands_free, self.state.look.value
         state.statuses.set(found.statuses)
         if found.error is not None:
             self._jobs.fail(found.error)
             return
+        if look is not None:
+            state.covered.set((*state.covered.value, *look.points_px))
         state.fit.set(None)
         state.misfit.set(None)
         if state.is_automatic.value:
@@ -216,6 +240,9 @@ class WizardController:
         following = next((page for page in state.lacking if page > state.at.value), None)
         left = len(state.lacking)
         self.go_to(following or self._next_lacking)
+        if goes_on and state.waits_for_person:
+            # Hands hold the target; the next outline waits for it.
+            state.is_checking.set(True)
         state.note.set(
             f"{title} is captured. " + (f"{left} to go." if left else "All steps are captured: fit them.")
         )

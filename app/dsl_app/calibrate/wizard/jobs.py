@@ -51,6 +51,7 @@ class WizardJobs:
             lambda error: self._over(lambda: on_failed(error)),
             lambda: self._over(self._stopped),
             exclusive=RIG if on_rig else "",
+            is_told_elsewhere=True,
         )
         # Set before any listener hears of it: it might leave at once.
         self._job = job

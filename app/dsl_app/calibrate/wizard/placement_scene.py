@@ -112,6 +112,16 @@ class Face:
         return AXIS[0] + FOCAL_WIDTHS * x / z, AXIS[1] + FOCAL_WIDTHS * PICTURE_ASPECT * y / z
 
     @property
+    def found_half_mm(self) -> Point | None:
+        """Half sizes between the points that a look finds: outermost corners of squares or of patches."""
+        if self.target == "board":
+            side = 2 * (self.half_mm[0] - BOARD_RIM_MM) / self.squares[0]
+            return (self.squares[0] / 2 - 1) * side, (self.squares[1] / 2 - 1) * side
+        if self.target == "color-checker":
+            return 2.5 * PATCH_PITCH_MM + PATCH_MM / 2, 1.5 * PATCH_PITCH_MM + PATCH_MM / 2
+        return None
+
+    @property
     def sheet(self) -> Part:
         """All of it."""
         (half_x, half_y) = self.half_mm

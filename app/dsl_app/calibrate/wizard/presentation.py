@@ -5,7 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-from dsl_app.calibrate.wizard.state import Doing, Fit, WizardState
+from dsl_app.calibrate.wizard.ghost import LEAST_SHARED, PointsPx
+from dsl_app.calibrate.wizard.state import Doing, Fit, Look, WizardState
 from dsl_app.shared.jobs.base import JobProgress
 from dsl_app.shared.notify import describe_seconds
 from dsl_app.shared.widget_state import ButtonState
@@ -16,7 +17,7 @@ from dsl_core.model.placement import Placement
 #: A sentence and its role of the style sheet.
 Verdict = tuple[str, str]
 #: The buttons of which one is the main one at any time.
-Main = Literal["back", "next", "all", "capture", "fit", "accept", "following", "leave"]
+Main = Literal["back", "next", "all", "check", "capture", "fit", "accept", "following", "leave"]
 #: The page of the settings, and that of the first step.
 SETTINGS_PAGE, FIRST_PAGE = 0, 1
 ADVANCED_TIP = "Settings of this calibration: the target's size, distances, how much is captured"
@@ -33,6 +34,7 @@ class Buttons:
 
     leave: ButtonState
     back: ButtonState
+    itself: ButtonState
     check: ButtonState
     all: ButtonState
     capture: ButtonState
@@ -56,7 +58,8 @@ def buttons(state: WizardState) -> Buttons:
     return Buttons(
         leave=ButtonState(is_primary=main == "leave", text="&Close" if is_done else "&Leave"),
         back=ButtonState(is_enabled=state.at.value != FIRST_PAGE and idle, is_primary=main == "back"),
-        check=ButtonState(on_step and not can_stop, idle),
+        itself=ButtonState(state.waits_for_person and not can_stop, idle),
+        check=ButtonState(on_step and not can_stop, idle, main == "check"),
         all=ButtonState(
             state.places_itself.value and bool(state.lacking) and not can_stop, idle, main == "all"
         ),
@@ -81,7 +84,10 @@ def main_button(state: WizardState) -> Main:
     """The button that continues from the current page."""
     status, fit = state.status, state.fit.value
     if status is not None and status.state != "captured":
-        return "all" if state.places_itself.value else "capture"
+        if state.places_itself.value:
+            return "all"
+        has_looked = state.is_checking.value or state.look.value is not None
+        return "check" if state.waits_for_person and not has_looked else "capture"
     if state.at.value == SETTINGS_PAGE:
         return "back"
     if state.at.value != state.last:
@@ -181,8 +187,31 @@ class StepDisplay:
     instruction: str
     placement: Placement
     figures: tuple[Figure, ...]
+    points: Points
     verdict: str
     role: str
+
+
+@dataclass(frozen=True)
+class Points:
+    """What is drawn over the camera's picture, px: the outline that is wanted, what was found, what is done.
+
+    ``legend`` names what there is of them, with the role of its colour in the theme.
+    """
+
+    wanted: PointsPx = ()
+    found: PointsPx = ()
+    covered: PointsPx = ()
+
+    @property
+    def legend(self) -> tuple[tuple[str, str], ...]:
+        """Words and their roles."""
+        every = (
+            (self.wanted, "┅ wanted here", "accent"),
+            (self.found, "● found", "good"),
+            (self.covered, "● captured before", "muted"),
+        )
+        return tuple((words, role) for points, words, role in every if points)
 
 
 def step_display(state: WizardState) -> StepDisplay | None:
@@ -192,7 +221,9 @@ def step_display(state: WizardState) -> StepDisplay | None:
         return None
     step = status.step
     figures = () if look is None else look.figures
-    return StepDisplay(step.title, step.instruction, step.placement, figures, *_step_verdict(state))
+    found = () if look is None else look.points_px
+    points = Points(state.outline, found, state.covered.value)
+    return StepDisplay(step.title, step.instruction, step.placement, figures, points, *_step_verdict(state))
 
 
 def _step_verdict(state: WizardState) -> Verdict:
@@ -202,7 +233,7 @@ def _step_verdict(state: WizardState) -> Verdict:
     if look is not None and look.trouble:
         return look.trouble, "bad"
     if look is not None and look.is_good:
-        return "Everything is right: capture.", "good"
+        return _verdict_on_good(state, look)
     if look is not None:
         return "Not right yet; the table says what to do.", "warn"
     if state.is_checking.value:
@@ -211,7 +242,27 @@ def _step_verdict(state: WizardState) -> Verdict:
         return "✓ Captured. If you redo it, the old capture is kept until the new one is complete.", "good"
     if status is not None and status.state == "refused":
         return f"✗ Refused: {status.reason}", "bad"
+    if state.waits_for_person and state.captures_itself.value:
+        return (
+            "Start the check, then bring the target into the dashed outline: once it is right and still, it"
+            " is captured by itself."
+        ), "muted"
     return "Place the target, then check that it is right, or capture at once.", "muted"
+
+
+def _verdict_on_good(state: WizardState, look: Look) -> Verdict:
+    if state.status is not None and state.status.state == "captured":
+        return "Everything is right. It is captured already; redo it only if the target was moved.", "good"
+    by_itself = state.waits_for_person and state.captures_itself.value and state.is_checking.value
+    if not by_itself:
+        return "Everything is right: capture.", "good"
+    if look.is_in_place:
+        return "Everything is right. Keep it still: it is captured by itself.", "good"
+    share = f"{100 * look.shared:.0f} %, wanted {100 * LEAST_SHARED:.0f} %"
+    return (
+        f"Well seen. Bring it into the dashed outline ({share}) and keep it still, or capture here.",
+        "warn",
+    )
 
 
 # The fit ---------------------------------------------------------------------------------------------

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import Enum
 
 import numpy as np
 from numpy.typing import NDArray
 
+from dsl_app.calibrate.wizard.ghost import LEAST_SHARED, PointsPx
 from dsl_app.shared.evented import Event, Value
 from dsl_app.shared.jobs.base import JobProgress
 from dsl_core.campaign.session import CalibrationSession, StepStatus
@@ -35,16 +37,27 @@ class Doing(Enum):
 
 @dataclass(frozen=True)
 class Look:
-    """What the last look at a step found; ``trouble`` is why nothing could be measured."""
+    """What the last look at a step found; ``trouble`` is why nothing could be measured.
+
+    ``points_px`` are points of the target in the camera's picture, and ``shared`` how well they cover the
+    outline where it is wanted, 0 to 1.
+    """
 
     key: str
     figures: tuple[Figure, ...] = ()
     trouble: str = ""
+    points_px: PointsPx = ()
+    shared: float = 0.0
 
     @property
     def is_good(self) -> bool:
         """Whether everything is as it should be."""
         return not self.trouble and not failures(self.figures)
+
+    @property
+    def is_in_place(self) -> bool:
+        """Whether the target is where its outline is."""
+        return self.shared >= LEAST_SHARED
 
 
 @dataclass(frozen=True)
@@ -82,7 +95,10 @@ class WizardState:
     ``at`` counts pages: 0 are the settings, 1 to n the steps, n + 1 the fit. ``trouble`` is what went wrong
     and what to do about it, ``note`` what was done last. ``misfit`` is the session whose captures gave no
     fit. ``allowed`` are figures that a person accepts although some are outside their limits.
-    ``is_automatic`` runs all steps without a person. ``closed`` fires once, when the last work ended.
+    ``is_automatic`` runs all steps without a person. ``outlines`` are where targets are wanted in the
+    camera's picture, by the keys of steps; a target that is right and still there is captured by itself if
+    ``captures_itself``. ``covered`` are the points of what was captured since the wizard opened. ``closed``
+    fires once, when the last work ended.
     """
 
     def __init__(self, name: str, title: str) -> None:
@@ -104,6 +120,9 @@ class WizardState:
         self.settings_trouble = Value("")
         self.places_itself = Value(False)
         self.is_automatic = Value(False)
+        self.outlines: Value[Mapping[str, PointsPx]] = Value({})
+        self.captures_itself = Value(True)
+        self.covered: Value[PointsPx] = Value(())
         #: The calibration that comes after this one, and whether a person goes on to it; empty: none.
         self.following, self.following_title = "", ""
         self.goes_on = False
@@ -125,6 +144,19 @@ class WizardState:
         """The step that is shown; None on the pages of settings and fit."""
         at = self.at.value
         return self.statuses.value[at - 1] if 1 <= at < self.last else None
+
+    @property
+    def outline(self) -> PointsPx:
+        """Where the target of the step that is shown is wanted; empty where that is not known."""
+        status = self.status
+        return () if status is None else self.outlines.value.get(status.step.key, ())
+
+    @property
+    def waits_for_person(self) -> bool:
+        """Whether a person is to bring a target into an outline, which is captured by itself then."""
+        status = self.status
+        is_open = status is not None and status.state != "captured"
+        return is_open and bool(self.outline) and not self.places_itself.value
 
     @property
     def may_accept(self) -> bool:

@@ -32,7 +32,7 @@ from dsl_app.calibrate.wizard.step_page import StepPage
 from dsl_app.shared.evented import follow_any
 from dsl_app.shared.theme import DARK, Theme
 from dsl_app.shared.widgets.dialogs import confirm
-from dsl_app.shared.widgets.forms import Banner, label, named, push_button, quiet, show_button
+from dsl_app.shared.widgets.forms import Banner, check_box, label, named, push_button, quiet, show_button
 from dsl_app.shared.widgets.help_window import add_help_key
 from dsl_app.shared.widgets.inside import apply_theme_inside, stop_following
 from dsl_app.shared.widgets.layouts import STRETCH, column_of, row_of
@@ -207,6 +207,10 @@ class WizardButtons(QWidget):
         self.back = _button("&Back", "Show the previous page")
         self.check = _button("Chec&k", "Check repeatedly whether the target is right")
         self.check.setCheckable(True)
+        self.itself = check_box(
+            "Capture by itself", "While checking, capture a target that is right, in its outline and still"
+        )
+        self.itself.setChecked(True)
         self.all = _button("Capture a&ll", "Place, look at and capture every step that is left, then fit")
         self.capture = _button("&Capture", "")
         self.stop = _button("&Stop", "Stop at the next safe point; frames captured so far are kept")
@@ -227,7 +231,7 @@ class WizardButtons(QWidget):
 
     def _lay_out(self) -> None:
         work = row_of((self._text, 1), self._bar)
-        early = (self.back, self.check, self.discard, self.all, self.stop)
+        early = (self.back, self.itself, self.check, self.discard, self.all, self.stop)
         late = (self.capture, self.fit, self.accept, self.next, self.following)
         row = row_of(self.leave, STRETCH, *early, *late)
         column_of(work, row, on=self, margins=0)
@@ -237,13 +241,17 @@ class WizardButtons(QWidget):
         self.back.clicked.connect(lambda: commands.go_to(page_before(state)))
         self.next.clicked.connect(lambda: commands.go_to(state.at.value + 1))
         self.check.clicked.connect(commands.check)
+        self.itself.toggled.connect(commands.capture_itself)
         self.all.clicked.connect(commands.capture_all)
         self.capture.clicked.connect(commands.capture)
         self.stop.clicked.connect(commands.stop)
         self.discard.clicked.connect(commands.discard)
         self.fit.clicked.connect(commands.fit)
         self.accept.clicked.connect(commands.accept)
-        shown = (state.at, state.doing, state.statuses, state.fit, state.allowed, state.look)
+        shown = (
+            *(state.at, state.doing, state.statuses, state.fit, state.allowed, state.look),
+            *(state.outlines, state.places_itself),
+        )
         self.stops = [
             *follow_any(self._show, *shown),
             *follow_any(self._show_activity, state.note, state.progress),
@@ -255,7 +263,7 @@ class WizardButtons(QWidget):
         for each in fields(Buttons):
             button, how = getattr(self, each.name), getattr(shown, each.name)
             show_button(button, how)
-            if how.is_primary:
+            if how.is_primary and isinstance(button, QPushButton):
                 button.setDefault(True)
         self._show_activity()
 

@@ -20,7 +20,7 @@ from dsl_app.shared.widgets.forms import label, push_button, remark_line, show_p
 from dsl_app.shared.widgets.help_window import set_help
 from dsl_app.shared.widgets.layouts import STRETCH, Stretch, boxed, column_of, row_of, splitter
 from dsl_app.shared.widgets.open_dialog import OpenDialog
-from dsl_app.shared.widgets.plots import CalmPlot
+from dsl_app.shared.widgets.plots import CalmPlot, colour_legend
 from dsl_app.shared.widgets.recent_list import RecentList
 from dsl_app.shared.widgets.spectrum_curve import SpectrumCurve
 
@@ -135,6 +135,9 @@ class PairFigures(QSplitter):
         self.plot.setXRange(430, 660, padding=0.02)
         self.plot.setYRange(0, 1, padding=0.02)
         self.curves = [SpectrumCurve(self.plot.getPlotItem(), with_band=i == 0) for i in range(2)]
+        self.legend = self.plot.addLegend(offset=(-12, 4), colCount=2, horSpacing=20)
+        for curve, name in zip(self.curves, "AB", strict=True):
+            self.legend.addItem(curve.solid, name)
         self.table = VerdictTable("Figures of the comparison", "Differences are A minus B")
         self.table.wrap(0)
         set_help(self.table, "comparing#figures")
@@ -161,9 +164,11 @@ class PairFigures(QSplitter):
             curve.set_spectrum(
                 None if side is None or pixel is None else spectrum_of_pixel(side.arrays, pixel)
             )
+        self.legend.setVisible(pair is not None and pixel is not None)
 
     def apply_theme(self, theme: Theme) -> None:
         """Apply the colours of a theme."""
         self.plot.apply_theme(theme)
         self.curves[0].set_colour(theme.pins[0], width=2)
         self.curves[1].set_colour(theme.pins[1], width=2, dashed=True)
+        colour_legend(self.legend, theme.text)

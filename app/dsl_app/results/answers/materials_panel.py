@@ -160,6 +160,9 @@ class MaterialsPanel(QWidget):
             button.setEnabled(materials is not None)
         self.table.setVisible(materials is not None)
         self.text.setText(HINT if materials is None else materials_text(materials))
+        lines = 1 if materials is None or not materials.notes else 2
+        # A layout takes one line of a text that breaks for enough, and draws the rest over the table.
+        self.text.setMinimumHeight(lines * self.text.fontMetrics().lineSpacing())
         self.text.setToolTip("" if materials is None else _method(materials))
         if materials is None:
             return
@@ -187,12 +190,16 @@ class MaterialsPanel(QWidget):
 
 
 def materials_text(materials: Materials) -> str:
-    """What the map rests on, and what is doubtful of it; short, since the legend needs the room."""
+    """What the map rests on, and what is doubtful of it: two lines at most, since the legend needs the room.
+
+    A note is told up to its reason; pointing at the text tells all of them whole.
+    """
     classes = len(materials.found.shown.names)
     text = f"{counted(classes, 'class', 'classes')} by {materials.name}."
     if materials.notes:
-        more = f" (and {len(materials.notes) - 1} more notes)" if len(materials.notes) > 1 else ""
-        text += f" {materials.notes[0]}{more}"
+        first, colon, _ = materials.notes[0].partition(": ")
+        others = f" and {counted(len(materials.notes) - 1, 'more note')}" if len(materials.notes) > 1 else ""
+        text += f" {first.rstrip('.')}{others}" + ("; point here for why." if colon or others else ".")
     return text
 
 

@@ -53,6 +53,7 @@ class Job(Generic[T]):
     window's thread. ``exclusive`` names something that only one job may use at a time, such as the rig.
     ``time_left`` tells the time left where the work knows it better than its reports say, and ``share`` what
     part of it is done, 0 to 1, where reports are of a step.
+    ``is_told_elsewhere`` leaves the job to the dialog that shows how far it is, and stops it.
     ``is_minor`` jobs are stopped without a question when the window closes. ``on_accepted`` is called when
     the runner has accepted the job, before the work begins; ``on_ended`` before the other callbacks, however
     the job ends. Without ``on_failed`` the runner tells the person what went wrong.
@@ -65,6 +66,7 @@ class Job(Generic[T]):
     on_cancelled: Callable[[], object] | None = None
     exclusive: str = ""
     is_minor: bool = False
+    is_told_elsewhere: bool = False
     on_accepted: Callable[[], object] | None = None
     on_ended: Callable[[], object] | None = None
     state: JobState = JobState.WAITING

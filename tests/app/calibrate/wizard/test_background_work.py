@@ -61,6 +61,8 @@ def test_dark_frames_between_patterns_are_not_shown(info: CameraInfo) -> None:
 def test_a_saturated_frame_is_shown_only_where_there_is_no_other(info: CameraInfo) -> None:
     assert shown([FULL_DN], info) == [FULL_DN]
     assert shown([1000, FULL_DN, 900], info) == [1000, None, 900]
+    # A test shot begins bright; the black after it is not worth more.
+    assert shown([FULL_DN, 230, 1200, 230], info) == [FULL_DN, None, 1200, None]
 
 
 def test_the_brightest_frame_is_forgotten_after_a_while(info: CameraInfo) -> None:

@@ -4,8 +4,11 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 from dsl_app.calibrate.state import RowState
+from dsl_app.calibrate.wizard.controller import WizardController
+from dsl_app.calibrate.wizard.ghost import PointsPx, as_points, ghost
 from dsl_app.calibrate.wizard.state import Doing
 
 from dsl_core.devices.base import DeviceRig
@@ -66,6 +69,71 @@ def test_a_wizard_goes_from_placement_to_acceptance_and_writes_the_rig(bench: Ca
     assert all(row.state.is_accepted for row in bench.state.rows.value)
     assert bench.library.names() == ("campaign",)
     assert [line.name for line in bench.state.library.value] == ["campaign"]
+
+
+#: A board where `FRONT` wants it in the twin's picture of 32 x 24 pixels, near it, and elsewhere.
+FRONT = Placement(target="board", options={"columns": 3, "rows": 3, "square_mm": 60.0, "depth_mm": 700.0})
+ASIDE = ((2.0, 2.0), (8.0, 2.0), (8.0, 8.0), (2.0, 8.0))
+
+
+def in_the_outline(bench: CalibrateBench, moved_px: float = 0.0) -> PointsPx:
+    wanted = ghost(FRONT, bench.calibrated[1].camera)
+    return as_points(np.array(wanted) + moved_px)
+
+
+def look_again(control: WizardController) -> None:
+    control._looked_at -= 10.0
+    control.take_news()
+
+
+def test_a_board_that_is_right_and_still_is_captured_by_itself(bench: CalibrateBench) -> None:
+    there = in_the_outline(bench)
+    bench.wrong = {"placement": FRONT, "points_px": (ASIDE, ASIDE, there, there)}
+    state, control = bench.wizard("selftest")
+    control.check(True)
+    look_again(control)
+    assert page(state) == 1, "a board elsewhere was captured"
+    look_again(control)
+    assert page(state) == 1, "a board was captured on its way"
+    look_again(control)
+    assert page(state) == 2
+    assert state.note.value == "dim picture is captured. 1 to go."
+    assert state.covered.value == there
+    assert is_on(state.is_checking), "the person has no hand free for the next check"
+    assert state.look.value is None
+
+
+def test_a_board_that_moves_is_not_captured_by_itself(bench: CalibrateBench) -> None:
+    where = tuple(in_the_outline(bench, 0.4 * (place % 2 * 2 - 1)) for place in range(4))
+    bench.wrong = {"placement": FRONT, "points_px": where}
+    state, control = bench.wizard("selftest")
+    control.check(True)
+    for _ in range(3):
+        look_again(control)
+    look = state.look.value
+    assert look is not None
+    assert look.is_in_place
+    assert page(state) == 1
+
+
+def test_nothing_is_captured_by_itself_unless_a_person_wants_it(bench: CalibrateBench) -> None:
+    bench.wrong = {"placement": FRONT, "points_px": (in_the_outline(bench),)}
+    state, control = bench.wizard("selftest")
+    control.capture_itself(False)
+    control.check(True)
+    look_again(control)
+    look_again(control)
+    assert page(state) == 1
+    control.check(False)
+    control.capture()
+    assert page(state) == 2
+    assert not is_on(state.is_checking), "a capture by hand starts no checks"
+    control.capture_itself(True)
+    control.go_to(1)
+    control.check(True)
+    look_again(control)
+    look_again(control)
+    assert page(state) == 1, "a captured step was captured again"
 
 
 def test_a_wizard_goes_on_where_it_was_left(bench: CalibrateBench) -> None:

@@ -67,6 +67,7 @@ def names(shown: Buttons, what: str) -> set[str]:
     return {name for name, button in every.items() if button.is_visible and getattr(button, what)}
 
 
+OUTLINES = {"a": ((0.0, 0.0), (10.0, 0.0), (10.0, 10.0), (0.0, 10.0))}
 CAPTURED: tuple[State, State] = ("captured", "captured")
 HALF: tuple[State, State] = ("captured", "missing")
 
@@ -81,6 +82,18 @@ CASES: dict[str, tuple[WizardState, str, str, str]] = {
         "leave back check all capture next",
         "leave check all capture next",
         "all",
+    ),
+    "a target that a person brings into its outline": (
+        wizard(FIRST, outlines=OUTLINES),
+        "leave back itself check capture next",
+        "leave itself check capture next",
+        "check",
+    ),
+    "a target that is looked at": (
+        wizard(FIRST, outlines=OUTLINES, is_checking=True),
+        "leave back itself check capture next",
+        "leave itself check capture next",
+        "capture",
     ),
     "a captured step": (
         wizard(FIRST, HALF), "leave back check capture next", "leave check capture next", "next"
@@ -254,6 +267,20 @@ def test_a_step_shows_what_to_place_and_what_the_look_found() -> None:
     assert shown is not None
     assert (shown.title, shown.instruction, shown.placement.target) == ("Step b", "Place b.", "board")
     assert shown.figures == (GOOD, FREE)
+    assert shown.points.legend == ()
+
+
+def test_a_step_shows_where_the_target_is_wanted_and_what_was_found_of_it() -> None:
+    found = ((1.0, 1.0), (9.0, 1.0), (9.0, 9.0))
+    state = wizard(FIRST, outlines=OUTLINES, look=Look("a", (GOOD,), "", found), covered=((3.0, 4.0),))
+    shown = step_display(state)
+    assert shown is not None
+    points = shown.points
+    assert (points.wanted, points.found, points.covered) == (OUTLINES["a"], found, ((3.0, 4.0),))
+    assert [words for words, _ in points.legend] == ["┅ wanted here", "● found", "● captured before"]
+    other = step_display(wizard(SECOND, outlines=OUTLINES))
+    assert other is not None
+    assert other.points.wanted == ()
 
 
 @pytest.mark.parametrize(
@@ -262,6 +289,28 @@ def test_a_step_shows_what_to_place_and_what_the_look_found() -> None:
         (wizard(FIRST), "Place the target", "muted"),
         (wizard(FIRST, is_checking=True), "Looking…", "muted"),
         (wizard(FIRST, look=Look("a", (GOOD,)), is_checking=True), "Everything is right", "good"),
+        (
+            wizard(FIRST, HALF, look=Look("a", (GOOD,))),
+            "Everything is right. It is captured already",
+            "good",
+        ),
+        (wizard(FIRST, outlines=OUTLINES), "Start the check, then bring the target into", "muted"),
+        (wizard(FIRST, outlines=OUTLINES, captures_itself=False), "Place the target, then", "muted"),
+        (
+            wizard(FIRST, outlines=OUTLINES, is_checking=True, look=Look("a", (GOOD,), shared=0.5)),
+            "Well seen. Bring it into the dashed outline (50 %, wanted 80 %)",
+            "warn",
+        ),
+        (
+            wizard(FIRST, outlines=OUTLINES, is_checking=True, look=Look("a", (GOOD,), shared=0.9)),
+            "Everything is right. Keep it still",
+            "good",
+        ),
+        (
+            wizard(FIRST, outlines=OUTLINES, look=Look("a", (GOOD,), shared=0.5)),
+            "Everything is right: capture",
+            "good",
+        ),
         (wizard(FIRST, look=Look("a", (BAD,))), "Not right yet", "warn"),
         (wizard(FIRST, look=Look("a", (), "No board.")), "No board.", "bad"),
         (wizard(FIRST, doing=Doing.CAPTURING, look=Look("a", (BAD,))), "Capturing. Do not touch", "warn"),

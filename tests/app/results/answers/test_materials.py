@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -141,6 +142,26 @@ def test_the_panel_is_a_legend_with_areas(qtbot: QtBot, bench: Bench) -> None:
     assert "By marks: spectral angle" in panel.text.toolTip()
     panel.clear.click()
     assert not panel.write.isEnabled()
+
+
+def test_notes_are_two_lines_that_leave_the_legend_alone(qtbot: QtBot, bench: Bench) -> None:
+    panel = MaterialsPanel(bench.state, bench.control.answers)
+    qtbot.addWidget(panel)
+    panel.show()
+    bench.control.marks.pin((30, 5))
+    panel.marks.click()
+    reason = "pin 1 is left out: its reflectance of 0.15 is known to ±0.44 only and would explain others."
+    for notes, told in (
+        ((reason,), "1 class by marks. pin 1 is left out; point here for why."),
+        ((reason,) * 6, "1 class by marks. pin 1 is left out and 5 more notes; point here for why."),
+        (("Two are alike.",), "1 class by marks. Two are alike."),
+    ):
+        bench.state.materials.set(replace(_shown(bench), notes=notes))
+        assert panel.text.text() == told
+        assert reason in panel.text.toolTip() or reason not in notes
+    panel.resize(430, panel.minimumSizeHint().height())
+    assert panel.text.height() >= 2 * panel.text.fontMetrics().lineSpacing()
+    assert panel.text.y() >= panel.table.geometry().bottom()
 
 
 def test_the_legend_is_seen_whole_at_150_percent(qtbot: QtBot, bench: Bench) -> None:

@@ -1,0 +1,46 @@
+"""The status bar: messages, jobs, and hints that end in an ellipsis where these leave them no room."""
+
+from __future__ import annotations
+
+from PySide6.QtCore import QEvent, QRect, Qt
+from PySide6.QtGui import QPainter, QPaintEvent
+from PySide6.QtWidgets import QSizeGrip, QStatusBar, QStyle, QStyleOption, QWidget
+
+#: Left of a hint, and between it and what is to its right, px.
+EDGE_PX, GAP_PX = 6, 12
+
+
+class StatusLine(QStatusBar):
+    """Paints its hint itself: Qt's own is cut off in the middle of a letter, at the text of a job."""
+
+    @property
+    def room(self) -> QRect:
+        """Where a hint may be: left of everything that is shown."""
+        direct = Qt.FindChildOption.FindDirectChildrenOnly
+        parts = self.findChildren(QWidget, options=direct)
+        shown = (each for each in parts if each.isVisible() and not isinstance(each, QSizeGrip))
+        right = min((each.x() for each in shown), default=self.width())
+        return QRect(EDGE_PX, 0, max(right - EDGE_PX - GAP_PX, 0), self.height())
+
+    @property
+    def shown_text(self) -> str:
+        """The hint as it fits."""
+        mode = Qt.TextElideMode.ElideRight
+        return self.fontMetrics().elidedText(self.currentMessage(), mode, self.room.width())
+
+    def paintEvent(self, event: QPaintEvent) -> None:
+        """Paint the background and the hint."""
+        option = QStyleOption()
+        option.initFrom(self)
+        painter = QPainter(self)
+        self.style().drawPrimitive(QStyle.PrimitiveElement.PE_PanelStatusBar, option, painter, self)
+        painter.setPen(self.palette().windowText().color())
+        painter.drawText(
+            self.room, Qt.AlignmentFlag.AlignVCenter | Qt.AlignmentFlag.AlignLeft, self.shown_text
+        )
+
+    def event(self, event: QEvent) -> bool:
+        """Paint again when jobs come and go, which moves the room of the hint."""
+        if event.type() is QEvent.Type.LayoutRequest:
+            self.update()
+        return super().event(event)
