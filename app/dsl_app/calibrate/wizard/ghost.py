@@ -56,8 +56,9 @@ def shared_part(wanted: PointsPx, found: PointsPx) -> float:
 
 
 def keeps_still(before: Sequence[tuple[float, float]], now: Sequence[tuple[float, float]]) -> bool:
-    """Whether two looks found the same points at the same places."""
+    """Whether two looks found the same points at the same places, counted from either end of a board."""
     if not now or len(before) != len(now):
         return False
-    moved = np.linalg.norm(np.asarray(now) - np.asarray(before), axis=1)
-    return float(moved.max()) <= STILL_PX
+    ways = (np.asarray(now), np.asarray(now)[::-1])
+    moved_px = (np.linalg.norm(way - np.asarray(before), axis=1).max() for way in ways)
+    return float(min(moved_px)) <= STILL_PX

@@ -57,5 +57,6 @@ def test_a_target_keeps_still_that_moves_by_less_than_a_pixel() -> None:
     points = as_points(np.array([[10.0, 10.0], [50.0, 12.0], [30.0, 40.0]]))
     assert keeps_still(points, as_points(np.array(points) + 0.6))
     assert not keeps_still(points, as_points(np.array(points) + np.array([0.0, 1.5])))
+    assert keeps_still(points, points[::-1]), "a board without marks may be counted from its other end"
     assert not keeps_still(points, points[:2])
     assert not keeps_still((), ())
