@@ -80,7 +80,7 @@ def fit_motion(scan: ProbedScan, probe: Probe) -> FilmMotion | None:
         return None
     effect = _effect(scan, scan.model.correspondence, probe)
     count = len(FIELDS)
-    fit = pool(probe, *_design(effect))
+    fit = pool(probe, *_design(effect, probe.step_nm))
     covariance = fit.covariance[:count, :count]
     std = np.sqrt(np.diag(covariance))
     # What could be chance helps no pixel, and harms those at the edge of the frame.
@@ -122,14 +122,21 @@ def _effect(scan: ProbedScan, correspondence: GratingModel, probe: Probe) -> Flo
     return np.nan_to_num(effect)
 
 
-def _design(effect: Floats) -> tuple[Floats, Floats]:
-    """Design (n, p, k) and prior (k,) of a film's numbers, and of what could look like them."""
-    count = effect.shape[2]
-    design = np.zeros((*effect.shape[:2], count + 1 + LEADING - 2))
+def _design(effect: Floats, step_nm: float) -> tuple[Floats, Floats]:
+    """Design (n, p, k) and prior (k,) of a film's numbers, and of what could look like them.
+
+    Lines that are not symmetric displace both orders alike; bands wider than `FINE_NM`, along which spectra
+    curve, to opposite sides.
+    """
+    count, wide_px = effect.shape[2], LEAST_MOTION_PX * (coarseness(step_nm) - 1.0)
+    sides = [(1.0, 1.0), (1.0, -1.0)][: 2 if wide_px else 1]
+    design = np.zeros((*effect.shape[:2], count + len(sides) + LEADING - 2))
     design[..., :count] = effect
-    design[:, _SHIFT, count] = 1.0
-    design[:, 2:LEADING, count + 1 :] = np.eye(LEADING - 2)
-    return design, np.r_[PRIOR_STD[:count], LOPSIDED_PX, PARAMETER_STD[2:LEADING]]
+    for column, shifts in enumerate(sides, count):
+        design[:, _SHIFT, column] = shifts
+    design[:, 2:LEADING, count + len(sides) :] = np.eye(LEADING - 2)
+    displaced = (LOPSIDED_PX, wide_px)[: len(sides)]
+    return design, np.r_[PRIOR_STD[:count], displaced, PARAMETER_STD[2:LEADING]]
 
 
 def _explains(probe: Probe, effect: Floats) -> bool:
@@ -138,7 +145,7 @@ def _explains(probe: Probe, effect: Floats) -> bool:
     fall, excess = np.zeros(CELLS[0] * CELLS[1]), 1.0
     # Without the film, gains and profile explain a part already.
     for effects, sign in ((effect, 1), (effect[..., :0], -1)):
-        design, prior = _design(effects)
+        design, prior = _design(effects, probe.step_nm)
         for out in range(FOLDS):
             fit = pool(probe, design, prior, fold != out)
             here = probe.sound & (fold == out)

@@ -17,7 +17,9 @@ from dsl_core.reconstruction.spectral.self_correction import fits_better
 from dsl_core.reconstruction.spectral.spectra import SpectralMaps, SpectralReconstruction
 from tests.cases.twin_scan import MemoryScan, solver_input, twin_scan
 
+#: Most of these tests need no finer ones.
 GRID = WavelengthGrid(step_nm=10.0)
+SLIPS = np.array([0.0, 0.3, 0.0, 0.0, 0.3])
 
 
 @pytest.fixture(scope="module")
@@ -29,9 +31,9 @@ def scanned() -> tuple[Rig, MemoryScan]:
     return devices.calibration, scan
 
 
-def solved(rig: Rig, scan: MemoryScan, as_calibrated: bool) -> SpectralMaps:
+def solved(rig: Rig, scan: MemoryScan, as_calibrated: bool, grid: WavelengthGrid = GRID) -> SpectralMaps:
     stack, pixels = solver_input(rig, scan)
-    data = (rig, scan.plan, GRID, correspondence(rig), stack.radiance, stack.std, pixels)
+    data = (rig, scan.plan, grid, correspondence(rig), stack.radiance, stack.std, pixels)
     return SpectralReconstruction(*data, as_calibrated=as_calibrated).run()
 
 
@@ -62,19 +64,27 @@ def test_most_of_the_error_of_a_darker_order_is_taken_back(
     assert error(taken, right) < 0.5 * error(left, right)
 
 
-def test_a_film_that_has_slipped_is_put_where_it_is(
-    scanned: tuple[Rig, MemoryScan], right: SpectralMaps
-) -> None:
-    rig, scan = scanned
-    slips = np.array([0.0, 0.3, 0.0, 0.0, 0.3])
-    before = with_film(rig, -slips)
-    left, taken = (solved(before, scan, as_calibrated) for as_calibrated in (True, False))
+def test_a_film_that_has_slipped_is_put_where_it_is(scanned: tuple[Rig, MemoryScan]) -> None:
+    (rig, scan), fine = scanned, WavelengthGrid()
+    right, left = (solved(each, scan, True, fine) for each in (rig, with_film(rig, -SLIPS)))
+    taken = solved(with_film(rig, -SLIPS), scan, False, fine)
     assert taken.followed is not None
     motion = taken.followed.motion
     assert motion is not None
-    assert (np.abs(motion.values - slips) < 4 * motion.std).all()
+    assert (np.abs(motion.values - SLIPS) < 4 * motion.std).all()
     assert (motion.values[[1, 4]] > 3 * motion.std[[1, 4]]).all()
     assert error(taken, right) < 0.5 * error(left, right)
+
+
+def test_by_wide_bands_its_motion_is_known_less_well(scanned: tuple[Rig, MemoryScan]) -> None:
+    """What spectra curve along them displaces the orders, like a film that has come closer."""
+    rig, scan = scanned
+    taken = solved(with_film(rig, -SLIPS), scan, False)
+    assert taken.followed is not None
+    motion = taken.followed.motion
+    assert motion is not None
+    assert (np.abs(motion.values - SLIPS) < 4 * motion.std).all()
+    assert motion.values[1] > 3 * motion.std[1]
 
 
 def test_a_film_as_calibrated_changes_nothing(scanned: tuple[Rig, MemoryScan], right: SpectralMaps) -> None:
