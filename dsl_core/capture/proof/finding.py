@@ -21,7 +21,7 @@ class Verdict(StrEnum):
     SATURATED = "saturated"
     DARK = "dark"
     MIRRORED = "mirrored"
-    BESIDE = "beside its place"
+    DISPLACED = "displaced"
     OTHER = "another picture"
 
 
@@ -42,7 +42,7 @@ _SEEN = {
     Verdict.SATURATED: "most of it is saturated",
     Verdict.DARK: "the pattern is missing from it",
     Verdict.MIRRORED: "columns of the projector run across the picture the wrong way round",
-    Verdict.BESIDE: "its lines lie a column or more beside the place that the code gives them",
+    Verdict.DISPLACED: "its lines are a column or more away from where the code says",
     Verdict.OTHER: "it shows something else",
 }
 _REMEDY = {
@@ -56,7 +56,7 @@ _REMEDY = {
     " long enough.",
     Verdict.MIRRORED: "Camera or projector is mirrored or upside down, or the calibration is of another rig:"
     " switch mirroring off in the settings of both, or calibrate again.",
-    Verdict.BESIDE: "Check that projector, camera and target have not moved since the code was captured,"
+    Verdict.DISPLACED: "Check that projector, camera and target have not moved since the code was captured,"
     " and that the projector does not correct or scale its picture.",
     Verdict.OTHER: "Check that camera, target and light have not moved since the scan began.",
 }

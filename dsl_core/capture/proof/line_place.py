@@ -1,4 +1,4 @@
-"""Whether lines lie where the code says: a projector that shows them a column beside is not seen otherwise.
+"""Whether lines are where the code says: that they are shown a column away is not seen otherwise.
 
 A picture that is shown a column to the side looks like the one that was asked for. But pixels of the columns
 that it should have lit are dark, and those next to them are lit. A small picture has few such pixels in each
@@ -17,14 +17,14 @@ from dsl_core.model.plan import Shot
 
 #: Columns to either side that lines are compared with.
 SIDES = (-1, 1)
-#: Votes for the place beside, net of those for the right one, and what they are per voter at least: lines
+#: Votes for the other place, net of those for the right one, and what they are per voter at least: lines
 #: in their place have nearly one net vote against it per voter, blurred ones less, but above zero.
 FEWEST_VOTES, LEAST_MEAN = 20.0, 0.3
 #: Pictures in a row that have to agree: a single one may light little but edges of surfaces.
 FEWEST_PICTURES = 2
 
 
-def beside(profile: Floats, columns: int) -> Floats:
+def displaced(profile: Floats, columns: int) -> Floats:
     """A flat `line_profile` (3 width,) displaced by so many columns; what leaves the picture is lost."""
     wide = profile.reshape(-1, 3)
     moved = np.zeros_like(wide)

@@ -14,7 +14,7 @@ from dsl_core.capture.proof.finding import Finding, Light, Verdict
 from dsl_core.capture.proof.first_code import FirstCode
 from dsl_core.capture.proof.later_settings import LaterSettings
 from dsl_core.capture.proof.light_steps import LightSteps
-from dsl_core.capture.proof.line_place import SIDES, LinePlaces, beside
+from dsl_core.capture.proof.line_place import SIDES, LinePlaces, displaced
 from dsl_core.capture.proof.line_shown import line_shown
 from dsl_core.capture.proof.neighbours import LineNeighbours
 from dsl_core.capture.proof.prediction import (
@@ -231,14 +231,14 @@ class FrameProof:
         return found if found.is_wrong else self._in_place(found, seen, lit, usual * wanted)
 
     def _in_place(self, found: Finding, seen: Counts, lit: Lit, wanted: Floats) -> Finding:
-        """A finding on lines, or that they lie beside their place since some shot."""
-        contests = {side: contest_of_lines(seen, lit, wanted, beside(wanted, side)) for side in SIDES}
-        displaced = self._line_places.judge(found.shot, contests)
-        if displaced is None:
+        """A finding on lines, or that they are out of their place since some shot."""
+        contests = {side: contest_of_lines(seen, lit, wanted, displaced(wanted, side)) for side in SIDES}
+        told = self._line_places.judge(found.shot, contests)
+        if told is None:
             return found
-        side, since = displaced
+        side, since = told
         where = "higher" if side > 0 else "lower"
-        return Finding(found.shot, Verdict.BESIDE, since, f"towards {where} columns")
+        return Finding(found.shot, Verdict.DISPLACED, since, f"towards {where} columns")
 
     def _profile(self, shot: Shot) -> Floats | None:
         """The `line_profile` of a shot, which is a rival of its neighbours as well."""

@@ -1,4 +1,4 @@
-"""Lines that are shown a column beside their place are found, with the shot since which they are."""
+"""Lines that are shown a column away from their place are found, with the shot since which they are."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from dsl_core.capture.proof.contest import Contest
 from dsl_core.capture.proof.finding import Finding, Verdict
-from dsl_core.capture.proof.line_place import SIDES, LinePlaces, beside
+from dsl_core.capture.proof.line_place import SIDES, LinePlaces, displaced
 from dsl_core.capture.proof.verifier import FrameProof
 from dsl_core.model.plan import CapturePlan, GrayCode, ScanLines, Setting, Shot
 from dsl_core.model.rig import Rig
@@ -56,8 +56,8 @@ def test_frames_taken_again_count_as_they_are_now() -> None:
 
 def test_a_displaced_profile_keeps_its_colours_and_loses_what_leaves_the_picture() -> None:
     profile = np.arange(12, dtype=np.float32)
-    assert beside(profile, 1).tolist() == [0, 0, 0, *range(9)]
-    assert beside(profile, -1).tolist() == [*range(3, 12), 0, 0, 0]
+    assert displaced(profile, 1).tolist() == [0, 0, 0, *range(9)]
+    assert displaced(profile, -1).tolist() == [*range(3, 12), 0, 0, 0]
 
 
 @cache
@@ -91,9 +91,9 @@ def _wrong(columns: int) -> list[Finding]:
 
 
 @pytest.mark.parametrize("columns", SIDES)
-def test_lines_shown_a_column_beside_are_found_within_a_few_frames(columns: int) -> None:
+def test_lines_shown_a_column_away_are_found_within_a_few_frames(columns: int) -> None:
     first = _wrong(columns)[0]
-    assert first.verdict is Verdict.BESIDE
+    assert first.verdict is Verdict.DISPLACED
     assert abs(first.again[0].pattern - SINCE) <= 1
     assert first.shot.pattern < SINCE + 8
     assert ("higher" if columns > 0 else "lower") in first.sentence
