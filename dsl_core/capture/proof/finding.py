@@ -21,6 +21,7 @@ class Verdict(StrEnum):
     SATURATED = "saturated"
     DARK = "dark"
     MIRRORED = "mirrored"
+    DISPLACED = "displaced"
     OTHER = "another picture"
 
 
@@ -41,6 +42,7 @@ _SEEN = {
     Verdict.SATURATED: "most of it is saturated",
     Verdict.DARK: "the pattern is missing from it",
     Verdict.MIRRORED: "columns of the projector run across the picture the wrong way round",
+    Verdict.DISPLACED: "its lines are a column or more away from where the code says",
     Verdict.OTHER: "it shows something else",
 }
 _REMEDY = {
@@ -54,6 +56,8 @@ _REMEDY = {
     " long enough.",
     Verdict.MIRRORED: "Camera or projector is mirrored or upside down, or the calibration is of another rig:"
     " switch mirroring off in the settings of both, or calibrate again.",
+    Verdict.DISPLACED: "Check that projector, camera and target have not moved since the code was captured,"
+    " and that the projector does not correct or scale its picture.",
     Verdict.OTHER: "Check that camera, target and light have not moved since the scan began.",
 }
 

@@ -14,11 +14,13 @@ from dsl_core.capture.proof.finding import Finding, Light, Verdict
 from dsl_core.capture.proof.first_code import FirstCode
 from dsl_core.capture.proof.later_settings import LaterSettings
 from dsl_core.capture.proof.light_steps import LightSteps
+from dsl_core.capture.proof.line_place import SIDES, LinePlaces, displaced
 from dsl_core.capture.proof.line_shown import line_shown
 from dsl_core.capture.proof.neighbours import LineNeighbours
 from dsl_core.capture.proof.prediction import (
     APART,
     Expected,
+    Lit,
     brightness_of_lines,
     brightness_of_picture,
     contest_of_lines,
@@ -76,6 +78,7 @@ class FrameProof:
         self._usual = UsualLight(self._first, calibration is not None)
         self._later = LaterSettings(plan, calibration, self._noise, self._kept)
         self._steps = LightSteps()
+        self._line_places = LinePlaces()
         #: The picture that came for two patterns, for as long as it comes.
         self._repeated: Counts | None = None
         self._profiles = Recent[Floats | None]()
@@ -224,7 +227,18 @@ class FrameProof:
             for verdict, rival in rivals
             if rival is not None
         }
-        return self._decide(shot, contests, share, lambda: self._line_shown(seen, shot))
+        found = self._decide(shot, contests, share, lambda: self._line_shown(seen, shot))
+        return found if found.is_wrong else self._in_place(found, seen, lit, usual * wanted)
+
+    def _in_place(self, found: Finding, seen: Counts, lit: Lit, wanted: Floats) -> Finding:
+        """A finding on lines, or that they are out of their place since some shot."""
+        contests = {side: contest_of_lines(seen, lit, wanted, displaced(wanted, side)) for side in SIDES}
+        told = self._line_places.judge(found.shot, contests)
+        if told is None:
+            return found
+        side, since = told
+        where = "higher" if side > 0 else "lower"
+        return Finding(found.shot, Verdict.DISPLACED, since, f"towards {where} columns")
 
     def _profile(self, shot: Shot) -> Floats | None:
         """The `line_profile` of a shot, which is a rival of its neighbours as well."""

@@ -1,0 +1,83 @@
+"""Whether lines are where the code says: that they are shown a column away is not seen otherwise.
+
+A picture that is shown a column to the side looks like the one that was asked for. But pixels of the columns
+that it should have lit are dark, and those next to them are lit. A small picture has few such pixels in each
+frame, so that frames since some shot are asked together; which shot that is, they say themselves.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from dsl_core.capture.proof.contest import Contest
+from dsl_core.capture.proof.raster import Floats
+from dsl_core.model.plan import Shot
+
+#: Columns to either side that lines are compared with.
+SIDES = (-1, 1)
+#: Votes for the other place, net of those for the right one, and what they are per voter at least: lines
+#: in their place have nearly one net vote against it per voter, blurred ones less, but above zero.
+FEWEST_VOTES, LEAST_MEAN = 20.0, 0.3
+#: Pictures in a row that have to agree: a single one may light little but edges of surfaces.
+FEWEST_PICTURES = 2
+
+
+def displaced(profile: Floats, columns: int) -> Floats:
+    """A flat `line_profile` (3 width,) displaced by so many columns; what leaves the picture is lost."""
+    wide = profile.reshape(-1, 3)
+    moved = np.zeros_like(wide)
+    if columns > 0:
+        moved[columns:] = wide[:-columns]
+    else:
+        moved[:columns] = wide[-columns:]
+    return moved.ravel()
+
+
+class LinePlaces:
+    """Remembers what pictures of lines say of their place."""
+
+    def __init__(self) -> None:
+        """Start without any picture."""
+        self._votes: dict[int, dict[int, tuple[Shot, float, int]]] = {side: {} for side in SIDES}
+
+    def judge(self, shot: Shot, contests: Mapping[int, Contest]) -> tuple[int, tuple[Shot, ...]] | None:
+        """The side on which lines lie, and the shots since they do up to this one; None if in their place.
+
+        ``contests`` are those of the right place with the one on each side. Shots that are returned are
+        forgotten, as they have to be taken again.
+        """
+        for side, contest in contests.items():
+            votes = self._votes[side]
+            votes.pop(shot.index, None)
+            if contest.count:
+                votes[shot.index] = (shot, contest.mean * contest.count, contest.count)
+        for side in contests:
+            since = self._since(side, shot)
+            if since:
+                for votes in self._votes.values():
+                    for each in since:
+                        votes.pop(each.index, None)
+                return side, since
+        return None
+
+    def _since(self, side: int, last: Shot) -> tuple[Shot, ...]:
+        """Shots up to the last one that agree best that lines lie on a side; none where they do not."""
+        votes, total, count, best = self._votes[side], 0.0, 0, 0.0
+        run: list[Shot] = []
+        since: tuple[Shot, ...] = ()
+        for index in sorted((at for at in votes if at <= last.index), reverse=True):
+            shot, mine, voters = votes[index]
+            if shot.setting != last.setting:
+                break
+            total, count = total + mine, count + voters
+            run.append(shot)
+            if total > 0:
+                break
+            if -total <= best:
+                continue
+            best = -total
+            if len(run) >= FEWEST_PICTURES and best > max(FEWEST_VOTES, LEAST_MEAN * count):
+                since = tuple(reversed(run))
+        return since

@@ -1,0 +1,103 @@
+"""Lines that are shown a column away from their place are found, with the shot since which they are."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from dsl_core.capture.proof.contest import Contest
+from dsl_core.capture.proof.finding import Finding, Verdict
+from dsl_core.capture.proof.line_place import SIDES, LinePlaces, displaced
+from dsl_core.capture.proof.verifier import FrameProof
+from dsl_core.model.plan import CapturePlan, GrayCode, ScanLines, Setting, Shot
+from dsl_core.model.rig import Rig
+from dsl_core.patterns.images import pattern_image
+from dsl_core.pipeline import fit_plan
+from dsl_core.simulation.sim_devices import open_twin
+
+#: Lines that are scanned, and the one from which on they are displaced.
+LINES, SINCE = range(40, 72), 56
+
+
+def line(index: int, setting: int = 0) -> Shot:
+    return Shot(index, "spectral", index, setting, 20.0, 1.0)
+
+
+def told(places: LinePlaces, means: dict[int, float], voters: int = 10) -> tuple[int, list[int]] | None:
+    """What is said of lines with these votes for their place against the one above, by index."""
+    found = None
+    for index, mean in means.items():
+        found = places.judge(line(index), {1: Contest(voters, mean), -1: Contest(voters, 0.8)})
+    return None if found is None else (found[0], [shot.index for shot in found[1]])
+
+
+def test_frames_are_asked_together_until_they_are_sure() -> None:
+    assert told(LinePlaces(), {0: 0.8, 1: 0.7, 2: -0.8, 3: -0.7}) is None
+    assert told(LinePlaces(), {0: 0.8, 1: 0.7, 2: -0.8, 3: -0.7, 4: -0.8}) == (1, [2, 3, 4])
+
+
+def test_a_single_frame_says_nothing_however_many_pixels_it_has() -> None:
+    assert told(LinePlaces(), {0: 0.8, 1: -0.8}, 4000) is None
+    assert told(LinePlaces(), {0: 0.8, 1: -0.8, 2: -0.8}, 4000) == (1, [1, 2])
+
+
+def test_lines_that_are_half_way_are_left_to_the_reconstruction() -> None:
+    assert told(LinePlaces(), dict.fromkeys(range(50), -0.2), 4000) is None
+
+
+def test_frames_taken_again_count_as_they_are_now() -> None:
+    places = LinePlaces()
+    assert told(places, {0: -0.8, 1: -0.8, 2: -0.8}) == (1, [0, 1, 2])
+    assert told(places, {0: 0.8, 1: 0.8, 2: 0.8, 3: 0.8, 4: -0.8}) is None
+
+
+def test_a_displaced_profile_keeps_its_colours_and_loses_what_leaves_the_picture() -> None:
+    profile = np.arange(12, dtype=np.float32)
+    assert displaced(profile, 1).tolist() == [0, 0, 0, *range(9)]
+    assert displaced(profile, -1).tolist() == [*range(3, 12), 0, 0, 0]
+
+
+@cache
+def _scan(columns: int) -> tuple[CapturePlan, Rig, dict[int, NDArray[np.uint16]]]:
+    """Code, white, black and some lines of a box, displaced by so many columns since one of them."""
+    plan = CapturePlan(
+        code=GrayCode(rows=False),
+        spectral=ScanLines(step_px=5),
+        settings=(Setting(exposure_ms=20.0, level=0.8),),
+        code_settings=(0,),
+    )
+    with open_twin({"scene": "box", "size": "64x48"}) as devices:
+        plan, pictures = fit_plan(plan, devices), {}
+        for shot in plan.shots():
+            if shot.role == "spectral" and shot.pattern not in LINES:
+                continue
+            is_displaced = shot.role == "spectral" and shot.pattern >= SINCE
+            devices.camera.configure(shot.exposure_ms)
+            devices.projector.show(np.roll(pattern_image(plan, shot), columns * is_displaced, 1))
+            devices.camera.prepare(shot.index)
+            pictures[shot.index] = devices.camera.snap().pixels
+        assert devices.calibration is not None
+        return plan, devices.calibration, pictures
+
+
+def _wrong(columns: int) -> list[Finding]:
+    plan, rig, pictures = _scan(columns)
+    proof = FrameProof(plan, rig)
+    found = [proof.judge(s, pictures[s.index]) for s in plan.shots() if s.index in pictures]
+    return [each for each in found if each.is_wrong]
+
+
+@pytest.mark.parametrize("columns", SIDES)
+def test_lines_shown_a_column_away_are_found_within_a_few_frames(columns: int) -> None:
+    first = _wrong(columns)[0]
+    assert first.verdict is Verdict.DISPLACED
+    assert abs(first.again[0].pattern - SINCE) <= 1
+    assert first.shot.pattern < SINCE + 8
+    assert ("higher" if columns > 0 else "lower") in first.sentence
+
+
+def test_lines_in_their_place_are_right() -> None:
+    assert _wrong(0) == []
