@@ -102,8 +102,8 @@ class Probe:
         """How far curves of camera and projector are off by what colours say; None where they say nothing."""
         if self.with_curves is None or not tells_of_curves(self.reflectance[self.sound]):
             return None
-        known = np.array(PRIOR_STD), self.step_nm, self.steepness
-        return curve_misfit(*self.with_curves, self.weight, *known)
+        prior_std = np.array(PRIOR_STD)
+        return curve_misfit(*self.with_curves, self.weight, prior_std, self.step_nm, self.steepness)
 
 
 def probe_targets(valid: NDArray[np.bool_]) -> Indices:
@@ -190,7 +190,7 @@ def _probe_some(scan: ProbedScan, targets: Indices) -> dict[str, NDArray[Any]]:
         "reflectance": solved.mean[reported].T.numpy(),
         "chi_square": solved.chi_square.numpy(),
         "correlation": _correlation(
-            (solved.residual * weight.sqrt()).split(light.sizes, 1), solved.gather
+            torch.split(solved.residual * weight.sqrt(), light.sizes, 1), solved.gather
         ).numpy(),
         "place": np.stack([2 * y / shape[0] - 1, 2 * x / shape[1] - 1], 1),
         "cell": cell_of(y, x, shape),

@@ -117,7 +117,7 @@ class _Profiles:
 
     def __init__(self, width_px: float, spread: Spread, halves_px: Tensor, widths: Tensor) -> None:
         """Half widths of bands (samples,) and widths of the spread relative to the usual one (samples,)."""
-        kinds, self._kind = torch.stack([halves_px, widths]).unique(dim=1, return_inverse=True)
+        kinds, self._kind = torch.unique(torch.stack([halves_px, widths]), dim=1, return_inverse=True)
         tables = [_changed_profiles(width_px, stretched(spread, by), half) for half, by in kinds.T.tolist()]
         self._size = max(len(table) for table in tables)
         # Zeros at both ends change nothing.
