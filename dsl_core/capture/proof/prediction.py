@@ -22,6 +22,9 @@ BRIGHT_SIGMAS, FEWEST_BRIGHT = 25.0, 12
 FEWEST_UNLIT = 60
 #: Columns count as lit by a pattern above this share of full light.
 LIT_SHARE = 0.1
+#: Brightness is measured where a pattern has this share of its brightest column: on the flank of a line light
+#: depends on parts of a column, which the code does not tell.
+BODY_SHARE = 0.5
 #: Of the pixels that a rival leaves bright or dark, every so many are asked where there are plenty.
 PLENTY = 4000
 
@@ -85,7 +88,8 @@ def brightness_of_lines(seen: Counts, lit: Lit, wanted: Floats, noise: Noise) ->
     Light that unlit pixels gained since black was taken is the room's and is left out.
     """
     at = Places.of(lit, wanted)
-    chosen = at.lit[seen[lit.index[at.lit]] < noise.sensor.full_scale_dn]
+    body = at.lit[wanted[lit.key[at.lit]] > BODY_SHARE * wanted.max()]
+    chosen = body[seen[lit.index[body]] < noise.sensor.full_scale_dn]
     room = _of_room(seen[lit.index[at.unlit]] - lit.black[at.unlit])
     light = lit.contrast[chosen] * wanted[lit.key[chosen]]
     gain = seen[lit.index[chosen]] - lit.black[chosen] - room

@@ -88,13 +88,13 @@ def test_of_many_pixels_some_thousand_are_asked(count: int, asked: int) -> None:
 
 
 def test_brightness_is_light_over_light_wanted_of_bright_pixels_that_are_not_saturated() -> None:
-    wanted = floats([0.09] * 10 + [0.11] * 10 + [1.0] * 10)
-    seen = np.full(60, 120, np.uint16)
+    wanted = floats([0.09] * 10 + [0.49] * 10 + [1.0] * 10 + [0.51] * 10)
+    seen = np.full(80, 120, np.uint16)
     seen[::2] += (800 * wanted).round().astype(np.uint16)
-    assert brightness_of_lines(seen, lit(30), wanted, NOISE) == pytest.approx(0.8, rel=1e-3)
-    seen[:20] = 3000  # where too little is expected
+    assert brightness_of_lines(seen, lit(40), wanted, NOISE) == pytest.approx(0.8, rel=1e-3)
+    seen[:40] = 3000  # less than half of the brightest: on the flank of a line
     seen[58] = 4095
-    assert brightness_of_lines(seen, lit(30), wanted, NOISE) == pytest.approx(0.8, rel=1e-3)
+    assert brightness_of_lines(seen, lit(40), wanted, NOISE) == pytest.approx(0.8, rel=1e-3)
 
 
 @pytest.mark.parametrize(("count", "contrast", "is_told"), [(12, 1000, True), (11, 1000, False)])
