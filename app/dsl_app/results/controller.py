@@ -79,10 +79,12 @@ class ResultsController:
         return is_loading or self.marks.is_reading
 
     def _offer(self, session: Path) -> None:
-        """Open the result next to a scan, or offer to reconstruct it."""
+        """Open the result next to a scan, or offer to reconstruct it; says why if it cannot be read."""
         target = session.with_suffix(".zarr")
         if (target / RESULT_NAME).is_file():
             self._load(target)
+        elif reason := _unreadable(session):
+            self._notifier.tell("error", reason)
         else:
             self.state.offer.set(session)
 
@@ -322,8 +324,19 @@ class ResultsController:
         self._runner.submit(Job("Intensity graph", work, done, failed, is_minor=True))
 
 
+def _unreadable(session: Path) -> str:
+    """Why a scan cannot be read, such as a part that is missing; empty if it can."""
+    from dsl_core.io.scan.folder import ScanReader
+
+    try:
+        ScanReader(session)
+    except DslError as error:
+        return sentence_of(error)
+    return ""
+
+
 def is_complete(session: Path) -> bool:
-    """Whether a scan has all its frames; True for one that cannot be read, which reconstructing reports."""
+    """Whether a scan has all its frames; True for one that cannot be read, as no resuming cures it."""
     from dsl_core.io.scan.folder import ScanReader
 
     try:

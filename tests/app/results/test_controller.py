@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from pathlib import Path
 
 import pytest
@@ -40,16 +41,24 @@ def test_what_cannot_be_opened_is_told_or_left_to_others(bench: Bench, tmp_path:
 
 
 def test_a_scan_is_offered_or_its_result_opened(bench: Bench, tmp_path: Path) -> None:
+    capture = make_capture(tmp_path / "set")
     for name in ("small.dsl", "other.dsl"):
-        (tmp_path / name).mkdir()
-        (tmp_path / name / "manifest.json").write_text("{}")
+        import_pictures(capture, tmp_path / name, first_mapping(12, PROJECTOR))
     bench.control.open(tmp_path / "small.dsl")
     offers = [bench.state.offer.value]
     bench.control.open(tmp_path / "other.dsl")
     assert [*offers, bench.state.offer.value] == [None, tmp_path / "other.dsl"]
     assert "reconstruct" in bench.control.command_line()
-    bench.control.reconstruct()
-    assert "manifest" in bench.told
+
+
+def test_a_scan_that_lacks_a_part_is_refused_at_once(bench: Bench, tmp_path: Path) -> None:
+    capture = make_capture(tmp_path / "set")
+    import_pictures(capture, tmp_path / "other.dsl", first_mapping(12, PROJECTOR))
+    shutil.rmtree(tmp_path / "other.dsl" / "frames")
+    assert bench.control.open(tmp_path / "other.dsl")
+    assert bench.state.offer.value is None
+    assert "other.dsl" in bench.told
+    assert "frames" in bench.told
 
 
 def test_captures_of_others_are_reconstructed_without_spectra(

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from dsl_app.results.state import Mark, Materials, ResultsState
 from dsl_app.shared.jobs.base import Job, JobRunner
-from dsl_app.shared.notify import Notifier
+from dsl_app.shared.notify import Notifier, sentence_of
 from dsl_core.analysis.classes import SpectralClass
 from dsl_core.analysis.classify import Brightness, Limits, Measure
 from dsl_core.io.result.result_arrays import ResultArrays
@@ -47,7 +47,7 @@ class AnswersController:
                 "Pin pixels, mark regions of known materials or add references first; they are the classes.",
             )
             return
-        self._start("Materials by marks", way, lambda result, _: (classes_of_marks(result, marks), ()))
+        self._start("marks", way, lambda result, _: (classes_of_marks(result, marks), ()))
 
     def from_library(self, path: Path, way: Way) -> None:
         """Look for the spectra of a file, or of a folder with all below it."""
@@ -64,16 +64,16 @@ class AnswersController:
             )
             return found, (*library.notes, *left_out)
 
-        self._start(f"Materials by {path.name}", way, classes)
+        self._start(path.name, way, classes)
 
-    def _start(self, title: str, way: Way, classes: _Classes) -> None:
+    def _start(self, name: str, way: Way, classes: _Classes) -> None:
         result = self.state.result.value
         if result is None or not result.has_spectra:
             self._notifier.tell("info", "Materials need a result with spectra. Open one first.")
             return
         self._request += 1
         request = self._request
-        colours = {mark.name: mark.colour for mark in self.state.marks.value}
+        title, colours = f"Materials by {name}", {mark.name: mark.colour for mark in self.state.marks.value}
 
         def work(progress: Progress) -> Materials:
             from dsl_core.analysis.areas import pixel_areas_mm2
@@ -97,13 +97,19 @@ class AnswersController:
             points = result.known("points_mm")
             areas = None if points is None else pixel_areas_mm2(points, result.known("normals"))
             made = Classification.of(scores, brightness=way.brightness, areas_mm2=areas)
-            return Materials(title.removeprefix("Materials by "), made, (*doubts, *notes))
+            return Materials(name, made, (*doubts, *notes))
 
         def done(materials: Materials) -> None:
             if self.state.result.value is result and request == self._request:
                 self.state.materials.set(materials)
 
-        self._runner.submit(Job(title, work, done, is_minor=True))
+        def failed(error: Exception) -> None:
+            if self.state.result.value is result and request == self._request:
+                # The map of other classes would pass for the answer.
+                self.state.materials.set(None)
+            self._notifier.tell("error", f"There is no map by {name}. {sentence_of(error)}")
+
+        self._runner.submit(Job(title, work, done, failed, is_minor=True))
 
     def set_limits(self, worst: float, margin: float) -> None:
         """Change the limits; the picture and the table follow at once."""

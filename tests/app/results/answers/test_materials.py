@@ -42,6 +42,13 @@ def _library(folder: Path) -> Path:
     return path
 
 
+def _short_library(folder: Path) -> Path:
+    """A library whose only spectrum does not cover the bands."""
+    path = folder / "short.csv"
+    path.write_text("wavelength_nm,reflectance\n440,0.2\n460,0.2\n480,0.3\n", encoding="utf-8")
+    return path
+
+
 def test_marks_are_classes_and_limits_work_at_once(bench: Bench) -> None:
     bench.control.answers.from_marks(ANGLE)
     assert "Pin pixels" in bench.told
@@ -99,6 +106,15 @@ def test_a_library_that_does_not_fit_is_told(bench: Bench, tmp_path: Path) -> No
     bench.control.answers.from_library(tmp_path / "none", Way())
     assert "no reflectance spectrum" in bench.told
     assert bench.state.materials.value is None
+
+
+def test_a_map_of_other_classes_never_stands_for_an_answer_that_failed(bench: Bench, tmp_path: Path) -> None:
+    bench.control.marks.pin((30, 5))
+    bench.control.answers.from_marks(ANGLE)
+    assert _shown(bench).name == "marks"
+    bench.control.answers.from_library(_short_library(tmp_path), ANGLE)
+    assert bench.state.materials.value is None
+    assert bench.told.startswith("There is no map by short.csv. ")
 
 
 def test_the_map_is_written(bench: Bench, tmp_path: Path) -> None:
