@@ -261,6 +261,7 @@ CASES = (
         r"planes contradict the geometry .* bulge towards the camera by 0\.\d+ ± 0\.\d+ mm",
         {"bow_mm": "0.5"},
         touched=_depth_stage(*PLANES),
+        quick=False,
     ),
     BadInput(
         "one step of the stage is not what was asked",
