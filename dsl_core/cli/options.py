@@ -197,15 +197,15 @@ def plan_of(source: str) -> CapturePlan:
     from dsl_core.io.plan_file import load_plan
     from dsl_core.model.presets import PRESETS, preset_plan
 
-    preset = preset_plan(source) if _is_preset(source) else None
-    if preset is not None:
+    path, preset = Path(source), preset_plan(source)
+    if preset is not None and not path.exists():
         return preset
-    if not Path(source).suffix and not Path(source).exists():
+    if not path.suffix and not path.exists():
         known = ", ".join(preset.key for preset in PRESETS)
         raise PlanError(
             f"There is no plan {source!r}; give a file written by 'dsl-scan plan', or one of {known}."
         )
-    return load_plan(Path(source))
+    return load_plan(path)
 
 
 def _is_preset(source: str) -> bool:

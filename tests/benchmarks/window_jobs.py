@@ -161,7 +161,7 @@ class WindowJobs:
         forecast = page.forecast
         page.middle.setCurrentWidget(forecast)
         control.plans.choose_preset("reference")
-        forecast._controller.begin()  # type: ignore[attr-defined]
+        forecast._controller.begin()
         known = forecast._state.points
         with self._job("predict while a plan is dragged"):
             for period_px in range(60, 60 + 2 * DRAGS, 2):

@@ -6,18 +6,19 @@ import re
 import subprocess
 import sys
 from pathlib import Path
+from typing import get_args
 
 import numpy as np
 import pytest
 
 import dsl_core
-from dsl_core.cli.options import PlanChoice
+from dsl_core.cli.options import PlanChoice, PlanSource
 from dsl_core.errors import PlanError
 from dsl_core.io.plan_file import load_plan, save_plan
 from dsl_core.io.result.result_file import load_result
 from dsl_core.io.scan.folder import ScanReader
 from dsl_core.model.plan import EnsembleCode, GrayCode, LineComb, Setting, XorCode
-from dsl_core.model.presets import preset_plan
+from dsl_core.model.presets import PRESETS, preset_plan
 
 from .conftest import SMALL_PLAN, SMALL_RIG, Give
 
@@ -270,6 +271,8 @@ def test_a_plan_is_a_preset_by_name_or_a_file(tmp_path: Path, monkeypatch: pytes
         PlanChoice("quik").build()
     with pytest.raises(PlanError, match="--plan gives the whole plan; leave out --code"):
         PlanChoice("comb", code="columns").build()
+    (option,) = get_args(PlanSource)[1:]
+    assert all(preset.key in option.help for preset in PRESETS)
 
 
 def test_the_demo_leaves_a_report_and_never_writes_over_another(
