@@ -240,11 +240,11 @@ def cause_findings(
     place = _film(causes, probe)
     yield place.model_copy(update={"significant": place.significant and probe.places})
     for finding in _gains(causes, bool(corrected)):
-        refuted = corrected is False and finding.part == "orders"
+        refuted = finding.part == "orders" and (corrected is False or not causes.unequal)
         yield finding.model_copy(update={"significant": finding.significant and not refuted})
     for index, (value, std) in enumerate(zip(probe.lines.values, probe.lines.std, strict=True)):
         yield _profile(PROFILE[index], float(value), float(std))
-    yield FitFinding.judged(
+    drift = FitFinding.judged(
         "light",
         "change of the light over the scan",
         (causes.drift, causes.drift_std),
@@ -253,6 +253,7 @@ def cause_findings(
         f"The light has changed by {causes.drift:+.1%} from the first line to the last.",
         "Let the projector warm up for longer.",
     )
+    yield drift.model_copy(update={"significant": causes.drifts})
     if probe.curves is not None:
         yield FitFinding.judged(
             "curves",
