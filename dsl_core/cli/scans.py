@@ -212,6 +212,8 @@ def _done(output: Output, target: Path, status: Status) -> None:
         f"All {status.total} frames are saved in {target} ({status.elapsed_s:.1f} s)."
         f" Next: dsl-scan reconstruct {target}"
     )
+    if status.overexposed:  # said on standard error when it was seen
+        output.put(overexposed=status.overexposed)
     if status.warning:
         output.say(status.warning)
         output.put(warning=status.warning)

@@ -152,14 +152,24 @@ def share_findings(
 
     Where the camera is known to be ``blurred``, lines of another shape along edges are no news.
     """
-    lit, measured = (int(np.count_nonzero(where)) for where in _lit_and_measured(flags))
+    is_lit, is_measured = _lit_and_measured(flags)
+    lit, measured = int(np.count_nonzero(is_lit)), int(np.count_nonzero(is_measured))
     if lit >= FEWEST:
+        too_bright = int(np.count_nonzero(is_lit & ~is_measured & ((flags & int(Flag.SATURATED)) != 0)))
+        yield _share(
+            "exposure",
+            "overexposed pixels without a depth",
+            too_bright / lit,
+            MOST_LOST,
+            "{0} of the lit pixels have no depth because they are overexposed in every setting.",
+            "Expose for a shorter time or with a lower level, or add a darker setting to the plan.",
+        )
         yield _share(
             "coverage",
             "lit pixels without a depth",
-            (lit - measured) / lit,
+            (lit - measured - too_bright) / lit,
             MOST_LOST,
-            "Light reaches {0} of the pixels that have no depth.",
+            "{0} of the lit pixels have no depth.",
             "See the flags: codes that disagree or a depth out of range tell of motion, of surfaces that"
             " light each other, or of another rig's calibration.",
         )

@@ -171,6 +171,8 @@ class ScanController:
             self.state.status.set(status)
             if status.warning and status.warning != (before.warning if before else ""):
                 self._warn(status)
+            if status.overexposed and not (before and before.overexposed):
+                self._notifier.tell("warning", status.overexposed)
             if self.state.phase.value.is_busy and self.state.phase.value is not Phase.STOPPING:
                 self.state.phase.set(_PHASES.get(status.state, self.state.phase.value))
         if picture is not None:
