@@ -333,7 +333,7 @@ def _motion(motion: FilmMotion, probe: Probe) -> FitFinding:
 
 
 def _film(causes: Causes, probe: Probe) -> FitFinding:
-    plus, minus = causes.shift_px[probe.sound].mean(0)
+    plus, minus = causes.mean_px
     return FitFinding.judged(
         "film",
         "place of the first orders",

@@ -61,7 +61,7 @@ def test_a_scan_tells_it_once_and_ends_as_usual(tmp_path, caplog) -> None:  # ty
     assert status.overexposed.startswith("White is overexposed in 9")
     assert "a darker setting" in status.overexposed
     assert [record.getMessage() for record in caplog.records].count(status.overexposed) == 1
-    before = [each for each in seen if not each.overexposed and each.shot is not None]
-    assert before[-1].shot.role == "white", "it is told at once"
+    before = [each.shot for each in seen if not each.overexposed and each.shot is not None]
+    assert before[-1].role == "white", "it is told at once"
     darker = plan.model_copy(update={"settings": (Setting(exposure_ms=1000 / 6, level=0.2),)})
     assert scan(rig, darker, tmp_path / "b.dsl").overexposed == ""

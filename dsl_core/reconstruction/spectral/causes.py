@@ -30,7 +30,8 @@ _TERMS = 6
 class Causes:
     """The parameters of the model fitted to a whole scan, with deviations from the scatter over cells.
 
-    ``shift_px`` (n, 2) of both orders at the probed pixels, their root mean square and its deviation;
+    ``shift_px`` (n, 2) of both orders at the probed pixels; their mean (2,) and root mean square, with its
+    deviation, over pixels that see the order: elsewhere the shift only continues what is seen;
     ``gain`` (2,) of both orders, with the deviations of their mean and difference; ``drift`` of the light
     from the first line to the last. A line lights a pixel by one order long before or after another does by
     the other, so that drift looks much as a difference of the gains: ``drift_alone`` and ``difference_alone``
@@ -38,6 +39,7 @@ class Causes:
     """
 
     shift_px: Floats
+    mean_px: Floats
     rms_px: float
     rms_std_px: float
     gain: Floats
@@ -99,11 +101,12 @@ def fit_causes(probe: Probe) -> Causes:
     prior_std = np.r_[np.full(first, PRIOR_STD[0]), PRIOR_STD[2:LEADING]]
     prior_std[first : first + 2] *= [0.5**0.5, 2**0.5]
     fit = pool(probe, design, prior_std)
-    found, covariance, used = fit.values, fit.covariance, probe.sound
+    found, covariance = fit.values, fit.covariance
     shift = design[:, :2] @ found
     spread = np.einsum("npk,kl,npl->np", design[:, :2], covariance, design[:, :2])
     # Noise adds its own square to that of the shift.
-    square, noise = float(np.mean(shift[used] ** 2)), float(np.mean(spread[used]))
+    telling = _telling(probe)
+    square, noise = float(np.sum(telling * shift**2)), float(np.sum(telling * spread))
     deviations = np.sqrt(np.diag(covariance))
     mean, apart = found[first : first + 2]
 
@@ -116,6 +119,7 @@ def fit_causes(probe: Probe) -> Causes:
     drift = len(found) - 1
     return Causes(
         shift_px=shift,
+        mean_px=np.sum(telling * shift, 0) / np.maximum(telling.sum(0), 1e-12),
         rms_px=float(np.sqrt(max(square - noise, 0.0))),
         rms_std_px=float(np.sqrt(noise / (2 * _TERMS))),
         gain=np.array([mean + 0.5 * apart, mean - 0.5 * apart]),
@@ -126,3 +130,12 @@ def fit_causes(probe: Probe) -> Causes:
         drift_alone=alone(drift, first + 1),
         difference_alone=alone(first + 1, drift),
     )
+
+
+def _telling(probe: Probe) -> Floats:
+    """Weights (n, 2), of sum 1, of what each pixel says of the shift of each order: at most as most do."""
+    known = np.stack([probe.normal[:, order, order] for order in (0, 1)], 1) * probe.weight[:, None]
+    known = np.where(probe.sound[:, None], known, 0.0)
+    some = known[known > 0]
+    limited = np.minimum(known, np.median(some) if some.size else 1.0)
+    return np.asarray(limited / max(float(limited.sum()), 1e-12))

@@ -60,6 +60,20 @@ def test_deviations_are_those_of_independent_pixels() -> None:
     assert found.rms_std_px == pytest.approx(np.sqrt(noise / 12), rel=1e-3)
 
 
+def test_where_an_order_is_not_seen_its_shift_is_no_news() -> None:
+    probe = probe_of()
+    x = probe.place[:, 1]
+    left = x < 0
+    probe.score[:, :2] = 0.0
+    probe.score[left, 0] = INFORMATION * 0.2 * (x[left] + 0.5)
+    probe.normal[~left, 0, 0] = 0.0
+    found = fit_causes(probe)
+    assert found.shift_px[x > 0.9, 0].min() > 0.27
+    assert found.mean_px == pytest.approx([0.0, 0.0], abs=0.01)
+    # A third of what the pixels say is of this order.
+    assert found.rms_px == pytest.approx(np.sqrt(0.2**2 / 12 / 3), rel=0.1)
+
+
 def test_noise_alone_is_no_shift() -> None:
     probe = probe_of()
     probe.score[:] = 0.0
@@ -102,7 +116,7 @@ def test_neither_drift_nor_gains_are_told_that_make_up_for_each_other() -> None:
 
 
 CAUSES = Causes(
-    np.zeros((1, 2)), 0.0, 0.0, np.array([0.02, -0.01]), 0.001, 0.002, 0.015, 0.001,
+    np.zeros((1, 2)), np.zeros(2), 0.0, 0.0, np.array([0.02, -0.01]), 0.001, 0.002, 0.015, 0.001,
     drift_alone=(0.015, 0.001), difference_alone=(0.03, 0.001),
 )  # fmt: skip
 
