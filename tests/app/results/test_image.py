@@ -26,7 +26,7 @@ def test_a_click_pins_and_keys_move_pin_and_remove(bench: Bench, qtbot: QtBot) -
     QTest.keyClick(canvas, Qt.Key.Key_Up)
     QTest.keyClick(canvas, Qt.Key.Key_Return)
     assert bench.marks[1].pixel == (20, 9)
-    assert "mm" in bench.page.marks.figures.text()
+    qtbot.waitUntil(lambda: "mm" in bench.page.marks.figures.toPlainText())
     QTest.keyClick(canvas, Qt.Key.Key_Delete)
     assert [mark.pixel for mark in bench.marks] == [(10, 10)]
     bench.window.do("undo")
