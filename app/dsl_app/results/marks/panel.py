@@ -21,6 +21,7 @@ from PySide6.QtWidgets import (
 from dsl_app.results.marks.comparison import comparison_html
 from dsl_app.results.marks.controller import MarksController
 from dsl_app.results.state import Mark, ResultsState
+from dsl_app.shared.plain_tip import plain_tip
 from dsl_app.shared.settings import folder_for
 from dsl_app.shared.theme import DARK, Theme
 from dsl_app.shared.widgets.forms import label, named, push_button, quiet
@@ -169,7 +170,7 @@ class MarksPanel(QWidget):
     def _show_row(self, item: QTreeWidgetItem, mark: Mark) -> None:
         for column, text in enumerate((mark.name, where(mark), count(mark))):
             item.setText(column, text)
-            item.setToolTip(column, mark.trouble)
+            item.setToolTip(column, plain_tip(mark.trouble))
         item.setIcon(0, swatch(self._theme.pin(mark.colour)))
         item.setCheckState(0, Qt.CheckState.Checked if mark.shown else Qt.CheckState.Unchecked)
         item.setForeground(1, QColor(self._theme.warn) if mark.trouble else QBrush())
