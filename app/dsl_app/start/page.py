@@ -7,7 +7,7 @@ from functools import partial
 from pathlib import Path
 
 from PySide6.QtCore import Qt
-from PySide6.QtGui import QShowEvent
+from PySide6.QtGui import QResizeEvent, QShowEvent
 from PySide6.QtWidgets import QFrame, QPushButton
 
 from dsl_app.shared.settings import RecentFiles
@@ -19,6 +19,8 @@ from dsl_app.start.examples import EXAMPLES
 from dsl_app.start.unfinished import Unfinished, UnfinishedController
 from dsl_app.start.unfinished_list import UnfinishedList
 
+#: Height of what is shown at least, px: a third of what is left over is above it.
+CONTENT_PX = 480
 #: Width of a card, and that in a wide window, px.
 CARD_PX, WIDE_CARD_PX, GAP_PX = 286, 380, 16
 
@@ -60,8 +62,12 @@ class StartPage(PageWidget):
         )
         self.files = RecentList(recent, open_path)
         self.unfinished = UnfinishedList(unfinished)
-        self.stops = [unfinished.found.follow(self._mark_next)]
         self._lay_out()
+        self.stops = [
+            unfinished.found.follow(self._mark_next),
+            # Without recent files, what is unfinished takes their place.
+            recent.paths.follow(lambda paths: self.files.setVisible(bool(paths))),
+        ]
 
     def _mark_next(self, found: tuple[Unfinished, ...]) -> None:
         """What was interrupted comes before an example."""
@@ -94,8 +100,15 @@ class StartPage(PageWidget):
             ),
         )
         self._cards = cards
-        column = column_of(
+        # What is found late has a place of its own next to recent files: nothing moves under a click.
+        below = row_of(
+            (self.files, 0, Qt.AlignmentFlag.AlignTop),
+            (self.unfinished, 0, Qt.AlignmentFlag.AlignTop),
             STRETCH,
+            spacing=GAP_PX,
+            margins=0,
+        )
+        self._column = column_of(
             label("dsl-scan", "title"),
             label("Hyperspectral 3D scans with a camera, a projector and a diffraction film", "muted"),
             14,
@@ -103,13 +116,10 @@ class StartPage(PageWidget):
             14,
             row_of(self.choose, self.captures, STRETCH),
             8,
-            self.unfinished,
-            self.files,
+            below,
             STRETCH,
-            STRETCH,
-            margins=0,
         )
-        self._middle = boxed(column)
+        self._middle = boxed(self._column)
         content = boxed(row_of(STRETCH, self._middle, STRETCH, margins=12))
         column_of(scrolled(content), on=self, margins=0)
         self.arrange()
@@ -120,8 +130,15 @@ class StartPage(PageWidget):
         for each in self._cards:
             each.setFixedWidth(card)
         width = 3 * card + 2 * GAP_PX
-        for part in (self._middle, self.files, self.unfinished):
-            part.setFixedWidth(width)
+        self._middle.setFixedWidth(width)
+        for part in (self.files, self.unfinished):
+            part.setFixedWidth((width - GAP_PX) // 2)
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        """Leave room above by the height of the page alone, whatever is listed below."""
+        super().resizeEvent(event)
+        above = max((event.size().height() - CONTENT_PX) // 3, 0)
+        self._column.setContentsMargins(0, above, 0, 0)
 
 
 def _card(title: str, text: str, *buttons: QPushButton) -> QFrame:
