@@ -14,6 +14,7 @@ from PySide6.QtWidgets import (
     QPushButton,
 )
 
+from dsl_app.scan.command_line import named_target
 from dsl_app.scan.controller import ScanController
 from dsl_app.scan.controls import RESUME, progress_text, run_controls
 from dsl_app.scan.forecast.figures import minutes, volume
@@ -89,18 +90,14 @@ class TargetBox(QGroupBox):
         ):
             form.addRow(title, widget)
         form.addRow("", self._split)
-        self.name.editingFinished.connect(self._rename)
+        # A scan that is started by a key takes the name as far as it is typed.
+        self.name.textEdited.connect(controller.name_scan)
+        self.name.editingFinished.connect(self._show_name)
         self.stops = [
             state.target.follow(self._show_target),
             state.facts.follow(self._show_facts),
             *follow_any(self._show_then, state.reconstruction_s, state.then_reconstruct),
         ]
-
-    def _rename(self) -> None:
-        text = self.name.text().strip()
-        target = self._state.target.value
-        if text and text != target.stem:
-            self._controller.plans.set_target(target.parent / text.replace("/", "-"))
 
     def _browse(self) -> None:
         target = self._state.target.value
@@ -109,8 +106,13 @@ class TargetBox(QGroupBox):
             self._controller.plans.set_target(Path(name) / target.name)
 
     def _show_target(self, target: Path) -> None:
-        self.name.setText(target.stem)
+        # Whoever types keeps the text and the place in it.
+        if not self.name.text().strip() or named_target(target.parent, self.name.text()) != target:
+            self._show_name()
         self._where.setText(f"in {breakable(target.parent)}")
+
+    def _show_name(self) -> None:
+        self.name.setText(self._state.target.value.stem)
 
     def _show_then(self) -> None:
         expected_s, follows = self._state.reconstruction_s.value, self._state.then_reconstruct.value

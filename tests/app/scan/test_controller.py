@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from dsl_app.connection.state import Link, RigChoice
+from dsl_app.scan import reconstruction_time
 from dsl_app.scan.job import ScanJob
 from dsl_app.scan.plan import connect_first, was_taken_with
 from dsl_app.scan.reconnect import ATTEMPTS, RETRY_S
@@ -160,6 +161,8 @@ def test_a_result_follows_and_is_told(
         return real(target, session, progress=progress, seen_geometry=see)
 
     monkeypatch.setattr(scans, "reconstruct_to", watched)
+    # The first reconstruction of a busy computer compiles for a minute.
+    monkeypatch.setattr(reconstruction_time, "MOST_US_PER_PX", np.inf)
     expected_s = bench.state.reconstruction_s.value
     results: list[Path] = []
     bench.state.result.connect(results.append)
@@ -357,6 +360,23 @@ def test_a_damaged_session_is_told(bench: ScanBench, tmp_path: Path) -> None:
     (tmp_path / "odd.dsl" / "manifest.json").write_text("{")
     assert bench.scans.open(tmp_path / "odd.dsl")
     assert "damaged" in bench.notifier.told[-1][1]
+
+
+def test_a_typed_name_stays_until_a_scan_has_it(bench: ScanBench, tmp_path: Path) -> None:
+    target = bench.state.target
+    bench.scans.name_scan("leaf 1/2.dsl ")
+    assert target.value == tmp_path / "leaf 1-2.dsl"
+    # As for the scan of the demo, which has its own name.
+    bench.scans.plan_new_scan()
+    assert target.value == tmp_path / "leaf 1-2.dsl"
+    bench.scans.plans.set_target(tmp_path / "demo" / "own.dsl")
+    bench.scans.start()
+    assert target.value == tmp_path / "leaf 1-2.dsl"
+    bench.scans.name_scan(" ")
+    assert target.value == tmp_path / "leaf 1-2.dsl"
+    bench.scans.start()
+    assert ScanReader(tmp_path / "leaf 1-2.dsl").missing() == []
+    assert target.value == tmp_path / "scan-20260301-1020.dsl"
 
 
 def test_leaving_a_session_plans_a_new_one(
