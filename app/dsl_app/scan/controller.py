@@ -211,11 +211,23 @@ class ScanController:
         self.state.interrupted.set(None)
         self.state.finished.set(folder)
         self.state.check_drift.set(True)
-        self.state.note.set(f"All {status.total} frames are saved in {folder}.")
+        assert self._scan is not None
+        lacks_calibration = not self._scan.is_calibrated
+        self.state.lacks_calibration.set(lacks_calibration)
+        what_next = f" {self._needs_calibration}" if lacks_calibration else ""
+        self.state.note.set(f"All {status.total} frames are saved in {folder}.{what_next}")
         self._choose_target()
         self.plans.refresh()
-        if self.state.then_reconstruct.value:
+        if self.state.then_reconstruct.value and not lacks_calibration:
             self.reconstruct(folder)
+
+    @property
+    def _needs_calibration(self) -> str:
+        """What comes before a scan without calibration can be reconstructed."""
+        choose = "press Reconstruct… and choose the calibration of its rig."
+        if self.state.has_library:
+            return f"They contain no calibration: {choose}"
+        return f"They contain no calibration: first calibrate the rig on the Calibrate page, then {choose}"
 
     def _failed(self, error: Exception) -> None:
         folder = self._end(Phase.LOST)

@@ -96,7 +96,7 @@ class TargetBox(QGroupBox):
         self.stops = [
             state.target.follow(self._show_target),
             state.facts.follow(self._show_facts),
-            *follow_any(self._show_then, state.reconstruction_s, state.then_reconstruct),
+            *follow_any(self._show_then, state.reconstruction_s, state.then_reconstruct, state.facts),
         ]
 
     def _browse(self) -> None:
@@ -115,7 +115,8 @@ class TargetBox(QGroupBox):
         self.name.setText(self._state.target.value.stem)
 
     def _show_then(self) -> None:
-        expected_s, follows = self._state.reconstruction_s.value, self._state.then_reconstruct.value
+        expected_s, facts = self._state.reconstruction_s.value, self._state.facts.value
+        follows = self._state.then_reconstruct.value and (facts is None or facts.is_calibrated)
         self._then.setText(f"then {about(expected_s)} to reconstruct" if expected_s and follows else "")
 
     def _show_facts(self, facts: Facts | None) -> None:
@@ -177,6 +178,8 @@ class RunBox(QGroupBox):
                 state.trouble,
                 state.is_reconstructing,
                 state.is_seen,
+                state.lacks_calibration,
+                state.calibrations,
             ),
             state.status.follow(self._show_status),
         ]
@@ -218,6 +221,7 @@ class RunBox(QGroupBox):
             has_result,
             state.trouble.value,
             state.is_reconstructing.value,
+            state.lacks_calibration.value and not state.has_library,
         )
         show_parts(self, shown)
 

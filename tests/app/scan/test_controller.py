@@ -3,7 +3,7 @@ from __future__ import annotations
 import shutil
 import threading
 from collections import namedtuple
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -180,6 +180,28 @@ def test_a_result_follows_and_is_told(
     assert 600 < middle_mm < 800
     assert bench.state.depth.value is None
     assert bench.state.reconstruction_s.value != expected_s
+
+
+def test_a_scan_without_calibration_is_not_reconstructed_but_says_what_to_do(bench: ScanBench) -> None:
+    own, devices = bench.calibration, bench.rig.state.devices.value
+    assert devices is not None
+    bench.rig.state.devices.set(replace(devices, calibration=None))
+    facts = bench.state.facts.value
+    assert facts is not None
+    assert not facts.is_calibrated
+    bench.state.then_reconstruct.set(True)
+    results: list[Path] = []
+    bench.state.result.connect(results.append)
+    bench.scans.start()
+    assert phase(bench) is Phase.DONE
+    assert "first calibrate the rig on the Calibrate page, then press Reconstruct…" in bench.state.note.value
+    assert bench.state.lacks_calibration.value
+    bench.library.store("lab", own)
+    bench.scans.plans.load_library()
+    bench.scans.start()
+    assert "no calibration: press Reconstruct… and choose" in bench.state.note.value
+    assert results == []
+    assert not bench.state.is_reconstructing.value
 
 
 @pytest.mark.parametrize(
