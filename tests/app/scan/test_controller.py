@@ -201,7 +201,8 @@ def test_a_scan_without_calibration_is_not_reconstructed_but_says_what_to_do(ben
     bench.scans.start()
     assert "no calibration: press Reconstruct… and choose" in bench.state.note.value
     assert results == []
-    assert not bench.state.is_reconstructing.value
+    assert "The reconstruction" not in bench.state.note.value
+    assert bench.notifier.told == []
 
 
 @pytest.mark.parametrize(
