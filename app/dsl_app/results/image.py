@@ -63,7 +63,7 @@ class ResultImage(QWidget):
         self.materials = pg.ImageItem(axisOrder="row-major")
         self.materials.setZValue(4)
         self._vertical, self._horizontal = (pg.InfiniteLine(angle=angle, movable=False) for angle in (90, 0))
-        self.pins = pg.ScatterPlotItem(size=11, pxMode=True)
+        self.pins = pg.ScatterPlotItem(size=11, pxMode=True, pen=pg.mkPen("#000000", width=1))
         for item in (self.overlay, self.materials, self._vertical, self._horizontal, self.pins):
             self.box.addItem(item, ignoreBounds=True)
         for line in (self._vertical, self._horizontal):
