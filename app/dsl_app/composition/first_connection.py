@@ -15,7 +15,7 @@ LOOKING = ("start", "results")
 
 
 class FirstConnection(QObject):
-    """Connects at once, or later on a page that needs no rig, whose first example needs none of its libraries."""
+    """Connects at once, or later on a page that needs no rig: a first example needs none of its libraries."""
 
     def __init__(self, window: MainWindow, rig: RigController) -> None:
         super().__init__(window)
