@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 from PySide6.QtCore import QObject, QTimer
 
-from dsl_app.connection.controller import RigController
 from dsl_app.connection.state import Link
 from dsl_app.shell.main_window import MainWindow
+
+if TYPE_CHECKING:
+    # The window comes up before numpy.
+    from dsl_app.connection.controller import RigController
 
 #: How long such a page is on screen before the rig is connected, and the time between two tries, ms.
 LATER_MS, AGAIN_MS = 3000, 200

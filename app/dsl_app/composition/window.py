@@ -113,11 +113,14 @@ class Composition(QObject):
         }
 
     def is_awaited(self) -> bool:
-        """Whether a person waits for a job, the rig or its first picture; any thread may ask."""
+        """Whether a person waits for a job, a result, the rig or its first picture; any thread may ask."""
         if any(not job.is_minor for job in self.window.parts.runner.active):
             return True
         # Asking must make neither.
         made = vars(self)
+        results = self.session.results if "session" in made else None
+        if results is not None and results.is_reading:
+            return True
         is_opening = "rig" in made and self.rig.state.link.value is Link.OPENING
         return is_opening or ("live" in made and self.live.state.is_exposing.value)
 

@@ -38,7 +38,7 @@ PAGE_MODULES = {
     ),
 }
 #: What a first look at a result needs, which takes least time.
-_LOOK = (*PAGE_MODULES["results"], "zarr", "pandas", "xarray", "dsl_core.io.result.result_file")
+_LOOK = (*PAGE_MODULES["results"], "zarr", "dsl_core.io.result.stored_arrays")
 #: What connecting a rig needs.
 _FIRST = (
     "scipy.linalg",
@@ -53,6 +53,8 @@ _FIRST = (
 )
 #: Calibrations, results and the 3D view.
 _LAST = (
+    "pandas",
+    "xarray",
     "dsl_app.calibrate.wizard.window",
     "dsl_core.workflows.scans",
     "dsl_core.campaign.recipes",
