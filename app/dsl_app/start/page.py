@@ -10,17 +10,20 @@ from PySide6.QtCore import Qt
 from PySide6.QtGui import QResizeEvent, QShowEvent
 from PySide6.QtWidgets import QFrame, QPushButton
 
+from dsl_app.shared.evented import follow_any
 from dsl_app.shared.settings import RecentFiles
 from dsl_app.shared.widgets.forms import label, push_button, set_role
 from dsl_app.shared.widgets.layouts import STRETCH, boxed, column_of, row_of, scrolled
 from dsl_app.shared.widgets.page import PageWidget
 from dsl_app.shared.widgets.recent_list import RecentList
 from dsl_app.start.examples import EXAMPLES
-from dsl_app.start.unfinished import Unfinished, UnfinishedController
+from dsl_app.start.unfinished import UnfinishedController
 from dsl_app.start.unfinished_list import UnfinishedList
 
-#: Height of what is shown at least, px: a third of what is left over is above it.
-CONTENT_PX = 480
+#: Height of what is shown at least, px: a third of what a window has beyond that is above it.
+CONTENT_PX = 520
+#: By how much a primary button is higher than its text, px.
+PRIMARY_MORE_PX = 12
 #: Width of a card, and that in a wide window, px.
 CARD_PX, WIDE_CARD_PX, GAP_PX = 286, 380, 16
 
@@ -40,12 +43,16 @@ class StartPage(PageWidget):
         unfinished: UnfinishedController,
     ) -> None:
         super().__init__()
+        self._unfinished = unfinished
         self.examples = {
             each.key: push_button(
                 each.title, each.about, partial(show_example, each.key), "" if place else "primary"
             )
             for place, each in enumerate(EXAMPLES)
         }
+        # As high as a primary button, which it is not while something else comes first.
+        first = self.examples[EXAMPLES[0].key]
+        first.setMinimumHeight(first.fontMetrics().height() + PRIMARY_MORE_PX)
         self.live = push_button(
             "Start the live view",
             "Connect the rig, expose and show its camera",
@@ -64,14 +71,16 @@ class StartPage(PageWidget):
         self.unfinished = UnfinishedList(unfinished)
         self._lay_out()
         self.stops = [
-            unfinished.found.follow(self._mark_next),
+            *follow_any(self._mark_next, unfinished.found, unfinished.is_resuming),
             # Without recent files, what is unfinished takes their place.
             recent.paths.follow(lambda paths: self.files.setVisible(bool(paths))),
         ]
 
-    def _mark_next(self, found: tuple[Unfinished, ...]) -> None:
-        """What was interrupted comes before an example."""
-        set_role(self.examples[EXAMPLES[0].key], "" if found else "primary")
+    def _mark_next(self) -> None:
+        """What was interrupted comes before an example; while it continues, so does waiting for it."""
+        control = self._unfinished
+        is_first = not (control.found.value or control.is_resuming.value)
+        set_role(self.examples[EXAMPLES[0].key], "primary" if is_first else "")
 
     def showEvent(self, event: QShowEvent) -> None:
         """Look for what was interrupted, soon."""
@@ -135,9 +144,9 @@ class StartPage(PageWidget):
             part.setFixedWidth((width - GAP_PX) // 2)
 
     def resizeEvent(self, event: QResizeEvent) -> None:
-        """Leave room above by the height of the page alone, whatever is listed below."""
+        """Leave room above by the height of the window alone, whatever is listed or told below."""
         super().resizeEvent(event)
-        above = max((event.size().height() - CONTENT_PX) // 3, 0)
+        above = max((self.window().height() - CONTENT_PX) // 3, 0)
         self._column.setContentsMargins(0, above, 0, 0)
 
 

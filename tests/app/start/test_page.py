@@ -2,6 +2,7 @@ from pathlib import Path
 
 import pytest
 from dsl_app.shared.settings import RecentFiles, Settings
+from dsl_app.shared.theme import LIGHT, style_sheet
 from dsl_app.start.examples import EXAMPLES
 from dsl_app.start.page import StartPage
 from dsl_app.start.unfinished import Unfinished, UnfinishedController
@@ -52,6 +53,9 @@ def test_what_was_interrupted_comes_before_an_example(qtbot: QtBot) -> None:
     blue = [each for each in page.findChildren(QPushButton) if each.property("role") == "primary"]
     assert [each.text() for each in blue] == ["Resume scan…"]
     found.set(())
+    page.unfinished._control.is_resuming.set(True)
+    assert page.examples["color-checker"].property("role") == ""
+    page.unfinished._control.is_resuming.set(False)
     assert page.examples["color-checker"].property("role") == "primary"
 
 
@@ -63,6 +67,7 @@ def test_nothing_moves_when_something_unfinished_is_found(
     for name in "abcdef":
         recent.add(tmp_path / name)
     page, _ = make_page(qtbot, recent)
+    page.setStyleSheet(style_sheet(LIGHT))
     page.resize(1200, height_px)
     QTest.qWait(0)
     parts = (*page.findChildren(QPushButton), page.files.files)
