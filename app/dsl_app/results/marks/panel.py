@@ -76,7 +76,8 @@ class MarksPanel(QWidget):
             header.setSectionResizeMode(column, QHeaderView.ResizeMode.ResizeToContents)
         self.hint = label(EMPTY, "muted", wraps=True)
         # A label would lay out a long table several times.
-        self.figures = named(QTextBrowser(), "Comparison with references")
+        tip = "The selected mark compared with references, and its distance from other pins"
+        self.figures = named(QTextBrowser(), "Comparison with references", tip)
         self.figures.setFrameShape(QFrame.Shape.NoFrame)
         self.figures.viewport().setAutoFillBackground(False)
         self.tree.setMinimumHeight(88)
