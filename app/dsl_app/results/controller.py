@@ -172,8 +172,6 @@ class ResultsController:
         if is_the_rest and picture is not None:
             self._notifier.tell("info", f"The spectra of {arrays.path.stem} are there. Key 1 shows colours.")
         self.opened.emit(arrays)
-        if arrays.has_spectra:
-            self._runner.submit(Job("Prepare colours", partial(_prepare_colours, arrays), is_minor=True))
 
     def _show_result(
         self, arrays: ResultArrays, picture: NDArray[np.uint8] | None, is_the_rest: bool = False
@@ -319,13 +317,6 @@ class ResultsController:
             self._notifier.tell("warning", sentence_of(error))
 
         self._runner.submit(Job("Intensity graph", work, done, failed, is_minor=True))
-
-
-def _prepare_colours(arrays: ResultArrays, _: Progress) -> None:
-    """Import in a thread what the first comparison of colours needs, which would block the window later."""
-    from dsl_core.optics.colour import observer_weights
-
-    observer_weights(arrays.wavelengths_nm)
 
 
 def _unreadable(session: Path) -> str:
