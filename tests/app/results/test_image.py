@@ -114,7 +114,7 @@ def test_depth_outside_the_limits_is_transparent_and_the_bar_says_them(bench: Be
 def test_a_class_map_lies_over_colours_and_hides_no_other_view(bench: Bench) -> None:
     layer = bench.page.image.content.materials
     bench.control.marks.pin((30, 5))
-    bench.control.answers.from_marks(bench.page.materials.way)
+    bench.control.answers.from_marks(bench.page.materials.content.way)
     assert layer.isVisible()
     for view in (ResultView.BAND, ResultView.DEPTH, ResultView.QUALITY):
         bench.control.show(view)
