@@ -16,6 +16,7 @@ from dsl_core.capture.proof.first_light import FEWEST_LIT, changed_light, is_unl
 from dsl_core.capture.proof.prediction import Lit
 from dsl_core.capture.proof.raster import Counts, Floats, Noise, Raster
 from dsl_core.model.plan import BinaryCode, CapturePlan, Shot
+from dsl_core.patterns.displaced_code import DisplacedCode, displaced_code
 
 #: Share of saturated pixels from which on a picture tells nothing, and up to which other pictures do.
 ALL_SATURATED, SOME_SATURATED = 0.98, 0.7
@@ -188,6 +189,8 @@ class FirstCode:
             elif self._is_mirrored():
                 again = tuple(each for number in self._pairs.pairs for each in self._pair_shots(number))
                 self.reviewed.append(Finding(shot, Verdict.MIRRORED, again))
+            elif (displaced := self._displaced()) is not None:
+                self.reviewed.append(self._since(shot, displaced))
         if not self.reviewed:
             return None
         for each in self.reviewed:
@@ -210,6 +213,19 @@ class FirstCode:
         return run_backwards(
             self._code, size_px, pairs, lit & self._margins(), self._raster.shape, self._rises
         )
+
+    def _displaced(self) -> DisplacedCode | None:
+        _, _, lit = self._pairs.contrast()
+        column, _ = decode(self._code, self._plan.projector_size_px, self._pairs.pairs)
+        known = np.where(lit & self._margins(), column, -1).reshape(self._raster.shape)
+        return displaced_code(self._code, self._plan.projector_size_px, known)
+
+    def _since(self, shot: Shot, displaced: DisplacedCode) -> Finding:
+        """That a code is displaced since one of its pairs; white and black look the same everywhere."""
+        numbers = [number for number in sorted(self._pairs.pairs) if number >= displaced.since_pair]
+        again = tuple(each for number in numbers for each in self._pair_shots(number))
+        where = "higher" if displaced.columns > 0 else "lower"
+        return Finding(shot, Verdict.DISPLACED, again, f"towards {where} columns than the code before it")
 
     def substitute(self, number: int, pair: Pair) -> None:
         """Take a pair of another setting for a wrong one: for the columns alone."""
