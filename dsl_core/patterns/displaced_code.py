@@ -1,9 +1,9 @@
 """Whether a part of a binary code was shown displaced, by the columns that it then never names.
 
-Displaced from some pair on, a code names columns that fit each other, but belong to a place next to their own.
-That shows only at edges of the stripes before: on one side of each, as many columns are named by no pixel as
-the picture was displaced by, and those on the other side by twice as many pixels. This needs neither the rows
-of a code nor a calibration.
+Displaced from some pair on, a code names columns that fit each other, but those of a place next to their own.
+That shows only at edges of the stripes before: on one side, as many columns are named by no pixel as the
+picture was displaced by, and as many on the other by twice as many. This needs neither the rows of a code nor
+a calibration.
 """
 
 from __future__ import annotations
@@ -21,13 +21,15 @@ from dsl_core.patterns.gray_code import bit_counts
 #: Columns by which pictures may be displaced, to either side; wider ones leave traces elsewhere as well.
 MOST_COLUMNS = 4
 #: Pixels that the columns in question should have, judged by those next to them.
-FEWEST_PIXELS = 24.0
+FEWEST_PIXELS = 16.0
 #: Shares of these from which on columns are named, and up to which they are named once.
-NAMED, ONCE = 0.3, 1.5
+NAMED, ONCE = 0.3, 1.25
 #: Columns on either side that say how many pixels there are in one.
 NEAR = 2
-#: Where a picture skips more than this share of columns, the same ones in all rows, so many edges must agree.
-MOST_SKIPPED, FEWEST_EDGES = 0.2, 20.0
+#: A picture that skips more than this share of columns may skip the same ones in all rows: so many edges have
+#: to agree, or several to differ by so many deviations of columns elsewhere, which are so far from them.
+MOST_SKIPPED, FEWEST_EDGES, SIGMAS = 0.2, 20.0, 4.0
+ELSEWHERE = [side * away for away in range(6, 27) for side in (-1, 1)]
 #: Pixels side by side whose columns are further apart are on different surfaces.
 STEP_PX = 20
 
@@ -54,16 +56,17 @@ def displaced_code(
     never, twice = is_never @ named, is_twice @ named
     # Columns that are named once say how many pixels a column has: on both sides, as surfaces end anywhere.
     sides = [_mean(is_once & _near(side), named) for side in (is_never, is_twice)]
-    # Between fine stripes there are none; then it is all of them together.
+    # Between fine stripes there are none, nor are there in each row of a coarse picture: all together then.
     is_fine = 2 * (is_once & _near(is_never)).sum(1) < is_never.sum(1)
-    all_together = _mean(is_never | is_twice, named)
-    least, most = (np.where(is_fine, all_together, of(*sides)) for of in (np.minimum, np.maximum))
+    skips = _skipped(column) > MOST_SKIPPED
+    all_together = _mean(is_never | is_twice | (is_once & _near(is_never | is_twice)), named)
+    least, most = (np.where(is_fine | skips, all_together, of(*sides)) for of in (np.minimum, np.maximum))
     expected = least * is_never.sum(1)
     told = (expected >= FEWEST_PIXELS) & (never < NAMED * expected)
     told &= twice > ONCE * most * is_twice.sum(1)
-    if _skipped(column) > MOST_SKIPPED:
+    if skips:
         edges = is_twice @ (named > 0).astype(np.float64) / [abs(one.columns) for one in tried]
-        told &= edges >= FEWEST_EDGES
+        told &= (edges >= FEWEST_EDGES) | ((edges > 1) & (_deviations(named, is_never, is_twice) > SIGMAS))
     if not told.any():
         return None
     return tried[int(np.where(told, expected - never, -1).argmax())]
@@ -74,6 +77,18 @@ def _skipped(column: NDArray[np.integer]) -> float:
     steps = np.abs(np.diff(column, axis=1))
     steps = steps[(column[:, 1:] >= 0) & (column[:, :-1] >= 0) & (steps <= STEP_PX) & (steps > 0)]
     return 1.0 - steps.size / float(steps.sum()) if steps.size else 1.0
+
+
+def _deviations(
+    named: NDArray[np.float64], never: NDArray[np.bool_], twice: NDArray[np.bool_]
+) -> NDArray[np.float64]:
+    """By how much columns ``twice`` exceed those ``never`` (tried, width), in deviations of other columns."""
+    moved = np.stack([np.roll(named, -away) for away in (0, *ELSEWHERE)], 1)
+    one, other = (columns @ moved / columns.sum(1, keepdims=True).clip(1) for columns in (never, twice))
+    apart = (other - one) / np.maximum(one + other, 1e-9)
+    # The median, as edges of the next stripes may be among those elsewhere.
+    usual = 1.48 * np.median(np.abs(apart[:, 1:]), 1)
+    return np.asarray(apart[:, 0] / usual.clip(1e-9))
 
 
 @lru_cache(maxsize=8)

@@ -16,11 +16,16 @@ GRAY = GrayCode(rows=False)
 
 
 def seen(
-    columns: int, since_pair: int, code: BinaryCode = GRAY, camera_px: int = 890, rows: int = 24
+    columns: int,
+    since_pair: int,
+    code: BinaryCode = GRAY,
+    camera_px: int = 890,
+    rows: int = 24,
+    lean_px: float = 7.3,
 ) -> NDArray[np.int32]:
     """Columns (rows, camera_px) that a code names on a plane that leans, displaced since one of its pairs."""
-    lean = np.linspace(0, 7.3, rows)[:, None]
-    at = (np.arange(camera_px) * (600 / camera_px) + 20 + lean).astype(int)
+    lean = np.linspace(0, lean_px, rows)[:, None]
+    at = (np.arange(camera_px) * (590 / camera_px) + 18 + lean).astype(int)
     decoder = decoder_of(code, SIZE_PX)
     for pair in range(sum(bit_counts(code, SIZE_PX)) * (2 if code.kind == "ensemble" else 1)):
         line = binary_image(code, SIZE_PX, 2 * pair)[0] > 0
@@ -53,9 +58,15 @@ def test_rows_between_are_no_displacement() -> None:
     assert displaced_code(GrayCode(), SIZE_PX, seen(1, 10, GrayCode())) is None
 
 
-def test_where_a_picture_skips_columns_many_edges_have_to_agree() -> None:
-    assert displaced_code(GRAY, SIZE_PX, seen(1, 3, camera_px=80, rows=400)) is None
+def test_where_a_picture_skips_columns_several_edges_have_to_agree() -> None:
+    assert displaced_code(GRAY, SIZE_PX, seen(1, 1, camera_px=80, rows=400)) is None
     assert displaced_code(GRAY, SIZE_PX, seen(1, 7, camera_px=80, rows=400)) == DisplacedCode(1, 7)
+
+
+@pytest.mark.parametrize("camera_px", [63, 80, 200, 430, 640, 890, 1300])
+@pytest.mark.parametrize("lean_px", [0.0, 2.5, 30.0])
+def test_columns_that_no_row_happens_to_see_are_no_displacement(camera_px: int, lean_px: float) -> None:
+    assert displaced_code(GRAY, SIZE_PX, seen(0, 0, camera_px=camera_px, rows=36, lean_px=lean_px)) is None
 
 
 def test_a_surface_that_ends_at_the_edge_of_a_stripe_is_no_displacement() -> None:
