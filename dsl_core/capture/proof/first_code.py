@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from dsl_core.capture.proof.code_pairs import CodePairs, Pair, alike, dominant
 from dsl_core.capture.proof.columns import LEAST_MARGIN, decode, exchanged_pairs, run_backwards
 from dsl_core.capture.proof.contest import vote
-from dsl_core.capture.proof.finding import Finding, Verdict
+from dsl_core.capture.proof.finding import Finding, Verdict, displaced
 from dsl_core.capture.proof.first_light import FEWEST_LIT, changed_light, is_unlit
 from dsl_core.capture.proof.prediction import Lit
 from dsl_core.capture.proof.raster import Counts, Floats, Noise, Raster
@@ -189,8 +189,8 @@ class FirstCode:
             elif self._is_mirrored():
                 again = tuple(each for number in self._pairs.pairs for each in self._pair_shots(number))
                 self.reviewed.append(Finding(shot, Verdict.MIRRORED, again))
-            elif (displaced := self._displaced()) is not None:
-                self.reviewed.append(self._since(shot, displaced))
+            elif (since := self._displaced()) is not None:
+                self.reviewed.append(self._since(shot, since))
         if not self.reviewed:
             return None
         for each in self.reviewed:
@@ -220,12 +220,11 @@ class FirstCode:
         known = np.where(lit & self._margins(), column, -1).reshape(self._raster.shape)
         return displaced_code(self._code, self._plan.projector_size_px, known)
 
-    def _since(self, shot: Shot, displaced: DisplacedCode) -> Finding:
+    def _since(self, shot: Shot, code: DisplacedCode) -> Finding:
         """That a code is displaced since one of its pairs; white and black look the same everywhere."""
-        numbers = [number for number in sorted(self._pairs.pairs) if number >= displaced.since_pair]
+        numbers = [number for number in sorted(self._pairs.pairs) if number >= code.since_pair]
         again = tuple(each for number in numbers for each in self._pair_shots(number))
-        where = "higher" if displaced.columns > 0 else "lower"
-        return Finding(shot, Verdict.DISPLACED, again, f"towards {where} columns than the code before it")
+        return displaced(shot, again, code.columns)
 
     def substitute(self, number: int, pair: Pair) -> None:
         """Take a pair of another setting for a wrong one: for the columns alone."""

@@ -24,15 +24,15 @@ FEWEST_VOTES, LEAST_MEAN = 20.0, 0.3
 FEWEST_PICTURES = 2
 
 
-def displaced(profile: Floats, columns: int) -> Floats:
-    """A flat `line_profile` (3 width,) displaced by so many columns; what leaves the picture is lost."""
+def moved(profile: Floats, columns: int) -> Floats:
+    """A flat `line_profile` (3 width,) moved by so many columns; what leaves the picture is lost."""
     wide = profile.reshape(-1, 3)
-    moved = np.zeros_like(wide)
+    found = np.zeros_like(wide)
     if columns > 0:
-        moved[columns:] = wide[:-columns]
+        found[columns:] = wide[:-columns]
     else:
-        moved[:columns] = wide[-columns:]
-    return moved.ravel()
+        found[:columns] = wide[-columns:]
+    return found.ravel()
 
 
 class LinePlaces:

@@ -10,11 +10,11 @@ from numpy.typing import NDArray
 
 from dsl_core.capture.proof.contest import Contest
 from dsl_core.capture.proof.control import choose_pairs, is_same
-from dsl_core.capture.proof.finding import Finding, Light, Verdict
+from dsl_core.capture.proof.finding import Finding, Light, Verdict, displaced
 from dsl_core.capture.proof.first_code import FirstCode
 from dsl_core.capture.proof.later_settings import LaterSettings
 from dsl_core.capture.proof.light_steps import LightSteps
-from dsl_core.capture.proof.line_place import SIDES, LinePlaces, displaced
+from dsl_core.capture.proof.line_place import SIDES, LinePlaces, moved
 from dsl_core.capture.proof.line_shown import line_shown
 from dsl_core.capture.proof.neighbours import LineNeighbours
 from dsl_core.capture.proof.prediction import (
@@ -230,7 +230,7 @@ class FrameProof:
         }
         found = self._decide(shot, contests, share, lambda: self._line_shown(seen, shot))
         wanted = usual * wanted
-        places = {side: contest_of_lines(seen, lit, wanted, displaced(wanted, side)) for side in SIDES}
+        places = {side: contest_of_lines(seen, lit, wanted, moved(wanted, side)) for side in SIDES}
         return self._in_place(found, contests, places)
 
     def _in_place(
@@ -246,11 +246,7 @@ class FrameProof:
         if found.is_wrong and min((each.mean for each in places.values()), default=1.0) > best - NEARLY:
             return found
         told = self._line_places.judge(found.shot, places, found.is_wrong)
-        if told is None:
-            return found
-        side, since = told
-        where = "higher" if side > 0 else "lower"
-        return Finding(found.shot, Verdict.DISPLACED, since, f"towards {where} columns")
+        return found if told is None else displaced(found.shot, told[1], told[0])
 
     def _profile(self, shot: Shot) -> Floats | None:
         """The `line_profile` of a shot, which is a rival of its neighbours as well."""
@@ -315,9 +311,7 @@ class FrameProof:
         light = np.float32(self._later.scale(shot)) * lit.contrast
         profile = np.float32(self._usual.share(replace(shot, setting=self._first))) * profile
         return {
-            side: contest_of_places(
-                seen, wanted, now, light, (profile, displaced(profile, side)), self._noise
-            )
+            side: contest_of_places(seen, wanted, now, light, (profile, moved(profile, side)), self._noise)
             for side in SIDES
         }
 

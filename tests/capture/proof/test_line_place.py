@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from dsl_core.capture.proof.contest import Contest
 from dsl_core.capture.proof.finding import Finding, Verdict
-from dsl_core.capture.proof.line_place import LinePlaces, displaced
+from dsl_core.capture.proof.line_place import LinePlaces, moved
 from dsl_core.capture.proof.verifier import FrameProof
 from dsl_core.model.plan import CapturePlan, GrayCode, ScanLines, Setting, Shot
 from dsl_core.model.rig import Rig
@@ -70,10 +70,10 @@ def test_a_picture_that_is_wrong_needs_no_others_and_counts_for_none() -> None:
     assert places.judge(line(5), {1: Contest(15, -0.9)}) is None, "as if it were the first"
 
 
-def test_a_displaced_profile_keeps_its_colours_and_loses_what_leaves_the_picture() -> None:
+def test_a_moved_profile_keeps_its_colours_and_loses_what_leaves_the_picture() -> None:
     profile = np.arange(12, dtype=np.float32)
-    assert displaced(profile, 1).tolist() == [0, 0, 0, *range(9)]
-    assert displaced(profile, -1).tolist() == [*range(3, 12), 0, 0, 0]
+    assert moved(profile, 1).tolist() == [0, 0, 0, *range(9)]
+    assert moved(profile, -1).tolist() == [*range(3, 12), 0, 0, 0]
 
 
 @cache
@@ -114,7 +114,7 @@ def test_lines_shown_a_column_away_are_found_within_a_few_frames(columns: int, s
     assert abs(first.again[0].pattern - SINCE) <= 1
     assert first.shot.setting == setting
     assert first.shot.pattern < SINCE + 10
-    assert ("higher" if columns > 0 else "lower") in first.sentence
+    assert f"(1 column towards {'higher' if columns > 0 else 'lower'} columns)" in first.sentence
 
 
 @pytest.mark.parametrize("setting", [0, 1])
