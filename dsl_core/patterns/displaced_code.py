@@ -48,8 +48,10 @@ def displaced_code(
     """What was displaced of a code, from the columns that it names at pixels; None if nothing was.
 
     ``column`` (rows, columns) is -1 where it is not known for certain; ``size_px`` is the projector's
-    (width, height). Raises `PlanError`.
+    (width, height). Narrow ones tell nothing. Raises `PlanError`.
     """
+    if size_px[0] <= 4 * MOST_COLUMNS:
+        return None
     named = np.bincount(column[column >= 0], minlength=size_px[0])[: size_px[0]].astype(np.float64)
     tried, times = _tried(code, size_px)
     is_never, is_once, is_twice = times == 0, times == 1, times >= 2

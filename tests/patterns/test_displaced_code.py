@@ -79,3 +79,9 @@ def test_a_surface_that_ends_at_the_edge_of_a_stripe_is_no_displacement() -> Non
 def test_few_pixels_say_nothing() -> None:
     assert displaced_code(GRAY, SIZE_PX, seen(1, 1, rows=8)) is None
     assert displaced_code(GRAY, SIZE_PX, np.full((4, 5), -1)) is None
+
+
+@pytest.mark.parametrize("width", [2, 3, 16, 17, 31, 64])
+def test_narrow_projectors_have_codes_too(width: int) -> None:
+    column = np.tile(np.arange(width), (48, 1))
+    assert displaced_code(GRAY, (width, 4), column) is None

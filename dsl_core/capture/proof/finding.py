@@ -58,7 +58,7 @@ _REMEDY = {
     " long enough.",
     Verdict.MIRRORED: "Camera or projector is mirrored or upside down, or the calibration is of another rig:"
     " switch mirroring off in the settings of both, or calibrate again.",
-    Verdict.DISPLACED: "Check that projector, camera and target have not moved since the code was captured,"
+    Verdict.DISPLACED: "Check that projector, camera and target have not moved since the scan began,"
     " and that the projector does not correct or scale its picture.",
     Verdict.OTHER: "Check that camera, target and light have not moved since the scan began.",
 }

@@ -294,6 +294,8 @@ class FrameProof:
         found = self._decide(shot, contests, share, lambda: None)
         if shot.role == "spectral" and has_black:
             found = self._in_place(found, contests, self._places_again(shot, seen, wanted, black))
+        if found.verdict is Verdict.DISPLACED:
+            return found
         if found.is_wrong:
             return self._with_doubtful(found)
         if share is not None and first_of_role and not later.is_measured(shot):

@@ -227,28 +227,35 @@ def test_sixty_pixels_have_to_be_lit(more: int, enough: bool) -> None:
     assert (judged(light)[0].lit is not None) == enough
 
 
-def displaced_since(first: int) -> Finding:
-    """What the whole of a code of 512 columns shows that is two columns lower from frame ``first`` on."""
+def displaced_since(first: int) -> tuple[Finding, list[Finding]]:
+    """What the whole of a code of 512 columns shows that is two columns lower from frame ``first`` on.
+
+    And what the frames that are asked for again show in their place.
+    """
     sizes = {"camera_size_px": (512, 64), "projector_size_px": (512, 64)}
     plan = PLAN.model_copy(update=sizes)
     assert isinstance(plan.code, GrayCode)
     shots = [shot for shot in plan.shots() if shot.role in ("code", "white", "black")]
     raster = Raster(plan.camera_size_px)
     code = FirstCode(plan, plan.code, shots, raster, Noise(SENSOR), "RGGB", True)
-    for shot in shots:
-        image = np.roll(pattern_image(plan, shot)[..., 1], -2 * (shot.index >= first), 1)
-        picture = raster.take((SENSOR.black_level_dn + 2000.0 * (image / 255.0)).astype(np.uint16))
-        found = code.add(shot, picture, None)
-    return found
+
+    def shown(shot: Shot, columns: int) -> Finding:
+        image = np.roll(pattern_image(plan, shot)[..., 1], columns, 1)
+        picture = (SENSOR.black_level_dn + 2000.0 * (image / 255.0)).astype(np.uint16)
+        return code.add(shot, raster.take(picture), None)
+
+    found = [shown(shot, -2 * (shot.index >= first)) for shot in shots][-1]
+    return found, [shown(shot, 0) for shot in found.again]
 
 
 @pytest.mark.parametrize("first", [4, 8, 12])
 def test_a_code_that_is_displaced_from_some_pair_on_is_taken_again_from_there(first: int) -> None:
-    found = displaced_since(first)
+    found, again = displaced_since(first)
     assert found.verdict is Verdict.DISPLACED
     assert [shot.pattern for shot in found.again] == list(range(first, 18))
-    assert "lower" in found.sentence
+    assert "(2 columns towards lower columns)" in found.sentence
+    assert not any(each.is_wrong for each in again)
 
 
 def test_a_code_all_of_which_is_displaced_fits_itself() -> None:
-    assert not displaced_since(0).is_wrong
+    assert not displaced_since(0)[0].is_wrong
