@@ -44,7 +44,7 @@ _SEEN = {
     Verdict.SATURATED: "most of it is saturated",
     Verdict.DARK: "the pattern is missing from it",
     Verdict.MIRRORED: "columns of the projector run across the picture the wrong way round",
-    Verdict.DISPLACED: "it is shown a column or more away from where pictures before it were",
+    Verdict.DISPLACED: "it is shown a column or more away from where pictures before were",
     Verdict.OTHER: "it shows something else",
 }
 _REMEDY = {

@@ -257,5 +257,22 @@ def test_a_code_that_is_displaced_from_some_pair_on_is_taken_again_from_there(fi
     assert not any(each.is_wrong for each in again)
 
 
+def test_pairs_that_are_displaced_when_they_are_taken_again_are_told_however_often() -> None:
+    code = first_code()
+    shots = SHOTS[:4]
+
+    def moved(shot: Shot) -> Counts:
+        return RASTER.take(np.roll(seen(shot).reshape(18, 32), 1, 1))
+
+    told = [code.add(shot, moved(shot) if shot.index == 3 else seen(shot), None) for shot in shots]
+    assert told[-1].again == tuple(shots)
+    for _ in range(2):
+        again = [code.add(shot, moved(shot), None) for shot in shots]
+        assert [found.is_wrong for found in again] == [False, False, False, True]
+        assert again[-1].verdict is Verdict.DISPLACED
+        assert again[-1].again == tuple(shots)
+    assert not any(code.add(shot, seen(shot), None).is_wrong for shot in shots)
+
+
 def test_a_code_all_of_which_is_displaced_fits_itself() -> None:
     assert not displaced_since(0)[0].is_wrong
