@@ -13,15 +13,18 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
+import torch
 from numpy.typing import NDArray
 
 from dsl_core.model.fit import FitFinding
 from dsl_core.model.plan import BinaryCode, CapturePlan, EnsembleCode, GrayCode, XorCode
 from dsl_core.model.result import Flag
 from dsl_core.model.rig import Rig
+from dsl_core.optics.correspondence import zero_order
 from dsl_core.patterns.gray_code import DecodedCode
 from dsl_core.reconstruction.geometry import Geometry
 from dsl_core.reconstruction.named_rows import named_rows
+from dsl_core.words import counted
 
 Floats = NDArray[np.float64]
 
@@ -43,6 +46,8 @@ MOST_APART_PX, MOST_ROWS_PX = 0.1, 0.05
 MOST_BY_FILM_PX = 0.1
 #: Share of the error of columns that is seen in rows: pictures are wider than high, and depth follows rows.
 ROWS_TELL = 0.5
+#: A number of columns is whole up to this, and explains rows but for this share of their displacement.
+NEARLY_WHOLE, LEFT_OVER = 0.15, 0.3
 #: Pixels that say nothing: their column is not that of one surface, or is not refined.
 _DOUBTFUL = Flag.NOT_REFINED | Flag.UNUSUAL_PEAK | Flag.DEPTH_EDGE
 
@@ -193,14 +198,19 @@ def _of_rows(
     pixels = pixels[:: len(pixels) // MOST_PIXELS | 1]
     exact, expected = named_rows(rig, kind, pixels, geometry.depth_mm.ravel()[pixels])
     height, width = geometry.depth_mm.shape
+    tiles = TILES[0] * TILES[1]
     tile = pixels // width * TILES[0] // height * TILES[1] + pixels % width * TILES[1] // width
-    usual, unsure = displacement(expected, exact, tile, TILES[0] * TILES[1])
-    shift, std = displacement(code.row.ravel()[pixels], exact, tile, TILES[0] * TILES[1])
+    usual, unsure = displacement(expected, exact, tile, tiles)
+    shift, std = displacement(code.row.ravel()[pixels], exact, tile, tiles)
     found = Disagreement.of(shift - usual, np.hypot(std, unsure))
     if found is None:
         return None
+    slope = _rows_per_column(rig, pixels, geometry.depth_mm.ravel()[pixels])
+    columns = whole_columns(shift - usual, np.hypot(std, unsure), _mean_of_groups(slope, tile, tiles))
     # A film that was turned moves the ends of stripes, but by no more.
     film = ", or the film," if found.rms_px < MOST_BY_FILM_PX else ""
+    by = counted(abs(columns), "column")
+    moved = f", or the projector's pattern moved by {by} before the code or within it" if columns else ""
     return FitFinding.judged(
         "geometry",
         "rows of the binary code",
@@ -208,7 +218,38 @@ def _of_rows(
         "px",
         MOST_ROWS_PX,
         f"Rows of the projector lie {found.rms_px:.2f} px (rms, at most {found.worst_px:+.2f}) from where"
-        f" lenses, pose and depth place them: a lens or the pose{film} is not as calibrated. Deviations of"
-        " depth contain what rows can tell of that.",
-        "Check focus, zoom and mounts of camera and projector, and calibrate the geometry again.",
+        f" lenses, pose and depth place them: a lens or the pose{film} is not as calibrated{moved}."
+        " Deviations of depth contain what rows can tell of that.",
+        "Check focus, zoom and mounts of camera and projector, and that the projector does not move its"
+        " picture. Scan again; if that does not help, calibrate the geometry again.",
     )
+
+
+def whole_columns(shift_px: Floats, std_px: Floats, rows_per_column: Floats) -> int:
+    """The whole number of columns whose displacement explains that of rows (groups,), px; 0 if there is none.
+
+    ``rows_per_column`` (groups,) says by how many rows the place of a pixel moves with its column.
+    """
+    known = np.isfinite(shift_px) & (std_px < TELLING_PX) & np.isfinite(rows_per_column)
+    shift, slope = shift_px[known], rows_per_column[known]
+    if known.sum() < FEWEST_GROUPS or float(slope @ slope) == 0:
+        return 0
+    columns = float(shift @ slope) / float(slope @ slope)
+    left = shift - columns * slope
+    is_whole = abs(columns - round(columns)) < NEARLY_WHOLE and left @ left < LEFT_OVER**2 * (shift @ shift)
+    return round(columns) if is_whole else 0
+
+
+def _rows_per_column(rig: Rig, pixels: NDArray[np.intp], depth_mm: Floats) -> Floats:
+    """By how many rows of the projector the place of pixels moves with each of its columns, (n,)."""
+    near, far = (
+        zero_order(rig, torch.as_tensor(pixels), torch.as_tensor(depth_mm * share))
+        for share in (0.999, 1.001)
+    )
+    return np.asarray(((far[1] - near[1]) / (far[0] - near[0])).numpy())
+
+
+def _mean_of_groups(values: Floats, group: NDArray[np.integer], groups: int) -> Floats:
+    """Means (groups,); NaN of groups without values."""
+    count, total = (np.bincount(group, weights, groups) for weights in (None, values))
+    return np.where(count > 0, total / np.maximum(count, 1), np.nan)

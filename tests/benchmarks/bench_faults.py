@@ -41,7 +41,7 @@ from dsl_core.progress import NoProgress
 from dsl_core.simulation.scenes.catalogue import scene_catalogue
 from dsl_core.workflows.scans import DOUBTS, reconstruct_scan
 from tests.benchmarks.common import options, print_table, write_json
-from tests.cases.faulty_lab import CAMERA, OTHER, PROJECTOR, SPECTRUM, STAGE, installed
+from tests.cases.faulty_lab import CAMERA, OTHER, PROJECTOR, SHIFTS, SPECTRUM, STAGE, installed
 from tests.cases.pattern_faults import LASTING, SINGLE
 from tests.cases.spoiled_pictures import SPOILED
 
@@ -73,7 +73,7 @@ REASONS = {
     "stage says NaN": "nan",
 }
 #: Changes that only old shots taken again tell from a scene: in scans of these, sentinels are taken.
-CHANGES = (*SPOILED, "projector shifts by 1", "projector squares its picture")
+CHANGES = (*SPOILED, *SHIFTS, "projector squares its picture")
 #: Faults of the beginning of a scan, and between the last picture of the code and the first line.
 EARLY, AT_LINES = ("counter wraps", "lamp warms up"), ("swapped at the lines",)
 #: What a result says of such a change; other sentences on its fit do not count, nor do any of other faults.
@@ -277,6 +277,11 @@ def run(chosen_kinds: Sequence[str], cases: Sequence[Case], work: Work) -> dict[
             at = int(rng.integers(2, len(shots) - 2))
             if kind in EARLY:
                 at = 2
+            elif kind.endswith("in the code"):
+                at = int(rng.integers(3, 2 * ScanReader(work.clean[case]).plan.code_bits[0]))
+            elif kind.endswith("in the last lines"):
+                last = [shot for shot in shots if shot.setting == shots[-1].setting]
+                at = int(rng.choice([s.index for s in last if s.role == "spectral"][:-8]))
             elif kind in AT_LINES:
                 at = next(shot.index for shot in shots if shot.role == "spectral") - 1
             if kind in STAGE:

@@ -222,10 +222,8 @@ class LabProjector(Projector):
                     image = 255 - image
                 case "projector mirrors":
                     image = image[:, ::-1].copy()
-                case "projector shifts by 8":
-                    image = np.roll(image, 8, 1)
-                case "projector shifts by 1":
-                    image = np.roll(image, 1, 1)
+                case kind if kind in SHIFTS:
+                    image = np.roll(image, SHIFTS[kind], 1)
                 case "projector squares its picture":
                     image = squared(image)
                 case "projector dims":
@@ -305,6 +303,16 @@ class LabInstrument(Spectroradiometer):
         return curve
 
 
+#: By how many columns pictures are displaced.
+SHIFTS = {
+    "projector shifts by 8": 8,
+    "projector shifts by 1": 1,
+    "projector shifts by 1 in the code": 1,
+    "projector shifts by -1 in the code": -1,
+    "projector shifts by 2 in the code": 2,
+    "projector shifts by 1 in the last lines": 1,
+    "projector shifts by -2 in the last lines": -2,
+}
 PROJECTOR = (
     "projector hangs",
     "projector raises once",
@@ -312,8 +320,7 @@ PROJECTOR = (
     "projector changes its size",
     "projector inverts",
     "projector mirrors",
-    "projector shifts by 8",
-    "projector shifts by 1",
+    *SHIFTS,
     "projector squares its picture",
     "projector dims",
 )

@@ -15,8 +15,9 @@ from dsl_core.model.geometry import Pose
 from dsl_core.model.plan import BinaryCode, CapturePlan, EnsembleCode, GrayCode, ScanLines, Setting, XorCode
 from dsl_core.model.rig import Rig
 from dsl_core.model.spectral import WavelengthGrid
-from dsl_core.reconstruction.code_agreement import displacement
+from dsl_core.reconstruction.code_agreement import displacement, whole_columns
 from dsl_core.reconstruction.named_rows import named_rows
+from dsl_core.words import counted
 from dsl_core.workflows import scans
 from tests.cases.small_rig import small_rig
 from tests.cases.twin_scan import MemoryScan, twin_scan
@@ -77,6 +78,27 @@ def test_a_projector_turned_since_calibration_is_told_and_depth_says_how_unsure_
     assert found["geometry"].significant
     assert not found["motion"].significant
     assert held(evaluation) > 0.9
+
+
+@pytest.mark.parametrize("columns", [-2, 1])
+def test_a_picture_displaced_by_whole_columns_is_told_from_other_lenses(
+    scanned: tuple[DeviceRig, MemoryScan], columns: int
+) -> None:
+    rig = calibration_of(scanned[0])
+    lens = rig.projector.model_copy(update={"cx_px": rig.projector.cx_px + columns})
+    found, _ = findings(scanned, rig.model_copy(update={"projector": lens}), scanned[1])
+    assert found["geometry"].significant
+    assert f"pattern moved by {counted(abs(columns), 'column')} " in found["geometry"].sentence
+
+
+def test_rows_are_displaced_by_whole_columns_if_these_explain_all_of_them() -> None:
+    slope, std = np.array([0.25, 0.3, 0.2, -0.1, np.nan]), np.full(5, 0.01)
+    assert whole_columns(2 * slope, std, slope) == 2
+    assert whole_columns(-1.1 * slope, std, slope) == -1
+    assert whole_columns(1.4 * slope, std, slope) == 0
+    assert whole_columns(slope + np.array([0.2, -0.2, 0.2, 0.0, 0.0]), std, slope) == 0
+    assert whole_columns(2 * slope, np.array([0.01, 0.01, 0.01, 0.2, 0.01]), slope) == 0, "too few tell"
+    assert whole_columns(2 * slope, std, 0 * slope) == 0
 
 
 def test_lines_that_moved_after_the_code_are_told(scanned: tuple[DeviceRig, MemoryScan]) -> None:

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
 from enum import StrEnum
 
 from dsl_core.model.plan import Shot, describe_shot
+from dsl_core.words import counted
 
 
 class Verdict(StrEnum):
@@ -42,7 +44,7 @@ _SEEN = {
     Verdict.SATURATED: "most of it is saturated",
     Verdict.DARK: "the pattern is missing from it",
     Verdict.MIRRORED: "columns of the projector run across the picture the wrong way round",
-    Verdict.DISPLACED: "its lines are a column or more away from where the code says",
+    Verdict.DISPLACED: "it is shown a column or more away from where pictures before were",
     Verdict.OTHER: "it shows something else",
 }
 _REMEDY = {
@@ -56,7 +58,7 @@ _REMEDY = {
     " long enough.",
     Verdict.MIRRORED: "Camera or projector is mirrored or upside down, or the calibration is of another rig:"
     " switch mirroring off in the settings of both, or calibrate again.",
-    Verdict.DISPLACED: "Check that projector, camera and target have not moved since the code was captured,"
+    Verdict.DISPLACED: "Check that projector, camera and target have not moved since the scan began,"
     " and that the projector does not correct or scale its picture.",
     Verdict.OTHER: "Check that camera, target and light have not moved since the scan began.",
 }
@@ -108,6 +110,27 @@ class Finding:
     def remedy(self) -> str:
         """What a person can do."""
         return _REMEDY.get(self.verdict, "")
+
+
+def displaced(shot: Shot, again: tuple[Shot, ...], columns: int) -> Finding:
+    """That shots are shown so many columns away from their place, positive towards higher ones."""
+    where = "higher" if columns > 0 else "lower"
+    return Finding(
+        shot, Verdict.DISPLACED, again, f"{counted(abs(columns), 'column')} towards {where} columns"
+    )
+
+
+def together(findings: Iterable[Finding]) -> tuple[Finding, ...]:
+    """Findings with those that follow each other and say the same of displaced shots made one."""
+    found: list[Finding] = []
+    for each in findings:
+        before = found[-1] if found else None
+        same = before is not None and (before.verdict, before.detail) == (Verdict.DISPLACED, each.detail)
+        if before is not None and same and before.again[-1].setting == each.again[0].setting:
+            found[-1] = replace(before, again=(*before.again, *each.again))
+        else:
+            found.append(each)
+    return tuple(found)
 
 
 @dataclass(frozen=True)

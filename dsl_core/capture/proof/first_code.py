@@ -11,11 +11,12 @@ from numpy.typing import NDArray
 from dsl_core.capture.proof.code_pairs import CodePairs, Pair, alike, dominant
 from dsl_core.capture.proof.columns import LEAST_MARGIN, decode, exchanged_pairs, run_backwards
 from dsl_core.capture.proof.contest import vote
-from dsl_core.capture.proof.finding import Finding, Verdict
-from dsl_core.capture.proof.first_light import FEWEST_LIT, changed_light, is_unlit
+from dsl_core.capture.proof.finding import Finding, Verdict, displaced
+from dsl_core.capture.proof.first_light import FEWEST_LIT, changed_light, has_moved, is_unlit
 from dsl_core.capture.proof.prediction import Lit
 from dsl_core.capture.proof.raster import Counts, Floats, Noise, Raster
 from dsl_core.model.plan import BinaryCode, CapturePlan, Shot
+from dsl_core.patterns.displaced_code import DisplacedCode, displaced_code
 
 #: Share of saturated pixels from which on a picture tells nothing, and up to which other pictures do.
 ALL_SATURATED, SOME_SATURATED = 0.98, 0.7
@@ -99,7 +100,7 @@ class FirstCode:
             verdict, detail = self._explain(pair, expected, broken)
             return Finding(shot, verdict, again, detail)
         self._pairs.pairs[number] = pair
-        wrong = None if self._at_the_end else self._blinding(shot) or self._lost_light(shot)
+        wrong = None if self._at_the_end else self._blinding(shot) or self._changed_first(shot)
         if wrong is not None:
             for each in wrong.again:
                 self._pairs.pairs.pop(each.pattern // 2, None)
@@ -119,8 +120,8 @@ class FirstCode:
             return None
         return Finding(shot, Verdict.SATURATED, self._pair_shots(next(iter(self._pairs.pairs))))
 
-    def _lost_light(self, shot: Shot) -> Finding | None:
-        """Whether the light failed before two pairs were right: both wrong alike, they fit each other."""
+    def _changed_first(self, shot: Shot) -> Finding | None:
+        """Whether light or picture changed before two pairs were right: both wrong alike, they fit."""
         numbers = list(self._pairs.pairs)
         if len(numbers) == 2 and all(is_unlit(*pair, self._noise) for pair in self._pairs.pairs.values()):
             again = tuple(each for number in sorted(numbers) for each in self._pair_shots(number))
@@ -128,11 +129,15 @@ class FirstCode:
         if not self._disputed or not {pattern // 2 for pattern in self._disputed} <= set(numbers):
             return None
         now = self._by_pattern(self._pairs.pairs)
+        again = tuple(self._shots["code", pattern] for pattern in sorted(self._disputed))
+        first = again[0].pattern
+        before = self._disputed[first], self._disputed[first + 1]
+        if has_moved(before, (now[first], now[first + 1]), self._noise):
+            return Finding(shot, Verdict.DISPLACED, again)
         ratio = changed_light(self._disputed, now, self._noise)
         if ratio is None:
             self._disputed = {}
             return None
-        again = tuple(self._shots["code", pattern] for pattern in sorted(self._disputed))
         return Finding(shot, Verdict.EXPOSURE, again, f"{ratio:.2g} times that of the first pictures")
 
     @staticmethod
@@ -188,6 +193,8 @@ class FirstCode:
             elif self._is_mirrored():
                 again = tuple(each for number in self._pairs.pairs for each in self._pair_shots(number))
                 self.reviewed.append(Finding(shot, Verdict.MIRRORED, again))
+            elif (since := self._displaced()) is not None:
+                self.reviewed.append(self._since(shot, since))
         if not self.reviewed:
             return None
         for each in self.reviewed:
@@ -210,6 +217,18 @@ class FirstCode:
         return run_backwards(
             self._code, size_px, pairs, lit & self._margins(), self._raster.shape, self._rises
         )
+
+    def _displaced(self) -> DisplacedCode | None:
+        _, _, lit = self._pairs.contrast()
+        column, _ = decode(self._code, self._plan.projector_size_px, self._pairs.pairs)
+        known = np.where(lit & self._margins(), column, -1).reshape(self._raster.shape)
+        return displaced_code(self._code, self._plan.projector_size_px, known)
+
+    def _since(self, shot: Shot, code: DisplacedCode) -> Finding:
+        """That a code is displaced since one of its pairs; white and black look the same everywhere."""
+        numbers = [number for number in sorted(self._pairs.pairs) if number >= code.since_pair]
+        again = tuple(each for number in numbers for each in self._pair_shots(number))
+        return displaced(shot, again, code.columns)
 
     def substitute(self, number: int, pair: Pair) -> None:
         """Take a pair of another setting for a wrong one: for the columns alone."""

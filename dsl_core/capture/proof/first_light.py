@@ -1,7 +1,8 @@
-"""Whether the light was as strong as it is now when the first pictures of a scan were taken.
+"""Whether light and picture were as they are now when the first pictures of a scan were taken.
 
 Two pairs of a code that break each other's sum are taken again together, since nobody knows which of them was
-wrong. That they agree then proves little: a lamp that failed for good between them leaves both dark.
+wrong. That they agree then proves little: a lamp that failed for good between them leaves both dark, and a
+picture that was displaced meanwhile is so in both.
 """
 
 from __future__ import annotations
@@ -10,7 +11,15 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from dsl_core.capture.proof.code_pairs import ALIKE, LIT_SIGMAS, SAME_LIGHT
+from dsl_core.capture.proof.code_pairs import (
+    ALIKE,
+    BROKEN_SHARE,
+    FEWEST_BROKEN,
+    LEAST_BROKEN,
+    LIT_SIGMAS,
+    SAME_LIGHT,
+    Pair,
+)
 from dsl_core.capture.proof.raster import Counts, Floats, Noise
 
 #: Pixels that have to be lit to compare the light of two pictures.
@@ -67,6 +76,24 @@ def _scaled(one: Floats, other: Floats) -> tuple[float, float]:
         one, other = one - one.mean(), other - other.mean()
     ratio = float(one @ other / (one @ one))
     return ratio, float(np.abs(other - ratio * one).mean())
+
+
+def has_moved(before: Pair, now: Pair, noise: Noise) -> bool:
+    """Whether a pattern and its inverse, taken once more, are displaced: some pixels changed sides, not most.
+
+    Where the sum of both changed, one of them was wrong; where all of both did, they were exchanged.
+    """
+    every = [*before, *now]
+    dark, bright = np.minimum.reduce(every), np.maximum.reduce(every)
+    contrast = bright.astype(np.float32) - dark.astype(np.float32)
+    sigma = np.sqrt(noise.variance(dark) + noise.variance(bright))
+    lit = (contrast > LIT_SIGMAS * sigma) & (bright < noise.sensor.full_scale_dn)
+    limit = BROKEN_SHARE * contrast
+    one, other = (new.astype(np.float32) - old for new, old in zip(now, before, strict=True))
+    changed = lit & (np.abs(one) > limit) & (np.abs(other) > limit)
+    broken = lit & (np.abs(one + other) > limit)
+    few = max(FEWEST_BROKEN, LEAST_BROKEN * int(lit.sum()))
+    return int(broken.sum()) < few and FEWEST_BROKEN <= int((changed & ~broken).sum()) < int(lit.sum()) / 2
 
 
 def is_unlit(one: Counts, other: Counts, noise: Noise) -> bool:

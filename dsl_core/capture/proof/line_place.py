@@ -16,7 +16,7 @@ from dsl_core.capture.proof.raster import Floats
 from dsl_core.model.plan import Shot
 
 #: Columns to either side that lines are compared with.
-SIDES = (-1, 1)
+SIDES = (-1, 1, -2, 2)
 #: Votes for the other place, net of those for the right one, and what they are per voter at least: lines
 #: in their place have nearly one net vote against it per voter, blurred ones less, but above zero.
 FEWEST_VOTES, LEAST_MEAN = 20.0, 0.3
@@ -24,15 +24,15 @@ FEWEST_VOTES, LEAST_MEAN = 20.0, 0.3
 FEWEST_PICTURES = 2
 
 
-def displaced(profile: Floats, columns: int) -> Floats:
-    """A flat `line_profile` (3 width,) displaced by so many columns; what leaves the picture is lost."""
+def moved(profile: Floats, columns: int) -> Floats:
+    """A flat `line_profile` (3 width,) moved by so many columns; what leaves the picture is lost."""
     wide = profile.reshape(-1, 3)
-    moved = np.zeros_like(wide)
+    found = np.zeros_like(wide)
     if columns > 0:
-        moved[columns:] = wide[:-columns]
+        found[columns:] = wide[:-columns]
     else:
-        moved[:columns] = wide[-columns:]
-    return moved.ravel()
+        found[:columns] = wide[-columns:]
+    return found.ravel()
 
 
 class LinePlaces:
@@ -42,27 +42,39 @@ class LinePlaces:
         """Start without any picture."""
         self._votes: dict[int, dict[int, tuple[Shot, float, int]]] = {side: {} for side in SIDES}
 
-    def judge(self, shot: Shot, contests: Mapping[int, Contest]) -> tuple[int, tuple[Shot, ...]] | None:
-        """The side on which lines lie, and the shots since they do up to this one; None if in their place.
+    def judge(
+        self, shot: Shot, contests: Mapping[int, Contest], is_wrong: bool = False
+    ) -> tuple[int, tuple[Shot, ...]] | None:
+        """By how many columns lines are away, and the shots since they are up to this one; None if they fit.
 
-        ``contests`` are those of the right place with the one on each side. Shots that are returned are
-        forgotten, as they have to be taken again.
+        ``contests`` are those of the right place with others. Shots that are returned are forgotten, as they
+        have to be taken again. A picture that ``is_wrong`` already needs no others to agree.
         """
         for side, contest in contests.items():
             votes = self._votes[side]
             votes.pop(shot.index, None)
             if contest.count:
                 votes[shot.index] = (shot, contest.mean * contest.count, contest.count)
-        for side in contests:
-            since = self._since(side, shot)
-            if since:
-                for votes in self._votes.values():
-                    for each in since:
-                        votes.pop(each.index, None)
-                return side, since
-        return None
+        since = {side: self._since(side, shot, 1 if is_wrong else FEWEST_PICTURES) for side in contests}
+        told = {side: self._against(side, shots) for side, shots in since.items() if shots}
+        if not told and is_wrong:
+            self._forget((shot,))
+        if not told:
+            return None
+        side = max(told, key=lambda each: told[each])
+        self._forget(since[side])
+        return side, since[side]
 
-    def _since(self, side: int, last: Shot) -> tuple[Shot, ...]:
+    def _against(self, side: int, shots: tuple[Shot, ...]) -> float:
+        """Votes of shots that lines are on a side."""
+        return -sum(self._votes[side][each.index][1] for each in shots)
+
+    def _forget(self, shots: tuple[Shot, ...]) -> None:
+        for votes in self._votes.values():
+            for each in shots:
+                votes.pop(each.index, None)
+
+    def _since(self, side: int, last: Shot, fewest: int) -> tuple[Shot, ...]:
         """Shots up to the last one that agree best that lines lie on a side; none where they do not."""
         votes, total, count, best = self._votes[side], 0.0, 0, 0.0
         run: list[Shot] = []
@@ -78,6 +90,6 @@ class LinePlaces:
             if -total <= best:
                 continue
             best = -total
-            if len(run) >= FEWEST_PICTURES and best > max(FEWEST_VOTES, LEAST_MEAN * count):
+            if len(run) >= fewest and best > max(FEWEST_VOTES, LEAST_MEAN * count):
                 since = tuple(reversed(run))
         return since

@@ -25,6 +25,8 @@ LIT_SHARE = 0.1
 #: Brightness is measured where a pattern has this share of its brightest column: on the flank of a line light
 #: depends on parts of a column, which the code does not tell.
 BODY_SHARE = 0.5
+#: A prediction explains another one that is nearer to it than this share of what a rival is apart.
+EXPLAINED = 0.25
 #: Of the pixels that a rival leaves bright or dark, every so many are asked where there are plenty.
 PLENTY = 4000
 
@@ -132,6 +134,25 @@ def rescaled(picture: Counts, old_black: Counts, new_black: Floats, scale: float
     # Nobody knows how much brighter a saturated pixel was.
     variance[(picture >= full) & (counts < full)] = np.inf
     return Expected(counts, variance)
+
+
+def contest_of_places(
+    seen: Counts, wanted: Expected, lit: Lit, light: Floats, profiles: tuple[Floats, Floats], noise: Noise
+) -> Contest:
+    """Whether a predicted picture is seen, or one whose pattern is displaced, for which there is no picture.
+
+    The latter follows from ``light``, the counts (n,) that white adds to black at the places of ``lit``, and
+    the ``profiles`` of the pattern in its place and out of it. Only pixels are asked whose prediction the
+    former explains: most are brighter, by what lenses and a film spread.
+    """
+    chosen = np.flatnonzero(np.take(np.abs(profiles[0] - profiles[1]) > APART, lit.key))
+    key, at, full = lit.key[chosen], lit.index[chosen], np.float32(noise.sensor.full_scale_dn)
+    usual, rival = (np.minimum(lit.black[chosen] + light[chosen] * each[key], full) for each in profiles)
+    expected, counts = wanted.counts[at], seen[at].astype(np.float32)
+    apart = np.abs(expected - rival)
+    variance = noise.variance(seen)[at] + wanted.variance[at]
+    asked = (np.abs(expected - usual) < EXPLAINED * apart) & (apart**2 > SIGMAS**2 * variance)
+    return vote(counts[asked], expected[asked], rival[asked])
 
 
 def contest_of_pictures(

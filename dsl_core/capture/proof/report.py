@@ -9,7 +9,7 @@ from contextlib import suppress
 import numpy as np
 from numpy.typing import NDArray
 
-from dsl_core.capture.proof.finding import Finding, ProofReport, Verdict
+from dsl_core.capture.proof.finding import Finding, ProofReport, Verdict, together
 from dsl_core.capture.proof.raster import Counts, Raster
 from dsl_core.capture.proof.verifier import FrameProof
 from dsl_core.capture.sentinels import movement_of
@@ -60,7 +60,7 @@ class SeenFrames:
                 pair = self._pair_elsewhere(number, shot.setting)
                 if pair is not None:
                     proof.substitute(number, pair)
-        return ProofReport(judged, tuple(wrong), untold)
+        return ProofReport(judged, together(wrong), untold)
 
     def _pair_elsewhere(self, number: int, setting: int) -> tuple[Counts, Counts] | None:
         """Pattern and inverse as another setting shows them."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -10,21 +10,21 @@ from numpy.typing import NDArray
 
 from dsl_core.capture.proof.contest import Contest
 from dsl_core.capture.proof.control import choose_pairs, is_same
-from dsl_core.capture.proof.finding import Finding, Light, Verdict
+from dsl_core.capture.proof.finding import Finding, Light, Verdict, displaced
 from dsl_core.capture.proof.first_code import FirstCode
 from dsl_core.capture.proof.later_settings import LaterSettings
 from dsl_core.capture.proof.light_steps import LightSteps
-from dsl_core.capture.proof.line_place import SIDES, LinePlaces, displaced
+from dsl_core.capture.proof.line_place import SIDES, LinePlaces, moved
 from dsl_core.capture.proof.line_shown import line_shown
 from dsl_core.capture.proof.neighbours import LineNeighbours
 from dsl_core.capture.proof.prediction import (
     APART,
     Expected,
-    Lit,
     brightness_of_lines,
     brightness_of_picture,
     contest_of_lines,
     contest_of_pictures,
+    contest_of_places,
     line_profile,
 )
 from dsl_core.capture.proof.raster import Counts, Floats, Noise, Raster
@@ -35,7 +35,8 @@ from dsl_core.model.captured_code import CapturedCode
 from dsl_core.model.plan import CapturePlan, NoCode, Shot, describe_shot
 from dsl_core.model.rig import Rig
 
-#: Where several rivals won, the picture before is blamed if its votes are nearly as many (their mean).
+#: Where several rivals won, the picture before is blamed if its votes are nearly as many (their mean), and
+#: another place of the same line only if its are more.
 NEARLY = 0.3
 
 
@@ -228,17 +229,24 @@ class FrameProof:
             if rival is not None
         }
         found = self._decide(shot, contests, share, lambda: self._line_shown(seen, shot))
-        return found if found.is_wrong else self._in_place(found, seen, lit, usual * wanted)
+        wanted = usual * wanted
+        places = {side: contest_of_lines(seen, lit, wanted, moved(wanted, side)) for side in SIDES}
+        return self._in_place(found, contests, places)
 
-    def _in_place(self, found: Finding, seen: Counts, lit: Lit, wanted: Floats) -> Finding:
-        """A finding on lines, or that they are out of their place since some shot."""
-        contests = {side: contest_of_lines(seen, lit, wanted, displaced(wanted, side)) for side in SIDES}
-        told = self._line_places.judge(found.shot, contests)
-        if told is None:
+    def _in_place(
+        self, found: Finding, rivals: Mapping[Verdict, Contest], places: Mapping[int, Contest]
+    ) -> Finding:
+        """A finding on a line, or that lines are out of their place since some shot.
+
+        ``places`` are contests of the right place with those so many columns away. A line next to its place
+        may seem dark, or like the next one, but is more like itself out of place than like any of the
+        ``rivals``.
+        """
+        best = min((each.mean for each in rivals.values() if each.is_told), default=1.0)
+        if found.is_wrong and min((each.mean for each in places.values()), default=1.0) > best - NEARLY:
             return found
-        side, since = told
-        where = "higher" if side > 0 else "lower"
-        return Finding(found.shot, Verdict.DISPLACED, since, f"towards {where} columns")
+        told = self._line_places.judge(found.shot, places, found.is_wrong)
+        return found if told is None else displaced(found.shot, told[1], told[0])
 
     def _profile(self, shot: Shot) -> Floats | None:
         """The `line_profile` of a shot, which is a rival of its neighbours as well."""
@@ -284,12 +292,30 @@ class FrameProof:
         share = self._brightness_again(shot, seen, wanted, black) if is_judged else None
         first_of_role = not self._usual.knows(shot)
         found = self._decide(shot, contests, share, lambda: None)
+        if shot.role == "spectral" and has_black:
+            found = self._in_place(found, contests, self._places_again(shot, seen, wanted, black))
+        if found.verdict is Verdict.DISPLACED:
+            return found
         if found.is_wrong:
             return self._with_doubtful(found)
         if share is not None and first_of_role and not later.is_measured(shot):
             later.measure(shot, share)
             self._usual.begin(shot)
         return found
+
+    def _places_again(self, shot: Shot, seen: Counts, wanted: Expected, black: Floats) -> dict[int, Contest]:
+        """Contests of a line's place with those next to it, from its picture at the first setting."""
+        lit = self._code.lit if self._code is not None else None
+        profile = self._profile(shot)
+        if lit is None or profile is None:
+            return {}
+        now = replace(lit, black=black[lit.index])
+        light = np.float32(self._later.scale(shot)) * lit.contrast
+        profile = np.float32(self._usual.share(replace(shot, setting=self._first))) * profile
+        return {
+            side: contest_of_places(seen, wanted, now, light, (profile, moved(profile, side)), self._noise)
+            for side in SIDES
+        }
 
     def _brightness_again(self, shot: Shot, seen: Counts, wanted: Expected, black: Floats) -> float | None:
         lit = self._code.lit if self._code is not None else None

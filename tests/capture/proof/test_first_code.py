@@ -225,3 +225,54 @@ def test_sixty_pixels_have_to_be_lit(more: int, enough: bool) -> None:
     light = np.zeros((18, 32))
     light[:, :3], light[:more, 3] = 2000.0, 2000.0  # three columns of 18
     assert (judged(light)[0].lit is not None) == enough
+
+
+def displaced_since(first: int) -> tuple[Finding, list[Finding]]:
+    """What the whole of a code of 512 columns shows that is two columns lower from frame ``first`` on.
+
+    And what the frames that are asked for again show in their place.
+    """
+    sizes = {"camera_size_px": (512, 64), "projector_size_px": (512, 64)}
+    plan = PLAN.model_copy(update=sizes)
+    assert isinstance(plan.code, GrayCode)
+    shots = [shot for shot in plan.shots() if shot.role in ("code", "white", "black")]
+    raster = Raster(plan.camera_size_px)
+    code = FirstCode(plan, plan.code, shots, raster, Noise(SENSOR), "RGGB", True)
+
+    def shown(shot: Shot, columns: int) -> Finding:
+        image = np.roll(pattern_image(plan, shot)[..., 1], columns, 1)
+        picture = (SENSOR.black_level_dn + 2000.0 * (image / 255.0)).astype(np.uint16)
+        return code.add(shot, raster.take(picture), None)
+
+    found = [shown(shot, -2 * (shot.index >= first)) for shot in shots][-1]
+    return found, [shown(shot, 0) for shot in found.again]
+
+
+@pytest.mark.parametrize("first", [4, 8, 12])
+def test_a_code_that_is_displaced_from_some_pair_on_is_taken_again_from_there(first: int) -> None:
+    found, again = displaced_since(first)
+    assert found.verdict is Verdict.DISPLACED
+    assert [shot.pattern for shot in found.again] == list(range(first, 18))
+    assert "(2 columns towards lower columns)" in found.sentence
+    assert not any(each.is_wrong for each in again)
+
+
+def test_pairs_that_are_displaced_when_they_are_taken_again_are_told_however_often() -> None:
+    code = first_code()
+    shots = SHOTS[:4]
+
+    def moved(shot: Shot) -> Counts:
+        return RASTER.take(np.roll(seen(shot).reshape(18, 32), 1, 1))
+
+    told = [code.add(shot, moved(shot) if shot.index == 3 else seen(shot), None) for shot in shots]
+    assert told[-1].again == tuple(shots)
+    for _ in range(2):
+        again = [code.add(shot, moved(shot), None) for shot in shots]
+        assert [found.is_wrong for found in again] == [False, False, False, True]
+        assert again[-1].verdict is Verdict.DISPLACED
+        assert again[-1].again == tuple(shots)
+    assert not any(code.add(shot, seen(shot), None).is_wrong for shot in shots)
+
+
+def test_a_code_all_of_which_is_displaced_fits_itself() -> None:
+    assert not displaced_since(0)[0].is_wrong

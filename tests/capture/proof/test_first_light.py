@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from dsl_core.capture.proof.first_light import changed_light, is_unlit
+from dsl_core.capture.proof.first_light import changed_light, has_moved, is_unlit
 from dsl_core.capture.proof.raster import Counts, Noise
 from dsl_core.model.rig import Sensor
 
@@ -50,6 +50,23 @@ def test_pictures_of_other_patterns_say_nothing_of_the_light(order: tuple[int, .
 def test_little_light_and_drift_are_not_told() -> None:
     assert changed_light(pictures(8), pictures(0), NOISE) is None
     assert changed_light(pictures(1000), pictures(1300), NOISE) is None
+
+
+@pytest.mark.parametrize(("columns", "is_told"), [(0, False), (1, True), (-2, True)])
+def test_a_pattern_and_its_inverse_that_moved_are_told_by_the_edges_of_stripes(
+    columns: int, is_told: bool
+) -> None:
+    before, now = pictures(1000), {n: np.roll(each, columns) for n, each in pictures(1000).items()}
+    assert has_moved((before[0], before[1]), (now[0], now[1]), NOISE) == is_told
+
+
+@pytest.mark.parametrize("order", [(1, 0), (0, 0), (0, 2), (3, 0), (2, 2)])
+def test_exchanged_and_wrong_pictures_have_not_moved(order: tuple[int, int]) -> None:
+    now = pictures(1000)
+    for light in (1000, 500, 0):
+        before = pictures(light)
+        assert not has_moved((before[order[0]], before[order[1]]), (now[0], now[1]), NOISE)
+    assert not has_moved((now[0], now[1]), (now[order[0]], now[order[1]]), NOISE)
 
 
 def even(*light: float) -> dict[int, Counts]:

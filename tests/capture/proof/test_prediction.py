@@ -13,6 +13,7 @@ from dsl_core.capture.proof.prediction import (
     brightness_of_picture,
     contest_of_lines,
     contest_of_pictures,
+    contest_of_places,
     line_profile,
     rescaled,
 )
@@ -129,6 +130,32 @@ def test_a_picture_of_another_setting_is_its_light_times_that_of_the_setting() -
     # Twice squared, of picture and black: (200 + 100) / 10 + 0.7, and so on.
     assert found.variance[:3] == pytest.approx([4 * 30.7, 4 * 20.7, 4 * (399.5 + 10 + 0.7)], rel=1e-3)
     assert np.isinf(found.variance[3]), "nobody knows how bright a saturated pixel was"
+
+
+def test_places_are_told_by_pixels_whose_prediction_the_columns_explain() -> None:
+    some = lit(40)
+    right, away = (floats(np.arange(40) // 10 % 2 == side) for side in (0, 1))
+    light = floats(np.full(40, 1000))
+    counts, seen = floats(np.full(80, 120)), np.full(80, 120, np.uint16)
+    counts[::2] += light * right
+    seen[::2] += (light * away).astype(np.uint16)
+    wanted = Expected(counts, floats(np.full(80, 9)))
+    contest = contest_of_places(seen, wanted, some, light, (right, away), NOISE)
+    assert (contest.count, contest.mean) == (40, -1.0)
+    as_wanted = contest_of_places(counts.astype(np.uint16), wanted, some, light, (right, away), NOISE)
+    assert (as_wanted.count, as_wanted.mean) == (40, 1.0)
+    counts[:10] += 400  # light beyond the line
+    assert contest_of_places(seen, wanted, some, light, (right, away), NOISE).count == 35
+    noisy = Expected(counts, floats(np.full(80, 1e6)))
+    assert contest_of_places(seen, noisy, some, light, (right, away), NOISE).count == 0
+
+
+def test_a_place_whose_light_saturates_either_way_says_nothing() -> None:
+    some, full = lit(40), NOISE.sensor.full_scale_dn
+    light, one, other = floats(np.full(40, 1e5)), floats(np.ones(40)), floats(np.full(40, 0.15))
+    wanted = Expected(floats(np.full(80, full)), floats(np.full(80, 9)))
+    seen = np.full(80, full, np.uint16)
+    assert contest_of_places(seen, wanted, some, light, (one, other), NOISE).count == 0
 
 
 def pictures(
