@@ -121,17 +121,19 @@ class HdrMerger:
         raws: Sequence[NDArray[np.unsignedinteger]],
         out: MergedFrame | None = None,
         levels: Sequence[float] | None = None,
+        black_dn: Sequence[float] | None = None,
     ) -> MergedFrame:
         """Merge one raw mosaic per setting, in the order of the gains; writes into ``out`` if given.
 
-        ``levels`` is the light that each was exposed to, relative to what the gains assume (None: all 1).
+        ``levels`` is the light that each was exposed to, relative to what the gains assume (None: all 1), and
+        ``black_dn`` what each has above its black frame in every pixel (None: nothing).
         Raises `DecodeError` when a frame is missing, has another size, or is not of whole numbers.
         """
         if out is None:
             out = MergedFrame(
                 np.empty(self.shape, np.float32), np.empty(self.shape, np.float32), np.empty(self.shape, bool)
             )
-        self._merge(raws, levels, out.radiance, out.variance, _NO_BITS, out.saturated)
+        self._merge(raws, levels, black_dn, out.radiance, out.variance, _NO_BITS, out.saturated)
         return out
 
     def merge_std(
@@ -140,19 +142,21 @@ class HdrMerger:
         radiance: Array,
         std: NDArray[np.floating],
         levels: Sequence[float] | None = None,
+        black_dn: Sequence[float] | None = None,
     ) -> None:
         """The same into ``radiance`` and ``std``, of half or single precision, both (rows, columns)."""
         saturated = _room().of(self.shape, bool)
         if std.dtype == np.float16:
-            self._merge(raws, levels, radiance, _NO_VALUES, std.view(np.uint16), saturated)
+            self._merge(raws, levels, black_dn, radiance, _NO_VALUES, std.view(np.uint16), saturated)
         else:
-            self._merge(raws, levels, radiance, std, _NO_BITS, saturated)
+            self._merge(raws, levels, black_dn, radiance, std, _NO_BITS, saturated)
             np.sqrt(std, out=std)
 
     def _merge(
         self,
         raws: Sequence[NDArray[np.unsignedinteger]],
         levels: Sequence[float] | None,
+        black_dn: Sequence[float] | None,
         radiance: Array,
         variance: NDArray[np.floating],
         halves: NDArray[np.uint16],
@@ -168,10 +172,13 @@ class HdrMerger:
             if not np.issubdtype(raw.dtype, np.unsignedinteger):
                 raise DecodeError(f"Raw frames contain unsigned whole numbers, not {raw.dtype}.")
         light = np.ones(len(raws), np.float32) if levels is None else np.asarray(levels, np.float32)
+        black = self._black
+        if black_dn is not None:
+            black = black + np.asarray(black_dn, np.float32)[:, None, None]
         counts = _room().of(self._black.shape, np.uint16)
         np.stack(raws, out=counts)
         merge_settings(
-            counts, self._black, self._floor, self._gains * light, self._shots * light, self._limit_dn,
+            counts, black, self._floor, self._gains * light, self._shots * light, self._limit_dn,
             radiance, variance, halves, saturated,
         )  # fmt: skip
 
