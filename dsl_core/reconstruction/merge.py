@@ -22,7 +22,14 @@ from dsl_core.patterns.binary_code import decoder_of
 from dsl_core.patterns.captured_code import decode_captured
 from dsl_core.patterns.gray_code import DecodedCode
 from dsl_core.progress import NoProgress, Progress
-from dsl_core.reconstruction.hdr import BlackFrame, HdrMerger, MergedFrame, black_frame, setting_gains_ms
+from dsl_core.reconstruction.hdr import (
+    BlackFrame,
+    HdrMerger,
+    MergedFrame,
+    black_frame,
+    gained_black,
+    setting_gains_ms,
+)
 from dsl_core.reconstruction.light.setting_ratios import Ratio, compare_settings
 
 T = TypeVar("T")
@@ -44,19 +51,26 @@ class Readout(Protocol):
 
 @dataclass(frozen=True)
 class Exposed:
-    """In what light each shot of a plan was taken, both (shots,).
+    """In what light each shot of a plan was taken, all (shots,).
 
-    ``levels`` are relative to the light that it should have had; ``black_dn`` is what every pixel has above
-    the black frame of the shot's setting, DN.
+    ``levels`` are relative to the light that it should have had. Black is ``black_dn`` more than the black
+    frame of the shot's setting in every pixel, and this ``black_share`` of what that is above its level.
     """
 
     levels: NDArray[np.float64]
     black_dn: NDArray[np.float64]
+    black_share: NDArray[np.float64]
 
-    def of(self, shots: Sequence[Shot]) -> tuple[list[float], list[float]]:
-        """Levels and black of some shots."""
+    @classmethod
+    def as_planned(cls, count: int) -> Exposed:
+        """Of so many shots."""
+        return cls(np.ones(count), np.zeros(count), np.zeros(count))
+
+    def of(self, shots: Sequence[Shot]) -> tuple[list[float], list[tuple[float, float]]]:
+        """Levels and what black has gained of some shots."""
         at = [shot.index for shot in shots]
-        return self.levels[at].tolist(), self.black_dn[at].tolist()
+        gained = zip(self.black_dn[at].tolist(), self.black_share[at].tolist(), strict=True)
+        return self.levels[at].tolist(), list(gained)
 
 
 class MergedScan:
@@ -122,7 +136,7 @@ class MergedScan:
 
     def _prepare(
         self, role: Role, pattern: int, raws: Sequence[NDArray[np.uint16]]
-    ) -> tuple[HdrMerger, tuple[list[float], list[float]] | tuple[()]]:
+    ) -> tuple[HdrMerger, tuple[list[float], list[tuple[float, float]]] | tuple[()]]:
         """What merges the shots of a pattern, their light and their black, after they were compared."""
         shots = self.shots_of(role, pattern)
         if self._compares:
@@ -140,10 +154,11 @@ class MergedScan:
             blacks = [self.blacks[shot.setting] for shot in shots]
             gains = [float(self.gains_ms[shot.setting]) for shot in shots]
             if self._exposed is not None:
-                _, more_dn = self._exposed.of(shots)
+                _, gained = self._exposed.of(shots)
+                level_dn = self.rig.sensor.black_level_dn
                 blacks = [
-                    replace(black, mean=black.mean + np.float32(dn))
-                    for black, dn in zip(blacks, more_dn, strict=True)
+                    replace(black, mean=gained_black(black.mean, *more, level_dn))
+                    for black, more in zip(blacks, gained, strict=True)
                 ]
             self.ratios[role, pattern] = compare_settings(raws, blacks, gains, self.rig.sensor)
 

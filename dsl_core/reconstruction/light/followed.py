@@ -27,7 +27,12 @@ from dsl_core.reconstruction.light.course import (
 from dsl_core.reconstruction.light.line_levels import LineLevels, candidates, line_levels
 from dsl_core.reconstruction.light.setting_ratios import Ratio
 from dsl_core.reconstruction.light.steady import SteadyLight
-from dsl_core.reconstruction.light.sudden import Again, SuddenChanges, sudden_changes
+from dsl_core.reconstruction.light.sudden import (
+    Again,
+    SuddenChanges,
+    share_of_black,
+    sudden_changes,
+)
 from dsl_core.reconstruction.merge import Exposed, PickedLines
 
 #: Frames whose sum is this far from white are of a scene that moved, or not what was asked for.
@@ -129,13 +134,16 @@ def follow_light(
 def blacks_again(scan: Pictures) -> list[Again]:
     """By how much black pictures that a scan took again differ from the first ones, DN."""
     plan, changes = scan.plan, []
+    whites = {shot.setting: shot for shot in plan.shots() if shot.role == "white"}
     for shot in plan.shots():
         old = plan.original(shot)
         if shot.role == "sentinel" and old.role == "black":
-            more = scan.source.read(shot).astype(np.float32) - scan.source.read(old)
-            changes.append(
-                Again(shot.index, float(more.mean()), max(float(more.std()) / np.sqrt(more.size), 1e-3))
-            )
+            black = scan.source.read(old).astype(np.float32)
+            more, share = scan.source.read(shot) - black, (0.0, float("inf"))
+            if old.setting in whites:
+                share = share_of_black(more, black, scan.source.read(whites[old.setting]))
+            std = float(more.std()) / np.sqrt(more.size)
+            changes.append(Again(shot.index, float(more.mean()), max(std, 1e-3), share))
     return changes
 
 
@@ -145,9 +153,9 @@ def black_wander(blacks: Sequence[Again], sudden: SuddenChanges | None = None) -
         return None
     means, stds = (np.array([getattr(each, name) for each in blacks]) for name in ("more", "std"))
     what = " All frames are off by as much."
-    if sudden is not None and sudden.black_dn:
+    if sudden is not None and sudden.black:
         often = "at once" if sudden.explains_black else "in part at once"
-        what = f" It did so {often}, {_since(sudden.black_dn)}; the frames are corrected for that."
+        what = f" It did so {often}, {_since(sudden.black)}; the frames are corrected for that."
     return FitFinding.judged(
         "light",
         "black taken again",
@@ -305,7 +313,7 @@ def _of_lines(scan: Pictures, lines: LineLevels | None) -> Iterator[Witness]:
 def _between_settings(scan: Pictures, course: LightCourse, exposed: Exposed | None) -> Exposed:
     """What makes the shots of a pattern agree with that of its last setting, besides changes at once."""
     count = scan.plan.shot_count
-    known = exposed or Exposed(np.ones(count), np.zeros(count))
+    known = exposed or Exposed.as_planned(count)
     levels = known.levels.copy()
     for (role, pattern), ratios in scan.ratios.items():
         shots = scan.shots_of(role, pattern)

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from dsl_core.model.captured_code import CapturedCode
 from dsl_core.model.frames import FrameSource
 from dsl_core.model.plan import CapturePlan, NoCode, Role, ScanLines, Shot
-from dsl_core.model.rig import Rig
+from dsl_core.model.rig import Rig, Sensor
 from dsl_core.optics.sensor import raw_variance
 from dsl_core.reconstruction.light.line_levels import pitch_of, zone_px
 from dsl_core.reconstruction.light.setting_ratios import compared_rows
@@ -28,6 +28,8 @@ Picture = NDArray[np.float32]
 FEWEST = 60
 #: Differences of pixels count up to so many deviations: a highlight is no change of black.
 CLIP = 4.0
+#: Variance of light over a picture, relative to that of noise, that tells by how much all of it changed.
+CONTRAST = 10.0
 #: Pixels without a column are unlit with less light than so many deviations.
 UNLIT = 3.0
 
@@ -47,20 +49,28 @@ class Scan(Protocol):
 class NeighbourSteps:
     """What each shot has more than the one before, all (shots,), NaN where that is not known.
 
-    ``black_dn`` in every pixel; ``log`` of its light, from which ``shared_dn`` of light, the mean that both
-    frames hold in the pixels asked (infinite for pictures of a code), was asked; with deviations.
+    ``black_dn`` is the mean over pixels that no line is near, where black is ``dark_dn`` above its level and
+    the frame before held ``faint_dn`` of light.
+    ``light_dn`` is the same with pixels that are bright in white counting more; there the frame before held
+    ``shared_dn`` of light, and black is ``light_dark_dn`` above its level. Pictures of a code tell the
+    logarithm ``log`` of their light at once. With deviations.
     """
 
     black_dn: Floats
     black_std_dn: Floats
+    dark_dn: Floats
+    faint_dn: Floats
+    light_dn: Floats
+    light_std_dn: Floats
+    shared_dn: Floats
+    light_dark_dn: Floats
     log: Floats
     log_std: Floats
-    shared_dn: Floats
 
 
 def neighbour_steps(scan: Scan, column: NDArray[np.integer]) -> NeighbourSteps:
     """Compare neighbouring frames of a scan whose pixels have these projector columns (negative: none)."""
-    found = NeighbourSteps(*(np.full(scan.plan.shot_count, np.nan) for _ in range(5)))
+    found = NeighbourSteps(*(np.full(scan.plan.shot_count, np.nan) for _ in range(10)))
     for setting in range(len(scan.plan.settings)):
         if setting in scan.plan.code_settings and not isinstance(scan.plan.code, NoCode | CapturedCode):
             _of_code(scan, setting, found)
@@ -78,13 +88,22 @@ def pair_against_white(scan: Scan, setting: int, number: int) -> tuple[tuple[flo
     white, black = (_read(scan, _shot(scan, role, 0, setting)) for role in ("white", "black"))
     one, other = (_read(scan, _shot(scan, "code", 2 * number + i, setting)) for i in (0, 1))
     sound = np.maximum(np.maximum(one, other), white) < 0.98 * sensor.full_scale_dn
-    light, both = (white - black)[sound].astype(np.float64), (one + other - 2 * black)[sound]
-    if sound.sum() < FEWEST or light.std() == 0:
+    light, both = ((each)[sound].astype(np.float64) for each in (white - black, one + other - 2 * black))
+    if light.size < FEWEST:
         return ((np.nan, np.nan), (np.nan, np.nan))
-    (slope, offset), covariance = np.polyfit(light, both, 1, cov=True)
-    stds = np.sqrt(np.diag(covariance))
-    slope = max(float(slope), 1e-3)
-    return (float(np.log(slope)), float(stds[0]) / slope), (float(offset) / 2, float(stds[1]) / 2)
+    # Noise of white and black would flatten the slope.
+    noise = [
+        float(raw_variance(sensor, each[sound] - sensor.black_level_dn).mean()) for each in (white, black)
+    ]
+    power = float(light.var()) - sum(noise)
+    if power < CONTRAST * sum(noise):
+        return ((np.nan, np.nan), (np.nan, np.nan))
+    slope = max((float(np.mean((light - light.mean()) * both)) - 2 * noise[1]) / power, 1e-3)
+    left = both - slope * light
+    std = float(left.std()) / np.sqrt(light.size)
+    slope_std = std / np.sqrt(power)
+    offset = float(left.mean()) / 2, float(np.hypot(std, slope_std * light.mean())) / 2
+    return (float(np.log(slope)), slope_std / slope), offset
 
 
 def _of_code(scan: Scan, setting: int, found: NeighbourSteps) -> None:
@@ -99,7 +118,6 @@ def _of_code(scan: Scan, setting: int, found: NeighbourSteps) -> None:
         )
         found.log[shot.index], found.log_std[shot.index] = light, light_std
         found.black_dn[shot.index], found.black_std_dn[shot.index] = black, black_std
-        found.shared_dn[shot.index] = np.inf
         last = own
 
 
@@ -109,34 +127,56 @@ def _of_lines(
     """Lines, each against the one before."""
     sensor, rows = scan.rig.sensor, compared_rows(column.shape[0])
     black = _read(scan, _shot(scan, "black", 0, setting))
-    columns, zone = column[rows].astype(np.float64), zone_px(lines, pitch_of(column))
-    noise = raw_variance(sensor, black - sensor.black_level_dn)
     whites = [shot for shot in scan.shots_of("white", 0) if shot.setting == setting]
-    unlit = columns < 0
-    if whites:
-        unlit &= _read(scan, whites[0]) - black < UNLIT * np.sqrt(2 * noise)
+    light = _read(scan, whites[0]) - black if whites else np.ones_like(black)
+    noise = raw_variance(sensor, black - sensor.black_level_dn)
+    columns, zone = column[rows].astype(np.float64), zone_px(lines, pitch_of(column))
+    known, unlit = columns >= 0, (columns < 0) & (light < UNLIT * np.sqrt(2 * noise))
+    weights = np.maximum(light, 0) * known
     before: Picture | None = None
     for pattern in range(scan.plan.spectral_count):
         shot = _shot(scan, "spectral", pattern, setting)
-        now, centre = _read(scan, shot), pattern * lines.step_px + lines.width_px / 2
+        now, middle = _read(scan, shot), (pattern - 0.5) * lines.step_px + lines.width_px / 2
         if before is not None:
-            away = np.abs(columns - (centre - lines.step_px / 2)) > zone + lines.step_px / 2
-            away = (away & (columns >= 0)) | unlit
+            from_line = columns - middle
+            away = ((np.abs(from_line) > zone + lines.step_px / 2) & known) | unlit
             if int(away.sum()) >= FEWEST:
-                _compare(shot.index, before[away], now[away], black[away], noise[away], found)
+                dark = black[away] - np.float32(sensor.black_level_dn)
+                pair = before[away], now[away]
+                _compare_black(shot.index, *pair, black[away], noise[away], dark, found)
+                _compare_light(shot.index, *pair, black[away], weights[away], sensor, dark, found)
         before = now
 
 
-def _compare(
-    at: int, before: Picture, now: Picture, black: Picture, noise: Picture, found: NeighbourSteps
+def _compare_black(
+    at: int,
+    before: Picture,
+    now: Picture,
+    black: Picture,
+    noise: Picture,
+    dark: Picture,
+    found: NeighbourSteps,
 ) -> None:
     deviation = np.sqrt(2 * noise)
     more = now - before
     middle = np.median(more)
-    mean = float(middle + np.clip(more - middle, -CLIP * deviation, CLIP * deviation).mean())
-    std = float(np.sqrt((deviation**2).sum(dtype=np.float64)) / len(more))
-    shared = float((before - black).mean())
-    found.black_dn[at], found.black_std_dn[at], found.shared_dn[at] = mean, std, shared
+    found.black_dn[at] = middle + np.clip(more - middle, -CLIP * deviation, CLIP * deviation).mean()
+    found.black_std_dn[at] = np.sqrt((deviation**2).sum(dtype=np.float64)) / len(more)
+    found.dark_dn[at], found.faint_dn[at] = dark.mean(), (before - black).mean()
+
+
+def _compare_light(
+    at: int, before: Picture, now: Picture, black: Picture, weight: Picture, sensor: Sensor, dark: Picture,
+    found: NeighbourSteps,
+) -> None:  # fmt: skip
+    total = float(weight.sum(dtype=np.float64))
+    if total <= 0:
+        return
+    noise = raw_variance(sensor, before - sensor.black_level_dn)
+    found.light_dn[at] = (weight * (now - before)).sum(dtype=np.float64) / total
+    found.light_std_dn[at] = np.sqrt(2 * (weight**2 * noise).sum(dtype=np.float64)) / total
+    found.shared_dn[at] = (weight * (before - black)).sum(dtype=np.float64) / total
+    found.light_dark_dn[at] = (weight * dark).sum(dtype=np.float64) / total
 
 
 def _shot(scan: Scan, role: Role, pattern: int, setting: int) -> Shot:

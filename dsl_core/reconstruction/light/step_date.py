@@ -20,7 +20,7 @@ LIKELIER, LIKELIER_THERE = 25.0, 4.0
 #: Other differences of so many deviations, and this share of the whole, are further changes: it was not one.
 ALONE_SIGMAS, ALONE_SHARE = 5.0, 0.3
 #: Variance by which scenes change from frame to frame, relative to that of the noise: at least.
-LEAST_SCENE = 0.1
+LEAST_SCENE = 0.3
 #: Differences that say what is usual between neighbours.
 USUAL_OF = 9
 
@@ -71,4 +71,4 @@ def _unusual(steps: Floats) -> Floats:
     half = USUAL_OF // 2
     wide = np.pad(steps, half, mode="reflect")
     around = np.lib.stride_tricks.sliding_window_view(wide, USUAL_OF)
-    return np.asarray(steps - np.median(around, axis=1))
+    return np.asarray(steps - np.median(np.delete(around, half, axis=1), axis=1))

@@ -6,7 +6,7 @@ did is not looked at any further.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dsl_core.model.captured_code import CapturedCode
+from dsl_core.model.plan import Shot
 from dsl_core.reconstruction.light.neighbour_steps import (
     NeighbourSteps,
     Scan,
@@ -29,34 +30,52 @@ Floats = NDArray[np.float64]
 LEAST_LOG, LEAST_DN, SIGMAS = 0.01, 0.5, 6.0
 #: Light that both neighbours hold in common has to be so many deviations to say by how much it changed.
 TELLING = 10.0
+#: What a change of black as lines show it may be wrong by, relative to it, and of that DN at least.
+ROUGH_SHARE, ROUGH_DN = 0.1, 0.5
 
 
 @dataclass(frozen=True)
 class Again:
-    """What an old shot had more than at first when it was taken again as ``shot``, and the deviation."""
+    """What an old shot had more than at first when it was taken again as ``shot``, and the deviation.
+
+    Of black, ``share`` is how much of that was a share of what is above the camera's level, with deviation.
+    """
 
     shot: int
     more: float
     std: float
+    share: tuple[float, float] = (0.0, np.inf)
+
+
+@dataclass(frozen=True)
+class Gained:
+    """A step of black: ``dn`` in every pixel, and this ``share`` of what it was above the camera's level."""
+
+    dn: float
+    share: float
 
 
 @dataclass(frozen=True)
 class SuddenChanges:
-    """Steps of black (DN) and of the logarithm of light by the first shot after each.
+    """Steps of black and of the logarithm of light by the first shot after each.
 
     ``explains_black`` is whether black did not change otherwise.
     """
 
-    black_dn: dict[int, float]
-    log: dict[int, float]
+    black: Mapping[int, Gained]
+    log: Mapping[int, float]
     explains_black: bool = True
 
     def exposed(self, scan: Scan) -> Exposed:
         """In what light each shot was taken: as calibrated at first, with black as in its black frame."""
-        log, dn = (_course(steps, scan.plan.shot_count) for steps in (self.log, self.black_dn))
+        count = scan.plan.shot_count
+        log = _course(self.log, count)
+        dn = _course({at: each.dn for at, each in self.black.items()}, count)
+        share = _course({at: each.share for at, each in self.black.items()}, count)
         blacks = {shot.setting: shot.index for shot in scan.shots_of("black", 0)}
         own = [blacks[shot.setting] for shot in scan.plan.shots()]
-        return Exposed(np.exp(log), dn - dn[own])
+        # Its black frame may be a later one than the shot.
+        return Exposed(np.exp(log), dn - dn[own], (share - share[own]) / (1 + share[own]))
 
 
 def sudden_changes(
@@ -71,24 +90,42 @@ def sudden_changes(
         return None
     white, black = (Again(at_first[role].index, 0.0, 0.0) for role in ("white", "black"))
     of_light, of_black = _since_code(scan)
-    lights = list(_changes([*of_light, white, *whites], LEAST_LOG))
+    lights = [each for each, _ in _changes([*of_light, white, *whites], LEAST_LOG)]
     darks = list(_changes([*of_black, black, *blacks], LEAST_DN))
     if not lights and not darks:
         return None
     steps = neighbour_steps(scan, column)
-    black_dn = {
-        at: change.total
-        for change in darks
+    dated = {
+        at: (change, share)
+        for change, share in darks
         if (at := date_of_step(change, steps.black_dn, steps.black_std_dn)) is not None
     }
-    log, log_std = _light_steps(scan, steps, black_dn)
+    rough = {at: _gained(scan, steps, at, *each, None) for at, each in dated.items()}
+    log, log_std = _light_steps(scan, steps, rough)
     light = {
         at: change.total
         for change in lights
-        if (at := date_of_step(change, log, log_std, black_dn.keys())) is not None
+        if (at := date_of_step(change, log, log_std, dated.keys())) is not None
     }
-    found = SuddenChanges(_as_exposed(scan, steps, black_dn, light), light, len(black_dn) == len(darks))
-    return found if light or black_dn else None
+    gained = {at: _gained(scan, steps, at, *each, light.get(at, 0.0)) for at, each in dated.items()}
+    return SuddenChanges(gained, light, len(dated) == len(darks)) if light or dated else None
+
+
+def share_of_black(
+    more: NDArray[np.floating], black: NDArray[np.floating], white: NDArray[np.floating]
+) -> tuple[float, float]:
+    """The share of black above its level by which it has grown by ``more``, and its deviation.
+
+    Pictures are those of pixels of one setting. White tells bright surfaces from dark ones: the noise of
+    black is in both of the others.
+    """
+    by = white.astype(np.float64) - white.mean()
+    slope = float((by * black).sum())
+    if slope == 0:
+        return 0.0, float("inf")
+    share = float((by * more).sum()) / slope
+    left = more - more.mean() - share * (black - black.mean())
+    return share, float(np.sqrt((by**2).sum()) * left.std() / abs(slope))
 
 
 def _since_code(scan: Scan) -> tuple[tuple[Again, ...], tuple[Again, ...]]:
@@ -102,44 +139,57 @@ def _since_code(scan: Scan) -> tuple[tuple[Again, ...], tuple[Again, ...]]:
     return (Again(at, *light),), (Again(at, *black),)
 
 
-def _changes(seen: Sequence[Again], least: float) -> Iterator[Change]:
+def _changes(seen: Sequence[Again], least: float) -> Iterator[tuple[Change, tuple[float, float]]]:
     for one, other in pairwise(seen):
         more, std = other.more - one.more, float(np.hypot(one.std, other.std))
         if np.isfinite(more) and abs(more) > max(least, SIGMAS * std):
-            yield Change(one.shot, other.shot, more)
+            known = one.share[0] if np.isfinite(one.share[1]) else 0.0
+            yield Change(one.shot, other.shot, more), (other.share[0] - known, other.share[1])
 
 
-def _course(steps: dict[int, float], shots: int) -> Floats:
+def _course(steps: Mapping[int, float], shots: int) -> Floats:
     course = np.zeros(shots)
     for at, more in steps.items():
         course[at:] += more
     return course
 
 
-def _light_steps(scan: Scan, steps: NeighbourSteps, black_dn: dict[int, float]) -> tuple[Floats, Floats]:
+def _light_steps(scan: Scan, steps: NeighbourSteps, black: Mapping[int, Gained]) -> tuple[Floats, Floats]:
     """By how much the logarithm of light differs from neighbour to neighbour, black taken off."""
     log, std = steps.log.copy(), steps.log_std.copy()
-    above = SuddenChanges(black_dn, {}).exposed(scan).black_dn
+    above = SuddenChanges(black, {}).exposed(scan)
+    none = Gained(0.0, 0.0)
     for at in np.flatnonzero(np.isfinite(steps.shared_dn) & np.isnan(log)):
-        more = black_dn.get(int(at), 0.0)
-        shared = steps.shared_dn[at] - (above[at] - more)
-        if shared > TELLING * steps.black_std_dn[at]:
-            change = (steps.black_dn[at] - more) / shared
-            log[at], std[at] = np.log1p(max(change, -0.9)), steps.black_std_dn[at] / shared
+        step, dark = black.get(int(at), none), steps.light_dark_dn[at]
+        more = step.dn + step.share * dark
+        shared = steps.shared_dn[at] - (above.black_dn[at] + above.black_share[at] * dark - more)
+        if shared > TELLING * steps.light_std_dn[at]:
+            change = (steps.light_dn[at] - more) / shared
+            log[at], std[at] = np.log1p(max(change, -0.9)), steps.light_std_dn[at] / shared
     return log, std
 
 
-def _as_exposed(
-    scan: Scan, steps: NeighbourSteps, black_dn: dict[int, float], light: dict[int, float]
-) -> dict[int, float]:
-    """Steps of black as large as frames of their own setting show: that of a room grows with exposure."""
-    first = min(scan.plan.code_settings)
-    shots = tuple(scan.plan.shots())
-    found = {}
-    for at, more in black_dn.items():
-        if shots[at].setting != first and shots[at].role == "spectral":
-            around = steps.black_dn[[i for i in range(at - 4, at + 5) if 0 <= i < len(shots) and i != at]]
-            shared = float(np.expm1(light.get(at, 0.0))) * steps.shared_dn[at]
-            more = float(steps.black_dn[at] - np.nanmedian(around)) - shared
-        found[at] = more
-    return found
+def _gained(
+    scan: Scan, steps: NeighbourSteps, at: int, change: Change, share: tuple[float, float], log: float | None
+) -> Gained:
+    """A step of black, from its mean and its share in old shots, and from what lines show of it.
+
+    At another exposure than that of old shots, light of the room is more and the camera's level is not. The
+    step of the light is that ``log``; None if it is not known yet.
+    """
+    shots: tuple[Shot, ...] = tuple(scan.plan.shots())
+    black = scan.source.read(scan.plan.references()["black"]).astype(np.float64)
+    dark = float(black.mean()) - scan.rig.sensor.black_level_dn
+    rows = [(1.0, dark, change.total, 0.05), (0.0, 1.0, *share)]
+    if log is not None and np.isfinite(steps.dark_dn[at]):
+        around = [i for i in range(at - 4, at + 5) if 0 <= i < len(shots) and i != at]
+        own = steps.black_dn[at] - float(np.nanmedian(steps.black_dn[around]))
+        own -= float(np.expm1(log)) * steps.faint_dn[at]
+        rows.append((1.0, steps.dark_dn[at], own, ROUGH_SHARE * abs(own) + ROUGH_DN))
+    weight = np.array([1 / max(std, 1e-9) for *_, std in rows])
+    design = np.array([[one, other] for one, other, *_ in rows]) * weight[:, None]
+    # Unless something speaks for a share, all pixels have gained alike.
+    design = np.vstack([design, [0.0, 1.0]])
+    wanted = np.append(np.array([value for *_, value, _ in rows]) * weight, 0.0)
+    dn, of_dark = np.linalg.lstsq(design, wanted, rcond=None)[0]
+    return Gained(float(dn), float(of_dark))
