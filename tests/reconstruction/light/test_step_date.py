@@ -51,7 +51,7 @@ def test_several_changes_are_no_single_one() -> None:
 def test_a_faint_step_is_dated_where_something_else_changed() -> None:
     """Three deviations could be chance at one of many shots, but hardly at the one that is named."""
     steps, stds = differences(jump(33), 4)
-    many = stds * 5
+    many = stds * 3
     assert date_of_step(CHANGE, steps, many) is None
     assert date_of_step(CHANGE, steps, many, (33, 60)) == 33
     assert date_of_step(CHANGE, steps, many, (60,)) is None
