@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dsl_core.capture.proof.contest import Contest
-from dsl_core.capture.proof.control import choose_pairs, is_same
+from dsl_core.capture.proof.control import choose_pairs, is_same, is_unchanged
 from dsl_core.capture.proof.finding import Finding, Light, Verdict
 from dsl_core.capture.proof.first_code import FirstCode
 from dsl_core.capture.proof.later_settings import LaterSettings
@@ -124,6 +124,12 @@ class FrameProof:
         """Whether a raw mosaic of the shot that `controls` named shows what it showed at first."""
         before = self._kept[control.index]
         return is_same(self._raster.take(pixels), before, self._code_pairs(), self._noise)
+
+    def is_unchanged(self, control: Shot, pixels: NDArray[np.uint16]) -> bool:
+        """Whether it does in the same light and contrast; False where its first picture is not known."""
+        before = self._kept.get(control.index)
+        seen = self._raster.take(pixels)
+        return before is not None and is_unchanged(seen, before, self._code_pairs(), self._noise)
 
     @property
     def first_setting(self) -> int:
