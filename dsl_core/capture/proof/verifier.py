@@ -126,10 +126,14 @@ class FrameProof:
         return is_same(self._raster.take(pixels), before, self._code_pairs(), self._noise)
 
     def is_unchanged(self, control: Shot, pixels: NDArray[np.uint16]) -> bool:
-        """Whether it does in the same light and contrast; False where its first picture is not known."""
+        """Whether it does in the same light and contrast; False where its first picture is not known.
+
+        So it is for other pictures than those of the code: white does not show that something moved.
+        """
         before = self._kept.get(control.index)
-        seen = self._raster.take(pixels)
-        return before is not None and is_unchanged(seen, before, self._code_pairs(), self._noise)
+        if before is None or self._shots[control.index].role != "code":
+            return False
+        return is_unchanged(self._raster.take(pixels), before, self._code_pairs(), self._noise)
 
     @property
     def first_setting(self) -> int:

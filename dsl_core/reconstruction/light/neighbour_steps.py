@@ -88,7 +88,7 @@ def pair_against_white(scan: Scan, setting: int, number: int) -> tuple[tuple[flo
     white, black = (_read(scan, _shot(scan, role, 0, setting)) for role in ("white", "black"))
     one, other = (_read(scan, _shot(scan, "code", 2 * number + i, setting)) for i in (0, 1))
     sound = np.maximum(np.maximum(one, other), white) < 0.98 * sensor.full_scale_dn
-    light, both = ((each)[sound].astype(np.float64) for each in (white - black, one + other - 2 * black))
+    light, both = (each[sound].astype(np.float64) for each in (white - black, one + other - 2 * black))
     if light.size < FEWEST:
         return ((np.nan, np.nan), (np.nan, np.nan))
     # Noise of white and black would flatten the slope.

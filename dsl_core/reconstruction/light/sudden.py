@@ -27,7 +27,8 @@ from dsl_core.reconstruction.merge import Exposed
 Floats = NDArray[np.float64]
 
 #: Changes between old shots that are looked into: logarithm of light, and black, DN; in deviations as well.
-LEAST_LOG, LEAST_DN, SIGMAS = 0.01, 0.5, 6.0
+#: Taken for a steady one, a step leaves at most half of itself.
+LEAST_LOG, LEAST_DN, SIGMAS = 0.02, 0.5, 6.0
 #: Light that both neighbours hold in common has to be so many deviations to say by how much it changed.
 TELLING = 10.0
 #: What a change of black as lines show it may be wrong by, relative to it, and of that DN at least.
