@@ -21,6 +21,7 @@ from dsl_core.capture.proof.prediction import (
     APART,
     Expected,
     Lit,
+    black_gained,
     brightness_of_lines,
     brightness_of_picture,
     contest_of_lines,
@@ -76,7 +77,7 @@ class FrameProof:
         #: What the last picture said of the pairs of the first code, one by one.
         self.reviewed: list[Finding] = []
         self._usual = UsualLight(self._first, calibration is not None)
-        self._later = LaterSettings(plan, calibration, self._noise, self._kept)
+        self._later = LaterSettings(plan, calibration, self._noise, self._kept, self._black_gained)
         self._steps = LightSteps()
         self._line_places = LinePlaces()
         #: The picture that came for two patterns, for as long as it comes.
@@ -300,6 +301,13 @@ class FrameProof:
             later.measure(shot, share)
             self._usual.begin(shot)
         return found
+
+    def _black_gained(self, shot: Shot, seen: Counts) -> np.float32:
+        lit = self._code.lit if self._code is not None else None
+        wanted = self._profile(shot) if shot.role == "spectral" else None
+        return (
+            np.float32(0) if lit is None or wanted is None else black_gained(seen, lit, wanted, self._noise)
+        )
 
     def _brightness_again(self, shot: Shot, seen: Counts, wanted: Expected, black: Floats) -> float | None:
         lit = self._code.lit if self._code is not None else None
