@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
 from typing import Protocol
 
@@ -185,7 +185,7 @@ def _told_of_light(sudden: SuddenChanges | None) -> Iterator[FitFinding]:
     )
 
 
-def _since(steps: Mapping[int, float]) -> str:
+def _since(steps: Iterable[int]) -> str:
     names = " and ".join(f"frame {at}" for at in sorted(steps))
     return f"from {names} on"
 

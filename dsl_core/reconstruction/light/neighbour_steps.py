@@ -23,6 +23,8 @@ from dsl_core.reconstruction.light.setting_ratios import compared_rows
 
 Floats = NDArray[np.float64]
 Picture = NDArray[np.float32]
+#: A figure and its deviation.
+Seen = tuple[float, float]
 
 #: Pixels away from lines that tell anything.
 FEWEST = 60
@@ -79,7 +81,7 @@ def neighbour_steps(scan: Scan, column: NDArray[np.integer]) -> NeighbourSteps:
     return found
 
 
-def pair_against_white(scan: Scan, setting: int, number: int) -> tuple[tuple[float, float], ...]:
+def pair_against_white(scan: Scan, setting: int, number: int) -> tuple[Seen, Seen]:
     """The light of a pair of the code over that of white, as a logarithm, and its black less black, DN.
 
     Each with its deviation; black is that of one picture.
@@ -108,7 +110,7 @@ def pair_against_white(scan: Scan, setting: int, number: int) -> tuple[tuple[flo
 
 def _of_code(scan: Scan, setting: int, found: NeighbourSteps) -> None:
     """Pairs of the code, then white, each against the one before."""
-    last = ((0.0, 0.0), (0.0, 0.0))
+    last: tuple[Seen, Seen] = ((0.0, 0.0), (0.0, 0.0))
     for number in reversed(range(scan.plan.code_count // 2)):
         own = pair_against_white(scan, setting, number)
         after = scan.plan.code_count == 2 * (number + 1)

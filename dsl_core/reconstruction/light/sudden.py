@@ -113,7 +113,7 @@ def sudden_changes(
 
 
 def share_of_black(
-    more: NDArray[np.floating], black: NDArray[np.floating], white: NDArray[np.floating]
+    more: NDArray[np.floating], black: NDArray[np.floating], white: NDArray[np.uint16]
 ) -> tuple[float, float]:
     """The share of black above its level by which it has grown by ``more``, and its deviation.
 

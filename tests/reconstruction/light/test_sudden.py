@@ -14,7 +14,7 @@ from dsl_core.model.fit import Fit
 from dsl_core.model.plan import CapturePlan, GrayCode, ScanLines, Sentinels, Setting
 from dsl_core.model.rig import Rig
 from dsl_core.reconstruction.light.neighbour_steps import pair_against_white
-from dsl_core.reconstruction.merge import MergedScan
+from dsl_core.reconstruction.rows.frames import ScanFrames
 from tests.cases.twin_scan import MemoryScan, twin_scan
 
 PLAN = CapturePlan(
@@ -68,7 +68,7 @@ def test_a_change_at_once_leaves_depth_as_it_was(factor: float, more_dn: float) 
 
 
 def test_a_change_among_pictures_of_the_code_is_seen_by_their_sum() -> None:
-    scan = MergedScan(changed(0, 0.8, 3.0, until=8), clean()[0])
+    scan = ScanFrames(changed(0, 0.8, 3.0, until=8), clean()[0], ())
     for number, (factor, more_dn) in {0: (0.8, 3.0), 6: (1.0, 0.0)}.items():
         (log, log_std), (dn, dn_std) = pair_against_white(scan, 0, number)
         # Light of the room is in black, which is less in a darker picture as well.
