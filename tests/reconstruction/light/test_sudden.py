@@ -41,7 +41,8 @@ def changed(at: int, factor: float = 1.0, more_dn: float = 0.0, until: int = 10_
     def frame(index: int, pixels: NDArray[np.uint16]) -> NDArray[np.uint16]:
         if not at <= index < until:
             return pixels
-        return np.clip(np.rint(black + factor * (pixels - black) + more_dn), 0, 4095).astype(np.uint16)
+        moved = np.rint(black + factor * (pixels - black) + more_dn)
+        return np.asarray(np.clip(moved, 0, 4095), np.uint16)
 
     return replace(scan, frames=tuple(frame(i, each) for i, each in enumerate(scan.frames)))
 
