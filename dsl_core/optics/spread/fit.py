@@ -128,8 +128,10 @@ def _fit_curve(view: View, family: _Family) -> SpreadFit | None:
         if halves is None:
             return found
         better = _choose(halves, family, shapes=True)
-    kept = better.pixels >= KEPT * found.pixels
-    return better if kept and better.after < WORSE * first.after else found
+        # Also when a later round comes back: it does so by chance.
+        if better.after >= WORSE * first.after:
+            return found
+    return better if better.pixels >= KEPT * found.pixels else found
 
 
 class _Family:

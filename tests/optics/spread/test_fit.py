@@ -189,6 +189,18 @@ def test_a_shape_that_leaves_pixels_out_explains_nothing(
     assert found is (last if counts else one)
 
 
+def test_a_shape_that_has_once_gone_astray_is_not_taken_when_it_comes_back(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    peaks, column = seen(KNOWN, runs=40)
+    one = SpreadFit(KNOWN, False, 0.01, 1.0, 1.0, 1000)
+    other = SpreadFit(TAILED, True, 0.01, 1.0, 0.8, 1000)
+    astray = replace(other, after=fit.WORSE * other.after)
+    chosen = iter([one, one, other, astray, *[other] * fit.ROUNDS])
+    monkeypatch.setattr(fit, "_choose", lambda halves, family, shapes: next(chosen))
+    assert fit.fit_spread(peaks, column, KNOWN) is one
+
+
 def test_pulls_are_decades_and_stretches_reach_from_two_fifths_to_their_inverse() -> None:
     assert np.log10(PULLS).tolist() == pytest.approx([-7, -6, -5, -4, -3, -2, -1])
     assert (STRETCHES[0], STRETCHES[-1]) == pytest.approx((0.4, 2.5))
