@@ -73,9 +73,11 @@ def test_record_goes_through_json_and_its_figures_pass(record: DepthStageCalibra
     assert len(record.model_dump_json()) < 100_000
 
 
-@pytest.mark.parametrize(("scale", "told"), [(-0.004, True), (0.001, False)])
-def test_filters_that_are_all_off_alike_are_told(
-    record: DepthStageCalibration, scale: float, told: bool
+@pytest.mark.parametrize(
+    ("scale", "lines_std", "told"), [(-0.004, 0.02, True), (0.001, 0.02, False), (-0.004, 0.7, False)]
+)
+def test_filters_that_are_all_off_alike_are_told_where_the_film_is_known(
+    record: DepthStageCalibration, scale: float, lines_std: float, told: bool
 ) -> None:
     flat = SpectralCurve.of([400.0, 700.0], [1.0, 1.0])
     chain = ChainCorrection(
@@ -90,9 +92,10 @@ def test_filters_that_are_all_off_alike_are_told(
         pixels=100,
         chi_square=1.0,
     )
-    figures = RECIPE.figures(record.model_copy(update={"chain": chain}))
+    film_std = record.film_std | {"lines_per_mm": lines_std}
+    figures = RECIPE.figures(record.model_copy(update={"chain": chain, "film_std": film_std}))
     failed = [str(figure) for figure in failures(figures)]
-    assert failed == (["filters against the LEDs' spectra, at 550 nm -2.200 ± 0.055 nm"] if told else [])
+    assert failed == (["filters against the LEDs' spectra, at 550 nm -2.200 ± 0.059 nm"] if told else [])
 
 
 def test_a_bulge_is_told_in_mm(record: DepthStageCalibration) -> None:
