@@ -164,7 +164,8 @@ def _fit(rig: Rig, samples: OrderSamples, mounting: Film) -> FilmFit:
     A cylinder that fits such a film is often one that cannot stand where it was mounted.
     """
     flat, bent = (_fit_filters(rig, samples, mounting, shaped) for shaped in (False, True))
-    if not is_plausible(bent.film, mounting) or FilmForm.of(rig, True).steepest(bent.film) > MAX_SLOPE:
+    form = FilmForm.of(rig.projector, bent.film, shaped=True)
+    if not is_plausible(bent.film, mounting) or form.steepest(bent.film) > MAX_SLOPE:
         return flat
     better = bent.scatter_px < (1 - MIN_GAIN) * flat.scatter_px or not is_plausible(flat.film, mounting)
     return bent if better else flat

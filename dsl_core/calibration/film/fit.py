@@ -23,6 +23,7 @@ from dsl_core.calibration.film.filter_angle import (
 )
 from dsl_core.calibration.film.order_samples import OrderSamples, grating_columns
 from dsl_core.errors import CalibrationError
+from dsl_core.model.geometry import Lens
 from dsl_core.model.rig import SHAPE_POWERS, Film, FilmShape, Rig
 from dsl_core.optics.pinhole import pixel_rays
 from dsl_core.optics.shading import Plane
@@ -94,7 +95,7 @@ def fit_film(
             " fit the film. Check that the film is on, the filters, and the exposure."
         )
     shifts = shift_terms(rig, samples.pixel)[:, : 3 if angled else 0]
-    form = FilmForm.of(rig, shaped)
+    form = FilmForm.of(rig.projector, rig.film, shaped)
     # The parameters are those of the film, its shape after its fields, and those of the angle.
     count = len(FIELDS) + len(form.std)
     centre, values = (np.pad(form.values(film), (0, shifts.shape[1])) for film in (mounting, rig.film))
@@ -153,9 +154,9 @@ class FilmForm:
     shaped: bool
 
     @classmethod
-    def of(cls, rig: Rig, shaped: bool) -> FilmForm:
-        """That of a rig's film."""
-        lens, far, known = rig.projector, rig.film.distance_mm, rig.film.shape
+    def of(cls, lens: Lens, film: Film, shaped: bool) -> FilmForm:
+        """That of a film in front of a projector's lens."""
+        far, known = film.distance_mm, film.shape
         middle_mm = far * ((lens.height_px - 1) / 2 - lens.cy_px) / lens.fy_px
         return cls(
             (0.5 * far * lens.width_px / lens.fx_px, 0.5 * far * lens.height_px / lens.fy_px),

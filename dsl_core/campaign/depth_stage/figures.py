@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from dsl_core.calibration.film.fit import FilmForm
 from dsl_core.model.calibration.depth_stage import DepthStageCalibration, StagePosition
 from dsl_core.model.figure import Figure, doubts
 
@@ -74,10 +75,21 @@ def depth_stage_figures(record: DepthStageCalibration) -> tuple[Figure, ...]:
             advice="Use more filters or positions, lines closer together, or longer exposures.",
         ),
         *film,
+        *_shape(record),
         *_colours(record),
         *_filter_index(record),
         *_chain(record),
         doubts("captures in doubt", record.warnings),
+    )
+
+
+def _shape(record: DepthStageCalibration) -> tuple[Figure, ...]:
+    """How steep the film is where it is no cylinder."""
+    if record.film.shape is None:
+        return ()
+    steepest = FilmForm.of(record.projector, record.film, shaped=True).steepest(record.film)
+    return (
+        Figure(name="film's steepest place besides its bend", value=np.degrees(steepest), unit="degrees"),
     )
 
 

@@ -90,7 +90,7 @@ def test_filters_seen_at_an_angle_do_not_bend_the_film(seed: int) -> None:
 
 def twisted(rig: Rig) -> Rig:
     """A rig with a film that is as steep as 0.04 in the corners by a twist and at the sides by an S."""
-    middle_mm = FilmForm.of(mounted(rig), shaped=True).middle_mm  # what tilts are counted from
+    middle_mm = FilmForm.of(rig.projector, Film(), shaped=True).middle_mm  # what tilts are counted from
     shape = FilmShape(middle_mm=middle_mm, factors=(0.0075, 0.0, 0.00015, 0.0, 0.0, 0.0))
     return rig.model_copy(update={"film": rig.film.model_copy(update={"shape": shape})})
 
@@ -122,7 +122,7 @@ def test_the_shape_of_a_film_does_not_explain_a_wrong_filter() -> None:
 
 def test_a_film_is_as_steep_as_its_shape_in_the_corner_of_the_frame() -> None:
     rig = small_rig()
-    form = FilmForm.of(rig, shaped=True)
+    form = FilmForm.of(rig.projector, rig.film, shaped=True)
     side, top = form.half_mm
     assert (side, top) == pytest.approx((28.2 * 320 / 983, 28.2 * 180 / 983), rel=1e-3)
     for i, (across, along) in enumerate(SHAPE_POWERS):
@@ -132,7 +132,7 @@ def test_a_film_is_as_steep_as_its_shape_in_the_corner_of_the_frame() -> None:
         power = side**across * top**along
         assert max(across / side, along / top) * power * form.std[i] == pytest.approx(SLOPE_STD)
     assert form.steepest(rig.film) == 0.0
-    assert len(FilmForm.of(rig, shaped=False).std) == 0
+    assert len(FilmForm.of(rig.projector, rig.film, shaped=False).std) == 0
 
 
 def test_filters_that_shift_nothing_have_no_index() -> None:

@@ -15,6 +15,7 @@ from dsl_core.errors import CalibrationError
 from dsl_core.model.calibration.chain import ChainCorrection
 from dsl_core.model.calibration.depth_stage import DepthStageCalibration
 from dsl_core.model.figure import failures
+from dsl_core.model.rig import Film, FilmShape
 from dsl_core.model.spectral import SpectralCurve
 from dsl_core.optics.correspondence import GratingModel, correspondence, triangulate, zero_order
 from dsl_core.progress import NoProgress
@@ -96,6 +97,18 @@ def test_filters_that_are_all_off_alike_are_told_where_the_film_is_known(
     figures = RECIPE.figures(record.model_copy(update={"chain": chain, "film_std": film_std}))
     failed = [str(figure) for figure in failures(figures)]
     assert failed == (["filters against the LEDs' spectra, at 550 nm -2.200 ± 0.059 nm"] if told else [])
+
+
+def test_a_film_that_is_no_cylinder_is_told_by_its_slope(record: DepthStageCalibration) -> None:
+    def slopes(film: Film) -> list[float]:
+        figures = RECIPE.figures(record.model_copy(update={"film": film}))
+        return [figure.value for figure in figures if figure.name == "film's steepest place besides its bend"]
+
+    assert slopes(record.film) == []
+    twist = FilmShape(factors=(0.004, 0.0, 0.0, 0.0, 0.0, 0.0))
+    side_mm = record.film.distance_mm * record.projector.width_px / 2 / record.projector.fx_px
+    (slope,) = slopes(record.film.model_copy(update={"shape": twist}))
+    assert slope == pytest.approx(np.degrees(0.004 * side_mm))
 
 
 def test_a_bulge_is_told_in_mm(record: DepthStageCalibration) -> None:
