@@ -173,7 +173,7 @@ def test_a_twisted_film_sends_light_where_its_own_twin_does() -> None:
     """The twin renders its foreign films by other formulas, with vectors instead of turns."""
     rig = published_rig()
     pixels, depth = sampled(rig)
-    bent = BentFilm(rig, Foreign.of("bend-twist"))
+    bent = BentFilm(rig, Foreign(frozenset({"bend-twist"})))
     shape = FilmShape(middle_mm=bent.middle_v, factors=(bent.twist_per_mm, 0.0, 0.0, 0.0, 0.0, 0.0))
     twisted = rig.film.model_copy(update={"shape": shape})
     point = projector_points(rig, pixels, depth)
