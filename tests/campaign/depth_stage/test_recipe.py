@@ -9,16 +9,18 @@ import numpy as np
 import pytest
 import torch
 
-from dsl_core.campaign.common.recipe import Bench
-from dsl_core.campaign.depth_stage.recipe import STAGE_NOTE, DepthStageRecipe
+from dsl_core.calibration.common.tiles import ColumnSamples
+from dsl_core.campaign.common.recipe import Bench, Step
+from dsl_core.campaign.depth_stage.recipe import STAGE_NOTE, DepthStageRecipe, SeenPlane
 from dsl_core.errors import CalibrationError
 from dsl_core.model.calibration.chain import ChainCorrection
 from dsl_core.model.calibration.depth_stage import DepthStageCalibration
 from dsl_core.model.figure import failures
+from dsl_core.model.line_spread import LineSpread
 from dsl_core.model.rig import Film, FilmShape
 from dsl_core.model.spectral import SpectralCurve
 from dsl_core.optics.correspondence import GratingModel, correspondence, triangulate, zero_order
-from dsl_core.progress import NoProgress
+from dsl_core.progress import NoProgress, Progress
 from tests.cases.board_calibrated import board_calibrated
 from tests.cases.film_bench import film_bench, take, take_all, truth_of, without
 
@@ -64,6 +66,29 @@ def test_film_lies_within_its_deviations(bench: Bench, record: DepthStageCalibra
         (getattr(record.film, name) - getattr(truth, name)) / std for name, std in record.film_std.items()
     ]
     assert np.sqrt(np.mean(np.square(pulls))) < 2.5
+
+
+@pytest.mark.parametrize("shown", [(), (0,), (1,), (0, 1)])
+def test_columns_of_all_planes_are_counted_from_one_place_of_a_line(
+    bench: Bench, monkeypatch: pytest.MonkeyPatch, shown: tuple[int, ...]
+) -> None:
+    plain = [step for step in RECIPE.steps(bench) if step.placement.filter_nm is None]
+    uneven = [
+        bench.rig.projector_response.with_spread(LineSpread.of(np.array(shares), 0.5))
+        for shares in ((0.2, 0.5, 0.3), (0.3, 0.5, 0.2))
+    ]
+
+    def seen(recipe: DepthStageRecipe, bench: Bench, step: Step, progress: Progress) -> SeenPlane:
+        number = plain.index(step)
+        response = uneven[number] if number in shown else bench.rig.projector_response
+        return SeenPlane(ColumnSamples(*np.zeros((3, 0))), response, None)
+
+    monkeypatch.setattr(DepthStageRecipe, "_plain", seen)
+    found = [each.response for each in RECIPE._planes(bench, plain, NoProgress())]
+    if not shown:
+        assert found == [bench.rig.projector_response] * 2
+    else:
+        assert found == [uneven[k] if k in shown else uneven[1 - k] for k in range(2)]
 
 
 def test_record_goes_through_json_and_its_figures_pass(record: DepthStageCalibration) -> None:
