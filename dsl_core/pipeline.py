@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from dsl_core.capture.overexposure import ExposureWatch, full_scale_dn
 from dsl_core.capture.preflight import fit_plan, require_possible
 from dsl_core.capture.proof.report import SeenFrames
 from dsl_core.capture.proof.report import prove as prove_frames
@@ -78,6 +79,8 @@ def open_scan(
     require_possible(rig, plan)
     with ScanWriter.open(folder, plan, rig, notes) as writer:
         sink: FrameSink = WatchedSink(writer, watch) if watch else writer
+        exposure = ExposureWatch(plan, full_scale_dn(rig))
+        sink = WatchedSink(sink, _told_to(exposure.add))
         stored = ScanReader(folder)
         proof, sentinels, seen = None, None, SeenFrames(plan)
         if prove:
@@ -89,7 +92,7 @@ def open_scan(
             sink = WatchedSink(WatchedSink(sink, _told_to(sentinels.add)), _told_to(seen.keep))
         runner = Runner(
             rig, plan, sink, pattern_image, progress=progress, token=token, proof=proof, stored=stored,
-            sentinels=sentinels, waits=waits,
+            sentinels=sentinels, exposure=exposure, waits=waits,
         )  # fmt: skip
         yield runner
         if prove and runner.status.state is State.FINISHED:

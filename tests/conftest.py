@@ -4,6 +4,7 @@ import gc
 import os
 import signal
 
+from dsl_core.solve.heap import keep_freed_memory
 from tests.cases.memory import do_not_wait_for_the_disk
 
 os.environ.setdefault("QT_API", "pyside6")
@@ -18,4 +19,5 @@ if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
 # Collecting all the objects of torch, numba and a thousand tests takes a tenth of a run's time, for nothing.
 gc.set_threshold(50_000, 20, 50)
 
+keep_freed_memory()
 do_not_wait_for_the_disk()

@@ -8,6 +8,9 @@ from collections.abc import Collection, Sequence
 from dataclasses import replace
 from typing import NoReturn
 
+import numpy as np
+from numpy.typing import NDArray
+
 from dsl_core.capture.diagnosis import Diagnosis
 from dsl_core.capture.exposure import ShotTaker
 from dsl_core.capture.proof.finding import Finding, Light, Verdict
@@ -31,12 +34,15 @@ _log = logging.getLogger(__name__)
 
 
 class PictureError(DeviceError):
-    """Pictures do not show their pattern, however often they are taken; ``wrong`` are their shots."""
+    """Pictures do not show their pattern, however often they are taken; ``wrong`` are their shots.
 
-    def __init__(self, message: str, wrong: tuple[Shot, ...] = ()) -> None:
+    ``has_changed``: devices, light or scene are not as they were, and nobody knows since when.
+    """
+
+    def __init__(self, message: str, wrong: tuple[Shot, ...] = (), *, has_changed: bool = False) -> None:
         """Keep the sentence and the shots."""
         super().__init__(message)
-        self.wrong = wrong
+        self.wrong, self.has_changed = wrong, has_changed
 
 
 class ProvenShots:
@@ -57,6 +63,8 @@ class ProvenShots:
         self._is_late = False
         self._untold: list[Shot] = []
         self._recent: deque[Shot] = deque(maxlen=JUST_BEFORE)
+        #: What was saved since an old picture, taken again, last looked as it did at first.
+        self._since_sound: set[Shot] = set()
         self._doubts = 0
         #: Shots that were taken again because a picture did not show their pattern.
         self.corrected = 0
@@ -89,6 +97,7 @@ class ProvenShots:
             found = self._proof.judge(shot, pixels)
             if not found.is_wrong:
                 self._diagnosis.keep(shot, pixels)
+                self._date(shot, pixels, self._proof)
             is_untold = found.verdict is Verdict.UNTOLD and self._is_alone(shot)
             tail = [*tail, shot] if is_untold else []
             self._correct(found, self._proof)
@@ -149,8 +158,18 @@ class ProvenShots:
         self._sink.write(shot, frame)
         self._diagnosis.keep(shot, frame.pixels)
         self._recent.append(shot)
+        if self._proof is not None:
+            self._date(shot, frame.pixels, self._proof)
         if not _is_sure(found) and self._is_alone(shot) and shot not in self._untold:
             self._untold.append(shot)
+
+    def _date(self, shot: Shot, pixels: NDArray[np.uint16], proof: FrameProof) -> None:
+        """Note since when nobody has seen that devices, light and scene are as they were."""
+        if shot.role == "sentinel":
+            if proof.is_unchanged(replace(shot, index=shot.pattern), pixels):
+                self._since_sound.clear()
+        elif self._is_alone(shot):
+            self._since_sound.add(shot)
 
     def _is_alone(self, shot: Shot) -> bool:
         """Whether a shot is judged by itself: those of the first code are by what they are together."""
@@ -227,9 +246,11 @@ class ProvenShots:
 
     def _require_control(self, proof: FrameProof) -> None:
         """Raise `DeviceError` unless a picture of the first code still looks as it did at first."""
+        is_sound = True
         for control in proof.controls():
             frame = self._again(control)
             if proof.is_as_before(control, frame.pixels):
+                is_sound &= proof.is_unchanged(control, frame.pixels)
                 continue
             reason = self._explain() or (
                 "Projector, camera, light or target have changed since. Check that the projector follows,"
@@ -237,9 +258,12 @@ class ProvenShots:
             )
             raise PictureError(
                 f"{describe_shot(control).capitalize()}, captured once more as a control, no longer shows its"
-                f" pattern. {reason} Frames before are saved."
+                f" pattern. {reason} Frames before are saved.",
+                has_changed=True,
             )
         self._recent.clear()
+        if is_sound:
+            self._since_sound.clear()
 
     def _explain(self) -> str:
         """What has changed since the scan began, and what to do; empty where that does not show."""
@@ -255,9 +279,12 @@ class ProvenShots:
         The ``latest`` is among them if it was saved, because others were wrong.
         """
         doubted = {*self._untold, *self._recent, *(shot for shot in error.wrong if shot != latest)}
+        if error.has_changed:
+            doubted |= self._since_sound
         withdrawn = sorted(doubted, key=lambda shot: shot.index)
         self._untold.clear()
         self._recent.clear()
+        self._since_sound.clear()
         if not withdrawn:
             raise error
         self._sink.withdraw(withdrawn)

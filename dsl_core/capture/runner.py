@@ -15,6 +15,7 @@ from enum import StrEnum
 
 from dsl_core.capture.diagnosis import Diagnosis
 from dsl_core.capture.exposure import PatternImage, RetryPolicy, ShotTaker
+from dsl_core.capture.overexposure import ExposureWatch
 from dsl_core.capture.preflight import require_possible
 from dsl_core.capture.proof.verifier import FrameProof
 from dsl_core.capture.proven import ProvenShots
@@ -50,8 +51,8 @@ class Status:
     """A moment of a scan; ``done`` counts saved frames, those of earlier runs included.
 
     ``elapsed_s`` is the time spent running, pauses left out; ``remaining_s`` is estimated from it.
-    ``corrected`` counts shots that were taken again because a picture did not show their pattern, and
-    ``warning`` says what moved meanwhile.
+    ``corrected`` counts shots that were taken again because a picture did not show their pattern,
+    ``warning`` says what moved meanwhile, and ``overexposed`` how much is.
     """
 
     state: State
@@ -63,6 +64,7 @@ class Status:
     message: str = ""
     corrected: int = 0
     warning: str = ""
+    overexposed: str = ""
 
 
 Listener = Callable[[Status], None]
@@ -91,13 +93,15 @@ class Runner:
         token: CancelToken | None = None,
         clock: Callable[[], float] = time.monotonic,
         sentinels: SentinelWatch | None = None,
+        exposure: ExposureWatch | None = None,
         waits: bool = False,
     ) -> None:
         """Keep the parts; ``clock`` gives seconds and only serves the estimate of the remaining time.
 
         With ``proof`` every picture is judged, and taken again if it does not show its pattern; ``stored``
         has the frames of earlier runs, from which it learns. When ``sentinels``, which see the frames of the
-        sink, find that something moved, the scan pauses if it ``waits``, and ends otherwise.
+        sink, find that something moved, the scan pauses if it ``waits``, and ends otherwise. ``exposure``
+        sees them, too; what it finds is only told.
         """
         self._rig = rig
         self._plan = plan
@@ -109,7 +113,7 @@ class Runner:
         self._stored = stored
         self._progress = progress or NoProgress()
         self._pace = _Pace(clock, rig.projector.info.latency_ms)
-        self._sentinels, self._waits = sentinels, waits
+        self._sentinels, self._exposure, self._waits = sentinels, exposure, waits
         self._status = Status(State.IDLE, total=plan.shot_count)
         self._listeners: list[Listener] = []
         self._condition = threading.Condition()
@@ -195,6 +199,9 @@ class Runner:
 
     def _heed(self, only_sentinels_left: bool) -> None:
         """Pause or end when something has moved; a scan that has all it needs ends as usual."""
+        if self._exposure is not None and self._exposure.found and not self._status.overexposed:
+            _log.warning("%s", self._exposure.found)
+            self._set(State.RUNNING, overexposed=self._exposure.found)
         moved = None if self._sentinels is None else self._sentinels.found
         if moved is None or self._status.warning:
             return

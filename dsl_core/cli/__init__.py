@@ -20,9 +20,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     gc.set_threshold(*_COLLECTION)
     try:
         # Inside, so that Ctrl-C while it loads ends in a sentence as well.
+        from dsl_core.solve.heap import keep_freed_memory
         from dsl_core.solve.threads import share_no_small_matrices
 
         share_no_small_matrices()
+        keep_freed_memory()
         from dsl_core.cli.run import run
 
         return run(list(sys.argv[1:] if arguments is None else arguments))

@@ -12,6 +12,8 @@ import re
 import sys
 import traceback
 import warnings
+from collections.abc import Callable
+from functools import cache
 from typing import Annotated
 
 import typer
@@ -110,6 +112,12 @@ def _globally(
     """Hyperspectral 3D scanning by Dispersed Structured Light."""
 
 
+@cache
+def _commands() -> Callable[..., int | None]:
+    """All commands, which take longer to assemble than a short one to run."""
+    return typer.main.get_command(app)
+
+
 def run(arguments: list[str]) -> int:
     """Run one command and return its exit code."""
     debug = "--debug" in arguments
@@ -123,7 +131,7 @@ def run(arguments: list[str]) -> int:
             raise PlanError(
                 "An argument is empty: perhaps a variable of the shell is not set. Name what is meant."
             )
-        code = app(arguments, prog_name="dsl-scan", standalone_mode=False)
+        code = _commands()(arguments, prog_name="dsl-scan", standalone_mode=False)
         sys.stdout.flush()
     except BaseException as error:
         # Click turns a closed pipe into an exit of its own.

@@ -32,6 +32,7 @@ from dsl_core.cli.output import Output
 from dsl_core.errors import StoreError
 from dsl_core.io import MANIFEST_NAME
 from dsl_core.io.staging import check_targets
+from dsl_core.words import quoted
 
 if TYPE_CHECKING:
     from dsl_core.capture.runner import Status
@@ -208,12 +209,34 @@ def _state(output: Output, plan: CapturePlan, folder: Path, devices: DeviceRig) 
 
 
 def _done(output: Output, target: Path, status: Status) -> None:
-    output.say(
-        f"All {status.total} frames are saved in {target} ({status.elapsed_s:.1f} s)."
-        f" Next: dsl-scan reconstruct {target}"
-    )
+    output.say(f"All {status.total} frames are saved in {target} ({status.elapsed_s:.1f} s). {_next(target)}")
+    if status.overexposed:  # said on standard error when it was seen
+        output.put(overexposed=status.overexposed)
     if status.warning:
         output.say(status.warning)
         output.put(warning=status.warning)
     output.put(scan=target, frames=status.total, seconds=round(status.elapsed_s, 2), state="finished")
     output.finish()
+
+
+def _next(target: Path) -> str:
+    """What follows a scan: without a calibration of its own it needs one, which may have to be made first."""
+    from dsl_core.io.calibration_library import CalibrationLibrary
+    from dsl_core.io.scan.folder import ScanReader
+    from dsl_core.io.scan.origin import rig_of_notes
+
+    reader, command = ScanReader(target), f"dsl-scan reconstruct {quoted(target)}"
+    if reader.calibration is not None:
+        return f"Next: {command}"
+    known = CalibrationLibrary().names()
+    if known:
+        return (
+            f"The scan has no calibration. Next: {command} --calibration NAME, where NAME is that of its rig"
+            f" in the library, which has: {', '.join(known)}."
+        )
+    rig, options = rig_of_notes(reader.manifest.notes) or ("RIG", {})
+    words = " ".join([f"--rig {quoted(rig)}", *(f"--option {key}={v}" for key, v in options.items())])
+    return (
+        "The scan has no calibration, and the library is empty. Next: calibrate the rig with"
+        f" 'dsl-scan calibrate all CAMPAIGN {words}', then {command} --calibration CAMPAIGN"
+    )

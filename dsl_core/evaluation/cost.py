@@ -9,7 +9,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 
 #: Memory is read this often; shorter peaks can be missed.
-_INTERVAL_S = 0.01
+_INTERVAL_S = 0.05
 
 
 @dataclass(frozen=True)

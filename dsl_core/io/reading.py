@@ -12,12 +12,12 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from io import FileIO, RawIOBase
 from pathlib import Path
-from typing import Any
-
-import numpy as np
-from numpy.typing import NDArray
+from typing import TYPE_CHECKING, Any
 
 from dsl_core.io.sealed import unseal
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
 
 #: More than any plan, rig or campaign file of this program holds.
 MOST_BYTES = 64 << 20
@@ -76,6 +76,8 @@ def read_array(path: Path) -> NDArray[Any]:
     Raises `OSError` as `read_bounded` does, and ``ValueError`` for what is no array or declares more than the
     file holds, before anything is allocated for it.
     """
+    import numpy as np
+
     size = require_plain(path)
     with path.open("rb") as file:
         try:

@@ -86,11 +86,27 @@ class ColumnResidual(Record):
         return self
 
 
+#: Powers of the places across and along its lines that a film's shape is made of.
+SHAPE_POWERS = ((1, 1), (0, 2), (3, 0), (2, 1), (1, 2), (0, 3))
+
+
+class FilmShape(Record):
+    """What a film's height has beyond that of its cylinder, such as a twist.
+
+    The height (mm) is the sum of ``factors`` times `SHAPE_POWERS` of the places (mm) across and along the
+    lines, from the projector's axis across them and from ``middle_mm`` along them.
+    """
+
+    middle_mm: float = 0.0
+    factors: tuple[float, float, float, float, float, float] = (0.0,) * 6
+
+
 class Film(Record):
     """The diffraction film in front of the projector, in projector coordinates.
 
     The film is a cylinder patch whose axis is vertical: ``bend_per_mm`` is its curvature. Tilts turn
-    its normal away from the projector axis; roll turns its lines about that axis.
+    its normal away from the projector axis; roll turns its lines about that axis. A film that is bent in
+    another way has a ``shape`` besides.
     """
 
     distance_mm: float = Field(default=29.0, gt=0)
@@ -99,6 +115,7 @@ class Film(Record):
     tilt_y_deg: float = 0.0
     roll_deg: float = 0.0
     bend_per_mm: float = 0.0
+    shape: FilmShape | None = None
 
     @property
     def period_nm(self) -> float:

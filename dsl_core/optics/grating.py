@@ -18,7 +18,7 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
-from dsl_core.model.rig import Film
+from dsl_core.model.rig import Film, FilmShape
 
 #: The film is close to the projector and the scene is far, so each step shrinks the error about
 #: twentyfold; five steps end below 3e-4 px.
@@ -35,12 +35,13 @@ class Vectors(NamedTuple):
 
 @dataclass(frozen=True)
 class FilmFrame:
-    """The film's pose in projector coordinates: rotation rows are its x, y and normal axes."""
+    """The film's pose in projector coordinates and its form: rotation rows are its x, y and normal axes."""
 
     axes: NDArray[np.float64]
     distance_mm: float
     bend_per_mm: float
     period_nm: float
+    shape: FilmShape | None = None
 
     @classmethod
     def of(cls, film: Film) -> FilmFrame:
@@ -50,7 +51,22 @@ class FilmFrame:
         rx = np.array([[1, 0, 0], [0, cx, -sx], [0, sx, cx]])
         ry = np.array([[cy, 0, sy], [0, 1, 0], [-sy, 0, cy]])
         rz = np.array([[cz, -sz, 0], [sz, cz, 0], [0, 0, 1]])
-        return cls((ry @ rx @ rz).T, film.distance_mm, film.bend_per_mm, film.period_nm)
+        return cls((ry @ rx @ rz).T, film.distance_mm, film.bend_per_mm, film.period_nm, film.shape)
+
+    def surface(self, u: Tensor, v: Tensor) -> tuple[Tensor, Tensor, Tensor | None]:
+        """Height (mm) of the film at places across and along its lines (mm), and its slopes along both.
+
+        The second slope is None for a cylinder, which has none.
+        """
+        height, slope = 0.5 * self.bend_per_mm * u * u, self.bend_per_mm * u
+        if self.shape is None:
+            return height, slope, None
+        uv, vv, uuu, uuv, uvv, vvv = self.shape.factors
+        v = v - self.shape.middle_mm
+        height = height + v * (uv * u + vv * v) + u * u * (uuu * u + uuv * v) + v * v * (uvv * u + vvv * v)
+        slope = slope + v * (uv + 2 * uuv * u + uvv * v) + 3 * uuu * u * u
+        along = u * (uv + uuv * u + 2 * uvv * v) + v * (2 * vv + 3 * vvv * v)
+        return height, slope, along
 
     def to_film(self, p: Vectors) -> Vectors:
         """Rotate projector coordinates into the film's axes."""
@@ -77,19 +93,24 @@ def incoming_direction(frame: FilmFrame, point: Vectors, order: int, wavelength_
     film_x, film_y = target.x * scale, target.y * scale
     direction = target
     for _ in range(ITERATIONS):
-        u = film_x - origin[0]
-        sag = 0.5 * frame.bend_per_mm * u * u
+        sag, slope, slope_along = frame.surface(film_x - origin[0], film_y - origin[1])
         dx, dy, dz = target.x - film_x, target.y - film_y, target.z - (origin[2] + sag)
         inverse = torch.rsqrt(dx * dx + dy * dy + dz * dz)
         # Local frame on the bent film: x axis (1, 0, slope), normal (-slope, 0, 1), both normalised.
-        slope = frame.bend_per_mm * u
         unit = torch.rsqrt(1 + slope * slope)
         a_out = (dx + slope * dz) * unit * inverse
         b = dy * inverse
+        if slope_along is not None:
+            # There the film rises along the lines too: its frame is turned about that x axis.
+            rise = slope_along * unit
+            turn = torch.rsqrt(1 + rise * rise)
+            b = (b + rise * (dz - slope * dx) * unit * inverse) * turn
         a = a_out + shift
         # Evanescent orders end at grazing incidence, far outside any frame, instead of NaN.
         a = a.clip(-0.999, 0.999)
         c = torch.sqrt((1 - a * a - b * b).clip(min=1e-3))
+        if slope_along is not None:
+            b, c = (b - rise * c) * turn, (c + rise * b) * turn
         direction = Vectors((a - slope * c) * unit, b, (slope * a + c) * unit)
         reach = (origin[2] + sag) / direction.z
         film_x, film_y = direction.x * reach, direction.y * reach

@@ -152,14 +152,24 @@ def share_findings(
 
     Where the camera is known to be ``blurred``, lines of another shape along edges are no news.
     """
-    lit, measured = (int(np.count_nonzero(where)) for where in _lit_and_measured(flags))
+    is_lit, is_measured = _lit_and_measured(flags)
+    lit, measured = int(np.count_nonzero(is_lit)), int(np.count_nonzero(is_measured))
     if lit >= FEWEST:
+        too_bright = int(np.count_nonzero(is_lit & ~is_measured & ((flags & int(Flag.SATURATED)) != 0)))
+        yield _share(
+            "exposure",
+            "overexposed pixels without a depth",
+            too_bright / lit,
+            MOST_LOST,
+            "{0} of the lit pixels have no depth because they are overexposed in every setting.",
+            "Expose for a shorter time or with a lower level, or add a darker setting to the plan.",
+        )
         yield _share(
             "coverage",
             "lit pixels without a depth",
-            (lit - measured) / lit,
+            (lit - measured - too_bright) / lit,
             MOST_LOST,
-            "Light reaches {0} of the pixels that have no depth.",
+            "{0} of the lit pixels have no depth.",
             "See the flags: codes that disagree or a depth out of range tell of motion, of surfaces that"
             " light each other, or of another rig's calibration.",
         )
@@ -240,11 +250,11 @@ def cause_findings(
     place = _film(causes, probe)
     yield place.model_copy(update={"significant": place.significant and probe.places})
     for finding in _gains(causes, bool(corrected)):
-        refuted = corrected is False and finding.part == "orders"
+        refuted = finding.part == "orders" and (corrected is False or not causes.unequal)
         yield finding.model_copy(update={"significant": finding.significant and not refuted})
     for index, (value, std) in enumerate(zip(probe.lines.values, probe.lines.std, strict=True)):
         yield _profile(PROFILE[index], float(value), float(std))
-    yield FitFinding.judged(
+    drift = FitFinding.judged(
         "light",
         "change of the light over the scan",
         (causes.drift, causes.drift_std),
@@ -253,6 +263,7 @@ def cause_findings(
         f"The light has changed by {causes.drift:+.1%} from the first line to the last.",
         "Let the projector warm up for longer.",
     )
+    yield drift.model_copy(update={"significant": causes.drifts})
     if probe.curves is not None:
         yield FitFinding.judged(
             "curves",
@@ -322,7 +333,7 @@ def _motion(motion: FilmMotion, probe: Probe) -> FitFinding:
 
 
 def _film(causes: Causes, probe: Probe) -> FitFinding:
-    plus, minus = causes.shift_px[probe.sound].mean(0)
+    plus, minus = causes.mean_px
     return FitFinding.judged(
         "film",
         "place of the first orders",

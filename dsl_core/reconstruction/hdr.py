@@ -75,6 +75,11 @@ def black_frame(frames: Sequence[NDArray[np.unsignedinteger]], sensor: Sensor) -
     return BlackFrame(mean, np.asarray(variance, np.float32))
 
 
+def gained_black(black: Array, dn: float, share: float, level_dn: float) -> Array:
+    """Black (DN) with so much more in every pixel, and this share more of what is above its level."""
+    return np.asarray(black + np.float32(dn) + np.float32(share) * (black - np.float32(level_dn)), np.float32)
+
+
 def setting_gains_ms(settings: Sequence[Setting], response: ProjectorResponse) -> NDArray[np.float64]:
     """Exposure x pattern radiance above the projector's black, ms at full drive, shape (settings,)."""
     black = response.radiance(0.0)
@@ -104,6 +109,7 @@ class HdrMerger:
                 f"Exposure x pattern radiance must be positive, given {np.asarray(gains_ms).tolist()} ms."
             )
         self.shape = blacks[0].mean.shape
+        self._level_dn = sensor.black_level_dn
         full_dn = sensor.full_scale_dn
         margin = 0.02 * full_dn if saturation_margin_dn is None else saturation_margin_dn
         self._limit_dn = int(np.ceil(full_dn - margin))
@@ -121,17 +127,19 @@ class HdrMerger:
         raws: Sequence[NDArray[np.unsignedinteger]],
         out: MergedFrame | None = None,
         levels: Sequence[float] | None = None,
+        gained: Sequence[tuple[float, float]] | None = None,
     ) -> MergedFrame:
         """Merge one raw mosaic per setting, in the order of the gains; writes into ``out`` if given.
 
-        ``levels`` is the light that each was exposed to, relative to what the gains assume (None: all 1).
+        ``levels`` is the light that each was exposed to, relative to what the gains assume (None: all 1), and
+        ``gained`` what each has above its black frame, as in `gained_black` (None: nothing).
         Raises `DecodeError` when a frame is missing, has another size, or is not of whole numbers.
         """
         if out is None:
             out = MergedFrame(
                 np.empty(self.shape, np.float32), np.empty(self.shape, np.float32), np.empty(self.shape, bool)
             )
-        self._merge(raws, levels, out.radiance, out.variance, _NO_BITS, out.saturated)
+        self._merge(raws, levels, gained, out.radiance, out.variance, _NO_BITS, out.saturated)
         return out
 
     def merge_std(
@@ -140,19 +148,21 @@ class HdrMerger:
         radiance: Array,
         std: NDArray[np.floating],
         levels: Sequence[float] | None = None,
+        gained: Sequence[tuple[float, float]] | None = None,
     ) -> None:
         """The same into ``radiance`` and ``std``, of half or single precision, both (rows, columns)."""
         saturated = _room().of(self.shape, bool)
         if std.dtype == np.float16:
-            self._merge(raws, levels, radiance, _NO_VALUES, std.view(np.uint16), saturated)
+            self._merge(raws, levels, gained, radiance, _NO_VALUES, std.view(np.uint16), saturated)
         else:
-            self._merge(raws, levels, radiance, std, _NO_BITS, saturated)
+            self._merge(raws, levels, gained, radiance, std, _NO_BITS, saturated)
             np.sqrt(std, out=std)
 
     def _merge(
         self,
         raws: Sequence[NDArray[np.unsignedinteger]],
         levels: Sequence[float] | None,
+        gained: Sequence[tuple[float, float]] | None,
         radiance: Array,
         variance: NDArray[np.floating],
         halves: NDArray[np.uint16],
@@ -168,10 +178,15 @@ class HdrMerger:
             if not np.issubdtype(raw.dtype, np.unsignedinteger):
                 raise DecodeError(f"Raw frames contain unsigned whole numbers, not {raw.dtype}.")
         light = np.ones(len(raws), np.float32) if levels is None else np.asarray(levels, np.float32)
+        black = self._black
+        if gained is not None:
+            black = np.stack(
+                [gained_black(each, *more, self._level_dn) for each, more in zip(black, gained, strict=True)]
+            )
         counts = _room().of(self._black.shape, np.uint16)
         np.stack(raws, out=counts)
         merge_settings(
-            counts, self._black, self._floor, self._gains * light, self._shots * light, self._limit_dn,
+            counts, black, self._floor, self._gains * light, self._shots * light, self._limit_dn,
             radiance, variance, halves, saturated,
         )  # fmt: skip
 

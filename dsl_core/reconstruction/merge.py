@@ -6,7 +6,7 @@ import threading
 from collections import deque
 from collections.abc import Callable, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Protocol, TypeVar
 
 import numpy as np
@@ -22,7 +22,14 @@ from dsl_core.patterns.binary_code import decoder_of
 from dsl_core.patterns.captured_code import decode_captured
 from dsl_core.patterns.gray_code import DecodedCode
 from dsl_core.progress import NoProgress, Progress
-from dsl_core.reconstruction.hdr import BlackFrame, HdrMerger, MergedFrame, black_frame, setting_gains_ms
+from dsl_core.reconstruction.hdr import (
+    BlackFrame,
+    HdrMerger,
+    MergedFrame,
+    black_frame,
+    gained_black,
+    setting_gains_ms,
+)
 from dsl_core.reconstruction.light.setting_ratios import Ratio, compare_settings
 
 T = TypeVar("T")
@@ -42,6 +49,30 @@ class Readout(Protocol):
         """How drive levels become light."""
 
 
+@dataclass(frozen=True)
+class Exposed:
+    """In what light each shot of a plan was taken, all (shots,).
+
+    ``levels`` are relative to the light that it should have had. Black is ``black_dn`` more than the black
+    frame of the shot's setting in every pixel, and this ``black_share`` of what that is above its level.
+    """
+
+    levels: NDArray[np.float64]
+    black_dn: NDArray[np.float64]
+    black_share: NDArray[np.float64]
+
+    @classmethod
+    def as_planned(cls, count: int) -> Exposed:
+        """Of so many shots."""
+        return cls(np.ones(count), np.zeros(count), np.zeros(count))
+
+    def of(self, shots: Sequence[Shot]) -> tuple[list[float], list[tuple[float, float]]]:
+        """Levels and what black has gained of some shots."""
+        at = [shot.index for shot in shots]
+        gained = zip(self.black_dn[at].tolist(), self.black_share[at].tolist(), strict=True)
+        return self.levels[at].tolist(), list(gained)
+
+
 class MergedScan:
     """Reads the settings of a shot and merges them."""
 
@@ -49,15 +80,15 @@ class MergedScan:
         self,
         source: FrameSource,
         rig: Readout,
-        levels: NDArray[np.float64] | None = None,
+        exposed: Exposed | None = None,
         *,
         compares: bool = True,
     ) -> None:
-        """``levels`` (shots,) is the light of each shot relative to that it should have had; None: all 1.
+        """``exposed`` says in what light shots were taken; None: as planned.
 
         Settings of one pattern are compared with each other unless ``compares`` is off.
         """
-        self.source, self.rig, self.plan, self._levels = source, rig, source.plan, levels
+        self.source, self.rig, self.plan, self._exposed = source, rig, source.plan, exposed
         self._compares = compares
         #: What settings of one pattern say of each other's light, of the patterns merged so far.
         self.ratios: dict[tuple[Role, int], tuple[Ratio | None, ...]] = {}
@@ -87,8 +118,8 @@ class MergedScan:
         out: MergedFrame | None = None,
     ) -> MergedFrame:
         """The same from mosaics that were read already, one for each of the pattern's shots."""
-        merger, levels = self._prepare(role, pattern, raws)
-        return merger.merge(raws, out, levels)
+        merger, exposed = self._prepare(role, pattern, raws)
+        return merger.merge(raws, out, *exposed)
 
     def merge_line(
         self,
@@ -100,24 +131,35 @@ class MergedScan:
         """Radiance and deviation of a line frame, from mosaics that were read already or are read now."""
         if raws is None:
             raws = [self.source.read(shot) for shot in self.shots_of("spectral", index)]
-        merger, levels = self._prepare("spectral", index, raws)
-        merger.merge_std(raws, radiance, std, levels)
+        merger, exposed = self._prepare("spectral", index, raws)
+        merger.merge_std(raws, radiance, std, *exposed)
 
     def _prepare(
         self, role: Role, pattern: int, raws: Sequence[NDArray[np.uint16]]
-    ) -> tuple[HdrMerger, list[float] | None]:
-        """What merges the shots of a pattern, and their light, after they were compared."""
+    ) -> tuple[HdrMerger, tuple[list[float], list[tuple[float, float]]] | tuple[()]]:
+        """What merges the shots of a pattern, their light and their black, after they were compared."""
         shots = self.shots_of(role, pattern)
         if self._compares:
             self.compare(role, pattern, raws)
-        levels = None if self._levels is None else [float(self._levels[shot.index]) for shot in shots]
-        return self._merger(tuple(shot.setting for shot in shots)), levels
+        exposed = () if self._exposed is None else self._exposed.of(shots)
+        return self._merger(tuple(shot.setting for shot in shots)), exposed
 
     def compare(self, role: Role, pattern: int, raws: Sequence[NDArray[np.uint16]]) -> None:
-        """Put down in ``ratios`` what settings of one pattern say of each other's light."""
-        settings = [shot.setting for shot in self.shots_of(role, pattern)]
-        if len(settings) > 1:
-            blacks, gains = [self.blacks[i] for i in settings], [float(self.gains_ms[i]) for i in settings]
+        """Put down in ``ratios`` what settings of one pattern say of each other's light.
+
+        Black is as exposed; levels are not taken off, since it is they that are asked for.
+        """
+        shots = self.shots_of(role, pattern)
+        if len(shots) > 1:
+            blacks = [self.blacks[shot.setting] for shot in shots]
+            gains = [float(self.gains_ms[shot.setting]) for shot in shots]
+            if self._exposed is not None:
+                _, gained = self._exposed.of(shots)
+                level_dn = self.rig.sensor.black_level_dn
+                blacks = [
+                    replace(black, mean=gained_black(black.mean, *more, level_dn))
+                    for black, more in zip(blacks, gained, strict=True)
+                ]
             self.ratios[role, pattern] = compare_settings(raws, blacks, gains, self.rig.sensor)
 
     def shots_of(self, role: Role, pattern: int) -> list[Shot]:

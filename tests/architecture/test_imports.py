@@ -77,3 +77,12 @@ def test_the_command_line_starts_light() -> None:
     code = "import json, sys, dsl_core.cli; print(json.dumps(sorted(sys.modules)))"
     answer = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert set(HEAVY).isdisjoint(json.loads(answer.stdout))
+
+
+def test_the_window_is_painted_before_heavy_libraries_are_imported() -> None:
+    """They are imported in a thread afterwards, while the window is on screen already."""
+    modules = "dsl_app.__main__, dsl_app.composition.window, dsl_app.shell.application"
+    code = f"import json, sys, {modules}; print(json.dumps(sorted(sys.modules)))"
+    answer = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    heavy = {"numpy", "pyqtgraph", *HEAVY} - {"PySide6"}
+    assert heavy.isdisjoint(json.loads(answer.stdout))

@@ -267,7 +267,7 @@ class WindowJobs:
             self._live_for(GROW_S)
         with self._job("look for a spectrum"):
             page._control.point_at((400, 300))
-            page._control.search.start(page.search.mode.itemData(0))
+            page._control.search.start(page.search.content.mode.itemData(0))
             self.stage.idle()
             self._live_for(GROW_S)
         page._control.search.clear()

@@ -137,18 +137,20 @@ def test_shots_nobody_can_judge_before_the_stop_are_taken_again_on_resuming(
     assert [index for index in range(30) if sink.frames[index].frame_id != -1] == list(range(blind, 30))
 
 
+@pytest.mark.usefixtures("blind")
 @pytest.mark.parametrize("kind", ["half from", "dark from"])
-def test_pictures_at_the_end_that_cannot_be_judged_are_withdrawn_where_a_control_fails(
-    scene: RenderedScene, blind: int, kind: str
+def test_all_since_the_code_is_withdrawn_where_the_end_cannot_be_judged_and_a_control_fails(
+    scene: RenderedScene, kind: str
 ) -> None:
     sink = MemorySink(scene.plan)
     runner, spoiled = _run(scene, sink, PatternFault(kind, 31))
     last = scene.plan.shot_count - 1
-    said = f"captured once more as a control.*{last + 1 - blind} frames between {blind} and {last}"
+    first = next(shot.index for shot in scene.plan.shots() if shot.role == "spectral")
+    said = f"captured once more as a control.*{last + 1 - first} frames between {first} and {last}"
     with pytest.raises(DeviceError, match=said):
         runner.run()
     assert spoiled.wrong
-    assert sorted(sink.frames) == list(range(blind))
+    assert sorted(sink.frames) == list(range(first))
     assert _run(scene, sink)[0].run().state is State.FINISHED
     assert _wrong(sink, spoiled) == []
 

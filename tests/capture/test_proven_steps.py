@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -37,7 +38,7 @@ class Bench:
         self._tell, self._same, self._differs = list(tell), is_as_before, differs
         self.believed: list[int] = []
         self.first_setting, self.token = 0, CancelToken()
-        self.cause = ""
+        self.cause, self.is_quite_the_same = "", True
         parts: Any = self
         self.shots = ProvenShots(parts, parts, parts, parts, self.token)
 
@@ -56,6 +57,9 @@ class Bench:
 
     def is_as_before(self, control: Shot, pixels: object) -> bool:
         return self._same or control.index == 0
+
+    def is_unchanged(self, control: Shot, pixels: object) -> bool:
+        return self.is_quite_the_same
 
     def write(self, shot: Shot, frame: Frame) -> None:
         self.written[shot.index] = frame.corrected
@@ -292,6 +296,19 @@ def test_the_eight_pictures_before_a_wrong_one_are_withdrawn_back_to_the_last_co
     with pytest.raises(PictureError, match=r"2 frames between 20 and 21"):
         take_all(bench, lines[12:24])
     assert bench.withdrawn == [20, 21], "from the picture after which all was well"
+
+
+def test_everything_since_an_old_picture_last_looked_the_same_is_withdrawn_when_one_does_not() -> None:
+    plan = PLAN.model_copy(update={"spectral": LineComb(width_px=1, step_px=1, period_px=40)})
+    lines = tuple(plan.shots())[12:40]
+    again = replace(lines[14], role="sentinel", pattern=4)
+    for is_quite_the_same, first in ((True, 27), (False, 12)):
+        bench = Bench(*[is_right] * 25, stepped, is_as_before=False)
+        bench.is_quite_the_same = is_quite_the_same
+        take_all(bench, [*lines[:14], again, *lines[15:25]])
+        with pytest.raises(PictureError, match=f"frames between {first} and 36, captured just before"):
+            bench.shots.take(lines[26])
+        assert bench.withdrawn == [at for at in range(first, 37) if at != again.index or first > again.index]
 
 
 def test_a_shot_found_wrong_on_the_way_is_taken_again_though_the_next_is_right() -> None:

@@ -8,11 +8,13 @@ import numpy as np
 import pytest
 import torch
 
-from dsl_core.model.rig import Film, Rig
+from dsl_core.model.rig import SHAPE_POWERS, Film, FilmShape, Rig
 from dsl_core.optics import grating
-from dsl_core.optics.correspondence import GratingModel, projector_points, zero_order
+from dsl_core.optics.correspondence import Footprint, GratingModel, projector_points, zero_order
 from dsl_core.optics.grating import FilmFrame, Vectors, incoming_direction
 from dsl_core.optics.pinhole import project
+from dsl_core.simulation.foreign.film_shape import BentFilm
+from dsl_core.simulation.foreign.variants import Foreign
 from dsl_core.simulation.published_rig import published_rig
 
 BANDS_NM = np.arange(430.0, 661.0, 5.0)
@@ -165,3 +167,35 @@ def test_light_through_a_bent_film_leaves_from_where_it_meets_it(
     far = (goal.z - z) / out[2]
     assert (x + far * out[0] - goal.x).abs().max() < 1e-6
     assert (y + far * out[1] - goal.y).abs().max() < 1e-6
+
+
+def test_a_twisted_film_sends_light_where_its_own_twin_does() -> None:
+    """The twin renders its foreign films by other formulas, with vectors instead of turns."""
+    rig = published_rig()
+    pixels, depth = sampled(rig)
+    bent = BentFilm(rig, Foreign(frozenset({"bend-twist"})))
+    shape = FilmShape(middle_mm=bent.middle_v, factors=(bent.twist_per_mm, 0.0, 0.0, 0.0, 0.0, 0.0))
+    twisted = rig.film.model_copy(update={"shape": shape})
+    point = projector_points(rig, pixels, depth)
+    plain = project(rig.projector, *incoming_direction(FilmFrame.of(rig.film), point, 1, NM[:, None]))
+    found = project(rig.projector, *incoming_direction(FilmFrame.of(twisted), point, 1, NM[:, None]))
+    wanted = project(rig.projector, *bent.incoming(point, 1, NM[:, None]))
+    inside = Footprint(*wanted).inside(rig.projector.width_px, rig.projector.height_px)
+    assert float((plain[0] - wanted[0])[inside].abs().max()) > 1.0
+    for seen, truth in zip(found, wanted, strict=True):
+        assert float((seen - truth)[inside].abs().max()) < 1e-3
+
+
+def test_the_slopes_of_a_film_are_those_of_its_height() -> None:
+    factors = (0.007, -0.005, 2e-4, -3e-4, 4e-4, -5e-4)
+    film = Film(bend_per_mm=0.003, shape=FilmShape(middle_mm=-6.0, factors=factors))
+    u, v = (torch.tensor(each, dtype=torch.float64) for each in ([-9.0, 1.0, 7.0], [-11.0, -6.0, -1.0]))
+    height, *slopes = FilmFrame.of(film).surface(u, v)
+    wanted = 0.0015 * u**2
+    for factor, (i, j) in zip(factors, SHAPE_POWERS, strict=True):
+        wanted = wanted + factor * u**i * (v + 6.0) ** j
+    assert torch.allclose(height, wanted)
+    for slope, (du, dv) in zip(slopes, ((1e-5, 0.0), (0.0, 1e-5)), strict=True):
+        ahead, behind = (FilmFrame.of(film).surface(u + s * du, v + s * dv)[0] for s in (1, -1))
+        assert slope is not None
+        assert torch.allclose(slope, (ahead - behind) / 2e-5, atol=1e-7)

@@ -67,6 +67,16 @@ def test_a_flag_is_told_from_the_share_that_is_not_normal(flag: Flag, limit: flo
     assert f"{limit + 0.02:.0%}" in above.words
 
 
+def test_pixels_that_are_lost_to_overexposure_are_told_by_themselves() -> None:
+    bright = flags(Flag.SATURATED | Flag.CODE_UNSURE, 0.3)
+    fit = Fit.of(judged(bright))
+    assert fit.parts == ("exposure",)
+    assert "30% of the lit pixels" in fit.words
+    assert "darker setting" in fit.words
+    assert Fit.of(judged(flags(Flag.SATURATED, 0.3))).parts == (), "these have a depth"
+    assert Fit.of(judged(bright | np.flip(flags(Flag.OUT_OF_RANGE, 0.2)))).parts == ("exposure", "coverage")
+
+
 def test_lines_of_another_shape_are_no_news_where_the_camera_is_out_of_focus() -> None:
     made = flags(Flag.UNUSUAL_PEAK, 0.3)
     assert Fit.of(share_findings(made, None)).parts == ("profile",)

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from dsl_core.errors import DecodeError
 from dsl_core.model.plan import CapturePlan, Setting, Shot
-from dsl_core.reconstruction.merge import MergedScan, check_source
+from dsl_core.reconstruction.merge import Exposed, MergedScan, check_source
 from tests.cases.small_rig import small_rig
 
 
@@ -79,5 +79,18 @@ def test_light_of_a_shot_that_was_too_strong_is_divided_out() -> None:
     levels = np.ones(Flat.plan.shot_count)
     for shot in Flat.plan.shots():
         levels[shot.index] = 1.25 if shot.role == "white" else 1.0
-    merged = MergedScan(Flat(), small_rig(), levels)
+    merged = MergedScan(Flat(), small_rig(), Exposed(levels, 0 * levels, 0 * levels))
     assert float(np.median(merged.merge("white", 0).radiance)) == pytest.approx(4.0, rel=1e-3)
+
+
+def test_black_that_a_shot_has_gained_is_taken_off() -> None:
+    gained = np.zeros(Flat.plan.shot_count)
+    usual = MergedScan(Flat(), small_rig())
+    for shot in Flat.plan.shots():
+        gained[shot.index] = 10.0 * (1 + shot.setting) if shot.role == "white" else 0.0
+    light, black = usual.merge("white", 0), gained[[shot.index for shot in usual.shots_of("white", 0)]]
+    merged = MergedScan(Flat(), small_rig(), Exposed(np.ones_like(gained), gained, 0 * gained)).merge(
+        "white", 0
+    )
+    less, apart = light.radiance - merged.radiance, black / usual.gains_ms
+    assert 0.99 * apart.min() < less.min() <= less.max() < 1.01 * apart.max()

@@ -158,7 +158,7 @@ def search(stage: Stage) -> None:
     assert tabs is not None
     tabs.setCurrentWidget(page.search)
     for mode in SearchMode:
-        page.search.mode.setCurrentIndex(page.search.mode.findData(mode))
+        page.search.content.mode.setCurrentIndex(page.search.content.mode.findData(mode))
         stage.press("Search", page)
         stage.idle()
         stage.shoot(mode.name.lower())

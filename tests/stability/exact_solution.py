@@ -55,7 +55,9 @@ class Solved:
 
 def exact_tau(system: System, prior: Prior) -> Floats:
     """The place of the largest evidence (pixels,), by the solver's parabola, from exact evidences."""
-    evidence = np.stack([exact_evidence(system, tau, prior) for tau in prior.taus])
+    # All in one: arrays are small, and each operation costs more than its numbers.
+    many = system.at(np.tile(np.arange(system.pixels), len(prior.taus)))
+    evidence = exact_evidence(many, np.repeat(prior.taus, system.pixels), prior).reshape(len(prior.taus), -1)
     best = evidence.argmax(0).clip(1, len(evidence) - 2)
     at = np.arange(evidence.shape[1])
     left, middle, right = (evidence[best + i, at] for i in (-1, 0, 1))
@@ -66,11 +68,13 @@ def exact_tau(system: System, prior: Prior) -> Floats:
     return np.asarray(np.exp(logs[best] + shift * (logs[1] - logs[0])))
 
 
-def exact_evidence(system: System, tau: float, prior: Prior) -> Floats:
-    """Twice the logarithm of the evidence up to a constant (pixels,)."""
-    posterior = _solve(system, np.full(system.pixels, tau), prior)
-    none = System(np.zeros((3, system.bands, 1)), np.zeros((system.bands, 1)), np.zeros((system.bands, 0, 1)))
-    volume = _solve(none, np.full(1, tau), prior).log_determinant
+def exact_evidence(system: System, tau: Floats, prior: Prior) -> Floats:
+    """Twice the logarithm of the evidence of a deviation (pixels,) up to a constant (pixels,)."""
+    posterior = _solve(system, tau, prior)
+    taus, which = np.unique(tau, return_inverse=True)
+    bands, count = system.bands, len(taus)
+    none = System(np.zeros((3, bands, count)), np.zeros((bands, count)), np.zeros((bands, 0, count)))
+    volume = _solve(none, taus, prior).log_determinant[which]
     return np.asarray(volume - posterior.log_determinant + posterior.quadratic)
 
 

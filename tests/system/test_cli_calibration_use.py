@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
+from dsl_core.devices import registry
 from dsl_core.devices.conditions import current_conditions
 from dsl_core.devices.registry import open_rig
 from dsl_core.io.calibration_library import CalibrationLibrary
@@ -48,6 +50,26 @@ def test_a_scan_stores_the_calibration_it_is_told(give: Give, tmp_path: Path, ca
     assert "no calibration 'lob'; it has: lab" in give(
         "scan", tmp_path / "b.dsl", *SMALL_RIG, *QUICK, "--calibration", "lob"
     ).sentence  # fmt: skip
+
+
+def test_a_scan_without_calibration_says_what_comes_before_its_reconstruction(
+    give: Give, tmp_path: Path, calibrated: Rig, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    command = ["scan", tmp_path / "with.dsl", *SMALL_RIG, *QUICK]
+    assert f"Next: dsl-scan reconstruct {command[1]}\n" in give(*command).out
+    monkeypatch.setattr(
+        registry, "open_rig", lambda name, options: replace(open_rig(name, options), calibration=None)
+    )
+    first = give("scan", tmp_path / "first.dsl", *SMALL_RIG, *QUICK).out
+    assert f"Next: dsl-scan reconstruct {tmp_path / 'first.dsl'} --calibration NAME" in first
+    assert "in the library, which has: lab." in first
+    monkeypatch.setenv("DSL_SCAN_HOME", str(tmp_path / "empty"))
+    second = give("scan", tmp_path / "second.dsl", *SMALL_RIG, *QUICK).out
+    assert (
+        "Next: calibrate the rig with 'dsl-scan calibrate all CAMPAIGN --rig twin --option size=112x72'"
+        in second
+    )
+    assert f"then dsl-scan reconstruct {tmp_path / 'second.dsl'} --calibration CAMPAIGN" in second
 
 
 def test_other_settings_are_refused_unless_overridden(give: Give, tmp_path: Path, calibrated: Rig) -> None:

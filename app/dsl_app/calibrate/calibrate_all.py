@@ -105,7 +105,7 @@ class CalibrateAll:
         left = overall.left_s()
         rest = "" if left is None else f"  ·  about {describe_seconds(left)} left for everything"
         if overall.is_early:
-            rest = f"  ·  the time left is told from {100 * LEAST_SHARE:.0f} % of everything on"
+            rest = f"  ·  the time left is told once {100 * LEAST_SHARE:.0f} % of everything is done"
         self._state.running.set(overall.name)
         self._state.everything.set(f"{told.stage or 'starting'}{count}{rest}")
         seen = None if self._camera is None else self._camera.take_seen()
@@ -143,7 +143,7 @@ class UnattendedGuide:
             self._is_fitting = True
             self.overall.next_part()
         self.overall.report(done, total)
-        self.progress.report(": ".join(filter(None, (self.title, stage))), done, total)
+        self.progress.report(_told_once(self.title, stage), done, total)
 
     def begins(self, session: CalibrationSession, missing: int) -> None:
         """Remember which calibration it is."""
@@ -171,6 +171,19 @@ class UnattendedGuide:
             raise CalibrationError(f"{fitted.title} is outside its limits: {told} Its wizard shows the fit.")
         self.overall.ends()
         return True
+
+
+def _told_once(title: str, stage: str) -> str:
+    """A stage under the title of its calibration, in which no name follows itself.
+
+    >>> _told_once("Self-test", "Self-test: self-test"), _told_once("Geometry", "pose 1: capture")
+    ('Self-test', 'Geometry: pose 1: capture')
+    """
+    parts = [part for part in (title, *stage.split(": ")) if part]
+    before = ["", *parts]
+    return ": ".join(
+        part for part, last in zip(parts, before, strict=False) if part.casefold() != last.casefold()
+    )
 
 
 def _parts(recipe: AnyRecipe, devices: DeviceRig, campaign: CampaignFolder) -> int:

@@ -24,6 +24,7 @@ from dsl_app.calibrate.figures_table import FiguresTable
 from dsl_app.calibrate.presentation import kept_version, library_selection, main_button, version_texts
 from dsl_app.calibrate.state import CalibrateState, DriftVerdict
 from dsl_app.shared.evented import follow_any
+from dsl_app.shared.plain_tip import plain_tip
 from dsl_app.shared.theme import Theme
 from dsl_app.shared.widget_state import LabelState
 from dsl_app.shared.widgets.forms import label, push_button, set_role, show_label
@@ -154,7 +155,7 @@ class LibraryPanel(QGroupBox):
         items = [cell(text) for text in version_texts(line, self._state.in_use.value)]
         if line.error:
             for item in items:
-                item.setToolTip(line.error)
+                item.setToolTip(plain_tip(line.error))
         return items
 
     def _select(self) -> None:
@@ -178,6 +179,7 @@ class LibraryPanel(QGroupBox):
             return
         box = QMessageBox(self)
         box.setWindowTitle("Check for drift")
+        box.setTextFormat(Qt.TextFormat.PlainText)
         box.setText(
             "Mount the film and place a flat, matt target that fills the picture. Which target is it?"
         )

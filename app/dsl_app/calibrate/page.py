@@ -202,17 +202,18 @@ class CalibrationRow(QFrame):
         grid.setContentsMargins(12, 6, 8, 6)
         grid.setHorizontalSpacing(12)
         grid.setVerticalSpacing(1)
+        # One part: a figure of two lines does not come between them.
+        name = boxed(column_of(self._title, self._purpose, margins=0, spacing=1))
+        grid.addWidget(name, 1, 0, 2, 1, Qt.AlignmentFlag.AlignTop)
         top: tuple[tuple[QWidget, int], ...] = (
-            (self._title, _NAME_PX),
             (self.state, _STATE_PX),
             (self.figure, 0),
             (self.date, _DATE_PX),
         )
-        for column, (widget, width) in enumerate(top):
+        for column, (widget, width) in enumerate(top, 1):
             widget.setMinimumWidth(width)
             grid.addWidget(widget, 1, column, Qt.AlignmentFlag.AlignTop)
         grid.setColumnStretch(2, 1)
-        grid.addWidget(self._purpose, 2, 0, Qt.AlignmentFlag.AlignTop)
         grid.addWidget(self.reason, 2, 1, 1, 3, Qt.AlignmentFlag.AlignTop)
         # Both lines stay together in the middle of a high row.
         for edge in (0, 3):

@@ -101,12 +101,12 @@ class DemoController:
 
 def _fetch(key: str, target: Path) -> Path:
     """The example in a folder of the person's own, copied there unless it is; raises `StoreError`."""
-    from dsl_core.io.result.result_file import RESULT_FOLDER, load_result
+    from dsl_core.io.result.result_file import RESULT_FOLDER, checked_attributes
     from dsl_core.io.staging import staged
     from dsl_core.resources import resource_path
 
     try:
-        load_result(target)
+        checked_attributes(target)
     except StoreError:
         # Not there yet, damaged, or of another version.
         with staged([target], overwrite=True, kind=RESULT_FOLDER) as (draft,):

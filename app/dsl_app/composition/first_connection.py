@@ -2,20 +2,25 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 from PySide6.QtCore import QObject, QTimer
 
-from dsl_app.connection.controller import RigController
 from dsl_app.connection.state import Link
 from dsl_app.shell.main_window import MainWindow
 
-#: How long the Start page is on screen before the rig is connected, and the time between two tries, ms.
+if TYPE_CHECKING:
+    # The window comes up before numpy.
+    from dsl_app.connection.controller import RigController
+
+#: How long such a page is on screen before the rig is connected, and the time between two tries, ms.
 LATER_MS, AGAIN_MS = 3000, 200
 #: Pages that need no rig.
 LOOKING = ("start", "results")
 
 
 class FirstConnection(QObject):
-    """Connects at once, or from the Start page later: a first example needs none of a rig's libraries."""
+    """Connects at once, or later on a page that needs no rig: a first example needs none of its libraries."""
 
     def __init__(self, window: MainWindow, rig: RigController) -> None:
         super().__init__(window)
@@ -23,7 +28,7 @@ class FirstConnection(QObject):
 
     def begin(self, at_once: bool) -> None:
         """Connect now, or when another page is opened, or when no job runs for a while."""
-        if at_once or self._window.page != "start":
+        if at_once or self._window.page not in LOOKING:
             self._connect()
             return
         self._window.opened.connect(lambda page: None if page in LOOKING else self._connect())

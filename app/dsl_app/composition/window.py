@@ -76,6 +76,9 @@ class Composition(QObject):
         ``in_background`` imports that page in a thread once the window is painted.
         """
         self.window = make_window(self.pages, folder, theme, self.commands, self.handlers)
+        if self._options.demo:
+            # Where its result is shown: no other page is imported and made before.
+            self.window.parts.settings.page = "results"
         open_first_page(self.window, PAGE_MODULES if in_background else None)
         return self.window
 
@@ -110,16 +113,21 @@ class Composition(QObject):
         }
 
     def is_awaited(self) -> bool:
-        """Whether a person waits for a job, the rig or its first picture; any thread may ask."""
+        """Whether a person waits for a job, a result, the rig or its first picture; any thread may ask."""
         if any(not job.is_minor for job in self.window.parts.runner.active):
             return True
         # Asking must make neither.
         made = vars(self)
+        results = self.session.results if "session" in made else None
+        if results is not None and results.is_reading:
+            return True
         is_opening = "rig" in made and self.rig.state.link.value is Link.OPENING
         return is_opening or ("live" in made and self.live.state.is_exposing.value)
 
     def start(self) -> None:
-        """Connect the rig and open what was requested, once the window is on screen."""
+        """Open what was requested, and soon connect the rig, once the window is on screen."""
+        if self._options.demo:
+            self.demo.show()
         QTimer.singleShot(CONNECT_AFTER_MS, self, self._start_now)
 
     def _start_now(self) -> None:
@@ -127,8 +135,6 @@ class Composition(QObject):
         FirstConnection(self.window, self.rig).begin(self._options.rig is not None)
         if self._options.open is not None:
             self.window.open_path(self._options.open)
-        if self._options.demo:
-            self.demo.show()
         if self._options.offers_tour and not self.window.parts.settings.tour_seen:
             # Offered once; the Help menu always has it.
             self.window.parts.settings.tour_seen = True

@@ -123,12 +123,7 @@ class ResultsController:
         self.state.busy.set(title)
 
         def both(progress: Progress) -> tuple[ResultArrays, NDArray[np.uint8] | None]:
-            from dsl_core.optics.colour import observer_weights
-
             arrays = completed(work(progress))
-            if arrays.has_spectra:
-                # Import here what the first comparison of colours needs; later it would block the window.
-                observer_weights(arrays.wavelengths_nm)
             return arrays, rgba_of_colours(arrays["rgb"]) if "rgb" in arrays.arrays else None
 
         def ended() -> None:

@@ -63,7 +63,7 @@ class ResultImage(QWidget):
         self.materials = pg.ImageItem(axisOrder="row-major")
         self.materials.setZValue(4)
         self._vertical, self._horizontal = (pg.InfiniteLine(angle=angle, movable=False) for angle in (90, 0))
-        self.pins = pg.ScatterPlotItem(size=11, pxMode=True)
+        self.pins = pg.ScatterPlotItem(size=11, pxMode=True, pen=pg.mkPen("#000000", width=1))
         for item in (self.overlay, self.materials, self._vertical, self._horizontal, self.pins):
             self.box.addItem(item, ignoreBounds=True)
         for line in (self._vertical, self._horizontal):
@@ -206,16 +206,13 @@ class ResultImage(QWidget):
         for item in self._mark_items:
             self.box.removeItem(item)
         self._mark_items = []
-        spots = []
-        for mark in marks:
-            colour = self._theme.pin(mark.colour)
-            if not mark.shown or mark.trouble:
-                continue
-            if mark.pixel is not None:
-                spots.append({"pos": mark.pixel, "brush": colour, "pen": pg.mkPen("#000000", width=1)})
-            elif mark.kind == "region":
-                self._mark_items.append(self._region_item(mark, colour))
-        self.pins.setData(spots)
+        seen = [mark for mark in marks if mark.shown and not mark.trouble]
+        for mark in seen:
+            if mark.kind == "region":
+                self._mark_items.append(self._region_item(mark, self._theme.pin(mark.colour)))
+        pins = [(mark.pixel, self._theme.pin(mark.colour)) for mark in seen if mark.pixel is not None]
+        places = np.array([pixel for pixel, _ in pins]).reshape(-1, 2)
+        self.pins.setData(pos=places, brush=[pg.mkBrush(colour) for _, colour in pins])
         for item in self._mark_items:
             self.box.addItem(item, ignoreBounds=True)
 

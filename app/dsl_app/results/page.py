@@ -27,6 +27,7 @@ from dsl_app.results.view_bar import ViewBar
 from dsl_app.results.welcome import Offer, Welcome
 from dsl_app.shared.evented import follow_any
 from dsl_app.shared.jobs.base import JobRunner
+from dsl_app.shared.plain_tip import plain_tip
 from dsl_app.shared.settings import folder_for
 from dsl_app.shared.theme import DARK, Theme
 from dsl_app.shared.widget_state import LabelState
@@ -81,11 +82,11 @@ class ResultsPage(PageWidget):
         set_help(self.spectra, "numbers#spectra")
         self.marks = MarksPanel(state, control.marks)
         set_help(self.marks, "numbers#pins-regions-references")
-        self.materials = MaterialsPanel(state, control.answers)
+        self.materials = Deferred(lambda: MaterialsPanel(state, control.answers))
         set_help(self.materials, "materials")
-        self.colours = ColoursPanel(state)
+        self.colours = Deferred(lambda: ColoursPanel(state))
         set_help(self.colours, "materials#colours")
-        self.search = SearchPanel(state, control.search)
+        self.search = Deferred(lambda: SearchPanel(state, control.search))
         set_help(self.search, "numbers#search")
         self._graph: IntensityWindow | None = None
         self.title, self.about = label("Results", "title"), ClippedLabel()
@@ -179,7 +180,7 @@ class ResultsPage(PageWidget):
             button.setEnabled(summary.has_result)
         self.title.setText(summary.title)
         self.about.setText(summary.about)
-        self.about.setToolTip(summary.details)
+        self.about.setToolTip(plain_tip(summary.details))
         show_label(self.warning, LabelState(summary.warning, "warn", summary.advice))
 
     def _show_graph(self, graph: IntensityGraph | None) -> None:

@@ -69,6 +69,11 @@ def rig_of_scan(notes: Mapping[str, object]) -> tuple[RigChoice | None, bool]:
     return choice, is_built_in(choice.name) or is_of_this_computer(notes)
 
 
+def named_target(folder: Path, name: str) -> Path:
+    """The scan folder with a name that a person typed, with or without its ending."""
+    return folder / f"{name.strip().replace('/', '-').removesuffix(SUFFIX)}{SUFFIX}"
+
+
 def fresh_target(folder: Path, now: datetime) -> Path:
     """A scan folder that does not exist yet, named by date and minute."""
     return first_free(folder, f"scan-{now:%Y%m%d-%H%M}", SUFFIX)

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from dsl_app.connection.controller import RIG, RigController
 from dsl_app.connection.state import Link
-from dsl_app.scan.command_line import fresh_target, rig_of_scan, scan_command
+from dsl_app.scan.command_line import fresh_target, named_target, rig_of_scan, scan_command
 from dsl_app.scan.job import ScanJob, ScanRequest
 from dsl_app.scan.plan import ScanPlanController
 from dsl_app.scan.reconnect import Reconnector
@@ -61,6 +61,8 @@ class ScanController:
         self._stop_expecting = state.plan.follow(
             lambda plan: state.reconstruction_s.set(self._pace.expected_s(plan.camera_size_px))
         )
+        #: The name that a person typed for a scan to come.
+        self._name = ""
         #: Where the person saves scans.
         self._folder = state.target.value.parent
         self._stop_following = state.target.changed.connect(self._keep_folder)
@@ -171,6 +173,8 @@ class ScanController:
             self.state.status.set(status)
             if status.warning and status.warning != (before.warning if before else ""):
                 self._warn(status)
+            if status.overexposed and not (before and before.overexposed):
+                self._notifier.tell("warning", status.overexposed)
             if self.state.phase.value.is_busy and self.state.phase.value is not Phase.STOPPING:
                 self.state.phase.set(_PHASES.get(status.state, self.state.phase.value))
         if picture is not None:
@@ -209,11 +213,23 @@ class ScanController:
         self.state.interrupted.set(None)
         self.state.finished.set(folder)
         self.state.check_drift.set(True)
-        self.state.note.set(f"All {status.total} frames are saved in {folder}.")
+        assert self._scan is not None
+        lacks_calibration = not self._scan.is_calibrated
+        self.state.lacks_calibration.set(lacks_calibration)
+        what_next = f" {self._needs_calibration}" if lacks_calibration else ""
+        self.state.note.set(f"All {status.total} frames are saved in {folder}.{what_next}")
         self._choose_target()
         self.plans.refresh()
-        if self.state.then_reconstruct.value:
+        if self.state.then_reconstruct.value and not lacks_calibration:
             self.reconstruct(folder)
+
+    @property
+    def _needs_calibration(self) -> str:
+        """What comes before a scan without calibration can be reconstructed."""
+        choose = "press Reconstruct… and choose the calibration of its rig."
+        if self.state.has_library:
+            return f"They contain no calibration: {choose}"
+        return f"They contain no calibration: first calibrate the rig on the Calibrate page, then {choose}"
 
     def _failed(self, error: Exception) -> None:
         folder = self._end(Phase.LOST)
@@ -256,9 +272,17 @@ class ScanController:
         if target.parent != self._hidden:
             self._folder = target.parent
 
+    def name_scan(self, name: str) -> None:
+        """Name the next scan; that stays until there is a scan with this name. An empty one is ignored."""
+        if name.strip():
+            self._name = name
+            self.plans.set_target(named_target(self.state.target.value.parent, name))
+
     def _choose_target(self) -> None:
         """Name the next scan, in the folder where the person saves scans."""
-        self.state.target.set(fresh_target(self._folder, self._clock()))
+        typed = named_target(self._folder, self._name)
+        is_free = bool(self._name) and not typed.exists()
+        self.state.target.set(typed if is_free else fresh_target(self._folder, self._clock()))
 
     def reconstruct(self, session: Path) -> None:
         """Reconstruct a complete scan, save the result next to it and report it."""

@@ -55,12 +55,13 @@ def run_controls(
     has_result: bool = True,
     trouble: str = "",
     is_reconstructing: bool = False,
+    must_calibrate: bool = False,
 ) -> RunControls:
     """The controls of a scan in a phase; ``note`` is what became of the last one.
 
     ``trouble`` is said above the page, with how far the scan came; that is not said again. A finished scan
-    without a result is reconstructed next, whatever kept it from having one; while one is, there is only to
-    wait.
+    without a result is reconstructed next, whatever kept it from having one, unless one ``must_calibrate``
+    before; while one is, there is only to wait.
     """
     is_raw = phase is Phase.DONE and has_finished and not (has_result or is_reconstructing)
     obstacles = () if facts is None or phase.is_busy else facts.obstacles
@@ -95,7 +96,7 @@ def run_controls(
         drift=ButtonState(is_resumable),
         again=ButtonState(
             has_finished and not phase.is_busy and session is None,
-            is_primary=is_raw,
+            is_primary=is_raw and not must_calibrate,
             text="Reconstruct…" if is_raw else "Reconstruct a&gain…",
         ),
         phase=LabelState(f"● {phase.value}" if is_ready else "● not ready", _PHASE_ROLES.get(phase, "muted")),

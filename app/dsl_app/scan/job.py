@@ -39,6 +39,8 @@ class ScanJob:
     def __init__(self, request: ScanRequest) -> None:
         self.request = request
         self.token = CancelToken()
+        #: Whether the finished scan contains a calibration, without which it cannot be reconstructed.
+        self.is_calibrated = True
         self._lock = threading.Lock()
         self._runner: Runner | None = None
         #: A lock of its own: the runner reports its status under a lock, and that takes the other one.
@@ -54,6 +56,7 @@ class ScanJob:
     def work(self, progress: Progress) -> Status:
         """Capture every missing frame; raises what the engine raises."""
         from dsl_core import pipeline
+        from dsl_core.io.scan.folder import ScanReader
         from dsl_core.workflows import scans
 
         request = self.request
@@ -81,7 +84,9 @@ class ScanJob:
                 self._runner = runner
                 if self._is_paused:
                     runner.pause()
-            return runner.run()
+            status = runner.run()
+        self.is_calibrated = ScanReader(request.folder).calibration is not None
+        return status
 
     def _calibrated(self) -> tuple[DeviceRig, dict[str, str]]:
         """The devices with the calibration ordered, and what was overridden, as notes of the scan."""

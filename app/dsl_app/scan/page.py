@@ -20,6 +20,7 @@ from dsl_app.scan.run import CalibrationBox, RunBox, TargetBox
 from dsl_app.scan.state import Phase, Reconnection, ScanState
 from dsl_app.scan.view import ScanView
 from dsl_app.shared.evented import follow_any
+from dsl_app.shared.plain_tip import plain_tip
 from dsl_app.shared.widgets.deferred import Deferred
 from dsl_app.shared.widgets.figure_file import PlotFigure
 from dsl_app.shared.widgets.forms import Banner, show_button
@@ -119,7 +120,7 @@ class ScanPage(PageWidget):
             self.view.show()
         else:
             self.middle.insertTab(1, self.view, FRAMES)
-            self.middle.setTabToolTip(1, FRAMES_TIP)
+            self.middle.setTabToolTip(1, plain_tip(FRAMES_TIP))
 
     def _connect(self) -> None:
         state, controller = self._state, self._controller

@@ -158,7 +158,7 @@ class ScanPlanController:
             is_there = self._devices is not None and was_taken_with(session, self._rig.choice.value)
             connects = not is_there and session.rig_to_open is not None
             needs = () if self._devices or connects else (connect_first(session),)
-            facts = replace(facts, obstacles=needs, remarks=(), connects=connects)
+            facts = replace(facts, obstacles=needs, remarks=(), connects=connects, is_calibrated=True)
         state.facts.set(facts)
 
     def _fitted(self, plan: CapturePlan) -> CapturePlan:
@@ -326,9 +326,16 @@ def find_facts(
     obstacles = [*_obstacles(devices, plan, calibration, override), *_place(target)]
     if needs.free_bytes < needs.needed_bytes:
         obstacles.append("There is not enough disk space. Free some space, or choose another drive.")
-    remarks = (NO_CALIBRATION,) if devices is not None and calibration is None else ()
+    is_calibrated = devices is None or calibration is not None
     return Facts(
-        needs.frames, needs.seconds, needs.needed_bytes, needs.free_bytes, tuple(obstacles), remarks, differ
+        needs.frames,
+        needs.seconds,
+        needs.needed_bytes,
+        needs.free_bytes,
+        tuple(obstacles),
+        () if is_calibrated else (NO_CALIBRATION,),
+        differ,
+        is_calibrated=is_calibrated,
     )
 
 

@@ -6,6 +6,7 @@ from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QFormLayout, QGridLayout, QGroupBox, QWidget
 
 from dsl_app.scan.state import preset_of
+from dsl_app.shared.plain_tip import plain_tip
 from dsl_app.shared.widgets.forms import ChoiceBox, NumberBox, WholeBox, label, push_button, quiet
 from dsl_app.shared.widgets.help_window import set_help
 from dsl_app.shared.widgets.layouts import row_of
@@ -170,7 +171,7 @@ class SettingRows(QWidget):
             exposure, level = self._rows[i]
             exposure.setSingleStep(period_ms)
             cycles = whole_cycles(setting.exposure_ms, period_ms)
-            exposure.setToolTip(f"{cycles} LED cycles of {period_ms:.2f} ms. {_EXPOSURE_TIP}")
+            exposure.setToolTip(plain_tip(f"{cycles} LED cycles of {period_ms:.2f} ms. {_EXPOSURE_TIP}"))
             for box, value in ((exposure, setting.exposure_ms), (level, setting.level)):
                 with quiet(box):
                     box.setValue(value)

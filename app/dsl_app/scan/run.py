@@ -14,6 +14,7 @@ from PySide6.QtWidgets import (
     QPushButton,
 )
 
+from dsl_app.scan.command_line import named_target
 from dsl_app.scan.controller import ScanController
 from dsl_app.scan.controls import RESUME, progress_text, run_controls
 from dsl_app.scan.forecast.figures import minutes, volume
@@ -89,18 +90,14 @@ class TargetBox(QGroupBox):
         ):
             form.addRow(title, widget)
         form.addRow("", self._split)
-        self.name.editingFinished.connect(self._rename)
+        # A scan that is started by a key takes the name as far as it is typed.
+        self.name.textEdited.connect(controller.name_scan)
+        self.name.editingFinished.connect(self._show_name)
         self.stops = [
             state.target.follow(self._show_target),
             state.facts.follow(self._show_facts),
-            *follow_any(self._show_then, state.reconstruction_s, state.then_reconstruct),
+            *follow_any(self._show_then, state.reconstruction_s, state.then_reconstruct, state.facts),
         ]
-
-    def _rename(self) -> None:
-        text = self.name.text().strip()
-        target = self._state.target.value
-        if text and text != target.stem:
-            self._controller.plans.set_target(target.parent / text.replace("/", "-"))
 
     def _browse(self) -> None:
         target = self._state.target.value
@@ -109,11 +106,17 @@ class TargetBox(QGroupBox):
             self._controller.plans.set_target(Path(name) / target.name)
 
     def _show_target(self, target: Path) -> None:
-        self.name.setText(target.stem)
+        # Whoever types keeps the text and the place in it.
+        if not self.name.text().strip() or named_target(target.parent, self.name.text()) != target:
+            self._show_name()
         self._where.setText(f"in {breakable(target.parent)}")
 
+    def _show_name(self) -> None:
+        self.name.setText(self._state.target.value.stem)
+
     def _show_then(self) -> None:
-        expected_s, follows = self._state.reconstruction_s.value, self._state.then_reconstruct.value
+        expected_s, facts = self._state.reconstruction_s.value, self._state.facts.value
+        follows = self._state.then_reconstruct.value and (facts is None or facts.is_calibrated)
         self._then.setText(f"then {about(expected_s)} to reconstruct" if expected_s and follows else "")
 
     def _show_facts(self, facts: Facts | None) -> None:
@@ -175,6 +178,8 @@ class RunBox(QGroupBox):
                 state.trouble,
                 state.is_reconstructing,
                 state.is_seen,
+                state.lacks_calibration,
+                state.calibrations,
             ),
             state.status.follow(self._show_status),
         ]
@@ -216,6 +221,7 @@ class RunBox(QGroupBox):
             has_result,
             state.trouble.value,
             state.is_reconstructing.value,
+            state.lacks_calibration.value and not state.has_library,
         )
         show_parts(self, shown)
 

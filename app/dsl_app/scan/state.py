@@ -104,7 +104,8 @@ class InterruptedScan:
 class Facts:
     """The cost of a plan, ``obstacles`` that prevent it from starting, and ``remarks`` that do not.
 
-    ``connects`` says that starting connects the rig first.
+    ``connects`` says that starting connects the rig first, ``is_calibrated`` that the scan can be
+    reconstructed once it is complete.
     """
 
     frames: int
@@ -115,6 +116,7 @@ class Facts:
     remarks: tuple[str, ...] = ()
     settings_differ: bool = False
     connects: bool = False
+    is_calibrated: bool = True
 
 
 @dataclass(frozen=True)
@@ -133,8 +135,9 @@ class ScanState:
     ``plan_file`` is the file that holds exactly the current plan, if there is one. ``check_drift`` compares
     two old frames before an interrupted scan resumes. ``period_ms`` is the LED cycle
     of the rig's projector. ``finished`` is the scan that was completed last, ``result`` fires with each new
-    result; ``is_reconstructing`` says that one is being made, and ``depth`` is that of it, mm, while its
-    spectra are computed; ``reconstruction_s`` is how long one of the plan is expected to take.
+    result; ``lacks_calibration`` says of the one completed last that it contains no calibration to be
+    reconstructed with; ``is_reconstructing`` says that one is being made, and ``depth`` is that of it, mm,
+    while its spectra are computed; ``reconstruction_s`` is how long one of the plan is expected to take.
     ``is_seen`` says that the page is on screen, where everything is said; ``wanted`` asks for it.
     """
 
@@ -149,6 +152,7 @@ class ScanState:
         self.then_reconstruct = Value(True)
         self.interrupted: Value[InterruptedScan | None] = Value(None)
         self.finished: Value[Path | None] = Value(None)
+        self.lacks_calibration = Value(False)
         self.facts: Value[Facts | None] = Value(None)
         self.period_ms = Value(1000.0 / 60.0)
         self.latency_ms = Value(0.0)
@@ -166,6 +170,11 @@ class ScanState:
         self.reconstruction_s: Value[float | None] = Value(None)
         self.is_seen = Value(False)
         self.wanted: Event[None] = Event()
+
+    @property
+    def has_library(self) -> bool:
+        """Whether the library has a calibration to choose."""
+        return any(each.key for each in self.calibrations.value)
 
     @property
     def preset(self) -> Preset | None:

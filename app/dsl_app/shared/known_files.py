@@ -9,11 +9,8 @@ from pathlib import Path
 
 from dsl_core.io import CAMPAIGN_NAME, MANIFEST_NAME, PUBLISHED_PLACES, PUBLISHED_STARTS
 from dsl_core.io.reading import read_json
-from dsl_core.io.spectra.catalogue import suffixes
 
 RESULT_NAME = "zarr.json"
-#: Endings of files that may hold a reference spectrum.
-REFERENCE_SUFFIXES = suffixes()
 _MARKS = ".marks.json"
 _OPENS = (
     "dsl-scan opens scans (folders NAME.dsl), results (folders NAME.zarr), plans and pattern sets (.json),"
@@ -58,7 +55,10 @@ def kind_of(path: Path) -> Kind:
     suffix = path.suffix.lower()
     if suffix == ".json" and path.is_file():
         return _kind_of_json(path)
-    return Kind.REFERENCE if suffix in REFERENCE_SUFFIXES and path.is_file() else Kind.UNKNOWN
+    # The window comes up before numpy, which the formats need.
+    from dsl_core.io.spectra.catalogue import suffixes
+
+    return Kind.REFERENCE if suffix in suffixes() and path.is_file() else Kind.UNKNOWN
 
 
 def _is_published(folder: Path) -> bool:

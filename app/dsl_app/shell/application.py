@@ -15,7 +15,7 @@ from PySide6.QtGui import QColor, QIcon, QPalette
 from PySide6.QtWidgets import QApplication
 
 from dsl_app.shared.jobs.base import Job
-from dsl_app.shared.jobs.memory import CHECK_MS, GarbageCollector, limit_heaps
+from dsl_app.shared.jobs.memory import CHECK_MS, GarbageCollector
 from dsl_app.shared.jobs.qt_runner import QtRunner
 from dsl_app.shared.known_files import Kind
 from dsl_app.shared.notify import Notifier
@@ -29,6 +29,7 @@ from dsl_app.shell.log import LogRecords
 from dsl_app.shell.main_window import MainWindow
 from dsl_app.shell.paged_window import Parts
 from dsl_app.shell.warm_up import import_early
+from dsl_core.solve.heap import keep_freed_memory, limit_heaps
 
 _log = logging.getLogger(__name__)
 _SCHEMES = {
@@ -46,6 +47,7 @@ def make_application(arguments: Sequence[str]) -> QApplication:
     """The one Qt application, in a style that looks alike on all systems."""
     sys.setswitchinterval(SWITCH_S)
     limit_heaps()
+    keep_freed_memory()
     _remove_import_hook()
     application = QApplication.instance()
     if not isinstance(application, QApplication):

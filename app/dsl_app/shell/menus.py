@@ -8,6 +8,7 @@ from pathlib import Path
 from PySide6.QtGui import QAction, QKeySequence
 from PySide6.QtWidgets import QMainWindow, QMenu, QWidget
 
+from dsl_app.shared.plain_tip import plain_tip
 from dsl_app.shared.settings import RecentFiles, entry_text
 from dsl_app.shell.actions import Action
 
@@ -36,7 +37,7 @@ class Menus:
         if record.shortcut:
             made.setShortcut(QKeySequence(record.shortcut))
         made.setStatusTip(record.tip)
-        made.setToolTip(record.tip or record.text.replace("&", ""))
+        made.setToolTip(plain_tip(record.tip or record.text.replace("&", "")))
         made.setCheckable(record.checkable)
         made.triggered.connect(lambda _checked=False, key=record.key: self._do(key))
         self.actions[record.key] = made
@@ -68,7 +69,7 @@ class RecentMenu(QMenu):
             # Only the first nine have a mnemonic.
             number = f"&{i}  " if i < 10 else f"{i}  "
             action = self.addAction(f"{number}{entry_text(path).replace('&', '&&')}")
-            action.setToolTip(str(path))
+            action.setToolTip(plain_tip(str(path)))
             action.setStatusTip(str(path))
             action.triggered.connect(lambda _checked=False, path=path: self._open(path))
         if self.isEmpty():

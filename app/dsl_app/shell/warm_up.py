@@ -38,13 +38,14 @@ PAGE_MODULES = {
     ),
 }
 #: What a first look at a result needs, which takes least time.
-_LOOK = (*PAGE_MODULES["results"], "zarr", "pandas", "xarray", "dsl_core.io.result.result_file")
+_LOOK = (*PAGE_MODULES["results"], "zarr", "dsl_core.io.result.stored_arrays")
+#: What the first comparison of colours needs, which a person does soon; it would block the window then.
+_COMPARE = ("dsl_core.optics.colour", "scipy.interpolate")
 #: What connecting a rig needs.
 _FIRST = (
     "scipy.linalg",
     "scipy.ndimage",
     "scipy.optimize",
-    "scipy.interpolate",
     "cv2",
     "torch",
     "dsl_core.simulation.sim_devices",
@@ -53,6 +54,8 @@ _FIRST = (
 )
 #: Calibrations, results and the 3D view.
 _LAST = (
+    "pandas",
+    "xarray",
     "dsl_app.calibrate.wizard.window",
     "dsl_core.workflows.scans",
     "dsl_core.campaign.recipes",
@@ -69,7 +72,9 @@ _LAST = (
     "vtkmodules.vtkViewsContext2D",
     "vtkmodules.vtkInteractionStyle",
 )
-STEPS = tuple(dict.fromkeys((*_LOOK, *_FIRST, *chain.from_iterable(PAGE_MODULES.values()), *_LAST)))
+STEPS = tuple(
+    dict.fromkeys((*_LOOK, *_COMPARE, *_FIRST, *chain.from_iterable(PAGE_MODULES.values()), *_LAST))
+)
 #: Pause between two steps, s, and how long all of them may be kept waiting by what a person waits for.
 REST_S, PATIENCE_S = 0.05, 20.0
 #: Large libraries of some packages: while the system loads them, Python's lock is free.

@@ -177,7 +177,9 @@ def about_window(parent: QWidget) -> QDialog:
     """Name, version, reference and licence of the program."""
     from PySide6 import __version__ as qt_version
 
-    text = QLabel(
+    text = QLabel()
+    text.setTextFormat(Qt.TextFormat.RichText)
+    text.setText(
         f"<h3>dsl-scan {__version__}</h3>"
         "<p>Hyperspectral 3D scanning by Dispersed Structured Light: an RGB camera, an RGB projector and a"
         " diffraction film.</p>"

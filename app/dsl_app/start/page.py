@@ -7,18 +7,23 @@ from functools import partial
 from pathlib import Path
 
 from PySide6.QtCore import Qt
-from PySide6.QtGui import QShowEvent
+from PySide6.QtGui import QResizeEvent, QShowEvent
 from PySide6.QtWidgets import QFrame, QPushButton
 
+from dsl_app.shared.evented import follow_any
 from dsl_app.shared.settings import RecentFiles
 from dsl_app.shared.widgets.forms import label, push_button, set_role
 from dsl_app.shared.widgets.layouts import STRETCH, boxed, column_of, row_of, scrolled
 from dsl_app.shared.widgets.page import PageWidget
 from dsl_app.shared.widgets.recent_list import RecentList
 from dsl_app.start.examples import EXAMPLES
-from dsl_app.start.unfinished import Unfinished, UnfinishedController
+from dsl_app.start.unfinished import UnfinishedController
 from dsl_app.start.unfinished_list import UnfinishedList
 
+#: Height of what is shown at least, px: a third of what a window has beyond that is above it.
+CONTENT_PX = 520
+#: By how much a primary button is higher than its text, px.
+PRIMARY_MORE_PX = 12
 #: Width of a card, and that in a wide window, px.
 CARD_PX, WIDE_CARD_PX, GAP_PX = 286, 380, 16
 
@@ -38,12 +43,16 @@ class StartPage(PageWidget):
         unfinished: UnfinishedController,
     ) -> None:
         super().__init__()
+        self._unfinished = unfinished
         self.examples = {
             each.key: push_button(
                 each.title, each.about, partial(show_example, each.key), "" if place else "primary"
             )
             for place, each in enumerate(EXAMPLES)
         }
+        # As high as a primary button, which it is not while something else comes first.
+        first = self.examples[EXAMPLES[0].key]
+        first.setMinimumHeight(first.fontMetrics().height() + PRIMARY_MORE_PX)
         self.live = push_button(
             "Start the live view",
             "Connect the rig, expose and show its camera",
@@ -60,12 +69,18 @@ class StartPage(PageWidget):
         )
         self.files = RecentList(recent, open_path)
         self.unfinished = UnfinishedList(unfinished)
-        self.stops = [unfinished.found.follow(self._mark_next)]
         self._lay_out()
+        self.stops = [
+            *follow_any(self._mark_next, unfinished.found, unfinished.is_resuming),
+            # Without recent files, what is unfinished takes their place.
+            recent.paths.follow(lambda paths: self.files.setVisible(bool(paths))),
+        ]
 
-    def _mark_next(self, found: tuple[Unfinished, ...]) -> None:
-        """What was interrupted comes before an example."""
-        set_role(self.examples[EXAMPLES[0].key], "" if found else "primary")
+    def _mark_next(self) -> None:
+        """What was interrupted comes before an example; while it continues, so does waiting for it."""
+        control = self._unfinished
+        is_first = not (control.found.value or control.is_resuming.value)
+        set_role(self.examples[EXAMPLES[0].key], "primary" if is_first else "")
 
     def showEvent(self, event: QShowEvent) -> None:
         """Look for what was interrupted, soon."""
@@ -94,8 +109,15 @@ class StartPage(PageWidget):
             ),
         )
         self._cards = cards
-        column = column_of(
+        # What is found late has a place of its own next to recent files: nothing moves under a click.
+        below = row_of(
+            (self.files, 0, Qt.AlignmentFlag.AlignTop),
+            (self.unfinished, 0, Qt.AlignmentFlag.AlignTop),
             STRETCH,
+            spacing=GAP_PX,
+            margins=0,
+        )
+        self._column = column_of(
             label("dsl-scan", "title"),
             label("Hyperspectral 3D scans with a camera, a projector and a diffraction film", "muted"),
             14,
@@ -103,13 +125,10 @@ class StartPage(PageWidget):
             14,
             row_of(self.choose, self.captures, STRETCH),
             8,
-            self.unfinished,
-            self.files,
+            below,
             STRETCH,
-            STRETCH,
-            margins=0,
         )
-        self._middle = boxed(column)
+        self._middle = boxed(self._column)
         content = boxed(row_of(STRETCH, self._middle, STRETCH, margins=12))
         column_of(scrolled(content), on=self, margins=0)
         self.arrange()
@@ -120,8 +139,15 @@ class StartPage(PageWidget):
         for each in self._cards:
             each.setFixedWidth(card)
         width = 3 * card + 2 * GAP_PX
-        for part in (self._middle, self.files, self.unfinished):
-            part.setFixedWidth(width)
+        self._middle.setFixedWidth(width)
+        for part in (self.files, self.unfinished):
+            part.setFixedWidth((width - GAP_PX) // 2)
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        """Leave room above by the height of the window alone, whatever is listed or told below."""
+        super().resizeEvent(event)
+        above = max((self.window().height() - CONTENT_PX) // 3, 0)
+        self._column.setContentsMargins(0, above, 0, 0)
 
 
 def _card(title: str, text: str, *buttons: QPushButton) -> QFrame:

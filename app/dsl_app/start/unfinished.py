@@ -38,6 +38,8 @@ class UnfinishedController:
         self, folders: Callable[[], Iterable[Path]], runner: JobRunner, open_path: Callable[[Path], object]
     ) -> None:
         self.found: Value[tuple[Unfinished, ...]] = Value(())
+        #: Whether a reconstruction continues now.
+        self.is_resuming = Value(False)
         self._folders, self._runner, self._open_path = folders, runner, open_path
         self._running: set[Path] = set()
 
@@ -64,6 +66,7 @@ class UnfinishedController:
             return
         begun = what.result
         self._running.add(what.path)
+        self.is_resuming.set(True)
         self._show(self.found.value)
 
         def work(progress: Progress) -> Path:
@@ -73,6 +76,7 @@ class UnfinishedController:
 
         def ended() -> None:
             self._running.discard(what.path)
+            self.is_resuming.set(bool(self._running))
             self.look()
 
         self._runner.submit(Job(f"Reconstruct {what.path.stem}", work, self._open_path, on_ended=ended))

@@ -7,6 +7,7 @@ from functools import partial
 from PySide6.QtCore import QTimer
 from PySide6.QtWidgets import QWidget
 
+from dsl_app.shared.plain_tip import plain_tip
 from dsl_app.shared.widgets.forms import label, push_button
 from dsl_app.shared.widgets.layouts import boxed, column_of, row_of
 from dsl_app.start.unfinished import Unfinished, UnfinishedController
@@ -42,7 +43,7 @@ class UnfinishedList(QWidget):
 
     def _line(self, what: Unfinished, is_first: bool) -> QWidget:
         words = label(what.words, wraps=True)
-        words.setToolTip(str(what.path))
+        words.setToolTip(plain_tip(str(what.path)))
         role = "primary" if is_first else ""
         button = push_button(what.button, f"Continue {what.path}", partial(self._resume, what), role)
         return boxed(row_of((words, 1), button, margins=0))

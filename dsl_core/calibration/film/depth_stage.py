@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,11 +11,19 @@ from numpy.typing import NDArray
 from dsl_core.calibration.common.tiles import ColumnSamples
 from dsl_core.calibration.film.correspondence import fit_stage_grid
 from dsl_core.calibration.film.filter_angle import seen_straight
-from dsl_core.calibration.film.fit import FilmFit, fit_film, is_plausible, require_plausible, with_geometry
+from dsl_core.calibration.film.fit import (
+    MAX_SLOPE,
+    FilmFit,
+    FilmForm,
+    fit_film,
+    is_plausible,
+    require_plausible,
+    with_geometry,
+)
 from dsl_core.calibration.film.order_columns import fit_columns, search_columns
 from dsl_core.calibration.film.order_paths import LineFrames, filter_passband
 from dsl_core.calibration.film.order_samples import OrderSamples, grating_columns
-from dsl_core.calibration.film.residual import choose_residual
+from dsl_core.calibration.film.residual import MIN_GAIN, choose_residual
 from dsl_core.calibration.geometry.plane_refinement import PlaneRefinement, refine_planes
 from dsl_core.calibration.geometry.stage_planes import with_unsure_zero
 from dsl_core.errors import CalibrationError
@@ -104,9 +112,8 @@ def calibrate_depth_stage(
         [f"position {z:g} mm" for z in data.positions_mm],
         [f"filter {each.filter_nm:g} nm" for each in data.filters],
         progress,
-        warped=bool(film.warp_px.any()),
     )
-    seen = _filters(fitted, data, replace(samples, column_px=samples.column_px - film.warp_px))
+    seen = _filters(fitted, data, samples)
     return DepthStageCalibration(
         camera=fitted.camera,
         projector=fitted.projector,
@@ -143,26 +150,33 @@ def fit_first_orders(
     here, mounting = rig, rig.film
     for round_ in range(1 + FINE_ROUNDS):
         samples = _samples(here, planes, data, round_ == 0, progress)
-        fit = _fit(here, samples, mounting, angled=round_ > 0)
+        fit = _fit(here, samples, mounting)
         here = rig.model_copy(update={"film": fit.film})
         samples = seen_straight(here, samples, fit.angle)
-        flat = replace(samples, column_px=samples.column_px - fit.warp_px)
-        _require_filters(rig, here, data, flat, WRONG_PX if round_ == 0 else OFF_PX)
+        _require_filters(rig, here, data, samples, WRONG_PX if round_ == 0 else OFF_PX)
         require_plausible(fit.film, mounting)
     return fit, samples
 
 
-def _fit(rig: Rig, samples: OrderSamples, mounting: Film, angled: bool) -> FilmFit:
-    """The film that fits best: flat or a cylinder, or warped where only a film at an odd place would fit."""
-    found = fit_film(rig, samples, mounting)
-    warped = not is_plausible(found.film, mounting)
-    if warped:
-        found = fit_film(rig.model_copy(update={"film": mounting}), samples, mounting, warped=True)
-    if not angled:
-        return found
-    askew = fit_film(rig, samples, mounting, angled=True, warped=warped)
-    better = askew.angle.is_of_filters and is_plausible(askew.film, mounting)
-    return askew if better else found
+def _fit(rig: Rig, samples: OrderSamples, mounting: Film) -> FilmFit:
+    """The film that fits best: a cylinder, or one of another shape where a cylinder leaves more over.
+
+    A cylinder that fits such a film is often one that cannot stand where it was mounted.
+    """
+    flat, bent = (_fit_filters(rig, samples, mounting, shaped) for shaped in (False, True))
+    form = FilmForm.of(rig.projector, bent.film, shaped=True)
+    if not is_plausible(bent.film, mounting) or form.steepest(bent.film) > MAX_SLOPE:
+        return flat
+    better = bent.scatter_px < (1 - MIN_GAIN) * flat.scatter_px or not is_plausible(flat.film, mounting)
+    return bent if better else flat
+
+
+def _fit_filters(rig: Rig, samples: OrderSamples, mounting: Film, shaped: bool) -> FilmFit:
+    """The film with filters that shift with the angle of view where that is beyond doubt."""
+    askew = fit_film(rig, samples, mounting, angled=True, shaped=shaped)
+    if askew.angle.is_of_filters and is_plausible(askew.film, mounting):
+        return askew
+    return fit_film(rig, samples, mounting, shaped=shaped)
 
 
 def _samples(
@@ -213,11 +227,11 @@ def _require_filters(
 
 def _odd_one(mounted: Rig, fitted: Rig, data: StageData, samples: OrderSamples) -> tuple[int, int, float]:
     """The capture without which all others agree best: position, filter, and how far it is off, nm."""
-    found = []
+    found, shaped = [], fitted.film.shape is not None
     # A wrong capture pulls the film towards itself, so that others may look worse than it.
     for position, name in np.ndindex(len(data.positions_mm), len(data.filters)):
         mine = (samples.position == position) & (samples.filter == name)
-        film = fit_film(fitted, samples.only(~mine), mounted.film).film
+        film = fit_film(fitted, samples.only(~mine), mounted.film, shaped=shaped).film
         shifts = _shifts_nm(fitted.model_copy(update={"film": film}), data, samples)
         off = float(shifts[position, name])
         shifts[position, name] = 0.0

@@ -1,8 +1,9 @@
-"""The film's pose, period and bend from columns of first orders on known planes.
+"""The film's pose, period and shape from columns of first orders on known planes.
 
 All six numbers of `Film` are fitted to all samples; where samples cannot tell them apart (distance and
-bend, or period and distance over few depths) the values of the mounting decide, as a prior. On request the
-shift of filters with the angle of view is fitted as well (`FilterAngle`), or another shape (`warp_terms`).
+bend, or period and distance over few depths) the values of the mounting decide, as a prior. On request its
+shape is fitted as well, and the shift of filters with the angle of view (`FilterAngle`): that is alike in
+both orders and at all depths, while a film moves light by the slope of the place where it goes through.
 """
 
 from __future__ import annotations
@@ -21,9 +22,9 @@ from dsl_core.calibration.film.filter_angle import (
     shift_terms,
 )
 from dsl_core.calibration.film.order_samples import OrderSamples, grating_columns
-from dsl_core.calibration.film.warp import WARP_STD_PX, warp_terms
 from dsl_core.errors import CalibrationError
-from dsl_core.model.rig import Film, Rig
+from dsl_core.model.geometry import Lens
+from dsl_core.model.rig import SHAPE_POWERS, Film, FilmShape, Rig
 from dsl_core.optics.pinhole import pixel_rays
 from dsl_core.optics.shading import Plane
 from dsl_core.progress import NoProgress, Progress
@@ -43,8 +44,9 @@ WORDS = (
     ("tilt about x", "°"), ("tilt about y", "°"), ("roll", "°"), ("bend", "/mm"), ("density", " lines/mm"),
     ("distance from the projector", " mm"),
 )  # fmt: skip
-#: So many columns of a film of another shape share what polynomials leave of it.
-WARPED_TOGETHER = 1000.0
+#: How steep each power of a film's shape is beforehand, in the corner of the projector's frame (one
+#: deviation), how steep all together can be, and the step of differences over a power, in its deviations.
+SLOPE_STD, MAX_SLOPE, SHAPE_STEP = 0.05, 0.2, 1e-3
 #: Residuals beyond this many deviations weigh less (Huber), and no column is better than this (px).
 HUBER_SIGMAS, FLOOR_PX = 2.5, 0.003
 #: What all columns of a filter and order have in common beyond their noise, px: evenly, and as a ramp in
@@ -58,8 +60,7 @@ class FilmFit:
     """The film, the covariance of `FIELDS`, and the robust scatter of the residuals (px).
 
     ``gain`` (fields, samples) is how far each field moves when a column does. ``angle`` is the shift of the
-    filters with the angle of view, none where it was not fitted, and ``warp_px`` (samples,) what a film of
-    another shape adds to columns.
+    filters with the angle of view, none where it was not fitted.
     """
 
     film: Film
@@ -67,7 +68,6 @@ class FilmFit:
     scatter_px: float
     gain: Floats
     angle: FilterAngle
-    warp_px: Floats
 
     @property
     def std(self) -> dict[str, float]:
@@ -81,43 +81,37 @@ def fit_film(
     mounting: Film,
     rounds: int = ROUNDS,
     angled: bool = False,
-    warped: bool = False,
+    shaped: bool = False,
 ) -> FilmFit:
     """Fit the film of ``rig`` by Gauss and Newton, robustly; ``mounting`` is what its prior is about.
 
-    With ``angled`` the filters shift with the angle of view, all alike, by what fits best. With ``warped``
-    columns may be off by smooth functions of place and depth, for a film whose shape its numbers cannot say.
-    Raises `CalibrationError` with too few samples, or when the fit does not converge.
+    With ``angled`` the filters shift with the angle of view, all alike, by what fits best; with ``shaped``
+    the film need be no cylinder. Raises `CalibrationError` with too few samples, or when the fit does not
+    converge.
     """
     if len(samples) < MIN_SAMPLES:
         raise CalibrationError(
             f"First orders were found in only {len(samples)} tiles of the image; {MIN_SAMPLES} are needed to"
             " fit the film. Check that the film is on, the filters, and the exposure."
         )
-    warps = warp_terms(rig, samples) if warped else np.empty((len(samples), 0))
     shifts = shift_terms(rig, samples.pixel)[:, : 3 if angled else 0]
-    # The parameters are those of the film, of the angle and of the warp, one after the other.
-    count = len(FIELDS)
-    of_film, of_angle = slice(count), slice(count, count + shifts.shape[1])
-    linear_count = shifts.shape[1] + warps.shape[1]
-    centre, values = (np.pad(_values(film), (0, linear_count)) for film in (mounting, rig.film))
-    prior_std = np.concatenate(
-        [PRIOR_STD, ANGLE_STD[: shifts.shape[1]], np.full(warps.shape[1], WARP_STD_PX)]
-    )
+    form = FilmForm.of(rig.projector, rig.film, shaped)
+    # The parameters are those of the film, its shape after its fields, and those of the angle.
+    count = len(FIELDS) + len(form.std)
+    centre, values = (np.pad(form.values(film), (0, shifts.shape[1])) for film in (mounting, rig.film))
+    prior_std = np.concatenate([PRIOR_STD, form.std, ANGLE_STD[: shifts.shape[1]]])
+    steps = np.concatenate([STEPS, SHAPE_STEP * form.std])
     sigma = np.hypot(samples.std_px, FLOOR_PX)
     scale, covariance, gain = 1.0, np.eye(len(values)), np.empty((len(values), len(samples)))
     for _ in range(rounds):
-        now = _with(rig, values[of_film])
+        now = form.rig(rig, values[:count])
         here = grating_columns(now, samples)
-        ahead = [grating_columns(_with(rig, values[of_film] + step), samples) for step in np.diag(STEPS)]
-        by_film = (np.stack(ahead, 1) - here[:, None]) / STEPS
+        ahead = [grating_columns(form.rig(rig, values[:count] + step), samples) for step in np.diag(steps)]
+        by_film = (np.stack(ahead, 1) - here[:, None]) / steps
         by_angle = columns_per_share(now, samples)[:, None] * shifts if angled else shifts
-        linear = np.concatenate([by_angle, warps], 1)
-        residual = samples.column_px - here - linear @ values[count:]
-        jacobian = np.concatenate([by_film, linear], 1) * prior_std
+        residual = samples.column_px - here - by_angle @ values[count:]
+        jacobian = np.concatenate([by_film, by_angle], 1) * prior_std
         weight, scale = huber_weights(residual, sigma, HUBER_SIGMAS)
-        if warped:
-            weight = weight / WARPED_TOGETHER
         information = (jacobian * weight[:, None]).T @ jacobian + np.eye(len(values))
         gradient = jacobian.T @ (weight * residual) + (centre - values) / prior_std
         covariance = np.linalg.inv(information)
@@ -126,7 +120,7 @@ def fit_film(
         values = values + prior_std * step.clip(-1, 1)
         if np.abs(step / np.sqrt(np.diag(covariance))).max() < 1e-2:
             break
-    film = _with(rig, values[of_film]).film
+    film = form.rig(rig, values[:count]).film
     if not np.isfinite(values).all() or film.lines_per_mm <= 0 or film.distance_mm <= 0:
         raise CalibrationError(
             "The fit of the film did not converge. Check the filters, and the film's data."
@@ -135,16 +129,74 @@ def fit_film(
     spread = covariance * np.outer(prior_std, prior_std) + common @ common.T
     angle = NO_SHIFT
     if angled:
-        std = np.sqrt(np.diag(spread)[of_angle])
-        angle = FilterAngle(tuple(values[of_angle].tolist()), tuple(std.tolist()))
+        std = np.sqrt(np.diag(spread)[count:])
+        angle = FilterAngle(tuple(values[count:].tolist()), tuple(std.tolist()))
+    of_fields = slice(len(FIELDS))
     return FilmFit(
         film=film,
-        covariance=spread[of_film, of_film],
+        covariance=spread[of_fields, of_fields],
         scatter_px=scale * float(np.median(sigma)),
-        gain=gain[of_film],
+        gain=gain[of_fields],
         angle=angle,
-        warp_px=warps @ values[of_angle.stop :],
     )
+
+
+@dataclass(frozen=True)
+class FilmForm:
+    """A film's numbers in a row, and the part of it that the projector's frame is on.
+
+    ``half_mm`` is half the size of that part across and along the lines, ``middle_mm`` its middle along them.
+    Without ``shaped`` films are cylinders.
+    """
+
+    half_mm: tuple[float, float]
+    middle_mm: float
+    shaped: bool
+
+    @classmethod
+    def of(cls, lens: Lens, film: Film, shaped: bool) -> FilmForm:
+        """That of a film in front of a projector's lens."""
+        far, known = film.distance_mm, film.shape
+        middle_mm = far * ((lens.height_px - 1) / 2 - lens.cy_px) / lens.fy_px
+        return cls(
+            (0.5 * far * lens.width_px / lens.fx_px, 0.5 * far * lens.height_px / lens.fy_px),
+            middle_mm if known is None else known.middle_mm,
+            shaped,
+        )
+
+    @property
+    def std(self) -> Floats:
+        """Deviations of the factors of the shape beforehand; none without one."""
+        if not self.shaped:
+            return np.empty(0)
+        return np.asarray(SLOPE_STD / _slopes(*np.array(self.half_mm)).max(0))
+
+    def steepest(self, film: Film) -> float:
+        """Largest slope of a film's shape on that part."""
+        if film.shape is None:
+            return 0.0
+        u, v = np.meshgrid(*(np.linspace(-half, half, 9) for half in self.half_mm))
+        return float(np.abs(np.tensordot(np.array(film.shape.factors), _slopes(u, v), (0, 1))).max())
+
+    def values(self, film: Film) -> Floats:
+        """The fields, and with a shape its factors."""
+        factors = (FilmShape() if film.shape is None else film.shape).factors if self.shaped else ()
+        return np.array([*(getattr(film, name) for name in FIELDS), *factors])
+
+    def rig(self, rig: Rig, values: Floats) -> Rig:
+        """The rig with such a film."""
+        shape = None
+        if self.shaped:
+            shape = FilmShape(middle_mm=self.middle_mm, factors=tuple(values[len(FIELDS) :].tolist()))
+        fields = dict(zip(FIELDS, values[: len(FIELDS)].tolist(), strict=True))
+        return rig.model_copy(update={"film": rig.film.model_copy(update=fields | {"shape": shape})})
+
+
+def _slopes(u: Floats, v: Floats) -> Floats:
+    """Slopes across and along the lines of each of `SHAPE_POWERS` at places, (2, powers, ...)."""
+    across = [i * u ** max(i - 1, 0) * v**j for i, j in SHAPE_POWERS]
+    along = [j * u**i * v ** max(j - 1, 0) for i, j in SHAPE_POWERS]
+    return np.array([across, along])
 
 
 def is_plausible(film: Film, mounting: Film) -> bool:
@@ -197,7 +249,7 @@ def with_geometry(
     ``variants`` are rigs and planes of all positions, each one deviation off in an independent direction. The
     film makes up for such errors, so that columns come out right though its own numbers are off.
     """
-    here = grating_columns(_with(rig, _values(fit.film)), samples)
+    here = grating_columns(_with(rig, fit.film), samples)
     covariance = fit.covariance.copy()
     progress = progress or NoProgress()
     for other, planes in variants:
@@ -205,7 +257,7 @@ def with_geometry(
         rays = pixel_rays(other.camera).reshape(3, -1)[:, samples.pixel]
         inverse = np.stack([plane.inverse for plane in planes])[samples.position]
         there = replace(samples, depth_mm=1 / (inverse.T * rays).sum(0))
-        moved = fit.gain @ (here - grating_columns(_with(other, _values(fit.film)), there))
+        moved = fit.gain @ (here - grating_columns(_with(other, fit.film), there))
         covariance += np.outer(moved, moved)
     progress.report("what the geometry leaves open", 1, 1)
     return replace(fit, covariance=covariance)
@@ -215,6 +267,5 @@ def _values(film: Film) -> Floats:
     return np.array([getattr(film, name) for name in FIELDS])
 
 
-def _with(rig: Rig, values: Floats) -> Rig:
-    film = rig.film.model_copy(update=dict(zip(FIELDS, values.tolist(), strict=True)))
+def _with(rig: Rig, film: Film) -> Rig:
     return rig.model_copy(update={"film": film})

@@ -41,20 +41,19 @@ def choose_residual(
     positions: Sequence[str],
     filters: Sequence[str],
     progress: Progress | None = None,
-    warped: bool = False,
 ) -> tuple[ColumnResidual, tuple[HeldOutError, ...]]:
     """The correction for the film of ``rig``, and the errors on what was left out.
 
-    Film, ``warped`` or not, and correction are fitted again without each position, each filter, and a third
+    Film and correction are fitted again without each position, each filter, and a third
     of the samples; ``positions`` and ``filters`` are their names.
     """
-    progress = progress or NoProgress()
+    progress, shaped = progress or NoProgress(), rig.film.shape is not None
     folds = list(_folds(samples, positions, filters))
     errors = np.empty((MAX_DEGREE + 1, len(folds)))
     noise = np.empty(len(folds))
     for i, (_, out) in enumerate(folds):
         progress.report("hold captures out", i, len(folds))
-        film = fit_film(rig, samples.only(~out), rig.film, rounds=3, warped=warped).film
+        film = fit_film(rig, samples.only(~out), rig.film, rounds=3, shaped=shaped).film
         again = rig.model_copy(update={"film": film})
         inside, outside = samples.only(~out), samples.only(out)
         left = outside.column_px - grating_columns(again, outside)

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from dsl_core.model.calibration.chain import ChainCorrection
+import numpy as np
+
+from dsl_core.calibration.film.fit import FilmForm
 from dsl_core.model.calibration.depth_stage import DepthStageCalibration, StagePosition
 from dsl_core.model.figure import Figure, doubts
 
@@ -73,10 +75,21 @@ def depth_stage_figures(record: DepthStageCalibration) -> tuple[Figure, ...]:
             advice="Use more filters or positions, lines closer together, or longer exposures.",
         ),
         *film,
+        *_shape(record),
         *_colours(record),
         *_filter_index(record),
-        *_chain(record.chain),
+        *_chain(record),
         doubts("captures in doubt", record.warnings),
+    )
+
+
+def _shape(record: DepthStageCalibration) -> tuple[Figure, ...]:
+    """How steep the film is where it is no cylinder."""
+    if record.film.shape is None:
+        return ()
+    steepest = FilmForm.of(record.projector, record.film, shaped=True).steepest(record.film)
+    return (
+        Figure(name="film's steepest place besides its bend", value=np.degrees(steepest), unit="degrees"),
     )
 
 
@@ -100,7 +113,8 @@ def _plane_advice(record: DepthStageCalibration, worst: StagePosition) -> str:
     )
 
 
-def _chain(chain: ChainCorrection | None) -> tuple[Figure, ...]:
+def _chain(record: DepthStageCalibration) -> tuple[Figure, ...]:
+    chain = record.chain
     if chain is None:
         return ()
     correction = Figure(
@@ -112,7 +126,9 @@ def _chain(chain: ChainCorrection | None) -> tuple[Figure, ...]:
     )
     if chain.wavelength_scale is None:
         return (correction,)
-    std_nm = MIDDLE_NM * chain.wavelength_scale_std
+    # The LEDs say which wavelength the film's fit is off by, which it knows no better than its line density.
+    density_std = record.film_std["lines_per_mm"] / record.film.lines_per_mm
+    std_nm = MIDDLE_NM * float(np.hypot(chain.wavelength_scale_std, density_std))
     limit = max(MAX_FILTERS_NM, FILTER_SIGMAS * std_nm)
     filters = Figure(
         name=f"filters against the LEDs' spectra, at {MIDDLE_NM:g} nm",

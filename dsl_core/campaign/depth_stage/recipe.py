@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -143,7 +143,7 @@ class DepthStageRecipe(Recipe[DepthStageCalibration]):
             [bench.kept(step, STAGE_NOTE, StageNote) for step in plain],
             len(filtered) // len(plain),
         )
-        seen = [self._plain(bench, step, progress) for step in plain]
+        seen = self._planes(bench, plain, progress)
         data = StageData(
             positions_mm=tuple(note.position_mm for note in notes),
             stage_std_mm=self.stage_std_mm,
@@ -242,6 +242,20 @@ class DepthStageRecipe(Recipe[DepthStageCalibration]):
         )
         bench.keep(step, PLANE_NOTE, note)
         return note
+
+    def _planes(self, bench: Bench, plain: list[Step], progress: Progress) -> list[SeenPlane]:
+        """The planes, all with columns counted from the same place of a line.
+
+        Where one position is bright enough to show an uneven spread of the lines and another is not, the
+        other one is read with what the nearest of them shows: it is the same projector.
+        """
+        seen = [self._plain(bench, step, progress) for step in plain]
+        uneven = [k for k, each in enumerate(seen) if each.response.spread is not None]
+        for k in sorted(set(range(len(seen))) - set(uneven)) if uneven else ():
+            nearest = min(uneven, key=lambda other: abs(other - k))
+            rig = bench.rig.model_copy(update={"projector_response": seen[nearest].response})
+            seen[k] = self._plain(replace(bench, rig=rig), plain[k], progress)
+        return seen
 
     def _plain(self, bench: Bench, step: Step, progress: Progress) -> SeenPlane:
         with naming(step):

@@ -11,6 +11,8 @@ from dsl_core.capture.proof.raster import Counts, Floats, Noise
 
 #: Stripes are well seen by a pixel, or by so many of those that are lit, with this share of the contrast.
 WELL_SEEN = 0.7
+#: Contrast relative to what it was that is no change.
+UNCHANGED = 0.03
 #: A pixel is lit with a contrast of so many deviations.
 LIT_SIGMAS = 12.0
 
@@ -42,6 +44,19 @@ def is_same(seen: Counts, before: Counts, pairs: Mapping[int, Pair], noise: Nois
     """Whether a picture shows what it showed ``before``, as far as light reaches."""
     contrast = _contrast(pairs.values())
     return alike(seen, before, contrast, contrast > LIT_SIGMAS * np.sqrt(noise.variance(before)))
+
+
+def is_unchanged(seen: Counts, before: Counts, pairs: Mapping[int, Pair], noise: Noise) -> bool:
+    """Whether a picture shows what it showed ``before`` in the same light, with the same contrast.
+
+    What changes slowly, such as mist or focus, is the same for long, and not unchanged.
+    """
+    if not is_same(seen, before, pairs, noise):
+        return False
+    lit = _contrast(pairs.values()) > LIT_SIGMAS * np.sqrt(noise.variance(before))
+    old, new = (each[lit] - each[lit].mean(dtype=np.float64) for each in (before, seen))
+    power = float(old @ old)
+    return power > 0 and abs(float(old @ new) / power - 1) < UNCHANGED
 
 
 def _contrast(pairs: Iterable[Pair]) -> Floats:

@@ -12,7 +12,7 @@ from dsl_core.capture.proof.code_pairs import CodePairs, Pair, alike, dominant
 from dsl_core.capture.proof.columns import LEAST_MARGIN, decode, exchanged_pairs, run_backwards
 from dsl_core.capture.proof.contest import vote
 from dsl_core.capture.proof.finding import Finding, Verdict, displaced
-from dsl_core.capture.proof.first_light import FEWEST_LIT, changed_light, has_moved, is_unlit
+from dsl_core.capture.proof.first_light import FEWEST_LIT, changed_light, has_moved, is_unlit, unsettled_pairs
 from dsl_core.capture.proof.prediction import Lit
 from dsl_core.capture.proof.raster import Counts, Floats, Noise, Raster
 from dsl_core.model.plan import BinaryCode, CapturePlan, Shot
@@ -44,7 +44,7 @@ class FirstCode:
         self._lit: Lit | None = None
         #: Pictures of the first two pairs as they were before both were taken again, by pattern.
         self._disputed: dict[int, Counts] = {}
-        self._at_the_end, self._is_believed = at_the_end, False
+        self._at_the_end, self._is_believed, self._is_settled = at_the_end, False, False
         #: What the last look at all pairs together found.
         self.reviewed: list[Finding] = []
 
@@ -183,6 +183,8 @@ class FirstCode:
                 verdict, detail = self._explain(pair, expected, broken)
                 self.reviewed.append(Finding(shot, verdict, self._pair_shots(number), detail))
         if not self.reviewed:
+            self.reviewed = self._unsettled(shot)
+        if not self.reviewed:
             numbers = () if self._is_believed else self._exchanged()
             if numbers:
                 # Taken again with the same result, it is what there is to see.
@@ -202,6 +204,24 @@ class FirstCode:
                 self._pairs.pairs.pop(wrong.pattern // 2, None)
         again = tuple(wrong for each in self.reviewed for wrong in each.again)
         return replace(self.reviewed[0], again=again)
+
+    def _unsettled(self, shot: Shot) -> list[Finding]:
+        """Pairs that were taken in other light than white and black were, as while a lamp warms up.
+
+        Taken again with the same result, the light is what it is: it is measured, and corrected for, later.
+        """
+        if self._at_the_end or self._is_settled:
+            return []
+        self._is_settled = True
+        _, _, lit = self._pairs.contrast()
+        ends = self._ends["white"], self._ends["black"]
+        found = unsettled_pairs(self._pairs.pairs, ends, lit, self._noise)
+        return [
+            Finding(
+                shot, Verdict.EXPOSURE, self._pair_shots(number), f"{ratio:.2f} times that of the last ones"
+            )
+            for number, ratio in found.items()
+        ]
 
     def _exchanged(self) -> tuple[int, ...]:
         _, _, lit = self._pairs.contrast()

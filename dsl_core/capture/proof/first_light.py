@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
+from numpy.typing import NDArray
 
 from dsl_core.capture.proof.code_pairs import (
     ALIKE,
@@ -22,6 +23,8 @@ from dsl_core.capture.proof.code_pairs import (
 )
 from dsl_core.capture.proof.raster import Counts, Floats, Noise
 
+#: Light of a pair of pictures relative to the last ones from which on it is worth taking it again.
+SETTLED = 0.02
 #: Pixels that have to be lit to compare the light of two pictures.
 FEWEST_LIT = 60
 #: Of the pictures taken again, so many others with other light than before are no single wrong picture.
@@ -65,6 +68,30 @@ def changed_light(before: Mapping[int, Counts], now: Mapping[int, Counts], noise
     if len(ratios) < FEWEST_CHANGED or min(ratios) < 1 < max(ratios):
         return None
     return float(np.median(ratios))
+
+
+def unsettled_pairs(
+    pairs: Mapping[int, tuple[Counts, Counts]],
+    ends: tuple[Counts, Counts],
+    lit: NDArray[np.bool_],
+    noise: Noise,
+) -> dict[int, float]:
+    """Pairs whose light was not yet that of the ``ends``, white and black, with the factor they have of it.
+
+    None where too few pixels are ``lit``, or where the last pair differs as well: nothing has settled then,
+    or it is the ends that are wrong.
+    """
+    if int(lit.sum()) < FEWEST_LIT:
+        return {}
+
+    def light(pair: tuple[Counts, Counts]) -> float:
+        return sum(float(each[lit].sum(dtype=np.float64)) for each in pair) - dark
+
+    dark = 2 * noise.sensor.black_level_dn * float(lit.sum())
+    usual = light(ends)
+    ratios = {number: light(pair) / usual for number, pair in pairs.items()}
+    found = {number: ratio for number, ratio in ratios.items() if abs(ratio - 1) > SETTLED}
+    return {} if max(pairs) in found else found
 
 
 def _scaled(one: Floats, other: Floats) -> tuple[float, float]:

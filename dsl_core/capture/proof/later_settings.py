@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -24,10 +24,19 @@ class LaterSettings:
     """
 
     def __init__(
-        self, plan: CapturePlan, calibration: Rig | None, noise: Noise, kept: Mapping[int, Counts]
+        self,
+        plan: CapturePlan,
+        calibration: Rig | None,
+        noise: Noise,
+        kept: Mapping[int, Counts],
+        gained: Callable[[Shot, Counts], np.float32] = lambda shot, seen: np.float32(0),
     ) -> None:
-        """``kept`` are the right pictures so far by the index of their shot; others may change it."""
+        """``kept`` are the right pictures so far by the index of their shot; others may change it.
+
+        ``gained`` says by how much black was more than its picture when the one of a shot was taken, DN.
+        """
         self._plan, self._calibration, self._noise, self._kept = plan, calibration, noise, kept
+        self._gained = gained
         self._first = min(plan.code_settings)
         shots = tuple(plan.shots())
         self._places = {(s.role, s.pattern): s.index for s in shots if s.setting == self._first}
@@ -60,7 +69,9 @@ class LaterSettings:
         return self._rescaled.get(
             pattern.index,
             (old, old_black, black, self._measured.get(shot.setting)),
-            lambda: rescaled(old, old_black, black, self.scale(shot), self._noise),
+            lambda: rescaled(
+                old, old_black, black, self.scale(shot), self._noise, self._gained(pattern, old)
+            ),
         )
 
     def is_measured(self, shot: Shot) -> bool:

@@ -20,6 +20,9 @@ BLUR = 0.15
 BRIGHT_SIGMAS, FEWEST_BRIGHT = 25.0, 12
 #: Unlit pixels that say how much light of the room has changed since black was taken.
 FEWEST_UNLIT = 60
+#: A share of the pixels that a line leaves unlit has none of its first orders either; and by how many
+#: deviations of a pixel black has to have gained before it is taken off.
+NO_ORDERS, LEAST_GAINED = 0.25, 0.5
 #: Columns count as lit by a pattern above this share of full light.
 LIT_SHARE = 0.1
 #: Brightness is measured where a pattern has this share of its brightest column: on the flank of a line light
@@ -29,6 +32,7 @@ BODY_SHARE = 0.5
 EXPLAINED = 0.25
 #: Of the pixels that a rival leaves bright or dark, every so many are asked where there are plenty.
 PLENTY = 4000
+_NOTHING = np.float32(0)
 
 
 @dataclass(frozen=True)
@@ -98,6 +102,22 @@ def brightness_of_lines(seen: Counts, lit: Lit, wanted: Floats, noise: Noise) ->
     return _ratio(gain, light, lit.sigma[chosen] ** 2)
 
 
+def black_gained(seen: Counts, lit: Lit, wanted: Floats, noise: Noise) -> np.float32:
+    """What black has gained since it was taken, as a picture of a line shows it, DN; 0 for little.
+
+    ``wanted`` is its `line_profile`. First orders reach some of the pixels that a line does not light, so
+    that those with the least light tell.
+    """
+    unlit = Places.of(lit, wanted).unlit
+    if unlit.size < FEWEST_UNLIT:
+        return _NOTHING
+    black = lit.black[unlit]
+    sigma = np.float32(np.sqrt(2 * np.median(noise.variance(black))))
+    # What a normal distribution has its lowest quarter below.
+    gained = np.float32(np.quantile(seen[lit.index[unlit]] - black, NO_ORDERS)) + np.float32(0.674) * sigma
+    return gained if abs(gained) > LEAST_GAINED * sigma else _NOTHING
+
+
 def _of_room(gain: Floats) -> np.float32:
     """What the room's light has gained since black, from what unlit pixels have: their median."""
     return np.float32(np.median(gain) if gain.size >= FEWEST_UNLIT else 0)
@@ -119,13 +139,23 @@ class Expected:
     variance: Floats
 
 
-def rescaled(picture: Counts, old_black: Counts, new_black: Floats, scale: float, noise: Noise) -> Expected:
+def rescaled(
+    picture: Counts,
+    old_black: Counts,
+    new_black: Floats,
+    scale: float,
+    noise: Noise,
+    gained_dn: np.float32 = _NOTHING,
+) -> Expected:
     """The picture of an earlier setting at another one, whose light is ``scale`` times as strong.
 
+    The picture has ``gained_dn`` over its black.
     Noise is scaled as well and may take counts below zero: cut off there, their sum would be too bright.
     """
     factor, full = np.float32(scale), noise.sensor.full_scale_dn
     counts = np.subtract(picture, old_black, dtype=np.float32)
+    if gained_dn:
+        counts -= gained_dn
     counts *= factor
     counts += new_black
     np.minimum(counts, np.float32(full), out=counts)

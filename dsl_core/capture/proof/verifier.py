@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dsl_core.capture.proof.contest import Contest
-from dsl_core.capture.proof.control import choose_pairs, is_same
+from dsl_core.capture.proof.control import choose_pairs, is_same, is_unchanged
 from dsl_core.capture.proof.finding import Finding, Light, Verdict, displaced
 from dsl_core.capture.proof.first_code import FirstCode
 from dsl_core.capture.proof.later_settings import LaterSettings
@@ -20,6 +20,7 @@ from dsl_core.capture.proof.neighbours import LineNeighbours
 from dsl_core.capture.proof.prediction import (
     APART,
     Expected,
+    black_gained,
     brightness_of_lines,
     brightness_of_picture,
     contest_of_lines,
@@ -77,7 +78,7 @@ class FrameProof:
         #: What the last picture said of the pairs of the first code, one by one.
         self.reviewed: list[Finding] = []
         self._usual = UsualLight(self._first, calibration is not None)
-        self._later = LaterSettings(plan, calibration, self._noise, self._kept)
+        self._later = LaterSettings(plan, calibration, self._noise, self._kept, self._black_gained)
         self._steps = LightSteps()
         self._line_places = LinePlaces()
         #: The picture that came for two patterns, for as long as it comes.
@@ -125,6 +126,16 @@ class FrameProof:
         """Whether a raw mosaic of the shot that `controls` named shows what it showed at first."""
         before = self._kept[control.index]
         return is_same(self._raster.take(pixels), before, self._code_pairs(), self._noise)
+
+    def is_unchanged(self, control: Shot, pixels: NDArray[np.uint16]) -> bool:
+        """Whether it does in the same light and contrast; False where its first picture is not known.
+
+        So it is for other pictures than those of the code: white does not show that something moved.
+        """
+        before = self._kept.get(control.index)
+        if before is None or self._shots[control.index].role != "code":
+            return False
+        return is_unchanged(self._raster.take(pixels), before, self._code_pairs(), self._noise)
 
     @property
     def first_setting(self) -> int:
@@ -316,6 +327,13 @@ class FrameProof:
             side: contest_of_places(seen, wanted, now, light, (profile, moved(profile, side)), self._noise)
             for side in SIDES
         }
+
+    def _black_gained(self, shot: Shot, seen: Counts) -> np.float32:
+        lit = self._code.lit if self._code is not None else None
+        wanted = self._profile(shot) if shot.role == "spectral" else None
+        return (
+            np.float32(0) if lit is None or wanted is None else black_gained(seen, lit, wanted, self._noise)
+        )
 
     def _brightness_again(self, shot: Shot, seen: Counts, wanted: Expected, black: Floats) -> float | None:
         lit = self._code.lit if self._code is not None else None

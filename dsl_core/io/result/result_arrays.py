@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -12,13 +13,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dsl_core.errors import StoreError
-from dsl_core.io.result.result_file import load_result
+from dsl_core.io.result.result_file import checked_attributes, damage_of, own_attributes
 from dsl_core.model.result import VARIABLES
 from dsl_core.progress import NoProgress, Progress
 
 if TYPE_CHECKING:
-    import xarray as xr
+    from dsl_core.io.result.stored_arrays import StoredArray
 
+#: The axis of bands.
+BANDS = "wavelength_nm"
 #: What is read of a variable between two looks at whether the person has cancelled.
 AT_ONCE_BYTES = 16e6
 
@@ -70,33 +73,67 @@ class ResultArrays:
         return 0 <= pixel[0] < width and 0 <= pixel[1] < height
 
 
-def _parts(variable: xr.DataArray) -> list[slice]:
+def _parts(shape: tuple[int, ...]) -> list[slice]:
     """Slices of the first axis, of as many bands as `AT_ONCE_BYTES` hold: each read has a cost of its own."""
-    each = max(1, int(AT_ONCE_BYTES // max(1, 4 * math.prod(variable.shape[1:]))))
-    return [slice(first, first + each) for first in range(0, len(variable), each)]
+    each = max(1, int(AT_ONCE_BYTES // max(1, 4 * math.prod(shape[1:]))))
+    return [slice(first, first + each) for first in range(0, shape[0], each)]
 
 
-def _ordered(result: xr.Dataset, path: Path) -> xr.Dataset:
-    """The same with axes and bands in the order that is relied on."""
-    for name in VARIABLES:
-        axes = VARIABLES[name][0]
-        if name in result and set(result[name].dims) != set(axes):
-            has = ", ".join(str(axis) for axis in result[name].dims)
+@dataclass(frozen=True)
+class _Ordered:
+    """An array read with its axes as `VARIABLES` has them, and its bands in an ``order``, if it has bands."""
+
+    stored: StoredArray
+    axes: tuple[str, ...]
+    order: NDArray[np.intp]
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        return tuple(self.stored.shape[self.stored.dims.index(axis)] for axis in self.axes)
+
+    def read(self, part: slice) -> NDArray[Any]:
+        """The values of a part of the first axis; raises `StoreError`."""
+        rises = bool((np.diff(self.order) == 1).all())
+        first: Any = part if self.axes[0] != BANDS or rises else self.order[part]
+        keys = {axis: slice(None) for axis in self.axes} | {self.axes[0]: first}
+        values = self.stored.values(tuple(keys[axis] for axis in self.stored.dims))
+        return values.transpose([self.stored.dims.index(axis) for axis in self.axes])
+
+
+def _require_one_size(found: Mapping[str, StoredArray], labels: Mapping[str, list[str]], path: Path) -> None:
+    """Raise `StoreError` where two arrays, or the names along an axis, differ in how long that axis is."""
+    sizes = {axis: len(names) for axis, names in labels.items()}
+    for stored in found.values():
+        for axis, size in zip(stored.dims, stored.shape, strict=True):
+            if sizes.setdefault(axis, size) != size:
+                raise damage_of(
+                    path, ValueError(f"{stored.name} has {size} values along {axis}, not {sizes[axis]}")
+                )
+
+
+def _ordered(found: Mapping[str, StoredArray], path: Path) -> tuple[NDArray[np.float64], dict[str, _Ordered]]:
+    """Wavelengths that rise, and the arrays of a result with axes and bands in the order relied on."""
+    for name, (axes, *_) in VARIABLES.items():
+        if name in found and set(found[name].dims) != set(axes):
+            has = ", ".join(found[name].dims)
             raise StoreError(
                 f"{path} has {name} along the axes ({has}); ({', '.join(axes)}) are needed. Rename them where"
                 " the result was made."
             )
-        if name in result:
-            result[name] = result[name].transpose(*axes)
-    if "reflectance" not in result:
-        return result
-    nm = result["wavelength_nm"].values if "wavelength_nm" in result.coords else np.empty(0)
-    if not nm.size or not np.isfinite(nm).all() or len(np.unique(nm)) < nm.size:
-        raise StoreError(
-            f"{path} has a reflectance, but not one wavelength for each of its bands. Add the coordinate"
-            " wavelength_nm, in nm."
-        )
-    return result if (np.diff(nm) > 0).all() else result.isel(wavelength_nm=np.argsort(nm))
+    is_axis = BANDS in found and found[BANDS].dims == (BANDS,)
+    nm = np.asarray(found[BANDS].values((slice(None),)) if is_axis else (), np.float64)
+    order = np.arange(nm.size)
+    if "reflectance" in found:
+        if not nm.size or not np.isfinite(nm).all() or len(np.unique(nm)) < nm.size:
+            raise StoreError(
+                f"{path} has a reflectance, but not one wavelength for each of its bands. Add the coordinate"
+                " wavelength_nm, in nm."
+            )
+        order = np.argsort(nm)
+    there = {
+        name: _Ordered(found[name], axes, order) for name, (axes, *_) in VARIABLES.items() if name in found
+    }
+    return nm[order], there
 
 
 def load_arrays(path: Path, progress: Progress | None = None) -> ResultArrays:
@@ -104,26 +141,30 @@ def load_arrays(path: Path, progress: Progress | None = None) -> ResultArrays:
 
     Raises `StoreError`, also for a result of another program whose arrays have other axes.
     """
+    from dsl_core.io.result.stored_arrays import stored_arrays
+
     progress = progress or NoProgress()
-    result = _ordered(load_result(path), path)
-    if not {"depth_mm", "reflectance"} & set(result):
+    attributes = checked_attributes(path)
+    found = stored_arrays(path, partial(damage_of, path))
+    _require_one_size(found, attributes.get("labels", {}), path)
+    nm, there = _ordered(found, path)
+    if not {"depth_mm", "reflectance"} & set(there):
         raise StoreError(
             f"{path} contains columns of the projector and no depth. Reconstruct its scan with a calibration,"
             " or export the columns with 'dsl-scan export'."
         )
-    parts = {name: _parts(result[name]) for name in VARIABLES if name in result}
+    parts = {name: _parts(each.shape) for name, each in there.items()}
     total, done, arrays = sum(map(len, parts.values())), 0, {}
-    for name in parts:
-        variable = result[name]
-        kind = np.float32 if variable.dtype.kind == "f" else variable.dtype
-        arrays[name] = np.empty(variable.shape, kind)
+    for name, each in there.items():
+        kind = each.stored.dtype
+        arrays[name] = np.empty(each.shape, np.float32 if kind.kind == "f" else kind)
         for part in parts[name]:
             progress.report("read the result", done, total)
-            arrays[name][part] = variable[part].values
+            arrays[name][part] = each.read(part)
             done += 1
-    nm = result["wavelength_nm"].values if "wavelength_nm" in result.coords else np.empty(0)
+    missing: tuple[str, ...] = ()
     if "depth_mm" not in arrays:
         # Where pixels are is unknown; their spectra can be looked at all the same.
         arrays["depth_mm"] = np.full(arrays["reflectance"].shape[1:], np.nan, np.float32)
-        return ResultArrays(path, np.asarray(nm, np.float64), arrays, dict(result.attrs), ("depth_mm",))
-    return ResultArrays(path, np.asarray(nm, np.float64), arrays, dict(result.attrs))
+        missing = ("depth_mm",)
+    return ResultArrays(path, nm, arrays, own_attributes(attributes), missing)

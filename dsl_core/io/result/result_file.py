@@ -13,6 +13,7 @@ from __future__ import annotations
 import logging
 import warnings
 from collections.abc import Mapping
+from functools import partial
 from json import JSONDecodeError
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -80,37 +81,49 @@ def load_result(path: Path, *, lazy: bool = True) -> xr.Dataset:
 
     Raises `StoreError` when the folder is missing, damaged, not a result, or of another schema version.
     """
+    return opened(path, checked_attributes(path), lazy=lazy)
+
+
+def checked_attributes(path: Path) -> dict[str, Any]:
+    """The attributes of a result whose files are all there, with those of its folder.
+
+    Raises `StoreError` when the folder is missing, damaged, not a result, or of another schema version.
+    """
     stored = read_attributes(path)
     if not check_inventory(path, stored):
         _log.warning("%s was written without checksums: damage to it would not be noticed.", path)
+    return stored
 
-    return opened(path, stored, lazy=lazy)
+
+def own_attributes(stored: Mapping[str, Any]) -> dict[str, Any]:
+    """The attributes without those of the folder."""
+    return {key: value for key, value in stored.items() if key not in _OF_THE_FOLDER}
+
+
+def damage_of(path: Path, error: Exception) -> StoreError:
+    """What is said of a result whose arrays cannot be read."""
+    return StoreError(f"The result {path} is damaged ({error}). Reconstruct it again from the scan's frames.")
 
 
 def opened(path: Path, stored: Mapping[str, Any], *, lazy: bool = True) -> xr.Dataset:
     """A folder's arrays with its attributes, whether all belongs to it or not; raises `StoreError`."""
     import xarray as xr
 
-    from dsl_core.io.result.stored_arrays import FAILURES, stored_variables
+    from dsl_core.io.result.stored_arrays import FAILURES
+    from dsl_core.io.result.stored_variables import stored_variables
 
-    def damaged(error: Exception) -> StoreError:
-        return StoreError(
-            f"The result {path} is damaged ({error}). Reconstruct it again from the scan's frames."
-        )
-
-    variables = stored_variables(path, damaged)
+    variables = stored_variables(path, partial(damage_of, path))
     try:
-        attributes = {key: value for key, value in stored.items() if key not in _OF_THE_FOLDER}
         labels = stored.get("labels", {})
         for variable in variables.values():
             # A scale factor read from JSON is a Python float, from which xarray would decode to float64.
             if "scale_factor" in variable.attrs:
                 variable.attrs["scale_factor"] = np.float32(variable.attrs["scale_factor"])
-        raw = xr.Dataset(variables, attrs=attributes)
+        raw = xr.Dataset(variables, attrs=own_attributes(stored))
         result = xr.decode_cf(raw).assign_coords({n: (n, np.array(v)) for n, v in labels.items()})
         return result if lazy else result.load()
     except FAILURES as error:
-        raise damaged(error) from error
+        raise damage_of(path, error) from error
 
 
 def has_checksums(path: Path) -> bool:

@@ -1,17 +1,18 @@
-"""The arrays of a result on disk as variables: read when they are used, and checked when they are read."""
+"""The arrays of a result on disk: read part by part, unpacked, and checked when they are read.
+
+It needs no xarray, which takes longer to import than a result takes to be read.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import zarr
 from numpy.typing import NDArray
-from xarray import Variable
-from xarray.backends import BackendArray
-from xarray.core import indexing
 
 from dsl_core.errors import StoreError
 
@@ -20,47 +21,81 @@ FAILURES = (OSError, ValueError, KeyError, RuntimeError, TypeError, ArithmeticEr
 #: An array may take this much memory, or that many times its file: few bytes that unpack to more are a trap.
 MOST_BYTES = 1 << 30
 MOST_RATIO = 200
+#: Conventions of CF that say how values were packed.
+_FILLS, _SCALE, _OFFSET = ("_FillValue", "missing_value"), "scale_factor", "add_offset"
 
 
-class _Checked(BackendArray):
-    """An array whose damage is told in a sentence, whenever it is noticed."""
+@dataclass(frozen=True)
+class StoredArray:
+    """An array of a folder with the names of its axes; ``damaged`` makes the error that readers get."""
 
-    def __init__(self, array: zarr.Array[Any], damaged: Callable[[Exception], StoreError]) -> None:
-        self.shape: tuple[int, ...] = array.shape
-        self.dtype: np.dtype[Any] = array.dtype
-        self._array, self._damaged = array, damaged
+    name: str
+    dims: tuple[str, ...]
+    array: zarr.Array[Any]
+    damaged: Callable[[Exception], StoreError]
 
-    def __getitem__(self, key: indexing.ExplicitIndexer) -> Any:
-        return indexing.explicit_indexing_adapter(key, self.shape, indexing.IndexingSupport.OUTER, self._read)
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Values along each axis."""
+        return tuple(self.array.shape)
 
-    def _read(self, key: tuple[Any, ...]) -> NDArray[Any]:
+    @property
+    def dtype(self) -> np.dtype[Any]:
+        """The type of its values once they are unpacked: float32 where they were packed."""
+        is_packed = self._fills or {_SCALE, _OFFSET} & set(self.array.attrs)
+        return np.dtype(np.float32) if is_packed and self.array.dtype.kind in "iu" else self.array.dtype
+
+    def stored(self, key: tuple[Any, ...]) -> NDArray[Any]:
+        """Values as they are stored, by a slice or indices for each axis; raises `StoreError`."""
         try:
-            values: NDArray[Any] = np.asarray(self._array.oindex[key])
+            values: NDArray[Any] = np.asarray(self.array.oindex[key])
         except FAILURES as error:
-            raise self._damaged(error) from error
+            raise self.damaged(error) from error
         return values
 
+    def values(self, key: tuple[Any, ...]) -> NDArray[Any]:
+        """Values unpacked by CF's conventions, NaN where there is none; raises `StoreError`."""
+        stored = self.stored(key)
+        if self.dtype == stored.dtype and not (self._fills or {_SCALE, _OFFSET} & set(self.array.attrs)):
+            return stored
+        try:
+            found = stored.astype(self.dtype)
+            for fill in self._fills:
+                found[stored == fill] = np.nan
+            for convention, act in ((_SCALE, np.multiply), (_OFFSET, np.add)):
+                if convention in self.array.attrs:
+                    act(found, found.dtype.type(self.array.attrs[convention]), out=found)
+        except FAILURES as error:
+            raise self.damaged(error) from error
+        return found
 
-def stored_variables(path: Path, damaged: Callable[[Exception], StoreError]) -> dict[str, Variable]:
-    """Every array of a folder by its name, packed as it is stored.
+    @property
+    def _fills(self) -> tuple[float, ...]:
+        """What stands for no value; floating-point numbers have NaN, whose text is not looked for."""
+        named = (self.array.attrs.get(name) for name in _FILLS)
+        return tuple(each for each in named if isinstance(each, int | float))
+
+
+def stored_arrays(path: Path, damaged: Callable[[Exception], StoreError]) -> dict[str, StoredArray]:
+    """Every array of a folder by its name.
 
     ``damaged`` turns what zarr raises into the error that readers get, at once or when a chunk is read.
     """
     try:
         group = zarr.open_group(path, mode="r", zarr_format=3, use_consolidated=False)
-        return {name: _variable(array, path / name, damaged) for name, array in group.arrays()}
+        return {name: _checked(name, array, path / name, damaged) for name, array in group.arrays()}
     except FAILURES as error:
         raise damaged(error) from error
 
 
-def _variable(array: zarr.Array[Any], folder: Path, damaged: Callable[[Exception], StoreError]) -> Variable:
+def _checked(
+    name: str, array: zarr.Array[Any], folder: Path, damaged: Callable[[Exception], StoreError]
+) -> StoredArray:
     _require_honest(array, folder)
-    lazy = indexing.LazilyIndexedArray(_Checked(array, damaged))
     dims = array.metadata.dimension_names or ()  # type: ignore[union-attr]
     if len(dims) != array.ndim or None in dims:
         raise ValueError(f"{folder.name} does not name its axes")
-    kept = indexing.MemoryCachedArray(indexing.CopyOnWriteArray(lazy))  # type: ignore[no-untyped-call, arg-type]
-    return Variable(dims, kept, dict(array.attrs))
+    return StoredArray(name, tuple(str(each) for each in dims), array, damaged)
 
 
 def _require_honest(array: zarr.Array[Any], folder: Path) -> None:

@@ -35,8 +35,9 @@ REACH_PX = 6.0
 STRETCHINGS, ROUNDS = 3, 4
 #: How often curve and field are fitted in turn, at most.
 FIELD_ROUNDS = 2
-#: A shape that explains the lines so much worse than it first promised has gone astray.
-WORSE = 1.2
+#: A shape that explains the lines so much worse than it first promised has gone astray, unless what it falls
+#: short of is at most this share of what it promised to explain better than the simpler curve.
+WORSE, SHORT_SHARE = 1.2, 0.05
 #: One that explains fewer pixels than this share of those before has only left out what it cannot explain.
 KEPT = 0.98
 #: Factors by which a curve may be stretched, and how often the search among them is repeated, finer.
@@ -128,8 +129,16 @@ def _fit_curve(view: View, family: _Family) -> SpreadFit | None:
         if halves is None:
             return found
         better = _choose(halves, family, shapes=True)
-    kept = better.pixels >= KEPT * found.pixels
-    return better if kept and better.after < WORSE * first.after else found
+        # Also when a later round comes back: it does so by chance.
+        if _is_astray(better, first, found):
+            return found
+    return better if better.pixels >= KEPT * found.pixels else found
+
+
+def _is_astray(shape: SpreadFit, first: SpreadFit, simple: SpreadFit) -> bool:
+    """Whether a shape does not explain the lines as it first did, next to a simpler curve."""
+    short = shape.after - first.after
+    return short >= max((WORSE - 1) * first.after, SHORT_SHARE * (simple.after - first.after))
 
 
 class _Family:

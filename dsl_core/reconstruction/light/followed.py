@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import replace
 from typing import Protocol
 
 import numpy as np
@@ -26,7 +27,13 @@ from dsl_core.reconstruction.light.course import (
 from dsl_core.reconstruction.light.line_levels import LineLevels, candidates, line_levels
 from dsl_core.reconstruction.light.setting_ratios import Ratio
 from dsl_core.reconstruction.light.steady import SteadyLight
-from dsl_core.reconstruction.merge import PickedLines
+from dsl_core.reconstruction.light.sudden import (
+    Again,
+    SuddenChanges,
+    share_of_black,
+    sudden_changes,
+)
+from dsl_core.reconstruction.merge import Exposed, PickedLines
 
 #: Frames whose sum is this far from white are of a scene that moved, or not what was asked for.
 MOST_MISFIT = 0.2
@@ -50,7 +57,7 @@ class Pictures(Protocol):
     def shots_of(self, role: Role, pattern: int) -> list[Shot]:
         """The shots of a pattern, one for each setting it was captured with."""
 
-    def expose(self, levels: NDArray[np.float64]) -> None:
+    def expose(self, exposed: Exposed) -> None:
         """From now on merge frames as exposed to other light."""
 
     def follow(self, light: SteadyLight) -> None:
@@ -87,44 +94,68 @@ def follow_light(
         return pixels
 
     pixels = look()
-    black = black_wander(frames)
-    of_black = (black,) if black is not None and black.significant else ()
-    if of_black:
-        # Dim settings show the change of black rather than that of the light.
-        frames.ratios = {}
-    before = light_course([*_of_settings(frames), *_of_whites(frames)], frames.plan.shot_count)
-    if before is not None and not before.is_steady:
-        frames.expose(_between_settings(frames, before))
+    blacks, whites = blacks_again(frames), list(_of_whites(frames))
+    sudden = sudden_changes(
+        frames, code.column, [Again(each.shot, each.log, each.std) for each in whites], blacks
+    )
+    exposed = None if sudden is None else sudden.exposed(frames)
+    if exposed is not None:
+        frames.expose(exposed)
         code, white = frames.decode(progress)
         pixels = look()
+        whites = [_without(each, exposed) for each in whites]
+    black = black_wander(blacks, sudden)
+    told = (*([] if black is None or not black.significant else [black]), *_told_of_light(sudden))
+    if black is not None and black.significant and (sudden is None or not sudden.explains_black):
+        # Dim settings show the change of black rather than that of the light.
+        frames.ratios = {}
+    settings = [_without(each, exposed) for each in _of_settings(frames)]
+    before = light_course([*settings, *whites], frames.plan.shot_count)
+    if before is not None and not before.is_steady:
+        frames.expose(_between_settings(frames, before, exposed))
+        code, white = frames.decode(progress)
+        pixels = look()
+        settings = [_without(each, exposed) for each in _of_settings(frames)]
     lines = line_levels(
         frames.plan, code.column, (white.radiance, white.variance), frames.pick(pixels, progress)
     )
     if lines is not None and lines.misfit > MOST_MISFIT:
         lines = None
-    witnesses = [*_of_settings(frames), *_of_whites(frames), *_of_lines(frames, lines)]
-    course = light_course(witnesses, frames.plan.shot_count)
+    course = light_course([*settings, *whites, *_of_lines(frames, lines)], frames.plan.shot_count)
     if course is None:
-        return code, white, of_black
+        return code, white, told
     if not course.is_steady:
         light = _steady(frames, course, lines)
         frames.follow(light)
         white = light.steady_white(white)
-    return code, white, (*of_black, *light_findings(course, lines is not None))
+    return code, white, (*told, *light_findings(course, lines is not None))
 
 
-def black_wander(scan: Pictures) -> FitFinding | None:
-    """By how much black pictures that a scan took again differ from the first ones; None without any."""
-    plan = scan.plan
-    changes = []
+def blacks_again(scan: Pictures) -> list[Again]:
+    """By how much black pictures that a scan took again differ from the first ones, DN."""
+    plan, changes = scan.plan, []
+    whites = {shot.setting: shot for shot in plan.shots() if shot.role == "white"}
     for shot in plan.shots():
         old = plan.original(shot)
         if shot.role == "sentinel" and old.role == "black":
-            more = scan.source.read(shot).astype(np.float32) - scan.source.read(old)
-            changes.append((float(more.mean()), float(more.std() / np.sqrt(more.size))))
-    if not changes:
+            black = scan.source.read(old).astype(np.float32)
+            more, share = scan.source.read(shot) - black, (0.0, float("inf"))
+            if old.setting in whites:
+                share = share_of_black(more, black, scan.source.read(whites[old.setting]))
+            std = float(more.std()) / np.sqrt(more.size)
+            changes.append(Again(shot.index, float(more.mean()), max(std, 1e-3), share))
+    return changes
+
+
+def black_wander(blacks: Sequence[Again], sudden: SuddenChanges | None = None) -> FitFinding | None:
+    """What `blacks_again` says to a person, and since when; None without any."""
+    if not blacks:
         return None
-    means, stds = np.array(changes).T
+    means, stds = (np.array([getattr(each, name) for each in blacks]) for name in ("more", "std"))
+    what = " All frames are off by as much."
+    if sudden is not None and sudden.black:
+        often = "at once" if sudden.explains_black else "in part at once"
+        what = f" It did so {often}, {_since(sudden.black)}; the frames are corrected for that."
     return FitFinding.judged(
         "light",
         "black taken again",
@@ -132,9 +163,39 @@ def black_wander(scan: Pictures) -> FitFinding | None:
         "DN",
         MOST_BLACK_DN,
         f"Black pictures changed by up to {means[np.abs(means).argmax()]:+.1f} DN during the scan: the black"
-        " level of the camera drifts, or the light of the room changes. All frames are off by as much.",
+        f" level of the camera drifts, or the light of the room changes.{what}",
         "Let the camera warm up, switch on its black-level correction, and keep the light of the room away.",
     )
+
+
+def _told_of_light(sudden: SuddenChanges | None) -> Iterator[FitFinding]:
+    """What changes of light at once say to a person."""
+    if sudden is None or not sudden.log:
+        return
+    worst = max(sudden.log.values(), key=abs)
+    yield FitFinding.judged(
+        "light",
+        "step of the light",
+        float(np.expm1(worst)),
+        "1",
+        LEAST_DRIFT,
+        f"The light has changed by {np.expm1(worst):+.1%} at once, {_since(sudden.log)}.{_CORRECTED} Which of"
+        " both was as calibrated, no scan can tell: the first is taken to be.",
+        "Switch automatic exposure and gain of the camera off, and check the lamp and its supply.",
+    )
+
+
+def _since(steps: Iterable[int]) -> str:
+    names = " and ".join(f"frame {at}" for at in sorted(steps))
+    return f"from {names} on"
+
+
+def _without(witness: Witness, exposed: Exposed | None) -> Witness:
+    """What a witness says of the light beyond its changes at once."""
+    if exposed is None or witness.against is None:
+        return witness
+    known = np.log(exposed.levels[witness.shot] / exposed.levels[witness.against])
+    return replace(witness, log=witness.log - float(known))
 
 
 def light_findings(course: LightCourse, with_lines: bool) -> Iterator[FitFinding]:
@@ -249,17 +310,22 @@ def _of_lines(scan: Pictures, lines: LineLevels | None) -> Iterator[Witness]:
         yield Witness(shot.index, None, float(log), float(np.hypot(std, LEVEL_ERROR)), slope)
 
 
-def _between_settings(scan: Pictures, course: LightCourse) -> NDArray[np.float64]:
-    """Levels (shots,) that make the shots of a pattern agree with that of its last setting."""
-    levels = np.ones(scan.plan.shot_count)
+def _between_settings(scan: Pictures, course: LightCourse, exposed: Exposed | None) -> Exposed:
+    """What makes the shots of a pattern agree with that of its last setting, besides changes at once."""
+    count = scan.plan.shot_count
+    known = exposed or Exposed.as_planned(count)
+    levels = known.levels.copy()
     for (role, pattern), ratios in scan.ratios.items():
         shots = scan.shots_of(role, pattern)
         for place, (shot, ratio) in enumerate(zip(shots[:-1], ratios, strict=False)):
             drift = course.log[shot.index] - course.log[shots[-1].index]
             apart = 0.0 if course.drifts or not course.settings else course.settings[place]
-            seen = ratio.log if ratio is not None and course.flickers else drift + apart
-            levels[shot.index] = np.exp(seen)
-    return levels
+            seen = drift + apart
+            if ratio is not None and course.flickers:
+                steps = known.levels[shot.index] / known.levels[shots[-1].index]
+                seen = ratio.log - float(np.log(steps))
+            levels[shot.index] *= np.exp(seen)
+    return replace(known, levels=levels)
 
 
 def _steady(scan: Pictures, course: LightCourse, lines: LineLevels | None) -> SteadyLight:

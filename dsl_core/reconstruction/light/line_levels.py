@@ -80,7 +80,7 @@ def line_levels(
     summed = frames.sum(1) * (total.sum() / frames.sum())
     usual = np.polyval(np.polyfit(summed, light_variance, 1), summed).clip(light_variance.min())
     noise = (SUM_ERROR * summed) ** 2 + mean**2 * usual + blacks**2
-    smooth, smooth_std = _smooth_rows(plan, flat, frames, variance, _pitch(column))
+    smooth, smooth_std = _smooth_rows(plan, flat, frames, variance, pitch_of(column))
     return _solve(frames, variance, total, noise, smooth, smooth_std)
 
 
@@ -143,11 +143,16 @@ def candidates(
     return np.asarray(some[:: max(len(some) // (2 * PIXELS), 1)])
 
 
-def _pitch(column: NDArray[np.integer]) -> float:
+def pitch_of(column: NDArray[np.integer]) -> float:
     """Projector columns from one pixel to the next."""
     known = (column[:, 1:] >= 0) & (column[:, :-1] >= 0)
     steps = np.abs(np.diff(column, axis=1))[known]
     return float(np.median(steps)) if steps.size else 1.0
+
+
+def zone_px(lines: ScanLines, pitch: float) -> float:
+    """Columns from the middle of a line from which on only first orders reach a pixel."""
+    return lines.width_px / 2 + 2 * lines.step_px + ZERO_PX + 1.5 * pitch
 
 
 def _smooth_rows(
@@ -161,7 +166,7 @@ def _smooth_rows(
     if not isinstance(plan.spectral, ScanLines) or count < 16:
         return np.zeros((0, count)), np.zeros(0)
     step, width = plan.spectral.step_px, plan.spectral.width_px
-    zone = width / 2 + 2 * step + ZERO_PX + 1.5 * pitch
+    zone = zone_px(plan.spectral, pitch)
     k = np.arange(2, count - 2)
     centre = k * step + width / 2
     # In the order of columns, pixels near a line are next to each other.

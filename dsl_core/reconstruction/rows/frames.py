@@ -17,6 +17,7 @@ from dsl_core.reconstruction.hdr import MergedFrame
 from dsl_core.reconstruction.light.setting_ratios import Ratio, compared_rows
 from dsl_core.reconstruction.light.steady import SteadyLight
 from dsl_core.reconstruction.merge import (
+    Exposed,
     LineStack,
     MergedScan,
     PickedLines,
@@ -42,7 +43,7 @@ class ScanFrames:
         self.source, self.rig, self.plan, self.bands = source, rig, source.plan, bands
         #: What settings of one pattern say of each other's light; known after a `look` at all of them.
         self.ratios: dict[tuple[Role, int], tuple[Ratio | None, ...]] = {}
-        self._levels: NDArray[np.float64] | None = None
+        self._exposed: Exposed | None = None
         self._light: SteadyLight | None = None
         self._whole: MergedScan | None = None
         self._picked: PickedLines | None = None
@@ -66,9 +67,9 @@ class ScanFrames:
         """The shots of a pattern, one for each setting it was captured with."""
         return self._shots[role, pattern]
 
-    def expose(self, levels: NDArray[np.float64]) -> None:
-        """From now on merge frames as exposed to other light: ``levels`` (shots,) relative to nominal."""
-        self._levels, self._whole, self._held, self._picked = levels, None, None, None
+    def expose(self, exposed: Exposed) -> None:
+        """From now on merge frames as exposed to other light."""
+        self._exposed, self._whole, self._held, self._picked = exposed, None, None, None
 
     def follow(self, light: SteadyLight) -> None:
         """From now on give line frames as they would be in steady light."""
@@ -90,7 +91,7 @@ class ScanFrames:
             return decode_columns(self._scan(), progress)
         found = []
         for band in self.bands:
-            scan = MergedScan(RowsOf(self.source, band.rows), self.rig, self._levels, compares=False)
+            scan = MergedScan(RowsOf(self.source, band.rows), self.rig, self._exposed, compares=False)
             found.append(decode_columns(scan, progress))
         return all_rows([code for code, _ in found]), all_rows([white for _, white in found])
 
@@ -101,7 +102,7 @@ class ScanFrames:
             self.ratios = self._scan().ratios
             return
         rows = compared_rows(self.plan.camera_size_px[1])
-        few = MergedScan(RowsOf(self.source, rows), self.rig)
+        few = MergedScan(RowsOf(self.source, rows), self.rig, self._exposed)
 
         def compare(key: tuple[Role, int]) -> None:
             few.compare(*key, [self.source.read(shot)[rows] for shot in self.shots_of(*key)])
@@ -127,7 +128,7 @@ class ScanFrames:
             self._held = None
             scan = self._scan()
             if not self.in_one:
-                scan = MergedScan(RowsOf(self.source, band.near), self.rig, self._levels, compares=False)
+                scan = MergedScan(RowsOf(self.source, band.near), self.rig, self._exposed, compares=False)
             stack = stack_lines(scan, progress, self._room.of)
             if self._light is not None:
                 self._light.steady(stack)
@@ -142,13 +143,13 @@ class ScanFrames:
 
     def _scan(self) -> MergedScan:
         if self._whole is None:
-            self._whole = MergedScan(self.source, self.rig, self._levels)
+            self._whole = MergedScan(self.source, self.rig, self._exposed)
         return self._whole
 
     def _read(self, pixels: Indices, few: MergedScan | None, progress: Progress | None) -> PickedLines:
         """The lines of some pixels from whole frames, whose settings are compared in some rows of a scan."""
         source = PixelsOf(self.source, pixels)
-        scan = MergedScan(source, self.rig, self._levels, compares=False)
+        scan = MergedScan(source, self.rig, self._exposed, compares=False)
         shape, rows = (self.plan.spectral_count, pixels.size), compared_rows(self.plan.camera_size_px[1])
         radiance, std = np.empty(shape, np.float32), np.empty(shape, deviation_type(scan))
 

@@ -20,6 +20,8 @@ MOST_SHIFT_PX, MOST_GAIN = 0.035, 0.015
 MOST_DRIFT, MOST_CURVES = 0.014, 0.015
 #: Rms of a level that changes steadily from that of the start, relative to its change.
 SINCE_START = 3**-0.5
+#: What a parameter is held at zero by.
+NONE_STD = 1e-5
 #: Terms of the shift of an order over the picture: up to second degree.
 _TERMS = 6
 
@@ -28,12 +30,16 @@ _TERMS = 6
 class Causes:
     """The parameters of the model fitted to a whole scan, with deviations from the scatter over cells.
 
-    ``shift_px`` (n, 2) of both orders at the probed pixels, their root mean square and its deviation;
+    ``shift_px`` (n, 2) of both orders at the probed pixels; their mean (2,) and root mean square, with its
+    deviation, over pixels that see the order: elsewhere the shift only continues what is seen;
     ``gain`` (2,) of both orders, with the deviations of their mean and difference; ``drift`` of the light
-    from the first line to the last.
+    from the first line to the last. A line lights a pixel by one order long before or after another does by
+    the other, so that drift looks much as a difference of the gains: ``drift_alone`` and ``difference_alone``
+    are each, with its deviation, where the other is none.
     """
 
     shift_px: Floats
+    mean_px: Floats
     rms_px: float
     rms_std_px: float
     gain: Floats
@@ -41,17 +47,23 @@ class Causes:
     difference_std: float
     drift: float
     drift_std: float
+    drift_alone: tuple[float, float]
+    difference_alone: tuple[float, float]
 
     @property
     def drifts(self) -> bool:
-        """Whether the light has changed during the scan."""
-        return matters(self.drift, self.drift_std, MOST_DRIFT)
+        """Whether the light has changed during the scan.
+
+        What frames ask for only together with gains that make up for it is an error of something else.
+        """
+        return matters(self.drift, self.drift_std, MOST_DRIFT) and matters(*self.drift_alone, MOST_DRIFT)
 
     @property
     def unequal(self) -> bool:
-        """Whether one order is brighter or darker against the other than calibrated."""
+        """Whether one order is brighter against the other than calibrated; judged as `drifts` is."""
         plus, minus = self.gain
-        return matters(plus - minus, self.difference_std, MOST_GAIN)
+        both = matters(plus - minus, self.difference_std, MOST_GAIN)
+        return both and matters(*self.difference_alone, MOST_GAIN)
 
     @property
     def common_gain(self) -> float:
@@ -83,25 +95,47 @@ def fit_causes(probe: Probe) -> Causes:
     design = np.zeros((count, len(PARAMETERS), 2 * _TERMS + rest))
     design[:, 0, :_TERMS] = design[:, 1, _TERMS : 2 * _TERMS] = terms
     design[:, 2:LEADING, 2 * _TERMS :] = np.eye(rest)
-    prior_std = np.r_[np.full(2 * _TERMS, PRIOR_STD[0]), PRIOR_STD[2:LEADING]]
+    first = 2 * _TERMS
+    # Mean and difference of the gains, in the place of both.
+    design[:, 2:4, first : first + 2] = [[1.0, 0.5], [1.0, -0.5]]
+    prior_std = np.r_[np.full(first, PRIOR_STD[0]), PRIOR_STD[2:LEADING]]
+    prior_std[first : first + 2] *= [0.5**0.5, 2**0.5]
     fit = pool(probe, design, prior_std)
-    found, covariance, used = fit.values, fit.covariance, probe.sound
+    found, covariance = fit.values, fit.covariance
     shift = design[:, :2] @ found
     spread = np.einsum("npk,kl,npl->np", design[:, :2], covariance, design[:, :2])
     # Noise adds its own square to that of the shift.
-    square, noise = float(np.mean(shift[used] ** 2)), float(np.mean(spread[used]))
-    first = 2 * _TERMS
-    pair = np.array([[0.5, 0.5], [1.0, -1.0]])
-    common, difference = np.sqrt(
-        np.diag(pair @ covariance[first : first + 2, first : first + 2] @ pair.T)
-    ).tolist()
+    telling = _telling(probe)
+    square, noise = float(np.sum(telling * shift**2)), float(np.sum(telling * spread))
+    deviations = np.sqrt(np.diag(covariance))
+    mean, apart = found[first : first + 2]
+
+    def alone(kept: int, held: int) -> tuple[float, float]:
+        held_std = prior_std.copy()
+        held_std[held] = NONE_STD
+        one = pool(probe, design, held_std)
+        return float(one.values[kept]), float(np.sqrt(one.covariance[kept, kept]))
+
+    drift = len(found) - 1
     return Causes(
         shift_px=shift,
+        mean_px=np.sum(telling * shift, 0) / np.maximum(telling.sum(0), 1e-12),
         rms_px=float(np.sqrt(max(square - noise, 0.0))),
         rms_std_px=float(np.sqrt(noise / (2 * _TERMS))),
-        gain=found[first : first + 2],
-        common_std=common,
-        difference_std=difference,
-        drift=float(found[-1]),
-        drift_std=float(np.sqrt(covariance[-1, -1])),
+        gain=np.array([mean + 0.5 * apart, mean - 0.5 * apart]),
+        common_std=float(deviations[first]),
+        difference_std=float(deviations[first + 1]),
+        drift=float(found[drift]),
+        drift_std=float(deviations[drift]),
+        drift_alone=alone(drift, first + 1),
+        difference_alone=alone(first + 1, drift),
     )
+
+
+def _telling(probe: Probe) -> Floats:
+    """Weights (n, 2), of sum 1, of what each pixel says of the shift of each order: at most as most do."""
+    known = np.stack([probe.normal[:, order, order] for order in (0, 1)], 1) * probe.weight[:, None]
+    known = np.where(probe.sound[:, None], known, 0.0)
+    some = known[known > 0]
+    limited = np.minimum(known, np.median(some) if some.size else 1.0)
+    return np.asarray(limited / max(float(limited.sum()), 1e-12))

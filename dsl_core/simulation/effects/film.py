@@ -99,7 +99,7 @@ class FilmBend(FilmShape):
 
     name = "film-bend"
     summary = "bend of the film"
-    ideal = MappingProxyType({"rig.film.bend_per_mm": 0.0})
+    ideal = MappingProxyType({"rig.film.bend_per_mm": 0.0, "rig.film.shape": None})
 
 
 class FilmTilt(FilmShape):

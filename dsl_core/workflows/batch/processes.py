@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from multiprocessing.connection import Connection, wait
 from typing import Any
 
+from dsl_core.solve.heap import keep_freed_memory
 from dsl_core.solve.threads import share_cores
 from dsl_core.workflows.batch.runner import MOST_DEATHS, Ended, Rows, given_up
 from dsl_core.workflows.batch.task import ScanTask, SeenRows, do_task
@@ -124,6 +125,7 @@ def _serve(channel: Connection, threads: int, work: Work) -> None:
     # Ctrl-C reaches the whole group; the process that handed out the tasks ends this one.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     share_cores(threads)
+    keep_freed_memory()
     threading.Thread(target=_end_with_parent, daemon=True, name="parent watch").start()
     while True:
         try:

@@ -6,10 +6,12 @@ from collections.abc import Sequence
 
 import pytest
 from dsl_app.calibrate.calibrate_all import UnattendedGuide
+from dsl_app.calibrate.overall import Overall
 from dsl_app.calibrate.state import RowState
 
 from dsl_core.campaign.common.recipe import Step
 from dsl_core.model.figure import Figure
+from dsl_core.progress import CallbackProgress
 from tests.app.calibrate.calibrate_bench import (
     CalibrateBench,
     states,
@@ -62,8 +64,18 @@ def test_rows_are_live_while_everything_is_calibrated(
     # Two steps and a fit, a step and a fit: the bar is of all of them.
     assert shares == pytest.approx([0.0, 0.2, 0.6], abs=0.001)
     # Why no time left is told is told.
-    assert texts[0].endswith("the time left is told from 4 % of everything on")
+    assert texts[0].endswith("the time left is told once 4 % of everything is done")
     assert texts[1].endswith("left for everything")
     assert seen[-1][2]
     assert bench.state.running.value == ""
     assert bench.state.seen.value is None
+
+
+def test_a_name_that_calibration_step_and_stage_share_is_told_once() -> None:
+    told: list[str] = []
+    overall = Overall({"selftest": 2})
+    overall.begins("selftest", 1)
+    progress = CallbackProgress(lambda stage, done, total: told.append(stage))
+    guide = UnattendedGuide(progress, "Self-test", overall)
+    guide.report("Self-test: self-test", 0, 8)
+    assert told == ["Self-test"]

@@ -10,6 +10,7 @@ from dsl_app.calibrate.campaign_box import NewCampaignDialog
 from dsl_app.calibrate.state import ABOUT
 from dsl_app.calibrate.wizard.settings_page import SettingsPage
 from dsl_app.shared.theme import DARK
+from PySide6.QtCore import QPoint
 from PySide6.QtGui import QDesktopServices
 from PySide6.QtWidgets import (
     QAbstractButton,
@@ -109,6 +110,17 @@ def test_everything_by_one_button_and_the_library_shows_it(
     assert stage.bench.state.in_use.value == "campaign"
     assert cell(library.table, 0, 2) == "scans"
     assert not library.restore.isEnabled()
+
+
+def test_a_figure_of_two_lines_does_not_part_a_title_from_its_purpose(stage: Stage) -> None:
+    row = stage.page.rows["selftest"]
+    gaps = set()
+    for words in ("Short", "A figure of several lines. " * 12):
+        row.figure.setText(words)
+        row.figure.show()
+        stage.qtbot.wait(5)
+        gaps.add(row._purpose.mapTo(row, QPoint()).y() - row._title.mapTo(row, QPoint()).y())
+    assert len(gaps) == 1
 
 
 def test_every_control_has_a_name_and_a_tip(stage: Stage) -> None:

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from dsl_app.composition import demo
+from dsl_app.composition import window as window_module
 from dsl_app.composition.demo import DemoController
 from dsl_app.composition.window import Composition, StartOptions
 from dsl_app.connection.state import Link, RigChoice
@@ -60,6 +61,21 @@ def test_the_examples_open_from_a_folder_of_the_person(
     assert result.sizes["wavelength_nm"] == 47
     assert float((result["flags"] == 0).mean()) > 0.5
     assert "Start a live scan" in bench.scans.notifier.offers
+
+
+def test_a_start_with_the_demo_makes_no_page_but_that_of_its_result(
+    qtbot: QtBot, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(window_module, "demo_folder", lambda: tmp_path / "demo")
+    composition = Composition(StartOptions(demo=True))
+    window = composition.open_window(tmp_path)
+    qtbot.addWidget(window)
+    assert (window.page, list(window._made)) == ("results", ["results"])
+    composition.start()
+    page = window.page_of("results")
+    qtbot.waitUntil(lambda: page.subject() is not None, timeout=60_000)
+    assert page.subject() == tmp_path / "demo" / f"{EXAMPLES[0].key}.zarr"
+    window.close()
 
 
 def test_what_is_said_of_a_picture_leaves_with_it(qtbot: QtBot, tmp_path: Path) -> None:

@@ -51,7 +51,9 @@ def test_a_rig_that_was_named_or_a_page_that_needs_it_waits_for_nothing(bench: B
     assert bench.waiting == []
 
 
-def test_an_example_is_opened_first(bench: Bench) -> None:
+@pytest.mark.parametrize("page", ["start", "results"])
+def test_an_example_is_opened_first(bench: Bench, page: str) -> None:
+    bench.window.page = page
     bench.first.begin(at_once=False)
     bench.window.parts.runner.active = ("Open the example face",)
     bench.window.opened.emit("results")

@@ -52,12 +52,12 @@ def test_every_view_shows_what_there_is(bench: Bench, tmp_path: Path, kind: str)
     for pixel in ((width // 2, height // 2), (0, 0)):
         control.point_at(pixel)
         control.marks.pin(pixel)
-        control.search.start(bench.page.search.mode.itemData(0))
+        control.search.start(bench.page.search.content.mode.itemData(0))
     if "band" in kind and state.marks.value:
         (curve, _), *_ = bench.page.spectra.content.named_curves
         assert len(curve.getData()[0]) == 2
     control.relight("A", False)
-    control.answers.from_marks(bench.page.materials.way)
+    control.answers.from_marks(bench.page.materials.content.way)
     assert bench.page.pixel_info.values.text()
     told = bench.page.warning.text()
     assert ("standard deviation of depth" in told) == (" alone" in kind or kind == "spectra and depth")

@@ -26,7 +26,7 @@ def test_a_click_pins_and_keys_move_pin_and_remove(bench: Bench, qtbot: QtBot) -
     QTest.keyClick(canvas, Qt.Key.Key_Up)
     QTest.keyClick(canvas, Qt.Key.Key_Return)
     assert bench.marks[1].pixel == (20, 9)
-    assert "mm" in bench.page.marks.figures.text()
+    qtbot.waitUntil(lambda: "mm" in bench.page.marks.figures.toPlainText())
     QTest.keyClick(canvas, Qt.Key.Key_Delete)
     assert [mark.pixel for mark in bench.marks] == [(10, 10)]
     bench.window.do("undo")
@@ -114,7 +114,7 @@ def test_depth_outside_the_limits_is_transparent_and_the_bar_says_them(bench: Be
 def test_a_class_map_lies_over_colours_and_hides_no_other_view(bench: Bench) -> None:
     layer = bench.page.image.content.materials
     bench.control.marks.pin((30, 5))
-    bench.control.answers.from_marks(bench.page.materials.way)
+    bench.control.answers.from_marks(bench.page.materials.content.way)
     assert layer.isVisible()
     for view in (ResultView.BAND, ResultView.DEPTH, ResultView.QUALITY):
         bench.control.show(view)

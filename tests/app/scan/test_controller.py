@@ -3,12 +3,13 @@ from __future__ import annotations
 import shutil
 import threading
 from collections import namedtuple
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 from dsl_app.connection.state import Link, RigChoice
+from dsl_app.scan import reconstruction_time
 from dsl_app.scan.job import ScanJob
 from dsl_app.scan.plan import connect_first, was_taken_with
 from dsl_app.scan.reconnect import ATTEMPTS, RETRY_S
@@ -160,6 +161,8 @@ def test_a_result_follows_and_is_told(
         return real(target, session, progress=progress, seen_geometry=see)
 
     monkeypatch.setattr(scans, "reconstruct_to", watched)
+    # The first reconstruction of a busy computer compiles for a minute.
+    monkeypatch.setattr(reconstruction_time, "MOST_US_PER_PX", np.inf)
     expected_s = bench.state.reconstruction_s.value
     results: list[Path] = []
     bench.state.result.connect(results.append)
@@ -177,6 +180,29 @@ def test_a_result_follows_and_is_told(
     assert 600 < middle_mm < 800
     assert bench.state.depth.value is None
     assert bench.state.reconstruction_s.value != expected_s
+
+
+def test_a_scan_without_calibration_is_not_reconstructed_but_says_what_to_do(bench: ScanBench) -> None:
+    own, devices = bench.calibration, bench.rig.state.devices.value
+    assert devices is not None
+    bench.rig.state.devices.set(replace(devices, calibration=None))
+    facts = bench.state.facts.value
+    assert facts is not None
+    assert not facts.is_calibrated
+    bench.state.then_reconstruct.set(True)
+    results: list[Path] = []
+    bench.state.result.connect(results.append)
+    bench.scans.start()
+    assert phase(bench) is Phase.DONE
+    assert "first calibrate the rig on the Calibrate page, then press Reconstruct…" in bench.state.note.value
+    assert bench.state.lacks_calibration.value
+    bench.library.store("lab", own)
+    bench.scans.plans.load_library()
+    bench.scans.start()
+    assert "no calibration: press Reconstruct… and choose" in bench.state.note.value
+    assert results == []
+    assert "The reconstruction" not in bench.state.note.value
+    assert bench.notifier.told == []
 
 
 @pytest.mark.parametrize(
@@ -357,6 +383,23 @@ def test_a_damaged_session_is_told(bench: ScanBench, tmp_path: Path) -> None:
     (tmp_path / "odd.dsl" / "manifest.json").write_text("{")
     assert bench.scans.open(tmp_path / "odd.dsl")
     assert "damaged" in bench.notifier.told[-1][1]
+
+
+def test_a_typed_name_stays_until_a_scan_has_it(bench: ScanBench, tmp_path: Path) -> None:
+    target = bench.state.target
+    bench.scans.name_scan("leaf 1/2.dsl ")
+    assert target.value == tmp_path / "leaf 1-2.dsl"
+    # As for the scan of the demo, which has its own name.
+    bench.scans.plan_new_scan()
+    assert target.value == tmp_path / "leaf 1-2.dsl"
+    bench.scans.plans.set_target(tmp_path / "demo" / "own.dsl")
+    bench.scans.start()
+    assert target.value == tmp_path / "leaf 1-2.dsl"
+    bench.scans.name_scan(" ")
+    assert target.value == tmp_path / "leaf 1-2.dsl"
+    bench.scans.start()
+    assert ScanReader(tmp_path / "leaf 1-2.dsl").missing() == []
+    assert target.value == tmp_path / "scan-20260301-1020.dsl"
 
 
 def test_leaving_a_session_plans_a_new_one(

@@ -115,6 +115,11 @@ def test_progress_is_empty_until_there_is_some() -> None:
 def test_frames_that_nothing_was_made_of_are_reconstructed_next() -> None:
     raw = run_controls(Phase.DONE, None, FREE, "", has_finished=True, has_result=False)
     assert (raw.start.is_primary, raw.again.is_primary, raw.again.text) == (False, True, "Reconstruct…")
+    # It cannot be before there is a calibration; the button stays, for one in a file.
+    bare = run_controls(
+        Phase.DONE, None, FREE, "", has_finished=True, has_result=False, must_calibrate=True
+    ).again
+    assert (bare.is_primary, bare.is_visible, bare.is_enabled) == (False, True, True)
     done = run_controls(Phase.DONE, None, FREE, "", has_finished=True, has_result=True)
     assert (done.start.is_primary, done.again.is_primary) == (True, False)
     made = run_controls(

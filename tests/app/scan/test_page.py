@@ -91,6 +91,24 @@ def slow(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(SimCamera, "snap", slowly)
 
 
+def test_a_name_counts_as_far_as_it_is_typed(ready: Bench, tmp_path: Path) -> None:
+    page, bench, _ = ready
+    field = page.target.name
+    field.selectAll()
+    QTest.keyClicks(field, "leaf 1/2")
+    assert bench.state.target.value == tmp_path / "leaf 1-2.dsl"
+    # Another folder is chosen meanwhile: neither the text nor the place in it changes.
+    field.cursorBackward(False, 3)
+    bench.scans.plans.set_target(tmp_path / "other" / "leaf 1-2.dsl")
+    assert (field.text(), field.cursorPosition()) == ("leaf 1/2", 5)
+    QTest.keyClick(field, Qt.Key.Key_Return)
+    assert field.text() == "leaf 1-2"
+    field.selectAll()
+    QTest.keyClick(field, Qt.Key.Key_Delete)
+    QTest.keyClick(field, Qt.Key.Key_Return)
+    assert field.text() == "leaf 1-2"
+
+
 def test_pause_go_on_and_finish(qtbot: QtBot, ready: Bench, slow: None, tmp_path: Path) -> None:
     page, bench, _ = ready
     click(page.run.start)

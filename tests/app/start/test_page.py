@@ -1,9 +1,13 @@
 from pathlib import Path
 
+import pytest
 from dsl_app.shared.settings import RecentFiles, Settings
+from dsl_app.shared.theme import LIGHT, style_sheet
 from dsl_app.start.examples import EXAMPLES
 from dsl_app.start.page import StartPage
 from dsl_app.start.unfinished import Unfinished, UnfinishedController
+from PySide6.QtCore import QRect
+from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QPushButton
 from pytestqt.qtbot import QtBot
 
@@ -49,7 +53,34 @@ def test_what_was_interrupted_comes_before_an_example(qtbot: QtBot) -> None:
     blue = [each for each in page.findChildren(QPushButton) if each.property("role") == "primary"]
     assert [each.text() for each in blue] == ["Resume scan…"]
     found.set(())
+    page.unfinished._control.is_resuming.set(True)
+    assert page.examples["color-checker"].property("role") == ""
+    page.unfinished._control.is_resuming.set(False)
     assert page.examples["color-checker"].property("role") == "primary"
+
+
+@pytest.mark.parametrize("height_px", [600, 800, 1300])
+def test_nothing_moves_when_something_unfinished_is_found(
+    qtbot: QtBot, tmp_path: Path, height_px: int
+) -> None:
+    recent = RecentFiles(Settings())
+    for name in "abcdef":
+        recent.add(tmp_path / name)
+    page, _ = make_page(qtbot, recent)
+    page.setStyleSheet(style_sheet(LIGHT))
+    page.resize(1200, height_px)
+    QTest.qWait(0)
+    parts = (*page.findChildren(QPushButton), page.files.files)
+
+    def places() -> list[QRect]:
+        return [QRect(part.mapTo(page, part.rect().topLeft()), part.size()) for part in parts]
+
+    before = places()
+    lines = [Unfinished(Path(f"{name}.dsl"), f"{name} was interrupted.", "Resume scan…") for name in "ghij"]
+    page.unfinished._control.found.set(tuple(lines))
+    QTest.qWait(0)
+    assert page.unfinished.isVisible()
+    assert places() == before
 
 
 def test_all_cards_fit_the_smallest_window(qtbot: QtBot) -> None:

@@ -27,17 +27,18 @@ from dsl_core.calibration.film.depth_stage import (
     fit_first_orders,
     stage_curves,
 )
-from dsl_core.calibration.film.fit import Floats, fit_film
+from dsl_core.calibration.film.filter_angle import columns_per_share, shift_terms
+from dsl_core.calibration.film.fit import MAX_SLOPE, FilmForm, fit_film, is_plausible
 from dsl_core.calibration.film.order_columns import TileColumns
 from dsl_core.calibration.film.order_paths import LineFrames
 from dsl_core.calibration.film.order_samples import OrderSamples, grating_columns
 from dsl_core.errors import CalibrationError
 from dsl_core.model.calibration.depth_stage import FilterSeen
-from dsl_core.model.rig import CorrespondenceGrid, Film, Rig
+from dsl_core.model.rig import CorrespondenceGrid, Film, FilmShape, Rig
 from dsl_core.optics.correspondence import GratingModel
 from dsl_core.optics.filters import nominal_filter
 from dsl_core.progress import NoProgress
-from tests.cases.film_samples import NOISE_PX, mounted, samples_of, small_rig
+from tests.cases.film_samples import NOISE_PX, mounted, saddle, samples_of, small_rig
 from tests.cases.order_lines import SIZE, TRUE_FILM, line_frames, plane_at, rig_with
 
 DEPTHS_MM, FILTERS_NM = (600.0, 850.0), (480.0, 540.0, 620.0)
@@ -77,22 +78,37 @@ def test_the_film_is_found_from_its_data_sheet() -> None:
     assert (samples.pixel < SIZE[0] * SIZE[1]).all()
 
 
-@pytest.mark.parametrize("angled", [False, True])
-def test_a_film_is_warped_only_where_it_would_have_to_be_tilted_like_a_roof(angled: bool) -> None:
+def test_a_film_that_fits_as_a_cylinder_is_one() -> None:
     rig = small_rig()
-    plain = samples_of(rig, NOISE_PX)
-    found = _fit(mounted(rig), plain, Film(), angled)
-    assert not found.warp_px.any()
-    assert found.film == fit_film(mounted(rig), plain, Film()).film
-    bent = replace(plain, column_px=plain.column_px + columns_of_a_saddle(plain))
-    found = _fit(mounted(rig), bent, Film(), angled)
-    assert found.warp_px.any()
-    assert abs(found.film.tilt_x_deg - rig.film.tilt_x_deg) < 3.0
+    samples = samples_of(rig, NOISE_PX)
+    assert _fit(mounted(rig), samples, Film()).film == fit_film(mounted(rig), samples, Film()).film
 
 
-def columns_of_a_saddle(samples: OrderSamples) -> Floats:
-    rows, columns = np.divmod(samples.pixel, small_rig().camera.width_px)
-    return np.asarray(2.0 * (2 * columns / 222 - 1) * (2 * rows / 145 - 1))
+@pytest.mark.parametrize("index", [None, 1.9])
+def test_a_bent_film_and_filters_seen_at_an_angle_are_told_apart(index: float | None) -> None:
+    rig = small_rig()
+    shape = FilmShape(middle_mm=-6.0, factors=(0.0075, 0.0, 0.00015, 0.0, 0.0, 0.0))
+    rig = rig.model_copy(update={"film": rig.film.model_copy(update={"shape": shape})})
+    straight = seen = samples_of(rig, NOISE_PX)
+    if index is not None:
+        shift = shift_terms(rig, seen.pixel) @ (index**-2 * np.array([1.0, np.radians(3.0), 0.0]))
+        seen = replace(seen, column_px=seen.column_px + columns_per_share(rig, seen) * shift)
+    found = _fit(mounted(rig), seen, Film())
+    assert (found.angle.index is None) == (index is None)
+    if found.angle.index is not None:
+        assert found.angle.index[0] == pytest.approx(index, abs=0.02)
+    assert found.film.lines_per_mm == pytest.approx(rig.film.lines_per_mm, abs=0.1)
+    off = grating_columns(mounted(rig).model_copy(update={"film": found.film}), straight)
+    assert np.sqrt(np.mean((off - grating_columns(rig, straight)) ** 2)) < 0.02
+
+
+def test_no_film_is_bent_more_than_one_can_be() -> None:
+    rig = small_rig()
+    odd = samples_of(rig, NOISE_PX, saddle)
+    found = fit_film(mounted(rig), odd, Film(), shaped=True).film
+    assert is_plausible(found, Film())
+    assert FilmForm.of(rig.projector, rig.film, shaped=True).steepest(found) > MAX_SLOPE
+    assert _fit(mounted(rig), odd, Film()).film.shape is None
 
 
 def test_a_wrong_filter_is_named_with_its_wavelength() -> None:

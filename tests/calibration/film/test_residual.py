@@ -19,7 +19,7 @@ from dsl_core.calibration.film.residual import (
     fit_residual,
 )
 from dsl_core.errors import CalibrationError
-from dsl_core.model.rig import Film
+from dsl_core.model.rig import Film, FilmShape
 from dsl_core.optics.correspondence import GratingModel, HybridModel, correspondence
 from tests.cases.film_samples import (
     NAMES,
@@ -32,8 +32,10 @@ from tests.cases.film_samples import (
 )
 
 
-def test_no_correction_is_chosen_where_the_film_is_enough() -> None:
+@pytest.mark.parametrize("shape", [None, FilmShape(middle_mm=-6.0, factors=(0.004, 0, 1e-4, 0, 0, 0))])
+def test_no_correction_is_chosen_where_the_film_is_enough(shape: FilmShape | None) -> None:
     rig = small_rig()
+    rig = rig.model_copy(update={"film": rig.film.model_copy(update={"shape": shape})})
     residual, held_out = choose_residual(rig, samples_of(rig, NOISE_PX), POSITIONS, NAMES)
     assert residual.degrees == ()
     assert [each.kept_out for each in held_out] == [*POSITIONS, *NAMES, "a third of the tiles"]

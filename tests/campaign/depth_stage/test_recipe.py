@@ -9,15 +9,18 @@ import numpy as np
 import pytest
 import torch
 
-from dsl_core.campaign.common.recipe import Bench
-from dsl_core.campaign.depth_stage.recipe import STAGE_NOTE, DepthStageRecipe
+from dsl_core.calibration.common.tiles import ColumnSamples
+from dsl_core.campaign.common.recipe import Bench, Step
+from dsl_core.campaign.depth_stage.recipe import STAGE_NOTE, DepthStageRecipe, SeenPlane
 from dsl_core.errors import CalibrationError
 from dsl_core.model.calibration.chain import ChainCorrection
 from dsl_core.model.calibration.depth_stage import DepthStageCalibration
 from dsl_core.model.figure import failures
+from dsl_core.model.line_spread import LineSpread
+from dsl_core.model.rig import Film, FilmShape
 from dsl_core.model.spectral import SpectralCurve
 from dsl_core.optics.correspondence import GratingModel, correspondence, triangulate, zero_order
-from dsl_core.progress import NoProgress
+from dsl_core.progress import NoProgress, Progress
 from tests.cases.board_calibrated import board_calibrated
 from tests.cases.film_bench import film_bench, take, take_all, truth_of, without
 
@@ -65,6 +68,29 @@ def test_film_lies_within_its_deviations(bench: Bench, record: DepthStageCalibra
     assert np.sqrt(np.mean(np.square(pulls))) < 2.5
 
 
+@pytest.mark.parametrize("shown", [(), (0,), (1,), (0, 1)])
+def test_columns_of_all_planes_are_counted_from_one_place_of_a_line(
+    bench: Bench, monkeypatch: pytest.MonkeyPatch, shown: tuple[int, ...]
+) -> None:
+    plain = [step for step in RECIPE.steps(bench) if step.placement.filter_nm is None]
+    uneven = [
+        bench.rig.projector_response.with_spread(LineSpread.of(np.array(shares), 0.5))
+        for shares in ((0.2, 0.5, 0.3), (0.3, 0.5, 0.2))
+    ]
+
+    def seen(recipe: DepthStageRecipe, bench: Bench, step: Step, progress: Progress) -> SeenPlane:
+        number = plain.index(step)
+        response = uneven[number] if number in shown else bench.rig.projector_response
+        return SeenPlane(ColumnSamples(*np.zeros((3, 0))), response, None)
+
+    monkeypatch.setattr(DepthStageRecipe, "_plain", seen)
+    found = [each.response for each in RECIPE._planes(bench, plain, NoProgress())]
+    if not shown:
+        assert found == [bench.rig.projector_response] * 2
+    else:
+        assert found == [uneven[k] if k in shown else uneven[1 - k] for k in range(2)]
+
+
 def test_record_goes_through_json_and_its_figures_pass(record: DepthStageCalibration) -> None:
     assert DepthStageCalibration.model_validate_json(record.model_dump_json()) == record
     assert failures(RECIPE.figures(record)) == ()
@@ -73,9 +99,11 @@ def test_record_goes_through_json_and_its_figures_pass(record: DepthStageCalibra
     assert len(record.model_dump_json()) < 100_000
 
 
-@pytest.mark.parametrize(("scale", "told"), [(-0.004, True), (0.001, False)])
-def test_filters_that_are_all_off_alike_are_told(
-    record: DepthStageCalibration, scale: float, told: bool
+@pytest.mark.parametrize(
+    ("scale", "lines_std", "told"), [(-0.004, 0.02, True), (0.001, 0.02, False), (-0.004, 0.7, False)]
+)
+def test_filters_that_are_all_off_alike_are_told_where_the_film_is_known(
+    record: DepthStageCalibration, scale: float, lines_std: float, told: bool
 ) -> None:
     flat = SpectralCurve.of([400.0, 700.0], [1.0, 1.0])
     chain = ChainCorrection(
@@ -90,9 +118,22 @@ def test_filters_that_are_all_off_alike_are_told(
         pixels=100,
         chi_square=1.0,
     )
-    figures = RECIPE.figures(record.model_copy(update={"chain": chain}))
+    film_std = record.film_std | {"lines_per_mm": lines_std}
+    figures = RECIPE.figures(record.model_copy(update={"chain": chain, "film_std": film_std}))
     failed = [str(figure) for figure in failures(figures)]
-    assert failed == (["filters against the LEDs' spectra, at 550 nm -2.200 ± 0.055 nm"] if told else [])
+    assert failed == (["filters against the LEDs' spectra, at 550 nm -2.200 ± 0.059 nm"] if told else [])
+
+
+def test_a_film_that_is_no_cylinder_is_told_by_its_slope(record: DepthStageCalibration) -> None:
+    def slopes(film: Film) -> list[float]:
+        figures = RECIPE.figures(record.model_copy(update={"film": film}))
+        return [figure.value for figure in figures if figure.name == "film's steepest place besides its bend"]
+
+    assert slopes(record.film) == []
+    twist = FilmShape(factors=(0.004, 0.0, 0.0, 0.0, 0.0, 0.0))
+    side_mm = record.film.distance_mm * record.projector.width_px / 2 / record.projector.fx_px
+    (slope,) = slopes(record.film.model_copy(update={"shape": twist}))
+    assert slope == pytest.approx(np.degrees(0.004 * side_mm))
 
 
 def test_a_bulge_is_told_in_mm(record: DepthStageCalibration) -> None:

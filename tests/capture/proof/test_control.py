@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from dsl_core.capture.proof.code_pairs import Pair
-from dsl_core.capture.proof.control import choose_pairs, is_same
+from dsl_core.capture.proof.control import choose_pairs, is_same, is_unchanged
 from dsl_core.capture.proof.raster import Noise
 from dsl_core.model.rig import Sensor
 
@@ -76,3 +76,15 @@ def test_light_reaches_pixels_with_twelve_deviations_of_contrast(contrast: int, 
     black = np.full(80, 100, np.uint16)
     pairs = {0: (black, black + np.uint16(contrast))}
     assert is_same(black, black, pairs, NOISE) == is_lit
+
+
+@pytest.mark.parametrize(("contrast", "unchanged"), [(1.0, True), (1.02, True), (0.95, False), (1.05, False)])
+def test_mist_that_takes_a_twentieth_of_the_contrast_is_a_change_though_the_picture_is_the_same(
+    contrast: float, unchanged: bool
+) -> None:
+    one, other = stripes(2)
+    now = (one.mean() + contrast * (one - one.mean()) + 2).round().astype(np.uint16)
+    pairs = {0: (one, other)}
+    assert is_same(now, one, pairs, NOISE)
+    assert is_unchanged(now, one, pairs, NOISE) == unchanged
+    assert not is_unchanged(other, one, pairs, NOISE)

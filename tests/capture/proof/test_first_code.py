@@ -157,6 +157,25 @@ def test_an_overexposed_scene_is_no_single_saturated_picture() -> None:
     assert Verdict.SATURATED not in verdicts
 
 
+def test_pictures_of_a_lamp_that_warms_up_are_taken_again_once_it_has() -> None:
+    """Pairs of a fifth and a tenth less light than the last ones; the second time, it is what there is."""
+    assert isinstance(PLAN.code, GrayCode)
+    code = FirstCode(PLAN, PLAN.code, SHOTS, RASTER, Noise(SENSOR), "RGGB", True)
+    dim = dict(zip(SHOTS, (0.8, 0.8, 0.9, 0.9, 0.99, 0.99), strict=False))
+
+    def found(shot: Shot) -> Finding:
+        return code.add(shot, seen(shot, 2000.0 * dim.get(shot, 1.0)), None)
+
+    *before, last = [found(shot) for shot in SHOTS]
+    assert not any(each.is_wrong for each in before)
+    assert last.again == tuple(SHOTS[:4])
+    assert last.verdict is Verdict.EXPOSURE
+    assert "0.8" in last.detail
+    assert code.lit is None
+    assert not any(found(shot).is_wrong for shot in SHOTS[:4])
+    assert code.lit is not None
+
+
 def test_light_that_fails_for_good_between_the_first_two_pairs_is_told_however_often_they_are_taken() -> None:
     for light, verdict in ((0.0, Verdict.DARK), (1000.0, Verdict.EXPOSURE)):
         code = first_code()

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from dsl_core.capture.proof.first_light import changed_light, has_moved, is_unlit
+from dsl_core.capture.proof.first_light import changed_light, has_moved, is_unlit, unsettled_pairs
 from dsl_core.capture.proof.raster import Counts, Noise
 from dsl_core.model.rig import Sensor
 
@@ -98,3 +98,18 @@ def test_a_pixel_in_a_thousand_six_deviations_bright_is_lit(sigmas: float, pixel
     bright = round(sigmas * float(np.sqrt(2 * NOISE.variance(one)[0])))
     one[:pixels] += np.uint16(bright)
     assert is_unlit(one, other, NOISE) == unlit
+
+
+@pytest.mark.parametrize(("light", "wrong"), [(0.97, {0, 2}), (0.99, set()), (1.03, {0, 2})])
+def test_pairs_of_other_light_than_the_last_ones_have_not_settled(light: float, wrong: set[int]) -> None:
+    usual = pictures(1000.0)
+    white, black = (np.full(400, SENSOR.black_level_dn + light, np.uint16) for light in (1000, 0))
+    other = pictures(1000.0 * light)
+    pairs = {n: (other[0], other[1]) if n in (0, 2) else (usual[2], usual[3]) for n in range(5)}
+    lit = np.ones(400, bool)
+    found = unsettled_pairs(pairs, (white, black), lit, NOISE)
+    assert set(found) == wrong
+    assert list(found.values()) == pytest.approx([light] * len(wrong), abs=0.01)
+    # Of few pixels nothing is known, and where the last pair differs the ends may be wrong.
+    assert unsettled_pairs(pairs, (white, black), np.arange(400) < 59, NOISE) == {}
+    assert unsettled_pairs({**pairs, 4: pairs[0]}, (white, black), lit, NOISE) == {}

@@ -83,6 +83,15 @@ def test_nothing_is_expected_of_what_was_not_seen_at_the_first_setting() -> None
     found = known.expected(LATER_LINE, LATER_LINE)
     assert found is not None
     assert found.counts.tolist() == [310 + 0.5 * 600] * 4
+    brighter = LaterSettings(
+        PLAN, RIG, NOISE, kept, lambda shot, seen: np.float32(shot.pattern * seen[0] / 9)
+    )
+    brighter.measure(LATER_LINE, 0.5 / brighter.scale(LATER_LINE))
+    without = brighter.expected(LATER_LINE, LATER_LINE)
+    assert without is not None
+    assert without.counts.tolist() == [310 + 0.5 * (600 - 100)] * 4, (
+        "what black had gained in the old picture"
+    )
     kept[10] = counts(1300)
     white = known.white(LATER_LINE)
     assert white is not None

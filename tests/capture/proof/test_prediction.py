@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from dsl_core.capture.proof.prediction import (
     Expected,
     Lit,
+    black_gained,
     brightness_of_lines,
     brightness_of_picture,
     contest_of_lines,
@@ -275,3 +276,26 @@ def test_light_of_the_room_that_changed_is_not_taken_for_that_of_a_picture(then:
     share = (0.8 * 10_000 + 160 * now) / (10_000 + 160 * then)
     quiet = Expected(wanted.counts, floats(np.full(160, 1.0)))
     assert brightness_of_picture(seen, quiet, black, NOISE, None, pattern) == pytest.approx(share, rel=1e-3)
+
+
+@pytest.mark.parametrize(("more", "found"), [(0, 0.0), (16, 16.0), (-9, -9.0)])
+def test_black_that_has_gained_is_told_from_first_orders_by_pixels_that_these_do_not_reach(
+    more: int, found: float
+) -> None:
+    wanted, count = floats(np.r_[np.ones(200), np.zeros(1800)]), 2000
+    some = Lit(
+        np.arange(count), np.arange(count), floats(np.full(count, 120)), floats(np.full(count, 900)),
+        floats(np.ones(count)),
+    )  # fmt: skip
+    # As wide as two pictures of this variance are apart.
+    noise = np.random.default_rng(2).normal(0, np.sqrt(2 * (2.0 + 0.35)), count)
+    light = np.r_[np.full(800, 50.0), np.zeros(1200)]
+    seen = np.rint(120 + more + light + noise).astype(np.uint16)
+    assert black_gained(seen, some, wanted, NOISE) == pytest.approx(found, abs=0.8 if found else 0)
+    assert black_gained(seen, some, floats(np.ones(count)), NOISE) == 0, "all pixels are lit"
+
+
+def test_what_black_has_gained_is_not_multiplied_with_the_light() -> None:
+    picture, black = np.array([316, 216], np.uint16), np.array([200, 200], np.uint16)
+    found = rescaled(picture, black, floats([150, 150]), 30.0, NOISE, np.float32(16))
+    assert found.counts == pytest.approx([150 + 30 * 100, 150])

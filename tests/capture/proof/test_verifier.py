@@ -181,3 +181,17 @@ def test_columns_rise_unless_the_projector_is_mirrored(
     FrameProof(scene.plan, rig.model_copy(update={"pose": pose}))
     FrameProof(scene.plan, None)
     assert asked == [rises, None]
+
+
+def test_a_picture_of_the_code_is_unchanged_only_in_the_same_light(scene: RenderedScene) -> None:
+    rig, proof = scene.open(3), FrameProof(scene.plan, scene.calibration)
+    code, white = _shot(scene, "code", 8, 0), _shot(scene, "white", 0, 0)
+    assert not proof.is_unchanged(code, _take(rig, scene, code)), "nothing is known of it yet"
+    for shot in list(scene.plan.shots())[: _shot(scene, "black", 0, 0).index + 1]:
+        proof.judge(shot, _take(rig, scene, shot))
+    now = _take(rig, scene, code)
+    assert proof.is_unchanged(code, now)
+    mist = (now.mean() + 0.95 * (now - now.mean())).astype(np.uint16)
+    assert proof.is_as_before(code, mist)
+    assert not proof.is_unchanged(code, mist)
+    assert not proof.is_unchanged(white, _take(rig, scene, white)), "it does not show what has moved"

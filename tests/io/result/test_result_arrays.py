@@ -1,15 +1,20 @@
 from __future__ import annotations
 
+import shutil
+import subprocess
+import sys
 import tracemalloc
 from pathlib import Path
 
 import numpy as np
 import pytest
+import zarr
 
-from dsl_core.errors import Cancelled
+from dsl_core.errors import Cancelled, StoreError
 from dsl_core.io.result import result_arrays
+from dsl_core.io.result.inventory import CHECKSUM, INVENTORY
 from dsl_core.io.result.result_arrays import load_arrays
-from dsl_core.io.result.result_file import save_result
+from dsl_core.io.result.result_file import load_result, save_result
 from dsl_core.model.result import build_result
 from dsl_core.progress import CallbackProgress, CancelToken
 
@@ -62,3 +67,35 @@ def test_reading_can_be_stopped(stored: Path) -> None:
     token.cancel()
     with pytest.raises(Cancelled):
         load_arrays(stored, CallbackProgress(lambda *_: None, token))
+
+
+def test_arrays_are_the_values_of_the_data_set(stored: Path) -> None:
+    arrays, result = load_arrays(stored), load_result(stored)
+    assert set(arrays.arrays) <= set(result)
+    for name, values in arrays.arrays.items():
+        np.testing.assert_array_equal(values, result[name].values, err_msg=name)
+        assert values.dtype == result[name].dtype, name
+    np.testing.assert_array_equal(arrays.wavelengths_nm, result["wavelength_nm"].values)
+    assert arrays.attributes == result.attrs
+
+
+def test_reading_needs_neither_xarray_nor_pandas(stored: Path) -> None:
+    """They take longer to import than the result takes to be read: a person waits for the first one."""
+    code = (
+        "import sys; from pathlib import Path; from dsl_core.io.result.result_arrays import load_arrays;"
+        f"load_arrays(Path({str(stored)!r})); print({{'dask', 'pandas', 'xarray'}} & set(sys.modules))"
+    )
+    answer = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert answer.stdout.strip() == "set()"
+
+
+def test_an_axis_of_two_lengths_is_damage(stored: Path) -> None:
+    shutil.rmtree(stored / "wavelength_nm")
+    group = zarr.open_group(stored, mode="r+", zarr_format=3, use_consolidated=False)
+    group.create_array(
+        "wavelength_nm", data=NM[1:], dimension_names=["wavelength_nm"], compressors=None, overwrite=True
+    )
+    attributes = {k: v for k, v in group.attrs.items() if k not in (INVENTORY, CHECKSUM)}
+    group.attrs.put(attributes)
+    with pytest.raises(StoreError, match="along wavelength_nm"):
+        load_arrays(stored)

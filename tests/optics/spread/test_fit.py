@@ -16,7 +16,7 @@ from dsl_core.optics.spread import fit
 from dsl_core.optics.spread.curves import density
 from dsl_core.optics.spread.equations import MIN_PIXELS, Normal, Peaks
 from dsl_core.optics.spread.field import FieldFamily, FieldFit
-from dsl_core.optics.spread.fit import PULLS, STRETCHES, SpreadFit, _choose, _Family, fit_spread
+from dsl_core.optics.spread.fit import PULLS, STRETCHES, SpreadFit, _choose, _Family, _is_astray, fit_spread
 
 WIDTH_PX, STEP_PX, RUN = 5, 2, 8
 PLACES = np.arange(-48, 49) / 8
@@ -189,6 +189,18 @@ def test_a_shape_that_leaves_pixels_out_explains_nothing(
     assert found is (last if counts else one)
 
 
+def test_a_shape_that_has_once_gone_astray_is_not_taken_when_it_comes_back(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    peaks, column = seen(KNOWN, runs=40)
+    one = SpreadFit(KNOWN, False, 0.01, 1.0, 1.0, 1000)
+    other = SpreadFit(TAILED, True, 0.01, 1.0, 0.8, 1000)
+    astray = replace(other, after=1.01 * fit.WORSE * other.after)
+    chosen = iter([one, one, other, astray, *[other] * fit.ROUNDS])
+    monkeypatch.setattr(fit, "_choose", lambda halves, family, shapes: next(chosen))
+    assert fit.fit_spread(peaks, column, KNOWN) is one
+
+
 def test_pulls_are_decades_and_stretches_reach_from_two_fifths_to_their_inverse() -> None:
     assert np.log10(PULLS).tolist() == pytest.approx([-7, -6, -5, -4, -3, -2, -1])
     assert (STRETCHES[0], STRETCHES[-1]) == pytest.approx((0.4, 2.5))
@@ -201,3 +213,22 @@ def test_a_known_curve_narrower_than_a_step_stays_half_a_step_wide() -> None:
     shares = _Family(KNOWN.with_gaussian(0.1)).stretched(0.5)
     middle = len(shares) // 2
     assert shares[middle + 1] / shares[middle] == pytest.approx(np.exp(-2))
+
+
+@pytest.mark.parametrize(
+    ("first", "after", "simple", "astray"),
+    [
+        (0.5, 0.59, 0.9, False),  # by less than a fifth
+        (0.5, 0.61, 0.9, True),
+        (0.5, 0.61, 5.0, False),  # little of what it explains better
+        (0.26, 0.32, 11.0, False),
+        (0.26, 0.9, 11.0, True),
+    ],
+)
+def test_a_shape_has_gone_astray_when_it_loses_what_it_promised(
+    first: float, after: float, simple: float, astray: bool
+) -> None:
+    def fitted(chi_square: float) -> SpreadFit:
+        return SpreadFit(ProjectorResponse(), True, 0.01, 20.0, chi_square, 1000)
+
+    assert _is_astray(fitted(after), fitted(first), fitted(simple)) is astray

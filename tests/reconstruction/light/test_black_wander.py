@@ -8,7 +8,7 @@ import pytest
 from dsl_core import pipeline
 from dsl_core.model.fit import Fit
 from dsl_core.model.plan import CapturePlan, ScanLines, Sentinels, Setting
-from dsl_core.reconstruction.light.followed import black_wander
+from dsl_core.reconstruction.light.followed import black_wander, blacks_again
 from dsl_core.reconstruction.rows.frames import ScanFrames
 from tests.cases.small_rig import small_rig
 from tests.cases.twin_scan import MemoryScan, twin_scan
@@ -47,7 +47,7 @@ def test_black_is_compared_with_the_first_one(more_dn: float, told: bool) -> Non
     for shot in plan.shots():
         if shot.role == "sentinel":
             frames[shot.index] = frames[shot.index] + np.uint16(more_dn)
-    found = black_wander(ScanFrames(MemoryScan(plan, tuple(frames)), small_rig(), ()))
+    found = black_wander(blacks_again(ScanFrames(MemoryScan(plan, tuple(frames)), small_rig(), ())))
     assert found is not None
     assert found.significant == told
     assert found.value == pytest.approx(more_dn, abs=0.4)
@@ -55,4 +55,4 @@ def test_black_is_compared_with_the_first_one(more_dn: float, told: bool) -> Non
 
 def test_scans_that_take_nothing_again_say_nothing_of_black() -> None:
     plan = PLAN.model_copy(update={"camera_size_px": (8, 6), "sentinels": None})
-    assert black_wander(ScanFrames(MemoryScan(plan, ()), small_rig(), ())) is None
+    assert black_wander(blacks_again(ScanFrames(MemoryScan(plan, ()), small_rig(), ()))) is None

@@ -77,7 +77,7 @@ def test_shots_of_a_pattern_agree_with_that_of_its_last_setting() -> None:
     scan.ratios["spectral", 2] = (None, Ratio(0, 0))
     apart = replace(course_of(), settings=(-0.2,))
     for course in (course_of(0.1), course_of(0.1, 0.05), apart):
-        found = followed._between_settings(scan, course)
+        found = followed._between_settings(scan, course, None).levels
         wanted = np.ones(PLAN.shot_count)
         for k in range(COUNT):
             first, last = shots_of("spectral", k)

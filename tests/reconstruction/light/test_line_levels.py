@@ -72,8 +72,8 @@ def test_candidates_are_lit_pixels_that_have_a_column_and_not_all_of_them(
 
 def test_the_pitch_is_that_of_neighbours_whose_columns_are_known() -> None:
     column = np.array([[10, 12, 14, -1, 90, 91], [5, 3, -1, 7, 4, -1]])
-    assert module._pitch(column) == 2.0
-    assert module._pitch(np.array([[4, -1, 9]])) == 1.0
+    assert module.pitch_of(column) == 2.0
+    assert module.pitch_of(np.array([[4, -1, 9]])) == 1.0
 
 
 def test_the_difference_of_neighbouring_frames_is_a_robust_deviation_less_noise() -> None:

@@ -60,6 +60,20 @@ def test_deviations_are_those_of_independent_pixels() -> None:
     assert found.rms_std_px == pytest.approx(np.sqrt(noise / 12), rel=1e-3)
 
 
+def test_where_an_order_is_not_seen_its_shift_is_no_news() -> None:
+    probe = probe_of()
+    x = probe.place[:, 1]
+    left = x < 0
+    probe.score[:, :2] = 0.0
+    probe.score[left, 0] = INFORMATION * 0.2 * (x[left] + 0.5)
+    probe.normal[~left, 0, 0] = 0.0
+    found = fit_causes(probe)
+    assert found.shift_px[x > 0.9, 0].min() > 0.27
+    assert found.mean_px == pytest.approx([0.0, 0.0], abs=0.01)
+    # A third of what the pixels say is of this order.
+    assert found.rms_px == pytest.approx(np.sqrt(0.2**2 / 12 / 3), rel=0.1)
+
+
 def test_noise_alone_is_no_shift() -> None:
     probe = probe_of()
     probe.score[:] = 0.0
@@ -72,16 +86,50 @@ def test_noise_alone_is_no_shift() -> None:
     assert found.rms_px == pytest.approx(np.sqrt(square - noise), rel=1e-3)
 
 
-CAUSES = Causes(np.zeros((1, 2)), 0.0, 0.0, np.array([0.02, -0.01]), 0.001, 0.002, 0.015, 0.001)
+def alike(drift: float, difference: float) -> Probe:
+    """What asks for these, of a scan to which gains look much as a drift of their difference."""
+    probe = probe_of()
+    plus, minus, over = (PARAMETERS.index(name) for name in ("gain +1", "gain -1", "drift"))
+    seen = np.zeros((2, len(PARAMETERS)))
+    seen[0, [plus, minus, over]], seen[1, over] = (1.0, -1.0, 1.0), 0.1
+    normal = INFORMATION * (seen.T @ seen + np.diag(np.r_[[1.0, 1.0, 1e-4, 1e-4, 1.0, 1.0, 1e-4, 1.0, 1.0]]))
+    asked = np.zeros(len(PARAMETERS))
+    asked[[plus, minus, over]] = 0.5 * difference, -0.5 * difference, drift
+    return replace(
+        probe,
+        normal=np.broadcast_to(normal, probe.normal.shape).copy(),
+        score=np.broadcast_to(normal @ asked, probe.score.shape).copy(),
+    )
+
+
+def test_neither_drift_nor_gains_are_told_that_make_up_for_each_other() -> None:
+    both = fit_causes(alike(-0.13, 0.13))
+    assert both.drift == pytest.approx(-0.13, rel=0.05)
+    assert abs(both.drift) > 5 * both.drift_std
+    assert abs(both.drift_alone[0]) < 0.01
+    assert not both.drifts
+    assert not both.unequal
+    assert fit_causes(alike(-0.13, 0.0)).drifts
+    assert not fit_causes(alike(-0.13, 0.0)).unequal
+    assert fit_causes(alike(0.0, 0.1)).unequal
+    assert not fit_causes(alike(0.0, 0.1)).drifts
+
+
+CAUSES = Causes(
+    np.zeros((1, 2)), np.zeros(2), 0.0, 0.0, np.array([0.02, -0.01]), 0.001, 0.002, 0.015, 0.001,
+    drift_alone=(0.015, 0.001), difference_alone=(0.03, 0.001),
+)  # fmt: skip
 
 
 def test_changes_count_from_what_matters_on() -> None:
     assert CAUSES.drifts
     assert not replace(CAUSES, drift=-0.0139).drifts
     assert not replace(CAUSES, drift_std=0.01).drifts
+    assert not replace(CAUSES, drift_alone=(0.015, 0.01)).drifts
     assert CAUSES.unequal
     assert not replace(CAUSES, gain=np.array([0.03, 0.0151])).unequal
     assert not replace(CAUSES, difference_std=0.05).unequal
+    assert not replace(CAUSES, difference_alone=(0.01, 0.001)).unequal
 
 
 @pytest.mark.parametrize(

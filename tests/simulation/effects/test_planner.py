@@ -10,6 +10,7 @@ import pytest
 from dsl_core.devices.base import DeviceRig
 from dsl_core.errors import DeviceError
 from dsl_core.model.plan import Setting
+from dsl_core.model.rig import FilmShape
 from dsl_core.simulation.effects.base import Limits
 from dsl_core.simulation.effects.catalogue import EXTRAS, NAMES, NEEDED, USUAL, Choice, with_effects
 from dsl_core.simulation.effects.planner import EffectPlan, describe, plan_effects
@@ -128,8 +129,9 @@ def test_the_twin_renders_what_it_is_asked_to_and_notes_it() -> None:
 
 def test_leaving_out_everything_ends_in_an_ideal_rig() -> None:
     world = world_of("sphere")
-    path = with_effects(world.everything(), NEEDED)
+    path = with_effects(world.everything().with_value("rig.film.shape", FilmShape()), NEEDED)
     rig = path.rig
+    assert rig.film.shape is None
     assert not any(rig.camera.distortion + rig.projector.distortion)
     assert rig.film.bend_per_mm == rig.film.tilt_x_deg == rig.film.roll_deg == 0
     assert rig.projector_response.gamma == 1

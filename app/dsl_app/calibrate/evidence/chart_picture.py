@@ -12,6 +12,7 @@ from PySide6.QtCore import QEvent, QRectF, Qt, Signal
 from PySide6.QtGui import QColor, QFontMetricsF, QHelpEvent, QKeyEvent, QPainter, QPaintEvent, QPen
 from PySide6.QtWidgets import QToolTip, QWidget
 
+from dsl_app.shared.plain_tip import plain_tip
 from dsl_app.shared.theme import DARK, Theme
 from dsl_app.shared.widgets.forms import quiet
 from dsl_app.shared.widgets.layouts import column_of
@@ -61,7 +62,7 @@ class ChartPicture(QWidget):
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self.setAccessibleName("Chart with its corners")
         tip = "Drag the corners, or choose one with 1 to 4 and move it with the arrow keys (Shift: by 10 px)."
-        self.setToolTip(tip)
+        self.setToolTip(plain_tip(tip))
         self.canvas = PictureView("")
         self.canvas.setFocusPolicy(Qt.FocusPolicy.NoFocus)
         self.box, self.image = self.canvas.box, self.canvas.image
@@ -220,7 +221,9 @@ class Swatches(QWidget):
                 else ""
             )
             QToolTip.showText(
-                event.globalPos(), f"{words}. Left measured, right expected." if words else "", self
+                event.globalPos(),
+                plain_tip(f"{words}. Left measured, right expected." if words else ""),
+                self,
             )
             return True
         return super().event(event)

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 from PySide6.QtWidgets import QTableWidgetItem
 
+from dsl_app.shared.plain_tip import plain_tip
 from dsl_app.shared.widgets.read_table import LEFT, RIGHT, ReadTable, cell
 from dsl_core.model.figure import with_std
 
@@ -23,7 +24,7 @@ class NumberTable(ReadTable):
         for column, (_, tip) in enumerate(heads):
             head = self.horizontalHeaderItem(column)
             assert head is not None
-            head.setToolTip(tip)
+            head.setToolTip(plain_tip(tip))
             head.setTextAlignment(LEFT if column in self._words else RIGHT)
         self.be_dense()
         self.horizontalHeader().setStretchLastSection(len(heads) - 1 in self._words)

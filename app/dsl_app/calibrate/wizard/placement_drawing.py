@@ -18,6 +18,7 @@ from dsl_app.calibrate.wizard.placement_scene import (
     film_text,
     in_words,
 )
+from dsl_app.shared.plain_tip import plain_tip
 from dsl_app.shared.theme import DARK, Theme
 from dsl_core.model.placement import Placement
 from dsl_core.optics.colour import CIE_1931_XYZ, CIE_NM, xyz_to_srgb
@@ -52,7 +53,7 @@ class PlacementDrawing(QWidget):
         self._placement = placement
         words = in_words(placement)
         self.setAccessibleDescription(words)
-        self.setToolTip(words)
+        self.setToolTip(plain_tip(words))
         self.update()
 
     def apply_theme(self, theme: Theme) -> None:

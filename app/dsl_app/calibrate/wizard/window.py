@@ -30,6 +30,7 @@ from dsl_app.calibrate.wizard.settings_page import SettingsPage
 from dsl_app.calibrate.wizard.state import Doing, WizardState
 from dsl_app.calibrate.wizard.step_page import StepPage
 from dsl_app.shared.evented import follow_any
+from dsl_app.shared.plain_tip import plain_tip
 from dsl_app.shared.theme import DARK, Theme
 from dsl_app.shared.widgets.dialogs import confirm
 from dsl_app.shared.widgets.forms import Banner, check_box, label, named, push_button, quiet, show_button
@@ -180,7 +181,7 @@ class PageList(QListWidget):
             for line in lines:
                 item = QListWidgetItem(line.text)
                 item.setForeground(QColor(getattr(self._theme, line.role or "text")))
-                item.setToolTip(line.tip)
+                item.setToolTip(plain_tip(line.tip))
                 item.setData(Qt.ItemDataRole.AccessibleTextRole, line.accessible_text)
                 self.addItem(item)
             self.setCurrentRow(max(row, 0))
@@ -273,7 +274,7 @@ class WizardButtons(QWidget):
         self._bar.setRange(0, shown.total)
         self._bar.setValue(shown.done)
         self._text.setText(shown.text)
-        self._text.setToolTip(shown.text)
+        self._text.setToolTip(plain_tip(shown.text))
 
 
 def _button(text: str, tip: str) -> QPushButton:

@@ -12,6 +12,7 @@ from PySide6.QtWidgets import QAbstractItemView, QTableWidgetItem
 from dsl_app.compare.series.controller import SeriesController
 from dsl_app.compare.series.state import SeriesKind, SeriesState
 from dsl_app.shared.evented import follow_any
+from dsl_app.shared.plain_tip import plain_tip
 from dsl_app.shared.widgets.forms import quiet
 from dsl_app.shared.widgets.read_table import RIGHT, ReadTable, cell
 from dsl_core.evaluation.time_sweep import FIGURES, best_points
@@ -59,7 +60,7 @@ class SeriesTable(ReadTable):
             for column, head in enumerate(heads):
                 item = self.horizontalHeaderItem(column)
                 if item is not None:
-                    item.setToolTip(TIPS.get(head, ""))
+                    item.setToolTip(plain_tip(TIPS.get(head, "")))
             self.show_rows([self._items(texts) for texts in row_texts(self._state)])
             rows = self._state.rows.value
             at = next((i for i, row in enumerate(rows) if row.path == self._state.selected.value), None)

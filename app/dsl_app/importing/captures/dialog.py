@@ -14,6 +14,7 @@ from dsl_app.importing.captures.pictures import DecodedPicture, FilesTable
 from dsl_app.importing.captures.state import NOMINAL, NONE, CapturesState, Said, captures_view
 from dsl_app.shared.evented import follow_any
 from dsl_app.shared.known_files import breakable
+from dsl_app.shared.plain_tip import plain_tip
 from dsl_app.shared.widgets.dialogs import JobDialog, use_room
 from dsl_app.shared.widgets.forms import (
     ChoiceBox,
@@ -185,7 +186,7 @@ class CapturesDialog(JobDialog):
         request = self._state.request.value
         if request.folder is not None:
             self.folder.setText(breakable(request.folder))
-            self.folder.setToolTip(str(request.folder))
+            self.folder.setToolTip(plain_tip(str(request.folder)))
         if self.calibration.findData(request.calibration) < 0:
             self.calibration.addItem(Path(request.calibration).name, request.calibration)
         self.calibration.choose(request.calibration)
@@ -291,5 +292,5 @@ def _sentence(lines: int = MOST_LINES) -> QLabel:
 
 def _say(sentence: QLabel, said: Said) -> None:
     sentence.setText(said.text or " ")
-    sentence.setToolTip(said.text)
+    sentence.setToolTip(plain_tip(said.text))
     set_role(sentence, said.role)

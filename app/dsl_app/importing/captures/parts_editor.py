@@ -10,6 +10,7 @@ from PySide6.QtWidgets import QListWidget, QMenu, QSizePolicy, QWidget
 
 from dsl_app.importing.captures.fields import KINDS, part_fields, part_words, picture_fields
 from dsl_app.importing.captures.fields_form import FieldsForm
+from dsl_app.shared.plain_tip import plain_tip
 from dsl_app.shared.widgets.forms import named, push_button, quiet
 from dsl_app.shared.widgets.layouts import STRETCH, boxed, column_of, row_of, scrolled, tabs_of
 
@@ -67,7 +68,7 @@ class PartsEditor(QWidget):
             self.parts.clear()
             self.parts.addItems(words)
             for place, text in enumerate(words):
-                self.parts.item(place).setToolTip(text)
+                self.parts.item(place).setToolTip(plain_tip(text))
             self.parts.setCurrentRow(min(row, len(words) - 1))
         self.pictures.show_fields(picture_fields(mapping))
         self._show_part()

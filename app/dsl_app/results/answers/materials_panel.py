@@ -9,6 +9,7 @@ from PySide6.QtWidgets import QFileDialog, QWidget
 
 from dsl_app.results.answers.controller import AnswersController, Way
 from dsl_app.results.state import Materials, ResultsState
+from dsl_app.shared.plain_tip import plain_tip
 from dsl_app.shared.settings import folder_for
 from dsl_app.shared.theme import DARK, Theme
 from dsl_app.shared.widgets.forms import ChoiceBox, NumberBox, check_box, label, push_button, quiet
@@ -150,8 +151,8 @@ class MaterialsPanel(QWidget):
             self.worst.setSuffix(unit)
             self.worst.setSingleStep(0.005)
             self.margin.setSingleStep(0.01)
-            self.worst.setToolTip(tip)
-            self.margin.setToolTip(_MARGIN[measure is Measure.PROBABILITY])
+            self.worst.setToolTip(plain_tip(tip))
+            self.margin.setToolTip(plain_tip(_MARGIN[measure is Measure.PROBABILITY]))
             self.worst.setValue(limits.worst)
             self.margin.setValue(limits.margin)
 
@@ -163,7 +164,7 @@ class MaterialsPanel(QWidget):
         lines = 1 if materials is None or not materials.notes else 2
         # A layout takes one line of a text that breaks for enough, and draws the rest over the table.
         self.text.setMinimumHeight(lines * self.text.fontMetrics().lineSpacing())
-        self.text.setToolTip("" if materials is None else _method(materials))
+        self.text.setToolTip(plain_tip("" if materials is None else _method(materials)))
         if materials is None:
             return
         with quiet(self.measure):

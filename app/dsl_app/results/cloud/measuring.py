@@ -13,6 +13,7 @@ from dsl_app.shared.spectrum import Pixel
 from dsl_core.evaluation.marks import distance_between
 from dsl_core.evaluation.shape import PlaneFit, Section, fit_plane, section
 from dsl_core.io.result.result_arrays import ResultArrays
+from dsl_core.model.figure import with_std
 
 
 class Measure(Enum):
@@ -48,7 +49,8 @@ def measure_points(result: ResultArrays, kind: Measure, first: Pixel, last: Pixe
     if cut is None:
         return Measured("There is no section between these two points: choose two that are apart.")
     low, high = np.nanmin(cut.height_mm), np.nanmax(cut.height_mm)
-    return Measured(f"{text}, height from {low:.2f} to {high:.2f} mm", (a, b), cut)
+    span = f"height from {low:.2f} to {high:.2f} mm".replace("-", "−")
+    return Measured(f"{text}, {span}", (a, b), cut)
 
 
 def _with_deviation(value: float, std: float) -> str:
@@ -77,5 +79,5 @@ def _plane_text(fit: PlaneFit) -> str:
     left_out = f", {fit.points - fit.used:,} too far off" if fit.used < fit.points else ""
     return (
         f"Plane of {fit.used:,} points{left_out}: flat to {fit.rms_mm:.2g} mm RMS{expected}, range"
-        f" {fit.range_mm:.2g} mm, tilt {fit.tilt_deg:.2f}° ± {fit.tilt_std_deg:.1g}°"
+        f" {fit.range_mm:.2g} mm, tilt {with_std(fit.tilt_deg, fit.tilt_std_deg, 4)}°"
     )

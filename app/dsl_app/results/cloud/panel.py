@@ -63,6 +63,9 @@ class CloudPanel(QWidget):
         self._press: tuple[float, float] | None = None
         self._measure, self._picked = Measure.NOTHING, list[Pixel]()
         self._hint = label("", "muted", wraps=True, can_be_copied=True)
+        # Always the height of two lines: a shorter answer does not move the tools above it.
+        self._hint.setMinimumHeight(2 * self._hint.fontMetrics().lineSpacing())
+        self._hint.setAlignment(Qt.AlignmentFlag.AlignTop)
         self.tools = CloudTools()
         self.section: SectionPlot | None = None
         #: In the place of the view until it is there: what is done, or why there is none.

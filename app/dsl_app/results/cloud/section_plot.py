@@ -19,7 +19,7 @@ class SectionPlot(CalmPlot):
 
     def __init__(self) -> None:
         tip = "Height of the surface above the straight line between the two points, towards the camera"
-        super().__init__("Section", tip, "height (mm)", "along the line (mm)")
+        super().__init__("Section", tip, "Height (mm)", "Along the line (mm)")
         self.setFixedHeight(HEIGHT_PX)
         item = self.getPlotItem()
         self._low, self._high = (pg.PlotCurveItem(pen=pg.mkPen(None)) for _ in range(2))

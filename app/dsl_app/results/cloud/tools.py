@@ -11,6 +11,7 @@ from PySide6.QtWidgets import QMenu, QSlider, QToolButton, QWidget
 
 from dsl_app.results.cloud.look import Look, Side
 from dsl_app.results.cloud.measuring import Measure
+from dsl_app.shared.plain_tip import plain_tip
 from dsl_app.shared.widgets.forms import ChoiceBox, named
 from dsl_app.shared.widgets.layouts import STRETCH, row_of
 
@@ -82,7 +83,7 @@ class CloudTools(QWidget):
         action = self.switches.addAction(text)
         action.setCheckable(True)
         action.setChecked(bool(getattr(self.look, key)))
-        action.setToolTip(tip)
+        action.setToolTip(plain_tip(tip))
         action.toggled.connect(lambda on: self._change(**{key: on}))
         return action
 

@@ -16,6 +16,7 @@ from PySide6.QtWidgets import (
 )
 
 from dsl_app.results.export.controller import ExportController
+from dsl_app.shared.plain_tip import plain_tip
 from dsl_app.shared.settings import folder_for
 from dsl_app.shared.widgets.forms import check_box, label, named, push_button, set_role
 from dsl_app.shared.widgets.help_window import add_help_key
@@ -45,7 +46,7 @@ class ExportDialog(QDialog):
             box = self.formats[form.key] = QCheckBox(form.about)
             refusal = control.refusal(form)
             box.setEnabled(not refusal)
-            box.setToolTip(refusal or form.about)
+            box.setToolTip(plain_tip(refusal or form.about))
             box.toggled.connect(lambda _: self._check())
         self.replace = check_box("Replace existing files", "If not ticked, existing files are never replaced")
         self.replace.toggled.connect(lambda _: self._check())

@@ -5,14 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterable
 from pathlib import Path
 
-from PySide6.QtCore import QModelIndex, QSize, Qt
-from PySide6.QtGui import QColor, QGuiApplication, QKeySequence, QShortcut
+from PySide6.QtCore import QModelIndex, QSize, Qt, QTimer
+from PySide6.QtGui import QBrush, QColor, QGuiApplication, QKeySequence, QShortcut
 from PySide6.QtWidgets import (
     QAbstractItemView,
     QFileDialog,
     QFrame,
     QHeaderView,
-    QScrollArea,
+    QTextBrowser,
     QTreeWidget,
     QTreeWidgetItem,
     QWidget,
@@ -21,6 +21,7 @@ from PySide6.QtWidgets import (
 from dsl_app.results.marks.comparison import comparison_html
 from dsl_app.results.marks.controller import MarksController
 from dsl_app.results.state import Mark, ResultsState
+from dsl_app.shared.plain_tip import plain_tip
 from dsl_app.shared.settings import folder_for
 from dsl_app.shared.theme import DARK, Theme
 from dsl_app.shared.widgets.forms import label, named, push_button, quiet
@@ -52,6 +53,8 @@ class MarksPanel(QWidget):
     def __init__(self, state: ResultsState, control: MarksController) -> None:
         super().__init__()
         self._state, self._control, self._theme = state, control, DARK
+        #: Marks as they are listed, each with its row, by key.
+        self._rows: dict[int, tuple[Mark, QTreeWidgetItem]] = {}
         self.tree = named(
             QTreeWidget(),
             "Pins, regions and references",
@@ -72,13 +75,11 @@ class MarksPanel(QWidget):
         for column in (1, 2):
             header.setSectionResizeMode(column, QHeaderView.ResizeMode.ResizeToContents)
         self.hint = label(EMPTY, "muted", wraps=True)
-        self.figures = label("", name="Comparison with references", can_be_copied=True)
-        self.figures.setTextFormat(Qt.TextFormat.RichText)
-        self.figures.setAlignment(Qt.AlignmentFlag.AlignTop)
-        self.below = QScrollArea()
-        self.below.setWidget(self.figures)
-        self.below.setWidgetResizable(True)
-        self.below.setFrameShape(QFrame.Shape.NoFrame)
+        # A label would lay out a long table several times.
+        tip = "The selected mark compared with references, and its distance from other pins"
+        self.figures = named(QTextBrowser(), "Comparison with references", tip)
+        self.figures.setFrameShape(QFrame.Shape.NoFrame)
+        self.figures.viewport().setAutoFillBackground(False)
         self.tree.setMinimumHeight(88)
         self.reference = push_button(
             "Add reference…",
@@ -94,7 +95,12 @@ class MarksPanel(QWidget):
         )
         # Two rows, as the smallest window is too narrow for one.
         add, put = row_of(self.reference, self.remove, STRETCH), row_of(self.copy, self.export, STRETCH)
-        column_of(self.hint, (self.tree, 1), add, put, (self.below, 1), on=self, margins=0)
+        column_of(self.hint, (self.tree, 1), add, put, (self.figures, 1), on=self, margins=0)
+        # A new mark is added, then selected: its table is made once.
+        self._later = QTimer(self)
+        self._later.setSingleShot(True)
+        self._later.setInterval(0)
+        self._later.timeout.connect(self._compare)
         self._connect()
 
     def _connect(self) -> None:
@@ -136,56 +142,77 @@ class MarksPanel(QWidget):
             self._control.export_spectra(target[0], overwrite=target[1])
 
     def _fill(self) -> None:
+        """Change the rows that differ: with all rows made anew, pinning takes longer with every pin.
+
+        Marks are added, changed and removed, never moved.
+        """
+        marks = self._state.marks.value
         with quiet(self.tree):
-            self.tree.clear()
-            self.tree.addTopLevelItems([self._item(mark) for mark in self._state.marks.value])
-        self.hint.setVisible(not self._state.marks.value)
+            for key in self._rows.keys() - {mark.key for mark in marks}:
+                _, item = self._rows.pop(key)
+                self.tree.takeTopLevelItem(self.tree.indexOfTopLevelItem(item))
+            for place, mark in enumerate(marks):
+                self._put(place, mark)
+        self.hint.setVisible(not marks)
         self._show_selection()
 
-    def _item(self, mark: Mark) -> QTreeWidgetItem:
-        item = QTreeWidgetItem([mark.name, where(mark), count(mark)])
-        item.setData(0, KEY, mark.key)
+    def _put(self, place: int, mark: Mark) -> None:
+        shown, item = self._rows.get(mark.key, (None, None))
+        if item is None:
+            item = QTreeWidgetItem()
+            item.setData(0, KEY, mark.key)
+            item.setFlags(item.flags() | Qt.ItemFlag.ItemIsEditable | Qt.ItemFlag.ItemIsUserCheckable)
+            item.setTextAlignment(2, Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
+            self.tree.insertTopLevelItem(place, item)
+        if shown is not mark:
+            self._rows[mark.key] = mark, item
+            self._show_row(item, mark)
+
+    def _show_row(self, item: QTreeWidgetItem, mark: Mark) -> None:
+        for column, text in enumerate((mark.name, where(mark), count(mark))):
+            item.setText(column, text)
+            item.setToolTip(column, plain_tip(mark.trouble))
         item.setIcon(0, swatch(self._theme.pin(mark.colour)))
-        item.setFlags(item.flags() | Qt.ItemFlag.ItemIsEditable | Qt.ItemFlag.ItemIsUserCheckable)
         item.setCheckState(0, Qt.CheckState.Checked if mark.shown else Qt.CheckState.Unchecked)
-        if mark.trouble:
-            item.setForeground(1, QColor(self._theme.warn))
-            for i in range(3):
-                item.setToolTip(i, mark.trouble)
-        item.setTextAlignment(2, Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
-        return item
+        item.setForeground(1, QColor(self._theme.warn) if mark.trouble else QBrush())
 
     def _item_changed(self, item: QTreeWidgetItem, column: int) -> None:
-        if column != 0:
-            return
         key = int(item.data(0, KEY))
-        shown = item.checkState(0) == Qt.CheckState.Checked
-        mark = next((mark for mark in self._state.marks.value if mark.key == key), None)
-        if mark is None:
+        if column != 0 or key not in self._rows:
             return
+        mark, _ = self._rows[key]
+        shown = item.checkState(0) == Qt.CheckState.Checked
         if mark.shown != shown:
             self._control.show(key, shown)
         elif item.text(0) != mark.name:
             self._control.rename(key, item.text(0))
+            with quiet(self.tree):
+                # The name that it has now, which is the old one where none was given.
+                item.setText(0, self._rows[key][0].name)
 
     def _selection_changed(self, item: QTreeWidgetItem | None, _before: object) -> None:
         self._state.selected.set(0 if item is None else int(item.data(0, KEY)))
 
     def _show_selection(self) -> None:
         key = self._state.selected.value
-        items = [self.tree.topLevelItem(i) for i in range(self.tree.topLevelItemCount())]
-        chosen = [item for item in items if item is not None and item.data(0, KEY) == key]
+        chosen = self._rows.get(key)
         with quiet(self.tree):
-            self.tree.setCurrentIndex(self.tree.indexFromItem(chosen[0]) if chosen else QModelIndex())
+            self.tree.setCurrentIndex(QModelIndex() if chosen is None else self.tree.indexFromItem(chosen[1]))
         self.remove.setEnabled(self._state.selected_mark is not None)
+        self._later.start()
+
+    def _compare(self) -> None:
         text = comparison_html(self._state, self._theme)
-        self.below.setVisible(bool(text))
-        self.figures.setText(text)
+        self.figures.setVisible(bool(text))
+        self.figures.setHtml(text)
 
     def apply_theme(self, theme: Theme) -> None:
         """Apply the colours of a theme."""
         self._theme = theme
-        self._fill()
+        with quiet(self.tree):
+            for mark, item in self._rows.values():
+                self._show_row(item, mark)
+        self._show_selection()
 
 
 def where(mark: Mark) -> str:

@@ -6,6 +6,7 @@ from PySide6.QtWidgets import QFormLayout, QWidget
 
 from dsl_app.results.search.controller import SearchController
 from dsl_app.results.state import ResultsState, Search, SearchMode
+from dsl_app.shared.plain_tip import plain_tip
 from dsl_app.shared.widgets.forms import ChoiceBox, NumberBox, label, push_button
 from dsl_app.shared.widgets.layouts import STRETCH, row_of
 from dsl_core.words import capitalised
@@ -53,7 +54,7 @@ class SearchPanel(QWidget):
     def _choose(self) -> None:
         metamers = self._chosen is SearchMode.METAMERS
         self.delta_e.setEnabled(metamers)
-        self.angle.setToolTip(f"Finds pixels with a {'larger' if metamers else 'smaller'} angle")
+        self.angle.setToolTip(plain_tip(f"Finds pixels with a {'larger' if metamers else 'smaller'} angle"))
         self._control.set_mode(self._chosen)
 
     def _limit(self) -> None:

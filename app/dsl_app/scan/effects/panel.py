@@ -11,6 +11,7 @@ from PySide6.QtWidgets import QPushButton, QTableWidgetItem, QWidget
 from dsl_app.scan.effects.controller import EffectsController
 from dsl_app.scan.effects.state import EffectChoice, EffectsState, EffectsView
 from dsl_app.shared.evented import follow_any
+from dsl_app.shared.plain_tip import plain_tip
 from dsl_app.shared.widgets.forms import ChoiceBox, NumberBox, label, quiet
 from dsl_app.shared.widgets.layouts import STRETCH, column_of, row_of
 from dsl_app.shared.widgets.read_table import RIGHT, ReadTable, cell
@@ -44,7 +45,9 @@ class EffectsPanel(QWidget):
         self.choice = ChoiceBox("Effects", "Which effects of light the simulated rig renders")
         for wanted, title, what in _CHOICES:
             self.choice.addItem(title, wanted.value)
-            self.choice.setItemData(self.choice.count() - 1, f"{title}: {what}", Qt.ItemDataRole.ToolTipRole)
+            self.choice.setItemData(
+                self.choice.count() - 1, plain_tip(f"{title}: {what}"), Qt.ItemDataRole.ToolTipRole
+            )
         self.tolerance = NumberBox(
             "Tolerance",
             0.001,
@@ -139,7 +142,7 @@ class EffectsPanel(QWidget):
     def _cells(self, row: Decision) -> tuple[QTableWidgetItem, ...]:
         role = "text" if row.on else "muted"
         first = cell(row.effect.name, role)
-        first.setToolTip(row.effect.summary)
+        first.setToolTip(plain_tip(row.effect.summary))
         flags = Qt.ItemFlag.ItemIsEnabled | Qt.ItemFlag.ItemIsSelectable
         first.setFlags(flags if row.effect.needed else flags | Qt.ItemFlag.ItemIsUserCheckable)
         first.setCheckState(Qt.CheckState.Checked if row.on else Qt.CheckState.Unchecked)

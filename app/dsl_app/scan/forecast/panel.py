@@ -11,6 +11,7 @@ from dsl_app.scan.forecast.figures import FIGURES
 from dsl_app.scan.forecast.operating_curve import OperatingCurve
 from dsl_app.scan.forecast.state import ForecastPoint, ForecastState, identity
 from dsl_app.shared.evented import follow_any
+from dsl_app.shared.plain_tip import plain_tip
 from dsl_app.shared.widget_state import LabelState
 from dsl_app.shared.widgets.deferred import Deferred
 from dsl_app.shared.widgets.forms import ChoiceBox, NumberBox, label, push_button, show_label
@@ -170,7 +171,7 @@ class ForecastPanel(QWidget):
         for column, text in told.items():
             heading = self.table.horizontalHeaderItem(column)
             if heading is not None:
-                heading.setToolTip(text)
+                heading.setToolTip(plain_tip(text))
 
     def _show_note(self) -> None:
         state = self._state
@@ -244,7 +245,7 @@ def _table() -> ReadTable:
     for row, figure in enumerate(FIGURES):
         for column in range(len(_HEADS)):
             item = cell(figure.title if column == 0 else "", side=RIGHT if column else LEFT)
-            item.setToolTip(figure.tip)
+            item.setToolTip(plain_tip(figure.tip))
             table.setItem(row, column, item)
     first = table.horizontalHeaderItem(0)
     if first is not None:

@@ -1,21 +1,13 @@
-"""Garbage collection in the window's thread only, and memory returned to the system. No Qt here."""
+"""Garbage collection in the window's thread only. No Qt here."""
 
 from __future__ import annotations
 
-import ctypes
 import gc
-import sys
 import time
 from collections.abc import Callable
-from functools import cache
-from typing import Any
 
 #: How often to call `GarbageCollector.check`, ms, and the longest time between two full collections, s.
 CHECK_MS, FULL_S = 500, 300.0
-#: Heaps from which threads allocate. Each of the system's default, eight a core, keeps its peak.
-HEAPS = 2
-#: Numbers of the C library's ``mallopt``.
-_M_ARENA_MAX = -8
 
 
 class GarbageCollector:
@@ -50,26 +42,3 @@ class GarbageCollector:
             gc.collect(1)
         elif gc.get_count()[0] > gc.get_threshold()[0]:
             gc.collect(0)
-
-
-def limit_heaps() -> None:
-    """Let all threads share few heaps; to be called before there are any."""
-    limit = _c_function("mallopt")
-    if limit is not None:
-        limit(_M_ARENA_MAX, HEAPS)
-
-
-def trim_memory() -> None:
-    """Return freed memory of the heaps to the system; quick where there is little."""
-    trim = _c_function("malloc_trim")
-    if trim is not None:
-        trim(0)
-
-
-@cache
-def _c_function(name: str) -> Callable[..., Any] | None:
-    """A function of GNU's C library; None on other systems, whose heaps behave."""
-    if sys.platform != "linux":
-        return None
-    found: Callable[..., Any] | None = getattr(ctypes.CDLL(None), name, None)
-    return found

@@ -9,9 +9,9 @@ from typing import Any
 from PySide6.QtCore import QObject, QTimer, Signal
 
 from dsl_app.shared.jobs.base import Job, JobState
-from dsl_app.shared.jobs.memory import trim_memory
 from dsl_app.shared.notify import sentence_of
 from dsl_core.errors import DeviceError
+from dsl_core.solve.heap import trim_memory
 
 #: Interval between progress updates, ms: short enough to look smooth, long enough to cost little.
 TICK_MS = 100

@@ -16,6 +16,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
+from dsl_app.shared.plain_tip import plain_tip
 from dsl_app.shared.widgets.forms import label, named, push_button, set_role
 from dsl_app.shared.widgets.inside import stop_following
 from dsl_app.shared.widgets.layouts import column_of
@@ -103,8 +104,8 @@ class JobDialog(QDialog):
     def name_buttons(self, go: str, go_tip: str, cancel_tip: str) -> None:
         """Set the texts and tooltips of the buttons."""
         self.go.setText(go)
-        self.go.setToolTip(go_tip)
-        self.buttons.button(QDialogButtonBox.StandardButton.Cancel).setToolTip(cancel_tip)
+        self.go.setToolTip(plain_tip(go_tip))
+        self.buttons.button(QDialogButtonBox.StandardButton.Cancel).setToolTip(plain_tip(cancel_tip))
 
     def close_column(self) -> None:
         """Add remark and buttons below everything else."""

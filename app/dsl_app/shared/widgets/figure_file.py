@@ -8,7 +8,6 @@ from html import escape
 from pathlib import Path
 from typing import Any
 
-import pyqtgraph as pg
 from PySide6.QtCore import QBuffer, QByteArray, QIODevice, QRectF
 from PySide6.QtGui import QImage, QImageWriter, QPaintDevice, QPainter
 from PySide6.QtWidgets import QGraphicsItem, QGraphicsView
@@ -56,6 +55,8 @@ def save_figure(figure: PlotFigure, path: Path, theme: Theme) -> None:
 
 
 def _legend(figure: PlotFigure) -> Any:
+    import pyqtgraph as pg
+
     legend = pg.LegendItem(offset=(-12, 8), labelTextColor=LIGHT.text, brush=pg.mkBrush(f"{LIGHT.base}d0"))
     # It scales with the figure.
     legend.setFlag(legend.GraphicsItemFlag.ItemIgnoresTransformations, False)

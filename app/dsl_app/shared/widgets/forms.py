@@ -22,6 +22,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
+from dsl_app.shared.plain_tip import plain_tip
 from dsl_app.shared.widget_state import ButtonState, LabelState
 from dsl_app.shared.widgets.layouts import row_of
 from dsl_app.shared.wording import in_window
@@ -154,7 +155,7 @@ def remark_line() -> QLabel:
 def push_button(text: str, tip: str, do: Clicked = None, role: str = "") -> QPushButton:
     """A button with its tooltip, what a click does, and its role of the style sheet."""
     made = QPushButton(text)
-    made.setToolTip(tip)
+    made.setToolTip(plain_tip(tip))
     if do is not None:
         made.clicked.connect(do)
     if role:
@@ -165,7 +166,7 @@ def push_button(text: str, tip: str, do: Clicked = None, role: str = "") -> QPus
 def check_box(text: str, tip: str) -> QCheckBox:
     """A check box with its tooltip."""
     made = QCheckBox(text)
-    made.setToolTip(tip)
+    made.setToolTip(plain_tip(tip))
     return made
 
 
@@ -173,7 +174,7 @@ def named(widget: W, name: str, tip: str = "") -> W:
     """A widget with the name that screen readers tell, and its tooltip."""
     widget.setAccessibleName(name)
     if tip:
-        widget.setToolTip(tip)
+        widget.setToolTip(plain_tip(tip))
     return widget
 
 
@@ -193,7 +194,7 @@ def show_button(button: QAbstractButton, state: ButtonState) -> None:
     if state.text is not None:
         button.setText(state.text)
     if state.tip is not None:
-        button.setToolTip(state.tip)
+        button.setToolTip(plain_tip(state.tip))
     if state.name is not None:
         button.setAccessibleName(state.name)
     button.setVisible(state.is_visible)
@@ -205,7 +206,7 @@ def show_label(line: QLabel, state: LabelState) -> None:
     """Draw a label as it was decided."""
     # One that keeps its line while it is hidden needs a text to know how high that is.
     line.setText(in_window(state.text) or " " * line.sizePolicy().retainSizeWhenHidden())
-    line.setToolTip(state.tip)
+    line.setToolTip(plain_tip(state.tip))
     line.setVisible(bool(state.text))
     set_role(line, state.role)
 

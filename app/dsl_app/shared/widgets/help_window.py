@@ -17,8 +17,8 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from dsl_app.shared.widgets.forms import Clicked, named, push_button, quiet
-from dsl_app.shared.widgets.layouts import STRETCH, column_of, row_of, splitter
+from dsl_app.shared.widgets.forms import Clicked, label, named, push_button, quiet
+from dsl_app.shared.widgets.layouts import STRETCH, boxed, column_of, row_of, splitter
 from dsl_core.errors import StoreError
 from dsl_core.resources import resource_path
 
@@ -108,6 +108,8 @@ class HelpWindow(QDialog):
         self.search.setMaximumWidth(SEARCH_PX)
         self.search.textChanged.connect(lambda _: self._filter())
         self.search.returnPressed.connect(self.find_next)
+        self.nothing = label("No page contains all of these words. Try fewer or other words.", wraps=True)
+        self.nothing.hide()
         for page in help_pages():
             item = QListWidgetItem(title_of(page))
             item.setData(Qt.ItemDataRole.UserRole, page.stem)
@@ -125,7 +127,8 @@ class HelpWindow(QDialog):
         # The longest title is read whole.
         width = self.pages.sizeHintForColumn(0) + 4 * self.pages.frameWidth() + LIST_MARGIN_PX
         sizes = (width, self.width() - width)
-        parts = splitter(Qt.Orientation.Horizontal, (self.pages, 0), (self.text, 1), sizes=sizes)
+        left = boxed(column_of(self.nothing, (self.pages, 1), margins=0))
+        parts = splitter(Qt.Orientation.Horizontal, (left, 0), (self.text, 1), sizes=sizes)
         column_of(head, (parts, 1), on=self)
 
     @property
@@ -150,10 +153,14 @@ class HelpWindow(QDialog):
 
     def _filter(self) -> None:
         texts = {page.stem: page.read_text(encoding="utf-8").lower() for page in help_pages()}
+        hits = 0
         for i in range(self.pages.count()):
             item = self.pages.item(i)
             text = texts[str(item.data(Qt.ItemDataRole.UserRole))]
-            item.setHidden(not all(word in text for word in self._words))
+            is_hit = all(word in text for word in self._words)
+            item.setHidden(not is_hit)
+            hits += is_hit
+        self.nothing.setVisible(hits == 0)
 
     def find_next(self) -> None:
         """Show the next place of the first word, on a listed page."""

@@ -18,6 +18,8 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
+from dsl_app.shared.plain_tip import plain_tip
+
 B = TypeVar("B", bound=QBoxLayout)
 Margins = int | tuple[int, int, int, int]
 
@@ -122,5 +124,5 @@ def tabs_of(name: str, *tabs: tuple[QWidget, str, str]) -> QTabWidget:
     made.tabBar().setDrawBase(False)
     made.tabBar().setAccessibleName(name)
     for widget, title, tip in tabs:
-        made.setTabToolTip(made.addTab(widget, title), tip)
+        made.setTabToolTip(made.addTab(widget, title), plain_tip(tip))
     return made

@@ -16,6 +16,7 @@ from PySide6.QtWidgets import (
     QTableWidgetItem,
 )
 
+from dsl_app.shared.plain_tip import plain_tip
 from dsl_app.shared.theme import DARK, Theme
 from dsl_app.shared.widgets.forms import quiet
 
@@ -51,7 +52,7 @@ class ReadTable(QTableWidget):
         self._widened: int | None = None
         self.theme = DARK
         self.setAccessibleName(name)
-        self.setToolTip(tip)
+        self.setToolTip(plain_tip(tip))
         self.setHorizontalHeaderLabels(heads)
         self.setEditTriggers(QAbstractItemView.EditTrigger.NoEditTriggers)
         self.setSelectionBehavior(QAbstractItemView.SelectionBehavior.SelectRows)
@@ -154,5 +155,5 @@ def cell(text: str, role: str = "", side: Qt.AlignmentFlag = LEFT) -> QTableWidg
     item = QTableWidgetItem(text)
     item.setData(_ROLE, role)
     item.setTextAlignment(side)
-    item.setToolTip(text)
+    item.setToolTip(plain_tip(text))
     return item

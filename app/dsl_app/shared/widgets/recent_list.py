@@ -9,6 +9,7 @@ from PySide6.QtCore import Qt
 from PySide6.QtGui import QShowEvent
 from PySide6.QtWidgets import QListWidget, QListWidgetItem, QWidget
 
+from dsl_app.shared.plain_tip import plain_tip
 from dsl_app.shared.settings import RecentFiles, entry_text
 from dsl_app.shared.widgets.forms import label, named
 from dsl_app.shared.widgets.layouts import column_of
@@ -41,7 +42,7 @@ class RecentList(QWidget):
         for path in filter(self._fits, self._recent.paths.value):
             item = QListWidgetItem(entry_text(path))
             item.setData(Qt.ItemDataRole.UserRole, str(path))
-            item.setToolTip(str(path))
+            item.setToolTip(plain_tip(str(path)))
             if not path.exists():
                 item.setForeground(self.palette().placeholderText())
             self.files.addItem(item)

@@ -235,7 +235,7 @@ def test_a_class_has_the_colour_of_its_mark_wherever_it_is_shown(
     materials = state.materials.value
     assert materials is not None
     assert dict(zip(materials.found.shown.names, materials.found.shown.colours, strict=True)) == names
-    image, panel = window.page.image.content, window.page.materials
+    image, panel = window.page.image.content, window.page.materials.content
     for theme in (DARK, LIGHT):
         window.page.apply_theme(theme)
         lookup = image.materials.lut

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 import pytest
 from dsl_app.results.cloud.measuring import Measure, measure_plane, measure_points
@@ -28,7 +30,7 @@ def test_a_section_of_a_flat_wall_is_flat(result: ResultArrays) -> None:
     assert found.section is not None
     assert len(found.section.along_mm) == 31
     assert np.abs(found.section.height_mm).max() < 3
-    assert "height from" in found.text
+    assert "height from −" in found.text
     assert "two that are apart" in measure_points(result, Measure.SECTION, (3, 12), (3, 12)).text
 
 
@@ -38,5 +40,8 @@ def test_a_plane_tells_how_flat_and_how_tilted(result: ResultArrays) -> None:
     found = measure_plane(result, mask)
     assert "Plane of 416 points" in found.text
     assert "noise alone 0.25" in found.text
+    # The tilt is as exact as its deviation.
+    tilt, std = re.findall(r"tilt (\S+) ± (\S+)°", found.text)[0]
+    assert len(tilt.partition(".")[2]) == len(std.partition(".")[2])
     mask[:] = False
     assert "at least four points" in measure_plane(result, mask).text

@@ -115,6 +115,17 @@ def test_the_cloud_hides_what_lies_outside_the_limits_and_keeps_its_view(bench: 
     qtbot.waitUntil(lambda: view.renderer.shown == 24 * 36 - 1)
 
 
+def test_tools_stay_where_they_are_while_the_hint_below_them_changes(bench: Bench, qtbot: QtBot) -> None:
+    cloud_view(bench, qtbot)
+    panel = bench.page.cloud
+    tops = set()
+    for words in ("Short.", "Long enough for two lines. " * 3):
+        panel._hint.setText(words)
+        QTest.qWait(5)
+        tops.add(panel.tools.y())
+    assert len(tops) == 1
+
+
 def test_the_cloud_and_the_picture_share_one_cursor(bench: Bench, qtbot: QtBot) -> None:
     view = cloud_view(bench, qtbot)
     widget = view

@@ -17,7 +17,7 @@ from dsl_app.shared.theme import LIGHT
 from PySide6.QtCore import QMimeData, QPointF, Qt, QUrl
 from PySide6.QtGui import QDropEvent
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QApplication, QFileDialog
+from PySide6.QtWidgets import QApplication, QFileDialog, QTreeWidgetItem
 from pytestqt.qtbot import QtBot
 
 from tests.app.support.results_bench import Bench, select
@@ -43,6 +43,37 @@ def test_the_list_names_hides_and_selects(bench: Bench) -> None:
     assert now is not None
     tree.setCurrentItem(now)
     assert bench.state.selected.value == bench.marks[0].key
+
+
+def test_rows_of_marks_that_stay_as_they_are_stay_too(bench: Bench) -> None:
+    marks = bench.control.marks
+    for column in (10, 20, 30):
+        marks.pin((column, 10))
+    tree = bench.page.marks.tree
+
+    def rows() -> list[QTreeWidgetItem | None]:
+        return [tree.topLevelItem(place) for place in range(tree.topLevelItemCount())]
+
+    def names() -> list[str]:
+        return [row.text(0) for row in rows() if row is not None]
+
+    before = rows()
+    first, _, third = before
+    marks.pin((15, 10))
+    assert rows()[:3] == before
+    marks.remove(bench.marks[1].key)
+    assert rows()[:2] == [first, third]
+    bench.window.parts.undo.undo()
+    assert names() == ["pin 1", "pin 2", "pin 3", "pin 4"]
+    assert rows()[2] == third
+    marks.rename(bench.marks[2].key, "sky")
+    assert rows()[2] == third
+    assert names() == ["pin 1", "pin 2", "sky", "pin 4"]
+    assert third is not None
+    third.setText(0, "  ")
+    assert names() == ["pin 1", "pin 2", "sky", "pin 4"]
+    bench.state.marks.set(())
+    assert rows() == []
 
 
 def test_a_mark_that_lost_its_spectrum_says_why_and_is_drawn_nowhere(
@@ -95,10 +126,10 @@ def test_references_are_dropped_and_compared(bench: Bench, qtbot: QtBot, tmp_pat
     text = comparison_html(bench.state, LIGHT)
     assert "tile &lt;b&gt;" in text
     assert "2.000" in text
-    assert "ΔE00" in bench.page.marks.figures.text()
+    qtbot.waitUntil(lambda: "ΔE00" in bench.page.marks.figures.toPlainText())
 
 
-def test_a_library_that_is_dropped_asks_which_spectrum(bench: Bench, tmp_path: Path) -> None:
+def test_a_library_that_is_dropped_asks_which_spectrum(bench: Bench, qtbot: QtBot, tmp_path: Path) -> None:
     bench.control.marks.pin((10, 10))
     bench.window.open_path(write_library(tmp_path / "plants.sli"))
     (dialog,) = bench.page.findChildren(LibraryDialog)
@@ -111,7 +142,7 @@ def test_a_library_that_is_dropped_asks_which_spectrum(bench: Bench, tmp_path: P
     assert [mark.name for mark in bench.marks] == ["pin 1", "Brick"]
     assert not dialog.isVisible()
     bench.state.selected.set(bench.marks[0].key)
-    assert "Brick" in bench.page.marks.figures.text()
+    qtbot.waitUntil(lambda: "Brick" in bench.page.marks.figures.toPlainText())
     bench.window.open_path(tmp_path / "plants.hdr")
     again = bench.page.findChildren(LibraryDialog)[-1]
     again.reject()

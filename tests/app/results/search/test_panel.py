@@ -10,7 +10,7 @@ from tests.app.support.results_bench import bench as bench
 
 def test_the_search_is_shown_with_its_share(bench: Bench) -> None:
     bench.control.point_at((30, 5))
-    panel = bench.page.search
+    panel = bench.page.search.content
     panel.start.click()
     assert "50.06 % of the pixels with a spectrum" in panel.text.text()
     assert bench.page.image.content.overlay.isVisible()

@@ -1,14 +1,12 @@
 from __future__ import annotations
 
 import gc
-import sys
 import threading
 import weakref
 from collections.abc import Iterator
 
-import psutil
 import pytest
-from dsl_app.shared.jobs.memory import FULL_S, GarbageCollector, trim_memory
+from dsl_app.shared.jobs.memory import FULL_S, GarbageCollector
 
 
 class Knot:
@@ -76,18 +74,6 @@ def test_what_grew_old_is_found_in_time_but_not_while_a_job_runs(day: Day) -> No
     day.is_busy = False
     day.keeper.check()
     assert knot() is None
-
-
-@pytest.mark.skipif(sys.platform != "linux", reason="other systems have other heaps")
-def test_freed_memory_goes_back_to_the_system() -> None:
-    process = psutil.Process()
-    blocks = [bytearray(20_000) for _ in range(5_000)]
-    last = bytearray(20_000)
-    full = process.memory_info().rss
-    del blocks
-    trim_memory()
-    assert len(last) == 20_000
-    assert full - process.memory_info().rss > 60e6
 
 
 def test_no_thread_collects_by_itself_while_windows_are_tested() -> None:

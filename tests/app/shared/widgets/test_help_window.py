@@ -126,5 +126,9 @@ def test_a_search_lists_the_pages_with_all_words_and_shows_where(qtbot: QtBot, w
     assert first.selectedText().lower() == "spectral"
     QTest.keyClick(made.search, Qt.Key.Key_Return)
     assert made.text.textCursor().position() != first.position()
+    assert made.nothing.isHidden()
+    made.search.setText("spectral quux")
+    assert not made.nothing.isHidden()
     made.search.clear()
+    assert made.nothing.isHidden()
     assert not any(made.pages.item(i).isHidden() for i in range(made.pages.count()))

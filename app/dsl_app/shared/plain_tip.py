@@ -1,0 +1,17 @@
+"""Tooltips in which nothing is read as markup. No Qt."""
+
+from __future__ import annotations
+
+from html import escape
+
+
+def plain_tip(text: str) -> str:
+    """A tooltip that shows a text as it is: names in it may come from a file of a stranger.
+
+    Qt guesses whether a tooltip is markup. What it could take for that is given as markup of the same text.
+
+    >>> plain_tip("scans/<b>leaf</b>.zarr")
+    '<p>scans/&lt;b&gt;leaf&lt;/b&gt;.zarr</p>'
+    """
+    is_mistakable = "<" in text or "&lt;" in text
+    return f"<p>{escape(text, quote=False)}</p>".replace("\n", "<br>") if is_mistakable else text

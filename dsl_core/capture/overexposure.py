@@ -1,0 +1,44 @@
+"""Whether white is overexposed in every setting of a plan: there codes are unsure and columns unrefined."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dsl_core.devices.base import DeviceRig
+from dsl_core.model.plan import CapturePlan, Shot
+
+#: Share of the picture from which on a person is told; highlights and a wall behind an object are usual.
+MOST_OVEREXPOSED = 0.5
+
+
+def full_scale_dn(rig: DeviceRig) -> int:
+    """The number of a saturated pixel, as the calibration says, or else the camera's number of bits."""
+    known = rig.calibration
+    return (1 << rig.camera.info.bit_depth) - 1 if known is None else known.sensor.full_scale_dn
+
+
+class ExposureWatch:
+    """Takes the frames of a scan in their order; ``found`` says how much of white is overexposed, if much."""
+
+    def __init__(self, plan: CapturePlan, full_scale_dn: int) -> None:
+        """Pixels that reach ``full_scale_dn`` are saturated."""
+        self._waits_for = {shot.index for shot in plan.shots() if shot.role == "white"}
+        self._full_scale_dn = full_scale_dn
+        self._always: NDArray[np.bool_] | None = None
+        self.found = ""
+
+    def add(self, shot: Shot, pixels: NDArray[np.unsignedinteger]) -> None:
+        """Look at a frame (rows, columns), DN."""
+        if shot.index not in self._waits_for:
+            return
+        self._waits_for.discard(shot.index)
+        saturated = pixels >= self._full_scale_dn
+        self._always = saturated if self._always is None else self._always & saturated
+        share = float(self._always.mean())
+        if not self._waits_for and share >= MOST_OVEREXPOSED:
+            self.found = (
+                f"White is overexposed in {share:.0%} of the picture in every setting of the plan: codes are"
+                " unsure there, and depth is lost where lines are overexposed too. Expose for a shorter time,"
+                " or with a lower level, or choose a plan that has a darker setting as well, like coarse."
+            )

@@ -1,0 +1,67 @@
+"""White that is overexposed in every setting is told as soon as it was captured; the scan goes on."""
+
+from __future__ import annotations
+
+import logging
+
+import numpy as np
+import pytest
+
+from dsl_core.capture.overexposure import MOST_OVEREXPOSED, ExposureWatch
+from dsl_core.capture.runner import Status
+from dsl_core.model.plan import CapturePlan, GrayCode, ScanLines, Setting
+from dsl_core.pipeline import open_scan, scan
+from dsl_core.simulation.sim_devices import open_twin
+
+PLAN = CapturePlan(
+    camera_size_px=(10, 10),
+    code=GrayCode(rows=False),
+    spectral=ScanLines(step_px=5),
+    settings=(Setting(exposure_ms=10, level=0.2), Setting(exposure_ms=20, level=0.8)),
+    code_settings=(0, 1),
+)
+FULL_DN = 1023
+
+
+def white(share: float) -> np.ndarray[tuple[int, ...], np.dtype[np.uint16]]:
+    pixels = np.full(100, FULL_DN - 1, np.uint16)
+    pixels[: round(100 * share)] = FULL_DN
+    return pixels.reshape(10, 10)
+
+
+@pytest.mark.parametrize(
+    ("dark", "bright", "told"),
+    [
+        (MOST_OVEREXPOSED + 0.02, 1.0, "52%"),
+        (1.0, 1.0, "100%"),
+        (MOST_OVEREXPOSED - 0.02, 1.0, ""),
+        (0.0, 1.0, ""),
+    ],
+)
+def test_what_no_setting_spares_counts(dark: float, bright: float, told: str) -> None:
+    watch = ExposureWatch(PLAN, FULL_DN)
+    for shot in PLAN.shots():
+        share = 1.0 if shot.role != "white" else dark if shot.setting == 0 else bright
+        watch.add(shot, white(share))
+    assert (told in watch.found) if told else watch.found == ""
+
+
+def test_a_scan_tells_it_once_and_ends_as_usual(tmp_path, caplog) -> None:  # type: ignore[no-untyped-def]
+    rig = open_twin({"size": "48x32", "scene": "plane"})
+    plan = CapturePlan(
+        code=GrayCode(rows=False),
+        spectral=ScanLines(width_px=40, step_px=40),
+        settings=(Setting(exposure_ms=1000 / 3, level=0.4),),
+        code_settings=(0,),
+    ).sized(rig.camera.info, rig.projector.info)
+    seen: list[Status] = []
+    with caplog.at_level(logging.WARNING), open_scan(rig, plan, tmp_path / "a.dsl") as runner:
+        runner.listen(seen.append)
+        status = runner.run()
+    assert status.overexposed.startswith("White is overexposed in 9")
+    assert "a darker setting" in status.overexposed
+    assert [record.getMessage() for record in caplog.records].count(status.overexposed) == 1
+    before = [each.shot for each in seen if not each.overexposed and each.shot is not None]
+    assert before[-1].role == "white", "it is told at once"
+    darker = plan.model_copy(update={"settings": (Setting(exposure_ms=1000 / 6, level=0.2),)})
+    assert scan(rig, darker, tmp_path / "b.dsl").overexposed == ""

@@ -1,0 +1,77 @@
+"""Light and black that change at once in the middle of a scan are found when they do, and taken off."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from dsl_core import pipeline
+from dsl_core.model.fit import Fit
+from dsl_core.model.plan import CapturePlan, GrayCode, ScanLines, Sentinels, Setting
+from dsl_core.model.rig import Rig
+from dsl_core.reconstruction.light.neighbour_steps import pair_against_white
+from dsl_core.reconstruction.rows.frames import ScanFrames
+from tests.cases.twin_scan import MemoryScan, twin_scan
+
+PLAN = CapturePlan(
+    code=GrayCode(rows=False),
+    spectral=ScanLines(step_px=5),
+    settings=(Setting(exposure_ms=333.3, level=0.2),),
+    code_settings=(0,),
+    sentinels=Sentinels(),
+)
+
+
+@cache
+def clean() -> tuple[Rig, MemoryScan]:
+    devices, scan = twin_scan(PLAN, size="64x48", scene="stage")
+    assert devices.calibration is not None
+    return devices.calibration, scan
+
+
+def changed(at: int, factor: float = 1.0, more_dn: float = 0.0, until: int = 10_000) -> MemoryScan:
+    """The scan with ``factor`` times the light and so much more black from a shot on."""
+    rig, scan = clean()
+    black = rig.sensor.black_level_dn
+
+    def frame(index: int, pixels: NDArray[np.uint16]) -> NDArray[np.uint16]:
+        if not at <= index < until:
+            return pixels
+        moved = np.rint(black + factor * (pixels - black) + more_dn)
+        return np.asarray(np.clip(moved, 0, 4095), np.uint16)
+
+    return replace(scan, frames=tuple(frame(i, each) for i, each in enumerate(scan.frames)))
+
+
+def reconstructed(scan: MemoryScan) -> tuple[NDArray[np.float32], dict[str, str]]:
+    """Depth, and sentences of what was found by name."""
+    rig, _ = clean()
+    result = pipeline.reconstruct(scan, rig, pipeline.Options(spectra=False))
+    fit = Fit.read(result.attrs)
+    assert fit is not None
+    return result["depth_mm"].values, {each.name: each.sentence for each in fit.significant}
+
+
+@pytest.mark.parametrize(("factor", "more_dn"), [(1.0, 16.0), (1.2, 0.0), (0.8, -5.0)])
+def test_a_change_at_once_leaves_depth_as_it_was(factor: float, more_dn: float) -> None:
+    usual, said = reconstructed(clean()[1])
+    assert not said.keys() & {"black taken again", "step of the light"}
+    depth, said = reconstructed(changed(100, factor, more_dn))
+    known = np.isfinite(usual)
+    assert (np.abs(depth - usual)[known] < 0.5).mean() > 0.9
+    assert "from frame 100 on" in said["black taken again"]
+    assert ("from frame 100 on" in said.get("step of the light", "")) == (factor != 1.0)
+    assert "drift of the light" not in said
+
+
+def test_a_change_among_pictures_of_the_code_is_seen_by_their_sum() -> None:
+    scan = ScanFrames(changed(0, 0.8, 3.0, until=8), clean()[0], ())
+    for number, (factor, more_dn) in {0: (0.8, 3.0), 6: (1.0, 0.0)}.items():
+        (log, log_std), (dn, dn_std) = pair_against_white(scan, 0, number)
+        # Light of the room is in black, which is less in a darker picture as well.
+        assert np.exp(log) == pytest.approx(factor, abs=0.01 + 5 * log_std)
+        assert dn == pytest.approx(more_dn, abs=5 * dn_std + (1 - factor) * 40)
