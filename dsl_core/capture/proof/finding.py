@@ -44,7 +44,7 @@ _SEEN = {
     Verdict.SATURATED: "most of it is saturated",
     Verdict.DARK: "the pattern is missing from it",
     Verdict.MIRRORED: "columns of the projector run across the picture the wrong way round",
-    Verdict.DISPLACED: "it is shown a column or more away from where pictures before were",
+    Verdict.DISPLACED: "it is displaced from the pictures before",
     Verdict.OTHER: "it shows something else",
 }
 _REMEDY = {
@@ -113,11 +113,10 @@ class Finding:
 
 
 def displaced(shot: Shot, again: tuple[Shot, ...], columns: int) -> Finding:
-    """That shots are shown so many columns away from their place, positive towards higher ones."""
+    """That shots are shown so many columns or more away from their place, positive towards higher ones."""
     where = "higher" if columns > 0 else "lower"
-    return Finding(
-        shot, Verdict.DISPLACED, again, f"{counted(abs(columns), 'column')} towards {where} columns"
-    )
+    detail = f"at least {counted(abs(columns), 'column')} towards {where} columns"
+    return Finding(shot, Verdict.DISPLACED, again, detail)
 
 
 def together(findings: Iterable[Finding]) -> tuple[Finding, ...]:

@@ -38,8 +38,8 @@ def test_a_report_has_a_sentence_for_each_finding() -> None:
 def test_displaced_shots_are_named_with_the_number_of_columns() -> None:
     found = displaced(SHOTS[3], (SHOTS[2], SHOTS[3]), -2)
     assert found.verdict is Verdict.DISPLACED
-    assert found.detail == "2 columns towards lower columns"
-    assert displaced(SHOTS[3], (SHOTS[3],), 1).detail == "1 column towards higher columns"
+    assert found.detail == "at least 2 columns towards lower columns"
+    assert displaced(SHOTS[3], (SHOTS[3],), 1).detail == "at least 1 column towards higher columns"
 
 
 def test_displaced_shots_that_follow_each_other_are_one_finding() -> None:

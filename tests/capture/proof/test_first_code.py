@@ -272,7 +272,7 @@ def test_a_code_that_is_displaced_from_some_pair_on_is_taken_again_from_there(fi
     found, again = displaced_since(first)
     assert found.verdict is Verdict.DISPLACED
     assert [shot.pattern for shot in found.again] == list(range(first, 18))
-    assert "(2 columns towards lower columns)" in found.sentence
+    assert "(at least 2 columns towards lower columns)" in found.sentence
     assert not any(each.is_wrong for each in again)
 
 
