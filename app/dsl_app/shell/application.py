@@ -20,7 +20,7 @@ from dsl_app.shared.jobs.qt_runner import QtRunner
 from dsl_app.shared.known_files import Kind
 from dsl_app.shared.notify import Notifier
 from dsl_app.shared.settings import RecentFiles, load_settings, settings_folder
-from dsl_app.shared.theme import DARK, LIGHT, Theme, style_sheet
+from dsl_app.shared.theme import DARK, LIGHT, Theme
 from dsl_app.shared.undo import UndoStack
 from dsl_app.shared.widgets.icons import icon
 from dsl_app.shared.widgets.page import PageWidget
@@ -75,7 +75,7 @@ def _remove_import_hook() -> None:
 
 
 def set_theme(name: str) -> Theme:
-    """Give the whole application the theme of a name; returns its colours."""
+    """Give the whole application the colours of a theme by its name; returns them."""
     application = QApplication.instance()
     assert isinstance(application, QApplication)
     hints = application.styleHints()
@@ -83,9 +83,6 @@ def set_theme(name: str) -> Theme:
     dark = name == "dark" or (name == "system" and hints.colorScheme() == Qt.ColorScheme.Dark)
     theme = DARK if dark else LIGHT
     application.setPalette(_palette(theme))
-    sheet = style_sheet(theme)
-    if application.styleSheet() != sheet:  # the same one again would cost a look at every widget
-        application.setStyleSheet(sheet)
     return theme
 
 

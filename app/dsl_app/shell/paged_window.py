@@ -14,7 +14,7 @@ from PySide6.QtWidgets import QMainWindow, QStackedWidget
 from dsl_app.shared.jobs.qt_runner import QtRunner
 from dsl_app.shared.known_files import Kind, kind_of, meant_by, refusal
 from dsl_app.shared.settings import RecentFiles, Settings, save_early, save_settings
-from dsl_app.shared.theme import DARK, Theme
+from dsl_app.shared.theme import DARK, Theme, style_sheet
 from dsl_app.shared.undo import UndoStack
 from dsl_app.shared.widgets.dialogs import confirm
 from dsl_app.shared.widgets.layouts import boxed, column_of, row_of
@@ -170,6 +170,10 @@ class PagedWindow(QMainWindow):
     def apply_theme(self, name: str) -> None:
         """Show a theme by name: system, light or dark."""
         self.theme = self.parts.set_theme(name)
+        # Not of the application: each part would be styled again each time it is put into a larger one.
+        sheet = style_sheet(self.theme)
+        if self.styleSheet() != sheet:  # the same one again would cost a look at every widget
+            self.setStyleSheet(sheet)
         self.parts.settings.theme = name  # type: ignore[assignment]
         self.rail.paint_icons(self.theme)
         for page in self._made.values():

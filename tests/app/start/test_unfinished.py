@@ -52,9 +52,9 @@ def test_a_scan_is_opened_and_a_reconstruction_continued(
     monkeypatch.setattr(unfinished, "resume_result", lambda begun, progress: begun.target)
     control.resume(result)
     assert control.found.value == (scan,), "it is offered although it runs"
-    states = [control.is_resuming.value]
+    resuming = [control.is_resuming.value]
     runner.run_all()
-    assert [*states, control.is_resuming.value] == [True, False]
+    assert [*resuming, control.is_resuming.value] == [True, False]
     assert opened[-1] == Path("x/cup.zarr")
 
 

@@ -153,6 +153,7 @@ class CloudPanel(QWidget):
         self.view = view
         view.apply_theme(self._theme)
         self.tools.setEnabled(can_draw)
+        self._show_hint()
         self.message.hide()
         self._box.insertWidget(0, view, 1)
         # The widget gets its size, and with it the camera, in the event loop.
