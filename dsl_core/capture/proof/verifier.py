@@ -33,7 +33,7 @@ from dsl_core.capture.proof.recent import Recent
 from dsl_core.capture.proof.sentinel import SentinelProof
 from dsl_core.capture.proof.usual_light import LEAST_LIGHT, UsualLight
 from dsl_core.model.captured_code import CapturedCode
-from dsl_core.model.plan import CapturePlan, NoCode, Shot, describe_shot
+from dsl_core.model.plan import CapturePlan, NoCode, ScanLines, Shot, describe_shot
 from dsl_core.model.rig import Rig
 
 #: Where several rivals won, the picture before is blamed if its votes are nearly as many (their mean), and
@@ -329,8 +329,10 @@ class FrameProof:
         }
 
     def _black_gained(self, shot: Shot, seen: Counts) -> np.float32:
+        """By how much black was more; 0 where many lines leave no pixel without their first orders."""
         lit = self._code.lit if self._code is not None else None
-        wanted = self._profile(shot) if shot.role == "spectral" else None
+        one_line = shot.role == "spectral" and isinstance(self._plan.spectral, ScanLines)
+        wanted = self._profile(shot) if one_line else None
         return (
             np.float32(0) if lit is None or wanted is None else black_gained(seen, lit, wanted, self._noise)
         )
