@@ -14,12 +14,12 @@ from dsl_core.calibration.film.filter_angle import seen_straight
 from dsl_core.calibration.film.fit import (
     MAX_SLOPE,
     FilmFit,
-    FilmForm,
     fit_film,
     is_plausible,
     require_plausible,
     with_geometry,
 )
+from dsl_core.calibration.film.form import FilmForm
 from dsl_core.calibration.film.order_columns import fit_columns, search_columns
 from dsl_core.calibration.film.order_paths import LineFrames, filter_passband
 from dsl_core.calibration.film.order_samples import OrderSamples, grating_columns

@@ -21,10 +21,10 @@ from dsl_core.calibration.film.filter_angle import (
     columns_per_share,
     shift_terms,
 )
+from dsl_core.calibration.film.form import FIELDS, FilmForm
 from dsl_core.calibration.film.order_samples import OrderSamples, grating_columns
 from dsl_core.errors import CalibrationError
-from dsl_core.model.geometry import Lens
-from dsl_core.model.rig import SHAPE_POWERS, Film, FilmShape, Rig
+from dsl_core.model.rig import Film, Rig
 from dsl_core.optics.pinhole import pixel_rays
 from dsl_core.optics.shading import Plane
 from dsl_core.progress import NoProgress, Progress
@@ -32,8 +32,7 @@ from dsl_core.solve.robust import huber_weights
 
 Floats = NDArray[np.float64]
 
-#: Fitted fields, how well a mounting is known beforehand (one deviation), and steps of differences.
-FIELDS = ("tilt_x_deg", "tilt_y_deg", "roll_deg", "bend_per_mm", "lines_per_mm", "distance_mm")
+#: How well a mounting is known beforehand (one deviation), and steps of differences, by the fields.
 PRIOR_STD = np.array([3.0, 3.0, 3.0, 0.01, 25.0, 3.0])
 STEPS = np.array([1e-3, 1e-3, 1e-3, 1e-6, 1e-2, 1e-2])
 ROUNDS = 15
@@ -44,9 +43,8 @@ WORDS = (
     ("tilt about x", "°"), ("tilt about y", "°"), ("roll", "°"), ("bend", "/mm"), ("density", " lines/mm"),
     ("distance from the projector", " mm"),
 )  # fmt: skip
-#: How steep each power of a film's shape is beforehand, in the corner of the projector's frame (one
-#: deviation), how steep all together can be, and the step of differences over a power, in its deviations.
-SLOPE_STD, MAX_SLOPE, SHAPE_STEP = 0.05, 0.2, 1e-3
+#: How steep a film's shape can be, and the step of differences over one of its powers, in its deviations.
+MAX_SLOPE, SHAPE_STEP = 0.2, 1e-3
 #: Residuals beyond this many deviations weigh less (Huber), and no column is better than this (px).
 HUBER_SIGMAS, FLOOR_PX = 2.5, 0.003
 #: What all columns of a filter and order have in common beyond their noise, px: evenly, and as a ramp in
@@ -139,64 +137,6 @@ def fit_film(
         gain=gain[of_fields],
         angle=angle,
     )
-
-
-@dataclass(frozen=True)
-class FilmForm:
-    """A film's numbers in a row, and the part of it that the projector's frame is on.
-
-    ``half_mm`` is half the size of that part across and along the lines, ``middle_mm`` its middle along them.
-    Without ``shaped`` films are cylinders.
-    """
-
-    half_mm: tuple[float, float]
-    middle_mm: float
-    shaped: bool
-
-    @classmethod
-    def of(cls, lens: Lens, film: Film, shaped: bool) -> FilmForm:
-        """That of a film in front of a projector's lens."""
-        far, known = film.distance_mm, film.shape
-        middle_mm = far * ((lens.height_px - 1) / 2 - lens.cy_px) / lens.fy_px
-        return cls(
-            (0.5 * far * lens.width_px / lens.fx_px, 0.5 * far * lens.height_px / lens.fy_px),
-            middle_mm if known is None else known.middle_mm,
-            shaped,
-        )
-
-    @property
-    def std(self) -> Floats:
-        """Deviations of the factors of the shape beforehand; none without one."""
-        if not self.shaped:
-            return np.empty(0)
-        return np.asarray(SLOPE_STD / _slopes(*np.array(self.half_mm)).max(0))
-
-    def steepest(self, film: Film) -> float:
-        """Largest slope of a film's shape on that part."""
-        if film.shape is None:
-            return 0.0
-        u, v = np.meshgrid(*(np.linspace(-half, half, 9) for half in self.half_mm))
-        return float(np.abs(np.tensordot(np.array(film.shape.factors), _slopes(u, v), (0, 1))).max())
-
-    def values(self, film: Film) -> Floats:
-        """The fields, and with a shape its factors."""
-        factors = (FilmShape() if film.shape is None else film.shape).factors if self.shaped else ()
-        return np.array([*(getattr(film, name) for name in FIELDS), *factors])
-
-    def rig(self, rig: Rig, values: Floats) -> Rig:
-        """The rig with such a film."""
-        shape = None
-        if self.shaped:
-            shape = FilmShape(middle_mm=self.middle_mm, factors=tuple(values[len(FIELDS) :].tolist()))
-        fields = dict(zip(FIELDS, values[: len(FIELDS)].tolist(), strict=True))
-        return rig.model_copy(update={"film": rig.film.model_copy(update=fields | {"shape": shape})})
-
-
-def _slopes(u: Floats, v: Floats) -> Floats:
-    """Slopes across and along the lines of each of `SHAPE_POWERS` at places, (2, powers, ...)."""
-    across = [i * u ** max(i - 1, 0) * v**j for i, j in SHAPE_POWERS]
-    along = [j * u**i * v ** max(j - 1, 0) for i, j in SHAPE_POWERS]
-    return np.array([across, along])
 
 
 def is_plausible(film: Film, mounting: Film) -> bool:

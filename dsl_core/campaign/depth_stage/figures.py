@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from dsl_core.calibration.film.fit import FilmForm
+from dsl_core.calibration.film.form import FilmForm
 from dsl_core.model.calibration.depth_stage import DepthStageCalibration, StagePosition
 from dsl_core.model.figure import Figure, doubts
 

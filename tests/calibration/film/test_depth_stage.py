@@ -28,7 +28,8 @@ from dsl_core.calibration.film.depth_stage import (
     stage_curves,
 )
 from dsl_core.calibration.film.filter_angle import columns_per_share, shift_terms
-from dsl_core.calibration.film.fit import MAX_SLOPE, FilmForm, fit_film, is_plausible
+from dsl_core.calibration.film.fit import MAX_SLOPE, fit_film, is_plausible
+from dsl_core.calibration.film.form import FilmForm
 from dsl_core.calibration.film.order_columns import TileColumns
 from dsl_core.calibration.film.order_paths import LineFrames
 from dsl_core.calibration.film.order_samples import OrderSamples, grating_columns

@@ -16,13 +16,11 @@ from dsl_core.calibration.film.filter_angle import (
 )
 from dsl_core.calibration.film.fit import (
     COMMON_PX,
-    FIELDS,
-    SLOPE_STD,
-    FilmForm,
     _common_offsets,
     fit_film,
     require_plausible,
 )
+from dsl_core.calibration.film.form import FIELDS, SLOPE_STD, FilmForm
 from dsl_core.calibration.film.order_samples import grating_columns
 from dsl_core.errors import CalibrationError
 from dsl_core.model.rig import SHAPE_POWERS, Film, FilmShape, Rig

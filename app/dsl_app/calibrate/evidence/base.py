@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from contextlib import suppress
 from importlib import import_module
+from queue import SimpleQueue
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
-from PySide6.QtCore import QObject, Qt, QThreadPool, Signal
+from PySide6.QtCore import QObject, Qt, QThreadPool, QTimer, Signal
 from PySide6.QtWidgets import QSplitter, QWidget
 
 from dsl_app.shared.theme import DARK, Theme
@@ -21,6 +21,9 @@ if TYPE_CHECKING:
     from dsl_core.campaign.session import CalibrationSession
 
 R = TypeVar("R", bound=Record)
+
+#: How often to look whether something was read, ms.
+LOOK_MS = 30
 
 
 class Evidence(QWidget, Generic[R]):
@@ -114,13 +117,13 @@ def stacked(top: QWidget, bottom: QWidget, sizes: tuple[int, int]) -> QSplitter:
 class BackgroundReader(QObject):
     """Reads something in another thread and shows it in the window's; only the latest is shown."""
 
-    _ended = Signal(int, object, object)
-
     def __init__(self, parent: QObject) -> None:
         super().__init__(parent)
         self._number = 0
         self._show: Callable[[Any], object] | None = None
-        self._ended.connect(self._finish)
+        self._ended: SimpleQueue[tuple[int, object, Exception | None]] = SimpleQueue()
+        self._timer = QTimer(self, interval=LOOK_MS)
+        self._timer.timeout.connect(self._look)
 
     @property
     def is_busy(self) -> bool:
@@ -130,18 +133,23 @@ class BackgroundReader(QObject):
     def read(self, work: Callable[[], Any], show: Callable[[Any], object]) -> None:
         """Call ``show`` with what ``work`` returns, or with the exception that it raised."""
         self._number, self._show = self._number + 1, show
-        number = self._number
+        number, ended = self._number, self._ended
 
         def run() -> None:
+            # A signal of this object would crash the program if that was deleted just now, with its wizard.
             try:
-                found, trouble = work(), None
+                ended.put((number, work(), None))
             except Exception as error:  # shown in the window, never lost in a thread
-                found, trouble = None, error
-            # The widget may have been deleted meanwhile, and this object with it: nobody waits for it then.
-            with suppress(RuntimeError):
-                self._ended.emit(number, found, trouble)
+                ended.put((number, None, error))
 
         QThreadPool.globalInstance().start(run)
+        self._timer.start()
+
+    def _look(self) -> None:
+        while not self._ended.empty():
+            self._finish(*self._ended.get())
+        if not self.is_busy:
+            self._timer.stop()
 
     def _finish(self, number: int, found: object, trouble: Exception | None) -> None:
         if number != self._number or self._show is None:

@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+import gc
 import subprocess
 import sys
+import threading
+import weakref
 
 import pytest
+import shiboken6
 from dsl_app.calibrate.evidence.base import BackgroundReader, PlainEvidence, make_evidence
 from dsl_app.calibrate.wizard.state import Fit
+from PySide6.QtCore import QThreadPool
 from PySide6.QtWidgets import QLabel, QPushButton, QTableWidget, QTabWidget, QWidget
 from pytestqt.qtbot import QtBot
 
@@ -69,3 +74,22 @@ def test_only_the_latest_of_what_is_read_is_shown(qtbot: QtBot) -> None:
     reader.read(lambda: 1 / 0, shown.append)
     qtbot.waitUntil(lambda: not reader.is_busy)
     assert isinstance(shown[1], ZeroDivisionError)
+
+
+def test_a_thread_that_reads_knows_nothing_of_a_widget_that_may_be_deleted(qtbot: QtBot) -> None:
+    widget, begun, go_on = QWidget(), threading.Event(), threading.Event()
+    reader = BackgroundReader(widget)
+
+    def work() -> None:
+        begun.set()
+        go_on.wait(10)
+
+    reader.read(work, print)
+    assert begun.wait(10)
+    known = weakref.ref(reader)
+    shiboken6.delete(widget)
+    del reader, widget
+    gc.collect()
+    assert known() is None
+    go_on.set()
+    assert QThreadPool.globalInstance().waitForDone(10_000)
