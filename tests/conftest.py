@@ -4,6 +4,8 @@ import gc
 import os
 import signal
 
+import pytest
+
 from dsl_core.solve.heap import keep_freed_memory
 from tests.cases.memory import do_not_wait_for_the_disk
 
@@ -21,3 +23,11 @@ gc.set_threshold(50_000, 20, 50)
 
 keep_freed_memory()
 do_not_wait_for_the_disk()
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Begin with the tests of the calibrated campaign: one process makes it, and no other has to wait for it.
+
+    Processes share the tests in their order, and take over from the end of each other's.
+    """
+    items.sort(key=lambda item: "calibrated" not in getattr(item, "fixturenames", ()))

@@ -60,7 +60,7 @@ def make_fluorescent(rig: DeviceRig) -> None:
 
 
 def test_fluorescence_is_flagged_and_its_error_is_within_the_band(tmp_path: Path) -> None:
-    plan = next(preset.plan for preset in PRESETS if preset.key == "columns")
+    plan = next(preset.plan for preset in PRESETS if preset.key == "coarse")
     with open_rig("twin", {"size": "112x72", "scene": "color-checker", "seed": "3"}) as rig:
         make_fluorescent(rig)
         with pipeline.open_scan(rig, pipeline.fit_plan(plan, rig), tmp_path / "s.dsl") as scan:
