@@ -96,6 +96,14 @@ def test_columns_and_amplitudes_settle_from_half_a_pixel_away() -> None:
     assert float((far - column - 3.0).abs().max()) <= 3 * LONGEST_PX + 1e-9
 
 
+def test_chi_square_of_lines_that_are_explained_is_the_share_of_their_noise() -> None:
+    noise = 0.02
+    peaks, column, amplitude = peaks_of(400, noise)
+    _, _, chi_square = settle(peaks, column, amplitude, RESPONSE, None)
+    share = noise**2 / (noise**2 + (MODEL_ERROR * amplitude) ** 2)
+    assert float((chi_square / share).mean()) == pytest.approx(1.0, abs=0.1)
+
+
 def test_chi_square_is_per_line_beyond_two() -> None:
     peaks, column, amplitude = peaks_of(3)
     peaks.variance[:, 0] = torch.inf

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from dsl_core.reconstruction.light.step_date import Change, date_of_step
+from dsl_core.reconstruction.light.step_date import Change, _covariance, date_of_step
 
 COUNT, NOISE = 80, 0.1
 CHANGE = Change(after=5, before=70, total=1.0)
@@ -55,3 +55,10 @@ def test_a_faint_step_is_dated_where_something_else_changed() -> None:
     assert date_of_step(CHANGE, steps, many) is None
     assert date_of_step(CHANGE, steps, many, (33, 60)) == 33
     assert date_of_step(CHANGE, steps, many, (60,)) is None
+
+
+def test_differences_vary_by_the_scene_as_well_as_by_noise() -> None:
+    more, noise = np.random.default_rng(3).normal(0, 0.5, 2001), np.full(2001, 0.3)
+    covariance = _covariance(more, noise)
+    assert np.diag(covariance) == pytest.approx(np.full(2001, 0.5**2), rel=0.1)
+    assert np.diag(covariance, 1) == pytest.approx(np.full(2000, -(0.3**2) / 2))
