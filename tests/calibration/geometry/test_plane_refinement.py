@@ -137,6 +137,15 @@ def test_lines_that_are_counted_from_elsewhere_take_the_geometry_with_them() -> 
     assert followed < 0.6 * held
 
 
+def test_rigs_one_deviation_off_vary_by_the_covariance(
+    several: list[tuple[Rig, Rig, PlaneRefinement]],
+) -> None:
+    for _, _, found in several:
+        own = shared_parameters(found.rig).ravel()
+        off = np.stack([shared_parameters(rig).ravel() - own for rig, _ in found.variants()])
+        assert np.diag(off.T @ off) == pytest.approx(np.diag(found.covariance), rel=0.02, abs=1e-12)
+
+
 def test_a_bulge_at_all_positions_is_measured(several: list[tuple[Rig, Rig, PlaneRefinement]]) -> None:
     for _, _, flat in several:
         assert abs(flat.bow_mm) < 3 * flat.bow_std_mm < 0.3
