@@ -107,6 +107,13 @@ def test_expected_colours_are_those_of_the_rig() -> None:
     assert expected_colours(truth(), CHART) == pytest.approx(signals(truth(), 3), rel=1e-9)
 
 
+def test_figures_are_shares_of_white_in_percent(record: ColorCheckerCalibration) -> None:
+    found = {figure.name: figure.value for figure in color_checker_figures(record)}
+    assert found["residual before the refinement"] == pytest.approx(100 * record.start)
+    assert found["residual"] == pytest.approx(100 * record.residual)
+    assert found["residual of patches held out"] == pytest.approx(100 * record.held_out)
+
+
 def test_figures_pass_and_a_bad_patch_is_named(record: ColorCheckerCalibration) -> None:
     assert "worst patch" not in " ".join(figure.name for figure in failures(color_checker_figures(record)))
     spoilt = record.patches[7].model_copy(update={"held_out": 1.1 * WORST_PERCENT / 100})

@@ -77,6 +77,13 @@ def test_parts_may_name_their_own_files_and_skip_others(tmp_path: Path) -> None:
     )
 
 
+def test_of_inverses_alone_each_pattern_is_lacking(tmp_path: Path) -> None:
+    folder = _folder(tmp_path, ["0.png", "1.png", "2.png"])
+    found = _arranged(folder, StripePictures(bits=3, inverse="none", inverse_first=True))
+    assert found.code == CapturedCode(column_sets=(Stripes(bits=3, lacking=(0, 2, 4)),))
+    assert [said for _, said in found.table] == [f"columns, gray bit {bit} inverse" for bit in (2, 1, 0)]
+
+
 def test_absent_pictures_leave_their_digit_to_the_other(tmp_path: Path) -> None:
     folder = _folder(tmp_path, [f"{i}.png" for i in (0, 1, 2, 4, 5)])
     found = _arranged(folder, StripePictures(bits=3), missing=(3,))
