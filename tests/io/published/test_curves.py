@@ -50,6 +50,8 @@ def test_a_centre_does_not_depend_on_where_wavelengths_are_dense(tmp_path: Path)
         (PEAKS[:, ::-1], "nm,R,G,B", "red must have the longest"),
         (PEAKS[:, :2], "nm,R,G", r"has 2 curves \(R, G\); three curves, R, G, B are needed"),
         (PEAKS - 0.1, "nm,R,G,B", "negative by more than 2% of its largest"),
+        (0.01 * (PEAKS - 0.1), "nm,R,G,B", "negative by more than 2% of its largest"),
+        (0 * PEAKS, "nm,R,G,B", "contains values that are missing"),
     ],
 )
 def test_what_cannot_be_meant_is_refused(tmp_path: Path, values: np.ndarray, header: str, words: str) -> None:

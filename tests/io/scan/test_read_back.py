@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from dsl_core.errors import StoreError
+from dsl_core.io.records import replace_record
 from dsl_core.io.scan.check import find_problems
 from dsl_core.io.scan.folder import ScanReader, ScanWriter
 from dsl_core.model.frames import Frame
@@ -54,6 +55,19 @@ def test_metadata_that_changed_are_written_again(
     assert find_problems(reader, verify=True) == []
     assert reader.manifest == writer.manifest
     assert len(reader.entries) == plan.shot_count
+
+
+def test_only_a_manifest_of_another_scan_is_written_again(
+    tmp_path: Path, plan: CapturePlan, frame_of: FrameOf
+) -> None:
+    path = tmp_path / "scan.dsl" / "manifest.json"
+    with _written(path.parent, plan, frame_of) as writer:
+        own = path.stat().st_ino
+        assert writer.read_back() == []
+        assert path.stat().st_ino == own, "it was left alone"
+        replace_record(path, writer.manifest.model_copy(update={"notes": {"rig": "another"}}))
+        assert writer.read_back() == []
+    assert ScanReader(path.parent).manifest == writer.manifest
 
 
 def test_frames_that_vanished_or_changed_are_missing_again(
