@@ -142,7 +142,7 @@ class MarksPanel(QWidget):
             self._control.export_spectra(target[0], overwrite=target[1])
 
     def _fill(self) -> None:
-        """Change the rows that differ: with all rows made anew, pinning takes longer with every pin.
+        """Change only the rows that differ: if all were replaced, each pin would take longer than the last.
 
         Marks are added, changed and removed, never moved.
         """
