@@ -28,7 +28,8 @@ def scene(orders: tuple[int, ...] = (0, 1)) -> SimpleNamespace:
     entries = np.zeros((2, 2 * SUPPORTS.max() + 1))
     for values, support in zip(entries, SUPPORTS, strict=True):
         values[1 : 2 * support] = rng.uniform(0.1, 1.0, 2 * support - 1)
-    # Order +1 rises with the bands, beyond the lit frames, and order -1 falls; one sample has one band, the last has none.
+    # Order +1 rises with the bands, beyond the lit frames, and order -1 falls; one sample has one band, the
+    # last has none.
     start = rng.integers(6, 32, (1, SAMPLES))
     rising = np.cumsum(np.vstack([start, rng.integers(2, 9, (BANDS - 1, SAMPLES))]), 0)
     columns = np.stack([rising, 60 - rising]).astype(np.int32)
