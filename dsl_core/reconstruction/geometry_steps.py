@@ -17,6 +17,7 @@ from dsl_core.reconstruction.code_agreement import NamedPlaces, code_agreement
 from dsl_core.reconstruction.columns.column import MODEL_ERROR
 from dsl_core.reconstruction.columns.line_spread import own_spread, spread_pixels, with_own_spread
 from dsl_core.reconstruction.columns.peak_error import own_peak_error
+from dsl_core.reconstruction.columns.spread_doubt import spread_doubt
 from dsl_core.reconstruction.geometry import Geometry, geometry_of, require_light, require_pixels
 from dsl_core.reconstruction.hdr import MergedFrame
 from dsl_core.reconstruction.lenses import follow_lenses
@@ -66,16 +67,17 @@ class GeometrySteps:
         options, frames, lines = self._options, self._frames, self._lines
         code, white = self._taken()
         refines_rig = options.refine_columns and not options.as_calibrated
-        peak_error, calibrated, spread = MODEL_ERROR, self.rig.projector_response, None
+        peak_error, calibrated, spread, doubt = MODEL_ERROR, self.rig.projector_response, None, None
         if refines_rig:
             spread = own_spread(self.rig, lines, code, white, frames)
             self.rig = with_own_spread(self.rig, spread)
             peak_error = own_peak_error(self.rig, lines, code, white, frames)
+            doubt = spread_doubt(self.rig, lines, code, white, frames, spread)
         columns = columns_by_rows(self.rig, options, frames, code, white, peak_error, self._progress)
         named = NamedPlaces.of(code)
         del code, white
         refined_by = lines if options.refine_columns else None
-        geometry = geometry_of(self.rig, refined_by, columns, frames.shape, options.surface_window_px)
+        geometry = geometry_of(self.rig, refined_by, columns, frames.shape, options.surface_window_px, doubt)
         del columns
         require_pixels(geometry.flags)
         if not refines_rig:
