@@ -59,8 +59,10 @@ def spread_doubt(
     None where single lines do not cover the picture, and where it is known well enough.
     """
     pixels = spread_pixels(lines, code, white)
-    seen = np.inf if found is None else found.rms_std_px / found.response.blur_px
-    relative = float((FOCUS_STD**-2 + seen**-2) ** -0.5)
+    relative = FOCUS_STD
+    if found is not None:
+        seen = found.rms_std_px / found.response.blur_px
+        relative *= seen / float(np.hypot(FOCUS_STD, seen))
     if lines is None or pixels.size == 0 or relative < SURE:
         return None
     picked = stack.pick(pixels)
