@@ -28,6 +28,8 @@ FRAMES, FEWEST = 16, 60
 #: The rms of what frames have more has to be so many deviations of a single one, and this share of the noise
 #: of a single pixel: less is hidden in it.
 SIGMAS, OF_NOISE = 3.0, 0.05
+#: Narrow bands that come and go leave less than this, which is taken off and not told.
+LEAST_TOLD_DN = 0.2
 #: Variance of black over a picture, relative to its noise, from which on it may be the room that is seen.
 CONTRAST = 1.0
 #: What an interpolated frame may be off by, relative to the light of so many frames on either side.
@@ -68,7 +70,7 @@ class RoomFlicker:
             "flicker of the room",
             (self.rms_dn, self.std_dn),
             "DN",
-            0.0,
+            LEAST_TOLD_DN,
             f"The light of the room, or the black level, differed by {self.rms_dn:.2f} DN (rms) from frame to"
             " frame. The frames of lines are corrected for it.",
             "Keep the light of the room away, or use lamps that do not flicker.",

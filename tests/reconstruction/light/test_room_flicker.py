@@ -80,6 +80,7 @@ def test_what_all_pixels_have_more_is_found_frame_by_frame(seen: Seen) -> None:
     assert quick([found.dn[at] for at in seen.lines] - wanted) < 0.15 * quick(wanted)
     assert found.rms_dn == pytest.approx(0.8, rel=0.3)
     assert found.finding.significant
+    assert not RoomFlicker({}, {}, 0.19, 0.01).finding.significant
     # What is known already is not found again.
     exposed = found.exposed(Exposed.as_planned(len(more)))
     assert exposed.black_dn[seen.lines] == pytest.approx([found.dn[at] for at in seen.lines])
