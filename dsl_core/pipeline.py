@@ -9,22 +9,16 @@ command line starts at once.
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import numpy as np
-from numpy.typing import NDArray
-
-from dsl_core.capture.overexposure import ExposureWatch, full_scale_dn
 from dsl_core.capture.preflight import fit_plan, require_possible
 from dsl_core.capture.proof.report import SeenFrames
 from dsl_core.capture.proof.report import prove as prove_frames
-from dsl_core.capture.proof.verifier import FrameProof
 from dsl_core.capture.runner import Runner, State, Status
-from dsl_core.capture.sentinels import SentinelWatch
+from dsl_core.capture.scan_watches import ScanWatches
 from dsl_core.capture.sink import Watch, WatchedSink
 from dsl_core.devices.base import DeviceRig
 from dsl_core.errors import StoreError
@@ -36,9 +30,9 @@ from dsl_core.io.scan.folder import ScanReader, ScanWriter
 from dsl_core.io.scan.proof_file import read_proof, save_proof
 from dsl_core.io.staging import write_text
 from dsl_core.model.fit import FitFinding
-from dsl_core.model.frames import FrameSink, FrameSource
+from dsl_core.model.frames import FrameSource
 from dsl_core.model.options import Options
-from dsl_core.model.plan import CapturePlan, Shot
+from dsl_core.model.plan import CapturePlan
 from dsl_core.model.result_sink import MemorySink, ResultSink, SeenGeometry
 from dsl_core.model.rig import Rig
 from dsl_core.patterns.images import pattern_image
@@ -48,10 +42,6 @@ from dsl_core.solve.threads import one_kernel_thread
 
 if TYPE_CHECKING:
     import xarray as xr
-
-    from dsl_core.optics.lines.line_set import LineSet
-    from dsl_core.reconstruction.geometry import Geometry
-    from dsl_core.reconstruction.rows.frames import ScanFrames
 
 
 _log = logging.getLogger(__name__)
@@ -78,25 +68,16 @@ def open_scan(
     """
     require_possible(rig, plan)
     with ScanWriter.open(folder, plan, rig, notes) as writer:
-        sink: FrameSink = WatchedSink(writer, watch) if watch else writer
-        exposure = ExposureWatch(plan, full_scale_dn(rig))
-        sink = WatchedSink(sink, _told_to(exposure.add))
-        stored = ScanReader(folder)
-        proof, sentinels, seen = None, None, SeenFrames(plan)
-        if prove:
-            camera = rig.camera.info
-            proof = FrameProof(plan, rig.calibration, camera.bit_depth, camera.bayer)
-            sentinels = SentinelWatch(plan, rig.calibration.sensor if rig.calibration else None)
-            missing = {shot.index for shot in writer.missing()}
-            sentinels.learn(stored, (shot for shot in plan.shots() if shot.index not in missing))
-            sink = WatchedSink(WatchedSink(sink, _told_to(sentinels.add)), _told_to(seen.keep))
+        stored, watches = ScanReader(folder), ScanWatches.of(rig, plan, prove)
+        watches.learn(writer, stored)
+        sink = watches.over(WatchedSink(writer, watch) if watch else writer)
         runner = Runner(
-            rig, plan, sink, pattern_image, progress=progress, token=token, proof=proof, stored=stored,
-            sentinels=sentinels, exposure=exposure, waits=waits,
+            rig, plan, sink, pattern_image, progress=progress, token=token, stored=stored, waits=waits,
+            proof=watches.proof, sentinels=watches.sentinels, exposure=watches.exposure,
         )  # fmt: skip
         yield runner
-        if prove and runner.status.state is State.FINISHED:
-            _keep_proof(ScanReader(folder), seen)
+        if watches.seen is not None and runner.status.state is State.FINISHED:
+            _keep_proof(ScanReader(folder), watches.seen)
 
 
 def _keep_proof(reader: ScanReader, seen: SeenFrames) -> None:
@@ -110,10 +91,6 @@ def _keep_proof(reader: ScanReader, seen: SeenFrames) -> None:
         save_proof(reader, reader.calibration, found)
     except StoreError as error:
         _log.warning("The scan is complete; what its pictures show could not be kept with it: %s", error)
-
-
-def _told_to(watcher: Callable[[Shot, NDArray[np.uint16]], None]) -> Watch:
-    return lambda shot, frame: watcher(shot, frame.pixels)
 
 
 def scan(
@@ -146,7 +123,7 @@ def reconstruct(
     and normals as soon as they are known: spectra take much longer. Threads have whole pictures or tiles to
     work on, never parts of one tensor: see `one_kernel_thread`.
     """
-    from dsl_core.optics.lines.line_set import LineSet
+    from dsl_core.reconstruction.geometry_steps import GeometrySteps
     from dsl_core.reconstruction.light.own_sensor import own_sensor
     from dsl_core.reconstruction.rows.assembly import Assembly
     from dsl_core.reconstruction.rows.bands import bands_of
@@ -155,17 +132,23 @@ def reconstruct(
     from dsl_core.reconstruction.spectral.solvers import check_solver, row_solver, rows_together
 
     options, progress, timer = options or Options(), progress or NoProgress(), timer or StageTimer()
-    plan, lines = check_source(source, rig), LineSet.of(source.plan)
+    plan = check_source(source, rig)
     if options.spectra:
         check_solver(options.solver, rig, plan, options.correspondence)
     findings: list[FitFinding] = []
     if not options.as_calibrated:
-        sensor, found_of_sensor = own_sensor(source, rig.sensor)
+        sensor, found = own_sensor(source, rig.sensor)
         rig = rig.model_copy(update={"sensor": sensor})
-        findings += found_of_sensor
+        findings += found
     frames = ScanFrames(source, rig, bands_of(plan, options.band_rows, rows_together(rig, options)))
-    rig, geometry, found_of_depth = _depth(rig, lines, options, frames, progress, timer)
-    findings += found_of_depth
+    steps = GeometrySteps(rig, options, frames, progress)
+    with timer.stage("read, merge, decode the binary code"):
+        steps.decode()
+    with timer.stage("read and merge the line frames"):
+        steps.read_lines()
+    with timer.stage("columns, depth, normals"):
+        geometry = steps.measure()
+    rig, findings = steps.rig, findings + steps.findings
     if seen_geometry is not None:
         seen_geometry(maps_without_spectra(rig, options, geometry))
     solver = None
@@ -184,73 +167,6 @@ def reconstruct(
     with timer.stage("colour and result", in_parts=True):
         progress.report("colour and result", 0, 0)
         return result.finish(solver, findings)
-
-
-def _depth(
-    rig: Rig,
-    lines: LineSet | None,
-    options: Options,
-    frames: ScanFrames,
-    progress: Progress,
-    timer: StageTimer,
-) -> tuple[Rig, Geometry, list[FitFinding]]:
-    """Frames -> linear radiance -> columns -> depth -> surface, of the whole picture.
-
-    Unless all is ``as_calibrated``, light, line spread and lenses are followed: the rig as this scan has it,
-    and what was found of them.
-    """
-    from dsl_core.reconstruction.camera_spot import follow_spot, spot_finding
-    from dsl_core.reconstruction.code_agreement import NamedPlaces, code_agreement
-    from dsl_core.reconstruction.columns.column import MODEL_ERROR
-    from dsl_core.reconstruction.columns.line_spread import own_spread, spread_pixels, with_own_spread
-    from dsl_core.reconstruction.columns.peak_error import own_peak_error
-    from dsl_core.reconstruction.geometry import geometry_of, require_light, require_pixels
-    from dsl_core.reconstruction.lenses import follow_lenses
-    from dsl_core.reconstruction.light.followed import follow_light, unsure_level
-    from dsl_core.reconstruction.rows.columns import columns_by_rows
-    from dsl_core.reconstruction.spread_findings import spread_findings
-
-    findings: list[FitFinding] = []
-    refines_rig = options.refine_columns and not options.as_calibrated
-    with timer.stage("read, merge, decode the binary code"):
-        code, white = frames.decode(progress)
-        require_light(white.radiance, white.saturated)
-    with timer.stage("read and merge the line frames"):
-        if options.as_calibrated:
-            frames.look(progress=progress)
-        else:
-            asked = partial(spread_pixels, lines)
-            code, white, found_of_light = follow_light(frames, code, white, asked, progress)
-            findings += found_of_light
-            unsure = float(np.hypot(rig.white_scale_rel_std, unsure_level(frames.plan, found_of_light)))
-            rig = rig.model_copy(update={"white_scale_rel_std": unsure})
-    with timer.stage("columns, depth, normals"):
-        peak_error = MODEL_ERROR
-        if refines_rig:
-            found = own_spread(rig, lines, code, white, frames)
-            calibrated = rig.projector_response
-            rig = with_own_spread(rig, found)
-            peak_error = own_peak_error(rig, lines, code, white, frames)
-        columns = columns_by_rows(rig, options, frames, code, white, peak_error, progress)
-        named = NamedPlaces.of(code)
-        del code, white  # of large pictures they take much of the memory
-        geometry = geometry_of(
-            rig, lines if options.refine_columns else None, columns, frames.shape, options.surface_window_px
-        )
-        del columns
-        require_pixels(geometry.flags)
-        if refines_rig:
-            rig, geometry, found_of_lenses = follow_lenses(rig, lines, geometry, options.surface_window_px)
-            findings += found_of_lenses
-            geometry, spot = follow_spot(rig, lines, geometry, options.surface_window_px)
-            findings += [] if spot is None else [spot_finding(spot)]
-            if found is not None:
-                findings += spread_findings(calibrated, found, 0.0 if spot is None else spot.columns_px)
-            geometry, found_of_code = code_agreement(
-                rig, frames.plan, named, geometry, options.surface_window_px
-            )
-            findings += found_of_code
-    return rig, geometry, findings
 
 
 def evaluate(result: xr.Dataset, truth: Truth) -> Evaluation:

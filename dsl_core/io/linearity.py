@@ -40,7 +40,7 @@ class Linearity:
 
 
 def linearity_of(
-    source: FrameSource, full_scale_dn: float, black_level_dn: float = 0.0, absent: Collection[int] = ()
+    source: FrameSource, full_scale_dn: float, black_level_dn: float, absent: Collection[int] = ()
 ) -> Linearity:
     """Read white, black and the finest pairs of a scan, and say what their sums tell.
 

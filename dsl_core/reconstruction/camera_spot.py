@@ -81,7 +81,7 @@ class CameraSpot:
     @property
     def rms_std_px(self) -> float:
         """Deviation of the rms width."""
-        return self.std_px2 / (2 * max(self.rms_px, math.sqrt(self.std_px2)))
+        return self.std_px2 / (2 * max(self.rms_px, math.sqrt(self.std_px2), 1e-9))
 
 
 def follow_spot(

@@ -25,6 +25,7 @@ from dsl_core.reconstruction.columns.lateral_colour import material_std_px
 from dsl_core.reconstruction.columns.line_spread import wave_std_px
 from dsl_core.reconstruction.columns.maps import CHUNK, WHOLE_PX_STD, ColumnFinder, ColumnMaps
 from dsl_core.reconstruction.columns.pattern_column import radiance_profiles
+from dsl_core.reconstruction.columns.spread_doubt import SpreadDoubt
 from dsl_core.reconstruction.columns.two_surfaces import two_surfaces_std_px
 from dsl_core.reconstruction.hdr import MergedFrame
 from dsl_core.reconstruction.merge import LineStack
@@ -143,7 +144,9 @@ def reconstruct_geometry(
     """
     search = ColumnSearch(rig, plan, refine_columns, device)
     found = search.find(code, white, stack, 0, progress)
-    return geometry_of(rig, search.lines, found, code.column.shape, surface_window_px, shared_errors)
+    return geometry_of(
+        rig, search.lines, found, code.column.shape, surface_window_px, shared_errors=shared_errors
+    )
 
 
 @dataclass(frozen=True)
@@ -206,17 +209,23 @@ def geometry_of(
     found: FoundColumns,
     shape: tuple[int, ...],
     surface_window_px: int | None = None,
+    spread_doubt: SpreadDoubt | None = None,
     shared_errors: bool = True,
 ) -> Geometry:
-    """Depth and surface from the columns of a whole picture of a shape, which it takes over."""
+    """Depth and surface from the columns of a whole picture of a shape, which it takes over.
+
+    ``spread_doubt`` is what columns may be off by through the line spread.
+    """
     maps, flags = found.maps, found.flags
-    waves = wave_std_px(maps.column_px.reshape(shape), maps.refined.reshape(shape), lines)
+    waves = wave_std_px(maps.column_px.reshape(shape), maps.refined.reshape(shape), lines).ravel()
+    if spread_doubt is not None:
+        waves = np.hypot(waves, np.where(maps.refined, spread_doubt.at(maps.column_px), np.float32(0.0)))
     common = math.hypot(rig.column_std_px, _zero_std_px(rig)) if shared_errors else 0.0
     colours = material_std_px(rig, maps.column_px)
     good = (flags & int(DEPTH_INVALID)) == 0
     seen_px = np.where(good, maps.column_px, np.float32(np.nan)).reshape(shape)
     doubt = two_surfaces_std_px(seen_px, (maps.unusual & good).reshape(shape)).ravel()
-    dq = np.hypot(np.hypot(maps.column_std_px, common), np.hypot(waves.ravel(), np.hypot(colours, doubt)))
+    dq = np.hypot(np.hypot(maps.column_std_px, common), np.hypot(waves, np.hypot(colours, doubt)))
     # In place, because maps of a large picture are large.
     depth_mm, depth_std = maps.depth_mm.reshape(shape), maps.slope_mm_per_px.reshape(shape)
     maps.slope_mm_per_px[:] *= dq

@@ -51,6 +51,8 @@ SWAPS: dict[type[ast.AST], str] = {
 LIMIT_S = 900.0
 #: Half as much again of a guard against zero is as good a guard, so numbers below this become one.
 TINY = 1e-5
+#: Whole numbers up to this become one more, larger ones half as much again, as other numbers do.
+SMALL = 9
 #: Statements whose absence changes no result.
 TALK = ("progress.report(", "_log.", "warnings.")
 
@@ -102,7 +104,8 @@ def faults_of(path: str, source: str) -> Iterator[Fault]:
             case ast.Constant(value=bool(value)):
                 yield on(node.lineno, node.col_offset, node.end_col_offset or 0, str(not value))
             case ast.Constant(value=int(value)):
-                yield on(node.lineno, node.col_offset, node.end_col_offset or 0, str(value + 1))
+                new = str(value + 1 if value <= SMALL else value * 3 // 2)
+                yield on(node.lineno, node.col_offset, node.end_col_offset or 0, new)
             case ast.Constant(value=float(value)):
                 new = repr(1.0 if abs(value) < TINY else value * 1.5)
                 yield on(node.lineno, node.col_offset, node.end_col_offset or 0, new)

@@ -24,11 +24,11 @@ def test_absent_frames_and_sharp_stripes_leave_it_unknown(tmp_path: Path) -> Non
     pictures = [half, 210 - half, half, 210 - half, np.full((48, 64), 200), np.full((48, 64), 10)]
     write(tmp_path, {f"{k}.png": np.asarray(each, np.uint16) for k, each in enumerate(pictures)})
     scan = open_pictures(tmp_path, Mapping(parts=PARTS, projector_size_px=PROJECTOR))
-    found = linearity_of(scan, 255)
+    found = linearity_of(scan, 255, 0)
     assert (found.verdict, found.figures, found.is_wrong) == ("unknown", None, False)
     assert found.sentence.startswith("too few pixels see bright and dark stripes at once")
     for absent in ({4}, {0, 2}):
-        assert linearity_of(scan, 255, absent=absent).sentence.startswith("frames are missing")
+        assert linearity_of(scan, 255, 0, absent=absent).sentence.startswith("frames are missing")
 
 
 SUM = "pattern and inverse together are 27.0 ± 1.0 % of the contrast {} than white and black together"
@@ -66,7 +66,7 @@ def test_real_pictures_are_linear_until_they_are_encoded(tmp_path: Path, power: 
         cv2.imwrite(str(tmp_path / f"{place}.png"), np.rint(values**power * 255))
     parts = (StripePictures(bits=3), WhitePicture(), BlackPicture())
     scan = open_pictures(tmp_path, Mapping(parts=parts, projector_size_px=(1024, 768)))
-    found = linearity_of(scan, 255)
+    found = linearity_of(scan, 255, 0)
     assert found.verdict == verdict
     assert found.figures is not None
     assert found.figures.exponent == pytest.approx(1 / power, rel=0.1)

@@ -15,6 +15,7 @@ from dsl_core.optics.lines.line_set import LineSet
 from dsl_core.reconstruction.camera_spot import (
     CameraSpot,
     column_slopes,
+    fit_spot,
     follow_spot,
     light_slopes,
     spot_finding,
@@ -126,6 +127,20 @@ def test_pixels_that_see_a_point_and_other_patterns_change_nothing() -> None:
     assert follow_spot(rig(), LineSet.of(CapturePlan(spectral=LineComb())), sharp) == (sharp, None)
     dark = replace(sharp, depth_mm=np.full(SHAPE, np.nan))
     assert follow_spot(rig(), LINES, dark)[1] is None
+
+
+def test_a_displacement_is_doubted_by_the_scatter_of_the_spot_but_never_wholly() -> None:
+    random = np.random.default_rng(4)
+    before, _ = geometry(rig(), 0.0)
+    pull = random.standard_normal(SHAPE)
+    flat = np.broadcast_to(np.arange(COLUMNS) * 1.0, SHAPE)
+    for scatter_px2, doubt in ((0.02, 0.058), (0.4, 1.0)):
+        moved = flat + (0.5 + scatter_px2 * np.sign(random.standard_normal(SHAPE))) * pull
+        exact = np.full(SHAPE, 1e-4, np.float32)
+        found = fit_spot(rig(), replace(before, column_px=moved, column_std_px=exact), pull, np.ones(SHAPE))
+        assert found is not None
+        assert found.present
+        assert found.doubt == pytest.approx(doubt, rel=0.02)
 
 
 def test_slopes_of_a_ramp_are_exact_with_and_without_a_mosaic() -> None:

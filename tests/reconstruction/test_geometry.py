@@ -74,7 +74,7 @@ def test_depth_is_as_sure_as_the_column_and_what_all_columns_share() -> None:
     flags = np.zeros(COUNT, np.uint16)
     flags[5] = int(Flag.NO_LIGHT)
     for shared, std_px in ((True, 0.05), (False, 0.03)):
-        found = geometry_of(rig, None, FoundColumns(maps_of(), flags), SHAPE, 5, shared)
+        found = geometry_of(rig, None, FoundColumns(maps_of(), flags), SHAPE, 5, shared_errors=shared)
         good = np.ones(SHAPE, bool)
         good.ravel()[5] = False
         assert found.column_std_px[good] == pytest.approx(std_px, rel=1e-5)

@@ -37,6 +37,14 @@ def test_a_jump_is_cut_and_a_steep_slope_is_not() -> None:
     assert len(mesh_of_grid(_points(slope)).triangles) == 2 * 29 * 39
 
 
+def test_a_step_that_noise_might_be_is_cut_from_a_hundredth_of_the_distance_on() -> None:
+    deviation = np.full((30, 40), 5.0)
+    for step_mm, columns in ((6.5, 39), (8.0, 38)):
+        depth = np.where(np.arange(40) < 20, 700.0, 700.0 + step_mm) * np.ones((30, 1))
+        mesh = mesh_of_grid(_points(depth, focal_px=4000.0), deviation)
+        assert len(mesh.triangles) == 2 * 29 * columns
+
+
 def test_noise_does_not_cut_but_a_flagged_step_does() -> None:
     rng = np.random.default_rng(3)
     depth = 700 + rng.normal(0, 2.0, (30, 40))

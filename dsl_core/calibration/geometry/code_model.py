@@ -217,7 +217,8 @@ class _CodeFit:
         # The pseudoinverse: directions that no pixel tells of are left alone.
         strength, directions = np.linalg.eigh(squares)
         known = np.abs(strength) > RANK * np.abs(strength).max(1, keepdims=True)
-        along = np.einsum("nij,ni->nj", directions, rights) * known / np.where(known, strength, 1.0)
+        along = np.where(known, np.einsum("nij,ni->nj", directions, rights), 0.0)
+        along /= np.where(known, strength, 1.0)
         step = np.einsum("nij,nj->ni", directions, along)
         limit = np.minimum(1.0, 0.5 / np.maximum(np.abs(step).max(1), 1e-12))
         enough = np.array([each[2] >= MIN_PIXELS for each in sums])

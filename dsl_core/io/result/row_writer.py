@@ -72,7 +72,7 @@ class RowWriter:
         make_folder(self.work)
         self._lock = FolderLock(self.work / _LOCK)
         self._shape, self._origin, self._nm = shape, origin, wavelengths_nm
-        self._height = bands[0].stop - bands[0].start
+        self._height = bands[0].stop
         key = f"{self._key}\n{shape} {origin} {self._height} {wavelengths_nm.tolist()}".encode()
         with self._writing():
             if self._is_of(key):

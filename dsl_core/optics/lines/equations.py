@@ -134,10 +134,9 @@ class LineEquations:
         # What the left-out diagonals may sum to is added to the main one: a truncated matrix of bright pixels
         # would not be positive definite.
         self.dropped = max(self.dropped, order_lines.dropped)
-        if self.matrix.shape[0] < bandwidth + 1:
-            self.matrix = torch.nn.functional.pad(
-                self.matrix, (0, 0, 0, 0, 0, bandwidth + 1 - self.matrix.shape[0])
-            )
+        more = bandwidth + 1 - self.matrix.shape[0]
+        if more > 0:
+            self.matrix = torch.nn.functional.pad(self.matrix, (0, 0, 0, 0, 0, more))
         reached = [j for j, any_pixel in enumerate(inside.any(1).tolist()) if any_pixel]
         if not reached:
             return

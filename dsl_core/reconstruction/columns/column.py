@@ -30,6 +30,10 @@ MODEL_ERROR = 0.0015
 COMB_ERROR = 0.05
 #: A refined column this far from the decoded one is not the same peak.
 MAX_SHIFT_PX = 2.0
+#: Columns less sure than this are weighed over all places as far from the decoded one as that, and so many.
+LOOSE_PX, FARTHEST_PX, PLACES = 0.08, 1.2, 49
+#: How sure the ends of a decoded column are.
+CODE_STD_PX = 0.15
 #: Above this reduced chi-square the profile does not fit (two surfaces in one pixel, motion).
 MAX_CHI_SQUARE = 25.0
 #: Peaks beyond that are fitted again, as wide as surfaces out of focus make them (relative to what is
@@ -86,6 +90,12 @@ def refine(
     good = (fit.used > 3) & (fit.amplitude > 0) & (chi_square < limit) & (std_px < 1 / math.sqrt(12))
     good &= ((q - coarse_px).abs() < MAX_SHIFT_PX) & torch.isfinite(q)
     otherwise = torch.where(fit.measured, fit.brightest, torch.maximum(fit.amplitude, fit.brightest))
+    loose = torch.nonzero(good & ~unusual & (std_px > LOOSE_PX)).ravel()
+    if lines.single and len(loose):
+        some = coarse_px[loose], radiance[:, loose], std[:, loose], lines, response
+        own = None if widths is None else widths[loose]
+        scale = chi_square[loose].clip(min=1)
+        q[loose], std_px[loose] = _loose_columns(*some, own, model_error, fit.amplitude[loose], scale)
     return Column(
         torch.where(good, q, coarse_px),
         torch.where(good, std_px, torch.full_like(q, 1 / math.sqrt(12))),
@@ -94,6 +104,43 @@ def refine(
         good,
         good & unusual,
     )
+
+
+def _loose_columns(
+    coarse_px: Tensor,
+    radiance: Tensor,
+    std: Tensor,
+    lines: LineSet,
+    response: ProjectorResponse,
+    widths: Tensor | None,
+    model_error: float,
+    amplitude: Tensor,
+    scale: Tensor,
+) -> tuple[Tensor, Tensor]:
+    """Mean and deviation (px) of columns over all places that explain the lines and the code.
+
+    Where lines are no narrower than their step, none shows a slope in the middle of one: a fit stops where
+    one begins, and its curvature there knows nothing of the places in between. ``scale`` is how many times
+    too large chi-squares are.
+    """
+    places = torch.linspace(-FARTHEST_PX, FARTHEST_PX, PLACES).to(coarse_px)
+    widest = 1.0 if widths is None else float(widths.max())
+    y, variance, centres = _window(coarse_px, radiance, std, lines, response.blur_px * widest)
+    weight = 1 / (variance + (model_error * amplitude) ** 2)
+    reach_px = float((coarse_px - centres).abs().max()) + FARTHEST_PX
+    table = LineTable(lines.width_px, response, reach_px, coarse_px, widths)
+    likely = torch.empty((PLACES, len(coarse_px))).to(coarse_px)
+    for row, place in zip(likely, places, strict=True):
+        g, _ = table.at(coarse_px + place - centres)
+        wg = weight * g
+        row[:] = -(weight * y * y).sum(0) + (wg * y).sum(0) ** 2 / (wg * g).sum(0).clip(min=1e-30)
+    # The code names a column, and is not sure at its ends.
+    named = torch.special.log_ndtr((0.5 - places.abs()) / CODE_STD_PX)
+    share = torch.softmax(likely / (2 * scale) + named[:, None], 0)
+    away = places[:, None]
+    mean = (share * away).sum(0)
+    spread = (share * (away - mean) ** 2).sum(0)
+    return coarse_px + mean, torch.sqrt(spread + (places[1] - places[0]) ** 2 / 12)
 
 
 @dataclass(frozen=True)

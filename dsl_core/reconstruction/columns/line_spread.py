@@ -36,6 +36,8 @@ EDGE_STEPS = 4.0
 REGIONS = (4, 6)
 #: Runs of a region, at least and at most, and how often they are asked: each time most of a wave is found.
 FEWEST, MOST, ASKED = 30, 400, 3
+#: Pixels of a run that lines refined, at least.
+MOST_OF_RUN = 7
 
 
 def own_spread(
@@ -115,10 +117,12 @@ def wave_std_px(
     """Rms of the waves around each pixel (rows, columns), px; 0 where there are none or nobody can tell.
 
     ``column_px`` and ``refined`` (rows, columns) are the columns of all pixels and where lines refined them.
+    Regions too small to tell have what the whole picture tells.
     """
     std = np.zeros(column_px.shape, np.float32)
     if lines is None or not lines.single:
         return std
+    usual = _rms(column_px, refined, lines.step_px) or 0.0
     rows, columns = (
         np.linspace(0, size, parts + 1).astype(int)
         for size, parts in zip(column_px.shape, REGIONS, strict=True)
@@ -126,23 +130,25 @@ def wave_std_px(
     for top, bottom in pairwise(rows):
         for left, right in pairwise(columns):
             where = np.s_[top:bottom, left:right]
-            std[where] = _rms(column_px[where], refined[where], lines.step_px)
+            own = _rms(column_px[where], refined[where], lines.step_px)
+            std[where] = usual if own is None else own
     return std
 
 
-def _rms(column_px: NDArray[np.floating], refined: NDArray[np.bool_], period_px: float) -> float:
-    """Rms of the wave of a region, px."""
+def _rms(column_px: NDArray[np.floating], refined: NDArray[np.bool_], period_px: float) -> float | None:
+    """Rms of the wave of a region, px; None where too few runs tell."""
     width = column_px.shape[1] // RUN * RUN
     used = refined[:, :width].reshape(-1, RUN)
-    whole = np.flatnonzero(used.all(1))
-    whole = whole[:: max(len(whole) // MOST, 1)]
-    if len(whole) < FEWEST:
-        return 0.0
-    runs = torch.as_tensor(column_px[:, :width].reshape(-1, RUN)[whole].astype(np.float64))
+    some = np.flatnonzero(used.sum(1) >= MOST_OF_RUN)
+    some = some[:: max(len(some) // MOST, 1)]
+    if len(some) < FEWEST:
+        return None
+    runs = torch.as_tensor(column_px[:, :width].reshape(-1, RUN)[some].astype(np.float64))
+    there = torch.as_tensor(used[some])
     straight = runs
     for _ in range(ASKED):
-        wave = column_wave(straight, torch.ones_like(runs, dtype=torch.bool), period_px)
+        wave = column_wave(straight, there, period_px)
         if int(wave.smooth.sum()) < FEWEST:
-            return 0.0
+            return None
         straight = straight - wave.px
-    return float((runs - straight)[wave.smooth].square().mean().sqrt())
+    return float((runs - straight)[wave.smooth][there[wave.smooth]].square().mean().sqrt())

@@ -25,6 +25,7 @@ from dsl_core.reconstruction.light.course import (
     light_course,
 )
 from dsl_core.reconstruction.light.line_levels import LineLevels, candidates, line_levels
+from dsl_core.reconstruction.light.room_flicker import room_flicker
 from dsl_core.reconstruction.light.setting_ratios import Ratio
 from dsl_core.reconstruction.light.steady import SteadyLight
 from dsl_core.reconstruction.light.sudden import (
@@ -43,6 +44,8 @@ LEVEL_ERROR = 0.004
 LEAST_APART, APART = 0.01, "settings against each other"
 #: Changes of black that matter: first orders of dark surfaces are a few numbers bright.
 MOST_BLACK_DN = 0.5
+#: Rms of a flicker's changes of black that two pictures of it hardly exceed.
+USUAL_FLICKERS = 3.0
 _CORRECTED = " The frames are corrected for it."
 
 
@@ -104,8 +107,18 @@ def follow_light(
         code, white = frames.decode(progress)
         pixels = look()
         whites = [_without(each, exposed) for each in whites]
-    black = black_wander(blacks, sudden)
-    told = (*([] if black is None or not black.significant else [black]), *_told_of_light(sudden))
+    room = room_flicker(frames, code.column, frames.pick(pixels, progress), exposed)
+    if room is not None:
+        exposed = room.exposed(exposed or Exposed.as_planned(frames.plan.shot_count))
+        frames.expose(exposed)
+        code, white = frames.decode(progress)
+        pixels = look()
+    black = black_wander(blacks, sudden, 0.0 if room is None else room.rms_dn)
+    told = (
+        *([] if black is None or not black.significant else [black]),
+        *([] if room is None else [room.finding]),
+        *_told_of_light(sudden),
+    )
     if black is not None and black.significant and (sudden is None or not sudden.explains_black):
         # Dim settings show the change of black rather than that of the light.
         frames.ratios = {}
@@ -147,8 +160,13 @@ def blacks_again(scan: Pictures) -> list[Again]:
     return changes
 
 
-def black_wander(blacks: Sequence[Again], sudden: SuddenChanges | None = None) -> FitFinding | None:
-    """What `blacks_again` says to a person, and since when; None without any."""
+def black_wander(
+    blacks: Sequence[Again], sudden: SuddenChanges | None = None, flicker_dn: float = 0.0
+) -> FitFinding | None:
+    """What `blacks_again` says to a person, and since when; None without any.
+
+    Of a black that flickers from frame to frame (``flicker_dn`` rms), changes by as much are no news.
+    """
     if not blacks:
         return None
     means, stds = (np.array([getattr(each, name) for each in blacks]) for name in ("more", "std"))
@@ -161,7 +179,7 @@ def black_wander(blacks: Sequence[Again], sudden: SuddenChanges | None = None) -
         "black taken again",
         (float(np.sqrt(np.mean(means**2))), float(np.sqrt(np.mean(stds**2)))),
         "DN",
-        MOST_BLACK_DN,
+        max(MOST_BLACK_DN, USUAL_FLICKERS * flicker_dn),
         f"Black pictures changed by up to {means[np.abs(means).argmax()]:+.1f} DN during the scan: the black"
         f" level of the camera drifts, or the light of the room changes.{what}",
         "Let the camera warm up, switch on its black-level correction, and keep the light of the room away.",

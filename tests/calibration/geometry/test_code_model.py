@@ -131,6 +131,11 @@ def test_a_map_moves_by_half_a_pixel_at_most_and_not_without_thirty_pixels() -> 
         found = fit.steps(table, windows, [(seen[0][0], weight)], start)
         assert bool((found != start).any()) == moves
     assert fit.steps(table, [], [], maps[:0]).shape == (0, 6)
+    # Pixels of two rows tell nothing of a curve across rows.
+    two_rows = np.isin(windows[0].rows, [30, 31]).astype(float)
+    found = fit.steps(table, windows, [(seen[0][0], two_rows)], np.add(maps, [0.2, 0, 0, 0, 0, 0]))
+    assert 30 <= two_rows.sum() < 40
+    assert np.abs(found - maps).max() < 0.15
 
 
 def test_windows_are_the_pixels_within_a_radius_and_their_terms_those_of_a_quadratic() -> None:

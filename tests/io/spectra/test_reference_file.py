@@ -75,6 +75,14 @@ def test_byte_order_offset_scale_and_falling_wavelengths_are_understood(tmp_path
     assert read_references(path).references[0].name == "Grün"
 
 
+def test_a_library_cut_off_after_its_offset_is_told(tmp_path: Path) -> None:
+    path = write_library(tmp_path / "a.sli", {"header offset": 12}, offset=12)
+    path.write_bytes(path.read_bytes()[:-4])
+    wanted = 2 * len(NM)
+    with pytest.raises(CalibrationError, match=rf"are {wanted} values, but it contains {wanted - 1}\."):
+        read_references(path)
+
+
 def test_deleted_values_are_neither_shown_nor_bridged(tmp_path: Path) -> None:
     path = write_library(tmp_path / "a.sli", {"data ignore value": -1})
     values = np.stack([GRASS, BRICK]).astype("<f4")

@@ -28,8 +28,9 @@ def scene(orders: tuple[int, ...] = (0, 1)) -> SimpleNamespace:
     entries = np.zeros((2, 2 * SUPPORTS.max() + 1))
     for values, support in zip(entries, SUPPORTS, strict=True):
         values[1 : 2 * support] = rng.uniform(0.1, 1.0, 2 * support - 1)
-    # Order +1 rises with the bands and order -1 falls; one sample has one band, the last has none.
-    start = rng.integers(6, 20, (1, SAMPLES))
+    # Order +1 rises with the bands, beyond the lit frames, and order -1 falls; one sample has one band, the
+    # last has none.
+    start = rng.integers(6, 32, (1, SAMPLES))
     rising = np.cumsum(np.vstack([start, rng.integers(2, 9, (BANDS - 1, SAMPLES))]), 0)
     columns = np.stack([rising, 60 - rising]).astype(np.int32)
     inside = rng.random(columns.shape) < 0.8

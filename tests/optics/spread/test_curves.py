@@ -50,6 +50,8 @@ def test_density_step_and_band_belong_together(spread: LineSpread) -> None:
 def test_the_reach_leaves_the_stated_share_outside() -> None:
     assert step_response(SKEWED, np.array([reach_px(SKEWED)])) == pytest.approx(1 - BEYOND, abs=1e-4)
     assert reach_px(GAUSSIAN) == pytest.approx(2.512 * BLUR_PX, abs=0.01)
+    mirrored = LineSpread.of(np.where(PLACES <= 0, np.exp(PLACES / BLUR_PX), 0.0), STEP_PX)
+    assert reach_px(mirrored) == pytest.approx(reach_px(SKEWED), abs=0.01)
     # A band's table is long enough for a curve with tails.
     table = ProfileTable(5.0, SKEWED, 2.4, torch.device("cpu"), torch.float64)
     assert table.support_px >= 2.5 + 2.4 + reach_px(SKEWED)

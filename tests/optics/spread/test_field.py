@@ -93,10 +93,11 @@ def test_a_known_field_stands_until_lines_say_otherwise() -> None:
 
 
 def test_a_width_beyond_the_measured_places_stays_and_where_there_is_no_place_it_is_the_usual_one() -> None:
-    column = torch.tensor([620.0, 900.0, torch.nan, 320.0])
-    row = torch.tensor([350.0, 5000.0, 10.0, 180.0])
+    column = torch.tensor([620.0, 900.0, torch.nan, 320.0, 20.0, -900.0])
+    row = torch.tensor([350.0, 5000.0, 10.0, 180.0, 10.0, -900.0])
+    right, left = math.exp(0.11), math.exp(0.05)
     assert relative_width(FIELD, column, row).tolist() == pytest.approx(
-        [math.exp(0.11), math.exp(0.11), 1.0, math.exp(-0.1)]
+        [right, right, 1.0, math.exp(-0.1), left, left]
     )
     steep = FIELD.model_copy(update={"coefficients": (5.0,)})
     assert relative_width(steep, column, row).amax() == RANGE[1]

@@ -57,6 +57,25 @@ def test_refinement_is_unbiased_and_states_its_deviation() -> None:
     assert 0.8 < float(relative.std()) < 1.1
 
 
+def test_columns_in_the_middle_of_lines_that_do_not_overlap_are_as_unsure_as_stated() -> None:
+    apart = LineSet(width_px=5, step_px=5, first_px=2.0, lines=128, frames=128)
+    column, amplitude, _, _ = noisy(0.02)
+    generator = torch.Generator().manual_seed(5)
+    away = column - apart.centre_px(torch.arange(apart.lines))[:, None]
+    exact = amplitude * zero_order_profile(away, -2.5, 2.5, RESPONSE)
+    radiance = exact + 0.02 * torch.randn(exact.shape, generator=generator)
+    found = refine(column.round(), radiance, torch.full_like(exact, 0.02), apart, RESPONSE)
+    error = (found.column_px - column).abs()
+    loose = found.refined & (found.std_px > 0.08)
+    assert 0.2 < float(loose.float().mean()) < 0.6
+    assert float((error < 1.96 * found.std_px)[found.refined].float().mean()) > 0.94
+    assert float((error < 1.96 * found.std_px)[loose].float().mean()) > 0.94
+    assert error[loose].square().mean().sqrt() < 0.25
+    own = torch.ones_like(column)
+    same = refine(column.round(), radiance, torch.full_like(exact, 0.02), apart, RESPONSE, own)
+    assert (same.column_px - found.column_px).abs().max() < 1e-3
+
+
 def test_every_pixel_is_refined_by_its_own_width_of_the_spread() -> None:
     column, amplitude, _, std = noisy(0.01)
     widths = torch.where(torch.arange(PIXELS) % 2 == 0, 0.8, 1.3)

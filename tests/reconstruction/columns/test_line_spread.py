@@ -112,9 +112,17 @@ def test_waves_widen_the_deviation_where_they_are() -> None:
     assert std[:, 120:].max() < 0.002
 
 
-def test_nothing_is_said_of_pixels_that_no_single_lines_refined() -> None:
+def test_gaps_hide_no_waves_and_small_pictures_are_asked_as_a_whole() -> None:
     refined = np.ones((160, 240), bool)
     refined[:, ::7] = False
+    assert wave_std_px(columns(), refined, LINES)[:, :120].min() > 0.8 * 0.06 / np.sqrt(2)
+    small = wave_std_px(columns()[:40, :120], refined[:40, :120], LINES)
+    assert small.min() == small.max() > 0.8 * 0.06 / np.sqrt(2)
+
+
+def test_nothing_is_said_of_pixels_that_no_single_lines_refined() -> None:
+    refined = np.ones((160, 240), bool)
+    refined[:, ::2] = False
     assert not wave_std_px(columns(), refined, LINES).any()
     assert not wave_std_px(columns(), ~refined, None).any()
     comb = LineSet.of(CapturePlan(spectral=LineComb(shifts_px=(0, 0, 0))))

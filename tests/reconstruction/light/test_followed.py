@@ -16,8 +16,10 @@ from dsl_core.reconstruction.hdr import MergedFrame
 from dsl_core.reconstruction.light import followed
 from dsl_core.reconstruction.light.course import LightCourse
 from dsl_core.reconstruction.light.line_levels import LineLevels
+from dsl_core.reconstruction.light.room_flicker import RoomFlicker
 from dsl_core.reconstruction.light.setting_ratios import Ratio
 from dsl_core.reconstruction.light.steady import SteadyLight
+from dsl_core.reconstruction.merge import Exposed
 from dsl_core.simulation.published_rig import published_rig
 
 PLAN = CapturePlan(
@@ -215,7 +217,13 @@ class Followed:
         self.white = MergedFrame(ones, 0.01 * ones, np.zeros(shape, bool))
         monkeypatch.setattr(followed, "light_course", lambda witnesses, shots: next(courses))
         monkeypatch.setattr(followed, "line_levels", lambda *given: lines)
+        monkeypatch.setattr(followed, "room_flicker", lambda *given: self.room)
+        self.room: RoomFlicker | None = None
         self.looked: list[int] = []
+
+    def expose(self, exposed: Exposed) -> None:
+        self.asked.append("expose")
+        self.exposed = exposed
 
     def decode(self, progress: Any) -> tuple[Any, MergedFrame]:
         self.asked.append("decode")
@@ -224,7 +232,7 @@ class Followed:
     def run(self) -> tuple[Any, ...]:
         scan = scan_of(
             source=SimpleNamespace(read=lambda shot: np.full((3, 4), 400, np.uint16)),
-            expose=lambda levels: self.asked.append("expose"),
+            expose=self.expose,
             follow=self.light.append,
             decode=self.decode,
             look=lambda pixels, progress: self.looked.append(len(pixels)),
@@ -241,6 +249,16 @@ def test_steady_light_is_left_alone_and_looked_at_once(monkeypatch: pytest.Monke
     assert not made.light
     assert made.looked == [13], "its own twelve pixels and one more of those that were asked for"
     assert len(findings) == 2
+
+
+def test_frames_are_looked_at_again_without_what_the_room_adds(monkeypatch: pytest.MonkeyPatch) -> None:
+    made = Followed(monkeypatch, course_of(), course_of(), levels_of())
+    made.room = RoomFlicker({3: 1.5}, {}, 0.7, 0.05)
+    _, _, findings = made.run()
+    assert made.asked == ["expose", "decode"]
+    assert made.looked == [13, 13]
+    assert made.exposed.black_dn.tolist() == [1.5 if k == 3 else 0.0 for k in range(PLAN.shot_count)]
+    assert findings[0].name == "flicker of the room"
 
 
 @pytest.mark.parametrize(("misfit", "believed"), [(0.19, True), (0.21, False)])

@@ -149,6 +149,22 @@ def test_banded_and_dense_solver_agree() -> None:
     assert (by_band.data_share - dense.data_share).abs().max() < 1e-9
 
 
+def test_equations_that_are_not_positive_lose_that_part_and_others_stay() -> None:
+    random = torch.Generator().manual_seed(2)
+    vectors = torch.linalg.qr(torch.randn((BANDS, BANDS), generator=random, dtype=torch.float64)).Q
+    values = torch.linspace(50, 5000, BANDS, dtype=torch.float64)
+    sound = (vectors * values) @ vectors.T
+    negative, without = values.clone(), values.clone()
+    negative[0], without[0] = -1e3, 0.0
+    right = torch.full((2, BANDS), 40.0, dtype=torch.float64)
+    prior = Prior(taus=ONE_TAU)
+    broken = torch.stack([sound, (vectors * negative) @ vectors.T])
+    found = solve_dense(broken, right, prior)
+    wanted = solve_dense(torch.stack([sound, (vectors * without) @ vectors.T]), right, prior)
+    assert (found.mean - wanted.mean).abs().max() < 1e-6
+    assert (found.std / wanted.std - 1).abs().max() < 1e-6
+
+
 def test_band_mean_keeps_straight_lines_and_area() -> None:
     line = torch.linspace(0, 1, 9, dtype=torch.float64)[:, None]
     assert (band_mean(line) - line)[1:-1].abs().max() < 1e-12

@@ -1,0 +1,90 @@
+"""What columns may be off by because nobody knows the line spread better.
+
+A spread that is off moves columns by as much as it moves them between two lines. Lines that overlap show the
+spread themselves; those that do not leave it to the calibration, and the focus of a projector changes from
+day to day.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+
+from dsl_core.model.rig import Rig
+from dsl_core.optics.lines.line_set import LineSet
+from dsl_core.optics.spread.field import widths_at
+from dsl_core.optics.spread.fit import SpreadFit
+from dsl_core.patterns.gray_code import DecodedCode
+from dsl_core.reconstruction.columns.column import refine
+from dsl_core.reconstruction.columns.line_spread import Pickable, spread_pixels
+from dsl_core.reconstruction.hdr import MergedFrame
+from dsl_core.solve.threads import one_kernel_thread
+
+#: Relative deviation of the width of the spread from its calibration, before a scan is seen.
+FOCUS_STD = 0.06
+#: A width that is surer than this moves no column by as much as anybody minds.
+SURE = 0.003
+#: By how much the width is changed to see what moves, and places between two lines that are told apart.
+STEP, PLACES = 0.03, 16
+#: No column moves farther than this with the width, px for a width twice as large.
+LARGEST_PX = 3.0
+
+
+@dataclass(frozen=True)
+class SpreadDoubt:
+    """Deviation of columns (px) at ``PLACES`` places between two lines, the first on the middle of one."""
+
+    lines: LineSet
+    std_px: NDArray[np.float64]
+
+    def at(self, column_px: NDArray[np.floating]) -> NDArray[np.float32]:
+        """Deviation at columns of any shape, px; 0 where they are NaN."""
+        place = _places(self.lines, torch.as_tensor(np.nan_to_num(column_px)))
+        return np.where(np.isfinite(column_px), self.std_px[place.numpy()], 0.0).astype(np.float32)
+
+
+def spread_doubt(
+    rig: Rig,
+    lines: LineSet | None,
+    code: DecodedCode,
+    white: MergedFrame,
+    stack: Pickable,
+    found: SpreadFit | None,
+) -> SpreadDoubt | None:
+    """How far columns move with a width that is neither calibrated nor ``found`` any better.
+
+    None where single lines do not cover the picture, and where it is known well enough.
+    """
+    pixels = spread_pixels(lines, code, white)
+    relative = FOCUS_STD
+    if found is not None:
+        seen = found.rms_std_px / found.response.blur_px
+        relative *= seen / float(np.hypot(FOCUS_STD, seen))
+    if lines is None or pixels.size == 0 or relative < SURE:
+        return None
+    picked = stack.pick(pixels)
+    with one_kernel_thread():
+        column = torch.as_tensor(code.likely_column.ravel()[pixels].astype(np.float64))
+        known = widths_at(rig, torch.as_tensor(pixels), column)
+        widths = torch.ones_like(column) if known is None else known
+        y, std = (torch.as_tensor(values.astype(np.float64)) for values in (picked.radiance, picked.std))
+        usual, wider = (
+            refine(column, y, std, lines, rig.projector_response, widths * by) for by in (1.0, 1 + STEP)
+        )
+    both = usual.refined & wider.refined
+    place = _places(lines, usual.column_px[both]).numpy()
+    moved = ((wider.column_px - usual.column_px)[both] / STEP).numpy().clip(-LARGEST_PX, LARGEST_PX)
+    count = np.bincount(place, minlength=PLACES)
+    square = np.bincount(place, moved**2, PLACES) / np.maximum(count, 1)
+    # Where no column is, lines say nothing: neighbours stand for it.
+    square[count == 0] = square[count > 0].max(initial=0.0)
+    return SpreadDoubt(lines, relative * np.sqrt(square))
+
+
+def _places(lines: LineSet, column_px: torch.Tensor) -> torch.Tensor:
+    """Which of the places between two lines columns are at."""
+    nearest = lines.centre_px(lines.nearest(column_px)).to(column_px.dtype)
+    return ((column_px - nearest) / lines.step_px * PLACES).round().long() % PLACES

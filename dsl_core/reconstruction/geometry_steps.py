@@ -1,0 +1,100 @@
+"""From frames to depth, points and normals of a whole picture, in three steps that can be timed."""
+
+from __future__ import annotations
+
+from functools import partial
+
+import numpy as np
+
+from dsl_core.model.fit import FitFinding
+from dsl_core.model.options import Options
+from dsl_core.model.rig import Rig
+from dsl_core.optics.lines.line_set import LineSet
+from dsl_core.patterns.gray_code import DecodedCode
+from dsl_core.progress import Progress
+from dsl_core.reconstruction.camera_spot import follow_spot, spot_finding
+from dsl_core.reconstruction.code_agreement import NamedPlaces, code_agreement
+from dsl_core.reconstruction.columns.column import MODEL_ERROR
+from dsl_core.reconstruction.columns.line_spread import own_spread, spread_pixels, with_own_spread
+from dsl_core.reconstruction.columns.peak_error import own_peak_error
+from dsl_core.reconstruction.columns.spread_doubt import spread_doubt
+from dsl_core.reconstruction.geometry import Geometry, geometry_of, require_light, require_pixels
+from dsl_core.reconstruction.hdr import MergedFrame
+from dsl_core.reconstruction.lenses import follow_lenses
+from dsl_core.reconstruction.light.followed import follow_light, unsure_level
+from dsl_core.reconstruction.rows.columns import columns_by_rows
+from dsl_core.reconstruction.rows.frames import ScanFrames
+from dsl_core.reconstruction.spread_findings import spread_findings
+
+
+class GeometrySteps:
+    """`decode`, `read_lines` and `measure`, in this order.
+
+    Unless all is ``as_calibrated``, light, line spread and lenses are followed: ``rig`` becomes the rig as
+    this scan has it, and ``findings`` say in what it differs from its calibration.
+    """
+
+    def __init__(self, rig: Rig, options: Options, frames: ScanFrames, progress: Progress) -> None:
+        """The frames are followed, too: later steps see them as in steady light."""
+        self.rig = rig
+        self.findings: list[FitFinding] = []
+        self._lines = LineSet.of(frames.plan)
+        self._options, self._frames, self._progress = options, frames, progress
+        # Of large pictures these take much of the memory: they are kept no longer than they are needed.
+        self._decoded: tuple[DecodedCode, MergedFrame] | None = None
+
+    def decode(self) -> None:
+        """Read what the binary code says of every pixel; raises `DslError` if nothing is lit."""
+        self._decoded = self._frames.decode(self._progress)
+        white = self._decoded[1]
+        require_light(white.radiance, white.saturated)
+
+    def read_lines(self) -> None:
+        """Look at the line frames once, and follow the light through all frames."""
+        if self._options.as_calibrated:
+            self._frames.look(progress=self._progress)
+            return
+        code, white, found = follow_light(
+            self._frames, *self._taken(), partial(spread_pixels, self._lines), self._progress
+        )
+        self._decoded = code, white
+        self.findings += found
+        unsure = float(np.hypot(self.rig.white_scale_rel_std, unsure_level(self._frames.plan, found)))
+        self.rig = self.rig.model_copy(update={"white_scale_rel_std": unsure})
+
+    def measure(self) -> Geometry:
+        """Columns, depth and surface; raises `DslError` if no pixel has a depth."""
+        options, frames, lines = self._options, self._frames, self._lines
+        code, white = self._taken()
+        refines_rig = options.refine_columns and not options.as_calibrated
+        peak_error, calibrated, spread, doubt = MODEL_ERROR, self.rig.projector_response, None, None
+        if refines_rig:
+            spread = own_spread(self.rig, lines, code, white, frames)
+            self.rig = with_own_spread(self.rig, spread)
+            peak_error = own_peak_error(self.rig, lines, code, white, frames)
+            doubt = spread_doubt(self.rig, lines, code, white, frames, spread)
+        columns = columns_by_rows(self.rig, options, frames, code, white, peak_error, self._progress)
+        named = NamedPlaces.of(code)
+        del code, white
+        refined_by = lines if options.refine_columns else None
+        geometry = geometry_of(self.rig, refined_by, columns, frames.shape, options.surface_window_px, doubt)
+        del columns
+        require_pixels(geometry.flags)
+        if not refines_rig:
+            return geometry
+        window_px = options.surface_window_px
+        self.rig, geometry, found = follow_lenses(self.rig, lines, geometry, window_px)
+        self.findings += found
+        geometry, spot = follow_spot(self.rig, lines, geometry, window_px)
+        if spot is not None:
+            self.findings.append(spot_finding(spot))
+        if spread is not None:
+            self.findings += spread_findings(calibrated, spread, 0.0 if spot is None else spot.columns_px)
+        geometry, found = code_agreement(self.rig, frames.plan, named, geometry, window_px)
+        self.findings += found
+        return geometry
+
+    def _taken(self) -> tuple[DecodedCode, MergedFrame]:
+        decoded, self._decoded = self._decoded, None
+        assert decoded is not None, "decode() comes first"
+        return decoded

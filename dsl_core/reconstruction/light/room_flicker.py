@@ -1,0 +1,234 @@
+"""Light of the room, or a black level, that differs from frame to frame, and what that adds to each of them.
+
+Away from a line a picture holds black and the faint light of first orders, which changes slowly from frame to
+frame. What a frame has more than its neighbours there is a multiple of that light where the projector
+flickers, and the same in all pixels, or a multiple of what the room lights, where something else does. Taken
+for a flicker of the projector, a single DN from the room makes much of a faint first order.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dsl_core.model.fit import FitFinding
+from dsl_core.model.plan import ScanLines, Shot
+from dsl_core.optics.sensor import raw_variance
+from dsl_core.reconstruction.light.line_levels import AROUND, PIXELS, pitch_of, zone_px
+from dsl_core.reconstruction.light.neighbour_steps import Scan
+from dsl_core.reconstruction.merge import Exposed, PickedLines
+
+Floats = NDArray[np.float64]
+
+#: Frames, and pixels away from a line, that are needed to tell anything.
+FRAMES, FEWEST = 16, 60
+#: The rms of what frames have more has to be so many deviations of a single one, and this share of the noise
+#: of a single pixel: less is hidden in it.
+SIGMAS, OF_NOISE = 3.0, 0.05
+#: Narrow bands that come and go leave less than this, which is taken off and not told.
+LEAST_TOLD_DN = 0.2
+#: Variance of black over a picture, relative to its noise, from which on it may be the room that is seen.
+CONTRAST = 1.0
+#: What an interpolated frame may be off by, relative to the light of so many frames on either side.
+INTERPOLATED, NEAR = 0.2, 4
+#: Differences count up to so many deviations, and how often that is asked.
+CLIP, ROUNDS = 4.0, 3
+#: How far the light of a projector may be off that of neighbouring frames, relative to it.
+PROJECTOR_STD = 0.3
+#: Sum of the squares of the shares by which a frame is interpolated.
+_SQUARES = sum(share**2 for share in AROUND.values())
+
+
+@dataclass(frozen=True)
+class RoomFlicker:
+    """What shots of lines have more than their black frame: ``dn`` in every pixel or a ``share`` of black.
+
+    Both by index of the shot. ``rms_dn``, with its deviation, is that of the setting where it is most.
+    """
+
+    dn: Mapping[int, float]
+    share: Mapping[int, float]
+    rms_dn: float
+    std_dn: float
+
+    def exposed(self, before: Exposed) -> Exposed:
+        """In what light shots were taken, besides what was known of it before."""
+        dn, share = before.black_dn.copy(), before.black_share.copy()
+        for known, found in ((dn, self.dn), (share, self.share)):
+            for shot, more in found.items():
+                known[shot] += more
+        return replace(before, black_dn=dn, black_share=share)
+
+    @property
+    def finding(self) -> FitFinding:
+        """What it says to a person."""
+        return FitFinding.judged(
+            "light",
+            "flicker of the room",
+            (self.rms_dn, self.std_dn),
+            "DN",
+            LEAST_TOLD_DN,
+            f"The light of the room, or the black level, differed by {self.rms_dn:.2f} DN (rms) from frame to"
+            " frame. The frames of lines are corrected for it.",
+            "Keep the light of the room away, or use lamps that do not flicker.",
+        )
+
+
+@dataclass(frozen=True)
+class _Places:
+    """Columns of some pixels (P,), rising, and how far from a line they are away from it, px."""
+
+    lines: ScanLines
+    column: Floats
+    zone_px: float
+
+    def away(self, pattern: int) -> NDArray[np.intp]:
+        """Pixels that are away from the line of a pattern."""
+        middle = pattern * self.lines.step_px + self.lines.width_px / 2
+        first, last = np.searchsorted(self.column, (middle - self.zone_px, middle + self.zone_px))
+        return np.r_[0:first, last : len(self.column)]
+
+
+@dataclass(frozen=True)
+class _Found:
+    """What frames have more (frames,) of something; the rms of it, and the deviation of that."""
+
+    more: Floats
+    rms: float
+    rms_std: float
+
+
+def room_flicker(
+    scan: Scan, column: NDArray[np.integer], seen: PickedLines, before: Exposed | None
+) -> RoomFlicker | None:
+    """What frames of single lines have more than their neighbours; None where that does not matter.
+
+    ``seen`` are the merged lines of some pixels, which decide whether to look any closer; ``column`` is the
+    projector column of each pixel of the picture, negative where unknown.
+    """
+    lines = scan.plan.spectral
+    if not isinstance(lines, ScanLines) or len(seen.radiance) < FRAMES:
+        return None
+    known = np.flatnonzero(np.isfinite(seen.std).all(0) & (column.ravel()[seen.pixels] >= 0))
+    pixels = seen.pixels[known[:: max(len(known) // PIXELS, 1)]]
+    pixels = pixels[np.argsort(column.ravel()[pixels], kind="stable")]
+    places = _Places(lines, column.ravel()[pixels].astype(np.float64), zone_px(lines, pitch_of(column)))
+    picked = seen.pick(pixels)
+    variance, same = np.square(picked.std, dtype=np.float64), np.ones((1, len(pixels)))
+    if _flicker(places, picked.radiance.astype(np.float64), variance, same)[0] is None:
+        return None
+    exposed = before or Exposed.as_planned(scan.plan.shot_count)
+    dn: dict[int, float] = {}
+    share: dict[int, float] = {}
+    most = (0.0, 0.0)
+    for setting in range(len(scan.plan.settings)):
+        shots = [
+            next(shot for shot in scan.shots_of("spectral", pattern) if shot.setting == setting)
+            for pattern in range(scan.plan.spectral_count)
+        ]
+        black = scan.source.read(next(s for s in scan.shots_of("black", 0) if s.setting == setting))
+        dark = black.ravel()[pixels].astype(np.float64) - scan.rig.sensor.black_level_dn
+        of_setting = _of_setting(scan, shots, pixels, places, dark, exposed)
+        for known, found, unit_dn in zip((dn, share), of_setting, (1.0, float(dark.mean())), strict=True):
+            if found is not None:
+                known.update({shot.index: float(more) for shot, more in zip(shots, found.more, strict=True)})
+                most = max(most, (found.rms * unit_dn, found.rms_std * unit_dn))
+    return RoomFlicker(dn, share, *most) if dn or share else None
+
+
+def _of_setting(
+    scan: Scan,
+    shots: list[Shot],
+    pixels: NDArray[np.intp],
+    places: _Places,
+    dark: Floats,
+    exposed: Exposed,
+) -> tuple[_Found | None, _Found | None]:
+    """What frames have more: DN in every pixel, and a share of ``dark``, black above its level."""
+    sensor = scan.rig.sensor
+    frames = np.empty((len(shots), len(pixels)))
+    for row, shot in zip(frames, shots, strict=True):
+        known = exposed.black_dn[shot.index] + exposed.black_share[shot.index] * dark
+        row[:] = scan.source.read(shot).ravel()[pixels] - sensor.black_level_dn - known
+    variance, noise = raw_variance(sensor, frames), raw_variance(sensor, dark)
+    frames -= dark
+    same = np.ones_like(dark)
+    if dark.var() - noise.mean() > CONTRAST * noise.mean():
+        both = _flicker(places, frames, variance, np.stack([same, dark]), noise)
+        if any(both):
+            return both[0], both[1]
+    return _flicker(places, frames, variance, same[None], noise)[0], None
+
+
+def _flicker(
+    places: _Places, frames: Floats, variance: Floats, shapes: Floats, black: Floats | float = 0.0
+) -> list[_Found | None]:
+    """What frames (frames, P) have more of ``shapes`` (n, P) than their neighbours; None where it is chance.
+
+    ``black`` (P,) is the variance of the black picture that was taken off all frames, and which is the second
+    of the shapes.
+    """
+    count, of_black = len(frames), np.broadcast_to(black, frames.shape[1:])
+    kept, own, std = [], [], []
+    for k in range(2, count - 2):
+        pixels = places.away(k)
+        if len(pixels) < FEWEST:
+            continue
+        around = np.sum([share * frames[k + by, pixels] for by, share in AROUND.items()], axis=0)
+        of_around = np.sum([share**2 * variance[k + by, pixels] for by, share in AROUND.items()], axis=0)
+        away, design = frames[k, pixels] - around, np.stack([around, *shapes[:, pixels]])
+        # Bands narrower than a few steps of the lines do not change slowly: what is lit by none counts most.
+        light = frames[max(k - NEAR, 0) : k + NEAR + 1, pixels].mean(0)
+        sure = 1 / (variance[k, pixels] + of_around + (INTERPOLATED * light) ** 2)
+        weight = sure
+        for _ in range(ROUNDS):
+            normal, right = (design * weight) @ design.T, (design * weight) @ away
+            # Noise that both sides share has its products in these sums, which light has not. The square of
+            # the light keeps its own: light below the noise tells nothing of the projector.
+            normal[0, 0] += PROJECTOR_STD**-2
+            right[0] += weight @ of_around
+            if len(shapes) > 1:
+                dark = weight @ of_black[pixels]
+                normal[0, 2] = normal[2, 0] = normal[0, 2] + dark
+                normal[2, 2] -= dark
+            inverse = np.linalg.pinv(normal, hermitian=True)
+            found = inverse @ right
+            left = np.abs(away - found @ design) * np.sqrt(sure)
+            usual = max(float(np.median(left)) / 0.6745, 1.0)
+            weight = sure * np.minimum(1, CLIP * usual / np.maximum(left, 1e-9))
+        kept.append(k)
+        own.append(found[1:])
+        std.append(usual * np.sqrt(np.diag(inverse)[1:].clip(1e-30)))
+    if len(kept) < FRAMES // 2:
+        return [None] * len(shapes)
+    return [
+        _frames_from_steps(count, np.array(kept), *each, _usual(variance, shape))
+        for *each, shape in zip(np.array(own).T, np.array(std).T, shapes, strict=True)
+    ]
+
+
+def _usual(variance: Floats, shape: Floats) -> float:
+    """Noise of a single pixel in units of the shape."""
+    return float(np.sqrt(np.median(variance))) / max(float(np.abs(shape).mean()), 1e-30)
+
+
+def _frames_from_steps(
+    count: int, kept: NDArray[np.intp], own: Floats, std: Floats, noise: float
+) -> _Found | None:
+    """What each frame has more, from what ``kept`` ones have more than their neighbours interpolated."""
+    of_steps = float(np.median(own**2)) / 0.455
+    rms = np.sqrt(max(of_steps - float(np.median(std**2)), 0.0) / (1 + _SQUARES))
+    if rms < max(SIGMAS * float(np.median(std)), OF_NOISE * noise):
+        return None
+    rows = np.zeros((len(kept), count))
+    at = np.arange(len(kept))
+    rows[at, kept] = 1.0
+    for by, share in AROUND.items():
+        rows[at, kept + by] = -share
+    weight = 1 / std**2
+    normal = (rows.T * weight) @ rows + np.eye(count) / rms**2
+    more = np.linalg.solve(normal, rows.T @ (weight * own))
+    return _Found(more, float(rms), float(2 * rms / np.sqrt(2 * len(kept))))
