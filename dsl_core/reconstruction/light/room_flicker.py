@@ -12,11 +12,16 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
+import torch
 from numpy.typing import NDArray
 
 from dsl_core.model.fit import FitFinding
 from dsl_core.model.plan import ScanLines, Shot
+from dsl_core.model.rig import ProjectorResponse
+from dsl_core.optics.lines.profile import halo_of_line
 from dsl_core.optics.sensor import raw_variance
+from dsl_core.optics.unlit import unlit_px
+from dsl_core.reconstruction.hdr import setting_gains_ms
 from dsl_core.reconstruction.light.line_levels import AROUND, PIXELS, pitch_of, zone_px
 from dsl_core.reconstruction.light.neighbour_steps import Scan
 from dsl_core.reconstruction.merge import Exposed, PickedLines
@@ -38,6 +43,8 @@ INTERPOLATED, NEAR = 0.2, 4
 CLIP, ROUNDS = 4.0, 3
 #: How far the light of a projector may be off that of neighbouring frames, relative to it.
 PROJECTOR_STD = 0.3
+#: What the halo, and what unlit pixels have in common, may be off by, relative to it and to a pixel's noise.
+HALO_ERROR, UNLIT_ERROR = 0.5, 0.03
 #: Sum of the squares of the shares by which a frame is interpolated.
 _SQUARES = sum(share**2 for share in AROUND.values())
 
@@ -84,12 +91,23 @@ class _Places:
     lines: ScanLines
     column: Floats
     zone_px: float
+    unlit_px: tuple[float, float]
 
     def away(self, pattern: int) -> NDArray[np.intp]:
         """Pixels that are away from the line of a pattern."""
-        middle = pattern * self.lines.step_px + self.lines.width_px / 2
+        middle = self._middle_px(pattern)
         first, last = np.searchsorted(self.column, (middle - self.zone_px, middle + self.zone_px))
         return np.r_[0:first, last : len(self.column)]
+
+    def unlit(self, pattern: int) -> tuple[NDArray[np.intp], Floats]:
+        """Pixels that no order of a pattern reaches, and how far from its line these are, px."""
+        middle, (near, far) = self._middle_px(pattern), self.unlit_px
+        ends = np.searchsorted(self.column, (middle - far, middle - near, middle + near, middle + far))
+        pixels = np.r_[ends[0] : ends[1], ends[2] : ends[3]] if far > near else np.empty(0, np.intp)
+        return pixels, np.abs(self.column[pixels] - middle)
+
+    def _middle_px(self, pattern: int) -> float:
+        return pattern * self.lines.step_px + self.lines.width_px / 2
 
 
 @dataclass(frozen=True)
@@ -115,12 +133,18 @@ def room_flicker(
     known = np.flatnonzero(np.isfinite(seen.std).all(0) & (column.ravel()[seen.pixels] >= 0))
     pixels = seen.pixels[known[:: max(len(known) // PIXELS, 1)]]
     pixels = pixels[np.argsort(column.ravel()[pixels], kind="stable")]
-    places = _Places(lines, column.ravel()[pixels].astype(np.float64), zone_px(lines, pitch_of(column)))
+    places = _Places(
+        lines,
+        column.ravel()[pixels].astype(np.float64),
+        zone_px(lines, pitch_of(column)),
+        unlit_px(scan.rig, lines.width_px),
+    )
     picked = seen.pick(pixels)
     variance, same = np.square(picked.std, dtype=np.float64), np.ones((1, len(pixels)))
     if _flicker(places, picked.radiance.astype(np.float64), variance, same)[0] is None:
         return None
     exposed = before or Exposed.as_planned(scan.plan.shot_count)
+    gains_ms = setting_gains_ms(scan.plan.settings, scan.rig.projector_response)
     dn: dict[int, float] = {}
     share: dict[int, float] = {}
     most = (0.0, 0.0)
@@ -131,10 +155,11 @@ def room_flicker(
         ]
         black = scan.source.read(next(s for s in scan.shots_of("black", 0) if s.setting == setting))
         dark = black.ravel()[pixels].astype(np.float64) - scan.rig.sensor.black_level_dn
-        of_setting = _of_setting(scan, shots, pixels, places, dark, exposed)
-        for known, found, unit_dn in zip((dn, share), of_setting, (1.0, float(dark.mean())), strict=True):
+        halo = _Halo(gains_ms[setting] * picked.radiance.max(0), scan.rig.projector_response)
+        of_setting = _of_setting(scan, shots, pixels, places, dark, exposed, halo)
+        for kind, found, unit_dn in zip((dn, share), of_setting, (1.0, float(dark.mean())), strict=True):
             if found is not None:
-                known.update({shot.index: float(more) for shot, more in zip(shots, found.more, strict=True)})
+                kind.update({shot.index: float(more) for shot, more in zip(shots, found.more, strict=True)})
                 most = max(most, (found.rms * unit_dn, found.rms_std * unit_dn))
     return RoomFlicker(dn, share, *most) if dn or share else None
 
@@ -146,6 +171,7 @@ def _of_setting(
     places: _Places,
     dark: Floats,
     exposed: Exposed,
+    halo: _Halo,
 ) -> tuple[_Found | None, _Found | None]:
     """What frames have more: DN in every pixel, and a share of ``dark``, black above its level."""
     sensor = scan.rig.sensor
@@ -157,19 +183,39 @@ def _of_setting(
     frames -= dark
     same = np.ones_like(dark)
     if dark.var() - noise.mean() > CONTRAST * noise.mean():
-        both = _flicker(places, frames, variance, np.stack([same, dark]), noise)
-        if any(both):
+        both = _flicker(places, frames, variance, np.stack([same, dark]), noise, halo)
+        if all(both):
             return both[0], both[1]
-    return _flicker(places, frames, variance, same[None], noise)[0], None
+        if both[1] is not None:
+            return None, _flicker(places, frames, variance, dark[None], noise, halo)[0]
+    return _flicker(places, frames, variance, same[None], 0 * noise, halo)[0], None
+
+
+@dataclass(frozen=True)
+class _Halo:
+    """The halo of lines whose zero order has an amplitude (P,) in each pixel."""
+
+    amplitude: Floats
+    response: ProjectorResponse
+
+    def at(self, pixels: NDArray[np.intp], distance_px: Floats, width_px: float) -> Floats:
+        """What reaches some pixels at a distance from a line, (n,)."""
+        share = halo_of_line(torch.as_tensor(distance_px), width_px, self.response).numpy()
+        return np.asarray(self.amplitude[pixels] * share)
 
 
 def _flicker(
-    places: _Places, frames: Floats, variance: Floats, shapes: Floats, black: Floats | float = 0.0
+    places: _Places,
+    frames: Floats,
+    variance: Floats,
+    shapes: Floats,
+    black: Floats | float = 0.0,
+    halo: _Halo | None = None,
 ) -> list[_Found | None]:
     """What frames (frames, P) have more of ``shapes`` (n, P) than their neighbours; None where it is chance.
 
-    ``black`` (P,) is the variance of the black picture that was taken off all frames, and which is the second
-    of the shapes.
+    ``black`` (P,) is the variance of the black picture that was taken off all frames, as the last of the
+    shapes has it. With a ``halo``, pixels that no order reaches tell what neighbours have in common.
     """
     count, of_black = len(frames), np.broadcast_to(black, frames.shape[1:])
     kept, own, std = [], [], []
@@ -190,10 +236,9 @@ def _flicker(
             # the light keeps its own: light below the noise tells nothing of the projector.
             normal[0, 0] += PROJECTOR_STD**-2
             right[0] += weight @ of_around
-            if len(shapes) > 1:
-                dark = weight @ of_black[pixels]
-                normal[0, 2] = normal[2, 0] = normal[0, 2] + dark
-                normal[2, 2] -= dark
+            dark = weight @ of_black[pixels]
+            normal[0, -1] = normal[-1, 0] = normal[0, -1] + dark
+            normal[-1, -1] -= dark
             inverse = np.linalg.pinv(normal, hermitian=True)
             found = inverse @ right
             left = np.abs(away - found @ design) * np.sqrt(sure)
@@ -204,10 +249,46 @@ def _flicker(
         std.append(usual * np.sqrt(np.diag(inverse)[1:].clip(1e-30)))
     if len(kept) < FRAMES // 2:
         return [None] * len(shapes)
+    unlit = (
+        np.full((2, count, len(shapes)), np.nan)
+        if halo is None
+        else _of_unlit(places, frames, variance, shapes, of_black, halo)
+    )
+    steps = np.array(own), np.array(std)
     return [
-        _frames_from_steps(count, np.array(kept), *each, _usual(variance, shape))
-        for *each, shape in zip(np.array(own).T, np.array(std).T, shapes, strict=True)
+        _frames_from_steps(
+            np.array(kept), *(e[:, i] for e in steps), *unlit[:, :, i], _usual(variance, shape)
+        )
+        for i, shape in enumerate(shapes)
     ]
+
+
+def _of_unlit(
+    places: _Places, frames: Floats, variance: Floats, shapes: Floats, of_black: Floats, halo: _Halo
+) -> Floats:
+    """What frames have of shapes (n, P) where no order of their line arrives, and deviations, (2, frames, n).
+
+    NaN for frames that leave too few pixels unlit.
+    """
+    found = np.full((2, len(frames), len(shapes)), np.nan)
+    for k in range(len(frames)):
+        pixels, distance_px = places.unlit(k)
+        if len(pixels) < FEWEST:
+            continue
+        faint = halo.at(pixels, distance_px, places.lines.width_px)
+        sure = 1 / (variance[k, pixels] + (HALO_ERROR * faint) ** 2)
+        values, design, weight = frames[k, pixels] - faint, shapes[:, pixels], sure
+        for _ in range(ROUNDS):
+            normal, right = (design * weight) @ design.T, (design * weight) @ values
+            # The noise of black is in both.
+            dark = weight @ of_black[pixels]
+            normal[-1, -1], right[-1] = normal[-1, -1] - dark, right[-1] + dark
+            inverse = np.linalg.pinv(normal, hermitian=True)
+            more = inverse @ right
+            left = np.abs(values - more @ design) * np.sqrt(sure)
+            weight = sure * np.minimum(1, CLIP / np.maximum(left, 1e-9))
+        found[:, k] = more, np.sqrt(np.diag(inverse).clip(1e-30))
+    return found
 
 
 def _usual(variance: Floats, shape: Floats) -> float:
@@ -216,10 +297,10 @@ def _usual(variance: Floats, shape: Floats) -> float:
 
 
 def _frames_from_steps(
-    count: int, kept: NDArray[np.intp], own: Floats, std: Floats, noise: float
+    kept: NDArray[np.intp], own: Floats, std: Floats, unlit: Floats, unlit_std: Floats, noise: float
 ) -> _Found | None:
-    """What each frame has more, from what ``kept`` ones have more than their neighbours interpolated."""
-    of_steps = float(np.median(own**2)) / 0.455
+    """What each frame has more, from what ``kept`` ones have more than their neighbours, and unlit pixels."""
+    count, of_steps = len(unlit), float(np.median(own**2)) / 0.455
     rms = np.sqrt(max(of_steps - float(np.median(std**2)), 0.0) / (1 + _SQUARES))
     if rms < max(SIGMAS * float(np.median(std)), OF_NOISE * noise):
         return None
@@ -229,6 +310,8 @@ def _frames_from_steps(
     for by, share in AROUND.items():
         rows[at, kept + by] = -share
     weight = 1 / std**2
-    normal = (rows.T * weight) @ rows + np.eye(count) / rms**2
-    more = np.linalg.solve(normal, rows.T @ (weight * own))
+    # Black flickered as well when its picture was taken, and all frames have that in common.
+    usual = np.where(np.isnan(unlit), rms**-2, (unlit_std**2 + (UNLIT_ERROR * noise) ** 2) ** -1)
+    normal = (rows.T * weight) @ rows + np.diag(usual)
+    more = np.linalg.solve(normal, rows.T @ (weight * own) + usual * np.nan_to_num(unlit))
     return _Found(more, float(rms), float(2 * rms / np.sqrt(2 * len(kept))))
