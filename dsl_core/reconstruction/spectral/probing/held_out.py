@@ -21,7 +21,7 @@ LEAST_FALL, FALL_SIGMAS = 25.0, 1.5
 
 @dataclass(frozen=True)
 class Hypothesis:
-    """Numbers (k,) that a ``design`` (n, p, k) turns into parameters of a probe's pixels, with their prior."""
+    """Numbers (k,), with their prior, that a ``design`` (n, p, k) turns into parameters of pixels."""
 
     design: Floats
     prior_std: Floats
