@@ -33,6 +33,8 @@ from dsl_core.reconstruction.spectral.self_correction import Followed
 
 #: Shares of pixels above which a scan is not what the twin's scenes lead to expect.
 MOST_POOR, MOST_AT_BOUND, MOST_LOST, MOST_UNDECIDED, MOST_UNUSUAL = 0.4, 0.1, 0.1, 0.5, 0.02
+#: Least mean of a band one of whose nodes is at the upper bound, 1.5, whatever its neighbours are.
+LEAST_HIGH = 0.99
 #: Bands wider than this many lines leave structure in the data that straight pieces cannot follow.
 WIDEST_BAND = 1.25
 #: Fewer pixels say nothing.
@@ -58,7 +60,8 @@ _CALIBRATE = "Run the drift check; calibrate again the part that it names."
 class SpectralCounts:
     """Of spectra: pixels that measured ``poor`` fits or are ``at_bound``, and what there are of bands.
 
-    Spectra that fit poorly touch bounds as well, as along edges: these count as ``poor`` alone. ``reached``
+    Spectra that fit poorly touch bounds as well, as along edges: these count as ``poor`` alone. Those that
+    touch 0 and fit are of dark surfaces, which noise takes there: only the upper bound counts. ``reached``
     are bands of pixels that lines reach, ``undecided`` those of them that the prior decides.
     """
 
@@ -72,18 +75,22 @@ class SpectralCounts:
 
 
 def count_spectra(
-    flags: NDArray[np.integer], data_share: NDArray[np.floating], reach: NDArray[np.integer]
+    flags: NDArray[np.integer],
+    reflectance: NDArray[np.floating],
+    data_share: NDArray[np.floating],
+    reach: NDArray[np.integer],
 ) -> SpectralCounts:
     """Counts of the flags (rows, columns) of a result with spectra, or of some rows of it.
 
-    ``data_share`` and ``reach`` (bands, rows, columns) are NaN and 0 where there is no spectrum.
+    ``reflectance``, ``data_share`` and ``reach`` (bands, rows, columns) are NaN and 0 where there is no
+    spectrum.
     """
     _, measured = _lit_and_measured(flags)
     reached = (reach & int(Reach.PLUS_ONE | Reach.MINUS_ONE) != 0) & np.isfinite(data_share)
     poor, at_bound = ((flags & int(flag)) != 0 for flag in (Flag.POOR_FIT, Flag.AT_BOUND))
     return SpectralCounts(
         poor=int(np.count_nonzero(measured & poor)),
-        at_bound=int(np.count_nonzero(measured & at_bound & ~poor)),
+        at_bound=int(np.count_nonzero(measured & at_bound & ~poor & (reflectance > LEAST_HIGH).any(0))),
         reached=int(np.count_nonzero(reached)),
         undecided=int(np.count_nonzero(reached & (data_share < 0.5))),
     )
@@ -197,10 +204,10 @@ def share_findings(
     )
     yield _share(
         "light",
-        "at a bound",
+        "at the upper bound",
         spectra.at_bound / measured,
         MOST_AT_BOUND,
-        "The spectra of {0} of the pixels touch 0 or 1.5.",
+        "The spectra of {0} of the pixels touch 1.5.",
         "Look for highlights and for light that the scan's black frames do not have.",
     )
 
@@ -248,7 +255,8 @@ def cause_findings(
     if motion is not None:
         yield _motion(motion, probe)
     place = _film(causes, probe)
-    yield place.model_copy(update={"significant": place.significant and probe.places})
+    told = place.significant and probe.places and causes.displaced
+    yield place.model_copy(update={"significant": told})
     for finding in _gains(causes, bool(corrected)):
         refuted = finding.part == "orders" and (corrected is False or not causes.unequal)
         yield finding.model_copy(update={"significant": finding.significant and not refuted})

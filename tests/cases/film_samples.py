@@ -13,6 +13,7 @@ from dsl_core.calibration.film.order_columns import TileColumns
 from dsl_core.calibration.film.order_samples import OrderSamples
 from dsl_core.model.rig import Film, Rig
 from dsl_core.optics.correspondence import GratingModel
+from dsl_core.optics.pinhole import pixel_rays
 from dsl_core.simulation.published_rig import published_rig
 
 SIZE = (222, 145)
@@ -78,3 +79,13 @@ def one_a_tile(samples: OrderSamples) -> OrderSamples:
     first = np.zeros(len(samples), bool)
     first[np.unique(keys, axis=0, return_index=True)[1]] = True
     return samples.only(first)
+
+
+def shift_of_filters(
+    rig: Rig, pixels: NDArray[np.int64], index: float, tilt_deg: float
+) -> NDArray[np.float64]:
+    """Relative shift of wavelengths by filters of an index that are tilted to the side, (n,), exactly."""
+    rays = pixel_rays(rig.camera).reshape(3, -1)[:, pixels]
+    tilt = np.radians(tilt_deg)
+    cosine = (np.array([np.sin(tilt), 0.0, np.cos(tilt)]) @ rays) / np.linalg.norm(rays, axis=0)
+    return np.asarray(np.sqrt(1 - (1 - cosine**2) / index**2) - 1)

@@ -35,13 +35,16 @@ GRID = WavelengthGrid(step_nm=10.0)
 
 
 def counted(data_share: np.ndarray, reach: np.ndarray) -> SpectralCounts:
-    return count_spectra(np.zeros(SHAPE, np.uint16), data_share, reach)
+    return count_spectra(np.zeros(SHAPE, np.uint16), 0 * data_share, data_share, reach)
 
 
-def judged(made: np.ndarray[tuple[int, ...], np.dtype[np.uint16]]) -> list[FitFinding]:
-    """What is said of flags and of spectra that reach nothing."""
+def judged(
+    made: np.ndarray[tuple[int, ...], np.dtype[np.uint16]], reflectance: float = 1.0
+) -> list[FitFinding]:
+    """What is said of flags and of spectra of one level that reach nothing."""
     nothing = np.zeros((1, *SHAPE), np.uint8)
-    return list(share_findings(made, count_spectra(made, nothing.astype(float), nothing)))
+    level = np.full(nothing.shape, reflectance)
+    return list(share_findings(made, count_spectra(made, level, nothing.astype(float), nothing)))
 
 
 def flags(flag: Flag, share: float) -> np.ndarray[tuple[int, ...], np.dtype[np.uint16]]:
@@ -89,6 +92,13 @@ def test_spectra_at_a_bound_that_fit_poorly_say_nothing_of_the_light() -> None:
     assert Fit.of(judged(both | flags(Flag.AT_BOUND, 0.45))).parts == ("light",)
 
 
+def test_dark_spectra_that_touch_zero_are_no_news() -> None:
+    touching = flags(Flag.AT_BOUND, 0.5)
+    assert Fit.of(judged(touching, 0.9)).parts == ()
+    # The least that a band holds one of whose nodes is 1.5.
+    assert Fit.of(judged(touching, 1.0)).parts == ("light",)
+
+
 def test_pixels_in_shadow_are_not_lost_and_depth_alone_has_no_spectra_to_judge() -> None:
     assert Fit.of(judged(flags(Flag.NO_LIGHT, 0.8))).parts == ()
     assert Fit.of(share_findings(flags(Flag.POOR_FIT, 0.8), None)).parts == ()
@@ -98,8 +108,8 @@ def test_counts_of_rows_add_up_to_those_of_the_picture() -> None:
     made, rng = flags(Flag.POOR_FIT, 0.3), np.random.default_rng(0)
     share, reach = rng.uniform(0, 1, (3, *SHAPE)), rng.integers(1, 5, (3, *SHAPE))
     rows = (slice(0, 7), slice(7, 20))
-    parts = (count_spectra(made[each], share[:, each], reach[:, each]) for each in rows)
-    assert sum(parts, SpectralCounts()) == count_spectra(made, share, reach)
+    parts = (count_spectra(made[each], share[:, each], share[:, each], reach[:, each]) for each in rows)
+    assert sum(parts, SpectralCounts()) == count_spectra(made, share, share, reach)
 
 
 @pytest.mark.parametrize(("step_nm", "share", "words"), [(20, 0.9, "coarse"), (1, 0.2, "fine"), (5, 0.9, "")])

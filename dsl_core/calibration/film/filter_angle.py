@@ -31,8 +31,9 @@ class FilterAngle:
     The centre of an interference filter is at ``centre * sqrt(1 - (sin(angle) / index)^2)``, the angle being
     that to the filter's normal and ``index`` the effective one of its layers, 1.5 to 2.2 (Macleod, Thin-Film
     Optical Filters). With the direction (x, y, z) of a pixel and a filter tilted by small angles, the
-    relative shift is a constant, which nobody can tell from the film's line density, and
-    ``-c (x^2 + y^2) / 2 + a x + b y`` with ``c = 1 / index^2``: ``values`` and ``std`` are of c, a and b.
+    relative shift is ``-c (x^2 + y^2) / 2 + a x + b y - (a^2 + b^2) / (2 c)`` with ``c = 1 / index^2``:
+    ``values`` and ``std`` are of c, a and b. The last term, that of the tilt alone, looks like another line
+    density of the film; the others say how large it is.
     """
 
     values: tuple[float, float, float] = (0.0, 0.0, 0.0)
@@ -64,8 +65,29 @@ def columns_per_share(rig: Rig, samples: OrderSamples) -> Floats:
     return (grating_columns(rig, longer) - grating_columns(rig, samples)) / SHARE_STEP
 
 
+def relative_shift(terms: Floats, values: Floats) -> Floats:
+    """Relative shift (n,) of wavelengths by c, a and b (3,), whose `shift_terms` are (n, 3)."""
+    return np.asarray(terms @ values + _by_tilt(values)[0])
+
+
+def shift_slopes(terms: Floats, values: Floats) -> Floats:
+    """What c, a and b add to `relative_shift` near ``values``, (n, 3)."""
+    return np.asarray(terms + _by_tilt(values)[1])
+
+
+def _by_tilt(values: Floats) -> tuple[float, Floats]:
+    """The shift of filters seen straight on that are tilted, and its slopes (3,)."""
+    c, a, b = values
+    # No filter has layers of a larger index, and without any angle there is no tilt.
+    held = max(c, FILTER_INDEX[1] ** -2)
+    square = a * a + b * b
+    return -0.5 * square / held, np.array(
+        [0.5 * square / held**2 if c == held else 0.0, -a / held, -b / held]
+    )
+
+
 def shift_terms(rig: Rig, pixels: NDArray[np.int64]) -> Floats:
-    """What ``c``, ``a`` and ``b`` do to the relative wavelength at flat pixel indices (n,), shape (n, 3)."""
+    """What ``c``, ``a`` and ``b`` do by themselves at flat pixel indices (n,), shape (n, 3)."""
     rays = pixel_rays(rig.camera).reshape(3, -1)[:, pixels]
     x, y, _ = rays / np.linalg.norm(rays, axis=0)
     return np.stack([-0.5 * (x**2 + y**2), x, y], 1)
@@ -73,5 +95,5 @@ def shift_terms(rig: Rig, pixels: NDArray[np.int64]) -> Floats:
 
 def seen_straight(rig: Rig, samples: OrderSamples, angle: FilterAngle) -> OrderSamples:
     """The samples as they would be through filters that shift nothing."""
-    shift = shift_terms(rig, samples.pixel) @ np.array(angle.values)
+    shift = relative_shift(shift_terms(rig, samples.pixel), np.array(angle.values))
     return replace(samples, column_px=samples.column_px - columns_per_share(rig, samples) * shift)

@@ -19,6 +19,8 @@ from dsl_core.calibration.film.filter_angle import (
     NO_SHIFT,
     FilterAngle,
     columns_per_share,
+    relative_shift,
+    shift_slopes,
     shift_terms,
 )
 from dsl_core.calibration.film.form import FIELDS, FilmForm
@@ -106,8 +108,11 @@ def fit_film(
         here = grating_columns(now, samples)
         ahead = [grating_columns(form.rig(rig, values[:count] + step), samples) for step in np.diag(steps)]
         by_film = (np.stack(ahead, 1) - here[:, None]) / steps
-        by_angle = columns_per_share(now, samples)[:, None] * shifts if angled else shifts
-        residual = samples.column_px - here - by_angle @ values[count:]
+        residual, by_angle = samples.column_px - here, shifts
+        if angled:
+            stretch = columns_per_share(now, samples)
+            by_angle = stretch[:, None] * shift_slopes(shifts, values[count:])
+            residual -= stretch * relative_shift(shifts, values[count:])
         jacobian = np.concatenate([by_film, by_angle], 1) * prior_std
         weight, scale = huber_weights(residual, sigma, HUBER_SIGMAS)
         information = (jacobian * weight[:, None]).T @ jacobian + np.eye(len(values))

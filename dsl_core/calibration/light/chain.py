@@ -26,6 +26,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dsl_core.calibration.common.spectral_nodes import NODES_NM, SMOOTHNESS
+from dsl_core.calibration.light.chain_deviation import LeftOut, Part
 from dsl_core.calibration.light.chain_equations import (
     ZERO_ORDER_ERROR,
     LineScan,
@@ -131,11 +132,12 @@ def _solve(rig: Rig, scans: list[LineScan], model: Correspondence, target: Spect
             " it fills the picture, is lit and not saturated, and capture the step again."
         )
     ratio, ratio_std = _mean_ratios(rig, scans, target)
-    parts = [
-        first_order_equations(rig, part, ratio, model, target, UNKNOWNS)
-        for scan in scans
-        for part in _parts(rig, scan)
+    placed = [
+        (number, place, first_order_equations(rig, part, ratio, model, target, UNKNOWNS))
+        for number, scan in enumerate(scans)
+        for place, part in _parts(rig, scan).items()
     ]
+    parts = [equations for _, _, equations in placed]
     zero = zero_order_equations(rig, ratio, ratio_std, target, UNKNOWNS)
     with_scale = reduce(add, parts) + zero
     total = _corrections(with_scale)
@@ -146,12 +148,14 @@ def _solve(rig: Rig, scans: list[LineScan], model: Correspondence, target: Spect
         **SMOOTHNESS,
     )
     used = [part for part in parts if part.count]
-    without = [
-        solve_given(total - _corrections(part), solution.prior, solution.noise_factor).values for part in used
-    ]
+    left_out = LeftOut(
+        solution,
+        total,
+        [Part(number, *place, _corrections(part)) for number, place, part in placed if part.count],
+    )
     x, first = solution.values, _corrections(with_scale - zero)
     misfit = first.square - 2 * x @ first.right + x @ first.normal @ x
-    chain_std = {order: _chain_std(rig, order, solution, np.array(without)) for order in ORDERS}
+    chain_std = {order: _chain_std(rig, order, solution, left_out) for order in ORDERS}
     return _Solved(
         solution,
         float(misfit / max(first.count, 1)),
@@ -199,19 +203,19 @@ def _refined_scale(
     return scale, std
 
 
-def _parts(rig: Rig, scan: LineScan) -> list[LineScan]:
-    """The scan in parts of the image."""
+def _parts(rig: Rig, scan: LineScan) -> dict[tuple[int, int], LineScan]:
+    """The scan in parts of the image, by their row and column."""
     rows, columns = np.divmod(scan.pixels, rig.camera.width_px)
-    down = rows * PARTS[0] // rig.camera.height_px
-    part = down * PARTS[1] + columns * PARTS[1] // rig.camera.width_px
-    return [scan.at(part == i) for i in np.unique(part)]
+    down, across = rows * PARTS[0] // rig.camera.height_px, columns * PARTS[1] // rig.camera.width_px
+    places = sorted(set(zip(down.tolist(), across.tolist(), strict=True)))
+    return {(y, x): scan.at((down == y) & (across == x)) for y, x in places}
 
 
 def _mean_ratios(rig: Rig, scans: list[LineScan], target: SpectralCurve) -> tuple[Floats, Floats]:
     """Measured over expected zero order of each colour, (3,), and its deviation from parts of the image."""
     found: list[list[float]] = [[], [], []]
     for scan in scans:
-        for part in _parts(rig, scan):
+        for part in _parts(rig, scan).values():
             ratio, colours = zero_order_ratios(rig, part, target), colours_of(rig, part)
             for colour in range(3):
                 if (colours == colour).any():
@@ -221,18 +225,15 @@ def _mean_ratios(rig: Rig, scans: list[LineScan], target: SpectralCurve) -> tupl
     return mean, np.hypot(std, ZERO_ORDER_ERROR)
 
 
-def _chain_std(rig: Rig, order: int, solution: SmoothSolution, without: Floats) -> Floats:
+def _chain_std(rig: Rig, order: int, solution: SmoothSolution, left_out: LeftOut) -> Floats:
     """Relative deviation of the product of all factors at the nodes, for a pixel anywhere in the image.
 
-    Deviation of the mean by the posterior and by leaving out parts of the image (jackknife), and how much
-    parts differ from it beyond their own noise.
+    Deviation of the mean by the posterior and by leaving out frames, and how much places differ from it.
     """
     product = _product(rig, order)
     posterior = np.einsum("ij,jk,ik->i", product, solution.covariance, product).clip(min=0)
-    count = len(without)
-    jackknife = (without @ product.T).var(0) * (count - 1)
-    between = (jackknife * count - posterior * count).clip(min=0)
-    return np.asarray(np.sqrt(posterior + jackknife + between + MODEL_STD**2))
+    by_parts = left_out.variance_of_mean(product) + left_out.variance_of_place(product)
+    return np.asarray(np.sqrt(posterior + by_parts + MODEL_STD**2))
 
 
 def _product(rig: Rig, order: int) -> Floats:

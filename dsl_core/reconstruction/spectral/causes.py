@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dsl_core.model.fit import matters
+from dsl_core.reconstruction.spectral.probing.held_out import Hypothesis, explains_others
 from dsl_core.reconstruction.spectral.probing.pooled import pool
 from dsl_core.reconstruction.spectral.probing.probe import LEADING, PRIOR_STD, Probe
 from dsl_core.reconstruction.spectral.probing.probed_light import PARAMETERS
@@ -31,7 +32,8 @@ class Causes:
     """The parameters of the model fitted to a whole scan, with deviations from the scatter over cells.
 
     ``shift_px`` (n, 2) of both orders at the probed pixels; their mean (2,) and root mean square, with its
-    deviation, over pixels that see the order: elsewhere the shift only continues what is seen;
+    deviation, over pixels that see the order: elsewhere the shift only continues what is seen; ``displaced``
+    is whether what some parts of the picture ask of it explains the others;
     ``gain`` (2,) of both orders, with the deviations of their mean and difference; ``drift`` of the light
     from the first line to the last. A line lights a pixel by one order long before or after another does by
     the other, so that drift looks much as a difference of the gains: ``drift_alone`` and ``difference_alone``
@@ -42,6 +44,7 @@ class Causes:
     mean_px: Floats
     rms_px: float
     rms_std_px: float
+    displaced: bool
     gain: Floats
     common_std: float
     difference_std: float
@@ -101,6 +104,8 @@ def fit_causes(probe: Probe) -> Causes:
     prior_std = np.r_[np.full(first, PRIOR_STD[0]), PRIOR_STD[2:LEADING]]
     prior_std[first : first + 2] *= [0.5**0.5, 2**0.5]
     fit = pool(probe, design, prior_std)
+    others = Hypothesis(design[..., first:], prior_std[first:])
+    displaced = explains_others(probe, Hypothesis(design, prior_std), others)
     found, covariance = fit.values, fit.covariance
     shift = design[:, :2] @ found
     spread = np.einsum("npk,kl,npl->np", design[:, :2], covariance, design[:, :2])
@@ -122,6 +127,7 @@ def fit_causes(probe: Probe) -> Causes:
         mean_px=np.sum(telling * shift, 0) / np.maximum(telling.sum(0), 1e-12),
         rms_px=float(np.sqrt(max(square - noise, 0.0))),
         rms_std_px=float(np.sqrt(noise / (2 * _TERMS))),
+        displaced=displaced,
         gain=np.array([mean + 0.5 * apart, mean - 0.5 * apart]),
         common_std=float(deviations[first]),
         difference_std=float(deviations[first + 1]),

@@ -21,11 +21,11 @@ from dsl_core.model.rig import Rig
 from dsl_core.optics.correspondence import GratingModel
 from dsl_core.optics.pixel_model import PixelModel
 from dsl_core.optics.spectra import ORDERS
+from dsl_core.reconstruction.spectral.probing.held_out import Hypothesis, explains_others
 from dsl_core.reconstruction.spectral.probing.pooled import pool
 from dsl_core.reconstruction.spectral.probing.probe import LEADING, Probe
 from dsl_core.reconstruction.spectral.probing.probe import PRIOR_STD as PARAMETER_STD
 from dsl_core.reconstruction.spectral.probing.probed_light import PARAMETERS, ProbedScan
-from dsl_core.reconstruction.spectral.probing.probed_pixels import CELLS
 
 Floats = NDArray[np.float64]
 
@@ -39,10 +39,6 @@ LOPSIDED_PX = 0.03
 #: `FINE_NM`. Spectra are taken as linear between bands, and what that leaves in the frames, which looks like
 #: a displacement, grows with the square of their distance.
 LEAST_MOTION_PX, FINE_NM = 0.02, 5.0
-#: Parts that the picture's cells are divided into; each is judged by a fit to the others.
-FOLDS = 4
-#: Fall of chi-square of the pixels held out, over the excess of their scatter, and in deviations over cells.
-LEAST_FALL, FALL_SIGMAS = 25.0, 1.5
 
 
 @dataclass(frozen=True)
@@ -88,7 +84,11 @@ def fit_motion(scan: ProbedScan, probe: Probe) -> FilmMotion | None:
     shift = effect[probe.sound][:, _SHIFT]
     spread = np.einsum("nok,kl,nol->no", shift, covariance, shift)
     shift_px, shift_std_px = (float(np.sqrt(np.mean(square))) for square in ((shift @ values) ** 2, spread))
-    if shift_px < LEAST_MOTION_PX * coarseness(probe.step_nm) or not _explains(probe, effect):
+    if shift_px < LEAST_MOTION_PX * coarseness(probe.step_nm):
+        return None
+    # Without the film, gains and profile explain a part already.
+    without = Hypothesis(*_design(effect[..., :0], probe.step_nm))
+    if not explains_others(probe, Hypothesis(*_design(effect, probe.step_nm)), without):
         return None
     return FilmMotion(values, std, shift_px, shift_std_px)
 
@@ -137,25 +137,6 @@ def _design(effect: Floats, step_nm: float) -> tuple[Floats, Floats]:
     design[:, 2:LEADING, count + len(sides) :] = np.eye(LEADING - 2)
     displaced = (LOPSIDED_PX, wide_px)[: len(sides)]
     return design, np.r_[PRIOR_STD[:count], displaced, PARAMETER_STD[2:LEADING]]
-
-
-def _explains(probe: Probe, effect: Floats) -> bool:
-    """Whether the film's numbers, fitted to some cells of the picture, explain the others surely."""
-    fold = (probe.cell // CELLS[1] + probe.cell % CELLS[1]) % FOLDS
-    fall, excess = np.zeros(CELLS[0] * CELLS[1]), 1.0
-    # Without the film, gains and profile explain a part already.
-    for effects, sign in ((effect, 1), (effect[..., :0], -1)):
-        design, prior = _design(effects, probe.step_nm)
-        for out in range(FOLDS):
-            fit = pool(probe, design, prior, fold != out)
-            here = probe.sound & (fold == out)
-            asked = design[here] @ fit.values
-            gained = 2 * (asked * probe.score[here]).sum(1)
-            gained -= np.einsum("np,npq,nq->n", asked, probe.normal[here], asked)
-            np.add.at(fall, probe.cell[here], sign * probe.weight[here] * gained)
-            excess = max(excess, fit.excess) if sign > 0 else excess
-    total = float(fall.sum())
-    return total > LEAST_FALL * excess and total > FALL_SIGMAS * float(np.linalg.norm(fall))
 
 
 def with_film(rig: Rig, changes: Floats) -> Rig:

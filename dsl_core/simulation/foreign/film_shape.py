@@ -1,8 +1,9 @@
-"""Films bent as the record of a calibration cannot say, and the ray through them to a point.
+"""Films bent otherwise than as cylinders, and the ray through them to a point.
 
 The film's surface is ``z = distance + bend u^2 / 2 + shape(u, v)`` with u across the lines and v along them,
-from the middle of the frame. Of the S and the twist only what a record cannot say is added: the linear part
-that best fits is taken out, as a calibration would have found it as a tilt.
+from the middle of the frame. An S and a twist are shapes that the record of a calibration can have
+(`dsl_core.model.rig.FilmShape`); no record has a dent. Of the S and the twist the linear part that best fits
+is taken out, which a calibration would have found as a tilt.
 """
 
 from __future__ import annotations
@@ -18,6 +19,8 @@ from dsl_core.simulation.foreign.variants import Foreign
 #: Largest slope of the S at the frame's side, and of the twist at the frame's top and bottom: as steep as the
 #: strongest usual bend of a drawn rig is there.
 S_SLOPE, TWIST_SLOPE = 0.04, 0.04
+#: Largest slope of the dent, where its middle is, and its radius, in halves of the frame across the lines.
+DENT_SLOPE, DENT_U, DENT_RADIUS = 0.04, 0.35, 0.3
 #: The film is close and the scene far: each step shrinks the error about twentyfold.
 STEPS = 12
 
@@ -35,6 +38,10 @@ class BentFilm:
         # d/du of k (u^3 - 3/5 half^2 u) is 2.4 k half^2 at the side.
         self.s_per_mm2 = S_SLOPE / (2.4 * self.half_u**2) if foreign.has("bend-s") else 0.0
         self.twist_per_mm = TWIST_SLOPE / half_v if foreign.has("bend-twist") else 0.0
+        self.dent_radius_mm = DENT_RADIUS * self.half_u
+        # The flank of a bell is steepest one radius from its middle.
+        steep = DENT_SLOPE * np.exp(0.5) * self.dent_radius_mm
+        self.dent_mm = float(steep) if foreign.has("film-dent") else 0.0
 
     def sag(self, u: Tensor, v: Tensor) -> tuple[Tensor, Tensor, Tensor]:
         """Height (mm) of the surface at places on the film (mm), and its slopes along u and v."""
@@ -42,7 +49,12 @@ class BentFilm:
         v = v - self.middle_v
         linear = 0.6 * self.half_u**2
         height = 0.5 * bend * u * u + s * (u * u - linear) * u + twist * u * v
-        return height, bend * u + s * (3 * u * u - linear) + twist * v, twist * u
+        slope_u, slope_v = bend * u + s * (3 * u * u - linear) + twist * v, twist * u
+        if not self.dent_mm:
+            return height, slope_u, slope_v
+        away, square = u - DENT_U * self.half_u, self.dent_radius_mm**2
+        dent = self.dent_mm * torch.exp(-0.5 * (away * away + v * v) / square)
+        return height + dent, slope_u - dent * away / square, slope_v - dent * v / square
 
     def incoming(self, point: Vectors, order: int, wavelengths_nm: Tensor) -> Vectors:
         """Direction from the projector's centre that reaches points (mm) through an order.

@@ -27,6 +27,7 @@ VARIANTS: Mapping[str, str] = MappingProxyType(
         "filter-angle": "bandpass filters tilted by 3 degrees and seen at an angle",
         "bend-s": "film bent in an S",
         "bend-twist": "twisted film",
+        "film-dent": "film with a dent, which no record of its shape can say",
         "flicker": "lamps of the room whose light differs from frame to frame",
     }
 )

@@ -27,7 +27,7 @@ from dsl_core.calibration.film.depth_stage import (
     fit_first_orders,
     stage_curves,
 )
-from dsl_core.calibration.film.filter_angle import columns_per_share, shift_terms
+from dsl_core.calibration.film.filter_angle import columns_per_share
 from dsl_core.calibration.film.fit import MAX_SLOPE, fit_film, is_plausible
 from dsl_core.calibration.film.form import FilmForm
 from dsl_core.calibration.film.order_columns import TileColumns
@@ -39,7 +39,7 @@ from dsl_core.model.rig import CorrespondenceGrid, Film, FilmShape, Rig
 from dsl_core.optics.correspondence import GratingModel
 from dsl_core.optics.filters import nominal_filter
 from dsl_core.progress import NoProgress
-from tests.cases.film_samples import NOISE_PX, mounted, saddle, samples_of, small_rig
+from tests.cases.film_samples import NOISE_PX, mounted, saddle, samples_of, shift_of_filters, small_rig
 from tests.cases.order_lines import SIZE, TRUE_FILM, line_frames, plane_at, rig_with
 
 DEPTHS_MM, FILTERS_NM = (600.0, 850.0), (480.0, 540.0, 620.0)
@@ -92,7 +92,7 @@ def test_a_bent_film_and_filters_seen_at_an_angle_are_told_apart(index: float | 
     rig = rig.model_copy(update={"film": rig.film.model_copy(update={"shape": shape})})
     straight = seen = samples_of(rig, NOISE_PX)
     if index is not None:
-        shift = shift_terms(rig, seen.pixel) @ (index**-2 * np.array([1.0, np.radians(3.0), 0.0]))
+        shift = shift_of_filters(rig, seen.pixel, index, 3.0)
         seen = replace(seen, column_px=seen.column_px + columns_per_share(rig, seen) * shift)
     found = _fit(mounted(rig), seen, Film())
     assert (found.angle.index is None) == (index is None)

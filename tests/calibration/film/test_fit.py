@@ -12,7 +12,6 @@ from dsl_core.calibration.film.filter_angle import (
     FilterAngle,
     columns_per_share,
     seen_straight,
-    shift_terms,
 )
 from dsl_core.calibration.film.fit import (
     COMMON_PX,
@@ -28,6 +27,7 @@ from tests.cases.film_samples import (
     NOISE_PX,
     mounted,
     samples_of,
+    shift_of_filters,
     small_rig,
 )
 
@@ -70,18 +70,22 @@ def test_a_fifth_of_wrong_samples_does_no_harm() -> None:
 def test_filters_seen_at_an_angle_do_not_bend_the_film(seed: int) -> None:
     # Index 1.9 and a tilt of 3 degrees: 4 nm at the side of the picture.
     rig, samples = small_rig(), samples_of(small_rig(), NOISE_PX, seed=seed)
-    truth = np.array([1.9**-2, 1.9**-2 * np.radians(3.0), 0.0])
-    shift = shift_terms(rig, samples.pixel) @ truth
+    shift = shift_of_filters(rig, samples.pixel, 1.9, 3.0)
     assert 550 * np.ptp(shift) > 4.0
     askew = replace(samples, column_px=samples.column_px + columns_per_share(rig, samples) * shift)
     bent = fit_film(mounted(rig), askew, Film())
     assert abs(bent.film.bend_per_mm - rig.film.bend_per_mm) > 1e-3
     found = fit_film(mounted(rig), askew, Film(), angled=True)
+    density = FIELDS.index("lines_per_mm")
     assert found.angle.index is not None
     assert found.angle.index[0] == pytest.approx(1.9, abs=max(0.02, 4 * found.angle.index[1]))
     fitted = rig.model_copy(update={"film": found.film})
     off = grating_columns(fitted, samples) - grating_columns(rig, samples)
     assert np.sqrt(np.mean(off**2)) < 0.02
+    # That of the tilt alone is 0.04 %: it is no other density of the film's lines.
+    sure = np.sqrt(found.covariance[density, density])
+    assert found.film.lines_per_mm == pytest.approx(rig.film.lines_per_mm, abs=2.5 * sure)
+    assert sure < 1.5e-4 * rig.film.lines_per_mm
     straight = seen_straight(fitted, askew, found.angle)
     assert np.abs(straight.column_px - samples.column_px).max() < 0.05
 

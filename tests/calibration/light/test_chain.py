@@ -204,7 +204,7 @@ def test_a_colour_that_no_part_of_the_image_shows_is_taken_as_known_to_no_more_t
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     module = "dsl_core.calibration.light.chain."
-    monkeypatch.setattr(module + "_parts", lambda _rig, scan: scan)
+    monkeypatch.setattr(module + "_parts", lambda _rig, scan: dict(enumerate(scan)))
     monkeypatch.setattr(module + "zero_order_ratios", lambda _rig, part, _target: np.array(part, float))
     monkeypatch.setattr(module + "colours_of", lambda *_: np.array([0, 0, 2]))
     parts: Any = [[0.9, 0.9, 2.0], [1.1, 1.1, 2.0]]
@@ -227,7 +227,7 @@ def test_chi_square_is_that_of_the_first_orders_with_the_deviation_of_three_colo
     halves: Any = [
         Equations.of(design[part], target[part], std[part]) for part in (slice(200), slice(200, 400))
     ]
-    monkeypatch.setattr(module + "_parts", lambda *_: [0, 1])
+    monkeypatch.setattr(module + "_parts", lambda *_: {(0, 0): 0, (0, 1): 1})
     monkeypatch.setattr(module + "first_order_equations", lambda rig, part, *_: halves[part])
     monkeypatch.setattr(module + "zero_order_equations", lambda *_: zero)
     ratio_std = np.array([0.01, 0.02, 0.02])
@@ -252,9 +252,9 @@ def test_an_image_has_three_parts_down_and_four_across(lines: LineScan) -> None:
     rig = published_rig()
     rig = rig.model_copy(update={"camera": rig.camera.resized(112, 72)})
     parts = _parts(rig, lines)
-    assert len(parts) == 12
-    for number, part in enumerate(parts):
+    assert sorted(parts) == [(y, x) for y in range(3) for x in range(4)]
+    for (down, across), part in parts.items():
         rows, columns = np.divmod(part.pixels, 112)
-        assert set((rows // 24).tolist()) == {number // 4}
-        assert set((columns // 28).tolist()) == {number % 4}
-    assert sum(len(part.pixels) for part in parts) == len(lines.pixels)
+        assert set((rows // 24).tolist()) == {down}
+        assert set((columns // 28).tolist()) == {across}
+    assert sum(len(part.pixels) for part in parts.values()) == len(lines.pixels)

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from dsl_core.reconstruction.spectral.causes import Causes, common_error, fit_causes
+from dsl_core.reconstruction.spectral.causes import MOST_SHIFT_PX, Causes, common_error, fit_causes
 from dsl_core.reconstruction.spectral.probing.line_probe import LineProbe
 from dsl_core.reconstruction.spectral.probing.probe import Probe
 from dsl_core.reconstruction.spectral.probing.probed_light import PARAMETERS
@@ -74,6 +74,18 @@ def test_where_an_order_is_not_seen_its_shift_is_no_news() -> None:
     assert found.rms_px == pytest.approx(np.sqrt(0.2**2 / 12 / 3), rel=0.1)
 
 
+def test_a_shift_that_a_few_cells_ask_for_explains_no_others() -> None:
+    assert fit_causes(probe_of()).displaced
+    few = probe_of()
+    few.score[:] = 0.0
+    odd = np.isin(few.cell, [29, 30])
+    few.score[odd, 1] = 2.0 * INFORMATION
+    found = fit_causes(few)
+    assert found.rms_px > 3 * found.rms_std_px
+    assert found.rms_px > MOST_SHIFT_PX
+    assert not found.displaced
+
+
 def test_noise_alone_is_no_shift() -> None:
     probe = probe_of()
     probe.score[:] = 0.0
@@ -116,7 +128,7 @@ def test_neither_drift_nor_gains_are_told_that_make_up_for_each_other() -> None:
 
 
 CAUSES = Causes(
-    np.zeros((1, 2)), np.zeros(2), 0.0, 0.0, np.array([0.02, -0.01]), 0.001, 0.002, 0.015, 0.001,
+    np.zeros((1, 2)), np.zeros(2), 0.0, 0.0, False, np.array([0.02, -0.01]), 0.001, 0.002, 0.015, 0.001,
     drift_alone=(0.015, 0.001), difference_alone=(0.03, 0.001),
 )  # fmt: skip
 

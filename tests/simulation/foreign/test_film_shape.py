@@ -1,4 +1,4 @@
-"""Rays through bent films: the grating equation where the bend is usual, and what an S and a twist add."""
+"""Rays through bent films: the grating equation where the bend is usual, and what other shapes add."""
 
 from __future__ import annotations
 
@@ -7,7 +7,14 @@ import pytest
 import torch
 
 from dsl_core.optics.correspondence import GratingModel, projector_points
-from dsl_core.simulation.foreign.film_shape import S_SLOPE, TWIST_SLOPE, BentFilm
+from dsl_core.simulation.foreign.film_shape import (
+    DENT_RADIUS,
+    DENT_SLOPE,
+    DENT_U,
+    S_SLOPE,
+    TWIST_SLOPE,
+    BentFilm,
+)
 from dsl_core.simulation.foreign.light_sources import Sources, trace, traced_nm
 from dsl_core.simulation.foreign.variants import Foreign
 from dsl_core.simulation.published_rig import published_rig
@@ -65,7 +72,24 @@ def test_slopes_are_those_stated_and_no_tilt_remains(name: str, slope: float) ->
     assert abs(tilt) < 0.02 * slope
 
 
-@pytest.mark.parametrize("name", ["bend-s", "bend-twist"])
+def test_a_dent_has_the_stated_slope_at_its_flank_and_none_in_its_middle() -> None:
+    film, usual = (BentFilm(RIG, Foreign(frozenset({kind}))) for kind in ("film-dent", "plain"))
+    middle, radius = DENT_U * film.half_u, DENT_RADIUS * film.half_u
+    u = torch.linspace(middle - 4 * radius, middle + 4 * radius, 401, dtype=torch.float64)
+    v = torch.full_like(u, film.middle_v)
+    height, along_u, along_v = (a - b for a, b in zip(film.sag(u, v), usual.sag(u, v), strict=True))
+    assert torch.gradient(height, spacing=(u,))[0][1:-1] == pytest.approx(along_u[1:-1].numpy(), abs=1e-4)
+    assert float(along_u.abs().max()) == pytest.approx(DENT_SLOPE, rel=1e-3)
+    assert float((u[along_u.argmax()] - middle).abs()) == pytest.approx(radius, rel=0.02)
+    assert float(along_u[200].abs()) < 1e-9
+    assert not along_v.any()
+    # Across the lines and along them it is the same.
+    turned = film.sag(torch.full_like(u, middle), film.middle_v + u - middle)
+    flat = usual.sag(torch.full_like(u, middle), film.middle_v + u - middle)
+    assert (turned[2] - flat[2]).numpy() == pytest.approx(along_u.numpy(), abs=1e-9)
+
+
+@pytest.mark.parametrize("name", ["bend-s", "bend-twist", "film-dent"])
 def test_first_orders_move_by_columns_and_the_zero_order_stays(name: str) -> None:
     """Half a column in the root of the mean square over the frame: 1 nm of wavelength."""
     bent, usual = sources(name), sources("plain")

@@ -58,8 +58,7 @@ def frame_levels(scan: ProbedScan, std: Floats) -> FrameLevels | None:
 
 def _add(solved: SolvedPixels, part: slice, normal: Tensor, score: Tensor) -> None:
     """Add the equations of some pixels, each with the weight that its frames' fit deserves."""
-    information = solved.information[part]
-    pixels, bands = information.shape[:2]
+    pixels, bands = solved.nodes[part].shape
     here = (solved.owner >= part.start) & (solved.owner < part.start + pixels)
     weight, residual = solved.light.weight[here], solved.residual[here]
     # A change of level by one is all of the light of a frame: what the model says of it.
@@ -78,6 +77,6 @@ def _add(solved: SolvedPixels, part: slice, normal: Tensor, score: Tensor) -> No
     own = by_frame(weight * light**2)
     score += (trust[:, None] * by_frame(weight * light * residual)).sum(0)
     normal += torch.diag((trust[:, None] * own).sum(0))
-    taken_up = torch.linalg.solve(information, cross.mT).reshape(pixels * bands, -1)
+    taken_up = solved.give_way(cross.mT, part).reshape(pixels * bands, -1)
     heavy = (cross * trust[:, None, None]).mT.reshape(pixels * bands, -1)
     normal -= heavy.T @ taken_up

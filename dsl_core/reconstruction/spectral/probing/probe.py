@@ -177,7 +177,7 @@ def _probe_some(scan: ProbedScan, targets: Indices) -> dict[str, NDArray[Any]]:
     changes = torch.cat([light.changes(own) * solved.shading[:, None, None], curves], 2)
     others = len(PARAMETERS)
     cross = of_all_curves(of_curves(solved.heavy @ changes), others)
-    bias = torch.linalg.solve(solved.information, cross)
+    bias = solved.give_way(cross)
     heavy = (changes * weight[..., None]).mT
     normal = normal_of_all_curves(of_curves(heavy @ changes), others) - cross.mT @ bias
     score = of_all_curves(of_curves((heavy @ solved.residual[..., None])[..., 0]), others)

@@ -250,7 +250,7 @@ class SolvedPixels:
     ``owner`` (m,) is the pixel of a sample, ``shading`` (m,) its shading, ``rows`` (m, bands, k) the model
     for that and ``heavy`` the same, weighted; ``residual`` (m, k) is what spectra leave. ``nodes`` (n, bands)
     and ``mean`` (bands, n) are the spectra, ``information`` (n, bands, bands) what is known of them, with the
-    prior.
+    prior; ``free`` (n, bands) are bands that are not held at a bound.
     """
 
     light: ProbedLight
@@ -262,11 +262,22 @@ class SolvedPixels:
     nodes: Tensor
     mean: Tensor
     information: Tensor
+    free: Tensor
 
     def gather(self, values: Tensor) -> Tensor:
         """Sums over the samples of each pixel: (m, ...) -> (n, ...)."""
         into = values.new_zeros((len(self.nodes), *values.shape[1:]))
         return into.index_add_(0, self.owner, values)
+
+    def give_way(self, asked: Tensor, part: slice = slice(None)) -> Tensor:
+        """By how much nodes of some pixels change that are asked to (pixels, bands, q) by the data.
+
+        Those that are held at a bound do not: with them, spectra of dark surfaces would take up more than
+        they can, and what is left would ask for changes of the model.
+        """
+        free = self.free[part].to(asked)
+        information = self.information[part] * free[:, None] * free[..., None] + torch.diag_embed(1 - free)
+        return torch.linalg.solve(information, asked * free[..., None])
 
     @property
     def chi_square(self) -> Tensor:
@@ -294,4 +305,5 @@ def solve_pixels(scan: ProbedScan, targets: Indices) -> SolvedPixels:
     prior = banded.to_dense(roughness(nodes.shape[1], matrix)[..., None])[0] * found.tau[:, None, None] ** -2
     prior = prior + torch.eye(nodes.shape[1]).to(matrix) * scan.prior.level_std**-2
     residual = light.values - (nodes[owners][:, None] @ rows)[:, 0]
-    return SolvedPixels(light, owners, lit, rows, heavy, residual, nodes, found.mean, matrix + prior)
+    free = ~found.at_bound.T
+    return SolvedPixels(light, owners, lit, rows, heavy, residual, nodes, found.mean, matrix + prior, free)
