@@ -14,9 +14,10 @@ from dsl_core.capture.proof.finding import Finding, Light, Verdict, displaced
 from dsl_core.capture.proof.first_code import FirstCode
 from dsl_core.capture.proof.later_settings import LaterSettings
 from dsl_core.capture.proof.light_steps import LightSteps
-from dsl_core.capture.proof.line_place import SIDES, LinePlaces, moved
-from dsl_core.capture.proof.line_shown import line_shown
-from dsl_core.capture.proof.neighbours import LineNeighbours
+from dsl_core.capture.proof.lines.bright_black import BrightBlack
+from dsl_core.capture.proof.lines.line_place import SIDES, LinePlaces, moved
+from dsl_core.capture.proof.lines.line_shown import line_shown
+from dsl_core.capture.proof.lines.neighbours import LineNeighbours
 from dsl_core.capture.proof.prediction import (
     APART,
     Expected,
@@ -84,6 +85,7 @@ class FrameProof:
         #: The picture that came for two patterns, for as long as it comes.
         self._repeated: Counts | None = None
         self._profiles = Recent[Floats | None]()
+        self._bright_black = BrightBlack(self._noise)
         self._neighbours = LineNeighbours(self._noise, self._raster.shape[1])
 
     def _first_code(self) -> FirstCode | None:
@@ -105,7 +107,7 @@ class FrameProof:
         """The same of what a `Raster` takes of a mosaic."""
         found = self._unless_repeated(self._judge(shot, seen), seen)
         if shot.role == "spectral" and not found.is_wrong:
-            found = self._with_doubt(found, seen)
+            found = self._unless_black_is_bright(found, seen) or self._with_doubt(found, seen)
         self._remember(found, seen)
         return found
 
@@ -183,6 +185,15 @@ class FrameProof:
         """
         ours = self._code is not None and shot.setting == self._first and not self._at_the_end
         return ours and before.index != shot.index and {before.role, shot.role} <= {"white", "black", "code"}
+
+    def _unless_black_is_bright(self, found: Finding, seen: Counts) -> Finding | None:
+        """That black and the first line have changed places, as this line and those before it show."""
+        at = self._blacks[found.shot.setting]
+        black = self._kept.get(at)
+        if black is None or not self._bright_black.is_told(found.shot.setting, seen, black):
+            return None
+        again = tuple(each for each in self._shots[at : at + 2] if each.role != "sentinel")
+        return Finding(found.shot, Verdict.OTHER, again, "black is brighter than the lines after it")
 
     def _with_doubt(self, found: Finding, seen: Counts) -> Finding:
         """A finding on a line; doubtful if it cannot be told and is unlike its neighbours."""

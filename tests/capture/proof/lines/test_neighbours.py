@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from dsl_core.capture.proof.neighbours import LineNeighbours
+from dsl_core.capture.proof.lines.neighbours import LineNeighbours
 from dsl_core.capture.proof.raster import Counts, Noise
 from dsl_core.model.rig import Sensor
 
