@@ -79,7 +79,7 @@ EARLY, AT_LINES = ("counter wraps", "lamp warms up"), ("swapped at the lines",)
 #: What a result says of such a change; other sentences on its fit do not count, nor do any of other faults.
 TOLD = r"Black pictures changed|The light (drifted|flickered|has changed)|(scene|Something|pattern) moved by"
 BAD = ("told", "WRONG", "reason?", "not resumed")
-_PICTURES = r"does not show its pattern|delivered the picture of the previous|captured once more as a control"
+_PICTURES = r"does not show its pattern|delivered the picture of the previous|captured once more"
 _SPECTRUM = "spectrum|measure"
 
 
@@ -179,7 +179,7 @@ def judge_scan(work: Work, case: Case, kind: str, at: int, tear: float) -> tuple
         return "WRONG", f"not a sentence: {type(error).__name__}: {error}"
     end = "corrected" if corrected else "right"
     if said:
-        wanted = REASONS.get(kind, _PICTURES)
+        wanted = REASONS.get(kind, f"{_PICTURES}|{TOLD}" if kind in CHANGES else _PICTURES)
         end = "stopped" if re.search(wanted, said) else "reason?"
         if kind == "cannot be opened":
             return end, said
@@ -278,7 +278,7 @@ def run(chosen_kinds: Sequence[str], cases: Sequence[Case], work: Work) -> dict[
             if kind in EARLY:
                 at = 2
             elif kind.endswith("in the code"):
-                at = int(rng.integers(3, 2 * ScanReader(work.clean[case]).plan.code_bits[0]))
+                at = int(rng.integers(2, 2 * ScanReader(work.clean[case]).plan.code_bits[0]))
             elif kind.endswith("in the last lines"):
                 last = [shot for shot in shots if shot.setting == shots[-1].setting]
                 at = int(rng.choice([s.index for s in last if s.role == "spectral"][:-8]))

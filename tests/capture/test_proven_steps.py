@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from dsl_core.capture.diagnosis import Explanation
 from dsl_core.capture.proof.finding import Finding, Light, Verdict
 from dsl_core.capture.proven import PictureError, ProvenShots
 from dsl_core.errors import Cancelled, DeviceError
@@ -39,6 +40,7 @@ class Bench:
         self.believed: list[int] = []
         self.first_setting, self.token = 0, CancelToken()
         self.cause, self.is_quite_the_same = "", True
+        self.displaced: list[bool] = []
         parts: Any = self
         self.shots = ProvenShots(parts, parts, parts, parts, self.token)
 
@@ -73,12 +75,21 @@ class Bench:
     def keep(self, shot: Shot, pixels: object) -> None:
         self.kept.append(shot.index)
 
-    def sentence(self, snap: Callable[[Shot], object]) -> str:
+    def first_picture(self) -> Shot | None:
+        return SHOTS[0] if self.displaced else None
+
+    def is_displaced(self, first: Shot, pixels: object) -> bool:
+        return self.displaced.pop(0)
+
+    def code_after(self, first: Shot) -> tuple[Shot, ...]:
+        return SHOTS[1:12]
+
+    def explain(self, snap: Callable[[Shot], object]) -> Explanation:
         if self.cause == "The lamp fails.":
             snap(SHOTS[10])
         if self.cause == "unplugged":
             raise DeviceError("no camera")
-        return self.cause
+        return Explanation(self.cause, self.cause == "It moved.")
 
 
 def is_right(shot: Shot) -> Finding:
@@ -394,3 +405,25 @@ def test_thirty_two_frames_before_a_missing_one_are_taken_again_at_most() -> Non
     count = len(tuple(stored.plan.shots()))
     bench.shots.learn(stored, {count - 1})  # type: ignore[arg-type]
     assert [index for index, *_ in bench.taken] == list(range(count - 33, count - 1))
+
+
+@pytest.mark.parametrize(("seen", "moved"), [([False], False), ([True, False], False), ([True, True], True)])
+def test_the_first_picture_is_looked_at_once_after_the_code(seen: list[bool], moved: bool) -> None:
+    bench = Bench(is_right)
+    bench.displaced = [*seen]
+    if not moved:
+        take_all(bench, SHOTS[11:15])
+        first = [at for at, (index, *_) in enumerate(bench.taken) if index == 0]
+        assert first == list(range(1, 1 + len(seen)))
+        return
+    with pytest.raises(PictureError, match=r"Frame 0 .* is displaced .* 11 frames between 1 and 11"):
+        take_all(bench, SHOTS[11:15])
+    assert bench.withdrawn == list(range(1, 12))
+
+
+def test_all_since_the_last_control_is_withdrawn_where_something_moved() -> None:
+    lines = tuple(PLAN.model_copy(update={"spectral": LineComb(width_px=1, step_px=1, period_px=40)}).shots())
+    bench = Bench(*[is_right] * 10, late)
+    bench.cause = "It moved."
+    with pytest.raises(PictureError, match=r"It moved\..* 10 frames between 12 and 21"):
+        take_all(bench, lines[12:24])

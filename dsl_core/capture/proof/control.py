@@ -15,6 +15,10 @@ WELL_SEEN = 0.7
 UNCHANGED = 0.03
 #: A pixel is lit with a contrast of so many deviations.
 LIT_SIGMAS = 12.0
+#: Edges of a pattern have moved if so many pixels changed sides, by this share of the contrast, but not most.
+FEWEST_CHANGED, CHANGED, MOST_CHANGED = 8, 0.3, 0.4
+#: Less contrast than this, as a share of what it was, shows no edges.
+LEAST_CONTRAST = 0.3
 
 
 def choose_pairs(pairs: Mapping[int, Pair], shape: tuple[int, int]) -> tuple[int, ...]:
@@ -57,6 +61,28 @@ def is_unchanged(seen: Counts, before: Counts, pairs: Mapping[int, Pair], noise:
     old, new = (each[lit] - each[lit].mean(dtype=np.float64) for each in (before, seen))
     power = float(old @ old)
     return power > 0 and abs(float(old @ new) / power - 1) < UNCHANGED
+
+
+def edges_moved(seen: Counts, before: Counts, pairs: Mapping[int, Pair], noise: Noise) -> bool:
+    """Whether edges of a picture of the code are where they were ``before``, in whatever light.
+
+    The first picture of a code has so few edges that hardly anything of it changes when it is displaced; but
+    pixels there change from light to dark, and no noise does that.
+    """
+    every = [picture for pair in pairs.values() for picture in pair]
+    dark, contrast = np.minimum.reduce(every).astype(np.float32), _contrast(pairs.values())
+    sigma = np.sqrt(noise.variance(before) + noise.variance(seen))
+    lit = contrast > LIT_SIGMAS * sigma
+    old, new = ((each[lit] - dark[lit]) / contrast[lit] for each in (before, seen))
+    was_bright = old > 0.5
+    if min(int(was_bright.sum()), int((~was_bright).sum())) < FEWEST_CHANGED:
+        return False
+    low, high = (float(np.median(new[part])) for part in (~was_bright, was_bright))
+    if high - low < LEAST_CONTRAST:
+        return False
+    new = (new - low) / (high - low)
+    changed = ((new > 0.5) != was_bright) & (np.abs(new - old) > CHANGED)
+    return FEWEST_CHANGED <= int(changed.sum()) < MOST_CHANGED * old.size
 
 
 def _contrast(pairs: Iterable[Pair]) -> Floats:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dsl_core.capture.proof.contest import Contest
-from dsl_core.capture.proof.control import choose_pairs, is_same, is_unchanged
+from dsl_core.capture.proof.control import choose_pairs, edges_moved, is_same, is_unchanged
 from dsl_core.capture.proof.finding import Finding, Light, Verdict, displaced
 from dsl_core.capture.proof.first_code import FirstCode
 from dsl_core.capture.proof.later_settings import LaterSettings
@@ -138,6 +138,23 @@ class FrameProof:
         if before is None or self._shots[control.index].role != "code":
             return False
         return is_unchanged(self._raster.take(pixels), before, self._code_pairs(), self._noise)
+
+    def first_picture(self) -> Shot | None:
+        """The shot that the scan began with, once the first code is whole; None in plans without one."""
+        if self._code is None or self._code.lit is None:
+            return None
+        return self._shots[self._places["code", 0]]
+
+    def code_after(self, first: Shot) -> tuple[Shot, ...]:
+        """The shots of the first code, its white and its black that are captured after a shot."""
+        own = (each for each in self._shots if each.setting == self._first and each.role != "sentinel")
+        return tuple(each for each in own if each.role != "spectral" and each.index > first.index)
+
+    def is_displaced(self, first: Shot, pixels: NDArray[np.uint16]) -> bool:
+        """Whether a raw mosaic of `first_picture` shows its pattern elsewhere than when the scan began."""
+        return edges_moved(
+            self._raster.take(pixels), self._kept[first.index], self._code_pairs(), self._noise
+        )
 
     @property
     def first_setting(self) -> int:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from dsl_core.capture.proof.code_pairs import Pair
-from dsl_core.capture.proof.control import choose_pairs, is_same, is_unchanged
+from dsl_core.capture.proof.control import choose_pairs, edges_moved, is_same, is_unchanged
 from dsl_core.capture.proof.raster import Noise
 from dsl_core.model.rig import Sensor
 
@@ -88,3 +88,24 @@ def test_mist_that_takes_a_twentieth_of_the_contrast_is_a_change_though_the_pict
     assert is_same(now, one, pairs, NOISE)
     assert is_unchanged(now, one, pairs, NOISE) == unchanged
     assert not is_unchanged(other, one, pairs, NOISE)
+
+
+def edge(at: int, low: float = 150.0, high: float = 250.0) -> np.ndarray:
+    """Light from one of sixteen columns on, in five rows."""
+    return np.tile(np.where(np.arange(16) < at, low, high), 5).round().astype(np.uint16)
+
+
+def test_an_edge_that_is_displaced_has_moved_in_any_light() -> None:
+    pairs = {1: stripes(8), 2: stripes(4)}
+    assert not edges_moved(edge(8), edge(8), pairs, NOISE)
+    assert not edges_moved(edge(9), edge(8), pairs, NOISE), "five pixels are too few"
+    assert edges_moved(edge(10), edge(8), pairs, NOISE)
+    assert edges_moved(edge(10, 180, 220), edge(8), pairs, NOISE)
+    assert not edges_moved(edge(8, 180, 220), edge(8), pairs, NOISE)
+    assert not edges_moved(edge(10, 195, 205), edge(8), pairs, NOISE), "nothing shows without contrast"
+
+
+def test_another_picture_is_no_edge_that_has_moved() -> None:
+    pairs = {1: stripes(8), 2: stripes(4)}
+    for other in (edge(0), edge(16), edge(8, 250, 150)):
+        assert not edges_moved(other, edge(8), pairs, NOISE)
