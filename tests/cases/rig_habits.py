@@ -1,7 +1,7 @@
 """What real cameras, projectors and rooms do that no plan asks for, as changes of pictures.
 
 A habit of the camera or the room takes a raw mosaic (rows, columns), DN, and how many pictures there were
-since it began, 0 for the first. One of the projector takes the picture it was sent (rows, columns, 3), 8 bits.
+since it began, 0 for the first. One of the projector takes the picture it was sent (rows, columns, 3).
 """
 
 from __future__ import annotations
