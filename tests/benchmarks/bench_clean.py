@@ -30,7 +30,7 @@ def plans() -> dict[str, CapturePlan]:
     """All presets, and a plan for each other code."""
     found = {preset.key: preset.plan for preset in PRESETS}
     quick = found["quick"]
-    lines = ScanLines(step_px=8)
+    lines = ScanLines(step_px=5)
     codes = {"rows": GrayCode(), "xor": XorCode(rows=False), "ensemble": EnsembleCode(rows=False)}
     for name, code in codes.items():
         found[name] = quick.model_copy(update={"code": code, "spectral": lines, "name": name})

@@ -152,9 +152,8 @@ class FrameProof:
 
     def is_displaced(self, first: Shot, pixels: NDArray[np.uint16]) -> bool:
         """Whether a raw mosaic of `first_picture` shows its pattern elsewhere than when the scan began."""
-        return edges_moved(
-            self._raster.take(pixels), self._kept[first.index], self._code_pairs(), self._noise
-        )
+        seen, before = self._raster.take(pixels), self._kept[first.index]
+        return edges_moved(seen, before, self._code_pairs(), self._noise, self._raster.shape)
 
     @property
     def first_setting(self) -> int:
