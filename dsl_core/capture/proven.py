@@ -29,6 +29,9 @@ FAILURES = 2
 CONTROL_EVERY = 8
 #: A change may begin a little before it shows: so many pictures before one that stays wrong are withdrawn.
 JUST_BEFORE = 8
+#: Pictures that are wrong like this, though nothing has changed that anybody could name, may have become so
+#: slowly: nobody knows since when.
+CREEPING = (Verdict.EXPOSURE, Verdict.OTHER)
 #: On resuming, so many shots before a missing one are captured again where nothing can be told of them.
 MOST_UNTOLD = 32
 _log = logging.getLogger(__name__)
@@ -229,7 +232,7 @@ class ProvenShots:
                 f" {found.seen}. {reason} Frames before it are saved. If the pictures are right all the same,"
                 " resume without checking that the scene has not moved.",
                 found.again,
-                has_changed=change.has_moved,
+                has_changed=change.has_moved or (not change.sentence and found.verdict in CREEPING),
             )
 
     def _be_late(self, shot: Shot, proof: FrameProof) -> None:

@@ -427,3 +427,15 @@ def test_all_since_the_last_control_is_withdrawn_where_something_moved() -> None
     bench.cause = "It moved."
     with pytest.raises(PictureError, match=r"It moved\..* 10 frames between 12 and 21"):
         take_all(bench, lines[12:24])
+
+
+@pytest.mark.parametrize(("cause", "first"), [("", 12), ("The lamp fails.", 14)])
+def test_all_since_the_last_control_is_withdrawn_where_nobody_knows_what_has_changed(
+    cause: str, first: int
+) -> None:
+    lines = tuple(PLAN.model_copy(update={"spectral": LineComb(width_px=1, step_px=1, period_px=40)}).shots())
+    bench = Bench(*[is_right] * 10, lambda shot: Finding(shot, Verdict.EXPOSURE, (shot,)))
+    bench.cause = cause
+    with pytest.raises(PictureError):
+        take_all(bench, lines[12:24])
+    assert bench.withdrawn == list(range(first, 22))
