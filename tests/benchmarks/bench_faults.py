@@ -83,6 +83,8 @@ TOLD = r"Black pictures changed|The light (drifted|flickered|has changed)|(scene
 BAD = ("told", "WRONG", "reason?", "not resumed")
 _PICTURES = r"does not show its pattern|delivered the picture of the previous|captured once more"
 _SPECTRUM = "spectrum|measure"
+#: Sentences that differ by numbers alone say the same.
+_NUMBER = re.compile(r"[-+±]?\d[\d.]*")
 
 
 @dataclass(frozen=True)
@@ -216,7 +218,8 @@ def _wrong(work: Work, case: Case, folder: Path) -> tuple[str, str]:
         result = reconstruct_scan(folder)
     except DslError as error:
         return f"{names}; no result", str(error)
-    told = " ".join(sorted(_sentences(result) - _sentences(wanted)))
+    usual = {_NUMBER.sub("#", sentence) for sentence in _sentences(wanted)}
+    told = " ".join(sorted(each for each in _sentences(result) if _NUMBER.sub("#", each) not in usual))
     depth = np.abs(result["depth_mm"].values - wanted["depth_mm"].values)
     known = np.isfinite(wanted["depth_mm"].values)
     bad = float((~(depth[known] < DEPTH_MM)).mean())
