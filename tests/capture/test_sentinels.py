@@ -116,7 +116,7 @@ def test_a_scan_that_waits_pauses_until_somebody_decides(scene: RenderedScene) -
 
 
 def test_what_was_put_back_during_a_pause_is_captured_again_from_the_motion_on(scene: RenderedScene) -> None:
-    moved, is_back = from_shot(30, 0, 1), []
+    moved, is_back = from_shot(30, 0, 1), list[bool]()
     now = Change(scene=lambda shot: 0 if is_back else int(moved(shot)))
     sink, runner = scan([scene, shifted(scene, 2)], now, waits=True)
 

@@ -7,6 +7,7 @@ since it began, 0 for the first. One of the projector takes the picture it was s
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 import cv2
 import numpy as np
@@ -71,7 +72,7 @@ def _passer_by(pixels: Mosaic, count: int) -> Mosaic:
 def _spot(shape: tuple[int, ...], light_dn: float) -> NDArray[np.floating]:
     down, across = np.mgrid[: shape[0], : shape[1]]
     away = ((down / shape[0] - 0.2) ** 2 + (across / shape[1] - 0.7) ** 2) / 0.3
-    return light_dn * np.exp(-away)
+    return np.asarray(light_dn * np.exp(-away))
 
 
 def _lamp_on(pixels: Mosaic, count: int) -> Mosaic:
@@ -172,7 +173,7 @@ CAMERA_HABITS: dict[str, Spoil] = {
 }
 
 
-def _light(image: Image, factor: NDArray[np.floating] | float) -> Image:
+def _light(image: NDArray[Any], factor: NDArray[np.floating] | float) -> Image:
     return np.asarray(np.clip(np.rint(image * np.asarray(factor)), 0, 255), np.uint8)
 
 
