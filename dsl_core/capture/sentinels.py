@@ -62,12 +62,14 @@ class SentinelWatch:
     def moved_now(self, take: Callable[[Shot], NDArray[np.uint16]]) -> Movement | None:
         """How white and a frame of the code, captured by ``take``, differ from those of the scan's beginning.
 
-        Raises what ``take`` raises, ``KeyError`` where the first pictures were not added.
+        What is no longer there of these says nothing. Raises what ``take`` raises.
         """
-        shots = self._references
-        old = {role: self._kept[shot.index] for role, shot in shots.items()}
-        new = {role: take(shot) for role, shot in shots.items()}
-        for role in ("white", "code"):
+        there = {role: shot for role, shot in self._references.items() if shot.index in self._kept}
+        if "black" not in there:
+            return None
+        old = {role: self._kept[shot.index] for role, shot in there.items()}
+        new = {role: take(shot) for role, shot in there.items()}
+        for role in sorted(there.keys() - {"black"}, reverse=True):
             pairs = (old[role], old["black"]), (new[role], new["black"])
             if found := moved_between(*pairs, self._sensor, role == "code"):
                 return found

@@ -159,3 +159,11 @@ def test_a_finished_scan_keeps_its_frames_while_not_all_is_back(scene: RenderedS
     assert sink.frames == kept
     assert again(scene, sink, [scene]).run().warning == ""
     assert movement_of(sink, scene.calibration.sensor) is None
+
+
+def test_what_is_damaged_of_the_first_pictures_does_not_say_whether_all_is_back(scene: RenderedScene) -> None:
+    sink, runner = scan([scene, shifted(scene, 2)], Change(scene=lambda shot: int(shot >= 30)))
+    with pytest.raises(DriftError):
+        runner.run()
+    sink.withdraw([scene.plan.references()["code"]])
+    assert again(scene, sink, [scene]).run().warning == ""

@@ -140,8 +140,8 @@ class FrameProof:
         return is_unchanged(self._raster.take(pixels), before, self._code_pairs(), self._noise)
 
     def first_picture(self) -> Shot | None:
-        """The shot that the scan began with, once the first code is whole; None in plans without one."""
-        if self._code is None or self._code.lit is None:
+        """The first picture of the first code, once that is whole; None in plans without one."""
+        if self._code is None or self._code.lit is None or self._places["code", 0] not in self._kept:
             return None
         return self._shots[self._places["code", 0]]
 
