@@ -144,6 +144,8 @@ class ProvenShots:
         found = self._proof.judge(shot, frame.pixels)
         if found.is_doubtful and not self._is_late:
             frame, found = self._ask_again(found, frame, self._proof)
+        elif self._proof.is_alone(found) and not self._is_late:
+            frame, found = self._compare(found, frame, self._proof)
         if shot not in found.again:
             self._save(shot, frame, found)
         if found.is_wrong:
@@ -203,6 +205,16 @@ class ProvenShots:
             proof.believe_light(doubt.shot)
         self._doubts += 1
         return second, found
+
+    def _compare(self, alone: Finding, frame: Frame, proof: FrameProof) -> tuple[Frame, Finding]:
+        """A picture that nothing tells, if another one of its shot is the same; else a third."""
+        second = self._taker.take(alone.shot, 1)
+        if not proof.differ_at_first(frame.pixels, second.pixels):
+            return frame, alone
+        self._failures += 1
+        self.corrected += 1
+        third = self._again(alone.shot, 1)
+        return replace(third, corrected="two pictures of it differed"), proof.judge(alone.shot, third.pixels)
 
     def _correct(self, found: Finding, proof: FrameProof) -> None:
         for earlier in range(len(SETTLE_MS)):

@@ -11,7 +11,7 @@ import pytest
 
 from dsl_core.capture.diagnosis import Explanation
 from dsl_core.capture.proof.finding import Finding, Light, Verdict
-from dsl_core.capture.proven import PictureError, ProvenShots
+from dsl_core.capture.proven import SETTLE_MS, PictureError, ProvenShots
 from dsl_core.errors import Cancelled, DeviceError
 from dsl_core.model.frames import Frame
 from dsl_core.model.plan import CapturePlan, GrayCode, LineComb, Shot
@@ -41,6 +41,7 @@ class Bench:
         self.first_setting, self.token = 0, CancelToken()
         self.cause, self.is_quite_the_same = "", True
         self.displaced: list[bool] = []
+        self.alone = False
         parts: Any = self
         self.shots = ProvenShots(parts, parts, parts, parts, self.token)
 
@@ -74,6 +75,12 @@ class Bench:
 
     def keep(self, shot: Shot, pixels: object) -> None:
         self.kept.append(shot.index)
+
+    def is_alone(self, found: Finding) -> bool:
+        return self.alone
+
+    def differ_at_first(self, one: object, other: object) -> bool:
+        return self._differs
 
     def first_picture(self) -> Shot | None:
         return SHOTS[0] if self.displaced else None
@@ -439,3 +446,14 @@ def test_all_since_the_last_control_is_withdrawn_where_nobody_knows_what_has_cha
     with pytest.raises(PictureError):
         take_all(bench, lines[12:24])
     assert bench.withdrawn == list(range(first, 22))
+
+
+@pytest.mark.parametrize("differs", [False, True])
+def test_a_line_that_nothing_tells_is_compared_with_another_picture_of_it(differs: bool) -> None:
+    bench = Bench(untold, differs=differs)
+    bench.alone = True
+    bench.shots.take(LINE)
+    third = [(13, 2, SETTLE_MS[1], True)]
+    assert bench.taken == [(13, 0, 0.0, False), (13, 1, 0.0, False), *(third if differs else [])]
+    assert bench.written == {13: "two pictures of it differed" if differs else ""}
+    assert bench.shots.corrected == differs

@@ -27,6 +27,7 @@ from dsl_core.capture.proof.prediction import (
     contest_of_lines,
     contest_of_pictures,
     contest_of_places,
+    is_lit_elsewhere,
     line_profile,
 )
 from dsl_core.capture.proof.raster import Counts, Floats, Noise, Raster
@@ -114,6 +115,14 @@ class FrameProof:
     def differ(self, one: NDArray[np.uint16], other: NDArray[np.uint16]) -> bool:
         """Whether two pictures of one shot of lines, as raw mosaics, show different patterns."""
         return self._neighbours.differ(self._raster.take(one), self._raster.take(other))
+
+    def is_alone(self, found: Finding) -> bool:
+        """Whether nothing tells a line: neither its columns, which are not seen, nor lines before it."""
+        return found.shot.role == "spectral" and found.verdict is Verdict.UNTOLD and self._neighbours.are_few
+
+    def differ_at_first(self, one: NDArray[np.uint16], other: NDArray[np.uint16]) -> bool:
+        """Whether two pictures of such a line, as raw mosaics, differ by more than noise."""
+        return self._neighbours.differ_at_first(self._raster.take(one), self._raster.take(other))
 
     def believe_light(self, shot: Shot) -> None:
         """Take the light of a shot for usual from now on, though it was unlike the pictures before."""
@@ -267,6 +276,8 @@ class FrameProof:
             if rival is not None
         }
         found = self._decide(shot, contests, share, lambda: self._line_shown(seen, shot))
+        if not found.is_wrong and is_lit_elsewhere(seen, lit, wanted):
+            return Finding(shot, Verdict.OTHER, (shot,), "it is bright where it should be dark")
         wanted = usual * wanted
         places = {side: contest_of_lines(seen, lit, wanted, moved(wanted, side)) for side in SIDES}
         return self._in_place(found, contests, places)
