@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dsl_core.capture.motion import moved_between
+from dsl_core.capture.put_back import ADVICE
 from dsl_core.model.captured_code import CapturedCode
 from dsl_core.model.plan import CapturePlan, Shot
 from dsl_core.model.rig import Sensor
@@ -41,6 +42,14 @@ class References:
     code: Mosaic
 
 
+@dataclass(frozen=True)
+class Explanation:
+    """What has changed, and what to do, as sentences (empty if nothing has); whether something moved."""
+
+    sentence: str = ""
+    has_moved: bool = False
+
+
 class Diagnosis:
     """Keeps the first pictures of the references of a plan, and compares them with later ones."""
 
@@ -59,8 +68,8 @@ class Diagnosis:
         if shot in self._shots.values() or shot in self._pair:
             self._kept[shot.index] = pixels
 
-    def sentence(self, take: Callable[[Shot], Mosaic]) -> str:
-        """What has changed and what to do, after capturing the references again; empty where nothing shows.
+    def explain(self, take: Callable[[Shot], Mosaic]) -> Explanation:
+        """What has changed, after capturing the references again.
 
         While the code is captured, its first pair stands in for them. Raises what ``take`` raises.
         """
@@ -76,7 +85,7 @@ class Diagnosis:
         elif self._pair and all(shot.index in self._kept for shot in self._pair):
             before, now = (_of_pair(*map(picture, self._pair)) for picture in (kept, take))
         else:
-            return ""
+            return Explanation()
         return what_changed(before, now, self._sensor)
 
 
@@ -85,18 +94,18 @@ def _of_pair(one: Mosaic, other: Mosaic) -> References:
     return References(white=np.maximum(one, other), black=np.minimum(one, other), code=one)
 
 
-def what_changed(before: References, now: References, sensor: Sensor) -> str:
-    """What is different in later pictures, and what to do; empty where nothing is."""
+def what_changed(before: References, now: References, sensor: Sensor) -> Explanation:
+    """What is different in later pictures."""
     old, new = (each.white.astype(np.float64) - each.black for each in (before, now))
     # All of the picture but what is saturated: of bright pixels alone, a motion would dim many.
     full = 0.98 * sensor.full_scale_dn
     used = (before.white < full) & (now.white < full)
     lit = used & (old > 0.25 * np.percentile(old, 95))
     if lit.sum() < FEWEST:
-        return ""
+        return Explanation()
     light = float(new[used].sum() / old[used].sum())
     if light < NO_LIGHT:
-        return (
+        return Explanation(
             "White and black now look the same: the projector gives no light, something covers it or the"
             " lens, or the camera repeats a picture. Check projector and camera, and resume the scan."
         )
@@ -123,5 +132,5 @@ def what_changed(before: References, now: References, sensor: Sensor) -> str:
             " was, and resume the scan."
         )
     if moved is not None:
-        found.append(f"{moved.sentence} {moved.advice}")
-    return " ".join(found)
+        found.append(f"{moved.sentence} {ADVICE}")
+    return Explanation(" ".join(found), moved is not None)

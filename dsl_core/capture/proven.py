@@ -11,10 +11,11 @@ from typing import NoReturn
 import numpy as np
 from numpy.typing import NDArray
 
-from dsl_core.capture.diagnosis import Diagnosis
+from dsl_core.capture.diagnosis import Diagnosis, Explanation
 from dsl_core.capture.exposure import ShotTaker
 from dsl_core.capture.proof.finding import Finding, Light, Verdict
 from dsl_core.capture.proof.verifier import FrameProof
+from dsl_core.capture.put_back import ADVICE
 from dsl_core.errors import Cancelled, DeviceError
 from dsl_core.model.frames import Frame, FrameSink, FrameSource
 from dsl_core.model.plan import Shot, describe_shot
@@ -28,6 +29,9 @@ FAILURES = 2
 CONTROL_EVERY = 8
 #: A change may begin a little before it shows: so many pictures before one that stays wrong are withdrawn.
 JUST_BEFORE = 8
+#: Pictures that are wrong like this, though nothing has changed that anybody could name, may have become so
+#: slowly: nobody knows since when.
+CREEPING = (Verdict.EXPOSURE, Verdict.OTHER)
 #: On resuming, so many shots before a missing one are captured again where nothing can be told of them.
 MOST_UNTOLD = 32
 _log = logging.getLogger(__name__)
@@ -66,6 +70,7 @@ class ProvenShots:
         #: What was saved since an old picture, taken again, last looked as it did at first.
         self._since_sound: set[Shot] = set()
         self._doubts = 0
+        self._has_seen_first = False
         #: Shots that were taken again because a picture did not show their pattern.
         self.corrected = 0
 
@@ -130,6 +135,8 @@ class ProvenShots:
         self._untold.clear()
 
     def _take(self, shot: Shot) -> None:
+        if self._proof is not None and self._is_alone(shot):
+            self._see_first(self._proof)
         frame = self._taker.take(shot, twice=self._is_late)
         if self._proof is None:
             self._sink.write(shot, frame)
@@ -137,6 +144,8 @@ class ProvenShots:
         found = self._proof.judge(shot, frame.pixels)
         if found.is_doubtful and not self._is_late:
             frame, found = self._ask_again(found, frame, self._proof)
+        elif self._proof.is_alone(found) and not self._is_late:
+            frame, found = self._compare(found, frame, self._proof)
         if shot not in found.again:
             self._save(shot, frame, found)
         if found.is_wrong:
@@ -197,6 +206,16 @@ class ProvenShots:
         self._doubts += 1
         return second, found
 
+    def _compare(self, alone: Finding, frame: Frame, proof: FrameProof) -> tuple[Frame, Finding]:
+        """A picture that nothing tells, if another one of its shot is the same; else a third."""
+        second = self._taker.take(alone.shot, 1)
+        if not proof.differ_at_first(frame.pixels, second.pixels):
+            return frame, alone
+        self._failures += 1
+        self.corrected += 1
+        third = self._again(alone.shot, 1)
+        return replace(third, corrected="two pictures of it differed"), proof.judge(alone.shot, third.pixels)
+
     def _correct(self, found: Finding, proof: FrameProof) -> None:
         for earlier in range(len(SETTLE_MS)):
             if not found.is_wrong:
@@ -218,12 +237,14 @@ class ProvenShots:
                     self._save(shot, frame, shown)
                     self.corrected += 1
         if found.is_wrong:
-            reason = self._explain() or f"{found.remedy} Resume the scan afterwards."
+            change = self._explain()
+            reason = change.sentence or f"{found.remedy} Resume the scan afterwards."
             raise PictureError(
                 f"{found.names.capitalize()} does not show its pattern after {len(SETTLE_MS) + 1} exposures:"
                 f" {found.seen}. {reason} Frames before it are saved. If the pictures are right all the same,"
                 " resume without checking that the scene has not moved.",
                 found.again,
+                has_changed=change.has_moved or (not change.sentence and found.verdict in CREEPING),
             )
 
     def _be_late(self, shot: Shot, proof: FrameProof) -> None:
@@ -252,7 +273,7 @@ class ProvenShots:
             if proof.is_as_before(control, frame.pixels):
                 is_sound &= proof.is_unchanged(control, frame.pixels)
                 continue
-            reason = self._explain() or (
+            reason = self._explain().sentence or (
                 "Projector, camera, light or target have changed since. Check that the projector follows,"
                 " that no automatic mode is on, and that nothing has moved, and resume the scan."
             )
@@ -265,13 +286,35 @@ class ProvenShots:
         if is_sound:
             self._since_sound.clear()
 
-    def _explain(self) -> str:
-        """What has changed since the scan began, and what to do; empty where that does not show."""
+    def _see_first(self, proof: FrameProof) -> None:
+        """Once in a run, after the first code, see that the very first picture is where it was.
+
+        A code that moved after its first pictures names columns that fit each other nearly everywhere, and
+        everything after it fits the code. Raises `PictureError` if it moved, for all of the code but that.
+        """
+        first = proof.first_picture()
+        if first is None or self._has_seen_first:
+            return
+        self._has_seen_first = True
+        if not proof.is_displaced(first, self._taker.take(first, twice=self._is_late).pixels):
+            return
+        if not proof.is_displaced(first, self._again(first).pixels):
+            return
+        raise PictureError(
+            f"{describe_shot(first).capitalize()}, captured once more, is displaced from where it was:"
+            " projector, camera or target moved while the code was captured, or the projector corrects or"
+            f" scales its picture. {self._explain().sentence or ADVICE} Frame {first.index} is kept.",
+            tuple(proof.code_after(first)),
+            has_changed=True,
+        )
+
+    def _explain(self) -> Explanation:
+        """What has changed since the scan began; nothing where that does not show."""
         try:
-            return self._diagnosis.sentence(lambda shot: self._again(shot).pixels)
+            return self._diagnosis.explain(lambda shot: self._again(shot).pixels)
         except DeviceError as error:
             _log.warning("No pictures could be taken to see what has changed: %s", error)
-            return ""
+            return Explanation()
 
     def _withdraw(self, error: PictureError, latest: Shot | None = None) -> NoReturn:
         """Remove the pictures that may be wrong for the same reason, and say so.

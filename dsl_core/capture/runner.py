@@ -19,6 +19,7 @@ from dsl_core.capture.overexposure import ExposureWatch
 from dsl_core.capture.preflight import require_possible
 from dsl_core.capture.proof.verifier import FrameProof
 from dsl_core.capture.proven import ProvenShots
+from dsl_core.capture.put_back import ADVICE, PutBack
 from dsl_core.capture.sentinels import SentinelWatch
 from dsl_core.devices.base import DeviceRig
 from dsl_core.errors import Cancelled, DriftError, DslError, StoreError
@@ -71,6 +72,9 @@ Listener = Callable[[Status], None]
 _log = logging.getLogger(__name__)
 #: So often a scan is completed after it was read back; a disk that loses frames again does not keep any.
 _COMPLETIONS = 2
+#: So often in a run, what moved may be put back; a rig that never keeps still does not scan for ever.
+_PUT_BACKS = 5
+_ALL_THE_SAME = "To continue all the same, resume the scan without checking that the scene has not moved."
 
 
 class Runner:
@@ -113,11 +117,13 @@ class Runner:
         self._stored = stored
         self._progress = progress or NoProgress()
         self._pace = _Pace(clock, rig.projector.info.latency_ms)
-        self._sentinels, self._exposure, self._waits = sentinels, exposure, waits
+        self._exposure, self._waits = exposure, waits
+        self._place = PutBack(plan, sentinels, lambda shot: self._taker.take(shot).pixels, sink)
         self._status = Status(State.IDLE, total=plan.shot_count)
         self._listeners: list[Listener] = []
         self._condition = threading.Condition()
         self._pause_requested = False
+        self._put_backs = 0
 
     @property
     def status(self) -> Status:
@@ -156,6 +162,7 @@ class Runner:
         try:
             self._set(State.CHECKING)
             require_possible(self._rig, self._plan)
+            self._require_place(list(self._sink.missing()))
             missing = list(self._sink.missing())
             if self._stored is not None:
                 self._shots.learn(self._stored, {shot.index for shot in missing})
@@ -188,7 +195,8 @@ class Runner:
         self._pace.start(missing)
         last = max((shot.index for shot in missing if shot.role != "sentinel"), default=-1)
         for shot in missing:
-            self._between_shots(shot, done)
+            if self._between_shots(shot, done) and self._is_back():
+                return self._take_all(list(self._sink.missing()))
             self._set(State.RUNNING, shot=shot, done=done)
             self._shots.take(shot)
             self._pace.passed(shot)
@@ -202,18 +210,42 @@ class Runner:
         if self._exposure is not None and self._exposure.found and not self._status.overexposed:
             _log.warning("%s", self._exposure.found)
             self._set(State.RUNNING, overexposed=self._exposure.found)
-        moved = None if self._sentinels is None else self._sentinels.found
+        moved = self._place.moved
         if moved is None or self._status.warning:
             return
-        self._set(State.RUNNING, warning=f"{moved.sentence} {moved.advice}")
         if only_sentinels_left:
+            self._set(State.RUNNING, warning=f"{moved.sentence} {moved.advice}")
             return
         if not self._waits:
-            raise DriftError(
-                f"{moved.sentence} {moved.advice} To continue all the same, resume the scan without checking"
-                " that the scene has not moved."
-            )
+            raise DriftError(f"{moved.sentence} {ADVICE} {_ALL_THE_SAME}")
+        self._set(State.RUNNING, warning=f"{moved.sentence} {ADVICE}")
         self.pause()
+
+    def _require_place(self, missing: list[Shot]) -> None:
+        """See that what moved in an earlier run is back; raises `DriftError` if not while frames lack."""
+        moved, away = self._place.moved, self._place.still_away()
+        if moved is None:
+            return
+        if away is None:
+            _log.warning(
+                "%s It is back in its place; what was captured since is captured again.", moved.sentence
+            )
+        elif missing:
+            raise DriftError(
+                f"{moved.sentence} Not all is back in its place: {away.sentence} {ADVICE} {_ALL_THE_SAME}"
+            )
+        else:
+            self._set(State.CHECKING, warning=f"{moved.sentence} {moved.advice}")
+
+    def _is_back(self) -> bool:
+        """Whether what moved was put back during a pause, so that all since then is captured again."""
+        moved = self._place.moved
+        if moved is None or self._put_backs == _PUT_BACKS:
+            return False
+        is_back = self._place.still_away() is None
+        self._put_backs += is_back
+        self._set(State.RUNNING, warning="" if is_back else f"{moved.sentence} {moved.advice}")
+        return is_back
 
     def _complete(self) -> None:
         """Read everything back and take again what is not there, so that a finished scan is a whole one."""
@@ -236,9 +268,10 @@ class Runner:
                 " changes the folder; then resume the scan."
             )
 
-    def _between_shots(self, shot: Shot, done: int) -> None:
-        """Wait while paused; raise `Cancelled` once that was requested."""
-        if self._must_wait():
+    def _between_shots(self, shot: Shot, done: int) -> bool:
+        """Wait while paused, and say whether that was so; raise `Cancelled` once that was requested."""
+        was_paused = self._must_wait()
+        if was_paused:
             self._pace.hold()
             self._set(State.PAUSED, shot=shot, done=done)
             with self._condition:
@@ -251,6 +284,7 @@ class Runner:
             raise Cancelled(
                 f"Cancelled after {done} of {self._plan.shot_count} frames; they are saved. Resume the scan."
             )
+        return was_paused
 
     def _must_wait(self) -> bool:
         return self._pause_requested and not self._token.is_cancelled

@@ -6,7 +6,7 @@ hardly moves in the picture, but the stripes on it do.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import replace
 
 import numpy as np
@@ -25,6 +25,7 @@ class SentinelWatch:
         """Without a ``sensor``, a usual one is assumed."""
         self._sensor = sensor or Sensor()
         self._old = {s.index: plan.original(s) for s in plan.shots() if s.role == "sentinel"}
+        self._references = plan.references()
         self._kept: dict[int, NDArray[np.uint16]] = {}
         self._black: dict[int, int] = {}
         self._still: dict[str, int] = {}
@@ -33,7 +34,8 @@ class SentinelWatch:
     @property
     def wanted(self) -> frozenset[int]:
         """Indices of the shots that are looked at."""
-        return frozenset(self._old) | {shot.index for shot in self._old.values()}
+        references = {shot.index for shot in self._references.values()}
+        return frozenset(self._old) | {shot.index for shot in self._old.values()} | references
 
     def learn(self, stored: FrameSource, there: Iterable[Shot]) -> None:
         """Look at frames of earlier runs."""
@@ -56,6 +58,30 @@ class SentinelWatch:
         elif old.role == "code":
             for black, old_black in self._black.items():
                 self._judge(shot.index, black, old_black)
+
+    def moved_now(self, take: Callable[[Shot], NDArray[np.uint16]]) -> Movement | None:
+        """How white and a frame of the code, captured by ``take``, differ from those of the scan's beginning.
+
+        What is no longer there of these says nothing. Raises what ``take`` raises.
+        """
+        there = {role: shot for role, shot in self._references.items() if shot.index in self._kept}
+        if "black" not in there:
+            return None
+        old = {role: self._kept[shot.index] for role, shot in there.items()}
+        new = {role: take(shot) for role, shot in there.items()}
+        for role in sorted(there.keys() - {"black"}, reverse=True):
+            pairs = (old[role], old["black"]), (new[role], new["black"])
+            if found := moved_between(*pairs, self._sensor, role == "code"):
+                return found
+        return None
+
+    def forget(self, shots: Iterable[Shot]) -> None:
+        """Forget frames that were withdrawn, and the motion that they showed."""
+        gone = {shot.index for shot in shots}
+        self._kept = {index: pixels for index, pixels in self._kept.items() if index not in gone}
+        self._still = {role: index for role, index in self._still.items() if index not in gone}
+        self._black = {}
+        self.found = None
 
     def _judge(self, index: int, black: int, old_black: int) -> None:
         old = self._old.get(index)

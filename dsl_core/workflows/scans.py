@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 from dsl_core.capture.movement import check_movement, pick_reference_shots
 from dsl_core.capture.proof.report import SeenFrames, WatchedSource, prove
 from dsl_core.capture.runner import Status
+from dsl_core.capture.sentinels import movement_of
 from dsl_core.devices.base import DeviceRig
 from dsl_core.devices.conditions import conditions_of
 from dsl_core.devices.registry import is_built_in, open_rig
@@ -88,6 +89,11 @@ def prepare_resume(rig: DeviceRig, folder: Path, check_drift: bool = True) -> tu
     sound = reader.sound()  # a damaged frame is taken again, and tells nothing of the scene
     done = [shot for shot in reader.plan.shots() if shot.index in sound]
     if check_drift and 0 < len(done) < reader.plan.shot_count:
+        sensor = None if reader.calibration is None else reader.calibration.sensor
+        moved = movement_of(reader, sensor, (s.index for s in reader.plan.shots() if s.index not in sound))
+        if moved is not None and moved.after is not None:
+            # What was captured after a motion does not show how things should be.
+            done = [shot for shot in done if shot.index <= moved.after]
         report = check_movement(rig, reader, pick_reference_shots(done), pattern_image)
         if not report.is_stable:
             raise DriftError(report.message)

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy.ndimage import gaussian_filter
 
-from dsl_core.capture.diagnosis import Diagnosis, References, what_changed
+from dsl_core.capture.diagnosis import Diagnosis, Explanation, References, what_changed
 from dsl_core.capture.proof.verifier import FrameProof
 from dsl_core.capture.runner import Runner
 from dsl_core.errors import DeviceError
@@ -35,8 +35,8 @@ def pictures(
 
 
 def test_nothing_is_said_of_pictures_that_differ_by_noise() -> None:
-    assert what_changed(pictures(), pictures(), SENSOR) == ""
-    assert what_changed(pictures(), pictures(light=1.03), SENSOR) == ""
+    assert what_changed(pictures(), pictures(), SENSOR).sentence == ""
+    assert what_changed(pictures(), pictures(light=1.03), SENSOR).sentence == ""
 
 
 @pytest.mark.parametrize(
@@ -55,7 +55,7 @@ def test_nothing_is_said_of_pictures_that_differ_by_noise() -> None:
     ],
 )
 def test_the_cause_is_named(later: References, said: str, not_said: str) -> None:
-    found = what_changed(pictures(), later, SENSOR)
+    found = what_changed(pictures(), later, SENSOR).sentence
     assert re.search(said, found), found
     assert not_said not in found
 
@@ -67,7 +67,7 @@ def test_a_plan_without_a_code_has_no_references() -> None:
     def never(shot: Shot) -> np.ndarray:
         raise AssertionError
 
-    assert Diagnosis(plan, SENSOR).sentence(never) == ""
+    assert Diagnosis(plan, SENSOR).explain(never) == Explanation()
 
 
 @pytest.fixture(scope="module")
@@ -120,13 +120,13 @@ def even(white: np.ndarray | float, room_dn: float) -> References:
     ],
 )  # fmt: skip
 def test_changes_matter_from_a_share_of_the_light_on(light: float, room_dn: float, said: str) -> None:
-    found = what_changed(even(1000.0, 20.0), even(1000.0 * light, room_dn), SENSOR)
+    found = what_changed(even(1000.0, 20.0), even(1000.0 * light, room_dn), SENSOR).sentence
     assert (said in found) if said else (found == "")
 
 
 @pytest.mark.parametrize(("room_dn", "is_told"), [(1.8, False), (2.4, True)])
 def test_black_tells_the_exposure_from_two_counts_on(room_dn: float, is_told: bool) -> None:
-    found = what_changed(even(1000.0, room_dn), even(500.0, room_dn / 2), SENSOR)
+    found = what_changed(even(1000.0, room_dn), even(500.0, room_dn / 2), SENSOR).sentence
     assert ("exposure or gain" in found) == is_told
 
 
@@ -134,7 +134,7 @@ def test_black_tells_the_exposure_from_two_counts_on(room_dn: float, is_told: bo
 def test_the_rooms_light_counts_against_the_lit_part_of_the_picture(added: int, is_told: bool) -> None:
     white = np.full((48, 72), 1000.0)
     white[:, 36:58], white[:, 58:] = 300.0, 100.0
-    found = what_changed(even(white, 20.0), even(white, 20.0 + added), SENSOR)
+    found = what_changed(even(white, 20.0), even(white, 20.0 + added), SENSOR).sentence
     assert ("light of the room" in found) == is_told
 
 
@@ -142,12 +142,12 @@ def test_saturated_pixels_tell_nothing() -> None:
     white = np.full((48, 72), 1000.0)
     glint = white.copy()
     glint[:, :24] = 0.99 * SENSOR.full_scale_dn - SENSOR.black_level_dn
-    assert what_changed(even(glint, 0.0), even(white, 0.0), SENSOR) == ""
-    assert what_changed(even(white, 0.0), even(glint, 0.0), SENSOR) == ""
+    assert what_changed(even(glint, 0.0), even(white, 0.0), SENSOR).sentence == ""
+    assert what_changed(even(white, 0.0), even(glint, 0.0), SENSOR).sentence == ""
 
 
 @pytest.mark.parametrize(("lit", "is_told"), [(11, False), (12, True)])
 def test_a_dozen_lit_pixels_are_needed(lit: int, is_told: bool) -> None:
     white = np.zeros((48, 72))
     white[0, :lit] = 2000.0
-    assert bool(what_changed(even(white, 20.0), even(white * 0.5, 20.0), SENSOR)) == is_told
+    assert bool(what_changed(even(white, 20.0), even(white * 0.5, 20.0), SENSOR).sentence) == is_told

@@ -9,8 +9,9 @@ from typing import Any
 import numpy as np
 import pytest
 
+from dsl_core.capture.diagnosis import Explanation
 from dsl_core.capture.proof.finding import Finding, Light, Verdict
-from dsl_core.capture.proven import PictureError, ProvenShots
+from dsl_core.capture.proven import SETTLE_MS, PictureError, ProvenShots
 from dsl_core.errors import Cancelled, DeviceError
 from dsl_core.model.frames import Frame
 from dsl_core.model.plan import CapturePlan, GrayCode, LineComb, Shot
@@ -39,6 +40,8 @@ class Bench:
         self.believed: list[int] = []
         self.first_setting, self.token = 0, CancelToken()
         self.cause, self.is_quite_the_same = "", True
+        self.displaced: list[bool] = []
+        self.alone = False
         parts: Any = self
         self.shots = ProvenShots(parts, parts, parts, parts, self.token)
 
@@ -73,12 +76,27 @@ class Bench:
     def keep(self, shot: Shot, pixels: object) -> None:
         self.kept.append(shot.index)
 
-    def sentence(self, snap: Callable[[Shot], object]) -> str:
+    def is_alone(self, found: Finding) -> bool:
+        return self.alone
+
+    def differ_at_first(self, one: object, other: object) -> bool:
+        return self._differs
+
+    def first_picture(self) -> Shot | None:
+        return SHOTS[0] if self.displaced else None
+
+    def is_displaced(self, first: Shot, pixels: object) -> bool:
+        return self.displaced.pop(0)
+
+    def code_after(self, first: Shot) -> tuple[Shot, ...]:
+        return SHOTS[1:12]
+
+    def explain(self, snap: Callable[[Shot], object]) -> Explanation:
         if self.cause == "The lamp fails.":
             snap(SHOTS[10])
         if self.cause == "unplugged":
             raise DeviceError("no camera")
-        return self.cause
+        return Explanation(self.cause, self.cause == "It moved.")
 
 
 def is_right(shot: Shot) -> Finding:
@@ -394,3 +412,48 @@ def test_thirty_two_frames_before_a_missing_one_are_taken_again_at_most() -> Non
     count = len(tuple(stored.plan.shots()))
     bench.shots.learn(stored, {count - 1})  # type: ignore[arg-type]
     assert [index for index, *_ in bench.taken] == list(range(count - 33, count - 1))
+
+
+@pytest.mark.parametrize(("seen", "moved"), [([False], False), ([True, False], False), ([True, True], True)])
+def test_the_first_picture_is_looked_at_once_after_the_code(seen: list[bool], moved: bool) -> None:
+    bench = Bench(is_right)
+    bench.displaced = [*seen]
+    if not moved:
+        take_all(bench, SHOTS[11:15])
+        first = [at for at, (index, *_) in enumerate(bench.taken) if index == 0]
+        assert first == list(range(1, 1 + len(seen)))
+        return
+    with pytest.raises(PictureError, match=r"Frame 0 .* is displaced .* 11 frames between 1 and 11"):
+        take_all(bench, SHOTS[11:15])
+    assert bench.withdrawn == list(range(1, 12))
+
+
+def test_all_since_the_last_control_is_withdrawn_where_something_moved() -> None:
+    lines = tuple(PLAN.model_copy(update={"spectral": LineComb(width_px=1, step_px=1, period_px=40)}).shots())
+    bench = Bench(*[is_right] * 10, late)
+    bench.cause = "It moved."
+    with pytest.raises(PictureError, match=r"It moved\..* 10 frames between 12 and 21"):
+        take_all(bench, lines[12:24])
+
+
+@pytest.mark.parametrize(("cause", "first"), [("", 12), ("The lamp fails.", 14)])
+def test_all_since_the_last_control_is_withdrawn_where_nobody_knows_what_has_changed(
+    cause: str, first: int
+) -> None:
+    lines = tuple(PLAN.model_copy(update={"spectral": LineComb(width_px=1, step_px=1, period_px=40)}).shots())
+    bench = Bench(*[is_right] * 10, lambda shot: Finding(shot, Verdict.EXPOSURE, (shot,)))
+    bench.cause = cause
+    with pytest.raises(PictureError):
+        take_all(bench, lines[12:24])
+    assert bench.withdrawn == list(range(first, 22))
+
+
+@pytest.mark.parametrize("differs", [False, True])
+def test_a_line_that_nothing_tells_is_compared_with_another_picture_of_it(differs: bool) -> None:
+    bench = Bench(untold, differs=differs)
+    bench.alone = True
+    bench.shots.take(LINE)
+    third = [(13, 2, SETTLE_MS[1], True)]
+    assert bench.taken == [(13, 0, 0.0, False), (13, 1, 0.0, False), *(third if differs else [])]
+    assert bench.written == {13: "two pictures of it differed" if differs else ""}
+    assert bench.shots.corrected == differs

@@ -8,10 +8,11 @@ from scipy.ndimage import gaussian_filter
 
 from dsl_core.capture.runner import Runner, State
 from dsl_core.capture.sentinels import SentinelWatch, movement_of
+from dsl_core.capture.sink import WatchedSink
 from dsl_core.errors import DriftError
 from dsl_core.model.plan import CapturePlan, GrayCode, ScanLines, Sentinels
 from dsl_core.simulation.published_rig import published_rig
-from tests.cases.changing_rig import Change, changing, shifted
+from tests.cases.changing_rig import Change, changing, from_shot, shifted
 from tests.cases.memory_sink import MemorySink
 from tests.cases.rendered_rig import RenderedScene, token_image
 
@@ -40,17 +41,22 @@ def scene() -> RenderedScene:
 
 
 def scan(scenes: list[RenderedScene], change: Change, waits: bool = False) -> tuple[MemorySink, Runner]:
+    sink = MemorySink(scenes[0].plan)
+    return sink, _runner(scenes, change, sink, waits)
+
+
+def again(scene: RenderedScene, sink: MemorySink, now: list[RenderedScene]) -> Runner:
+    """Another run of a scan, with what is there now."""
+    return _runner(now, Change(), sink)
+
+
+def _runner(scenes: list[RenderedScene], change: Change, sink: MemorySink, waits: bool = False) -> Runner:
     plan = scenes[0].plan
-    sink, watch = MemorySink(plan), SentinelWatch(plan, scenes[0].calibration.sensor)
-    keep = sink.write
-
-    def write(shot, frame):  # type: ignore[no-untyped-def]
-        keep(shot, frame)
-        watch.add(shot, frame.pixels)
-
-    sink.write = write  # type: ignore[method-assign]
+    watch = SentinelWatch(plan, scenes[0].calibration.sensor)
+    watch.learn(sink, (shot for shot in plan.shots() if shot.index in sink.frames))
     rig = replace(changing(scenes, change, 3), calibration=None)
-    return sink, Runner(rig, plan, sink, token_image, sentinels=watch, waits=waits)
+    watched = WatchedSink(sink, lambda shot, frame: watch.add(shot, frame.pixels))
+    return Runner(rig, plan, watched, token_image, sentinels=watch, waits=waits)
 
 
 @pytest.mark.parametrize(
@@ -92,7 +98,8 @@ def test_a_scan_with_all_its_frames_ends_with_a_warning(scene: RenderedScene) ->
 
 
 def test_a_scan_that_waits_pauses_until_somebody_decides(scene: RenderedScene) -> None:
-    _, runner = scan([scene, shifted(scene, 2)], Change(scene=lambda shot: int(shot >= 30)), waits=True)
+    moved = from_shot(30, 0, 1)
+    _, runner = scan([scene, shifted(scene, 2)], Change(scene=lambda shot: int(moved(shot))), waits=True)
     seen = []
 
     def decide(status) -> None:  # type: ignore[no-untyped-def]
@@ -102,5 +109,61 @@ def test_a_scan_that_waits_pauses_until_somebody_decides(scene: RenderedScene) -
             runner.resume()
 
     runner.listen(decide)
-    assert runner.run().state is State.FINISHED
+    status = runner.run()
+    assert status.state is State.FINISHED
+    assert "frames after that do not fit" in status.message
     assert seen.count(State.PAUSED) == 1
+
+
+def test_what_was_put_back_during_a_pause_is_captured_again_from_the_motion_on(scene: RenderedScene) -> None:
+    moved, is_back = from_shot(30, 0, 1), list[bool]()
+    now = Change(scene=lambda shot: 0 if is_back else int(moved(shot)))
+    sink, runner = scan([scene, shifted(scene, 2)], now, waits=True)
+
+    def put_back(status) -> None:  # type: ignore[no-untyped-def]
+        if status.state is State.PAUSED:
+            assert "Put back what moved and resume" in status.warning
+            is_back.append(True)
+            runner.resume()
+
+    runner.listen(put_back)
+    status = runner.run()
+    assert (status.state, status.warning, status.done) == (State.FINISHED, "", scene.plan.shot_count)
+    assert movement_of(sink, scene.calibration.sensor) is None
+
+
+def test_a_scan_that_saw_motion_resumes_once_all_is_back(scene: RenderedScene) -> None:
+    at = [shot.index for shot in scene.plan.shots() if shot.role == "sentinel"][4] - 3
+    sink, runner = scan([scene, shifted(scene, 2)], Change(scene=lambda shot: int(shot >= at)))
+    with pytest.raises(DriftError, match="Put back what moved and resume the scan"):
+        runner.run()
+    kept = {index: frame.pixels for index, frame in sink.frames.items()}
+    with pytest.raises(DriftError, match=r"Not all is back in its place: .* moved by 2\.\d ± 0\.1 px"):
+        again(scene, sink, [shifted(scene, 2)]).run()
+    assert sink.frames.keys() == kept.keys()
+    status = again(scene, sink, [scene]).run()
+    assert (status.state, status.warning) == (State.FINISHED, "")
+    assert movement_of(sink, scene.calibration.sensor) is None
+    same = {index for index, pixels in kept.items() if sink.frames[index].pixels is pixels}
+    assert 0 < max(same) < at
+    assert min(kept.keys() - same, default=at) <= at
+
+
+def test_a_finished_scan_keeps_its_frames_while_not_all_is_back(scene: RenderedScene) -> None:
+    last = scene.plan.shot_count - 6
+    moved = [scene, shifted(scene, 0, 2)]
+    sink, runner = scan(moved, Change(scene=lambda shot: int(shot >= last)))
+    runner.run()
+    kept = dict(sink.frames)
+    assert "moved by" in again(scene, sink, moved[1:]).run().warning
+    assert sink.frames == kept
+    assert again(scene, sink, [scene]).run().warning == ""
+    assert movement_of(sink, scene.calibration.sensor) is None
+
+
+def test_what_is_damaged_of_the_first_pictures_does_not_say_whether_all_is_back(scene: RenderedScene) -> None:
+    sink, runner = scan([scene, shifted(scene, 2)], Change(scene=lambda shot: int(shot >= 30)))
+    with pytest.raises(DriftError):
+        runner.run()
+    sink.withdraw([scene.plan.references()["code"]])
+    assert again(scene, sink, [scene]).run().warning == ""

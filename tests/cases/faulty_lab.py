@@ -31,6 +31,7 @@ from dsl_core.model.spectral import SpectralCurve
 from dsl_core.patterns.images import pattern_image
 from dsl_core.simulation.sim_devices import open_twin
 from tests.cases.pattern_faults import LASTING, SINGLE, PatternFault, PatternFaults
+from tests.cases.rig_habits import ALWAYS, CAMERA_HABITS, PROJECTOR_HABITS
 from tests.cases.spoiled_pictures import SPOILED, Spoil, squared
 
 Change = Callable[[Frame, "LabCamera"], object]
@@ -59,6 +60,8 @@ def open_lab(options: dict[str, str]) -> DeviceRig:
     rig = open_twin(rest)
     if kind == "swapped at the lines":
         kind = "swapped"
+    if kind.endswith(ALWAYS):
+        kind, at = kind.removesuffix(ALWAYS), 0
     if kind in (*SINGLE, *LASTING):
         plan = CapturePlan.model_validate_json(Path(plan_file).read_text())
         rig = PatternFaults(rig, plan, pattern_image, (PatternFault(kind, at, tear),)).rig
@@ -191,6 +194,7 @@ CAMERA: dict[str, tuple[bool, Change]] = {
     "clock in ms": (False, lambda frame, camera: replace(frame, timestamp_s=1e3 * frame.timestamp_s)),
     "memory used again": (False, _fill),
     **{kind: (is_single, _spoiled(spoil)) for kind, (is_single, spoil) in SPOILED.items()},
+    **{kind: (False, _spoiled(spoil)) for kind, spoil in CAMERA_HABITS.items()},
 }
 
 
@@ -226,6 +230,8 @@ class LabProjector(Projector):
                     image = np.roll(image, SHIFTS[kind], 1)
                 case "projector squares its picture":
                     image = squared(image)
+                case kind if kind in PROJECTOR_HABITS:
+                    image = PROJECTOR_HABITS[kind](image, self.shown - max(self.at, 1))
                 case "projector dims":
                     image = (0.75 * image).astype(np.uint8)
         self.projector.show(image)
@@ -323,6 +329,7 @@ PROJECTOR = (
     *SHIFTS,
     "projector squares its picture",
     "projector dims",
+    *PROJECTOR_HABITS,
 )
 #: Faults of the whole of a scan, that need no shot.
 OTHER = (

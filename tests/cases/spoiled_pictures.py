@@ -27,33 +27,34 @@ def _share(count: int) -> float:
     return min((count + 1) / SLOW, 1.0)
 
 
-def _counts(values: NDArray[np.floating]) -> Mosaic:
+def counts_of(values: NDArray[np.floating]) -> Mosaic:
+    """Counts that a camera can deliver, DN."""
     return np.asarray(np.clip(np.rint(values), 0, FULL_DN), np.uint16)
 
 
-def _scaled(pixels: Mosaic, factor: float | NDArray[np.floating]) -> Mosaic:
+def scaled(pixels: Mosaic, factor: float | NDArray[np.floating]) -> Mosaic:
     """With ``factor`` times the light over black."""
-    return _counts(BLACK_DN + (pixels - BLACK_DN) * factor)
+    return counts_of(BLACK_DN + (pixels - BLACK_DN) * factor)
 
 
-def _by_colour(pixels: Mosaic, change: Callable[[NDArray[np.float32]], Any]) -> Mosaic:
+def by_colour(pixels: Mosaic, change: Callable[[NDArray[np.float32]], Any]) -> Mosaic:
     """With each of the four colours of the mosaic changed as a picture of its own."""
     changed = pixels.copy()
     for down in (0, 1):
         for across in (0, 1):
             part = np.ascontiguousarray(pixels[down::2, across::2], np.float32)
-            changed[down::2, across::2] = _counts(change(part))
+            changed[down::2, across::2] = counts_of(change(part))
     return changed
 
 
 def _unsharp(pixels: Mosaic, count: int) -> Mosaic:
-    return _by_colour(pixels, lambda part: cv2.GaussianBlur(part, (0, 0), 0.01 + 0.8 * _share(count)))
+    return by_colour(pixels, lambda part: cv2.GaussianBlur(part, (0, 0), 0.01 + 0.8 * _share(count)))
 
 
 def _creeps(pixels: Mosaic, count: int) -> Mosaic:
     # Of each colour's own picture: a pixel there is two of the mosaic.
     shift = np.array([[1, 0, _share(count)], [0, 1, 0]], np.float32)
-    return _by_colour(
+    return by_colour(
         pixels,
         lambda part: cv2.warpAffine(part, shift, part.shape[::-1], borderMode=cv2.BORDER_REPLICATE),
     )
@@ -65,14 +66,14 @@ def _turns(pixels: Mosaic, count: int) -> Mosaic:
         turn = cv2.getRotationMatrix2D((columns / 2, rows / 2), 1.5 * _share(count), 1.0)
         return cv2.warpAffine(part, turn, (columns, rows), borderMode=cv2.BORDER_REPLICATE)
 
-    return _by_colour(pixels, turned)
+    return by_colour(pixels, turned)
 
 
 def _mist(pixels: Mosaic, count: int) -> Mosaic:
     """Contrast that falls by 30 %, with a veil of what it takes."""
     lost = 0.3 * _share(count)
     light = pixels - BLACK_DN
-    return _counts(BLACK_DN + (1 - lost) * light + 0.5 * lost * light.mean())
+    return counts_of(BLACK_DN + (1 - lost) * light + 0.5 * lost * light.mean())
 
 
 def _shadow(pixels: Mosaic, count: int) -> Mosaic:
@@ -80,7 +81,7 @@ def _shadow(pixels: Mosaic, count: int) -> Mosaic:
     if count >= 10:
         return pixels
     at = (np.arange(pixels.shape[1]) / pixels.shape[1] - count / 10) / 0.15
-    return _scaled(pixels, 1 - 0.7 * np.exp(-(at**2)))
+    return scaled(pixels, 1 - 0.7 * np.exp(-(at**2)))
 
 
 def _jpeg(pixels: Mosaic, count: int) -> Mosaic:
@@ -88,7 +89,7 @@ def _jpeg(pixels: Mosaic, count: int) -> Mosaic:
         coded = cv2.imencode(".jpg", (part / 16).astype(np.uint8), [cv2.IMWRITE_JPEG_QUALITY, 60])[1]
         return np.asarray(cv2.imdecode(coded, cv2.IMREAD_GRAYSCALE), np.float32) * 16
 
-    return _by_colour(pixels, lossy)
+    return by_colour(pixels, lossy)
 
 
 def _rows_slip(pixels: Mosaic, count: int) -> Mosaic:
@@ -106,7 +107,7 @@ def _dead_rows(pixels: Mosaic, count: int) -> Mosaic:
 
 def _one_led_fails(pixels: Mosaic, count: int) -> Mosaic:
     dim = pixels.copy()
-    dim[::2, ::2] = _scaled(pixels[::2, ::2], 0.1)  # red places of RGGB
+    dim[::2, ::2] = scaled(pixels[::2, ::2], 0.1)  # red places of RGGB
     return dim
 
 
@@ -120,10 +121,10 @@ def squared(image: NDArray[np.uint8]) -> NDArray[np.uint8]:
 
 #: Faults by name: whether they happen to a single picture, and what they make of it.
 SPOILED: dict[str, tuple[bool, Spoil]] = {
-    "light 10 % up": (False, lambda p, n: _scaled(p, 1.1)),
-    "lamp warms up": (False, lambda p, n: _scaled(p, 1 - 0.3 * np.exp(-n / 7))),
-    "exposure dithers": (False, lambda p, n: _scaled(p, 1 + 0.05 * (-1) ** n)),
-    "black jumps": (False, lambda p, n: _counts(p + 16.0)),
+    "light 10 % up": (False, lambda p, n: scaled(p, 1.1)),
+    "lamp warms up": (False, lambda p, n: scaled(p, 1 - 0.3 * np.exp(-n / 7))),
+    "exposure dithers": (False, lambda p, n: scaled(p, 1 + 0.05 * (-1) ** n)),
+    "black jumps": (False, lambda p, n: counts_of(p + 16.0)),
     "bit stuck": (False, lambda p, n: np.bitwise_or(p, np.uint16(32))),
     "low bits lost": (False, lambda p, n: np.bitwise_and(p, np.uint16(0xFFF0))),
     "JPEG": (False, _jpeg),

@@ -15,6 +15,11 @@ WELL_SEEN = 0.7
 UNCHANGED = 0.03
 #: A pixel is lit with a contrast of so many deviations.
 LIT_SIGMAS = 12.0
+#: Edges of a pattern have moved from so many camera pixels and deviations on.
+MOVED_PX, MOVED_SIGMAS = 0.06, 6.0
+#: Pixels are near an edge if light changes there by this share of the contrast from pixel to pixel; so many
+#: have to be.
+STEEP, FEWEST_NEAR = 0.15, 24
 
 
 def choose_pairs(pairs: Mapping[int, Pair], shape: tuple[int, int]) -> tuple[int, ...]:
@@ -57,6 +62,41 @@ def is_unchanged(seen: Counts, before: Counts, pairs: Mapping[int, Pair], noise:
     old, new = (each[lit] - each[lit].mean(dtype=np.float64) for each in (before, seen))
     power = float(old @ old)
     return power > 0 and abs(float(old @ new) / power - 1) < UNCHANGED
+
+
+def edges_moved(
+    seen: Counts, before: Counts, pairs: Mapping[int, Pair], noise: Noise, shape: tuple[int, int]
+) -> bool:
+    """Whether edges of a picture of the code are not where they were ``before``, in whatever light.
+
+    A pixel may see several columns of the projector, so that a displaced picture changes little of each; all
+    pixels near an edge together tell. ``shape`` is that of the raster.
+    """
+    every = [picture for pair in pairs.values() for picture in pair]
+    dark, contrast = np.minimum.reduce(every).astype(np.float32), _contrast(pairs.values())
+    sigma = np.sqrt(noise.variance(before) + noise.variance(seen))
+    lit = (contrast > LIT_SIGMAS * sigma).reshape(shape)
+    share = np.maximum(contrast, 1.0)
+    old, new = (((each - dark) / share).reshape(shape) for each in (before, seen))
+    slope = np.zeros(shape)
+    slope[:, 1:-1] = (old[:, 2:] - old[:, :-2]) / 2
+    sound = lit.copy()
+    sound[:, 1:-1] &= lit[:, 2:] & lit[:, :-2]
+    sound[:, [0, -1]] = False
+    steep = sound & (np.abs(slope) > STEEP)
+    near = steep.copy()
+    near[:, 1:] |= steep[:, :-1]
+    near[:, :-1] |= steep[:, 1:]
+    near &= sound
+    if int(steep.sum()) < FEWEST_NEAR:
+        return False
+    # Light of the projector and of the room may have changed meanwhile.
+    terms = np.stack([slope[near], old[near], np.ones(int(near.sum()))], 1)
+    found, *_ = np.linalg.lstsq(terms, new[near] - old[near], rcond=None)
+    left = new[near] - old[near] - terms @ found
+    deviation = np.maximum(sigma.reshape(shape)[near] / share.reshape(shape)[near], left.std())
+    std_px = float(np.sqrt(np.linalg.pinv((terms / deviation[:, None] ** 2).T @ terms)[0, 0]))
+    return abs(float(found[0])) > max(MOVED_PX, MOVED_SIGMAS * std_px)
 
 
 def _contrast(pairs: Iterable[Pair]) -> Floats:

@@ -20,6 +20,9 @@ BLUR = 0.15
 BRIGHT_SIGMAS, FEWEST_BRIGHT = 25.0, 12
 #: Unlit pixels that say how much light of the room has changed since black was taken.
 FEWEST_UNLIT = 60
+#: A pixel is bright with this share of white; orders and light from surface to surface give less. So many of
+#: the pixels that should be dark, as a share, show another pattern.
+BRIGHT_SHARE, ELSEWHERE = 0.5, 0.05
 #: A share of the pixels that a line leaves unlit has none of its first orders either; and by how many
 #: deviations of a pixel black has to have gained before it is taken off.
 NO_ORDERS, LEAST_GAINED = 0.25, 0.5
@@ -100,6 +103,16 @@ def brightness_of_lines(seen: Counts, lit: Lit, wanted: Floats, noise: Noise) ->
     light = lit.contrast[chosen] * wanted[lit.key[chosen]]
     gain = seen[lit.index[chosen]] - lit.black[chosen] - room
     return _ratio(gain, light, lit.sigma[chosen] ** 2)
+
+
+def is_lit_elsewhere(seen: Counts, lit: Lit, wanted: Floats) -> bool:
+    """Whether a picture of columns is as bright as white where its `line_profile` leaves it dark.
+
+    A single edge of a code in place of a line leaves most pixels dark, so that votes do not tell it.
+    """
+    unlit = Places.of(lit, wanted).unlit
+    bright = seen[lit.index[unlit]] - lit.black[unlit] > BRIGHT_SHARE * lit.contrast[unlit]
+    return int(bright.sum()) > max(FEWEST_UNLIT, ELSEWHERE * unlit.size)
 
 
 def black_gained(seen: Counts, lit: Lit, wanted: Floats, noise: Noise) -> np.float32:

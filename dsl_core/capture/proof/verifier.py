@@ -9,14 +9,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dsl_core.capture.proof.contest import Contest
-from dsl_core.capture.proof.control import choose_pairs, is_same, is_unchanged
+from dsl_core.capture.proof.control import choose_pairs, edges_moved, is_same, is_unchanged
 from dsl_core.capture.proof.finding import Finding, Light, Verdict, displaced
 from dsl_core.capture.proof.first_code import FirstCode
 from dsl_core.capture.proof.later_settings import LaterSettings
 from dsl_core.capture.proof.light_steps import LightSteps
-from dsl_core.capture.proof.line_place import SIDES, LinePlaces, moved
-from dsl_core.capture.proof.line_shown import line_shown
-from dsl_core.capture.proof.neighbours import LineNeighbours
+from dsl_core.capture.proof.lines.bright_black import BrightBlack
+from dsl_core.capture.proof.lines.line_place import SIDES, LinePlaces, moved
+from dsl_core.capture.proof.lines.line_shown import line_shown
+from dsl_core.capture.proof.lines.neighbours import LineNeighbours
 from dsl_core.capture.proof.prediction import (
     APART,
     Expected,
@@ -26,6 +27,7 @@ from dsl_core.capture.proof.prediction import (
     contest_of_lines,
     contest_of_pictures,
     contest_of_places,
+    is_lit_elsewhere,
     line_profile,
 )
 from dsl_core.capture.proof.raster import Counts, Floats, Noise, Raster
@@ -84,6 +86,7 @@ class FrameProof:
         #: The picture that came for two patterns, for as long as it comes.
         self._repeated: Counts | None = None
         self._profiles = Recent[Floats | None]()
+        self._bright_black = BrightBlack(self._noise)
         self._neighbours = LineNeighbours(self._noise, self._raster.shape[1])
 
     def _first_code(self) -> FirstCode | None:
@@ -105,13 +108,21 @@ class FrameProof:
         """The same of what a `Raster` takes of a mosaic."""
         found = self._unless_repeated(self._judge(shot, seen), seen)
         if shot.role == "spectral" and not found.is_wrong:
-            found = self._with_doubt(found, seen)
+            found = self._unless_black_is_bright(found, seen) or self._with_doubt(found, seen)
         self._remember(found, seen)
         return found
 
     def differ(self, one: NDArray[np.uint16], other: NDArray[np.uint16]) -> bool:
         """Whether two pictures of one shot of lines, as raw mosaics, show different patterns."""
         return self._neighbours.differ(self._raster.take(one), self._raster.take(other))
+
+    def is_alone(self, found: Finding) -> bool:
+        """Whether nothing tells a line: neither its columns, which are not seen, nor lines before it."""
+        return found.shot.role == "spectral" and found.verdict is Verdict.UNTOLD and self._neighbours.are_few
+
+    def differ_at_first(self, one: NDArray[np.uint16], other: NDArray[np.uint16]) -> bool:
+        """Whether two pictures of such a line, as raw mosaics, differ by more than noise."""
+        return self._neighbours.differ_at_first(self._raster.take(one), self._raster.take(other))
 
     def believe_light(self, shot: Shot) -> None:
         """Take the light of a shot for usual from now on, though it was unlike the pictures before."""
@@ -136,6 +147,22 @@ class FrameProof:
         if before is None or self._shots[control.index].role != "code":
             return False
         return is_unchanged(self._raster.take(pixels), before, self._code_pairs(), self._noise)
+
+    def first_picture(self) -> Shot | None:
+        """The first picture of the first code, once that is whole; None in plans without one."""
+        if self._code is None or self._code.lit is None or self._places["code", 0] not in self._kept:
+            return None
+        return self._shots[self._places["code", 0]]
+
+    def code_after(self, first: Shot) -> tuple[Shot, ...]:
+        """The shots of the first code, its white and its black that are captured after a shot."""
+        own = (each for each in self._shots if each.setting == self._first and each.role != "sentinel")
+        return tuple(each for each in own if each.role != "spectral" and each.index > first.index)
+
+    def is_displaced(self, first: Shot, pixels: NDArray[np.uint16]) -> bool:
+        """Whether a raw mosaic of `first_picture` shows its pattern elsewhere than when the scan began."""
+        seen, before = self._raster.take(pixels), self._kept[first.index]
+        return edges_moved(seen, before, self._code_pairs(), self._noise, self._raster.shape)
 
     @property
     def first_setting(self) -> int:
@@ -183,6 +210,15 @@ class FrameProof:
         """
         ours = self._code is not None and shot.setting == self._first and not self._at_the_end
         return ours and before.index != shot.index and {before.role, shot.role} <= {"white", "black", "code"}
+
+    def _unless_black_is_bright(self, found: Finding, seen: Counts) -> Finding | None:
+        """That black and the first line have changed places, as this line and those before it show."""
+        at = self._blacks[found.shot.setting]
+        black = self._kept.get(at)
+        if black is None or not self._bright_black.is_told(found.shot.setting, seen, black):
+            return None
+        again = tuple(each for each in self._shots[at : at + 2] if each.role != "sentinel")
+        return Finding(found.shot, Verdict.OTHER, again, "black is brighter than the lines after it")
 
     def _with_doubt(self, found: Finding, seen: Counts) -> Finding:
         """A finding on a line; doubtful if it cannot be told and is unlike its neighbours."""
@@ -240,6 +276,8 @@ class FrameProof:
             if rival is not None
         }
         found = self._decide(shot, contests, share, lambda: self._line_shown(seen, shot))
+        if not found.is_wrong and is_lit_elsewhere(seen, lit, wanted):
+            return Finding(shot, Verdict.OTHER, (shot,), "it is bright where it should be dark")
         wanted = usual * wanted
         places = {side: contest_of_lines(seen, lit, wanted, moved(wanted, side)) for side in SIDES}
         return self._in_place(found, contests, places)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from dsl_core.capture.proof.code_pairs import Pair
-from dsl_core.capture.proof.control import choose_pairs, is_same, is_unchanged
+from dsl_core.capture.proof.control import choose_pairs, edges_moved, is_same, is_unchanged
 from dsl_core.capture.proof.raster import Noise
 from dsl_core.model.rig import Sensor
 
@@ -88,3 +88,32 @@ def test_mist_that_takes_a_twentieth_of_the_contrast_is_a_change_though_the_pict
     assert is_same(now, one, pairs, NOISE)
     assert is_unchanged(now, one, pairs, NOISE) == unchanged
     assert not is_unchanged(other, one, pairs, NOISE)
+
+
+ROWS = 40
+
+
+def edge(at: float, low: float = 120.0, high: float = 280.0, seed: int = 0) -> np.ndarray:
+    """Light from one of sixteen columns on, in forty rows, as pixels see it that are a column wide."""
+    share = np.clip(np.arange(16) + 1 - at, 0, 1)
+    light = np.tile(low + (high - low) * share, (ROWS, 1))
+    return (light + np.random.default_rng(seed).normal(0, 3, light.shape)).round().astype(np.uint16).ravel()
+
+
+def moved(seen: np.ndarray, before: np.ndarray) -> bool:
+    on, off = edge(0), edge(16)
+    return edges_moved(seen, before, {1: (on, off), 2: (off, on)}, NOISE, (ROWS, 16))
+
+
+@pytest.mark.parametrize(("low", "high"), [(120, 280), (120, 240), (140, 300)])
+def test_an_edge_that_is_displaced_has_moved_in_any_light(low: float, high: float) -> None:
+    before = edge(8.4)
+    assert not moved(edge(8.4, low, high, 1), before)
+    assert not moved(edge(8.42, low, high, 2), before), "a fiftieth of a pixel is no motion"
+    assert moved(edge(8.7, low, high, 3), before)
+    assert moved(edge(7.6, low, high, 4), before)
+
+
+def test_without_an_edge_nothing_has_moved() -> None:
+    assert not moved(edge(16, seed=1), edge(16))
+    assert not moved(edge(8.4)[: 20 * 16].repeat(2), edge(16))

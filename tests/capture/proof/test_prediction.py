@@ -15,6 +15,7 @@ from dsl_core.capture.proof.prediction import (
     contest_of_lines,
     contest_of_pictures,
     contest_of_places,
+    is_lit_elsewhere,
     line_profile,
     rescaled,
 )
@@ -299,3 +300,18 @@ def test_what_black_has_gained_is_not_multiplied_with_the_light() -> None:
     picture, black = np.array([316, 216], np.uint16), np.array([200, 200], np.uint16)
     found = rescaled(picture, black, floats([150, 150]), 30.0, NOISE, np.float32(16))
     assert found.counts == pytest.approx([150 + 30 * 100, 150])
+
+
+@pytest.mark.parametrize(("bright", "is_told"), [(60, False), (61, True)])
+def test_more_than_sixty_bright_pixels_where_it_should_be_dark_show_another_pattern(
+    bright: int, is_told: bool
+) -> None:
+    count = 700
+    index = np.arange(count)
+    whole = Lit(index, index % 30, floats(np.full(count, 100)), floats(np.full(count, 200)), floats(index))
+    wanted = np.zeros(30, np.float32)
+    wanted[:3] = 1
+    seen = np.full(count, 180, np.uint16)
+    seen[index % 30 < 3] = 300
+    seen[np.flatnonzero(index % 30 >= 3)[:bright]] = 210
+    assert is_lit_elsewhere(seen, whole, wanted) == is_told

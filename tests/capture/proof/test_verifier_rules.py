@@ -212,3 +212,31 @@ def test_columns_rise_as_the_calibration_says(turned: bool, rises: bool) -> None
     unknown = proof(is_calibrated=False)._code
     assert unknown is not None
     assert unknown._rises is None
+
+
+def test_black_that_is_brighter_than_the_lines_is_taken_again_with_the_first_line() -> None:
+    judge, rng = proof(), np.random.default_rng(5)
+
+    def dark(lit: int) -> Counts:
+        level = np.full(32 * 18, 300.0)
+        level[20 * lit : 20 * lit + 20] += 60
+        found = np.rint(level + rng.normal(0, 2, level.size)).astype(np.uint16)
+        found.flags.writeable = False
+        return found
+
+    # White is not there yet, so that no line is judged by its columns.
+    judge.judge_raster(SHOTS[11], dark(0))
+    found = [judge.judge_raster(SHOTS[12 + at], dark(1 + at)) for at in range(4)]
+    assert [each.is_wrong for each in found] == [False, False, False, True]
+    assert [shot.index for shot in found[-1].again] == [11, 12]
+    assert "black is brighter than the lines after it" in found[-1].sentence
+
+
+def test_the_first_picture_is_named_once_the_code_is_whole() -> None:
+    judge: Any = proof()
+    assert judge.first_picture() is None
+    judge._code = SimpleNamespace(lit=object())
+    assert judge.first_picture() is None, "it is not there"
+    judge._kept[0] = counts(300)
+    assert judge.first_picture() == SHOTS[0]
+    assert [shot.index for shot in judge.code_after(SHOTS[0])] == list(range(1, 12))

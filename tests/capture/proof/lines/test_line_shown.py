@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from dsl_core.capture.proof.line_shown import line_shown
+from dsl_core.capture.proof.lines.line_shown import line_shown
 from dsl_core.capture.proof.prediction import Lit
 from dsl_core.capture.proof.raster import Counts, Floats
 from dsl_core.model.plan import Shot

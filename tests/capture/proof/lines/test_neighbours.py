@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from dsl_core.capture.proof.neighbours import LineNeighbours
+from dsl_core.capture.proof.lines.neighbours import LineNeighbours
 from dsl_core.capture.proof.raster import Counts, Noise
 from dsl_core.model.rig import Sensor
 
@@ -139,3 +139,20 @@ def test_light_counts_from_twenty_five_deviations_of_two_blacks_on(above: float,
     for _ in range(3):
         neighbours._has_other_light(picture.astype(np.uint16), black)
     assert neighbours._has_other_light(black, black) == counts
+
+
+def test_two_pictures_of_one_line_are_different_by_all_their_light_or_by_a_few_pixels() -> None:
+    rng = np.random.default_rng(3)
+    neighbours = LineNeighbours(Noise.of(Sensor(), 12), 40)
+    assert neighbours.are_few
+
+    def picture(light: float, room: float = 300.0, lit: int = 200) -> np.ndarray:
+        level = np.full(2000, room)
+        level[:lit] += light
+        return np.rint(level + rng.normal(0, 2.5, level.size)).astype(np.uint16)
+
+    line = picture(20)
+    assert not neighbours.differ_at_first(line, picture(20))
+    assert not neighbours.differ_at_first(line, picture(20, room=330.0)), "light of the room"
+    assert neighbours.differ_at_first(line, picture(10))
+    assert neighbours.differ_at_first(picture(400, lit=20), picture(0, lit=20))

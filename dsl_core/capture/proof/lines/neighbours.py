@@ -26,6 +26,10 @@ LITTLE = 0.3
 SAME_LINES = (0.6, 1.6)
 #: Light counts from so many deviations on.
 BRIGHT_SIGMAS = 25.0
+#: Two pictures of one shot are different if their light is by so many deviations, or more than so few pixels.
+SURE_SIGMAS, FEW = 6.0, 0.002
+#: Median of the deviations of a normal distribution.
+NORMAL = 0.6745
 #: Differences count up to so many deviations.
 _CLIP = 10.0
 
@@ -55,6 +59,23 @@ class LineNeighbours:
         doubtful = bool(((change < LITTLE * usual) & (usual > LEAST_CHANGE)).any())
         self._changes.append(change)
         return self._has_other_light(seen, black) or doubtful
+
+    @property
+    def are_few(self) -> bool:
+        """Whether too few pictures were compared to say what is usual."""
+        return len(self._changes) < FEWEST_USUAL
+
+    def differ_at_first(self, one: Counts, other: Counts) -> bool:
+        """Whether two pictures of one shot differ by more than noise and light of the room, all over.
+
+        That needs no neighbours: of two pictures of one pattern, all pixels together have the same light.
+        """
+        step = np.subtract(one, other, dtype=np.float32)
+        step -= np.median(step)
+        step /= np.sqrt(self._noise.variance(one) + self._noise.variance(other))
+        sigma = max(float(np.median(np.abs(step))) / NORMAL, 1.0)
+        all_over = abs(float(step.sum())) / (sigma * np.sqrt(step.size))
+        return all_over > SURE_SIGMAS or float((np.abs(step) > SURE_SIGMAS * sigma).mean()) > FEW
 
     def differ(self, one: Counts, other: Counts) -> bool:
         """Whether two pictures of one shot show different patterns."""

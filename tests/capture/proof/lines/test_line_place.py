@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from dsl_core.capture.proof.contest import Contest
 from dsl_core.capture.proof.finding import Finding, Verdict
-from dsl_core.capture.proof.line_place import LinePlaces, moved
+from dsl_core.capture.proof.lines.line_place import LinePlaces, moved
 from dsl_core.capture.proof.verifier import FrameProof
 from dsl_core.model.plan import CapturePlan, GrayCode, ScanLines, Setting, Shot
 from dsl_core.model.rig import Rig

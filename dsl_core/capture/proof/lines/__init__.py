@@ -1,0 +1,1 @@
+"""What pictures of lines show, by themselves and by those next to them."""
