@@ -11,7 +11,7 @@ from PySide6.QtWidgets import QFrame, QMessageBox, QPushButton, QWidget
 
 from dsl_app.shared.notify import Level
 from dsl_app.shared.widgets.forms import label, push_button
-from dsl_app.shared.widgets.layouts import Stretch, row_of
+from dsl_app.shared.widgets.layouts import STRETCH, row_of
 from dsl_app.shared.wording import in_window
 from dsl_app.shell.short_text import ShortText
 from dsl_app.shell.status_line import StatusLine
@@ -59,8 +59,7 @@ class Toast(QFrame):
         self.more.setVisible(bool(details))
         self.words.cut.connect(lambda is_cut: self.more.setVisible(is_cut or bool(details)))
         buttons += [self.more, _flat("Close", "Close this message", self.dismiss)]
-        # Buttons are next to a short text; a long one gets all of the room.
-        row_of(self.words, self.behind, *buttons, Stretch(), on=self, margins=(12, 0, 4, 0))
+        row_of(self.words, self.behind, *buttons, on=self, margins=(12, 0, 4, 0))
 
     def come_to_front(self, behind: int) -> None:
         """Be the one that is shown, before so many others; the time until it leaves begins."""
@@ -130,7 +129,8 @@ class Toasts(QObject):
     def __init__(self, line: StatusLine) -> None:
         super().__init__(line)
         self.place = QWidget()
-        self._row = row_of(on=self.place, margins=(0, 2, 8, 2))
+        # As wide as its text, where there is room.
+        self._row = row_of(STRETCH, on=self.place, margins=(0, 2, 8, 2))
         line.insertPermanentWidget(0, self.place, 1)
         self.place.hide()
         self._shown: list[Toast] = []
@@ -164,7 +164,7 @@ class Toasts(QObject):
             return
         toast.dismissed.connect(lambda: self._drop(toast))
         toast.hide()
-        self._row.addWidget(toast)
+        self._row.insertWidget(0, toast)
         self._shown.append(toast)
         for old in tuple(self._shown[:-MOST]):
             old.dismiss()

@@ -79,7 +79,8 @@ class CalibrationWizard(QDialog):
         for page in (self.settings, self.step, self.fit):
             self.stack.addWidget(page)
         row = row_of(self.steps, (self.stack, 1))
-        column_of(self.banner, (row, 1), self.buttons, on=self)
+        # Where it comes, nothing moves that a person clicks.
+        column_of((row, 1), self.banner, self.buttons, on=self)
 
     def _connect(self) -> None:
         state, commands = self._state, self._commands
