@@ -210,11 +210,11 @@ def test_the_fit_button_and_the_leave_button_follow_the_fit() -> None:
     assert buttons(done).leave.text == "&Leave"
 
 
-@pytest.mark.parametrize("values", [{"look": Look(figures=(BAD,))}, {"trouble": "No board was found."}])
+@pytest.mark.parametrize("values", [{"look": Look("a", (BAD,))}, {"trouble": "No board was found."}])
 def test_what_was_found_wrong_is_checked_before_it_is_captured(values: dict[str, object]) -> None:
     assert main_button(wizard(FIRST, places_itself=True, **values)) == "check"
     assert main_button(wizard(FIRST, **values)) == "check"
-    good = {"look": Look(figures=(GOOD,))}
+    good = {"look": Look("a", (GOOD,))}
     assert main_button(wizard(FIRST, places_itself=True, **good)) == "all"
 
 
