@@ -47,6 +47,8 @@ class Toast(QFrame):
         self.setAccessibleName(f"{level}: {text}")
         self.level, self.text = level, text
         self._details, self._stay_ms = details, stay_ms
+        # What is offered loses its sense with time, seen or not.
+        self._ages_behind = bool(offers)
         self._watch: QTimer | None = None
         self.words = ShortText(text)
         self.behind = label("", "muted")
@@ -78,6 +80,10 @@ class Toast(QFrame):
     def stand_back(self) -> None:
         """Wait behind another, for as long as that is shown."""
         self.hide()
+        if not self._ages_behind:
+            self._forget_time()
+
+    def _forget_time(self) -> None:
         if self._watch is not None:
             self._watch.stop()
             self._watch.deleteLater()
@@ -101,7 +107,8 @@ class Toast(QFrame):
 
     def dismiss(self) -> None:
         """Close the message."""
-        self.stand_back()
+        self.hide()
+        self._forget_time()
         self.dismissed.emit()
         self.deleteLater()
 

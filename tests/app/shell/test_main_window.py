@@ -238,6 +238,11 @@ def test_a_message_that_waits_behind_another_is_shown_for_its_whole_time(
     window.toasts.shown[-1].dismiss()
     assert window.toasts.shown[-1].isVisible()
     qtbot.waitUntil(lambda: not window.toasts.shown)
+    # An offer has its time, seen or not.
+    window.toasts.offer("Take the tour?", {"Tour": lambda: None}, stay_s=0.03)
+    window.toasts.tell("error", "The disk is full.")
+    qtbot.waitUntil(lambda: len(window.toasts.shown) == 1)
+    assert window.toasts.shown[0].text == "The disk is full."
 
 
 @pytest.mark.parametrize(("is_minor", "asked"), [(True, 0), (False, 1)])
