@@ -252,7 +252,7 @@ class WizardButtons(QWidget):
         self.accept.clicked.connect(commands.accept)
         shown = (
             *(state.at, state.doing, state.statuses, state.fit, state.allowed, state.look),
-            *(state.outlines, state.places_itself),
+            *(state.outlines, state.places_itself, state.trouble),
         )
         self.stops = [
             *follow_any(self._show, *shown),
