@@ -199,8 +199,10 @@ class PagedWindow(QMainWindow):
             return
         for page in self._made.values():
             page.release()
-        self.parts.runner.shut_down()
         self.save_settings()
+        # What a job does between two safe points can take seconds, in which the window would stand still.
+        self.hide()
+        self.parts.runner.shut_down()
         self.closed.emit()
         # Python's logging outlives the window and must not call into it.
         logging.getLogger().removeHandler(self.parts.records)

@@ -21,6 +21,7 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QFileDialog, QLabel, QMenu, QVBoxLayout
 from pytestqt.qtbot import QtBot
 
+from dsl_core.progress import Progress
 from tests.app.support.doubles import RecordingNotifier
 
 
@@ -261,6 +262,24 @@ def test_only_work_that_somebody_would_miss_keeps_the_window_open(
     threading.Timer(0.1, free.set).start()
     window.close()
     assert len(questions) == asked
+
+
+def test_nobody_sees_the_window_wait_for_its_threads(window: MainWindow) -> None:
+    window.show()
+    begun, seen = threading.Event(), list[bool]()
+
+    def work(progress: Progress) -> None:
+        begun.set()
+        try:
+            while True:
+                progress.report("work", 0, 0)
+        finally:
+            seen.append(window.isVisible())
+
+    window.parts.runner.submit(Job("Long work", work, is_minor=True))
+    assert begun.wait(10)
+    window.close()
+    assert seen == [False]
 
 
 def test_the_window_can_be_there_before_its_page(qtbot: QtBot, tmp_path: Path) -> None:
