@@ -77,7 +77,7 @@ class CalibratePage(PageWidget):
         column_of(on=self._listed)
         top = boxed(column_of((boxed(self._top), 1), (self._listed, 1), margins=0))
         self._split = splitter(Qt.Orientation.Vertical, (top, 0), (self.library, 1), sizes=(ROWS_PX, 300))
-        column_of(self.banner, self.head, (self._split, 1), on=self)
+        column_of(self.head, (self._split, 1), self.banner, on=self)
         self.arrange()
 
     def arrange(self) -> None:

@@ -97,7 +97,8 @@ class ScanPage(PageWidget):
         self._right, self._right_area = _side(RIGHT_PX, self.calibration, self.target, self.run)
         self._views = splitter(Qt.Orientation.Horizontal, (self.middle, 1))
         row = row_of(self._left_area, (self._views, 1), self._right_area)
-        column_of(self.banner, (row, 1), on=self)
+        # Below, so that no button moves when the rig is lost.
+        column_of((row, 1), self.banner, on=self)
 
     def arrange(self) -> None:
         """Show the frames next to the forecast, and all settings in one column, where there is room."""

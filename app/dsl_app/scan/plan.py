@@ -304,7 +304,7 @@ def read_plan(path: Path, now: CapturePlan) -> CapturePlan:
     if made.width_px != width_px:
         raise PlanError(
             f"The patterns of {path.name} are {made.width_px} columns wide, but the projector has {width_px}."
-            " Design patterns for this rig with 'dsl-scan design'."
+            " Open a pattern set that was designed for this rig."
         )
     return now.model_copy(
         update={

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from concurrent.futures import ThreadPoolExecutor
 from typing import TYPE_CHECKING
 
 from PySide6.QtCore import QObject
@@ -31,7 +32,10 @@ class SessionRestore(QObject):
         self.scans: ScanController | None = None
         self.pair: PairController | None = None
         self.series: SeriesController | None = None
-        self.store = SessionStore(window.parts.settings_path.parent / "sessions", self.collect)
+        # A disk that is busy takes a tenth of a second, for which the window would stand still.
+        self._writer = ThreadPoolExecutor(1, thread_name_prefix="session")
+        folder = window.parts.settings_path.parent / "sessions"
+        self.store = SessionStore(folder, self.collect, writer=self._writer)
         self._timer = Ticker(self, SAVE_MS, self.save)
 
     # Save ------------------------------------------------------------------------------------------
@@ -71,6 +75,7 @@ class SessionRestore(QObject):
     def _end(self) -> None:
         self._timer.stop()
         self.store.remove()
+        self._writer.shutdown()
 
     # Restore ---------------------------------------------------------------------------------------
 

@@ -9,6 +9,8 @@ from __future__ import annotations
 import logging
 import os
 from collections.abc import Callable
+from concurrent.futures import Executor, Future
+from contextlib import suppress
 from pathlib import Path
 
 from pydantic import ValidationError
@@ -24,8 +26,19 @@ _PREFIX = "session-"
 class SessionStore:
     """Writes what ``collect`` gives whenever that has changed since the last `save`."""
 
-    def __init__(self, folder: Path, collect: Callable[[], Session], process: int | None = None) -> None:
-        """``process`` is this program's number; its own by default."""
+    def __init__(
+        self,
+        folder: Path,
+        collect: Callable[[], Session],
+        process: int | None = None,
+        writer: Executor | None = None,
+    ) -> None:
+        """``process`` is this program's number; its own by default.
+
+        With a ``writer`` of one thread, `save` does not wait for the disk, and tells of a failure next time.
+        """
+        self._writer, self._writing = writer, Future[str]()
+        self._writing.set_result("")
         self._folder, self._collect = folder, collect
         self._process = os.getpid() if process is None else process
         self._path = folder / f"{_PREFIX}{self._process}.json"
@@ -37,10 +50,25 @@ class SessionStore:
 
         Called by a timer, so that many changes cost one write. An empty session gets no file.
         """
-        session = self._collect()
-        if session == self._latest or (self._latest is None and not session.names):
+        if not self._writing.done():
             return ""
+        session, trouble = self._collect(), self._told()
+        if session == self._latest or (self._latest is None and not session.names):
+            return trouble
         self._latest = session
+        if self._writer is not None:
+            self._writing = self._writer.submit(self._write, session)
+            return trouble
+        return self._write(session)
+
+    def _told(self) -> str:
+        """What became of the last write, once."""
+        trouble = self._writing.result()
+        self._writing = Future()
+        self._writing.set_result("")
+        return trouble
+
+    def _write(self, session: Session) -> str:
         try:
             self._folder.mkdir(parents=True, exist_ok=True)
             write_atomic(self._path, session.model_dump_json(indent=1).encode())
@@ -55,7 +83,9 @@ class SessionStore:
 
     def remove(self) -> None:
         """Remove the file: the program ends normally, and nothing has to be restored."""
-        self._path.unlink(missing_ok=True)
+        self._told()
+        with suppress(OSError):  # it was never written, and that was told
+            self._path.unlink()
 
     def crashed_session(self) -> tuple[Session | None, str]:
         """The newest session of a program that crashed, and a sentence on one that cannot be read.
@@ -70,9 +100,9 @@ class SessionStore:
                 continue
             try:
                 found = Session.model_validate_json(path.read_bytes())
-            except (OSError, ValidationError) as error:
+            except (OSError, ValidationError):
                 trouble = (
-                    f"The session before the crash could not be read ({type(error).__name__})."
+                    "The session before the crash could not be read: its file is damaged."
                     f"{set_aside(path)} Use File, Open recent to open your files."
                 )
                 continue

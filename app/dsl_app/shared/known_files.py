@@ -138,8 +138,8 @@ def refusal(path: Path) -> str:
             return f"{path.name} is a plan or pattern set. Use 'Open plan' on the Scan page to open it."
         case Kind.CALIBRATION:
             return (
-                f"{path.name} is a calibration. Add it to the library on the Calibrate page or by"
-                f" 'dsl-scan calibrations import {path.name}', then choose it on the Scan page."
+                f"{path.name} is a calibration. Import it into the library on the Calibrate page, then choose"
+                " it on the Scan page."
             )
         case Kind.PUBLISHED:
             return f"{path.name} has the layout of another program. Use File, Import to import it."

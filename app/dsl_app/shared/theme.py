@@ -106,6 +106,11 @@ QToolButton[role="choice"]:hover {{ border-color: {t.muted}; }}
 QToolButton[role="choice"]:focus {{ border-color: {t.text}; }}
 QToolButton[role="choice"]:checked {{ background: {t.accent}; color: {t.on_accent};
   border-color: {t.accent}; }}
+QToolButton[role="menu"] {{ padding: 3px 18px 3px 6px; border: 1px solid {t.muted}; border-radius: 2px;
+  background: {t.raised}; }}
+QToolButton[role="menu"]:hover, QToolButton[role="menu"]:focus {{ border-color: {t.text}; }}
+QToolButton[role="menu"]::menu-indicator {{ subcontrol-origin: border; subcontrol-position: right center;
+  right: 5px; }}
 QPushButton[role="primary"] {{ background: {t.accent}; color: {t.on_accent}; border: 1px solid {t.accent};
   border-radius: 4px; padding: 5px 14px; font-weight: 600; }}
 QPushButton[role="primary"]:disabled {{ background: {t.raised}; color: {t.muted}; border-color: {t.line}; }}

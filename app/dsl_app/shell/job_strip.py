@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QMenu, QProgressBar, QSizePolicy, QWidget
 
 from dsl_app.shared.jobs.base import Job
@@ -13,6 +14,9 @@ from dsl_app.shared.jobs.qt_runner import QtRunner
 from dsl_app.shared.notify import describe_seconds
 from dsl_app.shared.widgets.forms import label, named, push_button
 from dsl_app.shared.widgets.layouts import STRETCH, row_of
+
+#: The widest line of a job's words, px: longer ones take two, and leave room for a message.
+WIDEST_PX = 320
 
 
 class JobStrip(QWidget):
@@ -22,7 +26,8 @@ class JobStrip(QWidget):
         super().__init__(parent)
         self._runner = runner
         self._shown: Job[Any] | None = None
-        self._text = label("", name="Running job")
+        self._text = label("", name="Running job", wraps=True)
+        self._text.setAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
         self._bar = named(QProgressBar(), "Progress of the running job")
         self._bar.setFixedWidth(180)
         self._cancel = push_button("Cancel", "Stop this job at the next safe point; finished parts are kept")
@@ -51,6 +56,7 @@ class JobStrip(QWidget):
             return
         self._shown = view.job
         self._text.setText(view.text)
+        self._text.setFixedWidth(min(self._text.fontMetrics().horizontalAdvance(view.text) + 4, WIDEST_PX))
         done, total = view.job.extent
         self._bar.setRange(0, total)
         self._bar.setValue(done)

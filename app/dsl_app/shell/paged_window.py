@@ -17,7 +17,7 @@ from dsl_app.shared.settings import RecentFiles, Settings, save_early, save_sett
 from dsl_app.shared.theme import DARK, Theme, style_sheet
 from dsl_app.shared.undo import UndoStack
 from dsl_app.shared.widgets.dialogs import confirm
-from dsl_app.shared.widgets.layouts import boxed, column_of, row_of
+from dsl_app.shared.widgets.layouts import boxed, row_of
 from dsl_app.shared.widgets.page import PageWidget, dropped_paths
 from dsl_app.shell.actions import PAGES, Page
 from dsl_app.shell.job_strip import JobStrip
@@ -74,8 +74,9 @@ class PagedWindow(QMainWindow):
         self.setMinimumSize(SMALLEST)
         self.resize(first_size(self.screen().availableSize()))
         self.setAcceptDrops(True)
-        self.setStatusBar(StatusLine())
-        self.toasts = Toasts(self.statusBar())
+        line = StatusLine()
+        self.setStatusBar(line)
+        self.toasts = Toasts(line)
         self.rail = Rail([page for page in PAGES if page.key in makers])
         self.rail.chosen.connect(self.open_page)
         self.stack = QStackedWidget()
@@ -87,8 +88,7 @@ class PagedWindow(QMainWindow):
         self._lay_out()
 
     def _lay_out(self) -> None:
-        pages = column_of((self.stack, 1), self.toasts.strip, margins=0, spacing=0)
-        self.setCentralWidget(boxed(row_of(self.rail, (boxed(pages), 1), margins=0, spacing=0)))
+        self.setCentralWidget(boxed(row_of(self.rail, (self.stack, 1), margins=0, spacing=0)))
 
     # Pages -----------------------------------------------------------------------------------------
 
@@ -199,8 +199,10 @@ class PagedWindow(QMainWindow):
             return
         for page in self._made.values():
             page.release()
-        self.parts.runner.shut_down()
         self.save_settings()
+        # What a job does between two safe points can take seconds, in which the window would stand still.
+        self.hide()
+        self.parts.runner.shut_down()
         self.closed.emit()
         # Python's logging outlives the window and must not call into it.
         logging.getLogger().removeHandler(self.parts.records)

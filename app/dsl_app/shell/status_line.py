@@ -6,12 +6,27 @@ from PySide6.QtCore import QEvent, QRect, Qt
 from PySide6.QtGui import QPainter, QPaintEvent
 from PySide6.QtWidgets import QSizeGrip, QStatusBar, QStyle, QStyleOption, QWidget
 
+from dsl_app.shell.short_text import LINES
+
 #: Left of a hint, and between it and what is to its right, px.
 EDGE_PX, GAP_PX = 6, 12
+#: Above and below a message, px.
+MARGIN_PX = 5
 
 
 class StatusLine(QStatusBar):
-    """Paints its hint itself: Qt's own is cut off in the middle of a letter, at the text of a job."""
+    """Paints its hint itself: Qt's own is cut off in the middle of a letter, at the text of a job.
+
+    Its height is that of a message with two lines, whether there is one or not: a page that made room would
+    move what a person is about to click.
+    """
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._keep_height()
+
+    def _keep_height(self) -> None:
+        self.setFixedHeight(LINES * self.fontMetrics().lineSpacing() + 2 * MARGIN_PX)
 
     @property
     def room(self) -> QRect:
@@ -43,4 +58,6 @@ class StatusLine(QStatusBar):
         """Paint again when jobs come and go, which moves the room of the hint."""
         if event.type() is QEvent.Type.LayoutRequest:
             self.update()
+        elif event.type() is QEvent.Type.FontChange:
+            self._keep_height()
         return super().event(event)

@@ -1,4 +1,4 @@
-"""Messages below the page, which makes room for them: they never cover what they speak of."""
+"""Messages in the status bar, whose height is fixed: they cover nothing, and nothing moves when they come."""
 
 from __future__ import annotations
 
@@ -7,12 +7,14 @@ from collections.abc import Callable, Mapping
 
 from PySide6.QtCore import QObject, Qt, QTimer, Signal
 from PySide6.QtGui import QCursor
-from PySide6.QtWidgets import QFrame, QMessageBox, QPushButton, QStatusBar, QWidget
+from PySide6.QtWidgets import QFrame, QMessageBox, QPushButton, QWidget
 
 from dsl_app.shared.notify import Level
 from dsl_app.shared.widgets.forms import label, push_button
-from dsl_app.shared.widgets.layouts import column_of, row_of
+from dsl_app.shared.widgets.layouts import STRETCH, row_of
 from dsl_app.shared.wording import in_window
+from dsl_app.shell.short_text import ShortText
+from dsl_app.shell.status_line import StatusLine
 
 _log = logging.getLogger(__name__)
 _LEVELS = {"info": logging.INFO, "warning": logging.WARNING, "error": logging.ERROR}
@@ -23,12 +25,10 @@ ERROR_STAYS_MS = 45_000
 #: How often it is looked whether somebody is there, ms.
 LOOK_MS = 500
 MOST = 4
-#: A message that leaves by itself and is not wider than this, px, is told in the status bar.
-SHORT_PX = 420
 
 
 class Toast(QFrame):
-    """One message with its details and a Close button."""
+    """One message with its details and a Close button; ``stay_ms`` in front it leaves, or stays for 0."""
 
     dismissed = Signal()
 
@@ -36,38 +36,60 @@ class Toast(QFrame):
         self,
         level: Level,
         text: str,
-        details: str,
-        parent: QWidget,
+        details: str = "",
+        stay_ms: int = 0,
         offers: Mapping[str, Callable[[], object]] | None = None,
     ) -> None:
         """``offers`` are buttons by their texts; using one closes the toast."""
-        super().__init__(parent)
+        super().__init__()
         self.setProperty("role", "toast")
         self.setProperty("level", level)
         self.setAccessibleName(f"{level}: {text}")
         self.level, self.text = level, text
-        self.words = label(text, can_be_copied=True)
+        self._details, self._stay_ms = details, stay_ms
+        # What is offered loses its sense with time, seen or not.
+        self._ages_behind = bool(offers)
+        self._watch: QTimer | None = None
+        self.words = ShortText(text)
+        self.behind = label("", "muted")
         buttons = []
         for name, do in (offers or {}).items():
             offer = push_button(name, text, self.dismiss)
             offer.clicked.connect(lambda _checked=False, do=do: do())
             buttons.append(offer)
-        if details:
-            buttons.append(_flat("Details", "Show details", lambda: self._show(text, details)))
-        buttons.append(_flat("Close", "Close this message", self.dismiss))
-        row_of((self.words, 1), *buttons, on=self, margins=(12, 0, 4, 0))
+        self.more = _flat("Details", "Show the whole message", self._show)
+        self.more.setVisible(bool(details))
+        self.words.cut.connect(lambda is_cut: self.more.setVisible(is_cut or bool(details)))
+        buttons += [self.more, _flat("Close", "Close this message", self.dismiss)]
+        row_of(self.words, self.behind, *buttons, on=self, margins=(12, 0, 4, 0))
 
-    @property
-    def is_short(self) -> bool:
-        """Whether it is one line that fits into the status bar."""
-        return "\n" not in self.text and self.words.sizeHint().width() <= SHORT_PX
+    def come_to_front(self, behind: int) -> None:
+        """Be the one that is shown, before so many others; the time until it leaves begins."""
+        self.behind.setText(f"{behind} more" if behind else "")
+        self.behind.setVisible(bool(behind))
+        self.show()
+        if self._watch is not None:
+            return
+        self._watch = QTimer(self)
+        if self._stay_ms:
+            self._watch.timeout.connect(self.dismiss)
+            self._watch.start(self._stay_ms)
+        elif self.level == "error":
+            self._leave_once_read(self._watch)
 
-    def be_whole(self) -> None:
-        """Break the lines of a long text, with some room around."""
-        self.words.setWordWrap(True)
-        self.setContentsMargins(0, 4, 0, 4)
+    def stand_back(self) -> None:
+        """Wait behind another, for as long as that is shown."""
+        self.hide()
+        if not self._ages_behind:
+            self._forget_time()
 
-    def leave_once_read(self) -> None:
+    def _forget_time(self) -> None:
+        if self._watch is not None:
+            self._watch.stop()
+            self._watch.deleteLater()
+            self._watch = None
+
+    def _leave_once_read(self, watch: QTimer) -> None:
         """Close after `ERROR_STAYS_MS` with a person who is not pointing at the message."""
         unmoved, left_ms = QCursor.pos(), ERROR_STAYS_MS
         is_there = False
@@ -80,20 +102,21 @@ class Toast(QFrame):
             if left_ms <= 0:
                 self.dismiss()
 
-        watch = QTimer(self)
         watch.timeout.connect(look)
         watch.start(LOOK_MS)
 
     def dismiss(self) -> None:
         """Close the message."""
         self.hide()
+        self._forget_time()
         self.dismissed.emit()
         self.deleteLater()
 
-    def _show(self, text: str, details: str) -> None:
-        box = QMessageBox(QMessageBox.Icon.Information, "Details", text, parent=self.window())
+    def _show(self) -> None:
+        box = QMessageBox(QMessageBox.Icon.Information, "Details", self.text, parent=self.window())
         box.setTextFormat(Qt.TextFormat.PlainText)
-        box.setDetailedText(details)
+        if self._details:
+            box.setDetailedText(self._details)
         box.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         box.open()
 
@@ -105,69 +128,65 @@ def _flat(text: str, tip: str, do: Callable[[], object]) -> QPushButton:
 
 
 class Toasts(QObject):
-    """Shows toasts of a window; a `Notifier`. With more than `MOST`, the oldest is closed.
+    """Shows toasts of a window in its status ``line``, the latest in front of others; a `Notifier`.
 
-    What leaves by itself and is short is told in the status ``line``, everything else in the ``strip``, which
-    the window puts below its pages.
+    With more than `MOST`, the oldest is closed.
     """
 
-    def __init__(self, line: QStatusBar) -> None:
+    def __init__(self, line: StatusLine) -> None:
         super().__init__(line)
-        self._line = line
-        self.strip = QWidget()
-        self._rows = column_of(on=self.strip, margins=(0, 4, 8, 0), spacing=4)
-        self.strip.hide()
+        self.place = QWidget()
+        # As wide as its text, where there is room.
+        self._row = row_of(STRETCH, on=self.place, margins=(0, 2, 8, 2))
+        line.insertPermanentWidget(0, self.place, 1)
+        self.place.hide()
         self._shown: list[Toast] = []
 
     @property
     def shown(self) -> tuple[Toast, ...]:
-        """The toasts that are shown now."""
+        """The toasts that are there now, the one in front last."""
         return tuple(self._shown)
 
     def tell(self, level: Level, text: str, details: str = "") -> None:
         """Show a sentence, and keep it in the log."""
         _log.log(_LEVELS[level], "%s", in_window(text))
-        self._show(Toast(level, in_window(text), details, self.strip), STAY_MS.get(level, 0))
+        self._add(Toast(level, in_window(text), details, STAY_MS.get(level, 0)))
 
     def offer(self, text: str, offers: Mapping[str, Callable[[], object]], stay_s: float = 0.0) -> None:
         """Show a sentence with buttons by their texts until one is used or it is closed.
 
-        With ``stay_s`` it leaves by itself after that time.
+        With ``stay_s`` it leaves by itself after that time in front.
         """
-        self._show(Toast("info", text, "", self.strip, offers), round(1000 * stay_s))
+        self._add(Toast("info", text, stay_ms=round(1000 * stay_s), offers=offers))
 
     def withdraw(self, text: str) -> None:
-        """Close the message of a text, if it is still shown: it has lost its sense."""
+        """Close the message of a text, if it is still there: it has lost its sense."""
         for toast in self.shown:
             if toast.text == text:
                 toast.dismiss()
 
-    def _show(self, toast: Toast, stay_ms: int) -> None:
+    def _add(self, toast: Toast) -> None:
         if any(other.text == toast.text for other in self._shown):
             toast.deleteLater()
             return
         toast.dismissed.connect(lambda: self._drop(toast))
+        toast.hide()
+        self._row.insertWidget(0, toast)
         self._shown.append(toast)
         for old in tuple(self._shown[:-MOST]):
             old.dismiss()
-        if stay_ms:
-            QTimer.singleShot(stay_ms, toast, toast.dismiss)
-        elif toast.level == "error":
-            toast.leave_once_read()
-        self._place(toast, bool(stay_ms))
-        toast.show()
-
-    def _place(self, toast: Toast, leaves: bool) -> None:
-        """Put a toast into the status bar if it belongs there and no other is there yet, else the strip."""
-        is_taken = any(other.parent() is self._line for other in self._shown)
-        if leaves and toast.is_short and not is_taken:
-            self._line.insertPermanentWidget(0, toast)
-        else:
-            toast.be_whole()
-            self._rows.addWidget(toast)
-            self.strip.show()
+        self._arrange()
 
     def _drop(self, toast: Toast) -> None:
         if toast in self._shown:
             self._shown.remove(toast)
-            self.strip.setVisible(any(other.parent() is self.strip for other in self._shown))
+            self._row.removeWidget(toast)
+            self._arrange()
+
+    def _arrange(self) -> None:
+        """Show the latest, and nothing where there is none."""
+        for toast in self._shown[:-1]:
+            toast.stand_back()
+        if self._shown:
+            self._shown[-1].come_to_front(len(self._shown) - 1)
+        self.place.setVisible(bool(self._shown))

@@ -60,6 +60,7 @@ def test_after_a_crash_the_window_offers_once_what_was_open(
     wait_until(lambda: not crashed.window.parts.runner.active)
     crashed.window.do("view_depth")
     crashed.session.save()
+    crashed.session._writer.submit(int).result()
     again = Bench(qtbot, tmp_path)
     again.session.start()
     again.button("Restore session").click()

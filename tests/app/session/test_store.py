@@ -1,6 +1,8 @@
 from __future__ import annotations
 
 import os
+import threading
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 from dsl_app.session.records import ResultsPart, Session
@@ -60,3 +62,19 @@ def test_a_folder_that_cannot_be_written_is_told_once(tmp_path: Path) -> None:
     store = SessionStore(tmp_path / "sessions", lambda: next(sessions), process=7)
     assert "cannot be saved" in store.save()
     assert store.save() == ""
+
+
+def test_a_slow_disk_keeps_nobody_waiting_and_its_failure_is_told(tmp_path: Path) -> None:
+    (tmp_path / "sessions").write_text("a file in the way")
+    free = threading.Event()
+    with ThreadPoolExecutor(1) as writer:
+        writer.submit(free.wait, 10)
+        store = SessionStore(tmp_path / "sessions", lambda: LEAF, process=7, writer=writer)
+        assert store.save() == ""
+        # While one is being written, no other is begun.
+        assert store.save() == ""
+        free.set()
+        writer.submit(int).result(10)
+        assert "cannot be saved" in store.save()
+        assert store.save() == ""
+        store.remove()

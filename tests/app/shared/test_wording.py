@@ -13,7 +13,7 @@ from pytestqt.qtbot import QtBot
 from dsl_core.errors import CalibrationError
 from tests.architecture.words import texts_now
 
-OPTION = re.compile(r"(?<![\w-])--[a-z][a-z-]+")
+OPTION = re.compile(r"(?<![\w-])--[a-z][a-z-]+|'dsl-scan ")
 #: What makes command lines, in the window's own box for them, and what is printed in a terminal.
 COMMANDS = (
     "app/dsl_app/__main__.py",

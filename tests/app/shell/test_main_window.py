@@ -15,12 +15,13 @@ from dsl_app.shell.actions import ACTIONS, PAGES
 from dsl_app.shell.application import ExceptionHook, make_window, open_first_page
 from dsl_app.shell.main_window import MainWindow
 from dsl_app.shell.paged_window import first_size
-from PySide6.QtCore import QPoint, QSize
+from PySide6.QtCore import QSize
 from PySide6.QtGui import QCursor
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QFileDialog, QLabel, QMenu, QVBoxLayout
 from pytestqt.qtbot import QtBot
 
+from dsl_core.progress import Progress
 from tests.app.support.doubles import RecordingNotifier
 
 
@@ -187,7 +188,7 @@ def test_an_error_stays_until_somebody_was_there_to_read_it(
     QCursor.setPos(1, 1)
     QTest.mouseMove(window.stack)
     qtbot.waitUntil(lambda: not window.toasts.shown)
-    assert not window.toasts.strip.isVisible()
+    assert not window.toasts.place.isVisible()
     # Who was too late reads it in the log.
     assert ("ERROR", "The camera does not answer.") in [(r.levelname, r.message) for r in caplog.records]
 
@@ -200,25 +201,49 @@ def test_toasts_leave_when_closed_and_never_pile_up(window: MainWindow) -> None:
     assert len(window.toasts.shown) == 3
 
 
-def test_messages_stand_below_the_page_or_in_the_status_bar_and_cover_nothing(
-    window: MainWindow, qtbot: QtBot
-) -> None:
+def test_messages_move_nothing_and_the_latest_is_in_front(window: MainWindow, qtbot: QtBot) -> None:
     window.show()
+    QApplication.processEvents()
+    before = window.stack.geometry()
     window.toasts.tell("info", "Written.")
     window.toasts.tell("warning", "A longer sentence " * 30)
     window.toasts.offer("Compare both?", {"Compare": lambda: None})
     QApplication.processEvents()
-    short, *others = window.toasts.shown
-    assert short.parent() is window.statusBar()
-    height = window.stack.height()
-    for toast in others:
-        assert toast.parent() is window.toasts.strip
-        assert toast.mapTo(window, QPoint()).y() >= window.stack.mapTo(window, QPoint(0, height)).y()
-    for toast in others:
-        toast.dismiss()
+    written, long, offer = window.toasts.shown
+    assert [toast.isVisible() for toast in (written, long, offer)] == [False, False, True]
+    assert offer.behind.text() == "2 more"
+    assert window.statusBar().isAncestorOf(offer)
+    assert window.stack.geometry() == before
+    offer.dismiss()
     QApplication.processEvents()
-    assert not window.toasts.strip.isVisible()
-    assert window.stack.height() > height
+    assert long.isVisible()
+    assert window.stack.geometry() == before
+    # What does not fit is a click away.
+    assert long.words.text().endswith("…")
+    assert long.more.isVisible()
+    long.dismiss()
+    written.dismiss()
+    assert not window.toasts.place.isVisible()
+    assert window.stack.geometry() == before
+
+
+def test_a_message_that_waits_behind_another_is_shown_for_its_whole_time(
+    window: MainWindow, qtbot: QtBot, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(toasts.STAY_MS, "info", 30)
+    window.show()
+    window.toasts.tell("info", "Written.")
+    window.toasts.offer("Compare both?", {"Compare": lambda: None})
+    QTest.qWait(60)
+    assert [toast.text for toast in window.toasts.shown] == ["Written.", "Compare both?"]
+    window.toasts.shown[-1].dismiss()
+    assert window.toasts.shown[-1].isVisible()
+    qtbot.waitUntil(lambda: not window.toasts.shown)
+    # An offer has its time, seen or not.
+    window.toasts.offer("Take the tour?", {"Tour": lambda: None}, stay_s=0.03)
+    window.toasts.tell("error", "The disk is full.")
+    qtbot.waitUntil(lambda: len(window.toasts.shown) == 1)
+    assert window.toasts.shown[0].text == "The disk is full."
 
 
 @pytest.mark.parametrize(("is_minor", "asked"), [(True, 0), (False, 1)])
@@ -237,6 +262,24 @@ def test_only_work_that_somebody_would_miss_keeps_the_window_open(
     threading.Timer(0.1, free.set).start()
     window.close()
     assert len(questions) == asked
+
+
+def test_nobody_sees_the_window_wait_for_its_threads(window: MainWindow) -> None:
+    window.show()
+    begun, seen = threading.Event(), list[bool]()
+
+    def work(progress: Progress) -> None:
+        begun.set()
+        try:
+            while True:
+                progress.report("work", 0, 0)
+        finally:
+            seen.append(window.isVisible())
+
+    window.parts.runner.submit(Job("Long work", work, is_minor=True))
+    assert begun.wait(10)
+    window.close()
+    assert seen == [False]
 
 
 def test_the_window_can_be_there_before_its_page(qtbot: QtBot, tmp_path: Path) -> None:

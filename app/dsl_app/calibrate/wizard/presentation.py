@@ -84,6 +84,8 @@ def main_button(state: WizardState) -> Main:
     """The button that continues from the current page."""
     status, fit = state.status, state.fit.value
     if status is not None and status.state != "captured":
+        if state.trouble.value or (state.look.value is not None and not state.look.value.is_good):
+            return "check"  # what was wrong is right now, or not
         if state.places_itself.value:
             return "all"
         has_looked = state.is_checking.value or state.look.value is not None

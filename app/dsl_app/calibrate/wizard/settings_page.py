@@ -12,7 +12,7 @@ from PySide6.QtWidgets import QCheckBox, QFormLayout, QHBoxLayout, QLineEdit, QW
 
 from dsl_app.calibrate.wizard.settings import setting_title
 from dsl_app.calibrate.wizard.state import SettingRow
-from dsl_app.shared.widgets.forms import ChoiceBox, NumberBox, WholeBox, label, named, quiet
+from dsl_app.shared.widgets.forms import ChoiceBox, NumberBox, WholeBox, label, named, quiet, remark_line
 from dsl_app.shared.widgets.layouts import STRETCH, boxed, column_of, row_of, scrolled
 from dsl_core.model.board import Board, Charuco, Checkerboard
 
@@ -35,7 +35,9 @@ class SettingsPage(QWidget):
         self._shown: tuple[SettingRow, ...] = ()
         self.fields: dict[str, QLineEdit | QCheckBox | BoardEdit] = {}
         self._intro = label(INTRODUCTION, "muted", wraps=True)
-        self._trouble = label("", "bad", wraps=True, name="What is wrong with the settings")
+        self._trouble = remark_line()
+        self._trouble.setProperty("role", "bad")
+        self._trouble.setAccessibleName("What is wrong with the settings")
         content = QWidget()
         self._form = QFormLayout(content)
         self._form.setFieldGrowthPolicy(QFormLayout.FieldGrowthPolicy.AllNonFixedFieldsGrow)

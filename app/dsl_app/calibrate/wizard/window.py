@@ -79,7 +79,8 @@ class CalibrationWizard(QDialog):
         for page in (self.settings, self.step, self.fit):
             self.stack.addWidget(page)
         row = row_of(self.steps, (self.stack, 1))
-        column_of(self.banner, (row, 1), self.buttons, on=self)
+        # Where it comes, nothing moves that a person clicks.
+        column_of((row, 1), self.banner, self.buttons, on=self)
 
     def _connect(self) -> None:
         state, commands = self._state, self._commands
@@ -251,7 +252,7 @@ class WizardButtons(QWidget):
         self.accept.clicked.connect(commands.accept)
         shown = (
             *(state.at, state.doing, state.statuses, state.fit, state.allowed, state.look),
-            *(state.outlines, state.places_itself),
+            *(state.outlines, state.places_itself, state.trouble),
         )
         self.stops = [
             *follow_any(self._show, *shown),

@@ -177,17 +177,20 @@ class SeriesController:
         self._runner.submit(Job(state.busy.value, work, done, failed, cancelled, on_ended=idle))
 
     def _take(self, kind: SeriesKind, read: SeriesRow) -> None:
-        """Keep what was read, but prefer a position typed in the meantime."""
+        """Keep what was read, but prefer a position typed in the meantime; it may have been removed since."""
+        known = [row.position_mm for row in self.state.rows.value if row.path == read.path]
+        if not known:
+            self._read()
+            return
         if self.state.selected_row is None:
             self.select(read.path)
         if kind is SeriesKind.SWEEP:
             self._change(read.path, point=read.point, point_trouble=read.point_trouble)
             return
         read = self._of_one_size(read)
-        known = next(row.position_mm for row in self.state.rows.value if row.path == read.path)
         self._change(
             read.path,
-            position_mm=read.position_mm if known is None else known,
+            position_mm=read.position_mm if known[0] is None else known[0],
             target=read.target,
             target_trouble=read.target_trouble,
         )

@@ -90,6 +90,7 @@ class CloudTools(QWidget):
     def _menu_button(self, text: str, tip: str, menu: QMenu) -> QToolButton:
         button = named(QToolButton(), text, tip)
         button.setText(text)
+        button.setProperty("role", "menu")
         button.setMenu(menu)
         button.setPopupMode(QToolButton.ToolButtonPopupMode.InstantPopup)
         button.setFocusPolicy(Qt.FocusPolicy.StrongFocus)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -76,10 +76,26 @@ class MarksController:
         self._runner.submit(Job(f"Read {path.name}", work, done, is_minor=True))
 
     def add_references(self, path: Path, chosen: Iterable[Reference]) -> None:
-        """Add reference spectra of a file; ends the choice from a library."""
+        """Add reference spectra of a file; ends the choice from a library.
+
+        Says why one that has no wavelength in common with the result is neither drawn nor compared.
+        """
         self.state.library.set(None)
         for each in chosen:
+            self._tell_if_beside(each.name or path.stem, each.curve.wavelengths_nm)
             self._storage.when_read(lambda each=each: self._add(self._reference(path, each)))  # type: ignore[misc]
+
+    def _tell_if_beside(self, name: str, nm: Sequence[float]) -> None:
+        result = self.state.result.value
+        if result is None or not result.has_spectra:
+            return
+        low, high = result.wavelengths_nm[0], result.wavelengths_nm[-1]
+        if nm[-1] < low or nm[0] > high:
+            self._notifier.tell(
+                "warning",
+                f"{name} covers {nm[0]:.0f} to {nm[-1]:.0f} nm and the result {low:.0f} to {high:.0f} nm:"
+                " it is listed, but neither drawn nor compared. If that is not so, correct its wavelengths.",
+            )
 
     def _reference(self, path: Path, chosen: Reference) -> Mark:
         name = chosen.name or path.stem

@@ -199,6 +199,9 @@ class ForecastPanel(QWidget):
     def showEvent(self, event: QShowEvent) -> None:
         """Predictions are made while they can be seen."""
         super().showEvent(event)
+        # The header has its height in this theme only now.
+        head_px = self.table.horizontalHeader().sizeHint().height()
+        self.table.setFixedHeight(head_px + len(FIGURES) * ROW_PX + 4)
         self._controller.open(True)
 
     def hideEvent(self, event: QHideEvent) -> None:
@@ -250,5 +253,4 @@ def _table() -> ReadTable:
     first = table.horizontalHeaderItem(0)
     if first is not None:
         first.setTextAlignment(LEFT)
-    table.setFixedHeight(header.sizeHint().height() + len(FIGURES) * ROW_PX + 4)
     return table

@@ -6,7 +6,7 @@ from typing import Any
 
 import pyqtgraph as pg
 from PySide6.QtCore import QEvent, Qt
-from PySide6.QtGui import QKeyEvent
+from PySide6.QtGui import QDragLeaveEvent, QKeyEvent
 
 from dsl_app.shared.theme import Theme
 from dsl_app.shared.widgets.hints import hint, is_said_below
@@ -27,6 +27,9 @@ class Canvas(pg.GraphicsLayoutWidget):  # type: ignore[misc]
     def event(self, event: QEvent) -> bool:
         """Leave out a tooltip that the status line has already."""
         return False if is_said_below(self, event) else bool(super().event(event))
+
+    def dragLeaveEvent(self, event: QDragLeaveEvent) -> None:
+        """What is dragged never entered: pyqtgraph leaves it to the window. Qt would warn of that."""
 
 
 class PictureView(Canvas):

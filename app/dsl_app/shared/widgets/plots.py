@@ -7,6 +7,7 @@ from typing import Any
 
 import pyqtgraph as pg
 from PySide6.QtCore import QEvent
+from PySide6.QtGui import QDragLeaveEvent
 from PySide6.QtWidgets import QGraphicsItem
 
 from dsl_app.shared.theme import Theme
@@ -40,6 +41,9 @@ class CalmPlot(pg.PlotWidget):  # type: ignore[misc]
     def event(self, event: QEvent) -> bool:
         """Leave out a tooltip that the status line has already."""
         return False if is_said_below(self, event) else bool(super().event(event))
+
+    def dragLeaveEvent(self, event: QDragLeaveEvent) -> None:
+        """What is dragged never entered: pyqtgraph leaves it to the window. Qt would warn of that."""
 
     def apply_theme(self, theme: Theme) -> None:
         """Apply the colours of a theme to background and axes."""

@@ -210,6 +210,14 @@ def test_the_fit_button_and_the_leave_button_follow_the_fit() -> None:
     assert buttons(done).leave.text == "&Leave"
 
 
+@pytest.mark.parametrize("values", [{"look": Look("a", (BAD,))}, {"trouble": "No board was found."}])
+def test_what_was_found_wrong_is_checked_before_it_is_captured(values: dict[str, object]) -> None:
+    assert main_button(wizard(FIRST, places_itself=True, **values)) == "check"
+    assert main_button(wizard(FIRST, **values)) == "check"
+    good = {"look": Look("a", (GOOD,))}
+    assert main_button(wizard(FIRST, places_itself=True, **good)) == "all"
+
+
 def test_the_next_calibration_is_the_main_button_once_this_one_is_accepted() -> None:
     done = wizard(LAST, CAPTURED, fit=fit(GOOD, accepted=True))
     assert not buttons(done).following.is_visible

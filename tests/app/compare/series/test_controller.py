@@ -128,6 +128,20 @@ def test_accuracy_over_time_against_one_result(series: SeriesController, tmp_pat
     assert "quick" in (tmp_path / "sweep.html").read_text(encoding="utf-8")
 
 
+def test_a_result_that_is_removed_while_it_is_read_is_gone(stage: list[Path]) -> None:
+    runner, undo = ManualRunner(), UndoStack()
+    series = SeriesController(SeriesState(), runner, RecordingNotifier(), undo)
+    series.add(stage)
+    series.remove(stage[0])
+    runner.run_all()
+    assert [row.path for row in series.state.rows.value] == stage[1:]
+    assert all(row.is_read(SeriesKind.STAGE) for row in series.state.rows.value)
+    assert series.state.selected.value == stage[1]
+    undo.undo()
+    runner.run_all()
+    assert series.state.rows.value[0].target is not None
+
+
 def test_results_that_come_while_one_is_read_wait_and_a_cancel_says_so(stage: list[Path]) -> None:
     runner = ManualRunner()
     series = SeriesController(SeriesState(), runner, RecordingNotifier(), UndoStack())

@@ -65,6 +65,14 @@ def test_a_damaged_file_of_marks_does_not_keep_the_result_shut(tmp_path: Path) -
     assert "cannot be read" in bench.told
 
 
+def test_a_reference_beside_the_bands_is_told(bench: Bench, tmp_path: Path) -> None:
+    rows = [f"{nm},0.5" for nm in range(1000, 1201, 10)]
+    (tmp_path / "far.csv").write_text("\n".join(["nm,value", *rows]))
+    bench.control.marks.add_reference(tmp_path / "far.csv")
+    assert "covers 1000 to 1200 nm and the result" in bench.told
+    assert len(bench.names) == 1
+
+
 def test_a_file_without_spectrum_is_told(bench: Bench, tmp_path: Path) -> None:
     (tmp_path / "a.csv").write_text("hello")
     assert bench.control.open(tmp_path / "a.csv")

@@ -1,11 +1,14 @@
 from __future__ import annotations
 
+from typing import Any
+
 import pytest
 from dsl_app.shared.widgets.forms import ChoiceBox, NumberBox, WholeBox
-from dsl_app.shared.widgets.pictures import arrow_step, moved_within
+from dsl_app.shared.widgets.pictures import Canvas, arrow_step, moved_within
+from dsl_app.shared.widgets.plots import CalmPlot
 from PySide6.QtCore import QEvent, QPoint, QPointF, Qt
-from PySide6.QtGui import QKeyEvent, QWheelEvent
-from PySide6.QtWidgets import QWidget
+from PySide6.QtGui import QDragLeaveEvent, QKeyEvent, QWheelEvent
+from PySide6.QtWidgets import QApplication, QWidget
 from pytestqt.qtbot import QtBot
 
 
@@ -53,3 +56,10 @@ def test_the_wheel_changes_only_what_has_the_focus(qtbot: QtBot, i: int) -> None
     qtbot.waitUntil(box.hasFocus)
     _wheel(box)
     assert value() != before
+
+
+def test_what_is_dragged_over_a_plot_leaves_no_warning(qtbot: QtBot, qtlog: Any) -> None:
+    for made in (Canvas("Picture"), CalmPlot("Plot", "", "Left", "Bottom")):
+        qtbot.addWidget(made)
+        QApplication.sendEvent(made.viewport(), QDragLeaveEvent())
+    assert [each.message for each in qtlog.records] == []
