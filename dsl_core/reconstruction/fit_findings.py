@@ -33,6 +33,9 @@ from dsl_core.reconstruction.spectral.self_correction import Followed
 
 #: Shares of pixels above which a scan is not what the twin's scenes lead to expect.
 MOST_POOR, MOST_AT_BOUND, MOST_LOST, MOST_UNDECIDED, MOST_UNUSUAL = 0.4, 0.1, 0.1, 0.5, 0.02
+#: Few surfaces reflect less than the one, and no matt one more than the other: a spectrum at a bound says
+#: something only where its deviation excludes all between them.
+DARKEST, BRIGHTEST = 0.02, 1.0
 #: Bands wider than this many lines leave structure in the data that straight pieces cannot follow.
 WIDEST_BAND = 1.25
 #: Fewer pixels say nothing.
@@ -58,8 +61,9 @@ _CALIBRATE = "Run the drift check; calibrate again the part that it names."
 class SpectralCounts:
     """Of spectra: pixels that measured ``poor`` fits or are ``at_bound``, and what there are of bands.
 
-    Spectra that fit poorly touch bounds as well, as along edges: these count as ``poor`` alone. ``reached``
-    are bands of pixels that lines reach, ``undecided`` those of them that the prior decides.
+    Spectra that fit poorly touch bounds as well, as along edges: these count as ``poor`` alone. Those of dark
+    surfaces do by their noise where light is scarce: these do not count. ``reached`` are bands of pixels that
+    lines reach, ``undecided`` those of them that the prior decides.
     """
 
     poor: int = 0
@@ -72,15 +76,21 @@ class SpectralCounts:
 
 
 def count_spectra(
-    flags: NDArray[np.integer], data_share: NDArray[np.floating], reach: NDArray[np.integer]
+    flags: NDArray[np.integer],
+    data_share: NDArray[np.floating],
+    reach: NDArray[np.integer],
+    reflectance: NDArray[np.floating],
+    std: NDArray[np.floating],
 ) -> SpectralCounts:
     """Counts of the flags (rows, columns) of a result with spectra, or of some rows of it.
 
-    ``data_share`` and ``reach`` (bands, rows, columns) are NaN and 0 where there is no spectrum.
+    ``data_share``, ``reach``, ``reflectance`` and its deviation ``std`` (bands, rows, columns) are NaN where
+    there is no spectrum, and ``reach`` is 0.
     """
     _, measured = _lit_and_measured(flags)
     reached = (reach & int(Reach.PLUS_ONE | Reach.MINUS_ONE) != 0) & np.isfinite(data_share)
     poor, at_bound = ((flags & int(flag)) != 0 for flag in (Flag.POOR_FIT, Flag.AT_BOUND))
+    at_bound &= ((reflectance + 2 * std < DARKEST) | (reflectance - 2 * std > BRIGHTEST)).any(0)
     return SpectralCounts(
         poor=int(np.count_nonzero(measured & poor)),
         at_bound=int(np.count_nonzero(measured & at_bound & ~poor)),
@@ -200,7 +210,7 @@ def share_findings(
         "at a bound",
         spectra.at_bound / measured,
         MOST_AT_BOUND,
-        "The spectra of {0} of the pixels touch 0 or 1.5.",
+        "The spectra of {0} of the pixels touch 0 or 1.5 by more than their noise.",
         "Look for highlights and for light that the scan's black frames do not have.",
     )
 
