@@ -51,7 +51,7 @@ def _module(name: str) -> str:
 
 
 def _build(kind: type[Any], name: str, settings: Mapping[str, str]) -> Any:
-    """A recipe from texts, each read as `_value` does; a single value stands for a list of one."""
+    """A recipe from texts, each read as `_value` does; a value stands for a list of one, no text for none."""
     from pydantic import TypeAdapter, ValidationError
 
     known = {field.name for field in fields(kind)} if is_dataclass(kind) else set()
@@ -67,7 +67,7 @@ def _build(kind: type[Any], name: str, settings: Mapping[str, str]) -> Any:
         values = {key: _value(text) for key, text in settings.items()}
         for key, value in values.items():
             if get_origin(types[key]) is tuple and not isinstance(value, list):
-                values[key] = [value]
+                values[key] = [] if value == "" else [value]
         return TypeAdapter(kind).validate_python(values)
     except ValidationError as error:
         raise CalibrationError(f"A setting of {name} is wrong: {problems_in_words(error)}.") from error

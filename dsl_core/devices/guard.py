@@ -215,11 +215,15 @@ class _Stage(_Guard, Stage):
         super().__init__(stage, line, patience, "The stage")
         self._stage = stage
         self.tolerance_mm = stage.tolerance_mm
+        self._range_mm: tuple[float, float] | None = None
 
     @property
     def range_mm(self) -> tuple[float, float]:
-        stage = self._stage
-        return self._line.ask(self._name, "say its range", lambda: stage.range_mm, self._patience.answer_s)
+        # Asked once: it does not change, and what is planned with it must not wait for a stage that moves.
+        if self._range_mm is None:
+            stage, answer_s = self._stage, self._patience.answer_s
+            self._range_mm = self._line.ask(self._name, "say its range", lambda: stage.range_mm, answer_s)
+        return self._range_mm
 
     @property
     def position_mm(self) -> float:

@@ -38,7 +38,10 @@ REASONS: dict[Flag, str] = {
     Flag.OUT_OF_RANGE: "the triangulated depth is outside the calibrated range",
     Flag.NOT_REFINED: "the column could not be refined below one pixel; depth is coarse",
     Flag.DEPTH_EDGE: "depth jumps next to this pixel; normal and shading are unreliable",
-    Flag.BANDS_UNREACHED: "no first order reaches some bands; prior and zero-order colour decide there",
+    Flag.BANDS_UNREACHED: (
+        "the first orders bring too little light to some bands, or none; prior and zero-order colour decide"
+        " there"
+    ),
     Flag.AT_BOUND: "the spectrum touches a bound of the solver in some bands",
     Flag.POOR_FIT: (
         "the measured intensities do not fit any spectrum (mixed materials, interreflection, motion)"

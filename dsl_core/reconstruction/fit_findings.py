@@ -33,8 +33,9 @@ from dsl_core.reconstruction.spectral.self_correction import Followed
 
 #: Shares of pixels above which a scan is not what the twin's scenes lead to expect.
 MOST_POOR, MOST_AT_BOUND, MOST_LOST, MOST_UNDECIDED, MOST_UNUSUAL = 0.4, 0.1, 0.1, 0.5, 0.02
-#: Least mean of a band one of whose nodes is at the upper bound, 1.5, whatever its neighbours are.
-LEAST_HIGH = 0.99
+#: Mean of a band that no matt surface exceeds: a spectrum at the upper bound says something only where its
+#: deviation excludes all below.
+BRIGHTEST = 0.99
 #: Bands wider than this many lines leave structure in the data that straight pieces cannot follow.
 WIDEST_BAND = 1.25
 #: Fewer pixels say nothing.
@@ -60,9 +61,9 @@ _CALIBRATE = "Run the drift check; calibrate again the part that it names."
 class SpectralCounts:
     """Of spectra: pixels that measured ``poor`` fits or are ``at_bound``, and what there are of bands.
 
-    Spectra that fit poorly touch bounds as well, as along edges: these count as ``poor`` alone. Those that
-    touch 0 and fit are of dark surfaces, which noise takes there: only the upper bound counts. ``reached``
-    are bands of pixels that lines reach, ``undecided`` those of them that the prior decides.
+    Spectra that fit poorly touch bounds as well, as along edges: these count as ``poor`` alone. Those of dark
+    surfaces touch 0 by their noise: only the upper bound counts. ``reached`` are bands of pixels that lines
+    reach, ``undecided`` those of them that the prior decides.
     """
 
     poor: int = 0
@@ -76,21 +77,23 @@ class SpectralCounts:
 
 def count_spectra(
     flags: NDArray[np.integer],
-    reflectance: NDArray[np.floating],
     data_share: NDArray[np.floating],
     reach: NDArray[np.integer],
+    reflectance: NDArray[np.floating],
+    std: NDArray[np.floating],
 ) -> SpectralCounts:
     """Counts of the flags (rows, columns) of a result with spectra, or of some rows of it.
 
-    ``reflectance``, ``data_share`` and ``reach`` (bands, rows, columns) are NaN and 0 where there is no
-    spectrum.
+    ``data_share``, ``reach``, ``reflectance`` and its deviation ``std`` (bands, rows, columns) are NaN where
+    there is no spectrum, and ``reach`` is 0.
     """
     _, measured = _lit_and_measured(flags)
     reached = (reach & int(Reach.PLUS_ONE | Reach.MINUS_ONE) != 0) & np.isfinite(data_share)
     poor, at_bound = ((flags & int(flag)) != 0 for flag in (Flag.POOR_FIT, Flag.AT_BOUND))
+    at_bound &= (reflectance - 2 * std > BRIGHTEST).any(0)
     return SpectralCounts(
         poor=int(np.count_nonzero(measured & poor)),
-        at_bound=int(np.count_nonzero(measured & at_bound & ~poor & (reflectance > LEAST_HIGH).any(0))),
+        at_bound=int(np.count_nonzero(measured & at_bound & ~poor)),
         reached=int(np.count_nonzero(reached)),
         undecided=int(np.count_nonzero(reached & (data_share < 0.5))),
     )
@@ -207,7 +210,7 @@ def share_findings(
         "at the upper bound",
         spectra.at_bound / measured,
         MOST_AT_BOUND,
-        "The spectra of {0} of the pixels touch 1.5.",
+        "The spectra of {0} of the pixels touch 1.5, and more than by their noise.",
         "Look for highlights and for light that the scan's black frames do not have.",
     )
 

@@ -22,6 +22,7 @@ def test_settings_are_read_from_text() -> None:
     built = _build(kind, "fake", {"keys": "day", "scale": "3", "bad_steps": '["day"]'})
     assert built == FakeRecipe(keys=("day",), scale=3.0, bad_steps={"day"})
     assert _build(kind, "fake", {"keys": "a,b"}).keys == ("a", "b")
+    assert _build(kind, "fake", {"keys": ""}).keys == ()
     assert _value("430:460:15") == [430.0, 445.0, 460.0]
     with pytest.raises(CalibrationError, match="A setting of fake is wrong: scale must be a number"):
         _build(kind, "fake", {"scale": "large"})

@@ -35,16 +35,17 @@ GRID = WavelengthGrid(step_nm=10.0)
 
 
 def counted(data_share: np.ndarray, reach: np.ndarray) -> SpectralCounts:
-    return count_spectra(np.zeros(SHAPE, np.uint16), 0 * data_share, data_share, reach)
+    black = np.zeros_like(data_share)
+    return count_spectra(np.zeros(SHAPE, np.uint16), data_share, reach, black, black)
 
 
 def judged(
-    made: np.ndarray[tuple[int, ...], np.dtype[np.uint16]], reflectance: float = 1.0
+    made: np.ndarray[tuple[int, ...], np.dtype[np.uint16]], reflectance: float = 1.5, std: float = 0.0
 ) -> list[FitFinding]:
-    """What is said of flags and of spectra of one level that reach nothing."""
+    """What is said of flags and of even spectra that reach nothing."""
     nothing = np.zeros((1, *SHAPE), np.uint8)
-    level = np.full(nothing.shape, reflectance)
-    return list(share_findings(made, count_spectra(made, level, nothing.astype(float), nothing)))
+    even, deviation = np.full(nothing.shape, reflectance), np.full(nothing.shape, std)
+    return list(share_findings(made, count_spectra(made, nothing.astype(float), nothing, even, deviation)))
 
 
 def flags(flag: Flag, share: float) -> np.ndarray[tuple[int, ...], np.dtype[np.uint16]]:
@@ -92,11 +93,16 @@ def test_spectra_at_a_bound_that_fit_poorly_say_nothing_of_the_light() -> None:
     assert Fit.of(judged(both | flags(Flag.AT_BOUND, 0.45))).parts == ("light",)
 
 
-def test_dark_spectra_that_touch_zero_are_no_news() -> None:
-    touching = flags(Flag.AT_BOUND, 0.5)
-    assert Fit.of(judged(touching, 0.9)).parts == ()
-    # The least that a band holds one of whose nodes is 1.5.
-    assert Fit.of(judged(touching, 1.0)).parts == ("light",)
+@pytest.mark.parametrize(
+    ("reflectance", "std", "told"),
+    # Noise takes dark surfaces to 0. The least that a band holds one of whose nodes is 1.5 is 1.
+    [(0.0, 0.008, False), (0.9, 0.0, False), (1.0, 0.0, True), (1.5, 0.2, True), (1.3, 0.2, False)],
+)
+def test_spectra_at_a_bound_by_their_noise_say_nothing_of_the_light(
+    reflectance: float, std: float, told: bool
+) -> None:
+    found = judged(flags(Flag.AT_BOUND, 0.5), reflectance, std)
+    assert (Fit.of(found).parts == ("light",)) == told
 
 
 def test_pixels_in_shadow_are_not_lost_and_depth_alone_has_no_spectra_to_judge() -> None:
@@ -107,9 +113,11 @@ def test_pixels_in_shadow_are_not_lost_and_depth_alone_has_no_spectra_to_judge()
 def test_counts_of_rows_add_up_to_those_of_the_picture() -> None:
     made, rng = flags(Flag.POOR_FIT, 0.3), np.random.default_rng(0)
     share, reach = rng.uniform(0, 1, (3, *SHAPE)), rng.integers(1, 5, (3, *SHAPE))
+    made |= flags(Flag.AT_BOUND, 0.6)
+    cubes = share, reach, rng.uniform(0, 0.04, (3, *SHAPE)), np.full((3, *SHAPE), 0.002)
     rows = (slice(0, 7), slice(7, 20))
-    parts = (count_spectra(made[each], share[:, each], share[:, each], reach[:, each]) for each in rows)
-    assert sum(parts, SpectralCounts()) == count_spectra(made, share, share, reach)
+    parts = (count_spectra(made[each], *(cube[:, each] for cube in cubes)) for each in rows)
+    assert sum(parts, SpectralCounts()) == count_spectra(made, *cubes)
 
 
 @pytest.mark.parametrize(("step_nm", "share", "words"), [(20, 0.9, "coarse"), (1, 0.2, "fine"), (5, 0.9, "")])

@@ -239,6 +239,11 @@ def _affine(source: NDArray[np.float64], target: NDArray[np.float64]) -> NDArray
     return np.asarray(fit.T)
 
 
+def columns_per_pixel(pose: PoseObservation) -> float:
+    """How many columns of the projector a pixel of the camera sees on the board."""
+    return float(np.hypot(*_affine(pose.camera_px, pose.projector_px[:, :1])[0]))
+
+
 def coverage(points_px: NDArray[np.float64], size_px: Sequence[int]) -> float:
     """Share of the cells of a grid over the picture that hold a corner; points (n, axes), as many sizes."""
     cells = np.floor((points_px + 0.5) / np.array(size_px) * CELLS).astype(int)

@@ -33,6 +33,7 @@ from dsl_core.calibration.geometry.columns_only import (
 from dsl_core.calibration.geometry.pose_series import (
     GOOD_RMS_PX,
     check_poses,
+    columns_per_pixel,
     coverage,
     doubts,
     largest_angle_deg,
@@ -55,7 +56,8 @@ Size = tuple[int, int]
 
 #: A pose does not fit when its error is this many times that of the typical pose, or so many corners are off.
 OUTLIER_POSE, OUTLIER_SHARE = 3.0, 0.4
-#: And only where that matters: above this share of the error that a whole calibration may have (px).
+#: And only where that matters: above this share of the error that a whole calibration may have (px). Where
+#: the projector's pixels are finer, in those of the camera: no corner is known better than it sees them.
 HARMFUL_PX = GOOD_RMS_PX / 4
 MIN_POSES_TO_LEAVE_OUT = 4
 
@@ -191,9 +193,10 @@ def without(parameters: Floats, poses: Sequence[int] | NDArray[np.integer]) -> F
 def _fitting(poses: Sequence[PoseObservation], fit: Adjustment) -> NDArray[np.bool_]:
     """Which poses agree with the others, or differ from them by too little to do harm."""
     errors = np.array([_rms_px(fit, part, only_used=False) for part in _parts(poses)])
+    finer = np.array([max(1.0, columns_per_pixel(pose)) for pose in poses])
     lost = np.array([1 - fit.used[part].mean() for part in _parts(poses)])
     far = (np.median(np.abs(errors), 0) * OUTLIER_POSE < errors).any(1) & (lost > OUTLIER_SHARE / 2)
-    harmful = (errors > HARMFUL_PX).any(1)
+    harmful = (errors / np.stack([np.ones_like(finer), finer], 1) > HARMFUL_PX).any(1)
     return np.asarray(~(harmful & (far | (lost > OUTLIER_SHARE))))
 
 

@@ -13,6 +13,7 @@ from dsl_core.calibration.film.depth_stage import StageData, StageFilter, calibr
 from dsl_core.calibration.film.order_paths import LineFrames, thinned
 from dsl_core.calibration.geometry.plane_refinement import lone_plane
 from dsl_core.calibration.geometry.stage_planes import column_limit_px, require_steps
+from dsl_core.campaign.common.depths import stage_depths_mm
 from dsl_core.campaign.common.flat_target import (
     diffuser_lines,
     line_frames,
@@ -51,6 +52,8 @@ if TYPE_CHECKING:
 STAGE_NOTE, PLANE_NOTE = "stage.json", "plane.json"
 #: First orders are so much dimmer than white that lines may be exposed longer; the zero order saturates.
 LONGER = 3.0
+#: Usual positions are evenly between these shares of the rig's depth range.
+NEAR, FAR, POSITIONS = 0.2, 0.8, 3
 #: A plane that scatters this many times as much as those before it is the one that is wrong.
 LESS_FLAT = 2.0
 
@@ -83,12 +86,13 @@ class PlaneNote(Record):
 class DepthStageRecipe(Recipe[DepthStageCalibration]):
     """The calibration with a plane on a stage.
 
-    ``positions_mm`` are the positions of the stage; ``stage_std_mm`` is the standard deviation of the
-    stage's positions; ``filters_nm`` are the nominal centres of the bandpass filters. ``code_step_px`` is
-    the step of the lines without filter, at most 5; ``filter_step_px`` is the step of the lines through
-    filters, which may be far apart. ``reflectance`` is the reflectance of the target; ``chain`` lets the
-    plane correct the product of response, emission and efficiency; ``grid`` adds a model of the columns
-    derived from the data, which needs three positions.
+    ``positions_mm`` are the positions of the stage; with none given there are three over the rig's depth
+    range, as far as its stage reaches. ``stage_std_mm`` is the standard deviation of the stage's positions;
+    ``filters_nm`` are the nominal centres of the bandpass filters. ``code_step_px`` is the step of the lines
+    without filter, at most 5; ``filter_step_px`` is the step of the lines through filters, which may be far
+    apart. ``reflectance`` is the reflectance of the target; ``chain`` lets the plane correct the product of
+    response, emission and efficiency; ``grid`` adds a model of the columns derived from the data, which needs
+    three positions.
     """
 
     name = "depth-stage"
@@ -97,7 +101,7 @@ class DepthStageRecipe(Recipe[DepthStageCalibration]):
     needs = ("geometry", "spectralon", "bandpass")
     record_type = DepthStageCalibration
 
-    positions_mm: tuple[float, ...] = (600.0, 750.0, 900.0)
+    positions_mm: tuple[float, ...] = ()
     filters_nm: tuple[float, ...] = (450.0, 540.0, 640.0)
     code_step_px: int = 4
     filter_step_px: int = 16
@@ -108,7 +112,7 @@ class DepthStageRecipe(Recipe[DepthStageCalibration]):
 
     def steps(self, bench: Bench) -> tuple[Step, ...]:
         """At each position the plane without filter, then through each filter."""
-        positions, filters = sorted(set(self.positions_mm)), sorted(set(self.filters_nm))
+        positions, filters = self._positions_mm(bench), sorted(set(self.filters_nm))
         if len(positions) < 2 or not filters:
             raise CalibrationError(
                 "Depth stage: at least two different positions and one filter are needed, given"
@@ -117,6 +121,22 @@ class DepthStageRecipe(Recipe[DepthStageCalibration]):
         return tuple(
             step for position in positions for step in (_plain_step(position), *_filtered(position, filters))
         )
+
+    def _positions_mm(self, bench: Bench) -> list[float]:
+        """Those given, or the usual ones; raises `CalibrationError` for one that the stage does not reach."""
+        stage = bench.devices.stage
+        if not self.positions_mm:
+            return sorted(set(stage_depths_mm(bench.rig, stage, NEAR, FAR, POSITIONS)))
+        if stage is not None:
+            low, high = stage.range_mm
+            beyond = [each for each in self.positions_mm if not low <= each <= high]
+            if beyond:
+                named = ", ".join(f"{each:g}" for each in beyond)
+                raise CalibrationError(
+                    f"Depth stage: positions_mm names {named} mm; the stage moves from {low:g} to"
+                    f" {high:g} mm. Name positions in between, or none for the usual ones."
+                )
+        return sorted(set(self.positions_mm))
 
     def look(self, bench: Bench, step: Step) -> tuple[Figure, ...]:
         """Brightness and other light."""

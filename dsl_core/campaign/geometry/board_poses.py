@@ -8,6 +8,7 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
+from dsl_core.campaign.common.depths import depths_mm
 from dsl_core.errors import CalibrationError
 from dsl_core.model.board import Board, Charuco
 from dsl_core.model.geometry import Lens
@@ -21,7 +22,12 @@ Floats = NDArray[np.float64]
 CLEARANCE = 0.015
 #: Steps in which a board is moved to the middle until both devices see all of it.
 SHARES = np.linspace(1, 0, 11)
-DEPTHS_MM = (600.0, 850.0)
+#: Boards stand between these shares of the rig's depth range: in the middle of it, as far as they fit.
+NEAR, FAR = 0.2, 0.7
+#: Cells each way of the camera's picture by which is asked how much of it the projector lights.
+_CELLS = 40
+#: Devices of which less is common see little of each other, however small the board is.
+_FEW_COMMON = 0.6
 
 
 @dataclass(frozen=True)
@@ -109,18 +115,42 @@ def default_poses(board: Board, rig: Rig, count: int) -> tuple[BoardPose, ...]:
         )
     poses = tuple(_fitted(board, rig, wish) for wish in _WISHES[:count])
     if None in poses:
-        width, height = ((n + 1) * board.square_mm for n in board.corner_grid)
-        raise CalibrationError(
-            f"A board of {width:.0f} x {height:.0f} mm is too large: it does not fit into the view of"
-            f" camera and projector at {DEPTHS_MM[0]:.0f} to {DEPTHS_MM[1]:.0f} mm. Print smaller squares."
-        )
+        raise CalibrationError(_too_large(board, rig))
     return tuple(pose for pose in poses if pose is not None)
+
+
+def _too_large(board: Board, rig: Rig) -> str:
+    """Why a board is not seen as a whole, and what to do about it."""
+    near, far = depths_mm(rig, NEAR, FAR)
+    width, height = ((n + 1) * board.square_mm for n in board.corner_grid)
+    size, at = f"A board of {width:.0f} x {height:.0f} mm", f"at {near:.0f} to {far:.0f} mm"
+    common = common_share(rig, (near + far) / 2)
+    if common < _FEW_COMMON:
+        return (
+            f"{size} does not fit into the view of camera and projector {at}: as the rig is described, the"
+            f" projector lights {common:.0%} of the camera's picture there. If in truth it lights more,"
+            " correct the pose, the principal points (lens shift) or depth_range_mm of the rig's nominal"
+            " figures; if not, print smaller squares."
+        )
+    return (
+        f"{size} is too large: it does not fit into the view of camera and projector {at}. Print smaller"
+        " squares, or correct depth_range_mm of the rig's nominal figures if there is more room."
+    )
+
+
+def common_share(rig: Rig, depth_mm: float) -> float:
+    """Share of the camera's picture that the projector lights on a plane at a depth, 0 to 1."""
+    rays = pixel_rays(rig.camera)
+    step = max(1, rig.camera.width_px // _CELLS)
+    points = rays[:, ::step, ::step].reshape(3, -1) * depth_mm
+    return float(_within(rig.projector, rig.pose.matrix @ points + rig.pose.vector_mm[:, None], 0.0).mean())
 
 
 def _fitted(board: Board, rig: Rig, wish: tuple[float, ...]) -> BoardPose | None:
     """The pose nearest to a wish whose squares are all in view, farther away if necessary; None for none."""
     across, down, far, *turns = wish
-    for depth in np.linspace(DEPTHS_MM[0] + far * np.ptp(DEPTHS_MM), DEPTHS_MM[1], 6):
+    nearest, farthest = depths_mm(rig, NEAR + far * (FAR - NEAR), FAR)
+    for depth in np.linspace(nearest, farthest, 6):
         low, high = _view_mm(rig.camera, float(depth))
         middle, half = (low + high) / 2, (high - low) / 2
         for shares in sorted(product(SHARES, SHARES), key=sum, reverse=True):
@@ -145,10 +175,14 @@ def in_view(pose: BoardPose, board: Board, rig: Rig) -> bool:
 
 
 def _inside(lens: Lens, points: Floats) -> bool:
+    return bool(_within(lens, points, CLEARANCE * lens.width_px).all())
+
+
+def _within(lens: Lens, points: Floats, edge_px: float) -> NDArray[np.bool_]:
+    """Which points, (3, n) mm, a lens sees at least this far inside its picture."""
     column, row = project(lens, *points)
-    edge = CLEARANCE * lens.width_px
-    inside = (column > edge) & (column < lens.width_px - 1 - edge)
-    return bool((inside & (row > edge) & (row < lens.height_px - 1 - edge)).all())
+    inside = (column > edge_px) & (column < lens.width_px - 1 - edge_px)
+    return np.asarray(inside & (row > edge_px) & (row < lens.height_px - 1 - edge_px) & (points[2] > 0))
 
 
 def outline_mm(pose: BoardPose, board: Board) -> Floats:

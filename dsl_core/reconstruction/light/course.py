@@ -21,8 +21,8 @@ Floats = NDArray[np.float64]
 #: What the terms of the drift may be before a scan is seen: linear and quadratic over the scan.
 DRIFT_STD = (0.5, 0.3)
 NO_DRIFT = 1e-6
-#: Witnesses needed to say anything.
-FEWEST = 4
+#: Witnesses needed to say anything; so many are enough of pictures taken again, which see the light itself.
+FEWEST, FEWEST_AGAIN = 4, 2
 #: What settings may differ by through the response of the rig, and levels of lines by over the picture.
 SETTING_STD, SLOPE_STD = 0.01, 0.02
 #: The same of settings that are not as calibrated; witnesses must be so much likelier then (chi-square).
@@ -96,7 +96,8 @@ def light_course(witnesses: Sequence[Witness], shots: int) -> LightCourse | None
 
     A drift that may be chance is left out: the curve is then zero, and other figures are those without it.
     """
-    if len(witnesses) < FEWEST:
+    again = [each for each in witnesses if each.against is not None and each.setting is None]
+    if len(witnesses) < FEWEST and len(again) < FEWEST_AGAIN:
         return None
     nothing = (NO_DRIFT, NO_DRIFT)
     found, apart = _course(witnesses, shots, DRIFT_STD), _course(witnesses, shots, nothing, APART_STD)

@@ -222,14 +222,27 @@ def test_a_board_in_one_place_is_said_to_cover_little() -> None:
 def test_a_pose_fits_unless_it_is_far_off_or_lost_many_corners_and_does_harm(
     device: int, error_px: float, lost: int, fits: bool
 ) -> None:
-    poses: Any = [SimpleNamespace(ids=range(20))] * 5
+    assert _fitting(*_one_pose_off(device, error_px, lost)).tolist() == [True, True, fits, True, True]
+
+
+def test_a_projector_of_finer_pixels_is_judged_in_those_of_the_camera() -> None:
+    # Left out until then: a corner seen to a twentieth of a pixel of the camera, each on three columns.
+    assert _fitting(*_one_pose_off(1, 2.9 * HARMFUL_PX, 12, columns_per_pixel=3.0)).all()
+    assert not _fitting(*_one_pose_off(1, 3.2 * HARMFUL_PX, 12, columns_per_pixel=3.0)).all()
+    assert not _fitting(*_one_pose_off(0, 1.1 * HARMFUL_PX, 12, columns_per_pixel=3.0)).all()
+
+
+def _one_pose_off(device: int, error_px: float, lost: int, columns_per_pixel: float = 1.0) -> Any:
+    """Five poses of 20 corners with a typical error, the third with another one and corners lost."""
+    corners_px = np.stack(np.meshgrid(np.arange(5.0), np.arange(4.0)), -1).reshape(-1, 2)
+    seen_px = corners_px * columns_per_pixel
+    poses = [SimpleNamespace(ids=range(20), camera_px=corners_px, projector_px=seen_px)] * 5
     residuals = np.zeros((2, 100, 2))
     residuals[device, :, 0] = HARMFUL_PX
     residuals[device, 40:60, 0] = error_px
     used = np.ones(100, bool)
     used[40 : 40 + lost] = False
-    fit = Adjustment(np.zeros(0), np.zeros(0), residuals[0], residuals[1], used)
-    assert _fitting(poses, fit).tolist() == [True, True, fits, True, True]
+    return poses, Adjustment(np.zeros(0), np.zeros(0), residuals[0], residuals[1], used)
 
 
 @pytest.mark.parametrize(

@@ -12,6 +12,7 @@ import torch
 from dsl_core.calibration.common.tiles import ColumnSamples
 from dsl_core.campaign.common.recipe import Bench, Step
 from dsl_core.campaign.depth_stage.recipe import STAGE_NOTE, DepthStageRecipe, SeenPlane
+from dsl_core.devices.base import Stage
 from dsl_core.errors import CalibrationError
 from dsl_core.model.calibration.chain import ChainCorrection
 from dsl_core.model.calibration.depth_stage import DepthStageCalibration
@@ -160,6 +161,46 @@ def test_a_capture_without_first_orders_is_named(bench: Bench, tmp_path: Path) -
     take(RECIPE, other, step, film=False)
     with pytest.raises(CalibrationError, match="850 mm, filter of 540 nm: no first orders were found"):
         RECIPE.fit(other, NoProgress())
+
+
+class ShortStage(Stage):
+    """A stage that only answers how far it goes."""
+
+    def __init__(self, low_mm: float, high_mm: float) -> None:
+        self.ends_mm = low_mm, high_mm
+
+    @property
+    def range_mm(self) -> tuple[float, float]:
+        return self.ends_mm
+
+    @property
+    def position_mm(self) -> float:
+        return self.ends_mm[0]
+
+    def move_to(self, position_mm: float) -> float:
+        raise AssertionError(f"nothing is captured at {position_mm:g} mm")
+
+
+@pytest.mark.parametrize(
+    ("ends_mm", "wanted_mm"),
+    [
+        ((400.0, 1200.0), [600, 750, 900]),
+        ((600.4, 750.0), [601, 676, 750]),
+        ((0.0, 150.0), [0, 75, 150]),
+    ],
+)
+def test_usual_positions_are_those_that_the_stage_reaches(
+    bench: Bench, ends_mm: tuple[float, float], wanted_mm: list[float]
+) -> None:
+    short = replace(bench, devices=replace(bench.devices, stage=ShortStage(*ends_mm)))
+    steps = DepthStageRecipe().steps(short)
+    assert sorted({step.placement.options["depth_mm"] for step in steps}) == wanted_mm
+
+
+def test_a_position_beyond_the_stage_is_refused_before_anything_is_captured(bench: Bench) -> None:
+    short = replace(bench, devices=replace(bench.devices, stage=ShortStage(480.0, 760.0)))
+    with pytest.raises(CalibrationError, match="names 900 mm; the stage moves from 480 to 760 mm"):
+        DepthStageRecipe(positions_mm=(600.0, 750.0, 900.0)).steps(short)
 
 
 def test_positions_and_filters_are_needed(bench: Bench) -> None:

@@ -226,3 +226,16 @@ def test_both_devices_see_the_whole_board_in_every_pose(board: Checkerboard | Ch
 def test_a_board_too_large_is_refused() -> None:
     with pytest.raises(CalibrationError, match="A board of 800 x 560 mm is too large"):
         default_poses(Checkerboard(columns=9, rows=6, square_mm=80), published_rig(), 5)
+
+
+def test_devices_described_as_looking_past_each_other_are_named_instead_of_the_board() -> None:
+    rig = published_rig()
+    aside = rig.pose.model_copy(update={"translation_mm": (350.0, 0.0, 0.0)})
+    with pytest.raises(CalibrationError, match=r"projector lights \d+% of the camera.*correct the pose"):
+        default_poses(BOARD, rig.model_copy(update={"pose": aside}), 5)
+
+
+def test_boards_stand_at_the_depths_that_the_rig_is_for() -> None:
+    near = published_rig().model_copy(update={"depth_range_mm": (300.0, 420.0)})
+    poses = default_poses(Checkerboard(columns=6, rows=4, square_mm=8), near, 12)
+    assert all(324 <= pose.depth_mm <= 384 for pose in poses)

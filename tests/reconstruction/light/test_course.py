@@ -43,6 +43,18 @@ def test_a_drift_is_measured_from_the_first_shot_on() -> None:
     assert abs(course.drift + 0.1) < 3 * course.drift_std + 0.002
 
 
+@pytest.mark.parametrize(("drift", "drifts"), [(-0.055, True), (0.003, False)])
+def test_two_pictures_taken_again_are_enough(drift: float, drifts: bool) -> None:
+    again = [Witness(shot, 15, drift * (shot - 15) / (SHOTS - 1), 0.001) for shot in (104, 199)]
+    course = light_course(again, SHOTS)
+    assert course is not None
+    assert (course.drifts, course.flickers) == (drifts, False)
+    if drifts:
+        assert np.abs(course.log - drift * np.arange(SHOTS) / (SHOTS - 1)).max() < 0.006
+    assert light_course(again[1:], SHOTS) is None, "one may be a chance"
+    assert light_course([replace(each, setting=0) for each in again], SHOTS) is None, "settings may differ"
+
+
 def test_settings_that_do_not_agree_are_not_taken_for_drift() -> None:
     heard = [
         replace(each, log=each.log + (0.0 if each.setting is None else -0.2)) for each in witnesses(0.0, 0.0)
