@@ -137,7 +137,12 @@ def test_a_displacement_is_doubted_by_the_scatter_of_the_spot_but_never_wholly()
     for scatter_px2, doubt in ((0.02, 0.058), (0.4, 1.0)):
         moved = flat + (0.5 + scatter_px2 * np.sign(random.standard_normal(SHAPE))) * pull
         exact = np.full(SHAPE, 1e-4, np.float32)
-        found = fit_spot(rig(), replace(before, column_px=moved, column_std_px=exact), pull, np.ones(SHAPE))
+        found = fit_spot(
+            rig(),
+            replace(before, column_px=moved.astype(np.float32), column_std_px=exact),
+            pull,
+            np.ones(SHAPE),
+        )
         assert found is not None
         assert found.present
         assert found.doubt == pytest.approx(doubt, rel=0.02)

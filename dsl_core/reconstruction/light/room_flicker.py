@@ -97,7 +97,7 @@ class _Places:
         """Pixels that are away from the line of a pattern."""
         middle = self._middle_px(pattern)
         first, last = np.searchsorted(self.column, (middle - self.zone_px, middle + self.zone_px))
-        return np.r_[0:first, last : len(self.column)]
+        return np.concatenate([np.arange(first), np.arange(last, len(self.column))])
 
     def unlit(self, pattern: int) -> tuple[NDArray[np.intp], Floats]:
         """Pixels that no order of a pattern reaches, and how far from its line these are, px."""
@@ -179,7 +179,7 @@ def _of_setting(
     for row, shot in zip(frames, shots, strict=True):
         known = exposed.black_dn[shot.index] + exposed.black_share[shot.index] * dark
         row[:] = scan.source.read(shot).ravel()[pixels] - sensor.black_level_dn - known
-    variance, noise = raw_variance(sensor, frames), raw_variance(sensor, dark)
+    variance, noise = (np.asarray(raw_variance(sensor, each), np.float64) for each in (frames, dark))
     frames -= dark
     same = np.ones_like(dark)
     if dark.var() - noise.mean() > CONTRAST * noise.mean():
@@ -257,7 +257,12 @@ def _flicker(
     steps = np.array(own), np.array(std)
     return [
         _frames_from_steps(
-            np.array(kept), *(e[:, i] for e in steps), *unlit[:, :, i], _usual(variance, shape)
+            np.array(kept),
+            steps[0][:, i],
+            steps[1][:, i],
+            unlit[0, :, i],
+            unlit[1, :, i],
+            _usual(variance, shape),
         )
         for i, shape in enumerate(shapes)
     ]

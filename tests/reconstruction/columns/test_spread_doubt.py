@@ -39,7 +39,7 @@ def doubt(found: SpreadFit | None, lines: LineSet | None = LINES) -> SpreadDoubt
     white = SimpleNamespace(saturated=known, radiance=np.ones(SHAPE))
 
     def pick(pixels: np.ndarray) -> PickedLines:
-        return PickedLines(pixels, light[:, pixels], std[:, pixels], np.zeros(len(pixels)))
+        return PickedLines(pixels, light[:, pixels], std[:, pixels], np.zeros(len(pixels), np.float32))
 
     stack = SimpleNamespace(pick=pick)
     return spread_doubt(RIG, lines, code, white, stack, found)  # type: ignore[arg-type]
