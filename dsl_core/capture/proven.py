@@ -209,9 +209,8 @@ class ProvenShots:
     def _compare(self, alone: Finding, frame: Frame, proof: FrameProof) -> tuple[Frame, Finding]:
         """A picture that nothing tells, if another one of its shot is the same; else a third."""
         second = self._taker.take(alone.shot, 1)
-        if not proof.differ_at_first(frame.pixels, second.pixels):
+        if not proof.differ_at_first(alone.shot, frame.pixels, second.pixels):
             return frame, alone
-        self._failures += 1
         self.corrected += 1
         third = self._again(alone.shot, 1)
         return replace(third, corrected="two pictures of it differed"), proof.judge(alone.shot, third.pixels)

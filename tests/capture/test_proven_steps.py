@@ -79,7 +79,7 @@ class Bench:
     def is_alone(self, found: Finding) -> bool:
         return self.alone
 
-    def differ_at_first(self, one: object, other: object) -> bool:
+    def differ_at_first(self, shot: Shot, one: object, other: object) -> bool:
         return self._differs
 
     def first_picture(self) -> Shot | None:

@@ -118,11 +118,13 @@ class FrameProof:
 
     def is_alone(self, found: Finding) -> bool:
         """Whether nothing tells a line: neither its columns, which are not seen, nor lines before it."""
-        return found.shot.role == "spectral" and found.verdict is Verdict.UNTOLD and self._neighbours.are_few
+        is_line = found.shot.role == "spectral" and self._blacks[found.shot.setting] in self._kept
+        return is_line and found.verdict is Verdict.UNTOLD and self._neighbours.are_few
 
-    def differ_at_first(self, one: NDArray[np.uint16], other: NDArray[np.uint16]) -> bool:
-        """Whether two pictures of such a line, as raw mosaics, differ by more than noise."""
-        return self._neighbours.differ_at_first(self._raster.take(one), self._raster.take(other))
+    def differ_at_first(self, shot: Shot, one: NDArray[np.uint16], other: NDArray[np.uint16]) -> bool:
+        """Whether two pictures of such a line, as raw mosaics, differ by more than noise and flicker."""
+        black = self._kept[self._blacks[shot.setting]]
+        return self._neighbours.differ_at_first(self._raster.take(one), self._raster.take(other), black)
 
     def believe_light(self, shot: Shot) -> None:
         """Take the light of a shot for usual from now on, though it was unlike the pictures before."""

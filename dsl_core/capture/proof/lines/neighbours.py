@@ -26,8 +26,11 @@ LITTLE = 0.3
 SAME_LINES = (0.6, 1.6)
 #: Light counts from so many deviations on.
 BRIGHT_SIGMAS = 25.0
-#: Two pictures of one shot are different if their light is by so many deviations, or more than so few pixels.
-SURE_SIGMAS, FEW = 6.0, 0.002
+#: Two pictures of one shot are different if all their light is by so many deviations, or more than so few
+#: pixels by so many.
+LIGHT_SIGMAS, FEW, SURE_SIGMAS = 4.0, 0.002, 6.0
+#: Less than this share of its light is flicker.
+FLICKER = 0.25
 #: Median of the deviations of a normal distribution.
 NORMAL = 0.6745
 #: Differences count up to so many deviations.
@@ -65,17 +68,23 @@ class LineNeighbours:
         """Whether too few pictures were compared to say what is usual."""
         return len(self._changes) < FEWEST_USUAL
 
-    def differ_at_first(self, one: Counts, other: Counts) -> bool:
-        """Whether two pictures of one shot differ by more than noise and light of the room, all over.
+    def differ_at_first(self, one: Counts, other: Counts, black: Counts) -> bool:
+        """Whether two pictures of one shot differ by more than noise, flicker and light of the room.
 
         That needs no neighbours: of two pictures of one pattern, all pixels together have the same light.
         """
-        step = np.subtract(one, other, dtype=np.float32)
-        step -= np.median(step)
-        step /= np.sqrt(self._noise.variance(one) + self._noise.variance(other))
-        sigma = max(float(np.median(np.abs(step))) / NORMAL, 1.0)
-        all_over = abs(float(step.sum())) / (sigma * np.sqrt(step.size))
-        return all_over > SURE_SIGMAS or float((np.abs(step) > SURE_SIGMAS * sigma).mean()) > FEW
+        first, second = (np.subtract(each, black, dtype=np.float32) for each in (one, other))
+        first, second = first - np.median(first), second - np.median(second)
+        noise = np.sqrt(self._noise.variance(one) + self._noise.variance(other))
+        step = first - second
+        sigma = max(float(np.median(np.abs(step / noise))) / NORMAL, 1.0)
+        lost = abs(float(step.sum()))
+        is_dimmer = lost > FLICKER * max(abs(float(first.sum())), abs(float(second.sum())))
+        is_dimmer &= lost > LIGHT_SIGMAS * sigma * float(np.sqrt((noise**2).sum()))
+        gain = float(first @ second) / max(float(first @ first), 1e-9)
+        gain = gain if abs(gain - 1) < FLICKER else 1.0
+        left = np.abs(second - np.float32(gain) * first) / noise
+        return is_dimmer or float((left > SURE_SIGMAS * sigma).mean()) > FEW
 
     def differ(self, one: Counts, other: Counts) -> bool:
         """Whether two pictures of one shot show different patterns."""

@@ -151,8 +151,12 @@ def test_two_pictures_of_one_line_are_different_by_all_their_light_or_by_a_few_p
         level[:lit] += light
         return np.rint(level + rng.normal(0, 2.5, level.size)).astype(np.uint16)
 
-    line = picture(20)
-    assert not neighbours.differ_at_first(line, picture(20))
-    assert not neighbours.differ_at_first(line, picture(20, room=330.0)), "light of the room"
-    assert neighbours.differ_at_first(line, picture(10))
-    assert neighbours.differ_at_first(picture(400, lit=20), picture(0, lit=20))
+    line, black = picture(40), picture(0)
+    assert not neighbours.differ_at_first(line, picture(40), black)
+    assert not neighbours.differ_at_first(line, picture(40, room=330.0), black), "light of the room"
+    assert neighbours.differ_at_first(line, picture(20), black)
+    assert neighbours.differ_at_first(picture(400, lit=20), picture(0, lit=20), black)
+    assert neighbours.differ_at_first(picture(400, lit=200), picture(280, lit=200), black)
+    assert not neighbours.differ_at_first(picture(400, lit=200), picture(350, lit=200), black), "flicker"
+    elsewhere = np.roll(picture(40, lit=100), 100)
+    assert neighbours.differ_at_first(picture(40, lit=100), elsewhere, black), "another line"
