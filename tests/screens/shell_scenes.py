@@ -57,14 +57,19 @@ def _close(stage: Stage) -> None:
 
 
 def toasts(stage: Stage) -> None:
-    """Messages of all kinds, as many as there may be."""
+    """Messages of all kinds, each in front of those before it, and one that is too long for its place."""
     stage.open()
     tell = stage.window.toasts
     tell.tell("info", "Written: chart.ply, chart.csv.")
+    stage.shoot("info")
     tell.tell("warning", "The settings could not be saved: No space left on device.")
+    stage.shoot("warning")
     tell.tell("error", "The camera does not answer. Check its cable and power.", "Frame 17 of 129\nattempt 3")
+    stage.shoot("error")
     tell.offer("New here? A tour of seven steps shows what is where.", {"Take the tour": lambda: None})
-    stage.shoot()
+    stage.shoot("offer")
+    tell.tell("error", " ".join(f"The file /lab/2026/scans/chart-{i}.zarr is damaged." for i in range(20)))
+    stage.shoot("long")
 
 
 def tour(stage: Stage) -> None:

@@ -59,7 +59,7 @@ def run_controls(
 ) -> RunControls:
     """The controls of a scan in a phase; ``note`` is what became of the last one.
 
-    ``trouble`` is said above the page, with how far the scan came; that is not said again. A finished scan
+    ``trouble`` is said in the banner, with how far the scan came; that is not said again. A finished scan
     without a result is reconstructed next, whatever kept it from having one, unless one ``must_calibrate``
     before; while one is, there is only to wait.
     """

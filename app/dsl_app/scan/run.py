@@ -224,6 +224,9 @@ class RunBox(QGroupBox):
             state.lacks_calibration.value and not state.has_library,
         )
         show_parts(self, shown)
+        facts = state.facts.value
+        # What is ticked is remembered for the next scan that has a calibration.
+        self.then.setEnabled(facts is None or facts.is_calibrated)
 
     def _show_status(self, status: Status) -> None:
         self._bar.setRange(0, max(status.total, 1))

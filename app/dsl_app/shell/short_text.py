@@ -44,7 +44,7 @@ class ShortText(QLabel):
         super().resizeEvent(event)
         fits = self._is_inside(self._whole)
         self.setText(self._whole if fits else self._beginning())
-        self.setToolTip("" if fits else plain_tip(self._whole))
+        self.setToolTip(plain_tip("" if fits else self._whole))
         if fits != self.fits:
             self.fits = fits
             self.cut.emit(not fits)

@@ -155,7 +155,7 @@ class Toasts(QObject):
     def offer(self, text: str, offers: Mapping[str, Callable[[], object]], stay_s: float = 0.0) -> None:
         """Show a sentence with buttons by their texts until one is used or it is closed.
 
-        With ``stay_s`` it leaves by itself after that time in front.
+        With ``stay_s`` it leaves by itself after that time.
         """
         self._add(Toast("info", text, stay_ms=round(1000 * stay_s), offers=offers))
 

@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -252,6 +253,17 @@ def test_an_override_is_shown_as_it_is(ready: Bench) -> None:
     assert page.calibration.override.isVisible()
     page.calibration.override.click()
     assert not bench.state.override.value
+
+
+def test_no_reconstruction_is_promised_without_calibration(ready: Bench) -> None:
+    page, _, _ = ready
+    facts, run = page._state.facts, page.run
+    assert facts.value is not None
+    page._state.then_reconstruct.set(True)
+    assert run.then.isEnabled()
+    facts.set(replace(facts.value, is_calibrated=False))
+    assert not run.then.isEnabled()
+    assert run.then.isChecked()
 
 
 def test_a_step_wider_than_the_line_is_said_and_not_started(ready: Bench) -> None:

@@ -25,6 +25,8 @@ HINT = (
     "Name the material of every pixel: choose a folder or file of spectra, or mark known materials and use"
     " those."
 )
+#: Areas from here on are told in whole mm²: their edges are known to no tenth.
+LARGE_MM2 = 100.0
 #: As many rows of the legend are seen without scrolling.
 ROWS = 7
 _MEASURES = (
@@ -176,7 +178,8 @@ class MaterialsPanel(QWidget):
                 continue
             first = cell(row.label)
             first.setIcon(swatch(colours[row.value] if row.value else "transparent"))
-            area = "–" if row.area_mm2 is None else f"{row.area_mm2:,.1f} mm²"
+            digits = 1 if row.area_mm2 is not None and row.area_mm2 < LARGE_MM2 else 0
+            area = "–" if row.area_mm2 is None else f"{row.area_mm2:,.{digits}f} mm²"
             share = f"{100 * row.share:.1f} %" if row.label != "not judged" else ""
             figures = (cell(text, "", RIGHT) for text in (f"{row.pixels:,}", share, area))
             rows.append((first, *figures))

@@ -211,10 +211,10 @@ def test_the_fit_button_and_the_leave_button_follow_the_fit() -> None:
 
 
 @pytest.mark.parametrize("values", [{"look": Look("a", (BAD,))}, {"trouble": "No board was found."}])
-def test_what_was_found_wrong_is_checked_before_it_is_captured(values: dict[str, object]) -> None:
+def test_what_was_found_wrong_is_checked_before_it_is_captured(values: dict[str, Any]) -> None:
     assert main_button(wizard(FIRST, places_itself=True, **values)) == "check"
     assert main_button(wizard(FIRST, **values)) == "check"
-    good = {"look": Look("a", (GOOD,))}
+    good: dict[str, Any] = {"look": Look("a", (GOOD,))}
     assert main_button(wizard(FIRST, places_itself=True, **good)) == "all"
 
 
