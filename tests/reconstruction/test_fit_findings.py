@@ -81,6 +81,13 @@ def test_pixels_that_are_lost_to_overexposure_are_told_by_themselves() -> None:
     assert Fit.of(judged(bright | np.flip(flags(Flag.OUT_OF_RANGE, 0.2)))).parts == ("exposure", "coverage")
 
 
+def test_a_background_beyond_the_calibrated_depths_is_not_blamed_on_motion_alone() -> None:
+    far, unsure = flags(Flag.OUT_OF_RANGE, 0.3), np.flip(flags(Flag.CODES_DISAGREE, 0.2))
+    assert "if they show a background" in Fit.of(judged(far | unsure)).words
+    assert "surfaces that light each other" in Fit.of(judged(unsure)).words
+    assert "background" not in Fit.of(judged(flags(Flag.OUT_OF_RANGE, 0.1) | unsure)).words
+
+
 def test_lines_of_another_shape_are_no_news_where_the_camera_is_out_of_focus() -> None:
     made = flags(Flag.UNUSUAL_PEAK, 0.3)
     assert Fit.of(share_findings(made, None)).parts == ("profile",)
