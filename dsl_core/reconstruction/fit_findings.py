@@ -174,15 +174,8 @@ def share_findings(
             "{0} of the lit pixels have no depth because they are overexposed in every setting.",
             "Expose for a shorter time or with a lower level, or add a darker setting to the plan.",
         )
-        yield _share(
-            "coverage",
-            "lit pixels without a depth",
-            (lit - measured - too_bright) / lit,
-            MOST_LOST,
-            "{0} of the lit pixels have no depth.",
-            "See the flags: codes that disagree or a depth out of range tell of motion, of surfaces that"
-            " light each other, or of another rig's calibration.",
-        )
+        lost = lit - measured - too_bright
+        yield _share("coverage", "lit pixels without a depth", lost / lit, MOST_LOST, *_of_lost(flags, lost))
     if measured >= FEWEST:
         shape = _share(
             "profile",
@@ -212,6 +205,23 @@ def share_findings(
         MOST_AT_BOUND,
         "The spectra of {0} of the pixels touch 1.5, and more than by their noise.",
         "Look for highlights and for light that the scan's black frames do not have.",
+    )
+
+
+def _of_lost(flags: NDArray[np.integer], lost: int) -> tuple[str, str]:
+    """What is said of so many lit pixels without a depth, and what to do."""
+    known = (flags & int(DEPTH_INVALID)) == int(Flag.OUT_OF_RANGE)
+    if np.count_nonzero(known) > lost / 2:
+        return (
+            "{0} of the lit pixels have no depth, most of them for it is not among those that the rig is"
+            " calibrated for.",
+            "Nothing is wrong if they show a background, or what is nearer. If not, something moved, or the"
+            " calibration is of another rig.",
+        )
+    return (
+        "{0} of the lit pixels have no depth.",
+        "See the flags: codes that disagree or a depth out of range tell of motion, of surfaces that"
+        " light each other, or of another rig's calibration.",
     )
 
 

@@ -81,6 +81,13 @@ def test_pixels_that_are_lost_to_overexposure_are_told_by_themselves() -> None:
     assert Fit.of(judged(bright | np.flip(flags(Flag.OUT_OF_RANGE, 0.2)))).parts == ("exposure", "coverage")
 
 
+def test_a_background_beyond_the_calibrated_depths_is_not_blamed_on_motion_alone() -> None:
+    far, unsure = flags(Flag.OUT_OF_RANGE, 0.3), np.flip(flags(Flag.CODES_DISAGREE, 0.2))
+    assert "if they show a background" in Fit.of(judged(far | unsure)).words
+    assert "surfaces that light each other" in Fit.of(judged(unsure)).words
+    assert "background" not in Fit.of(judged(flags(Flag.OUT_OF_RANGE, 0.1) | unsure)).words
+
+
 def test_lines_of_another_shape_are_no_news_where_the_camera_is_out_of_focus() -> None:
     made = flags(Flag.UNUSUAL_PEAK, 0.3)
     assert Fit.of(share_findings(made, None)).parts == ("profile",)
@@ -114,10 +121,12 @@ def test_counts_of_rows_add_up_to_those_of_the_picture() -> None:
     made, rng = flags(Flag.POOR_FIT, 0.3), np.random.default_rng(0)
     share, reach = rng.uniform(0, 1, (3, *SHAPE)), rng.integers(1, 5, (3, *SHAPE))
     made |= flags(Flag.AT_BOUND, 0.6)
-    cubes = share, reach, rng.uniform(0, 0.04, (3, *SHAPE)), np.full((3, *SHAPE), 0.002)
-    rows = (slice(0, 7), slice(7, 20))
-    parts = (count_spectra(made[each], *(cube[:, each] for cube in cubes)) for each in rows)
-    assert sum(parts, SpectralCounts()) == count_spectra(made, *cubes)
+    dark, std = rng.uniform(0, 0.04, (3, *SHAPE)), np.full((3, *SHAPE), 0.002)
+    parts = (
+        count_spectra(made[each], share[:, each], reach[:, each], dark[:, each], std[:, each])
+        for each in (slice(0, 7), slice(7, 20))
+    )
+    assert sum(parts, SpectralCounts()) == count_spectra(made, share, reach, dark, std)
 
 
 @pytest.mark.parametrize(("step_nm", "share", "words"), [(20, 0.9, "coarse"), (1, 0.2, "fine"), (5, 0.9, "")])

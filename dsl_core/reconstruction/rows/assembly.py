@@ -71,8 +71,13 @@ class Assembly:
         if spectra is not None:
             inside = (..., own, self._columns)
             flags: NDArray[np.uint16] = np.asarray(wanted["flags"], np.uint16)
-            maps_of = (spectra.data_share, spectra.reach, spectra.reflectance, spectra.std)
-            counts = count_spectra(flags, *(each[inside] for each in maps_of))
+            counts = count_spectra(
+                flags,
+                spectra.data_share[inside],
+                spectra.reach[inside],
+                spectra.reflectance[inside],
+                spectra.std[inside],
+            )
         self._counts += counts
         self._sink.put(place, wanted, json.dumps(asdict(counts)))
 
