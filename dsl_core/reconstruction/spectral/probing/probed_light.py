@@ -277,7 +277,8 @@ class SolvedPixels:
         """
         free = self.free[part].to(asked)
         information = self.information[part] * free[:, None] * free[..., None] + torch.diag_embed(1 - free)
-        return torch.linalg.solve(information, asked * free[..., None])
+        given: Tensor = torch.linalg.solve(information, asked * free[..., None])
+        return given
 
     @property
     def chi_square(self) -> Tensor:
