@@ -28,7 +28,7 @@ SAME_LINES = (0.6, 1.6)
 BRIGHT_SIGMAS = 25.0
 #: Two pictures of one shot are different if all their light is by so many deviations, or more than so few
 #: pixels by so many.
-LIGHT_SIGMAS, FEW, SURE_SIGMAS = 4.0, 0.002, 6.0
+LIGHT_SIGMAS, FEW, SURE_SIGMAS = 5.0, 0.002, 6.0
 #: Less than this share of its light is flicker.
 FLICKER = 0.25
 #: Median of the deviations of a normal distribution.
@@ -74,7 +74,7 @@ class LineNeighbours:
         That needs no neighbours: of two pictures of one pattern, all pixels together have the same light.
         """
         first, second = (np.subtract(each, black, dtype=np.float32) for each in (one, other))
-        first, second = first - np.median(first), second - np.median(second)
+        first, second = first - _of_most(first), second - _of_most(second)
         noise = np.sqrt(self._noise.variance(one) + self._noise.variance(other))
         step = first - second
         sigma = max(float(np.median(np.abs(step / noise))) / NORMAL, 1.0)
@@ -121,3 +121,9 @@ class LineNeighbours:
         # No line takes light away: below black, the exposure was shorter or the room is darker.
         is_below_black = light < min(usual, 0.0) - enough
         return is_below_black or (usual > enough and not low * usual < light < high * usual)
+
+
+def _of_most(light: NDArray[np.float32]) -> np.float32:
+    """Mean of most pixels, without the brightest and the darkest; the median of whole counts jumps."""
+    low, high = np.quantile(light, (0.1, 0.8))
+    return np.float32(light[(light >= low) & (light <= high)].mean())
