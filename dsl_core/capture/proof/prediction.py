@@ -20,9 +20,9 @@ BLUR = 0.15
 BRIGHT_SIGMAS, FEWEST_BRIGHT = 25.0, 12
 #: Unlit pixels that say how much light of the room has changed since black was taken.
 FEWEST_UNLIT = 60
-#: A pixel is bright with this share of white; orders and light from surface to surface give less. So many of
-#: the pixels that should be dark, as a share, show another pattern.
-BRIGHT_SHARE, ELSEWHERE = 0.5, 0.05
+#: A pixel is bright with this share of white. First orders of wide lines and light from surface to surface
+#: give as much to one in sixteen of those that should be dark; another pattern does to more than this share.
+BRIGHT_SHARE, ELSEWHERE = 0.5, 0.2
 #: A share of the pixels that a line leaves unlit has none of its first orders either; and by how many
 #: deviations of a pixel black has to have gained before it is taken off.
 NO_ORDERS, LEAST_GAINED = 0.25, 0.5

@@ -302,8 +302,8 @@ def test_what_black_has_gained_is_not_multiplied_with_the_light() -> None:
     assert found.counts == pytest.approx([150 + 30 * 100, 150])
 
 
-@pytest.mark.parametrize(("bright", "is_told"), [(60, False), (61, True)])
-def test_more_than_sixty_bright_pixels_where_it_should_be_dark_show_another_pattern(
+@pytest.mark.parametrize(("bright", "is_told"), [(126, False), (127, True)])
+def test_a_fifth_of_the_pixels_bright_where_it_should_be_dark_shows_another_pattern(
     bright: int, is_told: bool
 ) -> None:
     count = 700
