@@ -302,7 +302,7 @@ def test_what_black_has_gained_is_not_multiplied_with_the_light() -> None:
     assert found.counts == pytest.approx([150 + 30 * 100, 150])
 
 
-@pytest.mark.parametrize(("bright", "is_told"), [(126, False), (127, True)])
+@pytest.mark.parametrize(("bright", "is_told"), [(125, False), (126, True)])
 def test_a_fifth_of_the_pixels_bright_where_it_should_be_dark_shows_another_pattern(
     bright: int, is_told: bool
 ) -> None:
