@@ -137,6 +137,11 @@ def test_graphs_fill_their_budget_and_no_more() -> None:
     assert BlockGraphs(PLAN, "RGGB", budget_bytes=exactly - 1).block_px == 4
 
 
+def test_graphs_of_a_large_camera_are_coarser() -> None:
+    large = PLAN.model_copy(update={"camera_size_px": (9000, 7000)})
+    assert BlockGraphs(large, "RGGB").block_px > 2
+
+
 def test_other_frames_and_places_outside_give_nothing() -> None:
     graphs = BlockGraphs(PLAN, "RGGB")
     graphs.add(next(PLAN.shots()), np.full((10, 18), 7, np.uint16))

@@ -17,7 +17,11 @@ COUNTS = np.round(9000 + 20 * (NM - 400))
 
 
 def asd(
-    revision: bytes = b"as7", kind: int = 0, white: bool = True, values: np.ndarray | None = None
+    revision: bytes = b"as7",
+    kind: int = 0,
+    white: bool = True,
+    values: np.ndarray | None = None,
+    counts: np.ndarray = COUNTS,
 ) -> bytes:
     """A binary file of ASD: counts and a white reference."""
     head = bytearray(484)
@@ -27,7 +31,7 @@ def asd(
     head[186], head[199] = kind, 2
     body = (SHARE * COUNTS if values is None else values).astype("<f8").tobytes()
     text = b"white tile"
-    block = struct.pack("<H16xH", 1 if white else 0, len(text)) + text + COUNTS.astype("<f8").tobytes()
+    block = struct.pack("<H16xH", 1 if white else 0, len(text)) + text + counts.astype("<f8").tobytes()
     return bytes(head) + body + (block if revision not in (b"ASD", b"asd") else b"")
 
 

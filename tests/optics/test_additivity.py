@@ -123,6 +123,16 @@ def test_the_deviation_of_a_single_pair_is_that_of_its_median_over_independent_e
     assert found.excess_std == pytest.approx(1.2533 * noise * 2**0.5 / (pixels / 9) ** 0.5, rel=0.05)
 
 
+def test_of_a_large_picture_only_some_pixels_are_kept() -> None:
+    row = np.repeat([3000, 1500, 100, 1500], 20).astype(np.uint16)
+    one = np.tile(row, (400, 3))
+    white, black = np.full_like(one, 3050), np.full_like(one, 90)
+    found = mixed_light((one, 3100 - one), white, black, FULL_DN)
+    assert found is not None
+    for values in (found.mixed, found.pure):
+        assert 4000 < values.shape[1] <= 8000
+
+
 def test_decoding_undoes_encoding() -> None:
     light = np.linspace(0, 1, 33)
     np.testing.assert_allclose(srgb_decode(srgb_encode(light)), light, atol=2e-5)

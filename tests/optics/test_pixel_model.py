@@ -318,6 +318,21 @@ def test_lines_are_as_wide_as_where_the_light_of_a_tile_comes_from() -> None:
     assert model.width(footprint, torch.zeros_like(inside)) == 1.0
 
 
+@pytest.mark.parametrize("many", [0, 1, 2, 3])
+def test_lines_of_a_pixel_are_as_wide_as_where_its_inside_bands_lie(many: int) -> None:
+    model, pixels, depth = some_model()
+    footprint = model.trace(pixels, depth).orders[1]
+    inside = torch.zeros_like(footprint.columns, dtype=torch.bool)
+    inside[:many] = True
+    first = float(footprint.columns[:many].mean()) if many else 0.0
+    field = SpreadField(centre_px=(first - 100, 0.0), half_px=(2000.0, 180.0), coefficients=(0.1, 2.0))
+    response = model.rig.projector_response.model_copy(update={"field": field})
+    model.rig = model.rig.model_copy(update={"projector_response": response})
+    own = footprint.columns[:many].mean(0) - field.centre_px[0]
+    wanted = (0.1 + 2.0 * own / 2000).exp() if many else torch.ones_like(own)
+    assert model.widths(footprint, inside).tolist() == pytest.approx(wanted.tolist(), rel=0.011)
+
+
 def test_demosaicing_blurs_by_the_typical_distance_of_neighbours() -> None:
     columns = np.array([[0.0, 0.7, 1.4, np.nan, 9.0], [0.0, -0.7, 50.0, 50.7, np.nan]])
     assert demosaic_blur_px(columns) == pytest.approx(0.7 * DEMOSAIC_SPREAD**0.5)

@@ -94,3 +94,5 @@ def test_bands_are_as_wide_as_the_mean_dispersion_in_steps(slope: float, steps: 
     nm = torch.as_tensor(bands.centres_nm)[:, None]
     columns = 100 + slope * nm * torch.tensor([0.9, 1.1], dtype=torch.float64)
     assert bands.half_width_px(columns) == pytest.approx(steps * 0.02 * 5.0)
+    own = [max(round(abs(slope) * share / 0.02), 1) * 0.02 * 5.0 for share in (0.9, 1.1)]
+    assert bands.half_widths_px(columns).tolist() == pytest.approx(own)

@@ -67,6 +67,18 @@ def test_every_column_is_located_with_its_colour_and_contrast() -> None:
     assert code.lit.contrast == pytest.approx(np.full(code.lit.index.size, 2000.0), abs=1)
 
 
+@pytest.mark.parametrize("role", ["white", "black"])
+def test_nothing_is_located_while_an_end_is_to_be_taken_again(role: Role) -> None:
+    code, _ = judged()
+    again, other = (
+        next(s for s in SHOTS if s.role == r) for r in (role, {"white": "black"}.get(role, "white"))
+    )
+    assert code.add(again, seen(other), None).is_wrong
+    assert code.lit is None
+    assert not code.add(again, seen(again), None).is_wrong
+    assert code.lit is not None
+
+
 def test_pixels_in_shadow_and_saturated_ones_are_not_located() -> None:
     light = np.full((18, 32), 2000.0)
     light[:, :5], light[:, 27:] = 3.0, SENSOR.full_scale_dn - SENSOR.black_level_dn

@@ -52,11 +52,12 @@ def test_little_light_and_drift_are_not_told() -> None:
     assert changed_light(pictures(1000), pictures(1300), NOISE) is None
 
 
+@pytest.mark.parametrize("light", [40, 1000])
 @pytest.mark.parametrize(("columns", "is_told"), [(0, False), (1, True), (-2, True)])
 def test_a_pattern_and_its_inverse_that_moved_are_told_by_the_edges_of_stripes(
-    columns: int, is_told: bool
+    columns: int, is_told: bool, light: int
 ) -> None:
-    before, now = pictures(1000), {n: np.roll(each, columns) for n, each in pictures(1000).items()}
+    before, now = pictures(light), {n: np.roll(each, columns) for n, each in pictures(light).items()}
     assert has_moved((before[0], before[1]), (now[0], now[1]), NOISE) == is_told
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -31,6 +33,12 @@ def counts(value: int) -> Counts:
 
 def later(kept: dict[int, Counts] | None = None, is_calibrated: bool = True) -> LaterSettings:
     return LaterSettings(PLAN, RIG if is_calibrated else None, NOISE, {} if kept is None else kept)
+
+
+def test_a_picture_that_the_first_setting_lacks_is_not_known() -> None:
+    known = later({index: counts(index) for index in range(16)})
+    assert known.earlier(LATER_LINE) is not None
+    assert known.earlier(replace(SHOTS[0], pattern=99)) is None
 
 
 def test_light_of_a_setting_is_that_of_its_exposure_and_level_until_it_is_measured() -> None:

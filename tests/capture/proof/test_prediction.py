@@ -296,6 +296,15 @@ def test_black_that_has_gained_is_told_from_first_orders_by_pixels_that_these_do
     assert black_gained(seen, some, floats(np.ones(count)), NOISE) == 0, "all pixels are lit"
 
 
+def test_what_black_has_gained_is_told_whatever_its_noise() -> None:
+    wanted, count = floats(np.r_[np.ones(200), np.zeros(1800)]), 2000
+    flat = floats(np.full(count, 300))
+    some = Lit(np.arange(count), np.arange(count), flat, 3 * flat, floats(np.ones(count)))
+    noise = np.random.default_rng(2).normal(0, np.sqrt(2 * (20.0 + 0.35)), count)
+    seen = np.rint(300 + 60 + noise).astype(np.uint16)
+    assert black_gained(seen, some, wanted, NOISE) == pytest.approx(60, abs=0.8)
+
+
 def test_what_black_has_gained_is_not_multiplied_with_the_light() -> None:
     picture, black = np.array([316, 216], np.uint16), np.array([200, 200], np.uint16)
     found = rescaled(picture, black, floats([150, 150]), 30.0, NOISE, np.float32(16))

@@ -10,6 +10,7 @@ import pytest
 
 from dsl_core.capture.proof.contest import Contest
 from dsl_core.capture.proof.finding import Finding, Light, Verdict
+from dsl_core.capture.proof.prediction import Expected
 from dsl_core.capture.proof.raster import Counts
 from dsl_core.capture.proof.verifier import FrameProof
 from dsl_core.model.geometry import Pose
@@ -171,6 +172,38 @@ def test_wrong_pictures_are_forgotten_and_right_ones_told(monkeypatch: pytest.Mo
     assert judge.judge_raster(SHOTS[14], counts(8)).verdict is Verdict.REPEATED, "pixel by pixel"
     monkeypatch.setattr(judge, "_judge", told(Verdict.RIGHT))
     assert judge.judge_raster(SHOTS[15], counts(8)).verdict is Verdict.RIGHT, "only what is wrong is repeated"
+
+
+def test_dark_pixels_are_asked_once_the_black_of_a_later_setting_is_there(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    judge, asked = proof(), list[float]()
+    judge._kept.update({at: counts(2000 if at == 10 else 100 + at) for at in range(16)})
+
+    def contest(*parts: Any) -> Contest:
+        asked.append(float(parts[4].max()))
+        return WON
+
+    monkeypatch.setattr("dsl_core.capture.proof.verifier.contest_of_pictures", contest)
+    judge._judge_again(SHOTS[16], counts(120))
+    assert min(asked) > 0, "only what is bright can be relied on"
+    judge._kept[27] = counts(111)
+    asked.clear()
+    judge._judge_again(SHOTS[16], counts(120))
+    assert set(asked) == {0.0}
+    asked.clear()
+    judge._judge_again(SHOTS[27], counts(111))
+    assert min(asked) > 0, "black cannot vouch for itself"
+
+
+def test_only_the_brightness_of_lines_is_asked_of_what_they_light(monkeypatch: pytest.MonkeyPatch) -> None:
+    judge, wanted = proof(), Expected(np.ones(4, np.float32), np.ones(4, np.float32))
+    monkeypatch.setattr(
+        "dsl_core.capture.proof.verifier.brightness_of_picture", lambda *parts: float(parts[-1] is not None)
+    )
+    for shot in (SHOTS[16], SHOTS[26], SHOTS[27], LATER_LINE):
+        asked = judge._brightness_again(shot, counts(5), wanted, wanted.counts)
+        assert asked == (shot.role == "spectral")
 
 
 def test_two_patterns_of_the_first_code_never_give_the_same_picture(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -381,6 +381,13 @@ def test_a_package_adds_a_format_and_replaces_none(
     assert "a package offers mine, which cannot be loaded" in caplog.text
 
 
+def test_pixels_are_exported_to_a_table_alone(tmp_path: Path) -> None:
+    (path,) = export_by_ending(small_result(), tmp_path / "a.csv", pixels=[(1, 0)])
+    assert path == tmp_path / "a.csv"
+    with pytest.raises(StoreError, match="Pixels are for csv, not for png"):
+        export_by_ending(small_result(), tmp_path / "a.png", pixels=[(1, 0)])
+
+
 def test_an_unknown_format(tmp_path: Path) -> None:
     with pytest.raises(StoreError, match="csv, envi, exr, glb, mesh, npy, obj, ply, png, stl, tiff"):
         export(small_result(), tmp_path / "x.las", "las")

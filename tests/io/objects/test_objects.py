@@ -113,6 +113,16 @@ def test_only_results_are_replaced_and_only_where_that_is_allowed(
     assert "2026/a.zarr/zarr.json" in twin.objects
 
 
+def test_a_name_that_is_taken_is_told_before_work_begins(twin: ObjectStoreTwin, result: Path) -> None:
+    publish(result, ObjectFolder(RESULT))
+    began = list[Path]()
+    with pytest.raises(TakenError), published(Path("s3://bucket/2026/a.zarr")) as draft:
+        began.append(draft)
+    assert not began
+    with published(Path("s3://bucket/2026/a.zarr"), overwrite=True) as draft:
+        save_result(small_result(), draft)
+
+
 def test_a_result_that_lacks_a_file_is_none(twin: ObjectStoreTwin, result: Path) -> None:
     publish(result, ObjectFolder(RESULT))
     del twin.objects["2026/a.zarr/rgb/zarr.json"]

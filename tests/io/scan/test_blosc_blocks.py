@@ -36,6 +36,15 @@ def test_rows_of_a_mosaic_that_could_not_be_compressed(store: FrameStore) -> Non
     np.testing.assert_array_equal(store.read_rows(1, slice(100, 300)), noise[100:300])
 
 
+def test_blocks_shuffled_by_bytes_are_found_as_well(mosaic: np.ndarray) -> None:
+    blosc = pytest.importorskip("numcodecs.blosc")
+    codec = blosc.Blosc(cname="zstd", clevel=1, shuffle=blosc.SHUFFLE, blocksize=1 << 18)
+    part, begins = blocks_of(codec.encode(mosaic), 300_000, 300_010)
+    found = np.frombuffer(codec.decode(part), "<u2")
+    np.testing.assert_array_equal(found, mosaic.ravel()[begins // 2 :][: found.size])
+    assert 0 < begins <= 300_000
+
+
 def test_only_the_blocks_that_are_needed_are_in_a_part(store: FrameStore) -> None:
     chunk = store.path(0).read_bytes()
     part, begins = blocks_of(chunk, 0, 10)

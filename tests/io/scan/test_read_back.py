@@ -36,7 +36,12 @@ def _flip(path: Path, place: int) -> None:
 @pytest.mark.parametrize("name", ["manifest.json", "frames.jsonl", "frames/zarr.json"])
 @pytest.mark.parametrize("how", ["deleted", "changed", "replaced"])
 def test_metadata_that_changed_are_written_again(
-    tmp_path: Path, plan: CapturePlan, frame_of: FrameOf, name: str, how: str
+    tmp_path: Path,
+    plan: CapturePlan,
+    frame_of: FrameOf,
+    caplog: pytest.LogCaptureFixture,
+    name: str,
+    how: str,
 ) -> None:
     folder = tmp_path / "scan.dsl"
     with _written(folder, plan, frame_of) as writer:
@@ -49,6 +54,7 @@ def test_metadata_that_changed_are_written_again(
         else:
             _flip(path, 2)
         assert writer.read_back() == []
+        assert [message.split(" of ")[0] for message in caplog.messages] == [name.split("/")[0]]
         extra = next(iter(plan.shots()))
         writer.write(extra, frame_of(extra))
     reader = ScanReader(folder)

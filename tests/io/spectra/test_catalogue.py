@@ -63,6 +63,18 @@ def test_reflectance_is_a_share_over_nanometres(tmp_path: Path, name: str) -> No
     assert len(read_references(tmp_path / name).references) == 1
 
 
+@pytest.mark.parametrize(("kind", "values"), [(0, SHARE * made.COUNTS), (1, SHARE * made.COUNTS), (1, SHARE)])
+@pytest.mark.parametrize("brightest", [1.0, 1e-4])
+def test_an_asd_is_divided_by_its_white_unless_it_is_done(
+    tmp_path: Path, kind: int, values: np.ndarray, brightest: float
+) -> None:
+    content = made.asd(kind=kind, values=values)
+    if kind == 0:  # counts per unit of time may be small numbers
+        content = made.asd(values=brightest * values, counts=brightest * made.COUNTS)
+    curve = read_spectrum(write(tmp_path / "a.asd", content), COVERS, radiance=False)
+    np.testing.assert_allclose(curve.values, SHARE, atol=1e-5)
+
+
 @pytest.mark.parametrize(
     ("name", "content", "scale"),
     [
@@ -80,6 +92,16 @@ def test_radiance_is_in_one_unit(tmp_path: Path, name: str, content: str | bytes
     curve = read_radiances(write(tmp_path / name, content), COVERS)[0]
     np.testing.assert_allclose(curve.values, SHARE * scale, rtol=1e-5)
     assert curve.unit == "W/(sr m2 nm)"
+
+
+def test_a_quantity_that_a_konica_minolta_states_is_kept(tmp_path: Path) -> None:
+    rows = [f"{nm:.0f},{100 * r:.5f}" for nm, r in zip(NM, SHARE, strict=True)]
+    content = "\n".join(["Instrument,CS-2000A", "Wavelength [nm],Reflectance [%]", *rows])
+    stated, unstated = (
+        read_spectra(write(tmp_path / "a.csv", each)) for each in (content, made.konica_minolta(lines=False))
+    )
+    assert [each.quantity for each in stated] == ["reflectance"]
+    assert [each.quantity for each in unstated] == ["radiance"]
 
 
 def test_several_spectra_are_listed_by_name(tmp_path: Path) -> None:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import cache
+from types import SimpleNamespace
+from typing import cast
 
 import numpy as np
 import pytest
@@ -12,8 +14,10 @@ from numpy.typing import NDArray
 from dsl_core import pipeline
 from dsl_core.model.fit import Fit
 from dsl_core.model.plan import CapturePlan, GrayCode, ScanLines, Sentinels, Setting
-from dsl_core.model.rig import Rig
-from dsl_core.reconstruction.light.neighbour_steps import pair_against_white
+from dsl_core.model.rig import Rig, Sensor
+from dsl_core.reconstruction.light.neighbour_steps import NeighbourSteps, pair_against_white
+from dsl_core.reconstruction.light.step_date import Change
+from dsl_core.reconstruction.light.sudden import _gained
 from dsl_core.reconstruction.rows.frames import ScanFrames
 from tests.cases.twin_scan import MemoryScan, twin_scan
 
@@ -66,6 +70,20 @@ def test_a_change_at_once_leaves_depth_as_it_was(factor: float, more_dn: float) 
     assert "from frame 100 on" in said["black taken again"]
     assert ("from frame 100 on" in said.get("step of the light", "")) == (factor != 1.0)
     assert "drift of the light" not in said
+
+
+def test_a_share_that_old_shots_hardly_tell_is_between_theirs_and_none() -> None:
+    sensor = Sensor()
+    picture = np.full((4, 6), sensor.black_level_dn + 40.0)
+    parts = SimpleNamespace(
+        plan=PLAN, rig=SimpleNamespace(sensor=sensor), source=SimpleNamespace(read=lambda shot: picture)
+    )
+    scan = cast("ScanFrames", parts)
+    for std, share in ((1.0, 0.25), (1e-3, 0.5), (np.inf, 0.0)):
+        steps = cast("NeighbourSteps", None)  # which are not asked before the step of the light is known
+        found = _gained(scan, steps, 100, Change(90, 110, 16.0), (0.5, std), None)
+        assert found.share == pytest.approx(share, abs=1e-3)
+        assert found.dn + found.share * 40 == pytest.approx(16.0, abs=1e-6)
 
 
 def test_a_change_among_pictures_of_the_code_is_seen_by_their_sum() -> None:
