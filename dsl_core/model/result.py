@@ -87,7 +87,7 @@ VARIABLES: dict[str, tuple[tuple[str, ...], str, str]] = {
     "points_mm": (("axis", "y", "x"), "mm", "point in camera coordinates"),
     "normals": (("axis", "y", "x"), "1", "unit normal in camera coordinates, towards the camera"),
     "shading": (("y", "x"), "1", "cosine and distance factor of the illumination"),
-    "reflectance": (("wavelength_nm", "y", "x"), "1", "reflectance on the Spectralon scale"),
+    "reflectance": (("wavelength_nm", "y", "x"), "1", "reflectance; 1 is a perfect white"),
     "reflectance_std": (("wavelength_nm", "y", "x"), "1", "posterior standard deviation of reflectance"),
     "data_share": (("wavelength_nm", "y", "x"), "1", "share of the answer decided by data, not by the prior"),
     "reach": (

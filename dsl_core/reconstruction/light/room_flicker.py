@@ -43,6 +43,8 @@ INTERPOLATED, NEAR = 0.2, 4
 CLIP, ROUNDS = 4.0, 3
 #: How far the light of a projector may be off that of neighbouring frames, relative to it.
 PROJECTOR_STD = 0.3
+#: Share of what frames have more that unlit pixels must have as well.
+AGREED = 0.5
 #: What the halo, and what unlit pixels have in common, may be off by, relative to it and to a pixel's noise.
 HALO_ERROR, UNLIT_ERROR = 0.5, 0.03
 #: Sum of the squares of the shares by which a frame is interpolated.
@@ -249,23 +251,16 @@ def _flicker(
         std.append(usual * np.sqrt(np.diag(inverse)[1:].clip(1e-30)))
     if len(kept) < FRAMES // 2:
         return [None] * len(shapes)
-    unlit = (
-        np.full((2, count, len(shapes)), np.nan)
-        if halo is None
-        else _of_unlit(places, frames, variance, shapes, of_black, halo)
-    )
-    steps = np.array(own), np.array(std)
-    return [
-        _frames_from_steps(
-            np.array(kept),
-            steps[0][:, i],
-            steps[1][:, i],
-            unlit[0, :, i],
-            unlit[1, :, i],
-            _usual(variance, shape),
-        )
-        for i, shape in enumerate(shapes)
-    ]
+    unlit = np.full((2, count, len(shapes)), np.nan)
+    if halo is not None:
+        unlit = _of_unlit(places, frames, variance, shapes, of_black, halo)
+    found: list[_Found | None] = []
+    for i, shape in enumerate(shapes):
+        steps, there = (np.array(own)[:, i], np.array(std)[:, i]), unlit[:, :, i]
+        agrees = halo is None or _agree(np.array(kept), steps[0], there[0])
+        noise = _usual(variance, shape)
+        found.append(_frames_from_steps(np.array(kept), *steps, *there, noise) if agrees else None)
+    return found
 
 
 def _of_unlit(
@@ -320,3 +315,15 @@ def _frames_from_steps(
     normal = (rows.T * weight) @ rows + np.diag(usual)
     more = np.linalg.solve(normal, rows.T @ (weight * own) + usual * np.nan_to_num(unlit))
     return _Found(more, float(rms), float(2 * rms / np.sqrt(2 * len(kept))))
+
+
+def _agree(kept: NDArray[np.intp], own: Floats, unlit: Floats) -> bool:
+    """Whether pixels that no order reaches have as much more than in neighbouring frames as all others have.
+
+    First orders that do not change slowly are in those others alone.
+    """
+    seen = unlit[kept] - np.sum([share * unlit[kept + by] for by, share in AROUND.items()], axis=0)
+    both = np.isfinite(seen)
+    return int(both.sum()) >= FRAMES // 2 and float(own[both] @ seen[both]) > AGREED * float(
+        own[both] @ own[both]
+    )
