@@ -22,7 +22,8 @@ from dsl_core.optics.lines.profile import halo_of_line
 from dsl_core.optics.sensor import raw_variance
 from dsl_core.optics.unlit import unlit_px
 from dsl_core.reconstruction.hdr import setting_gains_ms
-from dsl_core.reconstruction.light.line_levels import AROUND, PIXELS, pitch_of, zone_px
+from dsl_core.reconstruction.light.line_levels import AROUND, PIXELS, pitch_of
+from dsl_core.reconstruction.light.line_levels import zone_px as zone_px_of
 from dsl_core.reconstruction.light.neighbour_steps import Scan
 from dsl_core.reconstruction.merge import Exposed, PickedLines
 
@@ -30,6 +31,8 @@ Floats = NDArray[np.float64]
 
 #: Frames, and pixels away from a line, that are needed to tell anything.
 FRAMES, FEWEST = 16, 60
+#: Pixels that decide whether others are looked at.
+AT_FIRST = 3000
 #: The rms of what frames have more has to be so many deviations of a single one, and this share of the noise
 #: of a single pixel: less is hidden in it.
 SIGMAS, OF_NOISE = 3.0, 0.05
@@ -135,16 +138,18 @@ def room_flicker(
     known = np.flatnonzero(np.isfinite(seen.std).all(0) & (column.ravel()[seen.pixels] >= 0))
     pixels = seen.pixels[known[:: max(len(known) // PIXELS, 1)]]
     pixels = pixels[np.argsort(column.ravel()[pixels], kind="stable")]
-    places = _Places(
-        lines,
-        column.ravel()[pixels].astype(np.float64),
-        zone_px(lines, pitch_of(column)),
-        unlit_px(scan.rig, lines.width_px),
-    )
-    picked = seen.pick(pixels)
-    variance, same = np.square(picked.std, dtype=np.float64), np.ones((1, len(pixels)))
-    if _flicker(places, picked.radiance.astype(np.float64), variance, same)[0] is None:
+    zone_px, unlit = zone_px_of(lines, pitch_of(column)), unlit_px(scan.rig, lines.width_px)
+
+    def places_of(some: NDArray[np.intp]) -> _Places:
+        return _Places(lines, column.ravel()[some].astype(np.float64), zone_px, unlit)
+
+    # Most scans are steady, and few pixels are enough to say so.
+    few = pixels[:: max(-(-len(pixels) // AT_FIRST), 1)]
+    seen_by_few = seen.pick(few)
+    merged = seen_by_few.radiance.astype(np.float64), np.square(seen_by_few.std, dtype=np.float64)
+    if _flicker(places_of(few), *merged, np.ones((1, len(few))))[0] is None:
         return None
+    places, picked = places_of(pixels), seen.pick(pixels)
     exposed = before or Exposed.as_planned(scan.plan.shot_count)
     gains_ms = setting_gains_ms(scan.plan.settings, scan.rig.projector_response)
     dn: dict[int, float] = {}
@@ -254,13 +259,15 @@ def _flicker(
     unlit = np.full((2, count, len(shapes)), np.nan)
     if halo is not None:
         unlit = _of_unlit(places, frames, variance, shapes, of_black, halo)
-    found: list[_Found | None] = []
+    frame, steps, steps_std = np.array(kept), np.array(own), np.array(std)
+    of_shapes: list[_Found | None] = []
     for i, shape in enumerate(shapes):
-        steps, there = (np.array(own)[:, i], np.array(std)[:, i]), unlit[:, :, i]
-        agrees = halo is None or _agree(np.array(kept), steps[0], there[0])
+        more, there = steps[:, i], unlit[0, :, i]
+        agrees = halo is None or _agree(frame, more, there)
         noise = _usual(variance, shape)
-        found.append(_frames_from_steps(np.array(kept), *steps, *there, noise) if agrees else None)
-    return found
+        of_shape = _frames_from_steps(frame, more, steps_std[:, i], there, unlit[1, :, i], noise)
+        of_shapes.append(of_shape if agrees else None)
+    return of_shapes
 
 
 def _of_unlit(
