@@ -32,6 +32,7 @@ from dsl_core.optics.unlit import unlit_px
 from dsl_core.planning.noise import Bracket, demosaic_factors, own_channel, sideways_shares
 from dsl_core.planning.samples import SamplePixels
 from dsl_core.reconstruction.columns.column import Column, refine
+from dsl_core.reconstruction.columns.line_peaks import LinePeaks
 from dsl_core.reconstruction.columns.pattern_column import first_order_share, refine_by_profiles
 from dsl_core.reconstruction.geometry import LIT_SIGMAS
 from dsl_core.reconstruction.spectral.solving.dense_solver import solve_dense
@@ -254,7 +255,7 @@ class VirtualPixels:
         radiance, std = (v.reshape(-1, frames).T.contiguous() for v in (y, std))
         response, profiles = self.rig.projector_response, self.model.profiles
         if self.model.lines is not None:
-            column = refine(true.round(), radiance, std, self.model.lines, response, model_error=0.0)
+            column = refine(LinePeaks(true.round(), radiance, std, self.model.lines, response), 0.0)
         else:
             share = first_order_share(self.rig, profiles, self.pixels, self.column.to(self.shading).round())
             share = share.repeat_interleave(count, 0)

@@ -13,6 +13,7 @@ from dsl_core.optics.correspondence import GratingModel, triangulate, zero_order
 from dsl_core.optics.lines.line_set import LineSet
 from dsl_core.optics.lines.profile import zero_order_profile
 from dsl_core.reconstruction.columns.column import refine
+from dsl_core.reconstruction.columns.line_peaks import LinePeaks
 from dsl_core.simulation.published_rig import published_rig
 from tests.stability.case import Case, Outcome, is_honest, spread
 
@@ -74,7 +75,7 @@ def _refined(scale: float, noise: float) -> Callable[[torch.dtype], Outcome]:
         dirt = noise * torch.randn(clean.shape, generator=generator, dtype=torch.float64)
         radiance = ((clean + dirt) * scale).to(dtype)
         std = torch.full_like(radiance, noise * scale)
-        found = refine(column.round().to(dtype), radiance, std, LINES, RESPONSE)
+        found = refine(LinePeaks(column.round().to(dtype), radiance, std, LINES, RESPONSE))
         if float(found.refined.double().mean()) < 0.5:
             return Outcome("flagged", "NOT_REFINED")
         sigmas = ((found.column_px.double() - column) / found.std_px)[found.refined].numpy()

@@ -17,7 +17,9 @@ from torch import Tensor
 
 from dsl_core.model.rig import ProjectorResponse
 from dsl_core.optics.lines.line_set import LineSet
-from dsl_core.optics.lines.profile import LineTable, halo_of_line
+from dsl_core.optics.lines.profile import halo_of_line
+from dsl_core.reconstruction.columns.line_peaks import LinePeaks
+from dsl_core.reconstruction.columns.loose_columns import LOOSE_PX, loose_columns
 
 #: Steps of the fit, and the longest, px.
 ITERATIONS, STEP_PX = 6, 0.7
@@ -30,10 +32,6 @@ MODEL_ERROR = 0.0015
 COMB_ERROR = 0.05
 #: A refined column this far from the decoded one is not the same peak.
 MAX_SHIFT_PX = 2.0
-#: Columns less sure than this are weighed over all places as far from the decoded one as that, and so many.
-LOOSE_PX, FARTHEST_PX, PLACES = 0.08, 1.2, 49
-#: How sure the ends of a decoded column are.
-CODE_STD_PX = 0.15
 #: Above this reduced chi-square the profile does not fit (two surfaces in one pixel, motion).
 MAX_CHI_SQUARE = 25.0
 #: Peaks beyond that are fitted again, as wide as surfaces out of focus make them (relative to what is
@@ -58,32 +56,21 @@ class Column:
     unusual: Tensor
 
 
-def refine(
-    coarse_px: Tensor,
-    radiance: Tensor,
-    std: Tensor,
-    lines: LineSet,
-    response: ProjectorResponse,
-    widths: Tensor | None = None,
-    model_error: float = MODEL_ERROR,
-) -> Column:
+def refine(peaks: LinePeaks, model_error: float = MODEL_ERROR) -> Column:
     """Refine decoded columns.
 
-    ``coarse_px`` (pixels,) float; ``radiance`` and ``std`` (frames, pixels), DN per ms, infinite where
-    saturated; ``widths`` (pixels,) are those of the spread relative to the response's; ``model_error`` is
-    that of the peak of single lines, relative to it. Where the fit fails, the decoded column stays, with
-    the deviation of a whole pixel, ``1/sqrt(12)``. Its amplitude is that of the brightest frame near it, or
-    of the fit to what is left where frames are saturated, with an infinite deviation: less would make light
-    of the zero order next to them.
+    ``model_error`` is that of the peak of single lines, relative to it. Where the fit fails, the decoded
+    column stays, with the deviation of a whole pixel, ``1/sqrt(12)``. Its amplitude is that of the brightest
+    frame near it, or of the fit to what is left where frames are saturated, with an infinite deviation: less
+    would make light of the zero order next to them.
     """
-    fit = fit_peaks(coarse_px, radiance, std, lines, response, widths, model_error)
+    coarse_px, single = peaks.coarse_px, peaks.lines.single
+    fit = fit_peaks(peaks, model_error)
     unusual = (fit.chi_square > MAX_CHI_SQUARE) & (fit.used > 3) & (fit.amplitude > 0)
     poor = torch.nonzero(unusual).ravel()
-    if lines.single and len(poor):
-        some = (coarse_px[poor], radiance[:, poor], std[:, poor], lines, response)
-        expected = torch.ones(len(poor), dtype=coarse_px.dtype) if widths is None else widths[poor]
-        again = (fit_peaks(*some, focus * expected, UNUSUAL_ERROR) for focus in FOCI)
-        fit = _best_of(fit, poor, again)
+    if single and len(poor):
+        unlike = peaks.some(poor)
+        fit = _best_of(fit, poor, (fit_peaks(unlike.wider(focus), UNUSUAL_ERROR) for focus in FOCI))
     q, chi_square = fit.column_px, fit.chi_square
     std_px = torch.sqrt(chi_square.clip(min=1) / fit.information)
     limit = torch.where(unusual, UNUSUAL_CHI_SQUARE, MAX_CHI_SQUARE)
@@ -91,11 +78,9 @@ def refine(
     good &= ((q - coarse_px).abs() < MAX_SHIFT_PX) & torch.isfinite(q)
     otherwise = torch.where(fit.measured, fit.brightest, torch.maximum(fit.amplitude, fit.brightest))
     loose = torch.nonzero(good & ~unusual & (std_px > LOOSE_PX)).ravel()
-    if lines.single and len(loose):
-        some = coarse_px[loose], radiance[:, loose], std[:, loose], lines, response
-        own = None if widths is None else widths[loose]
+    if single and len(loose):
         scale = chi_square[loose].clip(min=1)
-        q[loose], std_px[loose] = _loose_columns(*some, own, model_error, fit.amplitude[loose], scale)
+        q[loose], std_px[loose] = loose_columns(peaks.some(loose), model_error, fit.amplitude[loose], scale)
     return Column(
         torch.where(good, q, coarse_px),
         torch.where(good, std_px, torch.full_like(q, 1 / math.sqrt(12))),
@@ -104,43 +89,6 @@ def refine(
         good,
         good & unusual,
     )
-
-
-def _loose_columns(
-    coarse_px: Tensor,
-    radiance: Tensor,
-    std: Tensor,
-    lines: LineSet,
-    response: ProjectorResponse,
-    widths: Tensor | None,
-    model_error: float,
-    amplitude: Tensor,
-    scale: Tensor,
-) -> tuple[Tensor, Tensor]:
-    """Mean and deviation (px) of columns over all places that explain the lines and the code.
-
-    Where lines are no narrower than their step, none shows a slope in the middle of one: a fit stops where
-    one begins, and its curvature there knows nothing of the places in between. ``scale`` is how many times
-    too large chi-squares are.
-    """
-    places = torch.linspace(-FARTHEST_PX, FARTHEST_PX, PLACES).to(coarse_px)
-    widest = 1.0 if widths is None else float(widths.max())
-    y, variance, centres = _window(coarse_px, radiance, std, lines, response.blur_px * widest)
-    weight = 1 / (variance + (model_error * amplitude) ** 2)
-    reach_px = float((coarse_px - centres).abs().max()) + FARTHEST_PX
-    table = LineTable(lines.width_px, response, reach_px, coarse_px, widths)
-    likely = torch.empty((PLACES, len(coarse_px))).to(coarse_px)
-    for row, place in zip(likely, places, strict=True):
-        g, _ = table.at(coarse_px + place - centres)
-        wg = weight * g
-        row[:] = -(weight * y * y).sum(0) + (wg * y).sum(0) ** 2 / (wg * g).sum(0).clip(min=1e-30)
-    # The code names a column, and is not sure at its ends.
-    named = torch.special.log_ndtr((0.5 - places.abs()) / CODE_STD_PX)
-    share = torch.softmax(likely / (2 * scale) + named[:, None], 0)
-    away = places[:, None]
-    mean = (share * away).sum(0)
-    spread = (share * (away - mean) ** 2).sum(0)
-    return coarse_px + mean, torch.sqrt(spread + (places[1] - places[0]) ** 2 / 12)
 
 
 @dataclass(frozen=True)
@@ -171,25 +119,16 @@ def _best_of(fit: PeakFit, poor: Tensor, again: Iterable[PeakFit]) -> PeakFit:
     return PeakFit(**found)
 
 
-def fit_peaks(
-    coarse_px: Tensor,
-    radiance: Tensor,
-    std: Tensor,
-    lines: LineSet,
-    response: ProjectorResponse,
-    widths: Tensor | None,
-    model_error: float,
-) -> PeakFit:
+def fit_peaks(peaks: LinePeaks, model_error: float) -> PeakFit:
     """Fit column and amplitude, with the arguments of `refine`, and judge nothing."""
-    widest = 1.0 if widths is None else float(widths.max())
-    y, variance, centres = _window(coarse_px, radiance, std, lines, response.blur_px * widest)
+    y, variance, centres = peaks.window()
     # Measured spreads may end sharply: from the middle between two frames no frame shows a slope.
-    q = coarse_px.clone() if response.spread is None else coarse_px + ASIDE_PX
+    q = peaks.coarse_px.clone() if peaks.response.spread is None else peaks.coarse_px + ASIDE_PX
     brightest = amplitude = y.amax(0)
-    error = model_error if lines.single else COMB_ERROR
+    error = model_error if peaks.lines.single else COMB_ERROR
     # No distance grows by more than the steps of all iterations.
     reach_px = float((q - centres).abs().max()) + ITERATIONS * STEP_PX
-    table = LineTable(lines.width_px, response, reach_px, q, widths)
+    table = peaks.table(q, reach_px)
     for _ in range(ITERATIONS):
         g, slope = table.at(q - centres)
         weight = 1 / (variance + (error * amplitude) ** 2)
@@ -238,18 +177,3 @@ def dark_offset(
         total += torch.where(w > 0, dark * w, 0.0).sum(0)
         weight += w.sum(0)
     return total / weight.clip(min=1e-30), 1 / weight.sqrt()
-
-
-def _window(
-    coarse: Tensor, radiance: Tensor, std: Tensor, lines: LineSet, blur_px: float
-) -> tuple[Tensor, Tensor, Tensor]:
-    """Values, variances and line centres of the frames around the peak, each (window, pixels)."""
-    half = math.ceil((lines.width_px / 2 + 3 * blur_px + 1) / lines.step_px)
-    offsets = torch.arange(-half, half + 1, device=coarse.device)[:, None]
-    line = lines.nearest(coarse) + offsets
-    frame = lines.frame(line)
-    y = torch.gather(radiance, 0, frame)
-    variance = torch.gather(std, 0, frame).to(y.dtype) ** 2
-    usable = lines.exists(line) & torch.isfinite(variance) & torch.isfinite(y)
-    variance = torch.where(usable, variance, torch.inf)
-    return torch.where(usable, y, 0.0), variance, lines.centre_px(line).to(coarse.dtype)

@@ -17,6 +17,7 @@ from dsl_core.optics.spread.field import widths_at
 from dsl_core.optics.unlit import unlit_px
 from dsl_core.progress import NoProgress, Progress
 from dsl_core.reconstruction.columns.column import MODEL_ERROR, Column, dark_offset, refine
+from dsl_core.reconstruction.columns.line_peaks import LinePeaks
 from dsl_core.reconstruction.columns.pattern_column import first_order_share, refine_by_profiles
 from dsl_core.reconstruction.hdr import MergedFrame
 from dsl_core.reconstruction.merge import LineStack
@@ -164,6 +165,6 @@ def _on_lines(
     peak_error: float,
 ) -> tuple[Column, Tensor, Tensor]:
     response = rig.projector_response
-    column = refine(start, y, std, lines, response, widths, peak_error)
+    column = refine(LinePeaks(start, y, std, lines, response, widths), peak_error)
     unlit = unlit_px(rig, lines.width_px)
     return column, *dark_offset(column.column_px, column.amplitude, y, std, lines, response, unlit)

@@ -8,16 +8,14 @@ brighter frames count less and deviations wider, so that it is taken no larger t
 from __future__ import annotations
 
 import numpy as np
-import torch
 from numpy.typing import NDArray
-from torch import Tensor
 
-from dsl_core.model.rig import ProjectorResponse, Rig
+from dsl_core.model.rig import Rig
 from dsl_core.optics.lines.line_set import LineSet
-from dsl_core.optics.spread.field import widths_at
 from dsl_core.patterns.gray_code import DecodedCode
 from dsl_core.reconstruction.columns.column import MODEL_ERROR, fit_peaks
-from dsl_core.reconstruction.columns.line_spread import Pickable, spread_pixels
+from dsl_core.reconstruction.columns.line_peaks import LinePeaks, smooth_peaks
+from dsl_core.reconstruction.columns.line_spread import Pickable
 from dsl_core.reconstruction.hdr import MergedFrame
 from dsl_core.solve.threads import one_kernel_thread
 
@@ -31,32 +29,16 @@ def own_peak_error(
     rig: Rig, lines: LineSet | None, code: DecodedCode, white: MergedFrame, stack: Pickable
 ) -> float:
     """Relative error of the modelled peak; the usual one where single lines do not cover the picture."""
-    pixels = spread_pixels(lines, code, white)
-    if lines is None or pixels.size == 0:
-        return MODEL_ERROR
-    seen = stack.pick(pixels)
     with one_kernel_thread():
-        column = torch.as_tensor(code.likely_column.ravel()[pixels].astype(np.float64))
-        widths = widths_at(rig, torch.as_tensor(pixels), column)
-        y, std = (torch.as_tensor(values.astype(np.float64)) for values in (seen.radiance, seen.std))
-        return peak_error(column, y, std, lines, rig.projector_response, widths)
+        peaks = smooth_peaks(rig, lines, code, white, stack)
+        return MODEL_ERROR if peaks is None else peak_error(peaks)
 
 
-def peak_error(
-    coarse_px: Tensor,
-    radiance: Tensor,
-    std: Tensor,
-    lines: LineSet,
-    response: ProjectorResponse,
-    widths: Tensor | None = None,
-) -> float:
-    """The smallest relative error that leaves no more of the peaks than noise does, at most `LARGEST`.
-
-    Arguments are those of `dsl_core.reconstruction.columns.column.refine`.
-    """
+def peak_error(peaks: LinePeaks) -> float:
+    """The smallest relative error that leaves no more of the peaks than noise does, at most `LARGEST`."""
 
     def excess(error: float) -> float:
-        fit = fit_peaks(coarse_px, radiance, std, lines, response, widths, error)
+        fit = fit_peaks(peaks, error)
         return _excess(fit.chi_square.numpy(), fit.used.numpy())
 
     if excess(0.0) <= 0:

@@ -15,11 +15,11 @@ from numpy.typing import NDArray
 
 from dsl_core.model.rig import Rig
 from dsl_core.optics.lines.line_set import LineSet
-from dsl_core.optics.spread.field import widths_at
 from dsl_core.optics.spread.fit import SpreadFit
 from dsl_core.patterns.gray_code import DecodedCode
 from dsl_core.reconstruction.columns.column import refine
-from dsl_core.reconstruction.columns.line_spread import Pickable, spread_pixels
+from dsl_core.reconstruction.columns.line_peaks import smooth_peaks
+from dsl_core.reconstruction.columns.line_spread import Pickable
 from dsl_core.reconstruction.hdr import MergedFrame
 from dsl_core.solve.threads import one_kernel_thread
 
@@ -58,22 +58,17 @@ def spread_doubt(
 
     None where single lines do not cover the picture, and where it is known well enough.
     """
-    pixels = spread_pixels(lines, code, white)
     relative = FOCUS_STD
     if found is not None:
         seen = found.rms_std_px / found.response.blur_px
         relative *= seen / float(np.hypot(FOCUS_STD, seen))
-    if lines is None or pixels.size == 0 or relative < SURE:
+    if lines is None or relative < SURE:
         return None
-    picked = stack.pick(pixels)
     with one_kernel_thread():
-        column = torch.as_tensor(code.likely_column.ravel()[pixels].astype(np.float64))
-        known = widths_at(rig, torch.as_tensor(pixels), column)
-        widths = torch.ones_like(column) if known is None else known
-        y, std = (torch.as_tensor(values.astype(np.float64)) for values in (picked.radiance, picked.std))
-        usual, wider = (
-            refine(column, y, std, lines, rig.projector_response, widths * by) for by in (1.0, 1 + STEP)
-        )
+        peaks = smooth_peaks(rig, lines, code, white, stack)
+        if peaks is None:
+            return None
+        usual, wider = refine(peaks), refine(peaks.wider(1 + STEP))
     both = usual.refined & wider.refined
     place = _places(lines, usual.column_px[both]).numpy()
     moved = ((wider.column_px - usual.column_px)[both] / STEP).numpy().clip(-LARGEST_PX, LARGEST_PX)

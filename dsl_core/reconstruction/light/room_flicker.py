@@ -12,16 +12,14 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
-import torch
 from numpy.typing import NDArray
 
 from dsl_core.model.fit import FitFinding
 from dsl_core.model.plan import ScanLines, Shot
-from dsl_core.model.rig import ProjectorResponse
-from dsl_core.optics.lines.profile import halo_of_line
 from dsl_core.optics.sensor import raw_variance
 from dsl_core.optics.unlit import unlit_px
 from dsl_core.reconstruction.hdr import setting_gains_ms
+from dsl_core.reconstruction.light.frame_excess import Halo, Pictures, Places
 from dsl_core.reconstruction.light.line_levels import AROUND, PIXELS, pitch_of
 from dsl_core.reconstruction.light.line_levels import zone_px as zone_px_of
 from dsl_core.reconstruction.light.neighbour_steps import Scan
@@ -29,8 +27,8 @@ from dsl_core.reconstruction.merge import Exposed, PickedLines
 
 Floats = NDArray[np.float64]
 
-#: Frames, and pixels away from a line, that are needed to tell anything.
-FRAMES, FEWEST = 16, 60
+#: Frames that are needed to tell anything.
+FRAMES = 16
 #: Pixels that decide whether others are looked at.
 AT_FIRST = 3000
 #: The rms of what frames have more has to be so many deviations of a single one, and this share of the noise
@@ -40,16 +38,10 @@ SIGMAS, OF_NOISE = 3.0, 0.05
 LEAST_TOLD_DN = 0.2
 #: Variance of black over a picture, relative to its noise, from which on it may be the room that is seen.
 CONTRAST = 1.0
-#: What an interpolated frame may be off by, relative to the light of so many frames on either side.
-INTERPOLATED, NEAR = 0.2, 4
-#: Differences count up to so many deviations, and how often that is asked.
-CLIP, ROUNDS = 4.0, 3
-#: How far the light of a projector may be off that of neighbouring frames, relative to it.
-PROJECTOR_STD = 0.3
 #: Share of what frames have more that unlit pixels must have as well.
 AGREED = 0.5
-#: What the halo, and what unlit pixels have in common, may be off by, relative to it and to a pixel's noise.
-HALO_ERROR, UNLIT_ERROR = 0.5, 0.03
+#: What unlit pixels have in common may be off by, relative to a pixel's noise.
+UNLIT_ERROR = 0.03
 #: Sum of the squares of the shares by which a frame is interpolated.
 _SQUARES = sum(share**2 for share in AROUND.values())
 
@@ -90,32 +82,6 @@ class RoomFlicker:
 
 
 @dataclass(frozen=True)
-class _Places:
-    """Columns of some pixels (P,), rising, and how far from a line they are away from it, px."""
-
-    lines: ScanLines
-    column: Floats
-    zone_px: float
-    unlit_px: tuple[float, float]
-
-    def away(self, pattern: int) -> NDArray[np.intp]:
-        """Pixels that are away from the line of a pattern."""
-        middle = self._middle_px(pattern)
-        first, last = np.searchsorted(self.column, (middle - self.zone_px, middle + self.zone_px))
-        return np.concatenate([np.arange(first), np.arange(last, len(self.column))])
-
-    def unlit(self, pattern: int) -> tuple[NDArray[np.intp], Floats]:
-        """Pixels that no order of a pattern reaches, and how far from its line these are, px."""
-        middle, (near, far) = self._middle_px(pattern), self.unlit_px
-        ends = np.searchsorted(self.column, (middle - far, middle - near, middle + near, middle + far))
-        pixels = np.r_[ends[0] : ends[1], ends[2] : ends[3]] if far > near else np.empty(0, np.intp)
-        return pixels, np.abs(self.column[pixels] - middle)
-
-    def _middle_px(self, pattern: int) -> float:
-        return pattern * self.lines.step_px + self.lines.width_px / 2
-
-
-@dataclass(frozen=True)
 class _Found:
     """What frames have more (frames,) of something; the rms of it, and the deviation of that."""
 
@@ -140,14 +106,18 @@ def room_flicker(
     pixels = pixels[np.argsort(column.ravel()[pixels], kind="stable")]
     zone_px, unlit = zone_px_of(lines, pitch_of(column)), unlit_px(scan.rig, lines.width_px)
 
-    def places_of(some: NDArray[np.intp]) -> _Places:
-        return _Places(lines, column.ravel()[some].astype(np.float64), zone_px, unlit)
+    def places_of(some: NDArray[np.intp]) -> Places:
+        return Places(lines, column.ravel()[some].astype(np.float64), zone_px, unlit)
 
     # Most scans are steady, and few pixels are enough to say so.
     few = pixels[:: max(-(-len(pixels) // AT_FIRST), 1)]
     seen_by_few = seen.pick(few)
-    merged = seen_by_few.radiance.astype(np.float64), np.square(seen_by_few.std, dtype=np.float64)
-    if _flicker(places_of(few), *merged, np.ones((1, len(few))))[0] is None:
+    merged = Pictures(
+        seen_by_few.radiance.astype(np.float64),
+        np.square(seen_by_few.std, dtype=np.float64),
+        np.zeros(len(few)),
+    )
+    if _flicker(places_of(few), merged, np.ones((1, len(few))))[0] is None:
         return None
     places, picked = places_of(pixels), seen.pick(pixels)
     exposed = before or Exposed.as_planned(scan.plan.shot_count)
@@ -162,7 +132,7 @@ def room_flicker(
         ]
         black = scan.source.read(next(s for s in scan.shots_of("black", 0) if s.setting == setting))
         dark = black.ravel()[pixels].astype(np.float64) - scan.rig.sensor.black_level_dn
-        halo = _Halo(gains_ms[setting] * picked.radiance.max(0), scan.rig.projector_response)
+        halo = Halo(gains_ms[setting] * picked.radiance.max(0), scan.rig.projector_response)
         of_setting = _of_setting(scan, shots, pixels, places, dark, exposed, halo)
         for kind, found, unit_dn in zip((dn, share), of_setting, (1.0, float(dark.mean())), strict=True):
             if found is not None:
@@ -175,10 +145,10 @@ def _of_setting(
     scan: Scan,
     shots: list[Shot],
     pixels: NDArray[np.intp],
-    places: _Places,
+    places: Places,
     dark: Floats,
     exposed: Exposed,
-    halo: _Halo,
+    halo: Halo,
 ) -> tuple[_Found | None, _Found | None]:
     """What frames have more: DN in every pixel, and a share of ``dark``, black above its level."""
     sensor = scan.rig.sensor
@@ -189,113 +159,43 @@ def _of_setting(
     variance, noise = (np.asarray(raw_variance(sensor, each), np.float64) for each in (frames, dark))
     frames -= dark
     same = np.ones_like(dark)
+    plain = Pictures(frames, variance, np.zeros_like(dark))
     if dark.var() - noise.mean() > CONTRAST * noise.mean():
-        both = _flicker(places, frames, variance, np.stack([same, dark]), noise, halo)
+        with_noise = Pictures(frames, variance, noise)
+        both = _flicker(places, with_noise, np.stack([same, dark]), halo)
         if all(both):
             return both[0], both[1]
         if both[1] is not None:
-            return None, _flicker(places, frames, variance, dark[None], noise, halo)[0]
-    return _flicker(places, frames, variance, same[None], 0 * noise, halo)[0], None
-
-
-@dataclass(frozen=True)
-class _Halo:
-    """The halo of lines whose zero order has an amplitude (P,) in each pixel."""
-
-    amplitude: Floats
-    response: ProjectorResponse
-
-    def at(self, pixels: NDArray[np.intp], distance_px: Floats, width_px: float) -> Floats:
-        """What reaches some pixels at a distance from a line, (n,)."""
-        share = halo_of_line(torch.as_tensor(distance_px), width_px, self.response).numpy()
-        return np.asarray(self.amplitude[pixels] * share)
+            return None, _flicker(places, with_noise, dark[None], halo)[0]
+    return _flicker(places, plain, same[None], halo)[0], None
 
 
 def _flicker(
-    places: _Places,
-    frames: Floats,
-    variance: Floats,
-    shapes: Floats,
-    black: Floats | float = 0.0,
-    halo: _Halo | None = None,
+    places: Places, pictures: Pictures, shapes: Floats, halo: Halo | None = None
 ) -> list[_Found | None]:
-    """What frames (frames, P) have more of ``shapes`` (n, P) than their neighbours; None where it is chance.
+    """What frames have more of ``shapes`` (n, P) than their neighbours; None where it is chance.
 
-    ``black`` (P,) is the variance of the black picture that was taken off all frames, as the last of the
-    shapes has it. With a ``halo``, pixels that no order reaches tell what neighbours have in common.
+    With a ``halo``, pixels that no order reaches tell what neighbours have in common, and have to agree.
     """
-    count, of_black = len(frames), np.broadcast_to(black, frames.shape[1:])
-    kept, own, std = [], [], []
-    for k in range(2, count - 2):
-        pixels = places.away(k)
-        if len(pixels) < FEWEST:
-            continue
-        around = np.sum([share * frames[k + by, pixels] for by, share in AROUND.items()], axis=0)
-        of_around = np.sum([share**2 * variance[k + by, pixels] for by, share in AROUND.items()], axis=0)
-        away, design = frames[k, pixels] - around, np.stack([around, *shapes[:, pixels]])
-        # Bands narrower than a few steps of the lines do not change slowly: what is lit by none counts most.
-        light = frames[max(k - NEAR, 0) : k + NEAR + 1, pixels].mean(0)
-        sure = 1 / (variance[k, pixels] + of_around + (INTERPOLATED * light) ** 2)
-        weight = sure
-        for _ in range(ROUNDS):
-            normal, right = (design * weight) @ design.T, (design * weight) @ away
-            # Noise that both sides share has its products in these sums, which light has not. The square of
-            # the light keeps its own: light below the noise tells nothing of the projector.
-            normal[0, 0] += PROJECTOR_STD**-2
-            right[0] += weight @ of_around
-            dark = weight @ of_black[pixels]
-            normal[0, -1] = normal[-1, 0] = normal[0, -1] + dark
-            normal[-1, -1] -= dark
-            inverse = np.linalg.pinv(normal, hermitian=True)
-            found = inverse @ right
-            left = np.abs(away - found @ design) * np.sqrt(sure)
-            usual = max(float(np.median(left)) / 0.6745, 1.0)
-            weight = sure * np.minimum(1, CLIP * usual / np.maximum(left, 1e-9))
-        kept.append(k)
-        own.append(found[1:])
-        std.append(usual * np.sqrt(np.diag(inverse)[1:].clip(1e-30)))
+    kept, steps, steps_std = pictures.beside_neighbours(places, shapes)
     if len(kept) < FRAMES // 2:
         return [None] * len(shapes)
-    unlit = np.full((2, count, len(shapes)), np.nan)
+    unlit = np.full((2, len(pictures.frames), len(shapes)), np.nan)
     if halo is not None:
-        unlit = _of_unlit(places, frames, variance, shapes, of_black, halo)
-    frame, steps, steps_std = np.array(kept), np.array(own), np.array(std)
-    of_shapes: list[_Found | None] = []
-    for i, shape in enumerate(shapes):
-        more, there = steps[:, i], unlit[0, :, i]
-        agrees = halo is None or _agree(frame, more, there)
-        noise = _usual(variance, shape)
-        of_shape = _frames_from_steps(frame, more, steps_std[:, i], there, unlit[1, :, i], noise)
-        of_shapes.append(of_shape if agrees else None)
-    return of_shapes
-
-
-def _of_unlit(
-    places: _Places, frames: Floats, variance: Floats, shapes: Floats, of_black: Floats, halo: _Halo
-) -> Floats:
-    """What frames have of shapes (n, P) where no order of their line arrives, and deviations, (2, frames, n).
-
-    NaN for frames that leave too few pixels unlit.
-    """
-    found = np.full((2, len(frames), len(shapes)), np.nan)
-    for k in range(len(frames)):
-        pixels, distance_px = places.unlit(k)
-        if len(pixels) < FEWEST:
-            continue
-        faint = halo.at(pixels, distance_px, places.lines.width_px)
-        sure = 1 / (variance[k, pixels] + (HALO_ERROR * faint) ** 2)
-        values, design, weight = frames[k, pixels] - faint, shapes[:, pixels], sure
-        for _ in range(ROUNDS):
-            normal, right = (design * weight) @ design.T, (design * weight) @ values
-            # The noise of black is in both.
-            dark = weight @ of_black[pixels]
-            normal[-1, -1], right[-1] = normal[-1, -1] - dark, right[-1] + dark
-            inverse = np.linalg.pinv(normal, hermitian=True)
-            more = inverse @ right
-            left = np.abs(values - more @ design) * np.sqrt(sure)
-            weight = sure * np.minimum(1, CLIP / np.maximum(left, 1e-9))
-        found[:, k] = more, np.sqrt(np.diag(inverse).clip(1e-30))
-    return found
+        unlit = pictures.where_unlit(places, shapes, halo)
+    return [
+        _frames_from_steps(
+            kept,
+            steps[:, i],
+            steps_std[:, i],
+            unlit[0, :, i],
+            unlit[1, :, i],
+            _usual(pictures.variance, shape),
+        )
+        if halo is None or _agree(kept, steps[:, i], unlit[0, :, i])
+        else None
+        for i, shape in enumerate(shapes)
+    ]
 
 
 def _usual(variance: Floats, shape: Floats) -> float:

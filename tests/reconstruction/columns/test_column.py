@@ -11,7 +11,8 @@ from dsl_core.model.rig import ProjectorResponse
 from dsl_core.optics.correspondence import triangulate, zero_order
 from dsl_core.optics.lines.line_set import LineSet
 from dsl_core.optics.lines.profile import halo_of_line, zero_order_profile
-from dsl_core.reconstruction.columns.column import _window, dark_offset, refine
+from dsl_core.reconstruction.columns.column import dark_offset, refine
+from dsl_core.reconstruction.columns.line_peaks import LinePeaks
 from dsl_core.simulation.published_rig import published_rig
 
 LINES = LineSet(width_px=5, step_px=2, first_px=2.0, lines=318, frames=318)
@@ -45,7 +46,7 @@ def noisy(noise: float) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor, torch
 
 def test_refinement_is_unbiased_and_states_its_deviation() -> None:
     column, amplitude, radiance, std = noisy(0.03)
-    found = refine(column.round(), radiance, std, LINES, RESPONSE)
+    found = refine(LinePeaks(column.round(), radiance, std, LINES, RESPONSE))
     assert found.refined.all()
     error = found.column_px - column
     z = error / found.std_px
@@ -64,7 +65,7 @@ def test_columns_in_the_middle_of_lines_that_do_not_overlap_are_as_unsure_as_sta
     away = column - apart.centre_px(torch.arange(apart.lines))[:, None]
     exact = amplitude * zero_order_profile(away, -2.5, 2.5, RESPONSE)
     radiance = exact + 0.02 * torch.randn(exact.shape, generator=generator)
-    found = refine(column.round(), radiance, torch.full_like(exact, 0.02), apart, RESPONSE)
+    found = refine(LinePeaks(column.round(), radiance, torch.full_like(exact, 0.02), apart, RESPONSE))
     error = (found.column_px - column).abs()
     loose = found.refined & (found.std_px > 0.08)
     assert 0.2 < float(loose.float().mean()) < 0.6
@@ -72,7 +73,7 @@ def test_columns_in_the_middle_of_lines_that_do_not_overlap_are_as_unsure_as_sta
     assert float((error < 1.96 * found.std_px)[loose].float().mean()) > 0.94
     assert error[loose].square().mean().sqrt() < 0.25
     own = torch.ones_like(column)
-    same = refine(column.round(), radiance, torch.full_like(exact, 0.02), apart, RESPONSE, own)
+    same = refine(LinePeaks(column.round(), radiance, torch.full_like(exact, 0.02), apart, RESPONSE, own))
     assert (same.column_px - found.column_px).abs().max() < 1e-3
 
 
@@ -83,10 +84,10 @@ def test_every_pixel_is_refined_by_its_own_width_of_the_spread() -> None:
     for width in (0.8, 1.3):
         own = RESPONSE.with_gaussian(0.6 * width)
         radiance[:, widths == width] = peaks(column, amplitude, own)[:, widths == width]
-    found = refine(column.round(), radiance, std, LINES, RESPONSE, widths)
+    found = refine(LinePeaks(column.round(), radiance, std, LINES, RESPONSE, widths))
     assert found.refined.all()
     assert (found.column_px - column).abs().max() < 2e-3
-    common = refine(column.round(), radiance, std, LINES, RESPONSE)
+    common = refine(LinePeaks(column.round(), radiance, std, LINES, RESPONSE))
     assert (common.column_px - column).abs().max() > 0.01
 
 
@@ -97,7 +98,7 @@ def test_peaks_out_of_focus_or_on_other_light_are_refined_and_said_to_be_unusual
     radiance[:, blurred] = peaks(column, amplitude, RESPONSE.with_gaussian(1.2))[:, blurred]
     veiled = (torch.arange(PIXELS) >= 1000) & (torch.arange(PIXELS) < 2000)
     radiance[:, veiled] += 0.05 * amplitude[veiled]
-    found = refine(column.round(), radiance, std, LINES, RESPONSE)
+    found = refine(LinePeaks(column.round(), radiance, std, LINES, RESPONSE))
     assert found.refined.all()
     assert torch.equal(found.unusual, blurred | veiled)
     error = (found.column_px - column).abs()
@@ -108,7 +109,7 @@ def test_peaks_out_of_focus_or_on_other_light_are_refined_and_said_to_be_unusual
 
 def test_refinement_of_exact_data_is_exact() -> None:
     column, amplitude, _, std = noisy(0.01)
-    found = refine(column.round(), peaks(column, amplitude), std, LINES, RESPONSE)
+    found = refine(LinePeaks(column.round(), peaks(column, amplitude), std, LINES, RESPONSE))
     assert (found.column_px - column).abs().max() < 1e-3
     assert (found.amplitude / amplitude - 1).abs().max() < 1e-3
 
@@ -122,7 +123,7 @@ def test_pixels_without_a_peak_keep_their_decoded_column() -> None:
     # Two surfaces in one pixel: two peaks.
     radiance[:, 300:400] += peaks(column + 3.0, amplitude)[:, 300:400]
     std[:, 300:400] = 0.003
-    found = refine(coarse, radiance, std, LINES, RESPONSE)
+    found = refine(LinePeaks(coarse, radiance, std, LINES, RESPONSE))
     assert found.refined[:100].float().mean() < 0.1
     assert not found.refined[100:400].any()
     assert found.refined[400:].all()
@@ -204,27 +205,10 @@ def test_a_saturated_line_is_as_bright_as_its_flanks_say() -> None:
     column, amplitude, radiance, std = noisy(0.003)
     bright = peaks(column, amplitude) > 0.2 * amplitude
     radiance[bright], std[bright] = 0.0, torch.inf
-    found = refine(column.round(), radiance, std, LINES, RESPONSE)
+    found = refine(LinePeaks(column.round(), radiance, std, LINES, RESPONSE))
     unsure = ~found.refined
     assert unsure.float().mean() > 0.1
     # The brightest frame that was measured would have a fifth of it at most.
     share = found.amplitude[unsure] / amplitude[unsure]
     assert float(share.median()) > 0.4
     assert torch.isinf(found.amplitude_std[unsure]).all()
-
-
-@pytest.mark.parametrize(("blur_px", "lines_beside"), [(0.6, 3), (0.8, 3), (0.9, 4)])
-def test_lines_count_to_a_column_beyond_three_widths_of_the_blur(blur_px: float, lines_beside: int) -> None:
-    # Half a line of five columns, three blurs and one column, in steps of two: 2.65, 2.95 or 3.1.
-    lines = LineSet(5, 2, 2.0, 40, 40)
-    frames = torch.arange(40.0, dtype=torch.float64)[:, None] * torch.ones(4, dtype=torch.float64)
-    std = torch.full_like(frames, 0.5)
-    std[20, 1], frames[21, 2] = torch.inf, torch.nan
-    coarse = torch.tensor([42.0, 42.9, 41.1, 3.0], dtype=torch.float64)
-    y, variance, centres = _window(coarse, frames, std, lines, blur_px)
-    beside = torch.arange(-lines_beside, lines_beside + 1)[:, None]
-    line = torch.tensor([20, 20, 20, 0]) + beside
-    assert torch.equal(centres, 2.0 + 2.0 * line)
-    known = (line >= 0) & ~((line == 20) & (torch.arange(4) == 1)) & ~((line == 21) & (torch.arange(4) == 2))
-    assert torch.equal(y, torch.where(known, line, 0).double())
-    assert torch.equal(variance, torch.where(known, 0.25, torch.inf).double())

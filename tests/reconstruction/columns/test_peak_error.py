@@ -10,6 +10,7 @@ from dsl_core.model.rig import ProjectorResponse
 from dsl_core.optics.lines.line_set import LineSet
 from dsl_core.optics.lines.profile import zero_order_profile
 from dsl_core.reconstruction.columns.column import refine
+from dsl_core.reconstruction.columns.line_peaks import LinePeaks
 from dsl_core.reconstruction.columns.peak_error import LARGEST, _excess, peak_error
 
 LINES = LineSet(width_px=5, step_px=2, first_px=2.0, lines=118, frames=118)
@@ -30,9 +31,10 @@ def peaks(blur_px: float) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor]:
 
 def test_peaks_as_modelled_have_no_error_but_their_noise() -> None:
     column, radiance, std = peaks(0.6)
-    assert peak_error(column.round(), radiance, std, LINES, RESPONSE) < NOISE / 5
+    assert peak_error(LinePeaks(column.round(), radiance, std, LINES, RESPONSE)) < NOISE / 5
     usual, own = (
-        refine(column.round(), radiance, std, LINES, RESPONSE, model_error=error) for error in (0.0015, 0.0)
+        refine(LinePeaks(column.round(), radiance, std, LINES, RESPONSE), model_error=error)
+        for error in (0.0015, 0.0)
     )
     assert (own.column_px - column).std() <= (usual.column_px - column).std()
     assert own.std_px.median() < 0.9 * usual.std_px.median()
@@ -41,15 +43,15 @@ def test_peaks_as_modelled_have_no_error_but_their_noise() -> None:
 
 def test_what_a_wrong_model_leaves_becomes_its_error_and_widens_deviations() -> None:
     column, radiance, std = peaks(0.62)
-    found = peak_error(column.round(), radiance, std, LINES, RESPONSE)
+    found = peak_error(LinePeaks(column.round(), radiance, std, LINES, RESPONSE))
     assert 0.002 < found < 0.02
-    wide = refine(column.round(), radiance, std, LINES, RESPONSE, model_error=found)
+    wide = refine(LinePeaks(column.round(), radiance, std, LINES, RESPONSE), model_error=found)
     assert ((wide.column_px - column).abs() < 1.96 * wide.std_px).double().mean() > 0.93
 
 
 def test_there_is_a_largest_error() -> None:
     column, radiance, std = peaks(1.6)
-    assert peak_error(column.round(), radiance, std, LINES, RESPONSE) == pytest.approx(LARGEST)
+    assert peak_error(LinePeaks(column.round(), radiance, std, LINES, RESPONSE)) == pytest.approx(LARGEST)
 
 
 def test_excess_is_nothing_for_noise_and_follows_the_chi_square() -> None:

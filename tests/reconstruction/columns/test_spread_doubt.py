@@ -13,6 +13,7 @@ from dsl_core.optics.lines.line_set import LineSet
 from dsl_core.optics.lines.profile import zero_order_profile
 from dsl_core.optics.spread.fit import SpreadFit
 from dsl_core.reconstruction.columns.column import refine
+from dsl_core.reconstruction.columns.line_peaks import LinePeaks
 from dsl_core.reconstruction.columns.spread_doubt import FOCUS_STD, SpreadDoubt, spread_doubt
 from dsl_core.reconstruction.merge import PickedLines
 from tests.cases.small_rig import small_rig
@@ -53,7 +54,7 @@ def test_deviations_are_what_a_width_off_by_one_deviation_moves() -> None:
     stated = doubt(None)
     assert stated is not None
     seen, std = (torch.as_tensor(each) for each in lines_seen(RESPONSE.with_gaussian(0.6 * (1 + FOCUS_STD))))
-    moved = refine(torch.as_tensor(COLUMN.ravel().round()), seen, std, LINES, RESPONSE)
+    moved = refine(LinePeaks(torch.as_tensor(COLUMN.ravel().round()), seen, std, LINES, RESPONSE))
     sure = (moved.refined & (moved.std_px < 0.05)).numpy()
     off = np.abs(moved.column_px.numpy() - COLUMN.ravel())[sure]
     by_place = stated.at(COLUMN.ravel())[sure]

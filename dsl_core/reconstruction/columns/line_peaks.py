@@ -1,0 +1,82 @@
+"""The light of scan lines around the decoded columns of some pixels, as columns are refined from it."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from dsl_core.model.rig import ProjectorResponse, Rig
+from dsl_core.optics.lines.line_set import LineSet
+from dsl_core.optics.lines.profile import LineTable
+from dsl_core.optics.spread.field import widths_at
+from dsl_core.patterns.gray_code import DecodedCode
+from dsl_core.reconstruction.columns.line_spread import Pickable, spread_pixels
+from dsl_core.reconstruction.hdr import MergedFrame
+
+
+@dataclass(frozen=True)
+class LinePeaks:
+    """Decoded columns of some pixels, ``coarse_px`` (pixels,) float, and what lines brought to them.
+
+    ``radiance`` and ``std`` (frames, pixels) are in DN per ms, infinite where saturated; ``widths`` (pixels,)
+    are those of the line spread relative to the response's, None where they are the same.
+    """
+
+    coarse_px: Tensor
+    radiance: Tensor
+    std: Tensor
+    lines: LineSet
+    response: ProjectorResponse
+    widths: Tensor | None = None
+
+    def some(self, pixels: Tensor) -> LinePeaks:
+        """Those of some pixels, by their indices."""
+        return replace(
+            self,
+            coarse_px=self.coarse_px[pixels],
+            radiance=self.radiance[:, pixels],
+            std=self.std[:, pixels],
+            widths=None if self.widths is None else self.widths[pixels],
+        )
+
+    def wider(self, by: float) -> LinePeaks:
+        """The same light, for a line spread so many times as wide."""
+        return replace(self, widths=by * self._relative_widths())
+
+    def table(self, columns_px: Tensor, reach_px: float) -> LineTable:
+        """The profile of a line around columns (pixels,), as far from it as the reach."""
+        return LineTable(self.lines.width_px, self.response, reach_px, columns_px, self.widths)
+
+    def window(self) -> tuple[Tensor, Tensor, Tensor]:
+        """Values, variances and line centres (px) of the frames around the peak, each (window, pixels)."""
+        widest_px = self.response.blur_px * (1.0 if self.widths is None else float(self.widths.max()))
+        half = math.ceil((self.lines.width_px / 2 + 3 * widest_px + 1) / self.lines.step_px)
+        offsets = torch.arange(-half, half + 1, device=self.coarse_px.device)[:, None]
+        line = self.lines.nearest(self.coarse_px) + offsets
+        frame = self.lines.frame(line)
+        y = torch.gather(self.radiance, 0, frame)
+        variance = torch.gather(self.std, 0, frame).to(y.dtype) ** 2
+        usable = self.lines.exists(line) & torch.isfinite(variance) & torch.isfinite(y)
+        variance = torch.where(usable, variance, torch.inf)
+        return torch.where(usable, y, 0.0), variance, self.lines.centre_px(line).to(self.coarse_px.dtype)
+
+    def _relative_widths(self) -> Tensor:
+        return torch.ones_like(self.coarse_px) if self.widths is None else self.widths
+
+
+def smooth_peaks(
+    rig: Rig, lines: LineSet | None, code: DecodedCode, white: MergedFrame, stack: Pickable
+) -> LinePeaks | None:
+    """The peaks of bright pixels on smooth surfaces; None where single lines do not cover the picture."""
+    pixels = spread_pixels(lines, code, white)
+    if lines is None or pixels.size == 0:
+        return None
+    seen = stack.pick(pixels)
+    column = torch.as_tensor(code.likely_column.ravel()[pixels].astype(np.float64))
+    y, std = (torch.as_tensor(values.astype(np.float64)) for values in (seen.radiance, seen.std))
+    widths = widths_at(rig, torch.as_tensor(pixels), column)
+    return LinePeaks(column, y, std, lines, rig.projector_response, widths)
