@@ -12,6 +12,7 @@ import pytest
 
 from dsl_core.errors import StoreError
 from dsl_core.io.claims import LAPSE_S, Claim, ClaimedError, Owner
+from dsl_core.io.scan.lock import FolderLock
 
 
 def test_a_claim_holds_until_it_is_released_and_leaves_nothing(tmp_path: Path) -> None:
@@ -22,6 +23,14 @@ def test_a_claim_holds_until_it_is_released_and_leaves_nothing(tmp_path: Path) -
         Claim(tmp_path / "b.zarr").release()
     assert list(tmp_path.iterdir()) == []
     Claim(tmp_path / "a.zarr").release()
+
+
+def test_a_released_claim_lets_go_of_its_file_too(tmp_path: Path) -> None:
+    # Systems that keep a file while it is open find it again.
+    claim = Claim(tmp_path / "a.zarr")
+    (tmp_path / "kept").hardlink_to(tmp_path / ".a.zarr.claim")
+    claim.release()
+    FolderLock(tmp_path / "kept").release()
 
 
 def test_the_claim_of_a_killed_process_is_taken_over_and_told(tmp_path: Path) -> None:

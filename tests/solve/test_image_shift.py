@@ -91,3 +91,11 @@ def test_a_tile_is_followed_two_and_a_half_pixels_beyond_the_others(scene: np.nd
         tile = tile_shifts(scene, moved, np.full(scene.shape, 4.0), (2, 3))
         assert np.isfinite(tile.x_std[0, 0]) == known
         assert tile.x[0, 0] == pytest.approx(by if known else 0.0, abs=0.2)
+
+
+@pytest.mark.parametrize(("by_px", "told"), [(0.015, False), (0.026, True)])
+def test_a_shift_that_matters_to_nobody_explains_nothing(scene: np.ndarray, by_px: float, told: bool) -> None:
+    moved = shift(scene, (0, by_px), order=3, mode="nearest")
+    got = tile_shifts(scene, moved, np.full(scene.shape, 1e-3), (1, 1))
+    assert got.x.item() == pytest.approx(by_px, abs=1e-3)
+    assert (got.better.item() > 0) is told

@@ -51,7 +51,7 @@ def test_a_second_picture_next_to_the_limit_is_the_same_step() -> None:
         steps.judge(line(index), 1.0, None)
     assert steps.judge(line(3), 0.79, None) is Light.STEP
     assert steps.judge(line(3), 0.82, None) is Light.STEP
-    assert steps.judge(line(3), 0.95, None) is Light.USUAL, "the first was wrong"
+    assert steps.judge(line(3), 0.91, None) is Light.USUAL, "the first was wrong"
     assert steps.judge(line(4), 0.82, None) is Light.USUAL
 
 

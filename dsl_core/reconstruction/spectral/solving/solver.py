@@ -54,7 +54,6 @@ def _solve(data: Tensor, right: Tensor, rows: Tensor | None, prior: Prior, check
     posterior = Posterior(data, weights, rows)
     mean = posterior.solve(right)
     mean, at_bound = _bounded(data, weights, rows, right, mean, prior.bounds, check)
-    check()
     std = torch.hypot(posterior.band_mean_variance().clip(min=1e-12).sqrt(), within_band(mean))
     return Spectra(mean, band_mean(mean), std, data_share(data), tau, at_bound)
 
