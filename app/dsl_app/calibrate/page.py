@@ -64,8 +64,17 @@ class CalibratePage(PageWidget):
         self.picture.setFixedWidth(PICTURE_PX)
         self.library = LibraryPanel(state, commands.library)
         self._timer = Ticker(self, FETCH_MS, commands.take_news)
+        # Once the page is on screen, which starting workers would delay.
+        self._read = QTimer(self)
+        self._read.setSingleShot(True)
+        self._read.setInterval(0)
+        self._read.timeout.connect(self._read_again)
         self._lay_out()
         self._connect()
+
+    def _read_again(self) -> None:
+        self._commands.refresh()
+        self._commands.library.load()
 
     def _lay_out(self) -> None:
         parts = ((row, 20) for row in self.rows.values())
@@ -151,10 +160,9 @@ class CalibratePage(PageWidget):
             self.picture.made.show_seen(seen)
 
     def showEvent(self, event: QShowEvent) -> None:
-        """Read campaign and library again: other programs may have changed them."""
+        """Read campaign and library again, soon: other programs may have changed them."""
         super().showEvent(event)
-        self._commands.refresh()
-        self._commands.library.load()
+        self._read.start()
 
     def page_actions(self) -> dict[str, Callable[[], object]]:
         """A wizard for each calibration, and all of them."""
@@ -179,6 +187,7 @@ class CalibratePage(PageWidget):
         """Stop what runs; everything captured is kept."""
         super().release()
         self._timer.stop()
+        self._read.stop()
         self._commands.close()
 
 

@@ -233,8 +233,10 @@ def set_role(widget: QWidget, role: str) -> None:
     """Give a widget another role and let the style sheet see it."""
     if widget.property("role") != role:
         widget.setProperty("role", role)
-        widget.style().unpolish(widget)
-        widget.style().polish(widget)
+        # What was never on screen is styled when it comes there: doing so twice makes a page late.
+        if widget.testAttribute(Qt.WidgetAttribute.WA_WState_Polished):
+            widget.style().unpolish(widget)
+            widget.style().polish(widget)
 
 
 class Banner(QFrame):
