@@ -201,10 +201,19 @@ class RandomPerson:
                     if key == "view_cloud":
                         self._wait(lambda: results.cloud.view is not None)
                     self.rest()
+        self._open_late_plots(results)
         for room in self.window.findChildren(Deferred):
             _ = room.content
         self._busy_all_workers()
         self._compare(results)
+
+    def _open_late_plots(self, results: ResultsPage) -> None:
+        """Make each plot that comes with its first use: one has some 55 widgets inside."""
+        self.done.append("first plots")
+        _ = results.graph
+        results.cloud._section_plot().hide()
+        for shown in (True, False):
+            results._state.contrast.set(shown)
 
     def _compare(self, results: ResultsPage) -> None:
         """Compare a result with itself: the scales are made for the first pair."""
