@@ -243,7 +243,7 @@ class DriftWindow(QDialog):
         column.addWidget(self._buttons(verdict, commands))
 
     def _buttons(self, verdict: DriftVerdict, commands: LibraryController) -> QDialogButtonBox:
-        buttons = QDialogButtonBox(QDialogButtonBox.StandardButton.Close)
+        buttons = QDialogButtonBox(QDialogButtonBox.StandardButton.Close, self)
         buttons.rejected.connect(self.reject)
         tip = "Repeat the quick capture; the target must still be in place"
         check = lambda: commands.check(verdict.name, verdict.spectralon, bool(verdict.overridden))  # noqa: E731

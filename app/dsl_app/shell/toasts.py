@@ -56,7 +56,7 @@ class Toast(QFrame):
         self._watch: QTimer | None = None
         self.words = ShortText(text)
         self.behind = label("", "muted")
-        buttons = []
+        buttons: list[QPushButton] = []
         for name, do in (offers or {}).items():
             offer = push_button(name, text, self.dismiss, "primary" if is_next and not buttons else "")
             offer.clicked.connect(lambda _checked=False, do=do: do())
