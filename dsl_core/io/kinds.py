@@ -30,7 +30,7 @@ def whose_inside(path: Path) -> str:
 def what_is_at(path: Path) -> str:
     """What a path holds, as a clause that follows "PATH is not a scan:"."""
     if not path.exists():
-        return "there is nothing of that name"
+        return "there is nothing of that name now; it may have been moved or deleted"
     if not path.is_dir():
         return "it is a file"
     told = next((words for name, words in _TOLD_BY.items() if (path / name).exists()), None)

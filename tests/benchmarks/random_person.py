@@ -19,6 +19,7 @@ from dsl_app.shared.jobs.qt_runner import WORKERS
 from dsl_app.shared.widgets.deferred import Deferred
 from dsl_app.shell.application import ExceptionHook
 from dsl_app.shell.main_window import MainWindow
+from dsl_app.start.examples import EXAMPLES
 from PySide6.QtCore import QEvent, QPoint, Qt, QTimer
 from PySide6.QtGui import QDrag
 from PySide6.QtTest import QTest
@@ -201,10 +202,27 @@ class RandomPerson:
                     if key == "view_cloud":
                         self._wait(lambda: results.cloud.view is not None)
                     self.rest()
+        self._open_late_plots(results)
+        self._open_examples()
         for room in self.window.findChildren(Deferred):
             _ = room.content
         self._busy_all_workers()
         self._compare(results)
+
+    def _open_late_plots(self, results: ResultsPage) -> None:
+        """Make each plot that comes with its first use: one has some 55 widgets inside."""
+        self.done.append("first plots")
+        _ = results.graph
+        results.cloud._section_plot().hide()
+        for shown in (True, False):
+            results._state.contrast.set(shown)
+
+    def _open_examples(self) -> None:
+        """Open the largest results there are: the first raises the memory by 100 MB, others no more."""
+        self.done.append("first examples")
+        for example in EXAMPLES:
+            self._composition.demo.show(example.key)
+            self.rest(cancel=False)
 
     def _compare(self, results: ResultsPage) -> None:
         """Compare a result with itself: the scales are made for the first pair."""

@@ -74,7 +74,7 @@ def views(stage: Stage) -> None:
         stage.window.do(view.value)
         stage.idle()
         if view is ResultView.CLOUD:
-            _wait_for_cloud(stage, page)
+            wait_for_cloud(stage, page)
         stage.shoot(view.value.removeprefix("view_"))
     stage.window.do("view_quality")
     for quality in QualityMap:
@@ -82,7 +82,7 @@ def views(stage: Stage) -> None:
         stage.shoot(f"quality-{quality.name.lower().replace('_', '-')}")
 
 
-def _wait_for_cloud(stage: Stage, page: ResultsPage) -> None:
+def wait_for_cloud(stage: Stage, page: ResultsPage) -> None:
     """The cloud is drawn in a thread of its own."""
     stage.wait(lambda: page.cloud.view is not None)
     view = page.cloud.view
@@ -99,7 +99,7 @@ def marks(stage: Stage) -> None:
     state.selected.set(state.marks.value[0].key)
     stage.shoot("compared")
     stage.window.do("view_cloud")
-    _wait_for_cloud(stage, page)
+    wait_for_cloud(stage, page)
     stage.shoot("cloud")
     page.marks.remove_selected()
     stage.shoot("undo")
@@ -129,7 +129,7 @@ def limits(stage: Stage) -> None:
     stage.window.do("view_cloud")
     state.cloud_by.set(ResultView.QUALITY)
     state.quality.set(QualityMap.SHARE)
-    _wait_for_cloud(stage, page)
+    wait_for_cloud(stage, page)
     stage.shoot("cloud")
 
 
@@ -157,6 +157,8 @@ def search(stage: Stage) -> None:
     tabs = page.findChild(QTabWidget)
     assert tabs is not None
     tabs.setCurrentWidget(page.search)
+    # The tab is made when it is seen.
+    stage.settle()
     for mode in SearchMode:
         page.search.content.mode.setCurrentIndex(page.search.content.mode.findData(mode))
         stage.press("Search", page)

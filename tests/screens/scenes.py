@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from tests.screens import (
+    answers_scenes,
     calibrate_scenes,
     compare_scenes,
     results_scenes,
@@ -23,6 +24,7 @@ SCENES: dict[str, Scene] = {
     **wizard_scenes.SCENES,
     **scan_scenes.SCENES,
     **results_scenes.SCENES,
+    **answers_scenes.SCENES,
     **compare_scenes.SCENES,
     **shell_scenes.SCENES,
     **trouble_scenes.SCENES,

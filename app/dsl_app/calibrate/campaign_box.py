@@ -35,7 +35,7 @@ class NewCampaignDialog(QDialog):
         self.folder.setToolTip("Folder that will contain the campaign's own folder")
         self.browse = push_button("Choose…", "Choose the folder of campaigns", self._browse)
         self._text = label("", "warn", wraps=True)
-        buttons = QDialogButtonBox(QDialogButtonBox.StandardButton.Cancel)
+        buttons = QDialogButtonBox(QDialogButtonBox.StandardButton.Cancel, self)
         self.begin = buttons.addButton("Begin", QDialogButtonBox.ButtonRole.AcceptRole)
         self.begin.setToolTip("Create the folder and start the campaign")
         set_role(self.begin, "primary")

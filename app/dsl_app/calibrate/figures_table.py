@@ -2,20 +2,17 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Sequence
 
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QHeaderView, QTableWidgetItem
 
-from dsl_app.calibrate.presentation import value_words
+from dsl_app.calibrate.presentation import name_words, value_words
 from dsl_app.shared.widgets.read_table import ReadTable, cell
 from dsl_core.model.figure import Figure
 
 _COLUMNS = ("", "Figure", "Value", "Limits", "What to do")
 _MARK_PX = 26
-#: A hyphen that is the sign of a number, as in ``order -1``.
-_SIGN = re.compile(r"(?<!\w)-(?=\d)")
 
 
 class FiguresTable(ReadTable):
@@ -41,7 +38,7 @@ def _items(figure: Figure) -> tuple[QTableWidgetItem, ...]:
     first.setData(Qt.ItemDataRole.AccessibleTextRole, word)
     return (
         first,
-        cell(_SIGN.sub("−", figure.name), "text"),
+        cell(name_words(figure), "text"),
         cell(value_words(figure), "text" if figure.passed else role),
         cell(figure.limits.replace("-", "−"), "muted"),
         cell("" if figure.passed else figure.advice, "text"),

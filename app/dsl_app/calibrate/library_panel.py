@@ -59,6 +59,7 @@ class LibraryPanel(QGroupBox):
         self.table = _table()
         # The version that was selected as the next one to use.
         self._offered: LibraryLine | None = None
+        self._told = ""
         self.details = QTextBrowser()
         self.details.setAccessibleName("Details of the calibration")
         self.details.setToolTip("Conditions, dates and figures of the selected calibration")
@@ -164,7 +165,10 @@ class LibraryPanel(QGroupBox):
             button.setEnabled(shown.can_use)
         self.restore.setEnabled(shown.can_restore)
         set_role(self.use, "primary" if self._next is not None and self.line == self._next else "")
-        self.details.setHtml(shown.details)
+        # It takes a while to lay out, and a list that is read selects its version several times.
+        if shown.details != self._told:
+            self._told = shown.details
+            self.details.setHtml(shown.details)
 
     # Actions ---------------------------------------------------------------------------------------
 
@@ -239,7 +243,7 @@ class DriftWindow(QDialog):
         column.addWidget(self._buttons(verdict, commands))
 
     def _buttons(self, verdict: DriftVerdict, commands: LibraryController) -> QDialogButtonBox:
-        buttons = QDialogButtonBox(QDialogButtonBox.StandardButton.Close)
+        buttons = QDialogButtonBox(QDialogButtonBox.StandardButton.Close, self)
         buttons.rejected.connect(self.reject)
         tip = "Repeat the quick capture; the target must still be in place"
         check = lambda: commands.check(verdict.name, verdict.spectralon, bool(verdict.overridden))  # noqa: E731

@@ -62,10 +62,19 @@ class CalibratePage(PageWidget):
         }
         self.picture = Deferred(LiveFrameView)
         self.picture.setFixedWidth(PICTURE_PX)
-        self.library = LibraryPanel(state, commands.library)
+        self._library = Deferred(self._make_library)
         self._timer = Ticker(self, FETCH_MS, commands.take_news)
+        # Once the page is on screen, which starting workers would delay.
+        self._read = QTimer(self)
+        self._read.setSingleShot(True)
+        self._read.setInterval(0)
+        self._read.timeout.connect(self._read_again)
         self._lay_out()
         self._connect()
+
+    def _read_again(self) -> None:
+        self._commands.refresh()
+        self._commands.library.load()
 
     def _lay_out(self) -> None:
         parts = ((row, 20) for row in self.rows.values())
@@ -76,7 +85,7 @@ class CalibratePage(PageWidget):
         self._listed = QGroupBox(LIBRARY)
         column_of(on=self._listed)
         top = boxed(column_of((boxed(self._top), 1), (self._listed, 1), margins=0))
-        self._split = splitter(Qt.Orientation.Vertical, (top, 0), (self.library, 1), sizes=(ROWS_PX, 300))
+        self._split = splitter(Qt.Orientation.Vertical, (top, 0), (self._library, 1), sizes=(ROWS_PX, 300))
         column_of(self.head, (self._split, 1), self.banner, on=self)
         self.arrange()
 
@@ -89,8 +98,8 @@ class CalibratePage(PageWidget):
         self._split.setSizes(
             [self.width() * share // sum(shares) for share in shares] if self.is_wide else [ROWS_PX, 300]
         )
-        self.library.place_table(self._listed if self.is_tall else None)
-        self.library.stack(self.is_wide)
+        if self._library.made is not None:
+            self._arrange_library(self._library.made)
         self._listed.setVisible(self.is_tall)
         # They take the room that there is, up to a height at which they still read as rows.
         for row in self.rows.values():
@@ -100,6 +109,20 @@ class CalibratePage(PageWidget):
         self._top.setDirection(direction.TopToBottom if is_below else direction.LeftToRight)
         self.picture.setMinimumWidth(0 if is_below else PICTURE_PX)
         self.picture.setMaximumWidth(LARGEST_PX if is_below else PICTURE_PX)
+
+    @property
+    def library(self) -> LibraryPanel:
+        """The calibrations kept, made when they are first seen: the rows above are read first."""
+        return self._library.content
+
+    def _make_library(self) -> LibraryPanel:
+        panel = LibraryPanel(self._state, self._commands.library)
+        self._arrange_library(panel)
+        return panel
+
+    def _arrange_library(self, panel: LibraryPanel) -> None:
+        panel.place_table(self._listed if self.is_tall else None)
+        panel.stack(self.is_wide)
 
     def _connect(self) -> None:
         state = self._state
@@ -151,10 +174,9 @@ class CalibratePage(PageWidget):
             self.picture.made.show_seen(seen)
 
     def showEvent(self, event: QShowEvent) -> None:
-        """Read campaign and library again: other programs may have changed them."""
+        """Read campaign and library again, soon: other programs may have changed them."""
         super().showEvent(event)
-        self._commands.refresh()
-        self._commands.library.load()
+        self._read.start()
 
     def page_actions(self) -> dict[str, Callable[[], object]]:
         """A wizard for each calibration, and all of them."""
@@ -179,6 +201,7 @@ class CalibratePage(PageWidget):
         """Stop what runs; everything captured is kept."""
         super().release()
         self._timer.stop()
+        self._read.stop()
         self._commands.close()
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass, replace
 from datetime import datetime
 from html import escape
@@ -23,6 +24,8 @@ NO_VERSION = (
     "<p>The library is empty. It keeps every rig calibrated on this computer, dated and never overwritten:"
     " calibrate everything in a campaign, keep a campaign in the library, or import a file.</p>"
 )
+#: A hyphen that is the sign of a number, as in ``order -1``.
+_SIGN = re.compile(r"(?<!\w)-(?=\d)")
 _ROLES = {
     RowState.MISSING: "muted",
     RowState.GOOD: "good",
@@ -148,7 +151,16 @@ def figure_words(figure: Figure) -> str:
     """
     limits = figure.limits.replace("-", "−")
     value, limits = (text.replace(" ", "\N{NO-BREAK SPACE}") for text in (value_words(figure), limits))
-    return f"{figure.name} {value}" + (f"  ({limits})" if limits else "")
+    return f"{name_words(figure)} {value}" + (f"  ({limits})" if limits else "")
+
+
+def name_words(figure: Figure) -> str:
+    """The name of a figure with typographic signs; hyphens between words stay.
+
+    >>> name_words(Figure(name="held-out efficiency of order -1", value=1.0, unit="%"))
+    'held-out efficiency of order −1'
+    """
+    return _SIGN.sub("−", figure.name)
 
 
 def value_words(figure: Figure) -> str:

@@ -243,7 +243,9 @@ class Composition(QObject):
             lambda: window.open_page("rig"),
             lambda: window.do("open"),
             lambda: window.do("import"),
-            UnfinishedController(self._scan_folders, window.parts.runner, window.open_path),
+            UnfinishedController(
+                self._scan_folders, window.parts.runner, window.open_path, self.session.is_offered
+            ),
         )
 
     def _scan_folders(self) -> list[Path]:

@@ -9,6 +9,7 @@ from PySide6.QtCore import QObject
 
 from dsl_app.session.records import Session
 from dsl_app.session.store import SessionStore
+from dsl_app.shared.evented import Value
 from dsl_app.shared.widgets.ticker import Ticker
 from dsl_app.shell.main_window import MainWindow
 
@@ -28,6 +29,8 @@ class SessionRestore(QObject):
     def __init__(self, window: MainWindow) -> None:
         super().__init__(window)
         self._window = window
+        #: Whether a session is offered, which is then what a person does next.
+        self.is_offered = Value(False)
         self.results: ResultsController | None = None
         self.scans: ScanController | None = None
         self.pair: PairController | None = None
@@ -68,7 +71,12 @@ class SessionRestore(QObject):
         if trouble:
             self._window.toasts.tell("warning", trouble)
         if session is not None:
-            self._window.toasts.offer(session.offer, {"Restore session": lambda: self.restore(session)})
+            self.is_offered.set(True)
+            self._window.toasts.offer_next(
+                session.offer,
+                {"Restore session": lambda: self.restore(session)},
+                lambda: self.is_offered.set(False),
+            )
         self._timer.start()
         self._window.closed.connect(self._end)
 

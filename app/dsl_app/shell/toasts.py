@@ -39,8 +39,12 @@ class Toast(QFrame):
         details: str = "",
         stay_ms: int = 0,
         offers: Mapping[str, Callable[[], object]] | None = None,
+        is_next: bool = False,
     ) -> None:
-        """``offers`` are buttons by their texts; using one closes the toast."""
+        """``offers`` are buttons by their texts; using one closes the toast.
+
+        ``is_next`` makes the first of them the blue one: what a person does next.
+        """
         super().__init__()
         self.setProperty("role", "toast")
         self.setProperty("level", level)
@@ -52,9 +56,9 @@ class Toast(QFrame):
         self._watch: QTimer | None = None
         self.words = ShortText(text)
         self.behind = label("", "muted")
-        buttons = []
+        buttons: list[QPushButton] = []
         for name, do in (offers or {}).items():
-            offer = push_button(name, text, self.dismiss)
+            offer = push_button(name, text, self.dismiss, "primary" if is_next and not buttons else "")
             offer.clicked.connect(lambda _checked=False, do=do: do())
             buttons.append(offer)
         self.more = _flat("Details", "Show the whole message", self._show)
@@ -158,6 +162,14 @@ class Toasts(QObject):
         With ``stay_s`` it leaves by itself after that time.
         """
         self._add(Toast("info", text, stay_ms=round(1000 * stay_s), offers=offers))
+
+    def offer_next(
+        self, text: str, offers: Mapping[str, Callable[[], object]], gone: Callable[[], object]
+    ) -> None:
+        """Offer what a person does next: the first button is the blue one; ``gone`` is called at its end."""
+        toast = Toast("info", text, offers=offers, is_next=True)
+        toast.dismissed.connect(gone)
+        self._add(toast)
 
     def withdraw(self, text: str) -> None:
         """Close the message of a text, if it is still there: it has lost its sense."""

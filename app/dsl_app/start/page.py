@@ -71,7 +71,7 @@ class StartPage(PageWidget):
         self.unfinished = UnfinishedList(unfinished)
         self._lay_out()
         self.stops = [
-            *follow_any(self._mark_next, unfinished.found, unfinished.is_resuming),
+            *follow_any(self._mark_next, unfinished.found, unfinished.is_resuming, unfinished.comes_second),
             # Without recent files, what is unfinished takes their place.
             recent.paths.follow(lambda paths: self.files.setVisible(bool(paths))),
         ]
@@ -79,7 +79,8 @@ class StartPage(PageWidget):
     def _mark_next(self) -> None:
         """What was interrupted comes before an example; while it continues, so does waiting for it."""
         control = self._unfinished
-        is_first = not (control.found.value or control.is_resuming.value)
+        others = (control.found, control.is_resuming, control.comes_second)
+        is_first = not any(each.value for each in others)
         set_role(self.examples[EXAMPLES[0].key], "primary" if is_first else "")
 
     def showEvent(self, event: QShowEvent) -> None:

@@ -32,11 +32,19 @@ class Unfinished:
 
 
 class UnfinishedController:
-    """Finds what was interrupted, and resumes it; ``open_path`` opens scans and finished results."""
+    """Finds what was interrupted, and resumes it; ``open_path`` opens scans and finished results.
+
+    ``comes_second`` says that something else is what a person does next.
+    """
 
     def __init__(
-        self, folders: Callable[[], Iterable[Path]], runner: JobRunner, open_path: Callable[[Path], object]
+        self,
+        folders: Callable[[], Iterable[Path]],
+        runner: JobRunner,
+        open_path: Callable[[Path], object],
+        comes_second: Value[bool] | None = None,
     ) -> None:
+        self.comes_second = Value(False) if comes_second is None else comes_second
         self.found: Value[tuple[Unfinished, ...]] = Value(())
         #: Whether a reconstruction continues now.
         self.is_resuming = Value(False)

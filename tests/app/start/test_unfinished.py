@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+from dsl_app.shared.evented import Value
 from dsl_app.start.unfinished import Unfinished, UnfinishedController, unfinished_in, worth_a_look
 from dsl_app.start.unfinished_list import UnfinishedList
 from PySide6.QtWidgets import QLabel, QPushButton
@@ -80,3 +81,18 @@ def test_the_list_has_a_button_each_and_is_gone_when_empty(qtbot: QtBot) -> None
     assert opened == [Path("x/leaf.dsl")]
     control.found.set(())
     assert shown.isHidden()
+
+
+def test_another_next_step_takes_the_blue_from_what_is_unfinished(qtbot: QtBot, found: Path) -> None:
+    comes_second = Value(True)
+    control = UnfinishedController(lambda: [found], InlineRunner(), print, comes_second)
+    listed = UnfinishedList(control)
+    qtbot.addWidget(listed)
+    control.look()
+
+    def roles() -> list[str]:
+        return [button.property("role") or "" for button in listed.findChildren(QPushButton)]
+
+    assert roles() == ["", ""]
+    comes_second.set(False)
+    assert sorted(roles()) == ["", "primary"]

@@ -38,7 +38,7 @@ class ColoursPanel(QWidget):
             "Colours", "CIELAB relative to the perfect diffuser", ("Mark", "L*", "a*", "b*", "ΔE00")
         )
         self.table.widen(0)
-        self.table.be_dense(padding_px=1)
+        self.table.be_dense(padding_px=0)
         self.text = label(EMPTY, "muted", wraps=True)
         self.text.setAlignment(Qt.AlignmentFlag.AlignTop)
         column_of(

@@ -29,6 +29,8 @@ HINT = (
 LARGE_MM2 = 100.0
 #: As many rows of the legend are seen without scrolling.
 ROWS = 7
+#: Lines of the hint, and of what a map rests on.
+TEXT_LINES = 2
 _MEASURES = (
     ("Probability", Measure.PROBABILITY),
     ("Spectral angle", Measure.ANGLE),
@@ -96,7 +98,8 @@ class MaterialsPanel(QWidget):
         limits = row_of(label("Limit"), self.worst, label("Margin"), self.margin, STRETCH)
         error = row_of(label("Library error"), self.error, STRETCH)
         map_row = row_of(self.write, self.clear, STRETCH)
-        column_of(sources, ways, error, limits, (self.table, 1), self.text, map_row, on=self, margins=0)
+        column_of(sources, ways, error, limits, self.text, (self.table, 1), map_row, on=self, margins=0)
+        self._keep_room()
         self.folder.clicked.connect(self.choose_folder)
         self.file.clicked.connect(self.choose_file)
         self.marks.clicked.connect(lambda: control.from_marks(self.way))
@@ -106,6 +109,12 @@ class MaterialsPanel(QWidget):
             box.valueChanged.connect(lambda _: control.set_limits(self.worst.value(), self.margin.value()))
         self._new_measure()
         state.materials.follow(self._show)
+
+    def _keep_room(self) -> None:
+        """Keep the room of the legend and of its notes: nothing moves under a click when they come."""
+        # A layout takes one line of a text that breaks for enough, and draws the rest over the table.
+        self.text.setMinimumHeight(TEXT_LINES * self.text.fontMetrics().lineSpacing())
+        self.table.keep_room(ROWS)
 
     @property
     def way(self) -> Way:
@@ -163,9 +172,6 @@ class MaterialsPanel(QWidget):
             button.setEnabled(materials is not None)
         self.table.setVisible(materials is not None)
         self.text.setText(HINT if materials is None else materials_text(materials))
-        lines = 1 if materials is None or not materials.notes else 2
-        # A layout takes one line of a text that breaks for enough, and draws the rest over the table.
-        self.text.setMinimumHeight(lines * self.text.fontMetrics().lineSpacing())
         self.text.setToolTip(plain_tip("" if materials is None else _method(materials)))
         if materials is None:
             return
@@ -184,7 +190,6 @@ class MaterialsPanel(QWidget):
             figures = (cell(text, "", RIGHT) for text in (f"{row.pixels:,}", share, area))
             rows.append((first, *figures))
         self.table.show_rows(rows)
-        self.table.ask_for_rows(ROWS)
 
     def apply_theme(self, theme: Theme) -> None:
         """Apply the colours of a theme."""

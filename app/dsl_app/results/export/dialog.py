@@ -51,7 +51,7 @@ class ExportDialog(QDialog):
         self.replace = check_box("Replace existing files", "If not ticked, existing files are never replaced")
         self.replace.toggled.connect(lambda _: self._check())
         self.text = label("", wraps=True)
-        self.buttons = QDialogButtonBox(QDialogButtonBox.StandardButton.Cancel)
+        self.buttons = QDialogButtonBox(QDialogButtonBox.StandardButton.Cancel, self)
         self.write = self.buttons.addButton("Export", QDialogButtonBox.ButtonRole.AcceptRole)
         self.write.setToolTip("Write the selected formats")
         set_role(self.write, "primary")

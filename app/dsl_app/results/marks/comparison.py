@@ -7,12 +7,14 @@ from html import escape
 import numpy as np
 
 from dsl_app.results.state import Mark, ResultsState
+from dsl_app.shared.spectrum import number_text
 from dsl_app.shared.theme import Theme
 from dsl_core.errors import DslError
 from dsl_core.evaluation.marks import distance_between
 from dsl_core.evaluation.spectral import compare
 from dsl_core.io.result.result_arrays import ResultArrays
 from dsl_core.model.figure import with_std
+from dsl_core.words import counted
 
 
 def comparison_html(state: ResultsState, theme: Theme) -> str:
@@ -23,7 +25,11 @@ def comparison_html(state: ResultsState, theme: Theme) -> str:
     if chosen is None or chosen.kind == "reference" or result is None:
         return ""
     shown = [mark for mark in state.marks.value if mark.shown and not mark.trouble and mark.key != chosen.key]
-    return comparison_table(chosen, shown, theme) + distance_table(chosen, shown, result, theme)
+    return (
+        region_table(chosen, state.band.value, theme)
+        + comparison_table(chosen, shown, theme)
+        + distance_table(chosen, shown, result, theme)
+    )
 
 
 def _table(head: list[str], rows: list[str], theme: Theme) -> str:
@@ -35,6 +41,20 @@ def _table(head: list[str], rows: list[str], theme: Theme) -> str:
         f"<table cellspacing='0' cellpadding='3' width='100%'>"
         f"<tr style='color:{theme.muted}'>{cells}</tr>{''.join(rows)}</table>"
     )
+
+
+def region_table(chosen: Mark, band: int, theme: Theme) -> str:
+    """At a band: the mean of a region, by how much its pixels differ, and what is stated for one of them."""
+    spectrum, stated = chosen.spectrum, chosen.pixel_std
+    if chosen.kind != "region" or spectrum.std is None or stated is None or band >= len(spectrum.nm):
+        return ""
+    figures = (spectrum.mean[band], spectrum.std[band], stated[band])
+    head = [f"{escape(chosen.name)}, {spectrum.nm[band]:g} nm", "mean", "spread ±", "stated ±"]
+    cells = "".join(f"<td align='right'>{number_text(float(each), 4)}</td>" for each in figures)
+    pixels = f"{chosen.used} of {counted(chosen.pixels, 'pixel')}"
+    about = "Spread: how its pixels differ. Stated: the deviation of one pixel."
+    rows = [f"<tr><td>{pixels}</td>{cells}</tr>", f"<tr><td colspan='4'>{about}</td></tr>"]
+    return _table(head, rows, theme)
 
 
 def comparison_table(chosen: Mark, others: list[Mark], theme: Theme) -> str:

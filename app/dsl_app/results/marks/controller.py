@@ -78,12 +78,13 @@ class MarksController:
     def add_references(self, path: Path, chosen: Iterable[Reference]) -> None:
         """Add reference spectra of a file; ends the choice from a library.
 
-        Says why one that has no wavelength in common with the result is neither drawn nor compared.
+        One that is listed already is selected instead. Says why one that has no wavelength in common with
+        the result is neither drawn nor compared.
         """
         self.state.library.set(None)
         for each in chosen:
             self._tell_if_beside(each.name or path.stem, each.curve.wavelengths_nm)
-            self._storage.when_read(lambda each=each: self._add(self._reference(path, each)))  # type: ignore[misc]
+            self._storage.when_read(lambda each=each: self._add_reference(path, each))  # type: ignore[misc]
 
     def _tell_if_beside(self, name: str, nm: Sequence[float]) -> None:
         result = self.state.result.value
@@ -97,9 +98,15 @@ class MarksController:
                 " it is listed, but neither drawn nor compared. If that is not so, correct its wavelengths.",
             )
 
-    def _reference(self, path: Path, chosen: Reference) -> Mark:
+    def _add_reference(self, path: Path, chosen: Reference) -> None:
+        origin = (path, chosen.name, chosen.curve)
+        for mark in self.state.marks.value:
+            if (mark.file, mark.entry, mark.curve) == origin:
+                self._notifier.tell("info", f"{mark.name} of {path.name} is listed already.")
+                self.state.selected.set(mark.key)
+                return
         name = chosen.name or path.stem
-        return mark_of_reference(name, self._colour(), path, chosen.curve, chosen.name)
+        self._add(mark_of_reference(name, self._colour(), path, chosen.curve, chosen.name))
 
     def _add_region(self, draft: Mark) -> None:
         result = self.state.result.value

@@ -46,7 +46,7 @@ class LibraryDialog(QDialog):
             item.setData(ENTRY, reference.name)
             self.list.addItem(item)
         self.text = label("", "muted", wraps=True)
-        self.buttons = QDialogButtonBox(QDialogButtonBox.StandardButton.Cancel)
+        self.buttons = QDialogButtonBox(QDialogButtonBox.StandardButton.Cancel, self)
         self.add = self.buttons.addButton("Add", QDialogButtonBox.ButtonRole.AcceptRole)
         self.add.setToolTip("Compare with the selected spectra")
         set_role(self.add, "primary")

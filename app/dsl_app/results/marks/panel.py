@@ -116,6 +116,7 @@ class MarksPanel(QWidget):
         self.export.clicked.connect(self.export_spectra)
         self._state.marks.follow(lambda _: self._fill())
         self._state.selected.follow(lambda _: self._show_selection())
+        self._state.band.changed.connect(lambda _: self._show_band())
 
     def choose_reference(self) -> None:
         """Ask for a file with a spectrum."""
@@ -200,6 +201,11 @@ class MarksPanel(QWidget):
             self.tree.setCurrentIndex(QModelIndex() if chosen is None else self.tree.indexFromItem(chosen[1]))
         self.remove.setEnabled(self._state.selected_mark is not None)
         self._later.start()
+
+    def _show_band(self) -> None:
+        mark = self._state.selected_mark
+        if mark is not None and mark.kind == "region":
+            self._later.start()
 
     def _compare(self) -> None:
         text = comparison_html(self._state, self._theme)

@@ -135,6 +135,7 @@ def reconstruct(
 
 def read_source(path: Path, library: tuple[str, ...]) -> ReconstructionSource:
     """Read what the choices depend on, from a scan or the scan of a result; raises `StoreError`."""
+    from dsl_core.io.kinds import what_is_at
     from dsl_core.io.result.result_file import load_result
     from dsl_core.io.scan.check import require_complete
     from dsl_core.io.scan.folder import ScanReader
@@ -150,8 +151,8 @@ def read_source(path: Path, library: tuple[str, ...]) -> ReconstructionSource:
             before, scan = path.with_suffix(RESULT_SUFFIX), path
         case _:
             raise StoreError(
-                f"{path.name} is not a scan. Choose a folder NAME.dsl with all of its frames, or open its"
-                " result first."
+                f"{path.name} is not a scan: {what_is_at(path)}. Choose a folder NAME.dsl with all of its"
+                " frames, or open its result first."
             )
     reader = ScanReader(scan)
     require_complete(reader)

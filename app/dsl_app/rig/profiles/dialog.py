@@ -52,7 +52,7 @@ class ProfileDialog(QDialog):
         )
         self.findings.wrap(1)
         self.trouble = label("", "bad", wraps=True)
-        self.buttons = QDialogButtonBox(QDialogButtonBox.StandardButton.Cancel)
+        self.buttons = QDialogButtonBox(QDialogButtonBox.StandardButton.Cancel, self)
         self.buttons.button(QDialogButtonBox.StandardButton.Cancel).setToolTip("Close unsaved (Escape)")
         self.save = self.buttons.addButton("Save", QDialogButtonBox.ButtonRole.AcceptRole)
         self.save.setToolTip("Save the profile, whole or not at all")

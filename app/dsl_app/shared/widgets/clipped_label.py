@@ -2,15 +2,21 @@
 
 from __future__ import annotations
 
-from PySide6.QtCore import QRect, Qt
+from PySide6.QtCore import Qt
 from PySide6.QtGui import QPainter, QPaintEvent
 from PySide6.QtWidgets import QLabel, QSizePolicy
 
-DOTS = "…"
+#: What is between two parts of a line.
+BETWEEN = " · "
+#: A last part of which less than this is left says nothing: the line is cut at its end, px.
+LEAST_PX = 60
 
 
 class ClippedLabel(QLabel):
-    """A muted line that may be narrower than its text; it ends in an ellipsis there, and is copied whole."""
+    """A muted line that may be narrower than its text; copied whole.
+
+    Its last part loses its middle first: of a path, the name at its end says most.
+    """
 
     def __init__(self) -> None:
         super().__init__()
@@ -20,21 +26,25 @@ class ClippedLabel(QLabel):
         self.setProperty("role", "muted")
 
     @property
-    def dots(self) -> QRect | None:
-        """Where the ellipsis is; None while the text is whole."""
-        room = self.contentsRect()
-        if self.fontMetrics().horizontalAdvance(self.text()) <= room.width():
-            return None
-        width = self.fontMetrics().horizontalAdvance(f" {DOTS}")
-        return room.adjusted(room.width() - width, 0, 0, 0)
+    def shown(self) -> str:
+        """The text as it fits."""
+        text, metrics, room_px = self.text(), self.fontMetrics(), self.contentsRect().width()
+        if metrics.horizontalAdvance(text) <= room_px:
+            return text
+        head, between, last = text.rpartition(BETWEEN)
+        left_px = room_px - metrics.horizontalAdvance(head + between)
+        if left_px < LEAST_PX:
+            return metrics.elidedText(text, Qt.TextElideMode.ElideRight, room_px)
+        return head + between + metrics.elidedText(last, Qt.TextElideMode.ElideMiddle, left_px)
 
     def paintEvent(self, event: QPaintEvent) -> None:
-        """Paint the text, and the ellipsis over its end."""
-        super().paintEvent(event)
-        area = self.dots
-        if area is not None:
-            painter = QPainter(self)
-            painter.fillRect(area, self.palette().window())
-            painter.setPen(self.palette().windowText().color())
-            painter.drawText(area, Qt.AlignmentFlag.AlignVCenter | Qt.AlignmentFlag.AlignRight, DOTS)
-            painter.end()
+        """Paint the text as it fits; while some of it is selected, from its beginning."""
+        shown = self.shown
+        if shown == self.text() or self.hasSelectedText():
+            super().paintEvent(event)
+            return
+        painter = QPainter(self)
+        painter.setPen(self.palette().windowText().color())
+        side = Qt.AlignmentFlag.AlignVCenter | Qt.AlignmentFlag.AlignLeft | Qt.TextFlag.TextSingleLine
+        painter.drawText(self.contentsRect(), side, shown)
+        painter.end()

@@ -50,7 +50,7 @@ def text_window(title: str, content: QWidget, parent: QWidget, width: int, heigh
     window.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
     window.setWindowTitle(title)
     window.resize(width, height)
-    buttons = QDialogButtonBox(QDialogButtonBox.StandardButton.Close)
+    buttons = QDialogButtonBox(QDialogButtonBox.StandardButton.Close, window)
     buttons.button(QDialogButtonBox.StandardButton.Close).setToolTip("Close this window (Escape)")
     buttons.rejected.connect(window.reject)
     column_of((content, 1), buttons, on=window)
@@ -92,7 +92,7 @@ class JobDialog(QDialog):
         self.stops: list[Callable[[], None]] = []
         self.column = column_of(on=self)
         self.text: QLabel = label("", "muted", wraps=True)
-        self.buttons = QDialogButtonBox(QDialogButtonBox.StandardButton.Cancel)
+        self.buttons = QDialogButtonBox(QDialogButtonBox.StandardButton.Cancel, self)
         self.go = self.buttons.addButton("", QDialogButtonBox.ButtonRole.AcceptRole)
         set_role(self.go, "primary")
         self.command = self.buttons.addButton("Show command line", QDialogButtonBox.ButtonRole.ActionRole)

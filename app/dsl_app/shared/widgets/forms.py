@@ -7,8 +7,8 @@ from contextlib import contextmanager
 from dataclasses import fields
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from PySide6.QtCore import QObject, Qt, SignalInstance
-from PySide6.QtGui import QKeyEvent, QWheelEvent
+from PySide6.QtCore import QLocale, QObject, Qt, SignalInstance
+from PySide6.QtGui import QKeyEvent, QValidator, QWheelEvent
 from PySide6.QtWidgets import (
     QAbstractButton,
     QCheckBox,
@@ -51,7 +51,10 @@ class CalmWheel(_Base):
 
 
 class NumberBox(CalmWheel, QDoubleSpinBox):
-    """A number with its unit."""
+    """A number with its unit, written with a point as in all texts; a comma that is typed is a point, too.
+
+    In the language of the system, Qt would leave the other sign out: 55.5 ms would become 555 ms.
+    """
 
     def __init__(
         self,
@@ -64,6 +67,7 @@ class NumberBox(CalmWheel, QDoubleSpinBox):
         tip: str = "",
     ) -> None:
         super().__init__()
+        self.setLocale(QLocale.c())
         self.setRange(low, high)
         self.setDecimals(decimals)
         self.setValue(value)
@@ -72,6 +76,10 @@ class NumberBox(CalmWheel, QDoubleSpinBox):
         named(self, name, tip or name)
         if unit:
             self.setSuffix(f" {unit}")
+
+    def validate(self, text: str, place: int) -> tuple[QValidator.State, str, int]:
+        """Take a comma for the point that it means."""
+        return super().validate(text.replace(",", "."), place)
 
 
 class WholeBox(CalmWheel, QSpinBox):
@@ -233,8 +241,10 @@ def set_role(widget: QWidget, role: str) -> None:
     """Give a widget another role and let the style sheet see it."""
     if widget.property("role") != role:
         widget.setProperty("role", role)
-        widget.style().unpolish(widget)
-        widget.style().polish(widget)
+        # What was never on screen is styled when it comes there: doing so twice makes a page late.
+        if widget.testAttribute(Qt.WidgetAttribute.WA_WState_Polished):
+            widget.style().unpolish(widget)
+            widget.style().polish(widget)
 
 
 class Banner(QFrame):

@@ -83,10 +83,13 @@ class ReadTable(QTableWidget):
         font.setFeature(QFont.Tag("tnum"), 1)
         self.setFont(font)
 
-    def ask_for_rows(self, most: int) -> None:
-        """Take the room of its rows, up to ``most``, from what is above and below."""
-        rows = min(self.rowCount(), most) * self.verticalHeader().defaultSectionSize()
-        self.setMinimumHeight(self.horizontalHeader().sizeHint().height() + rows + 2 * self.frameWidth())
+    def keep_room(self, rows: int) -> None:
+        """Keep the room of so many rows, whether they are there, seen or hidden: nothing moves for them."""
+        rows_px = rows * self.verticalHeader().defaultSectionSize()
+        self.setMinimumHeight(self.horizontalHeader().sizeHint().height() + rows_px + 2 * self.frameWidth())
+        policy = self.sizePolicy()
+        policy.setRetainSizeWhenHidden(True)
+        self.setSizePolicy(policy)
 
     def widen(self, column: int) -> None:
         """Let a column take the remaining width, but not less than `LEAST_WIDE_PX`; longer texts are cut."""

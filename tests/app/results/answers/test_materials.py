@@ -165,6 +165,7 @@ def test_notes_are_two_lines_that_leave_the_legend_alone(qtbot: QtBot, bench: Be
     qtbot.addWidget(panel)
     panel.show()
     bench.control.marks.pin((30, 5))
+    room = panel.minimumSizeHint()
     panel.marks.click()
     reason = "pin 1 is left out: its reflectance of 0.15 is known to ±0.44 only and would explain others."
     for notes, told in (
@@ -177,7 +178,9 @@ def test_notes_are_two_lines_that_leave_the_legend_alone(qtbot: QtBot, bench: Be
         assert reason in panel.text.toolTip() or reason not in notes
     panel.resize(430, panel.minimumSizeHint().height())
     assert panel.text.height() >= 2 * panel.text.fontMetrics().lineSpacing()
-    assert panel.text.y() >= panel.table.geometry().bottom()
+    assert panel.table.y() >= panel.text.geometry().bottom()
+    # Nothing moved when the legend came.
+    assert panel.minimumSizeHint() == room
 
 
 def test_the_legend_is_seen_whole_at_150_percent(qtbot: QtBot, bench: Bench) -> None:

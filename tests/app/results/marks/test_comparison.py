@@ -50,3 +50,17 @@ def test_a_short_reference_says_its_range(bench: Bench, tmp_path: Path) -> None:
     short.write_text("\n".join(f"{nm},0.5" for nm in range(500, 551, 5)))
     bench.control.marks.add_reference(short)
     assert "only 500–550 nm, free scale" in select(bench, 0)
+
+
+def test_a_region_says_how_its_pixels_differ_and_what_is_stated_for_one(bench: Bench) -> None:
+    bench.control.marks.add_outline(SQUARE)
+    region = bench.state.selected_mark
+    assert region is not None
+    assert region.spectrum.std is not None
+    assert region.pixel_std is not None
+    bench.state.band.set(1)
+    html = comparison_html(bench.state, LIGHT)
+    assert f"region 1, {region.spectrum.nm[1]:g} nm" in html
+    assert "20 of 20 pixels" in html
+    for value in (region.spectrum.mean[1], region.spectrum.std[1], region.pixel_std[1]):
+        assert f">{value:.4f}<" in html

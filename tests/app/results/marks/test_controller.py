@@ -57,6 +57,20 @@ def test_marks_are_saved_next_to_the_result(bench: Bench, tmp_path: Path) -> Non
     assert (gone.name, "tile.csv" in gone.trouble) == ("tile", True)
 
 
+def test_a_reference_that_is_listed_is_selected_and_not_added_again(bench: Bench, tmp_path: Path) -> None:
+    marks, tile = bench.control.marks, write_reference(tmp_path / "tile.csv", BLUE)
+    marks.add_reference(tile)
+    (listed,) = bench.state.marks.value
+    marks.pin((3, 3))
+    marks.add_reference(tile)
+    assert bench.names == ["tile", "pin 1"]
+    assert bench.state.selected_mark is listed
+    assert "tile of tile.csv is listed already" in bench.told
+    # The same file with other values is another reference.
+    marks.add_reference(write_reference(tile, 2 * BLUE))
+    assert len(bench.names) == 3
+
+
 def test_a_damaged_file_of_marks_does_not_keep_the_result_shut(tmp_path: Path) -> None:
     path = write_small_result(tmp_path)
     (tmp_path / "small.marks.json").write_text("{")

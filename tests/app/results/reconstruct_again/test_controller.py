@@ -172,7 +172,7 @@ def test_what_the_calibration_lacks_is_told_and_nothing_is_left(bench: Bench) ->
 
 
 def test_what_is_not_a_complete_scan_is_told(bench: Bench) -> None:
-    for path, sentence in ((bench.folder, "is not a scan"), (bench.folder / "gone.dsl", "is not a scan")):
+    for path, sentence in ((bench.folder, "is not a scan"), (bench.folder / "gone.dsl", "moved or deleted")):
         bench.control.prepare(path)
         assert sentence in bench.notifier.told[-1][1]
     log = bench.folder / "small.dsl" / "frames.jsonl"

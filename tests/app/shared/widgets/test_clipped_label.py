@@ -2,33 +2,37 @@
 
 from __future__ import annotations
 
-from dsl_app.shared.widgets.clipped_label import ClippedLabel
+from dsl_app.shared.widgets.clipped_label import LEAST_PX, ClippedLabel
 from pytestqt.qtbot import QtBot
 
-TEXT = "445 x 290 px, /a/long/folder/of/scans/color-checker.zarr"
+FACTS, PATH = "445 x 290 px · ", "/a/long/folder/of/scans/of/many/days/color-checker.zarr"
 
 
-def test_the_end_of_a_clipped_line_is_an_ellipsis(qtbot: QtBot) -> None:
+def test_a_path_loses_its_middle_and_facts_stay(qtbot: QtBot) -> None:
     label = ClippedLabel()
     qtbot.addWidget(label)
-    label.setText(TEXT)
-    whole_px = label.fontMetrics().horizontalAdvance(TEXT)
-    label.resize(whole_px + 10, 30)
-    dots = [label.dots]
-    label.resize(whole_px // 2, 30)
-    dots.append(label.dots)
-    unclipped, area = dots
-    assert unclipped is None
-    assert area is not None
-    assert area.right() == label.contentsRect().right()
-    picture = label.grab().toImage()
-    ground = label.palette().window().color()
-    # Nothing of the text is left between the ellipsis and the dots' left edge but the ground.
-    assert picture.pixelColor(area.left(), area.center().y()) == ground
-    assert any(
-        picture.pixelColor(x, y) != ground
-        for x in range(area.left(), area.right())
-        for y in range(area.top(), area.bottom())
-    )
+    label.setText(FACTS + PATH)
+    facts_px = label.fontMetrics().horizontalAdvance(FACTS)
+    whole_px = label.fontMetrics().horizontalAdvance(FACTS + PATH)
+    label.resize(whole_px + 1, 30)
+    assert label.shown == FACTS + PATH
+    label.resize((facts_px + whole_px) // 2, 30)
+    assert label.shown.startswith(FACTS + "/a/")
+    assert label.shown.endswith("checker.zarr")
+    assert "…" in label.shown
+    label.resize(facts_px + LEAST_PX // 2, 30)
+    assert label.shown.startswith(FACTS.strip())
+    assert label.shown.endswith("…")
     # What is copied, and read to the blind, is the whole text.
-    assert label.text() == TEXT
+    assert label.text() == FACTS + PATH
+
+
+def test_what_is_painted_is_what_fits(qtbot: QtBot) -> None:
+    label, short = ClippedLabel(), ClippedLabel()
+    for each in (label, short):
+        qtbot.addWidget(each)
+    label.setText(FACTS + PATH)
+    label.resize(label.fontMetrics().horizontalAdvance(FACTS + PATH) - 100, 30)
+    short.setText(label.shown)
+    short.resize(label.size())
+    assert label.grab().toImage() == short.grab().toImage()

@@ -3,7 +3,7 @@ from __future__ import annotations
 import pytest
 from dsl_app.shared.widgets.forms import ChoiceBox, NumberBox, check_box, label, named, push_button, quiet
 from dsl_app.shared.widgets.read_table import RIGHT, ReadTable, cell
-from PySide6.QtCore import Qt
+from PySide6.QtCore import QLocale, Qt
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QLineEdit, QWidget
 from pytestqt.qtbot import QtBot
@@ -90,3 +90,19 @@ def test_a_label_never_reads_its_text_as_markup(qtbot: QtBot) -> None:
     plain = label("x" * 14)
     qtbot.addWidget(plain)
     assert words.sizeHint().height() == plain.sizeHint().height()
+
+
+@pytest.mark.parametrize("language", ["de_DE", "en_US", "fr_FR"])
+def test_a_number_means_the_same_in_every_language(qtbot: QtBot, language: str) -> None:
+    before = QLocale()
+    QLocale.setDefault(QLocale(language))
+    try:
+        for typed in ("55.5", "55,5"):
+            box = NumberBox("Exposure", 0.0, 5000.0, 1.0, "ms", 1)
+            qtbot.addWidget(box)
+            box.selectAll()
+            QTest.keyClicks(box, typed)
+            box.interpretText()
+            assert (box.value(), box.text()) == (55.5, "55.5 ms")
+    finally:
+        QLocale.setDefault(before)
