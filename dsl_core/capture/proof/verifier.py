@@ -347,8 +347,6 @@ class FrameProof:
         first_of_role = not self._usual.knows(shot)
         found = self._decide(shot, contests, share, lambda: None)
         if shot.role == "spectral" and has_black:
-            if not found.is_wrong and self._is_over_white(shot, seen, black):
-                return Finding(shot, Verdict.OTHER, (shot,), "a part of it is brighter than white")
             found = self._in_place(found, contests, self._places_again(shot, seen, wanted, black))
         if found.verdict is Verdict.DISPLACED:
             return found
@@ -372,17 +370,6 @@ class FrameProof:
             side: contest_of_places(seen, wanted, now, light, (profile, moved(profile, side)), self._noise)
             for side in SIDES
         }
-
-    def _is_over_white(self, shot: Shot, seen: Counts, black: Floats) -> bool:
-        """`is_over_white` at a later setting, whose white follows from that of the first one."""
-        lit = self._code.lit if self._code is not None else None
-        profile = self._profile(shot)
-        if lit is None or profile is None:
-            return False
-        factor = np.float32(self._later.scale(shot))
-        sigma = np.float32(max(float(factor), 1.0)) * lit.sigma
-        now = replace(lit, black=black[lit.index], contrast=factor * lit.contrast, sigma=sigma)
-        return is_over_white(seen, now, profile)
 
     def _black_gained(self, shot: Shot, seen: Counts) -> np.float32:
         """By how much black was more; 0 where many lines leave no pixel without their first orders."""
