@@ -30,6 +30,7 @@ from dsl_core.model.plan import CapturePlan
 from dsl_core.model.spectral import SpectralCurve
 from dsl_core.patterns.images import pattern_image
 from dsl_core.simulation.sim_devices import open_twin
+from tests.cases.lab_mishaps import CAMERA_MISHAPS, PROJECTOR_MISHAPS, CameraMishap
 from tests.cases.pattern_faults import LASTING, SINGLE, PatternFault, PatternFaults
 from tests.cases.rig_habits import ALWAYS, CAMERA_HABITS, PROJECTOR_HABITS
 from tests.cases.spoiled_pictures import SPOILED, Spoil, squared
@@ -148,6 +149,12 @@ def _spoiled(spoil: Spoil) -> Change:
     return lambda frame, camera: replace(frame, pixels=spoil(frame.pixels, camera.happened - 1))
 
 
+def _mishap(change: CameraMishap) -> Change:
+    return lambda frame, camera: replace(
+        frame, pixels=change(frame.pixels, (camera.last or frame).pixels, camera.happened - 1)
+    )
+
+
 def _fill(frame: Frame, camera: LabCamera) -> object:
     if camera.buffer is None:
         camera.buffer = frame.pixels.copy()
@@ -195,6 +202,7 @@ CAMERA: dict[str, tuple[bool, Change]] = {
     "memory used again": (False, _fill),
     **{kind: (is_single, _spoiled(spoil)) for kind, (is_single, spoil) in SPOILED.items()},
     **{kind: (False, _spoiled(spoil)) for kind, spoil in CAMERA_HABITS.items()},
+    **{kind: (False, _mishap(change)) for kind, change in CAMERA_MISHAPS.items()},
 }
 
 
@@ -204,6 +212,7 @@ class LabProjector(Projector):
     def __init__(self, projector: Projector, kind: str, at: int) -> None:
         self.projector, self.kind, self.at = projector, kind, at
         self.shown = 0
+        self.last: NDArray[np.uint8] | None = None
 
     @property
     def info(self) -> ProjectorInfo:
@@ -214,6 +223,7 @@ class LabProjector(Projector):
 
     def show(self, image: NDArray[np.uint8]) -> None:
         self.shown += 1
+        last, self.last = image if self.last is None else self.last, image
         if self.shown >= self.at:
             match self.kind:
                 case "projector hangs":
@@ -232,6 +242,8 @@ class LabProjector(Projector):
                     image = squared(image)
                 case kind if kind in PROJECTOR_HABITS:
                     image = PROJECTOR_HABITS[kind](image, self.shown - max(self.at, 1))
+                case kind if kind in PROJECTOR_MISHAPS:
+                    image = PROJECTOR_MISHAPS[kind](image, last, self.shown - max(self.at, 1))
                 case "projector dims":
                     image = (0.75 * image).astype(np.uint8)
         self.projector.show(image)
@@ -330,6 +342,7 @@ PROJECTOR = (
     "projector squares its picture",
     "projector dims",
     *PROJECTOR_HABITS,
+    *PROJECTOR_MISHAPS,
 )
 #: Faults of the whole of a scan, that need no shot.
 OTHER = (

@@ -56,13 +56,19 @@ class CodePairs:
         return np.asarray(np.median(sums, axis=0), np.float32) if sums else None
 
     def broken(self, pair: Pair, expected: Floats | None) -> NDArray[np.bool_] | None:
-        """Pixels that break the sum of a pair, flat; None if it holds or nothing can be told."""
+        """Pixels that break the sum of a pair, flat; None if it holds or nothing can be told.
+
+        Light beyond full scale is lost: that the sum of a saturated pixel is too small breaks nothing. So it
+        is with white where fine stripes, blurred, just do not saturate.
+        """
         if expected is None:
             return None
         dark, bright, lit = self.contrast([pair])
         sigma = np.sqrt(2 * (self._noise.variance(pair[0]) + self._noise.variance(pair[1])))
         limit = np.maximum(BROKEN_SHARE * (bright - dark), BROKEN_SIGMAS * sigma)
-        found = lit & (np.abs(_together(pair) - expected) > limit)
+        apart = _together(pair) - expected
+        is_clipped = np.maximum(*pair) >= self._noise.sensor.full_scale_dn
+        found = lit & (np.abs(apart) > limit) & ~(is_clipped & (apart < 0))
         enough = max(FEWEST_BROKEN, LEAST_BROKEN * int(lit.sum()))
         return found if int(found.sum()) > enough else None
 

@@ -28,6 +28,9 @@ BRIGHT_SHARE, ELSEWHERE = 0.5, 0.2
 NO_ORDERS, LEAST_GAINED = 0.25, 0.5
 #: Columns count as lit by a pattern above this share of full light.
 LIT_SHARE = 0.1
+#: By how much pixels are brighter than white, and not by light of the room: as a share of the contrast of
+#: most of them, and in deviations.
+OVER_WHITE, OVER_WHITE_SIGMAS = 0.3, 8.0
 #: Brightness is measured where a pattern has this share of its brightest column: on the flank of a line light
 #: depends on parts of a column, which the code does not tell.
 BODY_SHARE = 0.5
@@ -113,6 +116,20 @@ def is_lit_elsewhere(seen: Counts, lit: Lit, wanted: Floats) -> bool:
     unlit = Places.of(lit, wanted).unlit
     bright = seen[lit.index[unlit]] - lit.black[unlit] > BRIGHT_SHARE * lit.contrast[unlit]
     return int(bright.sum()) > max(FEWEST_UNLIT, ELSEWHERE * unlit.size)
+
+
+def is_over_white(seen: Counts, lit: Lit, wanted: Floats) -> bool:
+    """Whether a picture of columns has pixels brighter than white where its `line_profile` leaves it dark.
+
+    A window of another program may be there, which hardly any votes are against. White is all lines together,
+    so that none of them is brighter; ``lit`` holds the black and the contrast of the picture's setting.
+    """
+    unlit = Places.of(lit, wanted).unlit
+    if unlit.size < FEWEST_UNLIT:
+        return False
+    over = seen[lit.index[unlit]] - lit.black[unlit] - lit.contrast[unlit]
+    least = np.maximum(OVER_WHITE * np.median(lit.contrast), OVER_WHITE_SIGMAS * lit.sigma[unlit])
+    return int((over > least).sum()) >= FEWEST_BRIGHT
 
 
 def black_gained(seen: Counts, lit: Lit, wanted: Floats, noise: Noise) -> np.float32:

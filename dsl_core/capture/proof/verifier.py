@@ -28,6 +28,7 @@ from dsl_core.capture.proof.prediction import (
     contest_of_pictures,
     contest_of_places,
     is_lit_elsewhere,
+    is_over_white,
     line_profile,
 )
 from dsl_core.capture.proof.raster import Counts, Floats, Noise, Raster
@@ -280,6 +281,8 @@ class FrameProof:
         found = self._decide(shot, contests, share, lambda: self._line_shown(seen, shot))
         if not found.is_wrong and is_lit_elsewhere(seen, lit, wanted):
             return Finding(shot, Verdict.OTHER, (shot,), "it is bright where it should be dark")
+        if not found.is_wrong and is_over_white(seen, lit, wanted):
+            return Finding(shot, Verdict.OTHER, (shot,), "a part of it is brighter than white")
         wanted = usual * wanted
         places = {side: contest_of_lines(seen, lit, wanted, moved(wanted, side)) for side in SIDES}
         return self._in_place(found, contests, places)

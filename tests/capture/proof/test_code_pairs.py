@@ -182,3 +182,15 @@ def test_the_sound_end_is_broken_by_less_than_a_tenth_of_the_other(lower: int, i
     broken[:20] = True
     broken[400 - lower :] = True
     assert end_of(broken, np.ones(400, bool)) == is_torn
+
+
+def test_a_saturated_white_may_fall_short_of_the_sum_but_not_exceed_it() -> None:
+    full = Sensor().full_scale_dn
+    pattern = counts(np.where(np.arange(1000) % 2, full - 10, 2500))
+    known = pairs_of((pattern, pattern[::-1].copy()))
+    expected = known.sum()
+    white, black = counts(np.full(1000, full)), counts(np.full(1000, 100))
+    assert known.broken((white, black), expected) is None, "light beyond full scale is lost"
+    dimmer = counts(np.full(1000, full - 20))
+    assert known.broken((dimmer, black), expected) is not None
+    assert known.broken((white, counts(np.full(1000, full - 1))), expected) is not None

@@ -16,6 +16,7 @@ from dsl_core.capture.proof.prediction import (
     contest_of_pictures,
     contest_of_places,
     is_lit_elsewhere,
+    is_over_white,
     line_profile,
     rescaled,
 )
@@ -324,3 +325,20 @@ def test_a_fifth_of_the_pixels_bright_where_it_should_be_dark_shows_another_patt
     seen[index % 30 < 3] = 300
     seen[np.flatnonzero(index % 30 >= 3)[:bright]] = 210
     assert is_lit_elsewhere(seen, whole, wanted) == is_told
+
+
+@pytest.mark.parametrize(
+    ("counts", "pixels", "is_told"), [(365, 12, True), (365, 11, False), (355, 12, False), (380, 12, True)]
+)
+def test_a_window_is_told_by_pixels_brighter_than_white_beside_the_line(
+    counts: int, pixels: int, is_told: bool
+) -> None:
+    index = np.arange(700)
+    some = Lit(index, index % 30, floats(index * 0 + 100), floats(index * 0 + 200), floats(index * 0 + 1))
+    wanted = np.zeros(30, np.float32)
+    wanted[:3] = 1
+    seen = np.full(700, 120, np.uint16)
+    seen[index % 30 < 3] = 500
+    assert not is_over_white(seen, some, wanted), "the line itself may be"
+    seen[np.flatnonzero(index % 30 >= 3)[:pixels]] = counts
+    assert is_over_white(seen, some, wanted) == is_told

@@ -109,6 +109,17 @@ def test_half_the_exposure_is_found_and_said(
     assert float(told[1]) == pytest.approx(0.5, abs=0.05)
 
 
+def test_a_window_brighter_than_white_is_found_in_a_line(scene: RenderedScene) -> None:
+    rig, white, line = scene.open(5), _shot(scene, "white", 0, 0), _shot(scene, "spectral", 6, 0)
+    window = _take(rig, scene, line).astype(np.int64)
+    black = _take(rig, scene, _shot(scene, "black", 0, 0)).astype(np.int64)
+    place = np.s_[20:26, 28:36]
+    window[place] = (1.8 * _take(rig, scene, white).astype(np.int64) - 0.8 * black)[place]
+    found = _judge_with(scene, {line.index: np.clip(window, 0, 4094).astype(np.uint16)})
+    assert [finding.verdict for finding in found] == [Verdict.OTHER]
+    assert "brighter than white" in found[0].sentence
+
+
 @pytest.mark.parametrize("factor", [0.62, 1.6])
 def test_the_first_picture_of_a_setting_says_how_bright_the_others_are(
     scene: RenderedScene, factor: float

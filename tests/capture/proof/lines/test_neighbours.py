@@ -160,3 +160,16 @@ def test_two_pictures_of_one_line_are_different_by_all_their_light_or_by_a_few_p
     assert not neighbours.differ_at_first(picture(400, lit=200), picture(350, lit=200), black), "flicker"
     elsewhere = np.roll(picture(40, lit=100), 100)
     assert neighbours.differ_at_first(picture(40, lit=100), elsewhere, black), "another line"
+
+
+def test_whole_counts_do_not_make_two_pictures_of_a_faint_line_different() -> None:
+    rng = np.random.default_rng(4)
+    neighbours = LineNeighbours(Noise.of(Sensor(), 12), 64)
+
+    def picture(light: float) -> np.ndarray:
+        level = np.full(3072, 261.0)
+        level[:256] += light
+        return np.rint(level + rng.normal(0, 2.6, level.size)).astype(np.uint16)
+
+    black = picture(0)
+    assert not any(neighbours.differ_at_first(picture(10), picture(10), black) for _ in range(200))
