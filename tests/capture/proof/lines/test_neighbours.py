@@ -160,3 +160,12 @@ def test_two_pictures_of_one_line_are_different_by_all_their_light_or_by_a_few_p
     assert not neighbours.differ_at_first(picture(400, lit=200), picture(350, lit=200), black), "flicker"
     elsewhere = np.roll(picture(40, lit=100), 100)
     assert neighbours.differ_at_first(picture(40, lit=100), elsewhere, black), "another line"
+
+
+def test_two_pictures_of_a_faint_line_do_not_differ_by_light_of_the_room() -> None:
+    neighbours = LineNeighbours(Noise(SENSOR), COLUMNS)
+    for index in range(8):
+        neighbours.is_doubtful(index, _picture(4.0 * index, index, 60.0), None)
+    usual, again = _picture(32.0, 50, 60.0), _picture(32.0, 51, 60.0)
+    assert not neighbours.differ(usual, np.asarray(again + 12, np.uint16))
+    assert neighbours.differ(usual, np.asarray(_picture(28.0, 52, 60.0) + 12, np.uint16))
