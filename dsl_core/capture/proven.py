@@ -25,6 +25,9 @@ from dsl_core.progress import CancelToken
 SETTLE_MS = (100.0, 300.0, 900.0)
 #: After so many wrong pictures on end, projector or camera count as late.
 FAILURES = 2
+#: Pictures of which nothing can be told are unlike those before them on end within so many shots. None of
+#: them is ever right, so that a lamp that flickers now and then would else add up over a scan.
+ON_END = 3
 #: Of doubtful pictures that come out the same again, every so many are followed by a control.
 CONTROL_EVERY = 8
 #: A change may begin a little before it shows: so many pictures before one that stays wrong are withdrawn.
@@ -64,6 +67,7 @@ class ProvenShots:
         self._taker, self._proof, self._sink, self._token = taker, proof, sink, token
         self._diagnosis = diagnosis
         self._failures = 0
+        self._unlike_at = 0
         self._is_late = False
         self._untold: list[Shot] = []
         self._recent: deque[Shot] = deque(maxlen=JUST_BEFORE)
@@ -193,7 +197,7 @@ class ProvenShots:
         found = proof.judge(doubt.shot, second.pixels)
         is_cured = doubt.verdict is Verdict.RIGHT and not found.is_doubtful
         if differs or is_cured:
-            self._failures += 1
+            self._count_unlike(found)
             self.corrected += 1
             was_torn = is_cured and doubt.light is not Light.STEP
             reason = (
@@ -205,6 +209,13 @@ class ProvenShots:
             proof.believe_light(doubt.shot)
         self._doubts += 1
         return second, found
+
+    def _count_unlike(self, found: Finding) -> None:
+        """Count a picture that another one of its shot was unlike as one of a run, or as the first of one."""
+        shot = found.shot.index
+        if found.verdict is Verdict.UNTOLD and shot - self._unlike_at > ON_END:
+            self._failures = 0
+        self._failures, self._unlike_at = self._failures + 1, shot
 
     def _compare(self, alone: Finding, frame: Frame, proof: FrameProof) -> tuple[Frame, Finding]:
         """A picture that nothing tells, if another one of its shot is the same; else a third."""

@@ -15,9 +15,10 @@ from dsl_core.model.conditions import BayerPattern as BayerPattern
 from dsl_core.model.conditions import CaptureConditions
 from dsl_core.model.conditions import colour_sites as colour_sites
 from dsl_core.model.geometry import Lens, Pose
-from dsl_core.model.line_spread import LineSpread, Spread
+from dsl_core.model.projector.line_spread import LineSpread, Spread
+from dsl_core.model.projector.spread_field import SpreadField
+from dsl_core.model.projector.tone_curve import ToneCurve
 from dsl_core.model.spectral import SpectralCurve
-from dsl_core.model.spread_field import SpreadField
 
 Range = tuple[float, float]
 Rgb = tuple[SpectralCurve, SpectralCurve, SpectralCurve]
@@ -148,13 +149,16 @@ class Sensor(Record):
 class ProjectorResponse(Record):
     """From drive level to light: ``radiance = level ** gamma``, black level, blur and halo.
 
-    The halo is light of the zero order scattered sideways in the film: a column at distance ``d``
-    px contributes ``halo_peak_per_px * exp(-|d| / halo_decay_px)`` of its radiance. Without a measured
-    ``spread`` the blur is a Gaussian of rms width ``blur_px``; with one, that is the curve's rms width. Where
-    a ``field`` was measured, all its distances are wider or narrower by place.
+    Where the light leaves that power law, ``tone`` is the curve that was measured and counts instead, and
+    ``gamma`` the mean exponent between the drive levels of a scan. The halo is light of the zero order
+    scattered sideways in the film: a column at distance ``d`` px contributes
+    ``halo_peak_per_px * exp(-|d| / halo_decay_px)`` of its radiance. Without a measured ``spread`` the blur
+    is a Gaussian of rms width ``blur_px``; with one, that is the curve's rms width. Where a ``field`` was
+    measured, all its distances are wider or narrower by place.
     """
 
     gamma: float = Field(default=2.2, gt=0)
+    tone: ToneCurve | None = None
     black_fraction: float = Field(default=0.0, ge=0, lt=1)
     blur_px: float = Field(default=0.6, gt=0)
     halo_peak_per_px: float = Field(default=0.0, ge=0)
@@ -190,10 +194,14 @@ class ProjectorResponse(Record):
             return self.with_spread(self.spread.blurred(blur_px))
         return self.with_gaussian(float(np.hypot(self.blur_px, blur_px)))
 
+    def light(self, level: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Light above black of drive levels 0..1, relative to full drive."""
+        return np.asarray(level**self.gamma if self.tone is None else self.tone.light(level))
+
     def radiance(self, level: float | NDArray[np.float64]) -> NDArray[np.float64]:
         """Radiance relative to full drive, black included, for a level in 0..1, after 8 bit rounding."""
         drive = np.round(np.clip(level, 0, 1) * 255) / 255
-        return np.asarray(self.black_fraction + (1 - self.black_fraction) * drive**self.gamma)
+        return np.asarray(self.black_fraction + (1 - self.black_fraction) * self.light(drive))
 
 
 class CorrespondenceGrid(Record):

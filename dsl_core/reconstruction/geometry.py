@@ -10,8 +10,8 @@ import torch
 from numpy.typing import NDArray
 
 from dsl_core.errors import DecodeError
-from dsl_core.model.line_spread import zero_std_px
 from dsl_core.model.plan import CapturePlan
+from dsl_core.model.projector.line_spread import zero_std_px
 from dsl_core.model.result import DEPTH_INVALID, REASONS, Flag
 from dsl_core.model.rig import Rig
 from dsl_core.optics.correspondence import triangulate

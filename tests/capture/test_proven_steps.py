@@ -11,7 +11,7 @@ import pytest
 
 from dsl_core.capture.diagnosis import Explanation
 from dsl_core.capture.proof.finding import Finding, Light, Verdict
-from dsl_core.capture.proven import SETTLE_MS, PictureError, ProvenShots
+from dsl_core.capture.proven import ON_END, SETTLE_MS, PictureError, ProvenShots
 from dsl_core.errors import Cancelled, DeviceError
 from dsl_core.model.frames import Frame
 from dsl_core.model.plan import CapturePlan, GrayCode, LineComb, Shot
@@ -189,6 +189,15 @@ def test_a_second_wrong_one_makes_everything_late() -> None:
     bench.shots.take(SHOTS[14])
     assert "captured twice" in bench.shots.note
     assert bench.taken[4:] == CONTROLS
+
+
+@pytest.mark.parametrize(("apart", "is_late"), [(ON_END, True), (ON_END + 1, False)])
+def test_pictures_that_nothing_tells_are_late_only_if_they_differ_on_end(apart: int, is_late: bool) -> None:
+    bench = Bench(doubtful, untold, doubtful, untold, untold, untold, untold, differs=True)
+    bench.shots.take(LINE)
+    bench.shots.take(SHOTS[LINE.index + apart])
+    assert ("captured twice" in bench.shots.note) == is_late
+    assert bench.shots.corrected == (4 if is_late else 2)  # both are taken again, now that all are late
 
 
 def test_what_could_not_be_told_before_devices_were_late_is_taken_again_after_a_control() -> None:

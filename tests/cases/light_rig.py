@@ -30,6 +30,7 @@ class LightWorld:
     seed: int = 0
     cycle_hz: float | None = None
     gamma: tuple[float, float, float] = (2.2, 2.2, 2.2)
+    srgb: bool = False
     black: float = 0.0005
     ambient: float = 0.002
     brightness: float = 1.0
@@ -51,7 +52,12 @@ class LightWorld:
         """What each LED brings of a picture in a ms, (LEDs, rows, columns), DN."""
         levels = np.arange(256)
         level = np.where(levels >= self.drop, 0.8, 1.0) * levels / 255
-        light = self.black + (1 - self.black) * level ** np.array(self.gamma)[:, None]
+        light = level ** np.array(self.gamma)[:, None]
+        if self.srgb:
+            light = np.tile(
+                np.where(level <= 0.04045, level / 12.92, ((level + 0.055) / 1.055) ** 2.4), (3, 1)
+            )
+        light = self.black + (1 - self.black) * light
         return np.asarray(np.stack([light[led][picture[..., led]] for led in range(3)]) * SEEN)
 
     def drive(self, start_ms: float, stop_ms: float) -> NDArray[np.float64]:

@@ -13,9 +13,9 @@ from torch import Tensor
 
 from dsl_core.model.geometry import Lens, Pose
 from dsl_core.model.plan import CapturePlan, GrayCode, LineComb, ScanLines
+from dsl_core.model.projector.spread_field import SpreadField
 from dsl_core.model.rig import Rig
 from dsl_core.model.spectral import WavelengthGrid
-from dsl_core.model.spread_field import SpreadField
 from dsl_core.optics.colour_neighbours import bayer_colours
 from dsl_core.optics.correspondence import correspondence
 from dsl_core.optics.pixel_model import DEMOSAIC_SPREAD, EDGE_PX, PixelModel, demosaic_blur_px, without_offset

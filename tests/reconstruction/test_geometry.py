@@ -10,8 +10,8 @@ import pytest
 
 from dsl_core.errors import DecodeError
 from dsl_core.model.calibration.lateral_colour import LateralColour
-from dsl_core.model.line_spread import LineSpread
 from dsl_core.model.plan import CapturePlan, GrayCode, ScanLines
+from dsl_core.model.projector.line_spread import LineSpread
 from dsl_core.model.result import Flag
 from dsl_core.optics.lines.line_set import LineSet
 from dsl_core.reconstruction import geometry

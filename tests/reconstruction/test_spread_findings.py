@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 import torch
 
+from dsl_core.model.projector.spread_field import SpreadField
 from dsl_core.model.rig import ProjectorResponse
-from dsl_core.model.spread_field import SpreadField
 from dsl_core.optics.spread.field import FieldFit
 from dsl_core.optics.spread.fit import SpreadFit
 from dsl_core.reconstruction.spread_findings import spread_findings

@@ -33,7 +33,7 @@ from dsl_core.model.calibration.depth_stage import (
     StagePosition,
     apply_depth_stage,
 )
-from dsl_core.model.line_spread import zero_std_px
+from dsl_core.model.projector.line_spread import zero_std_px
 from dsl_core.model.rig import CorrespondenceGrid, Film, Rig
 from dsl_core.model.spectral import SpectralCurve
 from dsl_core.optics.correspondence import GratingModel

@@ -4,7 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+import numpy as np
+
 from dsl_core.calibration.selftest.record import PUBLISHED_MS
+from dsl_core.calibration.selftest.tone import MOST_LEFT
 from dsl_core.model.calibration.selftest import (
     CameraCheck,
     CycleCheck,
@@ -19,7 +22,7 @@ from dsl_core.model.figure import Figure
 #: Limits: percent of full scale; times the read noise; share of full scale; share of pixels.
 LINEARITY_PERCENT, BLACK_NOISES, SATURATION, HOT = 0.5, 5.0, 0.9, 1e-3
 #: Largest difference of gamma between colours, rms residual of a ramp, both percent; largest black.
-GAMMA_SPREAD_PERCENT, RAMP_PERCENT, BLACK = 2.0, 1.0, 0.01
+GAMMA_SPREAD_PERCENT, RAMP_PERCENT, BLACK = 2.0, 100 * MOST_LEFT, 0.01
 #: The new picture must be visible when ``show`` returns, within this; beat at the advised exposures, percent.
 WAIT_MS, BEAT_PERCENT = 1.0, 0.3
 #: A line of a scan is 5 px wide, and its edges are modelled by a blur of about 0.6 px.
@@ -110,17 +113,27 @@ def _projector(projector: ProjectorCheck) -> Iterator[Figure]:
         Measured(value=100 * (max(values) - min(values)) / mean, std=100 * 2**0.5 * std / mean),
         "%",
         high=GAMMA_SPREAD_PERCENT,
-        advice="One gamma is kept for all colours: choose a picture mode without colour management, or scan"
+        advice="One curve is kept for all colours: choose a picture mode without colour management, or scan"
         " with one drive level only.",
     )
+    tone = projector.tone
+    if tone is not None:
+        level = np.linspace(tone.lowest_level, 1.0, 100)
+        off = np.log(tone.light(level)) - mean * np.log(level)
+        yield _figure(
+            "light by drive level, farthest from a power law",
+            Measured(value=100 * float(np.abs(np.expm1(off)).max()), std=100 * tone.rel_std),
+            "%",
+        )
     worst = max((ramp.residual_percent for ramp in projector.ramps), key=lambda each: each.value)
     yield _figure(
-        "ramps, rms distance from the power law",
+        f"ramps, rms distance from the {'power law' if tone is None else 'measured curve'}",
         worst,
         "%",
         high=RAMP_PERCENT,
-        advice="Switch off the projector's picture enhancements, and in the computer's display settings"
-        " colour profiles and night light.",
+        advice="The light changes with more than the drive level: switch off the projector's picture"
+        " enhancements and dynamic contrast, and in the computer's display settings colour profiles and night"
+        " light.",
     )
     yield Figure(
         name="ramps, steps that fall",

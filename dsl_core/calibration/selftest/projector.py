@@ -1,20 +1,21 @@
-"""Gamma and black of a projector from ramps of white, red, green and blue."""
+"""Light by drive level and black of a projector from ramps of white, red, green and blue."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from itertools import pairwise
-from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dsl_core.calibration.selftest.camera import STEADINESS, Dark, Transfer
 from dsl_core.calibration.selftest.readings import Readings, RegionSizes, line_fit
+from dsl_core.calibration.selftest.tone import MOST_LEFT, RampLight, design_of, fit_tone, mean_exponent
 from dsl_core.errors import CalibrationError
-from dsl_core.model.calibration.selftest import AmbientCheck, Measured, ProjectorCheck, RampCheck
+from dsl_core.model.calibration.selftest import AmbientCheck, Colour, Measured, ProjectorCheck, RampCheck
+from dsl_core.model.projector.tone_curve import ToneCurve
 
 Floats = NDArray[np.float64]
-Colour = Literal["white", "red", "green", "blue"]
 
 #: Which LEDs each ramp drives.
 RAMPS: dict[Colour, tuple[int, int, int]] = {
@@ -31,13 +32,19 @@ _MIN_LEVELS = 4
 def check_projector(
     ramps: Readings, dark: Dark, transfer: Transfer, sizes: RegionSizes
 ) -> tuple[ProjectorCheck, AmbientCheck]:
-    """Gamma of each ramp and of all, black, and the light while the projector is black.
+    """Light by drive level of each ramp and of all, black, and the light while the projector is black.
 
     Light above black of level d is ``k_c * d ** gamma`` in camera channel c, so its logarithm is a line in
-    that of d with one slope for all channels. A channel that clips leaves the fit at that level only: a lit
-    LED is seen, weaker, by the other two as well.
+    that of d with one slope for all channels; where the light leaves that law, a curve with one form for all
+    (`tone`). A channel that clips leaves the fit at that level only: a lit LED is seen, weaker, by the other
+    two as well.
     """
-    fits = {colour: _fit_ramp(ramp_of(ramps, colour), colour, dark, transfer, sizes) for colour in RAMPS}
+    seen = {colour: ramp_light(ramp_of(ramps, colour), colour, dark, transfer, sizes) for colour in RAMPS}
+    tone = fit_tone(list(seen.values()))
+    fits = _fit_ramps(seen, tone)
+    if any(check.residual_percent.value > 100 * MOST_LEFT for check, _, _ in fits.values()):
+        tone = None  # light that no smooth curve describes depends on something else
+        fits = _fit_ramps(seen, tone)
     values = np.array([check.gamma.value for check, _, _ in fits.values()])
     stds = np.array([check.gamma.std for check, _, _ in fits.values()])
     gamma, covariance = line_fit(np.ones((len(values), 1)), values, stds)
@@ -46,6 +53,7 @@ def check_projector(
     projector = ProjectorCheck(
         ramps=tuple(check for check, _, _ in fits.values()),
         gamma=Measured(value=float(gamma[0]), std=float(np.sqrt(covariance[0, 0]))),
+        tone=tone,
         black_fraction=black,
         black_has_ambient=has_ambient,
     )
@@ -57,10 +65,10 @@ def ramp_of(ramps: Readings, colour: Colour) -> Readings:
     return ramps[((ramps.drive > 0) == np.array(RAMPS[colour], bool)).all(1)]
 
 
-def _fit_ramp(
+def ramp_light(
     ramp: Readings, colour: Colour, dark: Dark, transfer: Transfer, sizes: RegionSizes
-) -> tuple[RampCheck, Floats, Floats]:
-    """The check of one colour; light at full drive above black and its standard deviation, (3,) DN per ms."""
+) -> RampLight:
+    """The usable light of one ramp; raises `CalibrationError` where there is too little."""
     exposure = ramp.exposure_ms[:, None]
     signal = ramp.mean_dn - dark.level_dn.value - dark.rate * exposure
     std = np.hypot(transfer.mean_std(signal, sizes.pixels), STEADINESS * signal)
@@ -73,25 +81,45 @@ def _fit_ramp(
             f" {len(ramp)} frames are neither clipped nor dark. Check that the projector shows all colours,"
             " or change the camera's aperture."
         )
-    channel = np.nonzero(used)[1]
-    level = np.log(np.broadcast_to(drive[:, None], used.shape)[used])
-    logarithm = np.log((signal / exposure)[used])
-    relative = (std / np.where(used, signal, 1))[used]
-    present = np.unique(channel)
-    design = np.concatenate([(channel[:, None] == present).astype(float), level[:, None]], 1)
-    found, covariance = line_fit(design, logarithm, relative)
-    residual = logarithm - design @ found
-    weight = relative**-2 / (relative**-2).sum()
+    return RampLight(
+        colour,
+        np.nonzero(used)[1],
+        np.broadcast_to(drive[:, None], used.shape)[used],
+        np.log((signal / exposure)[used]),
+        (std / np.where(used, signal, 1))[used],
+        _falls(drive, signal / exposure, std / exposure, used),
+    )
+
+
+def _fit_ramps(
+    seen: Mapping[Colour, RampLight], tone: ToneCurve | None
+) -> dict[Colour, tuple[RampCheck, Floats, Floats]]:
+    terms = 1 if tone is None else len(tone.coefficients)
+    return {colour: _fit_ramp(light, terms) for colour, light in seen.items()}
+
+
+def _fit_ramp(light: RampLight, terms: int) -> tuple[RampCheck, Floats, Floats]:
+    """The check of one colour; light at full drive above black and its standard deviation, (3,) DN per ms."""
+    design, present = design_of([light], terms)
+    found, covariance = line_fit(design, light.log_light, light.std)
+    residual = light.log_light - design @ found
+    weight = light.std**-2 / (light.std**-2).sum()
     rms = float(np.sqrt(weight @ residual**2))
+    shape, scales = slice(len(present), None), slice(len(present))
+    mean = mean_exponent(terms)
     check = RampCheck(
-        colour=colour,
-        gamma=Measured(value=float(found[-1]), std=float(np.sqrt(covariance[-1, -1]))),
+        colour=light.colour,
+        gamma=Measured(
+            value=float(mean @ found[shape]), std=float(np.sqrt(mean @ covariance[shape, shape] @ mean))
+        ),
+        coefficients=tuple(found[shape].tolist()) if terms > 1 else None,
         residual_percent=Measured(value=100 * rms, std=100 * rms / np.sqrt(2 * len(residual))),
-        falls=_falls(drive, signal / exposure, std / exposure, used),
+        falls=light.falls,
     )
     full, full_std = np.zeros(3), np.zeros(3)
-    full[present] = np.exp(found[:-1])
-    full_std[present] = full[present] * np.sqrt(np.diag(covariance)[:-1])
+    channels = [channel for _, channel in present]
+    full[channels] = np.exp(found[scales])
+    full_std[channels] = full[channels] * np.sqrt(np.diag(covariance)[scales])
     return check, full, full_std
 
 

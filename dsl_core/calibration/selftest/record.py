@@ -26,10 +26,10 @@ from dsl_core.calibration.selftest.cycle import (
 )
 from dsl_core.calibration.selftest.focus import BarFrames, check_focus
 from dsl_core.calibration.selftest.latency import check_latency, is_right, trials
-from dsl_core.calibration.selftest.projector import RAMPS, Colour, check_projector, ramp_of
+from dsl_core.calibration.selftest.projector import RAMPS, check_projector, ramp_of
 from dsl_core.calibration.selftest.readings import Readings, RegionSizes, joined
 from dsl_core.errors import CalibrationError
-from dsl_core.model.calibration.selftest import CycleCheck, SelfTest
+from dsl_core.model.calibration.selftest import Colour, CycleCheck, SelfTest
 
 #: Exposures of the published prototype, whose beat is measured for comparison.
 PUBLISHED_MS = (160.0, 320.0)

@@ -92,7 +92,7 @@ class SelfTestRecipe(Recipe[SelfTest]):
         return selftest_figures(record)
 
     def apply(self, record: SelfTest, rig: Rig) -> Rig:
-        """Sensor, gamma and black of the projector, and the period of its colour cycle."""
+        """Sensor, light by drive level and black of the projector, and the period of its colour cycle."""
         camera, projector = record.camera, record.projector
         sensor = {
             "bit_depth": camera.bit_depth,
@@ -100,7 +100,11 @@ class SelfTestRecipe(Recipe[SelfTest]):
             "electrons_per_dn": camera.electrons_per_dn.value,
             "read_noise_dn": camera.read_noise_dn.value,
         }
-        response = {"gamma": projector.gamma.value, "black_fraction": projector.black_fraction.value}
+        response = {
+            "gamma": projector.gamma.value,
+            "tone": projector.tone,
+            "black_fraction": projector.black_fraction.value,
+        }
         changes: dict[str, object] = {
             "sensor": rig.sensor.model_copy(update=sensor),
             "projector_response": rig.projector_response.model_copy(update=response),

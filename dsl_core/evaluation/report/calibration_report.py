@@ -147,6 +147,7 @@ def _distortion(lens: Lens) -> str:
 
 def _film(rig: Rig) -> dict[str, str]:
     film, response = rig.film, rig.projector_response
+    tone = "" if response.tone is None else " (a measured curve instead of a power law)"
     x, y, z = rig.pose.projector_centre_mm
     return {
         "Projector's centre": f"{x:.2f}, {y:.2f}, {z:.2f} mm from the camera's",
@@ -154,7 +155,7 @@ def _film(rig: Rig) -> dict[str, str]:
         "Tilt, roll": f"{film.tilt_x_deg:.3f}°, {film.tilt_y_deg:.3f}°, {film.roll_deg:.3f}°",
         "Bend": f"{film.bend_per_mm:.5f} per mm",
         "Column uncertainty": f"{rig.column_std_px:.3f} px",
-        "Gamma, black": f"{response.gamma:.3f}, {response.black_fraction:.5f}",
+        "Gamma, black": f"{response.gamma:.3f}{tone}, {response.black_fraction:.5f}",
         "White scale": f"{rig.white_scale:.4g} ± {100 * rig.white_scale_rel_std:.2f} %",
         "Depth range": "{:g} to {:g} mm".format(*rig.depth_range_mm),
         "Sensor": (

@@ -4,9 +4,14 @@ from __future__ import annotations
 
 from typing import Literal
 
+import numpy as np
+from numpy.typing import NDArray
 from pydantic import Field
 
 from dsl_core.model.base import Record
+from dsl_core.model.projector.tone_curve import ToneCurve
+
+Colour = Literal["white", "red", "green", "blue"]
 
 
 class Measured(Record):
@@ -38,26 +43,36 @@ class CameraCheck(Record):
 class RampCheck(Record):
     """One colour ramp: the best ``black + (1 - black) * level ** gamma``, and how well it fits.
 
-    ``residual_percent`` is the rms relative distance between measured and fitted light; ``falls`` counts the
-    steps of the ramp at which more drive gave less light.
+    Where the projector follows no power law, ``coefficients`` are those of this colour's own curve (see
+    `ToneCurve`), and ``gamma`` its mean exponent between the drive levels of a scan. ``residual_percent`` is
+    the rms relative distance between measured and fitted light; ``falls`` counts the steps of the ramp at
+    which more drive gave less light.
     """
 
-    colour: Literal["white", "red", "green", "blue"]
+    colour: Colour
     gamma: Measured
+    coefficients: tuple[float, ...] | None = None
     residual_percent: Measured
     falls: int
+
+    def light(self, level: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Fitted light above black of measured drive levels, relative to full drive."""
+        powers = (0.0, *(self.coefficients or (self.gamma.value,)))
+        return np.asarray(np.exp(np.polynomial.polynomial.polyval(np.log(level), powers)))
 
 
 class ProjectorCheck(Record):
     """From drive level to light.
 
-    ``gamma`` is the one value for all colours that a rig holds. ``black_fraction`` is the light of a dark
-    projector as a share of white; where no pixel sees past the projected picture, ambient light cannot be
-    told from it, and ``black_has_ambient`` is set.
+    ``gamma`` is the one value for all colours that a rig holds, and ``tone`` the one curve, None where a
+    power law says the same. ``black_fraction`` is the light of a dark projector as a share of white; where no
+    pixel sees past the projected picture, ambient light cannot be told from it, and ``black_has_ambient`` is
+    set.
     """
 
     ramps: tuple[RampCheck, ...]
     gamma: Measured
+    tone: ToneCurve | None = None
     black_fraction: Measured
     black_has_ambient: bool
 

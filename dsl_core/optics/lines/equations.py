@@ -14,7 +14,7 @@ from functools import lru_cache
 import torch
 from torch import Tensor
 
-from dsl_core.model.line_spread import Spread, stretched
+from dsl_core.model.projector.line_spread import Spread, stretched
 from dsl_core.optics.correspondence import like
 from dsl_core.optics.lines.line_set import LineSet
 from dsl_core.optics.lines.profile import SAMPLES, ProfileTable

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scipy.special import erf
 from torch import Tensor
 
-from dsl_core.model.line_spread import REACH, LineSpread, Spread
+from dsl_core.model.projector.line_spread import REACH, LineSpread, Spread
 from dsl_core.model.rig import ProjectorResponse
 from dsl_core.optics.spread.curves import EvenTable, density, mixed, reach_px, step_response, step_table
 

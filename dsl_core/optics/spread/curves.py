@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from scipy.special import ndtr
 from torch import Tensor
 
-from dsl_core.model.line_spread import REACH, LineSpread, Spread
+from dsl_core.model.projector.line_spread import REACH, LineSpread, Spread
 
 Floats = NDArray[np.float64]
 #: Samples a column, at least; linear interpolation between them errs by less than 1e-5.

@@ -14,8 +14,8 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
+from dsl_core.model.projector.spread_field import POWERS, SpreadField
 from dsl_core.model.rig import ProjectorResponse, Rig
-from dsl_core.model.spread_field import POWERS, SpreadField
 from dsl_core.optics.correspondence import triangulate, zero_order
 from dsl_core.optics.lines.profile import LineTable
 from dsl_core.optics.spread.equations import MAX_SHIFT_PX, MIN_PIXELS, MODEL_ERROR, View, settle, unit

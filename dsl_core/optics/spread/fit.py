@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from scipy.optimize import nnls
 from torch import Tensor
 
-from dsl_core.model.line_spread import LineSpread
+from dsl_core.model.projector.line_spread import LineSpread
 from dsl_core.model.rig import ProjectorResponse
 from dsl_core.optics.spread.curves import gaussian
 from dsl_core.optics.spread.equations import STEP_PX, Normal, Peaks, View

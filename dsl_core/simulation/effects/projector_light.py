@@ -60,21 +60,24 @@ class BlackLevel(Effect):
 
 
 class Gamma(Effect):
-    """Radiance as a power of the drive level; without it, it is proportional."""
+    """Radiance as a power of the drive level, or as a curve was measured; without it, it is proportional."""
 
     name = "gamma"
     summary = "gamma of the projector"
-    ideal = MappingProxyType({"rig.projector_response.gamma": 1.0})
+    ideal = MappingProxyType({"rig.projector_response.gamma": 1.0, "rig.projector_response.tone": None})
 
     def bound(self, limits: Limits) -> EffectBound:
         """The largest difference of radiance up to the level of each setting."""
-        gamma = limits.path.rig.projector_response.gamma
+        response = limits.path.rig.projector_response
         worst_ms = max(
-            s.exposure_ms * float(np.abs(levels - levels**gamma).max())
+            s.exposure_ms * float(np.abs(levels - response.light(levels)).max())
             for s in limits.settings
             for levels in [np.arange(round(255 * s.level) + 1) / 255]
         )
+        gamma = response.gamma
         reason = "the projector is linear" if gamma == 1 else f"radiance rises with a power of {gamma:.3g}"
+        if response.tone is not None:
+            reason = "radiance rises with a curve that was measured"
         return limits.of_dn(worst_ms * limits.ceiling, reason)
 
 

@@ -38,12 +38,27 @@ def true_rig(rig: Rig, foreign: Foreign) -> Rig:
 
 def led_radiance(response: ProjectorResponse, levels: Floats, foreign: Foreign | None) -> Floats:
     """Radiance of each LED at its drive levels (3 or 1, n), 0 to 1, black included, shape (3, n)."""
-    usual = np.broadcast_to(response.radiance(levels), (3, levels.shape[1]))
+    radiance = response.radiance(levels)
+    if foreign is not None and (foreign.has("tone-s") or foreign.has("tone-srgb")):
+        drive = np.round(255 * levels) / 255
+        light = _s_curve(drive) if foreign.has("tone-s") else _srgb(drive)
+        radiance = response.black_fraction + (1 - response.black_fraction) * light
+    usual = np.broadcast_to(radiance, (3, levels.shape[1]))
     if foreign is None or not foreign.has("response-curve"):
         return usual
     light = usual - response.black_fraction
     arch = 4 * levels * (1 - levels)
     return np.asarray(response.black_fraction + light * (1 + np.array(LED_SHARES)[:, None] * arch))
+
+
+def _s_curve(drive: Floats) -> Floats:
+    """Light of a cell between crossed polarisers: a square at its foot, and saturated at full drive."""
+    return np.asarray(drive**2 / (drive**2 + 0.4 * (1 - drive) ** 1.6))
+
+
+def _srgb(drive: Floats) -> Floats:
+    """IEC 61966-2-1."""
+    return np.where(drive <= 0.04045, drive / 12.92, ((drive + 0.055) / 1.055) ** 2.4)
 
 
 def _wavy(curves: Rgb, rng: np.random.Generator) -> Rgb:

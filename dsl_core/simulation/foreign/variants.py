@@ -18,6 +18,8 @@ VARIANTS: Mapping[str, str] = MappingProxyType(
         "spread-skew": "asymmetric line spread of the usual mean and variance",
         "spread-corners": "line spread up to 40 % wider towards the corners of the projector's frame",
         "response-curve": "LEDs whose light leaves the power law of the drive level by up to 2 %",
+        "tone-s": "light that follows the drive level in an S, as of a liquid crystal, and no power law",
+        "tone-srgb": "light that follows the drive level as sRGB says, straight at its foot",
         "prnu": "pixel gains that differ by 1 %, and hot pixels",
         "light-drift": "light of the projector that falls by 3 % in five minutes and comes back",
         "lateral-colour": "red and blue apart by half a full-size pixel at the side, in both lenses",
@@ -31,6 +33,8 @@ VARIANTS: Mapping[str, str] = MappingProxyType(
         "flicker": "lamps of the room whose light differs from frame to frame",
     }
 )
+#: What is not among ``all``: a projector has one curve, and nobody scans before the self-test measured it.
+_ALONE = frozenset({"tone-s", "tone-srgb"})
 
 
 @dataclass(frozen=True)
@@ -42,7 +46,9 @@ class Foreign:
 
     @classmethod
     def of(cls, text: str, seed: int = 0) -> Foreign | None:
-        """Variants from names with commas between, or ``all``; None for no text; raises `DeviceError`.
+        """Variants from names with commas between, or ``all`` but other tone curves; None for no text.
+
+        Raises `DeviceError` for other names.
 
         >>> sorted(Foreign.of("prnu, blur").names)
         ['blur', 'prnu']
@@ -51,7 +57,7 @@ class Foreign:
             return None
         names = [name.strip() for name in text.split(",")]
         if names == ["all"]:
-            return cls(frozenset(VARIANTS), seed)
+            return cls(frozenset(VARIANTS) - _ALONE, seed)
         unknown = [name for name in names if name not in VARIANTS]
         if unknown:
             raise DeviceError(

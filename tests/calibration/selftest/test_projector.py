@@ -15,6 +15,7 @@ from dsl_core.calibration.selftest.projector import (
     _falls,
     _fit_ramp,
     check_projector,
+    ramp_light,
     ramp_of,
 )
 from dsl_core.calibration.selftest.readings import Readings, RegionSizes
@@ -208,7 +209,7 @@ def test_signals_below_thirty_deviations_are_left_out_of_the_fit() -> None:
             table(np.full(6, 10.0), BLACK_DN + seen[:, None] * [1.0, 0.0, 0.0]),
             drive=levels[:, None] * np.array([1, 0, 0]),
         )
-        check, full, _ = _fit_ramp(ramp, "red", dark_none, quiet, sizes)
+        check, full, _ = _fit_ramp(ramp_light(ramp, "red", dark_none, quiet, sizes), 1)
         assert (abs(check.gamma.value - 2.0) < 1e-6) != is_used
         assert (abs(full[0] - 100.0) < 1e-3) != is_used
         assert full[1:].tolist() == [0.0, 0.0]
@@ -225,7 +226,7 @@ def test_deviations_of_light_are_those_of_noise_black_and_glow_together() -> Non
         drive=levels[:, None] * np.array([0, 1, 0]),
     )
     sizes = RegionSizes(np.full(3, 25), np.full(3, 25), 12)
-    check, full, full_std = _fit_ramp(ramp, "green", glow, transfer, sizes)
+    check, full, full_std = _fit_ramp(ramp_light(ramp, "green", glow, transfer, sizes), 1)
     signal = light[:, 1:]
     std = np.sqrt(
         (4 + 1 / 12 + signal / 10) / 25 + (1e-4 * signal) ** 2 + 0.7**2 + (0.3 * exposure[:, None]) ** 2

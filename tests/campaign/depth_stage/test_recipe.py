@@ -17,7 +17,7 @@ from dsl_core.errors import CalibrationError
 from dsl_core.model.calibration.chain import ChainCorrection
 from dsl_core.model.calibration.depth_stage import DepthStageCalibration
 from dsl_core.model.figure import failures
-from dsl_core.model.line_spread import LineSpread
+from dsl_core.model.projector.line_spread import LineSpread
 from dsl_core.model.rig import Film, FilmShape
 from dsl_core.model.spectral import SpectralCurve
 from dsl_core.optics.correspondence import GratingModel, correspondence, triangulate, zero_order

@@ -126,6 +126,21 @@ def test_steady_light_has_no_cycle_and_keeps_the_exposures_wanted() -> None:
     assert failed(figures) == []
 
 
+def test_a_projector_without_a_power_law_passes_and_is_kept_with_its_curve() -> None:
+    found, figures = run_selftest(light_rig(LightWorld(srgb=True)))
+    assert failed(figures) == []
+    by_name = {figure.name: figure for figure in figures}
+    assert by_name["light by drive level, farthest from a power law"].value > 15
+    assert "ramps, rms distance from the measured curve" in by_name
+    level = np.array([26, 51, 102, 204, 255]) / 255
+    light = ((level + 0.055) / 1.055) ** 2.4
+    response = RECIPE.apply(found, published_rig()).projector_response
+    assert response.light(level) == pytest.approx(light, rel=3e-3)
+    # A self-test on another projector takes the curve away again.
+    usual, _ = run_selftest(light_rig(LightWorld()))
+    assert RECIPE.apply(usual, published_rig()).projector_response.tone is None
+
+
 @pytest.mark.parametrize(
     ("world", "names"),
     [

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import torch
 
-from dsl_core.model.line_spread import LineSpread
+from dsl_core.model.projector.line_spread import LineSpread
 from dsl_core.model.rig import ProjectorResponse
 from dsl_core.optics.lines.profile import (
     SAMPLES,

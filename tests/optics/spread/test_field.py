@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 import torch
 
-from dsl_core.model.line_spread import stretched
+from dsl_core.model.projector.line_spread import stretched
+from dsl_core.model.projector.spread_field import POWERS, SpreadField
 from dsl_core.model.rig import ProjectorResponse
-from dsl_core.model.spread_field import POWERS, SpreadField
 from dsl_core.optics.correspondence import zero_order
 from dsl_core.optics.lines.profile import LineTable
 from dsl_core.optics.spread.equations import Peaks, View, settle

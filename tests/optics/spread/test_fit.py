@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 import torch
 
-from dsl_core.model.line_spread import LineSpread
+from dsl_core.model.projector.line_spread import LineSpread
+from dsl_core.model.projector.spread_field import SpreadField
 from dsl_core.model.rig import ProjectorResponse
-from dsl_core.model.spread_field import SpreadField
 from dsl_core.optics.lines.profile import zero_order_profile
 from dsl_core.optics.spread import fit
 from dsl_core.optics.spread.curves import density

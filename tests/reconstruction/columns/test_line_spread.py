@@ -10,8 +10,8 @@ import pytest
 from dsl_core import pipeline
 from dsl_core.model.fit import Fit
 from dsl_core.model.plan import CapturePlan, GrayCode, LineComb, ScanLines
+from dsl_core.model.projector.spread_field import SpreadField
 from dsl_core.model.rig import Rig
-from dsl_core.model.spread_field import SpreadField
 from dsl_core.optics.lines.line_set import LineSet
 from dsl_core.reconstruction.columns.line_spread import own_spread, wave_std_px
 from dsl_core.reconstruction.merge import MergedScan, decode_columns, stack_lines

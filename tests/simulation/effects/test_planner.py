@@ -10,6 +10,7 @@ import pytest
 from dsl_core.devices.base import DeviceRig
 from dsl_core.errors import DeviceError
 from dsl_core.model.plan import Setting
+from dsl_core.model.projector.tone_curve import ToneCurve
 from dsl_core.model.rig import FilmShape
 from dsl_core.simulation.effects.base import Limits
 from dsl_core.simulation.effects.catalogue import EXTRAS, NAMES, NEEDED, USUAL, Choice, with_effects
@@ -129,12 +130,15 @@ def test_the_twin_renders_what_it_is_asked_to_and_notes_it() -> None:
 
 def test_leaving_out_everything_ends_in_an_ideal_rig() -> None:
     world = world_of("sphere")
-    path = with_effects(world.everything().with_value("rig.film.shape", FilmShape()), NEEDED)
+    everything = world.everything().with_value("rig.film.shape", FilmShape())
+    curve = ToneCurve(coefficients=(2.0, 0.1), lowest_level=0.1)
+    path = with_effects(everything.with_value("rig.projector_response.tone", curve), NEEDED)
     rig = path.rig
     assert rig.film.shape is None
     assert not any(rig.camera.distortion + rig.projector.distortion)
     assert rig.film.bend_per_mm == rig.film.tilt_x_deg == rig.film.roll_deg == 0
     assert rig.projector_response.gamma == 1
+    assert rig.projector_response.tone is None
     assert rig.projector_response.halo_peak_per_px == rig.projector_response.black_fraction == 0
     assert path.truth.lit.all()
     # What is true of the scene stays true.

@@ -69,6 +69,16 @@ def test_leds_leave_the_power_law_at_half_drive_and_keep_full_drive_and_black() 
     assert ratio == pytest.approx(1 + np.array(LED_SHARES), abs=1e-4)
 
 
+@pytest.mark.parametrize(("name", "half"), [("tone-s", 0.6577), ("tone-srgb", 0.2159)])
+def test_other_tone_curves_start_at_black_end_at_full_and_pass_a_known_middle(name: str, half: float) -> None:
+    response = RIG.projector_response
+    light = led_radiance(response, np.array([[0.0, 128 / 255, 1.0]]), Foreign(frozenset({name})))
+    black = response.black_fraction
+    assert light[:, 0] == pytest.approx(black)
+    assert (light[:, 1] - black) / (1 - black) == pytest.approx(half, abs=2e-4)
+    assert light[:, 2] == pytest.approx(1.0)
+
+
 def test_what_is_foreign_is_in_frames_and_measurements_and_not_in_the_calibration() -> None:
     usual, foreign = (
         open_twin({"size": "48x32", "foreign": text}) for text in ("", "vignetting,curves,second-order,blur")

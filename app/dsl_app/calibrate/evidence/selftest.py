@@ -49,7 +49,8 @@ class SelfTestEvidence(Evidence[SelfTest]):
         )
         self.gamma = ChartBox(
             "Gamma of the projector",
-            "Distance of each colour's light from its power law, by drive level; the legend gives exponents.",
+            "Distance of each colour's light from its power law, or from its curve where the projector has"
+            " another, by drive level; the legend gives mean exponents.",
             "Off the law (%)",
             "Drive (of full)",
         )
@@ -125,8 +126,8 @@ class SelfTestEvidence(Evidence[SelfTest]):
         checks = {check.colour: check for check in record.projector.ramps}
         span = 1.5 * RAMP_PERCENT
         for ramp in curves.ramps:
-            model = ramp.level ** checks[ramp.colour].gamma.value
-            off = 100 * (ramp.light / model - 1)
+            ratio = ramp.light / checks[ramp.colour].light(ramp.level)
+            off = 100 * (ratio / np.median(ratio[ramp.level > DIM]) - 1)
             order = np.argsort(ramp.level)
             pen = pg.mkPen(colours[ramp.colour], width=1)
             box.item.addItem(pg.PlotCurveItem(ramp.level[order], off[order], pen=pen))

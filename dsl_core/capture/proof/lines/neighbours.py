@@ -87,12 +87,13 @@ class LineNeighbours:
         return is_dimmer or float((left > SURE_SIGMAS * sigma).mean()) > FEW
 
     def differ(self, one: Counts, other: Counts) -> bool:
-        """Whether two pictures of one shot show different patterns."""
+        """Whether two pictures of one shot show different patterns, whatever light the room gives to each."""
         usual = self._usual()
-        change = self.change(one, other)
+        step = np.subtract(one, other, dtype=np.float32)
+        change = self.change(one, other + _of_most(step))
         return bool(((change > 0.5 * usual) & (usual > LEAST_CHANGE) & (change > LEAST_CHANGE)).any())
 
-    def change(self, one: Counts, other: Counts) -> Bands:
+    def change(self, one: Counts, other: Counts | NDArray[np.float32]) -> Bands:
         """Variance of the difference beyond noise, in units of that of noise, in every part of the height."""
         step2 = np.subtract(one, other, dtype=np.float32)
         np.square(step2, out=step2)

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from torch import Tensor
 from torch.nn.functional import pad
 
-from dsl_core.model.line_spread import Spread, stretched
+from dsl_core.model.projector.line_spread import Spread, stretched
 from dsl_core.optics.colour_neighbours import bayer_colours
 from dsl_core.optics.correspondence import Footprint, like
 from dsl_core.optics.lines.profile import SAMPLES, ProfileTable, halo_of_line

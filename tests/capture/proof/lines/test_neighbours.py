@@ -173,3 +173,12 @@ def test_whole_counts_do_not_make_two_pictures_of_a_faint_line_different() -> No
 
     black = picture(0)
     assert not any(neighbours.differ_at_first(picture(10), picture(10), black) for _ in range(200))
+
+
+def test_two_pictures_of_a_faint_line_do_not_differ_by_light_of_the_room() -> None:
+    neighbours = LineNeighbours(Noise(SENSOR), COLUMNS)
+    for index in range(8):
+        neighbours.is_doubtful(index, _picture(4.0 * index, index, 60.0), None)
+    usual, again = _picture(32.0, 50, 60.0), _picture(32.0, 51, 60.0)
+    assert not neighbours.differ(usual, np.asarray(again + 12, np.uint16))
+    assert neighbours.differ(usual, np.asarray(_picture(28.0, 52, 60.0) + 12, np.uint16))

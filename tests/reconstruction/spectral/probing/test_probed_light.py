@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import torch
 
-from dsl_core.model.line_spread import stretched
+from dsl_core.model.projector.line_spread import stretched
 from dsl_core.optics.lines.profile import SAMPLES, ProfileTable, band_profile
 from dsl_core.reconstruction.spectral.probing import probed_light
 from dsl_core.reconstruction.spectral.probing.probed_light import (

@@ -7,9 +7,9 @@ import pytest
 from numpy.typing import NDArray
 
 from dsl_core.model.plan import CapturePlan, GrayCode, ScanLines
+from dsl_core.model.projector.spread_field import SpreadField
 from dsl_core.model.rig import Rig
 from dsl_core.model.spectral import WavelengthGrid
-from dsl_core.model.spread_field import SpreadField
 from dsl_core.optics.correspondence import correspondence
 from dsl_core.reconstruction.spectral.probing.probe import _probe_some, probe_targets
 from dsl_core.reconstruction.spectral.probing.probed_light import ProbedScan

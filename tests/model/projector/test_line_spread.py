@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from dsl_core.model.line_spread import LineSpread, zero_std_px
+from dsl_core.model.projector.line_spread import LineSpread, zero_std_px
 from dsl_core.model.rig import ProjectorResponse
 
 STEP_PX = 0.125

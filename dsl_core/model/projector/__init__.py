@@ -1,0 +1,1 @@
+"""What was measured of a projector's light, without assuming its form."""
