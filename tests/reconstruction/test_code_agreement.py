@@ -131,6 +131,17 @@ def test_light_of_the_first_orders_moves_the_ends_of_stripes_by_less_than_a_row(
     assert (plain[inside] == np.round(exact[inside])).mean() > 0.95
 
 
+@pytest.mark.parametrize("moved_px", [0.0, 0.4])
+def test_pixels_that_cannot_tell_the_finest_stripes_are_no_lines_that_moved(moved_px: float) -> None:
+    """A pixel of a small picture sees several columns, and its code names any of them."""
+    random = np.random.default_rng(5)
+    exact = random.uniform(100, 500, 4000)
+    named = np.rint(exact + moved_px + 0.8 * random.standard_normal(exact.size)).astype(int)
+    shift, std = displacement(named, exact, (exact / 100).astype(int), 6)
+    assert np.abs(shift[1:5] - moved_px).max() < 0.1
+    assert (np.abs(shift[1:5] - moved_px) < 4 * std[1:5]).all()
+
+
 def off(rig: Rig, code: BinaryCode) -> tuple[float, float]:
     """By how much the rows that a code names are off where they are from 120 to 220, and the deviation."""
     pixels = np.arange(0, 890 * 580, 211)

@@ -74,6 +74,17 @@ def test_another_blur_is_found_to_its_deviation_and_stays_a_gaussian(blur_px: fl
     assert found.after < 1.2 < found.before
 
 
+def test_a_curve_that_is_not_found_in_time_leaves_the_simpler_one(monkeypatch: pytest.MonkeyPatch) -> None:
+    def never(*_: object, maxiter: int) -> None:
+        raise RuntimeError(f"not found in {maxiter} steps")
+
+    monkeypatch.setattr(fit, "nnls", never)
+    peaks, column = seen(TAILED)
+    found = fit_spread(peaks, column.round(), KNOWN.with_gaussian(TAILED.blur_px))
+    assert found is not None
+    assert found.response.spread is None
+
+
 @pytest.mark.parametrize("true", [TAILED, SQUARE, SKEWED])
 def test_any_shape_is_found(true: ProjectorResponse) -> None:
     peaks, column = seen(true)
