@@ -324,6 +324,16 @@ class FrameProof:
     # Later settings: the same pictures were taken before ------------------------------------------------
 
     def _judge_again(self, shot: Shot, seen: Counts) -> Finding:
+        """A finding by the picture of the first setting, with and without what black has gained since."""
+        found, later = self._judge_later(shot, seen), self._later
+        if not found.is_wrong or later.gained(shot) == 0:
+            return found
+        later.takes_gained_off = False
+        other = self._judge_later(shot, seen)
+        later.takes_gained_off = True
+        return found if other.is_wrong else other
+
+    def _judge_later(self, shot: Shot, seen: Counts) -> Finding:
         later = self._later
         wanted, white, dark = later.expected(shot, shot), later.white(shot), later.black(shot)
         if wanted is None or white is None or dark is None:
