@@ -44,7 +44,7 @@ PARTS: dict[Part, str] = {
     "light": "the level of the light",
     "motion": "the scene, which should not move",
     "mixed pixels": "pixels that see several surfaces",
-    "surfaces": "surfaces whose light is not that of a matt one",
+    "surfaces": "surfaces that are not matt, or finer than pixels",
     "bands": "the width of the bands",
     "coverage": "the part of the picture that was measured",
     "exposure": "the exposure",

@@ -37,7 +37,7 @@ class LaterSettings:
         """
         self._plan, self._calibration, self._noise, self._kept = plan, calibration, noise, kept
         self._gained = gained
-        #: Whether what black has gained is taken off: first orders that reach all of a small object look alike.
+        #: Whether what black has gained is taken off: first orders that reach all of a small object look so.
         self.takes_gained_off = True
         self._first = min(plan.code_settings)
         shots = tuple(plan.shots())

@@ -25,7 +25,7 @@ SINCE_START = 3**-0.5
 NONE_STD = 1e-5
 #: Where chi-squares of most pixels exceed one by more than this, frames lack something: a cause must explain
 #: this share of it. Surfaces that light each other ask for gains and shifts as well, which explain little.
-MOST_EXCESS, EXPLAINS = 0.5, 0.15
+MOST_EXCESS, EXPLAINS = 0.5, 0.3
 #: Terms of the shift of an order over the picture: up to second degree.
 _TERMS = 6
 
