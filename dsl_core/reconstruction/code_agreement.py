@@ -43,6 +43,9 @@ EDGES_PX, STRAY = (0.08, 0.25, 0.5, 0.75, 1.0, 1.5), 0.02
 GROUP_STD_PX = 0.02
 #: Rms displacements that matter, px: of lines, whose light is not shaped as a stripe's edge, and of rows.
 MOST_APART_PX, MOST_ROWS_PX = 0.1, 0.05
+#: Where lines are blurred by more than this (rms, px), the finest stripes of a code have no contrast, or an
+#: inverted one: it names columns that are off by one or two, by their place, and lines differ by as much.
+BLURRED_PX, BLURRED_APART_PX = 1.4, 1.5
 #: The most that a film that has moved displaces rows by, px.
 MOST_BY_FILM_PX = 0.1
 #: Share of the error of columns that is seen in rows: pictures are wider than high, and depth follows rows.
@@ -100,18 +103,26 @@ class Disagreement:
 
 
 def code_agreement(
-    rig: Rig, plan: CapturePlan, code: NamedPlaces, geometry: Geometry, window_px: int | None = None
+    rig: Rig,
+    plan: CapturePlan,
+    code: NamedPlaces,
+    geometry: Geometry,
+    window_px: int | None = None,
+    blur_px: float = 0.0,
 ) -> tuple[Geometry, list[FitFinding]]:
     """Geometry whose deviations hold what the code disagrees by, and what was found.
 
     Codes of other programs, which may name parts of a pixel, are not asked. ``window_px`` is that of
-    `reconstruct_geometry`.
+    `reconstruct_geometry`, ``blur_px`` the rms width of lines as calibrated.
     """
     if not isinstance(plan.code, GrayCode | XorCode | EnsembleCode):
         return geometry, []
     usable = np.isfinite(geometry.depth_mm) & ((geometry.flags & int(_DOUBTFUL)) == 0)
     findings, error_px = [], 0.0
-    for found in (_of_columns(code, geometry, usable), _of_rows(rig, plan.code, code, geometry, usable)):
+    for found in (
+        _of_columns(code, geometry, usable, blur_px),
+        _of_rows(rig, plan.code, code, geometry, usable),
+    ):
         if found is not None:
             findings.append(found)
             share = ROWS_TELL if found.part == "geometry" else 1.0
@@ -168,7 +179,9 @@ def _correlated(seen: Floats, log_likelihood: Floats, tried: int) -> Floats:
     return np.asarray(score[first : first + tried])
 
 
-def _of_columns(code: NamedPlaces, geometry: Geometry, usable: NDArray[np.bool_]) -> FitFinding | None:
+def _of_columns(
+    code: NamedPlaces, geometry: Geometry, usable: NDArray[np.bool_], blur_px: float
+) -> FitFinding | None:
     usable = usable & (code.column >= 0)
     column = geometry.column_px[usable].astype(np.float64)
     group = (column.clip(0) / COLUMNS_PX).astype(int)
@@ -181,7 +194,7 @@ def _of_columns(code: NamedPlaces, geometry: Geometry, usable: NDArray[np.bool_]
         "lines against the binary code",
         (found.rms_px, found.rms_std_px),
         "px",
-        MOST_APART_PX,
+        BLURRED_APART_PX if blur_px > BLURRED_PX else MOST_APART_PX,
         f"Lines lie {found.rms_px:.2f} columns (rms, at most {-found.worst_px:+.2f}) from where the binary"
         " code saw the same points: the projector's picture, the camera or the scene moved between them."
         " Deviations of depth contain it.",

@@ -93,7 +93,8 @@ class GeometrySteps:
         self.findings += found
         if spread is not None:
             self.findings += spread_findings(calibrated, spread, 0.0 if spot is None else spot.columns_px)
-        geometry, found = code_agreement(self.rig, frames.plan, named, geometry, window_px)
+        blur_px = calibrated.blur_px
+        geometry, found = code_agreement(self.rig, frames.plan, named, geometry, window_px, blur_px)
         self.findings += found
         return geometry
 

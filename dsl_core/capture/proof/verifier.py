@@ -41,6 +41,8 @@ from dsl_core.model.rig import Rig
 #: Where several rivals won, the picture before is blamed if its votes are nearly as many (their mean), and
 #: another place of the same line only if its are more.
 NEARLY = 0.3
+#: Where a line lights so few pixels, most may see an edge, and vote for nothing.
+FEW_VOTES = 60
 
 
 class FrameProof:
@@ -420,7 +422,12 @@ class FrameProof:
         if set(lost) == {Verdict.DARK} and ratio is not None and ratio > LEAST_LIGHT:
             return Finding(shot, Verdict.EXPOSURE, (shot,), f"{ratio:.2g} times what was expected")
         if lost:
-            return self._named(shot, lost, name())
+            shown = name()
+            if shown == shot and all(
+                each.count < FEW_VOTES and each.mean > -NEARLY for each in lost.values()
+            ):
+                return Finding(shot, Verdict.UNTOLD, is_doubtful=True)
+            return self._named(shot, lost, shown)
         if any(contest.is_torn for contest in told.values()):
             return Finding(shot, Verdict.TORN, (shot,))
         found = self._usual.judge(shot, share)
