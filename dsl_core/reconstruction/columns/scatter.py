@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 #: Differences of five neighbours that leave no plane and no even curve, and the pixels of a tile.
 DIFFERENCES, TILE_PX = (1.0, -4.0, 6.0, -4.0, 1.0), 16
 #: Differences that a tile must have, and by how many times they exceed what deviations say if it matters.
-FEWEST, MATTERS = 40, 2.0
+FEWEST, MATTERS = 40, 3.0
 #: Median of the absolute value of a normal deviate.
 MEDIAN = 0.6745
 
