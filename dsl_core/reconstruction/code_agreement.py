@@ -36,12 +36,16 @@ FEWEST, FEWEST_GROUPS, TELLING_PX = 60, 4, 0.1
 MOST_PIXELS = 12_000
 #: Displacements that are tried, px, and how finely.
 MOST_PX, STEP_PX = 8.0, 0.02
-#: Deviation of where a stripe of the code ends (px), and the share of pixels that may say anything.
-EDGE_PX, STRAY = 0.08, 0.02
+#: Deviations of where a stripe of the code ends (px), and the share of pixels that may say anything. Pixels
+#: that see several columns at once cannot tell the finest stripes, and name any of them.
+EDGES_PX, STRAY = (0.08, 0.25, 0.5, 0.75, 1.0, 1.5), 0.02
 #: What a group is unsure of however many pixels it has: its pixels are wrong together.
 GROUP_STD_PX = 0.02
 #: Rms displacements that matter, px: of lines, whose light is not shaped as a stripe's edge, and of rows.
 MOST_APART_PX, MOST_ROWS_PX = 0.1, 0.05
+#: Where lines are blurred by more than this (rms, px), the finest stripes of a code have no contrast, or an
+#: inverted one: it names columns that are off by one or two, by their place, and lines differ by as much.
+BLURRED_PX, BLURRED_APART_PX = 1.4, 1.5
 #: The most that a film that has moved displaces rows by, px.
 MOST_BY_FILM_PX = 0.1
 #: Share of the error of columns that is seen in rows: pictures are wider than high, and depth follows rows.
@@ -99,18 +103,26 @@ class Disagreement:
 
 
 def code_agreement(
-    rig: Rig, plan: CapturePlan, code: NamedPlaces, geometry: Geometry, window_px: int | None = None
+    rig: Rig,
+    plan: CapturePlan,
+    code: NamedPlaces,
+    geometry: Geometry,
+    window_px: int | None = None,
+    blur_px: float = 0.0,
 ) -> tuple[Geometry, list[FitFinding]]:
     """Geometry whose deviations hold what the code disagrees by, and what was found.
 
     Codes of other programs, which may name parts of a pixel, are not asked. ``window_px`` is that of
-    `reconstruct_geometry`.
+    `reconstruct_geometry`, ``blur_px`` the rms width of lines as calibrated.
     """
     if not isinstance(plan.code, GrayCode | XorCode | EnsembleCode):
         return geometry, []
     usable = np.isfinite(geometry.depth_mm) & ((geometry.flags & int(_DOUBTFUL)) == 0)
     findings, error_px = [], 0.0
-    for found in (_of_columns(code, geometry, usable), _of_rows(rig, plan.code, code, geometry, usable)):
+    for found in (
+        _of_columns(code, geometry, usable, blur_px),
+        _of_rows(rig, plan.code, code, geometry, usable),
+    ):
         if found is not None:
             findings.append(found)
             share = ROWS_TELL if found.part == "geometry" else 1.0
@@ -128,13 +140,13 @@ def displacement(
     The first three are (n,); the displacement of each group and its deviation are (groups,), px, NaN where
     a group has too few pixels. A pixel says that the place is within half a pixel of the named one, and
     nothing about where: groups that see all of their pixels at one phase tell little, and their deviation
-    says so.
+    says so. How sure pixels are of it is each group's own.
     """
     # An odd number of places, so that none is preferred.
     most = round((MOST_PX + 1) / STEP_PX)
     centres = STEP_PX * np.arange(-most, most + 1, dtype=np.float64)
     edges = np.append(centres - STEP_PX / 2, centres[-1] + STEP_PX / 2)
-    log_likelihood = np.log(_named(centres))
+    log_likelihoods = [np.log(_named(centres, edge_px)) for edge_px in EDGES_PX]
     tried = centres[np.abs(centres) < MOST_PX - 0.5]
     away = named_px - exact_px
     shifts, stds = np.full((2, groups), np.nan)
@@ -142,19 +154,19 @@ def displacement(
         seen, _ = np.histogram(away[group == each], edges)
         if seen.sum() < FEWEST:
             continue
-        score = _correlated(seen.astype(np.float64), log_likelihood, len(tried))
-        weight = np.exp(score - score.max())
+        score = np.array([_correlated(seen.astype(np.float64), each, len(tried)) for each in log_likelihoods])
+        weight = np.exp(score - score.max()).sum(0)
         weight /= weight.sum()
         shifts[each] = weight @ tried
         stds[each] = math.hypot(math.sqrt(float(weight @ (tried - shifts[each]) ** 2)), GROUP_STD_PX)
     return shifts, stds
 
 
-def _named(away_px: Floats) -> Floats:
+def _named(away_px: Floats, edge_px: float) -> Floats:
     """Probability that a code names a pixel whose centre is so far from the place that it sees."""
     from scipy.special import ndtr
 
-    inside = ndtr((away_px + 0.5) / EDGE_PX) - ndtr((away_px - 0.5) / EDGE_PX)
+    inside = ndtr((away_px + 0.5) / edge_px) - ndtr((away_px - 0.5) / edge_px)
     return np.asarray((1 - STRAY) * inside + STRAY / (2 * MOST_PX))
 
 
@@ -162,12 +174,14 @@ def _correlated(seen: Floats, log_likelihood: Floats, tried: int) -> Floats:
     """Log likelihood of each displacement that is tried, (tried,)."""
     floor = float(log_likelihood.min())
     # Beyond the table there is nothing but stray pixels: the same floor.
-    score = np.correlate(seen, log_likelihood - floor, mode="same")
+    score = np.correlate(seen, log_likelihood - floor, mode="same") + floor * seen.sum()
     first = (len(seen) - tried) // 2
     return np.asarray(score[first : first + tried])
 
 
-def _of_columns(code: NamedPlaces, geometry: Geometry, usable: NDArray[np.bool_]) -> FitFinding | None:
+def _of_columns(
+    code: NamedPlaces, geometry: Geometry, usable: NDArray[np.bool_], blur_px: float
+) -> FitFinding | None:
     usable = usable & (code.column >= 0)
     column = geometry.column_px[usable].astype(np.float64)
     group = (column.clip(0) / COLUMNS_PX).astype(int)
@@ -180,7 +194,7 @@ def _of_columns(code: NamedPlaces, geometry: Geometry, usable: NDArray[np.bool_]
         "lines against the binary code",
         (found.rms_px, found.rms_std_px),
         "px",
-        MOST_APART_PX,
+        BLURRED_APART_PX if blur_px > BLURRED_PX else MOST_APART_PX,
         f"Lines lie {found.rms_px:.2f} columns (rms, at most {-found.worst_px:+.2f}) from where the binary"
         " code saw the same points: the projector's picture, the camera or the scene moved between them."
         " Deviations of depth contain it.",

@@ -33,6 +33,9 @@ from dsl_core.reconstruction.spectral.self_correction import Followed
 
 #: Shares of pixels above which a scan is not what the twin's scenes lead to expect.
 MOST_POOR, MOST_AT_BOUND, MOST_LOST, MOST_UNDECIDED, MOST_UNUSUAL = 0.4, 0.1, 0.1, 0.5, 0.02
+#: Side of an area (px), pixels of it that count at least, and their share that makes it an area of a kind;
+#: the shares of the picture that such areas may have.
+AREA_PX, AREA_PIXELS, AREA_SHARE, MOST_POOR_AREA, MOST_COARSE_AREA = 5, 15, 0.8, 0.02, 0.05
 #: Mean of a band that no matt surface exceeds: a spectrum at the upper bound says something only where its
 #: deviation excludes all below.
 BRIGHTEST = 0.99
@@ -54,7 +57,7 @@ _MOTIONS = (
     ("bent", 5, "/mm"),
     ("away from the projector", 2, " mm"),
 )
-_CALIBRATE = "Run the drift check; calibrate again the part that it names."
+_CALIBRATE = "run the drift check; calibrate again the part that it names."
 
 
 @dataclass(frozen=True)
@@ -182,20 +185,40 @@ def share_findings(
             "lines of another shape",
             int(np.count_nonzero((flags & int(Flag.UNUSUAL_PEAK)) != 0)) / measured,
             MOST_UNUSUAL,
-            "Lines have another shape in {0} of the pixels than in most: surfaces out of focus, translucent"
-            " or glossy ones, or light from surface to surface. Depth is less sure there, as stated, and"
-            " reflectances lack the light that leaves a surface next to the line.",
+            "Lines have another shape in {0} of the pixels than in most: surfaces out of focus, steep,"
+            " translucent or glossy ones, or light from surface to surface. Depth is less sure there, as"
+            " stated, and reflectances lack the light that leaves a surface next to the line.",
             "Look at the flags; narrow the aperture or move the object nearer to the focus.",
         )
         yield shape.model_copy(update={"significant": shape.significant and not blurred})
+        coarse = (flags & int(Flag.NOT_REFINED | Flag.SATURATED)) == int(Flag.NOT_REFINED)
+        yield _share(
+            "profile",
+            "areas without refined columns",
+            in_areas(coarse, is_measured) / measured,
+            MOST_COARSE_AREA,
+            "In areas that hold {0} of the pixels, lines have no peak that tells columns better than the"
+            " binary code does: surfaces are too dark, translucent, glossy or far out of focus there.",
+            "Depth is coarse there, as stated. Expose dark surfaces for longer; see the flags.",
+        )
     if spectra is None or measured < FEWEST:
         return
+    of_areas = in_areas((flags & int(Flag.POOR_FIT)) != 0, is_measured)
+    yield _share(
+        "surfaces",
+        "poor fit of whole areas",
+        of_areas / measured,
+        MOST_POOR_AREA,
+        "No spectrum explains the line frames of whole areas, which hold {0} of the pixels: surfaces there"
+        " are fluorescent, translucent, glossy or finer than pixels, or receive light from other surfaces.",
+        "Look at a picture of the flags: reflectances there are not to be trusted beyond their deviations.",
+    )
     yield _share(
         "mixed pixels",
         "poor fit",
-        spectra.poor / measured,
+        (spectra.poor - of_areas) / measured,
         MOST_POOR,
-        "No spectrum explains the line frames of {0} of the pixels.",
+        "No spectrum explains the line frames of {0} of the pixels, here and there.",
         "Look at a picture of the flags: along edges a pixel sees two materials, and more pixels help.",
     )
     yield _share(
@@ -206,6 +229,19 @@ def share_findings(
         "The spectra of {0} of the pixels touch 1.5, and more than by their noise.",
         "Look for highlights and for light that the scan's black frames do not have.",
     )
+
+
+def in_areas(is_kind: NDArray[np.bool_], is_measured: NDArray[np.bool_]) -> int:
+    """How many measured pixels (rows, columns) lie in whole areas of a kind, not along edges."""
+    from scipy.ndimage import uniform_filter
+
+    cells = AREA_PX**2
+    of_kind, measured = (
+        uniform_filter(mask.astype(np.float64), AREA_PX, mode="constant") * cells
+        for mask in (is_kind & is_measured, is_measured)
+    )
+    inside = is_kind & is_measured & (measured > AREA_PIXELS - 0.5) & (of_kind > AREA_SHARE * measured)
+    return int(np.count_nonzero(inside))
 
 
 def _of_lost(flags: NDArray[np.integer], lost: int) -> tuple[str, str]:
@@ -271,7 +307,8 @@ def cause_findings(
     told = place.significant and probe.places and causes.displaced
     yield place.model_copy(update={"significant": told})
     for finding in _gains(causes, bool(corrected)):
-        refuted = finding.part == "orders" and (corrected is False or not causes.unequal)
+        unequal = corrected is not False and causes.unequal
+        refuted = not (unequal if finding.part == "orders" else causes.brighter)
         yield finding.model_copy(update={"significant": finding.significant and not refuted})
     for index, (value, std) in enumerate(zip(probe.lines.values, probe.lines.std, strict=True)):
         yield _profile(PROFILE[index], float(value), float(std))
@@ -305,7 +342,7 @@ def cause_findings(
         "deviations",
         MOST_CHI_SQUARE**0.5,
         f"Frames of most pixels differ from the model by {np.sqrt(usual):.1f} times their noise.",
-        _CALIBRATE,
+        f"Surfaces that light each other, and translucent ones, do that. If there are none: {_CALIBRATE}",
     )
 
 

@@ -88,7 +88,7 @@ class Geometry:
                 column -= torch.as_tensor(self.displaced_px.ravel()[some])
             found, slope = (v.numpy() for v in triangulate(rig, torch.as_tensor(some), column))
             depth.ravel()[some], depth_std.ravel()[some] = found, slope * std_px.ravel()[some]
-        surface = reconstruct_surface(rig, depth, depth_std, window_px)
+        surface = reconstruct_surface(rig, depth, depth_std, window_px, _beyond(self.flags))
         edge = np.where(surface.edge, int(Flag.DEPTH_EDGE), 0).astype(np.uint16)
         return replace(
             self,
@@ -231,7 +231,7 @@ def geometry_of(
     maps.slope_mm_per_px[:] *= dq
     for values in (maps.depth_mm, maps.slope_mm_per_px):
         values[~good] = np.nan
-    surface = reconstruct_surface(rig, depth_mm, depth_std, surface_window_px)
+    surface = reconstruct_surface(rig, depth_mm, depth_std, surface_window_px, _beyond(flags.reshape(shape)))
     edge = np.where(surface.edge, int(Flag.DEPTH_EDGE), 0).astype(np.uint16)
     std = np.where(good, dq, np.nan).astype(np.float32).reshape(shape)
     light = (maps.amplitude, maps.amplitude_std, maps.offset, maps.offset_std)
@@ -239,6 +239,11 @@ def geometry_of(
     return Geometry(
         seen_px, std, depth_mm, depth_std, a, da, dark, dark_std, flags.reshape(shape) | edge, surface
     )
+
+
+def _beyond(flags: NDArray[np.uint16]) -> NDArray[np.bool_]:
+    """Pixels that see something, but out of the calibrated depths."""
+    return np.asarray((flags & int(DEPTH_INVALID)) == int(Flag.OUT_OF_RANGE))
 
 
 def _zero_std_px(rig: Rig) -> float:

@@ -18,6 +18,7 @@ from dsl_core.reconstruction.columns.column import MODEL_ERROR
 from dsl_core.reconstruction.columns.line_spread import own_spread, spread_pixels, with_own_spread
 from dsl_core.reconstruction.columns.peak_error import own_peak_error
 from dsl_core.reconstruction.columns.spread_doubt import spread_doubt
+from dsl_core.reconstruction.fine_texture import follow_scatter
 from dsl_core.reconstruction.geometry import Geometry, geometry_of, require_light, require_pixels
 from dsl_core.reconstruction.hdr import MergedFrame
 from dsl_core.reconstruction.lenses import follow_lenses
@@ -88,9 +89,12 @@ class GeometrySteps:
         geometry, spot = follow_spot(self.rig, lines, geometry, window_px)
         if spot is not None:
             self.findings.append(spot_finding(spot))
+        geometry, found = follow_scatter(self.rig, geometry, window_px)
+        self.findings += found
         if spread is not None:
             self.findings += spread_findings(calibrated, spread, 0.0 if spot is None else spot.columns_px)
-        geometry, found = code_agreement(self.rig, frames.plan, named, geometry, window_px)
+        blur_px = calibrated.blur_px
+        geometry, found = code_agreement(self.rig, frames.plan, named, geometry, window_px, blur_px)
         self.findings += found
         return geometry
 

@@ -35,6 +35,8 @@ CLEARLY_BETTER = 0.7
 CLEAR_MISFIT = 10.0
 #: A jump is this many deviations of the step to a neighbour, and this share of the inverse depth.
 JUMP_SIGMAS, JUMP_SHARE = 5.0, 0.004
+#: A surface that is nearer than this share to an end of the calibrated depths may go on beyond it.
+GOES_ON = 0.04
 #: Relative error of the light of a pixel next to a jump. One of the two pixels there sees both sides, by a
 #: share that nobody knows: at least half of it its own, evenly distributed.
 MIXED_REL_STD = (0.5 / 12) ** 0.5
@@ -73,9 +75,17 @@ def windows_px(largest: int) -> list[int]:
     return sizes
 
 
-def reconstruct_surface(rig: Rig, depth_mm: Map, depth_std_mm: Map, window_px: int | None = None) -> Surface:
+def reconstruct_surface(
+    rig: Rig,
+    depth_mm: Map,
+    depth_std_mm: Map,
+    window_px: int | None = None,
+    beyond: NDArray[np.bool_] | None = None,
+) -> Surface:
     """Fit planes around every pixel with a depth (NaN elsewhere) and derive normal and shading.
 
+    ``beyond`` (rows, columns) are pixels that see something out of the calibrated depths: next to them is an
+    edge, too.
     ``window_px`` is the size of the largest window. The deviation of a normal holds the noise of depth and
     what the misfit of the plane says about curvature; next to a jump that of shading holds mixed pixels.
     Large pictures are worked on block by block, with all pixels around that take part.
@@ -84,11 +94,12 @@ def reconstruct_surface(rig: Rig, depth_mm: Map, depth_std_mm: Map, window_px: i
     # A window next to a pixel, the neighbourhood of its misfit, and a neighbour beyond a jump.
     beside = 2 * window + 2
     blocks = list(_blocks(depth_mm.shape, beside))
+    jump = _beside_what_is_beyond(rig, depth_mm, beyond)
     if len(blocks) == 1:
-        return _surface_of(rig, depth_mm, depth_std_mm, window, blocks[0][1])
+        return _surface_of(rig, depth_mm, depth_std_mm, window, blocks[0][1], jump)
     found = Surface.empty(depth_mm.shape)
     for own, near in blocks:
-        part = _surface_of(rig, depth_mm[near], depth_std_mm[near], window, near)
+        part = _surface_of(rig, depth_mm[near], depth_std_mm[near], window, near, jump[near])
         inside = tuple(slice(o.start - n.start, o.stop - n.start) for o, n in zip(own, near, strict=True))
         for field in fields(Surface):
             getattr(found, field.name)[..., *own] = getattr(part, field.name)[..., *inside]
@@ -109,8 +120,21 @@ def _blocks(shape: tuple[int, ...], beside: int) -> Iterator[tuple[Block, Block]
         yield own, (next(near), next(near))
 
 
-def _surface_of(rig: Rig, depth_mm: Map, depth_std_mm: Map, window: int, place: Block) -> Surface:
-    """The surface of a block at a place of the picture."""
+def _beside_what_is_beyond(rig: Rig, depth_mm: Map, beyond: NDArray[np.bool_] | None) -> NDArray[np.bool_]:
+    """Pixels next to what is out of the calibrated depths, unless it is their own surface that goes on."""
+    import cv2
+
+    if beyond is None or not beyond.any():
+        return np.zeros(depth_mm.shape, bool)
+    low, high = rig.depth_range_mm
+    near = cv2.dilate(beyond.astype(np.uint8), np.ones((3, 3), np.uint8)) > 0
+    return np.asarray(near & (depth_mm > low * (1 + GOES_ON)) & (depth_mm < high * (1 - GOES_ON)))
+
+
+def _surface_of(
+    rig: Rig, depth_mm: Map, depth_std_mm: Map, window: int, place: Block, jump: NDArray[np.bool_]
+) -> Surface:
+    """The surface of a block at a place of the picture; at a ``jump`` is an edge whatever is seen."""
     rays = rays_in(rig.camera, *place)
     valid = np.isfinite(depth_mm)
     inverse = np.where(valid, 1 / np.where(valid, depth_mm, 1), 0.0)
@@ -123,7 +147,7 @@ def _surface_of(rig: Rig, depth_mm: Map, depth_std_mm: Map, window: int, place: 
     normal = -best.fit / length
     normal[:, bad] = np.nan
     spread = np.where(bad, np.nan, np.sqrt(best.variance) / length)
-    edge = (_beside_jump(rays, inverse, best.fit[:2], std, valid) | bad) & valid
+    edge = (_beside_jump(rays, inverse, best.fit[:2], std, valid) | bad | jump) & valid
     gain = np.broadcast_to(relative_gain(rig), (rig.camera.height_px, rig.camera.width_px))[place]
     shading, incidence_tan = _shading(rig, rays * np.where(valid, depth_mm, np.nan), normal, gain)
     relative = np.hypot(incidence_tan * spread, 2 * np.where(valid, depth_std_mm * inverse, np.nan))

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from dsl_core.capture.preflight import fit_plan
+from dsl_core.model.frames import Frame
 from dsl_core.model.presets import preset_plan
 from dsl_core.pipeline import scan
 from dsl_core.simulation.sim_devices import open_twin
@@ -17,4 +20,23 @@ def test_every_picture_of_a_white_wall_shows_its_pattern(preset: str, tmp_path: 
     plan = preset_plan(preset)
     assert plan is not None
     rig = open_twin({"size": "48x32", "scene": "plane"})
+    assert scan(rig, fit_plan(plan, rig), tmp_path / "scan.dsl").corrected == 0
+
+
+def test_a_small_object_before_nothing_shows_its_patterns(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """First orders of one line may reach all of it, so that none of its pixels tells what black is."""
+    plan = preset_plan("coarse")
+    assert plan is not None
+    rig = open_twin({"size": "96x64", "scene": "plane"})
+    snap, dark = rig.camera.snap, np.random.default_rng(1)
+
+    def of_a_small_object(timeout_ms: float = 5000.0) -> Frame:
+        seen = snap(timeout_ms)
+        pixels = np.rint(260.0 + dark.standard_normal(seen.pixels.shape)).astype(np.uint16)
+        pixels[20:44, 36:60] = seen.pixels[20:44, 36:60]
+        return replace(seen, pixels=pixels)
+
+    monkeypatch.setattr(rig.camera, "snap", of_a_small_object)
     assert scan(rig, fit_plan(plan, rig), tmp_path / "scan.dsl").corrected == 0

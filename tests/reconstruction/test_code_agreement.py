@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from itertools import pairwise
+from types import SimpleNamespace
+from typing import cast
 
 import numpy as np
 import pytest
@@ -15,7 +17,8 @@ from dsl_core.model.geometry import Pose
 from dsl_core.model.plan import BinaryCode, CapturePlan, EnsembleCode, GrayCode, ScanLines, Setting, XorCode
 from dsl_core.model.rig import Rig
 from dsl_core.model.spectral import WavelengthGrid
-from dsl_core.reconstruction.code_agreement import displacement, whole_columns
+from dsl_core.reconstruction.code_agreement import NamedPlaces, _of_columns, displacement, whole_columns
+from dsl_core.reconstruction.geometry import Geometry
 from dsl_core.reconstruction.named_rows import named_rows
 from dsl_core.words import counted
 from dsl_core.workflows import scans
@@ -131,6 +134,17 @@ def test_light_of_the_first_orders_moves_the_ends_of_stripes_by_less_than_a_row(
     assert (plain[inside] == np.round(exact[inside])).mean() > 0.95
 
 
+@pytest.mark.parametrize("moved_px", [0.0, 0.4])
+def test_pixels_that_cannot_tell_the_finest_stripes_are_no_lines_that_moved(moved_px: float) -> None:
+    """A pixel of a small picture sees several columns, and its code names any of them."""
+    random = np.random.default_rng(5)
+    exact = random.uniform(100, 500, 4000)
+    named = np.rint(exact + moved_px + 0.8 * random.standard_normal(exact.size)).astype(int)
+    shift, std = displacement(named, exact, (exact / 100).astype(int), 6)
+    assert np.abs(shift[1:5] - moved_px).max() < 0.1
+    assert (np.abs(shift[1:5] - moved_px) < 4 * std[1:5]).all()
+
+
 def off(rig: Rig, code: BinaryCode) -> tuple[float, float]:
     """By how much the rows that a code names are off where they are from 120 to 220, and the deviation."""
     pixels = np.arange(0, 890 * 580, 211)
@@ -152,3 +166,16 @@ def test_a_displacement_is_found_below_a_pixel_and_unknown_at_one_phase() -> Non
     assert (std[[0, 2]] < 0.05).all()
     assert std[1] > 0.15
     assert np.isnan(shift[3])
+
+
+@pytest.mark.parametrize(("blur_px", "told"), [(0.6, True), (1.7, False)])
+def test_columns_of_a_code_whose_finest_stripes_are_blurred_tell_of_no_motion(
+    blur_px: float, told: bool
+) -> None:
+    """There the code itself is off by one column or two."""
+    exact = np.random.default_rng(5).uniform(100, 500, (60, 80))
+    named = NamedPlaces(np.rint(exact + 0.8).astype(np.int32), None)
+    geometry = cast(Geometry, SimpleNamespace(column_px=exact))
+    found = _of_columns(named, geometry, np.ones(exact.shape, bool), blur_px)
+    assert found is not None
+    assert found.significant == told

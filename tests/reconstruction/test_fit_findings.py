@@ -48,6 +48,11 @@ def judged(
     return list(share_findings(made, count_spectra(made, nothing.astype(float), nothing, even, deviation)))
 
 
+def scattered(flag: Flag, share: float) -> np.ndarray[tuple[int, ...], np.dtype[np.uint16]]:
+    made = flags(flag, share).ravel()
+    return np.random.default_rng(2).permutation(made).reshape(SHAPE)
+
+
 def flags(flag: Flag, share: float) -> np.ndarray[tuple[int, ...], np.dtype[np.uint16]]:
     values = np.zeros(SHAPE, np.uint16)
     values.ravel()[: round(share * values.size)] = int(flag)
@@ -65,10 +70,27 @@ def flags(flag: Flag, share: float) -> np.ndarray[tuple[int, ...], np.dtype[np.u
     ],
 )
 def test_a_flag_is_told_from_the_share_that_is_not_normal(flag: Flag, limit: float, part: str) -> None:
-    below, above = (Fit.of(judged(flags(flag, limit + d))) for d in (-0.01, 0.02))
+    below, above = (Fit.of(judged(scattered(flag, limit + d))) for d in (-0.01, 0.02))
     assert below.parts == ()
     assert above.parts == (part,)
     assert f"{limit + 0.02:.0%}" in above.words
+
+
+@pytest.mark.parametrize(
+    ("flag", "part", "words"),
+    [(Flag.POOR_FIT, "surfaces", "fluorescent"), (Flag.NOT_REFINED, "profile", "too dark, translucent")],
+)
+def test_whole_areas_are_told_though_they_are_a_small_part_of_the_picture(
+    flag: Flag, part: Part, words: str
+) -> None:
+    area, lines = np.zeros(SHAPE, np.uint16), np.zeros(SHAPE, np.uint16)
+    area[5:14, 3:14] = lines[::4] = int(flag)
+    found = Fit.of(judged(area))
+    assert found.parts == (part,)
+    assert words in found.words
+    # Seen edges of so many pixels more are no areas, and neither are pixels that something else explains.
+    assert part not in Fit.of(judged(lines)).parts
+    assert Fit.of(judged(flags(Flag.SATURATED | Flag.NOT_REFINED, 0.3))).parts == ()
 
 
 def test_pixels_that_are_lost_to_overexposure_are_told_by_themselves() -> None:
@@ -95,9 +117,9 @@ def test_lines_of_another_shape_are_no_news_where_the_camera_is_out_of_focus() -
 
 
 def test_spectra_at_a_bound_that_fit_poorly_say_nothing_of_the_light() -> None:
-    both = flags(Flag.POOR_FIT, 0.3) | flags(Flag.AT_BOUND, 0.35)
+    both = scattered(Flag.POOR_FIT, 0.3) | scattered(Flag.AT_BOUND, 0.35)
     assert Fit.of(judged(both)).parts == ()
-    assert Fit.of(judged(both | flags(Flag.AT_BOUND, 0.45))).parts == ("light",)
+    assert Fit.of(judged(both | scattered(Flag.AT_BOUND, 0.45))).parts == ("light",)
 
 
 @pytest.mark.parametrize(

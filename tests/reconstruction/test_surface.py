@@ -339,3 +339,19 @@ def test_deviations_hold_noise_tilt_and_mixed_pixels() -> None:
     assert beside[40].sum() == 2
     assert (surface.shading_rel_std[beside] > MIXED_REL_STD).all()
     assert pytest.approx(np.var(np.linspace(0.5, 1, 100_001)) * 2, rel=1e-3) == MIXED_REL_STD**2
+
+
+def test_beside_what_is_out_of_the_calibrated_depths_is_an_edge() -> None:
+    rig = small_rig()
+    depth = np.full((rig.camera.height_px, rig.camera.width_px), 700.0)
+    beyond = np.zeros(depth.shape, bool)
+    beyond[:, 20:] = True
+    seen = np.where(beyond, np.nan, depth)
+    std = np.full(depth.shape, 0.3)
+    edge = reconstruct_surface(rig, seen, std, 5, beyond).edge
+    assert edge[:, 19].all()
+    assert not edge[:, :19].any()
+    assert not reconstruct_surface(rig, seen, std, 5).edge.any(), "a shadow is none"
+    # A surface that leaves the range goes on beyond it.
+    far = seen + rig.depth_range_mm[1] - 705.0
+    assert not reconstruct_surface(rig, far, std, 5, beyond).edge.any()

@@ -37,6 +37,8 @@ class LaterSettings:
         """
         self._plan, self._calibration, self._noise, self._kept = plan, calibration, noise, kept
         self._gained = gained
+        #: Whether what black has gained is taken off: first orders that reach all of a small object look so.
+        self.takes_gained_off = True
         self._first = min(plan.code_settings)
         shots = tuple(plan.shots())
         self._places = {(s.role, s.pattern): s.index for s in shots if s.setting == self._first}
@@ -68,11 +70,21 @@ class LaterSettings:
             return Expected(black, self._noise.variance(old_black))
         return self._rescaled.get(
             pattern.index,
-            (old, old_black, black, self._measured.get(shot.setting)),
+            (old, old_black, black, self._measured.get(shot.setting), self.takes_gained_off),
             lambda: rescaled(
-                old, old_black, black, self.scale(shot), self._noise, self._gained(pattern, old)
+                old,
+                old_black,
+                black,
+                self.scale(shot),
+                self._noise,
+                self.gained(pattern) if self.takes_gained_off else np.float32(0),
             ),
         )
+
+    def gained(self, pattern: Shot) -> np.float32:
+        """By how much black was more when the picture of a pattern was taken at the first setting, DN."""
+        old = self.earlier(pattern)
+        return np.float32(0) if old is None else self._gained(pattern, old)
 
     def is_measured(self, shot: Shot) -> bool:
         """Whether pictures have said how strong the light of a shot's setting is."""

@@ -42,6 +42,8 @@ from dsl_core.model.rig import Rig
 #: Where several rivals won, the picture before is blamed if its votes are nearly as many (their mean), and
 #: another place of the same line only if its are more.
 NEARLY = 0.3
+#: Where a line lights so few pixels, most may see an edge, and vote for nothing.
+FEW_VOTES = 60
 
 
 class FrameProof:
@@ -327,6 +329,16 @@ class FrameProof:
     # Later settings: the same pictures were taken before ------------------------------------------------
 
     def _judge_again(self, shot: Shot, seen: Counts) -> Finding:
+        """A finding by the picture of the first setting, with and without what black has gained since."""
+        found, later = self._judge_later(shot, seen), self._later
+        if not found.is_wrong or later.gained(shot) == 0:
+            return found
+        later.takes_gained_off = False
+        other = self._judge_later(shot, seen)
+        later.takes_gained_off = True
+        return found if other.is_wrong else other
+
+    def _judge_later(self, shot: Shot, seen: Counts) -> Finding:
         later = self._later
         wanted, white, dark = later.expected(shot, shot), later.white(shot), later.black(shot)
         if wanted is None or white is None or dark is None:
@@ -413,7 +425,12 @@ class FrameProof:
         if set(lost) == {Verdict.DARK} and ratio is not None and ratio > LEAST_LIGHT:
             return Finding(shot, Verdict.EXPOSURE, (shot,), f"{ratio:.2g} times what was expected")
         if lost:
-            return self._named(shot, lost, name())
+            shown = name()
+            if shown == shot and all(
+                each.count < FEW_VOTES and each.mean > -NEARLY for each in lost.values()
+            ):
+                return Finding(shot, Verdict.UNTOLD, is_doubtful=True)
+            return self._named(shot, lost, shown)
         if any(contest.is_torn for contest in told.values()):
             return Finding(shot, Verdict.TORN, (shot,))
         found = self._usual.judge(shot, share)

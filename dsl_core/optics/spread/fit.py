@@ -44,6 +44,8 @@ KEPT = 0.98
 STRETCHES, FINER = np.geomspace(0.4, 2.5, 25), 3
 #: Strengths of the pull towards the stretched curve, relative to the data's.
 PULLS = 10.0 ** np.arange(-7.0, 0.0)
+#: Steps that finding a curve without negative shares may take, for each of them: the weakest pulls need most.
+MOST_STEPS = 30
 #: A curve is preferred to a simpler one when it lowers the other half's chi-square by so much and this share.
 CLEARLY, CLEAR_SHARE = 30.0, 0.01
 
@@ -230,5 +232,10 @@ def _any(normal: Normal, near: Floats, pull: float) -> Floats:
     penalty = second.T @ second + 1e-4 * np.eye(len(near))
     penalty *= pull * np.trace(normal.matrix) / np.trace(penalty)
     root = np.linalg.cholesky(normal.matrix + penalty)
-    shares, _ = nnls(root.T, np.linalg.solve(root, normal.right + penalty @ near))
+    right = np.linalg.solve(root, normal.right + penalty @ near)
+    try:
+        shares, _ = nnls(root.T, right, maxiter=MOST_STEPS * len(near))
+    except RuntimeError:
+        # What the data leave so open is no better than the curve that it is pulled towards.
+        return near
     return np.asarray(shares)

@@ -8,6 +8,7 @@ smooth surfaces have waves; how large these are is an error that no pixel's own 
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import pairwise
 from typing import Protocol
 
@@ -15,10 +16,10 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from dsl_core.model.rig import Rig
+from dsl_core.model.rig import ProjectorResponse, Rig
 from dsl_core.optics.lines.line_set import LineSet
-from dsl_core.optics.spread.equations import Peaks
-from dsl_core.optics.spread.field import places_of
+from dsl_core.optics.spread.equations import Peaks, settle
+from dsl_core.optics.spread.field import places_of, relative_width
 from dsl_core.optics.spread.fit import REACH_PX, SpreadFit, fit_spread
 from dsl_core.optics.spread.wave import column_wave
 from dsl_core.patterns.gray_code import DecodedCode
@@ -38,6 +39,9 @@ REGIONS = (4, 6)
 FEWEST, MOST, ASKED = 30, 400, 3
 #: Pixels of a run that lines refined, at least.
 MOST_OF_RUN = 7
+#: Runs that see lines as calibrated rather than as found explain them so many times better, and are at least
+#: this share of all.
+BETTER, SHARP_SHARE = 4.0, 0.05
 
 
 def own_spread(
@@ -50,7 +54,39 @@ def own_spread(
     column = torch.as_tensor(code.likely_column.ravel()[pixels].astype(np.float64))
     with one_kernel_thread():
         place = places_of(rig, torch.as_tensor(pixels), column)
-        return fit_spread(_peaks(stack.pick(pixels), lines, column), column, rig.projector_response, place)
+        return scene_spread(_peaks(stack.pick(pixels), lines, column), column, rig.projector_response, place)
+
+
+def scene_spread(
+    peaks: Peaks, column_px: torch.Tensor, known: ProjectorResponse, place_px: torch.Tensor
+) -> SpreadFit | None:
+    """The line spread of the projector, with the arguments of `fit_spread`, whatever surfaces do to it.
+
+    A projector out of focus blurs lines on all surfaces. Where some show them as they are ``known``, and the
+    spread of most does not explain these, most are translucent or out of focus themselves.
+    """
+    found = fit_spread(peaks, column_px, known, place_px)
+    if found is None or not found.changed:
+        return found
+    as_known, as_found = (_misfit(peaks, column_px, place_px, each) for each in (known, found.response))
+    sharp = as_known * BETTER < as_found
+    if int(sharp.sum()) < SHARP_SHARE * len(sharp):
+        return found
+    pixels = torch.nonzero(sharp.repeat_interleave(peaks.run)).ravel()
+    of_sharp = fit_spread(peaks.of(pixels), column_px[pixels], known, place_px[:, pixels])
+    if of_sharp is None:
+        return replace(found, response=known, changed=False, field=None)
+    return of_sharp
+
+
+def _misfit(
+    peaks: Peaks, column_px: torch.Tensor, place_px: torch.Tensor, response: ProjectorResponse
+) -> torch.Tensor:
+    """Chi-square of each run with a response, that of its median pixel, (runs,); infinite where unknown."""
+    width = None if response.field is None else relative_width(response.field, place_px[0], place_px[1])
+    chi_square = settle(peaks, column_px, peaks.y.amax(0), response, width)[2]
+    chi_square = torch.where(torch.isfinite(chi_square), chi_square, torch.inf)
+    return chi_square.reshape(-1, peaks.run).median(1).values.clip(min=1.0)
 
 
 def with_own_spread(rig: Rig, found: SpreadFit | None) -> Rig:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import base64
 import json
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import asdict
@@ -13,6 +14,7 @@ from numpy.typing import NDArray
 from dsl_core.model.fit import FitFinding
 from dsl_core.model.options import Options
 from dsl_core.model.plan import CapturePlan
+from dsl_core.model.result import Flag
 from dsl_core.model.result_sink import ResultSink
 from dsl_core.model.rig import Rig
 from dsl_core.reconstruction.fit_findings import SpectralCounts, count_spectra, fit_of
@@ -27,7 +29,10 @@ if TYPE_CHECKING:
 
 
 class Assembly:
-    """Puts what is known of a picture into a sink, band by band; of the part alone that is wanted."""
+    """Puts what is known of a picture into a sink, band by band; of the part alone that is wanted.
+
+    ``counts`` are those of the spectra so far, ``poor`` (rows, columns) where none explains the frames.
+    """
 
     def __init__(
         self,
@@ -40,12 +45,14 @@ class Assembly:
     ) -> None:
         self._rig, self._plan, self._options = rig, plan, options
         self._geometry, self._sink = geometry, sink
-        self._counts = SpectralCounts()
+        self.counts = SpectralCounts()
         self._rows, self._columns = (
             slice(*wanted.indices(size)[:2])
             for wanted, size in zip(options.part, geometry.flags.shape, strict=True)
         )
         shape = self._rows.stop - self._rows.start, self._columns.stop - self._columns.start
+        # Whether no spectrum explains whole areas is seen in the whole picture.
+        self.poor = np.zeros(shape, bool)
         places = [place for band in bands if (place := self._place(band)).start < place.stop]
         sink.begin(shape, (self._rows.start, self._columns.start), options.grid.centres_nm, places)
 
@@ -56,10 +63,12 @@ class Assembly:
             if place.start >= place.stop:
                 continue
             note = self._sink.note_of(place)
-            if note is None:
+            kept = None if note is None else json.loads(note)
+            if kept is None or set(kept) != {"counts", "poor"}:
                 yield band
             else:
-                self._counts += SpectralCounts(**json.loads(note))
+                self.poor[place] = _unpacked(kept["poor"], self.poor[place].shape)
+                self.counts += SpectralCounts(**kept["counts"])
 
     def put(self, band: Band, spectra: SpectralMaps | None) -> None:
         """Put the rows of a band into the sink, with spectra if there are any."""
@@ -78,8 +87,10 @@ class Assembly:
                 spectra.reflectance[inside],
                 spectra.std[inside],
             )
-        self._counts += counts
-        self._sink.put(place, wanted, json.dumps(asdict(counts)))
+            self.poor[place] = (flags & int(Flag.POOR_FIT)) != 0
+        self.counts += counts
+        note = {"counts": asdict(counts), "poor": packed(self.poor[place])}
+        self._sink.put(place, wanted, json.dumps(note))
 
     def finish(self, solver: RowSolver | None, findings: Iterable[FitFinding]) -> xr.Dataset:
         """The whole result, with the verdict on it; ``findings`` are those that were made on the way."""
@@ -89,8 +100,8 @@ class Assembly:
             self._plan,
             self._options.grid,
             geometry.depth_mm,
-            geometry.flags[self._rows, self._columns],
-            None if solver is None else self._counts,
+            geometry.flags[self._rows, self._columns] | self.poor * np.uint16(int(Flag.POOR_FIT)),
+            None if solver is None else self.counts,
             None if solver is None else solver.followed,
             None if solver is None else solver.error,
             findings,
@@ -101,3 +112,13 @@ class Assembly:
         """Rows of a band in the result."""
         top, bottom = self._rows.start, self._rows.stop
         return slice(max(band.rows.start, top) - top, min(band.rows.stop, bottom) - top)
+
+
+def packed(mask: NDArray[np.bool_]) -> str:
+    """A mask as a little text."""
+    return base64.b64encode(np.packbits(mask).tobytes()).decode("ascii")
+
+
+def _unpacked(text: str, shape: tuple[int, ...]) -> NDArray[np.bool_]:
+    bits = np.frombuffer(base64.b64decode(text), np.uint8)
+    return np.unpackbits(bits, count=int(np.prod(shape))).astype(bool).reshape(shape)

@@ -23,6 +23,9 @@ MOST_DRIFT, MOST_CURVES = 0.014, 0.015
 SINCE_START = 3**-0.5
 #: What a parameter is held at zero by.
 NONE_STD = 1e-5
+#: Where chi-squares of most pixels exceed one by more than this, frames lack something: a cause must explain
+#: this share of it. Surfaces that light each other ask for gains and shifts as well, which explain little.
+MOST_EXCESS, EXPLAINS = 0.5, 0.3
 #: Terms of the shift of an order over the picture: up to second degree.
 _TERMS = 6
 
@@ -37,7 +40,8 @@ class Causes:
     ``gain`` (2,) of both orders, with the deviations of their mean and difference; ``drift`` of the light
     from the first line to the last. A line lights a pixel by one order long before or after another does by
     the other, so that drift looks much as a difference of the gains: ``drift_alone`` and ``difference_alone``
-    are each, with its deviation, where the other is none.
+    are each, with its deviation, where the other is none. ``explained`` are the shares of what frames lack
+    that the shifts, the mean and the difference of the gains, and drift explain; 1 where frames lack nothing.
     """
 
     shift_px: Floats
@@ -52,6 +56,12 @@ class Causes:
     drift_std: float
     drift_alone: tuple[float, float]
     difference_alone: tuple[float, float]
+    explained: tuple[float, float, float, float] = (1.0, 1.0, 1.0, 1.0)
+
+    @property
+    def brighter(self) -> bool:
+        """Whether both orders are brighter, or darker, than calibrated: it explains what frames lack."""
+        return self.explained[1] > EXPLAINS
 
     @property
     def drifts(self) -> bool:
@@ -59,14 +69,15 @@ class Causes:
 
         What frames ask for only together with gains that make up for it is an error of something else.
         """
-        return matters(self.drift, self.drift_std, MOST_DRIFT) and matters(*self.drift_alone, MOST_DRIFT)
+        both = matters(self.drift, self.drift_std, MOST_DRIFT)
+        return both and matters(*self.drift_alone, MOST_DRIFT) and self.explained[3] > EXPLAINS
 
     @property
     def unequal(self) -> bool:
         """Whether one order is brighter against the other than calibrated; judged as `drifts` is."""
         plus, minus = self.gain
         both = matters(plus - minus, self.difference_std, MOST_GAIN)
-        return both and matters(*self.difference_alone, MOST_GAIN)
+        return both and matters(*self.difference_alone, MOST_GAIN) and self.explained[2] > EXPLAINS
 
     @property
     def common_gain(self) -> float:
@@ -122,12 +133,14 @@ def fit_causes(probe: Probe) -> Causes:
         return float(one.values[kept]), float(np.sqrt(one.covariance[kept, kept]))
 
     drift = len(found) - 1
+    groups = slice(0, first), slice(first, first + 1), slice(first + 1, first + 2), slice(drift, drift + 1)
+    shares = [_explained(probe, design, prior_std, found, group) for group in groups]
     return Causes(
         shift_px=shift,
         mean_px=np.sum(telling * shift, 0) / np.maximum(telling.sum(0), 1e-12),
         rms_px=float(np.sqrt(max(square - noise, 0.0))),
         rms_std_px=float(np.sqrt(noise / (2 * _TERMS))),
-        displaced=displaced,
+        displaced=displaced and shares[0] > EXPLAINS,
         gain=np.array([mean + 0.5 * apart, mean - 0.5 * apart]),
         common_std=float(deviations[first]),
         difference_std=float(deviations[first + 1]),
@@ -135,7 +148,26 @@ def fit_causes(probe: Probe) -> Causes:
         drift_std=float(deviations[drift]),
         drift_alone=alone(drift, first + 1),
         difference_alone=alone(first + 1, drift),
+        explained=(shares[0], shares[1], shares[2], shares[3]),
     )
+
+
+def _explained(probe: Probe, design: Floats, prior_std: Floats, found: Floats, group: slice) -> float:
+    """Share of what the frames of sound pixels lack that a group of the ``found`` values explains."""
+    sound = probe.sound
+    if probe.freedom is None or not sound.any():
+        return 1.0
+    excess, weight = probe.chi_square[sound] - 1, probe.weight[sound]
+    if float(np.median(excess)) < MOST_EXCESS:
+        return 1.0
+    held_std = prior_std.copy()
+    held_std[group] = NONE_STD
+    fall = np.zeros(len(excess))
+    for values, sign in ((found, 1), (pool(probe, design, held_std).values, -1)):
+        asked = design[sound] @ values
+        fall += sign * 2 * (asked * probe.score[sound]).sum(1)
+        fall -= sign * np.einsum("np,npq,nq->n", asked, probe.normal[sound], asked)
+    return float(weight @ fall) / float(weight @ (excess * probe.freedom[sound]))
 
 
 def _telling(probe: Probe) -> Floats:

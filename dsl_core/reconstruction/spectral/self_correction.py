@@ -17,7 +17,7 @@ import numpy as np
 
 from dsl_core.optics.pixel_model import PixelModel
 from dsl_core.optics.spectra import ORDERS
-from dsl_core.reconstruction.spectral.causes import Causes, fit_causes
+from dsl_core.reconstruction.spectral.causes import EXPLAINS, MOST_EXCESS, Causes, fit_causes
 from dsl_core.reconstruction.spectral.film_motion import FilmMotion, fit_motion, moved
 from dsl_core.reconstruction.spectral.probing.probe import Probe, probe
 from dsl_core.reconstruction.spectral.probing.probed_light import ProbedScan
@@ -92,7 +92,14 @@ def corrected(model: PixelModel, causes: Causes) -> PixelModel | None:
 
 
 def fits_better(before: Probe, after: Probe) -> bool:
-    """Whether the frames of the pixels in both probes fit the second model better, not by chance."""
+    """Whether the frames of the pixels in both probes fit the second model better, not by chance.
+
+    Where they lack much, it has to explain a share of that: surfaces finer than pixels ask for a film that
+    has moved as well, which explains little.
+    """
     both = before.sound & after.sound
     fall = (before.chi_square - after.chi_square)[both]
-    return bool(both.sum() > 1 and fall.mean() > SURELY * fall.std() / np.sqrt(both.sum()))
+    if both.sum() < 2 or fall.mean() <= SURELY * fall.std() / np.sqrt(both.sum()):
+        return False
+    first, second = (float(np.median(each.chi_square[both])) for each in (before, after))
+    return first - 1 < MOST_EXCESS or first - second > EXPLAINS * (first - 1)

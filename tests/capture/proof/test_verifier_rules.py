@@ -128,6 +128,24 @@ def test_without_it_the_rival_that_won_most_does_and_late_before_all_that_are_ne
     assert proof()._named(LINE, {Verdict.DARK: LOST, Verdict.OTHER: WON}, None).verdict is Verdict.DARK
 
 
+@pytest.mark.parametrize(
+    ("lost", "shown", "verdict"),
+    [
+        (Contest(16, 0.1), LINE, Verdict.UNTOLD),
+        (Contest(16, 0.1), SHOTS[14], Verdict.SWAPPED),
+        (Contest(16, 0.1), None, Verdict.SWAPPED),
+        (Contest(16, -0.5), LINE, Verdict.SWAPPED),
+        (Contest(100, 0.1), LINE, Verdict.SWAPPED),
+    ],
+)
+def test_a_line_that_lights_a_few_pixels_at_edges_is_not_another_one(
+    lost: Contest, shown: Shot | None, verdict: Verdict
+) -> None:
+    found = proof()._decide(LINE, {Verdict.SWAPPED: lost, Verdict.LATE: WON}, 0.8, lambda: shown)
+    assert found.verdict is verdict
+    assert found.is_doubtful == (verdict is Verdict.UNTOLD)
+
+
 def test_rivals_are_the_shots_before_and_after() -> None:
     judge = proof()
     assert judge._rivals(LINE) == [(Verdict.SWAPPED, SHOTS[14]), (Verdict.LATE, SHOTS[12])]

@@ -18,7 +18,8 @@ from dsl_core.optics.spread.equations import Peaks, View, settle
 from dsl_core.optics.spread.field import RANGE, FieldFamily, FieldFit, _single, relative_width, widths_at
 from dsl_core.optics.spread.fit import SpreadFit, fit_spread
 from dsl_core.simulation.published_rig import published_rig
-from tests.optics.spread.test_fit import KNOWN, RUN, SKEWED, STEP_PX, WIDTH_PX
+from tests.cases.line_peaks import RUN, STEP_PX, WIDTH_PX
+from tests.optics.spread.test_fit import KNOWN, SKEWED
 
 #: 10 % wider in the corners than in the middle by curvature, and 6 % wider on the right than on the left.
 FIELD = SpreadField(

@@ -11,14 +11,13 @@ import torch
 from dsl_core.model.projector.line_spread import LineSpread
 from dsl_core.model.projector.spread_field import SpreadField
 from dsl_core.model.rig import ProjectorResponse
-from dsl_core.optics.lines.profile import zero_order_profile
 from dsl_core.optics.spread import fit
 from dsl_core.optics.spread.curves import density
-from dsl_core.optics.spread.equations import MIN_PIXELS, Normal, Peaks
+from dsl_core.optics.spread.equations import MIN_PIXELS, Normal
 from dsl_core.optics.spread.field import FieldFamily, FieldFit
 from dsl_core.optics.spread.fit import PULLS, STRETCHES, SpreadFit, _choose, _Family, _is_astray, fit_spread
+from tests.cases.line_peaks import RUN, seen
 
-WIDTH_PX, STEP_PX, RUN = 5, 2, 8
 PLACES = np.arange(-48, 49) / 8
 KNOWN = ProjectorResponse(blur_px=0.6, halo_peak_per_px=6e-4, halo_decay_px=31.0)
 
@@ -30,18 +29,6 @@ def shape(values: np.ndarray) -> ProjectorResponse:
 TAILED = shape(np.exp(-2 * PLACES**2 / 0.5**2) + 0.04 * np.exp(-0.5 * (PLACES / 1.5) ** 2))
 SQUARE = shape((np.abs(PLACES) < 1.0).astype(float))
 SKEWED = shape(np.exp(-0.5 * (PLACES / np.where(PLACES < 0, 0.35, 0.85)) ** 2))
-
-
-def seen(response: ProjectorResponse, runs: int = 250, noise: float = 2e-3) -> tuple[Peaks, torch.Tensor]:
-    """Lines that pixels see whose projector has this response, and the columns of the pixels."""
-    random = np.random.default_rng(3)
-    start, pitch = random.uniform(20, 600, (runs, 1)), random.uniform(0.6, 0.9, (runs, 1))
-    column = torch.as_tensor((start + pitch * np.arange(RUN)).ravel())
-    centres = (column / STEP_PX).round() * STEP_PX + STEP_PX * torch.arange(-4, 5)[:, None]
-    light = zero_order_profile(column - centres, -WIDTH_PX / 2, WIDTH_PX / 2, response)
-    amplitude = torch.as_tensor(random.uniform(0.3, 1.0, len(column)))
-    y = amplitude * light + noise * torch.as_tensor(random.standard_normal(light.shape))
-    return Peaks(y, torch.full_like(y, noise**2), centres, WIDTH_PX, STEP_PX, RUN), column
 
 
 def off(found: ProjectorResponse, true: ProjectorResponse) -> float:
@@ -72,6 +59,17 @@ def test_another_blur_is_found_to_its_deviation_and_stays_a_gaussian(blur_px: fl
     assert 0 < found.rms_std_px < 0.003
     assert abs(found.response.blur_px - blur_px) < 4 * found.rms_std_px + 1e-3
     assert found.after < 1.2 < found.before
+
+
+def test_a_curve_that_is_not_found_in_time_leaves_the_simpler_one(monkeypatch: pytest.MonkeyPatch) -> None:
+    def never(*_: object, maxiter: int) -> None:
+        raise RuntimeError(f"not found in {maxiter} steps")
+
+    monkeypatch.setattr(fit, "nnls", never)
+    peaks, column = seen(TAILED)
+    found = fit_spread(peaks, column.round(), KNOWN.with_gaussian(TAILED.blur_px))
+    assert found is not None
+    assert found.response.spread is None
 
 
 @pytest.mark.parametrize("true", [TAILED, SQUARE, SKEWED])

@@ -3,19 +3,22 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
+import torch
 
 from dsl_core import pipeline
 from dsl_core.model.fit import Fit
 from dsl_core.model.plan import CapturePlan, GrayCode, LineComb, ScanLines
 from dsl_core.model.projector.spread_field import SpreadField
-from dsl_core.model.rig import Rig
+from dsl_core.model.rig import ProjectorResponse, Rig
 from dsl_core.optics.lines.line_set import LineSet
-from dsl_core.reconstruction.columns.line_spread import own_spread, wave_std_px
+from dsl_core.reconstruction.columns.line_spread import own_spread, scene_spread, wave_std_px
 from dsl_core.reconstruction.merge import MergedScan, decode_columns, stack_lines
 from dsl_core.workflows import scans
+from tests.cases.line_peaks import RUN, seen
 from tests.cases.twin_scan import MemoryScan, twin_scan
 
 Scanned = tuple[Rig, MemoryScan, np.ndarray]
@@ -132,3 +135,19 @@ def test_nothing_is_said_of_pixels_that_no_single_lines_refined() -> None:
 @pytest.mark.parametrize("shape", [(8, 12), (3, 40)])
 def test_pictures_too_small_to_tell_have_none(shape: tuple[int, int]) -> None:
     assert not wave_std_px(np.zeros(shape), np.ones(shape, bool), LINES).any()
+
+
+@pytest.mark.parametrize(("translucent", "follows"), [(0.8, False), (1.0, True)])
+def test_a_projector_is_not_out_of_focus_where_any_surface_shows_sharp_lines(
+    translucent: float, follows: bool
+) -> None:
+    known = ProjectorResponse(blur_px=0.6)
+    sharp, column = seen(known)
+    wide, _ = seen(known.with_gaussian(1.2))
+    on_wax = torch.arange(len(column)) // RUN % 10 < 10 * translucent
+    peaks = replace(sharp, y=torch.where(on_wax, wide.y, sharp.y))
+    place = torch.stack([column, torch.zeros_like(column)])
+    found = scene_spread(peaks, column.round(), known, place)
+    assert found is not None
+    assert found.changed == follows
+    assert found.response.blur_px == pytest.approx(1.2 if follows else 0.6, abs=0.02)

@@ -60,8 +60,20 @@ def test_a_part_of_a_picture_begins_with_the_bands_that_reach_into_it() -> None:
 def test_missing_are_bands_of_the_part_that_have_no_note() -> None:
     assembly, sink = made((0, 6, 10, 6))
     assert [band.rows.start for band in assembly.missing(BANDS)] == [4, 8]
-    sink.notes[0, 2] = json.dumps(asdict(SpectralCounts()))
+    poor = np.arange(20).reshape(2, 10) % 3 == 0
+    kept = SpectralCounts(poor=7)
+    sink.notes[0, 2] = json.dumps({"counts": asdict(kept), "poor": module.packed(poor)})
     assert [band.rows.start for band in assembly.missing(BANDS)] == [8]
+    # What the verdict needs of kept rows is known again.
+    assert assembly.counts == kept
+    assert assembly.poor[:2].tolist() == poor.tolist()
+    assert not assembly.poor[2:].any()
+
+
+def test_rows_kept_by_another_version_are_made_again() -> None:
+    assembly, sink = made((0, 6, 10, 6))
+    sink.notes[0, 2] = json.dumps(asdict(SpectralCounts()))
+    assert [band.rows.start for band in assembly.missing(BANDS)] == [4, 8]
 
 
 @pytest.mark.parametrize(("top", "rows", "place"), [(4, [6, 7], (0, 2)), (8, [8, 9, 10, 11], (2, 6))])
@@ -80,4 +92,4 @@ def test_of_a_band_the_rows_and_columns_of_the_part_are_put(
     assert (where.start, where.stop) == place
     assert maps["map"].tolist() == numbers[rows, 2:9].tolist()
     assert maps["cube"].tolist() == [numbers[rows, 2:9].tolist()]
-    assert SpectralCounts(**json.loads(sink.notes[place])) == SpectralCounts()
+    assert SpectralCounts(**json.loads(sink.notes[place])["counts"]) == SpectralCounts()

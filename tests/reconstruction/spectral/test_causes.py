@@ -74,6 +74,17 @@ def test_where_an_order_is_not_seen_its_shift_is_no_news() -> None:
     assert found.rms_px == pytest.approx(np.sqrt(0.2**2 / 12 / 3), rel=0.1)
 
 
+@pytest.mark.parametrize(("chi_square", "believed"), [(1.2, True), (400.0, True), (1e6, False)])
+def test_what_explains_little_of_what_frames_lack_is_no_cause(chi_square: float, believed: bool) -> None:
+    """Light from surface to surface asks for gains and shifts, and leaves frames as unlike the model."""
+    many = len(probe_of().chi_square)
+    asks = replace(probe_of(), chi_square=np.full(many, chi_square), freedom=np.full(many, 2.0))
+    asks.score[:, 2] += 0.06 * INFORMATION
+    found = fit_causes(asks)
+    assert (found.displaced, found.drifts) == (believed, believed)
+    assert (found.brighter, found.unequal) == (believed, believed)
+
+
 def test_a_shift_that_a_few_cells_ask_for_explains_no_others() -> None:
     assert fit_causes(probe_of()).displaced
     few = probe_of()

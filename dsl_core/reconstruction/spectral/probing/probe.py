@@ -61,14 +61,14 @@ class Probe:
 
     ``normal`` (n, p, p) and ``score`` (n, p) are the equations of the parameters without the spectrum,
     weighted by the noise; ``bias`` (n, b, p) is the error of the stated reflectance for a parameter of one;
-    ``reflectance`` (n, b); ``chi_square`` (n,) is reduced; ``correlation`` (n,) is by how much sums of
-    neighbouring residuals vary more than independent ones; ``place`` (n, 2) is row and column from -1 to 1,
-    ``cell`` (n,) the cell of `CELLS`, ``pixel`` (n,) the flat index. ``with_curves`` are ``normal`` and
-    ``score`` of these parameters and of the curves after them, None where nobody asked. ``lines`` is what the
-    zero order of the same pixels says, ``nm_per_px`` how far apart columns of the first orders are,
-    ``step_nm`` bands; ``steepness`` is by how much the logarithm of the light changes along 1 nm. ``places``
-    is whether pixels can tell where the orders are: on a small piece of one colour an error of its spectrum
-    looks like a shift.
+    ``reflectance`` (n, b); ``chi_square`` (n,) is reduced, by ``freedom`` (n,), None where nobody counted;
+    ``correlation`` (n,) is by how much sums of neighbouring residuals vary more than independent ones;
+    ``place`` (n, 2) is row and column from -1 to 1, ``cell`` (n,) the cell of `CELLS`, ``pixel`` (n,) the
+    flat index. ``with_curves`` are ``normal`` and ``score`` of these parameters and of the curves after
+    them, None where nobody asked. ``lines`` is what the zero order of the same pixels says, ``nm_per_px``
+    how far apart columns of the first orders are, ``step_nm`` bands; ``steepness`` is by how much the
+    logarithm of the light changes along 1 nm. ``places`` is whether pixels can tell where the orders are:
+    on a small piece of one colour an error of its spectrum looks like a shift.
     """
 
     normal: Floats
@@ -86,6 +86,7 @@ class Probe:
     step_nm: float = 5.0
     steepness: float = USUAL_STEEPNESS
     with_curves: tuple[Floats, Floats] | None = None
+    freedom: Floats | None = None
 
     @property
     def sound(self) -> NDArray[np.bool_]:
@@ -189,6 +190,7 @@ def _probe_some(scan: ProbedScan, targets: Indices) -> dict[str, NDArray[Any]]:
         "bias": band_mean(bias[..., :others].transpose(0, 1))[reported].transpose(0, 1).numpy(),
         "reflectance": solved.mean[reported].T.numpy(),
         "chi_square": solved.chi_square.numpy(),
+        "freedom": solved.freedom.numpy(),
         "correlation": _correlation(
             torch.split(solved.residual * weight.sqrt(), light.sizes, 1), solved.gather
         ).numpy(),

@@ -281,11 +281,14 @@ class SolvedPixels:
         return given
 
     @property
+    def freedom(self) -> Tensor:
+        """Degrees of freedom (n,) of the frames of each pixel."""
+        return (self.gather((self.light.weight > 0).double().sum(1)) - SPECTRUM).clip(min=1)
+
+    @property
     def chi_square(self) -> Tensor:
         """Reduced chi-square (n,) of the frames of each pixel."""
-        weight = self.light.weight
-        freedom = (self.gather((weight > 0).double().sum(1)) - SPECTRUM).clip(min=1)
-        return self.gather((weight * self.residual**2).sum(1)) / freedom
+        return self.gather((self.light.weight * self.residual**2).sum(1)) / self.freedom
 
 
 def solve_pixels(scan: ProbedScan, targets: Indices) -> SolvedPixels:
