@@ -307,3 +307,13 @@ def test_pairs_that_are_displaced_when_they_are_taken_again_are_told_however_oft
 
 def test_a_code_all_of_which_is_displaced_fits_itself() -> None:
     assert not displaced_since(0)[0].is_wrong
+
+
+@pytest.mark.parametrize("number", [0, 1, 3])
+def test_the_other_half_of_a_forgotten_picture_is_judged_with_the_next_one(number: int) -> None:
+    code, _ = judged()
+    inverse = next(shot for shot in SHOTS if shot.role == "code" and shot.pattern == 2 * number + 1)
+    code.forget(inverse)
+    assert code.lit is None
+    assert code.add(inverse, seen(inverse), None).verdict is Verdict.RIGHT
+    assert code.lit is not None

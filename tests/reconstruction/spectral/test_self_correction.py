@@ -12,6 +12,7 @@ from dsl_core.model.plan import CapturePlan, GrayCode, ScanLines
 from dsl_core.model.rig import Rig
 from dsl_core.model.spectral import WavelengthGrid
 from dsl_core.optics.correspondence import correspondence
+from dsl_core.reconstruction.spectral import self_correction
 from dsl_core.reconstruction.spectral.film_motion import with_film
 from dsl_core.reconstruction.spectral.self_correction import fits_better
 from dsl_core.reconstruction.spectral.spectra import SpectralMaps, SpectralReconstruction
@@ -118,3 +119,13 @@ def test_what_both_orders_share_is_left_to_the_responses(
     found = solved(rig.model_copy(update={"efficiency": brighter}), scan, as_calibrated=False)
     assert found.followed is not None
     assert not found.followed.balanced
+
+
+def test_light_of_orders_that_frames_fit_no_better_is_found_and_not_taken_over(
+    scanned: tuple[Rig, MemoryScan], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(self_correction, "fits_better", lambda *_: False)
+    found = solved(one_order_brighter(scanned[0]), scanned[1], as_calibrated=False).followed
+    assert found is not None
+    assert (found.balanced, found.motion) == (False, None)
+    assert found.left is found.probe
