@@ -232,7 +232,7 @@ def share_findings(
 
 
 def in_areas(is_kind: NDArray[np.bool_], is_measured: NDArray[np.bool_]) -> int:
-    """How many measured pixels (rows, columns) lie in whole areas of a kind, not along edges."""
+    """How many measured pixels (rows, columns) belong to whole areas of a kind, not to edges."""
     from scipy.ndimage import uniform_filter
 
     cells = AREA_PX**2

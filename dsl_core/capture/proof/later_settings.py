@@ -37,8 +37,6 @@ class LaterSettings:
         """
         self._plan, self._calibration, self._noise, self._kept = plan, calibration, noise, kept
         self._gained = gained
-        #: Whether what black has gained is taken off: first orders that reach all of a small object look so.
-        self.takes_gained_off = True
         self._first = min(plan.code_settings)
         shots = tuple(plan.shots())
         self._places = {(s.role, s.pattern): s.index for s in shots if s.setting == self._first}
@@ -51,16 +49,20 @@ class LaterSettings:
         """The picture of the same pattern at the first setting."""
         return self._kept.get(self._places.get((shot.role, shot.pattern), -1))
 
-    def white(self, shot: Shot) -> Expected | None:
+    def white(self, shot: Shot, less_gained: bool = True) -> Expected | None:
         """White at the setting of a shot; None while nothing is known of it."""
-        return self.expected(_of_role("white", shot), shot)
+        return self.expected(_of_role("white", shot), shot, less_gained)
 
     def black(self, shot: Shot) -> Expected | None:
         """Black at the setting of a shot; None while nothing is known of it."""
         return self.expected(_of_role("black", shot), shot)
 
-    def expected(self, pattern: Shot, shot: Shot) -> Expected | None:
-        """The picture of a pattern at the setting of ``shot``; None while nothing is known of it."""
+    def expected(self, pattern: Shot, shot: Shot, less_gained: bool = True) -> Expected | None:
+        """The picture of a pattern at the setting of ``shot``; None while nothing is known of it.
+
+        With ``less_gained``, what black had gained is taken off: first orders that reach all of a small
+        object look like that, too.
+        """
         pattern = self._plan.original(pattern)
         old, old_black = self.earlier(pattern), self.earlier(_of_role("black", shot))
         if old is None or old_black is None:
@@ -70,14 +72,14 @@ class LaterSettings:
             return Expected(black, self._noise.variance(old_black))
         return self._rescaled.get(
             pattern.index,
-            (old, old_black, black, self._measured.get(shot.setting), self.takes_gained_off),
+            (old, old_black, black, self._measured.get(shot.setting), less_gained),
             lambda: rescaled(
                 old,
                 old_black,
                 black,
                 self.scale(shot),
                 self._noise,
-                self.gained(pattern) if self.takes_gained_off else np.float32(0),
+                self.gained(pattern) if less_gained else np.float32(0),
             ),
         )
 

@@ -330,24 +330,25 @@ class FrameProof:
 
     def _judge_again(self, shot: Shot, seen: Counts) -> Finding:
         """A finding by the picture of the first setting, with and without what black has gained since."""
-        found, later = self._judge_later(shot, seen), self._later
-        if not found.is_wrong or later.gained(shot) == 0:
+        found = self._judge_later(shot, seen)
+        if not found.is_wrong or self._later.gained(shot) == 0:
             return found
-        later.takes_gained_off = False
-        other = self._judge_later(shot, seen)
-        later.takes_gained_off = True
+        other = self._judge_later(shot, seen, less_gained=False)
         return found if other.is_wrong else other
 
-    def _judge_later(self, shot: Shot, seen: Counts) -> Finding:
+    def _judge_later(self, shot: Shot, seen: Counts, less_gained: bool = True) -> Finding:
         later = self._later
-        wanted, white, dark = later.expected(shot, shot), later.white(shot), later.black(shot)
+        wanted, white = later.expected(shot, shot, less_gained), later.white(shot, less_gained)
+        dark = later.black(shot)
         if wanted is None or white is None or dark is None:
             return Finding(shot, Verdict.UNTOLD)
         black = dark.counts
         # Before its own black is there, only what is bright can be relied on.
         has_black = shot.role != "black" and self._blacks[shot.setting] in self._kept
         least = np.float32(0 if has_black else APART) * (white.counts - black)
-        rivals = [(verdict, later.expected(rival, shot)) for verdict, rival in self._rivals(shot)]
+        rivals = [
+            (verdict, later.expected(rival, shot, less_gained)) for verdict, rival in self._rivals(shot)
+        ]
         rivals += [(Verdict.DARK, dark), (Verdict.OTHER, white)]
         contests = {
             verdict: contest_of_pictures(seen, wanted, rival, black, least, self._noise, self._raster)
