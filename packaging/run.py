@@ -76,6 +76,8 @@ QUICK = (
 #: Seconds on two cores, said before a computer's own first run is known.
 USUAL_S = {"test": 700, "test quick": 90}
 TIMES = "dsl-scan-times.json"
+#: The longest that one check, or all tests, may take: what hangs must not keep a server for a day.
+LIMIT_S = 3000.0
 
 
 class SetupError(Exception):
@@ -275,18 +277,29 @@ def prepare(venv: Path, torch: str | None, with_tests: bool) -> None:
         (venv / STAMP).write_text(json.dumps(current))
 
 
-def run(command: Sequence[str], variables: dict[str, str], folder: Path | None = None) -> tuple[int, bool]:
+def run(
+    command: Sequence[str],
+    variables: dict[str, str],
+    folder: Path | None = None,
+    limit_s: float | None = None,
+) -> tuple[int, bool]:
     """Run a command; return its exit code and whether Ctrl-C was pressed meanwhile.
 
-    The terminal sends Ctrl-C to the command too, which needs time to clean up.
+    The terminal sends Ctrl-C to the command too, which needs time to clean up. One that runs longer than
+    ``limit_s`` is ended, and answers 124.
     """
     process = subprocess.Popen(list(command), env=variables, cwd=folder)
     interrupted = False
     while True:
         try:
-            code = process.wait()
+            code = process.wait(limit_s)
         except KeyboardInterrupt:
             interrupted = True
+        except subprocess.TimeoutExpired:
+            say(f"{Path(command[0]).name} did not end within {limit_s:.0f} s and was stopped")
+            process.kill()
+            process.wait()
+            return 124, interrupted
         else:
             return (code if code >= 0 else 128 - code), interrupted
 
@@ -319,7 +332,7 @@ def test(venv: Path, arguments: Sequence[str]) -> int:
     for name, (program, *options) in (*CHECKS, ("pytest", ("pytest", *SHARED, "--durations=10", *chosen))):
         start = time.monotonic()
         say(f"{name} ...")
-        code, interrupted = run([str(venv_program(venv, program)), *options], variables, ROOT)
+        code, interrupted = run([str(venv_program(venv, program)), *options], variables, ROOT, LIMIT_S)
         results.append((name, code, time.monotonic() - start))
         if interrupted:
             return 130

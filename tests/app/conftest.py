@@ -29,10 +29,14 @@ def pytest_runtest_setup() -> None:
 
 @pytest.hookimpl(wrapper=True)
 def pytest_runtest_teardown(nextitem: pytest.Item | None) -> Generator[None]:
-    """Collect what the test left, and give collection back after the last test of the window."""
+    """Collect what the test left, and give collection back after the last test of the window.
+
+    Nothing of a window may be left by then: the threads of other tests collect what they come upon.
+    """
     global _ended
     yield
     _ended += 1
-    gc.collect(1 if _ended % TESTS_PER_FULL else 2)
-    if nextitem is None or Path(__file__).parent not in nextitem.path.parents:
+    is_last = nextitem is None or Path(__file__).parent not in nextitem.path.parents
+    gc.collect(2 if is_last or _ended % TESTS_PER_FULL == 0 else 1)
+    if is_last:
         gc.enable()

@@ -193,3 +193,9 @@ def test_ctrl_c_lets_the_command_put_things_in_order(tmp_path: Path) -> None:
     rest = process.communicate()[0]
     guard.cancel()
     assert (process.returncode, rest) == (2, "in order\n")
+
+
+def test_a_command_that_hangs_is_ended(capsys: pytest.CaptureFixture[str]) -> None:
+    hangs = [sys.executable, "-c", "import time; time.sleep(60)"]
+    assert run.run(hangs, dict(os.environ), limit_s=0.2) == (124, False)
+    assert f"{Path(sys.executable).name} did not end within 0 s and was stopped" in capsys.readouterr().err
