@@ -81,3 +81,10 @@ def test_a_square_is_split_where_more_of_it_is_joined_even_if_the_other_way_is_f
     mesh = mesh_of_grid(points, edge=edge)
     assert sorted(map(sorted, mesh.triangles.tolist())) == [[0, 1, 2], [1, 2, 3]]
     assert len(mesh_of_grid(points).triangles) == 2
+
+
+def test_a_square_whose_corners_are_all_joined_is_split_along_the_flatter_diagonal() -> None:
+    raised = np.array([[700.0, 700.6], [700.0, 700.0]])
+    along = mesh_of_grid(_points(raised)), mesh_of_grid(_points(raised[:, ::-1]))
+    falling, rising = ([sorted(each) for each in mesh.triangles.tolist()] for mesh in along)
+    assert (sorted(falling), sorted(rising)) == ([[0, 1, 3], [0, 2, 3]], [[0, 1, 2], [1, 2, 3]])

@@ -155,6 +155,15 @@ def test_changes_count_from_what_matters_on() -> None:
     assert not replace(CAUSES, difference_alone=(0.01, 0.001)).unequal
 
 
+def test_each_cause_must_explain_by_itself_what_frames_lack() -> None:
+    """The shares are those of the shifts, the mean and the difference of the gains, and drift."""
+    believed = []
+    for one in range(4):
+        only = replace(CAUSES, explained=tuple(float(share == one) for share in range(4)))
+        believed.append((only.brighter, only.unequal, only.drifts))
+    assert believed == [(False,) * 3, (True, False, False), (False, True, False), (False, False, True)]
+
+
 @pytest.mark.parametrize(
     ("gain", "common"),
     [((0.02, 0.01), 0.01), ((-0.02, -0.05), -0.02), ((0.02, -0.01), 0.0), ((0.02, 0.0), 0.0)],
