@@ -330,11 +330,18 @@ class FrameProof:
 
     def _judge_again(self, shot: Shot, seen: Counts) -> Finding:
         """A finding by the picture of the first setting, with and without what black has gained since."""
+        before = self._usual.copy(), self._steps.copy(), self._line_places.copy(), self._contested.copy()
         found = self._judge_later(shot, seen)
         if not found.is_wrong or self._later.gained(shot) == 0:
             return found
+        # Only the judgement that is believed counts for what is usual.
+        after = self._usual, self._steps, self._line_places, self._contested
+        self._usual, self._steps, self._line_places, self._contested = before
         other = self._judge_later(shot, seen, less_gained=False)
-        return found if other.is_wrong else other
+        if other.is_wrong:
+            self._usual, self._steps, self._line_places, self._contested = after
+            return found
+        return other
 
     def _judge_later(self, shot: Shot, seen: Counts, less_gained: bool = True) -> Finding:
         later = self._later
