@@ -92,7 +92,10 @@ CHANGES = (*SPOILED, *SHIFTS, "projector squares its picture", *HABITS)
 #: Faults of the beginning of a scan, and between the last picture of the code and the first line.
 EARLY, AT_LINES = ("counter wraps", "lamp warms up"), ("swapped at the lines",)
 #: What a result says of such a change; other sentences on its fit do not count, nor do any of other faults.
-TOLD = r"Black pictures changed|The light (drifted|flickered|has changed)|(scene|Something|pattern) moved by"
+TOLD = (
+    r"All lines together have|Black pictures changed|The light (drifted|flickered|has changed)"
+    r"|(scene|Something|pattern) moved by"
+)
 BAD = ("told", "WRONG", "reason?", "not resumed")
 _PICTURES = r"does not show its pattern|delivered the picture of the previous|captured once more"
 _SPECTRUM = "spectrum|measure"

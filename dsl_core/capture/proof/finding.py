@@ -134,13 +134,17 @@ def together(findings: Iterable[Finding]) -> tuple[Finding, ...]:
 
 @dataclass(frozen=True)
 class ProofReport:
-    """What a check of ``judged`` frames found: what is ``wrong``, and how many cannot be told."""
+    """What a check of ``judged`` frames found: what is ``wrong``, and how many cannot be told.
+
+    ``light`` is a sentence on what lines add up to, where that is not white.
+    """
 
     judged: int
     wrong: tuple[Finding, ...]
     untold: int
+    light: str = ""
 
     @property
     def sentences(self) -> tuple[str, ...]:
         """A sentence for everything that is wrong."""
-        return tuple(each.sentence for each in self.wrong)
+        return (*(each.sentence for each in self.wrong), *([self.light] if self.light else ()))

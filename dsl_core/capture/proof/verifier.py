@@ -17,6 +17,7 @@ from dsl_core.capture.proof.light_steps import LightSteps
 from dsl_core.capture.proof.lines.bright_black import BrightBlack
 from dsl_core.capture.proof.lines.line_place import SIDES, LinePlaces, moved
 from dsl_core.capture.proof.lines.line_shown import line_shown
+from dsl_core.capture.proof.lines.line_sum import LineSum, line_sum
 from dsl_core.capture.proof.lines.neighbours import LineNeighbours
 from dsl_core.capture.proof.prediction import (
     APART,
@@ -168,6 +169,11 @@ class FrameProof:
         """Whether a raw mosaic of `first_picture` shows its pattern elsewhere than when the scan began."""
         seen, before = self._raster.take(pixels), self._kept[first.index]
         return edges_moved(seen, before, self._code_pairs(), self._noise, self._raster.shape)
+
+    def line_sum(self) -> LineSum | None:
+        """What all lines of the first setting are together; None while that says nothing."""
+        lit = None if self._code is None else self._code.lit
+        return None if lit is None else line_sum(self._plan, self._first, self._kept, lit, self._noise)
 
     @property
     def first_setting(self) -> int:
