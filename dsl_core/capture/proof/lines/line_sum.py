@@ -69,7 +69,7 @@ def line_sum(
     again = [shot for shot in plan.shots() if shot.role == "sentinel" and shot.index in kept]
     black, white = (_course(by_role[role], again, plan, kept, at) for role in ("black", "white"))
     places = [shot.index for shot in lines]
-    dark, bright = (np.interp(places, *zip(*course, strict=True)) for course in (black, white))
+    dark, bright = (np.interp(places, *course) for course in (black, white))
     light = sum(float(kept[index][at].sum(dtype=np.float64)) for index in places) - float(dark.sum())
     # Light of white when each line was taken; its own black is the one nearest in time.
     usual = cover * float((bright - dark).sum()) / len(lines)
@@ -77,17 +77,18 @@ def line_sum(
         return None
     variance = noise.variance(kept[by_role["black"].index])[at].sum(dtype=np.float64)
     std = len(lines) * float(np.sqrt(variance)) / usual
-    unseen = UNSEEN_DN if len(black) > 1 else UNKNOWN_DN
+    unseen = UNSEEN_DN if len(black[0]) > 1 else UNKNOWN_DN
     allowed = LEAST + SIGMAS * std + len(lines) * unseen * at.size / usual
     return LineSum(light / usual, std, allowed)
 
 
 def _course(
     first: Shot, again: list[Shot], plan: CapturePlan, kept: Mapping[int, Counts], at: np.ndarray
-) -> list[tuple[int, float]]:
-    """Sums of the counts of a shot and of those that repeat it, by their places in the plan."""
+) -> tuple[list[int], list[float]]:
+    """Places in the plan of a shot and of those that repeat it, and the sums of their counts."""
     shots = [first, *(each for each in again if plan.original(each).index == first.index)]
-    return [(each.index, float(kept[each.index][at].sum(dtype=np.float64))) for each in shots]
+    sums = [float(kept[each.index][at].sum(dtype=np.float64)) for each in shots]
+    return [each.index for each in shots], sums
 
 
 def _even_cover(plan: CapturePlan) -> float | None:
