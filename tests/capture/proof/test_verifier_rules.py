@@ -29,7 +29,7 @@ PLAN = CapturePlan(
 SHOTS = tuple(PLAN.shots())
 LINE, LATER_LINE = SHOTS[13], SHOTS[29]
 WON, LOST = Contest(100, 0.9, 0.0), Contest(100, -0.9, -90.0)
-TORN, DOUBTFUL, FEW = Contest(100, 0.6, -9.0), Contest(100, 0.9, -2.0), Contest(11, -1.0, -11.0)
+TORN, DOUBTFUL, FEW = Contest(100, 0.6, -9.0), Contest(100, 0.9, -2.0, -2.0), Contest(11, -1.0, -11.0)
 
 
 def rig() -> Rig:
