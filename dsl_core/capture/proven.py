@@ -256,7 +256,10 @@ class ProvenShots:
         if found.is_wrong:
             change = self._explain()
             reason = change.sentence or f"{found.remedy} Resume the scan afterwards."
-            if change.is_as_at_first and found.verdict in DIM and found.shot.role == "spectral":
+            if found.verdict is Verdict.HIDDEN:
+                # Who stands there is in the pictures that would say what has changed, too.
+                reason = f"{found.remedy} Resume the scan afterwards."
+            elif change.is_as_at_first and found.verdict in DIM and found.shot.role == "spectral":
                 reason = _DIMMED
             raise PictureError(
                 f"{found.names.capitalize()} does not show its pattern after {len(SETTLE_MS) + 1} exposures:"

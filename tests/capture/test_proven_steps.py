@@ -182,6 +182,15 @@ def test_lines_alone_that_lost_their_light_blame_a_projector_that_dims_dark_pict
         bench.shots.take(LINE)
 
 
+def test_who_hides_a_part_is_asked_away_whatever_else_seems_changed() -> None:
+    bench = Bench(lambda shot: Finding(shot, Verdict.HIDDEN, (shot,)))
+    bench.cause = "It moved."
+    with pytest.raises(
+        PictureError, match=r"darker than the black picture.*\. Keep out of the way of camera"
+    ):
+        bench.shots.take(LINE)
+
+
 def test_nothing_is_taken_again_after_a_cancel() -> None:
     bench = Bench(late)
     bench.token.cancel()

@@ -24,6 +24,7 @@ class Verdict(StrEnum):
     DARK = "dark"
     MIRRORED = "mirrored"
     DISPLACED = "displaced"
+    HIDDEN = "partly hidden"
     OTHER = "another picture"
 
 
@@ -45,6 +46,7 @@ _SEEN = {
     Verdict.DARK: "the pattern is missing from it",
     Verdict.MIRRORED: "columns of the projector run across the picture the wrong way round",
     Verdict.DISPLACED: "it is displaced from the pictures before",
+    Verdict.HIDDEN: "a part of it is darker than the black picture, as if something were before it",
     Verdict.OTHER: "it shows something else",
 }
 _REMEDY = {
@@ -60,6 +62,8 @@ _REMEDY = {
     " switch mirroring off in the settings of both, or calibrate again.",
     Verdict.DISPLACED: "Check that projector, camera and target have not moved since the scan began,"
     " and that the projector does not correct or scale its picture.",
+    Verdict.HIDDEN: "Keep out of the way of camera, projector and lamps, and keep the light of the room as"
+    " it was.",
     Verdict.OTHER: "Check that camera, target and light have not moved since the scan began.",
 }
 

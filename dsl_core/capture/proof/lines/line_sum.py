@@ -78,7 +78,10 @@ def line_sum(
     variance = noise.variance(kept[by_role["black"].index])[at].sum(dtype=np.float64)
     std = len(lines) * float(np.sqrt(variance)) / usual
     unseen = UNSEEN_DN if len(black[0]) > 1 else UNKNOWN_DN
-    allowed = LEAST + SIGMAS * std + len(lines) * unseen * at.size / usual
+    # Nobody knows when between two takes black and white changed.
+    steps = [float(np.abs(np.diff(sums)).max(initial=0)) / 2 for _, sums in (black, white)]
+    wander = len(lines) * (unseen * at.size + steps[0]) / usual + steps[1] / white[1][0]
+    allowed = LEAST + SIGMAS * std + wander
     return LineSum(light / usual, std, allowed)
 
 

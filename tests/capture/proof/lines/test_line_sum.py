@@ -70,6 +70,14 @@ def test_without_black_taken_once_more_less_is_told() -> None:
     assert alone.allowed - watched.allowed == pytest.approx(0.7 * 32 / WHITE, rel=0.1)
 
 
+def test_a_lamp_that_came_on_at_some_time_between_two_blacks_is_no_light_of_the_lines() -> None:
+    found, usual = total(plan(every=40), black_dn=40.0), total(plan(every=40))
+    assert found is not None
+    assert usual is not None
+    assert found.allowed > usual.allowed + 0.5 * 30 * 32 / WHITE
+    assert found.sentence == ""
+
+
 def test_lines_that_leave_columns_out_say_nothing() -> None:
     assert total(plan(ScanLines(width_px=2, step_px=4, sparse=True))) is None
     assert total(plan(LineComb(width_px=2, step_px=2, period_px=16))) is not None
