@@ -67,7 +67,7 @@ def test_without_black_taken_once_more_less_is_told() -> None:
     alone, watched = total(plan()), total(plan(every=8))
     assert alone is not None
     assert watched is not None
-    assert alone.allowed - watched.allowed == pytest.approx(0.7 * 32 / WHITE, rel=0.1)
+    assert alone.allowed - watched.allowed == pytest.approx(0.7 * 32 / WHITE, abs=0.004)
 
 
 def test_a_lamp_that_came_on_at_some_time_between_two_blacks_is_no_light_of_the_lines() -> None:
