@@ -74,7 +74,7 @@ def test_a_lamp_that_came_on_at_some_time_between_two_blacks_is_no_light_of_the_
     found, usual = total(plan(every=40), black_dn=40.0), total(plan(every=40))
     assert found is not None
     assert usual is not None
-    assert found.allowed > usual.allowed + 0.5 * 30 * 32 / WHITE
+    assert found.allowed > usual.allowed + 0.5 * 20 * 32 / WHITE
     assert found.sentence == ""
 
 
