@@ -17,12 +17,15 @@ from dsl_core.capture.motion import moved_between
 from dsl_core.capture.put_back import ADVICE
 from dsl_core.model.captured_code import CapturedCode
 from dsl_core.model.plan import CapturePlan, Shot
-from dsl_core.model.rig import Sensor
+from dsl_core.model.rig import Sensor, colour_sites
 
 Mosaic = NDArray[np.uint16]
 
 #: Changes of light that matter: a factor of white, and a part of white by which black differs.
 LEAST_LIGHT, LEAST_ROOM = 0.05, 0.03
+#: Factors of the colours of white that differ by this share of each other are no change of all light, where
+#: each colour has had so much of it.
+UNEVEN, LEAST_COLOUR = 0.1, 0.05
 #: With less light than this, as a share of what it was, white and black are the same picture.
 NO_LIGHT = 0.02
 #: Factors of white and of black that are this much alike have one cause: the exposure.
@@ -44,10 +47,14 @@ class References:
 
 @dataclass(frozen=True)
 class Explanation:
-    """What has changed, and what to do, as sentences (empty if nothing has); whether something moved."""
+    """What has changed, and what to do, as sentences (empty if nothing has); whether something moved.
+
+    ``is_as_at_first``: white, black and code were compared, and nothing has changed.
+    """
 
     sentence: str = ""
     has_moved: bool = False
+    is_as_at_first: bool = False
 
 
 class Diagnosis:
@@ -117,7 +124,16 @@ def what_changed(before: References, now: References, sensor: Sensor) -> Explana
     if moved is None and abs(light - 1) < LEAST_LIGHT:
         moved = moved_between((before.code, before.black), (now.code, now.black), sensor, is_pattern=True)
     found = []
-    if abs(light - 1) > LEAST_LIGHT:
+    colours = _of_colours(old, new, used, sensor)
+    is_uneven = max(colours) > (1 + UNEVEN) * min(colours)
+    if is_uneven:
+        red, green, blue = colours
+        found.append(
+            f"The light of white is {red:.2f} times what it was when the scan began in red, {green:.2f} times"
+            f" in green and {blue:.2f} times in blue. Switch white balance of the camera and night mode of"
+            " the projector and of its computer off, check the projector's colours, and resume the scan."
+        )
+    elif abs(light - 1) > LEAST_LIGHT:
         is_exposure = dark_old > TELLING_DN and abs(dark_new / dark_old / light - 1) < ALIKE
         what = "exposure or gain of the camera" if is_exposure else "light of the projector or the exposure"
         found.append(
@@ -131,6 +147,20 @@ def what_changed(before: References, now: References, sensor: Sensor) -> Explana
             f" above its black level, and was at {dark_old:.0f} DN when the scan began. Keep the room as it"
             " was, and resume the scan."
         )
-    if moved is not None:
+    if moved is not None and not is_uneven:
+        # Other colours look like motion where surfaces have colours.
         found.append(f"{moved.sentence} {ADVICE}")
-    return Explanation(" ".join(found), moved is not None)
+    return Explanation(" ".join(found), moved is not None, not found)
+
+
+def _of_colours(
+    old: NDArray[np.float64], new: NDArray[np.float64], used: NDArray[np.bool_], sensor: Sensor
+) -> tuple[float, ...]:
+    """White less black over what it was in red, green and blue; ones where a colour has little light."""
+    rows, columns = np.indices(used.shape) % 2
+    colour = np.array(colour_sites(sensor.bayer)).reshape(2, 2)[rows, columns]
+    sums = [[float(light[used & (colour == each)].sum()) for light in (old, new)] for each in range(3)]
+    total = sum(before for before, _ in sums)
+    if min(before for before, _ in sums) < LEAST_COLOUR * total:
+        return 1.0, 1.0, 1.0
+    return tuple(max(now / before, 0.0) for before, now in sums)

@@ -35,6 +35,13 @@ JUST_BEFORE = 8
 #: Pictures that are wrong like this, though nothing has changed that anybody could name, may have become so
 #: slowly: nobody knows since when.
 CREEPING = (Verdict.EXPOSURE, Verdict.OTHER)
+#: Lines that are wrong like this while white, black and code look as at first have lost light of their own.
+DIM = (Verdict.DARK, Verdict.EXPOSURE)
+_DIMMED = (
+    "White, black and a frame of the code, captured once more, look as they did: the projector may give dark"
+    " pictures less light than bright ones. Switch its dynamic contrast, iris and eco mode off, check that"
+    " the exposure is long enough, and resume the scan."
+)
 #: On resuming, so many shots before a missing one are captured again where nothing can be told of them.
 MOST_UNTOLD = 32
 _log = logging.getLogger(__name__)
@@ -249,6 +256,11 @@ class ProvenShots:
         if found.is_wrong:
             change = self._explain()
             reason = change.sentence or f"{found.remedy} Resume the scan afterwards."
+            if found.verdict is Verdict.HIDDEN:
+                # Who stands there is in the pictures that would say what has changed, too.
+                reason = f"{found.remedy} Resume the scan afterwards."
+            elif change.is_as_at_first and found.verdict in DIM and found.shot.role == "spectral":
+                reason = _DIMMED
             raise PictureError(
                 f"{found.names.capitalize()} does not show its pattern after {len(SETTLE_MS) + 1} exposures:"
                 f" {found.seen}. {reason} Frames before it are saved. If the pictures are right all the same,"

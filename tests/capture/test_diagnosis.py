@@ -60,6 +60,19 @@ def test_the_cause_is_named(later: References, said: str, not_said: str) -> None
     assert not_said not in found
 
 
+def test_colours_that_changed_unevenly_are_named_and_are_no_motion() -> None:
+    rng, before = np.random.default_rng(1), pictures()
+    gain = np.where(np.indices(before.white.shape)[0] % 2, 1.0, 0.6) * np.where(
+        rng.random((64, 96)) < 0.5, 1, 0.98
+    )
+    later = (before.black + gain * (before.white.astype(float) - before.black)).round().astype(np.uint16)
+    found = what_changed(before, References(later, before.black, before.code), SENSOR)
+    assert re.search(r"0\.59 times .* in red, 0\.79 times in green and 0\.99 times in blue", found.sentence)
+    assert "moved" not in found.sentence
+    assert not found.is_as_at_first
+    assert what_changed(before, before, SENSOR).is_as_at_first
+
+
 def test_a_plan_without_a_code_has_no_references() -> None:
     plan = CapturePlan(code=NoCode(), spectral=ScanLines())
     assert plan.references() == {}

@@ -43,7 +43,7 @@ def _wrong(sink: MemorySink, spoiled: PatternFaults) -> list[int]:
     return [index for index, frame in sink.frames.items() if frame.frame_id in spoiled.wrong]
 
 
-@pytest.mark.parametrize("kind", ["late", "swapped", "torn", "half", "dark", "saturated"])
+@pytest.mark.parametrize("kind", ["late", "swapped", "torn", "band", "half", "dark", "saturated"])
 @pytest.mark.parametrize("at", [5, 20, 30])
 def test_a_wrong_picture_is_taken_again_and_noted(scene: RenderedScene, kind: str, at: int) -> None:
     sink = MemorySink(scene.plan)

@@ -96,7 +96,7 @@ class Bench:
             snap(SHOTS[10])
         if self.cause == "unplugged":
             raise DeviceError("no camera")
-        return Explanation(self.cause, self.cause == "It moved.")
+        return Explanation(self.cause, self.cause == "It moved.", self.cause == "")
 
 
 def is_right(shot: Shot) -> Finding:
@@ -171,6 +171,24 @@ def test_what_stays_wrong_is_an_error_with_its_cause_or_remedy(cause: str, reaso
         bench.shots.take(LINE)
     assert bench.taken[4:] == ([(10, 1, 100.0, True)] if cause == "The lamp fails." else [])
     assert bench.written == {}
+
+
+def test_lines_alone_that_lost_their_light_blame_a_projector_that_dims_dark_pictures() -> None:
+    bench = Bench(lambda shot: Finding(shot, Verdict.DARK, (shot,)))
+    bench.cause = ""
+    with pytest.raises(
+        PictureError, match=r"pattern is missing.*the projector may give dark pictures less light"
+    ):
+        bench.shots.take(LINE)
+
+
+def test_who_hides_a_part_is_asked_away_whatever_else_seems_changed() -> None:
+    bench = Bench(lambda shot: Finding(shot, Verdict.HIDDEN, (shot,)))
+    bench.cause = "It moved."
+    with pytest.raises(
+        PictureError, match=r"darker than the black picture.*\. Keep out of the way of camera"
+    ):
+        bench.shots.take(LINE)
 
 
 def test_nothing_is_taken_again_after_a_cancel() -> None:

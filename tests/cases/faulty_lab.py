@@ -31,6 +31,7 @@ from dsl_core.model.spectral import SpectralCurve
 from dsl_core.patterns.images import pattern_image
 from dsl_core.simulation.sim_devices import open_twin
 from tests.cases.lab_mishaps import CAMERA_MISHAPS, PROJECTOR_MISHAPS, CameraMishap
+from tests.cases.lab_surprises import CAMERA_SURPRISES, PROJECTOR_SURPRISES
 from tests.cases.pattern_faults import LASTING, SINGLE, PatternFault, PatternFaults
 from tests.cases.rig_habits import ALWAYS, CAMERA_HABITS, PROJECTOR_HABITS
 from tests.cases.spoiled_pictures import SPOILED, Spoil, squared
@@ -202,8 +203,11 @@ CAMERA: dict[str, tuple[bool, Change]] = {
     "memory used again": (False, _fill),
     **{kind: (is_single, _spoiled(spoil)) for kind, (is_single, spoil) in SPOILED.items()},
     **{kind: (False, _spoiled(spoil)) for kind, spoil in CAMERA_HABITS.items()},
-    **{kind: (False, _mishap(change)) for kind, change in CAMERA_MISHAPS.items()},
+    **{kind: (False, _mishap(change)) for kind, change in (CAMERA_MISHAPS | CAMERA_SURPRISES).items()},
 }
+
+
+_OF_PROJECTOR = PROJECTOR_MISHAPS | PROJECTOR_SURPRISES
 
 
 class LabProjector(Projector):
@@ -242,8 +246,8 @@ class LabProjector(Projector):
                     image = squared(image)
                 case kind if kind in PROJECTOR_HABITS:
                     image = PROJECTOR_HABITS[kind](image, self.shown - max(self.at, 1))
-                case kind if kind in PROJECTOR_MISHAPS:
-                    image = PROJECTOR_MISHAPS[kind](image, last, self.shown - max(self.at, 1))
+                case kind if kind in _OF_PROJECTOR:
+                    image = _OF_PROJECTOR[kind](image, last, self.shown - max(self.at, 1))
                 case "projector dims":
                     image = (0.75 * image).astype(np.uint8)
         self.projector.show(image)
@@ -342,7 +346,7 @@ PROJECTOR = (
     "projector squares its picture",
     "projector dims",
     *PROJECTOR_HABITS,
-    *PROJECTOR_MISHAPS,
+    *_OF_PROJECTOR,
 )
 #: Faults of the whole of a scan, that need no shot.
 OTHER = (

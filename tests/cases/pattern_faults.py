@@ -19,7 +19,7 @@ Image = NDArray[np.uint8]
 PatternImage = Callable[[CapturePlan, Shot], Image]
 
 #: What may be wrong with single pictures: only the first exposure of a shot, so that a second one is right.
-SINGLE = ("late", "repeated", "swapped", "torn", "half", "dark", "saturated")
+SINGLE = ("late", "repeated", "swapped", "torn", "band", "half", "dark", "saturated")
 #: What stays wrong from a shot on, also where earlier shots are captured again.
 LASTING = ("frozen", "projector late", "camera late", "camera repeats", "half from", "dark from")
 #: Of these, those that a second take of the same shot makes good.
@@ -102,6 +102,12 @@ class PatternFaults:
                 row = int(fault.tear * frame.pixels.shape[0])
                 pixels = np.concatenate([frame.pixels[:row], late.pixels[row:]])
                 return replace(frame, pixels=pixels), True
+            case "band":
+                # What was in memory where packets were lost.
+                rows, count = slice(int(fault.tear * len(frame.pixels)), None), len(frame.pixels) // 8
+                mixed = frame.pixels.copy()
+                mixed[rows][:count] = self._other(before, frame, timeout_ms).pixels[rows][:count]
+                return replace(frame, pixels=mixed), True
             case "half" | "half from":
                 self._camera.configure(frame.exposure_ms / 2)
                 dim = self._camera.snap(timeout_ms)

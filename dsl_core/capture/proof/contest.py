@@ -16,17 +16,22 @@ LEAST_MEAN = 0.15
 #: Votes against, net of those for, at the upper or lower end of a picture that make it torn: at least so
 #: many, and at least this share of all.
 TORN_VOTES, TORN_SHARE = 8.0, 0.02
-#: The same from which on another picture is asked for: right ones hardly ever have one net vote against.
+#: The same of rows anywhere, from which on another picture is asked for: right ones hardly ever have one net
+#: vote against in a row.
 DOUBTFUL_VOTES, DOUBTFUL_SHARE = 1.5, 0.005
 
 
 @dataclass(frozen=True)
 class Contest:
-    """The result of `vote`: ``count`` voters, their ``mean``, and the lowest sum from either end on."""
+    """The result of `vote`: ``count`` voters and their ``mean``.
+
+    ``worst_end`` is the lowest sum of votes from either end on, ``worst_run`` that of neighbours anywhere.
+    """
 
     count: int = 0
     mean: float = 1.0
     worst_end: float = 0.0
+    worst_run: float = 0.0
 
     @property
     def is_told(self) -> bool:
@@ -45,8 +50,8 @@ class Contest:
 
     @property
     def is_doubtful(self) -> bool:
-        """Whether a few pixels at the upper or lower end are unlike the picture wanted."""
-        return self.is_told and self.worst_end < -max(DOUBTFUL_VOTES, DOUBTFUL_SHARE * self.count)
+        """Whether a few pixels of rows next to each other are unlike the picture wanted."""
+        return self.is_told and self.worst_run < -max(DOUBTFUL_VOTES, DOUBTFUL_SHARE * self.count)
 
 
 def vote(seen: Floats, wanted: Floats, rival: Floats) -> Contest:
@@ -63,5 +68,7 @@ def vote(seen: Floats, wanted: Floats, rival: Floats) -> Contest:
     sums = np.cumsum(votes, dtype=np.float64)
     total = float(sums[-1])
     # What is left after the best beginning is the worst end.
-    worst = min(float(sums.min()), total - float(sums.max()), 0.0)
-    return Contest(seen.size, total / seen.size, worst)
+    peaks = np.maximum(np.maximum.accumulate(sums), 0)
+    run = min(float((sums - peaks).min()), 0.0)
+    end = min(float(sums.min()), total - float(sums.max()), 0.0)
+    return Contest(seen.size, total / seen.size, end, run)

@@ -11,8 +11,9 @@ from dsl_core.capture.proof.raster import Counts, Floats, Noise
 
 #: Stripes are well seen by a pixel, or by so many of those that are lit, with this share of the contrast.
 WELL_SEEN = 0.7
-#: Contrast relative to what it was that is no change.
-UNCHANGED = 0.03
+#: Contrast and light relative to what they were that are no change, and what single pixels may be off by as a
+#: share of the contrast, beyond their noise and so much more of its variance.
+UNCHANGED, MORE_NOISE = 0.03, 0.5
 #: A pixel is lit with a contrast of so many deviations.
 LIT_SIGMAS = 12.0
 #: Edges of a pattern have moved from so many camera pixels and deviations on.
@@ -54,14 +55,22 @@ def is_same(seen: Counts, before: Counts, pairs: Mapping[int, Pair], noise: Nois
 def is_unchanged(seen: Counts, before: Counts, pairs: Mapping[int, Pair], noise: Noise) -> bool:
     """Whether a picture shows what it showed ``before`` in the same light, with the same contrast.
 
-    What changes slowly, such as mist or focus, is the same for long, and not unchanged.
+    What changes slowly, such as mist or focus, is the same for long, and not unchanged; nor are colours whose
+    gain the camera sets by what it sees.
     """
     if not is_same(seen, before, pairs, noise):
         return False
     lit = _contrast(pairs.values()) > LIT_SIGMAS * np.sqrt(noise.variance(before))
-    old, new = (each[lit] - each[lit].mean(dtype=np.float64) for each in (before, seen))
+    level = noise.sensor.black_level_dn
+    light = [float(each[lit].mean(dtype=np.float64)) for each in (before, seen)]
+    old, new = (each[lit] - mean for each, mean in zip((before, seen), light, strict=True))
     power = float(old @ old)
-    return power > 0 and abs(float(old @ new) / power - 1) < UNCHANGED
+    if power <= 0 or abs((light[1] - level) / max(light[0] - level, 1.0) - 1) > UNCHANGED:
+        return False
+    contrast = float(old @ new) / power
+    usual = float((noise.variance(before) + noise.variance(seen))[lit].sum(dtype=np.float64))
+    left = float(((new - contrast * old) ** 2).sum()) - (1 + MORE_NOISE) * usual
+    return abs(contrast - 1) < UNCHANGED and left < UNCHANGED**2 * power
 
 
 def edges_moved(

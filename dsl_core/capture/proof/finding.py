@@ -24,6 +24,7 @@ class Verdict(StrEnum):
     DARK = "dark"
     MIRRORED = "mirrored"
     DISPLACED = "displaced"
+    HIDDEN = "partly hidden"
     OTHER = "another picture"
 
 
@@ -45,6 +46,7 @@ _SEEN = {
     Verdict.DARK: "the pattern is missing from it",
     Verdict.MIRRORED: "columns of the projector run across the picture the wrong way round",
     Verdict.DISPLACED: "it is displaced from the pictures before",
+    Verdict.HIDDEN: "a part of it is darker than the black picture, as if something were before it",
     Verdict.OTHER: "it shows something else",
 }
 _REMEDY = {
@@ -60,6 +62,8 @@ _REMEDY = {
     " switch mirroring off in the settings of both, or calibrate again.",
     Verdict.DISPLACED: "Check that projector, camera and target have not moved since the scan began,"
     " and that the projector does not correct or scale its picture.",
+    Verdict.HIDDEN: "Keep out of the way of camera, projector and lamps, and keep the light of the room as"
+    " it was.",
     Verdict.OTHER: "Check that camera, target and light have not moved since the scan began.",
 }
 
@@ -70,8 +74,8 @@ class Finding:
 
     ``again`` are the shots to take again, in the order of the plan: more than one where only together they
     are known to be wrong. ``detail`` says what was seen in more words, such as which other shot. A picture
-    ``is_doubtful`` if it cannot be told and is unlike its neighbours, if a few rows at its upper or lower
-    end do not show its pattern, or if its ``light`` has changed; a second picture says if it was right.
+    ``is_doubtful`` if it cannot be told and is unlike its neighbours, if a few rows
+    of it do not show its pattern, or if its ``light`` has changed; a second picture says if it was right.
     """
 
     shot: Shot
@@ -134,13 +138,17 @@ def together(findings: Iterable[Finding]) -> tuple[Finding, ...]:
 
 @dataclass(frozen=True)
 class ProofReport:
-    """What a check of ``judged`` frames found: what is ``wrong``, and how many cannot be told."""
+    """What a check of ``judged`` frames found: what is ``wrong``, and how many cannot be told.
+
+    ``light`` is a sentence on what lines add up to, where that is not white.
+    """
 
     judged: int
     wrong: tuple[Finding, ...]
     untold: int
+    light: str = ""
 
     @property
     def sentences(self) -> tuple[str, ...]:
         """A sentence for everything that is wrong."""
-        return tuple(each.sentence for each in self.wrong)
+        return (*(each.sentence for each in self.wrong), *([self.light] if self.light else ()))

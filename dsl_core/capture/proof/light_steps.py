@@ -31,6 +31,13 @@ class LightSteps:
         self._known: dict[tuple[str, int, bool], deque[float]] = {}
         self._steps: dict[int, tuple[tuple[str, int, bool], float]] = {}
 
+    def copy(self) -> LightSteps:
+        """What is remembered now."""
+        twin = LightSteps()
+        twin._known = {key: known.copy() for key, known in self._known.items()}
+        twin._steps = self._steps.copy()
+        return twin
+
     def judge(self, shot: Shot, share: float | None, dark: Contest | None) -> Light:
         """What a picture says of the light, from its brightness relative to the prediction.
 

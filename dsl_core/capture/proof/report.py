@@ -60,7 +60,8 @@ class SeenFrames:
                 pair = self._pair_elsewhere(number, shot.setting)
                 if pair is not None:
                     proof.substitute(number, pair)
-        return ProofReport(judged, together(wrong), untold)
+        total = proof.line_sum()
+        return ProofReport(judged, together(wrong), untold, "" if total is None else total.sentence)
 
     def _pair_elsewhere(self, number: int, setting: int) -> tuple[Counts, Counts] | None:
         """Pattern and inverse as another setting shows them."""

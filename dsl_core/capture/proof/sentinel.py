@@ -40,7 +40,7 @@ class SentinelProof:
                 seen, wanted, self._expected(rival), dark, np.zeros_like(dark), self._noise, self._raster
             )
             told |= found.is_told
-            if found.is_lost or found.is_torn:
+            if found.is_lost or found.is_torn or found.is_doubtful:
                 self._refused[shot.index] = self._refused.get(shot.index, 0) + 1
                 if self._refused[shot.index] > REFUSALS:
                     return Finding(shot, Verdict.UNTOLD)

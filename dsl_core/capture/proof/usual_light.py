@@ -30,6 +30,12 @@ class UsualLight:
         self._first_setting, self._is_calibrated = first_setting, is_calibrated
         self._known: dict[tuple[str, int], deque[float]] = {}
 
+    def copy(self) -> UsualLight:
+        """What is remembered now."""
+        twin = UsualLight(self._first_setting, self._is_calibrated)
+        twin._known = {key: known.copy() for key, known in self._known.items()}
+        return twin
+
     def knows(self, shot: Shot) -> bool:
         """Whether there were pictures of the shot's role and setting."""
         return (shot.role, shot.setting) in self._known
@@ -48,14 +54,14 @@ class UsualLight:
         """
         if share is None:
             return Finding(shot, Verdict.RIGHT)
-        known = self._known.setdefault((shot.role, shot.setting), deque(maxlen=REMEMBERED))
+        known = self._known.get((shot.role, shot.setting))
         low, high = SAME_EXPOSURE if known else FIRST_EXPOSURE
         if shot.setting == self._first_setting:
             high = MOST_LIGHT
         ratio = share / self.share(shot)
         if not low < ratio < high and (known or self._is_calibrated):
             return Finding(shot, Verdict.EXPOSURE, (shot,), f"{ratio:.2g} times what was expected")
-        known.append(share)
+        self._known.setdefault((shot.role, shot.setting), deque(maxlen=REMEMBERED)).append(share)
         return Finding(shot, Verdict.RIGHT)
 
     def begin(self, shot: Shot) -> None:

@@ -15,8 +15,10 @@ from dsl_core.capture.proof.first_code import FirstCode
 from dsl_core.capture.proof.later_settings import LaterSettings
 from dsl_core.capture.proof.light_steps import LightSteps
 from dsl_core.capture.proof.lines.bright_black import BrightBlack
+from dsl_core.capture.proof.lines.hidden import HiddenParts
 from dsl_core.capture.proof.lines.line_place import SIDES, LinePlaces, moved
 from dsl_core.capture.proof.lines.line_shown import line_shown
+from dsl_core.capture.proof.lines.line_sum import LineSum, line_sum
 from dsl_core.capture.proof.lines.neighbours import LineNeighbours
 from dsl_core.capture.proof.prediction import (
     APART,
@@ -90,6 +92,7 @@ class FrameProof:
         self._repeated: Counts | None = None
         self._profiles = Recent[Floats | None]()
         self._bright_black = BrightBlack(self._noise)
+        self._hidden = HiddenParts(self._noise)
         self._neighbours = LineNeighbours(self._noise, self._raster.shape[1])
 
     def _first_code(self) -> FirstCode | None:
@@ -111,7 +114,8 @@ class FrameProof:
         """The same of what a `Raster` takes of a mosaic."""
         found = self._unless_repeated(self._judge(shot, seen), seen)
         if shot.role == "spectral" and not found.is_wrong:
-            found = self._unless_black_is_bright(found, seen) or self._with_doubt(found, seen)
+            wrong = self._unless_black_is_bright(found, seen) or self._unless_hidden(found, seen)
+            found = wrong or self._with_doubt(found, seen)
         self._remember(found, seen)
         return found
 
@@ -169,6 +173,11 @@ class FrameProof:
         seen, before = self._raster.take(pixels), self._kept[first.index]
         return edges_moved(seen, before, self._code_pairs(), self._noise, self._raster.shape)
 
+    def line_sum(self) -> LineSum | None:
+        """What all lines of the first setting are together; None while that says nothing."""
+        lit = None if self._code is None else self._code.lit
+        return None if lit is None else line_sum(self._plan, self._first, self._kept, lit, self._noise)
+
     @property
     def first_setting(self) -> int:
         """The setting whose code is judged by itself."""
@@ -224,6 +233,14 @@ class FrameProof:
             return None
         again = tuple(each for each in self._shots[at : at + 2] if each.role != "sentinel")
         return Finding(found.shot, Verdict.OTHER, again, "black is brighter than the lines after it")
+
+    def _unless_hidden(self, found: Finding, seen: Counts) -> Finding | None:
+        """That something has come before a part of the scene or of its light."""
+        shot = found.shot
+        black = self._kept.get(self._blacks[shot.setting])
+        if black is None or not self._hidden.is_hidden(shot.setting, seen, black):
+            return None
+        return Finding(shot, Verdict.HIDDEN, (shot,))
 
     def _with_doubt(self, found: Finding, seen: Counts) -> Finding:
         """A finding on a line; doubtful if it cannot be told and is unlike its neighbours."""
@@ -330,11 +347,18 @@ class FrameProof:
 
     def _judge_again(self, shot: Shot, seen: Counts) -> Finding:
         """A finding by the picture of the first setting, with and without what black has gained since."""
+        before = self._usual.copy(), self._steps.copy(), self._line_places.copy(), self._contested.copy()
         found = self._judge_later(shot, seen)
         if not found.is_wrong or self._later.gained(shot) == 0:
             return found
+        # Only the judgement that is believed counts for what is usual.
+        after = self._usual, self._steps, self._line_places, self._contested
+        self._usual, self._steps, self._line_places, self._contested = before
         other = self._judge_later(shot, seen, less_gained=False)
-        return found if other.is_wrong else other
+        if other.is_wrong:
+            self._usual, self._steps, self._line_places, self._contested = after
+            return found
+        return other
 
     def _judge_later(self, shot: Shot, seen: Counts, less_gained: bool = True) -> Finding:
         later = self._later

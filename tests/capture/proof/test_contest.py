@@ -32,6 +32,15 @@ def test_a_tear_is_found_at_either_end() -> None:
         assert found.worst_end == -40.0
 
 
+def test_rows_in_the_middle_against_are_a_doubt_and_no_tear() -> None:
+    found = vote(np.r_[WANTED[:200], RIVAL[200:210], WANTED[210:]], WANTED, RIVAL)
+    assert (found.worst_end, found.worst_run) == (0.0, -10.0)
+    assert found.is_doubtful
+    assert not found.is_torn
+    assert vote(np.r_[RIVAL[:3], WANTED[3:]], WANTED, RIVAL).worst_run == -3.0
+    assert vote(WANTED, WANTED, RIVAL).worst_run == 0.0
+
+
 def test_scattered_pixels_against_are_no_tear() -> None:
     seen = WANTED.copy()
     seen[::9] = 100
@@ -58,7 +67,7 @@ def test_a_tear_has_eight_votes_and_a_fiftieth_of_all(count: int, limit: float) 
 
 
 @pytest.mark.parametrize(("count", "limit"), [(100, 1.5), (1000, 5.0)])
-def test_few_votes_against_at_an_end_are_a_doubt(count: int, limit: float) -> None:
-    assert Contest(count, 0.9, -limit - 0.1).is_doubtful
-    assert not Contest(count, 0.9, -limit + 0.1).is_doubtful
-    assert not Contest(11, 0.9, -limit - 0.1).is_doubtful
+def test_few_votes_against_in_a_row_are_a_doubt(count: int, limit: float) -> None:
+    assert Contest(count, 0.9, 0.0, -limit - 0.1).is_doubtful
+    assert not Contest(count, 0.9, 0.0, -limit + 0.1).is_doubtful
+    assert not Contest(11, 0.9, 0.0, -limit - 0.1).is_doubtful

@@ -90,6 +90,20 @@ def test_mist_that_takes_a_twentieth_of_the_contrast_is_a_change_though_the_pict
     assert not is_unchanged(other, one, pairs, NOISE)
 
 
+@pytest.mark.parametrize(
+    ("gains", "unchanged"),
+    [((1.0, 1.0), True), ((1.01, 1.01), True), ((1.06, 1.06), False), ((1.06, 0.94), False)],
+)
+def test_gains_of_colours_that_follow_the_picture_are_a_change(
+    gains: tuple[float, float], unchanged: bool
+) -> None:
+    one, other = stripes(4)
+    gain = np.resize(gains, one.size)
+    now = (100 + gain * (one - 100.0)).round().astype(np.uint16)
+    assert is_same(now, one, {0: (one, other)}, NOISE)
+    assert is_unchanged(now, one, {0: (one, other)}, NOISE) == unchanged
+
+
 ROWS = 40
 
 

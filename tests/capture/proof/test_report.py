@@ -7,7 +7,9 @@ from itertools import islice
 import pytest
 
 from dsl_core.capture.proof.finding import ProofReport, Verdict
+from dsl_core.capture.proof.lines.line_sum import LineSum
 from dsl_core.capture.proof.report import SeenFrames, prove
+from dsl_core.capture.proof.verifier import FrameProof
 from dsl_core.model.plan import describe_shot
 from tests.cases.memory_sink import MemorySink
 from tests.cases.rendered_rig import RenderedScene, token_image
@@ -49,6 +51,14 @@ def test_pictures_in_the_places_of_others_are_named(scene: RenderedScene, frames
     assert report.sentences[0].startswith(
         f"{describe_shot(shots[6]).capitalize()} or {describe_shot(shots[7])}"
     )
+
+
+def test_lines_that_do_not_add_up_to_white_are_told(
+    scene: RenderedScene, frames: MemorySink, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(FrameProof, "line_sum", lambda proof: LineSum(0.8, 0.01, 0.1))
+    (sentence,) = _judged(scene, frames).sentences
+    assert sentence.startswith("All lines together have 0.80 ± 0.01 times the light of white")
 
 
 def test_one_wrong_pair_leaves_the_lines_to_be_judged(scene: RenderedScene, frames: MemorySink) -> None:

@@ -46,6 +46,12 @@ def test_another_picture_is_named_and_refused_a_few_times_only(pictures: dict[st
     assert found.again == (other,)
 
 
+def test_stale_rows_in_the_middle_are_refused(pictures: dict[str, np.ndarray]) -> None:
+    again, line = pictures["again"], pictures["line"]
+    stale = np.concatenate([again[:960], line[960:1200], again[1200:]])
+    assert judge(pictures, stale, SentinelProof(Noise.of(None, 12), Raster(SIZE))) is Verdict.TORN
+
+
 def test_nothing_is_said_without_the_picture_of_before(pictures: dict[str, np.ndarray]) -> None:
     proof = SentinelProof(Noise.of(None, 12), Raster(SIZE))
     found = proof.judge(SHOT, pictures["line"], None, pictures["black"], [])

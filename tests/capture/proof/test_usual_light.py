@@ -70,6 +70,12 @@ def test_without_a_calibration_only_pictures_after_the_first_have_a_wrong_bright
     assert usual.judge(LATER_LINE, None).verdict is Verdict.RIGHT
 
 
+def test_a_first_picture_of_wrong_brightness_leaves_the_next_one_the_first() -> None:
+    usual = UsualLight(0, is_calibrated=True)
+    assert usual.judge(LATER_LINE, 0.1).is_wrong
+    assert not usual.knows(LATER_LINE)
+
+
 def test_a_picture_by_which_predictions_are_scaled_is_as_bright_as_predicted() -> None:
     usual = UsualLight(0, is_calibrated=True)
     usual.judge(LATER_LINE, 0.6)

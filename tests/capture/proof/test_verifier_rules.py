@@ -29,7 +29,7 @@ PLAN = CapturePlan(
 SHOTS = tuple(PLAN.shots())
 LINE, LATER_LINE = SHOTS[13], SHOTS[29]
 WON, LOST = Contest(100, 0.9, 0.0), Contest(100, -0.9, -90.0)
-TORN, DOUBTFUL, FEW = Contest(100, 0.6, -9.0), Contest(100, 0.9, -2.0), Contest(11, -1.0, -11.0)
+TORN, DOUBTFUL, FEW = Contest(100, 0.6, -9.0), Contest(100, 0.9, -2.0, -2.0), Contest(11, -1.0, -11.0)
 
 
 def rig() -> Rig:
@@ -212,6 +212,33 @@ def test_dark_pixels_are_asked_once_the_black_of_a_later_setting_is_there(
     asked.clear()
     judge._judge_again(SHOTS[27], counts(111))
     assert min(asked) > 0, "black cannot vouch for itself"
+
+
+@pytest.mark.parametrize("wrong", [(True, False), (True, True), (False, True)])
+def test_a_picture_judged_with_and_without_gained_black_counts_once(
+    monkeypatch: pytest.MonkeyPatch, wrong: tuple[bool, bool]
+) -> None:
+    judge = proof()
+    monkeypatch.setattr(judge._later, "gained", lambda shot: np.float32(3))
+
+    def later(shot: Shot, seen: Counts, less_gained: bool = True) -> Finding:
+        light = 0.8 if less_gained else 0.7
+        judge._usual.judge(shot, light)
+        judge._steps.judge(shot, light, None)
+        judge._line_places.judge(shot, {1: Contest(100, light)})
+        is_wrong = wrong[not less_gained]
+        if is_wrong:
+            judge._contested.add(less_gained)
+        return Finding(shot, Verdict.DISPLACED, (shot,) if is_wrong else ())
+
+    monkeypatch.setattr(judge, "_judge_later", later)
+    is_first = wrong != (True, False)
+    assert judge._judge_again(LATER_LINE, counts(5)).is_wrong == (wrong[0] and wrong[1])
+    light = 0.8 if is_first else 0.7
+    assert list(judge._usual._known["spectral", 1]) == [light]
+    assert list(judge._steps._known["spectral", 1, True]) == [light]
+    assert [votes for _, votes, _ in judge._line_places._votes[1].values()] == [100 * light]
+    assert judge._contested == ({True} if wrong[0] and is_first else set())
 
 
 def test_only_the_brightness_of_lines_is_asked_of_what_they_light(monkeypatch: pytest.MonkeyPatch) -> None:

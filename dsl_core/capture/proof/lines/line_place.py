@@ -42,6 +42,12 @@ class LinePlaces:
         """Start without any picture."""
         self._votes: dict[int, dict[int, tuple[Shot, float, int]]] = {side: {} for side in SIDES}
 
+    def copy(self) -> LinePlaces:
+        """What is remembered now."""
+        twin = LinePlaces()
+        twin._votes = {side: votes.copy() for side, votes in self._votes.items()}
+        return twin
+
     def judge(
         self, shot: Shot, contests: Mapping[int, Contest], is_wrong: bool = False
     ) -> tuple[int, tuple[Shot, ...]] | None:

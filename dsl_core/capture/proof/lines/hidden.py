@@ -1,0 +1,48 @@
+"""Whether something has come between the scene and the camera, or between a lamp of the room and the scene.
+
+No line takes light away: where its picture is darker than black, light of the room is missing. All of the
+room may have become darker, which changes most pixels alike; a part of the picture has not.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dsl_core.capture.proof.raster import Counts, Noise
+
+#: A pixel is darker by so many deviations, and by this share of what the room gives it.
+SIGMAS, SHARE = 4.0, 0.35
+#: So many pixels that the line before left as they were, as a share of all and at least.
+FEWEST_SHARE, FEWEST = 0.01, 12
+#: Median of the deviations of a normal distribution.
+NORMAL = 0.6745
+
+
+class HiddenParts:
+    """Compares lines with black and with the lines before them."""
+
+    def __init__(self, noise: Noise) -> None:
+        """Start without any line."""
+        self._noise = noise
+        self._before: tuple[int, NDArray[np.bool_]] | None = None
+
+    def is_hidden(self, setting: int, seen: Counts, black: Counts) -> bool:
+        """Whether a part of a line is darker than black that was not in the line before of this setting.
+
+        What was dark there already says more of black, which may have been too bright. A picture in which
+        nothing is hidden is remembered for the next.
+        """
+        room = np.subtract(black, np.float32(self._noise.sensor.black_level_dn), dtype=np.float32)
+        lost = np.subtract(black, seen, dtype=np.float32)
+        middle = np.float32(np.median(lost))
+        sigma = np.sqrt(self._noise.variance(seen) + self._noise.variance(black))
+        # Most pixels show noise alone: a camera that has more than it is said to have says so itself.
+        more = max(float(np.median(np.abs(lost - middle) / sigma)) / NORMAL, 1.0)
+        lost -= max(middle, np.float32(0))
+        dark = np.asarray((lost > SIGMAS * more * sigma) & (lost > SHARE * room))
+        before = self._before[1] if self._before is not None and self._before[0] == setting else dark
+        found = int((dark & ~before).sum()) >= max(FEWEST, FEWEST_SHARE * dark.size)
+        if not found:
+            self._before = setting, dark
+        return found

@@ -1,0 +1,105 @@
+"""Whether lines got the light that white got: light adds up, so that all lines together are white.
+
+No picture by itself tells that a projector gives dark pictures another share of its light than bright ones:
+every line has as much as those before it, and white, black and code, taken once more, look as they did.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from dsl_core.capture.proof.prediction import Lit
+from dsl_core.capture.proof.raster import Counts, Noise
+from dsl_core.model.plan import CapturePlan, LineComb, ScanLines, Shot
+from dsl_core.patterns.multiplexed import profiles
+
+#: How far the sum may be from white: what clean scans of all scenes differ by is a fifth of this.
+LEAST, SIGMAS = 0.05, 5.0
+#: What black may have changed by unseen, DN, with and without pictures of it among the lines.
+UNSEEN_DN, UNKNOWN_DN = 0.3, 1.0
+#: How uneven the lines may light the columns, as a share, but for those at the edges of the picture.
+EVEN, EDGE = 0.02, 16
+#: Pixels needed to say anything.
+FEWEST = 60
+
+
+@dataclass(frozen=True)
+class LineSum:
+    """Light of all lines together over what white has of it, with its deviation and how far off it may be."""
+
+    share: float
+    std: float
+    allowed: float
+
+    @property
+    def sentence(self) -> str:
+        """That the light differs; empty if it does not."""
+        if abs(self.share - 1) <= self.allowed:
+            return ""
+        return (
+            f"All lines together have {self.share:.2f} ± {max(self.std, 0.005):.2f} times the light of white,"
+            " which they add up to. The projector gives dark pictures another share of its light than bright"
+            " ones, the exposure changed in between, or other light came in. Switch dynamic contrast, eco"
+            " mode and limits of power of the projector off, and automatic modes of the camera; keep the"
+            " light of the room as it is, and scan again."
+        )
+
+
+def line_sum(
+    plan: CapturePlan, setting: int, kept: Mapping[int, Counts], lit: Lit, noise: Noise
+) -> LineSum | None:
+    """The sum of the lines of a setting, from the raster of each shot; None where it says nothing.
+
+    That is where lines do not light all columns evenly, or pictures are not there. What light and black have
+    changed by meanwhile is taken off, as far as white and black, taken once more, show it.
+    """
+    own = [shot for shot in plan.shots() if shot.setting == setting]
+    lines = [shot for shot in own if shot.role == "spectral"]
+    by_role = {shot.role: shot for shot in own if shot.role in ("white", "black")}
+    if not {shot.index for shot in (*lines, *by_role.values())} <= kept.keys() or len(by_role) < 2:
+        return None
+    cover = _even_cover(plan)
+    if cover is None or lit.index.size < FEWEST:
+        return None
+    # Half of the pixels have most of the light.
+    at = lit.index[lit.contrast >= np.median(lit.contrast)]
+    again = [shot for shot in plan.shots() if shot.role == "sentinel" and shot.index in kept]
+    black, white = (_course(by_role[role], again, plan, kept, at) for role in ("black", "white"))
+    places = [shot.index for shot in lines]
+    dark, bright = (np.interp(places, *course) for course in (black, white))
+    light = sum(float(kept[index][at].sum(dtype=np.float64)) for index in places) - float(dark.sum())
+    # Light of white when each line was taken; its own black is the one nearest in time.
+    usual = cover * float((bright - dark).sum()) / len(lines)
+    if usual <= 0:
+        return None
+    variance = noise.variance(kept[by_role["black"].index])[at].sum(dtype=np.float64)
+    std = len(lines) * float(np.sqrt(variance)) / usual
+    unseen = UNSEEN_DN if len(black[0]) > 1 else UNKNOWN_DN
+    # Nobody knows when between two takes black and white changed.
+    steps = [float(np.abs(np.diff(sums)).max(initial=0)) / 2 for _, sums in (black, white)]
+    wander = len(lines) * (unseen * at.size + steps[0]) / usual + steps[1] / white[1][0]
+    allowed = LEAST + SIGMAS * std + wander
+    return LineSum(light / usual, std, allowed)
+
+
+def _course(
+    first: Shot, again: list[Shot], plan: CapturePlan, kept: Mapping[int, Counts], at: np.ndarray
+) -> tuple[list[int], list[float]]:
+    """Places in the plan of a shot and of those that repeat it, and the sums of their counts."""
+    shots = [first, *(each for each in again if plan.original(each).index == first.index)]
+    sums = [float(kept[each.index][at].sum(dtype=np.float64)) for each in shots]
+    return [each.index for each in shots], sums
+
+
+def _even_cover(plan: CapturePlan) -> float | None:
+    """How many lines light each column; None where they do so unevenly, or are drawn in shades."""
+    if not isinstance(plan.spectral, ScanLines | LineComb):
+        return None
+    cover = profiles(plan.spectral, plan.projector_size_px[0]).sum(0, dtype=np.float64)
+    edge = len(cover) // EDGE
+    inner = cover[edge : len(cover) - edge]
+    mean = float(inner.mean())
+    return mean if mean > 0 and float(inner.std()) < EVEN * mean else None
