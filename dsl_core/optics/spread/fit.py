@@ -164,9 +164,14 @@ def _skirted(view: View, family: _Family, found: SpreadFit) -> SpreadFit:
         return _left_by(view, family.skirted(*_skirt_of(values)), pixels)
 
     def best(pixels: Tensor) -> Floats:
-        limits = {"maxfev": TRIALS, "xatol": SKIRT_STEP, "fatol": SKIRT_STEP}
-        trials = minimize(left, SKIRT_START, (pixels,), "Nelder-Mead", options=limits)
-        return np.asarray(trials.x)
+        trials = minimize(
+            left,
+            np.array(SKIRT_START),
+            (pixels,),
+            method="Nelder-Mead",
+            options={"maxfev": TRIALS, "xatol": SKIRT_STEP, "fatol": SKIRT_STEP},
+        )
+        return np.asarray(trials.x, np.float64)
 
     parts = [torch.nonzero(half == which).ravel() for which in (0, 1)]
     crossed = [left(best(own), other) for own, other in (parts, parts[::-1])]
