@@ -113,21 +113,17 @@ def test_rows_are_displaced_by_whole_columns_if_these_explain_all_of_them() -> N
     assert whole_columns(2 * slope, std, 0 * slope) == 0
 
 
-@pytest.mark.parametrize(("first", "part"), [(0.6, "motion"), (0.0, "geometry")])
-def test_lines_that_moved_after_the_code_are_told(
-    scanned: tuple[DeviceRig, MemoryScan], first: float, part: str
-) -> None:
+def test_lines_that_lie_beside_the_code_everywhere_are_told(scanned: tuple[DeviceRig, MemoryScan]) -> None:
     devices, scan = scanned
     lines = [shot.index for shot in scan.plan.shots() if shot.role == "spectral"]
     moved = list(scan.frames)
-    for now, after in list(pairwise(lines))[int(first * len(lines)) :]:
+    for now, after in pairwise(lines):
         # A mean of two lines, one step of 4 columns apart, is displaced.
         moved[now] = np.round(0.86 * scan.frames[now] + 0.14 * scan.frames[after]).astype(np.uint16)
     found, evaluation = findings(scanned, calibration_of(devices), MemoryScan(scan.plan, tuple(moved)))
     assert found["lines"].significant
-    # Where all lines have the same second one beside them, that may be how the projector shows lines.
-    assert found["lines"].part == part
-    assert ("less even" in found["lines"].sentence) == (part == "geometry")
+    # All lines have the same second one beside them: that may as well be how the projector shows lines.
+    assert "less even than calibrated, or the projector's picture" in found["lines"].sentence
     assert 0.1 < found["lines"].value < 0.5
     assert held(evaluation) > 0.9
 
