@@ -16,7 +16,7 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from dsl_core.model.fit import FitFinding
+from dsl_core.model.fit import FitFinding, Part
 from dsl_core.model.plan import BinaryCode, CapturePlan, EnsembleCode, GrayCode, XorCode
 from dsl_core.model.result import Flag
 from dsl_core.model.rig import Rig
@@ -46,12 +46,19 @@ MOST_APART_PX, MOST_ROWS_PX = 0.1, 0.05
 #: Where lines are blurred by more than this (rms, px), the finest stripes of a code have no contrast, or an
 #: inverted one: it names columns that are off by one or two, by their place, and lines differ by as much.
 BLURRED_PX, BLURRED_APART_PX = 1.4, 1.5
+#: Groups whose mean is smooth, and the share of a disagreement that has to be smooth if something
+#: moved; the share of its mean that changes over the columns if it moved while lines were captured.
+SMOOTH_GROUPS, MOST_SMOOTH, CHANGES = 5, 0.5, 0.35
+#: How far lines that are not even lie from their stripes at most, relative to the rms width of their light.
+UNEVEN = 0.6
 #: The most that a film that has moved displaces rows by, px.
 MOST_BY_FILM_PX = 0.1
 #: Share of the error of columns that is seen in rows: pictures are wider than high, and depth follows rows.
 ROWS_TELL = 0.5
 #: A number of columns is whole up to this, and explains rows but for this share of their displacement.
 NEARLY_WHOLE, LEFT_OVER = 0.15, 0.3
+#: Name of what is found of lines.
+LINES_AGAINST_CODE = "lines against the binary code"
 #: Pixels that say nothing: their column is not that of one surface, or is not refined.
 _DOUBTFUL = Flag.NOT_REFINED | Flag.UNUSUAL_PEAK | Flag.DEPTH_EDGE
 
@@ -96,6 +103,13 @@ class Disagreement:
         """Deviation of the root mean square."""
         return float(np.sqrt(np.mean(self.std_px**2) / len(self.std_px)))
 
+    def smooth(self) -> Floats:
+        """Shifts averaged over neighbouring groups, px: what moves does so along the columns, or at once."""
+        size = min(SMOOTH_GROUPS, len(self.shift_px))
+        weight = np.pad(self.std_px**-2.0, size // 2)
+        total = np.convolve(np.pad(self.shift_px, size // 2) * weight, np.ones(size), "valid")
+        return np.asarray(total / np.convolve(weight, np.ones(size), "valid"))
+
     @property
     def worst_px(self) -> float:
         """The largest shift, with its sign."""
@@ -125,7 +139,7 @@ def code_agreement(
     ):
         if found is not None:
             findings.append(found)
-            share = ROWS_TELL if found.part == "geometry" else 1.0
+            share = 1.0 if found.name == LINES_AGAINST_CODE else ROWS_TELL
             error_px = math.hypot(error_px, found.value / share if found.significant else 0.0)
     if error_px > 0:
         geometry = geometry.by(rig, np.full(geometry.depth_mm.shape, np.float32(error_px)), window_px)
@@ -189,16 +203,44 @@ def _of_columns(
     found = Disagreement.of(*displacement(code.column[usable], column, group, groups))
     if found is None:
         return None
+    part, cause, advice = _cause_of(found, blur_px)
     return FitFinding.judged(
-        "motion",
-        "lines against the binary code",
+        part,
+        LINES_AGAINST_CODE,
         (found.rms_px, found.rms_std_px),
         "px",
         BLURRED_APART_PX if blur_px > BLURRED_PX else MOST_APART_PX,
         f"Lines lie {found.rms_px:.2f} columns (rms, at most {-found.worst_px:+.2f}) from where the binary"
-        " code saw the same points: the projector's picture, the camera or the scene moved between them."
-        " Deviations of depth contain it.",
-        "Let projector and camera warm up, fix them and the scene, and scan again.",
+        f" code saw the same points: {cause} Deviations of depth contain it.",
+        advice,
+    )
+
+
+def _cause_of(found: Disagreement, blur_px: float) -> tuple[Part, str, str]:
+    """The part of the model that lines and code disagree about, the cause in words, and what to do.
+
+    What moves displaces neighbouring columns alike. Where all are displaced alike, by less than light that is
+    brighter on one side of a line can be, nobody can tell whether that or a motion is the cause.
+    """
+    smooth, mean = found.smooth(), float(np.average(found.shift_px, weights=found.std_px**-2.0))
+    if float(np.mean(smooth**2)) < MOST_SMOOTH * float(np.mean(found.shift_px**2)):
+        unknown = "the model of the lines does not fit, and nothing that moved explains it."
+        return (
+            "geometry",
+            unknown,
+            "Look at the other findings; repeat the self-test in focus, and scan again.",
+        )
+    if float(np.std(smooth)) > CHANGES * abs(mean) or abs(mean) > UNEVEN * blur_px:
+        moved = "the projector's picture, the camera or the scene moved between them."
+        return "motion", moved, "Let projector and camera warm up, fix them and the scene, and scan again."
+    either = (
+        "the light of lines is less even than calibrated, or the projector's picture, the camera or the scene"
+        " moved between them."
+    )
+    return (
+        "geometry",
+        either,
+        "Scan again: only what has moved will have changed. If nothing has, calibrate again.",
     )
 
 

@@ -47,6 +47,8 @@ FEWEST = 50
 MOST_BLUR, MOST_TAIL = 0.03, 0.004
 #: Chi-square of most pixels above which no cause explains the frames.
 MOST_CHI_SQUARE = 1.5
+#: Share of one order's displacement that the other's must have if uneven lines may be the cause.
+ALIKE = 0.4
 #: Added to findings whose effect the spectra of the result already allow for.
 CORRECTED = " The spectra of this result are corrected for it."
 #: Words, decimals and unit of the numbers of a film, as in `FIELDS`.
@@ -392,6 +394,9 @@ def _motion(motion: FilmMotion, probe: Probe) -> FitFinding:
 
 def _film(causes: Causes, probe: Probe) -> FitFinding:
     plus, minus = causes.mean_px
+    # Light that is brighter on one side of a line displaces both orders to that side.
+    alike = plus * minus > 0 and min(abs(plus), abs(minus)) > ALIKE * max(abs(plus), abs(minus))
+    lines = ", or the light of lines is less even than calibrated" if alike else ""
     return FitFinding.judged(
         "film",
         "place of the first orders",
@@ -399,7 +404,8 @@ def _film(causes: Causes, probe: Probe) -> FitFinding:
         "px",
         MOST_SHIFT_PX * coarseness(probe.step_nm),
         f"Wavelengths are off by {causes.rms_px * probe.nm_per_px:.2f} nm: order +1 lies {plus:+.3f} columns"
-        f" from its place, order -1 {minus:+.3f}, on average; the film has moved or is bent otherwise.",
+        f" from its place, order -1 {minus:+.3f}, on average; the film has moved or is bent"
+        f" otherwise{lines}.",
         "Run the drift check, and calibrate the depth stage again.",
     )
 

@@ -126,13 +126,16 @@ def _pairs(rig: Rig, amplitude: NDArray[np.floating], shading: Floats) -> tuple[
     """Steps of level, squared distance and shading between pixels that look alike, and their quarters."""
     height, width = amplitude.shape
 
+    step = max(2, 2 * round(width * APART / 2))
+    with np.errstate(invalid="ignore", divide="ignore"):
+        levels, lights = np.log(amplitude / shading), np.log(shading)
+    smooth = _smooth(lights, step)
+
     def seen(where: tuple[slice, slice]) -> tuple[Floats, NDArray[np.intp]]:
         rows, columns = np.meshgrid(np.arange(height)[where[0]], np.arange(width)[where[1]], indexing="ij")
-        with np.errstate(invalid="ignore", divide="ignore"):
-            level, light = np.log(amplitude[where] / shading[where]), np.log(shading[where])
-        return np.stack([level, _square(rig, rows, columns), light]), np.stack([rows, columns])
+        seen = [levels[where], _square(rig, rows, columns), smooth[where], lights[where]]
+        return np.stack(seen), np.stack([rows, columns])
 
-    step = max(2, 2 * round(width * APART / 2))
     # Single pixels, evenly thinned: the stride keeps no colour out.
     stride = max(int((height * width / PAIRS) ** 0.5) | 1, 1)
 
@@ -143,11 +146,27 @@ def _pairs(rig: Rig, amplitude: NDArray[np.floating], shading: Floats) -> tuple[
             (here, (rows, columns)), (there, _) = seen(first), seen(second)
             found = there - here
             with np.errstate(invalid="ignore"):
-                alike = (np.abs(found[0]) < ALIKE) & (np.abs(found[2]) < EVEN)
+                alike = (np.abs(found[0]) < ALIKE) & (np.abs(found[3]) < EVEN)
             quarter = 2 * (rows + down / 2 > height / 2) + (columns + across / 2 > width / 2)
-            yield np.concatenate([found[:, alike], quarter[alike][None]])
+            yield np.concatenate([found[:3, alike], quarter[alike][None]])
 
     return tuple(np.concatenate(list(steps()), 1))
+
+
+def _smooth(values: Floats, wide: int) -> Floats:
+    """Values (rows, columns) averaged over what is about so many pixels around; NaN stays unknown.
+
+    Noise of the shading is in levels, too, with the opposite sign: as a cause beside the gain it would seem
+    to explain what it only shares with them.
+    """
+    from scipy.ndimage import gaussian_filter
+
+    known = np.isfinite(values)
+    light, weight = (
+        gaussian_filter(each, wide / 2, mode="nearest", truncate=3.0)
+        for each in (np.where(known, values, 0.0), known.astype(np.float64))
+    )
+    return np.where(known, light / np.maximum(weight, 1e-9), np.nan)
 
 
 def _slope(level: Floats, *causes: Floats) -> tuple[float, float] | None:

@@ -60,10 +60,12 @@ def _field_finding(field: FieldFit) -> FitFinding:
         limit=100 * MOST_WIDER,
         significant=wider > MOST_WIDER and apart > SIGMAS * std,
         sentence=(
-            f"The projector's line spread is wider by {100 * wider:.1f} ± {100 * std * (1 + wider):.1f} %"
-            f" {here} of the measured part of its frame than {there}. The result follows it."
+            f"Lines are wider by {100 * wider:.1f} ± {100 * std * (1 + wider):.1f} % {here} of the measured"
+            f" part of the projector's frame than {there}: its lens spreads them so, or surfaces there are"
+            " translucent or out of focus. The result follows it."
         ),
-        advice="Check the focus of the projector and whether its lens is tilted.",
+        advice="If a flat matt target shows it, too, check the focus of the projector and whether its lens is"
+        " tilted.",
     )
 
 
@@ -80,9 +82,10 @@ def _curve_finding(calibrated: ProjectorResponse, found: SpreadFit) -> FitFindin
         100 * elsewhere,
         "% of the light of a line elsewhere than calibrated",
         100 * MOST_ELSEWHERE,
-        f"The projector spreads light over {own.blur_px:.3f} ± {found.rms_std_px:.3f} px (rms), by its"
+        f"Lines are spread over {own.blur_px:.3f} ± {found.rms_std_px:.3f} px (rms), by the projector's"
         f" calibration over {calibrated.blur_px:.3f} px; {elsewhere:.1%} of it falls elsewhere, and"
         f" {tails[1]:.1%} instead of {tails[0]:.1%} farther than {TAIL_PX:g} px away. The own spread"
         " of the scan was used.",
-        "Focus the projector as for its calibration, or calibrate again.",
+        "If a flat matt target shows it, too, focus the projector as for its calibration, or calibrate"
+        " again.",
     )

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import cast
 
 import numpy as np
 import pytest
@@ -17,13 +19,14 @@ from dsl_core.model.spectral import WavelengthGrid
 from dsl_core.optics.correspondence import correspondence
 from dsl_core.reconstruction.fit_findings import (
     SpectralCounts,
+    _film,
     band_findings,
     cause_findings,
     count_spectra,
     line_width_nm,
     share_findings,
 )
-from dsl_core.reconstruction.spectral.causes import MOST_SHIFT_PX
+from dsl_core.reconstruction.spectral.causes import MOST_SHIFT_PX, Causes
 from dsl_core.reconstruction.spectral.film_motion import FilmMotion
 from dsl_core.reconstruction.spectral.probing.probe import Probe, probe
 from dsl_core.reconstruction.spectral.spectra import SpectralReconstruction
@@ -260,6 +263,18 @@ def test_the_part_that_is_wrong_is_named(
     assert devices.calibration is not None
     fit = Fit.of(cause_findings(probed(wrong(devices.calibration), scan)))
     assert fit.parts[:1] == (() if part is None else (part,)), fit.words
+
+
+@pytest.mark.parametrize(
+    ("both", "told"), [((0.127, 0.061), True), ((0.1, 0.03), False), ((0.1, -0.1), False)]
+)
+def test_uneven_lines_are_a_cause_only_where_both_orders_lie_to_the_same_side(
+    both: tuple[float, float], told: bool
+) -> None:
+    causes = cast(Causes, SimpleNamespace(mean_px=both, rms_px=0.1, rms_std_px=0.008))
+    found = _film(causes, cast(Probe, SimpleNamespace(nm_per_px=1.9, step_nm=5.0)))
+    assert "film has moved or is bent otherwise" in found.sentence
+    assert ("less even" in found.sentence) == told
 
 
 def test_bands_must_be_narrow_to_tell_a_small_displacement(scanned: tuple[DeviceRig, MemoryScan]) -> None:

@@ -66,6 +66,19 @@ def test_a_lens_that_loses_light_in_the_corners_is_measured_and_followed(rig: Ri
     assert "-8." in flat_finding(found).sentence or "-7." in flat_finding(found).sentence
 
 
+def test_noise_of_the_shading_hides_no_gain_and_makes_none(rig: Rig) -> None:
+    # Light falls off to the corners as gain does: its noise must not count as an error that goes with it.
+    light = 1 - 0.2 * square(rig)
+    for loss in (0.0, 0.08):
+        level, shading = scene(rig, light * (1 - loss * square(rig)))
+        rough = shading * light * (1 + 0.02 * np.random.default_rng(8).standard_normal(shading.shape))
+        found = own_flat_field(rig, level, rough)
+        assert found is not None
+        assert found.present == (loss > 0)
+        for corner in (found.corner, found.beside_shading[0]):
+            assert corner == pytest.approx(np.log(1 - loss), abs=0.02)
+
+
 def test_an_even_camera_and_light_from_one_side_are_left_alone(rig: Rig) -> None:
     columns = np.linspace(-1, 1, rig.camera.width_px)[None]
     for change in (1.0, 1 + 0.06 * columns, 1 - 0.08 * np.where(columns > 0, columns, 0) ** 2):
@@ -99,6 +112,7 @@ def test_pixels_a_nineteenth_of_the_width_apart_are_compared(
     height, width = shading.shape
     assert (height, width) == (72, 112)
     far, look = square(rig), np.log(level / shading)
+    smooth = flat_field._smooth(np.log(shading), 6)
     wanted = []
     for down, across in ((0, 6), (6, 0)):
         for y in range(0, height - down, stride):
@@ -106,7 +120,10 @@ def test_pixels_a_nineteenth_of_the_width_apart_are_compared(
                 here, there = (y, x), (y + down, x + across)
                 step, light = look[there] - look[here], np.log(shading[there] / shading[here])
                 if abs(step) < 0.06 and abs(light) < 0.1:
-                    quarter = 2 * (y + down / 2 > 36) + (x + across / 2 > 56)
+                    quarter, light = (
+                        2 * (y + down / 2 > 36) + (x + across / 2 > 56),
+                        smooth[there] - smooth[here],
+                    )
                     wanted.append((step, far[there] - far[here], light, quarter))
     found = flat_field._pairs(rig, level, shading)
     assert len(wanted) > 500

@@ -38,7 +38,8 @@ def said(coefficients: tuple[float, ...], std: float = 0.002) -> tuple[str, bool
 )  # fmt: skip
 def test_the_sentence_names_where_lines_are_wider(coefficients: tuple[float, ...], words: str) -> None:
     sentence, significant = said(coefficients)
-    assert words.format("of the measured part of its frame than") in sentence
+    assert words.format("of the measured part of the projector's frame than") in sentence
+    assert "or surfaces there are translucent" in sentence
     assert significant
 
 

@@ -10,6 +10,9 @@ it explains all lines as well. So pixels come in runs of neighbours, over which 
 
 Three answers compete: the curve that is known already, the same curve stretched, and any curve, as near to
 the stretched one as the data allow. Each is fitted to one half of the pixels and judged by the other half.
+Where lines are as far apart as they are wide, each pixel sees so few that any curve goes astray with the
+columns. If none explains the lines there, the known curve with a skirt is tried: a part of the light, as
+lenses scatter it, falls under the same curve stretched further.
 """
 
 from __future__ import annotations
@@ -18,14 +21,15 @@ import math
 from dataclasses import dataclass, replace
 
 import numpy as np
+import torch
 from numpy.typing import NDArray
-from scipy.optimize import nnls
+from scipy.optimize import minimize, nnls
 from torch import Tensor
 
 from dsl_core.model.projector.line_spread import LineSpread
 from dsl_core.model.rig import ProjectorResponse
 from dsl_core.optics.spread.curves import gaussian
-from dsl_core.optics.spread.equations import STEP_PX, Normal, Peaks, View
+from dsl_core.optics.spread.equations import MAX_CHI_SQUARE, STEP_PX, Normal, Peaks, View, settle
 from dsl_core.optics.spread.field import FieldFamily, FieldFit
 
 Floats = NDArray[np.float64]
@@ -48,6 +52,15 @@ PULLS = 10.0 ** np.arange(-7.0, 0.0)
 MOST_STEPS = 30
 #: A curve is preferred to a simpler one when it lowers the other half's chi-square by so much and this share.
 CLEARLY, CLEAR_SHARE = 30.0, 0.01
+#: Share of the chi-square of the simpler curve that one with a skirt may leave.
+SKIRT_LEAVES = 0.7
+#: The most light that a skirt holds and the most that it is wider, and where the search for it begins: the
+#: logarithm of a stretching, the share of the light, and the logarithm of the further stretching less one.
+MOST_SHARE, WIDEST, SKIRT_START = 0.5, 6.0, (0.0, 0.1, 0.7)
+#: Trials of a skirt, at most, and how finely they are told apart.
+TRIALS, SKIRT_STEP = 150, 0.003
+#: How often columns are settled at each: they start from whole ones.
+SETTLED = 2
 
 
 @dataclass(frozen=True)
@@ -129,12 +142,68 @@ def _fit_curve(view: View, family: _Family) -> SpreadFit | None:
     for _ in range(ROUNDS):
         halves = view.equations(better.response, family.centres_px, waves=True)
         if halves is None:
-            return found
+            return _skirted(view, family, found)
         better = _choose(halves, family, shapes=True)
         # Also when a later round comes back: it does so by chance.
         if _is_astray(better, first, found):
-            return found
-    return better if better.pixels >= KEPT * found.pixels else found
+            return _skirted(view, family, found)
+    return better if better.pixels >= KEPT * found.pixels else _skirted(view, family, found)
+
+
+def _skirted(view: View, family: _Family, found: SpreadFit) -> SpreadFit:
+    """The curve with a skirt where it explains the lines surely better than the one ``found``, else that.
+
+    Columns are each pixel's own at every trial: what a wrong curve leaves in them would hold it up.
+    """
+    half = torch.arange(len(view.start_px)) // view.peaks.run % 2
+
+    def left(values: Floats, pixels: Tensor) -> float:
+        share = float(values[1])
+        if not 0 <= share <= MOST_SHARE or math.exp(values[2]) > WIDEST - 1:
+            return math.inf
+        return _left_by(view, family.skirted(*_skirt_of(values)), pixels)
+
+    def best(pixels: Tensor) -> Floats:
+        trials = minimize(
+            left,
+            np.array(SKIRT_START),
+            (pixels,),
+            method="Nelder-Mead",
+            options={"maxfev": TRIALS, "xatol": SKIRT_STEP, "fatol": SKIRT_STEP},
+        )
+        return np.asarray(trials.x, np.float64)
+
+    parts = [torch.nonzero(half == which).ravel() for which in (0, 1)]
+    crossed = [left(best(own), other) for own, other in (parts, parts[::-1])]
+    usual = [_left_by(view, found.response, other) for other in parts[::-1]]
+    if sum(crossed) > SKIRT_LEAVES * sum(usual):
+        return found
+    response = family.skirted(*_skirt_of(best(torch.cat(parts))))
+    view.column = view.start_px.clone()
+    halves = view.equations(response, family.centres_px, waves=False)
+    if halves is None:
+        return found
+    better = _choose(halves, _Family(response), shapes=False)
+    if better.pixels < KEPT * found.pixels:
+        return found
+    return replace(better, changed=True, before=found.before)
+
+
+def _skirt_of(values: Floats) -> tuple[float, float, float]:
+    """Stretching of the core, share of the light in the skirt, and its stretching, from those of a search."""
+    return math.exp(values[0]), float(values[1]), math.exp(values[0]) * (1 + math.exp(values[2]))
+
+
+def _left_by(view: View, response: ProjectorResponse, pixels: Tensor) -> float:
+    """Mean chi-square that a response leaves of the lines of some pixels; single ones count for little."""
+    peaks, column, amplitude = view.peaks.of(pixels), view.start_px[pixels], view.peaks.y.amax(0)[pixels]
+    width = None if view.width is None else view.width[pixels]
+    for _ in range(SETTLED):
+        column, amplitude, chi_square = settle(peaks, column, amplitude, response, width)
+    known = chi_square[torch.isfinite(chi_square)]
+    if len(known) == 0:
+        return math.inf
+    return float(known.clip(max=MAX_CHI_SQUARE * max(float(known.median()), 1.0)).mean())
 
 
 def _is_astray(shape: SpreadFit, first: SpreadFit, simple: SpreadFit) -> bool:
@@ -167,6 +236,11 @@ class _Family:
         if isinstance(self._known, LineSpread):
             return self.start.with_spread(LineSpread.of(self.stretched(factor), STEP_PX))
         return self.start.with_gaussian(self._known * factor)
+
+    def skirted(self, factor: float, share: float, skirt: float) -> ProjectorResponse:
+        """The curve stretched by a factor, with a share of its light under the curve stretched by another."""
+        shares = (1 - share) * self.stretched(factor) + share * self.stretched(skirt)
+        return self.start.with_spread(LineSpread.of(shares, STEP_PX))
 
     def _split(self, at_px: Floats, light: Floats) -> Floats:
         """Light at places between centres, shared by the two neighbours of each."""

@@ -85,6 +85,25 @@ def test_any_shape_is_found(true: ProjectorResponse) -> None:
     assert found.response.blur_px == pytest.approx(true.blur_px, rel=0.05)
 
 
+def test_a_skirt_is_found_where_lines_lie_side_by_side_and_pixels_far_apart() -> None:
+    # Three lines a pixel, whose column and amplitude are its own: a free shape goes astray with columns.
+    core, skirt = (np.exp(-0.5 * (PLACES / width) ** 2) / width for width in (0.6, 1.8))
+    true = shape(0.87 * core + 0.13 * skirt)
+    peaks, column = seen(true, runs=120, noise=4e-4, step_px=5, beside=1, pitch_px=(4.5, 6.5))
+    found = fit_spread(peaks, column.round(), KNOWN)
+    assert found is not None
+    assert found.changed
+    assert off(found.response, true) < 0.02
+    assert found.after < 1.2 < found.before
+    # A wider Gaussian explains its own lines and gets no skirt.
+    peaks, column = seen(
+        KNOWN.with_gaussian(0.8), runs=120, noise=4e-4, step_px=5, beside=1, pitch_px=(4.5, 6.5)
+    )
+    wider = fit_spread(peaks, column.round(), KNOWN)
+    assert wider is not None
+    assert wider.response.spread is None
+
+
 def test_pixels_with_a_second_light_do_not_count() -> None:
     peaks, column = seen(KNOWN)
     peaks.y[6:, ::5] += 0.3
