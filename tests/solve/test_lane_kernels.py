@@ -150,6 +150,7 @@ class Scene:
             self.equations, self.neighbours, self.shares, self.index, self.shading, self.offsets,
             self.broad if self.has_broad else np.zeros((0, 0, 0, 0)),
             self.levels, PRIOR, VOLUMES, TAUS, BOUNDS, LEVEL, UNEVEN, LOCAL, self.parameters, (0,) * band,
+            np.full((self.channels, self.columns), np.nan),
             (*nan(*sizes), np.zeros(ROWS * margin * LANES)), tuple(solutions),
             np.full((len(TAUS) + 1, LANES), np.nan), marks, *(out[name] for name in names),
         )  # fmt: skip

@@ -156,7 +156,8 @@ class LaneSolver:
             equations, shares is not None, np.zeros((0, 0, 0)) if shares is None else shares, index, shading,
             equations.shape[1] == self.channels(True), rows, levels, self._prior, self._volumes, self._taus,
             self._bounds, self._level, WITHIN_BAND, LOCAL_STD**-2, self._parameters, self._diagonals,
-            *self._work, found.nodes, found.mean, found.std, found.data_share, found.at_bound, found.tau,
+            np.empty((equations.shape[1], index.shape[1])), *self._work,
+            found.nodes, found.mean, found.std, found.data_share, found.at_bound, found.tau,
             found.misfit,
         )  # fmt: skip
         if not sound:
