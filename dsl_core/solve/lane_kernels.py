@@ -345,38 +345,39 @@ def gather(
     equations: Array, neighbours: bool, shares: Array, shading: Array, y: int, matrix: int, right: int,
     gathered: Array,
 ) -> None:  # fmt: skip
-    """Equations of the pixels of a row, (channels, columns), from those of their samples.
+    """Equations of the pixels of a row, (columns, channels), from those of their samples.
 
     The first channels are those of the ``matrix``, the next of the ``right`` side: both for unit reflectance.
     """
-    for c in range(gathered.shape[0]):
+    for x in range(gathered.shape[0]):
         if neighbours:
-            for x in range(gathered.shape[1]):
-                gathered[c, x] = equations[y + 1, c, x + 1]
-            add_samples_beside(equations, y + 1, shares, y, 0, 1, c, gathered)
-            add_samples_beside(equations, y, shares, y, 4, 5, c, gathered)
-            add_samples_beside(equations, y + 2, shares, y, 6, 7, c, gathered)
-            for x in range(gathered.shape[1]):
-                gathered[c, x] += shares[y, 2, x] * equations[y, c, x + 1]
-            for x in range(gathered.shape[1]):
-                gathered[c, x] += shares[y, 3, x] * equations[y + 2, c, x + 1]
+            left, beside, above, below = shares[y, 0, x], shares[y, 1, x], shares[y, 2, x], shares[y, 3, x]
+            for c in range(gathered.shape[1]):
+                total = equations[y + 1, x + 1, c] + left * equations[y + 1, x, c]
+                total += beside * equations[y + 1, x + 2, c]
+                gathered[x, c] = total + above * equations[y, x + 1, c] + below * equations[y + 2, x + 1, c]
+            corners = shares[y, 4, x], shares[y, 5, x], shares[y, 6, x], shares[y, 7, x]
+            if corners[0] + corners[1] + corners[2] + corners[3] > 0.0:
+                add_corners(equations, x, y, corners, gathered)
         else:
-            for x in range(gathered.shape[1]):
-                gathered[c, x] = equations[y, c, x]
-        for _ in range(2 if c < matrix else 1 if c < matrix + right else 0):
-            for x in range(gathered.shape[1]):
-                gathered[c, x] *= shading[y, x]
+            for c in range(gathered.shape[1]):
+                gathered[x, c] = equations[y, x, c]
+        for c in range(matrix + right):
+            gathered[x, c] *= shading[y, x]
+        for c in range(matrix):
+            gathered[x, c] *= shading[y, x]
 
 
 @within
-def add_samples_beside(
-    equations: Array, row: int, shares: Array, y: int, left: int, right: int, c: int, gathered: Array
+def add_corners(
+    equations: Array, x: int, y: int, shares: tuple[float, float, float, float], gathered: Array
 ) -> None:
-    """Add a channel of the samples at the left and at the right in a row of ``equations``."""
-    # No more arrays, or whether they overlap could not be found out before the loop.
-    for x in range(gathered.shape[1]):
-        gathered[c, x] += shares[y, left, x] * equations[row, c, x]
-        gathered[c, x] += shares[y, right, x] * equations[row, c, x + 2]
+    """Add the samples at a pixel's corners to its equations."""
+    # A loop of its own: with more arrays it could not be found out before whether they overlap.
+    a, b, c, d = shares
+    for k in range(gathered.shape[1]):
+        total = a * equations[y, x, k] + b * equations[y, x + 2, k]
+        gathered[x, k] += total + c * equations[y + 2, x, k] + d * equations[y + 2, x + 2, k]
 
 
 @compiled
@@ -390,12 +391,12 @@ def solve_blocks(
 ) -> bool:  # fmt: skip
     """Solve pixels from the sums of their samples' equations; False where a system is not positive definite.
 
-    ``equations`` are (rows, channels, columns), see `dsl_core.optics.lines.sums`. With ``neighbours`` they
+    ``equations`` are (rows, columns, channels), see `dsl_core.optics.lines.sums`. With ``neighbours`` they
     have one more sample on every side, of which pixels take ``shares`` (rows, 8, columns), in the order of
     `dsl_core.optics.colour_neighbours.AROUND`. ``index`` is the pixel's place in the results, negative where
     none is wanted. ``rows`` (rows, bands, 3, columns) are broad-band equations of values ``levels`` (rows, 3,
     columns), both empty where there are none. ``prior`` (4, bands) are the diagonals of squared second
-    differences and of the level. ``gathered`` (channels, columns) is room for the equations of a row. Results
+    differences and of the level. ``gathered`` (columns, channels) is room for the equations of a row. Results
     are (bands, pixels), ``tau`` and ``misfit`` (pixels,).
     """
     band, count = len(diagonals), prior.shape[1]
@@ -420,7 +421,7 @@ def solve_blocks(
                 continue
             for c in range(channels):
                 for i in range(LANES):
-                    sums[c * LANES + i] = gathered[c, x0 + i]
+                    sums[c * LANES + i] = gathered[x0 + i, c]
             broad = x0 < 0  # no literal: parts would be compiled once for it and once for any other
             for j in range(count):
                 for i in range(LANES):
