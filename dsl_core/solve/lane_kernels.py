@@ -22,6 +22,10 @@ Array = Any
 LANES, ROWS = 8, 3
 #: Pivots whose product is taken before its logarithm: that of eight numbers of single precision is a double.
 TOGETHER = 8
+#: Bits of a block's or pixel's number: cut to these it is not negative, and need not count from the end.
+MOST = (1 << 32) - 1
+#: Least variance of a band's reflectance, against rounding.
+LEAST_VARIANCE = 1e-12
 #: What follows the window's columns: product of pivots, evidence, logarithms, whether a pivot is bad; what
 #: broad rows have in common (6) and see (3); the factor of their small system (6) and its solution (3).
 PRODUCT, EVIDENCE, LOGS, BAD, GRAM, SEEN, SMALL, INNER, SUMS = 0, 1, 2, 3, 4, 10, 13, 19, 22
@@ -336,35 +340,79 @@ def gradient(
                     out[at] += prior[o, j - o] * weight[i] * x[at - o * LANES]
 
 
+@within
+def gather(
+    equations: Array, neighbours: bool, shares: Array, shading: Array, y: int, matrix: int, right: int,
+    gathered: Array,
+) -> None:  # fmt: skip
+    """Equations of the pixels of a row, (columns, channels), from those of their samples.
+
+    The first channels are those of the ``matrix``, the next of the ``right`` side: both for unit reflectance.
+    """
+    for x in range(gathered.shape[0]):
+        if neighbours:
+            left, beside, above, below = shares[y, 0, x], shares[y, 1, x], shares[y, 2, x], shares[y, 3, x]
+            for c in range(gathered.shape[1]):
+                total = equations[y + 1, x + 1, c] + left * equations[y + 1, x, c]
+                total += beside * equations[y + 1, x + 2, c]
+                gathered[x, c] = total + above * equations[y, x + 1, c] + below * equations[y + 2, x + 1, c]
+            corners = shares[y, 4, x], shares[y, 5, x], shares[y, 6, x], shares[y, 7, x]
+            if corners[0] + corners[1] + corners[2] + corners[3] > 0.0:
+                add_corners(equations, x, y, corners, gathered)
+        else:
+            for c in range(gathered.shape[1]):
+                gathered[x, c] = equations[y, x, c]
+        for c in range(matrix + right):
+            gathered[x, c] *= shading[y, x]
+        for c in range(matrix):
+            gathered[x, c] *= shading[y, x]
+
+
+@within
+def add_corners(
+    equations: Array, x: int, y: int, shares: tuple[float, float, float, float], gathered: Array
+) -> None:
+    """Add the samples at a pixel's corners to its equations."""
+    # A loop of its own: with more arrays it could not be found out before whether they overlap.
+    a, b, c, d = shares
+    for k in range(gathered.shape[1]):
+        total = a * equations[y, x, k] + b * equations[y, x + 2, k]
+        gathered[x, k] += total + c * equations[y + 2, x, k] + d * equations[y + 2, x + 2, k]
+
+
 @compiled
 def solve_blocks(
     equations: Array, neighbours: bool, shares: Array, index: Array, shading: Array, offsets: bool,
     rows: Array, levels: Array, prior: Array, volumes: Array, taus: Array, bounds: Array, level: float,
     uneven: float, local: float, parameters: float, diagonals: tuple[int, ...],
-    work: tuple[Array, ...], solutions: tuple[Array, ...], candidates: Array, marks: tuple[Array, ...],
-    nodes: Array, mean: Array, std: Array, share: Array, at_bound: Array, tau: Array, misfit: Array,
+    gathered: Array, work: tuple[Array, ...], solutions: tuple[Array, ...], candidates: Array,
+    marks: tuple[Array, ...], nodes: Array, mean: Array, std: Array, share: Array, at_bound: Array,
+    tau: Array, misfit: Array,
 ) -> bool:  # fmt: skip
     """Solve pixels from the sums of their samples' equations; False where a system is not positive definite.
 
-    ``equations`` are (rows, channels, columns), see `dsl_core.optics.lines.sums`. With ``neighbours`` they
+    ``equations`` are (rows, columns, channels), see `dsl_core.optics.lines.sums`. With ``neighbours`` they
     have one more sample on every side, of which pixels take ``shares`` (rows, 8, columns), in the order of
     `dsl_core.optics.colour_neighbours.AROUND`. ``index`` is the pixel's place in the results, negative where
     none is wanted. ``rows`` (rows, bands, 3, columns) are broad-band equations of values ``levels`` (rows, 3,
     columns), both empty where there are none. ``prior`` (4, bands) are the diagonals of squared second
-    differences and of the level. Results are (bands, pixels), ``tau`` and ``misfit`` (pixels,).
+    differences and of the level. ``gathered`` (columns, channels) is room for the equations of a row. Results
+    are (bands, pixels), ``tau`` and ``misfit`` (pixels,).
     """
     band, count = len(diagonals), prior.shape[1]
     size = band + 1
     at_right, at_square = count * size * LANES, (count * size + count) * LANES
     channels = count * size + count + 2 + (count if offsets else 0)
-    sums, right, extra, stiff_right, broad_rows, window, factor, block, near, spread = work
+    sums, right, extra, stiff_right, broad_rows, window, factor, inverse, near, spread = work
     x, solved, slope, product, ones, variance = solutions
     weight = candidates[0]
     pinned, wanted, used, todo = marks
     at_sums = (size * size + size + size * ROWS) * LANES
     bad, evident = at_sums + BAD * LANES, at_sums + EVIDENCE * LANES
     for y in range(index.shape[0]):
-        for x0 in range(0, index.shape[1], LANES):
+        gather(equations, neighbours, shares, shading, y, size * count, count, gathered)
+        for block in range(index.shape[1] // LANES):
+            x0 = (block & MOST) * LANES
             any_used = False
             for i in range(LANES):
                 used[i] = index[y, x0 + i] >= 0
@@ -372,29 +420,11 @@ def solve_blocks(
             if not any_used:
                 continue
             for c in range(channels):
-                if neighbours:
-                    for i in range(LANES):
-                        p = x0 + i
-                        total = np.float64(equations[y + 1, c, p + 1])
-                        total += shares[y, 0, p] * equations[y + 1, c, p]
-                        total += shares[y, 1, p] * equations[y + 1, c, p + 2]
-                        total += shares[y, 2, p] * equations[y, c, p + 1]
-                        total += shares[y, 3, p] * equations[y + 2, c, p + 1]
-                        total += shares[y, 4, p] * equations[y, c, p]
-                        total += shares[y, 5, p] * equations[y, c, p + 2]
-                        total += shares[y, 6, p] * equations[y + 2, c, p]
-                        total += shares[y, 7, p] * equations[y + 2, c, p + 2]
-                        sums[c * LANES + i] = total
-                else:
-                    for i in range(LANES):
-                        sums[c * LANES + i] = equations[y, c, x0 + i]
-            for c in range(count * size):
                 for i in range(LANES):
-                    sums[c * LANES + i] *= shading[y, x0 + i] * shading[y, x0 + i]
+                    sums[c * LANES + i] = gathered[x0 + i, c]
             broad = x0 < 0  # no literal: parts would be compiled once for it and once for any other
             for j in range(count):
                 for i in range(LANES):
-                    sums[at_right + j * LANES + i] *= shading[y, x0 + i]
                     right[j * LANES + i] = sums[at_right + j * LANES + i] + level * prior[3, j]
             if rows.size:
                 for j in range(count):
@@ -434,7 +464,9 @@ def solve_blocks(
                     continue
                 substitute(factor, broad, diagonals, count, window, solved)
                 if stage == len(taus):
-                    variance_of_means(factor, broad, diagonals, count, window, block, near, spread, variance)
+                    variance_of_means(
+                        factor, broad, diagonals, count, window, inverse, near, spread, variance
+                    )
                 else:
                     gradient(sums, right, broad_rows, broad, prior, weight, diagonals, solved, slope)
                 for i in range(LANES):
@@ -451,35 +483,28 @@ def solve_blocks(
                 for j in range(count):
                     for i in range(LANES):
                         grey = (product[(j + band) * LANES + i] + prior[3, j]) / shading[y, x0 + i]
-                        sums[at_square + (2 + j) * LANES + i] /= grey * grey
+                        change = sums[at_square + (2 + j) * LANES + i] / (grey * grey)
+                        variance[j * LANES + i] = max(variance[j * LANES + i], LEAST_VARIANCE) + change
             multiply(sums, diagonals, count, x, product)
+            deviations(x, band, count, uneven, extra, stiff_right, variance)
+            shares_of_data(sums, size, count, local)
             for i in range(LANES):
-                if not used[i]:
-                    continue
-                p, explained = index[y, x0 + i], 0.0
-                for j in range(count):
-                    at, k = (j + band) * LANES + i, j * LANES + i
-                    explained += x[at] * (2.0 * sums[at_right + k] - product[at])
-                    nodes[j, p], at_bound[j, p] = x[at], pinned[k]
-                    before, after = x[at - (LANES if j else 0)], x[at + (LANES if j < count - 1 else 0)]
-                    mean[j, p] = (before + 4.0 * x[at] + after) / 6.0
-                    bend = bent(x, band, count, j, i)
-                    middle = min(max(j, 1), count - 2)
-                    fourth = bent(x, band, count, middle - 1, i) + bent(x, band, count, middle + 1, i)
-                    fourth -= 2.0 * bent(x, band, count, middle, i)
-                    unsure = uneven * max(abs(bend), abs(fourth))
-                    square = max(variance[k], 1e-12) + unsure * unsure
-                    if offsets:
-                        square += sums[at_square + (2 + j) * LANES + i]
-                    std[j, p] = math.sqrt(square)
-                    data = sums[j * size * LANES + i]
-                    for o in range(1, min(3, size)):
-                        data += sums[(j * size + o) * LANES + i]
-                        if j >= o:
-                            data += sums[((j - o) * size + o) * LANES + i]
-                    share[j, p] = data / (data + local)
-                freedom = max(sums[at_square + LANES + i] - parameters, 1.0)
-                misfit[p] = (sums[at_square + i] - explained) / freedom
+                if used[i]:
+                    explained = 0.0
+                    for j in range(count):
+                        at = (j + band) * LANES + i
+                        explained += x[at] * (2.0 * sums[at_right + j * LANES + i] - product[at])
+                    freedom = max(sums[at_square + LANES + i] - parameters, 1.0)
+                    misfit[index[y, x0 + i]] = (sums[at_square + i] - explained) / freedom
+            for j in range(count):
+                before, after = LANES if j else 0, LANES if j < count - 1 else 0
+                for i in range(LANES):
+                    if used[i]:
+                        p, at = index[y, x0 + i] & MOST, (j + band) * LANES + i
+                        nodes[j, p], std[j, p] = x[at], variance[j * LANES + i]
+                        mean[j, p] = (x[at - before] + 4.0 * x[at] + x[at + after]) / 6.0
+                        share[j, p] = sums[j * size * LANES + i]
+                        at_bound[j, p] = pinned[j * LANES + i]
     return True
 
 
@@ -501,8 +526,47 @@ def most_evident(candidates: Array, i: int, taus: Array) -> float:
 
 
 @within
-def bent(x: Array, band: int, count: int, j: int, i: int) -> float:
-    """Second difference at a band, the outermost repeated."""
-    at = (min(max(j, 1), count - 2) + band) * LANES + i
-    value: float = x[at - LANES] - 2.0 * x[at] + x[at + LANES]
-    return value
+def deviations(
+    x: Array, band: int, count: int, uneven: float, second: Array, fourth: Array, variance: Array
+) -> None:
+    """Make a deviation of every ``variance`` (bands,), with what a band's mean may be off its middle.
+
+    That is ``uneven`` times the ``second`` or ``fourth`` difference, whichever is larger; the outermost ones
+    repeat their neighbours. Both are overwritten.
+    """
+    # One loop over bands and lanes: a short one would not become vector instructions.
+    last, margin = (count - 1) * LANES, band * LANES
+    for k in range(LANES, last):
+        at = margin + k
+        second[k] = x[at - LANES] - 2.0 * x[at] + x[at + LANES]
+    repeat_ends(second, last)
+    for k in range(LANES, last):
+        fourth[k] = second[k - LANES] - 2.0 * second[k] + second[k + LANES]
+    repeat_ends(fourth, last)
+    for k in range(last + LANES):
+        unsure = uneven * max(abs(second[k]), abs(fourth[k]))
+        variance[k] = math.sqrt(max(variance[k], LEAST_VARIANCE) + unsure * unsure)
+
+
+@within
+def repeat_ends(values: Array, last: int) -> None:
+    """Have the first band and the ``last`` repeat the ones beside them."""
+    for i in range(LANES):
+        values[i] = values[LANES + i]
+        values[last + i] = values[last - LANES + i]
+
+
+@within
+def shares_of_data(data: Array, size: int, count: int, local: float) -> None:
+    """Make the main diagonal the share of each band's answer that data within two bands of it decide."""
+    for j in range(count):
+        own = j * size * LANES
+        for o in range(1, min(3, size)):
+            for i in range(LANES):
+                data[own + i] += data[own + o * LANES + i]
+            if j >= o:
+                before = own - o * (size - 1) * LANES
+                for i in range(LANES):
+                    data[own + i] += data[before + i]
+        for i in range(LANES):
+            data[own + i] /= data[own + i] + local

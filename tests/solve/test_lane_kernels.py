@@ -83,12 +83,12 @@ class Scene:
         size, margin = self.band + 1, 2 * self.neighbours
         self.channels = BANDS * size + BANDS + 2 + (BANDS if self.offsets else 0)
         shape = self.rows + margin, self.columns + margin
-        self.equations = np.stack([np.stack([self.sample(rng) for _ in range(shape[1])], 1)
+        self.equations = np.stack([np.stack([self.sample(rng) for _ in range(shape[1])])
                                    for _ in range(shape[0])])  # fmt: skip
         self.shares = rng.uniform(0.0, 1.0, (self.rows, 8, self.columns)).round(1)
         self.shading = rng.uniform(0.4, 1.6, (self.rows, self.columns))
         # The last block has no pixel, and nothing that could be solved; some others of its row have none.
-        self.equations[-1, : BANDS * size : size, self.columns - 3] = -1e9
+        self.equations[-1, self.columns - 3, : BANDS * size : size] = -1e9
         self.index = np.full((self.rows, self.columns), -1, np.int64)
         wanted = np.ones(self.index.shape, bool)
         wanted[1, [0, 2, 5, *range(8, 16)]] = False
@@ -121,10 +121,10 @@ class Scene:
     def equations_of(self, y: int, x: int) -> Floats:
         """What is known of a pixel: its own sample, or those around it."""
         if not self.neighbours:
-            return np.asarray(self.equations[y, :, x])
-        total = self.equations[y + 1, :, x + 1].copy()
+            return np.asarray(self.equations[y, x])
+        total = self.equations[y + 1, x + 1].copy()
         for share, (dy, dx) in zip(self.shares[y, :, x], AROUND, strict=True):
-            total += share * self.equations[y + 1 + dy, :, x + 1 + dx]
+            total += share * self.equations[y + 1 + dy, x + 1 + dx]
         return np.asarray(total)
 
     def found(self) -> SimpleNamespace:
@@ -150,6 +150,7 @@ class Scene:
             self.equations, self.neighbours, self.shares, self.index, self.shading, self.offsets,
             self.broad if self.has_broad else np.zeros((0, 0, 0, 0)),
             self.levels, PRIOR, VOLUMES, TAUS, BOUNDS, LEVEL, UNEVEN, LOCAL, self.parameters, (0,) * band,
+            np.full((self.columns, self.channels), np.nan),
             (*nan(*sizes), np.zeros(ROWS * margin * LANES)), tuple(solutions),
             np.full((len(TAUS) + 1, LANES), np.nan), marks, *(out[name] for name in names),
         )  # fmt: skip
@@ -238,7 +239,7 @@ def test_every_pixel_of_a_grid_gets_what_dense_algebra_gives(scene: Scene) -> No
 @pytest.mark.parametrize(("lane", "is_sound"), [(3, False), (2, True)])
 def test_a_system_that_is_not_positive_is_told_where_a_pixel_wants_it(lane: int, is_sound: bool) -> None:
     scene = Scene(2, False, False, False, 9.0)
-    scene.equations[1, 3 * 2 : 3 * 4 : 3, lane] = -1e9
+    scene.equations[1, lane, 3 * 2 : 3 * 4 : 3] = -1e9
     assert (scene.index[1, lane] >= 0) is not is_sound
     assert scene.found().sound is is_sound
 
@@ -246,7 +247,7 @@ def test_a_system_that_is_not_positive_is_told_where_a_pixel_wants_it(lane: int,
 def test_what_is_known_exactly_has_a_deviation_of_a_millionth() -> None:
     scene = Scene(2, False, False, False, 9.0)
     rows = banded(1e14 * np.eye(BANDS), 3).ravel()
-    scene.equations[:] = np.concatenate([rows, np.full(BANDS, 0.5e14), [0.25e14 * BANDS, 20]])[:, None]
+    scene.equations[:] = np.concatenate([rows, np.full(BANDS, 0.5e14), [0.25e14 * BANDS, 20]])
     scene.shading[:] = 1.0
     assert scene.found().std == pytest.approx(1e-6, rel=1e-3)
 

@@ -42,7 +42,11 @@ def blocks_of(chunk: Bytes, first: int, last: int) -> tuple[bytes, int]:
     ends = np.append(order, size)[np.searchsorted(order, starts, side="right")]
     if starts.min() < HEADER.size + 4 * count or ends.max() > size:
         raise ValueError("its blocks are not where it says")
-    parts = [chunk[start:end] for start, end in zip(starts[low:high], ends[low:high], strict=True)]
+    # Read in one go: they are side by side, or nearly so.
+    from_byte = starts[low:high].min()
+    held = chunk[from_byte : ends[low:high].max()]
+    wanted = zip(starts[low:high] - from_byte, ends[low:high] - from_byte, strict=True)
+    parts = [held[start:end] for start, end in wanted]
     lengths = np.cumsum([0, *map(len, parts)]) + HEADER.size + 4 * len(parts)
     bytes_here = min(high * block, raw) - low * block
     head = HEADER.pack(version, codec, flags, typesize, bytes_here, block, int(lengths[-1]))

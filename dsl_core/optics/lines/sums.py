@@ -7,11 +7,26 @@ found in it without rounding.
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 Array = Any
+#: Bits of a number of frames: cut to these it is not negative, and need not count from an array's end.
+MOST = (1 << 32) - 1
+
+
+def by_line(table: NDArray[np.floating], step: int) -> NDArray[np.float64]:
+    """A profile's ``table`` so that what one line after the other sees of it is side by side, (step, lines).
+
+    Lines are ``step`` entries of the table apart. The last one of a row sees the table's first entries.
+    """
+    lines = -(-len(table) // step)
+    padded = np.zeros(lines * step)
+    padded[: len(table)] = table
+    return np.ascontiguousarray(padded.reshape(lines, step)[::-1].T)
 
 
 def add_samples(
@@ -21,7 +36,7 @@ def add_samples(
     amplitude: Array, halo_line: Array, halos: Array, halo_ratio: Array, model_error: float, surplus: float,
     size: int, with_offsets: bool, equations: Array,
 ) -> None:  # fmt: skip
-    """Equations (rows, channels, columns) of the samples in some rows of a grid.
+    """Equations (rows, columns, channels) of the samples in some rows of a grid.
 
     Channels are the matrix (bands x ``size``), the right side, the square and the number of the data, and
     with ``with_offsets`` the variance that an offset gives the right side. ``index`` (rows, columns) of the
@@ -29,18 +44,20 @@ def add_samples(
     there is none. ``own_rows`` are the rows of the grid to fill, from the first of ``equations`` on.
 
     ``radiance`` (frames, rows, columns) comes with deviations in ``halves``, whose bits stand for
-    ``variances``, or in ``singles``; the other one is empty. ``columns`` and ``supports`` are in steps of the
-    ``tables``, as ``first`` and ``step`` of the lines are; ``columns`` and ``inside`` are (orders, bands,
-    samples), ``white`` (orders, 3, bands), ``lit`` (orders, 2) frames of each order. ``halo_line`` is the
+    ``variances``, or in ``singles``; the other one is empty. ``tables`` (orders, step, lines) are as from
+    `by_line`. ``columns`` and ``supports`` are in steps of the profile's table, as ``first`` and ``step`` of
+    the lines are; ``columns`` and ``inside`` are (orders, bands, samples), ``white`` (orders, 3, bands),
+    ``lit`` (orders, 2) frames of each order. ``halo_line`` is the
     last line not beyond a sample's column, ``halos`` (2, samples) that line's halo and the next one's,
     ``halo_ratio`` how it falls from line to line. ``surplus`` is added to the main diagonal, relative to it.
     """
     bands = columns.shape[1]
     at_right, at_square = bands * size, bands * size + bands
-    channels = equations.shape[1]
+    channels = equations.shape[2]
     frames = radiance.shape[0]
     sums, value, weight = np.zeros(channels), np.zeros(frames), np.zeros(frames)
-    own, base = np.zeros(frames), np.zeros(bands, np.int64)
+    own, last = np.zeros(frames), tables.shape[2] - 1
+    phase, place, bright = np.zeros(bands, np.int64), np.zeros(bands, np.int64), np.zeros(bands)
     low, high = np.zeros(bands, np.int64), np.zeros(bands, np.int64)
     for row in range(own_rows[0], own_rows[1]):
         y, to = corner[0] + row, row - own_rows[0]
@@ -48,7 +65,7 @@ def add_samples(
             s, x = index[row, column], corner[1] + column
             if s < 0:
                 for c in range(channels):
-                    equations[to, c, column] = 0.0
+                    equations[to, column, c] = 0.0
                 continue
             for c in range(channels):
                 sums[c] = 0.0
@@ -56,14 +73,20 @@ def add_samples(
                 support = supports[m]
                 begin, end = bands, -1
                 least, most = 0, 0
+                whole, rest = 2 * support // step, 2 * support % step
                 for j in range(bands):
+                    low[j], high[j] = frames, -1
                     if inside[m, j, s]:
                         at = columns[m, j, s] - first
                         least, most = (at, at) if end < 0 else (min(least, at), max(most, at))
                         begin, end = min(begin, j), j
-                        base[j] = at + support
-                        low[j] = max((at - support) // step + 1, lit[m, 0])
-                        high[j] = min((at + support - 1) // step, lit[m, 1] - 1)
+                        # Half an entry makes the division safe from rounding; one of integers takes long.
+                        line = math.floor((at + support + 0.5) / step)
+                        phase[j] = at + support - line * step
+                        # What frame k shows is at `place + k`.
+                        place[j], bright[j] = last - line, white[m, colour[s], j]
+                        low[j] = max(line - whole + (1 if phase[j] >= rest else 0), lit[m, 0])
+                        high[j] = min(line - (1 if phase[j] == 0 else 0), lit[m, 1] - 1)
                 if end < 0:
                     continue
                 before = halo_line[s]
@@ -87,25 +110,26 @@ def add_samples(
                     sums[at_square] += heavy * signal * signal
                     sums[at_square + 1] += 1.0 if heavy > 0.0 else 0.0
                 for j in range(begin, end + 1):
-                    if not inside[m, j, s]:
-                        continue
-                    bright, right, grey = white[m, colour[s], j], 0.0, 0.0
-                    for k in range(low[j], high[j] + 1):
-                        own[k] = weight[k] * tables[m, base[j] - k * step]
-                        right += own[k] * value[k]
-                        grey += own[k]
-                    sums[at_right + j] += bright * right
+                    right, grey = 0.0, 0.0
+                    from_k, light = low[j] & MOST, phase[j] & MOST
+                    from_place = (place[j] + low[j]) & MOST
+                    for k in range(max(high[j] + 1 - low[j], 0) & MOST):
+                        own[from_k + k] = weight[from_k + k] * tables[m, light, from_place + k]
+                        right += own[from_k + k] * value[from_k + k]
+                        grey += own[from_k + k]
+                    sums[at_right + j] += bright[j] * right
                     if with_offsets:
-                        sums[at_square + 2 + j] += bright * grey
+                        sums[at_square + 2 + j] += bright[j] * grey
                     for o in range(min(size, end + 1 - j)):
-                        if inside[m, j + o, s]:
-                            both, of = 0.0, base[j + o]
-                            for k in range(max(low[j], low[j + o]), min(high[j], high[j + o]) + 1):
-                                both += own[k] * tables[m, of - k * step]
-                            sums[j * size + o] += bright * white[m, colour[s], j + o] * both
+                        both, begin_k = 0.0, max(low[j], low[j + o])
+                        from_k, light = begin_k & MOST, phase[j + o] & MOST
+                        from_place = (place[j + o] + begin_k) & MOST
+                        for k in range(max(min(high[j], high[j + o]) + 1 - begin_k, 0) & MOST):
+                            both += own[from_k + k] * tables[m, light, from_place + k]
+                        sums[j * size + o] += bright[j] * bright[j + o] * both
             for j in range(bands):
                 sums[j * size] *= 1.0 + surplus
                 if with_offsets:
                     sums[at_square + 2 + j] *= sums[at_square + 2 + j] * offset_variance[s]
             for c in range(channels):
-                equations[to, c, column] = sums[c]
+                equations[to, column, c] = sums[c]

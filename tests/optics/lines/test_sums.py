@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from dsl_core.optics.lines.sums import add_samples
+from dsl_core.optics.lines.sums import add_samples, by_line
 
 Floats = NDArray[np.float64]
 
@@ -54,9 +54,9 @@ def scene(orders: tuple[int, ...] = (0, 1)) -> SimpleNamespace:
 def summed(
     made: SimpleNamespace, rows: tuple[int, int] = (0, 3), *, half: bool = False, with_offsets: bool = True
 ) -> Floats:
-    """What the loop adds up, (rows, channels, columns)."""
+    """What the loop adds up, (rows, columns, channels)."""
     channels = BANDS * SIZE + BANDS + 2 + (BANDS if with_offsets else 0)
-    equations = np.full((rows[1] - rows[0] + 1, channels, 4), np.nan)
+    equations = np.full((rows[1] - rows[0] + 1, 4, channels), np.nan)
     squares = np.arange(65536, dtype=np.uint16).view(np.float16)
     nobody = np.zeros((0, 0, 0))
     with np.errstate(all="ignore"):
@@ -64,7 +64,8 @@ def summed(
         add_samples(
             made.radiance, made.std.view(np.uint16) if half else nobody.astype(np.uint16),
             nobody if half else made.std.astype(np.float32), variances, CORNER, INDEX, rows,
-            made.columns, made.inside, made.tables, made.supports, made.lit, FIRST, STEP, made.white,
+            made.columns, made.inside, np.stack([by_line(table, STEP) for table in made.tables]),
+            made.supports, made.lit, FIRST, STEP, made.white,
             made.colour, made.offset, made.offset_variance, made.amplitude,
             np.floor(made.place).astype(np.int64), made.halos, made.ratio, MODEL_ERROR, SURPLUS, SIZE,
             with_offsets, equations,
@@ -110,10 +111,10 @@ def wanted(made: SimpleNamespace, row: int, column: int) -> Floats:
 def assert_same(found: Floats, made: SimpleNamespace, first_row: int = 0) -> None:
     for row, column in np.ndindex(len(found), 4):
         if INDEX[first_row + row, column] < 0:
-            assert not found[row, :, column].any()
+            assert not found[row, column].any()
         else:
-            exact = wanted(made, first_row + row, column)[: found.shape[1]]
-            assert found[row, :, column] == pytest.approx(exact, rel=1e-6, abs=1e-9), (row, column)
+            exact = wanted(made, first_row + row, column)[: found.shape[2]]
+            assert found[row, column] == pytest.approx(exact, rel=1e-6, abs=1e-9), (row, column)
 
 
 @pytest.mark.parametrize("half", [True, False])
@@ -146,7 +147,7 @@ def test_what_is_no_number_has_no_weight() -> None:
 
 
 def test_a_sample_without_a_band_of_its_own_knows_nothing() -> None:
-    assert not summed(scene())[2, :, 3].any()
+    assert not summed(scene())[2, 3].any()
 
 
 @pytest.mark.parametrize("half", [True, False])
@@ -155,4 +156,4 @@ def test_data_count_however_little_they_weigh(half: bool) -> None:
     made.std *= np.float16(50)
     found = summed(made, half=half)
     assert_same(found, made)
-    assert float(found[0, BANDS * SIZE + BANDS + 1, 1]) > 5, "of weights below a hundredth"
+    assert float(found[0, 1, BANDS * SIZE + BANDS + 1]) > 5, "of weights below a hundredth"

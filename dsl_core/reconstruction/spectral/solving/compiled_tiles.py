@@ -82,7 +82,7 @@ class CompiledTiles:
         shading = on_grid(frames.known("shading").numpy(), pixels)
         shares = None if margin == 0 else np.ascontiguousarray(frames.shares(wide).swapaxes(0, 1))
         found = Found.empty(model.bands.count, len(frames.flat))
-        equations = np.zeros((STRIP + 2 * margin, solver.channels(offsets), samples.shape[1]))
+        equations = np.zeros((STRIP + 2 * margin, samples.shape[1], solver.channels(offsets)))
         done = 0
         for start in range(0, height, STRIP):
             check()
@@ -150,15 +150,16 @@ def _light(model: PixelModel, near: TileFrames, traced: Traced) -> tuple[tuple[A
         width = model.width(footprint, reached)
         own = OrderLines.of(bands, lines, response.line_spread, footprint.columns, reached, width)
         surplus, bandwidth = max(surplus, own.dropped), max(bandwidth, own.bandwidth)
-        tables.append(own.table.values.numpy())
+        tables.append(line_sums.by_line(own.table.values.numpy(), lines.step_px * SAMPLES))
         supports.append(round(own.table.support_px * SAMPLES))
         lit.append((frames.start, frames.stop))
         white.append(bands.moments[order].sum(1))
         columns.append((own.columns * SAMPLES).round().to(torch.int32).numpy())
         inside.append(reached.numpy())
-    entries = np.zeros((len(tables), max(map(len, tables), default=0)))
-    for table, values in zip(entries, tables, strict=True):
-        table[: len(values)] = values
+    seen = max((table.shape[1] for table in tables), default=0)
+    entries = np.zeros((len(tables), lines.step_px * SAMPLES, seen))
+    for entry, table in zip(entries, tables, strict=True):
+        entry[:, seen - table.shape[1] :] = table
     shape = (0, bands.count, len(near.flat))
     place = lines.position(near.known("column_px").double())
     before = place.floor()

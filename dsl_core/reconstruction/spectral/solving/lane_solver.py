@@ -36,12 +36,12 @@ def solve_spectra(
     check()
     bands, pixels = right.shape
     solver = LaneSolver(prior, bands, diagonals_for(len(data) - 1))
-    equations = np.zeros((1, solver.channels(offsets=False), whole_blocks(pixels)))
-    matrix = equations[0, : bands * solver.size, :pixels].reshape(bands, solver.size, pixels)
+    equations = np.zeros((1, whole_blocks(pixels), solver.channels(offsets=False)))
+    matrix = equations[0, :pixels, : bands * solver.size].reshape(pixels, bands, solver.size)
     for o in range(len(data)):
-        matrix[: bands - o, o] = data[o, : bands - o].numpy()
-    equations[0, bands * solver.size : bands * (solver.size + 1), :pixels] = right.numpy()
-    index = np.full((1, equations.shape[2]), -1, np.int64)
+        matrix[:, : bands - o, o] = data[o, : bands - o].T.numpy()
+    equations[0, :pixels, bands * solver.size : bands * (solver.size + 1)] = right.T.numpy()
+    index = np.full((1, equations.shape[1]), -1, np.int64)
     index[0, :pixels] = np.arange(pixels)
     broad = None
     if rows is not None:
@@ -154,9 +154,10 @@ class LaneSolver:
         rows, levels = broad or (np.zeros((0, 0, 0, 0)), np.zeros((0, 0, 0)))
         sound = solve_blocks(
             equations, shares is not None, np.zeros((0, 0, 0)) if shares is None else shares, index, shading,
-            equations.shape[1] == self.channels(True), rows, levels, self._prior, self._volumes, self._taus,
+            equations.shape[2] == self.channels(True), rows, levels, self._prior, self._volumes, self._taus,
             self._bounds, self._level, WITHIN_BAND, LOCAL_STD**-2, self._parameters, self._diagonals,
-            *self._work, found.nodes, found.mean, found.std, found.data_share, found.at_bound, found.tau,
+            np.empty((index.shape[1], equations.shape[2])), *self._work,
+            found.nodes, found.mean, found.std, found.data_share, found.at_bound, found.tau,
             found.misfit,
         )  # fmt: skip
         if not sound:
