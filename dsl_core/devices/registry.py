@@ -9,7 +9,7 @@ model whose fields are listed with their defaults and descriptions; see `with_op
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from importlib import import_module
 from importlib.metadata import EntryPoint
@@ -72,12 +72,16 @@ def with_options(record: type[BaseModel]) -> Callable[[OpenRig], OpenRig]:
 
 def list_rigs() -> list[RigEntry]:
     """All rigs of all installed packages, then this computer's profiles; broken ones with their error."""
-    return [_describe(point) for point in _points()] + [_describe_profile(name) for name in _profile_names()]
+    points = _points()
+    return [_describe(point) for point in points] + [
+        _describe_profile(name) for name in _profiles_but(points)
+    ]
 
 
 def rig_names() -> list[str]:
     """Names of all rigs and profiles, broken ones too; quick, as no package is loaded."""
-    return sorted({point.name for point in _points()} | set(_profile_names()))
+    points = _points()
+    return sorted({point.name for point in points} | set(_profiles_but(points)))
 
 
 def is_built_in(name: str) -> bool:
@@ -125,8 +129,9 @@ def _profiles() -> Any:
     return import_module(_PROFILES)
 
 
-def _profile_names() -> list[str]:
-    taken = {point.name for point in _points()}
+def _profiles_but(points: Sequence[EntryPoint]) -> list[str]:
+    """Names of this computer's profiles, but for those of installed rigs."""
+    taken = {point.name for point in points}
     return [name for name in _profiles().profile_names() if name not in taken]
 
 

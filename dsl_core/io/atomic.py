@@ -15,8 +15,8 @@ from dsl_core.io.objects.address import require_local
 PARTIAL_SUFFIX = ".partial"
 _DISK_FULL = {errno.ENOSPC, getattr(errno, "EDQUOT", errno.ENOSPC)}
 
-#: NumPy's ``tofile`` and Pillow's encoders, when the system takes less than they give it.
-_SHORT_WRITE = re.compile(r"\d+ requested and \d+ written|encoder error -2")
+#: NumPy's ``tofile``, which asks for room first, and Pillow's encoders, when the system gives or takes less.
+_SHORT_WRITE = re.compile(r"\d+ requested and \d+ written|Not enough free space to write|encoder error -2")
 #: Less than any file system needs for itself.
 _LITTLE_BYTES = 1 << 16
 

@@ -229,11 +229,20 @@ class RandomPerson:
         page, result = self.window.open_page("compare"), results._state.result.value
         assert isinstance(page, ComparePage)
         assert result is not None
-        self.done.append("first comparison")
+        self.done.append("comparison")
         for second in (False, True):
             page._control.open_side(result.path, second)
             self._wait(lambda: not page.pair._state.busy.value)
         self._wait(lambda: len(page.pair.pictures.content.bars) == 2)
+
+    def open_the_same(self) -> None:
+        """Open one example on both pages that keep results, whose sizes differ by 75 MB each."""
+        results = self.window.page_of("results")
+        assert isinstance(results, ResultsPage)
+        self._composition.demo.show(EXAMPLES[0].key)
+        self.rest(cancel=False)
+        self._compare(results)
+        self.rest(cancel=False)
 
     def _busy_all_workers(self) -> None:
         """Let each worker calculate once: the last of them, and its own helpers, else come after hours."""
@@ -275,7 +284,8 @@ class RandomPerson:
     def _wait(self, holds: Callable[[], object]) -> None:
         limit = time.monotonic() + PATIENCE_S
         while not holds():
-            assert time.monotonic() < limit, "it never came true"
+            running = [job.title for job in self.window.parts.runner.active]
+            assert time.monotonic() < limit, f"it never came true; jobs: {running}"
             self._live(0.02)
 
     @staticmethod

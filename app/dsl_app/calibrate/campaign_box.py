@@ -14,6 +14,7 @@ from dsl_app.calibrate.state import CalibrateState
 from dsl_app.connection.state import RigState
 from dsl_app.shared.evented import follow_any
 from dsl_app.shared.known_files import first_free
+from dsl_app.shared.widgets.dialogs import dialog_buttons
 from dsl_app.shared.widgets.forms import label, push_button, set_role, show_parts
 from dsl_app.shared.widgets.layouts import STRETCH, column_of, row_of
 
@@ -35,7 +36,7 @@ class NewCampaignDialog(QDialog):
         self.folder.setToolTip("Folder that will contain the campaign's own folder")
         self.browse = push_button("Choose…", "Choose the folder of campaigns", self._browse)
         self._text = label("", "warn", wraps=True)
-        buttons = QDialogButtonBox(QDialogButtonBox.StandardButton.Cancel, self)
+        buttons = dialog_buttons(QDialogButtonBox.StandardButton.Cancel)
         self.begin = buttons.addButton("Begin", QDialogButtonBox.ButtonRole.AcceptRole)
         self.begin.setToolTip("Create the folder and start the campaign")
         set_role(self.begin, "primary")
@@ -49,6 +50,7 @@ class NewCampaignDialog(QDialog):
         column_of(form, self._text, STRETCH, buttons, on=self)
         for field in (self.name, self.folder):
             field.textChanged.connect(lambda _: self._check())
+        self.name.setFocus()
         self.name.selectAll()
         self.resize(540, self.sizeHint().height())
 

@@ -27,6 +27,7 @@ from dsl_app.shared.evented import follow_any
 from dsl_app.shared.plain_tip import plain_tip
 from dsl_app.shared.theme import Theme
 from dsl_app.shared.widget_state import LabelState
+from dsl_app.shared.widgets.dialogs import dialog_buttons
 from dsl_app.shared.widgets.forms import label, push_button, set_role, show_label
 from dsl_app.shared.widgets.help_window import add_help_key
 from dsl_app.shared.widgets.layouts import STRETCH, column_of, row_of, splitter
@@ -243,7 +244,7 @@ class DriftWindow(QDialog):
         column.addWidget(self._buttons(verdict, commands))
 
     def _buttons(self, verdict: DriftVerdict, commands: LibraryController) -> QDialogButtonBox:
-        buttons = QDialogButtonBox(QDialogButtonBox.StandardButton.Close, self)
+        buttons = dialog_buttons(QDialogButtonBox.StandardButton.Close)
         buttons.rejected.connect(self.reject)
         tip = "Repeat the quick capture; the target must still be in place"
         check = lambda: commands.check(verdict.name, verdict.spectralon, bool(verdict.overridden))  # noqa: E731

@@ -79,7 +79,6 @@ class CalibratePage(PageWidget):
     def _lay_out(self) -> None:
         parts = ((row, 20) for row in self.rows.values())
         self.area = scrolled(boxed(column_of(*parts, STRETCH, margins=0, spacing=4)))
-        self.area.setFocusPolicy(Qt.FocusPolicy.NoFocus)
         self._top = row_of((self.area, 1), self.picture, margins=0)
         # In a high window the list of calibrations is below the rows, and their details fill the right side.
         self._listed = QGroupBox(LIBRARY)
@@ -128,7 +127,6 @@ class CalibratePage(PageWidget):
         state = self._state
         self.stops = [
             state.trouble.follow(self.banner.say),
-            state.foreign.follow(self.banner.action.setVisible),
             *follow_any(
                 self._show_rows,
                 state.rows,

@@ -78,6 +78,7 @@ def main_button(state: CalibrateState, devices: DeviceRig | None) -> str:
     """What a person does next: new, keep, use, everything, or a calibration's name; empty for nothing here.
 
     A rig that does not place targets itself is calibrated row by row. One that is kept is used for scans.
+    Without a rig, or with another one, the message across the page has the button that connects it.
     """
     if state.campaign.value is None:
         return "new"
@@ -87,6 +88,8 @@ def main_button(state: CalibrateState, devices: DeviceRig | None) -> str:
     if not left:
         kept = kept_version(state)
         return "keep" if kept is None else ("" if _is_used(kept, state.in_use.value) else "use")
+    if devices is None:
+        return ""
     return "everything" if _places_itself(devices) else left[0]
 
 

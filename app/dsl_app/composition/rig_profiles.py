@@ -27,14 +27,18 @@ class ProfileAction:
 
         window, state = self._window, ProfileState()
         state.saved.connect(self._saved)
-        control = ProfileController(
-            state, window.parts.runner, lambda: self._rig.link.value is not Link.CLOSED
-        )
+        control = ProfileController(state, window.parts.runner, self._takes_devices)
         control.open(profile_path(name) if name else None)
         dialog = ProfileDialog(state, control, window)
         dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         apply_theme_inside(dialog, window.theme)
         dialog.open()
+
+    def _takes_devices(self) -> bool:
+        """Whether a rig is connected that may hold a device: those of this program control none."""
+        from dsl_core.devices.registry import is_built_in
+
+        return self._rig.link.value is not Link.CLOSED and not is_built_in(self._rig.choice.value.name)
 
     def _saved(self, path: Path) -> None:
         self._offer(path.stem)

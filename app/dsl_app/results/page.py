@@ -134,7 +134,7 @@ class ResultsPage(PageWidget):
         self._below = column_of(margins=0)
         left = boxed(column_of(self.bar, (self.pictures, 1), self._below, self.pixel_info, margins=0))
         tabs = tabs_of(
-            "",
+            "Marks and answers",
             (self.marks, "Marks", "Pins, regions and references"),
             (self.materials, "Materials", "Which material is where, with areas"),
             (self.colours, "Colours", "Colours of the marks under several lights"),

@@ -57,6 +57,7 @@ class LiveView(QWidget):
             "Wheel to zoom, drag to pan, F to fit; arrow keys move the pixel that is read, with Shift by ten",
         )
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
+        self.setAccessibleName("Live picture")
         self.view.setFocusProxy(self)
         self._box, self._item = self.view.box, self.view.image
         self._read: tuple[int, int] | None = None
@@ -133,6 +134,8 @@ class LiveView(QWidget):
         self._empty.setVisible(True)
         for figure in (self._saturated, self._focus, self._rate, self._counts):
             figure.clear()
+        for curve in self._curves:
+            curve.setData([], [])
         if camera is not None:
             self._histogram.setXRange(0, 2**camera.bit_depth, padding=0)
 

@@ -110,6 +110,7 @@ class OptionsForm(QWidget):
         chosen = CHOSEN if self._is_simulated else ()
         self._picked = {key: value for key, value in sorted(options) if key in chosen}
         self.text.setText(" ".join(f"{key}={value}" for key, value in options if key not in chosen))
+        self.text.setCursorPosition(0)
         self._show()
 
     def _choose(self, key: str, value: str) -> None:

@@ -9,7 +9,7 @@ from dsl_app.scan.state import preset_of
 from dsl_app.shared.plain_tip import plain_tip
 from dsl_app.shared.widgets.forms import ChoiceBox, NumberBox, WholeBox, label, push_button, quiet
 from dsl_app.shared.widgets.help_window import set_help
-from dsl_app.shared.widgets.layouts import row_of
+from dsl_app.shared.widgets.layouts import row_of, tab_in_place
 from dsl_core.model.plan import CapturePlan, Columns, LineComb, NoCode, ScanLines, Setting
 from dsl_core.model.presets import CODE_CHOICES, PRESETS, code_of, name_of, whole_cycles
 
@@ -191,6 +191,7 @@ class SettingRows(QWidget):
         add = push_button("Add setting", tip, self._add)
         add.setEnabled(len(self._settings) < MOST_SETTINGS)
         self._grid.addWidget(add, len(self._settings) + 1, 0, 1, 3)
+        tab_in_place(self)
 
     def _add_row(self, i: int) -> None:
         exposure = NumberBox(f"Exposure of setting {i + 1}", 0.1, LONGEST_MS, 1, "ms", 1, _EXPOSURE_TIP)

@@ -51,7 +51,7 @@ class UvcCamera(Camera):
         if not capture.isOpened():
             raise DeviceError(
                 f"Webcam {settings.index} cannot be opened. Check that it is plugged in, that no other"
-                " program uses it, and index in the profile."
+                " program uses it, and that index in the profile is its number."
             )
         _log.warning("%s", CAUTION)
         for prop, value in zip((_WIDTH, _HEIGHT), settings.size_px, strict=True):

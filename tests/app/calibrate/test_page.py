@@ -81,6 +81,15 @@ def test_another_rigs_campaign_offers_to_connect_its_rig(stage: Stage) -> None:
     stage.wait(lambda: not stage.page.banner.isVisible())
 
 
+def test_a_campaign_without_a_rig_offers_to_connect_it(stage: Stage) -> None:
+    stage.bench.rig.disconnect()
+    stage.wait(lambda: "No rig is connected" in stage.page.banner.text)
+    assert not any(row.run.property("role") == "primary" for row in stage.page.rows.values())
+    stage.idle()
+    click(stage.page.banner.action)
+    stage.wait(lambda: not stage.page.banner.isVisible())
+
+
 def test_everything_by_one_button_and_the_library_shows_it(
     stage: Stage, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -95,7 +95,7 @@ ALL_GOOD: dict[str, object] = {"rows": (replace(ROW, state=RowState.GOOD),)}
         ({"campaign": None}, BY_ITSELF, "new"),
         ({}, BY_ITSELF, "everything"),
         ({}, BY_HAND, "geometry"),
-        ({}, None, "geometry"),
+        ({}, None, ""),
         (ALL_GOOD, BY_ITSELF, "keep"),
         ({"foreign": True}, BY_ITSELF, ""),
         ({"everything": "Geometry: fit, 2 of 8"}, BY_ITSELF, ""),

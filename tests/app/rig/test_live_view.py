@@ -36,3 +36,6 @@ def test_a_picture_that_was_made_is_shown_unless_settings_have_changed(qtbot: Qt
     assert view.draw.value is not draw
     view.show_frame(frame, (draw, made))
     assert view._item.image.max() < 77
+    assert all(curve.getData()[1].any() for curve in view._curves)
+    view.set_camera(None)
+    assert [curve.getData()[1] for curve in view._curves] == [None] * 3, "no counts of a camera that is gone"

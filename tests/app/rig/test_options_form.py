@@ -26,6 +26,7 @@ def test_choices_and_text_say_the_same(qtbot: QtBot) -> None:
     _choose(form.scene, "face")
     assert list(form.options) == [("scene", "face"), ("size", "64x48"), ("seed", "3")]
     assert form.text.text() == "seed=3", "what is chosen is not said twice"
+    assert form.text.cursorPosition() == 0, "a long text shows its beginning"
     form.size_px.setCurrentIndex(0)
     form.size_px.activated.emit(0)
     assert list(form.options) == [("scene", "face"), ("seed", "3")]

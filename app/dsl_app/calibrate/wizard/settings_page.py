@@ -7,7 +7,7 @@ from functools import partial
 from typing import TypeVar
 
 from pydantic import TypeAdapter, ValidationError
-from PySide6.QtCore import Qt, Signal
+from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QCheckBox, QFormLayout, QHBoxLayout, QLineEdit, QWidget
 
 from dsl_app.calibrate.wizard.settings import setting_title
@@ -42,7 +42,6 @@ class SettingsPage(QWidget):
         self._form = QFormLayout(content)
         self._form.setFieldGrowthPolicy(QFormLayout.FieldGrowthPolicy.AllNonFixedFieldsGrow)
         area = scrolled(content)
-        area.setFocusPolicy(Qt.FocusPolicy.NoFocus)
         column_of(self._intro, self._trouble, (area, 1), on=self, margins=(8, 0, 0, 0))
         self.say("")
 

@@ -6,7 +6,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from PySide6.QtCore import QSize
+from PySide6.QtCore import QSize, Qt
 from PySide6.QtWidgets import QFileDialog, QFormLayout, QLabel, QLineEdit, QMenu, QSizePolicy, QWidget
 
 from dsl_app.importing.captures.parts_editor import PartsEditor
@@ -96,7 +96,7 @@ class CapturesDialog(JobDialog):
         self.decoded = DecodedPicture()
         self.decoded.setMinimumWidth(PICTURE_PX)
         self.about_columns = _sentence(MOST_LINES + 1)
-        self.about_mapping = _sentence()
+        self.about_mapping = _sentence(MOST_LINES + 2)
         self.about_values = _sentence()
 
     def _make_bottom(self) -> None:
@@ -284,8 +284,9 @@ class CapturesDialog(JobDialog):
 
 
 def _sentence(lines: int = MOST_LINES) -> QLabel:
-    """A line for a sentence beside what it is about."""
+    """Lines for a sentence beside what it is about; one that is longer begins there, and its tip has all."""
     made = label(" ", "muted", wraps=True)
+    made.setAlignment(Qt.AlignmentFlag.AlignTop)
     made.setMaximumHeight(made.fontMetrics().lineSpacing() * lines + 2)
     return made
 

@@ -18,6 +18,7 @@ from PySide6.QtWidgets import (
 from dsl_app.results.export.controller import ExportController
 from dsl_app.shared.plain_tip import plain_tip
 from dsl_app.shared.settings import folder_for
+from dsl_app.shared.widgets.dialogs import dialog_buttons
 from dsl_app.shared.widgets.forms import check_box, label, named, push_button, set_role
 from dsl_app.shared.widgets.help_window import add_help_key
 from dsl_app.shared.widgets.layouts import STRETCH, column_of, row_of
@@ -51,7 +52,7 @@ class ExportDialog(QDialog):
         self.replace = check_box("Replace existing files", "If not ticked, existing files are never replaced")
         self.replace.toggled.connect(lambda _: self._check())
         self.text = label("", wraps=True)
-        self.buttons = QDialogButtonBox(QDialogButtonBox.StandardButton.Cancel, self)
+        self.buttons = dialog_buttons(QDialogButtonBox.StandardButton.Cancel)
         self.write = self.buttons.addButton("Export", QDialogButtonBox.ButtonRole.AcceptRole)
         self.write.setToolTip("Write the selected formats")
         set_role(self.write, "primary")

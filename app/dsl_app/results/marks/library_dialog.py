@@ -15,6 +15,7 @@ from PySide6.QtWidgets import (
 
 from dsl_app.results.marks.controller import MarksController
 from dsl_app.results.state import Library
+from dsl_app.shared.widgets.dialogs import dialog_buttons
 from dsl_app.shared.widgets.forms import label, named, set_role
 from dsl_app.shared.widgets.help_window import add_help_key
 from dsl_app.shared.widgets.layouts import column_of
@@ -46,7 +47,7 @@ class LibraryDialog(QDialog):
             item.setData(ENTRY, reference.name)
             self.list.addItem(item)
         self.text = label("", "muted", wraps=True)
-        self.buttons = QDialogButtonBox(QDialogButtonBox.StandardButton.Cancel, self)
+        self.buttons = dialog_buttons(QDialogButtonBox.StandardButton.Cancel)
         self.add = self.buttons.addButton("Add", QDialogButtonBox.ButtonRole.AcceptRole)
         self.add.setToolTip("Compare with the selected spectra")
         set_role(self.add, "primary")

@@ -13,7 +13,7 @@ from dsl_core.devices.driver_table import Kind, find_driver
 from dsl_core.errors import DeviceError
 from dsl_core.words import capitalised
 
-NOTHING_FOUND = "nothing found"
+NOTHING_FOUND, NOT_LOOKED = "nothing found", "nobody has looked yet"
 
 
 class DeviceForm(QWidget):
@@ -40,18 +40,19 @@ class DeviceForm(QWidget):
         self.form = QFormLayout()
         area = scrolled(boxed(self.form))
         column_of(top, (area, 1), on=self)
-        self.show_found(())
+        self.show_found(None)
 
     def _choose(self, found: Found | None) -> None:
         if found is not None:
             self._commands.choose_device(found)
 
-    def show_found(self, found: tuple[Found, ...]) -> None:
-        """List the devices of this kind."""
-        own = [each for each in found if each.kind == self.kind]
+    def show_found(self, found: tuple[Found, ...] | None) -> None:
+        """List the devices of this kind; None before anybody looked for them."""
+        none = NOT_LOOKED if found is None else NOTHING_FOUND
+        own = [each for each in found or () if each.kind == self.kind]
         with quiet(self.found):
             self.found.clear()
-            self.found.addItem(f"{len(own)} found: choose one" if own else NOTHING_FOUND, None)
+            self.found.addItem(f"{len(own)} found: choose one" if own else none, None)
             for each in own:
                 self.found.addItem(f"{each.device.words} ({each.driver})", each)
         self.found.setEnabled(bool(own))
@@ -87,7 +88,9 @@ class DeviceForm(QWidget):
             if setting.is_required() or default in (None, "", {}):
                 field.setPlaceholderText("needed" if setting.is_required() else "not set")
             else:
-                field.setPlaceholderText(text_of(default))
+                # To be read: a frame period is 1000 / 60 ms.
+                rounded = float(f"{default:.6g}") if isinstance(default, float) else default
+                field.setPlaceholderText(text_of(rounded))
             field.textEdited.connect(lambda text, name=name: self._commands.set_text(self.kind, name, text))
             self.fields[name] = field
             about = label(setting.description or "", "muted", wraps=True)

@@ -9,7 +9,7 @@ from dsl_app.rig.profiles.device_form import DeviceForm
 from dsl_app.rig.profiles.draft import Draft
 from dsl_app.rig.profiles.state import ProfileState, profile_view
 from dsl_app.shared.evented import follow_any
-from dsl_app.shared.widgets.dialogs import command_window
+from dsl_app.shared.widgets.dialogs import command_window, dialog_buttons
 from dsl_app.shared.widgets.forms import label, named, push_button, set_role
 from dsl_app.shared.widgets.help_window import add_help_key
 from dsl_app.shared.widgets.inside import stop_following
@@ -52,15 +52,15 @@ class ProfileDialog(QDialog):
         )
         self.findings.wrap(1)
         self.trouble = label("", "bad", wraps=True)
-        self.buttons = QDialogButtonBox(QDialogButtonBox.StandardButton.Cancel, self)
+        self.buttons = dialog_buttons(QDialogButtonBox.StandardButton.Cancel)
         self.buttons.button(QDialogButtonBox.StandardButton.Cancel).setToolTip("Close unsaved (Escape)")
         self.save = self.buttons.addButton("Save", QDialogButtonBox.ButtonRole.AcceptRole)
         self.save.setToolTip("Save the profile, whole or not at all")
-        set_role(self.save, "primary")
         self.command = self.buttons.addButton("Show command line", QDialogButtonBox.ButtonRole.ActionRole)
         self.command.setToolTip("Show the command that tries the devices of the saved profile")
         self._lay_out()
         self._connect()
+        self.name.setFocus()
 
     def _lay_out(self) -> None:
         form = QFormLayout()
@@ -84,7 +84,7 @@ class ProfileDialog(QDialog):
             state.draft.follow(self._show_draft),
             state.found.follow(self._show_found),
             state.findings.follow(self._show_findings),
-            *follow_any(self._show, state.draft, state.busy, state.trouble, state.findings),
+            *follow_any(self._show, state.draft, state.busy, state.trouble, state.findings, state.found),
         ]
 
     # Show ------------------------------------------------------------------------------------------
@@ -109,8 +109,9 @@ class ProfileDialog(QDialog):
         set_role(self.verdict, view.verdict_role)
         self.trouble.setText(view.trouble or view.remark)
         set_role(self.trouble, "bad" if view.trouble else "muted")
-        for button in (self.look, self.test, self.save):
+        for name, button in (("look", self.look), ("try", self.test), ("save", self.save)):
             button.setEnabled(view.can_act)
+            set_role(button, "primary" if name == view.following else "")
 
     # Do --------------------------------------------------------------------------------------------
 

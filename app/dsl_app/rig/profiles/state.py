@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from dsl_app.rig.profiles.draft import Draft
+from dsl_app.rig.profiles.draft import NEEDED, Draft
 from dsl_app.shared.evented import Event, Value
 from dsl_core.devices.doctor import Finding, Grade
 from dsl_core.devices.driver_table import FoundDevice, Kind
@@ -24,7 +24,8 @@ class Found:
 class ProfileState:
     """Values that the controller sets and the dialog follows.
 
-    ``drivers`` are the names of drivers by kind, ``found`` the devices they see. ``findings`` is what trying
+    ``drivers`` are the names of drivers by kind, ``found`` the devices they see, None before anybody looked.
+    ``findings`` is what trying
     the devices said, ``tried`` the draft that was tried. ``busy`` says what is being done (empty: nothing),
     ``trouble`` what is wrong. ``saved`` fires with the file.
     """
@@ -32,7 +33,7 @@ class ProfileState:
     def __init__(self) -> None:
         self.draft = Value(Draft())
         self.drivers: Value[Mapping[Kind, tuple[str, ...]]] = Value({})
-        self.found: Value[tuple[Found, ...]] = Value(())
+        self.found: Value[tuple[Found, ...] | None] = Value(None)
         self.findings: Value[tuple[Finding, ...]] = Value(())
         self.tried: Value[Draft | None] = Value(None)
         self.busy = Value("")
@@ -42,13 +43,17 @@ class ProfileState:
 
 @dataclass(frozen=True)
 class ProfileView:
-    """What the dialog says and which buttons can be used; ``verdict`` sums up what was tried."""
+    """What the dialog says and which buttons can be used; ``verdict`` sums up what was tried.
+
+    ``following`` is what a person does next: look, try or save.
+    """
 
     trouble: str
     remark: str
     verdict: str
     verdict_role: str
     can_act: bool
+    following: str
 
 
 def profile_view(state: ProfileState) -> ProfileView:
@@ -66,4 +71,11 @@ def profile_view(state: ProfileState) -> ProfileView:
             verdict, role = "Every device answers; see the warnings.", "warn"
         if state.tried.value is not draft:
             verdict, role = f"Before the last change: {verdict[0].lower()}{verdict[1:]}", "muted"
-    return ProfileView(state.trouble.value, remark, verdict, role, not busy)
+    return ProfileView(state.trouble.value, remark, verdict, role, not busy, _following(state))
+
+
+def _following(state: ProfileState) -> str:
+    draft = state.draft.value
+    if not all(draft.part(kind).driver for kind in NEEDED):
+        return "look"
+    return "save" if state.tried.value is draft else "try"

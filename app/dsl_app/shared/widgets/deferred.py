@@ -14,7 +14,7 @@ from shiboken6 import isValid
 
 from dsl_app.shared.theme import DARK, Theme
 from dsl_app.shared.widgets.inside import apply_theme_to
-from dsl_app.shared.widgets.layouts import column_of
+from dsl_app.shared.widgets.layouts import column_of, tab_in_place
 
 #: Between two deferred calls, ms: the window handles its other events.
 PAUSE_MS = 30
@@ -78,6 +78,8 @@ class Deferred(QWidget, Generic[P]):
             self.made = self._make()
             apply_theme_to(self.made, self._theme)
             self._column.addWidget(self.made)
+            # Before it takes the focus for this widget, which Qt would move with it.
+            tab_in_place(self)
             self.setFocusProxy(self.made)
         return self.made
 

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from itertools import pairwise
 
 from PySide6.QtCore import QSize, Qt
-from PySide6.QtGui import QFontDatabase
+from PySide6.QtGui import QFontDatabase, QIcon, QShowEvent
 from PySide6.QtWidgets import (
     QApplication,
     QDialog,
@@ -44,13 +45,34 @@ def confirm(parent: QWidget, title: str, text: str, go: str, stay: str) -> bool:
     return chosen is wanted
 
 
+class _Buttons(QDialogButtonBox):
+    """The Tab key follows the order on screen, which is that of the desktop, and not that of creation."""
+
+    def showEvent(self, event: QShowEvent) -> None:
+        """Put the buttons in order."""
+        super().showEvent(event)
+        for before, after in pairwise(sorted(self.buttons(), key=lambda button: button.x())):
+            self.setTabOrder(before, after)
+
+
+def dialog_buttons(leave: QDialogButtonBox.StandardButton) -> QDialogButtonBox:
+    """The buttons of a dialog, with one that leaves it.
+
+    The Tab key reaches widgets in the order in which they come to the dialog: laid out last, these are last,
+    and a form begins with its first field. The style's own icons are dark on a dark button.
+    """
+    made = _Buttons(leave)
+    made.button(leave).setIcon(QIcon())
+    return made
+
+
 def text_window(title: str, content: QWidget, parent: QWidget, width: int, height: int) -> QDialog:
     """A dialog around some content, with a Close button."""
     window = QDialog(parent)
     window.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
     window.setWindowTitle(title)
     window.resize(width, height)
-    buttons = QDialogButtonBox(QDialogButtonBox.StandardButton.Close, window)
+    buttons = dialog_buttons(QDialogButtonBox.StandardButton.Close)
     buttons.button(QDialogButtonBox.StandardButton.Close).setToolTip("Close this window (Escape)")
     buttons.rejected.connect(window.reject)
     column_of((content, 1), buttons, on=window)
@@ -92,7 +114,7 @@ class JobDialog(QDialog):
         self.stops: list[Callable[[], None]] = []
         self.column = column_of(on=self)
         self.text: QLabel = label("", "muted", wraps=True)
-        self.buttons = QDialogButtonBox(QDialogButtonBox.StandardButton.Cancel, self)
+        self.buttons = dialog_buttons(QDialogButtonBox.StandardButton.Cancel)
         self.go = self.buttons.addButton("", QDialogButtonBox.ButtonRole.AcceptRole)
         set_role(self.go, "primary")
         self.command = self.buttons.addButton("Show command line", QDialogButtonBox.ButtonRole.ActionRole)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import TypeVar
 
 from PySide6.QtCore import Qt
@@ -108,13 +109,31 @@ def splitter(direction: Qt.Orientation, *parts: tuple[QWidget, int], sizes: Sequ
 
 
 def scrolled(content: QWidget) -> QScrollArea:
-    """Content that scrolls up and down where it is higher than its room, without a frame."""
+    """Content that scrolls up and down where it is higher than its room, without a frame.
+
+    It follows the focus of what is inside and takes none itself, which nobody would see.
+    """
     area = QScrollArea()
+    area.setFocusPolicy(Qt.FocusPolicy.NoFocus)
     area.setWidget(content)
     area.setWidgetResizable(True)
     area.setFrameShape(QScrollArea.Shape.NoFrame)
     area.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
     return area
+
+
+def tab_in_place(place: QWidget) -> None:
+    """Let the Tab key come to what is inside a widget where that is: what is made later else comes last."""
+    chain, each = list[QWidget](), place.nextInFocusChain()
+    while each is not None and each is not place:
+        chain.append(each)
+        each = each.nextInFocusChain()
+    stops = [each for each in chain if each.focusPolicy() & Qt.FocusPolicy.TabFocus]
+    inside = [each for each in stops if place.isAncestorOf(each)]
+    # It is a ring, so that the last of the others is the one before.
+    others = [each for each in stops if not place.isAncestorOf(each)]
+    for before, after in pairwise((*others[-1:], *inside)):
+        QWidget.setTabOrder(before, after)
 
 
 def tabs_of(name: str, *tabs: tuple[QWidget, str, str]) -> QTabWidget:

@@ -79,6 +79,7 @@ def test_dropped_pictures_are_corrected_by_mouse_and_become_a_scan(
     QTest.keyClick(bits, Qt.Key.Key_Up)
     settle(qtbot, dialog)
     assert "12 pictures where the mapping wants 14" in dialog.about_mapping.text()
+    assert dialog.about_mapping.alignment() & Qt.AlignmentFlag.AlignTop, "a long one begins where it is read"
     assert not dialog.go.isEnabled()
     assert dialog.decoded.words.text() == "Nothing can be decoded yet."
     QTest.keyClick(bits, Qt.Key.Key_Down)

@@ -14,7 +14,7 @@ from dsl_app.rig.profiles.dialog import ProfileDialog
 from dsl_app.rig.profiles.state import Found, ProfileState, profile_view
 from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QWidget
+from PySide6.QtWidgets import QPushButton, QWidget
 from pytestqt.qtbot import QtBot
 
 from dsl_core.devices import doctor
@@ -26,6 +26,10 @@ from tests.app.support.real_window import show_window
 
 LEFT = Qt.MouseButton.LeftButton
 WEBCAM = Found("camera", "uvc", FoundDevice({"index": 1}, "webcam 1"))
+
+
+def is_blue(button: QPushButton) -> bool:
+    return bool(button.property("role") == "primary")
 
 
 class Bench:
@@ -103,6 +107,31 @@ def test_trying_says_beside_the_fields_what_works(bench: Bench, monkeypatch: pyt
     assert bench.dialog.verdict.text() == "1 of 2 findings prevent a scan."
     bench.control.change(note="new")
     assert profile_view(bench.state).verdict.startswith("Before the last change: 1 of 2")
+
+
+def test_the_blue_button_leads_from_name_to_look_try_and_save(
+    bench: Bench, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def blue() -> list[str]:
+        dialog = bench.dialog
+        return [each.text() for each in (dialog.look, dialog.test, dialog.save) if is_blue(each)]
+
+    monkeypatch.setattr(doctor, "examine", lambda profile: [Finding("camera uvc", Grade.GOOD, "640 px")])
+    found = bench.dialog.forms["camera"].found
+    assert bench.dialog.focusWidget() is bench.dialog.name
+    assert (found.currentText(), blue()) == ("nobody has looked yet", ["&Look for devices"])
+    bench.fill_in()
+    assert bench.dialog.forms["stage"].found.currentText() == "nothing found"
+    assert blue() == ["&Try"]
+    QTest.mouseClick(bench.dialog.test, LEFT)
+    assert blue() == ["Save"]
+    bench.control.change(note="new")
+    assert blue() == ["&Try"]
+
+
+def test_defaults_are_shown_as_a_person_writes_them(bench: Bench) -> None:
+    bench.fill_in()
+    assert bench.dialog.forms["projector"].fields["frame_period_ms"].placeholderText() == "16.6667"
 
 
 def test_a_profile_that_cannot_be_read_is_said(bench: Bench, tmp_path: Path) -> None:

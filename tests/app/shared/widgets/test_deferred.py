@@ -4,8 +4,9 @@ import time
 
 from dsl_app.shared.theme import DARK, LIGHT, Theme
 from dsl_app.shared.widgets.deferred import PAUSE_MS, Deferred, call_deferred
-from PySide6.QtCore import QTimer
-from PySide6.QtWidgets import QLabel, QVBoxLayout, QWidget
+from PySide6.QtCore import Qt, QTimer
+from PySide6.QtTest import QTest
+from PySide6.QtWidgets import QLabel, QLineEdit, QVBoxLayout, QWidget
 from pytestqt.qtbot import QtBot
 
 
@@ -89,3 +90,19 @@ def test_whose_window_is_gone_loses_the_turn_and_others_do_not(qtbot: QtBot) -> 
     column.removeWidget(gone)
     gone.deleteLater()
     qtbot.waitUntil(lambda: taken == ["page"])
+
+
+def test_the_tab_key_comes_to_a_part_where_it_is(qtbot: QtBot) -> None:
+    page, first, last = QWidget(), QLineEdit(), QLineEdit()
+    qtbot.addWidget(page)
+    room = Deferred(QLineEdit)
+    layout = QVBoxLayout(page)
+    for part in (first, room, last):
+        layout.addWidget(part)
+    page.show()
+    made = room.content
+    qtbot.waitUntil(made.isVisible)
+    first.setFocus()
+    for part in (made, last, first):
+        QTest.keyClick(page.focusWidget(), Qt.Key.Key_Tab)
+        assert page.focusWidget() is part

@@ -5,10 +5,23 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import pytest
-from dsl_app.shared.widgets.dialogs import confirm
+from dsl_app.shared.widgets.dialogs import confirm, dialog_buttons
+from dsl_app.shared.widgets.layouts import column_of
 from PySide6.QtCore import Qt, QTimer
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QApplication, QMessageBox, QPushButton, QWidget
+from PySide6.QtWidgets import (
+    QApplication,
+    QDialog,
+    QDialogButtonBox,
+    QLineEdit,
+    QMessageBox,
+    QProxyStyle,
+    QPushButton,
+    QStyle,
+    QStyleHintReturn,
+    QStyleOption,
+    QWidget,
+)
 from pytestqt.qtbot import QtBot
 
 
@@ -49,3 +62,46 @@ def test_only_the_button_that_names_it_ends_something(
 
     QTimer.singleShot(0, look)
     assert confirm(parent, "Jobs", "A <b>scan</b> runs.", "Stop and quit", "Keep working") is goes
+
+
+class _WithIcons(QProxyStyle):
+    """A desktop whose dialogs have icons on their buttons."""
+
+    def styleHint(
+        self,
+        hint: QStyle.StyleHint,
+        option: QStyleOption | None = None,
+        widget: QWidget | None = None,
+        returned: QStyleHintReturn | None = None,
+    ) -> int:
+        if hint == QStyle.StyleHint.SH_DialogButtonBox_ButtonsHaveIcons:
+            return 1
+        return super().styleHint(hint, option, widget, returned)
+
+
+def test_tab_goes_through_a_form_and_then_to_its_buttons(qtbot: QtBot) -> None:
+    dialog, first, second = QDialog(), QLineEdit(), QLineEdit()
+    qtbot.addWidget(dialog)
+    buttons = dialog_buttons(QDialogButtonBox.StandardButton.Cancel)
+    go = buttons.addButton("Go", QDialogButtonBox.ButtonRole.AcceptRole)
+    column_of(first, second, buttons, on=dialog)
+    dialog.show()
+    qtbot.waitUntil(lambda: dialog.focusWidget() is first)
+    QTest.keyClick(first, Qt.Key.Key_Tab)
+    assert dialog.focusWidget() is second
+    QTest.keyClick(second, Qt.Key.Key_Tab)
+    assert dialog.focusWidget() is go
+    assert go.isDefault()
+
+
+def test_no_button_of_a_dialog_has_an_icon_of_the_desktop(qtbot: QtBot, qapp: QApplication) -> None:
+    before, leave = qapp.style().name(), QDialogButtonBox.StandardButton.Cancel
+    qapp.setStyle(_WithIcons())
+    try:
+        plain, ours = QDialogButtonBox(leave), dialog_buttons(leave)
+        qtbot.addWidget(plain)
+        qtbot.addWidget(ours)
+        assert not plain.button(leave).icon().isNull(), "the desktop has none: nothing is tested"
+        assert ours.button(leave).icon().isNull()
+    finally:
+        qapp.setStyle(before)

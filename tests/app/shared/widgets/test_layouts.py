@@ -8,10 +8,12 @@ from dsl_app.shared.widgets.layouts import (
     row_of,
     scrolled,
     splitter,
+    tab_in_place,
     tabs_of,
 )
 from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QLabel, QWidget
+from PySide6.QtTest import QTest
+from PySide6.QtWidgets import QLabel, QLineEdit, QWidget
 from pytestqt.qtbot import QtBot
 
 
@@ -61,6 +63,23 @@ def test_scrolled_content_is_as_wide_as_its_room(qtbot: QtBot) -> None:
     assert area.widget() is content
     assert area.widgetResizable()
     assert area.horizontalScrollBarPolicy() is Qt.ScrollBarPolicy.ScrollBarAlwaysOff
+    assert area.focusPolicy() is Qt.FocusPolicy.NoFocus, "a stop of the Tab key that nobody sees"
+
+
+def test_the_tab_key_comes_to_what_was_made_later_where_it_is(qtbot: QtBot) -> None:
+    page, first, last = QWidget(), QLineEdit(), QLineEdit()
+    qtbot.addWidget(page)
+    place = boxed(column_of(margins=0))
+    column_of(first, place, last, on=page)
+    later = [QLineEdit(), QLineEdit()]
+    for field in later:
+        place.layout().addWidget(field)  # type: ignore[union-attr]
+    tab_in_place(place)
+    page.show()
+    first.setFocus()
+    for field in (*later, last, first):
+        QTest.keyClick(page.focusWidget(), Qt.Key.Key_Tab)
+        assert page.focusWidget() is field
 
 
 def test_tabs_have_titles_and_tips(qtbot: QtBot) -> None:
