@@ -269,9 +269,9 @@ def test_two_patterns_of_the_first_code_never_give_the_same_picture(monkeypatch:
 
 def test_controls_are_patterns_of_pairs_that_are_both_there() -> None:
     judge = proof()
-    for at in (0, 1, 4, 6, 7):
+    for at in (0, 1, 4, 6, 7, 8, 9):
         judge._kept[at] = counts(100 + at)
-    assert set(judge._code_pairs()) == {0, 3}
+    assert set(judge._code_pairs()) == {0, 3, 4}
     assert judge._code_pairs()[3][1] is judge._kept[7]
     assert proof().controls() == ()
     assert judge.first_setting == 0

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -99,6 +100,22 @@ def test_an_xor_code_as_ours_is_ours(tmp_path: Path) -> None:
     folder = _folder(tmp_path, [f"{i}.png" for i in range(6)])
     found = _arranged(folder, StripePictures(bits=3, code="xor", base_bit=1))
     assert found.code == XorCode(rows=False, base_px=4)
+
+
+@pytest.mark.parametrize(("code", "base_bit"), [("binary", 0), ("xor", 2)])
+def test_a_code_that_is_not_ours_stays_what_it_is(tmp_path: Path, code: Any, base_bit: int) -> None:
+    folder = _folder(tmp_path, [f"{i}.png" for i in range(6)])
+    part = StripePictures(bits=3, code=code, base_bit=base_bit)
+    assert isinstance(_arranged(folder, part).code, CapturedCode)
+
+
+def test_columns_and_rows_of_two_codes_are_not_our_code(tmp_path: Path) -> None:
+    folder = _folder(tmp_path, [f"{i:02}.png" for i in range(10)])
+    columns, rows = (
+        StripePictures(bits=3, code="xor"),
+        StripePictures(axis="rows", bits=2, code="xor", base_bit=1),
+    )
+    assert isinstance(_arranged(folder, columns, rows).code, CapturedCode)
 
 
 def test_a_mapping_cannot_leave_its_folder_or_code_nothing() -> None:

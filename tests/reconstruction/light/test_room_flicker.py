@@ -106,6 +106,19 @@ def test_a_room_that_flickers_is_a_share_of_what_it_lights(seen: Seen) -> None:
     assert found.rms_dn == pytest.approx(0.08 * np.median(room), rel=0.3)
 
 
+def test_lamps_that_flicker_and_light_for_every_pixel_are_told_apart(seen: Seen) -> None:
+    room = np.median([seen.scan.frames[at] for at in seen.lines], axis=0) - seen.rig.sensor.black_level_dn
+    rng = np.random.default_rng(3)
+    share, more = rng.normal(0, 0.08, len(seen.scan.frames)), rng.normal(0, 0.8, len(seen.scan.frames))
+    black = [shot.index for shot in seen.scan.plan.shots() if shot.role == "black"]
+    share[black] = more[black] = 0.0
+    found = seen.flicker(seen.with_(share[:, None, None] * room + more[:, None, None]))
+    assert found is not None
+    for name, kind, wanted in (("dn", found.dn, more), ("share", found.share, share)):
+        off = quick([kind[at] for at in seen.lines] - wanted[seen.lines])
+        assert off < 0.35 * quick(wanted[seen.lines]), name
+
+
 def test_patterns_other_than_single_lines_say_nothing(seen: Seen) -> None:
     some = Columns(levels=tuple(tuple((float(x % 2), 0.5, 0.5) for x in range(640)) for _ in range(20)))
     plan = PLAN.model_copy(update={"spectral": some, "camera_size_px": (80, 52)})
