@@ -55,6 +55,8 @@ TINY = 1e-5
 SMALL = 9
 #: Statements whose absence changes no result.
 TALK = ("progress.report(", "_log.", "warnings.")
+#: Constants of how much is computed at once, which bounds memory.
+AT_ONCE = ("BLOCK", "CHUNK")
 
 
 @dataclass(frozen=True)
@@ -116,8 +118,14 @@ def faults_of(path: str, source: str) -> Iterator[Fault]:
 
 
 def _without_effect(tree: ast.AST) -> Iterator[ast.AST]:
-    """Annotations, decorators, texts of errors and of the log, other systems, `strict`, seeds of chance."""
+    """Annotations, decorators, texts of errors and of the log, other systems, `strict`, seeds of chance.
+
+    And how much is computed at once.
+    """
     for node in ast.walk(tree):
+        match node:
+            case ast.Assign(targets=[ast.Name(id=name)]) if name.strip("_") in AT_ONCE:
+                yield node.value
         if isinstance(node, ast.If) and (here := _is_here(node.test)) is not None:
             yield from node.orelse if here else node.body
         if isinstance(node, ast.Raise) and node.exc is not None:
