@@ -42,6 +42,13 @@ _DIMMED = (
     " pictures less light than bright ones. Switch its dynamic contrast, iris and eco mode off, check that"
     " the exposure is long enough, and resume the scan."
 )
+#: The same of the first pictures at a drive level of their own.
+_TONE = (
+    "White, black and a frame of the code, captured once more, look as they did: the projector gives another"
+    " share of its light at this drive level than its calibration says, or the camera another exposure than"
+    " requested. Repeat the self-test, which measures how light follows the level, or use one level in all"
+    " settings; or switch automatic exposure and gain of the camera off, and resume the scan."
+)
 #: On resuming, so many shots before a missing one are captured again where nothing can be told of them.
 MOST_UNTOLD = 32
 _log = logging.getLogger(__name__)
@@ -261,6 +268,12 @@ class ProvenShots:
                 reason = f"{found.remedy} Resume the scan afterwards."
             elif change.is_as_at_first and found.verdict in DIM and found.shot.role == "spectral":
                 reason = _DIMMED
+            elif (
+                change.is_as_at_first
+                and found.verdict is Verdict.EXPOSURE
+                and not proof.is_at_first_level(found.shot)
+            ):
+                reason = _TONE
             raise PictureError(
                 f"{found.names.capitalize()} does not show its pattern after {len(SETTLE_MS) + 1} exposures:"
                 f" {found.seen}. {reason} Frames before it are saved. If the pictures are right all the same,"

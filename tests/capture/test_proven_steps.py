@@ -82,6 +82,9 @@ class Bench:
     def differ_at_first(self, shot: Shot, one: object, other: object) -> bool:
         return self._differs
 
+    def is_at_first_level(self, shot: Shot) -> bool:
+        return shot.level == CODE.level
+
     def first_picture(self) -> Shot | None:
         return SHOTS[0] if self.displaced else None
 
@@ -180,6 +183,16 @@ def test_lines_alone_that_lost_their_light_blame_a_projector_that_dims_dark_pict
         PictureError, match=r"pattern is missing.*the projector may give dark pictures less light"
     ):
         bench.shots.take(LINE)
+
+
+@pytest.mark.parametrize(
+    ("factor", "reason"), [(0.5, "Repeat the self-test, which"), (1.0, "Switch automatic")]
+)
+def test_a_wrong_brightness_at_another_level_asks_for_the_tone_curve(factor: float, reason: str) -> None:
+    bench = Bench(lambda shot: Finding(shot, Verdict.EXPOSURE, (shot,), "0.36 times what was expected"))
+    bench.cause = ""
+    with pytest.raises(PictureError, match=reason):
+        bench.shots.take(replace(CODE, level=factor * CODE.level))
 
 
 def test_who_hides_a_part_is_asked_away_whatever_else_seems_changed() -> None:

@@ -183,6 +183,10 @@ class FrameProof:
         """The setting whose code is judged by itself."""
         return self._first
 
+    def is_at_first_level(self, shot: Shot) -> bool:
+        """Whether a shot drives the projector at the level of the first code."""
+        return shot.level == self._plan.settings[self._first].level
+
     @property
     def lacking_pairs(self) -> tuple[int, ...]:
         """Pairs of the first code that are not there or were found wrong."""
