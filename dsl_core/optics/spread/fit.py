@@ -57,6 +57,9 @@ SKIRT_LEAVES = 0.7
 #: The most light that a skirt holds and the most that it is wider, and where the search for it begins: the
 #: logarithm of a stretching, the share of the light, and the logarithm of the further stretching less one.
 MOST_SHARE, WIDEST, SKIRT_START = 0.5, 6.0, (0.0, 0.1, 0.7)
+#: Stretchings (logarithm) and shares of the light that are looked at before a search, which takes long: where
+#: none of them explains the lines better than the curve, a search finds nothing either.
+LOOKS = tuple((log, share) for log in (-0.35, -0.15, 0.0) for share in (0.05, 0.12, 0.3))
 #: Trials of a skirt, at most, and how finely they are told apart.
 TRIALS, SKIRT_STEP = 150, 0.003
 #: How often columns are settled at each: they start from whole ones.
@@ -174,9 +177,12 @@ def _skirted(view: View, family: _Family, found: SpreadFit) -> SpreadFit:
         return np.asarray(trials.x, np.float64)
 
     parts = [torch.nonzero(half == which).ravel() for which in (0, 1)]
-    crossed = [left(best(own), other) for own, other in (parts, parts[::-1])]
-    usual = [_left_by(view, found.response, other) for other in parts[::-1]]
-    if sum(crossed) > SKIRT_LEAVES * sum(usual):
+    usual = sum(_left_by(view, found.response, part) for part in parts)
+    looks = (np.array([log, share, SKIRT_START[2]]) for log, share in LOOKS)
+    if not any(sum(left(look, part) for part in parts) < usual for look in looks):
+        return found
+    crossed = sum(left(best(own), other) for own, other in (parts, parts[::-1]))
+    if crossed > SKIRT_LEAVES * usual:
         return found
     response = family.skirted(*_skirt_of(best(torch.cat(parts))))
     view.column = view.start_px.clone()

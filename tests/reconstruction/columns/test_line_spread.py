@@ -69,7 +69,7 @@ def test_a_wrong_blur_of_the_calibration_does_no_harm_and_is_told(scanned: Scann
     told = next(finding for finding in fit.significant if finding.name == "line spread")
     assert told.part == "profile"
     assert re.search(r"over 0\.(599|600) ± 0\.00\d px", told.sentence)
-    assert "by its calibration over 0.700 px" in told.sentence
+    assert "by the projector's calibration over 0.700 px" in told.sentence
 
 
 def test_a_field_that_the_calibration_has_wrong_does_no_harm(scanned: Scanned, right: float) -> None:

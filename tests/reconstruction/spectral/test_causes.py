@@ -158,8 +158,8 @@ def test_changes_count_from_what_matters_on() -> None:
 def test_each_cause_must_explain_by_itself_what_frames_lack() -> None:
     """The shares are those of the shifts, the mean and the difference of the gains, and drift."""
     believed = []
-    for one in range(4):
-        only = replace(CAUSES, explained=tuple(float(share == one) for share in range(4)))
+    for a, b, c, d in np.eye(4).tolist():
+        only = replace(CAUSES, explained=(a, b, c, d))
         believed.append((only.brighter, only.unequal, only.drifts))
     assert believed == [(False,) * 3, (True, False, False), (False, True, False), (False, False, True)]
 
