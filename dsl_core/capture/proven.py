@@ -262,22 +262,10 @@ class ProvenShots:
                     self.corrected += 1
         if found.is_wrong:
             change = self._explain()
-            reason = change.sentence or f"{found.remedy} Resume the scan afterwards."
-            if found.verdict is Verdict.HIDDEN:
-                # Who stands there is in the pictures that would say what has changed, too.
-                reason = f"{found.remedy} Resume the scan afterwards."
-            elif change.is_as_at_first and found.verdict in DIM and found.shot.role == "spectral":
-                reason = _DIMMED
-            elif (
-                change.is_as_at_first
-                and found.verdict is Verdict.EXPOSURE
-                and not proof.is_at_first_level(found.shot)
-            ):
-                reason = _TONE
             raise PictureError(
                 f"{found.names.capitalize()} does not show its pattern after {len(SETTLE_MS) + 1} exposures:"
-                f" {found.seen}. {reason} Frames before it are saved. If the pictures are right all the same,"
-                " resume without checking that the scene has not moved.",
+                f" {found.seen}. {_what_to_do(found, change, proof)} Frames before it are saved. If the"
+                " pictures are right all the same, resume without checking that the scene has not moved.",
                 found.again,
                 has_changed=change.has_moved or (not change.sentence and found.verdict in CREEPING),
             )
@@ -375,6 +363,19 @@ class ProvenShots:
             f" captures {them} again.",
             error.wrong,
         ) from error
+
+
+def _what_to_do(found: Finding, change: Explanation, proof: FrameProof) -> str:
+    """Why a picture stays wrong as far as that is known, and what to do about it."""
+    if found.verdict is Verdict.HIDDEN:
+        # Who stands there is in the pictures that would say what has changed, too.
+        return f"{found.remedy} Resume the scan afterwards."
+    if change.is_as_at_first:
+        if found.verdict in DIM and found.shot.role == "spectral":
+            return _DIMMED
+        if found.verdict is Verdict.EXPOSURE and not proof.is_at_first_level(found.shot):
+            return _TONE
+    return change.sentence or f"{found.remedy} Resume the scan afterwards."
 
 
 def _is_sure(found: Finding) -> bool:

@@ -176,23 +176,27 @@ def test_what_stays_wrong_is_an_error_with_its_cause_or_remedy(cause: str, reaso
     assert bench.written == {}
 
 
-def test_lines_alone_that_lost_their_light_blame_a_projector_that_dims_dark_pictures() -> None:
-    bench = Bench(lambda shot: Finding(shot, Verdict.DARK, (shot,)))
-    bench.cause = ""
-    with pytest.raises(
-        PictureError, match=r"pattern is missing.*the projector may give dark pictures less light"
-    ):
-        bench.shots.take(LINE)
+DARK_LINE = "the projector may give dark pictures less light"
+LEVEL = "Repeat the self-test, which"
+EXPOSURE = "Switch automatic"
 
 
 @pytest.mark.parametrize(
-    ("factor", "reason"), [(0.5, "Repeat the self-test, which"), (1.0, "Switch automatic")]
+    ("shot", "verdict", "reason"),
+    [
+        (LINE, Verdict.DARK, DARK_LINE),
+        (LINE, Verdict.EXPOSURE, DARK_LINE),
+        (CODE, Verdict.EXPOSURE, EXPOSURE),
+        (replace(CODE, level=0.5 * CODE.level), Verdict.EXPOSURE, LEVEL),
+    ],
 )
-def test_a_wrong_brightness_at_another_level_asks_for_the_tone_curve(factor: float, reason: str) -> None:
-    bench = Bench(lambda shot: Finding(shot, Verdict.EXPOSURE, (shot,), "0.36 times what was expected"))
+def test_what_is_wrong_though_nothing_has_changed_is_told_by_what_it_shows(
+    shot: Shot, verdict: Verdict, reason: str
+) -> None:
+    bench = Bench(lambda shot: Finding(shot, verdict, (shot,), "0.36 times what was expected"))
     bench.cause = ""
     with pytest.raises(PictureError, match=reason):
-        bench.shots.take(replace(CODE, level=factor * CODE.level))
+        bench.shots.take(shot)
 
 
 def test_who_hides_a_part_is_asked_away_whatever_else_seems_changed() -> None:

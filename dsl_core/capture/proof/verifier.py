@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -48,6 +48,21 @@ NEARLY = 0.3
 FEW_VOTES = 60
 
 
+@dataclass
+class Learned:
+    """What the pictures so far say of those to come, as far as it follows from their findings."""
+
+    usual: UsualLight
+    steps: LightSteps
+    places: LinePlaces
+    #: Shots of later settings that were found wrong before.
+    contested: set[int]
+
+    def copy(self) -> Learned:
+        """Another one, which further pictures change alone."""
+        return Learned(self.usual.copy(), self.steps.copy(), self.places.copy(), self.contested.copy())
+
+
 class FrameProof:
     """Judges the shots of a plan one after the other; coarse, and quick enough to keep up with any camera.
 
@@ -80,14 +95,13 @@ class FrameProof:
         self._sentinels = SentinelProof(self._noise, self._raster)
         self._kept: dict[int, Counts] = {}
         self._untold: set[int] = set()
-        self._contested: set[int] = set()
         self._last: tuple[Shot, Counts] | None = None
         #: What the last picture said of the pairs of the first code, one by one.
         self.reviewed: list[Finding] = []
-        self._usual = UsualLight(self._first, calibration is not None)
+        self._learned = Learned(
+            UsualLight(self._first, calibration is not None), LightSteps(), LinePlaces(), set()
+        )
         self._later = LaterSettings(plan, calibration, self._noise, self._kept, self._black_gained)
-        self._steps = LightSteps()
-        self._line_places = LinePlaces()
         #: The picture that came for two patterns, for as long as it comes.
         self._repeated: Counts | None = None
         self._profiles = Recent[Floats | None]()
@@ -135,7 +149,7 @@ class FrameProof:
 
     def believe_light(self, shot: Shot) -> None:
         """Take the light of a shot for usual from now on, though it was unlike the pictures before."""
-        self._steps.believe(shot)
+        self._learned.steps.believe(shot)
 
     def controls(self) -> tuple[Shot, ...]:
         """Shots that show whether devices and scene are as they were; none before the first code."""
@@ -293,7 +307,7 @@ class FrameProof:
         if lit is None or wanted is None:
             return Finding(shot, Verdict.UNTOLD)
         share = brightness_of_lines(seen, lit, wanted, self._noise)
-        usual = np.float32(self._usual.share(shot))
+        usual = np.float32(self._learned.usual.share(shot))
         rivals = [(verdict, self._profile(rival)) for verdict, rival in self._rivals(shot)]
         rivals += [(Verdict.DARK, np.zeros_like(wanted)), (Verdict.OTHER, np.ones_like(wanted))]
         contests = {
@@ -322,7 +336,7 @@ class FrameProof:
         best = min((each.mean for each in rivals.values() if each.is_told), default=1.0)
         if found.is_wrong and min((each.mean for each in places.values()), default=1.0) > best - NEARLY:
             return found
-        told = self._line_places.judge(found.shot, places, found.is_wrong)
+        told = self._learned.places.judge(found.shot, places, found.is_wrong)
         return found if told is None else displaced(found.shot, told[1], told[0])
 
     def _profile(self, shot: Shot) -> Floats | None:
@@ -351,16 +365,15 @@ class FrameProof:
 
     def _judge_again(self, shot: Shot, seen: Counts) -> Finding:
         """A finding by the picture of the first setting, with and without what black has gained since."""
-        before = self._usual.copy(), self._steps.copy(), self._line_places.copy(), self._contested.copy()
+        before = self._learned.copy()
         found = self._judge_later(shot, seen)
         if not found.is_wrong or self._later.gained(shot) == 0:
             return found
         # Only the judgement that is believed counts for what is usual.
-        after = self._usual, self._steps, self._line_places, self._contested
-        self._usual, self._steps, self._line_places, self._contested = before
+        after, self._learned = self._learned, before
         other = self._judge_later(shot, seen, less_gained=False)
         if other.is_wrong:
-            self._usual, self._steps, self._line_places, self._contested = after
+            self._learned = after
             return found
         return other
 
@@ -385,7 +398,7 @@ class FrameProof:
         }
         is_judged = has_black or (self._calibration is not None and shot.role != "black")
         share = self._brightness_again(shot, seen, wanted, black) if is_judged else None
-        first_of_role = not self._usual.knows(shot)
+        first_of_role = not self._learned.usual.knows(shot)
         found = self._decide(shot, contests, share, lambda: None)
         if shot.role == "spectral" and has_black:
             found = self._in_place(found, contests, self._places_again(shot, seen, wanted, black))
@@ -395,7 +408,7 @@ class FrameProof:
             return self._with_doubtful(found)
         if share is not None and first_of_role and not later.is_measured(shot):
             later.measure(shot, share)
-            self._usual.begin(shot)
+            self._learned.usual.begin(shot)
         return found
 
     def _places_again(self, shot: Shot, seen: Counts, wanted: Expected, black: Floats) -> dict[int, Contest]:
@@ -406,7 +419,7 @@ class FrameProof:
             return {}
         now = replace(lit, black=black[lit.index])
         light = np.float32(self._later.scale(shot)) * lit.contrast
-        profile = np.float32(self._usual.share(replace(shot, setting=self._first))) * profile
+        profile = np.float32(self._learned.usual.share(replace(shot, setting=self._first))) * profile
         return {
             side: contest_of_places(seen, wanted, now, light, (profile, moved(profile, side)), self._noise)
             for side in SIDES
@@ -429,8 +442,8 @@ class FrameProof:
     def _with_doubtful(self, found: Finding) -> Finding:
         """Take the picture that a wrong one was compared with again as well, where it may be that one."""
         old = self._places[found.shot.role, found.shot.pattern]
-        is_doubtful = old in self._untold or found.shot.index in self._contested
-        self._contested.add(found.shot.index)
+        is_doubtful = old in self._untold or found.shot.index in self._learned.contested
+        self._learned.contested.add(found.shot.index)
         if found.shot.role != "spectral" or not is_doubtful:
             return found
         # The black picture just before may have changed places with it: at a setting of little light, nothing
@@ -450,7 +463,7 @@ class FrameProof:
     ) -> Finding:
         told = {verdict: contest for verdict, contest in contests.items() if contest.is_told}
         lost = {verdict: contest for verdict, contest in told.items() if contest.is_lost}
-        ratio = None if share is None else share / self._usual.share(shot)
+        ratio = None if share is None else share / self._learned.usual.share(shot)
         if set(lost) == {Verdict.DARK} and ratio is not None and ratio > LEAST_LIGHT:
             return Finding(shot, Verdict.EXPOSURE, (shot,), f"{ratio:.2g} times what was expected")
         if lost:
@@ -462,10 +475,10 @@ class FrameProof:
             return self._named(shot, lost, shown)
         if any(contest.is_torn for contest in told.values()):
             return Finding(shot, Verdict.TORN, (shot,))
-        found = self._usual.judge(shot, share)
+        found = self._learned.usual.judge(shot, share)
         if found.is_wrong:
             return found
-        light = self._steps.judge(shot, share, contests.get(Verdict.DARK))
+        light = self._learned.steps.judge(shot, share, contests.get(Verdict.DARK))
         is_frayed = any(contest.is_doubtful for contest in told.values())
         if Verdict.LATE in told:
             return replace(found, is_doubtful=is_frayed or light is Light.STEP, light=light)

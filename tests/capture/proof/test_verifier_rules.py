@@ -223,22 +223,22 @@ def test_a_picture_judged_with_and_without_gained_black_counts_once(
 
     def later(shot: Shot, seen: Counts, less_gained: bool = True) -> Finding:
         light = 0.8 if less_gained else 0.7
-        judge._usual.judge(shot, light)
-        judge._steps.judge(shot, light, None)
-        judge._line_places.judge(shot, {1: Contest(100, light)})
+        judge._learned.usual.judge(shot, light)
+        judge._learned.steps.judge(shot, light, None)
+        judge._learned.places.judge(shot, {1: Contest(100, light)})
         is_wrong = wrong[not less_gained]
         if is_wrong:
-            judge._contested.add(less_gained)
+            judge._learned.contested.add(less_gained)
         return Finding(shot, Verdict.DISPLACED, (shot,) if is_wrong else ())
 
     monkeypatch.setattr(judge, "_judge_later", later)
     is_first = wrong != (True, False)
     assert judge._judge_again(LATER_LINE, counts(5)).is_wrong == (wrong[0] and wrong[1])
     light = 0.8 if is_first else 0.7
-    assert list(judge._usual._known["spectral", 1]) == [light]
-    assert list(judge._steps._known["spectral", 1, True]) == [light]
-    assert [votes for _, votes, _ in judge._line_places._votes[1].values()] == [100 * light]
-    assert judge._contested == ({True} if wrong[0] and is_first else set())
+    assert list(judge._learned.usual._known["spectral", 1]) == [light]
+    assert list(judge._learned.steps._known["spectral", 1, True]) == [light]
+    assert [votes for _, votes, _ in judge._learned.places._votes[1].values()] == [100 * light]
+    assert judge._learned.contested == ({True} if wrong[0] and is_first else set())
 
 
 def test_only_the_brightness_of_lines_is_asked_of_what_they_light(monkeypatch: pytest.MonkeyPatch) -> None:
