@@ -137,6 +137,16 @@ def test_spectra_at_a_bound_by_their_noise_say_nothing_of_the_light(
     assert (Fit.of(found).parts == ("light",)) == told
 
 
+@pytest.mark.parametrize(("pixels", "told"), [(49, ()), (50, ("bands", "exposure", "profile", "surfaces"))])
+def test_fewer_than_fifty_pixels_say_nothing(pixels: int, told: tuple[str, ...]) -> None:
+    made = np.full(SHAPE, int(Flag.NO_LIGHT), np.uint16)
+    made.ravel()[:pixels] = int(Flag.POOR_FIT | Flag.UNUSUAL_PEAK)
+    lost = np.where(made == int(Flag.NO_LIGHT), made, int(Flag.SATURATED | Flag.CODE_UNSURE))
+    counts = SpectralCounts(reached=pixels, undecided=pixels)
+    found = [*share_findings(lost, None), *share_findings(made, counts), *band_findings(5, 11.0, counts)]
+    assert tuple(sorted(Fit.of(found).parts)) == told
+
+
 def test_pixels_in_shadow_are_not_lost_and_depth_alone_has_no_spectra_to_judge() -> None:
     assert Fit.of(judged(flags(Flag.NO_LIGHT, 0.8))).parts == ()
     assert Fit.of(share_findings(flags(Flag.POOR_FIT, 0.8), None)).parts == ()

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from dsl_core.errors import StoreError
+from dsl_core.io.pictures import picture_file
 from dsl_core.io.pictures.mapping import Mapping, RawLayout, StripePictures
 from dsl_core.io.pictures.picture_file import Picture, load_mosaic, load_values, pictures_in
 from tests.cases.foreign_captures import write
@@ -33,6 +34,21 @@ def test_colour_becomes_grey_or_one_channel(tmp_path: Path) -> None:
         picture = Picture(tmp_path / name)
         assert np.array_equal(load_mosaic(picture, MAPPING, 8), GREY + 3)
         assert np.array_equal(load_mosaic(picture, MAPPING.model_copy(update={"channel": "red"}), 8), GREY)
+
+
+@pytest.mark.parametrize(
+    ("shape", "is_one"), [((6, 8), True), ((7, 7), False), ((0, 5), False), ((1, 49), False)]
+)
+def test_a_picture_has_pixels_and_no_more_than_a_camera(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, shape: tuple[int, int], is_one: bool
+) -> None:
+    monkeypatch.setattr(picture_file, "MOST_PIXELS", 48)
+    np.save(tmp_path / "a.npy", np.zeros(shape, np.uint16))
+    if is_one:
+        assert load_values(Picture(tmp_path / "a.npy")).shape == shape
+    else:
+        with pytest.raises(StoreError, match=rf"a\.npy is {shape[1]} x {shape[0]} px, which no camera has"):
+            load_values(Picture(tmp_path / "a.npy"))
 
 
 def test_bits_are_moved_to_the_lower_end_and_floats_scaled(tmp_path: Path) -> None:
