@@ -51,7 +51,9 @@ PULLS = 10.0 ** np.arange(-7.0, 0.0)
 #: Steps that finding a curve without negative shares may take, for each of them: the weakest pulls need most.
 MOST_STEPS = 30
 #: A curve is preferred to a simpler one when it lowers the other half's chi-square by so much and this share.
-CLEARLY, CLEAR_SHARE = 30.0, 0.01
+#: A stretched one must gain a share as well: what the model leaves is alike in neighbouring pixels, so that a
+#: gain far beyond chance may still say nothing about the blur.
+CLEARLY, STRETCH_SHARE, CLEAR_SHARE = 30.0, 0.02, 0.01
 #: Share of the chi-square of the simpler curve that one with a skirt may leave.
 SKIRT_LEAVES = 0.7
 #: The most light that a skirt holds and the most that it is wider, and where the search for it begins: the
@@ -290,7 +292,7 @@ def _choose(halves: list[Normal], family: _Family, *, shapes: bool) -> SpreadFit
     scale = min(known, stretched, *pulled.values()) / whole.count
     factor = family.best(whole)
     response, after = family.start, known
-    if known - stretched > scale * CLEARLY:
+    if known - stretched > scale * (CLEARLY + STRETCH_SHARE * whole.count):
         response, after = family.response(factor), stretched
     if pulled and after - min(pulled.values()) > scale * (CLEARLY + CLEAR_SHARE * whole.count):
         pull = min(pulled, key=lambda each: pulled[each])
