@@ -240,9 +240,9 @@ class Runner:
     def _is_back(self) -> bool:
         """Whether what moved was put back during a pause, so that all since then is captured again."""
         moved = self._place.moved
-        if moved is None or self._put_backs == _PUT_BACKS:
+        if moved is None:
             return False
-        is_back = self._place.still_away() is None
+        is_back = self._put_backs < _PUT_BACKS and self._place.still_away() is None
         self._put_backs += is_back
         self._set(State.RUNNING, warning="" if is_back else f"{moved.sentence} {moved.advice}")
         return is_back

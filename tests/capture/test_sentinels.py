@@ -132,6 +132,26 @@ def test_what_was_put_back_during_a_pause_is_captured_again_from_the_motion_on(s
     assert movement_of(sink, scene.calibration.sensor) is None
 
 
+def test_a_scan_whose_rig_never_keeps_still_waits_for_it_five_times(scene: RenderedScene) -> None:
+    is_away = [False]
+    _, runner = scan([scene, shifted(scene, 2)], Change(scene=lambda shot: int(is_away[0])), waits=True)
+    pauses = list[int]()
+
+    def leave_and_return(status) -> None:  # type: ignore[no-untyped-def]
+        if status.state is State.PAUSED:
+            pauses.append(status.done)
+            is_away[0] = False
+            runner.resume()
+        else:
+            is_away[0] = status.done > 30
+
+    runner.listen(leave_and_return)
+    warning = runner.run().warning
+    assert len(pauses) == 6
+    assert "moved by 2.0 ± 0.1 px" in warning
+    assert warning.endswith("frames after that do not fit those before.")
+
+
 def test_a_scan_that_saw_motion_resumes_once_all_is_back(scene: RenderedScene) -> None:
     at = [shot.index for shot in scene.plan.shots() if shot.role == "sentinel"][4] - 3
     sink, runner = scan([scene, shifted(scene, 2)], Change(scene=lambda shot: int(shot >= at)))

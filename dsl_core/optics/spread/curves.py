@@ -111,4 +111,4 @@ def reach_px(spread: LineSpread) -> float:
     """Distance (px) beyond which hardly any light of a curve falls on either side."""
     grid, values = _steps(spread)
     low, high = np.searchsorted(values, [BEYOND, 1 - BEYOND])
-    return float(max(-grid[low], grid[min(high, len(grid) - 1)]))
+    return float(max(-grid[low], grid[high]))
