@@ -51,9 +51,9 @@ PULLS = 10.0 ** np.arange(-7.0, 0.0)
 #: Steps that finding a curve without negative shares may take, for each of them: the weakest pulls need most.
 MOST_STEPS = 30
 #: A curve is preferred to a simpler one when it lowers the other half's chi-square by so much and this share.
-#: A stretched one must gain a share as well: what the model leaves is alike in neighbouring pixels, so that a
-#: gain far beyond chance may still say nothing about the blur.
-CLEARLY, STRETCH_SHARE, CLEAR_SHARE = 30.0, 0.02, 0.01
+CLEARLY, CLEAR_SHARE = 30.0, 0.01
+#: In the end the known curve must leave so many times what the found one does, each with columns of its own.
+SURELY = 1.2
 #: Share of the chi-square of the simpler curve that one with a skirt may leave.
 SKIRT_LEAVES = 0.7
 #: The most light that a skirt holds and the most that it is wider, and where the search for it begins: the
@@ -128,7 +128,24 @@ def fit_spread(
 
 
 def _fit_curve(view: View, family: _Family) -> SpreadFit | None:
-    """The curve that pixels see whose relative widths are known."""
+    """The curve that pixels see whose relative widths are known; the known one unless it is surely worse.
+
+    Where lines do not overlap, columns make up for nearly any blur. The search gains little there, but more
+    than chance would bring, as neighbours share what the model leaves; and against columns that have followed
+    another curve, the known one looks bad.
+    """
+    found = _search(view, family)
+    if found is None or not found.changed:
+        return found
+    every = torch.arange(len(view.start_px))
+    known, now = (_left_by(view, each, every) for each in (family.start, found.response))
+    if known > SURELY * now:
+        return found
+    left = found.after * known / now
+    return replace(found, response=family.start, changed=False, before=left, after=left)
+
+
+def _search(view: View, family: _Family) -> SpreadFit | None:
     # First as if nothing was known of the columns: what the known curve explains, stretched or not, stands.
     halves = view.equations(family.start, family.centres_px, waves=False)
     for _ in range(STRETCHINGS):
@@ -292,7 +309,7 @@ def _choose(halves: list[Normal], family: _Family, *, shapes: bool) -> SpreadFit
     scale = min(known, stretched, *pulled.values()) / whole.count
     factor = family.best(whole)
     response, after = family.start, known
-    if known - stretched > scale * (CLEARLY + STRETCH_SHARE * whole.count):
+    if known - stretched > scale * CLEARLY:
         response, after = family.response(factor), stretched
     if pulled and after - min(pulled.values()) > scale * (CLEARLY + CLEAR_SHARE * whole.count):
         pull = min(pulled, key=lambda each: pulled[each])

@@ -192,16 +192,35 @@ def test_a_field_that_leaves_pixels_out_explains_nothing(
     assert found.pixels == (pixels if counts else 1000)
 
 
+@pytest.mark.parametrize(("step_px", "counts"), [(2, True), (5, False)])
+def test_another_blur_that_columns_make_up_for_is_not_taken(
+    step_px: int, counts: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Lines of five columns in steps of five show no blur: its search ends anywhere."""
+    narrow = KNOWN.with_gaussian(0.45)
+    peaks, column = seen(narrow, runs=100, step_px=step_px)
+    found = SpreadFit(narrow, True, 0.01, 9.0, 1.0, 800)
+    monkeypatch.setattr(fit, "_search", lambda view, family: found)
+    taken = fit.fit_spread(peaks, column.round(), KNOWN)
+    assert taken is not None
+    assert (taken is found) == counts
+    if not counts:
+        assert (taken.response, taken.changed) == (KNOWN, False)
+        # In the measure of the other one: even the true blur explains such lines no better.
+        assert taken.before == taken.after == pytest.approx(found.after, rel=0.1)
+
+
 @pytest.mark.parametrize(("pixels", "counts"), [(990, True), (970, False)])
 def test_a_shape_that_leaves_pixels_out_explains_nothing(
     pixels: int, counts: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    peaks, column = seen(KNOWN, runs=40)
+    peaks, column = seen(TAILED, runs=40)
     one = SpreadFit(KNOWN, False, 0.01, 1.0, 1.0, 1000)
     other = SpreadFit(TAILED, True, 0.01, 1.0, 0.8, 1000)
     last = replace(other, pixels=pixels)
     chosen = iter([one, one, other, *[last] * fit.ROUNDS])
     monkeypatch.setattr(fit, "_choose", lambda halves, family, shapes: next(chosen))
+    monkeypatch.setattr(fit, "_skirted", lambda view, family, found: found)
     found = fit.fit_spread(peaks, column, KNOWN)
     assert found is (last if counts else one)
 
