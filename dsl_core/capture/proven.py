@@ -46,9 +46,10 @@ _DIMMED = (
 #: The same of the first pictures at a drive level of their own.
 _TONE = (
     "White, black and a frame of the code, captured once more, look as they did: the projector gives another"
-    " share of its light at this drive level than its calibration says, or the camera another exposure than"
-    " requested. Repeat the self-test, which measures how light follows the level, or use one level in all"
-    " settings; or switch automatic exposure and gain of the camera off, and resume the scan."
+    " share of its light at this drive level than its calibration says, the camera's values are not"
+    " proportional to the light, or it exposes for longer or shorter than requested. Repeat the self-test,"
+    " which measures how light follows the level, or use one level in all settings; or switch gamma,"
+    " automatic exposure and gain of the camera off, and resume the scan."
 )
 #: On resuming, so many shots before a missing one are captured again where nothing can be told of them.
 MOST_UNTOLD = 32

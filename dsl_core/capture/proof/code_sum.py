@@ -64,7 +64,7 @@ def code_sum(
     """
     # Half of the pixels have most of the light.
     at = lit.index[lit.contrast >= np.median(lit.contrast)] if lit.index.size else lit.index
-    if at.size < FEWEST or len(pairs) < 3:
+    if at.size < FEWEST:
         return None
     white, black = (each[at].astype(np.float32) for each in ends)
     light = white - black
@@ -89,7 +89,8 @@ def code_sum(
     std = 2 * float(np.sqrt(variance.sum())) / float(light.sum())
     std = float(np.hypot(std, np.median(np.abs(values - share)) / np.sqrt(len(values))))
     allowed = LEAST + SIGMAS * std + 2 * UNSEEN_DN / float(light.mean())
-    last = shares[max(shares)] - 1
+    one, other = (each[at].astype(np.float32) - black for each in pairs[max(pairs)])
+    last = _ratio(one + other, light) - 1
     if last * (share - 1) < LAST * (share - 1) ** 2:
         allowed = np.inf
     more, wanted, noises = np.sum(edges, 0) if edges else (0.0, 0.0, 0.0)

@@ -17,6 +17,8 @@ from dsl_core.model.plan import CapturePlan, Shot
 LEAST, SIGMAS = 0.05, 6.0
 #: Blocks that have to be off, and how far from white its black may have been captured.
 FEWEST, NEAR = 3, 4
+#: Bands of rows leave no more than this share of the variance from block to block.
+BANDED = 0.2
 
 
 @dataclass(frozen=True)
@@ -24,7 +26,7 @@ class WhiteAgain:
     """Light of white, captured again as ``shot``, over that of the first, where it differs most.
 
     ``usual`` is what most of the picture has; ``columns`` and ``rows`` bound the blocks that differ, camera
-    pixels.
+    pixels. It ``is_banded`` where whole rows differ.
     """
 
     shot: Shot
@@ -33,10 +35,19 @@ class WhiteAgain:
     usual: float
     columns: tuple[int, int]
     rows: tuple[int, int]
+    is_banded: bool = False
 
     @property
     def sentence(self) -> str:
         """What is wrong, and what to do."""
+        if self.is_banded:
+            return (
+                f"White, captured again as frame {self.shot.index}, has {self.share:.2f} ±"
+                f" {max(self.std, 0.005):.2f} times its light of the beginning in whole rows, and"
+                f" {self.usual:.2f} times in others: the light flickers, as that of the mains or of pulsed"
+                " LEDs does, while the camera exposes one row after the other. Frames between are off by as"
+                " much. Expose for whole periods of the light, keep lamps of the room off, and scan again."
+            )
         return (
             f"White, captured again as frame {self.shot.index}, has {self.share:.2f} ±"
             f" {max(self.std, 0.005):.2f} times its light of the beginning in columns"
@@ -95,11 +106,15 @@ def _compared(
     if int(off.sum()) < FEWEST:
         return None
     worst = int(np.abs(np.where(off, apart, 0)).argmax())
+    row = np.flatnonzero(used) // _blocks(raster.shape[1])
+    of_rows = (np.bincount(row, apart) / np.maximum(np.bincount(row), 1))[row]
+    is_banded = float(np.var(apart - of_rows)) < BANDED * float(np.var(apart))
     down, across = np.divmod(np.flatnonzero(used)[off], _blocks(raster.shape[1]))
     return WhiteAgain(
         shot, float(ratio[worst]), float(of_ratio[worst]), usual,
         _span(across, _blocks(raster.shape[1]), size_px[0]),
         _span(down, _blocks(raster.shape[0]), size_px[1]),
+        is_banded,
     )  # fmt: skip
 
 

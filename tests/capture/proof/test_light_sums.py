@@ -57,6 +57,7 @@ def test_a_code_with_another_share_of_the_light_than_white_is_told(share: float,
 def test_light_that_settles_while_the_code_is_captured_does_not_depend_on_the_picture() -> None:
     # The last pair, just before white, has the light of white.
     assert not found([0.8, 0.85, 0.9, 0.94, 0.98, 1.0]).is_uneven
+    assert not found([0.8, 0.8, 0.8, 0.8, 0.8, 1.0]).is_uneven
     assert found([0.8, 0.8, 0.8, 0.8, 0.8, 0.8]).is_uneven
 
 

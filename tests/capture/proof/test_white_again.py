@@ -24,13 +24,15 @@ PLAN = CapturePlan(
 WHITES = [s.index for s in PLAN.shots() if s.role == "sentinel" and PLAN.original(s).role == "white"]
 
 
-def found(later: NDArray[np.float64] | float, since: int = 0, black_dn: float = 0.0) -> WhiteAgain | None:
-    """With so many times the light (rows, columns) in whites from one on, and so much more black."""
+def found(
+    later: NDArray[np.float64] | float, since: int = 0, more: NDArray[np.float64] | float = 0.0
+) -> WhiteAgain | None:
+    """With so many times the light (rows, columns) in whites from one on, and so much ``more`` black, DN."""
     rng, kept, raster = np.random.default_rng(1), dict[int, Counts](), Raster(SIZE)
     for shot in PLAN.shots():
         is_later = shot.role == "sentinel" and shot.index >= since
         light = (WHITE if PLAN.original(shot).role == "white" else 0.0) * (later if is_later else 1.0)
-        light = light + BLACK + (black_dn if is_later else 0.0)
+        light = light + BLACK + (more if is_later else 0.0)
         pixels = np.rint(light + rng.normal(0, 4, SIZE[::-1])).astype(np.uint16)
         kept[shot.index] = raster.take(pixels)
     return white_again(PLAN, kept, Noise.of(Sensor(), 12), raster)
@@ -50,9 +52,19 @@ def test_a_part_of_white_that_has_become_darker_is_told_with_its_place() -> None
     assert "in columns 32-48, rows 12-24 of the picture, and 0.96 times in most of it" in seen.sentence
 
 
+def test_bands_of_rows_are_light_that_flickers_and_no_dust() -> None:
+    down = np.arange(SIZE[1])[:, None] / SIZE[1]
+    seen, dust = found(1 + 0.15 * np.sin(2 * np.pi * 2.3 * down)), found(spot(0.85))
+    assert seen is not None
+    assert dust is not None
+    assert (seen.is_banded, dust.is_banded) == (True, False)
+    assert "the light flickers" in seen.sentence
+    assert "dust or moisture" in dust.sentence
+
+
 @pytest.mark.parametrize("share", [1.0, 0.7, 1.2])
 def test_a_lamp_that_fades_does_so_everywhere_and_black_is_taken_off(share: float) -> None:
-    assert found(share, black_dn=30.0) is None
+    assert found(share, more=200.0 * (1 - spot(0.0))) is None
 
 
 def test_a_part_that_differs_by_less_than_a_twentieth_is_no_matter() -> None:
