@@ -16,6 +16,7 @@ from dsl_core.capture.proof.lines.line_sum import even_cover
 from dsl_core.capture.proof.prediction import Lit
 from dsl_core.capture.proof.raster import Counts, Noise, Raster
 from dsl_core.model.plan import CapturePlan, Shot
+from dsl_core.patterns.multiplexed import profiles
 
 Floats = NDArray[np.floating]
 
@@ -84,7 +85,8 @@ def local_sum(
         seen += kept[shot.index][at]
     seen -= np.float32(len(lines)) * dark[at]
     # Each pixel has most of its light from the lines of its own column.
-    when = np.interp(column, np.linspace(0, width, len(lines)), [shot.index for shot in lines])
+    of_column = profiles(plan.spectral, width).sum(2).argmax(0)
+    when = np.array([shot.index for shot in lines])[of_column[column]]
     places = [each.index for each in white]
     sums = np.array([float(kept[each][at].sum(dtype=np.float64)) - float(dark[at].sum()) for each in places])
     wanted = cover * (first[at] - dark[at]) * np.interp(when, places, sums / sums[0])
@@ -102,7 +104,10 @@ def _takes(first: Shot, plan: CapturePlan, kept: Mapping[int, Counts]) -> list[S
 
 
 def _worst(
-    part: NDArray[np.integer], light: tuple[Floats, Floats, Floats], when: Floats, lines: Sequence[Shot]
+    part: NDArray[np.integer],
+    light: tuple[Floats, Floats, Floats],
+    when: NDArray[np.integer],
+    lines: Sequence[Shot],
 ) -> LocalSum | None:
     """The part that is furthest off, from light seen, light wanted and the variance of pixels by parts."""
     count = np.bincount(part, minlength=DOWN * ACROSS)
@@ -117,8 +122,8 @@ def _worst(
         return None
     worst = int(np.abs(np.where(off, apart, 0)).argmax())
     at = when[np.isin(part, np.flatnonzero(used)[off])]
-    index = np.array([shot.index for shot in lines])
-    first, last = (lines[int(np.abs(index - end).argmin())] for end in (at.min(), at.max()))
+    by_index = {shot.index: shot for shot in lines}
+    first, last = by_index[int(at.min())], by_index[int(at.max())]
     return LocalSum(float(1 + apart[worst]), float(std[worst]), (first, last))
 
 
