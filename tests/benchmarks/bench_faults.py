@@ -95,7 +95,7 @@ EARLY, AT_LINES = ("counter wraps", "lamp warms up"), ("swapped at the lines",)
 #: What a result says of such a change; other sentences on its fit do not count, nor do any of other faults.
 TOLD = (
     r"[Ll]ines together have|inverses? (together|both)|first pictures of the code had"
-    r"|In parts of the picture, lines|White, captured again"
+    r"|In parts of the picture, lines|Lines between frame|White, captured again"
     r"|Black pictures changed|The light (drifted|flickered|has changed)"
     r"|(scene|Something|pattern) moved by"
 )

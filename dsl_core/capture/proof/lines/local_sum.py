@@ -26,6 +26,8 @@ DOWN, ACROSS = 4, 24
 LEAST, SIGMAS = 0.1, 6.0
 #: Parts that have to be off, and pixels that a part needs.
 FEWEST_PARTS, FEWEST = 3, 24
+#: What parts beside each other leave of their differences (a share of the squares) if all rows are alike.
+ALIKE = 0.15
 #: White above this share of full scale may have lost light.
 SOUND = 0.9
 #: Share of the columns at either end of the picture that lines may light unevenly, as one in so many.
@@ -36,17 +38,27 @@ EDGE = 16
 class LocalSum:
     """Light of lines over what white has of it, in the part where they differ most from all others.
 
-    ``shots`` are the first and the last of the lines that light the parts that are off.
+    ``shots`` are the first and the last of the lines that light the parts that are off, which are so in
+    ``all_rows`` alike or in some.
     """
 
     share: float
     std: float
     shots: tuple[Shot, Shot]
+    all_rows: bool = False
 
     @property
     def sentence(self) -> str:
         """What is wrong."""
         first, last = self.shots
+        if self.all_rows:
+            return (
+                f"Lines between frame {first.index} and frame {last.index} have {self.share:.2f} ±"
+                f" {max(self.std, 0.005):.2f} times the light of white, which all lines add up to, and others"
+                " have not: the light of the projector changed for them (eco mode, iris, the lamp), or all"
+                " they lit was in a shadow or smoke. Switch eco mode and dynamic contrast off, keep the way"
+                " of the light free, and scan again."
+            )
         return (
             f"In parts of the picture, lines between frame {first.index} and frame {last.index} have"
             f" {self.share:.2f} ± {max(self.std, 0.005):.2f} times the light of white, which all lines add up"
@@ -122,9 +134,13 @@ def _worst(
         return None
     worst = int(np.abs(np.where(off, apart, 0)).argmax())
     at = when[np.isin(part, np.flatnonzero(used)[off])]
+    across = np.flatnonzero(used) % ACROSS
+    means = np.bincount(across, apart, ACROSS) / np.maximum(np.bincount(across, minlength=ACROSS), 1)
+    left = float(np.square(apart - means[across])[off].sum())
+    all_rows = left < ALIKE * float(np.square(apart)[off].sum())
     by_index = {shot.index: shot for shot in lines}
     first, last = by_index[int(at.min())], by_index[int(at.max())]
-    return LocalSum(float(1 + apart[worst]), float(std[worst]), (first, last))
+    return LocalSum(float(1 + apart[worst]), float(std[worst]), (first, last), all_rows)
 
 
 def _in_common(ratio: Floats, dark: Floats, std: Floats) -> Floats:

@@ -61,9 +61,17 @@ def test_a_shadow_on_some_rows_of_some_lines_is_told_with_its_frames() -> None:
     seen = found(shadow)
     assert seen is not None
     assert seen.share == pytest.approx(0.8, abs=0.02)
+    assert not seen.all_rows
     assert 38 <= seen.shots[0].index <= 44
     assert 48 <= seen.shots[1].index <= 54
     assert "In parts of the picture, lines between frame" in seen.sentence
+
+
+def test_lines_that_are_dim_in_all_rows_are_of_a_projector_that_dims() -> None:
+    seen = found(lambda at, light, *_: light * (0.8 if 40 <= at < 52 else 1.0))
+    assert seen is not None
+    assert seen.all_rows
+    assert "the light of the projector changed for them (eco mode" in seen.sentence
 
 
 def test_frames_are_named_where_several_lines_are_shown_at_once() -> None:
