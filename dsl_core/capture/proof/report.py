@@ -63,9 +63,9 @@ class SeenFrames:
                     proof.substitute(number, pair)
         whole = light_sentence(proof.code_sum(), proof.line_sum())
         light = [whole] if whole else []
-        light += [each.sentence for each in proof.local_sums()]
         again = proof.white_again()
         light += [] if again is None else [again.sentence]
+        light += [each.sentence for each in proof.local_sums()]
         return ProofReport(judged, together(wrong), untold, tuple(light))
 
     def _pair_elsewhere(self, number: int, setting: int) -> tuple[Counts, Counts] | None:
