@@ -84,7 +84,7 @@ def _rows_clamped(pixels: Mosaic, before: Mosaic, count: int) -> Mosaic:
     return counts_of(pixels - dark + BLACK_DN)
 
 
-def _jpeg(pixels: Mosaic, before: Mosaic, count: int) -> Mosaic:
+def _compressed(pixels: Mosaic, before: Mosaic, count: int) -> Mosaic:
     """Eight bits and a JPEG of each colour on the way."""
 
     def packed(part: NDArray[np.float32]) -> NDArray[np.float32]:
@@ -192,7 +192,7 @@ CAMERA_ODDITIES: dict[str, CameraMishap] = {
     "LEDs warm": _leds_warm,
     "gain noise": _gain_noise,
     "rows clamped": _rows_clamped,
-    "JPEG": _jpeg,
+    "compressed": _compressed,
     "rows dropped": _rows_dropped,
     "pulse bands": _pulse_bands,
     "lens breathes": _lens_breathes,
