@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from dsl_core.capture.diagnosis import Diagnosis, Explanation
 from dsl_core.capture.exposure import ShotTaker
 from dsl_core.capture.proof.finding import Finding, Light, Verdict
+from dsl_core.capture.proof.light_sums import light_sentence
 from dsl_core.capture.proof.verifier import FrameProof
 from dsl_core.capture.put_back import ADVICE
 from dsl_core.errors import Cancelled, DeviceError
@@ -45,9 +46,10 @@ _DIMMED = (
 #: The same of the first pictures at a drive level of their own.
 _TONE = (
     "White, black and a frame of the code, captured once more, look as they did: the projector gives another"
-    " share of its light at this drive level than its calibration says, or the camera another exposure than"
-    " requested. Repeat the self-test, which measures how light follows the level, or use one level in all"
-    " settings; or switch automatic exposure and gain of the camera off, and resume the scan."
+    " share of its light at this drive level than its calibration says, the camera's values are not"
+    " proportional to the light, or it exposes for longer or shorter than requested. Repeat the self-test,"
+    " which measures how light follows the level, or use one level in all settings; or switch gamma,"
+    " automatic exposure and gain of the camera off, and resume the scan."
 )
 #: On resuming, so many shots before a missing one are captured again where nothing can be told of them.
 MOST_UNTOLD = 32
@@ -89,17 +91,21 @@ class ProvenShots:
         self._since_sound: set[Shot] = set()
         self._doubts = 0
         self._has_seen_first = False
+        #: What is wrong with the light of the first code, as soon as that is known.
+        self._light = ""
         #: Shots that were taken again because a picture did not show their pattern.
         self.corrected = 0
 
     @property
     def note(self) -> str:
-        """What a person should know at the end, as a sentence with a space before it; empty if nothing."""
-        if not self.corrected:
-            return ""
-        what = "1 was" if self.corrected == 1 else f"{self.corrected} were"
-        late = " Everything was captured twice, since pictures came one late." if self._is_late else ""
-        return f" {what} captured again, because a picture did not show its pattern.{late}"
+        """What a person should know at the end, as sentences with a space before them; empty if nothing."""
+        found = []
+        if self.corrected:
+            what = "1 was" if self.corrected == 1 else f"{self.corrected} were"
+            found.append(f"{what} captured again, because a picture did not show its pattern.")
+            found += ["Everything was captured twice, since pictures came one late."] if self._is_late else []
+        found += [self._light, "" if self._proof is None else self._proof.settled]
+        return "".join(f" {each}" for each in found if each)
 
     def learn(self, stored: FrameSource, missing: Collection[int]) -> None:
         """Judge the frames of earlier runs, all but those ``missing``; wrong ones are taken again.
@@ -319,6 +325,9 @@ class ProvenShots:
         if first is None or self._has_seen_first:
             return
         self._has_seen_first = True
+        self._light = light_sentence(proof.code_sum(), None)
+        if self._light:
+            _log.warning("%s", self._light)
         if not proof.is_displaced(first, self._taker.take(first, twice=self._is_late).pixels):
             return
         if not proof.is_displaced(first, self._again(first).pixels):

@@ -46,6 +46,7 @@ from dsl_core.workflows.scans import DOUBTS, reconstruct_scan
 from tests.benchmarks.common import options, print_table, write_json
 from tests.cases.faulty_lab import CAMERA, OTHER, PROJECTOR, SHIFTS, SPECTRUM, STAGE, installed
 from tests.cases.lab_mishaps import CAMERA_MISHAPS, PROJECTOR_MISHAPS
+from tests.cases.lab_oddities import CAMERA_ODDITIES, PROJECTOR_ODDITIES
 from tests.cases.lab_surprises import CAMERA_SURPRISES, PROJECTOR_SURPRISES
 from tests.cases.pattern_faults import LASTING, SINGLE
 from tests.cases.rig_habits import ALWAYS, CAMERA_HABITS, PROJECTOR_HABITS
@@ -86,14 +87,16 @@ REASONS = {
 #: Changes that only old shots taken again tell from a scene: in scans of these, sentinels are taken.
 HABITS = (
     *(*CAMERA_HABITS, *PROJECTOR_HABITS, *CAMERA_MISHAPS, *PROJECTOR_MISHAPS),
-    *(*CAMERA_SURPRISES, *PROJECTOR_SURPRISES),
+    *(*CAMERA_SURPRISES, *PROJECTOR_SURPRISES, *CAMERA_ODDITIES, *PROJECTOR_ODDITIES),
 )
 CHANGES = (*SPOILED, *SHIFTS, "projector squares its picture", *HABITS)
 #: Faults of the beginning of a scan, and between the last picture of the code and the first line.
 EARLY, AT_LINES = ("counter wraps", "lamp warms up"), ("swapped at the lines",)
 #: What a result says of such a change; other sentences on its fit do not count, nor do any of other faults.
 TOLD = (
-    r"All lines together have|Black pictures changed|The light (drifted|flickered|has changed)"
+    r"[Ll]ines together have|inverses? (together|both)|first pictures of the code had"
+    r"|In parts of the picture, lines|Lines between frame|White, captured again"
+    r"|Black pictures changed|The light (drifted|flickered|has changed)"
     r"|(scene|Something|pattern) moved by"
 )
 BAD = ("told", "WRONG", "reason?", "not resumed")

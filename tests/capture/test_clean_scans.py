@@ -1,4 +1,4 @@
-"""Nothing is captured again in clean scans, whatever their patterns."""
+"""Nothing is captured again or said of clean scans, whatever their patterns."""
 
 from __future__ import annotations
 
@@ -9,6 +9,9 @@ import numpy as np
 import pytest
 
 from dsl_core.capture.preflight import fit_plan
+from dsl_core.capture.proof.verifier import FrameProof
+from dsl_core.io.scan.folder import ScanReader
+from dsl_core.io.scan.proof_file import read_proof
 from dsl_core.model.frames import Frame
 from dsl_core.model.presets import preset_plan
 from dsl_core.pipeline import scan
@@ -20,7 +23,30 @@ def test_every_picture_of_a_white_wall_shows_its_pattern(preset: str, tmp_path: 
     plan = preset_plan(preset)
     assert plan is not None
     rig = open_twin({"size": "48x32", "scene": "plane"})
-    assert scan(rig, fit_plan(plan, rig), tmp_path / "scan.dsl").corrected == 0
+    status = scan(rig, fit_plan(plan, rig), tmp_path / "scan.dsl")
+    assert status.corrected == 0
+    assert status.message == f"All {status.total} frames are saved."
+    reader = ScanReader(tmp_path / "scan.dsl")
+    assert reader.calibration is not None
+    found = read_proof(reader, reader.calibration)
+    assert found is not None
+    assert found.doubts == ()
+
+
+def test_light_that_no_frame_shows_any_more_is_kept_with_the_scan(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(FrameProof, "settled", "The light has settled.")
+    plan = preset_plan("preview")
+    assert plan is not None
+    rig = open_twin({"size": "48x32", "scene": "plane"})
+    status = scan(rig, fit_plan(plan, rig), tmp_path / "scan.dsl")
+    assert status.message.endswith(" The light has settled.")
+    reader = ScanReader(tmp_path / "scan.dsl")
+    assert reader.calibration is not None
+    found = read_proof(reader, reader.calibration)
+    assert found is not None
+    assert found.doubts == ("The light has settled.",)
 
 
 def test_a_small_object_before_nothing_shows_its_patterns(

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from dsl_core.capture.diagnosis import Explanation
+from dsl_core.capture.proof.code_sum import CodeSum
 from dsl_core.capture.proof.finding import Finding, Light, Verdict
 from dsl_core.capture.proven import ON_END, SETTLE_MS, PictureError, ProvenShots
 from dsl_core.errors import Cancelled, DeviceError
@@ -42,6 +43,8 @@ class Bench:
         self.cause, self.is_quite_the_same = "", True
         self.displaced: list[bool] = []
         self.alone = False
+        self.settled = ""
+        self.of_code: CodeSum | None = None
         parts: Any = self
         self.shots = ProvenShots(parts, parts, parts, parts, self.token)
 
@@ -54,6 +57,9 @@ class Bench:
 
     def differ(self, one: object, other: object) -> bool:
         return self._differs
+
+    def code_sum(self) -> CodeSum | None:
+        return self.of_code
 
     def controls(self) -> tuple[Shot, ...]:
         return (SHOTS[0], SHOTS[4])
@@ -157,6 +163,15 @@ def test_wrong_ones_are_taken_again_with_longer_waits() -> None:
     assert bench.written == {13: "it still shows the pattern before"}
     assert bench.shots.corrected == 1
     assert bench.shots.note == " 1 was captured again, because a picture did not show its pattern."
+
+
+def test_light_of_the_code_that_does_not_add_up_is_said_at_the_end() -> None:
+    bench = Bench(is_right)
+    bench.displaced = [False]
+    bench.of_code, bench.settled = CodeSum(1.3, 0.01, 0.03, 0.0, 0.01), "The light has settled."
+    bench.shots.take(LINE)
+    assert bench.shots.note.startswith(" Patterns and their inverses together have 1.30 ± 0.01 times")
+    assert bench.shots.note.endswith(" The light has settled.")
 
 
 @pytest.mark.parametrize(

@@ -31,6 +31,7 @@ from dsl_core.model.spectral import SpectralCurve
 from dsl_core.patterns.images import pattern_image
 from dsl_core.simulation.sim_devices import open_twin
 from tests.cases.lab_mishaps import CAMERA_MISHAPS, PROJECTOR_MISHAPS, CameraMishap
+from tests.cases.lab_oddities import CAMERA_ODDITIES, PROJECTOR_ODDITIES
 from tests.cases.lab_surprises import CAMERA_SURPRISES, PROJECTOR_SURPRISES
 from tests.cases.pattern_faults import LASTING, SINGLE, PatternFault, PatternFaults
 from tests.cases.rig_habits import ALWAYS, CAMERA_HABITS, PROJECTOR_HABITS
@@ -203,11 +204,14 @@ CAMERA: dict[str, tuple[bool, Change]] = {
     "memory used again": (False, _fill),
     **{kind: (is_single, _spoiled(spoil)) for kind, (is_single, spoil) in SPOILED.items()},
     **{kind: (False, _spoiled(spoil)) for kind, spoil in CAMERA_HABITS.items()},
-    **{kind: (False, _mishap(change)) for kind, change in (CAMERA_MISHAPS | CAMERA_SURPRISES).items()},
+    **{
+        kind: (False, _mishap(change))
+        for kind, change in (CAMERA_MISHAPS | CAMERA_SURPRISES | CAMERA_ODDITIES).items()
+    },
 }
 
 
-_OF_PROJECTOR = PROJECTOR_MISHAPS | PROJECTOR_SURPRISES
+_OF_PROJECTOR = PROJECTOR_MISHAPS | PROJECTOR_SURPRISES | PROJECTOR_ODDITIES
 
 
 class LabProjector(Projector):

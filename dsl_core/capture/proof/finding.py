@@ -140,15 +140,15 @@ def together(findings: Iterable[Finding]) -> tuple[Finding, ...]:
 class ProofReport:
     """What a check of ``judged`` frames found: what is ``wrong``, and how many cannot be told.
 
-    ``light`` is a sentence on what lines add up to, where that is not white.
+    ``light`` are sentences on what lines and pairs of the code add up to, where that is not white.
     """
 
     judged: int
     wrong: tuple[Finding, ...]
     untold: int
-    light: str = ""
+    light: tuple[str, ...] = ()
 
     @property
     def sentences(self) -> tuple[str, ...]:
         """A sentence for everything that is wrong."""
-        return (*(each.sentence for each in self.wrong), *([self.light] if self.light else ()))
+        return (*(each.sentence for each in self.wrong), *self.light)

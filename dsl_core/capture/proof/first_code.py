@@ -12,7 +12,15 @@ from dsl_core.capture.proof.code_pairs import CodePairs, Pair, alike, dominant
 from dsl_core.capture.proof.columns import LEAST_MARGIN, decode, exchanged_pairs, run_backwards
 from dsl_core.capture.proof.contest import vote
 from dsl_core.capture.proof.finding import Finding, Verdict, displaced
-from dsl_core.capture.proof.first_light import FEWEST_LIT, changed_light, has_moved, is_unlit, unsettled_pairs
+from dsl_core.capture.proof.first_light import (
+    FEWEST_LIT,
+    SETTLED,
+    changed_light,
+    has_moved,
+    is_unlit,
+    light_of_pairs,
+    unsettled_pairs,
+)
 from dsl_core.capture.proof.prediction import Lit
 from dsl_core.capture.proof.raster import Counts, Floats, Noise, Raster
 from dsl_core.model.plan import BinaryCode, CapturePlan, Shot
@@ -45,6 +53,10 @@ class FirstCode:
         #: Pictures of the first two pairs as they were before both were taken again, by pattern.
         self._disputed: dict[int, Counts] = {}
         self._at_the_end, self._is_believed, self._is_settled = at_the_end, False, False
+        #: Light of pairs over that of white, by number, where it differs, and of the first where it was taken
+        #: again for that.
+        self.light: dict[int, float] = {}
+        self.settled = 1.0
         #: What the last look at all pairs together found.
         self.reviewed: list[Finding] = []
 
@@ -210,12 +222,15 @@ class FirstCode:
 
         Taken again with the same result, the light is what it is: it is measured, and corrected for, later.
         """
-        if self._at_the_end or self._is_settled:
-            return []
-        self._is_settled = True
         _, _, lit = self._pairs.contrast()
-        ends = self._ends["white"], self._ends["black"]
-        found = unsettled_pairs(self._pairs.pairs, ends, lit, self._noise)
+        given = self._pairs.pairs, (self._ends["white"], self._ends["black"]), lit, self._noise
+        light = light_of_pairs(*given)
+        found: dict[int, float] = {}
+        if not (self._at_the_end or self._is_settled):
+            self._is_settled = True
+            found = unsettled_pairs(*given)
+            self.settled = found.get(min(light, default=0), 1.0)
+        self.light = {n: each for n, each in light.items() if n not in found and abs(each - 1) > SETTLED}
         return [
             Finding(
                 shot, Verdict.EXPOSURE, self._pair_shots(number), f"{ratio:.2f} times that of the last ones"

@@ -25,6 +25,8 @@ from dsl_core.capture.proof.raster import Counts, Floats, Noise
 
 #: Light of a pair of pictures relative to the last ones from which on it is worth taking it again.
 SETTLED = 0.02
+#: So many pairs of one light, other than that of all later ones, were no lamp that warms up.
+FEWEST_STEADY = 2
 #: Pixels that have to be lit to compare the light of two pictures.
 FEWEST_LIT = 60
 #: Of the pictures taken again, so many others with other light than before are no single wrong picture.
@@ -70,6 +72,24 @@ def changed_light(before: Mapping[int, Counts], now: Mapping[int, Counts], noise
     return float(np.median(ratios))
 
 
+def light_of_pairs(
+    pairs: Mapping[int, tuple[Counts, Counts]],
+    ends: tuple[Counts, Counts],
+    lit: NDArray[np.bool_],
+    noise: Noise,
+) -> dict[int, float]:
+    """Light of each pair over that of the ``ends``, white and black; empty where few pixels are ``lit``."""
+    if int(lit.sum()) < FEWEST_LIT:
+        return {}
+
+    def light(pair: tuple[Counts, Counts]) -> float:
+        return sum(float(each[lit].sum(dtype=np.float64)) for each in pair) - dark
+
+    dark = 2 * noise.sensor.black_level_dn * float(lit.sum())
+    usual = light(ends)
+    return {number: light(pair) / usual for number, pair in pairs.items()}
+
+
 def unsettled_pairs(
     pairs: Mapping[int, tuple[Counts, Counts]],
     ends: tuple[Counts, Counts],
@@ -79,18 +99,18 @@ def unsettled_pairs(
     """Pairs whose light was not yet that of the ``ends``, white and black, with the factor they have of it.
 
     None where too few pixels are ``lit``, or where the last pair differs as well: nothing has settled then,
-    or it is the ends that are wrong.
+    or it is the ends that are wrong. Of light that changed at once only the pair that saw both: taken again,
+    the others would hide that nobody knows which light was as calibrated.
     """
-    if int(lit.sum()) < FEWEST_LIT:
-        return {}
-
-    def light(pair: tuple[Counts, Counts]) -> float:
-        return sum(float(each[lit].sum(dtype=np.float64)) for each in pair) - dark
-
-    dark = 2 * noise.sensor.black_level_dn * float(lit.sum())
-    usual = light(ends)
-    ratios = {number: light(pair) / usual for number, pair in pairs.items()}
+    ratios = light_of_pairs(pairs, ends, lit, noise)
     found = {number: ratio for number, ratio in ratios.items() if abs(ratio - 1) > SETTLED}
+    if not found:
+        return {}
+    in_order = sorted(ratios)
+    alike = [abs(ratios[number] - ratios[in_order[0]]) < SETTLED / 2 for number in in_order]
+    steady = alike.index(False) if False in alike else len(alike)
+    if in_order[0] in found and steady >= FEWEST_STEADY and not found.keys() & set(in_order[steady + 1 :]):
+        return {number: found[number] for number in in_order[steady : steady + 1] if number in found}
     return {} if max(pairs) in found else found
 
 

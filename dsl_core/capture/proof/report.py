@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dsl_core.capture.proof.finding import Finding, ProofReport, Verdict, together
+from dsl_core.capture.proof.light_sums import light_sentence
 from dsl_core.capture.proof.raster import Counts, Raster
 from dsl_core.capture.proof.verifier import FrameProof
 from dsl_core.capture.sentinels import movement_of
@@ -60,8 +61,12 @@ class SeenFrames:
                 pair = self._pair_elsewhere(number, shot.setting)
                 if pair is not None:
                     proof.substitute(number, pair)
-        total = proof.line_sum()
-        return ProofReport(judged, together(wrong), untold, "" if total is None else total.sentence)
+        whole = light_sentence(proof.code_sum(), proof.line_sum())
+        light = [whole] if whole else []
+        again = proof.white_again()
+        light += [] if again is None else [again.sentence]
+        light += [each.sentence for each in proof.local_sums()]
+        return ProofReport(judged, together(wrong), untold, tuple(light))
 
     def _pair_elsewhere(self, number: int, setting: int) -> tuple[Counts, Counts] | None:
         """Pattern and inverse as another setting shows them."""

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from dsl_core.capture.proof.code_sum import CodeSum, code_sum
 from dsl_core.capture.proof.contest import Contest
 from dsl_core.capture.proof.control import choose_pairs, edges_moved, is_same, is_unchanged
 from dsl_core.capture.proof.finding import Finding, Light, Verdict, displaced
@@ -19,6 +20,7 @@ from dsl_core.capture.proof.lines.hidden import HiddenParts
 from dsl_core.capture.proof.lines.line_place import SIDES, LinePlaces, moved
 from dsl_core.capture.proof.lines.line_shown import line_shown
 from dsl_core.capture.proof.lines.line_sum import LineSum, line_sum
+from dsl_core.capture.proof.lines.local_sum import LocalSum, local_sum
 from dsl_core.capture.proof.lines.neighbours import LineNeighbours
 from dsl_core.capture.proof.prediction import (
     APART,
@@ -37,6 +39,7 @@ from dsl_core.capture.proof.raster import Counts, Floats, Noise, Raster
 from dsl_core.capture.proof.recent import Recent
 from dsl_core.capture.proof.sentinel import SentinelProof
 from dsl_core.capture.proof.usual_light import LEAST_LIGHT, UsualLight
+from dsl_core.capture.proof.white_again import WhiteAgain, white_again
 from dsl_core.model.captured_code import CapturedCode
 from dsl_core.model.plan import CapturePlan, NoCode, ScanLines, Shot, describe_shot
 from dsl_core.model.rig import Rig
@@ -101,7 +104,9 @@ class FrameProof:
         self._learned = Learned(
             UsualLight(self._first, calibration is not None), LightSteps(), LinePlaces(), set()
         )
-        self._later = LaterSettings(plan, calibration, self._noise, self._kept, self._black_gained)
+        self._later = LaterSettings(
+            plan, calibration, self._noise, self._kept, self._black_gained, self._level_of_code
+        )
         #: The picture that came for two patterns, for as long as it comes.
         self._repeated: Counts | None = None
         self._profiles = Recent[Floats | None]()
@@ -191,6 +196,39 @@ class FrameProof:
         """What all lines of the first setting are together; None while that says nothing."""
         lit = None if self._code is None else self._code.lit
         return None if lit is None else line_sum(self._plan, self._first, self._kept, lit, self._noise)
+
+    def local_sums(self) -> list[LocalSum]:
+        """Where lines of each setting do not add up to white though most of the picture does."""
+        lit = None if self._code is None else self._code.lit
+        if lit is None:
+            return []
+        settings = range(len(self._plan.settings))
+        found = (local_sum(self._plan, n, self._kept, lit, self._noise, self._raster) for n in settings)
+        return [each for each in found if each is not None]
+
+    def white_again(self) -> WhiteAgain | None:
+        """The white, captured again, that differs most from the first in a part of the picture."""
+        return white_again(self._plan, self._kept, self._noise, self._raster)
+
+    @property
+    def settled(self) -> str:
+        """That the light changed while the first code was captured, of which no frame shows it any more."""
+        ratio = 1.0 if self._code is None else self._code.settled
+        if ratio == 1:
+            return ""
+        return (
+            f"The first pictures of the code had {ratio:.2f} times the light of those since, and were"
+            " captured again. If the light was as calibrated at first, reflectances are off by as much: let"
+            " the projector warm up for longer, and switch automatic exposure and gain of the camera off."
+        )
+
+    def code_sum(self) -> CodeSum | None:
+        """What patterns and inverses of the first code are together; None while that says nothing."""
+        lit = None if self._code is None else self._code.lit
+        ends = [self._kept.get(self._places.get((role, 0), -1)) for role in ("white", "black")]
+        if lit is None or ends[0] is None or ends[1] is None:
+            return None
+        return code_sum(self._code_pairs(), (ends[0], ends[1]), lit, self._noise)
 
     @property
     def first_setting(self) -> int:
@@ -424,6 +462,12 @@ class FrameProof:
             side: contest_of_places(seen, wanted, now, light, (profile, moved(profile, side)), self._noise)
             for side in SIDES
         }
+
+    def _level_of_code(self, shot: Shot) -> float:
+        """Light of a picture of the first code over that of white; 1 for other shots."""
+        if self._code is None or shot.role != "code":
+            return 1.0
+        return self._code.light.get(shot.pattern // 2, 1.0)
 
     def _black_gained(self, shot: Shot, seen: Counts) -> np.float32:
         """By how much black was more; 0 where many lines leave no pixel without their first orders."""

@@ -107,6 +107,9 @@ def sudden_changes(
         at: change.total
         for change in lights
         if (at := date_of_step(change, log, log_std, dated.keys())) is not None
+        # A projector whose light depends on how bright its picture is, or a camera that is not linear, gives
+        # white another light than the code before it, and lines another one again.
+        and at != white.shot
     }
     gained = {at: _gained(scan, steps, at, *each, light.get(at, 0.0)) for at, each in dated.items()}
     return SuddenChanges(gained, light, len(dated) == len(darks)) if light or dated else None

@@ -184,8 +184,18 @@ def test_pictures_of_a_lamp_that_warms_up_are_taken_again_once_it_has() -> None:
     assert last.verdict is Verdict.EXPOSURE
     assert "0.8" in last.detail
     assert code.lit is None
+    assert code.settled == pytest.approx(0.8, abs=0.01)
     assert not any(found(shot).is_wrong for shot in SHOTS[:4])
     assert code.lit is not None
+
+
+@pytest.mark.parametrize("at_the_end", [False, True])
+def test_light_that_changed_at_once_in_the_code_is_kept_and_known(at_the_end: bool) -> None:
+    code = first_code(at_the_end)
+    told = [code.add(shot, seen(shot, 2000.0 * (0.9 if shot.index < 4 else 1.0)), None) for shot in SHOTS]
+    assert not any(found.is_wrong for found in told)
+    assert code.light == pytest.approx({0: 0.9, 1: 0.9}, abs=0.01)
+    assert code.settled == 1
 
 
 def test_light_that_fails_for_good_between_the_first_two_pairs_is_told_however_often_they_are_taken() -> None:

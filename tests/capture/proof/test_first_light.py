@@ -114,3 +114,24 @@ def test_pairs_of_other_light_than_the_last_ones_have_not_settled(light: float, 
     # Of few pixels nothing is known, and where the last pair differs the ends may be wrong.
     assert unsettled_pairs(pairs, (white, black), np.arange(400) < 59, NOISE) == {}
     assert unsettled_pairs({**pairs, 4: pairs[0]}, (white, black), lit, NOISE) == {}
+
+
+@pytest.mark.parametrize(
+    ("light", "again"),
+    [
+        ([0.9, 0.9, 0.9, 1.0, 1.0], {}),  # at once: both lights are still to be seen
+        ([0.9, 0.9, 0.95, 1.0, 1.0], {2: 0.95}),
+        ([0.9, 0.9, 0.9, 0.9, 0.95], {4: 0.95}),
+        ([0.9, 1.0, 1.0, 1.0, 1.0], {0: 0.9}),
+        ([0.85, 0.9, 0.93, 0.96, 1.0], {0: 0.85, 1: 0.9, 2: 0.93, 3: 0.96}),
+        ([0.9, 0.9, 1.0, 0.9, 1.0], {0: 0.9, 1: 0.9, 3: 0.9}),
+    ],
+)
+def test_of_light_that_changed_at_once_only_the_pair_of_both_is_taken_again(
+    light: list[float], again: dict[int, float]
+) -> None:
+    white, black = (np.full(400, SENSOR.black_level_dn + each, np.uint16) for each in (1000, 0))
+    of_light = [pictures(1000.0 * share) for share in light]
+    pairs = {number: (each[2 * number % 4], each[2 * number % 4 + 1]) for number, each in enumerate(of_light)}
+    found = unsettled_pairs(pairs, (white, black), np.ones(400, bool), NOISE)
+    assert found == pytest.approx(again, abs=0.01)

@@ -100,6 +100,11 @@ def test_nothing_is_expected_of_what_was_not_seen_at_the_first_setting() -> None
     assert without.counts.tolist() == [310 + 0.5 * (600 - 100)] * 4, (
         "what black had gained in the old picture"
     )
+    dimmer = LaterSettings(PLAN, RIG, NOISE, kept, level=lambda shot: 0.8 if shot.index == 13 else 1.0)
+    dimmer.measure(LATER_LINE, 0.5 / dimmer.scale(LATER_LINE))
+    in_usual_light = dimmer.expected(SHOTS[13], LATER_LINE)
+    assert in_usual_light is not None
+    assert in_usual_light.counts.tolist() == [310 + 0.5 * 600 / 0.8] * 4, "the old picture had less light"
     kept[10] = counts(1300)
     white = known.white(LATER_LINE)
     assert white is not None

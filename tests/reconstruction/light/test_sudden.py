@@ -72,6 +72,16 @@ def test_a_change_at_once_leaves_depth_as_it_was(factor: float, more_dn: float) 
     assert "drift of the light" not in said
 
 
+def test_a_code_of_other_light_than_white_is_no_change_at_once() -> None:
+    """So do projectors whose light depends on the picture: lines may have that of neither."""
+    white = clean()[1].plan.references()["white"].index
+    assert "step of the light" not in reconstructed(changed(0, 0.8, until=white))[1]
+    assert (
+        f"from frame {white - 2} on"
+        in reconstructed(changed(0, 0.8, until=white - 2))[1]["step of the light"]
+    )
+
+
 def test_a_share_that_old_shots_hardly_tell_is_between_theirs_and_none() -> None:
     sensor = Sensor()
     picture = np.full((4, 6), sensor.black_level_dn + 40.0)

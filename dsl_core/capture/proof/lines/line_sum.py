@@ -35,17 +35,9 @@ class LineSum:
     allowed: float
 
     @property
-    def sentence(self) -> str:
-        """That the light differs; empty if it does not."""
-        if abs(self.share - 1) <= self.allowed:
-            return ""
-        return (
-            f"All lines together have {self.share:.2f} ± {max(self.std, 0.005):.2f} times the light of white,"
-            " which they add up to. The projector gives dark pictures another share of its light than bright"
-            " ones, the exposure changed in between, or other light came in. Switch dynamic contrast, eco"
-            " mode and limits of power of the projector off, and automatic modes of the camera; keep the"
-            " light of the room as it is, and scan again."
-        )
+    def is_off(self) -> bool:
+        """Whether it is not the light of white."""
+        return abs(self.share - 1) > self.allowed
 
 
 def line_sum(
@@ -61,7 +53,7 @@ def line_sum(
     by_role = {shot.role: shot for shot in own if shot.role in ("white", "black")}
     if not {shot.index for shot in (*lines, *by_role.values())} <= kept.keys() or len(by_role) < 2:
         return None
-    cover = _even_cover(plan)
+    cover = even_cover(plan)
     if cover is None or lit.index.size < FEWEST:
         return None
     # Half of the pixels have most of the light.
@@ -94,8 +86,8 @@ def _course(
     return [each.index for each in shots], sums
 
 
-def _even_cover(plan: CapturePlan) -> float | None:
-    """How many lines light each column; None where they do so unevenly, or are drawn in shades."""
+def even_cover(plan: CapturePlan) -> float | None:
+    """How many lines of a plan light each column; None where they do so unevenly, or are drawn in shades."""
     if not isinstance(plan.spectral, ScanLines | LineComb):
         return None
     cover = profiles(plan.spectral, plan.projector_size_px[0]).sum(0, dtype=np.float64)

@@ -1,0 +1,110 @@
+"""Lines add up to white in every part of a picture; where they do not, a shadow or other light came in."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from dsl_core.capture.proof.lines.local_sum import LocalSum, local_sum
+from dsl_core.capture.proof.prediction import Lit
+from dsl_core.capture.proof.raster import Counts, Noise, Raster
+from dsl_core.model.plan import CapturePlan, GrayCode, LineComb, ScanLines, Sentinels, Setting, SpectralSet
+from dsl_core.model.rig import Sensor
+from dsl_core.patterns.multiplexed import profile
+
+WIDE, HIGH, BLACK, WHITE = 96, 24, 300.0, 1500.0
+#: What a picture of shot ``index`` shows at given places (shares of rows and columns), given its light.
+Scene = Callable[[int, NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]], NDArray[np.float64]]
+
+
+def plan(every: int | None = None, spectral: SpectralSet | None = None) -> CapturePlan:
+    return CapturePlan(
+        camera_size_px=(WIDE, HIGH),
+        projector_size_px=(WIDE, 18),
+        code=GrayCode(rows=False),
+        spectral=spectral or ScanLines(width_px=2, step_px=2),
+        settings=(Setting(exposure_ms=10.0, level=1.0),),
+        code_settings=(0,),
+        sentinels=None if every is None else Sentinels(every=every),
+    )
+
+
+def found(scene: Scene, every: int | None = None, spectral: SpectralSet | None = None) -> LocalSum | None:
+    """Of a scene where each column of the camera sees that of the projector."""
+    wanted, rng, kept = plan(every, spectral), np.random.default_rng(5), dict[int, Counts]()
+    raster = Raster((WIDE, HIGH))
+    column = np.tile(np.arange(WIDE), HIGH)
+    down, across = np.repeat(np.arange(HIGH), WIDE) / HIGH, column / WIDE
+    for shot in wanted.shots():
+        first = wanted.original(shot)
+        role = first.role
+        line = np.ones(column.size)
+        if role == "spectral":
+            line = profile(wanted.spectral, WIDE, first.pattern)[column, 1]
+        light = WHITE * {"white": 1.0, "black": 0.0, "code": 0.5, "spectral": 1.0}[role] * line
+        light = scene(shot.index, light, down, across)
+        kept[shot.index] = np.rint(light + BLACK + rng.normal(0, 1.5, column.size)).astype(np.uint16)
+    black, white = np.full(column.size, np.float32(BLACK)), np.full(column.size, np.float32(WHITE))
+    lit = Lit(np.arange(column.size), (3 * column).astype(np.intp), black, white, np.ones_like(black))
+    return local_sum(wanted, 0, kept, lit, Noise.of(Sensor(), 12), raster)
+
+
+def test_a_shadow_on_some_rows_of_some_lines_is_told_with_its_frames() -> None:
+    def shadow(
+        at: int, light: NDArray[np.float64], down: NDArray[np.float64], _: object
+    ) -> NDArray[np.float64]:
+        return light * np.where((40 <= at < 52) & (down < 0.5), 0.8, 1.0)
+
+    seen = found(shadow)
+    assert seen is not None
+    assert seen.share == pytest.approx(0.8, abs=0.02)
+    assert not seen.all_rows
+    assert 38 <= seen.shots[0].index <= 44
+    assert 48 <= seen.shots[1].index <= 54
+    assert "In parts of the picture, lines between frame" in seen.sentence
+
+
+def test_lines_that_are_dim_in_all_rows_are_of_a_projector_that_dims() -> None:
+    seen = found(lambda at, light, *_: light * (0.8 if 40 <= at < 52 else 1.0))
+    assert seen is not None
+    assert seen.all_rows
+    assert "the light of the projector changed for them (eco mode" in seen.sentence
+
+
+def test_frames_are_named_where_several_lines_are_shown_at_once() -> None:
+    def shadow(
+        at: int, light: NDArray[np.float64], down: NDArray[np.float64], _: object
+    ) -> NDArray[np.float64]:
+        return light * np.where((at in (18, 19)) & (down < 0.5), 0.7, 1.0)
+
+    seen = found(shadow, spectral=LineComb(width_px=2, step_px=2, period_px=24))
+    assert seen is not None
+    # Parts have whole columns, of the lines before and after as well.
+    assert (seen.shots[0].index, seen.shots[1].index) == (17, 20)
+
+
+@pytest.mark.parametrize("share", [1.0, 0.97, 0.7])
+def test_lines_that_are_dimmer_everywhere_are_of_no_part(share: float) -> None:
+    assert found(lambda at, light, *_: light * (share if at > 15 else 1.0)) is None
+
+
+def test_light_of_the_room_that_came_on_for_a_few_lines_is_told() -> None:
+    def door(
+        at: int, light: NDArray[np.float64], _: object, across: NDArray[np.float64]
+    ) -> NDArray[np.float64]:
+        return light + (60.0 * (1 - across) if 30 <= at < 42 else 0.0)
+
+    assert found(door) is not None
+    # All pixels alike: that is seen by the light of all lines together.
+    assert found(lambda at, light, *_: light + (5.0 if at > 15 else 0.0)) is None
+
+
+def test_light_that_white_shows_to_have_drifted_is_no_shadow() -> None:
+    def drift(at: int, light: NDArray[np.float64], *_: object) -> NDArray[np.float64]:
+        return light * (1 - 0.4 * max(at - 14, 0) / 60)
+
+    assert found(drift) is not None
+    assert found(drift, every=8) is None

@@ -1,0 +1,72 @@
+"""White, captured again, that is darker in a part of the picture alone: dust, or something in the way."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from dsl_core.capture.proof.raster import Counts, Noise, Raster
+from dsl_core.capture.proof.white_again import WhiteAgain, white_again
+from dsl_core.model.plan import CapturePlan, GrayCode, ScanLines, Sentinels, Setting
+from dsl_core.model.rig import Sensor
+
+SIZE, BLACK, WHITE = (64, 48), 300.0, 1500.0
+PLAN = CapturePlan(
+    camera_size_px=SIZE,
+    projector_size_px=(64, 18),
+    code=GrayCode(rows=False),
+    spectral=ScanLines(width_px=2, step_px=2),
+    settings=(Setting(exposure_ms=10.0, level=1.0),),
+    code_settings=(0,),
+    sentinels=Sentinels(every=16),
+)
+WHITES = [s.index for s in PLAN.shots() if s.role == "sentinel" and PLAN.original(s).role == "white"]
+
+
+def found(
+    later: NDArray[np.float64] | float, since: int = 0, more: NDArray[np.float64] | float = 0.0
+) -> WhiteAgain | None:
+    """With so many times the light (rows, columns) in whites from one on, and so much ``more`` black, DN."""
+    rng, kept, raster = np.random.default_rng(1), dict[int, Counts](), Raster(SIZE)
+    for shot in PLAN.shots():
+        is_later = shot.role == "sentinel" and shot.index >= since
+        light = (WHITE if PLAN.original(shot).role == "white" else 0.0) * (later if is_later else 1.0)
+        light = light + BLACK + (more if is_later else 0.0)
+        pixels = np.rint(light + rng.normal(0, 4, SIZE[::-1])).astype(np.uint16)
+        kept[shot.index] = raster.take(pixels)
+    return white_again(PLAN, kept, Noise.of(Sensor(), 12), raster)
+
+
+def spot(share: float) -> NDArray[np.float64]:
+    light = np.ones(SIZE[::-1])
+    light[12:24, 32:48] = share
+    return light
+
+
+def test_a_part_of_white_that_has_become_darker_is_told_with_its_place() -> None:
+    seen = found(0.96 * spot(0.9), since=WHITES[-1])
+    assert seen is not None
+    assert (seen.shot.index, seen.columns, seen.rows) == (WHITES[-1], (32, 48), (12, 24))
+    assert (seen.share, seen.usual) == pytest.approx((0.96 * 0.9, 0.96), abs=0.01)
+    assert "in columns 32-48, rows 12-24 of the picture, and 0.96 times in most of it" in seen.sentence
+
+
+def test_bands_of_rows_are_light_that_flickers_and_no_dust() -> None:
+    down = np.arange(SIZE[1])[:, None] / SIZE[1]
+    seen, dust = found(1 + 0.15 * np.sin(2 * np.pi * 2.3 * down)), found(spot(0.85))
+    assert seen is not None
+    assert dust is not None
+    assert (seen.is_banded, dust.is_banded) == (True, False)
+    assert "the light flickers" in seen.sentence
+    assert "dust or moisture" in dust.sentence
+
+
+@pytest.mark.parametrize("share", [1.0, 0.7, 1.2])
+def test_a_lamp_that_fades_does_so_everywhere_and_black_is_taken_off(share: float) -> None:
+    assert found(share, more=200.0 * (1 - spot(0.0))) is None
+
+
+def test_a_part_that_differs_by_less_than_a_twentieth_is_no_matter() -> None:
+    assert found(spot(0.97)) is None
+    assert found(spot(0.93)) is not None
