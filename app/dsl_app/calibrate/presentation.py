@@ -122,15 +122,20 @@ class RowDisplay:
     run: ButtonState
 
 
-def row_display(row: Row, is_busy: bool = False, running: str = "", is_next: bool = False) -> RowDisplay:
+def row_display(
+    row: Row, is_busy: bool = False, running: str = "", is_next: bool = False, opening: str = ""
+) -> RowDisplay:
     """A row of the page, which may be what a person does next.
 
-    While ``is_busy`` no wizard can be opened; ``running`` says what is done for it.
+    While ``is_busy`` no wizard can be opened; ``running`` says what is done for it. ``opening`` is the title
+    of the wizard that is being opened, which takes a second or two.
     """
     title, figure = row.about.title, row.figure
     role = "" if figure is None or figure.passed else "bad"
     begun = row.state is RowState.BEGUN or row.has_candidate
     word = "Continue…" if begun else ("Open…" if row.accepted else "Run…")
+    if opening == title:
+        word = "Opening…"
     tip = f"Open the wizard of {title}, which continues where it was left"
     if running:
         # What was known of it before is about to be replaced.
