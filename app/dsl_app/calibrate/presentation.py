@@ -10,6 +10,7 @@ from html import escape
 from dsl_app.calibrate.state import CalibrateState, Row, RowState
 from dsl_app.shared.known_files import breakable
 from dsl_app.shared.widget_state import ButtonState, LabelState
+from dsl_app.shared.wording import short_name
 from dsl_core.devices.base import DeviceRig
 from dsl_core.io.calibration_library import LibraryLine
 from dsl_core.model.calibration.accepted import AcceptedCalibration, CalibrationNote
@@ -61,7 +62,10 @@ def campaign_head(state: CalibrateState, devices: DeviceRig | None) -> CampaignH
     main = main_button(state, devices)
     title, place = "Calibrate", CAMPAIGN_HINT
     if facts is not None:
-        title, place = facts.path.name, f"in {breakable(facts.path.parent)}  ·  rig {facts.rig.words}"
+        title, place = (
+            short_name(facts.path.name),
+            f"in {breakable(facts.path.parent)}  ·  rig {facts.rig.words}",
+        )
     return CampaignHead(
         title,
         place,
