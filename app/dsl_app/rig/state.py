@@ -110,6 +110,15 @@ def _describe(info: CameraInfo | ProjectorInfo | None) -> str:
     return "–" if info is None else f"{info.model}\n{info.width_px} × {info.height_px} px"
 
 
+def exposure_text(exposure_ms: float) -> str:
+    """An exposure as a person says it.
+
+    >>> exposure_text(1000 / 60), exposure_text(17016.7)
+    ('16.67 ms', '17.02 s')
+    """
+    return f"{exposure_ms:.4g} ms" if exposure_ms < 1000 else f"{exposure_ms / 1000:.4g} s"
+
+
 def cycles_text(exposure_ms: float, cycle_ms: float | None) -> str:
     """How many LED cycles an exposure holds, and what is wrong with a part of one.
 

@@ -137,7 +137,7 @@ class CalibrationWizard(QDialog):
         return confirm(
             self,
             f"{self._state.title} is {self._state.doing.value.value}",
-            "Stop it and leave? Frames captured so far are kept, and the wizard continues from here next"
+            "Stop it and leave? Captures that are complete are kept, and the wizard continues after them next"
             " time.",
             go="Stop and leave",
             stay="Stay",
