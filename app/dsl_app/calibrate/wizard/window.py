@@ -23,6 +23,7 @@ from dsl_app.calibrate.wizard.presentation import (
     PageLine,
     activity,
     buttons,
+    leaving_text,
     page_before,
     page_lines,
 )
@@ -137,8 +138,7 @@ class CalibrationWizard(QDialog):
         return confirm(
             self,
             f"{self._state.title} is {self._state.doing.value.value}",
-            "Stop it and leave? Captures that are complete are kept, and the wizard continues after them next"
-            " time.",
+            leaving_text(self._state),
             go="Stop and leave",
             stay="Stay",
         )
