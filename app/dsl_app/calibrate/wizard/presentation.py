@@ -321,7 +321,7 @@ def leaving_text(state: WizardState) -> str:
     """What is asked before a capture or fit is stopped and the wizard left, and what of it stays."""
     stays = "Frames captured so far are kept, and the wizard continues from here next time."
     if not state.keeps_frames:
-        stays = "What is captured completely is kept; the rest begins anew next time."
+        stays = "What is captured completely is kept; the rest starts from its beginning next time."
     return f"Stop it and leave? {stays}"
 
 
@@ -329,4 +329,4 @@ def stopped_text(state: WizardState) -> str:
     """What is said after a capture was stopped."""
     if state.keeps_frames:
         return "Stopped. Frames captured so far are kept; capture again to continue."
-    return "Stopped. This capture is not kept; capture again to begin anew."
+    return "Stopped. This capture is not kept; capture again from its beginning."

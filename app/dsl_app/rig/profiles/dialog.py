@@ -132,8 +132,8 @@ class ProfileDialog(QDialog):
     def _may_drop(self) -> bool:
         return confirm(
             self,
-            "The rig profile is not saved",
-            "Close it and lose what was changed?",
+            "Unsaved rig profile",
+            "This rig profile is not saved. Close it and lose what was changed?",
             go="Close unsaved",
             stay="Keep editing",
         )

@@ -110,8 +110,8 @@ def test_another_cloud_takes_the_place_of_the_old_one() -> None:
 def test_a_cloud_without_points_can_be_coloured_again() -> None:
     cloud, plotter, points, colours = make(3)
     cloud.show(points[:0], colours[:0])
-    none, no_colours = cloud._points, colours[:0]
-    assert cloud.show(none, no_colours) is False
+    assert cloud._points is not None
+    assert cloud.show(cloud._points, colours[:0]) is False
     assert cloud.shown == 0
     assert plotter.drawn == 1, "one that is far away"
 
