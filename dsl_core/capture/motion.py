@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from dsl_core.model.plan import spoken_number
 from dsl_core.model.rig import Sensor
 from dsl_core.optics.sensor import raw_variance
 from dsl_core.solve.image_shift import TileShifts, tile_shifts
@@ -45,8 +46,8 @@ class Movement:
     def sentence(self) -> str:
         """What moved, by how much and when."""
         when = "since the scan began"
-        if self.before is not None:
-            when = f"between frame {self.after} and frame {self.before}"
+        if self.before is not None and self.after is not None:
+            when = f"between frame {spoken_number(self.after)} and frame {spoken_number(self.before)}"
         part = ""
         if self.columns is not None and self.rows is not None:
             part = " in columns {}-{}, rows {}-{} of the picture".format(*self.columns, *self.rows)

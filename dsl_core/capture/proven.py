@@ -335,7 +335,7 @@ class ProvenShots:
         raise PictureError(
             f"{describe_shot(first).capitalize()}, captured once more, is displaced from where it was:"
             " projector, camera or target moved while the code was captured, or the projector corrects or"
-            f" scales its picture. {self._explain().sentence or ADVICE} Frame {first.index} is kept.",
+            f" scales its picture. {self._explain().sentence or ADVICE} Frame {first.number} is kept.",
             tuple(proof.code_after(first)),
             has_changed=True,
         )
@@ -363,7 +363,7 @@ class ProvenShots:
         if not withdrawn:
             raise error
         self._sink.withdraw(withdrawn)
-        first, last = withdrawn[0].index, withdrawn[-1].index
+        first, last = withdrawn[0].number, withdrawn[-1].number
         which, them = f"{len(withdrawn)} frames between {first} and {last}", "them"
         if len(withdrawn) == 1:
             which, them = f"Frame {first}", "it"

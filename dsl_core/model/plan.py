@@ -146,6 +146,16 @@ class Shot:
     exposure_ms: float
     level: float
 
+    @property
+    def number(self) -> int:
+        """The frame as a person counts it, from 1."""
+        return spoken_number(self.index)
+
+
+def spoken_number(index: int) -> int:
+    """What a person calls the frame, pattern or setting of an index: files count from 0, texts from 1."""
+    return index + 1
+
 
 class Sized(Protocol):
     """A lens or a device with so many pixels."""
@@ -323,8 +333,9 @@ def describe_shot(shot: Shot) -> str:
     """Name a shot the way a person counts it.
 
     >>> describe_shot(Shot(44, "spectral", 3, 1, 10.0, 0.8))
-    'frame 44 (spectral pattern 3, setting 1)'
+    'frame 45 (spectral pattern 4, setting 2)'
     """
+    which, setting = spoken_number(shot.pattern), f"setting {spoken_number(shot.setting)}"
     if shot.role == "sentinel":
-        return f"frame {shot.index} (frame {shot.pattern} again, setting {shot.setting})"
-    return f"frame {shot.index} ({shot.role} pattern {shot.pattern}, setting {shot.setting})"
+        return f"frame {shot.number} (frame {which} again, {setting})"
+    return f"frame {shot.number} ({shot.role} pattern {which}, {setting})"

@@ -267,9 +267,15 @@ class RandomPerson:
                 break
             dialogs[-1].reject()
             self._live(0.1)
-        if cancel:
-            self.window.parts.runner.cancel_all()
-        self._wait(lambda: not self.window.parts.runner.active)
+        runner = self.window.parts.runner
+
+        def is_at_rest() -> bool:
+            # Again and again: a rig that is connected meanwhile starts its live view, which never ends.
+            if cancel:
+                runner.cancel_all()
+            return not runner.active
+
+        self._wait(is_at_rest)
         for toast in list(self.window.toasts.shown):
             toast.dismiss()
         self._live(0.2)

@@ -90,7 +90,7 @@ def test_devices_that_are_always_one_picture_late_still_give_a_right_scan(
 def test_what_stays_wrong_stops_the_scan_and_is_named(scene: RenderedScene, kind: str, what: str) -> None:
     sink = MemorySink(scene.plan)
     runner, spoiled = _run(scene, sink, PatternFault(kind, 30))
-    with pytest.raises(DeviceError, match=f"^Frame 30 .* after {len(SETTLE_MS) + 1} exposures: .*{what}"):
+    with pytest.raises(DeviceError, match=f"^Frame 31 .* after {len(SETTLE_MS) + 1} exposures: .*{what}"):
         runner.run()
     assert runner.status.state is State.FAILED
     assert sorted(sink.frames) == list(range(30 - JUST_BEFORE))
@@ -146,7 +146,7 @@ def test_all_since_the_code_is_withdrawn_where_the_end_cannot_be_judged_and_a_co
     runner, spoiled = _run(scene, sink, PatternFault(kind, 31))
     last = scene.plan.shot_count - 1
     first = next(shot.index for shot in scene.plan.shots() if shot.role == "spectral")
-    said = f"captured once more as a control.*{last + 1 - first} frames between {first} and {last}"
+    said = f"captured once more as a control.*{last + 1 - first} frames between {first + 1} and {last + 1}"
     with pytest.raises(DeviceError, match=said):
         runner.run()
     assert spoiled.wrong

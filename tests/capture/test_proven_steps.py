@@ -290,7 +290,7 @@ def test_light_that_has_changed_is_believed_after_a_control_alone() -> None:
     assert (bench.written, bench.believed) == ({13: ""}, [13])
     changed = Bench(of_unknown_light, stepped, is_as_before=False)
     changed.shots.take(SHOTS[12])
-    with pytest.raises(PictureError, match=r"Frame 12, captured just before"):
+    with pytest.raises(PictureError, match=r"Frame 13, captured just before"):
         changed.shots.take(LINE)
     assert (changed.withdrawn, changed.written) == ([12], {12: ""})
 
@@ -347,13 +347,13 @@ def test_what_could_not_be_told_is_withdrawn_when_a_control_has_changed() -> Non
     for shot in SHOTS[12:14]:
         bench.shots.take(shot)
     with pytest.raises(
-        PictureError, match=r"no longer shows its pattern.*2 frames between 12 and 13, captured just before"
+        PictureError, match=r"no longer shows its pattern.*2 frames between 13 and 14, captured just before"
     ):
         bench.shots.conclude()
     assert bench.withdrawn == [12, 13]
     one = Bench(untold, is_as_before=False)
     one.shots.take(LINE)
-    with pytest.raises(PictureError, match=r"Frame 13, captured just before.* captures it again"):
+    with pytest.raises(PictureError, match=r"Frame 14, captured just before.* captures it again"):
         one.shots.conclude()
     calm = Bench(untold)
     calm.shots.take(LINE)
@@ -366,11 +366,11 @@ def test_what_could_not_be_told_is_withdrawn_when_a_control_has_changed() -> Non
 def test_the_eight_pictures_before_a_wrong_one_are_withdrawn_back_to_the_last_control() -> None:
     lines = tuple(PLAN.model_copy(update={"spectral": LineComb(width_px=1, step_px=1, period_px=40)}).shots())
     bench = Bench(*[is_right] * 10, late)
-    with pytest.raises(PictureError, match=r"8 frames between 14 and 21, captured just before"):
+    with pytest.raises(PictureError, match=r"8 frames between 15 and 22, captured just before"):
         take_all(bench, lines[12:24])
     assert bench.withdrawn == list(range(14, 22))
     bench = Bench(*[is_right] * 8, stepped, stepped, is_right, late)
-    with pytest.raises(PictureError, match=r"2 frames between 20 and 21"):
+    with pytest.raises(PictureError, match=r"2 frames between 21 and 22"):
         take_all(bench, lines[12:24])
     assert bench.withdrawn == [20, 21], "from the picture after which all was well"
 
@@ -383,7 +383,7 @@ def test_everything_since_an_old_picture_last_looked_the_same_is_withdrawn_when_
         bench = Bench(*[is_right] * 25, stepped, is_as_before=False)
         bench.is_quite_the_same = is_quite_the_same
         take_all(bench, [*lines[:14], again, *lines[15:25]])
-        with pytest.raises(PictureError, match=f"frames between {first} and 36, captured just before"):
+        with pytest.raises(PictureError, match=f"frames between {first + 1} and 37, captured just before"):
             bench.shots.take(lines[26])
         assert bench.withdrawn == [at for at in range(first, 37) if at != again.index or first > again.index]
 
@@ -399,21 +399,21 @@ def test_a_shot_found_wrong_on_the_way_is_taken_again_though_the_next_is_right()
 def test_saved_frames_that_turn_out_wrong_for_good_are_withdrawn() -> None:
     pair = (SHOTS[2], CODE)
     bench = Bench(lambda shot: Finding(shot, Verdict.MIRRORED, pair))
-    with pytest.raises(PictureError, match=r"mirrored or upside down.*Frame 2, captured just before"):
+    with pytest.raises(PictureError, match=r"mirrored or upside down.*Frame 3, captured just before"):
         bench.shots.take(CODE)
     assert bench.withdrawn == [2], "the latest was not saved"
 
 
 def test_a_picture_that_was_taken_again_is_withdrawn_with_those_around_it() -> None:
     bench = Bench(is_right, late, is_right, late)
-    with pytest.raises(PictureError, match="2 frames between 12 and 13"):
+    with pytest.raises(PictureError, match="2 frames between 13 and 14"):
         take_all(bench, SHOTS[12:15])
     assert bench.withdrawn == [12, 13]
 
 
 def test_a_picture_that_was_saved_before_earlier_ones_turned_out_wrong_is_withdrawn_with_them() -> None:
     bench = Bench(lambda shot: Finding(shot, Verdict.SATURATED, SHOTS[:2]))
-    with pytest.raises(PictureError, match="3 frames between 0 and 3"):
+    with pytest.raises(PictureError, match="3 frames between 1 and 4"):
         bench.shots.take(CODE)
     assert bench.written == {3: ""}
     assert bench.withdrawn == [0, 1, 3]
@@ -482,7 +482,7 @@ def test_the_first_picture_is_looked_at_once_after_the_code(seen: list[bool], mo
         first = [at for at, (index, *_) in enumerate(bench.taken) if index == 0]
         assert first == list(range(1, 1 + len(seen)))
         return
-    with pytest.raises(PictureError, match=r"Frame 0 .* is displaced .* 11 frames between 1 and 11"):
+    with pytest.raises(PictureError, match=r"Frame 1 .* is displaced .* 11 frames between 2 and 12"):
         take_all(bench, SHOTS[11:15])
     assert bench.withdrawn == list(range(1, 12))
 
@@ -491,7 +491,7 @@ def test_all_since_the_last_control_is_withdrawn_where_something_moved() -> None
     lines = tuple(PLAN.model_copy(update={"spectral": LineComb(width_px=1, step_px=1, period_px=40)}).shots())
     bench = Bench(*[is_right] * 10, late)
     bench.cause = "It moved."
-    with pytest.raises(PictureError, match=r"It moved\..* 10 frames between 12 and 21"):
+    with pytest.raises(PictureError, match=r"It moved\..* 10 frames between 13 and 22"):
         take_all(bench, lines[12:24])
 
 

@@ -103,7 +103,7 @@ def test_a_shot_that_never_comes_ends_the_scan_clearly(
     sink = MemorySink(plan)
     runner = Runner(rig, plan, sink, pattern, policy=RetryPolicy(attempts=3))
     with pytest.raises(
-        DeviceError, match=r"Frame 4 \(code pattern 4, setting 0\) failed 3 times: No light\."
+        DeviceError, match=r"Frame 5 \(code pattern 5, setting 1\) failed 3 times: No light\."
     ):
         runner.run()
     assert runner.status.state is State.FAILED
@@ -348,7 +348,7 @@ def test_a_dead_projector_does_not_hide_the_reason(
 
     bench.before_show = dead
     runner = Runner(rig, plan, MemorySink(plan), pattern)
-    with pytest.raises(DeviceError, match=r"Frame 4 .* failed 4 times: The projector is unplugged"):
+    with pytest.raises(DeviceError, match=r"Frame 5 .* failed 4 times: The projector is unplugged"):
         runner.run()
     assert "could not be turned dark" in runner.status.message
 
@@ -410,7 +410,7 @@ def test_a_runner_runs_once(rig: DeviceRig, plan: CapturePlan, pattern: Pattern)
 
 
 def test_a_frame_not_taken_is_named(plan: CapturePlan) -> None:
-    with pytest.raises(StoreError, match=r"Frame 0 .* has not been captured"):
+    with pytest.raises(StoreError, match=r"Frame 1 .* has not been captured"):
         MemorySink(plan).read(next(plan.shots()))
 
 

@@ -74,7 +74,7 @@ def test_faults_depend_on_seed_and_shot_only() -> None:
 def test_an_unplugged_camera_ends_the_scan_at_its_shot() -> None:
     sink = MemorySink(PLAN)
     rig = with_faults(replay_rig(_source()), FaultPlan(camera_gone_at=5))
-    with pytest.raises(DeviceError, match=r"Frame 5 .* does not answer"):
+    with pytest.raises(DeviceError, match=r"Frame 6 .* does not answer"):
         Runner(rig, PLAN, sink, pattern_image).run()
     assert len(sink.frames) == 5
 
@@ -82,7 +82,7 @@ def test_an_unplugged_camera_ends_the_scan_at_its_shot() -> None:
 def test_an_unplugged_projector_ends_the_scan_at_its_pattern() -> None:
     sink = MemorySink(PLAN)
     rig = with_faults(replay_rig(_source()), FaultPlan(projector_gone_at=4))
-    with pytest.raises(DeviceError, match=r"Frame 4 .* projector .* does not answer"):
+    with pytest.raises(DeviceError, match=r"Frame 5 .* projector .* does not answer"):
         Runner(rig, PLAN, sink, pattern_image).run()
     assert len(sink.frames) == 4
 

@@ -28,6 +28,8 @@ def open_campaign(stage: Stage, material: Path, library: bool = False) -> Calibr
     stage.open(library=library, campaign=campaign)
     stage.connect(rig_of(campaign))
     page = stage.window.open_page("calibrate")
+    # The library is made when it is first painted, and read then.
+    stage.settle()
     stage.idle()
     assert isinstance(page, CalibratePage)
     return page

@@ -75,11 +75,11 @@ def _lost_metadata(scan: Path) -> None:
 @pytest.mark.parametrize(
     ("damage", "sentence"),
     [
-        (_missing, "lacks 1 of 154 frames, the first is frame 7 (code pattern 7, setting 0). Resume"),
-        (_extra, "contains 1 more frames than the 154 of its plan, the first is number 999"),
+        (_missing, "lacks 1 of 154 frames, the first is frame 8 (code pattern 8, setting 1). Resume"),
+        (_extra, "contains 1 more frames than the 154 of its plan, the first is number 1000"),
         (_swapped, "(swapped or copied)"),
         (_truncated, "has 100 of"),
-        (_repeated, "Frame 8 (code pattern 8, setting 0)"),
+        (_repeated, "Frame 9 (code pattern 9, setting 1)"),
         (_wrong_size, "contains 4032 bytes of 16 bit values instead of 16128"),
         (_wrong_type, "contains 8064 bytes of 8 bit values instead of 16128"),
         (_half_a_manifest, "manifest.json is damaged"),

@@ -155,8 +155,9 @@ class CalibrateController:
         wizard.open(lambda: self._opened(state, wizard), failed)
 
     def _opened(self, state: WizardState, wizard: WizardController) -> None:
-        self.state.opening.set("")
         self.wizard_ready.emit((state, wizard))
+        # Last: the row says that its wizard opens until that is there.
+        self.state.opening.set("")
 
     def _left(self, state: WizardState) -> None:
         self._closed()

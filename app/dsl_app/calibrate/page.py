@@ -159,7 +159,9 @@ class CalibratePage(PageWidget):
                 is_running = row.name == self._state.running.value
                 running = self._state.everything.value if is_running else ""
                 words = running.partition("  ·  ")[0]
-                self.rows[row.name].show_row(row, self._state.is_busy, words, row.name == following)
+                self.rows[row.name].show_row(
+                    row, self._state.is_busy, words, row.name == following, self._state.opening.value
+                )
 
     def _scroll_to(self, name: str) -> None:
         """Keep the calibration that runs in view."""
@@ -243,7 +245,9 @@ class CalibrationRow(QFrame):
         grid.addWidget(self.run, 0, 4, 4, 1, Qt.AlignmentFlag.AlignVCenter)
         self._purpose.setFixedWidth(_NAME_PX)
 
-    def show_row(self, row: Row, is_busy: bool = False, running: str = "", is_next: bool = False) -> None:
+    def show_row(
+        self, row: Row, is_busy: bool = False, running: str = "", is_next: bool = False, opening: str = ""
+    ) -> None:
         """Show the state of the calibration; while ``is_busy`` its wizard cannot be opened."""
-        show_parts(self, row_display(row, is_busy, running, is_next))
+        show_parts(self, row_display(row, is_busy, running, is_next, opening))
         self.setAccessibleName(f"{row.about.title}: {row.state.value}. {row.reason}".strip())

@@ -10,6 +10,7 @@ from html import escape
 from dsl_app.calibrate.state import CalibrateState, Row, RowState
 from dsl_app.shared.known_files import breakable
 from dsl_app.shared.widget_state import ButtonState, LabelState
+from dsl_app.shared.wording import short_name
 from dsl_core.devices.base import DeviceRig
 from dsl_core.io.calibration_library import LibraryLine
 from dsl_core.model.calibration.accepted import AcceptedCalibration, CalibrationNote
@@ -61,7 +62,10 @@ def campaign_head(state: CalibrateState, devices: DeviceRig | None) -> CampaignH
     main = main_button(state, devices)
     title, place = "Calibrate", CAMPAIGN_HINT
     if facts is not None:
-        title, place = facts.path.name, f"in {breakable(facts.path.parent)}  ·  rig {facts.rig.words}"
+        title, place = (
+            short_name(facts.path.name),
+            f"in {breakable(facts.path.parent)}  ·  rig {facts.rig.words}",
+        )
     return CampaignHead(
         title,
         place,
@@ -122,15 +126,20 @@ class RowDisplay:
     run: ButtonState
 
 
-def row_display(row: Row, is_busy: bool = False, running: str = "", is_next: bool = False) -> RowDisplay:
+def row_display(
+    row: Row, is_busy: bool = False, running: str = "", is_next: bool = False, opening: str = ""
+) -> RowDisplay:
     """A row of the page, which may be what a person does next.
 
-    While ``is_busy`` no wizard can be opened; ``running`` says what is done for it.
+    While ``is_busy`` no wizard can be opened; ``running`` says what is done for it. ``opening`` is the title
+    of the wizard that is being opened, which takes a second or two.
     """
     title, figure = row.about.title, row.figure
     role = "" if figure is None or figure.passed else "bad"
     begun = row.state is RowState.BEGUN or row.has_candidate
     word = "Continue…" if begun else ("Open…" if row.accepted else "Run…")
+    if opening == title:
+        word = "Opening…"
     tip = f"Open the wizard of {title}, which continues where it was left"
     if running:
         # What was known of it before is about to be replaced.

@@ -191,7 +191,7 @@ class ResultImage(QWidget):
             self.legend.setText(
                 " &nbsp; ".join(
                     f"{_swatch(colour, self._theme.muted)}&nbsp;{name.replace(' ', '&nbsp;')}&nbsp;"
-                    f'<span style="color:{self._theme.muted}">{100 * share:.1f} %</span>'
+                    f'<span style="color:{self._theme.muted}">{100 * share:.1f}&nbsp;%</span>'
                     for colour, name, share in layer.keys
                 )
             )

@@ -15,6 +15,7 @@ from dsl_app.shared.widgets.forms import check_box, label
 from dsl_app.shared.widgets.help_window import add_help_key
 from dsl_app.shared.widgets.layouts import column_of
 from dsl_app.shared.widgets.plots import RGB_COLOURS, CalmPlot, colour_legend
+from dsl_core.model.plan import spoken_number
 from dsl_core.workflows.inspection import IntensityGraph
 
 CHANNELS = ("R", "G", "B")
@@ -75,7 +76,7 @@ class IntensityWindow(QDialog):
         if graph is None:
             return
         self.setWindowTitle(f"Intensity graph of pixel {graph.pixel[0]}, {graph.pixel[1]}")
-        frames = np.arange(graph.measured.shape[1])
+        frames = spoken_number(0) + np.arange(graph.measured.shape[1])
         for c in range(3):
             self.measured[c].setData(frames, graph.measured[c])
             if graph.model is None:
@@ -84,12 +85,13 @@ class IntensityWindow(QDialog):
                 self.model[c].setData(frames, graph.model[c])
         self.zero.setVisible(graph.zero is not None)
         if graph.zero is not None:
-            self.zero.setPos(graph.zero)
+            self.zero.setPos(spoken_number(0) + graph.zero)
         for order, span in self.spans.items():
             reached = known(graph.orders.get(order))
             span.setVisible(reached.size > 0)
             if reached.size:
-                span.setRegion((float(reached.min()), float(reached.max())))
+                first = spoken_number(0)
+                span.setRegion((first + float(reached.min()), first + float(reached.max())))
         self.item.getAxis("top").setTicks([ticks(graph)])
         self._scale()
         self.text.setText(graph_text(graph))
@@ -98,7 +100,8 @@ class IntensityWindow(QDialog):
         graph = self._graph
         if graph is None:
             return
-        self.item.setXRange(0, graph.measured.shape[1] - 1, padding=0.02)
+        last = graph.measured.shape[1] - 1
+        self.item.setXRange(spoken_number(0), spoken_number(last), padding=0.02)
         top = faint_top(graph) if self.faint.isChecked() else float(np.nanmax(graph.measured))
         self.item.setYRange(
             min(float(np.nanpercentile(graph.measured, 1)), 0.0), HEADROOM * max(top, 1e-6), padding=0
@@ -132,7 +135,10 @@ def faint_top(graph: IntensityGraph) -> float:
 
 
 def ticks(graph: IntensityGraph) -> list[tuple[float, str]]:
-    """Ticks of the upper axis: round wavelengths of the first orders, and the zero order."""
+    """Ticks of the upper axis: round wavelengths of the first orders, and the zero order.
+
+    As on the lower one, frames are counted from 1.
+    """
     found = []
     for frames in graph.orders.values():
         round_nm = np.isclose(graph.wavelengths_nm % LABELLED_NM, 0)
@@ -141,7 +147,7 @@ def ticks(graph: IntensityGraph) -> list[tuple[float, str]]:
                 found.append((float(frame), f"{nm:g}"))
     if graph.zero is not None:
         found.append((graph.zero, "zero order"))
-    return found
+    return [(spoken_number(0) + frame, text) for frame, text in found]
 
 
 def graph_text(graph: IntensityGraph) -> str:

@@ -41,6 +41,7 @@ from dsl_app.shared.widgets.open_dialog import OpenDialog
 from dsl_app.shared.widgets.page import PageWidget
 from dsl_app.shared.widgets.save_dialog import ask_target
 from dsl_app.shared.widgets.ticker import Ticker
+from dsl_app.shared.wording import short_name
 from dsl_core.workflows.inspection import IntensityGraph
 
 #: How often to ask for what a reconstruction has found, ms.
@@ -178,7 +179,8 @@ class ResultsPage(PageWidget):
         self.offer.show_offer(summary.message, summary.can_reconstruct)
         for button in (self.reconstruct_again, self._inspect, self._report, self._export):
             button.setEnabled(summary.has_result)
-        self.title.setText(summary.title)
+        self.title.setText(short_name(summary.title))
+        self.title.setToolTip(plain_tip(summary.title))
         self.about.setText(summary.about)
         self.about.setToolTip(plain_tip(summary.details))
         show_label(self.warning, LabelState(summary.warning, "warn", summary.advice))

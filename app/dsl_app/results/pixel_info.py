@@ -24,15 +24,16 @@ def pixel_text(result: ResultArrays, pixel: Pixel, band: int) -> str:
     if "points_mm" in result.arrays:
         x, y, z = (float(v) for v in result.at("points_mm", pixel))
         spread = float(result.at("depth_std_mm", pixel)) if "depth_std_mm" in result.arrays else math.nan
-        x_text, y_text = number_text(x, 1), number_text(y, 1)
-        parts.append(f"x {x_text}  y {y_text}  z {number_text(z, 2)} ± {number_text(spread, 2)} mm")
+        place = f"x {number_text(x, 1)}  y {number_text(y, 1)}  z {number_text(z, 2)}"
+        parts.append(f"{place} ± {number_text(spread, 2)} mm" if math.isfinite(z) else "no depth")
     if result.has_spectra:
         value, std = (
             float(result.at(name, pixel)[band]) if name in result.arrays else math.nan
             for name in ("reflectance", "reflectance_std")
         )
-        nm = result.wavelengths_nm[band]
-        parts.append(f"{nm:g} nm  {number_text(value, 3)} ± {number_text(std, 3)}")
+        value_text = f"{number_text(value, 3)} ± {number_text(std, 3)}"
+        known = value_text if math.isfinite(value) else "no reflectance"
+        parts.append(f"{result.wavelengths_nm[band]:g} nm  {known}")
     return "   ·   ".join(parts)
 
 

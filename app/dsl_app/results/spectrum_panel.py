@@ -10,9 +10,10 @@ from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QWidget
 
 from dsl_app.results.state import Mark, ResultsState
+from dsl_app.shared.evented import follow_any
 from dsl_app.shared.spectrum import Pixel, Spectrum
 from dsl_app.shared.theme import DARK, Theme
-from dsl_app.shared.widgets.forms import ChoiceBox, check_box, quiet
+from dsl_app.shared.widgets.forms import ChoiceBox, check_box, label, quiet
 from dsl_app.shared.widgets.layouts import STRETCH, column_of, row_of
 from dsl_app.shared.widgets.plots import CalmPlot
 from dsl_app.shared.widgets.spectrum_curve import SpectrumCurve
@@ -48,6 +49,11 @@ class SpectrumPanel(QWidget):
             "Wavelength (nm)",
             left_width=48,
         )
+        #: Why there will be no curve.
+        self.note = label("", "muted", wraps=True)
+        self.note.setAttribute(Qt.WidgetAttribute.WA_TransparentForMouseEvents)
+        top = Qt.AlignmentFlag.AlignTop
+        column_of((self.note, 0, top), on=self.plot.viewport(), margins=(60, 12, 12, 12))
         self.item = self.plot.getPlotItem()
         self.item.setYRange(0, 1, padding=PADDING)
         self.band_line = pg.InfiniteLine(angle=90, movable=True)
@@ -67,6 +73,7 @@ class SpectrumPanel(QWidget):
         )
         self.band_line.sigPositionChanged.connect(self._band_dragged)
         state.result.follow(lambda _: self._new_result())
+        follow_any(self._explain, state.result, state.is_begun)
         state.cursor.follow(self._show_cursor)
         state.marks.follow(self._show_marks)
         state.selected.changed.connect(lambda _: self._show_bands())
@@ -79,6 +86,7 @@ class SpectrumPanel(QWidget):
         result = self._state.result.value
         self.live.set_spectrum(None)
         if result is None or not result.has_spectra:
+            self._show_band()
             return
         nm = result.wavelengths_nm
         self.item.setXRange(nm[0], nm[-1], padding=0.02)
@@ -86,6 +94,10 @@ class SpectrumPanel(QWidget):
         self._top = min(max(1.08 * spread_of(result["reflectance"][::6], 0.5, 99.8)[1], 0.1), TOP)
         self._show_band()
         self._draw_again()
+
+    def _explain(self) -> None:
+        self.note.setText(self._state.no_spectra)
+        self.note.setVisible(bool(self._state.no_spectra))
 
     def _show_cursor(self, pixel: Pixel | None) -> None:
         spectrum = None if pixel is None else self._state.spectrum_at(pixel)

@@ -193,6 +193,16 @@ class ResultsState:
         return None if self.is_begun.value else self.result.value
 
     @property
+    def no_spectra(self) -> str:
+        """Why the open result shows no spectra; empty where it has them, or none is open."""
+        result = self.result.value
+        if result is None or result.has_spectra:
+            return ""
+        if self.is_begun.value:
+            return "The spectra are still being computed."
+        return "This result has depth only. Reconstruct the scan with spectra to see them."
+
+    @property
     def selected_mark(self) -> Mark | None:
         """The selected mark."""
         return next((mark for mark in self.marks.value if mark.key == self.selected.value), None)

@@ -9,7 +9,7 @@ from dataclasses import replace
 
 from dsl_app.connection.controller import RigController
 from dsl_app.connection.state import Link, RigState
-from dsl_app.rig.state import LEVEL, Drawn, FrameCounts, LiveState
+from dsl_app.rig.state import LEVEL, Drawn, FrameCounts, LiveState, exposure_text
 from dsl_app.shared.notify import Notifier
 from dsl_core.capture.auto_exposure import ExposureSearch
 from dsl_core.devices.base import DeviceRig
@@ -247,7 +247,7 @@ class AutoExposer:
             self._notifier.tell("warning", search.trouble)
         else:
             level = self._state.level.value
-            self._notifier.tell("info", f"Exposed for {asked_ms:.4g} ms at intensity {level:.2f}.")
+            self._notifier.tell("info", f"Exposed for {exposure_text(asked_ms)} at intensity {level:.2f}.")
 
     def end(self) -> None:
         """Stop the search."""

@@ -11,14 +11,16 @@ from PySide6.QtCore import QPointF, Qt
 from PySide6.QtGui import QKeyEvent
 from PySide6.QtWidgets import QCheckBox, QWidget
 
+from dsl_app.connection.state import RigState
 from dsl_app.rig.display_row import DisplayRow
-from dsl_app.rig.state import Draw, Drawn, FrameCounts
+from dsl_app.rig.state import NO_RIG, Draw, Drawn, FrameCounts, picture_note, rate_text
 from dsl_app.shared.evented import Value
 from dsl_app.shared.theme import Theme
-from dsl_app.shared.widgets.forms import check_box, label, push_button, set_role
+from dsl_app.shared.widgets.forms import check_box, label, push_button, set_role, show_label
 from dsl_app.shared.widgets.layouts import STRETCH, boxed, column_of, row_of
 from dsl_app.shared.widgets.pictures import PictureView, Region, RegionBox, arrow_step, cut, moved_within
 from dsl_app.shared.widgets.plots import colour_legend
+from dsl_app.shared.widgets.ticker import Ticker
 from dsl_core.capture.preview import BINS, MANY_SATURATED, Statistics, quick_picture, site_colour, statistics
 from dsl_core.devices.base import CameraInfo
 from dsl_core.model.frames import Frame
@@ -27,10 +29,8 @@ from dsl_core.model.frames import Frame
 FIGURES_S = 0.25
 #: Height of the histogram below the picture, and the most that it takes next to it, px.
 LOW_PX, HIGH_PX = 130, 640
-NO_RIG = "No picture yet. Connect a rig and start the live view."
-NO_PICTURE = "No picture yet. Start the live view."
-#: A simulated rig of the full size computes for seconds before it has the first one.
-WAITING = "Waiting for the camera's first picture…"
+#: How often it is looked whether frames still come, ms.
+RATE_MS = 500
 #: Side of the cell of raw pixels that is shown as one, px.
 CELL_PX = 2
 _CHANNELS = ("R", "G", "B")
@@ -95,16 +95,18 @@ class LiveView(QWidget):
             for colour, name in zip(_COLOURS, _NAMES, strict=True)
         ]
         self._rate = label("", "muted")
+        self._rate_clock = Ticker(self, RATE_MS, self._show_rate)
         self._counts = label("", "muted")
         self._saturated = label("", wraps=True)
         self._focus = label("", "muted")
         self._pixel = label("Point at the picture to read raw counts.", "muted")
-        self._empty = label(NO_RIG, "muted", wraps=True)
+        self.note = label(NO_RIG, "muted", wraps=True)
+        self.note.setObjectName("over-picture")
         self._lay_out()
 
     def _lay_out(self) -> None:
         column_of(
-            (self._empty, 0, Qt.AlignmentFlag.AlignTop), on=self.view.viewport(), margins=(16, 12, 16, 12)
+            (self.note, 0, Qt.AlignmentFlag.AlignTop), on=self.view.viewport(), margins=(16, 12, 16, 12)
         )
         figures = row_of((self._saturated, 1), (self._focus, 0, Qt.AlignmentFlag.AlignTop), spacing=16)
         switches = row_of(self.saturation, self.logarithmic, self.region_box, self.fit, STRETCH, spacing=6)
@@ -130,8 +132,6 @@ class LiveView(QWidget):
         self._read = None
         self.region_box.setChecked(False)
         self.region_box.setEnabled(camera is not None)
-        self._explain()
-        self._empty.setVisible(True)
         for figure in (self._saturated, self._focus, self._rate, self._counts):
             figure.clear()
         for curve in self._curves:
@@ -139,13 +139,15 @@ class LiveView(QWidget):
         if camera is not None:
             self._histogram.setXRange(0, 2**camera.bit_depth, padding=0)
 
-    def set_live(self, is_live: bool) -> None:
-        """Say whether a picture is on its way or has to be asked for."""
-        self._is_live = is_live
-        self._explain()
-
-    def _explain(self) -> None:
-        self._empty.setText(NO_RIG if self._camera is None else WAITING if self._is_live else NO_PICTURE)
+    def show_rig(self, rig: RigState) -> None:
+        """Say over the picture what a person would else take for the present: no rig, a lost one, a stop."""
+        if rig.live.value and not self._is_live:
+            # The pause before does not count.
+            self._times = []
+        self._is_live = rig.live.value
+        show_label(self.note, picture_note(rig, self._frame is not None))
+        self._rate_clock.run_while(self._is_live)
+        self._show_rate()
 
     def show_frame(self, frame: Frame | None, drawn: Drawn | None = None) -> None:
         """Show a frame; ``drawn`` is its picture if somebody has made one, and how."""
@@ -157,7 +159,7 @@ class LiveView(QWidget):
         self._times = [*self._times[-29:], now]
         self._paint(drawn)
         if first:
-            self._empty.setVisible(False)
+            self.note.hide()
             self.show_all()
         if now - self._figures_at >= FIGURES_S:
             self._figures_at = now
@@ -180,12 +182,8 @@ class LiveView(QWidget):
             axis.setTextPen(theme.muted)
         colour_legend(self._legend, theme.muted)
 
-    @property
-    def frames_per_second(self) -> float:
-        """Rate of the last frames shown."""
-        if len(self._times) < 2:
-            return 0.0
-        return (len(self._times) - 1) / max(self._times[-1] - self._times[0], 1e-9)
+    def _show_rate(self) -> None:
+        self._rate.setText(rate_text(self._times, time.monotonic(), self._is_live))
 
     def _repaint(self) -> None:
         if self._frame is not None:
@@ -231,7 +229,7 @@ class LiveView(QWidget):
         self._saturated.setText(f"saturated  {shares}")
         set_role(self._saturated, "bad" if worst > MANY_SATURATED else "muted")
         self._focus.setText(f"focus score {found.focus:.3g}")
-        self._rate.setText(f"{self.frames_per_second:.0f} frames/s")
+        self._show_rate()
         self._show_pixel()
 
     def _show_histogram(self, found: Statistics) -> None:

@@ -112,9 +112,12 @@ class RigPage(PageWidget):
         if self.is_wide:
             made.place_controls(self.beside)
         self.stops += [
-            self._state.live.follow(made.set_live),
             made.draw.follow(state.draw.set),
             state.frame.follow(lambda frame: made.show_frame(frame, state.drawn)),
+            *follow_any(
+                lambda: made.show_rig(self._state),
+                *(self._state.link, self._state.live, self._state.choice, self._state.devices),
+            ),
             state.counts.follow(made.show_counts),
         ]
         return made

@@ -113,7 +113,7 @@ class ProjectorPanel(QGroupBox):
             for screen in QGuiApplication.screens():
                 self._screen.addItem(_describe(screen), screen.name())
             if lost:
-                self._screen.addItem(f"{lost} (disconnected)", LOST)
+                self._screen.addItem(f"Disconnected: {lost}", LOST)
             index = self._screen.findData(LOST if lost else chosen)
             self._screen.setCurrentIndex(max(index, 0))
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, TypeAlias
 
@@ -26,6 +26,8 @@ Drawn: TypeAlias = "tuple[Draw, NDArray[np.uint8]]"
 #: Drive level of the first trial picture.
 LEVEL = 0.8
 _LINK_ROLES = {Link.OPEN: "good", Link.OPENING: "warn", Link.LOST: "bad", Link.CLOSED: "muted"}
+
+_LINK_BUTTONS = {Link.OPEN: "Disconnect", Link.OPENING: "Connecting…"}
 
 
 @dataclass(frozen=True)
@@ -89,7 +91,7 @@ def rig_view(rig: RigState, live: LiveState) -> RigView:
         connect_button=ButtonState(
             is_enabled=link is not Link.OPENING,
             is_primary=link is not Link.OPEN,
-            text="Disconnect" if link is Link.OPEN else "Connect",
+            text=_LINK_BUTTONS.get(link, "Connect"),
         ),
         live_button=ButtonState(
             is_enabled=can_look,
@@ -108,6 +110,15 @@ def _describe(info: CameraInfo | ProjectorInfo | None) -> str:
     return "–" if info is None else f"{info.model}\n{info.width_px} × {info.height_px} px"
 
 
+def exposure_text(exposure_ms: float) -> str:
+    """An exposure as a person says it.
+
+    >>> exposure_text(1000 / 60), exposure_text(17016.7)
+    ('16.67 ms', '17.02 s')
+    """
+    return f"{exposure_ms:.4g} ms" if exposure_ms < 1000 else f"{exposure_ms / 1000:.4g} s"
+
+
 def cycles_text(exposure_ms: float, cycle_ms: float | None) -> str:
     """How many LED cycles an exposure holds, and what is wrong with a part of one.
 
@@ -122,6 +133,48 @@ def cycles_text(exposure_ms: float, cycle_ms: float | None) -> str:
     if whole and abs(exposure_ms - whole * cycle_ms) < 0.006:
         return counted(whole, "LED cycle")
     return f"{cycles:.2f} LED cycles: colours vary"
+
+
+NO_RIG = "No picture yet. Connect a rig and start the live view."
+NO_PICTURE = "No picture yet. Start the live view."
+#: A simulated rig of the full size computes for seconds before it has the first one.
+WAITING = "Waiting for the camera's first picture…"
+STOPPED = "The live view is stopped. This is its last picture."
+LOST = "The rig is lost. Connect it again."
+LOST_PICTURE = "The rig is lost: this is its last picture. Connect it again."
+#: How long no frame may come before the rate is no longer true, s, and how many usual pauses between frames.
+SILENT_S, SILENT_PAUSES = 2.0, 4.0
+
+
+def picture_note(rig: RigState, has_picture: bool) -> LabelState:
+    """What is said over the live picture, empty while that is live; ``has_picture``: one is shown."""
+    link = rig.link.value
+    if link is Link.OPENING:
+        return LabelState(f"Connecting {rig.choice.value.words}…", "muted")
+    if link is Link.LOST:
+        return LabelState(LOST_PICTURE if has_picture else LOST, "bad")
+    if rig.camera is None:
+        return LabelState(NO_RIG, "muted")
+    if rig.live.value:
+        return LabelState("" if has_picture else WAITING, "muted")
+    return LabelState(STOPPED if has_picture else NO_PICTURE, "muted")
+
+
+def rate_text(times_s: Sequence[float], now_s: float, is_live: bool) -> str:
+    """How often frames come that came at these times, or for how long none has come; empty while not live.
+
+    >>> rate_text([0.0, 0.1, 0.2], 0.25, True), rate_text([0.0, 0.1, 0.2], 7.2, True)
+    ('10 frames/s', 'no frame for 7 s')
+    """
+    if not is_live or not times_s:
+        return ""
+    pause_s = (times_s[-1] - times_s[0]) / max(len(times_s) - 1, 1)
+    silent_s = now_s - times_s[-1]
+    if silent_s > max(SILENT_S, SILENT_PAUSES * pause_s):
+        return f"no frame for {silent_s:.0f} s"
+    if not pause_s:
+        return ""
+    return f"{1 / pause_s:.0f} frames/s" if pause_s <= 1 else f"a frame every {pause_s:.1f} s"
 
 
 @dataclass(frozen=True)

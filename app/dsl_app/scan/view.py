@@ -19,7 +19,7 @@ from dsl_app.shared.widgets.layouts import column_of
 from dsl_app.shared.widgets.pictures import DEPTH, PictureView, arrow_step, colour_map
 from dsl_app.shared.widgets.plots import CalmPlot
 from dsl_core.capture.preview import BlockGraph
-from dsl_core.model.plan import CapturePlan, Shot
+from dsl_core.model.plan import CapturePlan, Shot, spoken_number
 from dsl_core.optics.levels import between, spread_of
 
 #: Red, green and blue of the camera: they are data and the same in every theme.
@@ -62,7 +62,7 @@ class FramePicture(QWidget):
             return
         self.view.image.setImage(shown.picture, autoLevels=False, levels=None)
         self.view.image.setRect(0, 0, *covered_px(shown))
-        self._text.setText(f"Frame {shown.shot.index + 1} of {plan.shot_count}: {words_of(shown.shot, plan)}")
+        self._text.setText(f"Frame {shown.shot.number} of {plan.shot_count}: {words_of(shown.shot, plan)}")
         if before is None or covered_px(before) != covered_px(shown):
             self.view.fit()
 
@@ -199,6 +199,6 @@ def covered_px(shown: LivePicture) -> tuple[int, int]:
 def words_of(shot: Shot, plan: CapturePlan) -> str:
     """Pattern and exposure of a shot, in words."""
     counts = {"code": plan.code_count, "spectral": plan.spectral_count}
-    which = f" {shot.pattern + 1} of {counts[shot.role]}" if shot.role in counts else ""
-    setting = f"setting {shot.setting + 1} of {len(plan.settings)}"
+    which = f" {spoken_number(shot.pattern)} of {counts[shot.role]}" if shot.role in counts else ""
+    setting = f"setting {spoken_number(shot.setting)} of {len(plan.settings)}"
     return f"{_ROLES[shot.role]}{which}, {setting} ({shot.exposure_ms:.1f} ms at level {shot.level:g})"

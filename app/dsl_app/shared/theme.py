@@ -87,6 +87,7 @@ QDockWidget::title {{ background: {t.window}; padding: 5px 8px; border-bottom: 1
 QGroupBox {{ border: 1px solid {t.line}; border-radius: 4px; margin-top: 18px; padding: 8px; }}
 QGroupBox::title {{ subcontrol-origin: margin; left: 0px; top: 2px; color: {t.muted}; font-weight: 600; }}
 QLabel[role="muted"] {{ color: {t.muted}; }}
+QLabel#over-picture {{ background: {t.raised}; border-radius: 4px; padding: 6px 10px; }}
 QLabel[role="title"] {{ font-size: 15pt; font-weight: 600; }}
 QLabel[role="heading"] {{ font-weight: 600; }}
 QLabel[role="good"] {{ color: {t.good}; }}

@@ -41,6 +41,22 @@ PHRASES = (
 PATTERNS = ((r"'dsl-scan calibrate geometry .* --pictures' reads", "the calibration of the geometry reads"),)
 
 
+#: Characters of a name that a heading has room for in the smallest window.
+MOST_CHARACTERS = 32
+
+
+def short_name(name: str, most: int = MOST_CHARACTERS) -> str:
+    """A name of at most so many characters: a longer one loses its middle, as its end tells it from others.
+
+    >>> short_name("sample of the second day, third try", 20)
+    'sample of…third try'
+    """
+    if len(name) <= most:
+        return name
+    ahead = (most - 1) // 2
+    return f"{name[:ahead].rstrip()}…{name[len(name) - (most - 1 - ahead) :].lstrip()}"
+
+
 def in_window(text: str) -> str:
     """A sentence without options of commands.
 

@@ -110,13 +110,15 @@ class Recipe(ABC, Generic[RecordT]):
 
     ``name`` is its name on the command line and that of its folder, such as ``bandpass``; ``title`` is the
     wizard's, such as ``Bandpass filters``; ``needs`` are the names of the calibrations that must be accepted
-    before; ``record_type`` is what `fit` returns, which is stored as JSON. Every `CalibrationError` names the
-    step concerned.
+    before; ``keeps_frames`` says that a capture that was stopped goes on after its last frame, and not
+    from the beginning; ``record_type`` is what `fit` returns, which is stored as JSON. Every
+    `CalibrationError` names the step concerned.
     """
 
     name: str
     title: str
     needs: tuple[str, ...] = ()
+    keeps_frames: bool = True
     record_type: type[RecordT]
 
     @abstractmethod

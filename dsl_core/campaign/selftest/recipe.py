@@ -37,6 +37,7 @@ class SelfTestRecipe(Recipe[SelfTest]):
 
     name = "selftest"
     title = "Self-test"
+    keeps_frames = False
     record_type = SelfTest
 
     wanted_ms: tuple[float, ...] = WANTED_MS

@@ -23,7 +23,7 @@ from dsl_core.capture.proof.first_light import (
 )
 from dsl_core.capture.proof.prediction import Lit
 from dsl_core.capture.proof.raster import Counts, Floats, Noise, Raster
-from dsl_core.model.plan import BinaryCode, CapturePlan, Shot
+from dsl_core.model.plan import BinaryCode, CapturePlan, Shot, spoken_number
 from dsl_core.patterns.displaced_code import DisplacedCode, displaced_code
 
 #: Share of saturated pixels from which on a picture tells nothing, and up to which other pictures do.
@@ -312,7 +312,7 @@ class FirstCode:
         """Which pattern of the pairs that are right a picture shows, in words; empty if none."""
         for pattern, other in self._by_pattern(self._pairs.pairs).items():
             if other is not seen and alike(seen, other, contrast, lit):
-                return f"like code pattern {pattern}"
+                return f"like code pattern {spoken_number(pattern)}"
         return ""
 
     def _pair_shots(self, number: int) -> tuple[Shot, ...]:

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from dsl_core.errors import StoreError
 from dsl_core.io.scan.capture_log import LogEntry
 from dsl_core.io.scan.folder import ScanReader
-from dsl_core.model.plan import Shot, describe_shot
+from dsl_core.model.plan import Shot, describe_shot, spoken_number
 
 #: A camera may round the exposure it was asked for by this share.
 EXPOSURE_TOLERANCE = 0.05
@@ -45,7 +45,8 @@ def _extra(reader: ScanReader) -> Iterator[str]:
     if extra:
         yield (
             f"{reader.folder} contains {len(extra)} more frames than the {count} of its plan, the first is"
-            f" number {extra[0]}. They belong to another scan; move {reader.store.path(extra[0])} away."
+            f" number {spoken_number(extra[0])}. They belong to another scan; move"
+            f" {reader.store.path(extra[0])} away."
         )
 
 
@@ -65,7 +66,7 @@ def _repeated(reader: ScanReader) -> Iterator[str]:
         entry = reader.entries.get(shot.index)
         if before and entry and _is_repeat(before[1], entry):
             yield (
-                f"{_name(reader, shot)} is the same exposure as frame {before[0].index}:"
+                f"{_name(reader, shot)} is the same exposure as frame {before[0].number}:"
                 f" the camera delivered an old picture. {_remedy(reader, shot)}"
             )
         before = (shot, entry) if entry else None

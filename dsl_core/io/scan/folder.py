@@ -33,7 +33,7 @@ from dsl_core.io.scan.frame_store import ChunkError, FrameStore, checksum
 from dsl_core.io.scan.lock import FolderLock
 from dsl_core.io.scan.manifest import Manifest, describe_scan, read_manifest, refuse_other_scan
 from dsl_core.model.frames import Frame
-from dsl_core.model.plan import CapturePlan, Shot, describe_shot
+from dsl_core.model.plan import CapturePlan, Shot, describe_shot, spoken_number
 from dsl_core.model.rig import Rig
 
 _logger = logging.getLogger(__name__)
@@ -122,7 +122,9 @@ class ScanReader:
         twins = [e.shot for e in self.entries.values() if e.crc32 == found and e.shot != shot.index]
         path = self.store.path(shot.index)
         if twins:
-            return f"its file {path} contains the picture of frame {twins[0]} (swapped or copied)"
+            return (
+                f"its file {path} contains the picture of frame {spoken_number(twins[0])} (swapped or copied)"
+            )
         return f"the pixels in {path} do not match their checksum (damaged)"
 
     def _sentence(self, shot: Shot, what: str) -> str:

@@ -22,6 +22,7 @@ from dsl_core.errors import StoreError
 from dsl_core.io.atomic import make_folder, store_error, sync_folder, write_atomic
 from dsl_core.io.reading import parts_of, read_bounded, read_json
 from dsl_core.io.scan.blosc_blocks import HEADER, Bytes, blocks_of
+from dsl_core.model.plan import spoken_number
 
 #: Blocks of 256 KiB decompress 1.7 times faster than Blosc's own choice for Zstandard, at the same size.
 _BLOSC = {"typesize": 2, "cname": "zstd", "clevel": 1, "shuffle": "bitshuffle", "blocksize": 1 << 18}
@@ -85,8 +86,8 @@ class FrameStore:
         """Store a mosaic, shape (height, width), so that it survives a power cut; raises `StoreError`."""
         if pixels.shape != (self.height_px, self.width_px) or pixels.dtype != np.uint16:
             raise StoreError(
-                f"Frame {index} is {pixels.dtype} of shape {pixels.shape}, but the scan needs uint16 of"
-                f" shape {(self.height_px, self.width_px)}. Make a plan for this camera's size."
+                f"Frame {spoken_number(index)} is {pixels.dtype} of shape {pixels.shape}, but the scan needs"
+                f" uint16 of shape {(self.height_px, self.width_px)}. Make a plan for this camera's size."
             )
         from numcodecs import blosc  # type: ignore[import-untyped]
 

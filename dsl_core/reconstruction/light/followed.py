@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from dsl_core.model.fit import FitFinding
 from dsl_core.model.frames import FrameSource
-from dsl_core.model.plan import CapturePlan, Role, Shot
+from dsl_core.model.plan import CapturePlan, Role, Shot, spoken_number
 from dsl_core.model.rig import Rig
 from dsl_core.optics.sensor import raw_variance
 from dsl_core.patterns.gray_code import DecodedCode
@@ -204,7 +204,7 @@ def _told_of_light(sudden: SuddenChanges | None) -> Iterator[FitFinding]:
 
 
 def _since(steps: Iterable[int]) -> str:
-    names = " and ".join(f"frame {at}" for at in sorted(steps))
+    names = " and ".join(f"frame {spoken_number(at)}" for at in sorted(steps))
     return f"from {names} on"
 
 

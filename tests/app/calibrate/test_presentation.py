@@ -175,6 +175,8 @@ def test_a_row_shows_its_figure_and_reason() -> None:
     bad = row_display(replace(ROW, figure=BAD))
     assert bad.figure.role == "bad"
     assert row_display(ROW).figure.text == row_display(ROW).date == ""
+    others = [row_display(ROW, is_busy=True, opening=title).run.text for title in (ROW.about.title, "Other")]
+    assert others == ["Opening…", "Run…"]
     running = row_display(replace(ROW, figure=GOOD), is_busy=True, running="Self-test: white, 3 of 8")
     assert running.state.text == "▶ running"
     assert running.reason.text == "Self-test: white, 3 of 8"

@@ -58,6 +58,7 @@ def test_depth_and_points_come_before_spectra_in_the_same_view(
         assert result is not None
         points = result["points_mm"].shape
         seen.append((result.path.name, points, result.has_spectra, state.is_begun.value, state.view.value))
+        assert state.no_spectra == "The spectra are still being computed."
         assert results_part(state) is None, "a session would open what is on no disk"
         control.show(ResultView.COLOUR)
         seen.append((bench.told,))
@@ -83,6 +84,7 @@ def test_depth_and_points_come_before_spectra_in_the_same_view(
     kept = state.view.value, state.cursor.value, state.depth_limits.value
     assert kept == (ResultView.CLOUD, PIXEL, (700.0, 710.0))
     assert "spectra of small are there" in bench.told
+    assert state.no_spectra == ""
     assert results_part(state) is not None
 
 

@@ -27,6 +27,10 @@ def test_the_intensity_graph_shows_orders_in_nm(bench: Bench) -> None:
     both = graph_text(replace(graph, orders={1: frames, -1: frames - 50.0}))
     assert both.startswith("First orders +1 and −1 reach the pixel.")
     assert [text for _, text in ticks(graph)] == ["450", "500", "550", "600", "650", "zero order"]
+    # The first frame is 1, as everywhere else.
+    x, y = window.measured[0].getData()
+    assert (x[0], x[y == 100.0].tolist()) == (1, [window.zero.value()])
+    assert ticks(graph)[-1][0] == 151.0
     assert window.item.viewRange()[1][1] < 5
     # The legend stands above the brightest signal, in the colour of the theme.
     place = window.item.legend.mapRectToParent(window.item.legend.boundingRect())

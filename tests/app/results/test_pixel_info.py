@@ -25,6 +25,7 @@ def test_pointing_shows_the_pixel_and_its_spectrum(bench: Bench, qtbot: QtBot) -
 
 def test_a_bad_pixel_says_why(bench: Bench) -> None:
     bench.control.point_at(DARK)
+    assert bench.page.pixel_info.values.text().endswith("no depth   ·   545 nm  no reflectance")
     assert "too little projector light" in bench.page.pixel_info.reasons.text()
     assert not bench.page.spectra.content.live.solid.isVisible()
     bench.control.point_at(UNREACHED)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from dsl_app.results.spectrum_panel import MOST_BANDS
@@ -10,7 +12,7 @@ from dsl_app.shared.widgets.spectrum_curve import SpectrumCurve
 
 from tests.app.support.results_bench import Bench
 from tests.app.support.results_bench import bench as bench
-from tests.app.support.small_result import NM
+from tests.app.support.small_result import NM, write_small_result
 
 
 def test_the_band_line_and_the_slider_agree(bench: Bench) -> None:
@@ -57,3 +59,12 @@ def test_of_many_marks_the_selected_one_alone_keeps_its_band(bench: Bench) -> No
     assert with_band() == ["pin 1"]
     bench.control.point_at((5, 5))
     assert has_band(panel.live)
+
+
+def test_a_result_of_depth_only_says_why_there_are_no_curves(bench: Bench, tmp_path: Path) -> None:
+    panel = bench.page.spectra.content
+    assert panel.note.isHidden()
+    (tmp_path / "flat").mkdir()
+    bench.window.open_path(write_small_result(tmp_path / "flat", spectra=False))
+    assert panel.note.text().startswith("This result has depth only.")
+    assert (panel.note.isVisible(), panel.band_line.isVisible()) == (True, False)

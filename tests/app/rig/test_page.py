@@ -8,9 +8,9 @@ import pytest
 from dsl_app.connection.controller import RigController
 from dsl_app.connection.state import Link, RigChoice, RigState
 from dsl_app.rig.controller import LiveController
-from dsl_app.rig.live_view import NO_RIG, WAITING
 from dsl_app.rig.options_form import parse_options
 from dsl_app.rig.page import RigPage
+from dsl_app.rig.state import LOST_PICTURE, NO_RIG, WAITING
 from dsl_app.shared.jobs.qt_runner import QtRunner
 from dsl_app.shared.theme import LIGHT
 from PySide6.QtCore import QPoint, QPointF, Qt
@@ -19,6 +19,7 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QPushButton
 from pytestqt.qtbot import QtBot
 
+from dsl_core.errors import DeviceError
 from dsl_core.model.frames import Frame
 from dsl_core.simulation.sim_devices import SimCamera
 from tests.app.support.doubles import RecordingNotifier
@@ -53,7 +54,7 @@ def test_connect_look_and_leave(qtbot: QtBot, bench: Bench) -> None:
     assert not page.live_button.isEnabled()
     connect(qtbot, page, state)
     assert "64 × 48" in page.camera_text.text()
-    qtbot.waitUntil(lambda: page.live.content.frames_per_second > 0, timeout=90_000)
+    qtbot.waitUntil(lambda: page.live.content._rate.text().endswith("frames/s"), timeout=90_000)
     assert page.live_button.text() == "Stop live view"
     click(page.live_button)
     qtbot.waitUntil(lambda: not state.live.value)
@@ -73,13 +74,32 @@ def test_the_page_says_that_the_first_picture_is_on_its_way(
         return snap(self, timeout_ms)
 
     monkeypatch.setattr(SimCamera, "snap", slowly)
-    empty = page.live.content._empty
+    empty = page.live.content.note
     assert empty.text() == NO_RIG
     connect(qtbot, page, state)
     qtbot.waitUntil(lambda: state.live.value)
     assert empty.text() == WAITING
     may_look.set()
     qtbot.waitUntil(empty.isHidden, timeout=90_000)
+
+
+def test_the_last_picture_of_a_lost_camera_says_that_it_is_old(
+    qtbot: QtBot, bench: Bench, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    page, state, _, _ = bench
+    connect(qtbot, page, state)
+    live = page.live.content
+    qtbot.waitUntil(live.note.isHidden, timeout=90_000)
+
+    def pulled(self: SimCamera, timeout_ms: float = 5000.0) -> Frame:
+        raise DeviceError("The camera was unplugged.")
+
+    monkeypatch.setattr(SimCamera, "snap", pulled)
+    qtbot.waitUntil(lambda: state.link.value is Link.LOST, timeout=90_000)
+    qtbot.waitUntil(lambda: not state.live.value)
+    assert (live.note.text(), live.note.isVisibleTo(live)) == (LOST_PICTURE, True)
+    assert live._item.image is not None
+    assert live._rate.text() == ""
 
 
 def test_connecting_projects_what_the_panel_names_and_exposes_for_it(qtbot: QtBot, bench: Bench) -> None:

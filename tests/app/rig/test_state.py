@@ -4,7 +4,20 @@ from dataclasses import replace
 
 from dsl_app.connection.controller import RigController
 from dsl_app.connection.state import Link, RigChoice, RigState
-from dsl_app.rig.state import LiveState, cycles_text, panel_view, rig_view
+from dsl_app.rig.state import (
+    LOST,
+    LOST_PICTURE,
+    NO_PICTURE,
+    NO_RIG,
+    STOPPED,
+    WAITING,
+    LiveState,
+    cycles_text,
+    panel_view,
+    picture_note,
+    rate_text,
+    rig_view,
+)
 
 from dsl_core.devices.base import ProjectorInfo
 from tests.app.support.doubles import InlineRunner, RecordingNotifier
@@ -22,7 +35,8 @@ def test_a_page_without_a_rig_offers_to_connect_one() -> None:
     buttons = (view.live_button, view.selftest, view.scan)
     assert [*(button.is_enabled for button in buttons), view.exposure, view.auto] == 5 * [False]
     rig.link.set(Link.OPENING)
-    assert not rig_view(rig, live).connect_button.is_enabled
+    button = rig_view(rig, live).connect_button
+    assert (button.is_enabled, button.text) == (False, "Connecting…")
 
 
 def test_a_page_with_a_rig_names_its_devices_and_offers_to_expose() -> None:
@@ -66,6 +80,32 @@ def test_a_lost_rig_can_be_connected_again_and_says_why_it_is_lost() -> None:
     buttons = (view.live_button, view.selftest, view.scan)
     assert [*(each.is_enabled or each.is_primary for each in buttons), view.auto] == 4 * [False]
     assert view.connect_button.is_primary
+
+
+def test_the_picture_says_what_else_would_be_taken_for_the_present() -> None:
+    controller = RigController(RigState(TWIN), InlineRunner(), RecordingNotifier())
+    rig = controller.state
+    assert picture_note(rig, False).text == NO_RIG
+    rig.link.set(Link.OPENING)
+    assert picture_note(rig, False).text == "Connecting twin, scene plane, size 64x48…"
+    rig.link.set(Link.CLOSED)
+    controller.connect(TWIN)
+    assert [picture_note(rig, has).text for has in (False, True)] == [NO_PICTURE, STOPPED]
+    rig.live.set(True)
+    assert [picture_note(rig, has).text for has in (False, True)] == [WAITING, ""]
+    rig.link.set(Link.LOST)
+    notes = [picture_note(rig, has) for has in (False, True)]
+    assert [(note.text, note.role) for note in notes] == [(LOST, "bad"), (LOST_PICTURE, "bad")]
+
+
+def test_a_rate_is_told_only_while_frames_come() -> None:
+    fast, slow = [0.0, 0.05, 0.1], [0.0, 5.0, 10.0]
+    assert [rate_text(fast, now, True) for now in (0.12, 3.1)] == ["20 frames/s", "no frame for 3 s"]
+    assert [rate_text(slow, now, True) for now in (14.0, 31.0)] == [
+        "a frame every 5.0 s",
+        "no frame for 21 s",
+    ]
+    assert [rate_text(fast, 0.12, False), rate_text([], 9.0, True), rate_text([1.0], 1.5, True)] == [""] * 3
 
 
 def test_parts_of_a_cycle_are_named() -> None:

@@ -7,7 +7,7 @@ import re
 from dsl_app.shared.notify import sentence_of
 from dsl_app.shared.widget_state import LabelState
 from dsl_app.shared.widgets.forms import Banner, label, show_label
-from dsl_app.shared.wording import PHRASES, in_window
+from dsl_app.shared.wording import MOST_CHARACTERS, PHRASES, in_window, short_name
 from pytestqt.qtbot import QtBot
 
 from dsl_core.errors import CalibrationError
@@ -62,3 +62,11 @@ def test_errors_labels_and_banners_say_what_to_click(qtbot: QtBot) -> None:
     banner.say(SENTENCE)
     for text in (line.text(), banner.text, sentence_of(CalibrationError(SENTENCE))):
         assert text.endswith("or tick 'Use despite different settings'.")
+
+
+def test_a_long_name_keeps_its_ends() -> None:
+    name = "sample of the second day, third try, with the new film"
+    short = short_name(name)
+    assert len(short) <= MOST_CHARACTERS
+    assert (short[:6], short[-8:]) == ("sample", "new film")
+    assert short_name("scan-20261127-2113") == "scan-20261127-2113"

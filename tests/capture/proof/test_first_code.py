@@ -146,7 +146,7 @@ def test_an_end_that_is_right_above_some_row_is_torn_and_one_like_the_picture_be
     found = end(late, before=late)
     assert found.verdict is Verdict.LATE
     assert found.again == (SHOTS[-2],)
-    assert found.detail == "like code pattern 4"
+    assert found.detail == "like code pattern 5"
     assert end(late).verdict is not Verdict.LATE
 
 

@@ -42,11 +42,11 @@ def test_missing(session: Path) -> None:
     (session / "frames" / "c.3.0.0").unlink()
     problem = _only_problem(session)
     assert "lacks 1 of" in problem
-    assert "frame 3 (code pattern 3, setting 0)" in problem
+    assert "frame 4 (code pattern 4, setting 1)" in problem
     assert "Resume" in problem
     with pytest.raises(StoreError, match="lacks 1 of"):
         require_complete(ScanReader(session))
-    with pytest.raises(StoreError, match=r"Frame 3 .* cannot be used: its file .*c\.3\.0\.0 cannot be read"):
+    with pytest.raises(StoreError, match=r"Frame 4 .* cannot be used: its file .*c\.3\.0\.0 cannot be read"):
         ScanReader(session).read(list(ScanReader(session).plan.shots())[3])
 
 
@@ -60,7 +60,7 @@ def test_truncated(session: Path, keep: int) -> None:
     path = session / "frames" / "c.5.0.0"
     path.write_bytes(path.read_bytes()[:keep])
     problem = _only_problem(session)
-    assert problem.startswith("Frame 5 (code pattern 5, setting 0)")
+    assert problem.startswith("Frame 6 (code pattern 6, setting 1)")
     size = path.stat().st_size
     assert f"{path} is cut off after {size} bytes" in problem or f"{path} has {size} of" in problem
 
@@ -82,8 +82,8 @@ def test_swapped(session: Path) -> None:
     spare.rename(b)
     found = find_problems(ScanReader(session), verify=True)
     assert len(found) == 2
-    assert "contains the picture of frame 7 (swapped or copied)" in found[0]
-    assert "contains the picture of frame 2 (swapped or copied)" in found[1]
+    assert "contains the picture of frame 8 (swapped or copied)" in found[0]
+    assert "contains the picture of frame 3 (swapped or copied)" in found[1]
 
 
 @pytest.mark.parametrize("pixels", [np.zeros((16, 25), np.uint16), np.zeros((16, 12), np.uint16)])
@@ -113,7 +113,7 @@ def test_repeated(tmp_path: Path, plan: CapturePlan, frame_of: FrameOf, same: st
     value = getattr(frames[5], same)
     frames[6] = replace(frames[6], **{same: value})
     _write(tmp_path / "scan.dsl", plan, frames)
-    assert "is the same exposure as frame 5" in _only_problem(tmp_path / "scan.dsl")
+    assert "is the same exposure as frame 6" in _only_problem(tmp_path / "scan.dsl")
 
 
 def test_equal_pictures_are_believed_when_clipped_or_confirmed(

@@ -47,6 +47,7 @@ class Opened:
     fit: Fit | None
     places_itself: bool
     outlines: Mapping[str, PointsPx]
+    keeps_frames: bool = True
 
 
 @dataclass(frozen=True)
@@ -102,7 +103,8 @@ class BackgroundWork:
         places = self._devices.place is not None
         camera = session.bench.rig.camera
         outlines = {each.key: ghost(each.placement, camera) for each in session.steps}
-        return Opened(statuses, settings, self._found(), places, outlines)
+        keeps = self.session.recipe.keeps_frames
+        return Opened(statuses, settings, self._found(), places, outlines, keeps)
 
     def _recipe(self, recipes: Sequence[AnyRecipe]) -> AnyRecipe:
         return next(recipe for recipe in recipes if recipe.name == self._name)

@@ -80,6 +80,7 @@ class WizardController:
         state = self.state
         state.places_itself.set(found.places_itself)
         state.outlines.set(found.outlines)
+        state.keeps_frames = found.keeps_frames
         state.settings.set(found.settings)
         state.misfit.set(None)
         state.statuses.set(found.statuses)

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import TypeVar
 
+from dsl_app.calibrate.wizard.presentation import stopped_text
 from dsl_app.calibrate.wizard.state import Doing, WizardState
 from dsl_app.connection.controller import RIG, RigController
 from dsl_app.shared.jobs.base import Job, JobProgress, JobRunner
@@ -129,4 +130,4 @@ class WizardJobs:
 
     def _stopped(self) -> None:
         self._give_up()
-        self.state.note.set("Stopped. Frames captured so far are kept; capture again to continue.")
+        self.state.note.set(stopped_text(self.state))

@@ -315,3 +315,18 @@ def _verdict_on(fit: Fit) -> Verdict:
     if fit.is_accepted:
         return f"✓ Accepted. {count}", "warn" if wrong else "good"
     return (f"✗ {count}", "bad") if wrong else (f"✓ {count} Accept the fit to use it.", "good")
+
+
+def leaving_text(state: WizardState) -> str:
+    """What is asked before a capture or fit is stopped and the wizard left, and what of it stays."""
+    stays = "Frames captured so far are kept, and the wizard continues from here next time."
+    if not state.keeps_frames:
+        stays = "What is captured completely is kept; the rest starts from its beginning next time."
+    return f"Stop it and leave? {stays}"
+
+
+def stopped_text(state: WizardState) -> str:
+    """What is said after a capture was stopped."""
+    if state.keeps_frames:
+        return "Stopped. Frames captured so far are kept; capture again to continue."
+    return "Stopped. This capture is not kept; capture again from its beginning."

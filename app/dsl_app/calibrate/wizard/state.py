@@ -126,6 +126,8 @@ class WizardState:
         #: The calibration that comes after this one, and whether a person goes on to it; empty: none.
         self.following, self.following_title = "", ""
         self.goes_on = False
+        #: Whether a capture that is stopped goes on after its last frame.
+        self.keeps_frames = True
         self.closed: Event[None] = Event()
         self.fit.changed.connect(self._forget_allowed)
 

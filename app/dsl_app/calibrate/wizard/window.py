@@ -23,6 +23,7 @@ from dsl_app.calibrate.wizard.presentation import (
     PageLine,
     activity,
     buttons,
+    leaving_text,
     page_before,
     page_lines,
 )
@@ -137,8 +138,7 @@ class CalibrationWizard(QDialog):
         return confirm(
             self,
             f"{self._state.title} is {self._state.doing.value.value}",
-            "Stop it and leave? Frames captured so far are kept, and the wizard continues from here next"
-            " time.",
+            leaving_text(self._state),
             go="Stop and leave",
             stay="Stay",
         )

@@ -28,6 +28,7 @@ from dsl_app.shared.widgets.pictures import (
     moved_within,
 )
 from dsl_app.shared.widgets.plots import theme_bar
+from dsl_app.shared.wording import short_name
 from dsl_core.optics.levels import spread_of
 
 BAND_PX = 260
@@ -123,7 +124,9 @@ class PairPictures(QWidget):
         self._paint_whole()
 
     def _title(self, pair: Pair | None) -> None:
-        names = ("", "", "") if pair is None else (f"A  {pair.first.name}", f"B  {pair.second.name}", "A − B")
+        names = ("", "", "")
+        if pair is not None:
+            names = f"A  {short_name(pair.first.name)}", f"B  {short_name(pair.second.name)}", "A − B"
         for title, name in zip(self.titles, names, strict=True):
             title.setText(name, color=self._theme.text)
 

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from dsl_app.shared.evented import Value
 from dsl_app.shared.spectrum import Pixel, number_text
 from dsl_app.shared.widget_state import ButtonState, LabelState
+from dsl_app.shared.wording import short_name
 from dsl_core.evaluation.summary import Truth
 from dsl_core.evaluation.verdict import Verdict
 from dsl_core.io.result.result_arrays import ResultArrays
@@ -21,6 +22,8 @@ from dsl_core.io.scan.origin import rig_of_notes
 Floats = NDArray[np.floating[Any]]
 
 
+#: Characters of the names of A and B beside the buttons that open them.
+MOST_BESIDE = 20
 #: What the page says while there is nothing to compare.
 NOTHING = (
     "Open a result as A, then another as B; or, for a scan of the simulated rig, use its ground truth as B."
@@ -114,7 +117,7 @@ def pair_display(state: PairState) -> PairDisplay:
     """What to show for a state."""
     first, second = state.first.value, state.second.value
     pair, busy = state.pair.value, state.busy.value
-    name_a, name_b = ("–" if side is None else side.name for side in (first, second))
+    name_a, name_b = ("–" if side is None else short_name(side.name, MOST_BESIDE) for side in (first, second))
     # Where the truth is known, it is what a single result is compared with.
     lacks_second = first is not None and second is None
     takes_truth = lacks_second and first is not None and first.is_simulated
@@ -144,7 +147,7 @@ def _at_hand(state: PairState) -> ButtonState:
     return ButtonState(
         is_enabled=not state.busy.value,
         is_primary=first is None,
-        text=f"{path.stem} as {side}",
+        text=f"{short_name(path.stem, MOST_BESIDE)} as {side}",
         tip=f"Compare {path.stem}, which is open on the Results page",
     )
 

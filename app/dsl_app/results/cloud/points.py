@@ -47,7 +47,8 @@ class PointsActor:
             # Uploading colours is as slow as points, so the rest grows again.
             first, *others = self._parts
             self._drop(others)
-            self._meshes[first]["colours"] = colours[self._parts[first]]
+            if self.shown:  # else its one point is none of the cloud
+                self._meshes[first]["colours"] = colours[self._parts[first]]
             self.be_coarse(self.is_coarse)
             return False
         self._drop(list(self._parts))
@@ -164,4 +165,7 @@ def spacing(points: Points) -> float:
     step = max(len(points) // COARSE, 1)
     apart = np.linalg.norm(points[1::step] - points[:-1:step][: len(points[1::step])], axis=1)
     wide, tall, _ = np.ptp(points[::step], axis=0)
-    return max(min(float(np.median(apart)), math.sqrt(wide * tall / len(points))), 1e-6)
+    beside = float(np.median(apart))
+    # A single row or column covers no area.
+    covered = math.sqrt(wide * tall / len(points)) or beside
+    return max(min(beside, covered), 1e-6)

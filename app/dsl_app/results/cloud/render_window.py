@@ -123,14 +123,14 @@ class RenderWindow:
         self._show_box()
 
     def _choose(self) -> None:
-        surface = self.shows_surface
-        self.surface.turn_on(surface)
-        self.cloud.turn_on(not surface, self.look.size)
+        # Only then it is known whether there is one.
+        self.surface.turn_on(self.look.surface)
+        self.cloud.turn_on(not self.shows_surface, self.look.size)
 
     @property
     def shows_surface(self) -> bool:
         """Whether the surface is drawn, and not the points."""
-        return self.look.surface and self.surface.has_grid
+        return self.look.surface and self.surface.can_be_drawn
 
     @property
     def shown(self) -> int:

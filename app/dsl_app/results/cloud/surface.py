@@ -30,6 +30,8 @@ class SurfaceActor:
         self._levels: list[tuple[Any, Any, NDArray[np.intp]]] = []
         self._every = 1
         self._is_coarse, self._is_lit, self._is_on = False, True, True
+        #: Whether it was tried, and no points were neighbours: a single row, a pixel.
+        self._is_empty = False
 
     @property
     def shown(self) -> int:
@@ -37,9 +39,9 @@ class SurfaceActor:
         return len(self._levels[-1][2]) if self._levels else 0
 
     @property
-    def has_grid(self) -> bool:
-        """Whether it is known which points are neighbours."""
-        return self._grid is not None
+    def can_be_drawn(self) -> bool:
+        """Whether it is known which points are neighbours, and any are."""
+        return self._grid is not None and not self._is_empty
 
     def show(self, points: Points, colours: NDArray[np.uint8], grid: Grid | None) -> None:
         """Show a cloud; without a grid there is no surface."""
@@ -47,6 +49,7 @@ class SurfaceActor:
         self._points, self._grid, self._colours = points, grid, colours
         if is_new:
             self._drop(0)
+            self._is_empty = False
         elif self._is_on and self._levels:
             for _, mesh, vertices in self._levels:
                 mesh["colours"] = colours[vertices]
@@ -86,9 +89,10 @@ class SurfaceActor:
         return True
 
     def _begin(self) -> None:
-        if self._grid is not None and len(self._grid.flat):
+        if self._grid is not None and len(self._grid.flat) and not self._is_empty:
             rows, columns = self._grid.shape
             self._add(max(math.ceil(math.sqrt(rows * columns / COARSE)), 1))
+            self._is_empty = not self._levels
 
     def _drop(self, first: int) -> None:
         for actor, _, _ in self._levels[first:]:

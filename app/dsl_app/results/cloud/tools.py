@@ -80,7 +80,9 @@ class CloudTools(QWidget):
         menu.addAction(text).triggered.connect(do)
 
     def _switch(self, key: str, text: str, tip: str) -> QAction:
-        action = self.switches.addAction(text)
+        # One that the menu makes itself was once found deleted under its Python object.
+        action = QAction(text, self)
+        self.switches.addAction(action)
         action.setCheckable(True)
         action.setChecked(bool(getattr(self.look, key)))
         action.setToolTip(plain_tip(tip))

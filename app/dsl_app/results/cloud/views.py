@@ -44,6 +44,8 @@ BROKEN = (
 DRAWING = "Drawing the first 3D picture…"
 SLOW = "Without a graphics card this can take a minute. Everything else can be used meanwhile."
 SLOW_MS = 3000
+#: Said where no point is to be drawn.
+NO_POINTS = "No pixel with a depth is shown: the result has none, or none within the limits of depth."
 _BUTTONS: dict[Qt.MouseButton, MouseButton] = {
     Qt.MouseButton.LeftButton: "Left",
     Qt.MouseButton.MiddleButton: "Middle",
@@ -133,6 +135,7 @@ class InteractiveCloud(CloudView):
         self._seen: Rendering | None = None
         #: What is said instead of a picture, until there is one of the cloud.
         self.waiting = DRAWING
+        self._is_empty = False
         QTimer.singleShot(SLOW_MS, self, self.say_more)
         self.setAccessibleName("Point cloud")
         self.setAccessibleDescription("Arrow keys rotate, plus and minus zoom, Home resets the view")
@@ -148,8 +151,8 @@ class InteractiveCloud(CloudView):
         self, points: Points, colours: Colours, reset_view: bool = True, grid: Grid | None = None
     ) -> None:
         """Show points with their colours, as many as this computer draws in time."""
-        if not len(points):
-            self.waiting = ""
+        self._is_empty = not len(points)
+        self.update()
         self.renderer.show(points, colours, reset_view, grid)
 
     def take_look(self, look: Look) -> None:
@@ -229,14 +232,15 @@ class InteractiveCloud(CloudView):
         painter.fillRect(event.rect(), QColor(self._theme.surround))
         painter.drawImage(0, 0, self.image)
         # An empty view has no scale that a bar could tell.
-        if self._seen is not None and not self.waiting:
+        told = NO_POINTS if self._is_empty else self.waiting
+        if self._seen is not None and not told:
             theme = self._theme
             size, inks = (self.width(), self.height()), (theme.text, theme.accent, theme.surround)
             OverlayPainter(painter, *size, *inks).paint(self._seen, self._overlay)
-        if self.waiting:
+        if told:
             painter.setPen(QColor(self._theme.muted))
             centred = Qt.AlignmentFlag.AlignCenter | Qt.TextFlag.TextWordWrap
-            painter.drawText(self.rect().adjusted(20, 20, -20, -20), centred, self.waiting)
+            painter.drawText(self.rect().adjusted(20, 20, -20, -20), centred, told)
         painter.end()
 
     def resizeEvent(self, event: QResizeEvent) -> None:

@@ -134,10 +134,15 @@ class MarksController:
     # Change ----------------------------------------------------------------------------------------
 
     def remove(self, key: int) -> None:
-        """Remove a mark."""
+        """Remove a mark; if it was selected, the one in its place is, so that several can be removed."""
         mark = self._find(key)
-        if mark is not None:
-            self._change(f"removing {mark.name}", tuple(m for m in self.state.marks.value if m.key != key))
+        if mark is None:
+            return
+        place = self.state.marks.value.index(mark)
+        rest = tuple(m for m in self.state.marks.value if m is not mark)
+        self._change(f"removing {mark.name}", rest)
+        if self.state.selected.value == key:
+            self.state.selected.set(rest[min(place, len(rest) - 1)].key if rest else 0)
 
     def rename(self, key: int, name: str) -> None:
         """Rename a mark; an empty name is ignored."""

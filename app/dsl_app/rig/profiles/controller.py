@@ -30,13 +30,13 @@ class ProfileController:
         """Edit the profile of a file; None begins a new one."""
         self.state.findings.set(())
         self.state.trouble.set("")
-        self.state.draft.set(Draft())
-        if path is None:
-            return
-        try:
-            self.state.draft.set(draft_of(load_profile(path), path))
-        except DslError as error:
-            self.state.trouble.set(sentence_of(error))
+        self.state.opened = Draft()
+        if path is not None:
+            try:
+                self.state.opened = draft_of(load_profile(path), path)
+            except DslError as error:
+                self.state.trouble.set(sentence_of(error))
+        self.state.draft.set(self.state.opened)
 
     # Edit ------------------------------------------------------------------------------------------
 

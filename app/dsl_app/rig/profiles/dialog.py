@@ -9,7 +9,7 @@ from dsl_app.rig.profiles.device_form import DeviceForm
 from dsl_app.rig.profiles.draft import Draft
 from dsl_app.rig.profiles.state import ProfileState, profile_view
 from dsl_app.shared.evented import follow_any
-from dsl_app.shared.widgets.dialogs import command_window, dialog_buttons
+from dsl_app.shared.widgets.dialogs import command_window, confirm, dialog_buttons
 from dsl_app.shared.widgets.forms import label, named, push_button, set_role
 from dsl_app.shared.widgets.help_window import add_help_key
 from dsl_app.shared.widgets.inside import stop_following
@@ -123,6 +123,20 @@ class ProfileDialog(QDialog):
     def _save(self) -> None:
         if self._commands.save():
             self.accept()
+
+    def reject(self) -> None:
+        """Leave; what was not saved is dropped only if the person agrees."""
+        if not self._state.is_unsaved or self._may_drop():
+            super().reject()
+
+    def _may_drop(self) -> bool:
+        return confirm(
+            self,
+            "Unsaved rig profile",
+            "This rig profile is not saved. Close it and lose what was changed?",
+            go="Close unsaved",
+            stay="Keep editing",
+        )
 
     def done(self, result: int) -> None:
         """Disconnect from the state."""

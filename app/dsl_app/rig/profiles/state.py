@@ -24,6 +24,7 @@ class Found:
 class ProfileState:
     """Values that the controller sets and the dialog follows.
 
+    ``opened`` is the draft as it was read, before anything was changed.
     ``drivers`` are the names of drivers by kind, ``found`` the devices they see, None before anybody looked.
     ``findings`` is what trying
     the devices said, ``tried`` the draft that was tried. ``busy`` says what is being done (empty: nothing),
@@ -32,6 +33,7 @@ class ProfileState:
 
     def __init__(self) -> None:
         self.draft = Value(Draft())
+        self.opened = Draft()
         self.drivers: Value[Mapping[Kind, tuple[str, ...]]] = Value({})
         self.found: Value[tuple[Found, ...] | None] = Value(None)
         self.findings: Value[tuple[Finding, ...]] = Value(())
@@ -39,6 +41,11 @@ class ProfileState:
         self.busy = Value("")
         self.trouble = Value("")
         self.saved: Event[Path] = Event()
+
+    @property
+    def is_unsaved(self) -> bool:
+        """Whether leaving would lose what a person chose or typed."""
+        return self.draft.value != self.opened
 
 
 @dataclass(frozen=True)

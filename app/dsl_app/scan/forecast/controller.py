@@ -256,7 +256,7 @@ class ForecastController:
             return
 
         def work(progress: Progress) -> MeasuredScan:
-            progress.report("compare with the truth", 0, 0)
+            progress.report("compare", 0, 0)
             return measure(scan, result)
 
         def failed(error: Exception) -> None:

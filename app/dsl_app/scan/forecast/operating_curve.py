@@ -46,7 +46,7 @@ class OperatingCurve(QWidget):
             "Accuracy against time",
             "Expected error against capture time; lower left is better. Click a point, drag the marker"
             " along the curve, or press the arrow keys. The star is the published plan.",
-            "RMSE", "Capture time",
+            "RMSE", "Capture time", left_width=60,
         )  # fmt: skip
         self.plot.setMouseEnabled(False, False)
         self.plot.setFocusPolicy(Qt.FocusPolicy.StrongFocus)

@@ -32,6 +32,24 @@ class Canvas(pg.GraphicsLayoutWidget):  # type: ignore[misc]
         """What is dragged never entered: pyqtgraph leaves it to the window. Qt would warn of that."""
 
 
+class Picture(pg.ImageItem):  # type: ignore[misc]
+    """A picture that is gone from the screen once it is cleared.
+
+    pyqtgraph lets Qt paint the place of a cleared picture, which is empty by then. Its view may so keep what
+    it showed until something else is painted there.
+    """
+
+    def __init__(self) -> None:
+        super().__init__(axisOrder="row-major")
+
+    def clear(self) -> None:
+        """Show nothing."""
+        super().clear()
+        scene = self.scene()
+        for view in () if scene is None else scene.views():
+            view.viewport().update()
+
+
 class PictureView(Canvas):
     """A picture with square pixels, its first row at the top, on a background of the theme."""
 
@@ -40,7 +58,7 @@ class PictureView(Canvas):
         super().__init__(name, tip)
         self.box = box or pg.ViewBox(lockAspect=True, invertY=True, enableMenu=False)
         self.addItem(self.box, 0, 0)
-        self.image = pg.ImageItem(axisOrder="row-major")
+        self.image = Picture()
         self.box.addItem(self.image)
 
     def fit(self, padding: float = 0.01) -> None:

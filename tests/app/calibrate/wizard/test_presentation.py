@@ -11,15 +11,18 @@ from dsl_app.calibrate.wizard.presentation import (
     activity,
     buttons,
     fit_display,
+    leaving_text,
     main_button,
     page_before,
     page_lines,
     step_display,
+    stopped_text,
 )
 from dsl_app.calibrate.wizard.state import Doing, Fit, Look, WizardState
 from dsl_app.shared.jobs.base import JobProgress
 
 from dsl_core.campaign.common.recipe import Step
+from dsl_core.campaign.selftest.recipe import SelfTestRecipe
 from dsl_core.campaign.session import CalibrationSession, State, StepStatus
 from dsl_core.model.base import Record
 from dsl_core.model.calibration.accepted import AcceptedCalibration
@@ -401,3 +404,13 @@ def test_what_was_allowed_of_a_fit_is_not_allowed_of_the_next() -> None:
     state.fit.set(None)
     state.fit.set(fit(worse))
     assert not may_accept(state)
+
+
+def test_what_stays_of_a_stopped_capture_is_said_as_it_is() -> None:
+    state = WizardState("geometry", "Geometry")
+    texts = leaving_text(state), stopped_text(state)
+    assert all("Frames captured so far are kept" in text for text in texts)
+    # A self-test is measured in one go.
+    state.keeps_frames = False
+    assert not any("are kept" in text for text in (leaving_text(state), stopped_text(state)))
+    assert SelfTestRecipe.keeps_frames is False

@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from dsl_app.results.cloud.points import COARSE, SLOW_S, PointsActor
+from dsl_app.results.cloud.points import COARSE, SLOW_S, PointsActor, spacing
 
 
 class Actor:
@@ -105,3 +105,17 @@ def test_another_cloud_takes_the_place_of_the_old_one() -> None:
     cloud.grow(0.001)
     assert cloud.show(points[:50], colours[:50])
     assert plotter.drawn == 50
+
+
+def test_a_cloud_without_points_can_be_coloured_again() -> None:
+    cloud, plotter, points, colours = make(3)
+    cloud.show(points[:0], colours[:0])
+    assert cloud._points is not None
+    assert cloud.show(cloud._points, colours[:0]) is False
+    assert cloud.shown == 0
+    assert plotter.drawn == 1, "one that is far away"
+
+
+def test_points_of_a_single_row_are_as_far_apart_as_they_are() -> None:
+    row = np.array([[x_mm, 0.0, 700.0] for x_mm in range(0, 60, 3)], np.float32)
+    assert spacing(row) == pytest.approx(3.0)

@@ -119,3 +119,16 @@ def test_a_surface_grows_while_its_pictures_stay_quick(
     assert not window.grow(0.001)
     window.take_look(Look(surface=False))
     assert window.shown == SHAPE[0] * SHAPE[1]
+
+
+@pytest.mark.parametrize("is_surface_first", [True, False])
+def test_points_without_neighbours_are_drawn_as_points(window: RenderWindow, is_surface_first: bool) -> None:
+    x_mm = np.linspace(-30, 30, 20)
+    row = np.stack([x_mm, np.zeros(20), np.full(20, 700.0)], axis=1).astype(np.float32)
+    if not is_surface_first:
+        window.take_look(Look(surface=False))
+    _show(window, (row, Grid((1, 20), np.arange(20))))
+    window.take_look(Look())
+    assert not window.shows_surface
+    assert window.shown == 20
+    assert (window.draw().pixels[..., 0] > 100).sum() >= 20

@@ -110,6 +110,10 @@ def test_no_scale_is_told_before_there_is_a_picture_of_the_cloud(
     view.waiting = ""
     view.grab()
     assert painted == [view._seen]
+    painted.clear()
+    view.show_cloud(np.empty((0, 3), np.float32), np.empty((0, 3), np.uint8))
+    view.grab()
+    assert painted == [], "without points there is a sentence instead of a scale"
 
 
 def test_pictures_follow_the_size_of_the_window(bench: Bench, qtbot: QtBot) -> None:

@@ -30,6 +30,20 @@ def test_pins_and_regions_are_made_undone_and_done_again(bench: Bench) -> None:
     assert bench.state.marks.value[1] is region
 
 
+def test_marks_are_removed_one_after_the_other_without_choosing_each(bench: Bench) -> None:
+    marks, state = bench.control.marks, bench.state
+    for column in (3, 6, 9):
+        marks.pin((column, 3))
+    first, second, third = (mark.key for mark in state.marks.value)
+    state.selected.set(second)
+    marks.remove(first)
+    assert state.selected.value == second
+    marks.remove(second)
+    assert state.selected.value == third
+    marks.remove(third)
+    assert (bench.names, state.selected.value) == ([], 0)
+
+
 def test_what_has_no_spectrum_is_not_marked(bench: Bench) -> None:
     bench.control.marks.pin(DARK)
     assert "no spectrum" in bench.told

@@ -12,9 +12,9 @@ from dsl_app.rig.profiles.controller import ProfileController
 from dsl_app.rig.profiles.device_form import caption
 from dsl_app.rig.profiles.dialog import ProfileDialog
 from dsl_app.rig.profiles.state import Found, ProfileState, profile_view
-from PySide6.QtCore import Qt
+from PySide6.QtCore import Qt, QTimer
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QPushButton, QWidget
+from PySide6.QtWidgets import QApplication, QMessageBox, QPushButton, QWidget
 from pytestqt.qtbot import QtBot
 
 from dsl_core.devices import doctor
@@ -138,6 +138,30 @@ def test_a_profile_that_cannot_be_read_is_said(bench: Bench, tmp_path: Path) -> 
     (tmp_path / "broken.json").write_text("{")
     bench.control.open(tmp_path / "broken.json")
     assert "not JSON" in bench.dialog.trouble.text()
+
+
+@pytest.mark.parametrize("drops", [False, True])
+def test_escape_asks_before_it_drops_what_was_typed(bench: Bench, qtbot: QtBot, drops: bool) -> None:
+    dialog, asked = bench.dialog, []
+
+    def answer() -> None:
+        box = QApplication.activeModalWidget()
+        assert isinstance(box, QMessageBox)
+        asked.append(box.text())
+        name = "Close unsaved" if drops else "Keep editing"
+        QTest.mouseClick(next(each for each in box.buttons() if each.text() == name), LEFT)
+
+    QTest.keyClicks(dialog.name, "x")
+    QTimer.singleShot(0, answer)
+    QTest.keyClick(dialog.name, Qt.Key.Key_Escape)
+    assert len(asked) == 1
+    assert dialog.isVisible() is not drops
+    if not drops:
+        # As it was opened, there is nothing to lose.
+        dialog.name.clear()
+        bench.control.change(name="")
+        QTest.keyClick(dialog.name, Qt.Key.Key_Escape)
+        assert not dialog.isVisible()
 
 
 def test_captions_have_the_unit() -> None:

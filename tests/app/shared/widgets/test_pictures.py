@@ -2,9 +2,10 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
 import pytest
 from dsl_app.shared.widgets.forms import ChoiceBox, NumberBox, WholeBox
-from dsl_app.shared.widgets.pictures import Canvas, arrow_step, moved_within
+from dsl_app.shared.widgets.pictures import Canvas, PictureView, arrow_step, moved_within
 from dsl_app.shared.widgets.plots import CalmPlot
 from PySide6.QtCore import QEvent, QPoint, QPointF, Qt
 from PySide6.QtGui import QDragLeaveEvent, QKeyEvent, QWheelEvent
@@ -63,3 +64,12 @@ def test_what_is_dragged_over_a_plot_leaves_no_warning(qtbot: QtBot, qtlog: Any)
         qtbot.addWidget(made)
         QApplication.sendEvent(made.viewport(), QDragLeaveEvent())
     assert [each.message for each in qtlog.records] == []
+
+
+def test_a_cleared_picture_is_gone_from_the_screen(qtbot: QtBot, monkeypatch: pytest.MonkeyPatch) -> None:
+    view, painted = PictureView("Picture"), list[str]()
+    qtbot.addWidget(view)
+    view.image.setImage(np.full((20, 30, 3), 200, np.uint8), autoLevels=False, levels=None)
+    monkeypatch.setattr(view.viewport(), "update", lambda: painted.append("all of it"))
+    view.image.clear()
+    assert painted == ["all of it"]
