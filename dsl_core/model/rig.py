@@ -188,6 +188,12 @@ class ProjectorResponse(Record):
         """The same with a measured curve of the line spread."""
         return self.model_copy(update={"blur_px": spread.rms_px, "spread": spread})
 
+    def of_width(self, blur_px: float) -> Self:
+        """The same with its curve, or the Gaussian, stretched to this rms width."""
+        if self.spread is None:
+            return self.with_gaussian(blur_px)
+        return self.with_spread(self.spread.stretched(blur_px / self.spread.rms_px))
+
     def blurred(self, blur_px: float) -> Self:
         """The same after a further Gaussian blur."""
         if self.spread is not None:

@@ -73,7 +73,7 @@ def fit_zero_order(
     reach_px: float,
     progress: Progress | None = None,
 ) -> ZeroOrderFit:
-    """Fit blur and halo with the columns of some pixels.
+    """Fit blur and halo with the columns of some pixels; a measured spread keeps its shape.
 
     ``coarse_px`` (P,) are decoded columns; ``radiance`` and ``std`` (frames, P) are DN per ms, the deviation
     infinite where saturated. Lines up to ``reach_px`` from a column show no first order. Raises
@@ -113,7 +113,7 @@ def fit_zero_order(
     scale = np.sqrt(max(float(np.median(chi[use])), 1.0))
     blur, peak, decay = float(common[0]), float(common[1]), float(np.exp(common[2]))
     spread = np.sqrt(np.diag(covariance)) * scale * (1.0, 1.0, decay)
-    response = start.with_gaussian(blur).model_copy(update={"halo_peak_per_px": peak, "halo_decay_px": decay})
+    response = start.of_width(blur).model_copy(update={"halo_peak_per_px": peak, "halo_decay_px": decay})
     return ZeroOrderFit(
         column, amplitude, use, response, (spread[0], spread[1], spread[2]), float(np.mean(chi[use]))
     )
@@ -170,7 +170,7 @@ def _window(
 
 
 def _profile(data: _Data, column: Floats, start: ProjectorResponse, common: Floats) -> Floats:
-    response = start.with_gaussian(float(common[0])).model_copy(
+    response = start.of_width(float(common[0])).model_copy(
         update={"halo_peak_per_px": float(common[1]), "halo_decay_px": float(np.exp(common[2]))}
     )
     distance = torch.as_tensor(column - data.centres)

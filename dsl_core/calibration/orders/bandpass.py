@@ -134,6 +134,8 @@ def fit_bandpass(
         halo_peak_std_per_px=profile.std[1],
         halo_decay_px=profile.response.halo_decay_px,
         halo_decay_std_px=profile.std[2],
+        spread=profile.response.spread,
+        field=profile.response.field,
         warnings=tuple(warnings),
     )
 

@@ -175,8 +175,8 @@ class BandpassRecipe(Recipe[BandpassCalibration]):
     def _plane(self, bench: Bench, step: Step, progress: Progress) -> tuple[LineScan, ZeroOrderFit]:
         source = bench.scan_of(step)
         with naming(step):
-            scan = diffuser_lines(source, bench.rig, progress, self.pixels)
-            return scan, plane_profile(bench.rig, scan, progress)
+            shown, scan = diffuser_lines(source, bench.rig, progress, self.pixels)
+            return scan, plane_profile(shown, scan, progress)
 
     def _filter(self, bench: Bench, rig: Rig, step: Step, scan: LineScan) -> SeenFilter:
         note, source = bench.kept(step, CURVE_NAME, FilterNote), bench.scan_of(step)

@@ -140,16 +140,16 @@ def scanned_geometry(
 
 def diffuser_lines(
     source: FrameSource, rig: Rig, progress: Progress | None = None, pixels: int = PIXELS
-) -> LineScan:
-    """Reconstruct a scan with code and lines of a flat target, and choose pixels evenly.
+) -> tuple[Rig, LineScan]:
+    """Reconstruct a scan with code and lines of a flat target: the rig as it shows it, and pixels of it.
 
-    Depth and shading are those of the plane through them. Raises `CalibrationError` when the scan has no
-    scan lines or the target is not flat, and what a reconstruction raises.
+    Pixels are chosen evenly. Depth and shading are those of the plane through them. Raises `CalibrationError`
+    when the scan has no scan lines or the target is not flat, and what a reconstruction raises.
     """
     from dsl_core.reconstruction.scan_result import known_pixels
 
     lines = scan_lines_of(source)
-    _, stack, geometry = scanned_geometry(source, rig, progress)
+    rig, stack, geometry = scanned_geometry(source, rig, progress)
     known = known_pixels(geometry)
     # One plane for all pixels: its shading has none of the noise of normals of single pixels.
     flat = fit_plane(rig, geometry.depth_mm, known.valid)
@@ -163,7 +163,7 @@ def diffuser_lines(
     valid = np.flatnonzero(flat.on_plane)
     # At random, since any regular step would meet the colours of the mosaic unevenly.
     chosen = np.sort(np.random.default_rng(0).permutation(valid)[:pixels])
-    return LineScan(
+    return rig, LineScan(
         lines=lines,
         pixels=chosen.astype(np.int64),
         depth_mm=depth_mm.ravel()[chosen],

@@ -295,7 +295,7 @@ class DepthStageRecipe(Recipe[DepthStageCalibration]):
         scans = []
         for step in plain:
             with naming(step):
-                scans.append(diffuser_lines(bench.scan_of(step), rig, progress))
+                scans.append(diffuser_lines(bench.scan_of(step), rig, progress)[1])
         progress.report("chain", 0, 1)
         return chain_correction(rig, scans, reflectance=self.reflectance)
 

@@ -5,6 +5,8 @@ from __future__ import annotations
 from pydantic import Field
 
 from dsl_core.model.base import Record
+from dsl_core.model.projector.line_spread import LineSpread
+from dsl_core.model.projector.spread_field import SpreadField
 from dsl_core.model.rig import Rgb, Rig
 from dsl_core.model.spectral import SpectralCurve
 
@@ -39,7 +41,9 @@ class BandpassCalibration(Record):
     """Efficiency by order relative to the zero order, response, white scale, blur and halo, with deviations.
 
     The response keeps the scale that green had before; ``white_scale`` belongs to it. ``misfit`` is the
-    factor by which the scatter of the efficiency exceeds its stated deviations, by order.
+    factor by which the scatter of the efficiency exceeds its stated deviations, by order. Where the lines
+    call for another curve than a Gaussian, ``spread`` is that curve, of the rms width ``blur_px``, and where
+    its width varies over the projector's frame, ``field`` says how.
     """
 
     filters: tuple[FilterSample, ...]
@@ -56,13 +60,21 @@ class BandpassCalibration(Record):
     halo_peak_std_per_px: float = Field(ge=0)
     halo_decay_px: float = Field(gt=0)
     halo_decay_std_px: float = Field(ge=0)
+    spread: LineSpread | None = None
+    field: SpreadField | None = None
     warnings: tuple[str, ...] = ()
 
 
 def apply_bandpass(record: BandpassCalibration, rig: Rig) -> Rig:
     """The rig with efficiencies, response, white scale, blur and halo as measured."""
-    response = rig.projector_response.with_gaussian(record.blur_px).model_copy(
-        update={"halo_peak_per_px": record.halo_peak_per_px, "halo_decay_px": record.halo_decay_px}
+    response = rig.projector_response.model_copy(
+        update={
+            "blur_px": record.blur_px,
+            "spread": record.spread,
+            "field": record.field,
+            "halo_peak_per_px": record.halo_peak_per_px,
+            "halo_decay_px": record.halo_decay_px,
+        }
     )
     return rig.model_copy(
         update={

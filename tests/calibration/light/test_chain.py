@@ -46,7 +46,7 @@ def scanned() -> tuple[Rig, MemoryScan]:
 
 @pytest.fixture(scope="module")
 def lines(scanned: tuple[Rig, MemoryScan]) -> LineScan:
-    return diffuser_lines(scanned[1], scanned[0], pixels=2500)
+    return diffuser_lines(scanned[1], scanned[0], pixels=2500)[1]
 
 
 def test_filters_that_are_all_off_alike_are_measured_by_the_leds(
