@@ -60,7 +60,8 @@ class GeometrySteps:
         )
         self._decoded = code, white
         self.findings += found
-        unsure = float(np.hypot(self.rig.white_scale_rel_std, unsure_level(self._frames.plan, found)))
+        level = unsure_level(self._frames.plan, self.rig.projector_response, found)
+        unsure = float(np.hypot(self.rig.white_scale_rel_std, level))
         self.rig = self.rig.model_copy(update={"white_scale_rel_std": unsure})
 
     def measure(self) -> Geometry:

@@ -175,8 +175,14 @@ class BandpassRecipe(Recipe[BandpassCalibration]):
     def _plane(self, bench: Bench, step: Step, progress: Progress) -> tuple[LineScan, ZeroOrderFit]:
         source = bench.scan_of(step)
         with naming(step):
-            shown, scan = diffuser_lines(source, bench.rig, progress, self.pixels)
-            return scan, plane_profile(shown, scan, progress)
+            scan = diffuser_lines(source, bench.rig, progress, self.pixels)[1]
+            profile = plane_profile(bench.rig, scan, progress)
+            # Until the halo is known, the curve of the spread would hold it.
+            rig = bench.rig.model_copy(update={"projector_response": profile.response})
+            shown, scan = diffuser_lines(source, rig, progress, self.pixels)
+            if shown.projector_response != profile.response:
+                profile = plane_profile(shown, scan, progress)
+            return scan, profile
 
     def _filter(self, bench: Bench, rig: Rig, step: Step, scan: LineScan) -> SeenFilter:
         note, source = bench.kept(step, CURVE_NAME, FilterNote), bench.scan_of(step)

@@ -61,6 +61,22 @@ class Peaks:
 
 
 @dataclass(frozen=True)
+class Fixed:
+    """Light farther out than lines tell: Gaussians ``STEP_PX`` wide at ``centres_px``, with ``shares``."""
+
+    centres_px: Floats
+    shares: Floats
+
+    def light(self, width_px: int, distance_px: Tensor, width: Tensor | None) -> Tensor:
+        """What it adds to a line of ``width_px`` at distances (window, P); ``width`` as in `View`."""
+        near = np.abs(self.centres_px) < float(distance_px.abs().max()) + width_px / 2 + 1
+        if not near.any():
+            return torch.zeros_like(distance_px)
+        shares = torch.as_tensor(self.shares[near]).to(distance_px)
+        return _shapes(width_px, distance_px, self.centres_px[near], width) @ shares
+
+
+@dataclass(frozen=True)
 class Normal:
     """Weighted squares of some pixels as a function of the shares: ``w N w - 2 b w + c``."""
 
@@ -89,6 +105,7 @@ class View:
     """What pixels see, and the columns and amplitudes found so far.
 
     ``width`` (P,) is how much wider than the common one the spread is at each pixel; None where it is not.
+    ``fixed`` is light of the spread that is known and not asked for.
     """
 
     peaks: Peaks
@@ -96,6 +113,7 @@ class View:
     column: Tensor
     amplitude: Tensor
     width: Tensor | None = None
+    fixed: Fixed | None = None
 
     def equations(
         self, response: ProjectorResponse, centres_px: Floats, *, waves: bool
@@ -130,6 +148,7 @@ class View:
                 centres_px,
                 std_px,
                 None if self.width is None else self.width[part],
+                self.fixed,
             )
             for part in parts
         ]
@@ -166,6 +185,7 @@ def _normal(
     centres_px: Floats,
     column_std_px: float,
     width: Tensor | None,
+    fixed: Fixed | None = None,
 ) -> Normal:
     """Normal equations of the shares: each pixel has an amplitude, and a column known to a deviation."""
     distance = column - peaks.centres
@@ -173,6 +193,8 @@ def _normal(
     table = LineTable(peaks.width_px, response, float(distance.abs().max()) + 1, column, width)
     g, slope = table.at(distance)
     halo = halo_integral(distance + half, response) - halo_integral(distance - half, response)
+    if fixed is not None:
+        halo = halo + fixed.light(peaks.width_px, distance, width)
     root = (peaks.variance + (MODEL_ERROR * amplitude) ** 2).rsqrt()
     shapes = _shapes(peaks.width_px, distance, centres_px, width)
     rows = shapes * (root * amplitude)[..., None]

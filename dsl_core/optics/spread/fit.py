@@ -26,10 +26,10 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize, nnls
 from torch import Tensor
 
-from dsl_core.model.projector.line_spread import LineSpread
+from dsl_core.model.projector.line_spread import REACH, LineSpread
 from dsl_core.model.rig import ProjectorResponse
 from dsl_core.optics.spread.curves import gaussian
-from dsl_core.optics.spread.equations import MAX_CHI_SQUARE, STEP_PX, Normal, Peaks, View, settle
+from dsl_core.optics.spread.equations import MAX_CHI_SQUARE, STEP_PX, Fixed, Normal, Peaks, View, settle
 from dsl_core.optics.spread.field import FieldFamily, FieldFit
 
 Floats = NDArray[np.float64]
@@ -96,7 +96,7 @@ def fit_spread(
     places (column and row on the projector, px, (2, P)) are given, the width may vary over them.
     """
     family = _Family(start)
-    view = View(peaks, column_px, column_px.clone(), peaks.y.amax(0))
+    view = View(peaks, column_px, column_px.clone(), peaks.y.amax(0), fixed=family.fixed)
     if place_px is None:
         return _fit_curve(view, family)
     fields = FieldFamily(place_px)
@@ -238,43 +238,60 @@ def _is_astray(shape: SpreadFit, first: SpreadFit, simple: SpreadFit) -> bool:
 
 
 class _Family:
-    """The known curve, as shares of Gaussians on an even grid, and the same curve stretched."""
+    """The known curve, as shares of Gaussians on an even grid, and the same curve stretched.
+
+    What of a measured curve lies farther out than ``centres_px`` is ``fixed``: the lines next to a pixel tell
+    little of it, and it is neither stretched nor reshaped.
+    """
 
     def __init__(self, start: ProjectorResponse) -> None:
         self.start, self._known = start, start.line_spread
-        # On the grid of a measured curve that curve is exact.
-        first = self._known.first_px if isinstance(self._known, LineSpread) else 0.0
-        count = math.ceil(REACH_PX / STEP_PX)
-        steps = round(-first / STEP_PX) + np.arange(-count, count + 1, dtype=np.float64)
-        self.centres_px = first + STEP_PX * steps
+        first, reach = 0.0, REACH_PX
+        if isinstance(self._known, LineSpread):
+            first = self._known.first_px
+            margin_px = REACH * max(self._known.core_px - STEP_PX, 0.0)
+            reach = max(reach, float(np.abs(self._known.centres_px).max()) + margin_px + STEP_PX)
+        count, middle = math.ceil(REACH_PX / STEP_PX), round(-first / STEP_PX)
+        self.centres_px = first + STEP_PX * (middle + np.arange(-count, count + 1, dtype=np.float64))
+        self.fixed: Fixed | None = None
+        self._shares = np.zeros(0)
+        if not isinstance(self._known, LineSpread):
+            return
+        most = max(math.ceil(reach / STEP_PX), count)
+        grid = first + STEP_PX * (middle + np.arange(-most, most + 1, dtype=np.float64))
+        shares = _on_grid(self._known, grid)
+        self._near = slice(most - count, most + count + 1)
+        self._shares = shares[self._near].copy()
+        shares[self._near] = 0.0
+        if shares.any():
+            self.fixed = Fixed(grid, shares)
 
     def stretched(self, factor: float) -> Floats:
-        """Shares of the curve with all distances times a factor."""
+        """Shares of the curve with all distances times a factor; all light but the fixed."""
         if isinstance(self._known, LineSpread):
-            return self._split(self._known.centres_px * factor, np.array(self._known.shares))
+            return _split(self.centres_px * factor, self._shares, self.centres_px)
         width = math.sqrt(max((factor * self._known) ** 2 - STEP_PX**2, (STEP_PX / 2) ** 2))
         shares = gaussian(self.centres_px, width)
         return np.asarray(shares / shares.sum())
 
+    def spread(self, shares: Floats) -> LineSpread:
+        """The curve of some shares, with the fixed light."""
+        if self.fixed is not None:
+            whole = self.fixed.shares.copy()
+            whole[self._near] = shares
+            shares = whole
+        return LineSpread.of(shares, STEP_PX)
+
     def response(self, factor: float) -> ProjectorResponse:
         """What the curve stretched is as a response."""
         if isinstance(self._known, LineSpread):
-            return self.start.with_spread(LineSpread.of(self.stretched(factor), STEP_PX))
+            return self.start.with_spread(self.spread(self.stretched(factor)))
         return self.start.with_gaussian(self._known * factor)
 
     def skirted(self, factor: float, share: float, skirt: float) -> ProjectorResponse:
         """The curve stretched by a factor, with a share of its light under the curve stretched by another."""
         shares = (1 - share) * self.stretched(factor) + share * self.stretched(skirt)
-        return self.start.with_spread(LineSpread.of(shares, STEP_PX))
-
-    def _split(self, at_px: Floats, light: Floats) -> Floats:
-        """Light at places between centres, shared by the two neighbours of each."""
-        position = ((at_px - self.centres_px[0]) / STEP_PX).clip(0, len(self.centres_px) - 1)
-        whole = np.minimum(np.floor(position + 1e-9).astype(int), len(self.centres_px) - 2)
-        shares = np.zeros(len(self.centres_px))
-        np.add.at(shares, whole, light * (1 - (position - whole)))
-        np.add.at(shares, whole + 1, light * (position - whole))
-        return shares
+        return self.start.with_spread(self.spread(shares))
 
     def best(self, normal: Normal) -> float:
         """The factor that explains some pixels best."""
@@ -287,9 +304,41 @@ class _Family:
         return float(factors[len(factors) // 2])
 
     def std(self, normal: Normal, factor: float, chi_square: float) -> float:
-        """Relative deviation of a factor where chi-squares have this size, by how fast they grow off it."""
+        """Relative deviation of a factor where chi-squares have this size, by how fast they grow off it.
+
+        At most one: of a factor at whose sides they do not grow nothing is known.
+        """
         low, middle, high = (normal.cost(self.stretched(factor * by)) for by in (0.98, 1.0, 1.02))
-        return math.sqrt(2 * chi_square / max((low + high - 2 * middle) / 0.02**2, 1e-30))
+        return min(math.sqrt(2 * chi_square / max((low + high - 2 * middle) / 0.02**2, 1e-30)), 1.0)
+
+    @staticmethod
+    def is_at_end(factor: float) -> bool:
+        """Whether a factor is the smallest or largest that is tried.
+
+        Then something else asks for it, such as a camera whose values are not proportional to the light.
+        """
+        low, high = STRETCHES[0] * STRETCHES[1], STRETCHES[-1] * STRETCHES[-2]
+        return not low < factor**2 < high
+
+
+def _on_grid(known: LineSpread, grid_px: Floats) -> Floats:
+    """Shares of Gaussians ``STEP_PX`` wide at even places (px) that make a curve of whatever Gaussians."""
+    shares = np.array(known.shares)
+    if known.core_px**2 - STEP_PX**2 < (STEP_PX / 2) ** 2:
+        return _split(known.centres_px, shares, grid_px)
+    width_px = math.sqrt(known.core_px**2 - STEP_PX**2)
+    each = gaussian(grid_px[:, None] - known.centres_px, width_px)
+    return np.asarray(each / each.sum(0) @ shares)
+
+
+def _split(at_px: Floats, light: Floats, centres_px: Floats) -> Floats:
+    """Light at places (px) between even centres, shared by the two neighbours of each."""
+    position = ((at_px - centres_px[0]) / STEP_PX).clip(0, len(centres_px) - 1)
+    whole = np.minimum(np.floor(position + 1e-9).astype(int), len(centres_px) - 2)
+    shares = np.zeros(len(centres_px))
+    np.add.at(shares, whole, light * (1 - (position - whole)))
+    np.add.at(shares, whole + 1, light * (position - whole))
+    return shares
 
 
 def _choose(halves: list[Normal], family: _Family, *, shapes: bool) -> SpreadFit:
@@ -309,12 +358,12 @@ def _choose(halves: list[Normal], family: _Family, *, shapes: bool) -> SpreadFit
     scale = min(known, stretched, *pulled.values()) / whole.count
     factor = family.best(whole)
     response, after = family.start, known
-    if known - stretched > scale * CLEARLY:
+    if known - stretched > scale * CLEARLY and not family.is_at_end(factor):
         response, after = family.response(factor), stretched
     if pulled and after - min(pulled.values()) > scale * (CLEARLY + CLEAR_SHARE * whole.count):
         pull = min(pulled, key=lambda each: pulled[each])
         shares = _any(whole, family.stretched(factor), pull)
-        response, after = family.start.with_spread(LineSpread.of(shares, STEP_PX)), pulled[pull]
+        response, after = family.start.with_spread(family.spread(shares)), pulled[pull]
     return SpreadFit(
         response,
         response is not family.start,

@@ -13,7 +13,9 @@ from dsl_core.model.rig import ProjectorResponse, Rig
 from dsl_core.optics.lines.line_set import LineSet
 from dsl_core.optics.lines.profile import LineTable
 from dsl_core.optics.spread.field import widths_at
+from dsl_core.optics.unlit import unlit_px
 from dsl_core.patterns.gray_code import DecodedCode
+from dsl_core.reconstruction.columns.dark_offset import dark_offset
 from dsl_core.reconstruction.columns.line_spread import Pickable, spread_pixels
 from dsl_core.reconstruction.hdr import MergedFrame
 
@@ -23,7 +25,8 @@ class LinePeaks:
     """Decoded columns of some pixels, ``coarse_px`` (pixels,) float, and what lines brought to them.
 
     ``radiance`` and ``std`` (frames, pixels) are in DN per ms, infinite where saturated; ``widths`` (pixels,)
-    are those of the line spread relative to the response's, None where they are the same.
+    are those of the line spread relative to the response's, None where they are the same. ``offset``
+    (pixels,) is light that all line frames have alike, None where there is none.
     """
 
     coarse_px: Tensor
@@ -32,6 +35,7 @@ class LinePeaks:
     lines: LineSet
     response: ProjectorResponse
     widths: Tensor | None = None
+    offset: Tensor | None = None
 
     def some(self, pixels: Tensor) -> LinePeaks:
         """Those of some pixels, by their indices."""
@@ -41,7 +45,21 @@ class LinePeaks:
             radiance=self.radiance[:, pixels],
             std=self.std[:, pixels],
             widths=None if self.widths is None else self.widths[pixels],
+            offset=None if self.offset is None else self.offset[pixels],
         )
+
+    def without_offset(self, unlit_px: tuple[float, float]) -> LinePeaks:
+        """The same light without what frames have in which no order lights a pixel (see `dark_offset`).
+
+        Light that lenses scatter, or a black frame's own noise, would pass for tails of the lines. Where a
+        frame of the peak is saturated nobody knows yet how bright its halo is, and nothing is taken off.
+        """
+        y, variance, _ = self.window()
+        offset, std = dark_offset(
+            self.coarse_px, y.amax(0), self.radiance, self.std, self.lines, self.response, unlit_px
+        )
+        known = torch.isfinite(std) & torch.isfinite(variance).all(0)
+        return replace(self, offset=torch.where(known, offset, 0.0))
 
     def wider(self, by: float) -> LinePeaks:
         """The same light, for a line spread so many times as wide."""
@@ -62,6 +80,8 @@ class LinePeaks:
         variance = torch.gather(self.std, 0, frame).to(y.dtype) ** 2
         usable = self.lines.exists(line) & torch.isfinite(variance) & torch.isfinite(y)
         variance = torch.where(usable, variance, torch.inf)
+        if self.offset is not None:
+            y = y - self.offset
         return torch.where(usable, y, 0.0), variance, self.lines.centre_px(line).to(self.coarse_px.dtype)
 
     def _relative_widths(self) -> Tensor:
@@ -79,4 +99,5 @@ def smooth_peaks(
     column = torch.as_tensor(code.likely_column.ravel()[pixels].astype(np.float64))
     y, std = (torch.as_tensor(values.astype(np.float64)) for values in (seen.radiance, seen.std))
     widths = widths_at(rig, torch.as_tensor(pixels), column)
-    return LinePeaks(column, y, std, lines, rig.projector_response, widths)
+    peaks = LinePeaks(column, y, std, lines, rig.projector_response, widths)
+    return peaks.without_offset(unlit_px(rig, lines.width_px))

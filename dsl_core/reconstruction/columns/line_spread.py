@@ -22,7 +22,9 @@ from dsl_core.optics.spread.equations import Peaks, settle
 from dsl_core.optics.spread.field import places_of, relative_width
 from dsl_core.optics.spread.fit import REACH_PX, SpreadFit, fit_spread
 from dsl_core.optics.spread.wave import column_wave
+from dsl_core.optics.unlit import unlit_px
 from dsl_core.patterns.gray_code import DecodedCode
+from dsl_core.reconstruction.columns.dark_offset import dark_offset
 from dsl_core.reconstruction.hdr import MergedFrame
 from dsl_core.reconstruction.merge import PickedLines
 from dsl_core.solve.threads import one_kernel_thread
@@ -54,7 +56,8 @@ def own_spread(
     column = torch.as_tensor(code.likely_column.ravel()[pixels].astype(np.float64))
     with one_kernel_thread():
         place = places_of(rig, torch.as_tensor(pixels), column)
-        return scene_spread(_peaks(stack.pick(pixels), lines, column), column, rig.projector_response, place)
+        peaks = _peaks(stack.pick(pixels), lines, column, rig)
+        return scene_spread(peaks, column, rig.projector_response, place)
 
 
 def scene_spread(
@@ -127,8 +130,8 @@ def spread_pixels(lines: LineSet | None, code: DecodedCode, white: MergedFrame) 
     return np.asarray((first[:, None] + np.arange(RUN)).ravel())
 
 
-def _peaks(seen: PickedLines, lines: LineSet, column: torch.Tensor) -> Peaks:
-    """The lines around the columns of some pixels."""
+def _peaks(seen: PickedLines, lines: LineSet, column: torch.Tensor, rig: Rig) -> Peaks:
+    """The lines around the columns of some pixels, without what all of a pixel's lines have alike."""
     half = int((lines.width_px / 2 + REACH_PX) / lines.step_px)
     line = lines.nearest(column) + torch.arange(-half, half + 1)[:, None]
     frame = lines.frame(line).numpy()
@@ -137,6 +140,13 @@ def _peaks(seen: PickedLines, lines: LineSet, column: torch.Tensor) -> Peaks:
         for frames in (seen.radiance, seen.std)
     )
     used = lines.exists(line) & torch.isfinite(y) & torch.isfinite(std)
+    all_y, all_std = (torch.as_tensor(frames) for frames in (seen.radiance, seen.std))
+    amplitude = torch.where(used, y, 0.0).amax(0).to(all_y)
+    unlit = unlit_px(rig, lines.width_px)
+    offset, std_of = dark_offset(
+        column.to(all_y), amplitude, all_y, all_std, lines, rig.projector_response, unlit
+    )
+    y = y - torch.where(torch.isfinite(std_of) & used.all(0), offset, 0.0)
     return Peaks(
         torch.where(used, y, 0.0),
         torch.where(used, std**2, torch.inf),

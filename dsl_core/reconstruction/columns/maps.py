@@ -16,7 +16,8 @@ from dsl_core.optics.lines.line_set import LineSet
 from dsl_core.optics.spread.field import widths_at
 from dsl_core.optics.unlit import unlit_px
 from dsl_core.progress import NoProgress, Progress
-from dsl_core.reconstruction.columns.column import MODEL_ERROR, Column, dark_offset, refine
+from dsl_core.reconstruction.columns.column import MODEL_ERROR, Column, refine
+from dsl_core.reconstruction.columns.dark_offset import dark_offset
 from dsl_core.reconstruction.columns.line_peaks import LinePeaks
 from dsl_core.reconstruction.columns.pattern_column import first_order_share, refine_by_profiles
 from dsl_core.reconstruction.hdr import MergedFrame
@@ -165,6 +166,7 @@ def _on_lines(
     peak_error: float,
 ) -> tuple[Column, Tensor, Tensor]:
     response = rig.projector_response
-    column = refine(LinePeaks(start, y, std, lines, response, widths), peak_error)
     unlit = unlit_px(rig, lines.width_px)
+    peaks = LinePeaks(start, y, std, lines, response, widths).without_offset(unlit)
+    column = refine(peaks, peak_error)
     return column, *dark_offset(column.column_px, column.amplitude, y, std, lines, response, unlit)

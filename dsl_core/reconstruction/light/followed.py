@@ -12,11 +12,11 @@ from numpy.typing import NDArray
 from dsl_core.model.fit import FitFinding
 from dsl_core.model.frames import FrameSource
 from dsl_core.model.plan import CapturePlan, Role, Shot, spoken_number
-from dsl_core.model.rig import Rig
+from dsl_core.model.rig import ProjectorResponse, Rig
 from dsl_core.optics.sensor import raw_variance
 from dsl_core.patterns.gray_code import DecodedCode
 from dsl_core.progress import Progress
-from dsl_core.reconstruction.hdr import MergedFrame
+from dsl_core.reconstruction.hdr import MergedFrame, setting_gains_ms
 from dsl_core.reconstruction.light.course import (
     LEAST_DRIFT,
     LEAST_FLICKER,
@@ -42,6 +42,10 @@ MOST_MISFIT = 0.2
 LEVEL_ERROR = 0.004
 #: Settings that differ by more are told, and what that is called.
 LEAST_APART, APART = 0.01, "settings against each other"
+#: Share of white's values that those of first orders have, roughly.
+FAINT = 0.1
+#: Settings whose light (logarithm) is closer to each other say nothing of a camera's curve.
+LEAST_BRACKET = 0.5
 #: Changes of black that matter: first orders of dark surfaces are a few numbers bright.
 MOST_BLACK_DN = 0.5
 #: Rms of a flicker's changes of black that two pictures of it hardly exceed.
@@ -245,18 +249,27 @@ def light_findings(course: LightCourse, with_lines: bool) -> Iterator[FitFinding
     yield flicker.model_copy(update={"significant": course.flickers})
 
 
-def unsure_level(plan: CapturePlan, findings: Iterable[FitFinding]) -> float:
+def unsure_level(plan: CapturePlan, response: ProjectorResponse, findings: Iterable[FitFinding]) -> float:
     """Relative deviation of the level of all light, where settings disagree about it.
 
-    Which of them is right no scan can tell. A projector whose gamma is off by as much as makes settings of
-    two drive levels disagree has, at the last of them, another share of its full light as well.
+    Which of them is right no scan can tell, nor whose fault it is. A projector whose gamma is off by as much
+    as makes settings of two drive levels disagree has, at the last of them, another share of its full light
+    as well. A camera whose values follow a power of the light makes less of first orders, which are faint,
+    than of white. The larger of both counts.
     """
     apart = next((f for f in findings if f.significant and f.name == APART), None)
-    levels = [setting.level for setting in plan.settings]
-    if apart is None or levels[-1] == levels[0]:
+    if apart is None:
         return 0.0
-    gamma = float(np.log1p(apart.value) / np.log(levels[-1] / levels[0]))
-    return abs(gamma * float(np.log(levels[-1])))
+    log = float(np.log1p(apart.value))
+    levels = [setting.level for setting in plan.settings]
+    gains_ms = setting_gains_ms(plan.settings, response)
+    projector = camera = 0.0
+    if levels[-1] != levels[0]:
+        projector = log / float(np.log(levels[-1] / levels[0])) * float(np.log(levels[-1]))
+    apart_by = float(np.log(gains_ms[-1] / gains_ms[0]))
+    if abs(apart_by) > LEAST_BRACKET:
+        camera = log / apart_by * float(np.log(FAINT))
+    return max(abs(projector), abs(camera))
 
 
 def _settings_finding(course: LightCourse) -> FitFinding:

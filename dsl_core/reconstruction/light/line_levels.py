@@ -4,7 +4,8 @@ Light adds up: the frames of a set that covers all columns evenly are together a
 pixel and whatever surfaces do with the light. That gives the level of each frame relative to white. And away
 from a line itself a picture changes slowly from frame to frame, because only first orders reach there: a
 frame that is brighter than its neighbours in all of these pixels had more light. The first law tells slow
-changes, the second one quick ones.
+changes, the second one quick ones. Where light from surface to surface outshines first orders the second does
+not hold, and halves of the picture contradict each other: then neither is asked.
 """
 
 from __future__ import annotations
@@ -32,6 +33,10 @@ SUM_ERROR, SMOOTH_ERROR = 0.1, 0.0025
 AROUND = {-2: -1 / 6, -1: 4 / 6, 1: 4 / 6, 2: -1 / 6}
 #: Pixels within so many columns of a line's edge see it by the zero order, on a camera as fine as the lines.
 ZERO_PX = 6.0
+#: Share of what frames of one half of the picture are off their neighbours that the other half has as well.
+AGREED = 0.5
+#: Frames by which quick changes are judged.
+FEWEST_FRAMES = 8
 #: What frames are expected to differ by, unless they say more.
 LEAST_SPREAD = 0.01
 
@@ -80,7 +85,15 @@ def line_levels(
     summed = frames.sum(1) * (total.sum() / frames.sum())
     usual = np.polyval(np.polyfit(summed, light_variance, 1), summed).clip(light_variance.min())
     noise = (SUM_ERROR * summed) ** 2 + mean**2 * usual + blacks**2
-    smooth, smooth_std = _smooth_rows(plan, flat, frames, variance, pitch_of(column))
+    pitch = pitch_of(column)
+    smooth, smooth_std = _smooth_rows(plan, flat, frames, variance, pitch)
+    if 1.1 * _quick(smooth, smooth_std) > LEAST_SPREAD:
+        upper = picked < np.median(picked)
+        halves = (
+            _smooth_rows(plan, flat[half], frames[half], variance[half], pitch)[0] for half in (upper, ~upper)
+        )
+        if not _agree(*halves):
+            return None
     return _solve(frames, variance, total, noise, smooth, smooth_std)
 
 
@@ -111,9 +124,27 @@ def _solve(
     return LineLevels(-np.log(needed.clip(1e-3)), deviation, misfit, quick)
 
 
+def _agree(one: Floats, other: Floats) -> bool:
+    """Whether two halves of a picture, by their rows of the second law, say the same of quick changes.
+
+    A lamp that flickers is as bright in both. Light that surfaces send each other changes from line to line
+    as well, by what each line hits, and that differs from place to place.
+    """
+    off = np.full((2, one.shape[1]), np.nan)
+    for own, smooth in zip(off, (one, other), strict=True):
+        own[smooth.argmax(1)] = smooth.sum(1)
+    both = off[:, np.isfinite(off).all(0)]
+    if both.shape[1] < FEWEST_FRAMES:
+        return False
+    # Few frames may be far off in either half: signs count, and sizes up to the usual one.
+    usual = max(float(np.median(np.abs(both))), 1e-12)
+    both = np.clip(both / usual, -3, 3)
+    return float((both[0] * both[1]).sum()) > AGREED * float((both**2).sum()) / 2
+
+
 def _quick(smooth: Floats, smooth_std: Floats) -> float:
     """By how much frames differ, from how far they are off their neighbours."""
-    if len(smooth) < 8:
+    if len(smooth) < FEWEST_FRAMES:
         return 0.0
     off = smooth.sum(1)
     norm = np.sqrt((smooth**2).sum(1))

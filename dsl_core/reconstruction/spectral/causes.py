@@ -19,6 +19,8 @@ Floats = NDArray[np.float64]
 MOST_SHIFT_PX, MOST_GAIN = 0.035, 0.015
 #: What matters of the light over the scan, and of curves by which colours disagree.
 MOST_DRIFT, MOST_CURVES = 0.014, 0.015
+#: A larger drift is not one: white taken again would show it, and effects are taken to be linear.
+LARGEST_DRIFT = 0.3
 #: Rms of a level that changes steadily from that of the start, relative to its change.
 SINCE_START = 3**-0.5
 #: What a parameter is held at zero by.
@@ -69,7 +71,7 @@ class Causes:
 
         What frames ask for only together with gains that make up for it is an error of something else.
         """
-        both = matters(self.drift, self.drift_std, MOST_DRIFT)
+        both = matters(self.drift, self.drift_std, MOST_DRIFT) and abs(self.drift) < LARGEST_DRIFT
         return both and matters(*self.drift_alone, MOST_DRIFT) and self.explained[3] > EXPLAINS
 
     @property

@@ -49,6 +49,44 @@ def test_the_known_spread_stays_where_it_is_the_true_one() -> None:
     assert measured.response is TAILED
 
 
+def coarser(values: np.ndarray) -> ProjectorResponse:
+    return KNOWN.with_spread(LineSpread.of(values, 0.25))
+
+
+#: Curves that other programs might store: on a coarser grid, and reaching farther than lines tell.
+OTHERS = (
+    coarser(np.exp(-0.5 * ((np.arange(-16, 17) / 4) / 0.5) ** 2)),
+    coarser((1 + ((np.arange(-80, 81) / 4) / 0.8) ** 2) ** -1.5),
+)
+
+
+@pytest.mark.parametrize("known", OTHERS, ids=["coarse", "far"])
+def test_a_measured_spread_of_any_grid_and_reach_stays_where_it_is_the_true_one(
+    known: ProjectorResponse,
+) -> None:
+    peaks, column = seen(known)
+    found = fit_spread(peaks, column.round(), known)
+    assert found is not None
+    assert not found.changed
+    assert found.after < 1.2
+
+
+def test_light_farther_out_than_lines_tell_is_kept_while_the_rest_is_stretched() -> None:
+    known, family = OTHERS[1].spread, _Family(OTHERS[1])
+    assert family.fixed is not None
+    found = family.response(1.1).spread
+    assert found is not None
+    assert known is not None
+
+    def light(spread: LineSpread, low_px: float, high_px: float) -> float:
+        places = np.arange(low_px, high_px, 0.01)
+        return float((density(spread, places) + density(spread, -places)).sum()) * 0.01
+
+    assert light(known, 7, 30) > 0.003
+    assert light(found, 7, 30) == pytest.approx(light(known, 7, 30), rel=0.02)
+    assert light(found, 0, 1) < 0.98 * light(known, 0, 1)
+
+
 @pytest.mark.parametrize("blur_px", [0.5, 0.63, 0.8])
 def test_another_blur_is_found_to_its_deviation_and_stays_a_gaussian(blur_px: float) -> None:
     peaks, column = seen(KNOWN.with_gaussian(blur_px))
@@ -70,6 +108,16 @@ def test_a_curve_that_is_not_found_in_time_leaves_the_simpler_one(monkeypatch: p
     found = fit_spread(peaks, column.round(), KNOWN.with_gaussian(TAILED.blur_px))
     assert found is not None
     assert found.response.spread is None
+
+
+def test_lines_side_by_side_of_a_camera_with_a_gamma_do_not_make_a_spread_that_no_lens_has() -> None:
+    """Values to the power 1.03: dim flanks read less, as if lines were far sharper than they are."""
+    peaks, column = seen(KNOWN, step_px=5, noise=2e-4, beside=1, pitch_px=(4.0, 6.0))
+    peaks = replace(peaks, y=peaks.y.clip(1e-9) ** 1.03)
+    found = fit_spread(peaks, column.round(), KNOWN)
+    assert found is not None
+    assert found.response is KNOWN
+    assert 0 < found.rms_std_px <= KNOWN.blur_px
 
 
 @pytest.mark.parametrize("true", [TAILED, SQUARE, SKEWED])

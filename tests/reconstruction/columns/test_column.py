@@ -11,7 +11,8 @@ from dsl_core.model.rig import ProjectorResponse
 from dsl_core.optics.correspondence import triangulate, zero_order
 from dsl_core.optics.lines.line_set import LineSet
 from dsl_core.optics.lines.profile import halo_of_line, zero_order_profile
-from dsl_core.reconstruction.columns.column import dark_offset, refine
+from dsl_core.reconstruction.columns.column import refine
+from dsl_core.reconstruction.columns.dark_offset import dark_offset
 from dsl_core.reconstruction.columns.line_peaks import LinePeaks
 from dsl_core.simulation.published_rig import published_rig
 

@@ -5,6 +5,7 @@ import torch
 
 from dsl_core.model.rig import ProjectorResponse
 from dsl_core.optics.lines.line_set import LineSet
+from dsl_core.optics.lines.profile import zero_order_profile
 from dsl_core.reconstruction.columns.line_peaks import LinePeaks
 
 
@@ -40,3 +41,22 @@ def test_a_spread_that_is_wider_somewhere_looks_at_more_lines_and_keeps_its_shap
     assert last.radiance.shape == (40, 1) == last.std.shape
     assert last.widths is not None
     assert last.widths.tolist() == [2.0]
+
+
+def test_light_that_all_frames_have_alike_is_taken_off_but_not_where_the_peak_is_saturated() -> None:
+    response = ProjectorResponse(blur_px=0.6, halo_peak_per_px=1e-3, halo_decay_px=31.0)
+    lines = LineSet(5, 5, 2.0, 124, 124)
+    column = torch.tensor([301.3, 251.9], dtype=torch.float64)
+    distance = column - lines.centre_px(torch.arange(124))[:, None]
+    frames = 0.01 + 2.0 * zero_order_profile(distance, -2.5, 2.5, response)
+    std = torch.full_like(frames, 1e-3)
+    std[50, 1] = torch.inf
+    found = LinePeaks(column.round(), frames, std, lines, response).without_offset((80.0, 160.0))
+    assert found.offset is not None
+    assert found.offset.tolist() == pytest.approx([0.01, 0.0], abs=2e-4)
+    y, _, centres = found.window()
+    exact = 2.0 * zero_order_profile(column - centres, -2.5, 2.5, response)
+    assert y[:, 0].tolist() == pytest.approx(exact[:, 0].tolist(), abs=2e-4)
+    one = found.some(torch.tensor([0]))
+    assert one.offset is not None
+    assert one.offset.tolist() == found.offset[:1].tolist()

@@ -11,7 +11,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from dsl_core.model.plan import CapturePlan, GrayCode, ScanLines, Sentinels, Shot
+from dsl_core.model.plan import CapturePlan, GrayCode, ScanLines, Sentinels, Setting, Shot
+from dsl_core.model.rig import ProjectorResponse
 from dsl_core.reconstruction.hdr import MergedFrame
 from dsl_core.reconstruction.light import followed
 from dsl_core.reconstruction.light.course import LightCourse
@@ -112,11 +113,32 @@ def test_settings_that_do_not_agree_leave_the_level_unsure_as_a_wrong_gamma_does
     apart = (0.8 / 0.2) ** -0.2
     course = replace(course_of(), settings=(float(np.log(apart)),))
     two = PLAN.model_copy(update={"settings": CapturePlan().settings})
-    unsure = followed.unsure_level(two, followed.light_findings(course, True))
+    # At equal light of both settings, it cannot be a camera that is not proportional to the light.
+    alike = tuple(
+        setting.model_copy(update={"exposure_ms": 100 / setting.level**2.2}) for setting in two.settings
+    )
+    two = two.model_copy(update={"settings": alike})
+    exact = ProjectorResponse(gamma=2.2)
+    unsure = followed.unsure_level(two, exact, followed.light_findings(course, True))
     assert unsure == pytest.approx(1 - 0.8**0.2, rel=0.03)
-    assert followed.unsure_level(two, followed.light_findings(course_of(), True)) == 0.0
+    assert followed.unsure_level(two, exact, followed.light_findings(course_of(), True)) == 0.0
     once = two.model_copy(update={"settings": (two.settings[1], two.settings[1])})
-    assert followed.unsure_level(once, followed.light_findings(course, True)) == 0.0
+    assert followed.unsure_level(once, exact, followed.light_findings(course, True)) == 0.0
+
+
+def test_settings_that_do_not_agree_leave_faint_light_unsure_as_a_camera_with_a_gamma_does() -> None:
+    """Values that follow the light to the power 1.03, of exposures of which one is a tenth of the other."""
+    level = CapturePlan().settings[1].level
+    two = PLAN.model_copy(
+        update={
+            "settings": (Setting(exposure_ms=20, level=level), Setting(exposure_ms=200, level=level)),
+        }
+    )
+    course = replace(course_of(), settings=(float(np.log(0.1**0.03)),))
+    findings = tuple(followed.light_findings(course, True))
+    unsure = followed.unsure_level(two, ProjectorResponse(), findings)
+    # What is a tenth as bright as white reads so much less, compared with white.
+    assert unsure == pytest.approx(-np.log(0.1**0.03), rel=1e-3)
 
 
 def test_a_drift_is_taken_off_as_it_is() -> None:

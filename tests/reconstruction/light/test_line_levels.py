@@ -15,8 +15,11 @@ PLAN = CapturePlan(code=GrayCode(rows=False), spectral=ScanLines(), projector_si
 SHAPE = (24, 120)
 
 
-def levels(gains: np.ndarray, plan: CapturePlan = PLAN) -> LineLevels | None:
-    """Of frames with this light: 85 % of each line straight, the rest spread over 40 columns beside it."""
+def levels(gains: np.ndarray, plan: CapturePlan = PLAN, by_hit: float = 0.0) -> LineLevels | None:
+    """Of frames with this light: 85 % of each line straight, the rest spread over 40 columns beside it.
+
+    By a share ``by_hit`` light beside a line depends on what it hits in the same row.
+    """
     rng = np.random.default_rng(5)
     profiles = gaussian_filter1d(spectral_profiles(plan)[:, :, 0].astype(float), 0.9, axis=1)
     column = np.broadcast_to(np.arange(SHAPE[1]), SHAPE)
@@ -29,6 +32,9 @@ def levels(gains: np.ndarray, plan: CapturePlan = PLAN) -> LineLevels | None:
     light = np.array([seen(each) for each in profiles])
     sure = np.full(SHAPE, 0.02)
     white = seen(np.ones(SHAPE[1])) + 0.02 * rng.normal(size=SHAPE)
+    away = np.abs(np.arange(SHAPE[1]) - np.arange(len(light))[:, None] * 2 - 2) > 8
+    hit = 1 + by_hit * rng.uniform(-1, 1, (len(light), 4)).repeat(SHAPE[0] // 4, axis=1)
+    light = light * np.where(away[:, None], hit[..., None], 1.0)
     frames = light * gains[:, None, None] + 0.02 * rng.normal(size=light.shape)
     stack = LineStack(frames.astype(np.float32), np.full(light.shape, 0.02), np.zeros(SHAPE, np.float32))
     whites = (white, sure**2)
@@ -51,6 +57,11 @@ def test_steady_frames_are_found_steady() -> None:
     assert found is not None
     assert np.std(found.log[4:-4]) < 0.005
     assert found.quick < 0.004
+
+
+def test_light_from_surface_to_surface_is_no_flicker() -> None:
+    """What a line hits differs between the rows of a picture, and so does the light that comes from there."""
+    assert levels(np.ones(PLAN.spectral_count), by_hit=0.2) is None
 
 
 def test_patterns_that_cover_columns_unevenly_say_nothing() -> None:
@@ -189,6 +200,7 @@ def test_the_sum_of_light_is_compared_with_what_goes_straight_and_what_is_spread
         given.extend(arrays)
 
     monkeypatch.setattr(module, "_solve", keep)
+    monkeypatch.setattr(module, "_agree", lambda *_: True)  # of random light no two halves do
     seen = PickedLines(pixels, radiance, std, black)
     line_levels(PLAN, column, (light, light_variance), seen)
     frames, variance, total, noise, rows, stds = given

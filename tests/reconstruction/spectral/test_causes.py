@@ -147,6 +147,8 @@ CAUSES = Causes(
 def test_changes_count_from_what_matters_on() -> None:
     assert CAUSES.drifts
     assert not replace(CAUSES, drift=-0.0139).drifts
+    # More than doubled light is no drift: white that is taken again would show it.
+    assert not replace(CAUSES, drift=1.17).drifts
     assert not replace(CAUSES, drift_std=0.01).drifts
     assert not replace(CAUSES, drift_alone=(0.015, 0.01)).drifts
     assert CAUSES.unequal
