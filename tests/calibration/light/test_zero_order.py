@@ -15,6 +15,7 @@ from dsl_core.calibration.light.zero_order import (
 )
 from dsl_core.errors import CalibrationError
 from dsl_core.model.plan import ScanLines
+from dsl_core.model.projector.line_spread import LineSpread
 from dsl_core.model.rig import ProjectorResponse
 from dsl_core.optics.lines.profile import zero_order_profile
 
@@ -47,6 +48,20 @@ def test_blur_halo_and_columns_are_found_from_decoded_columns() -> None:
         assert abs(found / truth - 1) < 0.01
         assert abs(found - truth) < 4 * spread
     assert fit.good.mean() > 0.98
+    assert np.sqrt(np.mean((fit.column_px - column)[fit.good] ** 2)) < 0.01
+
+
+def test_a_measured_spread_keeps_its_shape_and_finds_its_width() -> None:
+    places = np.arange(-32, 33) / 8
+    skewed = LineSpread.of(np.exp(-0.5 * (places / np.where(places < 0, 0.4, 1.0)) ** 2), 0.125)
+    truth = TRUTH.with_spread(skewed)
+    column, radiance, std = lines_seen(400, truth)
+    start = START.with_spread(skewed.stretched(0.85))
+    fit = fit_zero_order(LINES, np.round(column), radiance, std, start, REACH_PX)
+    assert fit.response.blur_px == pytest.approx(truth.blur_px, rel=0.01)
+    assert fit.response.spread is not None
+    assert fit.response.spread.lean_px == pytest.approx(skewed.lean_px, rel=0.01)
+    assert fit.response.halo_peak_per_px == pytest.approx(truth.halo_peak_per_px, rel=0.03)
     assert np.sqrt(np.mean((fit.column_px - column)[fit.good] ** 2)) < 0.01
 
 

@@ -15,6 +15,7 @@ from dsl_core.errors import CalibrationError
 from dsl_core.model.calibration.bandpass import BandpassCalibration
 from dsl_core.model.figure import failures
 from dsl_core.model.placement import Placement
+from dsl_core.optics.spread.curves import step_response
 from dsl_core.progress import NoProgress
 from tests.cases.film_bench import film_bench, place, take, take_all, truth_of, without
 
@@ -65,6 +66,22 @@ def test_second_order_blur_and_halo_are_found(bench: Bench, record: BandpassCali
     assert found.blur_px == pytest.approx(truth.projector_response.blur_px, rel=0.01)
     assert found.halo_peak_per_px == pytest.approx(truth.projector_response.halo_peak_per_px, rel=0.02)
     assert found.halo_decay_px == pytest.approx(truth.projector_response.halo_decay_px, rel=0.03)
+
+
+def test_lines_with_tails_are_kept_as_they_are(tmp_path: Path) -> None:
+    """An eighth of their light is three times as wide; the halo is not taken for it, nor it for the halo."""
+    bench = film_bench(tmp_path, 4, KNOWN, foreign="spread-tails", size="64x42")
+    truth, first = truth_of(bench.devices).projector_response, RECIPE.steps(bench)[0]
+    start = truth.model_copy(update={"blur_px": 0.6, "halo_peak_per_px": 0.0, "halo_decay_px": 30.0})
+    bench = replace(bench, rig=bench.rig.model_copy(update={"projector_response": start}))
+    take(RECIPE, bench, first)
+    found = RECIPE._plane(bench, first, NoProgress())[1].response
+    assert found.spread is not None
+    away = np.array([-3.0, -2.0, -1.0, -0.5])
+    true = 7 / 8 * step_response(truth.blur_px, away) + 1 / 8 * step_response(3 * truth.blur_px, away)
+    np.testing.assert_allclose(step_response(found.spread, away), true, atol=2e-3)
+    assert found.halo_peak_per_px == pytest.approx(truth.halo_peak_per_px, rel=0.02)
+    assert found.halo_decay_px == pytest.approx(truth.halo_decay_px, rel=0.03)
 
 
 def test_response_comes_near_the_truth(bench: Bench, record: BandpassCalibration) -> None:

@@ -48,6 +48,10 @@ def test_a_response_keeps_width_and_curve_together() -> None:
     assert response.blur_px == spread.rms_px
     assert response.blurred(0.4).blur_px == pytest.approx(spread.blurred(0.4).rms_px)
     assert response.with_gaussian(0.7).line_spread == 0.7
+    wider = response.of_width(0.7)
+    assert wider.blur_px == pytest.approx(0.7)
+    assert wider.spread == spread.stretched(0.7 / spread.rms_px)
+    assert ProjectorResponse(blur_px=0.6).of_width(0.7).line_spread == 0.7
     assert ProjectorResponse(blur_px=0.3).blurred(0.4).line_spread == pytest.approx(0.5)
     assert ProjectorResponse.model_validate_json(response.model_dump_json()) == response
     with pytest.raises(ValidationError, match="blur_px must be the rms width"):

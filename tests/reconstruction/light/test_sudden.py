@@ -77,7 +77,7 @@ def test_a_code_of_other_light_than_white_is_no_change_at_once() -> None:
     white = clean()[1].plan.references()["white"].index
     assert "step of the light" not in reconstructed(changed(0, 0.8, until=white))[1]
     assert (
-        f"from frame {white - 2} on"
+        f"from frame {white - 1} on"
         in reconstructed(changed(0, 0.8, until=white - 2))[1]["step of the light"]
     )
 
