@@ -13,6 +13,8 @@ from pathlib import Path
 
 import pytest
 
+from tests.app.support.questions import answering_questions
+
 os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
 os.environ.setdefault("QT_API", "pyside6")
 
@@ -27,14 +29,16 @@ def pytest_runtest_setup() -> None:
     gc.disable()
 
 
-@pytest.hookimpl(wrapper=True)
-def pytest_runtest_teardown(nextitem: pytest.Item | None) -> Generator[None]:
+@pytest.hookimpl(wrapper=True, tryfirst=True)
+def pytest_runtest_teardown(item: pytest.Item, nextitem: pytest.Item | None) -> Generator[None]:
     """Collect what the test left, and give collection back after the last test of the window.
 
-    Nothing of a window may be left by then: the threads of other tests collect what they come upon.
+    Nothing of a window may be left by then: the threads of other tests collect what they come upon. A window
+    that a failed test leaves at work asks before it closes, and nobody would ever answer.
     """
     global _ended
-    yield
+    with answering_questions():
+        yield
     _ended += 1
     is_last = nextitem is None or Path(__file__).parent not in nextitem.path.parents
     gc.collect(2 if is_last or _ended % TESTS_PER_FULL == 0 else 1)

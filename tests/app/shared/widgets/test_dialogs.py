@@ -24,6 +24,8 @@ from PySide6.QtWidgets import (
 )
 from pytestqt.qtbot import QtBot
 
+from tests.app.support.questions import answering_questions
+
 
 def _press(key: Qt.Key) -> Callable[[QMessageBox], None]:
     return lambda box: QTest.keyClick(box, key)
@@ -105,3 +107,12 @@ def test_no_button_of_a_dialog_has_an_icon_of_the_desktop(qtbot: QtBot, qapp: QA
         assert ours.button(leave).icon().isNull()
     finally:
         qapp.setStyle(before)
+
+
+def test_what_windows_ask_while_tests_close_them_is_answered(qtbot: QtBot) -> None:
+    """Else one that a failed test leaves at work would wait for ever."""
+    window = QWidget()
+    qtbot.addWidget(window)
+    with answering_questions():
+        assert confirm(window, "Jobs are running", "Stop?", go="Stop and quit", stay="Keep working")
+        assert QDialog(window).exec() == QDialog.DialogCode.Rejected
