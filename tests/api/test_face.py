@@ -169,7 +169,7 @@ def test_the_readme_shows_what_evaluate_prints(
     assert outputs.differences(lines, printed) == []
     assert len(lines) == len(printed)
     # A changed figure, a missing line and one too many are told.
-    assert len(outputs.differences([lines[0], lines[1].replace("1.5", "1.7"), *lines[2:]], printed)) == 1
+    assert len(outputs.differences([lines[0], lines[1].replace("1.4", "1.7"), *lines[2:]], printed)) == 1
     assert outputs.differences([*lines[:2], *lines[3:]], printed)
     assert outputs.differences([*lines, "Speckle 0.1 %"], printed) == [
         "shown: Speckle 0.1 %; printed: nothing"

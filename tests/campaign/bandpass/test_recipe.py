@@ -5,17 +5,20 @@ from __future__ import annotations
 import re
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+from dsl_core.campaign.bandpass import recipe
 from dsl_core.campaign.bandpass.recipe import BandpassRecipe
 from dsl_core.campaign.common.recipe import Bench
 from dsl_core.errors import CalibrationError
 from dsl_core.model.calibration.bandpass import BandpassCalibration
 from dsl_core.model.figure import failures
 from dsl_core.model.placement import Placement
-from dsl_core.optics.spread.curves import step_response
+from dsl_core.model.projector.line_spread import LineSpread
+from dsl_core.model.rig import ProjectorResponse, Rig
 from dsl_core.progress import NoProgress
 from tests.cases.film_bench import film_bench, place, take, take_all, truth_of, without
 
@@ -68,20 +71,29 @@ def test_second_order_blur_and_halo_are_found(bench: Bench, record: BandpassCali
     assert found.halo_decay_px == pytest.approx(truth.projector_response.halo_decay_px, rel=0.03)
 
 
-def test_lines_with_tails_are_kept_as_they_are(tmp_path: Path) -> None:
-    """An eighth of their light is three times as wide; the halo is not taken for it, nor it for the halo."""
-    bench = film_bench(tmp_path, 4, KNOWN, foreign="spread-tails", size="64x42")
-    truth, first = truth_of(bench.devices).projector_response, RECIPE.steps(bench)[0]
-    start = truth.model_copy(update={"blur_px": 0.6, "halo_peak_per_px": 0.0, "halo_decay_px": 30.0})
-    bench = replace(bench, rig=bench.rig.model_copy(update={"projector_response": start}))
-    take(RECIPE, bench, first)
-    found = RECIPE._plane(bench, first, NoProgress())[1].response
-    assert found.spread is not None
-    away = np.array([-3.0, -2.0, -1.0, -0.5])
-    true = 7 / 8 * step_response(truth.blur_px, away) + 1 / 8 * step_response(3 * truth.blur_px, away)
-    np.testing.assert_allclose(step_response(found.spread, away), true, atol=2e-3)
-    assert found.halo_peak_per_px == pytest.approx(truth.halo_peak_per_px, rel=0.02)
-    assert found.halo_decay_px == pytest.approx(truth.halo_decay_px, rel=0.03)
+def test_a_spread_is_sought_once_the_halo_is_known_and_then_kept(
+    bench: Bench, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Before, its curve would hold the halo."""
+    start, step = bench.rig.projector_response, RECIPE.steps(bench)[0]
+    halo = start.model_copy(update={"blur_px": 0.8, "halo_peak_per_px": 0.002})
+    curve = halo.with_spread(LineSpread(first_px=0.0, step_px=0.5, core_px=0.7, shares=(1.0,)))
+    refined = curve.of_width(0.71)
+    seen, fitted = list[ProjectorResponse](), list[ProjectorResponse]()
+
+    def lines(source: object, rig: Rig, *given: object) -> tuple[Rig, object]:
+        seen.append(rig.projector_response)
+        shown = curve if rig.projector_response == halo else rig.projector_response
+        return rig.model_copy(update={"projector_response": shown}), "lines"
+
+    def profile(rig: Rig, *given: object) -> SimpleNamespace:
+        fitted.append(rig.projector_response)
+        return SimpleNamespace(response=halo if rig.projector_response == start else refined)
+
+    monkeypatch.setattr(recipe, "diffuser_lines", lines)
+    monkeypatch.setattr(recipe, "plane_profile", profile)
+    assert RECIPE._plane(bench, step, NoProgress())[1].response == refined
+    assert (seen, fitted) == ([start, halo], [start, curve])
 
 
 def test_response_comes_near_the_truth(bench: Bench, record: BandpassCalibration) -> None:
