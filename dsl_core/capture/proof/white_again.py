@@ -42,14 +42,14 @@ class WhiteAgain:
         """What is wrong, and what to do."""
         if self.is_banded:
             return (
-                f"White, captured again as frame {self.shot.index}, has {self.share:.2f} ±"
+                f"White, captured again as frame {self.shot.number}, has {self.share:.2f} ±"
                 f" {max(self.std, 0.005):.2f} times its light of the beginning in whole rows, and"
                 f" {self.usual:.2f} times in others: the light flickers, as that of the mains or of pulsed"
                 " LEDs does, while the camera exposes one row after the other. Frames between are off by as"
                 " much. Expose for whole periods of the light, keep lamps of the room off, and scan again."
             )
         return (
-            f"White, captured again as frame {self.shot.index}, has {self.share:.2f} ±"
+            f"White, captured again as frame {self.shot.number}, has {self.share:.2f} ±"
             f" {max(self.std, 0.005):.2f} times its light of the beginning in columns"
             f" {self.columns[0]}-{self.columns[1]}, rows {self.rows[0]}-{self.rows[1]} of the picture, and"
             f" {self.usual:.2f} times in most of it: dust or moisture came onto lens, film or target,"

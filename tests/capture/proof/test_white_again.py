@@ -49,6 +49,7 @@ def test_a_part_of_white_that_has_become_darker_is_told_with_its_place() -> None
     assert seen is not None
     assert (seen.shot.index, seen.columns, seen.rows) == (WHITES[-1], (32, 48), (12, 24))
     assert (seen.share, seen.usual) == pytest.approx((0.96 * 0.9, 0.96), abs=0.01)
+    assert f"captured again as frame {WHITES[-1] + 1}, has" in seen.sentence
     assert "in columns 32-48, rows 12-24 of the picture, and 0.96 times in most of it" in seen.sentence
 
 

@@ -53,14 +53,14 @@ class LocalSum:
         first, last = self.shots
         if self.all_rows:
             return (
-                f"Lines between frame {first.index} and frame {last.index} have {self.share:.2f} ±"
+                f"Lines between frame {first.number} and frame {last.number} have {self.share:.2f} ±"
                 f" {max(self.std, 0.005):.2f} times the light of white, which all lines add up to, and others"
                 " have not: the light of the projector changed for them (eco mode, iris, the lamp), or all"
                 " they lit was in a shadow or smoke. Switch eco mode and dynamic contrast off, keep the way"
                 " of the light free, and scan again."
             )
         return (
-            f"In parts of the picture, lines between frame {first.index} and frame {last.index} have"
+            f"In parts of the picture, lines between frame {first.number} and frame {last.number} have"
             f" {self.share:.2f} ± {max(self.std, 0.005):.2f} times the light of white, which all lines add up"
             " to: something cast a shadow, smoke or steam drifted by, the light changed, or other light came"
             " in while they were captured. Keep the way of the light free and the room as it is, and scan"

@@ -64,13 +64,15 @@ def test_a_shadow_on_some_rows_of_some_lines_is_told_with_its_frames() -> None:
     assert not seen.all_rows
     assert 38 <= seen.shots[0].index <= 44
     assert 48 <= seen.shots[1].index <= 54
-    assert "In parts of the picture, lines between frame" in seen.sentence
+    first, last = (shot.index + 1 for shot in seen.shots)
+    assert f"In parts of the picture, lines between frame {first} and frame {last} have" in seen.sentence
 
 
 def test_lines_that_are_dim_in_all_rows_are_of_a_projector_that_dims() -> None:
     seen = found(lambda at, light, *_: light * (0.8 if 40 <= at < 52 else 1.0))
     assert seen is not None
     assert seen.all_rows
+    assert seen.sentence.startswith(f"Lines between frame {seen.shots[0].index + 1} and frame ")
     assert "the light of the projector changed for them (eco mode" in seen.sentence
 
 
