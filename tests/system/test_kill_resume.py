@@ -1,4 +1,4 @@
-"""``kill -9`` at ten moments of a scan: every resumed scan equals the unbroken one, bit by bit."""
+"""``kill -9`` at twenty moments of a scan: every resumed scan equals the unbroken one, bit by bit."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from dsl_core.io.scan.check import find_problems
 from dsl_core.io.scan.folder import ScanReader
 from tests.cases.memory import folder_in_memory
 
-KILLS = 10
+KILLS = 20
 ROOT = Path(__file__).parents[2]
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="Windows has neither fork nor SIGKILL")
@@ -95,7 +95,7 @@ def folder(tmp_path: Path) -> Iterator[Path]:
 
 
 @pytest.mark.timeout(300)
-def test_ten_killed_scans_resume_to_the_unbroken_one(server: Server, folder: Path) -> None:
+def test_twenty_killed_scans_resume_to_the_unbroken_one(server: Server, folder: Path) -> None:
     duration_s = server.duration_s(folder / "unbroken.dsl")
     unbroken = _frames(folder / "unbroken.dsl")
     assert unbroken.std() > 0
