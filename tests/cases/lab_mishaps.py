@@ -172,7 +172,8 @@ CAMERA_MISHAPS: dict[str, CameraMishap] = {
 }
 
 
-def _image(values: NDArray[np.floating]) -> Image:
+def as_image(values: NDArray[np.floating]) -> Image:
+    """Drive levels of any value, as a projector takes them."""
     return np.asarray(np.clip(np.rint(values), 0, 255), np.uint8)
 
 
@@ -181,12 +182,12 @@ def _vivid(image: Image, before: Image, count: int) -> Image:
     values = image / 255.0
     grey = values.mean(2, keepdims=True)
     values = np.clip(grey + 1.4 * (values - grey), 0, 1)
-    return _image(255 * (values + 0.25 * values * (1 - values) * (2 * values - 1) * 2))
+    return as_image(255 * (values + 0.25 * values * (1 - values) * (2 * values - 1) * 2))
 
 
 def _dusk(image: Image, before: Image, count: int) -> Image:
     """Desktops turn warmer in the evening, slowly."""
-    return _image(image * (1 - _slowly(count) * np.array([0.0, 0.15, 0.4])))
+    return as_image(image * (1 - _slowly(count) * np.array([0.0, 0.15, 0.4])))
 
 
 def _notification(image: Image, before: Image, count: int) -> Image:
@@ -222,7 +223,7 @@ def _no_sync(image: Image, before: Image, count: int) -> Image:
 
 def _smoothed(image: Image, before: Image, count: int) -> Image:
     """Pictures between pictures: some light of the one before."""
-    return _image(0.8 * image + 0.2 * before.astype(np.float64))
+    return as_image(0.8 * image + 0.2 * before.astype(np.float64))
 
 
 def _resized(image: Image, before: Image, count: int) -> Image:
@@ -248,7 +249,7 @@ def _dead_columns(image: Image, before: Image, count: int) -> Image:
 
 def _room_sensor(image: Image, before: Image, count: int) -> Image:
     """Brightness that follows a sensor of the room's light, in steps."""
-    return _image(image * (1 - 0.08 * ((count // 15) % 3)))
+    return as_image(image * (1 - 0.08 * ((count // 15) % 3)))
 
 
 def _upside_down(image: Image, before: Image, count: int) -> Image:

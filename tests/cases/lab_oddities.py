@@ -10,7 +10,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from tests.cases.lab_mishaps import CameraMishap, ProjectorMishap
+from tests.cases.lab_mishaps import CameraMishap, ProjectorMishap, as_image
 from tests.cases.spoiled_pictures import BLACK_DN, FULL_DN, Mosaic, by_colour, counts_of, scaled
 
 Image = NDArray[np.uint8]
@@ -206,22 +206,18 @@ CAMERA_ODDITIES: dict[str, CameraMishap] = {
 }
 
 
-def _image(values: NDArray[np.floating]) -> Image:
-    return np.asarray(np.clip(np.rint(values), 0, 255), np.uint8)
-
-
 def _mean_level(image: Image) -> float:
     return float(image.mean()) / max(float(image.max()), 1.0)
 
 
 def _iris_both_ways(image: Image, before: Image, count: int) -> Image:
     """Dark and bright pictures lose an eighth, those in between nothing: lines and white agree."""
-    return _image(image * (1 - 0.125 * abs(2 * min(_mean_level(image), 1.0) - 1)))
+    return as_image(image * (1 - 0.125 * abs(2 * min(_mean_level(image), 1.0) - 1)))
 
 
 def _iris_lags(image: Image, before: Image, count: int) -> Image:
     """An iris that follows the mean of this picture and of the one before, by up to a fifth."""
-    return _image(image * (0.8 + 0.2 * (_mean_level(image) + _mean_level(before)) / 2))
+    return as_image(image * (0.8 + 0.2 * (_mean_level(image) + _mean_level(before)) / 2))
 
 
 def _pointer_wanders(image: Image, before: Image, count: int) -> Image:
@@ -241,12 +237,12 @@ def _cover_slips(image: Image, before: Image, count: int) -> Image:
 
 def _black_inserted(image: Image, before: Image, count: int) -> Image:
     """Black pictures between the others, for motion: a quarter of the light, in some exposures."""
-    return _image(0.75 * image) if _rng(count).random() < 0.3 else image
+    return as_image(0.75 * image) if _rng(count).random() < 0.3 else image
 
 
 def _edges_enhanced(image: Image, before: Image, count: int) -> Image:
     soft = cv2.GaussianBlur(image.astype(np.float32), (0, 0), 1.5)
-    return _image(1.5 * image - 0.5 * soft)
+    return as_image(1.5 * image - 0.5 * soft)
 
 
 #: Of the projector and of the computer that sends it pictures.

@@ -12,7 +12,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from tests.cases.lab_mishaps import CameraMishap, ProjectorMishap
+from tests.cases.lab_mishaps import CameraMishap, ProjectorMishap, as_image
 from tests.cases.spoiled_pictures import BLACK_DN, Mosaic, by_colour, counts_of, scaled
 
 Image = NDArray[np.uint8]
@@ -107,37 +107,33 @@ CAMERA_SURPRISES: dict[str, CameraMishap] = {
 }
 
 
-def _image(values: NDArray[np.floating]) -> Image:
-    return np.asarray(np.clip(np.rint(values), 0, 255), np.uint8)
-
-
 def _is_dark(image: Image) -> bool:
     return float(image.mean()) < DARK * max(float(image.max()), 1.0)
 
 
 def _eco(image: Image, before: Image, count: int) -> Image:
     """A lamp that saves power on dark pictures, and gives all again with the first bright one."""
-    return _image(image * 0.9) if _is_dark(image) and _is_dark(before) else image
+    return as_image(image * 0.9) if _is_dark(image) and _is_dark(before) else image
 
 
 def _eco_wakes(image: Image, before: Image, count: int) -> Image:
     """The same, but bright pictures after dark ones come before the lamp is up."""
-    return _image(image * 0.9) if _is_dark(before) else image
+    return as_image(image * 0.9) if _is_dark(before) else image
 
 
 def _range_toggles(image: Image, before: Image, count: int) -> Image:
     """A cable whose ends agree anew on full or limited levels now and then."""
-    return _image(16 + image * (219 / 255)) if count % 25 < 8 else image
+    return as_image(16 + image * (219 / 255)) if count % 25 < 8 else image
 
 
 def _power_limit(image: Image, before: Image, count: int) -> Image:
     """Bright pictures get less light, so that the supply keeps up."""
-    return _image(image * (1 - 0.12 * float(image.mean()) / max(float(image.max()), 1.0)))
+    return as_image(image * (1 - 0.12 * float(image.mean()) / max(float(image.max()), 1.0)))
 
 
 def _overdrive(image: Image, before: Image, count: int) -> Image:
     """Levels that are overshot for speed, by what changed since the picture before."""
-    return _image(image + 0.2 * (image.astype(np.float64) - before))
+    return as_image(image + 0.2 * (image.astype(np.float64) - before))
 
 
 def _no_signal(image: Image, before: Image, count: int) -> Image:

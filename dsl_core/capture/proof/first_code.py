@@ -223,12 +223,12 @@ class FirstCode:
         Taken again with the same result, the light is what it is: it is measured, and corrected for, later.
         """
         _, _, lit = self._pairs.contrast()
-        given = self._pairs.pairs, (self._ends["white"], self._ends["black"]), lit, self._noise
-        light = light_of_pairs(*given)
+        ends = self._ends["white"], self._ends["black"]
+        light = light_of_pairs(self._pairs.pairs, ends, lit, self._noise)
         found: dict[int, float] = {}
         if not (self._at_the_end or self._is_settled):
             self._is_settled = True
-            found = unsettled_pairs(*given)
+            found = unsettled_pairs(light)
             self.settled = found.get(min(light, default=0), 1.0)
         self.light = {n: each for n, each in light.items() if n not in found and abs(each - 1) > SETTLED}
         return [

@@ -90,19 +90,13 @@ def light_of_pairs(
     return {number: light(pair) / usual for number, pair in pairs.items()}
 
 
-def unsettled_pairs(
-    pairs: Mapping[int, tuple[Counts, Counts]],
-    ends: tuple[Counts, Counts],
-    lit: NDArray[np.bool_],
-    noise: Noise,
-) -> dict[int, float]:
-    """Pairs whose light was not yet that of the ``ends``, white and black, with the factor they have of it.
+def unsettled_pairs(ratios: Mapping[int, float]) -> dict[int, float]:
+    """Pairs whose light was not yet that of white and black, with the factor they have of it.
 
-    None where too few pixels are ``lit``, or where the last pair differs as well: nothing has settled then,
-    or it is the ends that are wrong. Of light that changed at once only the pair that saw both: taken again,
-    the others would hide that nobody knows which light was as calibrated.
+    ``ratios`` are those of `light_of_pairs`. None where the last pair differs as well: nothing has settled
+    then, or it is white and black that are wrong. Of light that changed at once only the pair that saw both:
+    taken again, the others would hide that nobody knows which light was as calibrated.
     """
-    ratios = light_of_pairs(pairs, ends, lit, noise)
     found = {number: ratio for number, ratio in ratios.items() if abs(ratio - 1) > SETTLED}
     if not found:
         return {}
@@ -111,7 +105,7 @@ def unsettled_pairs(
     steady = alike.index(False) if False in alike else len(alike)
     if in_order[0] in found and steady >= FEWEST_STEADY and not found.keys() & set(in_order[steady + 1 :]):
         return {number: found[number] for number in in_order[steady : steady + 1] if number in found}
-    return {} if max(pairs) in found else found
+    return {} if max(ratios) in found else found
 
 
 def _scaled(one: Floats, other: Floats) -> tuple[float, float]:

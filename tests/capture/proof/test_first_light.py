@@ -5,7 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from dsl_core.capture.proof.first_light import changed_light, has_moved, is_unlit, unsettled_pairs
+from dsl_core.capture.proof.first_light import (
+    changed_light,
+    has_moved,
+    is_unlit,
+    light_of_pairs,
+    unsettled_pairs,
+)
 from dsl_core.capture.proof.raster import Counts, Noise
 from dsl_core.model.rig import Sensor
 
@@ -108,12 +114,12 @@ def test_pairs_of_other_light_than_the_last_ones_have_not_settled(light: float, 
     other = pictures(1000.0 * light)
     pairs = {n: (other[0], other[1]) if n in (0, 2) else (usual[2], usual[3]) for n in range(5)}
     lit = np.ones(400, bool)
-    found = unsettled_pairs(pairs, (white, black), lit, NOISE)
+    found = unsettled_pairs(light_of_pairs(pairs, (white, black), lit, NOISE))
     assert set(found) == wrong
     assert list(found.values()) == pytest.approx([light] * len(wrong), abs=0.01)
     # Of few pixels nothing is known, and where the last pair differs the ends may be wrong.
-    assert unsettled_pairs(pairs, (white, black), np.arange(400) < 59, NOISE) == {}
-    assert unsettled_pairs({**pairs, 4: pairs[0]}, (white, black), lit, NOISE) == {}
+    assert unsettled_pairs(light_of_pairs(pairs, (white, black), np.arange(400) < 59, NOISE)) == {}
+    assert unsettled_pairs(light_of_pairs({**pairs, 4: pairs[0]}, (white, black), lit, NOISE)) == {}
 
 
 @pytest.mark.parametrize(
@@ -133,5 +139,5 @@ def test_of_light_that_changed_at_once_only_the_pair_of_both_is_taken_again(
     white, black = (np.full(400, SENSOR.black_level_dn + each, np.uint16) for each in (1000, 0))
     of_light = [pictures(1000.0 * share) for share in light]
     pairs = {number: (each[2 * number % 4], each[2 * number % 4 + 1]) for number, each in enumerate(of_light)}
-    found = unsettled_pairs(pairs, (white, black), np.ones(400, bool), NOISE)
+    found = unsettled_pairs(light_of_pairs(pairs, (white, black), np.ones(400, bool), NOISE))
     assert found == pytest.approx(again, abs=0.01)
