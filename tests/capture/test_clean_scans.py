@@ -66,3 +66,25 @@ def test_a_small_object_before_nothing_shows_its_patterns(
 
     monkeypatch.setattr(rig.camera, "snap", of_a_small_object)
     assert scan(rig, fit_plan(plan, rig), tmp_path / "scan.dsl").corrected == 0
+
+
+@pytest.mark.parametrize("preset", ["preview", "coarse"])
+def test_a_camera_with_three_times_the_noise_stated_shows_its_patterns(
+    preset: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    plan = preset_plan(preset)
+    assert plan is not None
+    rig = open_twin({"size": "96x64", "scene": "color-checker"})
+    assert rig.calibration is not None
+    sensor, snap, random = rig.calibration.sensor, rig.camera.snap, np.random.default_rng(1)
+
+    def with_more_noise(timeout_ms: float = 5000.0) -> Frame:
+        seen = snap(timeout_ms)
+        dn = seen.pixels.astype(np.float64)
+        stated = np.maximum(dn - sensor.black_level_dn, 0) / sensor.electrons_per_dn + sensor.read_noise_dn**2
+        more = np.sqrt(8 * stated) * random.standard_normal(dn.shape)
+        pixels = np.where(dn < sensor.full_scale_dn, np.rint(dn + more), dn).clip(0, sensor.full_scale_dn)
+        return replace(seen, pixels=pixels.astype(np.uint16))
+
+    monkeypatch.setattr(rig.camera, "snap", with_more_noise)
+    assert scan(rig, fit_plan(plan, rig), tmp_path / "scan.dsl").corrected == 0

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from dsl_core.capture.diagnosis import Explanation
-from dsl_core.capture.proof.code_sum import CodeSum
+from dsl_core.capture.proof.code.code_sum import CodeSum
 from dsl_core.capture.proof.finding import Finding, Light, Verdict
 from dsl_core.capture.proven import ON_END, SETTLE_MS, PictureError, ProvenShots
 from dsl_core.errors import Cancelled, DeviceError

@@ -6,8 +6,9 @@ from collections.abc import Iterable, Mapping
 
 import numpy as np
 
-from dsl_core.capture.proof.code_pairs import Pair, alike
-from dsl_core.capture.proof.raster import Counts, Floats, Noise
+from dsl_core.capture.proof.code.code_pairs import Pair, alike
+from dsl_core.capture.proof.noise import Noise
+from dsl_core.capture.proof.raster import Counts, Floats
 
 #: Stripes are well seen by a pixel, or by so many of those that are lit, with this share of the contrast.
 WELL_SEEN = 0.7

@@ -7,8 +7,9 @@ from dataclasses import replace
 
 import numpy as np
 
+from dsl_core.capture.proof.noise import Noise
 from dsl_core.capture.proof.prediction import Expected, rescaled
-from dsl_core.capture.proof.raster import Counts, Floats, Noise
+from dsl_core.capture.proof.raster import Counts, Floats
 from dsl_core.capture.proof.recent import Recent
 from dsl_core.model.plan import CapturePlan, Role, Shot
 from dsl_core.model.rig import Rig

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dsl_core.capture.proof.code_sum import CodeSum
+from dsl_core.capture.proof.code.code_sum import CodeSum
 from dsl_core.capture.proof.lines.line_sum import LineSum
 
 #: No deviation is given as less than this.

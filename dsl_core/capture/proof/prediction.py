@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dsl_core.capture.proof.contest import Contest, vote
-from dsl_core.capture.proof.raster import Counts, Floats, Noise, Raster
+from dsl_core.capture.proof.noise import Noise
+from dsl_core.capture.proof.raster import Counts, Floats, Raster
 from dsl_core.model.plan import CapturePlan, Shot
 from dsl_core.patterns.multiplexed import profile
 

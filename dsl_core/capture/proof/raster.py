@@ -6,12 +6,10 @@ ones, because a line lights only a few pixels of each.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-
 import numpy as np
 from numpy.typing import NDArray
 
-from dsl_core.model.rig import Sensor, colour_sites
+from dsl_core.model.rig import colour_sites
 
 Floats = NDArray[np.float32]
 Counts = NDArray[np.uint16]
@@ -19,8 +17,6 @@ Counts = NDArray[np.uint16]
 _ROWS, _PIXELS = 36, 32_000
 #: Pixels of a row at most; wider pictures are thinned.
 _WIDTH = 1024
-#: Pictures whose variance is remembered, as each is compared with several.
-_REMEMBERED = 8
 #: Blocks down and across that stand in for pixels where these are too noisy.
 BLOCKS = 16
 
@@ -66,46 +62,3 @@ class Raster:
         """Channel of every compared pixel, flat: 0 red, 1 green, 2 blue."""
         table = np.array(colour_sites(bayer), np.int8)
         return np.asarray(table[self._mosaic].ravel())
-
-
-@dataclass(frozen=True)
-class Noise:
-    """What a camera's counts are worth."""
-
-    sensor: Sensor
-    _known: dict[int, tuple[Counts | Floats, Floats]] = field(
-        default_factory=dict, init=False, repr=False, compare=False
-    )
-
-    @classmethod
-    def of(cls, sensor: Sensor | None, bit_depth: int) -> Noise:
-        """Of a known sensor, or else of one like the published camera's with this bit depth."""
-        if sensor is not None:
-            return cls(sensor)
-        share = 2.0 ** (bit_depth - 12)
-        usual = Sensor()
-        return cls(
-            Sensor(
-                bit_depth=bit_depth,
-                black_level_dn=0.0,
-                electrons_per_dn=usual.electrons_per_dn / share,
-                read_noise_dn=max(2.0 * share, 0.5),
-            )
-        )
-
-    def variance(self, counts: Counts | Floats) -> Floats:
-        """Variance of counts, DN^2; those of pictures that cannot change are remembered."""
-        known = self._known.get(id(counts))
-        if known is not None and known[0] is counts:
-            return known[1]
-        sensor = self.sensor
-        found = np.asarray(np.subtract(counts, np.float32(sensor.black_level_dn), dtype=np.float32))
-        np.maximum(found, 0, out=found)
-        found /= np.float32(sensor.electrons_per_dn)
-        found += np.float32(sensor.read_noise_dn**2 + 0.1)
-        if not counts.flags.writeable:
-            found.flags.writeable = False
-            if len(self._known) >= _REMEMBERED:
-                self._known.pop(next(iter(self._known)))
-            self._known[id(counts)] = counts, found
-        return found

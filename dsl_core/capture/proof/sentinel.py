@@ -10,8 +10,9 @@ from collections.abc import Iterable
 import numpy as np
 
 from dsl_core.capture.proof.finding import Finding, Verdict
+from dsl_core.capture.proof.noise import Noise
 from dsl_core.capture.proof.prediction import Expected, contest_of_pictures
-from dsl_core.capture.proof.raster import Counts, Noise, Raster
+from dsl_core.capture.proof.raster import Counts, Raster
 from dsl_core.model.plan import Shot
 
 #: So many takes of one sentinel may be refused.

@@ -8,11 +8,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from dsl_core.capture.proof.code_sum import CodeSum, code_sum
+from dsl_core.capture.proof.code.code_sum import CodeSum, code_sum
+from dsl_core.capture.proof.code.first_code import FirstCode
 from dsl_core.capture.proof.contest import Contest
 from dsl_core.capture.proof.control import choose_pairs, edges_moved, is_same, is_unchanged
 from dsl_core.capture.proof.finding import Finding, Light, Verdict, displaced
-from dsl_core.capture.proof.first_code import FirstCode
 from dsl_core.capture.proof.later_settings import LaterSettings
 from dsl_core.capture.proof.light_steps import LightSteps
 from dsl_core.capture.proof.lines.bright_black import BrightBlack
@@ -22,6 +22,7 @@ from dsl_core.capture.proof.lines.line_shown import line_shown
 from dsl_core.capture.proof.lines.line_sum import LineSum, line_sum
 from dsl_core.capture.proof.lines.local_sum import LocalSum, local_sum
 from dsl_core.capture.proof.lines.neighbours import LineNeighbours
+from dsl_core.capture.proof.noise import Noise
 from dsl_core.capture.proof.prediction import (
     APART,
     Expected,
@@ -35,7 +36,7 @@ from dsl_core.capture.proof.prediction import (
     is_over_white,
     line_profile,
 )
-from dsl_core.capture.proof.raster import Counts, Floats, Noise, Raster
+from dsl_core.capture.proof.raster import Counts, Floats, Raster
 from dsl_core.capture.proof.recent import Recent
 from dsl_core.capture.proof.sentinel import SentinelProof
 from dsl_core.capture.proof.usual_light import LEAST_LIGHT, UsualLight

@@ -10,7 +10,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from dsl_core.capture.proof.raster import BLOCKS, Counts, Floats, Noise, Raster
+from dsl_core.capture.proof.noise import Noise
+from dsl_core.capture.proof.raster import BLOCKS, Counts, Floats, Raster
 from dsl_core.model.plan import CapturePlan, Shot
 
 #: How far the light of a block may be from that of most, as a share, and in deviations.

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from dsl_core.capture.proof.code_pairs import Pair
+from dsl_core.capture.proof.code.code_pairs import Pair
 from dsl_core.capture.proof.control import choose_pairs, edges_moved, is_same, is_unchanged
-from dsl_core.capture.proof.raster import Noise
+from dsl_core.capture.proof.noise import Noise
 from dsl_core.model.rig import Sensor
 
 SHAPE = (5, 16)

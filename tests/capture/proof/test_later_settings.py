@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from dsl_core.capture.proof.later_settings import LaterSettings
-from dsl_core.capture.proof.raster import Counts, Noise
+from dsl_core.capture.proof.noise import Noise
+from dsl_core.capture.proof.raster import Counts
 from dsl_core.model.plan import CapturePlan, GrayCode, LineComb, Setting
 from dsl_core.simulation.published_rig import published_rig
 

@@ -8,12 +8,13 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from dsl_core.capture.proof.code_pairs import Pair
-from dsl_core.capture.proof.code_sum import CodeSum, code_sum
+from dsl_core.capture.proof.code.code_pairs import Pair
+from dsl_core.capture.proof.code.code_sum import CodeSum, code_sum
 from dsl_core.capture.proof.light_sums import light_sentence
 from dsl_core.capture.proof.lines.line_sum import LineSum
+from dsl_core.capture.proof.noise import Noise
 from dsl_core.capture.proof.prediction import Lit
-from dsl_core.capture.proof.raster import Counts, Noise
+from dsl_core.capture.proof.raster import Counts
 from dsl_core.model.rig import Sensor
 
 PIXELS, BLACK, WHITE = 600, 300.0, 1500.0

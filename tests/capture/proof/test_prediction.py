@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from dsl_core.capture.proof.noise import Noise
 from dsl_core.capture.proof.prediction import (
     Expected,
     Lit,
@@ -20,7 +21,7 @@ from dsl_core.capture.proof.prediction import (
     line_profile,
     rescaled,
 )
-from dsl_core.capture.proof.raster import Noise, Raster
+from dsl_core.capture.proof.raster import Raster
 from dsl_core.model.plan import CapturePlan, GrayCode, LineComb, Role, Shot
 from dsl_core.model.rig import Sensor
 

@@ -1,12 +1,11 @@
-"""Rows that stand for a picture, their blocks and colours, and what counts are worth."""
+"""Rows that stand for a picture, their blocks and colours."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
 
-from dsl_core.capture.proof.raster import Noise, Raster
-from dsl_core.model.rig import Sensor
+from dsl_core.capture.proof.raster import Raster
 
 
 @pytest.mark.parametrize(
@@ -51,27 +50,3 @@ def test_blocks_are_means_of_sixteen_parts_down_and_across() -> None:
     small = Raster((9, 31))
     assert small.pooled == 1
     assert small.pool(np.arange(279, dtype=np.uint16)).tolist() == list(range(279))
-
-
-def test_variance_of_counts_is_shot_noise_above_black_read_noise_and_rounding() -> None:
-    noise = Noise(Sensor(black_level_dn=260.0, electrons_per_dn=4.0, read_noise_dn=3.0))
-    counts = np.array([0, 260, 660], np.uint16)
-    assert noise.variance(counts) == pytest.approx([9.1, 9.1, 109.1])
-    counts[0] = 660
-    assert noise.variance(counts)[0] == pytest.approx(109.1)
-    taken = Raster((3, 1)).take(counts[None])
-    assert noise.variance(taken) is noise.variance(taken), "what cannot change is remembered"
-
-
-@pytest.mark.parametrize(
-    ("bits", "electrons", "read_dn"), [(12, 10.0, 2.0), (8, 160.0, 0.5), (10, 40.0, 0.5), (16, 0.625, 32.0)]
-)
-def test_an_unknown_sensor_is_like_the_published_one_in_its_own_counts(
-    bits: int, electrons: float, read_dn: float
-) -> None:
-    sensor = Noise.of(None, bits).sensor
-    assert (sensor.bit_depth, sensor.black_level_dn) == (bits, 0.0)
-    assert sensor.electrons_per_dn == pytest.approx(electrons)
-    assert sensor.read_noise_dn == pytest.approx(read_dn)
-    known = Sensor(bit_depth=10)
-    assert Noise.of(known, 12).sensor is known

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from dsl_core.capture.proof.finding import Verdict
-from dsl_core.capture.proof.raster import Noise, Raster
+from dsl_core.capture.proof.noise import Noise
+from dsl_core.capture.proof.raster import Raster
 from dsl_core.capture.proof.sentinel import REFUSALS, SentinelProof
 from dsl_core.model.plan import Shot
 

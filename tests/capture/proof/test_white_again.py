@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from dsl_core.capture.proof.raster import Counts, Noise, Raster
+from dsl_core.capture.proof.noise import Noise
+from dsl_core.capture.proof.raster import Counts, Raster
 from dsl_core.capture.proof.white_again import WhiteAgain, white_again
 from dsl_core.model.plan import CapturePlan, GrayCode, ScanLines, Sentinels, Setting
 from dsl_core.model.rig import Sensor

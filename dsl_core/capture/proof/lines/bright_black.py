@@ -11,7 +11,8 @@ from collections import deque
 import numpy as np
 from numpy.typing import NDArray
 
-from dsl_core.capture.proof.raster import Counts, Noise
+from dsl_core.capture.proof.noise import Noise
+from dsl_core.capture.proof.raster import Counts
 
 #: So many lines on end are asked, of the first ones after black.
 TOGETHER, FIRST = 4, 32

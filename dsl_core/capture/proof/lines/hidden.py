@@ -9,7 +9,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from dsl_core.capture.proof.raster import Counts, Noise
+from dsl_core.capture.proof.noise import Noise
+from dsl_core.capture.proof.raster import Counts
 
 #: A pixel is darker by so many deviations, and by this share of what the room gives it.
 SIGMAS, SHARE = 4.0, 0.35

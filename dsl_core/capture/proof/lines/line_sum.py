@@ -11,8 +11,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from dsl_core.capture.proof.noise import Noise
 from dsl_core.capture.proof.prediction import Lit
-from dsl_core.capture.proof.raster import Counts, Noise
+from dsl_core.capture.proof.raster import Counts
 from dsl_core.model.plan import CapturePlan, LineComb, ScanLines, Shot
 from dsl_core.patterns.multiplexed import profiles
 

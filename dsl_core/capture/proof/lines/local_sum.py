@@ -13,8 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dsl_core.capture.proof.lines.line_sum import even_cover
+from dsl_core.capture.proof.noise import Noise
 from dsl_core.capture.proof.prediction import Lit
-from dsl_core.capture.proof.raster import Counts, Noise, Raster
+from dsl_core.capture.proof.raster import Counts, Raster
 from dsl_core.model.plan import CapturePlan, Shot
 from dsl_core.patterns.multiplexed import profiles
 

@@ -13,7 +13,8 @@ from statistics import median
 import numpy as np
 from numpy.typing import NDArray
 
-from dsl_core.capture.proof.raster import Counts, Noise
+from dsl_core.capture.proof.noise import Noise
+from dsl_core.capture.proof.raster import Counts
 
 Bands = NDArray[np.float64]
 #: Parts of the height that are compared, and lines that say what is usual.

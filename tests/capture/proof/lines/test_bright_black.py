@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from dsl_core.capture.proof.lines.bright_black import FIRST, TOGETHER, BrightBlack
-from dsl_core.capture.proof.raster import Noise
+from dsl_core.capture.proof.noise import Noise
 from dsl_core.model.rig import Sensor
 
 SIZE = 600

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from dsl_core.capture.proof.lines.hidden import HiddenParts
-from dsl_core.capture.proof.raster import Counts, Noise
+from dsl_core.capture.proof.noise import Noise
+from dsl_core.capture.proof.raster import Counts
 from dsl_core.model.rig import Sensor
 
 NOISE, LEVEL = Noise.of(Sensor(), 12), Sensor().black_level_dn

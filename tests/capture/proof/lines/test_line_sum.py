@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from dsl_core.capture.proof.lines.line_sum import LineSum, line_sum
+from dsl_core.capture.proof.noise import Noise
 from dsl_core.capture.proof.prediction import Lit
-from dsl_core.capture.proof.raster import Counts, Noise
+from dsl_core.capture.proof.raster import Counts
 from dsl_core.model.plan import CapturePlan, GrayCode, LineComb, ScanLines, Sentinels, Setting, SpectralSet
 from dsl_core.model.rig import Sensor
 

@@ -9,8 +9,9 @@ import pytest
 from numpy.typing import NDArray
 
 from dsl_core.capture.proof.lines.local_sum import LocalSum, local_sum
+from dsl_core.capture.proof.noise import Noise
 from dsl_core.capture.proof.prediction import Lit
-from dsl_core.capture.proof.raster import Counts, Noise, Raster
+from dsl_core.capture.proof.raster import Counts, Raster
 from dsl_core.model.plan import CapturePlan, GrayCode, LineComb, ScanLines, Sentinels, Setting, SpectralSet
 from dsl_core.model.rig import Sensor
 from dsl_core.patterns.multiplexed import profile

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from dsl_core.capture.proof.lines.neighbours import LineNeighbours
-from dsl_core.capture.proof.raster import Counts, Noise
+from dsl_core.capture.proof.noise import Noise
+from dsl_core.capture.proof.raster import Counts
 from dsl_core.model.rig import Sensor
 
 ROWS, COLUMNS = 24, 64

@@ -12,7 +12,7 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from dsl_core.capture.proof.code_pairs import (
+from dsl_core.capture.proof.code.code_pairs import (
     ALIKE,
     BROKEN_SHARE,
     FEWEST_BROKEN,
@@ -21,7 +21,8 @@ from dsl_core.capture.proof.code_pairs import (
     SAME_LIGHT,
     Pair,
 )
-from dsl_core.capture.proof.raster import Counts, Floats, Noise
+from dsl_core.capture.proof.noise import Noise
+from dsl_core.capture.proof.raster import Counts, Floats
 
 #: Light of a pair of pictures relative to the last ones from which on it is worth taking it again.
 SETTLED = 0.02

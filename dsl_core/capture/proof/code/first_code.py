@@ -8,11 +8,9 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from dsl_core.capture.proof.code_pairs import CodePairs, Pair, alike, dominant
-from dsl_core.capture.proof.columns import LEAST_MARGIN, decode, exchanged_pairs, run_backwards
-from dsl_core.capture.proof.contest import vote
-from dsl_core.capture.proof.finding import Finding, Verdict, displaced
-from dsl_core.capture.proof.first_light import (
+from dsl_core.capture.proof.code.code_pairs import CodePairs, Pair, alike, dominant
+from dsl_core.capture.proof.code.columns import LEAST_MARGIN, decode, exchanged_pairs, run_backwards
+from dsl_core.capture.proof.code.first_light import (
     FEWEST_LIT,
     SETTLED,
     changed_light,
@@ -21,8 +19,11 @@ from dsl_core.capture.proof.first_light import (
     light_of_pairs,
     unsettled_pairs,
 )
+from dsl_core.capture.proof.contest import vote
+from dsl_core.capture.proof.finding import Finding, Verdict, displaced
+from dsl_core.capture.proof.noise import Noise
 from dsl_core.capture.proof.prediction import Lit
-from dsl_core.capture.proof.raster import Counts, Floats, Noise, Raster
+from dsl_core.capture.proof.raster import Counts, Floats, Raster
 from dsl_core.model.plan import BinaryCode, CapturePlan, Shot, spoken_number
 from dsl_core.patterns.displaced_code import DisplacedCode, displaced_code
 
@@ -100,6 +101,7 @@ class FirstCode:
             return Finding(shot, Verdict.UNTOLD)
         pair = (other, seen) if inverse else (seen, other)
         again = self._pair_shots(number)
+        self._pairs.learn_noise(pair, self._raster)
         expected = None if self._at_the_end else self._pairs.sum()
         broken = self._pairs.broken(pair, expected)
         if broken is not None and expected is not None:

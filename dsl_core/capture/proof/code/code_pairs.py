@@ -12,7 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dsl_core.capture.proof.finding import Verdict
-from dsl_core.capture.proof.raster import Counts, Floats, Noise
+from dsl_core.capture.proof.noise import Noise, noise_excess
+from dsl_core.capture.proof.raster import Counts, Floats, Raster
 
 #: A pixel breaks the sum by more than this share of its contrast, and by so many standard deviations.
 BROKEN_SHARE, BROKEN_SIGMAS = 0.3, 6.0
@@ -35,6 +36,7 @@ class CodePairs:
         """Start without any."""
         self._noise = noise
         self.pairs: dict[int, Pair] = {}
+        self._least_excess = np.inf
 
     def contrast(self, more: Iterable[Pair] = ()) -> tuple[Floats, Floats, NDArray[np.bool_]]:
         """Darkest and brightest counts of every pixel in all pairs and ``more``, and where both say enough.
@@ -54,6 +56,25 @@ class CodePairs:
         """Pattern and inverse together, the median over the pairs; None without any."""
         sums = [_together(pair) for pair in list(self.pairs.values())[-9:]]
         return np.asarray(np.median(sums, axis=0), np.float32) if sums else None
+
+    def learn_noise(self, pair: Pair, raster: Raster) -> None:
+        """Believe what a further pair shows of the camera's noise, where that is more than stated.
+
+        Of all pairs so far the least counts: a wrong picture looks like noise at most.
+        """
+        if not self.pairs:
+            return
+        other = next(reversed(self.pairs.values()))
+        every = (*pair, *other)
+        variance = sum(map(self._noise.variance, every), np.float32(0)) / np.float32(self._noise.excess)
+        dark, bright = np.minimum.reduce(every), np.maximum.reduce(every)
+        sound = bright.astype(np.float32) - dark > LIT_SIGMAS / 2 * np.sqrt(variance)
+        sound &= bright < self._noise.sensor.full_scale_dn
+        apart = np.where(sound, _together(pair) - _together(other), np.float32(np.nan))
+        excess = noise_excess(apart, np.asarray(variance), raster)
+        if excess is not None:
+            self._least_excess = min(self._least_excess, excess)
+            self._noise.take_excess(self._least_excess)
 
     def broken(self, pair: Pair, expected: Floats | None) -> NDArray[np.bool_] | None:
         """Pixels that break the sum of a pair, flat; None if it holds or nothing can be told.

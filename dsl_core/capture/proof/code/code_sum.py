@@ -12,9 +12,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from dsl_core.capture.proof.code_pairs import Pair
+from dsl_core.capture.proof.code.code_pairs import Pair
+from dsl_core.capture.proof.noise import Noise
 from dsl_core.capture.proof.prediction import Lit
-from dsl_core.capture.proof.raster import Counts, Noise
+from dsl_core.capture.proof.raster import Counts
 
 #: How far the sums may be from white, and from each other: what clean scans of all scenes differ by is a
 #: fifth of this.

@@ -5,14 +5,15 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from dsl_core.capture.proof.first_light import (
+from dsl_core.capture.proof.code.first_light import (
     changed_light,
     has_moved,
     is_unlit,
     light_of_pairs,
     unsettled_pairs,
 )
-from dsl_core.capture.proof.raster import Counts, Noise
+from dsl_core.capture.proof.noise import Noise
+from dsl_core.capture.proof.raster import Counts
 from dsl_core.model.rig import Sensor
 
 SENSOR = Sensor()

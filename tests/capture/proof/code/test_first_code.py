@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from dsl_core.capture.proof.code.first_code import FirstCode
 from dsl_core.capture.proof.finding import Finding, Verdict
-from dsl_core.capture.proof.first_code import FirstCode
-from dsl_core.capture.proof.raster import Counts, Noise, Raster
+from dsl_core.capture.proof.noise import Noise
+from dsl_core.capture.proof.raster import Counts, Raster
 from dsl_core.model.plan import CapturePlan, GrayCode, LineComb, Role, Setting, Shot
 from dsl_core.model.rig import Sensor
 from dsl_core.optics.sensor import bayer_channels

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from dsl_core.capture.proof.code_pairs import CodePairs, Pair, alike, dominant, end_of
+from dsl_core.capture.proof.code.code_pairs import CodePairs, Pair, alike, dominant, end_of
 from dsl_core.capture.proof.finding import Verdict
-from dsl_core.capture.proof.raster import Noise
+from dsl_core.capture.proof.noise import Noise
 from dsl_core.model.rig import Sensor
 
 #: Variance of counts: light above 100 DN over 10, and 0.35.

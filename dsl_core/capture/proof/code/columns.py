@@ -7,7 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from dsl_core.capture.proof.code_pairs import Pair
+from dsl_core.capture.proof.code.code_pairs import Pair
 from dsl_core.model.plan import BinaryCode
 from dsl_core.patterns.binary_code import decoder_of
 

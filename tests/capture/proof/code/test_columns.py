@@ -5,9 +5,15 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from dsl_core.capture.proof import columns
-from dsl_core.capture.proof.code_pairs import Pair
-from dsl_core.capture.proof.columns import _Neighbours, _of_columns, decode, exchanged_pairs, run_backwards
+from dsl_core.capture.proof.code import columns
+from dsl_core.capture.proof.code.code_pairs import Pair
+from dsl_core.capture.proof.code.columns import (
+    _Neighbours,
+    _of_columns,
+    decode,
+    exchanged_pairs,
+    run_backwards,
+)
 from dsl_core.model.plan import GrayCode
 from dsl_core.patterns.gray_code import code_image
 
