@@ -30,6 +30,7 @@ Part = Literal[
     "curves",
     "flat field",
     "focus",
+    "noise",
 ]
 
 #: How many deviations of its own a figure must be away from zero.
@@ -53,6 +54,7 @@ PARTS: dict[Part, str] = {
     "curves": "the curves of camera and projector",
     "flat field": "the flat field of the camera",
     "focus": "the focus of the camera",
+    "noise": "the noise of the camera",
 }
 
 

@@ -17,6 +17,7 @@ from dsl_core.model.frames import FrameSource
 from dsl_core.model.plan import CapturePlan, Shot
 from dsl_core.model.rig import Sensor
 from dsl_core.optics.sensor import bayer_channels
+from dsl_core.reconstruction.light.own_noise import own_noise
 from dsl_core.reconstruction.light.setting_ratios import compared_rows
 
 Counts = NDArray[np.int64]
@@ -38,7 +39,7 @@ ALIKE = 10
 
 
 def own_sensor(source: FrameSource, sensor: Sensor) -> tuple[Sensor, tuple[FitFinding, ...]]:
-    """The sensor with the saturation and the noise of rounding that frames show, and what was found."""
+    """The sensor with the saturation, rounding and noise that frames show, and what was found."""
     counts = _counts(source, sensor)
     ends_dn, step_dn = saturation_dn(counts, sensor), step_of(counts.sum(0))
     findings = []
@@ -48,7 +49,8 @@ def own_sensor(source: FrameSource, sensor: Sensor) -> tuple[Sensor, tuple[FitFi
     if step_dn > sensor.step_dn:
         findings.append(_steps(step_dn, sensor))
         sensor = sensor.model_copy(update={"step_dn": step_dn})
-    return sensor, tuple(findings)
+    sensor, noisy = own_noise(source, sensor)
+    return sensor, (*findings, *noisy)
 
 
 def saturation_dn(counts: Counts, sensor: Sensor) -> int | None:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from dsl_core.model.plan import CapturePlan, GrayCode, ScanLines, Setting, Shot
+from dsl_core.model.plan import CapturePlan, GrayCode, NoCode, ScanLines, Setting, Shot
 from dsl_core.model.rig import Sensor
 from dsl_core.optics.sensor import bayer_channels, raw_variance
 from dsl_core.reconstruction.light.own_sensor import own_sensor, step_of
@@ -38,6 +38,9 @@ class Lit:
         light = np.zeros(SHAPE)
         if shot.role != "black":
             light += np.linspace(20, 150, SHAPE[1]) if self.noisy else 70.0
+        if shot.role == "code":
+            stripe = np.arange(SHAPE[1]) * (shot.pattern // 2 + 2) // SHAPE[1] % 2
+            light = light * (stripe == shot.pattern % 2)
         own = np.array(self.colours)[bayer_channels(SENSOR.bayer, *SHAPE)]
         signal = light * own * PLAN.settings[shot.setting].exposure_ms
         rng = np.random.default_rng(shot.index)
@@ -78,6 +81,17 @@ def test_steps_are_noise_and_are_told_if_they_are_coarser_than_it() -> None:
     assert fine.step_dn == 2
     assert not told.significant
     assert own_sensor(Lit(step_dn=16), sensor) == (sensor, ())
+
+
+def test_noise_is_that_of_the_frames_where_it_is_more_than_calibrated() -> None:
+    calm = SENSOR.model_copy(update={"electrons_per_dn": 90.0, "read_noise_dn": 1 / 3})
+    sensor, (told,) = own_sensor(Lit(), calm)
+    assert sensor.electrons_per_dn == pytest.approx(SENSOR.electrons_per_dn, rel=0.3)
+    assert told.significant
+    assert told.part == "noise"
+    assert told.value == pytest.approx(np.sqrt(90 / sensor.electrons_per_dn))
+    assert "times as noisy as its calibration says" in told.sentence
+    assert own_sensor(Lit(plan=PLAN.model_copy(update={"code": NoCode()})), calm) == (calm, ())
 
 
 def test_a_step_is_that_between_values_that_many_pixels_have() -> None:

@@ -12,8 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dsl_core.capture.proof.finding import Verdict
-from dsl_core.capture.proof.noise import Noise, noise_excess
+from dsl_core.capture.proof.noise import Noise
 from dsl_core.capture.proof.raster import Counts, Floats, Raster
+from dsl_core.optics.seen_noise import noise_excess, noisier
 
 #: A pixel breaks the sum by more than this share of its contrast, and by so many standard deviations.
 BROKEN_SHARE, BROKEN_SIGMAS = 0.3, 6.0
@@ -34,7 +35,7 @@ class CodePairs:
 
     def __init__(self, noise: Noise) -> None:
         """Start without any."""
-        self._noise = noise
+        self._noise, self._stated = noise, noise.sensor
         self.pairs: dict[int, Pair] = {}
         self._least_excess = np.inf
 
@@ -65,16 +66,12 @@ class CodePairs:
         if not self.pairs:
             return
         other = next(reversed(self.pairs.values()))
-        every = (*pair, *other)
-        variance = sum(map(self._noise.variance, every), np.float32(0)) / np.float32(self._noise.excess)
-        dark, bright = np.minimum.reduce(every), np.maximum.reduce(every)
-        sound = bright.astype(np.float32) - dark > LIT_SIGMAS / 2 * np.sqrt(variance)
-        sound &= bright < self._noise.sensor.full_scale_dn
-        apart = np.where(sound, _together(pair) - _together(other), np.float32(np.nan))
-        excess = noise_excess(apart, np.asarray(variance), raster)
+        one, before = ((a.reshape(raster.shape), b.reshape(raster.shape)) for a, b in (pair, other))
+        variance, full = Noise(self._stated).variance, self._stated.full_scale_dn
+        excess = noise_excess(one, before, variance, full)
         if excess is not None:
             self._least_excess = min(self._least_excess, excess)
-            self._noise.take_excess(self._least_excess)
+            self._noise.take(noisier(self._stated, self._least_excess))
 
     def broken(self, pair: Pair, expected: Floats | None) -> NDArray[np.bool_] | None:
         """Pixels that break the sum of a pair, flat; None if it holds or nothing can be told.
