@@ -85,7 +85,9 @@ class LinePlaces:
         votes, total, count, best = self._votes[side], 0.0, 0, 0.0
         run: list[Shot] = []
         since: tuple[Shot, ...] = ()
-        for index in sorted((at for at in votes if at <= last.index), reverse=True):
+        for index in range(last.index, -1, -1):
+            if index not in votes:
+                continue
             shot, mine, voters = votes[index]
             if shot.setting != last.setting:
                 break
