@@ -104,7 +104,7 @@ class Assembly:
             None if solver is None else self.counts,
             None if solver is None else solver.followed,
             None if solver is None else solver.error,
-            findings,
+            [*findings, *(() if solver is None else solver.findings)],
         )
         return self._sink.finish(attributes_of(self._rig, self._plan, fit))
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from dsl_core.errors import PlanError
+from dsl_core.model.fit import FitFinding
 from dsl_core.model.options import SOLVERS, Options, names
 from dsl_core.model.plan import CapturePlan
 from dsl_core.model.rig import Rig
@@ -17,6 +18,7 @@ from dsl_core.optics.spectra import Bands
 from dsl_core.progress import Progress
 from dsl_core.reconstruction.rows.bands import Band
 from dsl_core.reconstruction.rows.frames import ScanFrames
+from dsl_core.reconstruction.spectral.colour_sites import colour_sites_finding
 from dsl_core.reconstruction.spectral.model_error import ModelError
 from dsl_core.reconstruction.spectral.nearest_line import ColourBasis, NearestLine
 from dsl_core.reconstruction.spectral.probing.frame_levels import frame_levels
@@ -49,6 +51,7 @@ class RowSolver:
     rows: Callable[[Band, Progress | None], SpectralMaps]
     followed: Followed | None = None
     error: ModelError | None = None
+    findings: tuple[FitFinding, ...] = ()
 
 
 def rows_together(rig: Rig, options: Options) -> int | None:
@@ -84,6 +87,11 @@ def row_solver(
     lines = LineSet.of(plan)
     asked = probed_pixels(pixels.valid, rig.sensor.bayer) if lines is not None and lines.single else _NONE
 
+    findings: tuple[FitFinding, ...] = ()
+    if lines is not None and asked.size:
+        wrong = colour_sites_finding(rig, lines, model, frames.pick(asked, progress), pixels)
+        findings = () if wrong is None else (wrong,)
+
     def picked() -> tuple[PickedCube, PickedCube]:
         lines = frames.pick(asked, progress)
         width = pixels.valid.shape[1]
@@ -105,4 +113,4 @@ def row_solver(
         best.take(stack.radiance, stack.std, band.near.start)
         return best.solve(band.rows, progress, part=options.part)
 
-    return RowSolver(solve, best.followed, best.error)
+    return RowSolver(solve, best.followed, best.error, findings)
