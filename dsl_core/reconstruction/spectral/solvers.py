@@ -19,8 +19,10 @@ from dsl_core.progress import Progress
 from dsl_core.reconstruction.rows.bands import Band
 from dsl_core.reconstruction.rows.frames import ScanFrames
 from dsl_core.reconstruction.spectral.colour_sites import colour_sites_finding
+from dsl_core.reconstruction.spectral.first_order_light import FirstOrderLight
 from dsl_core.reconstruction.spectral.model_error import ModelError
 from dsl_core.reconstruction.spectral.nearest_line import ColourBasis, NearestLine
+from dsl_core.reconstruction.spectral.order_balance import order_balance_finding
 from dsl_core.reconstruction.spectral.probing.frame_levels import frame_levels
 from dsl_core.reconstruction.spectral.probing.picked_cube import PickedCube
 from dsl_core.reconstruction.spectral.probing.probe import probed_pixels
@@ -87,10 +89,11 @@ def row_solver(
     lines = LineSet.of(plan)
     asked = probed_pixels(pixels.valid, rig.sensor.bayer) if lines is not None and lines.single else _NONE
 
-    findings: tuple[FitFinding, ...] = ()
+    findings: list[FitFinding] = []
     if lines is not None and asked.size:
-        wrong = colour_sites_finding(rig, lines, model, frames.pick(asked, progress), pixels)
-        findings = () if wrong is None else (wrong,)
+        seen = FirstOrderLight.of(lines, model, frames.pick(asked, progress), pixels)
+        told = colour_sites_finding(rig, seen), order_balance_finding(rig, seen)
+        findings = [each for each in told if each is not None]
 
     def picked() -> tuple[PickedCube, PickedCube]:
         lines = frames.pick(asked, progress)
@@ -113,4 +116,4 @@ def row_solver(
         best.take(stack.radiance, stack.std, band.near.start)
         return best.solve(band.rows, progress, part=options.part)
 
-    return RowSolver(solve, best.followed, best.error, findings)
+    return RowSolver(solve, best.followed, best.error, tuple(findings))
