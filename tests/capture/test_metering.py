@@ -139,6 +139,8 @@ def test_a_dark_scene_lengthens_exposures_up_to_the_limit_and_says_what_is_left(
     darker = meter(rig_of(Bench(brightest / 20)), plan_of((200.0, 1.0)))
     assert exposures(darker) == [200.0 * MOST_LONGER]
     assert "reaches 4.9%. Open the aperture" in darker.sentence
+    within = meter(rig_of(Bench(brightest / 20, range_ms=(1.0, 400.0))), plan_of((100.0, 1.0), (200.0, 1.0)))
+    assert exposures(within) == [200.0, 400.0], "the ratio of the settings stays"
     short = meter(rig_of(Bench(brightest / 20, range_ms=(1.0, 200.0))), plan_of((200.0, 1.0)))
     assert exposures(short) == [200.0]
     assert short.is_told
@@ -149,6 +151,13 @@ def test_light_that_is_too_much_for_the_shortest_exposure_is_told() -> None:
     found = meter(rig_of(bench), plan_of((200.0, 1.0)))
     assert exposures(found) == [20.0]
     assert "saturates even at 20 ms, the shortest possible: close the aperture" in found.sentence
+
+
+def test_a_plan_that_is_as_short_as_possible_is_still_told_to_saturate() -> None:
+    found = meter(rig_of(Bench(light_for(3.0, 20.0), range_ms=(15.0, 1000.0))), plan_of((20.0, 1.0)))
+    assert exposures(found) == [20.0]
+    assert found.is_told
+    assert "shortened" not in found.sentence
 
 
 def test_what_cannot_be_measured_keeps_its_plan() -> None:

@@ -96,6 +96,16 @@ def test_whole_areas_are_told_though_they_are_a_small_part_of_the_picture(
     assert Fit.of(judged(flags(Flag.SATURATED | Flag.NOT_REFINED, 0.3))).parts == ()
 
 
+def test_a_small_translucent_patch_is_told_and_pixels_along_an_edge_are_not() -> None:
+    patch, edge = np.zeros((2, 60, 60), np.uint16)
+    patch[20:28, 20:28] = edge[:, 30] = int(Flag.UNUSUAL_PEAK)
+    told = Fit.of(share_findings(patch, None))
+    assert told.parts == ("profile",)
+    assert "light leaves a translucent surface elsewhere" in told.words
+    assert Fit.of(share_findings(edge, None)).parts == ()
+    assert Fit.of(share_findings(patch, None, blurred=True)).parts == ()
+
+
 def test_pixels_that_are_lost_to_overexposure_are_told_by_themselves() -> None:
     bright = flags(Flag.SATURATED | Flag.CODE_UNSURE, 0.3)
     fit = Fit.of(judged(bright))
