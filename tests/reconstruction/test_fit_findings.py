@@ -20,6 +20,7 @@ from dsl_core.optics.correspondence import correspondence
 from dsl_core.reconstruction.fit_findings import (
     SpectralCounts,
     _film,
+    _profile,
     band_findings,
     cause_findings,
     count_spectra,
@@ -295,6 +296,12 @@ def test_uneven_lines_are_a_cause_only_where_both_orders_lie_to_the_same_side(
     found = _film(causes, cast(Probe, SimpleNamespace(nm_per_px=1.9, step_nm=5.0)))
     assert "film has moved or is bent otherwise" in found.sentence
     assert ("less even" in found.sentence) == told
+
+
+def test_a_blur_that_lines_do_not_show_is_not_told() -> None:
+    assert _profile("blur", 0.4, 0.09).significant
+    assert not _profile("blur", 0.4, 0.13).significant, "lines side by side before wax"
+    assert _profile("tail", 0.4, 0.13).significant
 
 
 def test_bands_must_be_narrow_to_tell_a_small_displacement(scanned: tuple[DeviceRig, MemoryScan]) -> None:
