@@ -14,6 +14,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from dsl_core.capture import metering
 from dsl_core.capture.preflight import fit_plan, require_possible
 from dsl_core.capture.proof.report import SeenFrames
 from dsl_core.capture.proof.report import prove as prove_frames
@@ -45,7 +46,16 @@ if TYPE_CHECKING:
 
 
 _log = logging.getLogger(__name__)
-__all__ = ["Options", "evaluate", "fit_plan", "open_scan", "reconstruct", "scan", "write_report"]
+__all__ = ["Options", "evaluate", "fit_plan", "meter", "open_scan", "reconstruct", "scan", "write_report"]
+
+
+def meter(rig: DeviceRig, plan: CapturePlan, token: CancelToken | None = None) -> metering.Metered:
+    """The plan with exposures for this scene, as `capture.metering.meter` measures them.
+
+    Raises `PlanError` where the plan is impossible on the rig, before anything is shown.
+    """
+    require_possible(rig, plan)
+    return metering.meter(rig, plan, pattern_image, token)
 
 
 @contextmanager

@@ -18,6 +18,12 @@ def full_scale_dn(rig: DeviceRig) -> int:
     return (1 << rig.camera.info.bit_depth) - 1 if known is None else known.sensor.full_scale_dn
 
 
+def by_colour(pixels: NDArray[np.unsignedinteger]) -> NDArray[np.unsignedinteger]:
+    """The pixels of each cell of a raw mosaic (rows, columns), DN, shape (4, rows // 2, columns // 2)."""
+    rows, columns = (2 * (length // 2) for length in pixels.shape)
+    return np.stack([pixels[i:rows:2, j:columns:2] for i in (0, 1) for j in (0, 1)])
+
+
 class ExposureWatch:
     """Takes the frames of a scan in their order; ``found`` says how much of white is overexposed, if much."""
 
@@ -33,7 +39,8 @@ class ExposureWatch:
         if shot.index not in self._waits_for:
             return
         self._waits_for.discard(shot.index)
-        saturated = pixels >= self._full_scale_dn
+        # One colour is enough to tell a code and to find a line.
+        saturated = by_colour(pixels).min(axis=0) >= self._full_scale_dn
         self._always = saturated if self._always is None else self._always & saturated
         share = float(self._always.mean())
         if not self._waits_for and share >= MOST_OVEREXPOSED:

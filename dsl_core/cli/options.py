@@ -117,7 +117,14 @@ Settings = Annotated[
     list[str],
     typer.Option("--setting", help="EXPOSURE_MS@LEVEL, like 166.7@0.2; repeat for a bracket, darkest first."),
 ]
-
+Meter = Annotated[
+    bool | None,
+    typer.Option(
+        "--match-exposure/--keep-exposure",
+        help="Measure how bright the scene is first, and scale the exposures of the plan to it (usual, unless"
+        " a file or --setting gives them).",
+    ),
+]
 Sentinel = Annotated[
     bool | None,
     typer.Option(
@@ -142,6 +149,11 @@ class PlanChoice:
     def is_written(self) -> bool:
         """Whether a file says exactly what to capture; any other plan is fitted to the rig."""
         return self.source is not None and not _is_preset(self.source)
+
+    @property
+    def is_exposed(self) -> bool:
+        """Whether somebody chose exposures, in a file or by an option."""
+        return self.is_written or bool(self.settings)
 
     def build(self) -> CapturePlan:
         """The plan; raises `PlanError` when the choices contradict each other or are impossible."""

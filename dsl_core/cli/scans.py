@@ -16,6 +16,7 @@ from dsl_core.cli.options import (
     Force,
     Json,
     Lines,
+    Meter,
     OverrideCalibration,
     PlanChoice,
     PlanSource,
@@ -100,6 +101,7 @@ def scan(
     override: OverrideCalibration = False,
     effects: Effects = None,
     tolerance: Tolerance = None,
+    meter: Meter = None,
     json: Json = False,
 ) -> None:
     """Capture a plan; every frame is saved to disk before the next is captured."""
@@ -119,8 +121,11 @@ def scan(
         calibrated, overridden = _calibrate(output, devices, calibration, override)
         fitted = made if choice.is_written else pipeline.fit_plan(made, calibrated)
         _require_patterns(fitted)
-        _state(output, fitted, target, calibrated)
         notes = rig_notes(rig, options) | overridden
+        if meter if meter is not None else not choice.is_exposed:
+            fitted, metered = _metered(output, calibrated, fitted)
+            notes |= metered
+        _state(output, fitted, target, calibrated)
         with output.progress() as progress, resumed_by(f"dsl-scan resume {target}"):
             status = pipeline.scan(calibrated, fitted, target, progress, notes)
     _done(output, target, status)
@@ -196,6 +201,18 @@ def _require_patterns(plan: CapturePlan) -> None:
 
     spectral_profiles(plan)
     pattern_image(plan, next(plan.shots()))
+
+
+def _metered(output: Output, devices: DeviceRig, plan: CapturePlan) -> tuple[CapturePlan, dict[str, str]]:
+    """The plan with exposures for the scene, and what was measured, as notes of the scan."""
+    from dsl_core import pipeline
+
+    found = pipeline.meter(devices, plan)
+    if found.is_told:
+        output.say(found.sentence)
+    if found.sentence:
+        output.put(metered=found.sentence)
+    return found.plan, found.notes
 
 
 def _state(output: Output, plan: CapturePlan, folder: Path, devices: DeviceRig) -> None:

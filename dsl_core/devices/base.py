@@ -181,7 +181,8 @@ class DeviceRig:
     what was there before with ``put_back``, and says in words with ``standing`` what is there now.
     ``nominal`` is what data sheets say of the rig, the start of a calibration. ``filters`` holds measured
     transmissions of bandpass filters by their nominal centres, nm, as far as there are any. ``patience`` says
-    when a call that does not return is given up.
+    when a call that does not return is given up. A rig that ``only_repeats`` plays back an earlier scan:
+    there is nothing to measure with it.
     """
 
     name: str
@@ -198,6 +199,7 @@ class DeviceRig:
     filters: dict[float, SpectralCurve] = field(default_factory=dict)
     notes: dict[str, str] = field(default_factory=dict)
     patience: Patience = Patience()
+    only_repeats: bool = False
 
     def close(self) -> None:
         """Close every device, also when one of them fails to; raises the first failure at the end."""

@@ -94,4 +94,5 @@ def replay_rig(source: FrameSource, calibration: Rig | None = None) -> DeviceRig
         projector=ReplayProjector(source, period_ms),
         calibration=calibration,
         sleep=lambda seconds: None,
+        only_repeats=True,
     )

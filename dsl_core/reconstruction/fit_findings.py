@@ -36,6 +36,7 @@ MOST_POOR, MOST_AT_BOUND, MOST_LOST, MOST_UNDECIDED, MOST_UNUSUAL = 0.4, 0.1, 0.
 #: Side of an area (px), pixels of it that count at least, and their share that makes it an area of a kind;
 #: the shares of the picture that such areas may have.
 AREA_PX, AREA_PIXELS, AREA_SHARE, MOST_POOR_AREA, MOST_COARSE_AREA = 5, 15, 0.8, 0.02, 0.05
+MOST_UNUSUAL_AREA = 0.003
 #: Mean of a band that no matt surface exceeds: a spectrum at the upper bound says something only where its
 #: deviation excludes all below.
 BRIGHTEST = 0.99
@@ -45,6 +46,9 @@ WIDEST_BAND = 1.25
 FEWEST = 50
 #: Blur and tail of the lines below which neither is worth a finding.
 MOST_BLUR, MOST_TAIL = 0.03, 0.004
+#: Relative deviation of a blur beyond which lines, side by side in few frames, do not show it: what they seem
+#: to show then is light that translucent surfaces spread.
+UNSURE_BLUR = 0.1
 #: Chi-square of most pixels above which no cause explains the frames.
 MOST_CHI_SQUARE = 1.5
 #: Share of one order's displacement that the other's must have if uneven lines may be the cause.
@@ -193,6 +197,16 @@ def share_findings(
             "Look at the flags; narrow the aperture or move the object nearer to the focus.",
         )
         yield shape.model_copy(update={"significant": shape.significant and not blurred})
+        areas = _share(
+            "profile",
+            "areas of lines of another shape",
+            in_areas((flags & int(Flag.UNUSUAL_PEAK)) != 0, is_measured) / measured,
+            MOST_UNUSUAL_AREA,
+            "Lines have another shape in areas that hold {0} of the pixels: light leaves a translucent"
+            " surface elsewhere than where it entered, and depth there is less sure, as stated.",
+            "Look at a picture of the flags; a matt coat, such as chalk spray, shows the surface itself.",
+        )
+        yield areas.model_copy(update={"significant": areas.significant and not blurred})
         coarse = (flags & int(Flag.NOT_REFINED | Flag.SATURATED)) == int(Flag.NOT_REFINED)
         yield _share(
             "profile",
@@ -437,7 +451,7 @@ def _gains(causes: Causes, corrected: bool) -> Iterator[FitFinding]:
 
 def _profile(name: str, value: float, std: float) -> FitFinding:
     blur = name == "blur"
-    return FitFinding.judged(
+    made = FitFinding.judged(
         "profile",
         f"{name} of the lines",
         (value, std),
@@ -449,3 +463,5 @@ def _profile(name: str, value: float, std: float) -> FitFinding:
         " the calibration says.",
         "Repeat the self-test with the projector in focus.",
     )
+    shows = not blur or std < UNSURE_BLUR
+    return made.model_copy(update={"significant": made.significant and shows})

@@ -24,9 +24,10 @@ FULL_DN = 1023
 
 
 def white(share: float) -> np.ndarray[tuple[int, ...], np.dtype[np.uint16]]:
-    pixels = np.full(100, FULL_DN - 1, np.uint16)
-    pixels[: round(100 * share)] = FULL_DN
-    return pixels.reshape(10, 10)
+    """A picture of which this share of the cells of 2 x 2 pixels is saturated in every colour."""
+    cells = np.full(25, FULL_DN - 1, np.uint16)
+    cells[: round(25 * share)] = FULL_DN
+    return np.kron(cells.reshape(5, 5), np.ones((2, 2), np.uint16))
 
 
 @pytest.mark.parametrize(
@@ -44,6 +45,14 @@ def test_what_no_setting_spares_counts(dark: float, bright: float, told: str) ->
         share = 1.0 if shot.role != "white" else dark if shot.setting == 0 else bright
         watch.add(shot, white(share))
     assert (told in watch.found) if told else watch.found == ""
+
+
+def test_what_one_colour_still_measures_does_not_count() -> None:
+    watch, pixels = ExposureWatch(PLAN, FULL_DN), white(1.0)
+    pixels[::2, ::2] = FULL_DN - 1
+    for shot in PLAN.shots():
+        watch.add(shot, pixels)
+    assert watch.found == ""
 
 
 def test_a_scan_tells_it_once_and_ends_as_usual(tmp_path, caplog) -> None:  # type: ignore[no-untyped-def]

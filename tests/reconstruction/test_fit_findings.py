@@ -20,6 +20,7 @@ from dsl_core.optics.correspondence import correspondence
 from dsl_core.reconstruction.fit_findings import (
     SpectralCounts,
     _film,
+    _profile,
     band_findings,
     cause_findings,
     count_spectra,
@@ -94,6 +95,16 @@ def test_whole_areas_are_told_though_they_are_a_small_part_of_the_picture(
     # Seen edges of so many pixels more are no areas, and neither are pixels that something else explains.
     assert part not in Fit.of(judged(lines)).parts
     assert Fit.of(judged(flags(Flag.SATURATED | Flag.NOT_REFINED, 0.3))).parts == ()
+
+
+def test_a_small_translucent_patch_is_told_and_pixels_along_an_edge_are_not() -> None:
+    patch, edge = np.zeros((2, 60, 60), np.uint16)
+    patch[20:28, 20:28] = edge[:, 30] = int(Flag.UNUSUAL_PEAK)
+    told = Fit.of(share_findings(patch, None))
+    assert told.parts == ("profile",)
+    assert "light leaves a translucent surface elsewhere" in told.words
+    assert Fit.of(share_findings(edge, None)).parts == ()
+    assert Fit.of(share_findings(patch, None, blurred=True)).parts == ()
 
 
 def test_pixels_that_are_lost_to_overexposure_are_told_by_themselves() -> None:
@@ -285,6 +296,12 @@ def test_uneven_lines_are_a_cause_only_where_both_orders_lie_to_the_same_side(
     found = _film(causes, cast(Probe, SimpleNamespace(nm_per_px=1.9, step_nm=5.0)))
     assert "film has moved or is bent otherwise" in found.sentence
     assert ("less even" in found.sentence) == told
+
+
+def test_a_blur_that_lines_do_not_show_is_not_told() -> None:
+    assert _profile("blur", 0.4, 0.09).significant
+    assert not _profile("blur", 0.4, 0.13).significant, "lines side by side before wax"
+    assert _profile("tail", 0.4, 0.13).significant
 
 
 def test_bands_must_be_narrow_to_tell_a_small_displacement(scanned: tuple[DeviceRig, MemoryScan]) -> None:

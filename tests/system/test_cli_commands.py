@@ -121,6 +121,29 @@ def test_a_scan_says_before_it_starts_what_it_takes(give: Give, tmp_path: Path) 
     assert f"dsl-scan reconstruct {tmp_path / 'a.dsl'}" in said[-1]
 
 
+@pytest.mark.parametrize(
+    ("words", "metered"),
+    [
+        ([], True),
+        (["--keep-exposure"], False),
+        (["--setting", "166.7@0.2"], False),
+        (["--setting", "166.7@0.2", "--match-exposure"], True),
+    ],
+)
+def test_a_scan_exposes_for_the_scene_unless_exposures_were_chosen(
+    give: Give, tmp_path: Path, words: list[str], metered: bool
+) -> None:
+    scene = ["--rig", "twin", "-O", "size=32x24", "-O", "scene=plane", "-O", "reflectance=0.002"]
+    patterns = ["--code", "columns", "--comb", "80x80x640", "--no-sentinels"]
+    ending = give("scan", tmp_path / "a.dsl", *scene, *patterns, *words, "--json")
+    assert ending.code == 0
+    manifest = ScanReader(tmp_path / "a.dsl").manifest
+    longer = manifest.plan.settings[0].exposure_ms / 166.7
+    assert longer == pytest.approx(4.0 if metered else 1.0, abs=0.01)
+    assert manifest.notes.get("exposures") == ending.json.get("metered")
+    assert ("metered" in ending.json) == metered
+
+
 def test_reconstruct_says_what_each_stage_costs(give: Give, finished: Path, tmp_path: Path) -> None:
     target = tmp_path / "depth.zarr"
     ending = give("reconstruct", finished / "scan.dsl", "-o", target, "--depth-only", "--no-refine", "--json")

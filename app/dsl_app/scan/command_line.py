@@ -40,9 +40,18 @@ def needs_file(plan: CapturePlan) -> bool:
 
 
 def scan_command(
-    target: Path, rig: str, plan: CapturePlan, calibration: str, override: bool, file: Path | None = None
+    target: Path,
+    rig: str,
+    plan: CapturePlan,
+    calibration: str,
+    override: bool,
+    file: Path | None = None,
+    meters: bool = False,
 ) -> str:
-    """The command that captures this scan; ``rig`` as in `RigChoice.command`, ``file`` holds the plan."""
+    """The command that captures this scan; ``rig`` as in `RigChoice.command`, ``file`` holds the plan.
+
+    ``meters`` says whether the scene is measured first.
+    """
     words, first = ["dsl-scan scan", quoted(target), rig], ""
     if file is None and needs_file(plan):
         file, first = (
@@ -54,6 +63,8 @@ def scan_command(
         words.append(f"--calibration {quoted(calibration)}")
     if override:
         words.append("--override-calibration")
+    if meters:
+        words.append("--match-exposure")
     return first + " ".join(words)
 
 

@@ -102,6 +102,7 @@ class ScanController:
             state.override.value,
             is_resumed=session is not None,
             check_drift=state.check_drift.value,
+            meters=state.is_metered,
         )
         self._scan = scan = ScanJob(request)
         self._reconnector.forget()
@@ -167,6 +168,8 @@ class ScanController:
             return
         if self._was_refused():
             self._ended(Phase.PLANNING)
+        if exposed := scan.take_exposed():
+            self._notifier.tell("info", exposed)
         status, picture = scan.take_news()
         if status is not None:
             before = self.state.status.value
@@ -401,6 +404,7 @@ class ScanController:
             state.calibration.value.key,
             state.override.value,
             state.plan_file.value,
+            state.is_metered,
         )
 
     def close(self) -> None:

@@ -21,7 +21,10 @@ PICTURE_CELLS = 800
 
 @dataclass(frozen=True)
 class ScanRequest:
-    """What to scan: with which devices, plan and calibration, and into which folder."""
+    """What to scan: with which devices, plan and calibration, and into which folder.
+
+    With ``meters`` a new scan measures the scene first and scales the exposures of its plan to it.
+    """
 
     devices: DeviceRig
     plan: CapturePlan
@@ -31,6 +34,7 @@ class ScanRequest:
     override: bool
     is_resumed: bool
     check_drift: bool = True
+    meters: bool = False
 
 
 class ScanJob:
@@ -50,6 +54,7 @@ class ScanJob:
         self._status: Status | None = None
         self._picture: LivePicture | None = None
         self._left_s: float | None = None
+        self._exposed = ""
 
     # In the job's thread ---------------------------------------------------------------------------
 
@@ -69,6 +74,9 @@ class ScanJob:
         else:
             devices, overridden = self._calibrated()
             plan, notes = request.plan, request.notes | overridden
+            if request.meters:
+                plan, metered = self._metered(devices, progress)
+                notes |= metered
         graphs = BlockGraphs(plan, devices.camera.info.bayer)
         if request.is_resumed:
             self._read_before(graphs, progress)
@@ -97,6 +105,16 @@ class ScanJob:
             return replace(request.devices, calibration=None), {}
         devices, overridden = with_calibration(request.devices, request.calibration, request.override)
         return devices, {"calibration_overridden": "; ".join(overridden)} if overridden else {}
+
+    def _metered(self, devices: DeviceRig, progress: Progress) -> tuple[CapturePlan, dict[str, str]]:
+        """The plan with exposures for the scene, and what was measured, as notes of the scan."""
+        from dsl_core import pipeline
+
+        progress.report("measure the light", 0, 0)
+        found = pipeline.meter(devices, self.request.plan, self.token)
+        with self._lock:
+            self._exposed = found.sentence if found.is_told else ""
+        return found.plan, found.notes
 
     def _read_before(self, graphs: BlockGraphs, progress: Progress) -> None:
         """Add the frames of earlier runs to the graphs."""
@@ -131,6 +149,12 @@ class ScanJob:
             news = self._status, self._picture
             self._status = self._picture = None
         return news
+
+    def take_exposed(self) -> str:
+        """What is to be said of the exposures, once; empty where they are as planned."""
+        with self._lock:
+            said, self._exposed = self._exposed, ""
+        return said
 
     def left_s(self) -> float | None:
         """Seconds left of the whole scan, which stand still in a pause; None before the first frame."""

@@ -155,6 +155,11 @@ class RunBox(QGroupBox):
             "Capture two old frames again and compare before resuming. Without this check, a scan whose scene"
             " or light has changed is resumed and its frames do not fit together",
         )
+        self.meter = check_box(
+            "Match exposures to the scene",
+            "Measure white first, and scale all exposures of the preset so that it is neither overexposed nor"
+            " dark. Exposures that you choose yourself, or open from a file, are kept",
+        )
         self.then = QCheckBox("Reconstruct at the end")
         self.then.setToolTip("Reconstruct and open the result as soon as all frames are saved")
         self.phase, self.frames, self.time = label(""), label(""), label("")
@@ -165,9 +170,12 @@ class RunBox(QGroupBox):
         self.renew.clicked.connect(controller.plan_new_scan)
         self.then.toggled.connect(state.then_reconstruct.set)
         self.drift.toggled.connect(state.check_drift.set)
+        self.meter.toggled.connect(state.meters.set)
         self.stops = [
             state.then_reconstruct.follow(self.then.setChecked),
             state.check_drift.follow(self.drift.setChecked),
+            state.meters.follow(self.meter.setChecked),
+            *follow_any(self._show_meter, state.plan, state.plan_file, state.interrupted, state.period_ms),
             *follow_any(
                 self._show,
                 state.phase,
@@ -188,6 +196,7 @@ class RunBox(QGroupBox):
         buttons = row_of(self.pause, self.cancel)
         column_of(
             self.then,
+            self.meter,
             self.drift,
             self.connect_rig,
             self.start,
@@ -227,6 +236,10 @@ class RunBox(QGroupBox):
         facts = state.facts.value
         # What is ticked is remembered for the next scan that has a calibration.
         self.then.setEnabled(facts is None or facts.is_calibrated)
+
+    def _show_meter(self) -> None:
+        self.meter.setVisible(self._state.interrupted.value is None)
+        self.meter.setEnabled(self._state.can_be_metered)
 
     def _show_status(self, status: Status) -> None:
         self._bar.setRange(0, max(status.total, 1))

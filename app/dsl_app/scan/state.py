@@ -133,7 +133,8 @@ class ScanState:
 
     ``trouble`` says what interrupted the scan (empty: nothing), ``note`` how the last one ended.
     ``plan_file`` is the file that holds exactly the current plan, if there is one. ``check_drift`` compares
-    two old frames before an interrupted scan resumes. ``period_ms`` is the LED cycle
+    two old frames before an interrupted scan resumes. ``meters`` measures the scene before a new scan and
+    scales exposures to it, where nobody chose them. ``period_ms`` is the LED cycle
     of the rig's projector. ``finished`` is the scan that was completed last, ``result`` fires with each new
     result; ``lacks_calibration`` says of the one completed last that it contains no calibration to be
     reconstructed with; ``is_reconstructing`` says that one is being made, and ``depth`` is that of it, mm,
@@ -149,6 +150,7 @@ class ScanState:
         self.calibration = Value(OWN_CALIBRATION)
         self.override = Value(False)
         self.check_drift = Value(True)
+        self.meters = Value(True)
         self.then_reconstruct = Value(True)
         self.interrupted: Value[InterruptedScan | None] = Value(None)
         self.finished: Value[Path | None] = Value(None)
@@ -180,6 +182,17 @@ class ScanState:
     def preset(self) -> Preset | None:
         """The preset that the plan equals; None for a custom plan."""
         return preset_of(self.plan.value, self.period_ms.value)
+
+    @property
+    def can_be_metered(self) -> bool:
+        """Whether exposures are those of a preset: others were chosen by a person, here or in a file."""
+        is_new = self.interrupted.value is None and self.plan_file.value is None
+        return is_new and self.preset is not None
+
+    @property
+    def is_metered(self) -> bool:
+        """Whether the scan scales its exposures to the scene."""
+        return self.meters.value and self.can_be_metered
 
 
 def preset_of(plan: CapturePlan, period_ms: float) -> Preset | None:

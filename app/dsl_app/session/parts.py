@@ -76,6 +76,7 @@ def scan_part(state: ScanState) -> ScanPart | None:
         plan=state.plan.value,
         target=state.target.value,
         then_reconstruct=state.then_reconstruct.value,
+        meters=state.meters.value,
         calibration=state.calibration.value.key,
     )
 
@@ -86,6 +87,7 @@ def restore_scan(part: ScanPart, control: ScanController) -> None:
     Whether to use a calibration although settings differ is asked again: a crash must not skip the check.
     """
     control.state.then_reconstruct.set(part.then_reconstruct)
+    control.state.meters.set(part.meters)
     if (part.target / MANIFEST_NAME).is_file() and not is_complete(part.target):
         control.open(part.target)
         return

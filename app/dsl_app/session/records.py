@@ -35,6 +35,7 @@ class ScanPart(_Part):
     plan: CapturePlan
     target: Path
     then_reconstruct: bool = True
+    meters: bool = True
     calibration: str = ""
 
 

@@ -34,6 +34,9 @@ MAX_CHI_SQUARE = 25.0
 #: Peaks beyond that are fitted again, as wide as surfaces out of focus make them (relative to what is
 #: expected) and with this relative error: pixels see other light as well, of glare or a second surface.
 FOCI, UNUSUAL_ERROR = (1.0, 0.75, 1.35, 1.8, 2.4), 0.03
+#: What any peak of even width leaves may be uneven, as light that travels in a translucent surface is: it
+#: displaces columns by this many times what as much noise would, and by no more than so many px.
+UNEVEN, MOST_UNEVEN_PX = 10.0, 1.0
 #: What fits no better than this then is not one peak.
 UNUSUAL_CHI_SQUARE = 4.0
 
@@ -78,9 +81,12 @@ def refine(peaks: LinePeaks, model_error: float = MODEL_ERROR) -> Column:
     if single and len(loose):
         scale = chi_square[loose].clip(min=1)
         q[loose], std_px[loose] = loose_columns(peaks.some(loose), model_error, fit.amplitude[loose], scale)
+    std_px = torch.where(good, std_px, torch.full_like(q, 1 / math.sqrt(12)))
+    uneven_px = UNEVEN * torch.sqrt(chi_square / fit.information)
+    std_px = torch.where(unusual & single, torch.maximum(std_px, uneven_px.clip(max=MOST_UNEVEN_PX)), std_px)
     return Column(
         torch.where(good, q, coarse_px),
-        torch.where(good, std_px, torch.full_like(q, 1 / math.sqrt(12))),
+        std_px,
         torch.where(good, fit.amplitude, otherwise),
         torch.where(good | fit.measured, fit.amplitude_std, torch.inf),
         good,

@@ -15,6 +15,8 @@ from dsl_app.scan.plan import connect_first, was_taken_with
 from dsl_app.scan.reconnect import ATTEMPTS, RETRY_S
 from dsl_app.scan.state import CalibrationChoice, InterruptedScan, Phase, Reconnection
 
+from dsl_core import pipeline
+from dsl_core.capture.metering import Metered
 from dsl_core.capture.runner import State, Status
 from dsl_core.cli.options import PlanChoice
 from dsl_core.devices.base import DeviceRig
@@ -48,6 +50,10 @@ def bench(tmp_path: Path) -> ScanBench:
 
 def phase(bench: ScanBench) -> Phase:
     return bench.state.phase.value
+
+
+def is_metered(bench: ScanBench) -> bool:
+    return bench.state.is_metered
 
 
 def fail_from(monkeypatch: pytest.MonkeyPatch, shot: int) -> None:
@@ -535,6 +541,37 @@ def test_the_command_line_makes_the_same_plan(bench: ScanBench, preset: object, 
     assert [s.exposure_ms for s in made.settings] == pytest.approx(
         [s.exposure_ms for s in wanted.settings], rel=1e-11
     )
+
+
+def test_a_preset_is_exposed_for_the_scene_and_the_next_scan_measures_anew(
+    bench: ScanBench, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    exposed = bench.state.plan.value
+    monkeypatch.setattr(pipeline, "meter", lambda *asked: Metered(exposed, "Exposures are shortened.", True))
+    bench.plan(SHORT)
+    preset = bench.state.plan.value
+    assert bench.scans.command_line().endswith(" --match-exposure")
+    bench.scans.start()
+    assert bench.state.finished.value is not None
+    taken = ScanReader(bench.state.finished.value)
+    assert taken.plan == exposed
+    assert taken.manifest.notes["exposures"] == "Exposures are shortened."
+    bench.scans.take_news()
+    assert ("info", "Exposures are shortened.") in bench.notifier.told
+    assert bench.state.plan.value == preset, "the next scan starts from the preset again"
+
+
+def test_exposures_that_a_person_chose_are_kept(bench: ScanBench, tmp_path: Path) -> None:
+    bench.plan(SHORT)
+    assert is_metered(bench)
+    bench.state.meters.set(False)
+    assert not is_metered(bench)
+    assert "--match-exposure" not in bench.scans.command_line()
+    bench.state.meters.set(True)
+    bench.state.plan_file.set(tmp_path / "plan.json")
+    assert not is_metered(bench)
+    bench.plan(BRIEF)
+    assert not is_metered(bench)
 
 
 def test_a_disk_that_fills_up_on_the_way_interrupts_and_loses_nothing(

@@ -130,6 +130,7 @@ def test_a_scan_that_is_opened_brings_another_plan_than_the_file(
         raise DeviceError("The power failed.")
 
     bench.plan(SHORT)
+    bench.state.meters.set(False)
     with monkeypatch.context() as losing:
         losing.setattr(SimCamera, "snap", lost)
         bench.scans.start()

@@ -63,6 +63,7 @@ def test_a_plan_comes_back(tmp_path: Path) -> None:
     first.plan()
     first.scans.plans.set_target(tmp_path / "leaf.dsl")
     first.scans.plans.set_override(True)
+    first.state.meters.set(False)
     part = scan_part(first.state)
     assert part is not None
     again = make_bench(tmp_path)
@@ -70,6 +71,7 @@ def test_a_plan_comes_back(tmp_path: Path) -> None:
     assert again.state.plan.value == first.state.plan.value
     assert again.state.target.value == tmp_path / "leaf.dsl"
     assert not again.state.then_reconstruct.value
+    assert not again.state.meters.value
     # Nobody overrides a check unasked.
     assert not again.state.override.value
 

@@ -1,0 +1,195 @@
+"""How bright white is before a scan starts, and exposures of its plan that suit the scene."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dsl_core.capture.exposure import PatternImage, RetryPolicy, ShotTaker
+from dsl_core.capture.overexposure import by_colour, full_scale_dn
+from dsl_core.devices.base import DeviceRig
+from dsl_core.errors import DeviceError
+from dsl_core.model.plan import CapturePlan, Setting, Shot
+from dsl_core.model.rig import ProjectorResponse
+from dsl_core.progress import CancelToken
+
+#: What white is to reach where exposures are shortened, as a share of full scale in its dimmest colour: lines
+#: have at most .9 of its light, and what saturates in two colours is measured by the third. First orders
+#: need whatever light there can be.
+FILL = 1.1
+#: Up to here exposures stay as they are: little more than highlights is lost.
+MOST = 1.3
+#: What white is to reach in its brightest colour where exposures are lengthened.
+FILL_IN_DARK = 0.85
+#: A scene whose white, by its brightest colour, stays below this in a plan's brightest setting is dark.
+DIM = 0.4
+#: Exposures that nobody chose are lengthened by this factor at most: a scan takes as much longer.
+MOST_LONGER = 4.0
+#: Shares of the picture that may be brighter: highlights, and small bright things in a dark scene.
+_BRIGHTER, _BRIGHTER_IN_DARK = 0.02, 0.005
+#: A saturated picture says only that it is too bright: the next is exposed for this much less.
+_SHORTEN = 8.0
+_MOST_FRAMES = 4
+
+
+@dataclass(frozen=True)
+class Metered:
+    """A plan whose exposures suit the scene, and what was measured, in a sentence or two.
+
+    ``is_told`` says whether a person should read it: exposures have changed, or none is right.
+    """
+
+    plan: CapturePlan
+    sentence: str = ""
+    is_told: bool = False
+
+    @property
+    def notes(self) -> dict[str, str]:
+        """What a scan's manifest says of it."""
+        return {"exposures": self.sentence} if self.sentence else {}
+
+
+def meter(
+    rig: DeviceRig, plan: CapturePlan, pattern_image: PatternImage, token: CancelToken | None = None
+) -> Metered:
+    """Measure white and scale all exposures of a plan alike, so that they suit the scene.
+
+    They become shorter where white saturates in every colour in the darkest setting, and up to `MOST_LONGER`
+    times longer where it stays dark even in the brightest. All are whole cycles of the projector and within
+    what the camera can do; drive levels and the ratio of the settings stay. One frame is taken, and another
+    for each time that white saturates in it. A rig that plays back a scan keeps its exposures, and so does a
+    plan without white.
+
+    Raises `DeviceError` when a picture cannot be taken, `Cancelled` when the ``token`` is.
+    """
+    white = next((shot for shot in plan.shots() if shot.role == "white"), None)
+    if white is None or rig.only_repeats:
+        return Metered(plan)
+    known = rig.calibration or rig.nominal
+    response = ProjectorResponse() if known is None else known.projector_response
+    period_ms = rig.projector.info.frame_period_ms if known is None else known.frame_period_ms
+    fit = _Fit(plan, period_ms, rig.camera.info.exposure_range_ms, response)
+    black_dn = 0.0 if known is None else known.sensor.black_level_dn
+    taker = ShotTaker(rig, plan, pattern_image, RetryPolicy(), token)
+    try:
+        seen = _measure(taker, white, fit, full_scale_dn(rig), black_dn)
+    except DeviceError as error:
+        raise DeviceError(
+            f"White could not be measured before the scan: {error.__cause__ or error} Nothing is saved yet."
+        ) from error
+    finally:
+        taker.show_black()
+    return fit.to(seen)
+
+
+@dataclass(frozen=True)
+class _White:
+    """White in the darkest setting of a plan, as shares of full scale above black, which may exceed 1.
+
+    ``is_clipped`` says that even the shortest exposure saturates, so that it may be brighter still.
+    """
+
+    by_dimmest: float
+    by_brightest: float
+    is_clipped: bool
+
+
+def _measure(taker: ShotTaker, white: Shot, fit: _Fit, full_dn: int, black_dn: float) -> _White:
+    darkest = fit.darkest
+    exposure_ms = darkest.exposure_ms
+    is_clipped = False
+    for _ in range(_MOST_FRAMES):
+        shot = replace(white, exposure_ms=exposure_ms, level=darkest.level)
+        colours = by_colour(taker.take(shot).pixels)
+        is_saturated = float(np.mean(colours.min(axis=0) >= full_dn)) > _BRIGHTER
+        shorter_ms = fit.exposure_ms(exposure_ms / _SHORTEN)
+        is_clipped = is_saturated and shorter_ms >= exposure_ms
+        if is_clipped or not is_saturated:
+            break
+        exposure_ms = shorter_ms
+    scale = darkest.exposure_ms / exposure_ms / (full_dn - black_dn)
+    dimmest = _exceeded_by(_BRIGHTER, colours.min(axis=0)) - black_dn
+    brightest = _exceeded_by(_BRIGHTER_IN_DARK, colours.max(axis=0)) - black_dn
+    return _White(max(dimmest, 0.0) * scale, max(brightest, 0.0) * scale, is_clipped)
+
+
+def _exceeded_by(share: float, values: NDArray[np.unsignedinteger]) -> float:
+    return float(np.quantile(values, 1.0 - share))
+
+
+@dataclass(frozen=True)
+class _Fit:
+    """A plan on a projector of this period and response, and a camera of this range, ms."""
+
+    plan: CapturePlan
+    period_ms: float
+    range_ms: tuple[float, float]
+    response: ProjectorResponse
+
+    def light(self, setting: Setting) -> float:
+        """Light of white in a setting, in any unit."""
+        return setting.exposure_ms * float(self.response.radiance(setting.level))
+
+    @property
+    def darkest(self) -> Setting:
+        """The setting with the least light."""
+        return min(self.plan.settings, key=self.light)
+
+    def exposure_ms(self, wanted_ms: float) -> float:
+        """The longest exposure of whole cycles within this one, or the shortest that there is."""
+        low_ms, high_ms = self.range_ms
+        cycles = int(min(wanted_ms, high_ms) / self.period_ms + 1e-6)
+        return max(cycles, int(np.ceil(low_ms / self.period_ms - 1e-6)), 1) * self.period_ms
+
+    def to(self, white: _White) -> Metered:
+        """The plan for white of this brightness."""
+        most_light = max(map(self.light, self.plan.settings)) / self.light(self.darkest)
+        if white.is_clipped or white.by_dimmest > MOST:
+            return self._shortened(white)
+        if white.by_brightest * most_light < DIM:
+            return self._lengthened(white.by_brightest * most_light)
+        said = f"White reaches {white.by_dimmest:.0%} of full scale in its dimmest colour"
+        return Metered(self.plan, f"{said}: exposures are as planned.")
+
+    def _shortened(self, white: _White) -> Metered:
+        made = self._scaled(FILL / white.by_dimmest)
+        shortest_ms = min(made.settings, key=self.light).exposure_ms
+        least = white.by_dimmest * shortest_ms / self.darkest.exposure_ms
+        said = f"White reaches {white.by_dimmest:.0%} of full scale even in its dimmest colour"
+        if made != self.plan:
+            said += f": exposures are shortened {self._words(made)}"
+        if white.is_clipped or least > MOST:
+            said += (
+                f". It saturates even at {shortest_ms:.4g} ms, the shortest possible: close the aperture, or"
+                " lower the projector's intensity"
+            )
+        return Metered(made, f"{said}.", True)
+
+    def _lengthened(self, share: float) -> Metered:
+        longest_ms = max(each.exposure_ms for each in self.plan.settings)
+        factor = min(FILL_IN_DARK / max(share, 1e-6), MOST_LONGER, self.range_ms[1] / longest_ms)
+        made = self._scaled(max(factor, 1.0))
+        longer = max(each.exposure_ms for each in made.settings) / longest_ms
+        said = f"The scene is dark, white reaches {share:.1%} of full scale in the brightest setting"
+        if made != self.plan:
+            said += f": exposures are lengthened {self._words(made)}"
+        if share * longer < DIM:
+            said += f", and white reaches {share * longer:.1%}. Open the aperture, or choose longer exposures"
+        return Metered(made, f"{said}.", True)
+
+    def _scaled(self, factor: float) -> CapturePlan:
+        settings = tuple(
+            Setting(exposure_ms=self.exposure_ms(each.exposure_ms * factor), level=each.level)
+            for each in self.plan.settings
+        )
+        return self.plan.model_copy(update={"settings": settings})
+
+    def _words(self, made: CapturePlan) -> str:
+        """From which exposures to which."""
+        return f"from {_listed(self.plan)} to {_listed(made)} ms"
+
+
+def _listed(plan: CapturePlan) -> str:
+    return " and ".join(f"{setting.exposure_ms:.4g}" for setting in plan.settings)

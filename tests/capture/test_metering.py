@@ -1,0 +1,184 @@
+"""Exposures of a plan follow the brightness of the scene: measured once, scaled alike, told in a sentence."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from dsl_core.capture.metering import FILL, FILL_IN_DARK, MOST_LONGER, Metered
+from dsl_core.devices.base import Camera, CameraInfo, DeviceRig, Projector, ProjectorInfo
+from dsl_core.errors import DeviceError, PlanError
+from dsl_core.model.frames import Frame
+from dsl_core.model.plan import CapturePlan, GrayCode, NoCode, ScanLines, Setting
+from dsl_core.pipeline import meter
+from tests.cases.small_rig import small_rig
+
+PERIOD_MS = 10.0
+FULL_DN, BLACK_DN = 4095, 260.0
+#: Brightness of white in the red, two green and blue pixels of a cell, relative to the brightest.
+COLOURS = np.array([[0.5, 1.0], [1.0, 0.8]])
+
+
+@dataclass
+class Bench(Camera, Projector):
+    """Both devices: white at full drive adds ``dn_per_ms`` to the brightest colour; a share is brighter."""
+
+    dn_per_ms: float
+    range_ms: tuple[float, float] = (1.0, 2000.0)
+    highlights: float = 0.0
+    exposures_ms: list[float] = field(default_factory=list)
+    shown: list[int] = field(default_factory=list)
+    frames: int = 0
+
+    @property
+    def info(self) -> CameraInfo:  # type: ignore[override]
+        return CameraInfo("bench", "1", 40, 20, "RGGB", 12, self.range_ms)
+
+    def configure(self, exposure_ms: float) -> float:
+        if not self.range_ms[0] <= exposure_ms <= self.range_ms[1]:
+            raise DeviceError(f"cannot expose for {exposure_ms} ms")
+        self.exposures_ms.append(exposure_ms)
+        return exposure_ms
+
+    def show(self, image: NDArray[np.uint8]) -> None:
+        self.shown.append(int(image.max()))
+
+    def snap(self, timeout_ms: float = 5000.0) -> Frame:
+        light = (self.shown[-1] / 255) ** 2.2 * self.exposures_ms[-1] * self.dn_per_ms
+        signal = light * np.tile(COLOURS, (10, 20))
+        signal[:, : round(40 * self.highlights)] *= 50
+        pixels = np.clip(signal + BLACK_DN, 0, FULL_DN).astype(np.uint16)
+        self.frames += 1
+        return Frame(pixels, self.exposures_ms[-1], 0.1 * self.frames, self.frames)
+
+
+class Screen(Projector):
+    def __init__(self, bench: Bench) -> None:
+        self.bench = bench
+
+    @property
+    def info(self) -> ProjectorInfo:
+        return ProjectorInfo("bench", "1", 32, 8, 0.0, PERIOD_MS)
+
+    def show(self, image: NDArray[np.uint8]) -> None:
+        self.bench.show(image)
+
+
+def rig_of(bench: Bench) -> DeviceRig:
+    sensor = small_rig().sensor.model_copy(update={"black_level_dn": BLACK_DN, "bit_depth": 12})
+    nominal = small_rig().model_copy(update={"sensor": sensor, "frame_period_ms": PERIOD_MS})
+    return DeviceRig("bench", bench, Screen(bench), nominal=nominal, sleep=lambda seconds: None)
+
+
+def plan_of(*settings: tuple[float, float]) -> CapturePlan:
+    return CapturePlan(
+        camera_size_px=(40, 20),
+        projector_size_px=(32, 8),
+        code=GrayCode(rows=False),
+        spectral=ScanLines(step_px=5),
+        settings=tuple(Setting(exposure_ms=ms, level=level) for ms, level in settings),
+        code_settings=tuple(range(len(settings))),
+    )
+
+
+def exposures(found: Metered) -> list[float]:
+    return [setting.exposure_ms for setting in found.plan.settings]
+
+
+def light_for(share: float, exposure_ms: float, level: float = 1.0) -> float:
+    """DN a millisecond of a scene whose white reaches this share in its dimmest colour."""
+    return float(share * (FULL_DN - BLACK_DN) / (COLOURS.min() * exposure_ms * level**2.2))
+
+
+def test_white_that_saturates_in_every_colour_shortens_all_exposures_alike() -> None:
+    bench = Bench(light_for(2.4, 200.0))
+    found = meter(rig_of(bench), plan_of((200.0, 1.0), (400.0, 1.0)))
+    assert exposures(found) == [90.0, 180.0], f"{FILL} of full scale, in whole cycles"
+    assert "reaches 240% of full scale" in found.sentence
+    assert "shortened from 200 and 400 to 90 and 180 ms." in found.sentence
+    assert found.is_told
+    assert found.notes == {"exposures": found.sentence}
+    assert bench.exposures_ms == [200.0, 20.0], "one frame, and one more as that one was saturated"
+    assert bench.shown[-1] == 0, "the projector is dark afterwards"
+
+
+@pytest.mark.parametrize("share", [0.25, 1.2])
+def test_white_that_fits_keeps_the_plan_and_is_not_told(share: float) -> None:
+    plan = plan_of((200.0, 1.0))
+    found = meter(rig_of(Bench(light_for(share, 200.0))), plan)
+    assert found.plan == plan
+    assert not found.is_told
+    assert "as planned" in found.notes["exposures"]
+
+
+def test_the_darkest_setting_counts_by_its_light_not_by_its_level() -> None:
+    # At level .5 and 200 ms there is .44 of the light of level 1 and 100 ms.
+    bench = Bench(light_for(0.5, 100.0))
+    plan = plan_of((100.0, 1.0), (200.0, 0.5))
+    assert meter(rig_of(bench), plan).plan == plan
+    assert bench.exposures_ms == [200.0]
+
+
+def test_highlights_do_not_shorten_exposures() -> None:
+    few = Bench(light_for(0.5, 200.0), highlights=0.025)
+    # The ninth part of a column of cells is interpolated: one of twenty is more than 2 %, none is not.
+    assert not meter(rig_of(few), plan_of((200.0, 1.0))).is_told
+    many = Bench(light_for(0.5, 200.0), highlights=0.1)
+    assert exposures(meter(rig_of(many), plan_of((200.0, 1.0))))[0] < 200.0
+
+
+def test_a_dark_scene_lengthens_exposures_up_to_the_limit_and_says_what_is_left() -> None:
+    brightest = light_for(0.125, 200.0)  # a quarter of full scale in its brightest colour
+    found = meter(rig_of(Bench(brightest)), plan_of((100.0, 1.0), (200.0, 1.0)))
+    assert exposures(found) == [340.0, 680.0], f"{FILL_IN_DARK} of full scale in the brightest setting"
+    assert "The scene is dark, white reaches 25.0% of full scale" in found.sentence
+    assert "Open the aperture" not in found.sentence
+    darker = meter(rig_of(Bench(brightest / 20)), plan_of((200.0, 1.0)))
+    assert exposures(darker) == [200.0 * MOST_LONGER]
+    assert "reaches 4.9%. Open the aperture" in darker.sentence
+    within = meter(rig_of(Bench(brightest / 20, range_ms=(1.0, 400.0))), plan_of((100.0, 1.0), (200.0, 1.0)))
+    assert exposures(within) == [200.0, 400.0], "the ratio of the settings stays"
+    short = meter(rig_of(Bench(brightest / 20, range_ms=(1.0, 200.0))), plan_of((200.0, 1.0)))
+    assert exposures(short) == [200.0]
+    assert short.is_told
+
+
+def test_light_that_is_too_much_for_the_shortest_exposure_is_told() -> None:
+    bench = Bench(light_for(40.0, 200.0), range_ms=(15.0, 1000.0))
+    found = meter(rig_of(bench), plan_of((200.0, 1.0)))
+    assert exposures(found) == [20.0]
+    assert "saturates even at 20 ms, the shortest possible: close the aperture" in found.sentence
+
+
+def test_a_plan_that_is_as_short_as_possible_is_still_told_to_saturate() -> None:
+    found = meter(rig_of(Bench(light_for(3.0, 20.0), range_ms=(15.0, 1000.0))), plan_of((20.0, 1.0)))
+    assert exposures(found) == [20.0]
+    assert found.is_told
+    assert "shortened" not in found.sentence
+
+
+def test_what_cannot_be_measured_keeps_its_plan() -> None:
+    bench = Bench(light_for(5.0, 200.0))
+    no_code = plan_of((200.0, 1.0)).model_copy(update={"code": NoCode()})
+    assert meter(rig_of(bench), no_code) == Metered(no_code)
+    replayed = replace(rig_of(bench), only_repeats=True)
+    assert meter(replayed, plan_of((200.0, 1.0))) == Metered(plan_of((200.0, 1.0)))
+    assert bench.shown == []
+
+
+def test_an_impossible_plan_is_refused_before_anything_is_shown() -> None:
+    bench = Bench(1.0)
+    with pytest.raises(PlanError, match="setting 0 exposes for 3000 ms"):
+        meter(rig_of(bench), plan_of((3000.0, 1.0)))
+    assert bench.shown == []
+
+
+def test_the_projector_is_dark_after_a_camera_that_failed() -> None:
+    bench = Bench(1.0)
+    bench.snap = lambda timeout_ms=0.0: (_ for _ in ()).throw(DeviceError("no frame"))  # type: ignore[method-assign]
+    with pytest.raises(DeviceError, match=r"before the scan: no frame Nothing is saved yet\."):
+        meter(rig_of(bench), plan_of((200.0, 1.0)))
+    assert bench.shown[-1] == 0
