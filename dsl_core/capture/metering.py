@@ -19,8 +19,9 @@ from dsl_core.progress import CancelToken
 #: have at most .9 of its light, and what saturates in two colours is measured by the third. First orders
 #: need whatever light there can be.
 FILL = 1.1
-#: Up to here exposures stay as they are: little more than highlights is lost.
-MOST = 1.3
+#: Exposures stay as they are unless more of the picture than this share exceeds that: shorter ones cost all
+#: other pixels light.
+MOST, MOST_LOST = 1.3, 0.1
 #: What white is to reach in its brightest colour where exposures are lengthened.
 FILL_IN_DARK = 0.85
 #: A scene whose white, by its brightest colour, stays below this in a plan's brightest setting is dark.
@@ -28,7 +29,7 @@ DIM = 0.4
 #: Exposures that nobody chose are lengthened by this factor at most: a scan takes as much longer.
 MOST_LONGER = 4.0
 #: Shares of the picture that may be brighter: highlights, and small bright things in a dark scene.
-_BRIGHTER, _BRIGHTER_IN_DARK = 0.02, 0.005
+_BRIGHTER, _BRIGHTER_IN_DARK = 0.05, 0.005
 #: A saturated picture says only that it is too bright: the next is exposed for this much less.
 _SHORTEN = 8.0
 _MOST_FRAMES = 4
@@ -88,10 +89,12 @@ def meter(
 class _White:
     """White in the darkest setting of a plan, as shares of full scale above black, which may exceed 1.
 
-    ``is_clipped`` says that even the shortest exposure saturates, so that it may be brighter still.
+    ``lost`` is the share of the picture that exceeds `MOST` even in its dimmest colour. ``is_clipped`` says
+    that even the shortest exposure saturates, so that it may be brighter still.
     """
 
     by_dimmest: float
+    lost: float
     by_brightest: float
     is_clipped: bool
 
@@ -112,7 +115,10 @@ def _measure(taker: ShotTaker, white: Shot, fit: _Fit, full_dn: int, black_dn: f
     scale = darkest.exposure_ms / exposure_ms / (full_dn - black_dn)
     dimmest = _exceeded_by(_BRIGHTER, colours.min(axis=0)) - black_dn
     brightest = _exceeded_by(_BRIGHTER_IN_DARK, colours.max(axis=0)) - black_dn
-    return _White(max(dimmest, 0.0) * scale, max(brightest, 0.0) * scale, is_clipped)
+    # What saturates even then may be brighter by any factor.
+    most = full_dn - 1 if is_clipped else black_dn + MOST / scale
+    lost = float(np.mean(colours.min(axis=0) > most))
+    return _White(max(dimmest, 0.0) * scale, lost, max(brightest, 0.0) * scale, is_clipped)
 
 
 def _exceeded_by(share: float, values: NDArray[np.unsignedinteger]) -> float:
@@ -146,7 +152,7 @@ class _Fit:
     def to(self, white: _White) -> Metered:
         """The plan for white of this brightness."""
         most_light = max(map(self.light, self.plan.settings)) / self.light(self.darkest)
-        if white.is_clipped or white.by_dimmest > MOST:
+        if white.lost > MOST_LOST:
             return self._shortened(white)
         if white.by_brightest * most_light < DIM:
             return self._lengthened(white.by_brightest * most_light)
