@@ -98,7 +98,22 @@ class Layers:
         layer = self._painted(view, state)
         if layer is None or layer.keys:
             return layer
-        return replace(layer, keys=_missing(layer, view, in_space, state.depth_limits.value))
+        return replace(layer, keys=self._missing(layer, view, in_space, state.depth_limits.value))
+
+    def _missing(
+        self, layer: Layer, view: ResultView, in_space: bool, limits: Limits | None
+    ) -> tuple[tuple[str, str, float], ...]:
+        """The legend of pixels without a value, which pictures leave out, and of points, which are grey."""
+        known, is_grey = _known(layer), in_space and view is not ResultView.DEPTH
+        if is_grey:
+            # What has no depth is no point.
+            known = known[within(self.result["depth_mm"], limits)]
+        share = 1 - float(known.mean()) if known.size else 0.0
+        if share == 0:
+            return ()
+        no_depth = "no depth" if limits is None else "no depth between the limits"
+        what = {ResultView.DEPTH: no_depth, ResultView.QUALITY: "no value"}.get(view, "no spectrum")
+        return ((NOTHING if is_grey else "rgba(0,0,0,0)", what, share),)
 
     def _painted(self, view: ResultView, state: ResultsState) -> Layer | None:
         if view is ResultView.BAND and self.result.has_spectra:
@@ -215,20 +230,6 @@ def _classes(classes: NDArray[np.uint8], names: list[str], colours: list[str]) -
         if share > 0
     )
     return Layer(classes, (0, 255), table=table, keys=keys)
-
-
-def _missing(
-    layer: Layer, view: ResultView, in_space: bool, limits: Limits | None
-) -> tuple[tuple[str, str, float], ...]:
-    """The legend of pixels without a value, which pictures leave out and points show in grey."""
-    share = 1 - float(_known(layer).mean())
-    if share == 0:
-        return ()
-    no_depth = "no depth" if limits is None else "no depth between the limits"
-    what = {ResultView.DEPTH: no_depth, ResultView.QUALITY: "no value"}.get(view, "no spectrum")
-    # A point has a depth.
-    is_grey = in_space and view is not ResultView.DEPTH
-    return ((NOTHING if is_grey else "rgba(0,0,0,0)", what, share),)
 
 
 def _known(layer: Layer) -> NDArray[np.bool_]:

@@ -53,23 +53,29 @@ def test_the_cloud_has_the_colours_of_the_view_chosen_for_it(layers: Layers) -> 
 
 
 def test_points_without_a_value_are_grey_and_a_legend_says_so(layers: Layers) -> None:
-    picture = rgba_of_colours(layers.result["rgb"])
-    for by, what in ((ResultView.COLOUR, "no spectrum"), (ResultView.BAND, "no spectrum")):
+    # In the darkest pixel there is no depth either: it is no point.
+    colours, cube = layers.result["rgb"].copy(), layers.result["reflectance"].copy()
+    for values in (colours, cube):
+        values[:, 5, 7] = np.nan
+    arrays = {**layers.result.arrays, "rgb": colours, "reflectance": cube}
+    result = replace(layers.result, arrays=arrays)
+    missing = np.isnan(colours[0])
+    assert missing[DARK[1], DARK[0]]
+    for by in (ResultView.COLOUR, ResultView.BAND):
         state = state_of(ResultView.CLOUD)
         state.cloud_by.set(by)
-        state.picture.set(picture)
-        cloud = layers.layer(state)
+        state.picture.set(rgba_of_colours(colours))
+        cloud = Layers(result).layer(state)
         assert cloud is not None
-        assert rgb_of(cloud)[DARK[1], DARK[0]].tolist() == list(bytes.fromhex(NOTHING[1:]))
+        assert rgb_of(cloud)[5, 7].tolist() == list(bytes.fromhex(NOTHING[1:]))
         ((colour, name, share),) = cloud.keys
-        assert (colour, name) == (NOTHING, what)
-        missing = ~np.isfinite(layers.result["rgb"][0])
-        assert share == pytest.approx(missing.mean())
+        assert (colour, name) == (NOTHING, "no spectrum")
+        assert share == pytest.approx(1 / (missing.size - 1))
         state.view.set(by)
-        flat = layers.layer(state)
+        flat = Layers(result).layer(state)
         assert flat is not None
-        assert [key[1:] for key in flat.keys] == [(name, share)]
-        assert not flat.keys[0][0].startswith("#"), "a picture shows what is behind it there"
+        ((colour, name, share),) = flat.keys
+        assert (colour[:4], name, share) == ("rgba", "no spectrum", pytest.approx(missing.mean()))
 
 
 def test_what_depth_limits_hide_is_not_called_a_missing_depth(layers: Layers) -> None:
