@@ -32,6 +32,7 @@ class IntensityWindow(QDialog):
 
     def __init__(self, state: ResultsState, parent: QWidget) -> None:
         super().__init__(parent)
+        self._page = parent
         self._graph = state.graph.value
         self.setWindowTitle("Intensity graph")
         use_room(self, parent, QSize(860, 440))
@@ -75,8 +76,8 @@ class IntensityWindow(QDialog):
     def showEvent(self, event: QShowEvent) -> None:
         """Stand in the lower right corner of the page: at the left is the picture that is pointed at."""
         super().showEvent(event)
-        page = self.parentWidget()
-        self.move(page.mapToGlobal(page.rect().bottomRight()) - self.rect().bottomRight())
+        corner = self._page.mapToGlobal(self._page.rect().bottomRight())
+        self.move(corner - self.rect().bottomRight())
 
     def _show(self, graph: IntensityGraph | None) -> None:
         self._graph = graph
