@@ -34,7 +34,7 @@ class ExposureSearch:
         cycle_ms: float | None,
         black_level_dn: float = 0.0,
     ) -> None:
-        """``range_ms`` is what the camera can do."""
+        """``range_ms`` is what the camera can do, and what a person would wait for."""
         self._cycle_ms = cycle_ms
         low, high = range_ms
         self._low = math.ceil(low / cycle_ms) * cycle_ms if cycle_ms else low
@@ -43,8 +43,10 @@ class ExposureSearch:
         self._judged = 0
         self.found = False
         self.trouble = ""
-        #: Whether the trouble is too much light for any exposure.
-        self.is_too_bright = False
+        #: Whether the trouble is too much light for any exposure, or too little.
+        self.is_too_bright = self.is_too_dark = False
+        #: What the brightest pixels of the frame judged last reached, as a share of full scale.
+        self.share = 0.0
 
     @property
     def is_over(self) -> bool:
@@ -58,7 +60,7 @@ class ExposureSearch:
     def judge(self, pixels: NDArray[np.uint16], exposure_ms: float) -> float:
         """How long to expose the next frame after one of raw ``pixels``; the same once it `is_over`."""
         self._judged += 1
-        share = self._brightness(pixels)
+        self.share = share = self._brightness(pixels)
         if share >= 1.0:
             if exposure_ms <= self._low:
                 self.is_too_bright = True
@@ -82,9 +84,10 @@ class ExposureSearch:
 
     def _end(self, share: float, exposure_ms: float) -> None:
         if share < TOO_DARK:
+            self.is_too_dark = True
             self.trouble = (
-                f"Even the longest exposure, {exposure_ms:.4g} ms, reaches only {share:.0%} of full"
-                " scale. Open the aperture, or raise the projector's intensity."
+                f"The scene is too dark: even {exposure_ms / 1000:.3g} s of exposure reach only"
+                f" {100 * share:.0f} % of full scale. Open the aperture, or raise the projector's intensity."
             )
         else:
             self.found = True

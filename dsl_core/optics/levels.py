@@ -13,6 +13,8 @@ from dsl_core.errors import StoreError
 Levels = tuple[float, float]
 #: Indices of the bands that become red, green and blue.
 Bands = tuple[int, int, int]
+#: Values that differ by less than this share of themselves are one value, whose levels are that far from it.
+LEAST_SPREAD, ROOM = 1e-6, 5e-4
 #: Centres of the bands that look most like what eyes see, nm.
 NATURAL_NM = (650.0, 550.0, 450.0)
 
@@ -62,16 +64,34 @@ def rgba_of_colours(rgb: NDArray[np.float32]) -> NDArray[np.uint8]:
 
 
 def spread_of(values: NDArray[np.floating[Any]], low: float = 0.5, high: float = 99.5) -> tuple[float, float]:
-    """Levels that hold nearly all values, from a thinned copy."""
-    step = max(values.shape[-1] // 200, 1)
-    known = values[..., ::step, ::step]
-    known = known[np.isfinite(known)]
-    if known.size == 0:
+    """Levels that hold nearly all values, from a thinned copy; around a value that all share.
+
+    >>> spread_of(np.full((4, 4), 700.0))
+    (699.65, 700.35)
+    """
+    found = _quantiles(values, low, high)
+    if found is None:
         return 0.0, 1.0
-    bottom, top = (float(v) for v in np.percentile(known, (low, high)))
-    return bottom, max(top, bottom + 1e-6 * max(abs(bottom), 1.0))
+    bottom, top = found
+    if top - bottom > LEAST_SPREAD * max(abs(bottom), 1.0):
+        return bottom, top
+    # Levels so close would leave no room for the figures of a scale.
+    half = ROOM * abs(bottom) if abs(bottom) > LEAST_SPREAD else 1.0
+    return (max(bottom - half, 0.0) if bottom >= 0 else bottom - half), bottom + half
 
 
 def top_of(cube: NDArray[np.floating[Any]]) -> float:
     """The upper level for all bands of a cube (bands, rows, columns) alike; zero is the lower one."""
-    return spread_of(cube[:: max(len(cube) // 6, 1)])[1]
+    found = _quantiles(cube[:: max(len(cube) // 6, 1)], 0.5, 99.5)
+    return 1.0 if found is None else max(found[1], LEAST_SPREAD)
+
+
+def _quantiles(values: NDArray[np.floating[Any]], low: float, high: float) -> tuple[float, float] | None:
+    """Percentiles of the known values of a thinned copy; None where nothing is known."""
+    step = max(values.shape[-1] // 200, 1)
+    known = values[..., ::step, ::step]
+    known = known[np.isfinite(known)]
+    if known.size == 0:
+        return None
+    bottom, top = (float(value) for value in np.percentile(known, (low, high)))
+    return bottom, top

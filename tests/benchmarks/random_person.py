@@ -23,7 +23,7 @@ from dsl_app.start.examples import EXAMPLES
 from PySide6.QtCore import QEvent, QPoint, Qt, QTimer
 from PySide6.QtGui import QDrag
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QAbstractButton, QApplication, QComboBox, QDialog, QWidget
+from PySide6.QtWidgets import QAbstractButton, QApplication, QComboBox, QDialog, QMessageBox, QWidget
 
 from dsl_core.progress import Progress
 
@@ -303,10 +303,16 @@ class RandomPerson:
 
 
 def _give_up() -> None:
-    """Reject a question that stands in the way, such as one for a file."""
+    """Reject a question that stands in the way, such as one for a file; lose what a dialog would keep."""
     asked = QApplication.activeModalWidget()
     popup = QApplication.activePopupWidget()
     if popup is not None:
         popup.close()
+    elif isinstance(asked, QMessageBox) and isinstance(asked.parentWidget(), QDialog):
+        # Whether to leave that dialog unsaved: else it would stand there for ever.
+        for button in asked.buttons():
+            if asked.buttonRole(button) is QMessageBox.ButtonRole.AcceptRole:
+                button.click()
     elif isinstance(asked, QDialog):
-        asked.reject()
+        # Not here: a dialog that asks in turn would wait within this timer, which could not answer.
+        QTimer.singleShot(0, asked, asked.reject)

@@ -56,7 +56,10 @@ def test_what_no_exposure_can_mend_is_said() -> None:
     bright, _ = find(1000.0, 100.0)
     assert "Close the aperture" in bright.trouble
     dark, _ = find(0.01, 100.0)
+    assert "too dark: even 5 s of exposure" in dark.trouble
     assert "Open the aperture" in dark.trouble
+    assert (bright.is_too_bright, bright.is_too_dark) == (True, False)
+    assert (dark.is_too_bright, dark.is_too_dark) == (False, True)
 
 
 def test_light_that_flickers_ends_the_search() -> None:

@@ -36,8 +36,8 @@ ROWS_PX = 316
 WIDE_SHARES = (5, 4)
 #: The most that a row takes where there is more room, and in a high window.
 HIGHEST_PX, TALL_ROW_PX = 84, 110
-#: Width of what the camera sees while everything is calibrated.
-PICTURE_PX = 236
+#: Width of what the camera sees while everything is calibrated, and of that beside rows of a high window.
+PICTURE_PX, WIDE_PICTURE_PX = 236, 480
 #: No limit to a width.
 LARGEST_PX = 16_777_215
 _NAME_PX, _STATE_PX, _DATE_PX, _BUTTON_PX = 236, 154, 118, 100
@@ -106,8 +106,10 @@ class CalibratePage(PageWidget):
         # What the camera sees is below the rows where those are narrow and alone.
         is_below, direction = self.is_wide and not self.is_tall, QBoxLayout.Direction
         self._top.setDirection(direction.TopToBottom if is_below else direction.LeftToRight)
-        self.picture.setMinimumWidth(0 if is_below else PICTURE_PX)
-        self.picture.setMaximumWidth(LARGEST_PX if is_below else PICTURE_PX)
+        # Where there is most room of all, it is large enough to see what is wrong with a target.
+        beside_px = WIDE_PICTURE_PX if self.is_wide else PICTURE_PX
+        self.picture.setMinimumWidth(0 if is_below else beside_px)
+        self.picture.setMaximumWidth(LARGEST_PX if is_below else beside_px)
 
     @property
     def library(self) -> LibraryPanel:

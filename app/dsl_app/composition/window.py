@@ -293,6 +293,8 @@ class Composition(QObject):
         def remember(facts: CampaignFacts | None) -> None:
             if facts is not None:
                 settings.campaign, settings.campaigns_folder = str(facts.path), str(facts.path.parent)
+                # A campaign takes hours, in which a computer may lose its power.
+                window.save_early()
 
         state.campaign.changed.connect(remember)
         home = Path(settings.campaigns_folder or Path.home() / "dsl-campaigns")

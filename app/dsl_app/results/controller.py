@@ -14,7 +14,7 @@ from dsl_app.results.contrast.controller import ContrastController
 from dsl_app.results.export.controller import ExportController
 from dsl_app.results.marks.controller import MarksController
 from dsl_app.results.search.controller import SearchController
-from dsl_app.results.state import DAYLIGHT, Limits, ResultsState, ResultView
+from dsl_app.results.state import DAYLIGHT, NEED_SPECTRA, Limits, ResultsState, ResultView
 from dsl_app.shared.evented import Event
 from dsl_app.shared.jobs.base import Job, JobRunner, JobState
 from dsl_app.shared.known_files import RESULT_NAME, Kind, kind_of
@@ -194,8 +194,10 @@ class ResultsController:
         state.band.set(0)
         state.result.set(arrays)
         state.band.set(len(arrays.wavelengths_nm) // 2)
-        if not arrays.has_spectra and state.view.value in (ResultView.COLOUR, ResultView.BAND):
+        if not arrays.has_spectra and state.view.value in NEED_SPECTRA:
             state.view.set(ResultView.DEPTH)
+        if state.cloud_by.value in NEED_SPECTRA and not arrays.has_spectra and not state.is_begun.value:
+            state.cloud_by.set(ResultView.DEPTH)
         self.marks.load()
 
     def command_line(self) -> str:
@@ -213,7 +215,7 @@ class ResultsController:
     def show(self, view: ResultView) -> None:
         """Switch the view; says why where the result has nothing to show."""
         result = self.state.result.value
-        if result is not None and not result.has_spectra and view in (ResultView.COLOUR, ResultView.BAND):
+        if result is not None and not result.has_spectra and view in NEED_SPECTRA:
             what = (
                 "The spectra are still being computed. Colours can be seen then."
                 if self.state.is_begun.value

@@ -6,6 +6,7 @@ import numpy as np
 import pyqtgraph as pg
 from numpy.typing import NDArray
 from PySide6.QtCore import QSize, Qt
+from PySide6.QtGui import QShowEvent
 from PySide6.QtWidgets import QDialog, QWidget
 
 from dsl_app.results.state import ResultsState
@@ -31,6 +32,7 @@ class IntensityWindow(QDialog):
 
     def __init__(self, state: ResultsState, parent: QWidget) -> None:
         super().__init__(parent)
+        self._page = parent
         self._graph = state.graph.value
         self.setWindowTitle("Intensity graph")
         use_room(self, parent, QSize(860, 440))
@@ -70,6 +72,12 @@ class IntensityWindow(QDialog):
         self.text = label("", "muted", wraps=True)
         column_of((self.plot, 1), self.faint, self.text, on=self)
         state.graph.follow(self._show)
+
+    def showEvent(self, event: QShowEvent) -> None:
+        """Stand in the lower right corner of the page: at the left is the picture that is pointed at."""
+        super().showEvent(event)
+        corner = self._page.mapToGlobal(self._page.rect().bottomRight())
+        self.move(corner - self.rect().bottomRight())
 
     def _show(self, graph: IntensityGraph | None) -> None:
         self._graph = graph
@@ -126,10 +134,14 @@ def known(values: NDArray[np.float64] | None) -> NDArray[np.float64]:
 
 
 def faint_top(graph: IntensityGraph) -> float:
-    """The brightest signal of the first orders; of all frames where none reaches the pixel."""
+    """The brightest signal of the first orders, measured or modelled; of all frames where none is reached."""
     spans = [known(frames) for frames in graph.orders.values()]
+    curves = [graph.measured] if graph.model is None else [graph.measured, graph.model]
     parts = [
-        graph.measured[:, max(int(span.min()), 0) : int(span.max()) + 2] for span in spans if span.size > 0
+        curve[:, max(int(span.min()), 0) : int(span.max()) + 2]
+        for span in spans
+        if span.size > 0
+        for curve in curves
     ]
     return float(max(np.nanmax(part) for part in parts)) if parts else float(np.nanmax(graph.measured))
 

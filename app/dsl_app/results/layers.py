@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -60,7 +60,7 @@ class Contrast:
 
 @dataclass(frozen=True)
 class Layer:
-    """An image with levels and a lookup table; ``label`` names the colour bar, ``keys`` a legend instead.
+    """An image with levels and a lookup table; ``label`` names the colour bar, ``keys`` are a legend.
 
     Without ``contrast`` the picture has no levels that could be set.
     """
@@ -92,8 +92,30 @@ class Layers:
 
     def layer(self, state: ResultsState) -> Layer | None:
         """The layer of the current view; None where the result has nothing to show."""
-        view = state.view.value if state.view.value is not ResultView.CLOUD else state.cloud_by.value
+        in_space = state.view.value is ResultView.CLOUD
+        view = state.cloud_by.value if in_space else state.view.value
         self._chosen = state.levels.value
+        layer = self._painted(view, state)
+        if layer is None or layer.keys:
+            return layer
+        return replace(layer, keys=self._missing(layer, view, in_space, state.depth_limits.value))
+
+    def _missing(
+        self, layer: Layer, view: ResultView, in_space: bool, limits: Limits | None
+    ) -> tuple[tuple[str, str, float], ...]:
+        """The legend of pixels without a value, which pictures leave out, and of points, which are grey."""
+        known, is_grey = _known(layer), in_space and view is not ResultView.DEPTH
+        if is_grey:
+            # What has no depth is no point.
+            known = known[within(self.result["depth_mm"], limits)]
+        share = 1 - float(known.mean()) if known.size else 0.0
+        if share == 0:
+            return ()
+        no_depth = "no depth" if limits is None else "no depth between the limits"
+        what = {ResultView.DEPTH: no_depth, ResultView.QUALITY: "no value"}.get(view, "no spectrum")
+        return ((NOTHING if is_grey else "rgba(0,0,0,0)", what, share),)
+
+    def _painted(self, view: ResultView, state: ResultsState) -> Layer | None:
         if view is ResultView.BAND and self.result.has_spectra:
             return self._of_band("reflectance", state.band.value, GREY, "Reflectance")
         if view is ResultView.QUALITY:
@@ -210,16 +232,26 @@ def _classes(classes: NDArray[np.uint8], names: list[str], colours: list[str]) -
     return Layer(classes, (0, 255), table=table, keys=keys)
 
 
+def _known(layer: Layer) -> NDArray[np.bool_]:
+    """Where a picture has a colour."""
+    known: NDArray[np.bool_] = np.isfinite(layer.image) if layer.levels else layer.image[..., 3] > 0
+    return known
+
+
 def rgb_of(layer: Layer) -> NDArray[np.uint8]:
-    """The colours (rows, columns, 3) that a layer has on the screen, for the cloud."""
+    """The colours (rows, columns, 3) that a layer has on the screen, for the cloud; grey without a value."""
     if layer.levels is None:
-        return np.ascontiguousarray(layer.image[..., :3])
-    low, high = layer.levels
-    table = layer.table
-    if table is None:
-        table = colour_map(layer.colours).getLookupTable(nPts=256)
-    index = np.nan_to_num((layer.image - low) * (255 / (high - low))).clip(0, 255).astype(np.uint8)
-    return np.ascontiguousarray(np.asarray(table, np.uint8)[index][..., :3])
+        colours = layer.image[..., :3].copy()
+    else:
+        low, high = layer.levels
+        table = layer.table
+        if table is None:
+            table = colour_map(layer.colours).getLookupTable(nPts=256)
+        index = np.nan_to_num((layer.image - low) * (255 / (high - low))).clip(0, 255).astype(np.uint8)
+        colours = np.ascontiguousarray(np.asarray(table, np.uint8)[index][..., :3])
+    # Black would be taken for a dark surface.
+    colours[~_known(layer)] = tuple(bytes.fromhex(NOTHING[1:]))
+    return colours
 
 
 def materials_table(shown: ClassMap, ground: Ground) -> NDArray[np.uint8]:

@@ -47,6 +47,10 @@ class ResultView(Enum):
     CLOUD = "view_cloud"
 
 
+#: What a result of depth alone cannot show.
+NEED_SPECTRA = (ResultView.COLOUR, ResultView.BAND)
+
+
 class Tool(Enum):
     """What the mouse does on the picture."""
 

@@ -8,8 +8,9 @@ from PySide6.QtCore import QSize, Qt
 from PySide6.QtWidgets import QButtonGroup, QFrame, QLabel, QSlider, QToolButton, QWidget
 
 from dsl_app.results.controller import ResultsController
-from dsl_app.results.state import QualityMap, ResultsState, ResultView, Tool
+from dsl_app.results.state import NEED_SPECTRA, QualityMap, ResultsState, ResultView, Tool
 from dsl_app.shared.evented import follow_any
+from dsl_app.shared.plain_tip import plain_tip
 from dsl_app.shared.theme import Theme
 from dsl_app.shared.widgets.forms import ChoiceBox, NumberBox, check_box, label, named, quiet
 from dsl_app.shared.widgets.icons import icon
@@ -232,8 +233,18 @@ class ViewBar(QWidget):
             self.slider.setValue(self._state.band.value)
             self.nm.setText(f"{result.wavelengths_nm[self._state.band.value]:g} nm")
 
+    def _offer_views(self) -> None:
+        """Offer what the open result can show; why it cannot show the others is in their tooltips."""
+        reason = self._state.no_spectra
+        for number, (view, _, tip) in enumerate(VIEWS, 1):
+            if view in NEED_SPECTRA:
+                self.views[view].setEnabled(not reason)
+                self.views[view].setToolTip(plain_tip(reason or f"{tip} ({number})"))
+                self.cloud_by.offer(view, not reason)
+
     def _show_controls(self) -> None:
         state = self._state
+        self._offer_views()
         self.views[state.view.value].setChecked(True)
         bands = state.bands.value
         needed = controls_for(state.view.value, state.cloud_by.value, state.quality.value, bands is not None)

@@ -31,6 +31,13 @@ SAME_EXPOSURE = 0.02
 DIMMER, LEAST_LEVEL = 0.7, 0.05
 #: Live frames that may be on their way when the picture changes.
 STALE_FRAMES = 2
+#: Less than this share of full scale after a long exposure is worth a word.
+DIM = 0.5
+#: The longest exposure that is sought, ms: what needs more is dark, and its picture hardly live.
+LONGEST_MS = 2000.0
+#: What to do where there is little light.
+BLACK = "The projector shows black: choose White as the picture, then expose again."
+DARK = "The scene is dark: open the aperture, or raise the projector's intensity."
 
 
 class LiveController:
@@ -45,7 +52,9 @@ class LiveController:
         self._looked_at: DeviceRig | None = None
         #: What the panel names before anything is chosen on it.
         self._picture: tuple[PictureKind, float, int] = KINDS[0], LEVEL, 0
-        self._exposer = AutoExposer(rig.state, self.state, notifier, self.set_exposure, self._dim)
+        self._exposer = AutoExposer(
+            rig.state, self.state, notifier, self.set_exposure, self._dim, lambda: self._picture[0] == "black"
+        )
         rig.state.devices.follow(lambda _: self.set_exposure(self.state.exposure_ms.value))
         rig.state.live.changed.connect(self._live_changed)
 
@@ -189,6 +198,8 @@ class AutoExposer:
     """Sets the live exposure by what live frames show; idle until `begin`, then `judge` gets every frame.
 
     ``dim`` lowers the projector's intensity where even the shortest exposure saturates; False when it cannot.
+    ``is_black`` says whether the projector shows nothing. A search that fails for want of light leaves the
+    exposure as it was.
     """
 
     def __init__(
@@ -198,8 +209,12 @@ class AutoExposer:
         notifier: Notifier,
         set_exposure: Callable[[float], None],
         dim: Callable[[], bool],
+        is_black: Callable[[], bool],
     ) -> None:
         self._rig, self._state, self._notifier, self._set, self._dim = rig, state, notifier, set_exposure, dim
+        self._is_black = is_black
+        #: The exposure before the search, ms.
+        self._before_ms = state.exposure_ms.value
         #: Frames to leave out, as they may show the picture before it was dimmed.
         self._stale = 0
         self._search: ExposureSearch | None = None
@@ -212,8 +227,10 @@ class AutoExposer:
             return
         info, known = devices.camera.info, devices.calibration
         self._region, self._stale = region, 0
+        self._before_ms = self._state.exposure_ms.value
+        shortest_ms, longest_ms = info.exposure_range_ms
         self._search = search = ExposureSearch(
-            info.exposure_range_ms,
+            (shortest_ms, max(min(longest_ms, LONGEST_MS), shortest_ms)),
             2**info.bit_depth - 1,
             self._rig.cycle_ms,
             0.0 if known is None else known.sensor.black_level_dn,
@@ -243,11 +260,22 @@ class AutoExposer:
             self._stale = STALE_FRAMES
             return
         self.end()
-        if search.trouble:
+        if search.is_too_dark:
+            self._set(self._before_ms)
+            self._notifier.tell("warning", BLACK if self._is_black() else search.trouble)
+        elif search.trouble:
             self._notifier.tell("warning", search.trouble)
         else:
-            level = self._state.level.value
-            self._notifier.tell("info", f"Exposed for {exposure_text(asked_ms)} at intensity {level:.2f}.")
+            self._tell_found(asked_ms, search.share)
+
+    def _tell_found(self, exposure_ms: float, share: float) -> None:
+        text = f"Exposed for {exposure_text(exposure_ms)} at intensity {self._state.level.value:.2f}"
+        if share >= DIM or exposure_ms < LONGEST_MS / 2:
+            self._notifier.tell("info", f"{text}.")
+            return
+        advice = BLACK if self._is_black() else DARK
+        reached = f"where the brightest reach only {100 * share:.0f} % of full scale"
+        self._notifier.tell("warning", f"{text}, {reached}. {advice}")
 
     def end(self) -> None:
         """Stop the search."""

@@ -77,8 +77,14 @@ class SessionRestore(QObject):
                 {"Restore session": lambda: self.restore(session)},
                 lambda: self.is_offered.set(False),
             )
+            self._window.opened.connect(lambda _: self._be_calm(session))
         self._timer.start()
         self._window.closed.connect(self._end)
+
+    def _be_calm(self, session: Session) -> None:
+        """A page that is opened has a blue button of its own."""
+        self.is_offered.set(False)
+        self._window.toasts.be_calm(session.offer)
 
     def _end(self) -> None:
         self._timer.stop()

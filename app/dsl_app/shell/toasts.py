@@ -10,7 +10,7 @@ from PySide6.QtGui import QCursor
 from PySide6.QtWidgets import QFrame, QMessageBox, QPushButton, QWidget
 
 from dsl_app.shared.notify import Level
-from dsl_app.shared.widgets.forms import label, push_button
+from dsl_app.shared.widgets.forms import label, push_button, set_role
 from dsl_app.shared.widgets.layouts import STRETCH, row_of
 from dsl_app.shared.wording import in_window
 from dsl_app.shell.short_text import ShortText
@@ -56,10 +56,13 @@ class Toast(QFrame):
         self._watch: QTimer | None = None
         self.words = ShortText(text)
         self.behind = label("", "muted")
+        self._next: QPushButton | None = None
         buttons: list[QPushButton] = []
         for name, do in (offers or {}).items():
             offer = push_button(name, text, self.dismiss, "primary" if is_next and not buttons else "")
             offer.clicked.connect(lambda _checked=False, do=do: do())
+            if is_next and not buttons:
+                self._next = offer
             buttons.append(offer)
         self.more = _flat("Details", "Show the whole message", self._show)
         self.more.setVisible(bool(details))
@@ -80,6 +83,11 @@ class Toast(QFrame):
             self._watch.start(self._stay_ms)
         elif self.level == "error":
             self._leave_once_read(self._watch)
+
+    def be_calm(self) -> None:
+        """Offer what was offered next as one thing among others."""
+        if self._next is not None:
+            set_role(self._next, "")
 
     def stand_back(self) -> None:
         """Wait behind another, for as long as that is shown."""
@@ -170,6 +178,12 @@ class Toasts(QObject):
         toast = Toast("info", text, offers=offers, is_next=True)
         toast.dismissed.connect(gone)
         self._add(toast)
+
+    def be_calm(self, text: str) -> None:
+        """Offer what the message of a text offers as one thing among others: the person does another."""
+        for toast in self.shown:
+            if toast.text == text:
+                toast.be_calm()
 
     def withdraw(self, text: str) -> None:
         """Close the message of a text, if it is still there: it has lost its sense."""

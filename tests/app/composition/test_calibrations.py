@@ -9,6 +9,7 @@ from dsl_app.composition.window import Composition, StartOptions
 from dsl_app.connection.state import RigChoice
 from dsl_app.rig.page import RigPage
 from dsl_app.scan.page import ScanPage
+from dsl_app.shared.settings import load_settings
 from dsl_app.shell.main_window import MainWindow
 from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
@@ -37,6 +38,20 @@ def window(qtbot: QtBot, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Mai
 
 def idle(qtbot: QtBot, window: MainWindow) -> None:
     qtbot.waitUntil(lambda: window.parts.runner.active == (), timeout=60_000)
+
+
+def test_a_program_that_is_killed_remembers_its_campaign(
+    qtbot: QtBot, window: MainWindow, tmp_path: Path
+) -> None:
+    page, path = window.open_page("calibrate"), tmp_path / "room" / "march"
+    assert isinstance(page, CalibratePage)
+    page._commands.begin_campaign(path)
+    idle(qtbot, window)
+    # Nothing is closed.
+    settings, trouble = load_settings(window.parts.settings_path)
+    assert (settings.campaign, settings.campaigns_folder) == (str(path), str(path.parent))
+    assert trouble == ""
+    window.close()
 
 
 def test_the_self_test_opens_from_the_rig_page_on_the_real_twin(

@@ -18,7 +18,7 @@ def test_the_intensity_graph_shows_orders_in_nm(bench: Bench) -> None:
     frames = np.linspace(60.0, 110.0, NM.size)
     measured = np.zeros((3, 200))
     measured[:, 150], measured[1, 80] = 100.0, 2.0
-    graph = IntensityGraph((4, 5), measured, measured + 0.1, measured, 150.0, {1: frames}, NM)
+    graph = IntensityGraph((4, 5), measured, measured + 0.1, 1.2 * measured, 150.0, {1: frames}, NM)
     bench.state.graph.set(graph)
     window = bench.page.graph
     assert window.isVisible()
@@ -32,10 +32,12 @@ def test_the_intensity_graph_shows_orders_in_nm(bench: Bench) -> None:
     assert (x[0], x[y == 100.0].tolist()) == (1, [window.zero.value()])
     assert ticks(graph)[-1][0] == 151.0
     assert window.item.viewRange()[1][1] < 5
-    # The legend stands above the brightest signal, in the colour of the theme.
+    beside = bench.page.mapToGlobal(bench.page.rect().bottomRight()) - window.geometry().bottomRight()
+    assert beside.manhattanLength() < 10, "it hides the picture"
+    # The legend stands above the brightest signal, be it measured or modelled, in the colour of the theme.
     place = window.item.legend.mapRectToParent(window.item.legend.boundingRect())
     room = window.item.vb.boundingRect()
-    share = 2.1 / window.item.viewRange()[1][1]
+    share = 2.4 / window.item.viewRange()[1][1]
     assert place.bottom() < (1 - share) * room.height()
     for theme in (DARK, LIGHT):
         window.apply_theme(theme)

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
-from dsl_app.results.layers import Layers, rgb_of, within
+from dsl_app.results.layers import NOTHING, Layers, rgb_of, within
 from dsl_app.results.state import QualityMap, ResultsState, ResultView
 
 from dsl_core.io.result.result_arrays import load_arrays
+from dsl_core.optics.levels import rgba_of_colours
 from tests.app.support.small_result import BLUE, DARK, RED, UNREACHED, write_small_result
 
 
@@ -45,8 +47,55 @@ def test_the_cloud_has_the_colours_of_the_view_chosen_for_it(layers: Layers) -> 
     state.cloud_by.set(ResultView.DEPTH)
     cloud, depth = layers.layer(state), layers.layer(state_of(ResultView.DEPTH))
     assert cloud is not None
-    assert cloud == depth
+    assert depth is not None
+    assert (cloud.image is depth.image, cloud.levels) == (True, depth.levels)
     assert np.isnan(cloud.image[DARK[1], DARK[0]])
+
+
+def test_points_without_a_value_are_grey_and_a_legend_says_so(layers: Layers) -> None:
+    # In the darkest pixel there is no depth either: it is no point.
+    colours, cube = layers.result["rgb"].copy(), layers.result["reflectance"].copy()
+    for values in (colours, cube):
+        values[:, 5, 7] = np.nan
+    arrays = {**layers.result.arrays, "rgb": colours, "reflectance": cube}
+    result = replace(layers.result, arrays=arrays)
+    missing = np.isnan(colours[0])
+    assert missing[DARK[1], DARK[0]]
+    for by in (ResultView.COLOUR, ResultView.BAND):
+        state = state_of(ResultView.CLOUD)
+        state.cloud_by.set(by)
+        state.picture.set(rgba_of_colours(colours))
+        cloud = Layers(result).layer(state)
+        assert cloud is not None
+        assert rgb_of(cloud)[5, 7].tolist() == list(bytes.fromhex(NOTHING[1:]))
+        ((colour, name, share),) = cloud.keys
+        assert (colour, name) == (NOTHING, "no spectrum")
+        assert share == pytest.approx(1 / (missing.size - 1))
+        state.view.set(by)
+        flat = Layers(result).layer(state)
+        assert flat is not None
+        ((colour, name, share),) = flat.keys
+        assert (colour[:4], name) == ("rgba", "no spectrum")
+        assert share == pytest.approx(missing.mean())
+
+
+def test_what_depth_limits_hide_is_not_called_a_missing_depth(layers: Layers) -> None:
+    state = state_of(ResultView.DEPTH)
+    state.depth_limits.set((700.0, 705.0))
+    layer = layers.layer(state)
+    assert layer is not None
+    ((_, name, share),) = layer.keys
+    assert name == "no depth between the limits"
+    assert 0.5 < share < 0.9
+
+
+def test_a_picture_with_all_values_has_no_legend_of_missing_ones(layers: Layers) -> None:
+    even = {"depth_mm": np.full(layers.result.shape, 700.0, np.float32)}
+    result = replace(layers.result, arrays={**layers.result.arrays, **even})
+    layer = Layers(result).layer(state_of(ResultView.DEPTH))
+    assert layer is not None
+    assert layer.keys == ()
+    assert layer.levels == pytest.approx((699.65, 700.35), abs=1e-3), "a scale with room for figures"
 
 
 def test_flags_have_a_legend_with_their_shares(layers: Layers) -> None:

@@ -67,4 +67,5 @@ def test_a_result_of_depth_only_says_why_there_are_no_curves(bench: Bench, tmp_p
     (tmp_path / "flat").mkdir()
     bench.window.open_path(write_small_result(tmp_path / "flat", spectra=False))
     assert panel.note.text().startswith("This result has depth only.")
+    assert bench.page.marks.hint.text() == panel.note.text(), "nothing can be pinned"
     assert (panel.note.isVisible(), panel.band_line.isVisible()) == (True, False)

@@ -11,6 +11,7 @@ from dsl_app.results.state import QualityMap, ResultsState, ResultView
 from dsl_app.results.view_bar import ViewBar, controls_for
 from dsl_app.session.parts import restore_result, results_part
 from dsl_app.shared.undo import UndoStack
+from PySide6.QtCore import Qt
 from pytestqt.qtbot import QtBot
 
 from dsl_core.io.result.result_file import load_result, save_result
@@ -168,3 +169,20 @@ def test_a_view_has_the_controls_it_needs(
 ) -> None:
     found = asdict(controls_for(view, cloud_by, quality))
     assert {name for name, is_shown in found.items() if is_shown} == shown
+
+
+def test_a_result_of_depth_alone_offers_neither_colours_nor_bands(bench: Bench, tmp_path: Path) -> None:
+    bar, state = bench.bar, bench.state
+    needy = (ResultView.COLOUR, ResultView.BAND)
+    assert all(bar.views[view].isEnabled() for view in ResultView)
+    tips = [bar.views[view].toolTip() for view in needy]
+    bench.control.open(write_small_result(tmp_path / "flat", spectra=False))
+    assert [view for view in ResultView if not bar.views[view].isEnabled()] == list(needy)
+    assert all(bar.views[view].toolTip().startswith("This result has depth only") for view in needy)
+    assert (state.view.value, state.cloud_by.value) == (ResultView.DEPTH, ResultView.DEPTH)
+    model = bar.cloud_by.model()
+    flags = {bar.cloud_by.itemData(row): model.flags(model.index(row, 0)) for row in range(model.rowCount())}
+    assert [view for view, flag in flags.items() if not flag & Qt.ItemFlag.ItemIsEnabled] == list(needy)
+    bench.control.open(tmp_path / "small.zarr")
+    assert [bar.views[view].toolTip() for view in needy] == tips
+    assert all(bar.views[view].isEnabled() for view in ResultView)

@@ -181,6 +181,49 @@ def test_a_search_for_the_exposure_ends_with_the_live_view(qtbot: QtBot, start: 
     runner.shut_down()
 
 
+def expose_in(live: LiveController, dn_per_ms: float) -> None:
+    """Expose automatically for an even scene that bright."""
+    live._exposer.begin(None)
+    while live.state.is_exposing.value:
+        exposure_ms = live.state.exposure_ms.value
+        level = min(200 + dn_per_ms * exposure_ms, 4095)
+        live._exposer.judge(Frame(np.full((8, 8), level, np.uint16), exposure_ms, 0.0, 1))
+
+
+@pytest.mark.parametrize(
+    ("picture", "says"),
+    [("black", "The projector shows black"), ("white", "The scene is too dark: even 2 s of exposure")],
+)
+def test_in_the_dark_nothing_is_exposed_for_and_what_to_do_is_said(picture: PictureKind, says: str) -> None:
+    live, notifier = controller()
+    live.rig.connect(TWIN)
+    live.show(picture)
+    live.set_exposure(100.0)
+    # Seventeen seconds would do, but nobody waits so long for a live picture.
+    expose_in(live, dn_per_ms=0.1)
+    kind, text = notifier.told[-1]
+    assert kind == "warning"
+    assert text.startswith(says)
+    assert live.state.exposure_ms.value == 100.0
+
+
+@pytest.mark.parametrize(("picture", "says"), [("black", "shows black"), ("white", "open the aperture")])
+def test_a_dim_scene_is_exposed_for_and_what_would_light_it_is_said(picture: PictureKind, says: str) -> None:
+    live, notifier = controller()
+    live.rig.connect(TWIN)
+    live.show(picture)
+    expose_in(live, dn_per_ms=0.6)
+    assert live.state.exposure_ms.value == pytest.approx(2000, rel=0.01)
+    kind, text = notifier.told[-1]
+    assert kind == "warning"
+    assert "reach only 30 % of full scale" in text
+    assert says in text
+    expose_in(live, dn_per_ms=10.0)
+    kind, text = notifier.told[-1]
+    assert kind == "info"
+    assert "full scale" not in text
+
+
 def test_frames_that_were_not_fetched_are_counted_as_skipped() -> None:
     live, _ = controller()
     for number in range(3):

@@ -7,13 +7,14 @@ from html import escape
 import numpy as np
 
 from dsl_app.results.state import Mark, ResultsState
-from dsl_app.shared.spectrum import number_text
+from dsl_app.shared.spectrum import Spectrum, number_text
 from dsl_app.shared.theme import Theme
 from dsl_core.errors import DslError
 from dsl_core.evaluation.marks import distance_between
 from dsl_core.evaluation.spectral import compare
 from dsl_core.io.result.result_arrays import ResultArrays
 from dsl_core.model.figure import with_std
+from dsl_core.model.spectral import SpectralCurve
 from dsl_core.words import counted
 
 
@@ -22,7 +23,7 @@ def comparison_html(state: ResultsState, theme: Theme) -> str:
     chosen, result = state.selected_mark, state.result.value
     if chosen is not None and chosen.trouble:
         return f"<span style='color:{theme.warn}'>{escape(chosen.trouble)}</span>"
-    if chosen is None or chosen.kind == "reference" or result is None:
+    if chosen is None or result is None:
         return ""
     shown = [mark for mark in state.marks.value if mark.shown and not mark.trouble and mark.key != chosen.key]
     return (
@@ -58,30 +59,39 @@ def region_table(chosen: Mark, band: int, theme: Theme) -> str:
 
 
 def comparison_table(chosen: Mark, others: list[Mark], theme: Theme) -> str:
-    """A spectrum compared with every reference, as measured and with a free scale factor."""
+    """A spectrum compared with every reference, or a reference with every spectrum.
+
+    Each as measured, and with a free scale factor for the spectrum.
+    """
     rows = []
     for mark in others:
-        if mark.curve is None:
-            continue
-        name = escape(mark.name)
-        try:
-            found = compare(chosen.spectrum.mean, chosen.spectrum.nm, mark.curve)
-        except DslError as error:
-            rows.append(f"<tr><td>{name}</td><td colspan='4'>{escape(str(error))}</td></tr>")
-            continue
-        low, high = found.range_nm
-        # Nothing is extrapolated beyond the ends of a reference.
-        only = "" if found.bands == len(chosen.spectrum.nm) else "only "
-        for title, figures in (
-            (name, (f"{found.rmse:.4f}", f"{found.angle_rad:.4f}", f"{found.delta_e:.2f}", "1")),
-            (
-                f"<span style='color:{theme.muted}'>{only}{low:g}–{high:g} nm, free scale</span>",
-                (f"{found.rmse_scaled:.4f}", "", f"{found.delta_e_scaled:.2f}", f"{found.scale:.3f}"),
-            ),
-        ):
-            cells = "".join(f"<td align='right'>{figure}</td>" for figure in figures)
-            rows.append(f"<tr><td>{title}</td>{cells}</tr>")
+        measured, reference = (mark, chosen) if chosen.curve is not None else (chosen, mark)
+        if measured.curve is None and reference.curve is not None:
+            rows += _compared(mark.name, measured.spectrum, reference.curve, theme)
     return _table([f"{escape(chosen.name)} against", "RMSE", "angle, rad", "ΔE00", "×"], rows, theme)
+
+
+def _compared(name: str, spectrum: Spectrum, curve: SpectralCurve, theme: Theme) -> list[str]:
+    """The rows of one comparison, which begin with the name of what is compared with."""
+    name = escape(name)
+    try:
+        found = compare(spectrum.mean, spectrum.nm, curve)
+    except DslError as error:
+        return [f"<tr><td>{name}</td><td colspan='4'>{escape(str(error))}</td></tr>"]
+    low, high = found.range_nm
+    # Nothing is extrapolated beyond the ends of a reference.
+    only = "" if found.bands == len(spectrum.nm) else "only "
+    rows = []
+    for title, figures in (
+        (name, (f"{found.rmse:.4f}", f"{found.angle_rad:.4f}", f"{found.delta_e:.2f}", "1")),
+        (
+            f"<span style='color:{theme.muted}'>{only}{low:g}–{high:g} nm, free scale</span>",
+            (f"{found.rmse_scaled:.4f}", "", f"{found.delta_e_scaled:.2f}", f"{found.scale:.3f}"),
+        ),
+    ):
+        cells = "".join(f"<td align='right'>{figure}</td>" for figure in figures)
+        rows.append(f"<tr><td>{title}</td>{cells}</tr>")
+    return rows
 
 
 def distance_table(chosen: Mark, others: list[Mark], result: ResultArrays, theme: Theme) -> str:

@@ -133,15 +133,17 @@ class MarksController:
 
     # Change ----------------------------------------------------------------------------------------
 
-    def remove(self, key: int) -> None:
-        """Remove a mark; if it was selected, the one in its place is, so that several can be removed."""
-        mark = self._find(key)
-        if mark is None:
+    def remove(self, *keys: int) -> None:
+        """Remove marks at once; if the selected one goes, the one in its place is selected."""
+        marks = self.state.marks.value
+        gone = [mark for mark in marks if mark.key in keys]
+        if not gone:
             return
-        place = self.state.marks.value.index(mark)
-        rest = tuple(m for m in self.state.marks.value if m is not mark)
-        self._change(f"removing {mark.name}", rest)
-        if self.state.selected.value == key:
+        rest = tuple(mark for mark in marks if mark not in gone)
+        what = gone[0].name if len(gone) == 1 else f"{len(gone)} marks"
+        self._change(f"removing {what}", rest)
+        if self.state.selected.value in keys:
+            place = marks.index(gone[0])
             self.state.selected.set(rest[min(place, len(rest) - 1)].key if rest else 0)
 
     def rename(self, key: int, name: str) -> None:
@@ -150,11 +152,14 @@ class MarksController:
         if mark is not None and name.strip() and name.strip() != mark.name:
             self._replace(f"renaming to {name.strip()}", replace(mark, name=name.strip()))
 
-    def show(self, key: int, shown: bool) -> None:
-        """Show or hide a mark in the pictures and the plot."""
-        mark = self._find(key)
-        if mark is not None and mark.shown != shown:
-            self._replace(f"{'showing' if shown else 'hiding'} {mark.name}", replace(mark, shown=shown))
+    def show(self, shown: bool, *keys: int) -> None:
+        """Show or hide marks in the pictures and the plot."""
+        marks = self.state.marks.value
+        other = [mark for mark in marks if mark.key in keys and mark.shown != shown]
+        if other:
+            what = other[0].name if len(other) == 1 else f"{len(other)} marks"
+            after = tuple(replace(mark, shown=shown) if mark in other else mark for mark in marks)
+            self._change(f"{'showing' if shown else 'hiding'} {what}", after)
 
     def _replace(self, text: str, mark: Mark) -> None:
         self._change(text, tuple(mark if m.key == mark.key else m for m in self.state.marks.value))

@@ -58,14 +58,15 @@ class MarksPanel(QWidget):
         self.tree = named(
             QTreeWidget(),
             "Pins, regions and references",
-            "Tick to show; F2 or double-click to rename; Delete to remove; the selected one is compared",
+            "Tick to show; F2 or double-click to rename; Delete to remove; Ctrl or Shift selects several; the"
+            " one selected last is compared",
         )
         self.tree.setColumnCount(3)
         self.tree.setHeaderLabels(["Spectrum", "Where", "Pixels"])
         self.tree.setRootIsDecorated(False)
         self.tree.setUniformRowHeights(True)
         self.tree.setIconSize(QSize(SWATCH_PX, SWATCH_PX))
-        self.tree.setSelectionMode(QAbstractItemView.SelectionMode.SingleSelection)
+        self.tree.setSelectionMode(QAbstractItemView.SelectionMode.ExtendedSelection)
         self.tree.setEditTriggers(
             QAbstractItemView.EditTrigger.EditKeyPressed | QAbstractItemView.EditTrigger.DoubleClicked
         )
@@ -85,7 +86,7 @@ class MarksPanel(QWidget):
             "Add reference…",
             "Open a file with reflectance to compare with: text, CSV, ENVI, ASD, SVC, JCAMP-DX, CGATS",
         )
-        self.remove = push_button("Remove", "Remove the selected pin, region or reference (Delete)")
+        self.remove = push_button("Remove", "Remove the selected pins, regions and references (Delete)")
         self.copy = push_button(
             "Copy spectra",
             "Copy the ticked spectra for a spreadsheet: nm, mean, deviation, n, uncertainty (Ctrl+C)",
@@ -105,7 +106,8 @@ class MarksPanel(QWidget):
 
     def _connect(self) -> None:
         self.tree.itemChanged.connect(self._item_changed)
-        self.tree.currentItemChanged.connect(self._selection_changed)
+        self.tree.currentItemChanged.connect(self._current_changed)
+        self.tree.itemSelectionChanged.connect(self._show_removable)
         self.reference.clicked.connect(self.choose_reference)
         self.remove.clicked.connect(self.remove_selected)
         delete = QShortcut(QKeySequence(Qt.Key.Key_Delete), self.tree, self.remove_selected)
@@ -115,6 +117,7 @@ class MarksPanel(QWidget):
         self.copy.clicked.connect(self.copy_spectra)
         self.export.clicked.connect(self.export_spectra)
         self._state.marks.follow(lambda _: self._fill())
+        self._state.result.changed.connect(lambda _: self._show_hint())
         self._state.selected.follow(lambda _: self._show_selection())
         self._state.band.changed.connect(lambda _: self._show_band())
 
@@ -125,8 +128,13 @@ class MarksPanel(QWidget):
             self._control.add_reference(Path(name))
 
     def remove_selected(self) -> None:
-        """Remove the selected mark."""
-        self._control.remove(self._state.selected.value)
+        """Remove the selected marks."""
+        self._control.remove(*self._chosen)
+
+    @property
+    def _chosen(self) -> list[int]:
+        """The keys of the selected marks."""
+        return [int(item.data(0, KEY)) for item in self.tree.selectedItems()]
 
     def copy_spectra(self) -> None:
         """Copy the spectra shown, as a table."""
@@ -154,8 +162,13 @@ class MarksPanel(QWidget):
                 self.tree.takeTopLevelItem(self.tree.indexOfTopLevelItem(item))
             for place, mark in enumerate(marks):
                 self._put(place, mark)
-        self.hint.setVisible(not marks)
+        self._show_hint()
         self._show_selection()
+
+    def _show_hint(self) -> None:
+        """Say what to do while nothing is marked, or why nothing can be."""
+        self.hint.setText(self._state.no_spectra or EMPTY)
+        self.hint.setVisible(not self._state.marks.value)
 
     def _put(self, place: int, mark: Mark) -> None:
         shown, item = self._rows.get(mark.key, (None, None))
@@ -184,23 +197,31 @@ class MarksPanel(QWidget):
         mark, _ = self._rows[key]
         shown = item.checkState(0) == Qt.CheckState.Checked
         if mark.shown != shown:
-            self._control.show(key, shown)
+            # One of several that are selected takes them all along.
+            chosen = self._chosen
+            self._control.show(shown, *(chosen if key in chosen else (key,)))
         elif item.text(0) != mark.name:
             self._control.rename(key, item.text(0))
             with quiet(self.tree):
                 # The name that it has now, which is the old one where none was given.
                 item.setText(0, self._rows[key][0].name)
 
-    def _selection_changed(self, item: QTreeWidgetItem | None, _before: object) -> None:
+    def _current_changed(self, item: QTreeWidgetItem | None, _before: object) -> None:
         self._state.selected.set(0 if item is None else int(item.data(0, KEY)))
 
     def _show_selection(self) -> None:
         key = self._state.selected.value
         chosen = self._rows.get(key)
-        with quiet(self.tree):
-            self.tree.setCurrentIndex(QModelIndex() if chosen is None else self.tree.indexFromItem(chosen[1]))
-        self.remove.setEnabled(self._state.selected_mark is not None)
+        index = QModelIndex() if chosen is None else self.tree.indexFromItem(chosen[1])
+        # Making an item current that is so already would give up the others that are selected.
+        if index != self.tree.currentIndex():
+            with quiet(self.tree):
+                self.tree.setCurrentIndex(index)
+        self._show_removable()
         self._later.start()
+
+    def _show_removable(self) -> None:
+        self.remove.setEnabled(bool(self._chosen))
 
     def _show_band(self) -> None:
         mark = self._state.selected_mark

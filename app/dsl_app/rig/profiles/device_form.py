@@ -13,7 +13,7 @@ from dsl_core.devices.driver_table import Kind, find_driver
 from dsl_core.errors import DeviceError
 from dsl_core.words import capitalised
 
-NOTHING_FOUND, NOT_LOOKED = "nothing found", "nobody has looked yet"
+NOTHING_FOUND, NOT_LOOKED = "nothing found", "not looked for yet"
 
 
 class DeviceForm(QWidget):

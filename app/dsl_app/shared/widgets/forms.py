@@ -8,7 +8,7 @@ from dataclasses import fields
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from PySide6.QtCore import QLocale, QObject, Qt, SignalInstance
-from PySide6.QtGui import QKeyEvent, QValidator, QWheelEvent
+from PySide6.QtGui import QKeyEvent, QStandardItemModel, QValidator, QWheelEvent
 from PySide6.QtWidgets import (
     QAbstractButton,
     QCheckBox,
@@ -117,6 +117,12 @@ class ChoiceBox(CalmWheel, QComboBox):
     def choose(self, data: object) -> None:
         """Show the entry of some data as the chosen one."""
         self.setCurrentIndex(self.findData(data))
+
+    def offer(self, data: object, offered: bool) -> None:
+        """Let the entry of some data be chosen, or not."""
+        model = self.model()
+        assert isinstance(model, QStandardItemModel)
+        model.item(self.findData(data)).setEnabled(offered)
 
     def be_narrow(self, least_px: int = 80) -> None:
         """Let the box be narrower than its longest entry, which its list still shows whole."""

@@ -31,17 +31,32 @@ def test_a_pin_is_compared_with_references_and_measured_to_other_pins(bench: Ben
     assert "2.000" in html
     # Ten rows of 701.5 mm depth at 1/100 of it each.
     assert "70.150 ± 0.023 mm" in html
-    bench.control.marks.show(bench.state.marks.value[2].key, False)
+    bench.control.marks.show(False, bench.state.marks.value[2].key)
     assert "double" not in select(bench, 0)
 
 
-def test_regions_have_no_distance_and_references_no_table(bench: Bench, tmp_path: Path) -> None:
+def test_regions_have_no_distance(bench: Bench, tmp_path: Path) -> None:
     bench.control.marks.add_outline(SQUARE)
     bench.control.marks.pin((3, 3))
     bench.control.marks.add_reference(write_reference(tmp_path / "same.csv", BLUE))
     assert "distance" not in select(bench, 0)
     assert "same" in select(bench, 0)
-    assert select(bench, 2) == ""
+
+
+def test_a_reference_is_compared_with_all_that_is_measured_as_soon_as_it_is_added(
+    bench: Bench, tmp_path: Path
+) -> None:
+    bench.control.marks.add_reference(write_reference(tmp_path / "other.csv", BLUE))
+    assert select(bench, 0) == "", "nothing is measured yet"
+    bench.control.marks.add_outline(SQUARE)
+    bench.control.marks.pin((3, 3))
+    bench.control.marks.add_reference(write_reference(tmp_path / "double.csv", 2 * BLUE))
+    html = comparison_html(bench.state, LIGHT)
+    assert "double against" in html
+    assert [name in html for name in ("region 1", "pin 1", "other")] == [True, True, False]
+    # Both are half as bright, whichever way they are compared.
+    assert html.count("2.000") == 2
+    assert html.count(f"{np.sqrt(np.mean(BLUE**2)):.4f}") == 2
 
 
 def test_a_short_reference_says_its_range(bench: Bench, tmp_path: Path) -> None:

@@ -44,6 +44,23 @@ def test_marks_are_removed_one_after_the_other_without_choosing_each(bench: Benc
     assert (bench.names, state.selected.value) == ([], 0)
 
 
+def test_several_marks_are_removed_and_hidden_at_once(bench: Bench) -> None:
+    marks, state = bench.control.marks, bench.state
+    for column in (3, 6, 9, 12):
+        marks.pin((column, 3))
+    first, second, third, fourth = (mark.key for mark in state.marks.value)
+    state.selected.set(third)
+    marks.remove(second, third)
+    assert (bench.names, state.selected.value) == (["pin 1", "pin 4"], fourth)
+    assert bench.undo.undo_text == "removing 2 marks"
+    bench.undo.undo()
+    assert bench.names == ["pin 1", "pin 2", "pin 3", "pin 4"]
+    marks.show(False, first, fourth)
+    assert [mark.shown for mark in state.marks.value] == [False, True, True, False]
+    bench.undo.undo()
+    assert all(mark.shown for mark in state.marks.value)
+
+
 def test_what_has_no_spectrum_is_not_marked(bench: Bench) -> None:
     bench.control.marks.pin(DARK)
     assert "no spectrum" in bench.told
@@ -60,7 +77,7 @@ def test_marks_are_saved_next_to_the_result(bench: Bench, tmp_path: Path) -> Non
     mask[4:8, 20:30] = True
     marks.add_pixels(mask)
     marks.add_reference(write_reference(tmp_path / "tile.csv", BLUE))
-    marks.show(bench.state.marks.value[2].key, False)
+    marks.show(False, bench.state.marks.value[2].key)
     again = Bench(tmp_path / "small.zarr")
     assert again.names == ["sky", "region 1", "tile"]
     assert again.state.marks.value[1].used == 40
@@ -121,7 +138,7 @@ def test_spectra_are_copied_and_exported_and_read_again_as_references(bench: Ben
     assert "No spectrum is ticked" in bench.told
     marks.add_outline(SQUARE)
     marks.pin((3, 3))
-    marks.show(bench.state.marks.value[1].key, False)
+    marks.show(False, bench.state.marks.value[1].key)
     marks.copy_spectra(copied.append)
     assert "Copied 1 spectrum" in bench.told
     head, first = (line.split("\t") for line in copied[0].splitlines()[:2])

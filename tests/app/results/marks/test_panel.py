@@ -14,7 +14,7 @@ from dsl_app.results.state import Mark
 from dsl_app.shared.spectrum import Spectrum
 from dsl_app.shared.theme import DARK as DARK_THEME
 from dsl_app.shared.theme import LIGHT
-from PySide6.QtCore import QMimeData, QPointF, Qt, QUrl
+from PySide6.QtCore import QMimeData, QPoint, QPointF, Qt, QUrl
 from PySide6.QtGui import QDropEvent
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QFileDialog, QTreeWidgetItem
@@ -43,6 +43,30 @@ def test_the_list_names_hides_and_selects(bench: Bench) -> None:
     assert now is not None
     tree.setCurrentItem(now)
     assert bench.state.selected.value == bench.marks[0].key
+
+
+def test_several_rows_are_selected_hidden_and_removed(bench: Bench) -> None:
+    for column in (10, 15, 20, 25):
+        bench.control.marks.pin((column, 10))
+    panel = bench.page.marks
+    items = [item for place in range(4) if (item := panel.tree.topLevelItem(place)) is not None]
+    view = panel.tree.viewport()
+    for place, held in ((0, Qt.KeyboardModifier.NoModifier), (2, Qt.KeyboardModifier.ControlModifier)):
+        row = panel.tree.visualItemRect(items[place])
+        at = QPoint(row.left() + 90, row.center().y())
+        QTest.mouseClick(view, Qt.MouseButton.LeftButton, held, at)
+    assert panel.tree.selectedItems() == [items[0], items[2]]
+    assert bench.state.selected.value == bench.marks[2].key
+    items[0].setCheckState(0, Qt.CheckState.Unchecked)
+    assert [mark.shown for mark in bench.marks] == [False, True, False, True]
+    QTest.keyClick(panel.tree, Qt.Key.Key_Delete)
+    assert [mark.name for mark in bench.marks] == ["pin 2", "pin 4"]
+    bench.window.parts.undo.undo()
+    assert panel.tree.topLevelItemCount() == 4
+    QTest.keyClick(panel.tree, Qt.Key.Key_A, Qt.KeyboardModifier.ControlModifier)
+    QTest.mouseClick(panel.remove, Qt.MouseButton.LeftButton)
+    assert not list(bench.marks)
+    assert not panel.remove.isEnabled()
 
 
 def test_rows_of_marks_that_stay_as_they_are_stay_too(bench: Bench) -> None:

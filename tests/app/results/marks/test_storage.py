@@ -169,7 +169,7 @@ def test_an_offer_about_another_result_does_nothing(path: Path, tmp_path: Path) 
 def test_what_has_no_spectrum_now_stays_in_the_list_and_in_the_file(path: Path, tmp_path: Path) -> None:
     first = Bench(path, InlineRunner())
     first.control.marks.add_reference(write_reference(tmp_path / "tile.csv", BLUE))
-    first.control.marks.show(first.state.marks.value[-1].key, False)
+    first.control.marks.show(False, first.state.marks.value[-1].key)
     kept = first.kept
     (tmp_path / "tile.csv").rename(tmp_path / "away.csv")
     changed = load_result(path).load()

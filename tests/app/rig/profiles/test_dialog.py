@@ -119,7 +119,7 @@ def test_the_blue_button_leads_from_name_to_look_try_and_save(
     monkeypatch.setattr(doctor, "examine", lambda profile: [Finding("camera uvc", Grade.GOOD, "640 px")])
     found = bench.dialog.forms["camera"].found
     assert bench.dialog.focusWidget() is bench.dialog.name
-    assert (found.currentText(), blue()) == ("nobody has looked yet", ["&Look for devices"])
+    assert (found.currentText(), blue()) == ("not looked for yet", ["&Look for devices"])
     bench.fill_in()
     assert bench.dialog.forms["stage"].found.currentText() == "nothing found"
     assert blue() == ["&Try"]
