@@ -18,7 +18,7 @@ from dsl_core.capture.proof.light_sums import light_sentence
 from dsl_core.capture.proof.verifier import FrameProof
 from dsl_core.capture.put_back import ADVICE
 from dsl_core.errors import Cancelled, DeviceError
-from dsl_core.model.frames import Frame, FrameSink, FrameSource
+from dsl_core.model.frames import Frame, FrameSink, FrameSource, NotedSource
 from dsl_core.model.plan import Shot, describe_shot
 from dsl_core.progress import CancelToken
 
@@ -84,6 +84,11 @@ class ProvenShots:
         self._diagnosis = diagnosis
         self._failures = 0
         self._unlike_at = 0
+        #: Saved shots that are judged by themselves, by index.
+        self._alone: dict[int, Shot] = {}
+        #: Indices of shots that were taken again because they were wrong, or only the picture after them.
+        self._renewed: set[int] = set()
+        self._beside: set[int] = set()
         self._is_late = False
         self._untold: list[Shot] = []
         self._recent: deque[Shot] = deque(maxlen=JUST_BEFORE)
@@ -124,14 +129,18 @@ class ProvenShots:
                 continue
             pixels = stored.read(shot)
             found = self._proof.judge(shot, pixels)
+            if isinstance(stored, NotedSource):
+                self._proof.recall(shot, stored.corrected(shot))
             if not found.is_wrong:
                 self._diagnosis.keep(shot, pixels)
                 self._date(shot, pixels, self._proof)
+                self._note_alone(shot)
             is_untold = found.verdict is Verdict.UNTOLD and self._is_alone(shot)
             tail = [*tail, shot] if is_untold else []
             self._correct(found, self._proof)
         for shot in again:
             self.take(shot)
+        self._take_beside(self._proof)
 
     def take(self, shot: Shot) -> None:
         """Take a shot and save it.
@@ -181,6 +190,25 @@ class ProvenShots:
         self._correct(found, self._proof)
         if self._failures >= FAILURES and not self._is_late:
             self._be_late(shot, self._proof)
+        if frame.corrected:
+            self._renewed.add(shot.index)
+        self._take_beside(self._proof)
+
+    def _take_beside(self, proof: FrameProof) -> None:
+        """Take the picture just before each that was wrong again: what spoilt that may have begun in it.
+
+        A door that opens is half open in one picture, too little to be noticed. Where pictures come late, all
+        of them are taken twice already.
+        """
+        before = {index - 1 for index in self._renewed} - self._renewed - self._beside
+        for index in sorted(before & self._alone.keys()) if not self._is_late else ():
+            self._beside.add(index)
+            shot = self._alone[index]
+            frame = replace(self._again(shot), corrected="the picture after it was wrong")
+            found = proof.judge(shot, frame.pixels)
+            self._correct(found, proof)
+            if not found.is_wrong:
+                self._save(shot, frame, found)
 
     def _again(self, shot: Shot, earlier: int = 0) -> Frame:
         """Another picture of a shot, shown twice and for longer; ``earlier`` is how often that was done."""
@@ -191,6 +219,7 @@ class ProvenShots:
         self._sink.write(shot, frame)
         self._diagnosis.keep(shot, frame.pixels)
         self._recent.append(shot)
+        self._note_alone(shot)
         if self._proof is not None:
             self._date(shot, frame.pixels, self._proof)
         if not _is_sure(found) and self._is_alone(shot) and shot not in self._untold:
@@ -203,6 +232,10 @@ class ProvenShots:
                 self._since_sound.clear()
         elif self._is_alone(shot):
             self._since_sound.add(shot)
+
+    def _note_alone(self, shot: Shot) -> None:
+        if self._is_alone(shot) and shot.role != "sentinel":
+            self._alone[shot.index] = shot
 
     def _is_alone(self, shot: Shot) -> bool:
         """Whether a shot is judged by itself: those of the first code are by what they are together."""
@@ -257,6 +290,7 @@ class ProvenShots:
             taken: list[tuple[Shot, Frame, Finding]] = []
             for shot in wrong:
                 frame = replace(self._again(shot, earlier), corrected=reason)
+                self._renewed.add(shot.index)
                 taken.append((shot, frame, proof.judge(shot, frame.pixels)))
             found = _together([each for *_, each in taken])
             if len(wrong) > 1 and wrong[-1].role == "spectral" and not found.is_wrong:

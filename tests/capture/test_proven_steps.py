@@ -44,6 +44,7 @@ class Bench:
         self.displaced: list[bool] = []
         self.alone = False
         self.settled = ""
+        self.recalled: dict[int, str] = {}
         self.of_code: CodeSum | None = None
         parts: Any = self
         self.shots = ProvenShots(parts, parts, parts, parts, self.token)
@@ -75,6 +76,9 @@ class Bench:
 
     def believe_light(self, shot: Shot) -> None:
         self.believed.append(shot.index)
+
+    def recall(self, shot: Shot, why: str) -> None:
+        self.recalled[shot.index] = why
 
     def withdraw(self, shots: list[Shot]) -> None:
         self.withdrawn = [shot.index for shot in shots]
@@ -163,6 +167,33 @@ def test_wrong_ones_are_taken_again_with_longer_waits() -> None:
     assert bench.written == {13: "it still shows the pattern before"}
     assert bench.shots.corrected == 1
     assert bench.shots.note == " 1 was captured again, because a picture did not show its pattern."
+
+
+def test_the_line_before_a_wrong_one_is_taken_again_once() -> None:
+    """As of a door that was half open in it; others before have nothing to do with it."""
+    bench = Bench(is_right, is_right, late, is_right)
+    take_all(bench, SHOTS[12:16])
+    assert bench.taken == [
+        *((12, 0, 0.0, False), (13, 0, 0.0, False), (14, 0, 0.0, False)),
+        *((14, 1, 100.0, True), (13, 1, 100.0, True)),
+        (15, 0, 0.0, False),
+    ]
+    assert bench.written[13] == "the picture after it was wrong"
+    assert bench.shots.corrected == 1
+
+
+def test_the_line_before_a_wrong_one_has_to_show_its_pattern_too() -> None:
+    bench = Bench(is_right, late, is_right, late, is_right)
+    take_all(bench, SHOTS[13:15])
+    assert bench.taken[-2:] == [(13, 1, 100.0, True), (13, 1, 100.0, True)]
+    assert bench.written[13] == "it still shows the pattern before"
+
+
+def test_why_frames_of_an_earlier_run_were_taken_again_is_looked_at() -> None:
+    bench, stored = Bench(is_right), Stored()
+    stored.corrected = lambda shot: f"why {shot.index}"  # type: ignore[attr-defined]
+    bench.shots.learn(stored, range(2, len(SHOTS)))  # type: ignore[arg-type]
+    assert bench.recalled == {0: "why 0", 1: "why 1"}
 
 
 def test_light_of_the_code_that_does_not_add_up_is_said_at_the_end() -> None:
@@ -461,8 +492,8 @@ def test_frames_right_before_a_missing_one_are_taken_again_where_nothing_tells_o
     assert whole.taken == []
     wrong = Bench(*[is_right] * 13, late, is_right)
     wrong.shots.learn(stored, ())
-    assert wrong.taken == [(13, 1, 100.0, True)]
-    assert sorted(wrong.kept) == list(range(len(SHOTS))), "a wrong one only once it is right"
+    assert wrong.taken == [(13, 1, 100.0, True), (12, 1, 100.0, True)], "and the one before"
+    assert sorted(set(wrong.kept)) == list(range(len(SHOTS))), "a wrong one only once it is right"
 
 
 def test_thirty_two_frames_before_a_missing_one_are_taken_again_at_most() -> None:
