@@ -38,6 +38,8 @@ JUST_BEFORE = 8
 CREEPING = (Verdict.EXPOSURE, Verdict.OTHER)
 #: Lines that are wrong like this while white, black and code look as at first have lost light of their own.
 DIM = (Verdict.DARK, Verdict.EXPOSURE)
+#: What changes the light may begin in the picture before, unlike what spoils single pictures.
+OF_LIGHT = (*DIM, Verdict.HIDDEN)
 _DIMMED = (
     "White, black and a frame of the code, captured once more, look as they did: the projector may give dark"
     " pictures less light than bright ones. Switch its dynamic contrast, iris and eco mode off, check that"
@@ -86,7 +88,7 @@ class ProvenShots:
         self._unlike_at = 0
         #: Saved shots that are judged by themselves, by index.
         self._alone: dict[int, Shot] = {}
-        #: Indices of shots that were taken again because they were wrong, or only the picture after them.
+        #: Indices of shots that were taken again for their light, or for that of the picture after them.
         self._renewed: set[int] = set()
         self._beside: set[int] = set()
         self._is_late = False
@@ -190,12 +192,10 @@ class ProvenShots:
         self._correct(found, self._proof)
         if self._failures >= FAILURES and not self._is_late:
             self._be_late(shot, self._proof)
-        if frame.corrected:
-            self._renewed.add(shot.index)
         self._take_beside(self._proof)
 
     def _take_beside(self, proof: FrameProof) -> None:
-        """Take the picture just before each that was wrong again: what spoilt that may have begun in it.
+        """Take the picture just before each that had wrong light again: it may have changed in that already.
 
         A door that opens is half open in one picture, too little to be noticed. Where pictures come late, all
         of them are taken twice already.
@@ -280,9 +280,12 @@ class ProvenShots:
         return replace(third, corrected="two pictures of it differed"), proof.judge(alone.shot, third.pixels)
 
     def _correct(self, found: Finding, proof: FrameProof) -> None:
+        wrongs, is_of_light = set[int](), False
         for earlier in range(len(SETTLE_MS)):
             if not found.is_wrong:
-                return
+                break
+            wrongs |= {shot.index for shot in found.again}
+            is_of_light |= found.verdict in OF_LIGHT
             if self._token.is_cancelled:
                 raise Cancelled(f"Cancelled: {found.sentence} Frames that do are saved. Resume the scan.")
             _log.warning("%s It is captured again.", found.sentence)
@@ -290,7 +293,6 @@ class ProvenShots:
             taken: list[tuple[Shot, Frame, Finding]] = []
             for shot in wrong:
                 frame = replace(self._again(shot, earlier), corrected=reason)
-                self._renewed.add(shot.index)
                 taken.append((shot, frame, proof.judge(shot, frame.pixels)))
             found = _together([each for *_, each in taken])
             if len(wrong) > 1 and wrong[-1].role == "spectral" and not found.is_wrong:
@@ -300,6 +302,7 @@ class ProvenShots:
                 if shot not in found.again:
                     self._save(shot, frame, shown)
                     self.corrected += 1
+        self._renewed |= wrongs if is_of_light else set()
         if found.is_wrong:
             change = self._explain()
             raise PictureError(

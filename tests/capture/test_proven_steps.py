@@ -128,6 +128,10 @@ def late(shot: Shot) -> Finding:
     return Finding(shot, Verdict.LATE, (shot,))
 
 
+def dark(shot: Shot) -> Finding:
+    return Finding(shot, Verdict.DARK, (shot,))
+
+
 def doubtful(shot: Shot) -> Finding:
     return Finding(shot, Verdict.UNTOLD, is_doubtful=True)
 
@@ -171,7 +175,7 @@ def test_wrong_ones_are_taken_again_with_longer_waits() -> None:
 
 def test_the_line_before_a_wrong_one_is_taken_again_once() -> None:
     """As of a door that was half open in it; others before have nothing to do with it."""
-    bench = Bench(is_right, is_right, late, is_right)
+    bench = Bench(is_right, is_right, dark, is_right)
     take_all(bench, SHOTS[12:16])
     assert bench.taken == [
         *((12, 0, 0.0, False), (13, 0, 0.0, False), (14, 0, 0.0, False)),
@@ -183,10 +187,16 @@ def test_the_line_before_a_wrong_one_is_taken_again_once() -> None:
 
 
 def test_the_line_before_a_wrong_one_has_to_show_its_pattern_too() -> None:
-    bench = Bench(is_right, late, is_right, late, is_right)
+    bench = Bench(is_right, dark, is_right, late, is_right)
     take_all(bench, SHOTS[13:15])
     assert bench.taken[-2:] == [(13, 1, 100.0, True), (13, 1, 100.0, True)]
     assert bench.written[13] == "it still shows the pattern before"
+
+
+def test_a_single_late_picture_says_nothing_of_the_one_before() -> None:
+    bench = Bench(is_right, late, is_right)
+    take_all(bench, SHOTS[13:15])
+    assert bench.taken[-1] == (14, 1, 100.0, True)
 
 
 def test_why_frames_of_an_earlier_run_were_taken_again_is_looked_at() -> None:
@@ -492,8 +502,8 @@ def test_frames_right_before_a_missing_one_are_taken_again_where_nothing_tells_o
     assert whole.taken == []
     wrong = Bench(*[is_right] * 13, late, is_right)
     wrong.shots.learn(stored, ())
-    assert wrong.taken == [(13, 1, 100.0, True), (12, 1, 100.0, True)], "and the one before"
-    assert sorted(set(wrong.kept)) == list(range(len(SHOTS))), "a wrong one only once it is right"
+    assert wrong.taken == [(13, 1, 100.0, True)]
+    assert sorted(wrong.kept) == list(range(len(SHOTS))), "a wrong one only once it is right"
 
 
 def test_thirty_two_frames_before_a_missing_one_are_taken_again_at_most() -> None:
