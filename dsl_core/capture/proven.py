@@ -38,8 +38,6 @@ JUST_BEFORE = 8
 CREEPING = (Verdict.EXPOSURE, Verdict.OTHER)
 #: Lines that are wrong like this while white, black and code look as at first have lost light of their own.
 DIM = (Verdict.DARK, Verdict.EXPOSURE)
-#: What changes the light may begin in the picture before, unlike what spoils single pictures.
-OF_LIGHT = (*DIM, Verdict.HIDDEN)
 _DIMMED = (
     "White, black and a frame of the code, captured once more, look as they did: the projector may give dark"
     " pictures less light than bright ones. Switch its dynamic contrast, iris and eco mode off, check that"
@@ -86,11 +84,6 @@ class ProvenShots:
         self._diagnosis = diagnosis
         self._failures = 0
         self._unlike_at = 0
-        #: Saved shots that are judged by themselves, by index.
-        self._alone: dict[int, Shot] = {}
-        #: Indices of shots that were taken again for their light, or for that of the picture after them.
-        self._renewed: set[int] = set()
-        self._beside: set[int] = set()
         self._is_late = False
         self._untold: list[Shot] = []
         self._recent: deque[Shot] = deque(maxlen=JUST_BEFORE)
@@ -136,13 +129,11 @@ class ProvenShots:
             if not found.is_wrong:
                 self._diagnosis.keep(shot, pixels)
                 self._date(shot, pixels, self._proof)
-                self._note_alone(shot)
             is_untold = found.verdict is Verdict.UNTOLD and self._is_alone(shot)
             tail = [*tail, shot] if is_untold else []
             self._correct(found, self._proof)
         for shot in again:
             self.take(shot)
-        self._take_beside(self._proof)
 
     def take(self, shot: Shot) -> None:
         """Take a shot and save it.
@@ -192,23 +183,6 @@ class ProvenShots:
         self._correct(found, self._proof)
         if self._failures >= FAILURES and not self._is_late:
             self._be_late(shot, self._proof)
-        self._take_beside(self._proof)
-
-    def _take_beside(self, proof: FrameProof) -> None:
-        """Take the picture just before each that had wrong light again: it may have changed in that already.
-
-        A door that opens is half open in one picture, too little to be noticed. Where pictures come late, all
-        of them are taken twice already.
-        """
-        before = {index - 1 for index in self._renewed} - self._renewed - self._beside
-        for index in sorted(before & self._alone.keys()) if not self._is_late else ():
-            self._beside.add(index)
-            shot = self._alone[index]
-            frame = replace(self._again(shot), corrected="the picture after it was wrong")
-            found = proof.judge(shot, frame.pixels)
-            self._correct(found, proof)
-            if not found.is_wrong:
-                self._save(shot, frame, found)
 
     def _again(self, shot: Shot, earlier: int = 0) -> Frame:
         """Another picture of a shot, shown twice and for longer; ``earlier`` is how often that was done."""
@@ -219,7 +193,6 @@ class ProvenShots:
         self._sink.write(shot, frame)
         self._diagnosis.keep(shot, frame.pixels)
         self._recent.append(shot)
-        self._note_alone(shot)
         if self._proof is not None:
             self._date(shot, frame.pixels, self._proof)
         if not _is_sure(found) and self._is_alone(shot) and shot not in self._untold:
@@ -232,10 +205,6 @@ class ProvenShots:
                 self._since_sound.clear()
         elif self._is_alone(shot):
             self._since_sound.add(shot)
-
-    def _note_alone(self, shot: Shot) -> None:
-        if self._is_alone(shot) and shot.role != "sentinel":
-            self._alone[shot.index] = shot
 
     def _is_alone(self, shot: Shot) -> bool:
         """Whether a shot is judged by itself: those of the first code are by what they are together."""
@@ -280,12 +249,9 @@ class ProvenShots:
         return replace(third, corrected="two pictures of it differed"), proof.judge(alone.shot, third.pixels)
 
     def _correct(self, found: Finding, proof: FrameProof) -> None:
-        wrongs, is_of_light = set[int](), False
         for earlier in range(len(SETTLE_MS)):
             if not found.is_wrong:
-                break
-            wrongs |= {shot.index for shot in found.again}
-            is_of_light |= found.verdict in OF_LIGHT
+                return
             if self._token.is_cancelled:
                 raise Cancelled(f"Cancelled: {found.sentence} Frames that do are saved. Resume the scan.")
             _log.warning("%s It is captured again.", found.sentence)
@@ -302,7 +268,6 @@ class ProvenShots:
                 if shot not in found.again:
                     self._save(shot, frame, shown)
                     self.corrected += 1
-        self._renewed |= wrongs if is_of_light else set()
         if found.is_wrong:
             change = self._explain()
             raise PictureError(

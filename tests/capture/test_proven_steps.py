@@ -128,10 +128,6 @@ def late(shot: Shot) -> Finding:
     return Finding(shot, Verdict.LATE, (shot,))
 
 
-def dark(shot: Shot) -> Finding:
-    return Finding(shot, Verdict.DARK, (shot,))
-
-
 def doubtful(shot: Shot) -> Finding:
     return Finding(shot, Verdict.UNTOLD, is_doubtful=True)
 
@@ -171,32 +167,6 @@ def test_wrong_ones_are_taken_again_with_longer_waits() -> None:
     assert bench.written == {13: "it still shows the pattern before"}
     assert bench.shots.corrected == 1
     assert bench.shots.note == " 1 was captured again, because a picture did not show its pattern."
-
-
-def test_the_line_before_a_wrong_one_is_taken_again_once() -> None:
-    """As of a door that was half open in it; others before have nothing to do with it."""
-    bench = Bench(is_right, is_right, dark, is_right)
-    take_all(bench, SHOTS[12:16])
-    assert bench.taken == [
-        *((12, 0, 0.0, False), (13, 0, 0.0, False), (14, 0, 0.0, False)),
-        *((14, 1, 100.0, True), (13, 1, 100.0, True)),
-        (15, 0, 0.0, False),
-    ]
-    assert bench.written[13] == "the picture after it was wrong"
-    assert bench.shots.corrected == 1
-
-
-def test_the_line_before_a_wrong_one_has_to_show_its_pattern_too() -> None:
-    bench = Bench(is_right, dark, is_right, late, is_right)
-    take_all(bench, SHOTS[13:15])
-    assert bench.taken[-2:] == [(13, 1, 100.0, True), (13, 1, 100.0, True)]
-    assert bench.written[13] == "it still shows the pattern before"
-
-
-def test_a_single_late_picture_says_nothing_of_the_one_before() -> None:
-    bench = Bench(is_right, late, is_right)
-    take_all(bench, SHOTS[13:15])
-    assert bench.taken[-1] == (14, 1, 100.0, True)
 
 
 def test_why_frames_of_an_earlier_run_were_taken_again_is_looked_at() -> None:
