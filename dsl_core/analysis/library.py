@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from dsl_core.errors import CalibrationError
+from dsl_core.io.reading import read_bounded
 from dsl_core.io.spectra.catalogue import format_of, suffixes
 from dsl_core.io.spectra.records import Spectrum
 from dsl_core.io.spectra.reference_file import as_references
@@ -170,7 +171,7 @@ def read_groups(table: Path) -> dict[str, str]:
     import csv
 
     try:
-        rows = list(csv.DictReader(table.read_text(encoding="utf-8-sig").splitlines()))
+        rows = list(csv.DictReader(read_bounded(table).decode("utf-8-sig").splitlines()))
     except (OSError, UnicodeDecodeError, csv.Error) as error:
         raise CalibrationError(f"The table of groups {table} cannot be read ({error}).") from error
     if not rows or not {"name", "group"} <= set(rows[0]):

@@ -18,7 +18,7 @@ from dsl_core.capture.proof.light_sums import light_sentence
 from dsl_core.capture.proof.verifier import FrameProof
 from dsl_core.capture.put_back import ADVICE
 from dsl_core.errors import Cancelled, DeviceError
-from dsl_core.model.frames import Frame, FrameSink, FrameSource
+from dsl_core.model.frames import Frame, FrameSink, FrameSource, NotedSource
 from dsl_core.model.plan import Shot, describe_shot
 from dsl_core.progress import CancelToken
 
@@ -124,6 +124,8 @@ class ProvenShots:
                 continue
             pixels = stored.read(shot)
             found = self._proof.judge(shot, pixels)
+            if isinstance(stored, NotedSource):
+                self._proof.recall(shot, stored.corrected(shot))
             if not found.is_wrong:
                 self._diagnosis.keep(shot, pixels)
                 self._date(shot, pixels, self._proof)

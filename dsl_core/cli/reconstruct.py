@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from contextlib import ExitStack
 from dataclasses import asdict, replace
-from json import loads
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -132,6 +131,7 @@ def _reconstruct(
 ) -> str:
     """Depth and spectra; what was found, in a sentence."""
     from dsl_core.io.result.result_file import load_result
+    from dsl_core.model.attributes import sentences_of
     from dsl_core.workflows.batch.task import doubts_of
     from dsl_core.workflows.scans import DOUBTS, NOT_JUDGED, reconstruct_to
 
@@ -142,7 +142,7 @@ def _reconstruct(
         )
     result = load_result(target)
     output.costs(timer.stages)
-    doubts = loads(result.attrs.get(DOUBTS, "[]"))
+    doubts = list(sentences_of(result.attrs, DOUBTS))
     for sentence in doubts_of(result):
         output.say(sentence)
     not_judged = result.attrs.get(NOT_JUDGED, "")

@@ -4,12 +4,17 @@ from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from typing import Any
+
+from pydantic import TypeAdapter, ValidationError
 
 #: Memory is read this often; shorter peaks can be missed.
 _INTERVAL_S = 0.05
+#: Name of the attribute of a result that holds what its stages took, as JSON.
+COSTS_ATTRIBUTE = "stage_costs"
 
 
 @dataclass(frozen=True)
@@ -20,6 +25,14 @@ class StageCost:
     seconds: float
     peak_bytes: int
     start_bytes: int
+
+
+def costs_of(attributes: Mapping[Any, Any]) -> list[StageCost]:
+    """What the stages of a result took by its attributes; none where that cannot be read."""
+    try:
+        return TypeAdapter(list[StageCost]).validate_json(str(attributes.get(COSTS_ATTRIBUTE, "[]")))
+    except ValidationError:
+        return []
 
 
 @dataclass

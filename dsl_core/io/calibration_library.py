@@ -18,6 +18,7 @@ from typing import Literal
 from dsl_core.errors import DslError, StoreError
 from dsl_core.io.atomic import write_atomic
 from dsl_core.io.campaign_folder import now
+from dsl_core.io.reading import read_bounded
 from dsl_core.io.records import read_record, replace_record
 from dsl_core.io.rig_file import load_rig
 from dsl_core.model.base import Record
@@ -165,7 +166,7 @@ class CalibrationLibrary:
         """The stamp in use: the one noted, or the newest where the note is lost or points nowhere."""
         stamps = self.stamps(name)
         try:
-            noted = (self.home / name / "current").read_text(encoding="ascii").strip()
+            noted = read_bounded(self.home / name / "current").decode("ascii").strip()
         except (OSError, UnicodeDecodeError):
             noted = ""
         if noted in stamps:

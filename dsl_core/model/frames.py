@@ -49,6 +49,14 @@ class RowSource(Protocol):
         """Some rows of the raw mosaic of a shot, shape (rows, columns); raises `StoreError`."""
 
 
+@runtime_checkable
+class NotedSource(Protocol):
+    """A `FrameSource` that knows why frames were captured again."""
+
+    def corrected(self, shot: Shot) -> str:
+        """What an earlier picture showed instead of the pattern of a shot; empty if there was none."""
+
+
 def read_rows(source: FrameSource, shot: Shot, rows: slice) -> NDArray[np.uint16]:
     """Some rows of the raw mosaic of a shot, from any source; raises `StoreError`."""
     return source.read_rows(shot, rows) if isinstance(source, RowSource) else source.read(shot)[rows]

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import ValidationError
 
 from dsl_core.devices.base import DeviceRig
 from dsl_core.devices.replay import ReplayCamera, ReplayProjector
@@ -20,6 +21,7 @@ from dsl_core.io.scan.check import require_complete
 from dsl_core.io.scan.folder import ScanReader, ScanWriter
 from dsl_core.io.scan.frame_store import checksum
 from dsl_core.io.scan.manifest import read_manifest
+from dsl_core.model.base import problems_in_words
 from dsl_core.model.captured_code import CapturedCode, Stripes
 from dsl_core.model.frames import Frame, FrameSource
 from dsl_core.model.plan import CapturePlan, GrayCode, Shot, XorCode
@@ -156,7 +158,13 @@ def sensor_of_scan(reader: ScanReader) -> Sensor:
 
 def _imported_sensor(reader: ScanReader) -> Sensor | None:
     noted = reader.manifest.notes.get(SENSOR)
-    return None if noted is None else Sensor.model_validate_json(noted)
+    try:
+        return None if noted is None else Sensor.model_validate_json(noted)
+    except ValidationError as error:
+        raise StoreError(
+            f"The camera of the scan {reader.folder} is not legible ({problems_in_words(error)}). Import its"
+            " pictures again."
+        ) from error
 
 
 @dataclass(frozen=True)

@@ -16,7 +16,9 @@ from dsl_core.calibration.geometry.pose_series import observe_series
 from dsl_core.calibration.geometry.solve import calibrate_geometry as calibrate
 from dsl_core.errors import CalibrationError
 from dsl_core.io.pictures.mapping import Mapping as PictureMapping
+from dsl_core.io.pictures.picture_file import MOST_BYTES
 from dsl_core.io.png_parts import declares_too_much
+from dsl_core.io.reading import read_bounded
 from dsl_core.model.board import Board
 from dsl_core.model.calibration.geometry import GeometryCalibration
 from dsl_core.model.calibration.pose_frames import PoseFrames
@@ -198,8 +200,11 @@ def _read(path: Path) -> NDArray[Any]:
     import cv2
 
     # Through memory, because OpenCV cannot open every path on Windows.
-    data = path.read_bytes()
     picture = None
+    try:
+        data = read_bounded(path, MOST_BYTES)
+    except OSError:
+        data = b""
     if data and not declares_too_much(data):
         picture = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED)
     if picture is None:

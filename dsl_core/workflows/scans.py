@@ -17,7 +17,7 @@ from dsl_core.devices.base import DeviceRig
 from dsl_core.devices.conditions import conditions_of
 from dsl_core.devices.registry import is_built_in, open_rig
 from dsl_core.errors import CalibrationError, DecodeError, DriftError, StoreError
-from dsl_core.evaluation.cost import StageTimer
+from dsl_core.evaluation.cost import COSTS_ATTRIBUTE, StageTimer
 from dsl_core.evaluation.summary import Truth
 from dsl_core.io.linearity import Linearity, linearity_of
 from dsl_core.io.scan.check import require_complete
@@ -25,6 +25,7 @@ from dsl_core.io.scan.folder import ScanReader
 from dsl_core.io.scan.manifest import Manifest, read_manifest
 from dsl_core.io.scan.origin import is_of_this_computer, model_notes, rig_of_notes
 from dsl_core.io.scan.proof_file import read_proof
+from dsl_core.model.attributes import PLAN_ATTRIBUTE
 from dsl_core.model.conditions import differences
 from dsl_core.model.frames import FrameSource
 from dsl_core.model.plan import CapturePlan
@@ -133,15 +134,15 @@ def reconstruct_scan(
             proof = prove(reader, watched.seen, rig, rig.sensor.bit_depth, rig.sensor.bayer)
     return result.assign_attrs(
         {
+            **reader.manifest.notes,  # first, so that no note of a stranger's scan hides what was found
             **({DOUBTS: json.dumps(proof.doubts)} if proof.doubts else {}),
             **({NOT_JUDGED: proof.not_judged} if proof.untold else {}),
-            **reader.manifest.notes,
             **model_notes(rig, options.correspondence),
             "captured": reader.manifest.created,
             "captured_with": reader.manifest.rig_name,
-            "capture_plan": reader.plan.model_dump_json(),
+            PLAN_ATTRIBUTE: reader.plan.model_dump_json(),
             "capture_seconds": _capture_seconds(reader.manifest),
-            "stage_costs": json.dumps([asdict(stage) for stage in timer.stages]),
+            COSTS_ATTRIBUTE: json.dumps([asdict(stage) for stage in timer.stages]),
         }
     )
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -22,7 +23,7 @@ from dsl_core.evaluation.time_sweep import (
 from dsl_core.io.result.result_arrays import load_arrays
 from dsl_core.io.result.result_file import load_result
 from dsl_core.io.scan.origin import rig_of_notes
-from dsl_core.model.plan import CapturePlan
+from dsl_core.model.attributes import plan_of
 from dsl_core.progress import NoProgress, Progress
 from dsl_core.workflows.scans import truth_of
 
@@ -55,10 +56,10 @@ def position_of(path: Path, attributes: Mapping[str, Any]) -> float | None:
 
 def seconds_of(attributes: Mapping[str, Any]) -> float | None:
     """What the capture took: exposures and, where the scan knows it, the projector's latency."""
-    if "capture_seconds" in attributes:
+    plan = plan_of(attributes)
+    with suppress(KeyError, TypeError, ValueError):
         return float(attributes["capture_seconds"])
-    plan = attributes.get("capture_plan")
-    return CapturePlan.model_validate_json(plan).duration_s() if plan else None
+    return None if plan is None else plan.duration_s()
 
 
 # Depth test ----------------------------------------------------------------------------------------

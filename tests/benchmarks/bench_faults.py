@@ -48,6 +48,7 @@ from tests.cases.faulty_lab import CAMERA, OTHER, PROJECTOR, SHIFTS, SPECTRUM, S
 from tests.cases.lab_mishaps import CAMERA_MISHAPS, PROJECTOR_MISHAPS
 from tests.cases.lab_oddities import CAMERA_ODDITIES, PROJECTOR_ODDITIES
 from tests.cases.lab_surprises import CAMERA_SURPRISES, PROJECTOR_SURPRISES
+from tests.cases.lab_whims import CAMERA_WHIMS, PROJECTOR_WHIMS
 from tests.cases.pattern_faults import LASTING, SINGLE
 from tests.cases.rig_habits import ALWAYS, CAMERA_HABITS, PROJECTOR_HABITS
 from tests.cases.spoiled_pictures import SPOILED
@@ -88,6 +89,7 @@ REASONS = {
 HABITS = (
     *(*CAMERA_HABITS, *PROJECTOR_HABITS, *CAMERA_MISHAPS, *PROJECTOR_MISHAPS),
     *(*CAMERA_SURPRISES, *PROJECTOR_SURPRISES, *CAMERA_ODDITIES, *PROJECTOR_ODDITIES),
+    *(*CAMERA_WHIMS, *PROJECTOR_WHIMS),
 )
 CHANGES = (*SPOILED, *SHIFTS, "projector squares its picture", *HABITS)
 #: Faults of the beginning of a scan, and between the last picture of the code and the first line.

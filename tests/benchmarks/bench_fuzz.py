@@ -20,6 +20,7 @@ from hypothesis import HealthCheck, Phase, given, seed, settings
 
 from dsl_core.errors import DslError
 from tests.benchmarks.common import options, print_table, write_json
+from tests.cases.stranger_readers import MORE
 from tests.cases.strangers import SAMPLES, Change, Sample, changed, changes
 
 #: A reader may take so many CPU seconds, and so much memory beyond the file.
@@ -36,11 +37,11 @@ def main() -> int:
     parser.add_argument("--worker", default="", help="used by itself")
     chosen = parser.parse_args()
     if chosen.worker:
-        print(json.dumps(fuzz(next(s for s in SAMPLES if s.name == chosen.worker), chosen.seconds)))
+        print(json.dumps(fuzz(next(s for s in (*SAMPLES, *MORE) if s.name == chosen.worker), chosen.seconds)))
         return 0
     seconds = min(chosen.seconds, 0.5) if chosen.quick else chosen.seconds
     rows, found, bad = [], {}, 0
-    for sample in SAMPLES:
+    for sample in (*SAMPLES, *MORE):
         if chosen.only not in sample.name:
             continue
         command = [sys.executable, "-m", "tests.benchmarks.bench_fuzz", str(seconds), "--worker", sample.name]

@@ -44,6 +44,7 @@ class Bench:
         self.displaced: list[bool] = []
         self.alone = False
         self.settled = ""
+        self.recalled: dict[int, str] = {}
         self.of_code: CodeSum | None = None
         parts: Any = self
         self.shots = ProvenShots(parts, parts, parts, parts, self.token)
@@ -75,6 +76,9 @@ class Bench:
 
     def believe_light(self, shot: Shot) -> None:
         self.believed.append(shot.index)
+
+    def recall(self, shot: Shot, why: str) -> None:
+        self.recalled[shot.index] = why
 
     def withdraw(self, shots: list[Shot]) -> None:
         self.withdrawn = [shot.index for shot in shots]
@@ -163,6 +167,13 @@ def test_wrong_ones_are_taken_again_with_longer_waits() -> None:
     assert bench.written == {13: "it still shows the pattern before"}
     assert bench.shots.corrected == 1
     assert bench.shots.note == " 1 was captured again, because a picture did not show its pattern."
+
+
+def test_why_frames_of_an_earlier_run_were_taken_again_is_looked_at() -> None:
+    bench, stored = Bench(is_right), Stored()
+    stored.corrected = lambda shot: f"why {shot.index}"  # type: ignore[attr-defined]
+    bench.shots.learn(stored, range(2, len(SHOTS)))  # type: ignore[arg-type]
+    assert bench.recalled == {0: "why 0", 1: "why 1"}
 
 
 def test_light_of_the_code_that_does_not_add_up_is_said_at_the_end() -> None:

@@ -33,6 +33,7 @@ from dsl_core.simulation.sim_devices import open_twin
 from tests.cases.lab_mishaps import CAMERA_MISHAPS, PROJECTOR_MISHAPS, CameraMishap
 from tests.cases.lab_oddities import CAMERA_ODDITIES, PROJECTOR_ODDITIES
 from tests.cases.lab_surprises import CAMERA_SURPRISES, PROJECTOR_SURPRISES
+from tests.cases.lab_whims import CAMERA_WHIMS, PROJECTOR_WHIMS
 from tests.cases.pattern_faults import LASTING, SINGLE, PatternFault, PatternFaults
 from tests.cases.rig_habits import ALWAYS, CAMERA_HABITS, PROJECTOR_HABITS
 from tests.cases.spoiled_pictures import SPOILED, Spoil, squared
@@ -206,12 +207,12 @@ CAMERA: dict[str, tuple[bool, Change]] = {
     **{kind: (False, _spoiled(spoil)) for kind, spoil in CAMERA_HABITS.items()},
     **{
         kind: (False, _mishap(change))
-        for kind, change in (CAMERA_MISHAPS | CAMERA_SURPRISES | CAMERA_ODDITIES).items()
+        for kind, change in (CAMERA_MISHAPS | CAMERA_SURPRISES | CAMERA_ODDITIES | CAMERA_WHIMS).items()
     },
 }
 
 
-_OF_PROJECTOR = PROJECTOR_MISHAPS | PROJECTOR_SURPRISES | PROJECTOR_ODDITIES
+_OF_PROJECTOR = PROJECTOR_MISHAPS | PROJECTOR_SURPRISES | PROJECTOR_ODDITIES | PROJECTOR_WHIMS
 
 
 class LabProjector(Projector):

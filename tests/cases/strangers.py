@@ -124,7 +124,8 @@ def _of_bytes(data: bytes, change: Change) -> bytes:
 # Samples ---------------------------------------------------------------------------------------------
 
 
-def _plan() -> Any:
+def small_plan() -> Any:
+    """A plan of few frames of 12 x 8 pixels."""
     from dsl_core.model.plan import CapturePlan, GrayCode, LineComb, Setting
 
     return CapturePlan(
@@ -137,12 +138,13 @@ def _plan() -> Any:
     )
 
 
-def _make_scan(folder: Path) -> None:
+def make_scan(folder: Path) -> None:
+    """The scan ``a.dsl`` of that plan, of noise."""
     from dsl_core.io.scan.folder import ScanWriter
     from dsl_core.model.frames import Frame
 
     rng = np.random.default_rng(3)
-    with ScanWriter.create(folder / "a.dsl", _plan()) as writer:
+    with ScanWriter.create(folder / "a.dsl", small_plan()) as writer:
         for shot in writer.missing():
             pixels = rng.integers(200, 4000, (8, 12)).astype(np.uint16)
             writer.write(shot, Frame(pixels, shot.exposure_ms, 1.0 + shot.index, shot.index + 1))
@@ -180,7 +182,7 @@ def _make_records(folder: Path) -> None:
     from dsl_core.io.rig_file import save_rig
     from dsl_core.model.calibration.accepted import AcceptedCalibration
 
-    save_plan(_plan(), folder / "plan.json")
+    save_plan(small_plan(), folder / "plan.json")
     save_rig(small_rig(), folder / "rig.json")
     campaign = CampaignFolder.begin(folder / "campaign", "twin", {"size": "12x8"})
     campaign.propose(AcceptedCalibration(name="geometry", title="Geometry", record={"a": [1.0, 2.0]}))
@@ -288,7 +290,7 @@ def _make_dataset(folder: Path) -> None:
         for number in range(count):
             data = cv2.imencode(".png", image)[1]
             (folder / name / f"capture_{number:04d}.png").write_bytes(data.tobytes())
-    (folder / "plan.json").write_text(_plan().model_dump_json())
+    (folder / "plan.json").write_text(small_plan().model_dump_json())
 
 
 def _read_dataset(folder: Path) -> object:
@@ -332,7 +334,7 @@ def _read_patterns(folder: Path) -> object:
 _OF_SCAN = ("manifest.json", "frames.jsonl", "frames/zarr.json", "frames/c.3.0.0")
 _OF_RESULT = ("zarr.json", "depth_mm/zarr.json", "reflectance/zarr.json", "reflectance/c/0/0/0")
 SAMPLES = (
-    *(Sample(f"scan: {file}", _make_scan, f"a.dsl/{file}", _read_scan) for file in _OF_SCAN),
+    *(Sample(f"scan: {file}", make_scan, f"a.dsl/{file}", _read_scan) for file in _OF_SCAN),
     *(Sample(f"result: {file}", _make_result, f"a.zarr/{file}", _read_result) for file in _OF_RESULT),
     Sample("plan", _make_records, "plan.json", _describe("plan.json")),
     Sample("rig", _make_records, "rig.json", _describe("rig.json")),

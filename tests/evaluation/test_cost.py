@@ -9,7 +9,7 @@ import time
 import numpy as np
 import pytest
 
-from dsl_core.evaluation.cost import StageTimer
+from dsl_core.evaluation.cost import COSTS_ATTRIBUTE, StageCost, StageTimer, costs_of
 
 
 def test_stages_are_kept_in_order_with_time_and_memory() -> None:
@@ -35,3 +35,11 @@ def test_a_failing_stage_is_kept_and_its_thread_ends() -> None:
         raise RuntimeError("broken")
     assert timer.stages[0].name == "fails"
     assert all(thread.name != "memory watch" for thread in threading.enumerate())
+
+
+@pytest.mark.parametrize("text", ["5", "[", "{}", "[1]", '[{"name": "a"}]', "[" * 5000, 5.0])
+def test_costs_that_nobody_can_read_are_none(text: object) -> None:
+    assert costs_of({COSTS_ATTRIBUTE: text}) == []
+    assert costs_of({}) == []
+    told = '[{"name": "a", "seconds": 1.5, "peak_bytes": 7, "start_bytes": 5}]'
+    assert costs_of({COSTS_ATTRIBUTE: told}) == [StageCost("a", 1.5, 7, 5)]

@@ -25,13 +25,14 @@ from dsl_core.io.spectra.reference_file import read_references
 from dsl_core.model.calibration.accepted import AcceptedCalibration
 from dsl_core.model.plan import CapturePlan
 from dsl_core.planning.designed import DesignedSet, load_design, packed, save_design
+from tests.cases.stranger_readers import MORE
 from tests.cases.strangers import SAMPLES, Change, Sample, changed, changes
 
 #: Those that take long to read have few examples here; the benchmark has as many as there are seconds.
 SLOW = ("scan", "result", "dataset")
 
 
-@pytest.mark.parametrize("sample", SAMPLES, ids=lambda sample: sample.name)
+@pytest.mark.parametrize("sample", [*SAMPLES, *MORE], ids=lambda sample: sample.name)
 def test_a_changed_file_is_read_or_refused(sample: Sample, tmp_path: Path) -> None:
     sample.make(tmp_path)
     path = tmp_path / sample.file
@@ -68,12 +69,18 @@ def test_a_changed_file_is_read_or_refused(sample: Sample, tmp_path: Path) -> No
         ("campaign: accepted", rb"(?s).*", b'{"name": "' + b"x" * 300 + b'", "title": "T", "record": {}}'),
         ("YAML", rb"\n(?=[A-Za-z])", b"\n\x8a"),
         ("campaign: accepted", rb"(?s).*", b'{"name": "\\u0000", "title": "T", "record": {}}'),
+        ("step: manifest", rb"(?s).*", b"5"),
+        ("step: manifest", rb'"plan"', b'"plans"'),
+        ("step: manifest", rb'"level": *[0-9.]+', b'"level": "high"'),
+        ("step: manifest", rb'"gain_db": *[0-9.]+', b'"gain_db": Infinity'),
+        ("list", rb"(?s).*", b"a" * 6000),
+        ("list: manifest", rb'"imported_sensor": "{', b'"imported_sensor": "['),
     ],
 )
 def test_what_was_found_by_chance_is_refused(
     sample: str, part: bytes, instead: bytes, tmp_path: Path
 ) -> None:
-    found = next(each for each in SAMPLES if each.name == sample)
+    found = next(each for each in (*SAMPLES, *MORE) if each.name == sample)
     found.make(tmp_path)
     path = tmp_path / found.file
     path.write_bytes(re.sub(part, lambda _: instead, path.read_bytes(), count=1))
@@ -82,7 +89,7 @@ def test_what_was_found_by_chance_is_refused(
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="pipes have no place in folders there")
-@pytest.mark.parametrize("sample", SAMPLES, ids=lambda sample: sample.name)
+@pytest.mark.parametrize("sample", [*SAMPLES, *MORE], ids=lambda sample: sample.name)
 def test_a_pipe_is_never_waited_for(sample: Sample, tmp_path: Path) -> None:
     sample.make(tmp_path)
     (tmp_path / sample.file).unlink()

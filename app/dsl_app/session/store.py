@@ -18,6 +18,7 @@ from pydantic import ValidationError
 from dsl_app.session.records import Session
 from dsl_core.errors import StoreError
 from dsl_core.io.atomic import set_aside, write_atomic
+from dsl_core.io.reading import read_bounded
 
 _log = logging.getLogger(__name__)
 _PREFIX = "session-"
@@ -99,7 +100,7 @@ class SessionStore:
             if not number.isdigit() or (int(number) != self._process and is_running(int(number))):
                 continue
             try:
-                found = Session.model_validate_json(path.read_bytes())
+                found = Session.model_validate_json(read_bounded(path))
             except (OSError, ValidationError):
                 trouble = (
                     "The session before the crash could not be read: its file is damaged."

@@ -9,7 +9,7 @@ from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from pydantic import TypeAdapter
+from pydantic import TypeAdapter, ValidationError
 
 from dsl_core.devices.base import CameraInfo, ProjectorInfo
 from dsl_core.devices.conditions import conditions_of
@@ -18,14 +18,18 @@ from dsl_core.io import MANIFEST_NAME
 from dsl_core.io.atomic import make_folder, sync_folder
 from dsl_core.io.reading import read_json
 from dsl_core.io.records import read_record
-from dsl_core.model.base import Record
+from dsl_core.model.base import Record, problems_in_words
 from dsl_core.model.conditions import CaptureConditions, differences
+from dsl_core.model.plan import Setting
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
 NOTE_NAME = "capture.json"
 _ASIDE = ".replaced"
+_SETTINGS = TypeAdapter(tuple[Setting, ...])
+_CAMERA: TypeAdapter[CameraInfo | None] = TypeAdapter(CameraInfo | None)
+_PROJECTOR: TypeAdapter[ProjectorInfo | None] = TypeAdapter(ProjectorInfo | None)
 
 
 class CaptureNote(Record):
@@ -62,8 +66,9 @@ def scan_settings(folder: Path) -> tuple[str, ...]:
     """Exposures and drive levels of the scans under a folder, each once, such as ``333.3 ms at 0.8``."""
     seen: dict[str, None] = {}
     for manifest in sorted(folder.rglob(MANIFEST_NAME)):
-        for setting in _content(manifest)["plan"]["settings"]:
-            seen[f"{setting['exposure_ms']:.4g} ms at {setting['level']:g}"] = None
+        with _damage_told(manifest):
+            for setting in _SETTINGS.validate_python(read_json(manifest)["plan"]["settings"]):
+                seen[f"{setting.exposure_ms:.4g} ms at {setting.level:g}"] = None
     return tuple(seen)
 
 
@@ -113,18 +118,21 @@ def _move(source: Path, target: Path) -> None:
 @lru_cache(maxsize=1024)
 def _scanned_under(manifest: Path, changed_ns: int) -> CaptureConditions | None:
     """Conditions of a stored scan; of its manifest only the devices are looked at, which is fast."""
-    content = _content(manifest)
-    if not (content.get("camera") and content.get("projector")):
-        return None
-    camera = TypeAdapter(CameraInfo).validate_python(content["camera"])
-    return conditions_of(camera, TypeAdapter(ProjectorInfo).validate_python(content["projector"]))
+    with _damage_told(manifest):
+        content = read_json(manifest)
+        camera = _CAMERA.validate_python(content.get("camera"))
+        projector = _PROJECTOR.validate_python(content.get("projector"))
+        return None if camera is None or projector is None else conditions_of(camera, projector)
 
 
-def _content(manifest: Path) -> dict[str, dict[str, list[dict[str, float]]]]:
+@contextmanager
+def _damage_told(manifest: Path) -> Iterator[None]:
+    """Raise `StoreError` for a manifest that says something else than a manifest should."""
     try:
-        content: dict[str, dict[str, list[dict[str, float]]]] = read_json(manifest)
-    except (OSError, ValueError) as error:
-        raise StoreError(
-            f"{manifest} is damaged ({error}). Capture the step {manifest.parent.parent.name} again."
-        ) from error
-    return content
+        yield
+        return
+    except ValidationError as error:
+        why = problems_in_words(error)
+    except (OSError, ValueError, LookupError, TypeError, AttributeError) as error:
+        why = str(error) or type(error).__name__
+    raise StoreError(f"{manifest} is damaged ({why}). Capture the step {manifest.parent.parent.name} again.")

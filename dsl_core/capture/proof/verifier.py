@@ -223,6 +223,11 @@ class FrameProof:
             " the projector warm up for longer, and switch automatic exposure and gain of the camera off."
         )
 
+    def recall(self, shot: Shot, why: str) -> None:
+        """Take over, from ``why`` an earlier run captured a shot again, what no frame shows any more."""
+        if self._code is not None and shot.setting == self._first:
+            self._code.recall(shot, why)
+
     def code_sum(self) -> CodeSum | None:
         """What patterns and inverses of the first code are together; None while that says nothing."""
         lit = None if self._code is None else self._code.lit

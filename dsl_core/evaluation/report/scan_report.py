@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dsl_core.evaluation.cost import StageCost
+from dsl_core.evaluation.cost import COSTS_ATTRIBUTE, StageCost, costs_of
 from dsl_core.evaluation.report.curves import (
     HEIGHT,
     WIDTH,
@@ -23,6 +22,7 @@ from dsl_core.evaluation.report.pages import render_page
 from dsl_core.evaluation.report.pictures import ReportPicture, colour_picture, flag_picture, value_picture
 from dsl_core.evaluation.summary import Evaluation, PatchScore, Truth
 from dsl_core.evaluation.verdict import Goal, Verdict, verdicts
+from dsl_core.model.attributes import PLAN_ATTRIBUTE, plan_of
 from dsl_core.model.calibration.accepted import MISSED_ATTRIBUTE, read_missed
 from dsl_core.model.fit import ATTRIBUTE, Fit
 from dsl_core.model.plan import CapturePlan
@@ -251,11 +251,10 @@ def report_content(
 ) -> ReportContent:
     """What the report of a result says; plan and costs come from the result's attributes."""
     attributes = dict(result.attrs)
-    costs = [StageCost(**cost) for cost in json.loads(attributes.pop("stage_costs", "[]"))]
-    plan = attributes.pop("capture_plan", None)
+    costs, plan = costs_of(attributes), plan_of(attributes)
     fit = Fit.read(attributes)
     missed = read_missed(attributes)
-    for name in (ATTRIBUTE, MISSED_ATTRIBUTE):
+    for name in (ATTRIBUTE, MISSED_ATTRIBUTE, COSTS_ATTRIBUTE, PLAN_ATTRIBUTE):
         attributes.pop(name, None)
     effects = RenderedEffects.of_note(str(attributes.get("effects", "")))
     if effects is not None:
@@ -268,7 +267,7 @@ def report_content(
         truth=truth,
         verdicts=() if evaluation is None else verdicts(evaluation, goals),
         costs=costs,
-        plan=CapturePlan.model_validate_json(plan) if plan else None,
+        plan=plan,
         effects=effects,
         fit=fit,
         missed=missed,

@@ -214,7 +214,8 @@ def _page_count(path: Path, stamp: tuple[int, int]) -> int:
 
     try:
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore", Image.DecompressionBombWarning)
+            # Of damaged tags, too; whoever loads the picture says what is wrong.
+            warnings.simplefilter("ignore")
             with Image.open(path) as head:
                 count, sizes = int(getattr(head, "n_frames", 1)), set()
                 for page in range(count if count <= MOST_PICTURES else 0):
@@ -245,6 +246,7 @@ def _image(path: Path, index: int | None = None) -> NDArray[Any]:
     try:
         # The head is read first: a small file may claim a picture that no memory holds.
         with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
             warnings.simplefilter("error", Image.DecompressionBombWarning)
             with Image.open(io.BytesIO(data)) as head:
                 width, height = head.size

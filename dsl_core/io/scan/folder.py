@@ -118,6 +118,11 @@ class ScanReader:
         except ChunkError as error:
             raise StoreError(self._sentence(shot, str(error))) from error
 
+    def corrected(self, shot: Shot) -> str:
+        """What an earlier picture showed instead of the pattern of a shot; empty if there was none."""
+        entry = self.entries.get(shot.index)
+        return "" if entry is None else entry.corrected
+
     def _mismatch(self, shot: Shot, found: int) -> str:
         twins = [e.shot for e in self.entries.values() if e.crc32 == found and e.shot != shot.index]
         path = self.store.path(shot.index)

@@ -8,6 +8,7 @@ from typing import Any, Literal
 
 from pydantic import Field
 
+from dsl_core.model.attributes import sentences_of
 from dsl_core.model.base import Record
 from dsl_core.model.conditions import CaptureConditions
 from dsl_core.model.figure import Figure, failures
@@ -59,11 +60,7 @@ def missed_attributes(notes: Iterable[CalibrationNote]) -> dict[str, str]:
 
 def read_missed(attributes: Mapping[str, object]) -> tuple[str, ...]:
     """The sentences that a result's attributes hold, none where there are none that can be read."""
-    try:
-        found = json.loads(str(attributes.get(MISSED_ATTRIBUTE, "[]")))
-    except ValueError:
-        return ()
-    return tuple(map(str, found)) if isinstance(found, list) else ()
+    return sentences_of(attributes, MISSED_ATTRIBUTE)
 
 
 class AcceptedCalibration(Record):

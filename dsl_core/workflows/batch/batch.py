@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import os
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -75,7 +76,7 @@ def find_scans(source: Path) -> list[Path]:
     if not found:
         raise StoreError(f"{source} names no scan. Write a path of a scan on each line.")
     # A scan that is missing fails by itself; a file of which no line is a path is another kind of file.
-    if not any(address_of(scan) is not None or scan.exists() for scan in found):
+    if not any(address_of(scan) is not None or os.path.exists(scan) for scan in found):
         raise StoreError(
             f"{source} is not a list of scans: nothing is at {found[0]}, the first path in it. Give a text"
             " file with a path on each line."
@@ -134,7 +135,7 @@ def picture_px(scan: Path) -> tuple[int, int]:
     try:
         width, height = read_json(scan / MANIFEST_NAME)["plan"]["camera_size_px"]
         return int(width), int(height)
-    except (OSError, ValueError, TypeError, KeyError):
+    except (OSError, ValueError, TypeError, KeyError, OverflowError):
         return 0, 0
 
 

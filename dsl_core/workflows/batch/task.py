@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import json
 import time
 import traceback
 from collections.abc import Callable
@@ -23,6 +22,7 @@ from dsl_core.io.objects.copies import published_as
 from dsl_core.io.objects.rooms import brought, published
 from dsl_core.io.objects.store import ObjectFolder
 from dsl_core.io.scan.folder import ScanReader
+from dsl_core.model.attributes import sentences_of
 from dsl_core.model.fit import Fit
 from dsl_core.model.options import Options
 from dsl_core.model.rig import Rig
@@ -179,5 +179,5 @@ def doubts_of(result: xr.Dataset) -> list[str]:
     """Sentences about pictures that did not show their pattern, and what to do."""
     return [
         f"{doubt} The result may be wrong; scan again, or see 'dsl-scan info --verify'."
-        for doubt in json.loads(result.attrs.get(DOUBTS, "[]"))
+        for doubt in sentences_of(result.attrs, DOUBTS)
     ]

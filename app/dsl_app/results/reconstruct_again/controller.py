@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -26,6 +25,7 @@ from dsl_app.shared.jobs.base import Job, JobRunner
 from dsl_app.shared.known_files import Kind, kind_of
 from dsl_app.shared.notify import Notifier
 from dsl_core.errors import StoreError
+from dsl_core.evaluation.cost import costs_of
 from dsl_core.io.calibration_library import CalibrationLibrary
 from dsl_core.progress import Progress
 
@@ -172,7 +172,4 @@ def read_source(path: Path, library: tuple[str, ...]) -> ReconstructionSource:
 
 def took_s(attributes: Mapping[Any, Any]) -> float:
     """How long a result took, s; 0 if it does not say."""
-    try:
-        return sum(float(stage["seconds"]) for stage in json.loads(attributes.get("stage_costs", "[]")))
-    except (ValueError, TypeError, KeyError):
-        return 0.0
+    return sum(stage.seconds for stage in costs_of(attributes))

@@ -17,7 +17,9 @@ from dsl_core.capture.proof.code.first_light import (
     has_moved,
     is_unlit,
     light_of_pairs,
+    light_of_words,
     unsettled_pairs,
+    unsettled_words,
 )
 from dsl_core.capture.proof.contest import vote
 from dsl_core.capture.proof.finding import Finding, Verdict, displaced
@@ -231,14 +233,19 @@ class FirstCode:
         if not (self._at_the_end or self._is_settled):
             self._is_settled = True
             found = unsettled_pairs(light)
-            self.settled = found.get(min(light, default=0), 1.0)
+            first = found.get(min(light, default=0), 1.0)
+            self.settled = first if abs(first - 1) > SETTLED else self.settled
         self.light = {n: each for n, each in light.items() if n not in found and abs(each - 1) > SETTLED}
         return [
-            Finding(
-                shot, Verdict.EXPOSURE, self._pair_shots(number), f"{ratio:.2f} times that of the last ones"
-            )
+            Finding(shot, Verdict.EXPOSURE, self._pair_shots(number), unsettled_words(ratio))
             for number, ratio in found.items()
         ]
+
+    def recall(self, shot: Shot, why: str) -> None:
+        """Take over, from ``why`` an earlier run captured a shot again, what light it had before."""
+        light = light_of_words(why)
+        if shot.role == "code" and shot.pattern < 2 and light is not None and abs(light - 1) > SETTLED:
+            self.settled = light
 
     def _exchanged(self) -> tuple[int, ...]:
         _, _, lit = self._pairs.contrast()

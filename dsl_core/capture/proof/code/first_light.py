@@ -7,6 +7,7 @@ picture that was displaced meanwhile is so in both.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 
 import numpy as np
@@ -40,6 +41,7 @@ STRUCTURED = 0.3
 SEEN_SIGMAS = 5.0
 #: ... and so many of them do, as a share of all.
 SEEN_SHARE = 0.001
+_OF_THE_LAST = " times that of the last ones"
 
 
 def changed_light(before: Mapping[int, Counts], now: Mapping[int, Counts], noise: Noise) -> float | None:
@@ -96,7 +98,8 @@ def unsettled_pairs(ratios: Mapping[int, float]) -> dict[int, float]:
 
     ``ratios`` are those of `light_of_pairs`. None where the last pair differs as well: nothing has settled
     then, or it is white and black that are wrong. Of light that changed at once only the pair that saw both:
-    taken again, the others would hide that nobody knows which light was as calibrated.
+    taken again, the others would hide that nobody knows which light was as calibrated. Pairs beside those
+    that differ are taken again with them.
     """
     found = {number: ratio for number, ratio in ratios.items() if abs(ratio - 1) > SETTLED}
     if not found:
@@ -106,7 +109,22 @@ def unsettled_pairs(ratios: Mapping[int, float]) -> dict[int, float]:
     steady = alike.index(False) if False in alike else len(alike)
     if in_order[0] in found and steady >= FEWEST_STEADY and not found.keys() & set(in_order[steady + 1 :]):
         return {number: found[number] for number in in_order[steady : steady + 1] if number in found}
-    return {} if max(ratios) in found else found
+    if max(ratios) in found:
+        return {}
+    # What changed the light may have begun, or ended, in the pair beside, too little to be told.
+    beside = {number + side for number in found for side in (-1, 1)} & ratios.keys()
+    return {number: ratios[number] for number in sorted(found.keys() | beside)}
+
+
+def unsettled_words(ratio: float) -> str:
+    """What is noted of a picture that is taken again because its light was not yet that of later ones."""
+    return f"{ratio:.2f}{_OF_THE_LAST}"
+
+
+def light_of_words(why: str) -> float | None:
+    """The light in the note of such a picture; None in any other note."""
+    found = re.search(rf"(\d+\.\d+){_OF_THE_LAST}", why)
+    return None if found is None else float(found[1])
 
 
 def _scaled(one: Floats, other: Floats) -> tuple[float, float]:

@@ -25,6 +25,8 @@ Floats = NDArray[np.floating]
 DOWN, ACROSS = 4, 24
 #: How far sums of a part may be from those of the others, as a share of white, and in deviations.
 LEAST, SIGMAS = 0.1, 6.0
+#: The same for parts of all rows together, two of them beside each other.
+LEAST_OF_COLUMNS = 0.06
 #: Parts that have to be off, and pixels that a part needs.
 FEWEST_PARTS, FEWEST = 3, 24
 #: What parts beside each other leave of their differences (a share of the squares) if all rows are alike.
@@ -107,7 +109,8 @@ def local_sum(
     part += (column - edge) * ACROSS // (width - 2 * edge)
     # Noise of black is in all lines alike.
     variance = noise.variance(dark)[at] * (len(lines) + len(lines) ** 2 / len(black))
-    return _worst(part, (seen, wanted, variance), when, lines)
+    light = seen, wanted, variance
+    return _worst(part, light, when, lines) or _worst_columns(part % ACROSS, light, when, lines)
 
 
 def _takes(first: Shot, plan: CapturePlan, kept: Mapping[int, Counts]) -> list[Shot]:
@@ -139,9 +142,41 @@ def _worst(
     means = np.bincount(across, apart, ACROSS) / np.maximum(np.bincount(across, minlength=ACROSS), 1)
     left = float(np.square(apart - means[across])[off].sum())
     all_rows = left < ALIKE * float(np.square(apart)[off].sum())
+    return LocalSum(float(1 + apart[worst]), float(std[worst]), _span(at, lines), all_rows)
+
+
+def _worst_columns(
+    column: NDArray[np.integer],
+    light: tuple[Floats, Floats, Floats],
+    when: NDArray[np.integer],
+    lines: Sequence[Shot],
+) -> LocalSum | None:
+    """The same for parts of all rows: what is off beside each other counts from less on.
+
+    Thin haze, or a lamp that is dimmed for the last few lines, takes little from each part.
+    """
+    count = np.bincount(column, minlength=ACROSS)
+    seen, wanted, variance = (np.bincount(column, each, ACROSS) for each in light)
+    used = (count >= FEWEST) & (wanted > 0)
+    if int(used.sum()) < 2 * FEWEST_PARTS:
+        return None
+    ratio, std, apart = seen[used] / wanted[used], np.full(ACROSS, np.inf), np.zeros(ACROSS)
+    std[used] = np.sqrt(variance[used]) / wanted[used]
+    apart[used] = ratio - _in_common(ratio, count[used] / wanted[used], std[used])
+    off = np.abs(apart) > np.maximum(LEAST_OF_COLUMNS, SIGMAS * std)
+    beside = off[1:] & off[:-1] & (apart[1:] * apart[:-1] > 0)
+    off = np.append(beside, False) | np.insert(beside, 0, False)
+    if not off.any():
+        return None
+    worst = int(np.abs(np.where(off, apart, 0)).argmax())
+    at = when[off[column]]
+    return LocalSum(float(1 + apart[worst]), float(std[worst]), _span(at, lines), True)
+
+
+def _span(at: NDArray[np.integer], lines: Sequence[Shot]) -> tuple[Shot, Shot]:
+    """The first and the last of lines by their indices."""
     by_index = {shot.index: shot for shot in lines}
-    first, last = by_index[int(at.min())], by_index[int(at.max())]
-    return LocalSum(float(1 + apart[worst]), float(std[worst]), (first, last), all_rows)
+    return by_index[int(at.min())], by_index[int(at.max())]
 
 
 def _in_common(ratio: Floats, dark: Floats, std: Floats) -> Floats:

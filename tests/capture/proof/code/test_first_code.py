@@ -181,13 +181,24 @@ def test_pictures_of_a_lamp_that_warms_up_are_taken_again_once_it_has() -> None:
 
     *before, last = [found(shot) for shot in SHOTS]
     assert not any(each.is_wrong for each in before)
-    assert last.again == tuple(SHOTS[:4])
+    assert last.again == tuple(SHOTS[:6])
     assert last.verdict is Verdict.EXPOSURE
     assert "0.8" in last.detail
     assert code.lit is None
     assert code.settled == pytest.approx(0.8, abs=0.01)
-    assert not any(found(shot).is_wrong for shot in SHOTS[:4])
+    assert not any(found(shot).is_wrong for shot in SHOTS[:6])
     assert code.lit is not None
+
+
+def test_light_that_had_not_settled_is_known_from_why_the_first_picture_was_taken_again() -> None:
+    """Of a resumed scan, no frame shows it any more."""
+    code = first_code(False)
+    assert not any(code.add(shot, seen(shot, 2000.0), None).is_wrong for shot in SHOTS)
+    why = "its brightness is wrong (0.80 times that of the last ones)"
+    code.recall(SHOTS[2], why)
+    assert [code.settled] == [1]
+    code.recall(SHOTS[0], why)
+    assert [code.settled] == [0.8]
 
 
 @pytest.mark.parametrize("at_the_end", [False, True])

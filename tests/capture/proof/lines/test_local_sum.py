@@ -77,6 +77,25 @@ def test_lines_that_are_dim_in_all_rows_are_of_a_projector_that_dims() -> None:
     assert "the light of the projector changed for them (eco mode" in seen.sentence
 
 
+@pytest.mark.parametrize(("share", "is_told"), [(0.92, True), (1.08, True), (0.96, False)])
+def test_little_is_told_where_all_rows_of_several_parts_beside_each_other_have_it(
+    share: float, is_told: bool
+) -> None:
+    """Haze, or the last lines of a lamp that dims; less than a single part has to have."""
+    seen = found(lambda at, light, *_: light * (share if 40 <= at < 52 else 1.0))
+    assert (seen is not None) == is_told
+    if seen is not None:
+        assert seen.share == pytest.approx(share, abs=0.02)
+        assert seen.all_rows
+        assert 38 <= seen.shots[0].index <= 44
+        assert 48 <= seen.shots[1].index <= 54
+
+
+def test_little_is_not_told_of_one_part_nor_of_some_that_differ_both_ways() -> None:
+    assert found(lambda at, light, *_: light * (0.92 if 45 <= at < 47 else 1.0)) is None
+    assert found(lambda at, light, *_: light * (1 + 0.08 * (-1) ** (at // 2))) is None
+
+
 def test_frames_are_named_where_several_lines_are_shown_at_once() -> None:
     def shadow(
         at: int, light: NDArray[np.float64], down: NDArray[np.float64], _: object
