@@ -90,9 +90,9 @@ class CompiledTiles:
             broad = None if colour is None else _broad(model, colour, shading[part], pixels[part])
             own = None if shares is None else shares[part]
             solver.solve(equations, pixels[part], shading[part], own, broad, found)
-            if margin:
-                # The last rows are needed again by the next strip.
-                equations[: 2 * margin] = equations[stop - start : stop - start + 2 * margin].copy()
+            if margin and stop < height:
+                # The last rows are needed again by the next strip; numpy sees to it if they overlap.
+                equations[: 2 * margin] = equations[stop - start : stop - start + 2 * margin]
         return found.spectra(torch.float32), torch.from_numpy(found.misfit).float()
 
     def _solver(self, bands: int, diagonals: int) -> LaneSolver:
