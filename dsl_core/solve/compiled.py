@@ -28,14 +28,31 @@ _NO_PYTHON: dict[str, Any] = {"no_cpython_wrapper": True}
 
 def compiled(function: Callable[..., T]) -> Callable[..., T]:
     """A function of arrays and numbers as machine code, which runs without Python's lock on one thread."""
+    return _kept(function)
+
+
+def _kept(function: Callable[..., T], signature: str | None = None) -> Callable[..., T]:
+    """Compiled for a signature, if there is one, and kept on the disk where that is possible."""
     made: Callable[..., T]
     try:
-        made = njit(cache=True, **_OPTIONS)(function)
+        made = njit(signature, cache=True, **_OPTIONS)(function)
     except RuntimeError as error:
         if "no locator" not in str(error):
             raise
-        made = njit(**_OPTIONS)(function)
+        made = njit(signature, **_OPTIONS)(function)
     return made
+
+
+def compiled_for(signature: str) -> Callable[[Callable[..., T]], Callable[..., T]]:
+    """As `compiled`, for arguments of these types alone, and when its module is imported.
+
+    Otherwise a loop is compiled for arrays whose parts lie side by side, and again for those of larger ones.
+    """
+
+    def of(function: Callable[..., T]) -> Callable[..., T]:
+        return _kept(function, signature)
+
+    return of
 
 
 def within(function: Callable[..., T]) -> Callable[..., T]:

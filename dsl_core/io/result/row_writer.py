@@ -99,8 +99,9 @@ class RowWriter:
         """Write the maps (..., rows, columns) of a band of rows; raises `StoreError`."""
         part = build_result(dict(maps), self._nm, {})
         with self._writing():
+            group = self._group()
             for name in maps:
-                self._write(name, part[name].variable, rows)
+                self._write(group, name, part[name].variable, rows)
             # The note comes last, and once all else is safe: rows without one are made again.
             write_atomic(self._note(rows), note.encode())
         self._count(rows)
@@ -110,40 +111,40 @@ class RowWriter:
         if self._seen_rows is not None:
             self._seen_rows(self._rows_there, self._shape[0])
 
-    def _write(self, name: str, part: xr.Variable, rows: slice) -> None:
+    def _write(self, group: zarr.Group, name: str, part: xr.Variable, rows: slice) -> None:
         packing, values = PACKINGS.get(name), np.asarray(part.values)
         fitting = packing is not None and fits(values, packing)
-        group = self._group()
-        if name not in group:
-            self._create(name, part, fitting)
-        elif "scale_factor" in group[name].attrs and not fitting:
-            self._widen(name, part)
-        array = self._array(name)
+        # Whatever is opened is read from the disk: once for each variable.
+        array: Any = group.get(name)
+        if array is None:
+            array = self._create(group, name, part, fitting)
+        elif "scale_factor" in array.attrs and not fitting:
+            array = self._widen(group, name, part)
         packed = packing if "scale_factor" in array.attrs else None
         array[..., rows, :] = encoded(values, array.dtype, packed)
         place = ["0"] * (array.ndim - 1)
         place[array.ndim - 2 :] = [str(rows.start // self._height), "0"]
         make_safe(self.work / _ARRAYS / name / "c" / Path(*place))
 
-    def _create(self, name: str, part: xr.Variable, fitting: bool) -> None:
+    def _create(self, group: zarr.Group, name: str, part: xr.Variable, fitting: bool) -> zarr.Array[Any]:
         kind, encoding = stored_as(name, part, fitting)
         shape = (*part.shape[:-2], *self._shape)
-        new_array(self._group(), name, part, shape, kind, encoding, (self._height, self._shape[1]))
+        return new_array(group, name, part, shape, kind, encoding, (self._height, self._shape[1]))
 
-    def _widen(self, name: str, part: xr.Variable) -> None:
+    def _widen(self, group: zarr.Group, name: str, part: xr.Variable) -> zarr.Array[Any]:
         """Store a variable as float32 from now on: some of its values are out of the range of its packing."""
-        old, packing = self._array(name), PACKINGS[name]
-        aside = self.work / f"{name}.packed"
+        packing, aside = PACKINGS[name], self.work / f"{name}.packed"
         os.replace(self.work / _ARRAYS / name, aside)
         old = zarr.open_array(aside, mode="r", zarr_format=3)
-        self._create(name, part, fitting=False)
+        wide = self._create(group, name, part, fitting=False)
         for start in range(0, self._shape[0], self._height):
             rows = slice(start, min(start + self._height, self._shape[0]))
             if self._note(rows).is_file():
                 steps = np.asarray(old[..., rows, :])
                 values = steps.astype(np.float32) * np.float32(packing.step)
-                self._array(name)[..., rows, :] = np.where(steps == packing.fill, np.float32(np.nan), values)
+                wide[..., rows, :] = np.where(steps == packing.fill, np.float32(np.nan), values)
         shutil.rmtree(aside)
+        return wide
 
     def finish(self, attributes: dict[str, str | int | float]) -> xr.Dataset:
         """The whole result, read from the disk when it is used; it is in its place after `publish`.
@@ -217,6 +218,3 @@ class RowWriter:
 
     def _group(self) -> zarr.Group:
         return zarr.open_group(self.work / _ARRAYS, mode="r+", zarr_format=3, use_consolidated=False)
-
-    def _array(self, name: str) -> zarr.Array[Any]:
-        return zarr.open_array(self.work / _ARRAYS / name, mode="r+", zarr_format=3)

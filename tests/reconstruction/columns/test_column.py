@@ -12,7 +12,7 @@ from dsl_core.optics.correspondence import triangulate, zero_order
 from dsl_core.optics.lines.line_set import LineSet
 from dsl_core.optics.lines.profile import halo_of_line, zero_order_profile
 from dsl_core.reconstruction.columns.column import refine
-from dsl_core.reconstruction.columns.dark_offset import dark_offset
+from dsl_core.reconstruction.columns.dark_offset import by_tensors, dark_offset
 from dsl_core.reconstruction.columns.line_peaks import LinePeaks
 from dsl_core.simulation.published_rig import published_rig
 
@@ -235,3 +235,22 @@ def test_a_saturated_line_is_as_bright_as_its_flanks_say() -> None:
     share = found.amplitude[unsure] / amplitude[unsure]
     assert float(share.median()) > 0.4
     assert torch.isinf(found.amplitude_std[unsure]).all()
+
+
+def test_unlit_frames_are_summed_alike_pixel_by_pixel_and_by_tensors() -> None:
+    column, amplitude, radiance, std = noisy(0.02)
+    # At both ends of the projector, a saturated frame, one that is no number, a pixel without any frame.
+    column[:2], column[2:4] = torch.tensor([0.4, -3.0]), torch.tensor([630.2, 700.0])
+    std[150:, :3000:7], std[90:210, 5], std[140:230, 6] = torch.inf, torch.inf, torch.nan
+    radiance[150:160, ::7] = torch.inf
+    std[:, 8], radiance[100:, 9] = torch.inf, torch.nan
+    for values in (radiance, std):
+        values *= torch.linspace(0.5, 2.0, LINES.lines)[:, None]
+    given = column, amplitude, radiance[:, 3:-5].contiguous(), std[:, 3:-5].half()
+    part = (column[3:-5], amplitude[3:-5], radiance[:, 3:-5], std.half()[:, 3:-5])
+    wanted = by_tensors(part[0], part[1], given[2], given[3], LINES, RESPONSE, (80.3, 160.7))
+    for radiance_seen, std_seen in (part[2:], given[2:]):
+        found = dark_offset(part[0], part[1], radiance_seen, std_seen, LINES, RESPONSE, (80.3, 160.7))
+        for mine, tensors in zip(found, wanted, strict=True):
+            assert mine.numpy() == pytest.approx(tensors.numpy(), rel=2e-5, abs=2e-7, nan_ok=True)
+    assert torch.isfinite(wanted[1]).float().mean() > 0.9

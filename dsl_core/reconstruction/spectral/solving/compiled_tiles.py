@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import threading
-from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -26,6 +25,7 @@ from dsl_core.reconstruction.spectral.solving.prior import Prior
 from dsl_core.reconstruction.spectral.solving.solution import Spectra
 from dsl_core.reconstruction.spectral.solving.tile_frames import TileFrames
 from dsl_core.solve.compiled import compiled
+from dsl_core.solve.halves import squares_of_halves
 from dsl_core.solve.many import Check
 
 add_samples = compiled(line_sums.add_samples)
@@ -33,13 +33,6 @@ add_samples = compiled(line_sums.add_samples)
 STRIP = 4
 #: Degrees of freedom that a spectrum takes from its data, roughly, in the reduced chi-square.
 PARAMETERS = 25
-
-
-@lru_cache(maxsize=1)
-def _variances() -> NDArray[np.float32]:
-    """The square of every number of half precision, by its bits."""
-    with np.errstate(invalid="ignore", over="ignore"):
-        return np.arange(65536, dtype=np.uint16).view(np.float16).astype(np.float32) ** 2
 
 
 class CompiledTiles:
@@ -88,7 +81,7 @@ class CompiledTiles:
             check()
             stop = min(start + STRIP, height)
             add_samples(
-                radiance, halves, singles, _variances(), origin, samples,
+                radiance, halves, singles, squares_of_halves(), origin, samples,
                 (done, stop + 2 * margin), *light, surplus, solver.size, offsets,
                 equations[done - start :],
             )  # fmt: skip
@@ -97,9 +90,9 @@ class CompiledTiles:
             broad = None if colour is None else _broad(model, colour, shading[part], pixels[part])
             own = None if shares is None else shares[part]
             solver.solve(equations, pixels[part], shading[part], own, broad, found)
-            if margin:
-                # The last rows are needed again by the next strip.
-                equations[: 2 * margin] = equations[stop - start : stop - start + 2 * margin].copy()
+            if margin and stop < height:
+                # The last rows are needed again by the next strip; numpy sees to it if they overlap.
+                equations[: 2 * margin] = equations[stop - start : stop - start + 2 * margin]
         return found.spectra(torch.float32), torch.from_numpy(found.misfit).float()
 
     def _solver(self, bands: int, diagonals: int) -> LaneSolver:
