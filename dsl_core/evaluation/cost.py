@@ -9,8 +9,6 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import Any
 
-from pydantic import TypeAdapter, ValidationError
-
 #: Memory is read this often; shorter peaks can be missed.
 _INTERVAL_S = 0.05
 #: Name of the attribute of a result that holds what its stages took, as JSON.
@@ -29,6 +27,8 @@ class StageCost:
 
 def costs_of(attributes: Mapping[Any, Any]) -> list[StageCost]:
     """What the stages of a result took by its attributes; none where that cannot be read."""
+    from pydantic import TypeAdapter, ValidationError
+
     try:
         return TypeAdapter(list[StageCost]).validate_json(str(attributes.get(COSTS_ATTRIBUTE, "[]")))
     except ValidationError:

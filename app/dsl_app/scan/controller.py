@@ -253,9 +253,10 @@ class ScanController:
         self._offer_to_resume(self._end(Phase.STOPPED))
 
     def _offer_to_resume(self, folder: Path) -> None:
-        """Offer to resume, if the scan can be read."""
+        """Offer to resume, if the scan can be read; one of which nothing was saved is planned again."""
         try:
-            self._remember(folder)
+            if not self._remember(folder):
+                self._choose_target()
         except DslError as error:
             self._notifier.tell("error", str(error))
         self.plans.refresh()

@@ -128,8 +128,13 @@ def test_the_live_demo_connects_the_twin_and_scans(bench: Bench, tmp_path: Path)
 def test_after_a_live_demo_that_was_interrupted_too(
     bench: Bench, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
+    snap, taken = SimCamera.snap, list[Frame]()
+
     def lost(camera: SimCamera, timeout_ms: float = 5000.0) -> Frame:
-        raise DeviceError("The power failed.")
+        if len(taken) == 5:
+            raise DeviceError("The power failed.")
+        taken.append(snap(camera, timeout_ms))
+        return taken[-1]
 
     monkeypatch.setattr(SimCamera, "snap", lost)
     bench.demo.scan_live()
@@ -138,6 +143,19 @@ def test_after_a_live_demo_that_was_interrupted_too(
     assert session.folder.parent == tmp_path / "demo"
     bench.scans.scans.plan_new_scan()
     assert bench.scans.state.target.value == tmp_path / "scan-20260301-1020.dsl"
+
+
+def test_after_a_live_demo_of_which_nothing_was_saved(
+    bench: Bench, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    def lost(camera: SimCamera, timeout_ms: float = 5000.0) -> Frame:
+        raise DeviceError("The power failed.")
+
+    monkeypatch.setattr(SimCamera, "snap", lost)
+    bench.demo.scan_live()
+    assert bench.scans.state.interrupted.value is None
+    assert "Nothing is saved yet" in bench.scans.state.trouble.value
+    assert bench.scans.state.target.value.parent == tmp_path
 
 
 def test_a_live_demo_that_cannot_start_leaves_the_folder(

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import json
 import shlex
 import shutil
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
 
 import pytest
@@ -18,6 +19,7 @@ from dsl_app.results.reconstruct_again.state import (
 )
 
 from dsl_core.cli import main
+from dsl_core.evaluation.cost import COSTS_ATTRIBUTE, StageCost
 from dsl_core.io.calibration_library import CalibrationLibrary
 from dsl_core.io.result.result_file import load_result
 from dsl_core.io.rig_file import save_rig
@@ -188,8 +190,9 @@ def test_the_cost_is_said_in_bands_and_bytes(bench: Bench) -> None:
     assert bench.state.cost.value.startswith("47 bands · at most 1 MB")
     bench.control.change(step_nm=0.5)
     assert bench.state.cost.value.startswith("461 bands · at most 9 MB")
-    assert took_s({"stage_costs": '[{"seconds": 2.5}, {"seconds": 1}]'}) == 3.5
-    assert took_s({"stage_costs": "?"}) == took_s({}) == 0.0
+    stages = [StageCost("decode", 2.5, 2000, 1000), StageCost("spectra", 1.0, 3000, 1000)]
+    assert took_s({COSTS_ATTRIBUTE: json.dumps([asdict(stage) for stage in stages])}) == 3.5
+    assert took_s({COSTS_ATTRIBUTE: "?"}) == took_s({}) == 0.0
 
 
 def test_the_command_line_does_the_same(bench: Bench, capsys: pytest.CaptureFixture[str]) -> None:
