@@ -52,7 +52,7 @@ def by_tensors(
     unlit_px: tuple[float, float],
 ) -> tuple[Tensor, Tensor]:
     """As `dark_offset`, where there are unlit frames; in any precision and on any device."""
-    first, last = math.floor(unlit_px[0] / lines.step_px), math.ceil(unlit_px[1] / lines.step_px)
+    first, last = _nearest_and_farthest(lines, unlit_px)
     total = torch.zeros_like(column_px)
     weight = torch.zeros_like(column_px)
     for side in (-1, 1):
@@ -81,7 +81,7 @@ def _by_pixels(
     # Only who looks for columns needs compiled code.
     from dsl_core.reconstruction.columns.dark_kernels import unlit_means
 
-    first, last = math.floor(unlit_px[0] / lines.step_px), math.ceil(unlit_px[1] / lines.step_px)
+    first, last = _nearest_and_farthest(lines, unlit_px)
     nearest = lines.nearest(column_px)
     beside = column_px - lines.centre_px(nearest).to(column_px.dtype)
     halos = halo_of_line(
@@ -98,3 +98,8 @@ def _by_pixels(
         first, lines.lines, lines.step_px, *unlit_px, offset.numpy(), spread.numpy(),
     )  # fmt: skip
     return offset, spread
+
+
+def _nearest_and_farthest(lines: LineSet, unlit_px: tuple[float, float]) -> tuple[int, int]:
+    """How many lines away those are that may leave a pixel unlit, on either side."""
+    return math.floor(unlit_px[0] / lines.step_px), math.ceil(unlit_px[1] / lines.step_px)

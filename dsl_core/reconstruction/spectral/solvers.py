@@ -16,6 +16,7 @@ from dsl_core.optics.correspondence import correspondence
 from dsl_core.optics.lines.line_set import LineSet
 from dsl_core.optics.spectra import Bands
 from dsl_core.progress import Progress
+from dsl_core.reconstruction.merge import PickedLines
 from dsl_core.reconstruction.rows.bands import Band
 from dsl_core.reconstruction.rows.frames import ScanFrames
 from dsl_core.reconstruction.spectral.colour_sites import colour_sites_finding
@@ -89,26 +90,26 @@ def row_solver(
     lines = LineSet.of(plan)
     asked = probed_pixels(pixels.valid, rig.sensor.bayer) if lines is not None and lines.single else _NONE
 
+    picked = frames.pick(asked, progress)
     findings: list[FitFinding] = []
     if lines is not None and asked.size:
-        seen = FirstOrderLight.of(lines, model, frames.pick(asked, progress), pixels)
+        seen = FirstOrderLight.of(lines, model, picked, pixels)
         told = colour_sites_finding(rig, seen), order_balance_finding(rig, seen)
         findings = [each for each in told if each is not None]
 
-    def picked() -> tuple[PickedCube, PickedCube]:
-        lines = frames.pick(asked, progress)
+    def cubes(picked: PickedLines) -> tuple[PickedCube, PickedCube]:
         width = pixels.valid.shape[1]
-        return PickedCube(lines.radiance, asked, width), PickedCube(lines.std, asked, width)
+        return PickedCube(picked.radiance, asked, width), PickedCube(picked.std, asked, width)
 
     best = SpectralReconstruction(
-        rig, plan, options.grid, model, *picked(), pixels,
+        rig, plan, options.grid, model, *cubes(picked), pixels,
         device=options.device, as_calibrated=options.as_calibrated,
     )  # fmt: skip
     if frames.light is not None and frames.light.flickers:
         found = frame_levels(best.probed, frames.light.std)
         if found is not None:
             frames.follow(frames.light.refined(found.log, found.std))
-            best.take(*picked(), 0)
+            best.take(*cubes(frames.pick(asked, progress)), 0)
     best.learn()
 
     def solve(band: Band, progress: Progress | None) -> SpectralMaps:

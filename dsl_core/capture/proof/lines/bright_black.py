@@ -13,14 +13,13 @@ from numpy.typing import NDArray
 
 from dsl_core.capture.proof.noise import Noise
 from dsl_core.capture.proof.raster import Counts
+from dsl_core.optics.seen_noise import NORMAL
 
 #: So many lines on end are asked, of the first ones after black.
 TOGETHER, FIRST = 4, 32
 #: A pixel is too bright in black if each of them is so many deviations darker. That so many pixels are, but
 #: no greater share of all, is due to a line; light of the room changes everywhere.
 SIGMAS, FEWEST, MOST = 4.0, 6, 0.2
-#: Median of the deviations of a normal distribution.
-NORMAL = 0.6745
 
 
 class BrightBlack:

@@ -11,13 +11,12 @@ from numpy.typing import NDArray
 
 from dsl_core.capture.proof.noise import Noise
 from dsl_core.capture.proof.raster import Counts
+from dsl_core.optics.seen_noise import NORMAL
 
 #: A pixel is darker by so many deviations, and by this share of what the room gives it.
 SIGMAS, SHARE = 4.0, 0.35
 #: So many pixels that the line before left as they were, as a share of all and at least.
 FEWEST_SHARE, FEWEST = 0.01, 12
-#: Median of the deviations of a normal distribution.
-NORMAL = 0.6745
 
 
 class HiddenParts:

@@ -126,23 +126,16 @@ def _worst(
     lines: Sequence[Shot],
 ) -> LocalSum | None:
     """The part that is furthest off, from light seen, light wanted and the variance of pixels by parts."""
-    count = np.bincount(part, minlength=DOWN * ACROSS)
-    seen, wanted, variance = (np.bincount(part, each, DOWN * ACROSS) for each in light)
-    used = (count >= FEWEST) & (wanted > 0)
-    if int(used.sum()) < 2 * FEWEST_PARTS:
-        return None
-    ratio, std = seen[used] / wanted[used], np.sqrt(variance[used]) / wanted[used]
-    apart = ratio - _in_common(ratio, count[used] / wanted[used], std)
+    apart, std = _by_parts(part, DOWN * ACROSS, light)
     off = np.abs(apart) > np.maximum(LEAST, SIGMAS * std)
     if int(off.sum()) < FEWEST_PARTS:
         return None
-    worst = int(np.abs(np.where(off, apart, 0)).argmax())
-    at = when[np.isin(part, np.flatnonzero(used)[off])]
-    across = np.flatnonzero(used) % ACROSS
-    means = np.bincount(across, apart, ACROSS) / np.maximum(np.bincount(across, minlength=ACROSS), 1)
+    known = np.isfinite(std)
+    across, of = np.arange(DOWN * ACROSS) % ACROSS, np.flatnonzero(known) % ACROSS
+    means = np.bincount(of, apart[known], ACROSS) / np.maximum(np.bincount(of, minlength=ACROSS), 1)
     left = float(np.square(apart - means[across])[off].sum())
     all_rows = left < ALIKE * float(np.square(apart)[off].sum())
-    return LocalSum(float(1 + apart[worst]), float(std[worst]), _span(at, lines), all_rows)
+    return _told(apart, std, off, when[off[part]], lines, all_rows)
 
 
 def _worst_columns(
@@ -155,28 +148,44 @@ def _worst_columns(
 
     Thin haze, or a lamp that is dimmed for the last few lines, takes little from each part.
     """
-    count = np.bincount(column, minlength=ACROSS)
-    seen, wanted, variance = (np.bincount(column, each, ACROSS) for each in light)
-    used = (count >= FEWEST) & (wanted > 0)
-    if int(used.sum()) < 2 * FEWEST_PARTS:
-        return None
-    ratio, std, apart = seen[used] / wanted[used], np.full(ACROSS, np.inf), np.zeros(ACROSS)
-    std[used] = np.sqrt(variance[used]) / wanted[used]
-    apart[used] = ratio - _in_common(ratio, count[used] / wanted[used], std[used])
+    apart, std = _by_parts(column, ACROSS, light)
     off = np.abs(apart) > np.maximum(LEAST_OF_COLUMNS, SIGMAS * std)
     beside = off[1:] & off[:-1] & (apart[1:] * apart[:-1] > 0)
     off = np.append(beside, False) | np.insert(beside, 0, False)
-    if not off.any():
-        return None
+    return _told(apart, std, off, when[off[column]], lines, True) if off.any() else None
+
+
+def _by_parts(
+    part: NDArray[np.integer], number: int, light: tuple[Floats, Floats, Floats]
+) -> tuple[Floats, Floats]:
+    """How far the sum of each part is from what all have in common, and its deviation, as shares of white.
+
+    Parts of which too little is seen are not off, with a deviation that is infinite; so are all, where few
+    are left.
+    """
+    count = np.bincount(part, minlength=number)
+    seen, wanted, variance = (np.bincount(part, each, number) for each in light)
+    used = (count >= FEWEST) & (wanted > 0)
+    apart, std = np.zeros(number), np.full(number, np.inf)
+    if int(used.sum()) >= 2 * FEWEST_PARTS:
+        ratio, std[used] = seen[used] / wanted[used], np.sqrt(variance[used]) / wanted[used]
+        apart[used] = ratio - _in_common(ratio, count[used] / wanted[used], std[used])
+    return apart, std
+
+
+def _told(
+    apart: Floats,
+    std: Floats,
+    off: NDArray[np.bool_],
+    at: NDArray[np.integer],
+    lines: Sequence[Shot],
+    all_rows: bool,
+) -> LocalSum:
+    """The worst of the parts that are off, and the first and the last line that light them, by indices."""
     worst = int(np.abs(np.where(off, apart, 0)).argmax())
-    at = when[off[column]]
-    return LocalSum(float(1 + apart[worst]), float(std[worst]), _span(at, lines), True)
-
-
-def _span(at: NDArray[np.integer], lines: Sequence[Shot]) -> tuple[Shot, Shot]:
-    """The first and the last of lines by their indices."""
     by_index = {shot.index: shot for shot in lines}
-    return by_index[int(at.min())], by_index[int(at.max())]
+    span = by_index[int(at.min())], by_index[int(at.max())]
+    return LocalSum(float(1 + apart[worst]), float(std[worst]), span, all_rows)
 
 
 def _in_common(ratio: Floats, dark: Floats, std: Floats) -> Floats:

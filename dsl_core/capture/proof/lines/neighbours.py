@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from dsl_core.capture.proof.noise import Noise
 from dsl_core.capture.proof.raster import Counts
+from dsl_core.optics.seen_noise import NORMAL
 
 Bands = NDArray[np.float64]
 #: Parts of the height that are compared, and lines that say what is usual.
@@ -32,8 +33,6 @@ BRIGHT_SIGMAS = 25.0
 LIGHT_SIGMAS, FEW, SURE_SIGMAS = 5.0, 0.002, 6.0
 #: Less than this share of its light is flicker.
 FLICKER = 0.25
-#: Median of the deviations of a normal distribution.
-NORMAL = 0.6745
 #: Differences count up to so many deviations.
 _CLIP = 10.0
 
