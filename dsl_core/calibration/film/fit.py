@@ -38,6 +38,8 @@ Floats = NDArray[np.float64]
 PRIOR_STD = np.array([3.0, 3.0, 3.0, 0.01, 25.0, 3.0])
 STEPS = np.array([1e-3, 1e-3, 1e-3, 1e-6, 1e-2, 1e-2])
 ROUNDS = 15
+#: A film that moved by less, in its deviations, has the slopes it had: they are most of a round's work.
+SAME_SLOPES = 1.0
 #: How far from its mounting a film can be, in the unit of each field: a frame holds it within some degrees
 #: and centimetres, one that bends more touches it, and data sheets of gratings are right to a few percent.
 PLAUSIBLE = np.array([10.0, 10.0, 10.0, 0.05, 50.0, 20.0])
@@ -106,11 +108,14 @@ def fit_film(
     steps = np.concatenate([STEPS, SHAPE_STEP * form.std])
     sigma = np.hypot(samples.std_px, FLOOR_PX)
     scale, covariance, gain = 1.0, np.eye(len(values)), np.empty((len(values), len(samples)))
+    by_film, moved = np.empty((len(samples), count)), np.inf
     for _ in range(rounds):
         now = form.rig(rig, values[:count])
         here = grating_columns(now, samples)
-        ahead = [grating_columns(form.rig(rig, values[:count] + step), samples) for step in np.diag(steps)]
-        by_film = (np.stack(ahead, 1) - here[:, None]) / steps
+        if moved > SAME_SLOPES:
+            near = [form.rig(rig, values[:count] + step) for step in np.diag(steps)]
+            ahead = [grating_columns(each, samples) for each in near]
+            by_film = (np.stack(ahead, 1) - here[:, None]) / steps
         residual, by_angle = samples.column_px - here, shifts
         if angled:
             stretch = columns_per_share(now, samples)
@@ -125,7 +130,8 @@ def fit_film(
         gain = covariance @ (jacobian * weight[:, None]).T * prior_std[:, None]
         step = covariance @ gradient
         values = values + prior_std * step.clip(-1, 1)
-        if np.abs(step / np.sqrt(np.diag(covariance))).max() < 1e-2:
+        moved = float(np.abs(step / np.sqrt(np.diag(covariance))).max())
+        if moved < 1e-2:
             break
     film = form.rig(rig, values[:count]).film
     if not np.isfinite(values).all() or film.lines_per_mm <= 0 or film.distance_mm <= 0:

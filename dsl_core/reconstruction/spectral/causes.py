@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dsl_core.model.fit import matters
+from dsl_core.reconstruction.spectral.probing.cell_sums import CellSums
 from dsl_core.reconstruction.spectral.probing.held_out import Hypothesis, explains_others
-from dsl_core.reconstruction.spectral.probing.pooled import pool
 from dsl_core.reconstruction.spectral.probing.probe import LEADING, PRIOR_STD, Probe
 from dsl_core.reconstruction.spectral.probing.probed_light import PARAMETERS
 
@@ -116,9 +116,10 @@ def fit_causes(probe: Probe) -> Causes:
     design[:, 2:4, first : first + 2] = [[1.0, 0.5], [1.0, -0.5]]
     prior_std = np.r_[np.full(first, PRIOR_STD[0]), PRIOR_STD[2:LEADING]]
     prior_std[first : first + 2] *= [0.5**0.5, 2**0.5]
-    fit = pool(probe, design, prior_std)
-    others = Hypothesis(design[..., first:], prior_std[first:])
-    displaced = explains_others(probe, Hypothesis(design, prior_std), others)
+    sums = CellSums.of(probe, design)
+    fit = sums.fit(prior_std)
+    others = Hypothesis(sums.tail(first), prior_std[first:])
+    displaced = explains_others(Hypothesis(sums, prior_std), others)
     found, covariance = fit.values, fit.covariance
     shift = design[:, :2] @ found
     spread = np.einsum("npk,kl,npl->np", design[:, :2], covariance, design[:, :2])
@@ -131,12 +132,12 @@ def fit_causes(probe: Probe) -> Causes:
     def alone(kept: int, held: int) -> tuple[float, float]:
         held_std = prior_std.copy()
         held_std[held] = NONE_STD
-        one = pool(probe, design, held_std)
+        one = sums.fit(held_std)
         return float(one.values[kept]), float(np.sqrt(one.covariance[kept, kept]))
 
     drift = len(found) - 1
     groups = slice(0, first), slice(first, first + 1), slice(first + 1, first + 2), slice(drift, drift + 1)
-    shares = [_explained(probe, design, prior_std, found, group) for group in groups]
+    shares = [_explained(probe, sums, prior_std, found, group) for group in groups]
     return Causes(
         shift_px=shift,
         mean_px=np.sum(telling * shift, 0) / np.maximum(telling.sum(0), 1e-12),
@@ -154,7 +155,7 @@ def fit_causes(probe: Probe) -> Causes:
     )
 
 
-def _explained(probe: Probe, design: Floats, prior_std: Floats, found: Floats, group: slice) -> float:
+def _explained(probe: Probe, sums: CellSums, prior_std: Floats, found: Floats, group: slice) -> float:
     """Share of what the frames of sound pixels lack that a group of the ``found`` values explains."""
     sound = probe.sound
     if probe.freedom is None or not sound.any():
@@ -164,12 +165,8 @@ def _explained(probe: Probe, design: Floats, prior_std: Floats, found: Floats, g
         return 1.0
     held_std = prior_std.copy()
     held_std[group] = NONE_STD
-    fall = np.zeros(len(excess))
-    for values, sign in ((found, 1), (pool(probe, design, held_std).values, -1)):
-        asked = design[sound] @ values
-        fall += sign * 2 * (asked * probe.score[sound]).sum(1)
-        fall -= sign * np.einsum("np,npq,nq->n", asked, probe.normal[sound], asked)
-    return float(weight @ fall) / float(weight @ (excess * probe.freedom[sound]))
+    fall = sums.falls(found) - sums.falls(sums.fit(held_std).values)
+    return float(fall.sum()) / float(weight @ (excess * probe.freedom[sound]))
 
 
 def _telling(probe: Probe) -> Floats:

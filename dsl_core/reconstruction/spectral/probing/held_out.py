@@ -7,8 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from dsl_core.reconstruction.spectral.probing.pooled import pool
-from dsl_core.reconstruction.spectral.probing.probe import Probe
+from dsl_core.reconstruction.spectral.probing.cell_sums import CellSums
 from dsl_core.reconstruction.spectral.probing.probed_pixels import CELLS
 
 Floats = NDArray[np.float64]
@@ -21,27 +20,25 @@ LEAST_FALL, FALL_SIGMAS = 25.0, 1.5
 
 @dataclass(frozen=True)
 class Hypothesis:
-    """Numbers (k,), with their prior, that a ``design`` (n, p, k) turns into parameters of pixels."""
+    """Numbers (k,), with their prior, and what the cells of a picture ask of them."""
 
-    design: Floats
+    sums: CellSums
     prior_std: Floats
 
 
-def explains_others(probe: Probe, more: Hypothesis, less: Hypothesis) -> bool:
+def explains_others(more: Hypothesis, less: Hypothesis) -> bool:
     """Whether ``more`` numbers, fitted to some cells of the picture, explain the others surely better.
 
-    What a few cells alone ask for, an error of their own, explains no others.
+    Both are of the same pixels. What a few cells alone ask for, an error of their own, explains no others.
     """
-    fold = (probe.cell // CELLS[1] + probe.cell % CELLS[1]) % FOLDS
-    fall, excess = np.zeros(CELLS[0] * CELLS[1]), 1.0
-    for model, sign in ((more, 1), (less, -1)):
-        for out in range(FOLDS):
-            fit = pool(probe, model.design, model.prior_std, fold != out)
-            here = probe.sound & (fold == out)
-            asked = model.design[here] @ fit.values
-            gained = 2 * (asked * probe.score[here]).sum(1)
-            gained -= np.einsum("np,npq,nq->n", asked, probe.normal[here], asked)
-            np.add.at(fall, probe.cell[here], sign * probe.weight[here] * gained)
-            excess = max(excess, fit.excess) if sign > 0 else excess
+    cell = more.sums.cell
+    fold = (cell // CELLS[1] + cell % CELLS[1]) % FOLDS
+    fall, excess = np.zeros(len(cell)), 1.0
+    for out in range(FOLDS):
+        here = fold == out
+        fit = more.sums.fit(more.prior_std, ~here)
+        other = less.sums.fit(less.prior_std, ~here)
+        fall[here] = (more.sums.falls(fit.values) - less.sums.falls(other.values))[here]
+        excess = max(excess, fit.excess)
     total = float(fall.sum())
     return total > LEAST_FALL * excess and total > FALL_SIGMAS * float(np.linalg.norm(fall))

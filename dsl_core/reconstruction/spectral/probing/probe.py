@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -88,12 +89,12 @@ class Probe:
     with_curves: tuple[Floats, Floats] | None = None
     freedom: Floats | None = None
 
-    @property
+    @cached_property
     def sound(self) -> NDArray[np.bool_]:
         """Pixels (n,) whose numbers are finite and that see one surface, by how well their frames fit."""
         return sound_pixels(self.score, self.normal, self.chi_square, MIXED_FROM)
 
-    @property
+    @cached_property
     def weight(self) -> Floats:
         """Weight (n,) of each pixel: less where the frames fit less, nothing where they see two surfaces."""
         return np.where(self.sound, 1 / np.maximum(self.chi_square * self.correlation, 1), 0.0)
