@@ -193,9 +193,9 @@ class GenicamCamera(Camera):
         if known_ms is not None and abs(exposure_ms - known_ms) > _FORGOTTEN * known_ms:
             self._failed = True  # it answers, but not as it was set up
             raise DeviceError(
-                f"The camera {self._info.model} exposes {exposure_ms:g} ms, but was set to {known_ms:g} ms: it"
-                " restarted, or another program set it. Check its power supply, and let no other program use"
-                " it."
+                f"The camera {self._info.model} exposes {exposure_ms:g} ms, but was set to {known_ms:g} ms:"
+                " it restarted, or another program set it. Check its power supply, and let no other program"
+                " use it."
             )
         return exposure_ms
 
