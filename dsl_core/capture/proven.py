@@ -298,7 +298,8 @@ class ProvenShots:
         self._is_late = True
         _log.warning(
             "Pictures are wrong one after the other, or again and again, as if projector or camera were one"
-            " picture late. From %s on, everything is shown and captured twice, and the second picture is kept.",
+            " picture late. From %s on, everything is shown and captured twice, and the second picture is"
+            " kept.",
             describe_shot(shot),
         )
         for each in tuple(self._untold):
