@@ -29,6 +29,9 @@ FAILURES = 2
 #: Pictures of which nothing can be told are unlike those before them on end within so many shots. None of
 #: them is ever right, so that a lamp that flickers now and then would else add up over a scan.
 ON_END = 3
+#: So many pictures that are late within so many shots, with right ones between: a display that drops every so
+#: many. Those of which nothing could be told may have been late as well.
+LATE_OFTEN, LATE_WITHIN = 3, 64
 #: Of doubtful pictures that come out the same again, every so many are followed by a control.
 CONTROL_EVERY = 8
 #: A change may begin a little before it shows: so many pictures before one that stays wrong are withdrawn.
@@ -93,6 +96,8 @@ class ProvenShots:
         self._has_seen_first = False
         #: What is wrong with the light of the first code, as soon as that is known.
         self._light = ""
+        self._passed: deque[Shot] = deque(maxlen=MOST_UNTOLD)
+        self._late_at: deque[int] = deque(maxlen=LATE_OFTEN)
         #: Shots that were taken again because a picture did not show their pattern.
         self.corrected = 0
 
@@ -179,9 +184,18 @@ class ProvenShots:
         elif found.verdict is Verdict.RIGHT:
             self._failures = 0
         if _is_sure(found):
+            self._passed.extend(self._untold)
             self._untold.clear()
+        if found.verdict is Verdict.LATE:
+            self._late_at.append(shot.index)
         self._correct(found, self._proof)
-        if self._failures >= FAILURES and not self._is_late:
+        if self._is_late:
+            return
+        if len(self._late_at) == LATE_OFTEN and shot.index - self._late_at[0] <= LATE_WITHIN:
+            # A right picture says nothing of those before it, where late ones come and go.
+            self._untold = [*self._passed, *self._untold]
+            self._be_late(shot, self._proof)
+        elif self._failures >= FAILURES:
             self._be_late(shot, self._proof)
 
     def _again(self, shot: Shot, earlier: int = 0) -> Frame:
@@ -283,8 +297,9 @@ class ProvenShots:
         self._require_control(proof)
         self._is_late = True
         _log.warning(
-            "Pictures are wrong one after the other, as if projector or camera were one picture late. From %s"
-            " on, everything is shown and captured twice, and the second picture is kept.",
+            "Pictures are wrong one after the other, or again and again, as if projector or camera were one"
+            " picture late. From %s on, everything is shown and captured twice, and the second picture is"
+            " kept.",
             describe_shot(shot),
         )
         for each in tuple(self._untold):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import errno
 import os
 import re
@@ -41,7 +42,8 @@ def write_atomic(path: Path, data: bytes | bytearray | memoryview) -> None:
         os.replace(partial, path)
         sync_folder(path.parent)
     except OSError as error:
-        partial.unlink(missing_ok=True)
+        with contextlib.suppress(OSError):  # a drive that has become read-only does not even look for it
+            partial.unlink(missing_ok=True)
         raise store_error(path, error) from error
 
 
@@ -113,9 +115,12 @@ def make_durable(folder: Path) -> None:
 
 
 def remove_partials(folder: Path) -> None:
-    """Delete what an interrupted `write_atomic` left in a folder."""
-    for leftover in folder.glob("*" + PARTIAL_SUFFIX):
-        leftover.unlink(missing_ok=True)
+    """Delete what an interrupted `write_atomic` left in a folder; raises `StoreError`."""
+    try:
+        for leftover in folder.glob("*" + PARTIAL_SUFFIX):
+            leftover.unlink(missing_ok=True)
+    except OSError as error:
+        raise store_error(folder, error) from error
 
 
 def store_error(path: Path, error: OSError) -> StoreError:

@@ -145,8 +145,15 @@ class CampaignFolder:
         return fresh
 
     def discard(self, name: str) -> None:
-        """Delete the candidate; the accepted calibration stays. Nothing happens when there is none."""
-        self._candidate_path(name).unlink(missing_ok=True)
+        """Delete the candidate; the accepted calibration stays. Nothing happens when there is none.
+
+        Raises `StoreError` where the drive refuses.
+        """
+        path = self._candidate_path(name)
+        try:
+            path.unlink(missing_ok=True)
+        except OSError as error:
+            raise store_error(path, error) from error
 
     def _candidate_path(self, name: str) -> Path:
         return self.path / "candidates" / f"{name}.json"

@@ -3,10 +3,10 @@
     python -m tests.benchmarks.bench_kills [--quick] [--kills 10] [--jobs scan,resume] [--campaign]
 
 Each job runs in a child of this process, whose n-th call of the system that changes a disk is its last: it is
-killed before the call, within it (half of what it should write is there), or gets "no space left" from then
-on. Whatever was acknowledged has to be there, the same job has to go on afterwards, and its outcome has to be
-that of an unbroken one, with nothing left over. ``--campaign`` also kills all real calibrations, again and
-again in one folder; that takes many minutes.
+killed before the call, within it (half of what it should write is there), or gets "no space left" or
+"read-only file system" from then on. Whatever was acknowledged has to be there, the same job has to go on
+afterwards, and its outcome has to be that of an unbroken one, with nothing left over. ``--campaign`` also
+kills all real calibrations, again and again in one folder; that takes many minutes.
 """
 
 from __future__ import annotations
@@ -51,7 +51,7 @@ PLAN = CapturePlan(
     code_settings=(0,),
 )
 CALLS = ("open", "write", "fsync", "replace", "rename", "unlink", "rmdir", "mkdir", "ftruncate", "link")
-FAULTS = ("killed", "torn", "full")
+FAULTS = ("killed", "torn", "full", "read-only")
 #: How a child ended that said in a sentence what is wrong.
 _SAID = 3
 
@@ -111,6 +111,9 @@ def _counted(
             if name in ("open", "write", "fsync", "mkdir"):
                 raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
             return call(*arguments, **named)
+        if fault == "read-only":
+            # Of a name that is not there, too: the system looks whether it may write before it looks for it.
+            raise OSError(errno.EROFS, os.strerror(errno.EROFS))
         if fault == "torn" and name == "write":
             call(arguments[0], bytes(arguments[1])[: len(arguments[1]) // 2])
         os.kill(os.getpid(), signal.SIGKILL)
@@ -298,7 +301,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
             for number in range(2 if chosen.quick else chosen.kills):
                 folder = Path(spare) / f"{job.name}-{number}"
                 folder.mkdir()
-                fault, at = FAULTS[number % 3], int(rng.integers(1, count + 1))
+                fault, at = FAULTS[number % len(FAULTS)], int(rng.integers(1, count + 1))
                 wrong = judge(job, folder, wanted, fault, at)
                 row["WRONG" if wrong else fault] += 1
                 if wrong:

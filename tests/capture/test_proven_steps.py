@@ -12,7 +12,7 @@ import pytest
 from dsl_core.capture.diagnosis import Explanation
 from dsl_core.capture.proof.code.code_sum import CodeSum
 from dsl_core.capture.proof.finding import Finding, Light, Verdict
-from dsl_core.capture.proven import ON_END, SETTLE_MS, PictureError, ProvenShots
+from dsl_core.capture.proven import LATE_WITHIN, ON_END, SETTLE_MS, PictureError, ProvenShots
 from dsl_core.errors import Cancelled, DeviceError
 from dsl_core.model.frames import Frame
 from dsl_core.model.plan import CapturePlan, GrayCode, LineComb, Shot
@@ -274,6 +274,18 @@ def test_what_could_not_be_told_before_devices_were_late_is_taken_again_after_a_
         " Everything was captured twice, since pictures came one late.")  # fmt: skip
     bench.shots.take(SHOTS[14])
     assert bench.taken[-1] == (14, 0, 0.0, True)
+
+
+@pytest.mark.parametrize(("before", "is_late"), [(LATE_WITHIN, True), (LATE_WITHIN + 1, False)])
+def test_pictures_that_are_late_now_and_then_cast_doubt_on_untold_ones_before(
+    before: int, is_late: bool
+) -> None:
+    # A display that drops some pictures shows right ones between, which say nothing of those before.
+    bench = Bench(untold, is_right, late, is_right)
+    bench.shots._late_at.extend([14 - before, 13])
+    take_all(bench, SHOTS[12:15])
+    assert ("captured twice" in bench.shots.note) == is_late
+    assert bench.written[12] == ("it may be late" if is_late else "")
 
 
 def test_a_right_picture_ends_a_run_of_wrong_ones() -> None:

@@ -30,6 +30,7 @@ from dsl_core.model.plan import CapturePlan
 from dsl_core.model.spectral import SpectralCurve
 from dsl_core.patterns.images import pattern_image
 from dsl_core.simulation.sim_devices import open_twin
+from tests.cases.lab_links import CAMERA_LINKS, PROJECTOR_LINKS, CameraLink
 from tests.cases.lab_mishaps import CAMERA_MISHAPS, PROJECTOR_MISHAPS, CameraMishap
 from tests.cases.lab_oddities import CAMERA_ODDITIES, PROJECTOR_ODDITIES
 from tests.cases.lab_surprises import CAMERA_SURPRISES, PROJECTOR_SURPRISES
@@ -96,6 +97,7 @@ class LabCamera(Camera):
         self.happened = 0
         self.last: Frame | None = None
         self.buffer: NDArray[np.uint16] | None = None
+        self.pictures: list[NDArray[np.uint16]] = []
 
     @property
     def info(self) -> CameraInfo:
@@ -158,6 +160,14 @@ def _mishap(change: CameraMishap) -> Change:
     )
 
 
+def _link(change: CameraLink) -> Change:
+    def changed(frame: Frame, camera: LabCamera) -> object:
+        camera.pictures.append(frame.pixels)
+        return replace(frame, pixels=change(camera.pictures))
+
+    return changed
+
+
 def _fill(frame: Frame, camera: LabCamera) -> object:
     if camera.buffer is None:
         camera.buffer = frame.pixels.copy()
@@ -205,6 +215,7 @@ CAMERA: dict[str, tuple[bool, Change]] = {
     "memory used again": (False, _fill),
     **{kind: (is_single, _spoiled(spoil)) for kind, (is_single, spoil) in SPOILED.items()},
     **{kind: (False, _spoiled(spoil)) for kind, spoil in CAMERA_HABITS.items()},
+    **{kind: (False, _link(change)) for kind, change in CAMERA_LINKS.items()},
     **{
         kind: (False, _mishap(change))
         for kind, change in (CAMERA_MISHAPS | CAMERA_SURPRISES | CAMERA_ODDITIES | CAMERA_WHIMS).items()
@@ -222,6 +233,7 @@ class LabProjector(Projector):
         self.projector, self.kind, self.at = projector, kind, at
         self.shown = 0
         self.last: NDArray[np.uint8] | None = None
+        self.images: list[NDArray[np.uint8]] = []
 
     @property
     def info(self) -> ProjectorInfo:
@@ -251,6 +263,9 @@ class LabProjector(Projector):
                     image = squared(image)
                 case kind if kind in PROJECTOR_HABITS:
                     image = PROJECTOR_HABITS[kind](image, self.shown - max(self.at, 1))
+                case kind if kind in PROJECTOR_LINKS:
+                    self.images.append(image)
+                    image = PROJECTOR_LINKS[kind](self.images)
                 case kind if kind in _OF_PROJECTOR:
                     image = _OF_PROJECTOR[kind](image, last, self.shown - max(self.at, 1))
                 case "projector dims":
@@ -352,6 +367,7 @@ PROJECTOR = (
     "projector dims",
     *PROJECTOR_HABITS,
     *_OF_PROJECTOR,
+    *PROJECTOR_LINKS,
 )
 #: Faults of the whole of a scan, that need no shot.
 OTHER = (

@@ -69,6 +69,27 @@ def test_a_failed_write_keeps_the_old_file(tmp_path: Path, monkeypatch: pytest.M
     assert {each.name: each.read_bytes() for each in tmp_path.iterdir()} == {"file": b"old"}
 
 
+@pytest.fixture
+def read_only(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A drive that has become read-only refuses to delete even names that are not there."""
+
+    def refuse(*arguments: object, **named: object) -> None:
+        raise OSError(errno.EROFS, os.strerror(errno.EROFS))
+
+    for name in ("unlink", "replace", "fsync"):
+        monkeypatch.setattr(os, name, refuse)
+
+
+@pytest.mark.usefixtures("read_only")
+def test_a_drive_that_becomes_read_only_is_told_in_a_sentence(tmp_path: Path) -> None:
+    (tmp_path / "a.partial").write_text("x")
+    told = r"could not be written \(Read-only file system\)"
+    with pytest.raises(StoreError, match=told):
+        write_atomic(tmp_path / "file", b"new")
+    with pytest.raises(StoreError, match=told):
+        remove_partials(tmp_path)
+
+
 def test_what_is_set_aside_never_replaces_what_was_set_aside_before(tmp_path: Path) -> None:
     for content in ("first", "second"):
         (tmp_path / "marks.json").write_text(content)

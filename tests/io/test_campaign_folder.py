@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import errno
+import os
 from pathlib import Path
 
 import pytest
@@ -45,6 +47,17 @@ def test_a_discarded_fit_is_gone_and_the_accepted_one_stays(campaign: CampaignFo
     assert campaign.candidate("geometry") is None
     assert campaign.candidate("film") == fit("other", "film")
     assert campaign.accepted("geometry") == accepted
+
+
+def test_a_candidate_that_the_drive_keeps_is_told(
+    campaign: CampaignFolder, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refuse(*arguments: object, **named: object) -> None:
+        raise OSError(errno.EROFS, os.strerror(errno.EROFS))
+
+    monkeypatch.setattr(os, "unlink", refuse)
+    with pytest.raises(StoreError, match=r"geometry.json could not be written \(Read-only"):
+        campaign.discard("geometry")
 
 
 def test_what_is_replaced_goes_into_the_history_oldest_first(campaign: CampaignFolder) -> None:

@@ -49,7 +49,8 @@ def serve(projector: ScreenProjector, patterns: BinaryIO, answers: BinaryIO) -> 
         image = np.frombuffer(patterns.read(int(np.prod(shape))), np.uint8).reshape(shape)
         try:
             projector.show(image)
-            tell(answers, painted_s=time.monotonic())
+            period_ms = projector.info.frame_period_ms
+            tell(answers, painted_s=time.monotonic(), frame_period_ms=period_ms)
         except DslError as error:
             tell(answers, error=str(error))
 

@@ -12,6 +12,7 @@ import os
 import subprocess
 import sys
 import time
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -26,6 +27,8 @@ from dsl_core.model.base import Record
 BRINGS = "the window's libraries: pip install 'dsl-scan[gui]'"
 _PROGRAM = "dsl_app.rig.projector_process"
 _END_S = 5.0
+#: A display's refresh rate is told in several ways, 59.94 or 60 Hz; another mode differs by more than this.
+_OTHER_RATE = 0.01
 
 
 class ScreenSettings(Record):
@@ -73,7 +76,7 @@ class ScreenProjector(Projector):
 
     @property
     def info(self) -> ProjectorInfo:
-        """The screen's name and size in real pixels."""
+        """The screen's name, its size in real pixels, and its period when it last showed a pattern."""
         return self._info
 
     def show(self, image: NDArray[np.uint8]) -> None:
@@ -87,7 +90,10 @@ class ScreenProjector(Projector):
             self._process.stdin.flush()
         except OSError as error:
             raise DeviceError(_GONE) from error
-        painted_s = float(self._answer()["painted_s"])
+        said = self._answer()
+        painted_s, period_ms = float(said["painted_s"]), float(said["frame_period_ms"])
+        if abs(period_ms - self._info.frame_period_ms) > _OTHER_RATE * self._info.frame_period_ms:
+            self._info = replace(self._info, frame_period_ms=period_ms)
         left_s = painted_s + self._settings.latency_ms / 1000.0 - time.monotonic()
         if left_s > 0:
             time.sleep(left_s)

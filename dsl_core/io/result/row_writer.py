@@ -167,13 +167,11 @@ class RowWriter:
 
     def publish(self, attributes: Mapping[Any, Any]) -> Path:
         """Move the result to its place, whole or not at all, with its attributes; raises `StoreError`."""
-        seal_folder(self.work / _ARRAYS, {**attributes, "labels": self._labels})
-        with (
-            self._writing(),
-            staged([self._target], overwrite=self._overwrite, kind=RESULT_FOLDER) as (draft,),
-        ):
-            os.replace(self.work / _ARRAYS, draft)
-        self._clear()
+        with self._writing():
+            seal_folder(self.work / _ARRAYS, {**attributes, "labels": self._labels})
+            with staged([self._target], overwrite=self._overwrite, kind=RESULT_FOLDER) as (draft,):
+                os.replace(self.work / _ARRAYS, draft)
+        self._tidy()
         return self._target
 
     def __enter__(self) -> Self:
@@ -184,7 +182,7 @@ class RowWriter:
         if self._lock is None:
             return
         if not any(self.work.glob("rows.*.json")):
-            self._clear()
+            self._tidy()
         self._lock.release()
         self._lock = None
         with contextlib.suppress(OSError):
@@ -204,6 +202,11 @@ class RowWriter:
         path = self.work / _KEY
         half = any(self.work.glob("*.packed"))
         return path.is_file() and read_bounded(path) == key and (self.work / _ARRAYS).is_dir() and not half
+
+    def _tidy(self) -> None:
+        """Remove what nobody needs any more; what a drive keeps, the next run removes."""
+        with contextlib.suppress(OSError):
+            self._clear()
 
     def _clear(self) -> None:
         """Remove all but the lock."""

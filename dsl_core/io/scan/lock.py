@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import errno
 import os
 import sys
 from pathlib import Path
@@ -12,6 +13,8 @@ from dsl_core.io.atomic import store_error, write_all
 
 #: Windows locks byte ranges for reading too, so the locked byte is behind the text.
 _LOCK_BYTE = 1 << 20
+#: What systems say of a lock that another process holds; anything else is the drive's own failure.
+_HELD = {errno.EAGAIN, errno.EWOULDBLOCK, errno.EACCES, errno.EDEADLK}
 
 
 class LockedError(StoreError):
@@ -22,7 +25,7 @@ class FolderLock:
     """Held from construction to `release`; a lock left by a killed process is free at once."""
 
     def __init__(self, path: Path) -> None:
-        """Take the lock; raises `LockedError` that names who holds it, `StoreError` without a file."""
+        """Take the lock; raises `LockedError` that names who holds it, `StoreError` where none can be had."""
         try:
             self._descriptor: int | None = os.open(path, os.O_RDWR | os.O_CREAT, 0o644)
         except OSError as error:
@@ -33,6 +36,12 @@ class FolderLock:
             owner = os.read(self._descriptor, 32).decode(errors="replace").strip() or "unknown"
             os.close(self._descriptor)
             self._descriptor = None
+            if error.errno not in _HELD:
+                raise StoreError(
+                    f"{path.parent} cannot be locked ({error.strerror or error}), so that two programs might"
+                    " write to it at once. Choose a folder on a drive of this computer, or have the network"
+                    " drive mounted with locks."
+                ) from error
             raise LockedError(
                 f"{path.parent} is being written by another process (number {owner})."
                 " Wait until it ends, or end it, and try again."

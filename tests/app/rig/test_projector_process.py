@@ -43,6 +43,21 @@ def test_a_screen_that_is_not_there_is_named() -> None:
         ScreenProjector(ALONE.model_copy(update={"screen": "HDMI-9"}))
 
 
+@pytest.mark.parametrize(("period_ms", "is_told"), [(16.71, False), (33.3, True)])
+def test_a_screen_that_changes_its_rate_is_told(period_ms: float, is_told: bool) -> None:
+    said = {"model": "m", "serial": "", "width_px": 4, "height_px": 3, "frame_period_ms": 16.7}
+    shown = {"painted_s": 0.0, "frame_period_ms": period_ms}
+    program = (
+        f"import sys; print({json.dumps(json.dumps(said))}, flush=True); sys.stdin.buffer.readline();"
+        f" print({json.dumps(json.dumps(shown))}, flush=True); sys.stdin.buffer.read()"
+    )
+    with ScreenProjector(ALONE, [sys.executable, "-c", program]) as projector:
+        before = projector.info
+        projector.show(np.zeros((3, 4), np.uint8))
+        assert (projector.info != before) == is_told
+        assert projector.info.frame_period_ms == (period_ms if is_told else 16.7)
+
+
 def test_a_program_that_ended_is_told_and_closes_twice() -> None:
     said = {"model": "m", "serial": "", "width_px": 4, "height_px": 3, "frame_period_ms": 16.7}
     command = [sys.executable, "-c", f"print({json.dumps(json.dumps(said))})"]

@@ -127,8 +127,15 @@ def test_a_result_is_replaced_only_when_that_is_wanted(tmp_path: Path) -> None:
     assert float(write(target, maps(0.5), overwrite=True)["reflectance"].max()) == pytest.approx(0.5)
 
 
-def test_a_disk_that_is_full_at_any_step_is_told_and_the_result_is_made_afterwards(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+@pytest.mark.parametrize(
+    ("number", "refused", "told"),
+    [
+        (errno.ENOSPC, ("mkdir", "replace"), "space"),
+        (errno.EROFS, ("mkdir", "replace", "unlink", "rmdir"), "Read-only"),
+    ],
+)
+def test_a_disk_that_fails_at_any_step_is_told_and_the_result_is_made_afterwards(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, number: int, refused: tuple[str, ...], told: str
 ) -> None:
     calls: list[str] = []
     room = [10**9]
@@ -139,20 +146,23 @@ def test_a_disk_that_is_full_at_any_step_is_told_and_the_result_is_made_afterwar
         def instead(*arguments: Any, **more: Any) -> Any:
             calls.append(name)
             if len(calls) > room[0]:
-                raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+                raise OSError(number, os.strerror(number))
             return act(*arguments, **more)
 
         monkeypatch.setattr(os, name, instead)
 
-    for name in ("mkdir", "replace"):
+    for name in refused:
         limited(name)
     given = maps()
     write(tmp_path / "whole.zarr", given)
-    count = len(calls)
-    for after in (0, 1, count - 1):
+    last = max(step for step, name in enumerate(calls) if name == "replace")
+    for after in (0, 1, 2, last - 1, last):
         calls.clear()
         room[0] = after
-        with pytest.raises(StoreError, match="space"):
+        with pytest.raises(StoreError, match=told):
             write(tmp_path / f"{after}.zarr", given)
         room[0] = 10**9
         assert write(tmp_path / f"{after}.zarr", given).attrs["more"] == "of it"
+    calls.clear()
+    room[0] = last + 1  # the result is in its place: what cannot be tidied up does not matter
+    assert write(tmp_path / "kept.zarr", given).attrs["more"] == "of it"

@@ -20,6 +20,8 @@ from dsl_core.model.frames import Frame
 
 _log = logging.getLogger(__name__)
 _SEARCH_S = 0.25
+#: An exposure that nobody has set and that differs by this share from the one in force is not ours any more.
+_FORGOTTEN = 0.01
 T = TypeVar("T")
 
 
@@ -50,6 +52,7 @@ class GenicamCamera(Camera):
         self._numbers = FrameCounter()
         self.counts = FrameCounts()
         self._exposure_ms: float | None = None
+        self._in_force_ms: float | None = None
         self._failed = self._is_closed = False
         self._port: GenicamPort | None = None
         self._prepared, self._info = self._open()
@@ -177,10 +180,27 @@ class GenicamCamera(Camera):
         make_room(port, self._exposure_ms)
         port.write(feature, 1000.0 * self._exposure_ms)
         # Some cameras keep the old value, or round it, without a word.
-        return float(port.read(feature)) / 1000.0
+        self._in_force_ms = float(port.read(feature)) / 1000.0
+        return self._in_force_ms
+
+    def _exposure_in_force(self, port: GenicamPort) -> float:
+        """The exposure, ms; raises `DeviceError` if it is none that was set.
+
+        A camera that lost power for a moment comes back with its own exposure, gain and trigger, and some
+        libraries connect to it again without a word: then all has to be set up anew.
+        """
+        exposure_ms, known_ms = float(port.read(self._prepared.exposure_feature)) / 1000.0, self._in_force_ms
+        if known_ms is not None and abs(exposure_ms - known_ms) > _FORGOTTEN * known_ms:
+            self._failed = True  # it answers, but not as it was set up
+            raise DeviceError(
+                f"The camera {self._info.model} exposes {exposure_ms:g} ms, but was set to {known_ms:g} ms:"
+                " it restarted, or another program set it. Check its power supply, and let no other program"
+                " use it."
+            )
+        return exposure_ms
 
     def _take(self, port: GenicamPort, timeout_s: float) -> Frame:
-        exposure_ms = float(port.read(self._prepared.exposure_feature)) / 1000.0
+        exposure_ms = self._exposure_in_force(port)
         wait_s = exposure_ms / 1000.0 + self._settings.frame_wait_s
         until_s = self._clock() + timeout_s
         faults: list[str] = []
@@ -192,10 +212,13 @@ class GenicamCamera(Camera):
             port.execute(TRIGGER)
             raw = port.fetch(min(wait_s, left_s))
             if raw is not None and not raw.fault:
+                if faults:
+                    self._exposure_in_force(port)  # what went wrong before may have been a restart
+                frame = self._frame(raw, exposure_ms, triggered_s)
                 self.counts = replace(self.counts, delivered=self.counts.delivered + 1)
                 # Only a frame shows that a camera obeys: some accept settings from an old connection.
                 self._failed = False
-                return self._frame(raw, exposure_ms, triggered_s)
+                return frame
             if raw is None:
                 self.counts = replace(self.counts, late=self.counts.late + 1)
                 faults.append("no frame came")

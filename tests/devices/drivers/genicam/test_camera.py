@@ -125,6 +125,44 @@ def test_a_camera_that_comes_back_while_it_is_searched_for_gives_the_frame() -> 
     assert eye.snap().pixels.shape == (48, 64)
 
 
+@pytest.mark.parametrize("during_a_trigger", [False, True])
+def test_a_camera_that_restarts_unnoticed_is_set_up_again(during_a_trigger: bool) -> None:
+    sensor = FakeSensor()
+    default = dict(sensor.features)
+    lost_on_the_way = FakePort.execute
+
+    class Restarting(FakePort):
+        def execute(self, command: str) -> None:
+            if during_a_trigger and sensor.taken == 1:
+                sensor.features.update(default, PixelFormat="BayerRG16")
+                sensor.faults = ["lost"]
+                sensor.taken += 1
+            lost_on_the_way(self, command)
+
+    clock = Clock()
+    chosen = GenicamSettings(pixel_format="BayerRG16", adc_bits=12)
+    with GenicamCamera(lambda: Restarting(sensor), chosen, clock, clock.sleep) as eye:
+        eye.configure(2.0)
+        set_up = dict(sensor.features)
+        eye.snap()
+        if not during_a_trigger:
+            sensor.features.update(default)
+        assert eye.snap().exposure_ms == 2.0
+        assert sensor.features == set_up
+        assert eye.counts.reopened == 1
+
+
+def test_frames_of_another_format_have_the_camera_set_up_again() -> None:
+    sensor = FakeSensor()
+    with camera(sensor) as eye:
+        eye.snap()
+        sensor.features["PixelFormat"] = "BayerRG12p"
+        with pytest.raises(DeviceError, match="BayerRG12p instead of"):
+            eye.snap()
+        assert eye.snap().pixels.dtype == np.uint16
+        assert sensor.features["PixelFormat"] == "BayerRG16"
+
+
 def test_another_camera_in_its_place_is_refused() -> None:
     sensor = FakeSensor()
     eye = camera(sensor)
