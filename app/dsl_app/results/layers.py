@@ -121,6 +121,9 @@ class Layers:
         if view is ResultView.QUALITY:
             return self._quality(state.quality.value, state.band.value)
         picture, bands = state.picture.value, state.bands.value
+        if picture is not None and picture.shape[:2] != self.result.shape:
+            # It is that of another result, which is being opened.
+            picture = None
         if view is ResultView.DEPTH or picture is None:
             return self._depth(state.depth_limits.value)
         if bands is not None and self.result.has_spectra:
