@@ -11,7 +11,7 @@ from PySide6.QtGui import QKeyEvent
 from PySide6.QtWidgets import QLabel, QWidget
 
 from dsl_app.results.controller import ResultsController
-from dsl_app.results.layers import Layer, Layers, materials_table
+from dsl_app.results.layers import NO_COLOUR, Layer, Layers, materials_table
 from dsl_app.results.outline_box import OutlineBox
 from dsl_app.results.state import Mark, ResultsState, ResultView, Tool
 from dsl_app.shared.evented import follow_any
@@ -286,6 +286,9 @@ def tinted(mask: np.ndarray[Any, np.dtype[np.bool_]], colour: str, alpha: int, z
 
 
 def _swatch(colour: str, muted: str) -> str:
-    """A square of a colour of the picture; where that has none, hatched as there."""
-    square, ink = ("■", colour) if colour.startswith("#") else ("▨", muted)
+    """A square of a colour of the picture; hatched where that has none, an outline where it is faint."""
+    if colour == NO_COLOUR:
+        square, ink = "▨", muted
+    else:
+        square, ink = ("■", colour) if colour.startswith("#") else ("□", muted)
     return f'<span style="color:{ink}">{square}</span>'

@@ -6,7 +6,7 @@ import itertools
 
 import numpy as np
 import pytest
-from dsl_app.results.layers import Layers, rgb_of
+from dsl_app.results.layers import NO_COLOUR, Layers, rgb_of
 from dsl_app.results.state import QualityMap, ResultView, Tool
 from dsl_app.shared.theme import DARK as DARK_THEME
 from PySide6.QtCore import QPoint, Qt
@@ -77,9 +77,13 @@ def test_every_view_paints_the_shape_of_the_result(bench: Bench) -> None:
         assert layer is not None
         assert rgb_of(layer).shape == (24, 36, 3)
         assert image.legend.isVisible() == bool(layer.keys)
-        # What is faint in the picture is hatched in the legend.
+        # What is hatched in the picture is so in the legend, and what is faint has an outline.
         faint = sum(colour.startswith("rgba") for colour, *_ in layer.keys)
-        assert not layer.keys or image.legend.text().count("▨") == faint
+        hatched = sum(colour == NO_COLOUR for colour, *_ in layer.keys)
+        if layer.keys:
+            text = image.legend.text()
+            assert (text.count("▨"), text.count("□")) == (hatched, faint - hatched)
+            assert not hatched or image.no_values.isVisible()
         seen += faint
         assert image.image.image.shape[:2] == (24, 36)
     assert seen
