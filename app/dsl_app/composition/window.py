@@ -201,6 +201,13 @@ class Composition(QObject):
         self.window.open_page("results")
         self.window.open_path(path)
 
+    def _end_demo(self, opened: Path) -> None:
+        """Take back what is said of a finished scan once a person opens another."""
+        from dsl_app.composition.demo import PRESENTED
+
+        if opened.parent != demo_folder():
+            self.window.toasts.withdraw(PRESENTED)
+
     def _open_scan_page(self) -> ScanController:
         self.window.open_page("scan")
         assert self.scans is not None
@@ -392,6 +399,7 @@ class Composition(QObject):
 
         window, parts, state = self.window, self.window.parts, ResultsState()
         controller = ResultsController(state, parts.runner, window.toasts, parts.undo)
+        controller.opened.connect(lambda result: self._end_demo(result.path))
         welcome = Welcome(parts.recent, window.open_path, lambda: self.demo.show())
         self.session.results = controller
         page = ResultsPage(state, controller, parts.runner, welcome)

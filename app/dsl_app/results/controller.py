@@ -56,6 +56,8 @@ class ResultsController:
         self._found_first: ResultArrays | None = None
         #: What was open before that was shown: its picture, and the light of that.
         self._before: tuple[ResultArrays, NDArray[np.uint8] | None, tuple[str, bool]] | None = None
+        #: What coloured the cloud before a result with depth only.
+        self._cloud_by_chosen: ResultView | None = None
 
     # Open ------------------------------------------------------------------------------------------
 
@@ -196,9 +198,20 @@ class ResultsController:
         state.band.set(len(arrays.wavelengths_nm) // 2)
         if not arrays.has_spectra and state.view.value in NEED_SPECTRA:
             state.view.set(ResultView.DEPTH)
-        if state.cloud_by.value in NEED_SPECTRA and not arrays.has_spectra and not state.is_begun.value:
-            state.cloud_by.set(ResultView.DEPTH)
+        self._colour_cloud(arrays)
         self.marks.load()
+
+    def _colour_cloud(self, arrays: ResultArrays) -> None:
+        """Colour the cloud by what the result has, and again as a person chose once there are spectra."""
+        by, chosen = self.state.cloud_by, self._cloud_by_chosen
+        if not arrays.has_spectra and not self.state.is_begun.value:
+            if by.value in NEED_SPECTRA:
+                self._cloud_by_chosen = by.value
+                by.set(ResultView.DEPTH)
+        elif arrays.has_spectra and chosen is not None:
+            self._cloud_by_chosen = None
+            if by.value is ResultView.DEPTH:
+                by.set(chosen)
 
     def command_line(self) -> str:
         """The command that reconstructs the offered scan or exports the open result."""

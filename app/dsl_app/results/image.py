@@ -11,7 +11,7 @@ from PySide6.QtGui import QKeyEvent
 from PySide6.QtWidgets import QLabel, QWidget
 
 from dsl_app.results.controller import ResultsController
-from dsl_app.results.layers import Layer, Layers, materials_table
+from dsl_app.results.layers import NO_COLOUR, Layer, Layers, materials_table
 from dsl_app.results.outline_box import OutlineBox
 from dsl_app.results.state import Mark, ResultsState, ResultView, Tool
 from dsl_app.shared.evented import follow_any
@@ -19,7 +19,7 @@ from dsl_app.shared.spectrum import Pixel
 from dsl_app.shared.theme import DARK, Theme
 from dsl_app.shared.widgets.forms import named
 from dsl_app.shared.widgets.layouts import column_of
-from dsl_app.shared.widgets.pictures import PictureView, arrow_step, colour_map
+from dsl_app.shared.widgets.pictures import NoValues, PictureView, arrow_step, colour_map
 from dsl_app.shared.widgets.plots import theme_bar
 from dsl_core.io.result.result_arrays import ResultArrays
 
@@ -58,6 +58,7 @@ class ResultImage(QWidget):
             "Click or press Enter to pin a spectrum; drag to pan, wheel to zoom; arrow keys move the cursor",
             self.box,
         )
+        self.no_values = NoValues(self.box)
         self.image, self.overlay = self.canvas.image, pg.ImageItem(axisOrder="row-major")
         self.overlay.setZValue(5)
         self.materials = pg.ImageItem(axisOrder="row-major")
@@ -162,6 +163,7 @@ class ResultImage(QWidget):
         layer = None if self._layers is None else self._layers.layer(self._state)
         if layer is None:
             self.image.clear()
+            self.no_values.hide()
             self.bar.hide()
             lacks = "" if self._layers is None else self._layers.lacks(self._state.quality.value)
             self.legend.setText(lacks)
@@ -175,6 +177,11 @@ class ResultImage(QWidget):
         # Pixels have their centres at whole numbers.
         height, width = layer.image.shape[:2]
         self.image.setRect(-0.5, -0.5, width, height)
+        if layer.table is None:
+            self.no_values.lie_under(layer.image.shape)
+        else:
+            # A class is painted where there is nothing to tell, too.
+            self.no_values.hide()
         self._show_bar(layer)
 
     def _show_bar(self, layer: Layer) -> None:
@@ -252,6 +259,7 @@ class ResultImage(QWidget):
         """Apply the colours of a theme."""
         self._theme = theme
         self.canvas.apply_theme(theme)
+        self.no_values.apply_theme(theme)
         self.box.set_colour(theme.accent)
         for line in (self._vertical, self._horizontal):
             line.setPen(pg.mkPen(theme.accent, width=1))
@@ -278,6 +286,9 @@ def tinted(mask: np.ndarray[Any, np.dtype[np.bool_]], colour: str, alpha: int, z
 
 
 def _swatch(colour: str, muted: str) -> str:
-    """A square of a colour of the picture; where that is faint, its outline, which is seen on any theme."""
-    square, ink = ("■", colour) if colour.startswith("#") else ("□", muted)
+    """A square of a colour of the picture; hatched where that has none, an outline where it is faint."""
+    if colour == NO_COLOUR:
+        square, ink = "▨", muted
+    else:
+        square, ink = ("■", colour) if colour.startswith("#") else ("□", muted)
     return f'<span style="color:{ink}">{square}</span>'

@@ -29,6 +29,8 @@ from dsl_core.optics.levels import Bands, Levels, between, rgba_of_colours, spre
 ORDER_TEXTS = {1: "order +1", 2: "order −1", 3: "both first orders", 4: "zero order only"}
 ORDER_COLOURS = {1: "#4477aa", 2: "#ee6677", 3: "#228833", 4: "#ccbb44"}
 NOTHING = "#8a8f98"
+#: That of pixels which a picture leaves out, in its legend.
+NO_COLOUR = "rgba(0,0,0,0)"
 #: The variable of a result that each map of the quality shows; those of bands.
 _SHOWN_OF = {
     QualityMap.FLAGS: "flags",
@@ -113,7 +115,7 @@ class Layers:
             return ()
         no_depth = "no depth" if limits is None else "no depth between the limits"
         what = {ResultView.DEPTH: no_depth, ResultView.QUALITY: "no value"}.get(view, "no spectrum")
-        return ((NOTHING if is_grey else "rgba(0,0,0,0)", what, share),)
+        return ((NOTHING if is_grey else NO_COLOUR, what, share),)
 
     def _painted(self, view: ResultView, state: ResultsState) -> Layer | None:
         if view is ResultView.BAND and self.result.has_spectra:
@@ -121,6 +123,9 @@ class Layers:
         if view is ResultView.QUALITY:
             return self._quality(state.quality.value, state.band.value)
         picture, bands = state.picture.value, state.bands.value
+        if picture is not None and picture.shape[:2] != self.result.shape:
+            # It is that of another result, which is being opened.
+            picture = None
         if view is ResultView.DEPTH or picture is None:
             return self._depth(state.depth_limits.value)
         if bands is not None and self.result.has_spectra:

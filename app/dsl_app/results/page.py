@@ -141,7 +141,8 @@ class ResultsPage(PageWidget):
             (self.colours, "Colours", "Colours of the marks under several lights"),
             (self.search, "Search", ""),
         )
-        right = splitter(Qt.Orientation.Vertical, (self.spectra, 3), (tabs, 2), sizes=(400, 340))
+        # In the smallest window the highest tab has just its room: the plot stays as high with any of them.
+        right = splitter(Qt.Orientation.Vertical, (self.spectra, 3), (tabs, 2), sizes=(350, 345))
         self._sides = splitter(Qt.Orientation.Horizontal, (left, 1), (right, 1))
         self.arrange()
         return self._sides

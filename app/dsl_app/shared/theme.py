@@ -12,8 +12,10 @@ class Theme:
     """Colours by role, as ``#rrggbb``.
 
     ``window`` is the background, ``base`` that of plots and input, ``surround`` that of pictures, on which
-    white, black and grey areas keep their edges; ``line`` separates. ``muted`` is for units and hints. All
-    that is text keeps a contrast of 4.5 to 1 on ``window`` and ``base``, and ``muted`` on ``surround``, too.
+    white, black and grey areas keep their edges; ``raised`` is that of toolbars and of surfaces in 3D, whose
+    holes it is seen through: no black, which a dark surface has. ``line`` separates. ``muted`` is for units
+    and hints. All that is text keeps a contrast of 4.5 to 1 on ``window`` and ``base``, and ``muted`` on
+    ``surround`` and ``raised``, too.
     ``ground`` says which of the two sets of colours marks, curves and classes have.
     """
 

@@ -23,6 +23,7 @@ from dsl_core.model.frames import Frame
 from dsl_core.simulation.sim_devices import SimCamera
 from tests.app.support.doubles import InlineRunner
 from tests.app.support.scan_bench import ScanBench, make_bench
+from tests.app.support.small_result import write_small_result
 
 SMALL = {"scene": "color-checker", "size": "64x48"}
 
@@ -89,6 +90,33 @@ def test_what_is_said_of_a_picture_leaves_with_it(qtbot: QtBot, tmp_path: Path) 
     assert [toast.text for toast in window.toasts.shown] == ["Another.", demo.PRESENTED]
     window.open_page("start")
     assert [toast.text for toast in window.toasts.shown] == ["Another."]
+    window.close()
+
+
+def test_what_is_said_of_a_finished_scan_leaves_when_another_is_opened(
+    qtbot: QtBot, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(window_module, "demo_folder", lambda: tmp_path / "demo")
+    composition = Composition(StartOptions())
+    window = composition.open_window(tmp_path)
+    qtbot.addWidget(window)
+    window.open_page("results")
+    results = composition.session.results
+    assert results is not None
+    state = results.state
+    for folder, stays in ((tmp_path / "demo", True), (tmp_path, False)):
+        folder.mkdir(exist_ok=True)
+        window.toasts.offer(demo.PRESENTED, {"Start a live scan": lambda: None})
+        path = write_small_result(folder)
+        window.open_path(path)
+
+        def is_open(path: Path = path) -> bool:
+            shown = state.saved_result
+            return shown is not None and shown.path == path
+
+        qtbot.waitUntil(is_open)
+        said = [toast.text for toast in window.toasts.shown]
+        assert (demo.PRESENTED in said) is stays
     window.close()
 
 

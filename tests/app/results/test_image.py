@@ -6,14 +6,16 @@ import itertools
 
 import numpy as np
 import pytest
-from dsl_app.results.layers import Layers, rgb_of
+from dsl_app.results.layers import NO_COLOUR, Layers, rgb_of
 from dsl_app.results.state import QualityMap, ResultView, Tool
-from PySide6.QtCore import Qt
+from dsl_app.shared.theme import DARK as DARK_THEME
+from PySide6.QtCore import QPoint, Qt
 from PySide6.QtTest import QTest
 from pytestqt.qtbot import QtBot
 
 from tests.app.support.results_bench import Bench
 from tests.app.support.results_bench import bench as bench
+from tests.app.support.small_result import DARK
 
 
 def test_a_click_pins_and_keys_move_pin_and_remove(bench: Bench, qtbot: QtBot) -> None:
@@ -75,9 +77,13 @@ def test_every_view_paints_the_shape_of_the_result(bench: Bench) -> None:
         assert layer is not None
         assert rgb_of(layer).shape == (24, 36, 3)
         assert image.legend.isVisible() == bool(layer.keys)
-        # What is faint in the picture has an outline in the legend.
+        # What is hatched in the picture is so in the legend, and what is faint has an outline.
         faint = sum(colour.startswith("rgba") for colour, *_ in layer.keys)
-        assert not layer.keys or image.legend.text().count("□") == faint
+        hatched = sum(colour == NO_COLOUR for colour, *_ in layer.keys)
+        if layer.keys:
+            text = image.legend.text()
+            assert (text.count("▨"), text.count("□")) == (hatched, faint - hatched)
+            assert not hatched or image.no_values.isVisible()
         seen += faint
         assert image.image.image.shape[:2] == (24, 36)
     assert seen
@@ -121,3 +127,17 @@ def test_a_class_map_lies_over_colours_and_hides_no_other_view(bench: Bench) -> 
         assert not layer.isVisible()
     bench.control.show(ResultView.COLOUR)
     assert layer.isVisible()
+
+
+def test_what_has_no_value_is_hatched_and_no_dark_surface(bench: Bench) -> None:
+    canvas, image = bench.page.image.content.canvas, bench.page.image.content
+    bench.control.show(ResultView.DEPTH)
+    bench.page.apply_theme(DARK_THEME)
+    surround = canvas.grab().toImage().pixelColor(1, 1).name()
+    assert surround == DARK_THEME.surround
+    at = bench.at(DARK)
+    seen = {canvas.grab().toImage().pixelColor(at + QPoint(dx, 0)).name() for dx in range(-3, 4)}
+    assert seen == {DARK_THEME.line, DARK_THEME.muted}
+    # Where there is nothing to tell, quality has a colour of its own.
+    bench.control.show(ResultView.QUALITY)
+    assert not image.no_values.isVisible()

@@ -52,6 +52,14 @@ def test_the_cloud_has_the_colours_of_the_view_chosen_for_it(layers: Layers) -> 
     assert np.isnan(cloud.image[DARK[1], DARK[0]])
 
 
+def test_the_picture_of_the_next_result_is_not_painted_on_the_points_of_the_last(layers: Layers) -> None:
+    state = state_of(ResultView.CLOUD)
+    state.picture.set(np.full((7, 5, 4), 255, np.uint8))
+    shown = layers.layer(state)
+    assert shown is not None
+    assert shown.image.shape[:2] == layers.result.shape
+
+
 def test_points_without_a_value_are_grey_and_a_legend_says_so(layers: Layers) -> None:
     # In the darkest pixel there is no depth either: it is no point.
     colours, cube = layers.result["rgb"].copy(), layers.result["reflectance"].copy()

@@ -7,9 +7,10 @@ from pathlib import Path
 from dsl_app.results.state import ResultView
 from dsl_app.shared.theme import DARK as DARK_THEME
 from dsl_app.shared.theme import LIGHT
+from dsl_app.shared.widgets.deferred import Deferred
 from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QLabel
+from PySide6.QtWidgets import QLabel, QTabWidget
 from pytestqt.qtbot import QtBot
 
 from tests.app.support.results_bench import Bench
@@ -67,3 +68,20 @@ def test_themes_reach_every_panel(bench: Bench) -> None:
     for theme in (LIGHT, DARK_THEME):
         bench.page.apply_theme(theme)
         assert bench.page.image.content.canvas.backgroundBrush().color().name() == theme.surround
+
+
+def test_the_plot_keeps_its_height_beside_every_tab_of_the_smallest_window(
+    bench: Bench, qtbot: QtBot
+) -> None:
+    bench.window.resize(1280, 800)
+    page = bench.page
+    tabs = page.findChild(QTabWidget)
+    assert tabs is not None
+    heights = []
+    for place in range(tabs.count()):
+        tabs.setCurrentIndex(place)
+        room = tabs.currentWidget()
+        qtbot.waitUntil(lambda room=room: not isinstance(room, Deferred) or room.made is not None)  # type: ignore[misc]
+        qtbot.wait(20)
+        heights.append(page.spectra.height())
+    assert min(heights) == max(heights) > 250

@@ -185,4 +185,5 @@ def test_a_result_of_depth_alone_offers_neither_colours_nor_bands(bench: Bench, 
     assert [view for view, flag in flags.items() if not flag & Qt.ItemFlag.ItemIsEnabled] == list(needy)
     bench.control.open(tmp_path / "small.zarr")
     assert [bar.views[view].toolTip() for view in needy] == tips
+    assert state.cloud_by.value is ResultView.COLOUR
     assert all(bar.views[view].isEnabled() for view in ResultView)

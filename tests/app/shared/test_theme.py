@@ -22,8 +22,15 @@ def test_text_is_readable(theme: Theme, role: str) -> None:
     for behind in (theme.window, theme.base):
         assert contrast(getattr(theme, role), behind) >= 4.5
     # On pictures there are hints.
-    assert contrast(theme.muted, theme.surround) >= 4.5
-    assert contrast(theme.accent, theme.surround) >= 3
+    for behind in (theme.surround, theme.raised):
+        assert contrast(theme.muted, behind) >= 4.5
+        assert contrast(theme.accent, behind) >= 3
+
+
+def test_a_hole_of_a_surface_is_not_black() -> None:
+    for theme in (LIGHT, DARK):
+        assert contrast("#000000", theme.raised) >= 1.5
+        assert contrast("#ffffff", theme.raised) >= 1.15
 
 
 def test_white_of_a_picture_has_an_edge_in_either_theme() -> None:

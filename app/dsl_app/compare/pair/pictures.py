@@ -23,6 +23,7 @@ from dsl_app.shared.widgets.pictures import (
     DIFFERENCE,
     GREY,
     Canvas,
+    NoValues,
     arrow_step,
     colour_map,
     moved_within,
@@ -48,6 +49,7 @@ class PairPictures(QWidget):
         self.canvas.setFocusProxy(self)
         self.titles = [pg.LabelItem(text, justify="left") for text in ("A", "B", "A − B")]
         self.boxes = [pg.ViewBox(lockAspect=True, invertY=True, enableMenu=False) for _ in range(3)]
+        self.no_values = [NoValues(box) for box in self.boxes]
         self.images = [pg.ImageItem(axisOrder="row-major") for _ in range(3)]
         self.crosses = [pg.TargetItem(size=13, movable=False) for _ in range(3)]
         #: The colour bar of both pictures and that of their difference; slow to make, so only for a pair.
@@ -97,8 +99,9 @@ class PairPictures(QWidget):
     # Paint -----------------------------------------------------------------------------------------
 
     def _new_pair(self, pair: Pair | None) -> None:
-        for item in self.images:
+        for item, hatching in zip(self.images, self.no_values, strict=True):
             item.clear()
+            hatching.hide()
         if pair is not None and not self.bars:
             call_deferred(self, self._make_bars)
         for bar in self.bars:
@@ -163,6 +166,7 @@ class PairPictures(QWidget):
         self.images[i].setImage(image, levels=levels, lut=table, autoLevels=False)
         height, width = image.shape
         self.images[i].setRect(-0.5, -0.5, width, height)
+        self.no_values[i].lie_under(image.shape)
 
     def _show_cursor(self, pixel: Pixel | None) -> None:
         for cross in self.crosses:
@@ -174,6 +178,8 @@ class PairPictures(QWidget):
         """Apply the colours of a theme."""
         self._theme = theme
         self.canvas.setBackground(theme.surround)
+        for hatching in self.no_values:
+            hatching.apply_theme(theme)
         for cross in self.crosses:
             cross.setPen(pg.mkPen(theme.accent, width=2))
         self._theme_bars()

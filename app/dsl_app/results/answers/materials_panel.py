@@ -28,7 +28,7 @@ HINT = (
 #: Areas from here on are told in whole mm²: their edges are known to no tenth.
 LARGE_MM2 = 100.0
 #: As many rows of the legend are seen without scrolling.
-ROWS = 7
+ROWS = 5
 #: Lines of the hint, and of what a map rests on.
 TEXT_LINES = 2
 _MEASURES = (

@@ -183,7 +183,7 @@ class InteractiveCloud(CloudView):
     def apply_theme(self, theme: Theme) -> None:
         """Apply the colours of a theme, also where there is no picture yet."""
         self._theme = theme
-        self.renderer.call(lambda window: window.set_background(theme.surround))
+        self.renderer.call(lambda window: window.set_background(theme.raised))
         self.update()
 
     def projection(self) -> NDArray[np.float64]:
@@ -229,13 +229,13 @@ class InteractiveCloud(CloudView):
     def paintEvent(self, event: QPaintEvent) -> None:
         """Paint the latest picture."""
         painter = QPainter(self)
-        painter.fillRect(event.rect(), QColor(self._theme.surround))
+        painter.fillRect(event.rect(), QColor(self._theme.raised))
         painter.drawImage(0, 0, self.image)
         # An empty view has no scale that a bar could tell.
         told = NO_POINTS if self._is_empty else self.waiting
         if self._seen is not None and not told:
             theme = self._theme
-            size, inks = (self.width(), self.height()), (theme.text, theme.accent, theme.surround)
+            size, inks = (self.width(), self.height()), (theme.text, theme.accent, theme.raised)
             OverlayPainter(painter, *size, *inks).paint(self._seen, self._overlay)
         if told:
             painter.setPen(QColor(self._theme.muted))
@@ -346,8 +346,8 @@ class StaticCloud(CloudView):
 
     def apply_theme(self, theme: Theme) -> None:
         """Set the colour behind and around the picture."""
-        self._background = theme.surround
-        self._picture.setStyleSheet(f"background: {theme.surround}")
+        self._background = theme.raised
+        self._picture.setStyleSheet(f"background: {theme.raised}")
         if self._drawn is not None:
             self.show_cloud(*self._drawn)
 

@@ -1,4 +1,4 @@
-"""What all pictures share: colour scales, steps of the arrow keys, and a rectangle to drag."""
+"""What all pictures share: colour scales, hatching, steps of the arrow keys, and a rectangle to drag."""
 
 from __future__ import annotations
 
@@ -6,7 +6,8 @@ from typing import Any
 
 import pyqtgraph as pg
 from PySide6.QtCore import QEvent, Qt
-from PySide6.QtGui import QDragLeaveEvent, QKeyEvent
+from PySide6.QtGui import QBrush, QColor, QDragLeaveEvent, QKeyEvent, QPainter, QPen
+from PySide6.QtWidgets import QGraphicsRectItem
 
 from dsl_app.shared.theme import Theme
 from dsl_app.shared.widgets.hints import hint, is_said_below
@@ -48,6 +49,39 @@ class Picture(pg.ImageItem):  # type: ignore[misc]
         scene = self.scene()
         for view in () if scene is None else scene.views():
             view.viewport().update()
+
+
+class NoValues(QGraphicsRectItem):
+    """Hatching below a picture: seen where that has no value, which no dark surface looks like."""
+
+    def __init__(self, box: pg.ViewBox) -> None:
+        super().__init__()
+        self.setPen(QPen(Qt.PenStyle.NoPen))
+        self.setZValue(-10)
+        self._ground = QColor()
+        self.setAcceptedMouseButtons(Qt.MouseButton.NoButton)
+        self.hide()
+        box.addItem(self, ignoreBounds=True)
+
+    def lie_under(self, shape: tuple[int, ...]) -> None:
+        """Fill the place of a picture (rows, columns, ...); pixels have their centres at whole numbers."""
+        self.setRect(-0.5, -0.5, shape[1], shape[0])
+        self.show()
+
+    def apply_theme(self, theme: Theme) -> None:
+        """Apply the colours of a theme."""
+        self._ground = QColor(theme.line)
+        self.setBrush(QBrush(QColor(theme.muted), Qt.BrushStyle.BDiagPattern))
+
+    def paint(self, painter: QPainter, *_: object) -> None:
+        """Hatch in pixels of the screen: the zoom of the picture would make beams of the lines."""
+        place = painter.transform().mapRect(self.rect())
+        painter.save()
+        painter.resetTransform()
+        # A single pixel may lie between two lines.
+        painter.fillRect(place, self._ground)
+        painter.fillRect(place, self.brush())
+        painter.restore()
 
 
 class PictureView(Canvas):

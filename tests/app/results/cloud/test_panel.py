@@ -96,7 +96,7 @@ def test_3d_that_fails_leaves_a_picture_and_says_what_to_do(
         seen = drawn.grab().toImage()
         edge = [seen.pixelColor(seen.width() // 2, y).name() for y in (0, seen.height() - 1)]
         within = drawn.pixmap().toImage().pixelColor(0, 0).name()
-        assert {*edge, within} == {theme.surround}
+        assert {*edge, within} == {theme.raised}
 
 
 def test_the_cloud_hides_what_lies_outside_the_limits_and_keeps_its_view(bench: Bench, qtbot: QtBot) -> None:
