@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dsl_core.model.fit import matters
+from dsl_core.reconstruction.spectral.probing.curve_probe import BETWEEN
 from dsl_core.reconstruction.spectral.probing.held_out import Hypothesis, explains_others
 from dsl_core.reconstruction.spectral.probing.pooled import pool
 from dsl_core.reconstruction.spectral.probing.probe import LEADING, PRIOR_STD, Probe
@@ -92,6 +93,28 @@ class Causes:
         return float(np.sign(plus) * min(abs(plus), abs(minus))) if plus * minus > 0 else 0.0
 
 
+def beside_curves(probe: Probe, more: Hypothesis, less: Hypothesis) -> tuple[Probe, Hypothesis, Hypothesis]:
+    """The probe and what it is asked, the curves of camera and projector being off as colours say.
+
+    Curves that are off seem to displace both orders; where colours disagree, only what curves do not explain
+    as well tells of a place. All stay as they are where colours agree, or say nothing.
+    """
+    curves = probe.curves
+    if curves is None or probe.with_curves is None or not matters(curves.whole_rms, curves.std, MOST_CURVES):
+        return probe, more, less
+    normal, score = probe.with_curves
+    knot_std = np.full(score.shape[1] - probe.score.shape[1], curves.whole_rms / BETWEEN**0.5)
+
+    def beside(asked: Hypothesis) -> Hypothesis:
+        count, own, values = asked.design.shape
+        design = np.zeros((count, own + len(knot_std), values + len(knot_std)))
+        design[:, :own, :values] = asked.design
+        design[:, own:, values:] = np.eye(len(knot_std))
+        return Hypothesis(design, np.r_[asked.prior_std, knot_std])
+
+    return replace(probe, normal=normal, score=score), beside(more), beside(less)
+
+
 def common_error(probe: Probe, causes: Causes) -> float:
     """Relative error of all reflectance that no pixel sees by itself: curves, and the level of the light.
 
@@ -118,7 +141,7 @@ def fit_causes(probe: Probe) -> Causes:
     prior_std[first : first + 2] *= [0.5**0.5, 2**0.5]
     fit = pool(probe, design, prior_std)
     others = Hypothesis(design[..., first:], prior_std[first:])
-    displaced = explains_others(probe, Hypothesis(design, prior_std), others)
+    displaced = explains_others(*beside_curves(probe, Hypothesis(design, prior_std), others))
     found, covariance = fit.values, fit.covariance
     shift = design[:, :2] @ found
     spread = np.einsum("npk,kl,npl->np", design[:, :2], covariance, design[:, :2])

@@ -21,6 +21,7 @@ from dsl_core.model.rig import Rig
 from dsl_core.optics.correspondence import GratingModel
 from dsl_core.optics.pixel_model import PixelModel
 from dsl_core.optics.spectra import ORDERS
+from dsl_core.reconstruction.spectral.causes import beside_curves
 from dsl_core.reconstruction.spectral.probing.held_out import Hypothesis, explains_others
 from dsl_core.reconstruction.spectral.probing.pooled import pool
 from dsl_core.reconstruction.spectral.probing.probe import LEADING, Probe
@@ -76,7 +77,11 @@ def fit_motion(scan: ProbedScan, probe: Probe) -> FilmMotion | None:
         return None
     effect = _effect(scan, scan.model.correspondence, probe)
     count = len(FIELDS)
-    fit = pool(probe, *_design(effect, probe.step_nm))
+    # Without the film, gains and profile explain a part already.
+    asked, moves, stays = beside_curves(
+        probe, *(Hypothesis(*_design(part, probe.step_nm)) for part in (effect, effect[..., :0]))
+    )
+    fit = pool(asked, moves.design, moves.prior_std)
     covariance = fit.covariance[:count, :count]
     std = np.sqrt(np.diag(covariance))
     # What could be chance helps no pixel, and harms those at the edge of the frame.
@@ -86,9 +91,7 @@ def fit_motion(scan: ProbedScan, probe: Probe) -> FilmMotion | None:
     shift_px, shift_std_px = (float(np.sqrt(np.mean(square))) for square in ((shift @ values) ** 2, spread))
     if shift_px < LEAST_MOTION_PX * coarseness(probe.step_nm):
         return None
-    # Without the film, gains and profile explain a part already.
-    without = Hypothesis(*_design(effect[..., :0], probe.step_nm))
-    if not explains_others(probe, Hypothesis(*_design(effect, probe.step_nm)), without):
+    if not explains_others(asked, moves, stays):
         return None
     return FilmMotion(values, std, shift_px, shift_std_px)
 
