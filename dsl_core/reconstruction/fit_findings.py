@@ -24,6 +24,7 @@ from dsl_core.reconstruction.spectral.causes import (
     Causes,
     fit_causes,
 )
+from dsl_core.reconstruction.spectral.evenness import MOST_UNEVEN, fit_evenness
 from dsl_core.reconstruction.spectral.film_motion import LEAST_MOTION_PX, FilmMotion, coarseness
 from dsl_core.reconstruction.spectral.model_error import ModelError
 from dsl_core.reconstruction.spectral.probing.curve_probe import USUAL_STEEPNESS, CurveMisfit
@@ -343,6 +344,7 @@ def cause_findings(
         "Let the projector warm up for longer.",
     )
     yield drift.model_copy(update={"significant": causes.drifts})
+    yield from _evenness(probe)
     if probe.curves is not None:
         yield FitFinding.judged(
             "curves",
@@ -365,6 +367,25 @@ def cause_findings(
         f"Frames of most pixels differ from the model by {np.sqrt(usual):.1f} times their noise.",
         f"Surfaces that light each other, and translucent ones, do that. If there are none: {_CALIBRATE}",
     )
+
+
+def _evenness(probe: Probe) -> Iterator[FitFinding]:
+    light = fit_evenness(probe)
+    if light is None:
+        return
+    found = FitFinding.judged(
+        "light",
+        "evenness of the projector's light",
+        (light.change, light.std),
+        "1",
+        MOST_UNEVEN,
+        f"The projector's light changes by {light.change:+.1%} from the middle of its frame to its left and"
+        f" right. Lines of one wavelength are brighter than those of another: reflectances are off by about"
+        f" {light.error:.1%}, as stated.",
+        "Scan with the object in the middle of the projector's frame, where its light is even; no flat field"
+        " of the camera corrects this.",
+    )
+    yield found.model_copy(update={"significant": light.matters})
 
 
 def _wide_bands(probe: Probe, curves: CurveMisfit) -> FitFinding:

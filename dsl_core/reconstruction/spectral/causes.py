@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dsl_core.model.fit import matters
+from dsl_core.reconstruction.spectral.evenness import fit_evenness
 from dsl_core.reconstruction.spectral.probing.curve_probe import BETWEEN
 from dsl_core.reconstruction.spectral.probing.held_out import Hypothesis, explains_others
 from dsl_core.reconstruction.spectral.probing.pooled import pool
@@ -116,14 +117,17 @@ def beside_curves(probe: Probe, more: Hypothesis, less: Hypothesis) -> tuple[Pro
 
 
 def common_error(probe: Probe, causes: Causes) -> float:
-    """Relative error of all reflectance that no pixel sees by itself: curves, and the level of the light.
+    """Relative error of all reflectance that no pixel sees by itself: curves, and light over time and frame.
 
     With what bands leave that are wide for the light of the rig.
     """
     curves = probe.curves
     off = curves is not None and matters(curves.whole_rms, curves.std, MOST_CURVES)
     share = curves.whole_rms if curves is not None and off else 0.0
-    return float(np.hypot(share, SINCE_START * causes.drift if causes.drifts else 0.0))
+    light = fit_evenness(probe)
+    uneven = light.error if light is not None and light.matters else 0.0
+    drift = SINCE_START * causes.drift if causes.drifts else 0.0
+    return float(np.linalg.norm([share, uneven, drift]))
 
 
 def fit_causes(probe: Probe) -> Causes:
