@@ -28,17 +28,13 @@ class Evenness:
     """``change`` of the light from the middle of the frame to its left and right, with its deviation.
 
     ``error`` is what it puts reflectances off by, relative, root mean square over pixels and bands.
+    ``matters`` is whether that is much, no chance, and explains pixels that the fit has not seen.
     """
 
     change: float
     std: float
     error: float
-    explains: bool
-
-    @property
-    def matters(self) -> bool:
-        """Whether it matters, is not chance, and explains pixels that its fit has not seen."""
-        return self.explains and matters(self.change, self.std, MOST_UNEVEN)
+    matters: bool
 
 
 def fit_evenness(probe: Probe) -> Evenness | None:
@@ -52,10 +48,8 @@ def fit_evenness(probe: Probe) -> Evenness | None:
     prior_std = np.r_[UNEVEN_STD, PRIOR_STD[2:LEADING]]
     fit = pool(probe, design, prior_std)
     change, std = float(fit.values[0]), float(np.sqrt(fit.covariance[0, 0]))
+    error = abs(change) * float(np.sqrt(np.mean(probe.sideways**2)))
+    if not matters(change, std, MOST_UNEVEN):
+        return Evenness(change, std, error, False)
     uneven, even = Hypothesis(design, prior_std), Hypothesis(design[..., 1:], prior_std[1:])
-    return Evenness(
-        change,
-        std,
-        abs(change) * float(np.sqrt(np.mean(probe.sideways**2))),
-        explains_others(probe, uneven, even),
-    )
+    return Evenness(change, std, error, explains_others(probe, uneven, even))
