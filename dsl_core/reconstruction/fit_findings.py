@@ -24,6 +24,7 @@ from dsl_core.reconstruction.spectral.causes import (
     Causes,
     fit_causes,
 )
+from dsl_core.reconstruction.spectral.evenness import MOST_UNEVEN, fit_evenness
 from dsl_core.reconstruction.spectral.film_motion import LEAST_MOTION_PX, FilmMotion, coarseness
 from dsl_core.reconstruction.spectral.model_error import ModelError
 from dsl_core.reconstruction.spectral.probing.curve_probe import USUAL_STEEPNESS, CurveMisfit
@@ -64,6 +65,11 @@ _MOTIONS = (
     ("away from the projector", 2, " mm"),
 )
 _CALIBRATE = "run the drift check; calibrate again the part that it names."
+#: Turned by 0.05 degrees, a camera displaces orders like a film 0.3 mm farther away, and depth by 1 %.
+_OR_TURNED = (
+    " A camera or projector that has turned a little displaces the orders alike, and then depth is off, too:"
+    " measure a surface at a known distance."
+)
 
 
 @dataclass(frozen=True)
@@ -338,6 +344,7 @@ def cause_findings(
         "Let the projector warm up for longer.",
     )
     yield drift.model_copy(update={"significant": causes.drifts})
+    yield from _evenness(probe)
     if probe.curves is not None:
         yield FitFinding.judged(
             "curves",
@@ -360,6 +367,25 @@ def cause_findings(
         f"Frames of most pixels differ from the model by {np.sqrt(usual):.1f} times their noise.",
         f"Surfaces that light each other, and translucent ones, do that. If there are none: {_CALIBRATE}",
     )
+
+
+def _evenness(probe: Probe) -> Iterator[FitFinding]:
+    light = fit_evenness(probe)
+    if light is None:
+        return
+    found = FitFinding.judged(
+        "light",
+        "evenness of the projector's light",
+        (light.change, light.std),
+        "1",
+        MOST_UNEVEN,
+        f"The projector's light changes by {light.change:+.1%} from the middle of its frame to its left and"
+        f" right. Lines of one wavelength are brighter than those of another: reflectances are off by about"
+        f" {light.error:.1%}, as stated.",
+        "Scan with the object in the middle of the projector's frame, where its light is even; no flat field"
+        " of the camera corrects this.",
+    )
+    yield found.model_copy(update={"significant": light.matters})
 
 
 def _wide_bands(probe: Probe, curves: CurveMisfit) -> FitFinding:
@@ -402,7 +428,7 @@ def _motion(motion: FilmMotion, probe: Probe) -> FitFinding:
         f" by {motion.shift_px * probe.nm_per_px:.2f} nm." + CORRECTED,
         advice="Fix the film so that it cannot slip; if it moves further, repeat the depth-stage calibration."
         " The level of the light may have changed, too, which no scan can tell: the drift check with the"
-        " Spectralon does.",
+        " Spectralon does." + _OR_TURNED,
     )
 
 
@@ -420,7 +446,7 @@ def _film(causes: Causes, probe: Probe) -> FitFinding:
         f"Wavelengths are off by {causes.rms_px * probe.nm_per_px:.2f} nm: order +1 lies {plus:+.3f} columns"
         f" from its place, order -1 {minus:+.3f}, on average; the film has moved or is bent"
         f" otherwise{lines}.",
-        "Run the drift check, and calibrate the depth stage again.",
+        "Run the drift check, and calibrate the depth stage again." + _OR_TURNED,
     )
 
 

@@ -105,7 +105,8 @@ def flat_finding(found: FlatFit) -> FitFinding:
         significant=found.present,
         sentence=(
             f"Surfaces of one colour change by {change:+.1%} from the middle to the farthest corner, alike on"
-            " all sides: the gain of the camera is not as calibrated. Spectra of this result are corrected."
+            " all sides: the gain of the camera, or how even the projector's light is, is not as calibrated."
+            " Spectra of this result are corrected as for the camera."
         ),
         advice="Measure the flat field with a white sheet.",
     )

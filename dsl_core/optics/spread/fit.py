@@ -123,6 +123,11 @@ def fit_spread(
         or found.after - better.after < better.after * CLEARLY / better.pixels
     ):
         return found
+    # Where lines do not overlap, a field may follow what columns have made of other light.
+    every = torch.arange(len(view.start_px))
+    flat = _left_by(replace(view, width=known), found.response, every)
+    if _left_by(replace(view, width=varies.width), better.response, every) > (1 + CLEAR_SHARE) * flat:
+        return found
     response = better.response.model_copy(update={"field": varies.field})
     return replace(better, response=response, changed=True, field=varies, before=found.before)
 

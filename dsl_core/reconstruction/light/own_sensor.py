@@ -129,6 +129,7 @@ def _steps(step_dn: int, sensor: Sensor) -> FitFinding:
         # Rounding then adds as much as there is noise.
         max(float(np.sqrt(12)) * sensor.read_noise_dn, 1.5 * sensor.step_dn),
         f"The frames' values come in steps of {step_dn} DN, as in pictures of {bits} bits; the camera has"
-        f" {sensor.bit_depth}. Deviations include that; faint light is lost.",
+        f" {sensor.bit_depth}. Deviations include that as noise; light fainter than a step is lost, and"
+        " spectra of dark surfaces are off by more.",
         f"Store frames with all {sensor.bit_depth} bits of the camera, as raw files or 16-bit PNG or TIFF.",
     )

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dsl_core.model.fit import matters
+from dsl_core.reconstruction.spectral.evenness import fit_evenness
 from dsl_core.reconstruction.spectral.probing.cell_sums import CellSums
+from dsl_core.reconstruction.spectral.probing.curve_probe import BETWEEN
 from dsl_core.reconstruction.spectral.probing.held_out import Hypothesis, explains_others
 from dsl_core.reconstruction.spectral.probing.probe import LEADING, PRIOR_STD, Probe
 from dsl_core.reconstruction.spectral.probing.probed_light import PARAMETERS
@@ -92,15 +94,37 @@ class Causes:
         return float(np.sign(plus) * min(abs(plus), abs(minus))) if plus * minus > 0 else 0.0
 
 
+def beside_curves(probe: Probe, design: Floats, prior_std: Floats) -> Hypothesis:
+    """Values of a design (n, p, k), the curves of camera and projector being off as colours say.
+
+    Curves that are off seem to displace both orders; where colours disagree, only what curves do not explain
+    as well tells of a place. Then what colours ask of the curves follows after the k values.
+    """
+    curves = probe.curves
+    if curves is None or probe.with_curves is None or not matters(curves.whole_rms, curves.std, MOST_CURVES):
+        return Hypothesis(CellSums.of(probe, design), prior_std)
+    normal, score = probe.with_curves
+    count, own, values = design.shape
+    knot_std = np.full(score.shape[1] - own, curves.whole_rms / BETWEEN**0.5)
+    wider = np.zeros((count, own + len(knot_std), values + len(knot_std)))
+    wider[:, :own, :values] = design
+    wider[:, own:, values:] = np.eye(len(knot_std))
+    sums = CellSums.of(replace(probe, normal=normal, score=score), wider)
+    return Hypothesis(sums, np.r_[prior_std, knot_std])
+
+
 def common_error(probe: Probe, causes: Causes) -> float:
-    """Relative error of all reflectance that no pixel sees by itself: curves, and the level of the light.
+    """Relative error of all reflectance that no pixel sees by itself: curves, and light over time and frame.
 
     With what bands leave that are wide for the light of the rig.
     """
     curves = probe.curves
     off = curves is not None and matters(curves.whole_rms, curves.std, MOST_CURVES)
     share = curves.whole_rms if curves is not None and off else 0.0
-    return float(np.hypot(share, SINCE_START * causes.drift if causes.drifts else 0.0))
+    light = fit_evenness(probe)
+    uneven = light.error if light is not None and light.matters else 0.0
+    drift = SINCE_START * causes.drift if causes.drifts else 0.0
+    return float(np.linalg.norm([share, uneven, drift]))
 
 
 def fit_causes(probe: Probe) -> Causes:
@@ -118,8 +142,7 @@ def fit_causes(probe: Probe) -> Causes:
     prior_std[first : first + 2] *= [0.5**0.5, 2**0.5]
     sums = CellSums.of(probe, design)
     fit = sums.fit(prior_std)
-    others = Hypothesis(sums.tail(first), prior_std[first:])
-    displaced = explains_others(Hypothesis(sums, prior_std), others)
+    displaced = explains_others(beside_curves(probe, design, prior_std), first)
     found, covariance = fit.values, fit.covariance
     shift = design[:, :2] @ found
     spread = np.einsum("npk,kl,npl->np", design[:, :2], covariance, design[:, :2])

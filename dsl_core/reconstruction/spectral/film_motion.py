@@ -21,8 +21,8 @@ from dsl_core.model.rig import Rig
 from dsl_core.optics.correspondence import GratingModel
 from dsl_core.optics.pixel_model import PixelModel
 from dsl_core.optics.spectra import ORDERS
-from dsl_core.reconstruction.spectral.probing.cell_sums import CellSums
-from dsl_core.reconstruction.spectral.probing.held_out import Hypothesis, explains_others
+from dsl_core.reconstruction.spectral.causes import beside_curves
+from dsl_core.reconstruction.spectral.probing.held_out import explains_others
 from dsl_core.reconstruction.spectral.probing.probe import LEADING, Probe
 from dsl_core.reconstruction.spectral.probing.probe import PRIOR_STD as PARAMETER_STD
 from dsl_core.reconstruction.spectral.probing.probed_light import PARAMETERS, ProbedScan
@@ -76,9 +76,8 @@ def fit_motion(scan: ProbedScan, probe: Probe) -> FilmMotion | None:
         return None
     effect = _effect(scan, scan.model.correspondence, probe)
     count = len(FIELDS)
-    design, prior_std = _design(effect, probe.step_nm)
-    sums = CellSums.of(probe, design)
-    fit = sums.fit(prior_std)
+    moves = beside_curves(probe, *_design(effect, probe.step_nm))
+    fit = moves.sums.fit(moves.prior_std)
     covariance = fit.covariance[:count, :count]
     std = np.sqrt(np.diag(covariance))
     # What could be chance helps no pixel, and harms those at the edge of the frame.
@@ -89,8 +88,7 @@ def fit_motion(scan: ProbedScan, probe: Probe) -> FilmMotion | None:
     if shift_px < LEAST_MOTION_PX * coarseness(probe.step_nm):
         return None
     # Without the film, gains and profile explain a part already.
-    without = Hypothesis(sums.tail(count), prior_std[count:])
-    if not explains_others(Hypothesis(sums, prior_std), without):
+    if not explains_others(moves, count):
         return None
     return FilmMotion(values, std, shift_px, shift_std_px)
 

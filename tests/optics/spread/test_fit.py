@@ -219,12 +219,14 @@ def test_half_of_the_pixels_judges_what_the_other_half_asks_for() -> None:
     assert not _choose([quadratic(1.2), quadratic(0.83)], family, shapes=False).changed
 
 
-@pytest.mark.parametrize(("pixels", "counts"), [(990, True), (970, False)])
-def test_a_field_that_leaves_pixels_out_explains_nothing(
-    pixels: int, counts: bool, monkeypatch: pytest.MonkeyPatch
+@pytest.mark.parametrize(
+    ("pixels", "wider", "counts"), [(990, 1.0, True), (970, 1.0, False), (990, 1.5, False)]
+)
+def test_a_field_that_leaves_pixels_out_or_more_of_their_lines_explains_nothing(
+    pixels: int, wider: float, counts: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     peaks, column = seen(KNOWN, runs=40)
-    width = torch.ones_like(column)
+    width = torch.full_like(column, wider)
     field = SpreadField(centre_px=(300.0, 100.0), half_px=(300.0, 100.0), coefficients=(0.0,) * 6)
     fields = iter([FieldFit(field, np.eye(6), width, 0.01)] * 2)
     curves = iter(

@@ -176,7 +176,7 @@ def test_orders_share_the_smaller_gain_of_one_sign(gain: tuple[float, float], co
 
 def test_curves_and_drift_add_to_what_no_pixel_sees() -> None:
     def probe(curves: Any) -> Any:
-        return SimpleNamespace(curves=curves)
+        return SimpleNamespace(sideways=None, curves=curves)
 
     seen, chance, small = ((0.016, 0.001), (0.016, 0.02), (0.014, 0.001))
     drift = 0.015 / np.sqrt(3)

@@ -14,6 +14,7 @@ from dsl_core.model.spectral import WavelengthGrid
 from dsl_core.optics.correspondence import GratingModel
 from dsl_core.optics.spectra import ORDERS
 from dsl_core.reconstruction.spectral.film_motion import FIELDS, FilmMotion, fit_motion, with_film
+from dsl_core.reconstruction.spectral.probing.curve_probe import KNOTS_NM
 from dsl_core.reconstruction.spectral.probing.line_probe import LineProbe
 from dsl_core.reconstruction.spectral.probing.probe import Probe
 from dsl_core.reconstruction.spectral.probing.probed_light import PARAMETERS, ProbedScan
@@ -108,3 +109,50 @@ def test_displacement_of_a_corner_is_no_motion_of_the_film(scan: ProbedScan) -> 
 def test_a_small_piece_of_one_colour_tells_nothing(scan: ProbedScan) -> None:
     slipped = displaced(scan.model.rig, np.array([0.0, 0.1, 0.0, 0.0, 0.0]))
     assert fit_motion(scan, replace(slipped, places=False)) is None
+
+
+def with_curves_off(rig: Rig, moved_mm: float) -> Probe:
+    """A film that has moved away by so much, and curves by whose errors it seems to have moved by 0.3 mm.
+
+    What pixels see of the places of the orders is both together; colours see the curves alone.
+    """
+    pixels = displaced(rig, np.array([0.0, 0.0, 0.0, 0.0, 0.3]))
+    count, own, knots = len(pixels.pixel), len(PARAMETERS), 3 * len(KNOTS_NM)
+    random = np.random.default_rng(3)
+    seen = np.array(
+        [list(PARAMETERS).index(f"{kind} {order:+d}") for kind in ("shift", "stretch") for order in ORDERS]
+    )
+    alike = np.zeros((count, own))
+    alike[:, seen] = ((pixels.score - probed({}).score) * STD**2)[:, seen]  # without its noise
+    off = 0.05 * np.where(np.arange(knots) % 2, 1.0, -1.0)
+    model = np.zeros((count, own + knots, own + knots))
+    model[:] = np.eye(own + knots)
+    model[:, :own, own:] = alike[..., None] * off / (off @ off)
+    std = np.r_[STD, np.full(knots, 0.1)]
+    truth = np.concatenate([alike * moved_mm / 0.3, np.tile(off, (count, 1))], 1)
+    data = (model @ truth[..., None])[..., 0] + std * random.standard_normal(truth.shape)
+    heavy = model.transpose(0, 2, 1) / std**2
+    shapes = np.cos(np.arange(1, 5)[:, None] * np.linspace(0, np.pi, 40))
+    normal, score = heavy @ model, (heavy @ data[..., None])[..., 0]
+    return replace(
+        pixels,
+        normal=normal[:, :own, :own],
+        score=score[:, :own],
+        reflectance=0.5 + 0.2 * random.uniform(-1, 1, (count, 4)) @ shapes,
+        with_curves=(normal, score),
+    )
+
+
+@pytest.mark.parametrize(("moved_mm", "found"), [(0.0, False), (0.5, True)])
+def test_what_curves_do_that_are_off_is_no_motion(scan: ProbedScan, moved_mm: float, found: bool) -> None:
+    probe = with_curves_off(scan.model.rig, moved_mm)
+    assert probe.curves is not None
+    assert probe.curves.rms > 0.02
+    # Who does not look at the colours takes both for one motion.
+    taken_in = fit_motion(scan, replace(probe, with_curves=None))
+    assert taken_in is not None
+    assert taken_in.values[4] > moved_mm + 0.2
+    motion = fit_motion(scan, probe)
+    assert (motion is not None) == found
+    if motion is not None:
+        assert abs(motion.values[4] - moved_mm) < 3 * motion.std[4]

@@ -20,25 +20,26 @@ LEAST_FALL, FALL_SIGMAS = 25.0, 1.5
 
 @dataclass(frozen=True)
 class Hypothesis:
-    """Numbers (k,), with their prior, and what the cells of a picture ask of them."""
+    """Values (k,) by their prior, and what the cells of a picture ask of them."""
 
     sums: CellSums
     prior_std: Floats
 
 
-def explains_others(more: Hypothesis, less: Hypothesis) -> bool:
-    """Whether ``more`` numbers, fitted to some cells of the picture, explain the others surely better.
+def explains_others(asked: Hypothesis, first: int) -> bool:
+    """Whether the ``first`` values, fitted to some cells of the picture, explain the others surely better.
 
-    Both are of the same pixels. What a few cells alone ask for, an error of their own, explains no others.
+    Better than the values after them do alone. What a few cells ask for, an error of their own, explains no
+    others.
     """
-    cell = more.sums.cell
+    rest, rest_std = asked.sums.tail(first), asked.prior_std[first:]
+    cell = asked.sums.cell
     fold = (cell // CELLS[1] + cell % CELLS[1]) % FOLDS
     fall, excess = np.zeros(len(cell)), 1.0
     for out in range(FOLDS):
         here = fold == out
-        fit = more.sums.fit(more.prior_std, ~here)
-        other = less.sums.fit(less.prior_std, ~here)
-        fall[here] = (more.sums.falls(fit.values) - less.sums.falls(other.values))[here]
+        fit, without = asked.sums.fit(asked.prior_std, ~here), rest.fit(rest_std, ~here)
+        fall[here] = (asked.sums.falls(fit.values) - rest.falls(without.values))[here]
         excess = max(excess, fit.excess)
     total = float(fall.sum())
     return total > LEAST_FALL * excess and total > FALL_SIGMAS * float(np.linalg.norm(fall))

@@ -69,7 +69,9 @@ class Probe:
     them, None where nobody asked. ``lines`` is what the zero order of the same pixels says, ``nm_per_px``
     how far apart columns of the first orders are, ``step_nm`` bands; ``steepness`` is by how much the
     logarithm of the light changes along 1 nm. ``places`` is whether pixels can tell where the orders are:
-    on a small piece of one colour an error of its spectrum looks like a shift.
+    on a small piece of one colour an error of its spectrum looks like a shift. ``sideways`` (n, 2) is by how
+    much lines of each order are farther to the sides of the projector's frame than the pixel's own column:
+    the difference of squares, one at the side, mean over bands; None where nobody traced them.
     """
 
     normal: Floats
@@ -88,6 +90,7 @@ class Probe:
     steepness: float = USUAL_STEEPNESS
     with_curves: tuple[Floats, Floats] | None = None
     freedom: Floats | None = None
+    sideways: Floats | None = None
 
     @cached_property
     def sound(self) -> NDArray[np.bool_]:
@@ -146,6 +149,7 @@ def probe(scan: ProbedScan) -> Probe | None:
         with_curves=whole,
         lines=probe_lines(lines, response, scan.pixels, scan.radiance, scan.std, targets, widths),
         nm_per_px=_nm_per_px(scan, targets),
+        sideways=_sideways(scan, targets),
     )
 
 
@@ -162,6 +166,21 @@ def _nm_per_px(scan: ProbedScan, targets: Indices) -> float:
     columns = scan.model.trace(torch.as_tensor(targets), depth, orders=ORDERS[:1]).orders[ORDERS[0]].columns
     nm = scan.model.bands.centres_nm
     return float((nm[-1] - nm[0]) / (columns[-1] - columns[0]).abs().mean())
+
+
+def _sideways(scan: ProbedScan, targets: Indices) -> Floats:
+    """How much farther to the sides lines of orders are than own columns; 0 where none arrives, (n, 2)."""
+    model = scan.model
+    depth = torch.as_tensor(scan.pixels.depth_mm.ravel()[targets], dtype=torch.float64)
+    half = model.rig.projector.width_px / 2
+    own = torch.as_tensor(scan.pixels.column_px.ravel()[targets], dtype=torch.float64) / half - 1
+    traced = model.trace(torch.as_tensor(targets), depth, orders=ORDERS).orders
+    found = []
+    for order in ORDERS:
+        inside = model.inside(traced[order])
+        away = (traced[order].columns / half - 1) ** 2 - own**2
+        found.append(torch.where(inside, away, 0.0).sum(0) / inside.sum(0).clip(min=1))
+    return np.asarray(torch.stack(found, 1).numpy())
 
 
 def _probe_some(scan: ProbedScan, targets: Indices) -> dict[str, NDArray[Any]]:

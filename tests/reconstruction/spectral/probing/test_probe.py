@@ -121,6 +121,7 @@ def probed(monkeypatch: pytest.MonkeyPatch, share: float, varied: bool, **model:
     monkeypatch.setattr(probe_module, "widths_at", lambda *_: None)
     monkeypatch.setattr(probe_module, "probe_lines", lambda *_: None)
     monkeypatch.setattr(probe_module, "_nm_per_px", lambda *_: 2.0)
+    monkeypatch.setattr(probe_module, "_sideways", lambda *_: None)
     monkeypatch.setattr(probe_module, "_steepness", lambda *_: 0.1)
     camera = SimpleNamespace(width_px=1000 * share, fx_px=1000.0)
     given = {
@@ -180,3 +181,21 @@ def test_wavelengths_are_those_between_columns_whichever_way_they_run() -> None:
     scan: Any = SimpleNamespace(model=model, pixels=pixels)
     # 150 nm over a hundred columns and over fifty, 75 in the mean.
     assert probe_module._nm_per_px(scan, np.array([2, 0])) == pytest.approx(2.0)
+
+
+def test_lines_to_the_sides_of_own_columns_are_those_that_arrive() -> None:
+    columns = torch.tensor([[100.0, 300.0], [torch.nan, 260.0], [0.0, 250.0]])
+
+    def trace(where: torch.Tensor, depth: torch.Tensor, orders: tuple[int, ...]) -> Any:
+        return SimpleNamespace(orders={order: SimpleNamespace(columns=columns) for order in orders})
+
+    def inside(seen: Any) -> torch.Tensor:
+        return torch.as_tensor(seen.columns < 290)  # NaN is nowhere
+
+    rig = SimpleNamespace(projector=SimpleNamespace(width_px=400))
+    pixels = SimpleNamespace(depth_mm=np.full((2, 2), 7.0), column_px=np.array([[200.0, 0.0], [300.0, 0.0]]))
+    scan: Any = SimpleNamespace(model=SimpleNamespace(trace=trace, inside=inside, rig=rig), pixels=pixels)
+    # In half widths from the middle: -0.5 and -1 beside 0.5; 0.3 and 0.25 beside 0.
+    own, other = (0.5**2 + 1) / 2 - 0.5**2, (0.3**2 + 0.25**2) / 2
+    found = probe_module._sideways(scan, np.array([2, 0]))
+    assert found == pytest.approx(np.array([[own, own], [other, other]]))
