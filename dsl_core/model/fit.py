@@ -117,10 +117,12 @@ class Fit(Record):
 
     ``model_error[band][row][column]`` is the part of the stated deviation of reflectance that is the model's,
     as a share of reflectance, in cells of the picture; the rest is noise. Empty where nothing is known.
+    ``unseen`` is what no finding can tell, in a sentence, such as the age of the calibration.
     """
 
     findings: tuple[FitFinding, ...] = ()
     model_error: tuple[tuple[tuple[float, ...], ...], ...] = ()
+    unseen: str = ""
 
     @classmethod
     def of(
@@ -165,10 +167,12 @@ class Fit(Record):
 
     @property
     def words(self) -> str:
-        """The verdict: how well the model fits, then what does not, each with what to do about it."""
+        """The verdict, what does not fit, each with what to do about it, and what no finding can tell."""
         lines = [self.headline, *(f"{f.sentence} {f.advice}".strip() for f in self.significant)]
         if self.significant and self.model_error:
             lines.append(f"Deviations of reflectance contain {self.model_share:.1%} of it for the model.")
+        if self.unseen:
+            lines.append(self.unseen)
         return "\n".join(lines)
 
     @property

@@ -27,6 +27,8 @@ from dsl_core.io.scan.origin import is_of_this_computer, model_notes, rig_of_not
 from dsl_core.io.scan.proof_file import read_proof
 from dsl_core.model.attributes import PLAN_ATTRIBUTE
 from dsl_core.model.conditions import differences
+from dsl_core.model.fit import ATTRIBUTE as FIT_ATTRIBUTE
+from dsl_core.model.fit import Fit
 from dsl_core.model.frames import FrameSource
 from dsl_core.model.plan import CapturePlan
 from dsl_core.model.result_sink import ResultSink, SeenGeometry
@@ -36,8 +38,9 @@ from dsl_core.model.spectral import WavelengthGrid
 from dsl_core.patterns.images import pattern_image
 from dsl_core.pipeline import Options, reconstruct, scan
 from dsl_core.progress import NoProgress, Progress
+from dsl_core.reconstruction.calibration_age import unseen_since
 from dsl_core.version import __version__
-from dsl_core.workflows.captures import sensor_of_scan, with_imported_sensor
+from dsl_core.workflows.captures import is_import, sensor_of_scan, with_imported_sensor
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -138,6 +141,7 @@ def reconstruct_scan(
             **({DOUBTS: json.dumps(proof.doubts)} if proof.doubts else {}),
             **({NOT_JUDGED: proof.not_judged} if proof.untold else {}),
             **model_notes(rig, options.correspondence),
+            **_dated(result, rig, reader),
             "captured": reader.manifest.created,
             "captured_with": reader.manifest.rig_name,
             PLAN_ATTRIBUTE: reader.plan.model_dump_json(),
@@ -145,6 +149,16 @@ def reconstruct_scan(
             COSTS_ATTRIBUTE: json.dumps([asdict(stage) for stage in timer.stages]),
         }
     )
+
+
+def _dated(result: xr.Dataset, rig: Rig, reader: ScanReader) -> dict[str, str]:
+    """The verdict of a result, with what its scan cannot tell of a calibration that is old."""
+    # An import is dated by when it was made, and nobody knows when its pictures were taken.
+    unseen = "" if is_import(reader) else unseen_since(rig, reader.manifest.created)
+    fit = Fit.read({str(name): value for name, value in result.attrs.items()})
+    if fit is None or not unseen:
+        return {}
+    return {FIT_ATTRIBUTE: fit.model_copy(update={"unseen": unseen}).model_dump_json()}
 
 
 def reconstruct_to(

@@ -44,6 +44,11 @@ def test_the_part_of_the_model_in_the_deviations_is_told_where_it_matters() -> N
     assert Fit.of([finding("orders", 0.5, False)], error).words == "The model fits this rig and scene."
 
 
+def test_what_no_finding_can_tell_comes_last() -> None:
+    assert Fit(unseen="Old.").words == "The model fits this rig and scene.\nOld."
+    assert Fit(unseen="Old.", findings=(finding("light", 2.0, True),)).words.endswith("\nOld.")
+
+
 @pytest.mark.parametrize(
     ("found", "significant"), [(0.3, True), (0.1, False), ((-0.3, 0.05), True), ((0.3, 0.11), False)]
 )

@@ -12,8 +12,10 @@ from dsl_core.devices.replay import replay_rig
 from dsl_core.errors import DecodeError, DeviceError, StoreError
 from dsl_core.io.scan.folder import ScanReader, ScanWriter
 from dsl_core.io.scan.origin import rig_notes
+from dsl_core.model.fit import Fit
 from dsl_core.model.frames import Frame
 from dsl_core.model.plan import CapturePlan, GrayCode, LineComb, Setting
+from dsl_core.model.rig import Provenance
 from dsl_core.patterns.images import pattern_image
 from dsl_core.workflows import scans
 from dsl_core.workflows.scans import prepare_resume, reopen_rig, resume, truth_of
@@ -109,3 +111,15 @@ def test_a_scan_from_elsewhere_does_not_open_devices(
     ScanWriter.create(tmp_path / "b.dsl", PLAN, None, own).close()
     reopen_rig(tmp_path / "b.dsl")
     assert opened == ["laboratory"]
+
+
+@pytest.mark.parametrize(("notes", "told"), [({}, True), ({"imported_sensor": "{}"}, False)])
+def test_a_result_says_that_its_calibration_is_old_unless_its_pictures_have_no_date(
+    folder: Path, notes: dict[str, str], told: bool
+) -> None:
+    reader = ScanReader(folder)
+    reader.manifest.notes.update(notes)
+    rig = small_rig().model_copy(update={"provenance": Provenance(created="2020-01-01")})
+    found = Fit.read({**scans._dated(small_result().assign_attrs(fit=Fit().model_dump_json()), rig, reader)})
+    assert (found is not None) == told
+    assert found is None or "days older than this scan" in found.words

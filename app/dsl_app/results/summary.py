@@ -72,6 +72,7 @@ def summarise(result: ResultArrays | None, offer: Path | None, busy: str, is_beg
     missed = read_missed(result.attributes)
     doubted = fit if fit is not None and fit.significant else None
     lacks = [text] if (text := missing_text(result)) else []
+    unseen = [fit.unseen] if fit is not None and fit.unseen else []
     parts = (f"{width} × {height} px{bands}", captured, effects, str(result.path))
     return Summary(
         content,
@@ -82,8 +83,8 @@ def summarise(result: ResultArrays | None, offer: Path | None, busy: str, is_beg
         ),
         message=message,
         has_result=True,
-        warning=" ".join([*missed, *([doubted.headline] if doubted else []), *lacks]),
-        advice="\n".join([*missed, *([doubted.words] if doubted else []), *lacks]),
+        warning=" ".join([*missed, *([doubted.headline] if doubted else []), *lacks, *unseen]),
+        advice="\n".join([*missed, *([doubted.words] if doubted else unseen), *lacks]),
     )
 
 

@@ -118,6 +118,19 @@ def test_what_the_calibration_missed_stands_before_what_does_not_fit() -> None:
     assert "the place of the film" in both.warning
 
 
+def test_what_no_scan_shows_is_told_once_whether_the_model_fits_or_not() -> None:
+    old = "The calibration is 21 days older than this scan."
+    lost = FitFinding(
+        part="film", name="shift", value=0.1, unit="mm", limit=0.02, significant=True, sentence="It moved.",
+    )  # fmt: skip
+    fits = summarise(result(fit=Fit(unseen=old).model_dump_json()), None, "")
+    assert fits.warning == fits.advice == old
+    both = summarise(result(fit=Fit(findings=(lost,), unseen=old).model_dump_json()), None, "")
+    assert both.warning.endswith(old)
+    assert both.advice.endswith(f"It moved.\n{old}")
+    assert both.advice.count(old) == 1
+
+
 def test_a_model_that_does_not_fit_is_told_in_a_line_of_its_own(qtbot: QtBot, tmp_path: Path) -> None:
     found = FitFinding(
         part="film", name="shift", value=0.1, unit="mm", limit=0.02, significant=True,
