@@ -109,9 +109,14 @@ def scanned(patch: Patch) -> MemoryScan:
 
 
 @functools.cache
-def _drives(plan: CapturePlan) -> Floats:
-    """What the projector shows in every shot, (shots, width, LEDs); most cases have the same plan."""
-    return np.stack([pattern_image(plan, shot)[0] for shot in plan.shots()]) / 255
+def _drives(plan: CapturePlan) -> tuple[Floats, NDArray[np.intp]]:
+    """What the projector shows, (pictures, width, LEDs), and the picture of every shot.
+
+    Most cases have the same plan, and settings show the same pictures.
+    """
+    shown = np.stack([pattern_image(plan, shot)[0] for shot in plan.shots()])
+    pictures, which = np.unique(shown, axis=0, return_inverse=True)
+    return pictures / 255, which.ravel()
 
 
 def _rates(patch: Patch, plan: CapturePlan) -> Floats:
@@ -119,9 +124,9 @@ def _rates(patch: Patch, plan: CapturePlan) -> Floats:
     rig, shape = patch.rig, patch.depth_mm.shape
     pixels = torch.arange(patch.depth_mm.size)
     depth = torch.as_tensor(patch.depth_mm.ravel())
-    drives = _drives(plan)
+    drives, which = _drives(plan)
     response = rig.projector_response
-    light, which = np.unique(response.radiance(drives), axis=0, return_inverse=True)
+    light = response.radiance(drives)
     column = zero_order(rig, pixels, depth)[0]
     everywhere = torch.ones_like(column[None], dtype=torch.bool)
     moments = {order: hat_moments(rig, order, FINE_NM, STEP_NM)[0] for order in (0, 1, -1)}
@@ -137,7 +142,7 @@ def _rates(patch: Patch, plan: CapturePlan) -> Floats:
     colours = ImageFormation(response, light, paths, shading).forward(torch.as_tensor(reflectance)).numpy()
     own = bayer_channels(rig.sensor.bayer, *shape).ravel()
     mosaic = colours[own, :, np.arange(own.size)].T.reshape(-1, *shape)
-    return np.asarray(mosaic[which.ravel()])
+    return np.asarray(mosaic[which])
 
 
 def true_shading(patch: Patch) -> Floats:
