@@ -95,7 +95,7 @@ class ExposureSearch:
     def _brightness(self, pixels: NDArray[np.uint16]) -> float:
         """The brightest pixels that count, as a share of the range above black; 1 if saturated."""
         flat = pixels.ravel()
-        judged = flat[:: max(flat.size // _PIXELS, 1)]
+        judged = flat[:: flat.size // _PIXELS | 1]  # an odd step: every other column has only two colours
         place = int(judged.size * (1.0 - BRIGHTEST_SHARE))
         level = float(np.partition(judged, place)[place])
         if level >= self._full:

@@ -120,9 +120,18 @@ def test_half_a_percent_of_pixels_may_be_brighter(glints: int, level: float) -> 
 def test_large_frames_are_judged_by_an_even_part_of_their_pixels() -> None:
     search = ExposureSearch((1.0, 1000.0), 1000, None)
     pixels = np.zeros(400_000, np.uint16)
-    pixels[1::2] = 900
+    pixels[1::3] = 900
     assert search._brightness(pixels) == 0.0
     assert search._brightness(pixels[:399_999]) == 0.9
+
+
+@pytest.mark.parametrize("site", [(0, 0), (0, 1), (1, 0), (1, 1)])
+def test_every_colour_of_a_large_mosaic_is_judged(site: tuple[int, int]) -> None:
+    frame = np.full((600, 800), 1000, np.uint16)
+    frame[site[0] :: 2, site[1] :: 2] = FULL
+    search = ExposureSearch((0.02, 5000.0), FULL, CYCLE_MS)
+    assert search.judge(frame, 100.0) < 50.0
+    assert not search.found
 
 
 def test_the_twelfth_frame_is_the_last() -> None:

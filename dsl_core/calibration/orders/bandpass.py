@@ -58,7 +58,8 @@ class SeenFilter:
 
 def profile_scan(scan: LineScan) -> LineScan:
     """The pixels that blur and halo are fitted to, spread over all."""
-    return scan.at(np.arange(0, len(scan.pixels), max(len(scan.pixels) // PROFILE_PIXELS, 1)))
+    # An odd step keeps all colours of the mosaic: an even one has every other column, and only two of them.
+    return scan.at(np.arange(0, len(scan.pixels), len(scan.pixels) // PROFILE_PIXELS | 1))
 
 
 def plane_profile(rig: Rig, scan: LineScan, progress: Progress | None = None) -> ZeroOrderFit:

@@ -71,7 +71,7 @@ def line_profile(plan: CapturePlan, shot: Shot) -> Floats | None:
 def contest_of_lines(seen: Counts, lit: Lit, wanted: Floats, rival: Floats) -> Contest:
     """Which of two patterns of columns (`line_profile`) a picture shows."""
     chosen = np.flatnonzero(np.take(np.abs(wanted - rival) > APART, lit.key))
-    chosen = chosen[:: max(chosen.size // PLENTY, 1)]
+    chosen = chosen[:: chosen.size // PLENTY | 1]  # an odd step keeps all colours of the mosaic
     black, contrast = lit.black[chosen], lit.contrast[chosen]
     key = lit.key[chosen]
     return vote(

@@ -69,7 +69,7 @@ def line_levels(
         return None
     cover = _coverage(plan)
     sound = np.flatnonzero(np.isfinite(seen.std).all(0))
-    sound = sound[:: max(len(sound) // PIXELS, 1)]
+    sound = sound[:: len(sound) // PIXELS | 1]
     if cover is None or len(sound) < FEWEST:
         return None
     picked = seen.pixels[sound]
@@ -171,7 +171,8 @@ def candidates(
     light, variance = white
     lit = (column >= 0) & np.isfinite(variance) & (light > 5 * np.sqrt(np.maximum(variance, 0)))
     some = np.flatnonzero(lit.ravel())
-    return np.asarray(some[:: max(len(some) // (2 * PIXELS), 1)])
+    # An odd step keeps all colours of the mosaic.
+    return np.asarray(some[:: len(some) // (2 * PIXELS) | 1])
 
 
 def pitch_of(column: NDArray[np.integer]) -> float:

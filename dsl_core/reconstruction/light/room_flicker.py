@@ -102,7 +102,7 @@ def room_flicker(
     if not isinstance(lines, ScanLines) or len(seen.radiance) < FRAMES:
         return None
     known = np.flatnonzero(np.isfinite(seen.std).all(0) & (column.ravel()[seen.pixels] >= 0))
-    pixels = seen.pixels[known[:: max(len(known) // PIXELS, 1)]]
+    pixels = seen.pixels[known[:: len(known) // PIXELS | 1]]  # an odd step keeps all colours of the mosaic
     pixels = pixels[np.argsort(column.ravel()[pixels], kind="stable")]
     zone_px, unlit = zone_px_of(lines, pitch_of(column)), unlit_px(scan.rig, lines.width_px)
 

@@ -195,8 +195,18 @@ def test_pixels_have_their_places_in_the_image_and_whole_orders_where_rows_are_f
 def test_blur_and_halo_are_fitted_to_three_thousand_pixels_at_most() -> None:
     scan, _ = without_filter()
     many = scan.at(np.tile(np.arange(len(scan.pixels)), 5))
-    assert len(profile_scan(many).pixels) == 3125, "every fourth of 12500"
+    assert len(profile_scan(many).pixels) == 2500, "every fifth of 12500"
     assert profile_scan(scan).pixels.tolist() == scan.pixels.tolist()
+
+
+def test_a_target_that_fills_the_picture_is_seen_in_all_colours() -> None:
+    scan, _ = without_filter()
+    whole = replace(
+        scan.at(np.zeros(8064, int)), pixels=np.arange(8064), column_px=np.linspace(20.0, 620.0, 8064)
+    )
+    some = profile_scan(whole)
+    colours = bayer_channels(RIG.sensor.bayer, 72, 112).ravel()[some.pixels]
+    assert (np.bincount(colours) / len(colours)).tolist() == pytest.approx([0.25, 0.5, 0.25], abs=0.01)
 
 
 @pytest.mark.parametrize(("shift_px", "moved"), [(0.149, False), (0.151, True), (-0.151, True)])
