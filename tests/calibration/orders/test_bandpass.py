@@ -195,8 +195,19 @@ def test_pixels_have_their_places_in_the_image_and_whole_orders_where_rows_are_f
 def test_blur_and_halo_are_fitted_to_three_thousand_pixels_at_most() -> None:
     scan, _ = without_filter()
     many = scan.at(np.tile(np.arange(len(scan.pixels)), 5))
-    assert len(profile_scan(many).pixels) == 3125, "every fourth of 12500"
+    assert len(profile_scan(many).pixels) == 3000
     assert profile_scan(scan).pixels.tolist() == scan.pixels.tolist()
+
+
+@pytest.mark.parametrize(("width", "height"), [(112, 72), (160, 80), (160, 120)])
+def test_every_colour_of_a_small_picture_without_a_gap_is_among_the_pixels_of_the_fit(
+    width: int, height: int
+) -> None:
+    scan, _ = without_filter()
+    whole = replace(scan.at(np.arange(width * height) % len(scan.pixels)), pixels=np.arange(width * height))
+    chosen = profile_scan(whole).pixels
+    colours = bayer_channels(RIG.sensor.bayer, height, width).ravel()[chosen]
+    assert np.bincount(colours, minlength=3) / len(chosen) == pytest.approx([0.25, 0.5, 0.25], abs=0.03)
 
 
 @pytest.mark.parametrize(("shift_px", "moved"), [(0.149, False), (0.151, True), (-0.151, True)])
