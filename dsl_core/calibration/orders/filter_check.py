@@ -22,8 +22,11 @@ MEASURED_NM, NOMINAL_NM = 0.5, 1.5
 DOUBT_NM, WRONG_NM, NOISE_SIGMAS = 1.5, 4.0, 2.0
 #: The data sheet's line density of a film is as good as this.
 DENSITY_STD = 0.04
-#: Fewer filters than this are compared with the film's data sheet, not with each other.
-ENOUGH = 5
+#: So many others say how distance goes with wavelength; so many at least say the film's line density, and
+#: fewer are compared with its data sheet.
+ENOUGH, FEW = 5, 3
+#: Where film or target are not square to the light, density seems to change with wavelength by so much.
+ASKEW = 0.01
 #: Peaks wider than this (rms px) or with less than this share of the light are not those of a narrow filter.
 BROAD_PX, BROAD_SHARE = 9.0, 0.7
 #: Candidates of the search by colour, nm; relative error of the response known so far, and stray light.
@@ -44,14 +47,14 @@ class PlacedFilter:
 def found_wavelengths(rig: Rig, filters: Sequence[PlacedFilter]) -> list[tuple[float, float] | None]:
     """Where each filter is by the places of its orders: wavelength and deviation (nm), None without orders.
 
-    Each filter is compared with a quadratic through all others of the same order, robustly; with too few
-    others, with the film's data sheet.
+    Each filter is compared with a quadratic through all others of the same order, robustly; with few others,
+    with the line density that the middle one of them sees; with fewer, with the film's data sheet.
     """
     by_order = {order: _by_others(filters, order) for order in (1, -1)}
     found: list[tuple[float, float] | None] = []
     for i, each in enumerate(filters):
         estimates = [by_order[order][i] for order in by_order if by_order[order][i] is not None]
-        known = [e for e in estimates if e is not None] or _by_film(rig, each)
+        known = [e for e in estimates if e is not None] or _by_density(rig, filters, i) or _by_film(rig, each)
         if not known:
             found.append(None)
             continue
@@ -84,6 +87,23 @@ def _by_others(filters: Sequence[PlacedFilter], order: int) -> list[tuple[float,
             # Cauchy weights: a wrong filter among the others pulls no more.
             weight = 1 / tolerance[others] / np.sqrt(1 + (sigmas / 2) ** 2)
         found.append((float(fit(x[i])), float(tolerance[i]) * (1 + max(0.0, abs(float(x[i])) - 0.5))))
+    return found
+
+
+def _by_density(rig: Rig, filters: Sequence[PlacedFilter], index: int) -> list[tuple[float, float]]:
+    """A filter's wavelength by the line density that the others see, by order: any number of estimates."""
+    found = []
+    for order in (1, -1):
+        px, spread_px = np.abs([each.offsets_px.get(order, (np.nan, 0.0)) for each in filters]).T
+        sine = np.sin(np.arctan(px / rig.projector.fx_px))
+        others = (sine > 0) & (np.arange(len(filters)) != index)
+        if others.sum() < FEW or not sine[index] > 0:
+            continue
+        effective_nm = np.array([each.effective_nm for each in filters])
+        # Two swapped filters err in opposite directions, so that the middle one is neither.
+        nm = float(sine[index] * np.median(effective_nm[others] / sine[others]))
+        std = np.hypot(ASKEW, spread_px[index] / px[index]) * nm
+        found.append((nm, float(np.hypot(NOMINAL_NM, std))))
     return found
 
 

@@ -199,14 +199,15 @@ def test_blur_and_halo_are_fitted_to_three_thousand_pixels_at_most() -> None:
     assert profile_scan(scan).pixels.tolist() == scan.pixels.tolist()
 
 
-def test_a_target_that_fills_the_picture_is_seen_in_all_colours() -> None:
+@pytest.mark.parametrize(("width", "height"), [(112, 72), (160, 80), (160, 120)])
+def test_every_colour_of_a_small_picture_without_a_gap_is_among_the_pixels_of_the_fit(
+    width: int, height: int
+) -> None:
     scan, _ = without_filter()
-    whole = replace(
-        scan.at(np.zeros(8064, int)), pixels=np.arange(8064), column_px=np.linspace(20.0, 620.0, 8064)
-    )
-    some = profile_scan(whole)
-    colours = bayer_channels(RIG.sensor.bayer, 72, 112).ravel()[some.pixels]
-    assert (np.bincount(colours) / len(colours)).tolist() == pytest.approx([0.25, 0.5, 0.25], abs=0.01)
+    whole = replace(scan.at(np.arange(width * height) % len(scan.pixels)), pixels=np.arange(width * height))
+    chosen = profile_scan(whole).pixels
+    colours = bayer_channels(RIG.sensor.bayer, height, width).ravel()[chosen]
+    assert np.bincount(colours, minlength=3) / len(chosen) == pytest.approx([0.25, 0.5, 0.25], abs=0.03)
 
 
 @pytest.mark.parametrize(("shift_px", "moved"), [(0.149, False), (0.151, True), (-0.151, True)])

@@ -88,6 +88,22 @@ def test_few_filters_are_compared_with_the_film() -> None:
     assert verdict(filters[1], wrong, 3.0, 1.0)[0]
 
 
+def test_two_swapped_filters_of_four_are_named_and_the_others_are_not() -> None:
+    filters = [each for each in placed({580.0: 610.0, 610.0: 580.0}) if each.filter_nm >= 550]
+    found = found_wavelengths(published_rig(), filters)
+    verdicts = [verdict(each, where, 3.0, 1.0) for each, where in zip(filters, found, strict=True)]
+    assert [unusable for unusable, _ in verdicts] == [False, True, True, False]
+    assert "where those of 610 ± 6 nm should be" in verdicts[1][1]
+
+
+@pytest.mark.parametrize("density", [0.97, 1.03])
+def test_four_filters_show_a_film_unlike_its_data_sheet_and_raise_no_doubt(density: float) -> None:
+    filters = placed({nm: density * nm for nm in CENTRES})[2:6]
+    for each, found in zip(filters, found_wavelengths(published_rig(), filters), strict=True):
+        assert found == pytest.approx((each.filter_nm, 0.01 * each.filter_nm), rel=0.06)
+        assert verdict(each, found, 3.0, 1.0) == (False, "")
+
+
 @pytest.mark.parametrize(("asked", "there"), [(450.0, 600.0), (540.0, 470.0), (600.0, 540.0)])
 def test_colours_tell_another_filter(asked: float, there: float) -> None:
     rig = published_rig()
