@@ -20,7 +20,7 @@ from dsl_core.model.figure import Figure
 #: What to do first, and then: by hand, or on a rig that places targets itself.
 CAMPAIGN_HINT = (
     "No campaign is open. First choose New campaign: it makes a folder for all that is measured of this rig."
-    " Then {then}. To go on with one begun earlier, choose Open campaign."
+    " Then {then}. To continue one begun earlier, choose Open campaign."
 )
 ROW_BY_ROW, BY_ITSELF = "work through rows 1 to 6", "choose Calibrate everything, or work through rows 1 to 6"
 NO_VERSION = (

@@ -38,7 +38,7 @@ class RowState(Enum):
 class About:
     """What the page says about a calibration before anything of it is loaded.
 
-    ``needs`` is what to have at hand for it.
+    ``needs`` says what it takes, and whether the film is on.
     """
 
     title: str
