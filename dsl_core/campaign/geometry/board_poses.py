@@ -70,8 +70,8 @@ class BoardPose:
         how = ", ".join(turns) or "facing the camera"
         return (
             f"Film off. Hold the board still about {round(self.depth_mm / 10, 1):g} cm in front of the"
-            f" camera, {place}, {how}. All of it must be in view and lit by the projector; nothing may move while it is"
-            " captured."
+            f" camera, {place}, {how}. All of it must be in view and lit by the projector; nothing may"
+            " move while it is captured."
         )
 
 
