@@ -17,10 +17,12 @@ from dsl_core.model.calibration.accepted import AcceptedCalibration, Calibration
 from dsl_core.model.conditions import CaptureConditions
 from dsl_core.model.figure import Figure
 
+#: What to do first, and then: by hand, or on a rig that places targets itself.
 CAMPAIGN_HINT = (
-    "No campaign is open. A campaign is a folder that keeps all captures, fits and verdicts of one rig."
-    " Begin a new one, or open an existing one."
+    "No campaign is open. First choose New campaign: it makes a folder for all that is measured of this rig."
+    " Then {then}. To continue one begun earlier, choose Open campaign."
 )
+ROW_BY_ROW, BY_ITSELF = "work through rows 1 to 6", "choose Calibrate everything, or work through rows 1 to 6"
 NO_VERSION = (
     "<p>The library is empty. It keeps every rig calibrated on this computer, dated and never overwritten:"
     " calibrate everything in a campaign, keep a campaign in the library, or import a file.</p>"
@@ -60,7 +62,8 @@ def campaign_head(state: CalibrateState, devices: DeviceRig | None) -> CampaignH
     has_accepted = any(row.state.is_accepted for row in state.rows.value)
     places_itself = _places_itself(devices)
     main = main_button(state, devices)
-    title, place = "Calibrate", CAMPAIGN_HINT
+    title = "Calibrate"
+    place = CAMPAIGN_HINT.format(then=BY_ITSELF if places_itself else ROW_BY_ROW)
     if facts is not None:
         title, place = (
             short_name(facts.path.name),
@@ -145,6 +148,8 @@ def row_display(
         # What was known of it before is about to be replaced.
         row = replace(row, reason=running, accepted="")
         figure = None
+    elif row.state is RowState.MISSING and not row.reason:
+        row = replace(row, reason=row.about.needs)
     return RowDisplay(
         state=LabelState("▶ running", "heading")
         if running

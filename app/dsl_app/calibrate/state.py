@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 class RowState(Enum):
     """State of a calibration of the campaign; the words are shown."""
 
-    MISSING = "missing"
+    MISSING = "not done yet"
     BEGUN = "begun"
     GOOD = "good"
     AGEING = "ageing"
@@ -36,20 +36,40 @@ class RowState(Enum):
 
 @dataclass(frozen=True)
 class About:
-    """What the page says about a calibration before anything of it is loaded."""
+    """What the page says about a calibration before anything of it is loaded.
+
+    ``needs`` says what it takes, and whether the film is on.
+    """
 
     title: str
     purpose: str
+    needs: str = ""
 
 
 #: By name and in order.
 ABOUT = {
-    "selftest": About("Self-test", "Camera, projector, focus and room"),
-    "geometry": About("Geometry", "Lenses and pose, from a printed board"),
-    "spectralon": About("Spectralon", "Light of the LEDs, evenness, white"),
-    "color-checker": About("Color Checker", "Response and emission, from patches"),
-    "bandpass": About("Bandpass filters", "Brightness of the film's orders"),
-    "depth-stage": About("Depth stage", "Position and bend of the film"),
+    "selftest": About(
+        "Self-test", "Camera, projector, focus and room", "Needs a white surface. The film is off."
+    ),
+    "geometry": About(
+        "Geometry", "Lenses and pose, from a printed board", "Needs the printed board. The film is off."
+    ),
+    "spectralon": About(
+        "Spectralon", "Light of the LEDs, evenness, white", "Needs the Spectralon. The film is off."
+    ),
+    "color-checker": About(
+        "Color Checker", "Response and emission, from patches", "Needs the Color Checker. The film is off."
+    ),
+    "bandpass": About(
+        "Bandpass filters",
+        "Brightness of the film's orders",
+        "Needs the Spectralon and the filters. Mount the film now; it stays for all scans.",
+    ),
+    "depth-stage": About(
+        "Depth stage",
+        "Position and bend of the film",
+        "Needs the stage with a white plane or the Spectralon. The film stays on.",
+    ),
 }
 
 

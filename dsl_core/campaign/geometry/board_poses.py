@@ -69,9 +69,9 @@ class BoardPose:
         ]
         how = ", ".join(turns) or "facing the camera"
         return (
-            f"Film off. Hold the board still about {self.depth_mm:.0f} mm in front of the camera, {place},"
-            f" {how}. All of it must be in view and lit by the projector; nothing may move while it is"
-            " captured."
+            f"Film off. Hold the board still about {round(self.depth_mm / 10, 1):g} cm in front of the"
+            f" camera, {place}, {how}. All of it must be in view and lit by the projector; nothing may"
+            " move while it is captured."
         )
 
 

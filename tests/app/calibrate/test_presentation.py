@@ -49,12 +49,29 @@ def page(**values: Any) -> CalibrateState:
 def test_without_a_campaign_only_new_and_open_can_be_used() -> None:
     head = campaign_head(CalibrateState(), BY_ITSELF)
     assert head.title == "Calibrate"
-    assert "No campaign is open" in head.place
+    assert head.place.startswith("No campaign is open. First choose New campaign")
+    assert "choose Calibrate everything" in head.place
     assert head.new.is_enabled
     assert head.open.is_enabled
     assert not head.keep.is_visible
     assert not head.everything.is_enabled
     assert (head.new.is_primary, head.everything.is_primary) == (True, False)
+
+
+def test_without_a_campaign_a_rig_placed_by_hand_is_calibrated_row_by_row() -> None:
+    for devices in (BY_HAND, None):
+        place = campaign_head(CalibrateState(), devices).place
+        assert "Then work through rows 1 to 6." in place
+        assert "everything" not in place
+
+
+def test_a_row_that_is_not_done_says_what_it_needs() -> None:
+    for row in CalibrateState().rows.value:
+        assert row_display(row).reason.text.startswith("Needs the " if row.name != "selftest" else "Needs a ")
+    needy = replace(ROW, about=replace(ROW.about, needs="Needs a board."))
+    assert row_display(needy).reason.text == "Needs a board."
+    assert row_display(replace(needy, state=RowState.GOOD)).reason.text == ""
+    assert row_display(needy, running="white, 3 of 8").reason.text == "white, 3 of 8"
 
 
 def test_the_head_names_campaign_folder_and_rig() -> None:

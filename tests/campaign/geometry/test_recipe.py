@@ -221,6 +221,7 @@ def test_both_devices_see_the_whole_board_in_every_pose(board: Checkerboard | Ch
     assert np.ptp([pose.depth_mm for pose in poses]) > 150
     assert max(abs(pose.tilt_x_deg) for pose in poses) >= 35
     assert "lower edge tilted away by about 35°" in poses[1].instruction(published_rig())
+    assert "about 75 cm in front of the camera" in poses[1].instruction(published_rig())
 
 
 def test_a_board_too_large_is_refused() -> None:

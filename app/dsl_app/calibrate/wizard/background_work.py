@@ -32,6 +32,8 @@ from dsl_core.progress import Progress
 DARK_SHARE = 0.5
 #: Frames darker than this share even of a saturated one are black.
 BLACK_SHARE = 0.1
+#: The most of full scale that a camera adds to black; its darkest frame says how much it is.
+MOST_OFFSET = 0.1
 #: How long the brightest frame is remembered, s.
 MEMORY_S = 3.0
 #: How frames are shown: white targets are white; what is brighter and what is not stays to be judged.
@@ -196,7 +198,10 @@ class WatchedCamera(Camera):
         self._camera, self._clock = camera, clock
         self._lock = threading.Lock()
         self._frame: Frame | None = None
-        self._best, self._best_at, self._brightest_dn = 0.0, 0.0, 0.0
+        self._best_at, self._brightest_dn = 0.0, 0.0
+        #: Of the best frame: mean, and the share that saturation leaves of its worth.
+        self._best = 0.0, 1.0
+        self._offset_dn: float = MOST_OFFSET * 2**camera.info.bit_depth
 
     @property
     def info(self) -> CameraInfo:
@@ -218,23 +223,26 @@ class WatchedCamera(Camera):
         is_old = now - self._best_at > MEMORY_S
         if is_old:
             self._brightest_dn = 0.0
-        worth = self._worth(frame)
-        with self._lock:
-            if worth > self._best or is_old:
-                self._best, self._best_at = worth, now
-            if worth >= DARK_SHARE * self._best:
-                self._frame = frame
-        return frame
-
-    def _worth(self, frame: Frame) -> float:
-        """How well a frame shows the target: bright, but not saturated; black shows nothing."""
         thin = frame.pixels[::7, ::7]
         saturated = float(np.mean(thin >= 2**self.info.bit_depth - 1))
-        mean_dn = float(np.mean(thin))
-        self._brightest_dn = max(self._brightest_dn, mean_dn)
-        if mean_dn < BLACK_SHARE * self._brightest_dn:
+        seen = float(np.mean(thin)), 0.01 if saturated > MANY_SATURATED else 1.0
+        self._brightest_dn = max(self._brightest_dn, seen[0])
+        # Without it, black would be worth half of a target that fills little of the picture.
+        self._offset_dn = min(self._offset_dn, seen[0])
+        worth, best = self._worth(*seen), self._worth(*self._best)
+        with self._lock:
+            if worth > best or is_old:
+                self._best, self._best_at, best = seen, now, worth
+            if worth >= DARK_SHARE * best:
+                self._frame, self._best_at = frame, now
+        return frame
+
+    def _worth(self, mean_dn: float, share: float) -> float:
+        """How well a frame shows the target: bright, but not saturated; black shows nothing."""
+        light_dn = mean_dn - self._offset_dn
+        if light_dn < BLACK_SHARE * (self._brightest_dn - self._offset_dn):
             return 0.0
-        return mean_dn * (0.01 if saturated > MANY_SATURATED else 1.0)
+        return light_dn * share
 
     def take_frame(self) -> Frame | None:
         """The latest frame since the last call; None without one."""

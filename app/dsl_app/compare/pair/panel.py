@@ -9,6 +9,7 @@ from PySide6.QtWidgets import QFileDialog, QSplitter, QWidget
 
 from dsl_app.compare.pair.controller import PairController
 from dsl_app.compare.pair.pictures import PairControls, PairPictures
+from dsl_app.compare.pair.sides import PairSides
 from dsl_app.compare.pair.state import Pair, PairState, pair_display
 from dsl_app.compare.verdict_table import VerdictTable
 from dsl_app.shared.evented import follow_any
@@ -18,14 +19,12 @@ from dsl_app.shared.theme import Theme
 from dsl_app.shared.widgets.deferred import Deferred
 from dsl_app.shared.widgets.forms import label, push_button, remark_line, show_parts
 from dsl_app.shared.widgets.help_window import set_help
-from dsl_app.shared.widgets.layouts import STRETCH, Stretch, boxed, column_of, row_of, splitter
+from dsl_app.shared.widgets.layouts import STRETCH, boxed, column_of, row_of, splitter
 from dsl_app.shared.widgets.open_dialog import OpenDialog
 from dsl_app.shared.widgets.plots import CalmPlot, colour_legend
 from dsl_app.shared.widgets.recent_list import RecentList
 from dsl_app.shared.widgets.spectrum_curve import SpectrumCurve
 
-#: Width of the list of recent results, px.
-RECENT_PX = 560
 RESULT_SUFFIX = ".zarr"
 
 
@@ -36,7 +35,6 @@ class PairPanel(QWidget):
         super().__init__()
         self._state, self._control = state, control
         self.recent = RecentList(recent, self._use, self._is_free)
-        self.recent.setFixedWidth(RECENT_PX)
         self.name_a, self.name_b = label("", "heading"), label("", "heading")
         self.open_first = push_button("Open &A…", "Choose a result as A", lambda: self._choose(second=False))
         self.open_second = push_button("Open &B…", "Choose a result to compare A with")
@@ -73,7 +71,7 @@ class PairPanel(QWidget):
         )
         above = boxed(column_of((self.pictures, 1), self.bar, margins=0))
         self.parts = splitter(Qt.Orientation.Vertical, (above, 1), (self.figures, 1), sizes=(1000, 1000))
-        self.empty = boxed(row_of(STRETCH, boxed(column_of(STRETCH, self.recent, Stretch(2))), STRETCH))
+        self.empty = PairSides(self._state, self.recent)
         column_of(head, self.hint, (self.parts, 1), (self.empty, 1), on=self, margins=(0, 8, 0, 0))
 
     def _connect(self) -> None:

@@ -18,17 +18,13 @@ from dsl_core.evaluation.summary import Truth
 from dsl_core.evaluation.verdict import Verdict
 from dsl_core.io.result.result_arrays import ResultArrays
 from dsl_core.io.scan.origin import rig_of_notes
+from dsl_core.words import counted
 
 Floats = NDArray[np.floating[Any]]
 
 
 #: Characters of the names of A and B beside the buttons that open them.
 MOST_BESIDE = 20
-#: What the page says while there is nothing to compare.
-NOTHING = (
-    "Open a result as A, then another as B; or, for a scan of the simulated rig, use its ground truth as B."
-    " You can drop results (folders NAME.zarr) here."
-)
 
 
 class PairQuantity(Enum):
@@ -123,7 +119,7 @@ def pair_display(state: PairState) -> PairDisplay:
     takes_truth = lacks_second and first is not None and first.is_simulated
     idle, has_truth = not busy, second is not None and second.truth is not None
     at_hand = _at_hand(state)
-    hint = LabelState(f"{busy}…" if busy else NOTHING if pair is None else "", "muted")
+    hint = LabelState(f"{busy}…" if busy else "", "muted")
     return PairDisplay(
         name_a=f"A: {name_a}",
         name_b=f"B: {name_b}",
@@ -135,6 +131,34 @@ def pair_display(state: PairState) -> PairDisplay:
         swap=idle and pair is not None and not has_truth,
         report=ButtonState(is_enabled=idle and pair is not None and has_truth, is_primary=has_truth),
     )
+
+
+def side_texts(state: PairState) -> tuple[tuple[str, str], tuple[str, str]]:
+    """Title and text of the places of A and B before both are there."""
+    first, second = state.first.value, state.second.value
+    if first is None:
+        truth = ", or, if A is of the simulated rig, the true values of its scene."
+    elif first.is_simulated:
+        truth = ", or the true values of A's scene: choose Truth as B."
+    else:
+        truth = "."
+    missing = (
+        ("A: what you want to judge", "Choose Open A, or drop a result here (a folder NAME.zarr)."),
+        ("B: what to compare it with", f"Another result of the same size in pixels{truth}"),
+    )
+    a, b = (
+        text if side is None else (f"{letter}: {short_name(side.name)}", side_facts(side))
+        for side, letter, text in zip((first, second), "AB", missing, strict=True)
+    )
+    return a, b
+
+
+def side_facts(side: Side) -> str:
+    """What a result is: its size, its bands and how much of it has a depth."""
+    height, width = side.arrays.shape
+    share = 100 * float(np.mean(np.isfinite(side.arrays["depth_mm"])))
+    bands = counted(len(side.arrays.wavelengths_nm), "band")
+    return f"{width} × {height} px, {bands}, {share:.0f} % of the pixels have a depth"
 
 
 def _at_hand(state: PairState) -> ButtonState:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
 import pyqtgraph as pg
 from PySide6.QtCore import QEvent, Qt
 from PySide6.QtGui import QBrush, QColor, QDragLeaveEvent, QKeyEvent, QPainter, QPen
@@ -16,6 +17,8 @@ from dsl_app.shared.widgets.hints import hint, is_said_below
 GREY, DEPTH, SHARE = "CET-L1", "viridis", "cividis"
 #: Differences: white is zero, blue negative, red positive; lightness changes evenly.
 DIFFERENCE = "CET-D1A"
+#: Zero of a difference. The map's own is pink, as between its arms it passes from violet to orange.
+ZERO = (245, 245, 245)
 
 
 class Canvas(pg.GraphicsLayoutWidget):  # type: ignore[misc]
@@ -105,8 +108,18 @@ class PictureView(Canvas):
 
 
 def colour_map(name: str) -> Any:
-    """A colour map of pyqtgraph."""
-    return pg.colormap.get(name)
+    """A colour map of pyqtgraph; that of differences is white at zero."""
+    found = pg.colormap.get(name)
+    return _white_at_zero(found) if name == DIFFERENCE else found
+
+
+def _white_at_zero(found: Any) -> Any:
+    """A map whose middle is `ZERO`; what that takes fades towards both ends, which stay."""
+    places = np.linspace(0, 1, 129)
+    colours = found.map(places, mode="float")[:, :3] * 255
+    fades = (1 - np.abs(2 * places - 1))[:, None] ** 2
+    colours += fades * (np.array(ZERO) - colours[64])
+    return pg.ColorMap(places, np.rint(colours.clip(0, 255)).astype(np.uint8))
 
 
 # Arrow keys --------------------------------------------------------------------------------------

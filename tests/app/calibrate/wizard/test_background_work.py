@@ -58,6 +58,25 @@ def test_dark_frames_between_patterns_are_not_shown(info: CameraInfo) -> None:
     assert shown([1000, 20, 900, 400, 600], info) == [1000, None, 900, None, 600]
 
 
+def test_what_a_camera_adds_to_black_does_not_make_black_worth_showing(info: CameraInfo) -> None:
+    # A small target: its picture is hardly twice as bright as the black before and after it.
+    assert shown([450, 232, 450, 232, 440], info) == [450, None, 450, None, 440]
+    assert shown([2121, 232, 457, 232], info)[-1] is None
+
+
+def test_black_does_not_flash_while_the_target_stays_as_bright(info: CameraInfo) -> None:
+    now = 100.0
+    levels = (1000, 900, 50)
+    camera = WatchedCamera(Scripted([frame(level) for level in levels], info), clock=lambda: now)
+    found = []
+    for _ in levels:
+        camera.snap()
+        taken = camera.take_frame()
+        found.append(None if taken is None else int(taken.pixels[0, 0]))
+        now += 0.6 * MEMORY_S
+    assert found == [1000, 900, None]
+
+
 def test_a_saturated_frame_is_shown_only_where_there_is_no_other(info: CameraInfo) -> None:
     assert shown([FULL_DN], info) == [FULL_DN]
     assert shown([1000, FULL_DN, 900], info) == [1000, None, 900]

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 from dsl_app.compare.pair.controller import PairController
 from dsl_app.compare.pair.panel import PairPanel
-from dsl_app.compare.pair.state import NOTHING, PairQuantity, PairState
+from dsl_app.compare.pair.state import PairQuantity, PairState
 from dsl_app.shared.jobs.qt_runner import QtRunner
 from dsl_app.shared.settings import RecentFiles, Settings
 from dsl_app.shared.theme import DARK, LIGHT
@@ -51,8 +51,14 @@ def with_truth(qtbot: QtBot, bench: Bench, chart: Path) -> None:
 
 def test_an_empty_page_says_what_to_do(bench: Bench) -> None:
     page, _, _ = bench
-    assert page.hint.text() == NOTHING
-    assert page.hint.isVisible()
+    first, second = page.empty.places
+    assert "Open A" in first.text.text()
+    assert first.picture.is_empty
+    assert second.picture.is_empty
+    # Both share the page, and the recent results lie where the first one is missing.
+    assert abs(first.width() - second.width()) <= 1
+    assert first.width() + second.width() > 0.9 * page.width()
+    assert first.isAncestorOf(page.recent)
     assert not page.truth.isEnabled()
     assert not page.report.isEnabled()
     assert not page.parts.isVisible()
@@ -69,6 +75,14 @@ def test_recent_results_are_compared_by_a_double_click(qtbot: QtBot, bench: Benc
     files.itemActivated.emit(files.item(0))
     qtbot.waitUntil(lambda: state.first.value is not None and not state.busy.value, timeout=20_000)
     assert [files.item(i).text().split(" ")[0] for i in range(files.count())] == ["near.zarr"]
+    first, second = page.empty.places
+    assert second.isAncestorOf(page.recent)
+    assert first.title.text() == "A: chart"
+    assert (first.picture.is_empty, second.picture.is_empty) == (False, True)
+    # Its depth is seen: more than the ground of the place.
+    seen = first.picture.grab().toImage()
+    middle = seen.pixelColor(seen.width() // 2, seen.height() // 2)
+    assert middle != second.picture.grab().toImage().pixelColor(seen.width() // 2, seen.height() // 2)
     files.itemActivated.emit(files.item(0))
     qtbot.waitUntil(lambda: state.pair.value is not None, timeout=20_000)
     assert not page.empty.isVisible()

@@ -8,13 +8,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 from dsl_app.compare.pair.state import (
-    NOTHING,
     Pair,
     PairQuantity,
     PairState,
     Side,
     cursor_text,
     pair_display,
+    side_texts,
 )
 from dsl_app.shared.widget_state import LabelState
 
@@ -51,8 +51,8 @@ def state_of(sides: str, busy: str = "", trouble: str = "") -> PairState:
 @pytest.mark.parametrize(
     ("state", "names", "hint", "usable"),
     [
-        (state_of(""), ("–", "–"), NOTHING, "open"),
-        (state_of("a"), ("chart", "–"), NOTHING, "open truth"),
+        (state_of(""), ("–", "–"), "", "open"),
+        (state_of("a"), ("chart", "–"), "", "open truth"),
         (state_of("ab"), ("chart", "box"), "", "open truth swap"),
         (state_of("at"), ("chart", "truth"), "", "open truth report"),
         (state_of("at", busy="Compare"), ("chart", "truth"), "Compare…", ""),
@@ -106,6 +106,21 @@ def test_the_open_result_is_offered_for_a_free_side_alone() -> None:
         button = pair_display(state).at_hand
         offers[sides, path] = button.text if button.is_visible else ""
     assert list(offers.values()) == ["box as A", "box as B", "", ""]
+
+
+def test_a_free_place_says_what_may_come_there_and_a_taken_one_what_it_is() -> None:
+    nothing = side_texts(state_of(""))
+    assert "Open A" in nothing[0][1]
+    assert "if A is of the simulated rig" in nothing[1][1]
+    one = state_of("a")
+    first, second = side_texts(one)
+    assert first == ("A: chart", "3 × 2 px, 1 band, 100 % of the pixels have a depth")
+    assert second[1] == "Another result of the same size in pixels."
+    assert one.first.value is not None
+    arrays = replace(one.first.value.arrays, attributes=rig_notes("twin", {}))
+    one.first.set(replace(one.first.value, arrays=arrays))
+    assert side_texts(one)[1][1].endswith("choose Truth as B.")
+    assert side_texts(state_of("b"))[1][0] == "B: box"
 
 
 def test_the_hint_is_what_went_wrong() -> None:

@@ -5,7 +5,14 @@ from typing import Any
 import numpy as np
 import pytest
 from dsl_app.shared.widgets.forms import ChoiceBox, NumberBox, WholeBox
-from dsl_app.shared.widgets.pictures import Canvas, PictureView, arrow_step, moved_within
+from dsl_app.shared.widgets.pictures import (
+    DIFFERENCE,
+    Canvas,
+    PictureView,
+    arrow_step,
+    colour_map,
+    moved_within,
+)
 from dsl_app.shared.widgets.plots import CalmPlot
 from PySide6.QtCore import QEvent, QPoint, QPointF, Qt
 from PySide6.QtGui import QDragLeaveEvent, QKeyEvent, QWheelEvent
@@ -15,6 +22,18 @@ from pytestqt.qtbot import QtBot
 
 def _key(key: Qt.Key, modifier: Qt.KeyboardModifier = Qt.KeyboardModifier.NoModifier) -> QKeyEvent:
     return QKeyEvent(QEvent.Type.KeyPress, key, modifier)
+
+
+def test_a_difference_of_zero_is_white_and_both_signs_darken_evenly() -> None:
+    table = colour_map(DIFFERENCE).getLookupTable(nPts=257).astype(int)
+    assert table[128].tolist() == [245, 245, 245]
+    # Close to zero no tint is seen yet; at the ends blue is negative, red positive.
+    assert np.ptp(table[127:130], axis=1).max() <= 3
+    assert table[0, 2] > table[0, 0]
+    assert table[-1, 0] > table[-1, 2]
+    light = table @ [0.2126, 0.7152, 0.0722]
+    assert (np.diff(light[:129]) > -0.5).all()
+    assert (np.diff(light[128:]) < 0.5).all()
 
 
 def test_arrows_step_and_shift_steps_further() -> None:
