@@ -71,5 +71,5 @@ class CellSums:
 
     def falls(self, values: Floats) -> Floats:
         """By how much ``values`` (k,) lower the weighted squares that each cell (c,) leaves."""
-        asked: Floats = 2 * self.score @ values
-        return asked - np.einsum("k,ckl,l->c", values, self.normal, values)
+        fall: Floats = 2 * self.score @ values - np.einsum("k,ckl,l->c", values, self.normal, values)
+        return fall
