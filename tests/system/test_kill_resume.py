@@ -100,7 +100,8 @@ def test_twenty_killed_scans_resume_to_the_unbroken_one(server: Server, folder: 
     unbroken = _frames(folder / "unbroken.dsl")
     assert unbroken.std() > 0
     # By frames and not by time alone, since the time that a scan takes changes with the machine's load.
-    share = np.sort(np.random.default_rng(2024).uniform(0.0, 0.95, KILLS))
+    # Each in a stretch of its own: a busy machine kills late, and moments close together would be one.
+    share = 0.95 * (np.arange(KILLS) + np.random.default_rng(2024).uniform(0.0, 1.0, KILLS)) / KILLS
     left = []
     for number, moment in enumerate(share * len(unbroken)):
         scan = folder / f"{number}.dsl"
@@ -109,8 +110,8 @@ def test_twenty_killed_scans_resume_to_the_unbroken_one(server: Server, folder: 
         assert server.scan(scan) == 0
         assert find_problems(ScanReader(scan), verify=True) == []
         np.testing.assert_array_equal(_frames(scan), unbroken)
-    # The kills must have hit scans under way, at many different frames; a busy machine kills a little late.
-    assert len({count for count in left if count > 0}) >= KILLS // 4, left
+    # The kills must have hit scans under way, at many different frames.
+    assert len({count for count in left if count > 0}) >= KILLS // 2, left
 
 
 @pytest.mark.parametrize("server", ["made"], indirect=True)

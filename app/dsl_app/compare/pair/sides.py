@@ -21,7 +21,7 @@ LEAST_PX, ROUND_PX = 120, 8
 
 
 class PairSides(QWidget):
-    """The places of A and B; ``recent`` lies in the one that is filled next."""
+    """The places of A and B; ``recent`` is shown in the one that is filled next."""
 
     def __init__(self, state: PairState, recent: RecentList) -> None:
         super().__init__()

@@ -187,7 +187,7 @@ class GenicamCamera(Camera):
         """The exposure, ms; raises `DeviceError` if it is none that was set.
 
         A camera that lost power for a moment comes back with its own exposure, gain and trigger, and some
-        libraries connect to it again without a word: then all has to be set up anew.
+        libraries reconnect to it silently: then everything has to be set up again.
         """
         exposure_ms, known_ms = float(port.read(self._prepared.exposure_feature)) / 1000.0, self._in_force_ms
         if known_ms is not None and abs(exposure_ms - known_ms) > _FORGOTTEN * known_ms:
