@@ -135,6 +135,7 @@ def probe(scan: ProbedScan) -> Probe | None:
     response = scan.model.response(0.0)
     column = torch.as_tensor(scan.pixels.column_px.ravel()[targets], dtype=torch.float64)
     widths = widths_at(scan.model.rig, torch.as_tensor(targets), column)
+    traced = _columns(scan, targets)
     camera = scan.model.rig.camera
     wide = camera.width_px / camera.fx_px > ONE_VIEW
     whole = together.pop("normal"), together.pop("score")
@@ -148,8 +149,8 @@ def probe(scan: ProbedScan) -> Probe | None:
         steepness=_steepness(scan),
         with_curves=whole,
         lines=probe_lines(lines, response, scan.pixels, scan.radiance, scan.std, targets, widths),
-        nm_per_px=_nm_per_px(scan, targets),
-        sideways=_sideways(scan, targets),
+        nm_per_px=_nm_per_px(scan, traced[ORDERS[0]][0]),
+        sideways=_sideways(scan, column, traced),
     )
 
 
@@ -160,25 +161,27 @@ def _steepness(scan: ProbedScan) -> float:
     return steepness_per_nm(white, bands.step_nm)
 
 
-def _nm_per_px(scan: ProbedScan, targets: Indices) -> float:
-    """Wavelength from one column to the next in the first orders, mean over pixels."""
+def _columns(scan: ProbedScan, targets: Indices) -> dict[int, tuple[Tensor, Tensor]]:
+    """Columns (bands, n) of each first order at the probed pixels, and where they are inside the frame."""
     depth = torch.as_tensor(scan.pixels.depth_mm.ravel()[targets], dtype=torch.float64)
-    columns = scan.model.trace(torch.as_tensor(targets), depth, orders=ORDERS[:1]).orders[ORDERS[0]].columns
+    traced = scan.model.trace(torch.as_tensor(targets), depth, orders=ORDERS).orders
+    return {order: (traced[order].columns, scan.model.inside(traced[order])) for order in ORDERS}
+
+
+def _nm_per_px(scan: ProbedScan, columns: Tensor) -> float:
+    """Wavelength from one column to the next in an order of these columns (bands, n), mean over pixels."""
     nm = scan.model.bands.centres_nm
     return float((nm[-1] - nm[0]) / (columns[-1] - columns[0]).abs().mean())
 
 
-def _sideways(scan: ProbedScan, targets: Indices) -> Floats:
+def _sideways(scan: ProbedScan, column_px: Tensor, traced: dict[int, tuple[Tensor, Tensor]]) -> Floats:
     """How much farther to the sides lines of orders are than own columns; 0 where none arrives, (n, 2)."""
-    model = scan.model
-    depth = torch.as_tensor(scan.pixels.depth_mm.ravel()[targets], dtype=torch.float64)
-    half = model.rig.projector.width_px / 2
-    own = torch.as_tensor(scan.pixels.column_px.ravel()[targets], dtype=torch.float64) / half - 1
-    traced = model.trace(torch.as_tensor(targets), depth, orders=ORDERS).orders
+    half = scan.model.rig.projector.width_px / 2
+    own = column_px / half - 1
     found = []
     for order in ORDERS:
-        inside = model.inside(traced[order])
-        away = (traced[order].columns / half - 1) ** 2 - own**2
+        columns, inside = traced[order]
+        away = (columns / half - 1) ** 2 - own**2
         found.append(torch.where(inside, away, 0.0).sum(0) / inside.sum(0).clip(min=1))
     return np.asarray(torch.stack(found, 1).numpy())
 

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 import torch
 
+from dsl_core.optics.spectra import ORDERS
 from dsl_core.reconstruction.spectral.probing import probe as probe_module
 from dsl_core.reconstruction.spectral.probing.curve_probe import variety
 from dsl_core.reconstruction.spectral.probing.line_probe import LineProbe
@@ -120,6 +121,7 @@ def probed(monkeypatch: pytest.MonkeyPatch, share: float, varied: bool, **model:
     monkeypatch.setattr(probe_module, "probe_targets", lambda valid: np.arange(int(valid.sum())))
     monkeypatch.setattr(probe_module, "widths_at", lambda *_: None)
     monkeypatch.setattr(probe_module, "probe_lines", lambda *_: None)
+    monkeypatch.setattr(probe_module, "_columns", lambda *_: dict.fromkeys(ORDERS, (None, None)))
     monkeypatch.setattr(probe_module, "_nm_per_px", lambda *_: 2.0)
     monkeypatch.setattr(probe_module, "_sideways", lambda *_: None)
     monkeypatch.setattr(probe_module, "_steepness", lambda *_: 0.1)
@@ -171,31 +173,27 @@ def test_other_patterns_and_fewer_than_forty_pixels_say_nothing(
 
 def test_wavelengths_are_those_between_columns_whichever_way_they_run() -> None:
     columns = torch.tensor([[100.0, 300.0], [140.0, 260.0], [200.0, 250.0]])
-
-    def trace(where: torch.Tensor, depth: torch.Tensor, orders: tuple[int, ...]) -> Any:
-        assert depth.tolist() == [7.0, 5.0]
-        return SimpleNamespace(orders={order: SimpleNamespace(columns=columns) for order in orders})
-
-    model = SimpleNamespace(trace=trace, bands=SimpleNamespace(centres_nm=np.array([400.0, 500.0, 550.0])))
-    pixels = SimpleNamespace(depth_mm=np.array([[5.0, 6.0], [7.0, 8.0]]))
-    scan: Any = SimpleNamespace(model=model, pixels=pixels)
+    bands = SimpleNamespace(centres_nm=np.array([400.0, 500.0, 550.0]))
+    scan: Any = SimpleNamespace(model=SimpleNamespace(bands=bands))
     # 150 nm over a hundred columns and over fifty, 75 in the mean.
-    assert probe_module._nm_per_px(scan, np.array([2, 0])) == pytest.approx(2.0)
+    assert probe_module._nm_per_px(scan, columns) == pytest.approx(2.0)
 
 
 def test_lines_to_the_sides_of_own_columns_are_those_that_arrive() -> None:
     columns = torch.tensor([[100.0, 300.0], [torch.nan, 260.0], [0.0, 250.0]])
 
     def trace(where: torch.Tensor, depth: torch.Tensor, orders: tuple[int, ...]) -> Any:
+        assert depth.tolist() == [7.0, 5.0]
         return SimpleNamespace(orders={order: SimpleNamespace(columns=columns) for order in orders})
 
     def inside(seen: Any) -> torch.Tensor:
         return torch.as_tensor(seen.columns < 290)  # NaN is nowhere
 
     rig = SimpleNamespace(projector=SimpleNamespace(width_px=400))
-    pixels = SimpleNamespace(depth_mm=np.full((2, 2), 7.0), column_px=np.array([[200.0, 0.0], [300.0, 0.0]]))
+    pixels = SimpleNamespace(depth_mm=np.array([[5.0, 6.0], [7.0, 8.0]]))
     scan: Any = SimpleNamespace(model=SimpleNamespace(trace=trace, inside=inside, rig=rig), pixels=pixels)
     # In half widths from the middle: -0.5 and -1 beside 0.5; 0.3 and 0.25 beside 0.
     own, other = (0.5**2 + 1) / 2 - 0.5**2, (0.3**2 + 0.25**2) / 2
-    found = probe_module._sideways(scan, np.array([2, 0]))
+    traced = probe_module._columns(scan, np.array([2, 0]))
+    found = probe_module._sideways(scan, torch.tensor([300.0, 200.0]), traced)
     assert found == pytest.approx(np.array([[own, own], [other, other]]))
