@@ -7,6 +7,8 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from dsl_core.solve.thinned import thinned
+
 #: Share of full scale that the brightest pixels may reach, and the share from which that is near enough.
 FILL, NEAR = 0.9, 0.8
 #: Share of pixels that may be brighter than the brightness that is judged: glints and hot pixels.
@@ -94,8 +96,7 @@ class ExposureSearch:
 
     def _brightness(self, pixels: NDArray[np.uint16]) -> float:
         """The brightest pixels that count, as a share of the range above black; 1 if saturated."""
-        flat = pixels.ravel()
-        judged = flat[:: flat.size // _PIXELS | 1]  # an odd step: every other column has only two colours
+        judged = thinned(pixels.ravel(), _PIXELS)
         place = int(judged.size * (1.0 - BRIGHTEST_SHARE))
         level = float(np.partition(judged, place)[place])
         if level >= self._full:

@@ -24,6 +24,7 @@ from dsl_core.optics.correspondence import zero_order
 from dsl_core.patterns.gray_code import DecodedCode
 from dsl_core.reconstruction.geometry import Geometry
 from dsl_core.reconstruction.named_rows import named_rows
+from dsl_core.solve.thinned import thinned
 from dsl_core.words import counted
 
 Floats = NDArray[np.float64]
@@ -250,8 +251,7 @@ def _of_rows(
     if code.row is None:
         return None
     pixels = np.flatnonzero(usable & (code.row >= 0))
-    # An odd number keeps all colours of the mosaic.
-    pixels = pixels[:: len(pixels) // MOST_PIXELS | 1]
+    pixels = thinned(pixels, MOST_PIXELS)
     exact, expected = named_rows(rig, kind, pixels, geometry.depth_mm.ravel()[pixels])
     height, width = geometry.depth_mm.shape
     tiles = TILES[0] * TILES[1]

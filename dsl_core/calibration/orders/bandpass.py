@@ -35,6 +35,7 @@ from dsl_core.optics.filters import FINE_NM, passed
 from dsl_core.optics.spectra import ORDERS, SECOND_ORDERS
 from dsl_core.optics.unlit import unlit_px
 from dsl_core.progress import Progress
+from dsl_core.solve.thinned import thinned
 
 Floats = NDArray[np.float64]
 
@@ -58,8 +59,7 @@ class SeenFilter:
 
 def profile_scan(scan: LineScan) -> LineScan:
     """The pixels that blur and halo are fitted to, spread over all."""
-    # An odd step keeps all colours of the mosaic: an even one has every other column, and only two of them.
-    return scan.at(np.arange(0, len(scan.pixels), len(scan.pixels) // PROFILE_PIXELS | 1))
+    return scan.at(thinned(np.arange(len(scan.pixels)), PROFILE_PIXELS))
 
 
 def plane_profile(rig: Rig, scan: LineScan, progress: Progress | None = None) -> ZeroOrderFit:

@@ -12,6 +12,7 @@ from dsl_core.capture.proof.noise import Noise
 from dsl_core.capture.proof.raster import Counts, Floats, Raster
 from dsl_core.model.plan import CapturePlan, Shot
 from dsl_core.patterns.multiplexed import profile
+from dsl_core.solve.thinned import thinned
 
 #: Two predictions tell a pixel apart if they differ by this share of its light and so many deviations.
 APART, SIGMAS = 0.3, 6.0
@@ -71,7 +72,7 @@ def line_profile(plan: CapturePlan, shot: Shot) -> Floats | None:
 def contest_of_lines(seen: Counts, lit: Lit, wanted: Floats, rival: Floats) -> Contest:
     """Which of two patterns of columns (`line_profile`) a picture shows."""
     chosen = np.flatnonzero(np.take(np.abs(wanted - rival) > APART, lit.key))
-    chosen = chosen[:: chosen.size // PLENTY | 1]  # an odd step keeps all colours of the mosaic
+    chosen = thinned(chosen, PLENTY)
     black, contrast = lit.black[chosen], lit.contrast[chosen]
     key = lit.key[chosen]
     return vote(

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from dsl_core.model.plan import CapturePlan, NoSpectral, ScanLines
 from dsl_core.patterns.images import spectral_profiles
 from dsl_core.reconstruction.merge import PickedLines
+from dsl_core.solve.thinned import thinned
 
 Floats = NDArray[np.float64]
 
@@ -69,7 +70,7 @@ def line_levels(
         return None
     cover = _coverage(plan)
     sound = np.flatnonzero(np.isfinite(seen.std).all(0))
-    sound = sound[:: len(sound) // PIXELS | 1]
+    sound = thinned(sound, PIXELS)
     if cover is None or len(sound) < FEWEST:
         return None
     picked = seen.pixels[sound]
@@ -171,8 +172,7 @@ def candidates(
     light, variance = white
     lit = (column >= 0) & np.isfinite(variance) & (light > 5 * np.sqrt(np.maximum(variance, 0)))
     some = np.flatnonzero(lit.ravel())
-    # An odd step keeps all colours of the mosaic.
-    return np.asarray(some[:: len(some) // (2 * PIXELS) | 1])
+    return thinned(some, 2 * PIXELS)
 
 
 def pitch_of(column: NDArray[np.integer]) -> float:

@@ -24,6 +24,7 @@ from dsl_core.reconstruction.light.line_levels import AROUND, PIXELS, pitch_of
 from dsl_core.reconstruction.light.line_levels import zone_px as zone_px_of
 from dsl_core.reconstruction.light.neighbour_steps import Scan
 from dsl_core.reconstruction.merge import Exposed, PickedLines
+from dsl_core.solve.thinned import thinned
 
 Floats = NDArray[np.float64]
 
@@ -102,7 +103,7 @@ def room_flicker(
     if not isinstance(lines, ScanLines) or len(seen.radiance) < FRAMES:
         return None
     known = np.flatnonzero(np.isfinite(seen.std).all(0) & (column.ravel()[seen.pixels] >= 0))
-    pixels = seen.pixels[known[:: len(known) // PIXELS | 1]]  # an odd step keeps all colours of the mosaic
+    pixels = seen.pixels[thinned(known, PIXELS)]
     pixels = pixels[np.argsort(column.ravel()[pixels], kind="stable")]
     zone_px, unlit = zone_px_of(lines, pitch_of(column)), unlit_px(scan.rig, lines.width_px)
 
