@@ -63,6 +63,9 @@ CHECKS = (
 SHARED = ("-n", "logical", "--maxprocesses", "4", "--dist", "worksteal")
 
 
+#: Makes what a new environment lacks while mypy has one core to itself; all processes of the tests would.
+FIRST_USE = ("-m", "tests.cases.first_use")
+
 #: Tests that are quick and reach far, for a look between two changes; mypy keeps what it found.
 QUICK = (
     *(
@@ -304,6 +307,20 @@ def run(
             return (code if code >= 0 else 128 - code), interrupted
 
 
+@contextlib.contextmanager
+def beside(command: Sequence[str], variables: dict[str, str]) -> Iterator[None]:
+    """Run a command meanwhile, and wait for its end; what it says or fails in shows in the tests as well."""
+    quiet = subprocess.DEVNULL
+    process = subprocess.Popen(list(command), env=variables, cwd=ROOT, stdout=quiet, stderr=quiet)
+    try:
+        yield
+        with contextlib.suppress(subprocess.TimeoutExpired):
+            process.wait(LIMIT_S)
+    finally:
+        process.kill()
+        process.wait()
+
+
 def expected_s(venv: Path, what: str) -> float:
     """How long tests took here the last time, or usually take on two cores."""
     try:
@@ -329,13 +346,19 @@ def test(venv: Path, arguments: Sequence[str]) -> int:
     if not arguments or what == "test quick":
         say(f"{what} takes about {max(1, round(expected_s(venv, what) / 60))} min on this computer")
     results: list[tuple[str, int, float]] = []
-    for name, (program, *options) in (*CHECKS, ("pytest", ("pytest", *SHARED, "--durations=10", *chosen))):
+
+    def completes(name: str, program: str, *options: str) -> bool:
         start = time.monotonic()
         say(f"{name} ...")
         code, interrupted = run([str(venv_program(venv, program)), *options], variables, ROOT, LIMIT_S)
         results.append((name, code, time.monotonic() - start))
-        if interrupted:
+        return not interrupted
+
+    with beside([str(venv_program(venv, "python")), *FIRST_USE], variables):
+        if not all(completes(name, *command) for name, command in CHECKS):
             return 130
+    if not completes("pytest", "pytest", *SHARED, "--durations=10", *chosen):
+        return 130
     for name, code, seconds in results:
         say(f"{name:17s} {'passed' if code == 0 else f'FAILED ({code})':11s} {seconds:6.1f} s")
     worst = next((code for _, code, _ in results if code != 0), 0)

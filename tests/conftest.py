@@ -7,7 +7,7 @@ import signal
 import pytest
 
 from dsl_core.solve.heap import keep_freed_memory
-from tests.cases.memory import do_not_wait_for_the_disk
+from tests.cases.memory import do_not_wait_for_the_disk, keep_temporary_folders_in_memory
 
 os.environ.setdefault("QT_API", "pyside6")
 os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
@@ -23,6 +23,7 @@ gc.set_threshold(50_000, 20, 50)
 
 keep_freed_memory()
 do_not_wait_for_the_disk()
+keep_temporary_folders_in_memory()
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:

@@ -1,18 +1,15 @@
-"""Folders in memory, and one small calibrated campaign for all tests: killed in the middle, then resumed."""
+"""One small calibrated campaign for all tests: killed in the middle, then resumed."""
 
 from __future__ import annotations
 
 import pickle
 import shutil
-import tempfile
-from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import pytest
 from filelock import FileLock
 
-from tests.cases.memory import folder_in_memory
 from tests.cases.tiny_campaign import Ending, contents, give, kill_at
 
 #: The file whose birth ends the first process, and the step that it belongs to.
@@ -28,42 +25,30 @@ class Calibrated:
     ending: Ending
 
 
-@pytest.fixture(scope="session")
-def memory(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
-    """Where all captures of these tests go."""
-    with folder_in_memory(tmp_path_factory.mktemp("memory")) as folder:
-        yield folder
-
-
-@pytest.fixture
-def tmp_path(memory: Path) -> Path:
-    """A folder for one test, in memory."""
-    return Path(tempfile.mkdtemp(dir=memory))
-
-
 @pytest.fixture(scope="module")
-def module_folder(memory: Path) -> Path:
-    """A folder for the tests of a module, in memory."""
-    return Path(tempfile.mkdtemp(dir=memory))
+def module_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder for the tests of a module."""
+    return tmp_path_factory.mktemp("module")
 
 
 @pytest.fixture(scope="session")
-def calibrated(tmp_path_factory: pytest.TempPathFactory, memory: Path, worker_id: str) -> Calibrated:
+def calibrated(tmp_path_factory: pytest.TempPathFactory, worker_id: str) -> Calibrated:
     """The campaign; of processes that share the tests the first makes it, the others copy it."""
+    home = tmp_path_factory.mktemp("campaigns")
     if worker_id == "master":
-        return _make(memory)
+        return _make(home)
     shared = tmp_path_factory.getbasetemp().parent / "calibrated"
     made = shared / "made.pickle"
     with FileLock(f"{shared}.lock"):
         if not made.exists():
             shutil.rmtree(shared, ignore_errors=True)  # half of one that failed
-            own = _make(memory)
+            own = _make(home)
             shutil.copytree(own.folder, shared / own.folder.name)
             made.write_bytes(pickle.dumps(own))
             return own
     found = pickle.loads(made.read_bytes())
     assert isinstance(found, Calibrated)
-    own = replace(found, folder=memory / found.folder.name)
+    own = replace(found, folder=home / found.folder.name)
     shutil.copytree(shared / own.folder.name, own.folder)
     return own
 

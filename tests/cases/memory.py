@@ -4,27 +4,24 @@ from __future__ import annotations
 
 import os
 import shutil
-import tempfile
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 
+import psutil
+
 MEMORY = Path("/dev/shm")
-#: Less free memory than this is left to others, bytes.
-LEAST_FREE = 1 << 30
+#: Tests keep less than this, bytes, and leave as much to others.
+LEAST_FREE = 4 << 30
 
 
-@contextmanager
-def folder_in_memory(otherwise: Path) -> Iterator[Path]:
-    """A new folder in memory, or ``otherwise`` where there is none.
+def keep_temporary_folders_in_memory() -> None:
+    """Let pytest make its folders in memory, for programs that tests start, unless told of a place.
 
     A killed process loses nothing there that it gave to the system: only a power cut tells it from a disk.
     """
-    if not (os.access(MEMORY, os.W_OK) and shutil.disk_usage(MEMORY).free > LEAST_FREE):
-        yield otherwise
+    if not os.access(MEMORY, os.W_OK) or shutil.disk_usage(MEMORY).free < LEAST_FREE:
         return
-    with tempfile.TemporaryDirectory(prefix="dsl-scan-test-", dir=MEMORY) as name:
-        yield Path(name)
+    if psutil.virtual_memory().available > 2 * LEAST_FREE:
+        os.environ.setdefault("PYTEST_DEBUG_TEMPROOT", str(MEMORY))
 
 
 def do_not_wait_for_the_disk() -> None:

@@ -9,6 +9,7 @@ import signal
 import subprocess
 import sys
 import threading
+import time
 from pathlib import Path
 from types import ModuleType
 
@@ -83,6 +84,21 @@ def test_tests_say_how_long_they_take_here(tmp_path: Path) -> None:
 
 def test_what_is_quick_is_there() -> None:
     assert all((run.ROOT / path).exists() for path in run.QUICK)
+    assert (run.ROOT / run.FIRST_USE[1].replace(".", "/")).with_suffix(".py").exists()
+
+
+def test_what_runs_beside_the_checks_has_ended_before_the_tests(tmp_path: Path) -> None:
+    made, late = tmp_path / "made", "import sys, time; time.sleep(0.2); open(sys.argv[1], 'w').close()"
+    with run.beside([sys.executable, "-c", late, str(made)], dict(os.environ)):
+        pass
+    assert made.exists()
+
+
+def test_what_runs_beside_the_checks_ends_when_they_are_broken_off() -> None:
+    started, endless = time.monotonic(), [sys.executable, "-c", "import time; time.sleep(60)"]
+    with pytest.raises(OSError, match="broken off"), run.beside(endless, dict(os.environ)):
+        raise OSError("broken off")
+    assert time.monotonic() - started < 50
 
 
 def test_what_ldconfig_does_not_list_is_missing() -> None:

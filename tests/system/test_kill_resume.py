@@ -17,7 +17,6 @@ from numpy.typing import NDArray
 from dsl_core.errors import StoreError
 from dsl_core.io.scan.check import find_problems
 from dsl_core.io.scan.folder import ScanReader
-from tests.cases.memory import folder_in_memory
 
 KILLS = 20
 ROOT = Path(__file__).parents[2]
@@ -87,24 +86,17 @@ def server(request: pytest.FixtureRequest) -> Iterator[Server]:
     server.close()
 
 
-@pytest.fixture
-def folder(tmp_path: Path) -> Iterator[Path]:
-    """A folder in memory where there is one."""
-    with folder_in_memory(tmp_path) as found:
-        yield found
-
-
 @pytest.mark.timeout(300)
-def test_twenty_killed_scans_resume_to_the_unbroken_one(server: Server, folder: Path) -> None:
-    duration_s = server.duration_s(folder / "unbroken.dsl")
-    unbroken = _frames(folder / "unbroken.dsl")
+def test_twenty_killed_scans_resume_to_the_unbroken_one(server: Server, tmp_path: Path) -> None:
+    duration_s = server.duration_s(tmp_path / "unbroken.dsl")
+    unbroken = _frames(tmp_path / "unbroken.dsl")
     assert unbroken.std() > 0
     # By frames and not by time alone, since the time that a scan takes changes with the machine's load.
     # Each in a stretch of its own: a busy machine kills late, and moments close together would be one.
     share = 0.95 * (np.arange(KILLS) + np.random.default_rng(2024).uniform(0.0, 1.0, KILLS)) / KILLS
     left = []
     for number, moment in enumerate(share * len(unbroken)):
-        scan = folder / f"{number}.dsl"
+        scan = tmp_path / f"{number}.dsl"
         server.scan(scan, kill_after=(int(moment), moment % 1 * duration_s / len(unbroken)))
         left.append(_frames_left(scan))
         assert server.scan(scan) == 0
@@ -115,10 +107,10 @@ def test_twenty_killed_scans_resume_to_the_unbroken_one(server: Server, folder: 
 
 
 @pytest.mark.parametrize("server", ["made"], indirect=True)
-def test_one_scan_killed_again_and_again_gets_there(server: Server, folder: Path) -> None:
-    duration_s = server.duration_s(folder / "unbroken.dsl")
-    scan = folder / "scan.dsl"
+def test_one_scan_killed_again_and_again_gets_there(server: Server, tmp_path: Path) -> None:
+    duration_s = server.duration_s(tmp_path / "unbroken.dsl")
+    scan = tmp_path / "scan.dsl"
     for _ in range(KILLS):
         server.scan(scan, kill_after=(0, duration_s / 4))
     assert server.scan(scan) == 0
-    np.testing.assert_array_equal(_frames(scan), _frames(folder / "unbroken.dsl"))
+    np.testing.assert_array_equal(_frames(scan), _frames(tmp_path / "unbroken.dsl"))
