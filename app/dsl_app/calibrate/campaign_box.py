@@ -118,7 +118,7 @@ class CampaignBox(QFrame):
         self.everything.clicked.connect(commands.run_everything)
         self.cancel.clicked.connect(commands.cancel_everything)
         self.keep.clicked.connect(commands.keep)
-        shown = (state.campaign, state.everything, state.outcome, state.rows, state.foreign)
+        shown = (state.campaign, state.everything, state.outcome, state.refused, state.rows, state.foreign)
         self.stops = follow_any(self._show, *shown, state.library, state.in_use, self._rig.devices)
 
     def ask_new(self) -> bool:

@@ -137,6 +137,7 @@ class CalibratePage(PageWidget):
                 state.running,
                 state.campaign,
                 state.foreign,
+                state.refused,
                 state.library,
                 state.in_use,
                 self._rig.devices,

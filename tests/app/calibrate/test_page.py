@@ -97,10 +97,10 @@ def test_everything_by_one_button_and_the_library_shows_it(
     click(stage.page.head.everything)
     assert stage.page.head.cancel.isVisible()
     assert not stage.page.rows["selftest"].run.isEnabled()
-    stage.wait(lambda: "Everything is calibrated" in stage.bench.state.outcome.value)
+    stage.wait(lambda: "Everything is calibrated" in stage.bench.state.outcome.value.text)
     stage.idle()
     # How it ended is said where it was started, not in the library below.
-    assert stage.page.head.progress.text() == stage.bench.state.outcome.value
+    assert stage.page.head.progress.text() == stage.bench.state.outcome.value.text
     assert not stage.bench.state.note.value
     library = stage.page.library
     assert cell(library.table, 0, 0) == "campaign"

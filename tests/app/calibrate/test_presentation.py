@@ -112,6 +112,10 @@ ALL_GOOD: dict[str, object] = {"rows": (replace(ROW, state=RowState.GOOD),)}
         ({"campaign": None}, BY_ITSELF, "new"),
         ({}, BY_ITSELF, "everything"),
         ({}, BY_HAND, "geometry"),
+        # Starting everything again would end there again.
+        ({"refused": "geometry"}, BY_ITSELF, "geometry"),
+        ({"refused": "selftest"}, BY_ITSELF, "everything"),
+        ({"rows": (replace(ROW, has_candidate=True),)}, BY_ITSELF, "geometry"),
         ({}, None, ""),
         (ALL_GOOD, BY_ITSELF, "keep"),
         ({"foreign": True}, BY_ITSELF, ""),
