@@ -39,7 +39,7 @@ class StepPage(QWidget):
         self._lay_out()
         shown = (
             *(state.at, state.statuses, state.look, state.doing, state.is_checking),
-            *(state.captures_itself, state.outlines, state.covered, state.places_itself),
+            *(state.captures_itself, state.is_awaited, state.outlines, state.covered, state.places_itself),
         )
         self.stops = [*follow_any(self._show, *shown), state.seen.follow(self.picture.show_seen)]
 
