@@ -253,6 +253,7 @@ class DriftWindow(QDialog):
         self.again = push_button("Check &again", tip, check)
         tip = "Scan with this calibration from now on, despite the drift"
         self.use = push_button("&Use anyway", tip, lambda: commands.use(verdict.name))
+        set_role(self.again, "" if verdict.passed else "primary")
         for button in (self.again, self.use):
             buttons.addButton(button, QDialogButtonBox.ButtonRole.ActionRole)
             button.clicked.connect(self.accept)

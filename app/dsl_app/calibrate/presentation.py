@@ -52,6 +52,7 @@ class CampaignHead:
     keep: ButtonState
     cancel: ButtonState
     everything: ButtonState
+    scan: ButtonState
 
 
 def campaign_head(state: CalibrateState, devices: DeviceRig | None) -> CampaignHead:
@@ -80,15 +81,16 @@ def campaign_head(state: CalibrateState, devices: DeviceRig | None) -> CampaignH
         keep=ButtonState(facts is not None and not is_running, usable and has_accepted, main == "keep"),
         cancel=ButtonState(is_running),
         everything=ButtonState(not is_running, usable and places_itself, main == "everything"),
+        scan=ButtonState(main == "scan", is_primary=True),
     )
 
 
 def main_button(state: CalibrateState, devices: DeviceRig | None) -> str:
-    """What a person does next: new, keep, use, everything, or a calibration's name; empty for nothing here.
+    """What a person does next: new, keep, use, scan, everything, or a calibration's name; empty for nothing.
 
     A rig that does not place targets itself is calibrated row by row, and so is a calibration that was
     refused, or whose fit waits to be judged: its wizard shows what is wrong, and starting everything again
-    would end there again. One that is kept is used for scans.
+    would end there again. One that is kept is used for scans, and then a scan is planned.
     Without a rig, or with another one, the message across the page has the button that connects it.
     """
     if state.campaign.value is None:
@@ -98,7 +100,7 @@ def main_button(state: CalibrateState, devices: DeviceRig | None) -> str:
     left = [row.name for row in state.rows.value if not row.state.is_accepted]
     if not left:
         kept = kept_version(state)
-        return "keep" if kept is None else ("" if _is_used(kept, state.in_use.value) else "use")
+        return "keep" if kept is None else ("scan" if _is_used(kept, state.in_use.value) else "use")
     if devices is None:
         return ""
     first = left[0]

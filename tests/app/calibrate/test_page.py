@@ -119,6 +119,12 @@ def test_everything_by_one_button_and_the_library_shows_it(
     assert stage.bench.state.in_use.value == "campaign"
     assert cell(library.table, 0, 2) == "scans"
     assert not library.restore.isEnabled()
+    # And then there is nothing left to do here.
+    asked: list[bool] = []
+    stage.page.scan_requested.connect(lambda: asked.append(True))
+    assert stage.page.head.scan.property("role") == "primary"
+    click(stage.page.head.scan)
+    assert asked == [True]
 
 
 def test_a_figure_of_two_lines_does_not_part_a_title_from_its_purpose(stage: Stage) -> None:
