@@ -11,6 +11,7 @@ from dsl_app.calibrate.campaign_status import Recipes
 from dsl_app.calibrate.wizard.background_work import BackgroundWork, Captured, Opened
 from dsl_app.calibrate.wizard.ghost import keeps_still
 from dsl_app.calibrate.wizard.jobs import WizardJobs
+from dsl_app.calibrate.wizard.settings import trouble_in_titles
 from dsl_app.calibrate.wizard.state import Doing, Fit, Look, WizardState
 from dsl_app.connection.controller import RigController
 from dsl_app.connection.state import Link
@@ -326,7 +327,7 @@ class WizardController:
 
         def refused(error: Exception) -> None:
             self._jobs.forget_queued()
-            self.state.settings_trouble.set(sentence_of(error))
+            self.state.settings_trouble.set(trouble_in_titles(sentence_of(error), self.state.name))
             if then_fit:
                 self._jobs.fail(error)
 
