@@ -26,8 +26,8 @@ from dsl_core.model.calibration.accepted import AcceptedCalibration
 from dsl_core.model.figure import Figure, failures
 from dsl_core.progress import Progress
 
-#: Told how it ended: a sentence, and why it failed, None when it did not.
-Ended = Callable[[str, Exception | None], object]
+#: Told how it ended: a sentence, why it failed (None: it did not), and the calibration it was at, if any.
+Ended = Callable[[str, Exception | None, str], object]
 CANNOT_PLACE = "This rig cannot place its targets itself. Run the calibrations one by one."
 
 
@@ -121,7 +121,7 @@ class CalibrateAll:
         self._state.running.set("")
         self._state.everything.set("")
         self._state.seen.set(None)
-        self._told(note, error)
+        self._told(note, error, self._overall.name)
 
 
 @dataclass
@@ -149,6 +149,8 @@ class UnattendedGuide:
         """Remember which calibration it is."""
         self.title, self._is_fitting = session.recipe.title, False
         self.overall.begins(session.recipe.name, missing)
+        # Else its row would show the last that was told of the one before.
+        self.progress.report(self.title, 0, 0)
 
     def place(self, step: Step) -> None:
         """Raise `CalibrationError`: no person is there to place a target."""

@@ -92,6 +92,7 @@ class CampaignBox(QFrame):
             "Calibrate everythin&g",
             "Run all calibrations in order, without questions, on a rig that places targets itself",
         )
+        self.scan = push_button("P&lan a scan…", "Open the Scan page; scans use this calibration")
         self.cancel = push_button("Sto&p", "Stop at the next safe point; everything captured is kept")
         self.keep = push_button(
             "&Keep in library", "Assemble the rig as far as it is calibrated and save it in the library"
@@ -106,7 +107,7 @@ class CampaignBox(QFrame):
             (words, 1),
             *(
                 (button, 0, Qt.AlignmentFlag.AlignTop)
-                for button in (self.new, self.open, self.keep, self.cancel, self.everything)
+                for button in (self.new, self.open, self.keep, self.cancel, self.everything, self.scan)
             ),
             on=self,
             margins=0,
@@ -118,7 +119,7 @@ class CampaignBox(QFrame):
         self.everything.clicked.connect(commands.run_everything)
         self.cancel.clicked.connect(commands.cancel_everything)
         self.keep.clicked.connect(commands.keep)
-        shown = (state.campaign, state.everything, state.outcome, state.rows, state.foreign)
+        shown = (state.campaign, state.everything, state.outcome, state.refused, state.rows, state.foreign)
         self.stops = follow_any(self._show, *shown, state.library, state.in_use, self._rig.devices)
 
     def ask_new(self) -> bool:

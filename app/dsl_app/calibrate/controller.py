@@ -18,10 +18,11 @@ from dsl_app.connection.state import RigChoice
 from dsl_app.shared.evented import Event
 from dsl_app.shared.jobs.base import Job, JobRunner
 from dsl_app.shared.notify import NO_RIG, Notifier, sentence_of
+from dsl_app.shared.widget_state import LabelState
 from dsl_core.campaign.guide import calibrated_rig
 from dsl_core.campaign.products import Products, write_products
 from dsl_core.devices.conditions import current_conditions
-from dsl_core.errors import DslError
+from dsl_core.errors import CalibrationError, DecodeError, DslError
 from dsl_core.io import CAMPAIGN_NAME
 from dsl_core.io.calibration_library import CalibrationLibrary
 from dsl_core.io.campaign_folder import CampaignFolder, take_campaign
@@ -92,7 +93,8 @@ class CalibrateController:
         info = campaign.info
         rig = RigChoice(info.rig, tuple(info.options.items()))
         self.state.note.set("")
-        self.state.outcome.set("")
+        self.state.outcome.set(LabelState())
+        self.state.refused.set("")
         self.state.campaign.set(CampaignFacts(campaign.path.absolute(), rig))
         self.refresh()
 
@@ -146,6 +148,8 @@ class CalibrateController:
         )
         self._wizard = wizard
         self.state.opening.set(title)
+        # It was read by now, and the wizard tells it anew.
+        self.state.outcome.set(LabelState())
         state.closed.connect(lambda _: self._left(state))
 
         def failed(error: Exception) -> None:
@@ -197,15 +201,19 @@ class CalibrateController:
         """Update how far it is; called by the window's timer."""
         self._everything.take_news()
 
-    def _ended(self, note: str, error: Exception | None) -> None:
+    def _ended(self, note: str, error: Exception | None, name: str) -> None:
         self._lock.close()
-        self.state.outcome.set(note)
+        outcome = LabelState(note, "muted")
+        if error is not None:
+            title, reason = ABOUT[name].title if name in ABOUT else name, sentence_of(error)
+            at = f" at {title}" if name and not reason.startswith(title) else ""
+            outcome = LabelState(f"Calibrating everything stopped{at}: {reason}", "bad")
+            self._notifier.tell("error", outcome.text)
+        self.state.outcome.set(outcome)
+        # A lost device or a full disk is no matter of the calibration, which goes on afterwards.
+        self.state.refused.set(name if isinstance(error, CalibrationError | DecodeError) else "")
         self.refresh()
         self.library.load()
-        if error is not None:
-            text = f"Calibrating everything stopped: {sentence_of(error)}"
-            self.state.outcome.set(text)
-            self._notifier.tell("error", text)
 
     # The rig so far --------------------------------------------------------------------------------
 

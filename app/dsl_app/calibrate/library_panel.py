@@ -30,6 +30,7 @@ from dsl_app.shared.widget_state import LabelState
 from dsl_app.shared.widgets.dialogs import dialog_buttons
 from dsl_app.shared.widgets.forms import label, push_button, set_role, show_label
 from dsl_app.shared.widgets.help_window import add_help_key
+from dsl_app.shared.widgets.hints import FocusRing
 from dsl_app.shared.widgets.layouts import STRETCH, column_of, row_of, splitter
 from dsl_app.shared.widgets.read_table import ReadTable, cell
 from dsl_core.io.calibration_library import LibraryLine
@@ -62,6 +63,7 @@ class LibraryPanel(QGroupBox):
         self._offered: LibraryLine | None = None
         self._told = ""
         self.details = QTextBrowser()
+        FocusRing(self.details)
         self.details.setAccessibleName("Details of the calibration")
         self.details.setToolTip("Conditions, dates and figures of the selected calibration")
         self._note = label("", "muted", wraps=True)
@@ -251,6 +253,7 @@ class DriftWindow(QDialog):
         self.again = push_button("Check &again", tip, check)
         tip = "Scan with this calibration from now on, despite the drift"
         self.use = push_button("&Use anyway", tip, lambda: commands.use(verdict.name))
+        set_role(self.again, "" if verdict.passed else "primary")
         for button in (self.again, self.use):
             buttons.addButton(button, QDialogButtonBox.ButtonRole.ActionRole)
             button.clicked.connect(self.accept)

@@ -7,7 +7,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from PySide6.QtCore import Qt, QTimer
+from PySide6.QtCore import Qt, QTimer, Signal
 from PySide6.QtGui import QShowEvent
 from PySide6.QtWidgets import QBoxLayout, QFrame, QGridLayout, QGroupBox, QWidget
 
@@ -44,7 +44,12 @@ _NAME_PX, _STATE_PX, _DATE_PX, _BUTTON_PX = 236, 154, 118, 100
 
 
 class CalibratePage(PageWidget):
-    """Follows a `CalibrateState` and asks a controller; ``home`` is where new campaigns are proposed."""
+    """Follows a `CalibrateState` and asks a controller; ``home`` is where new campaigns are proposed.
+
+    ``scan_requested`` asks for the Scan page.
+    """
+
+    scan_requested = Signal()
 
     def __init__(
         self, state: CalibrateState, rig: RigState, commands: CalibrateController, home: Path
@@ -57,6 +62,7 @@ class CalibratePage(PageWidget):
             commands.connect_rig,
         )
         self.head = CampaignBox(state, rig, commands, home)
+        self.head.scan.clicked.connect(self.scan_requested)
         self.rows = {
             row.name: CalibrationRow(row, number, self.run) for number, row in enumerate(state.rows.value, 1)
         }
@@ -137,6 +143,7 @@ class CalibratePage(PageWidget):
                 state.running,
                 state.campaign,
                 state.foreign,
+                state.refused,
                 state.library,
                 state.in_use,
                 self._rig.devices,

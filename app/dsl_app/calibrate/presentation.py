@@ -52,6 +52,7 @@ class CampaignHead:
     keep: ButtonState
     cancel: ButtonState
     everything: ButtonState
+    scan: ButtonState
 
 
 def campaign_head(state: CalibrateState, devices: DeviceRig | None) -> CampaignHead:
@@ -72,19 +73,24 @@ def campaign_head(state: CalibrateState, devices: DeviceRig | None) -> CampaignH
     return CampaignHead(
         title,
         place,
-        LabelState(progress or state.outcome.value, "warn" if progress == "stopping" else "muted"),
+        LabelState(progress, "warn" if progress == "stopping" else "muted")
+        if progress
+        else state.outcome.value,
         new=ButtonState(is_enabled=not is_running, is_primary=main == "new"),
         open=ButtonState(is_enabled=not is_running),
         keep=ButtonState(facts is not None and not is_running, usable and has_accepted, main == "keep"),
         cancel=ButtonState(is_running),
         everything=ButtonState(not is_running, usable and places_itself, main == "everything"),
+        scan=ButtonState(main == "scan", is_primary=True),
     )
 
 
 def main_button(state: CalibrateState, devices: DeviceRig | None) -> str:
-    """What a person does next: new, keep, use, everything, or a calibration's name; empty for nothing here.
+    """What a person does next: new, keep, use, scan, everything, or a calibration's name; empty for nothing.
 
-    A rig that does not place targets itself is calibrated row by row. One that is kept is used for scans.
+    A rig that does not place targets itself is calibrated row by row, and so is a calibration that was
+    refused, or whose fit waits to be judged: its wizard shows what is wrong, and starting everything again
+    would end there again. One that is kept is used for scans, and then a scan is planned.
     Without a rig, or with another one, the message across the page has the button that connects it.
     """
     if state.campaign.value is None:
@@ -94,10 +100,14 @@ def main_button(state: CalibrateState, devices: DeviceRig | None) -> str:
     left = [row.name for row in state.rows.value if not row.state.is_accepted]
     if not left:
         kept = kept_version(state)
-        return "keep" if kept is None else ("" if _is_used(kept, state.in_use.value) else "use")
+        return "keep" if kept is None else ("scan" if _is_used(kept, state.in_use.value) else "use")
     if devices is None:
         return ""
-    return "everything" if _places_itself(devices) else left[0]
+    first = left[0]
+    needs_judging = first == state.refused.value or any(
+        row.has_candidate for row in state.rows.value if row.name == first
+    )
+    return "everything" if _places_itself(devices) and not needs_judging else first
 
 
 def kept_version(state: CalibrateState) -> LibraryLine | None:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 from dsl_app.connection.state import RigChoice
 from dsl_app.shared.evented import Event, Value
+from dsl_app.shared.widget_state import LabelState
 
 if TYPE_CHECKING:
     from dsl_app.calibrate.wizard.state import Seen
@@ -130,7 +131,8 @@ class CalibrateState:
     """Values that the calibrations' controllers set and the page follows.
 
     ``trouble`` is a sentence on why nothing can be calibrated (empty: nothing is wrong), ``note`` one on what
-    was done last in the library, ``outcome`` one on how calibrating everything ended. ``foreign`` says that
+    was done last in the library, ``outcome`` one on how calibrating everything ended, and
+    ``refused`` the calibration at which it was refused (empty: none). ``foreign`` says that
     the campaign belongs to another rig; ``opening`` is the title of the wizard that is being opened;
     ``everything`` says how far a calibration of everything is (empty: none runs), ``running`` names the
     calibration that it is at, ``seen`` is what the camera sees of it. ``in_use`` is the library's name that
@@ -143,7 +145,8 @@ class CalibrateState:
         self.foreign = Value(False)
         self.trouble = Value("")
         self.note = Value("")
-        self.outcome = Value("")
+        self.outcome = Value(LabelState())
+        self.refused = Value("")
         self.opening = Value("")
         self.everything = Value("")
         self.running = Value("")

@@ -305,7 +305,9 @@ class Composition(QObject):
 
         state.campaign.changed.connect(remember)
         home = Path(settings.campaigns_folder or Path.home() / "dsl-campaigns")
-        return CalibratePage(state, self.rig.state, control, home)
+        page = CalibratePage(state, self.rig.state, control, home)
+        page.scan_requested.connect(lambda: window.open_page("scan"))
+        return page
 
     def _open_wizard(self, state: WizardState, control: WizardController) -> None:
         from dsl_app.calibrate.wizard.window import CalibrationWizard

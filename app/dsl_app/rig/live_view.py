@@ -17,6 +17,7 @@ from dsl_app.rig.state import NO_RIG, Draw, Drawn, FrameCounts, picture_note, ra
 from dsl_app.shared.evented import Value
 from dsl_app.shared.theme import Theme
 from dsl_app.shared.widgets.forms import check_box, label, push_button, set_role, show_label
+from dsl_app.shared.widgets.hints import FocusRing
 from dsl_app.shared.widgets.layouts import STRETCH, boxed, column_of, row_of
 from dsl_app.shared.widgets.pictures import PictureView, Region, RegionBox, arrow_step, cut, moved_within
 from dsl_app.shared.widgets.plots import colour_legend
@@ -59,6 +60,7 @@ class LiveView(QWidget):
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self.setAccessibleName("Live picture")
         self.view.setFocusProxy(self)
+        FocusRing(self, self.view)
         self._box, self._item = self.view.box, self.view.image
         self._read: tuple[int, int] | None = None
         self.rectangle = RegionBox(CELL_PX)
@@ -85,6 +87,8 @@ class LiveView(QWidget):
         self._histogram.hideButtons()
         self._histogram.setMenuEnabled(False)
         self._histogram.setAccessibleName("Histogram of raw counts")
+        # No key does anything with it.
+        self._histogram.setFocusPolicy(Qt.FocusPolicy.NoFocus)
         self._histogram.setLabel("bottom", "raw counts, DN")
         # Room for half of the outermost numbers of the axes.
         self._histogram.getPlotItem().setContentsMargins(0, 8, 14, 0)

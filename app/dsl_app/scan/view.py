@@ -15,6 +15,7 @@ from dsl_app.scan.controller import ScanController
 from dsl_app.scan.state import LivePicture, ScanState
 from dsl_app.shared.widgets.forms import label
 from dsl_app.shared.widgets.help_window import set_help
+from dsl_app.shared.widgets.hints import FocusRing
 from dsl_app.shared.widgets.layouts import column_of
 from dsl_app.shared.widgets.pictures import DEPTH, PictureView, arrow_step, colour_map
 from dsl_app.shared.widgets.plots import CalmPlot
@@ -44,6 +45,7 @@ class FramePicture(QWidget):
         self.view = PictureView("Last frame of the scan", tip)
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self.view.setFocusProxy(self)
+        FocusRing(self, self.view)
         self.box = self.view.box
         self.box.setMouseEnabled(False, False)
         self._mark = pg.TargetItem(size=13, movable=False, pen=pg.mkPen("#ffffff", width=2))

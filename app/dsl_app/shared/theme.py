@@ -109,6 +109,7 @@ QToolButton[role="choice"]:hover {{ border-color: {t.muted}; }}
 QToolButton[role="choice"]:focus {{ border-color: {t.text}; }}
 QToolButton[role="choice"]:checked {{ background: {t.accent}; color: {t.on_accent};
   border-color: {t.accent}; }}
+QToolButton[role="choice"]:checked:focus {{ border-color: {t.text}; }}
 QToolButton[role="menu"] {{ padding: 3px 18px 3px 6px; border: 1px solid {t.muted}; border-radius: 2px;
   background: {t.raised}; }}
 QToolButton[role="menu"]:hover, QToolButton[role="menu"]:focus {{ border-color: {t.text}; }}

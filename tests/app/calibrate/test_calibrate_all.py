@@ -3,13 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from types import SimpleNamespace
+from typing import cast
 
 import pytest
 from dsl_app.calibrate.calibrate_all import UnattendedGuide
 from dsl_app.calibrate.overall import Overall
+from dsl_app.calibrate.presentation import main_button
 from dsl_app.calibrate.state import RowState
 
 from dsl_core.campaign.common.recipe import Step
+from dsl_core.campaign.session import CalibrationSession
+from dsl_core.errors import DeviceError
 from dsl_core.model.figure import Figure
 from dsl_core.progress import CallbackProgress
 from tests.app.calibrate.calibrate_bench import (
@@ -29,11 +34,42 @@ def test_everything_runs_in_order_and_stops_with_the_reason(bench: CalibrateBenc
     assert "Brightness is outside its limits" in bench.told
     assert "Open the aperture." in bench.told
     assert bench.row("selftest").has_candidate
+    # Which calibration it was, where a person goes on, and in red, as it is no news.
+    outcome = bench.state.outcome.value
+    assert outcome.text.startswith("Calibrating everything stopped at Self-test: Brightness is outside")
+    assert (outcome.role, bench.state.refused.value) == ("bad", "selftest")
+    assert main_button(bench.state, devices) == "selftest"
     bench.wrong = {}
     bench.control.run_everything()
-    assert "Everything is calibrated" in bench.state.outcome.value
+    assert "Everything is calibrated" in bench.state.outcome.value.text
     assert all(row.state.is_accepted for row in bench.state.rows.value)
+    assert bench.state.refused.value == ""
     assert bench.library.names() == ("campaign",)
+
+
+def test_a_lost_device_is_no_fault_of_the_calibration(
+    bench: CalibrateBench, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    devices = bench.rig.state.devices.value
+    assert devices is not None
+    devices.place = lambda placement: None
+
+    def lose(*_: object) -> bool:
+        raise DeviceError("The camera does not answer. Check its cable.")
+
+    monkeypatch.setattr(UnattendedGuide, "looked", lose)
+    bench.control.run_everything()
+    assert "stopped at Self-test: The camera does not answer" in bench.state.outcome.value.text
+    # It goes on once the device is back.
+    assert main_button(bench.state, devices) == "everything"
+
+
+def test_a_calibration_that_begins_is_named_at_once() -> None:
+    told: list[str] = []
+    guide = UnattendedGuide(CallbackProgress(lambda stage, done, total: told.append(stage)))
+    session = SimpleNamespace(recipe=SimpleNamespace(title="Spectralon", name="spectralon"))
+    guide.begins(cast(CalibrationSession, session), 2)
+    assert told == ["Spectralon"]
 
 
 def test_rows_are_live_while_everything_is_calibrated(

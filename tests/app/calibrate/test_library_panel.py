@@ -44,6 +44,7 @@ def test_a_missed_drift_check_offers_to_check_again_and_to_go_on(
         return window
 
     window = shown()
+    assert window.again.property("role") == "primary"
     click(window.again)
     assert checks == [("room 12", False, True)]
     QApplication.sendPostedEvents(None, QEvent.Type.DeferredDelete)

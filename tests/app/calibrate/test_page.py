@@ -97,10 +97,10 @@ def test_everything_by_one_button_and_the_library_shows_it(
     click(stage.page.head.everything)
     assert stage.page.head.cancel.isVisible()
     assert not stage.page.rows["selftest"].run.isEnabled()
-    stage.wait(lambda: "Everything is calibrated" in stage.bench.state.outcome.value)
+    stage.wait(lambda: "Everything is calibrated" in stage.bench.state.outcome.value.text)
     stage.idle()
     # How it ended is said where it was started, not in the library below.
-    assert stage.page.head.progress.text() == stage.bench.state.outcome.value
+    assert stage.page.head.progress.text() == stage.bench.state.outcome.value.text
     assert not stage.bench.state.note.value
     library = stage.page.library
     assert cell(library.table, 0, 0) == "campaign"
@@ -119,6 +119,12 @@ def test_everything_by_one_button_and_the_library_shows_it(
     assert stage.bench.state.in_use.value == "campaign"
     assert cell(library.table, 0, 2) == "scans"
     assert not library.restore.isEnabled()
+    # And then there is nothing left to do here.
+    asked: list[bool] = []
+    stage.page.scan_requested.connect(lambda: asked.append(True))
+    assert stage.page.head.scan.property("role") == "primary"
+    click(stage.page.head.scan)
+    assert asked == [True]
 
 
 def test_a_figure_of_two_lines_does_not_part_a_title_from_its_purpose(stage: Stage) -> None:

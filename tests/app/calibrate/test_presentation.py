@@ -112,6 +112,10 @@ ALL_GOOD: dict[str, object] = {"rows": (replace(ROW, state=RowState.GOOD),)}
         ({"campaign": None}, BY_ITSELF, "new"),
         ({}, BY_ITSELF, "everything"),
         ({}, BY_HAND, "geometry"),
+        # Starting everything again would end there again.
+        ({"refused": "geometry"}, BY_ITSELF, "geometry"),
+        ({"refused": "selftest"}, BY_ITSELF, "everything"),
+        ({"rows": (replace(ROW, has_candidate=True),)}, BY_ITSELF, "geometry"),
         ({}, None, ""),
         (ALL_GOOD, BY_ITSELF, "keep"),
         ({"foreign": True}, BY_ITSELF, ""),
@@ -143,9 +147,13 @@ def test_what_is_kept_is_used_for_scans_next() -> None:
     state.library.set((others, own))
     assert kept_version(state) == own
     assert main_button(state, BY_ITSELF) == "use"
+    assert not campaign_head(state, BY_ITSELF).scan.is_visible
     assert not campaign_head(state, BY_ITSELF).keep.is_primary
     state.in_use.set("room-12")
-    assert main_button(state, BY_ITSELF) == "", "what comes next is on the Scan page"
+    assert main_button(state, BY_ITSELF) == "scan"
+    assert main_button(state, None) == "scan"
+    head = campaign_head(state, BY_ITSELF)
+    assert (head.scan.is_visible, head.scan.is_primary) == (True, True)
 
 
 def test_while_everything_runs_it_can_only_be_stopped() -> None:

@@ -1,7 +1,9 @@
 from __future__ import annotations
 
 import pytest
-from dsl_app.shared.theme import DARK, LIGHT, Theme
+from dsl_app.shared.theme import DARK, LIGHT, Theme, style_sheet
+from PySide6.QtWidgets import QHBoxLayout, QToolButton, QWidget
+from pytestqt.qtbot import QtBot
 
 
 def luminance(colour: str) -> float:
@@ -43,3 +45,24 @@ def test_white_of_a_picture_has_an_edge_in_either_theme() -> None:
 def test_accent_and_pins_stand_out(theme: Theme) -> None:
     assert contrast(theme.on_accent, theme.accent) >= 4.5
     assert all(contrast(theme.pin(index), theme.base) >= 3 for index in range(250))
+
+
+@pytest.mark.parametrize("is_checked", [False, True])
+def test_a_choice_shows_that_it_has_the_keys(qtbot: QtBot, is_checked: bool) -> None:
+    window = QWidget()
+    qtbot.addWidget(window)
+    row, pictures = QHBoxLayout(window), []
+    buttons = [QToolButton(), QToolButton()]
+    for button in buttons:
+        button.setProperty("role", "choice")
+        button.setCheckable(True)
+        button.setChecked(is_checked)
+        row.addWidget(button)
+    window.setStyleSheet(style_sheet(DARK))
+    window.show()
+    window.activateWindow()
+    for other in buttons:
+        other.setFocus()
+        qtbot.waitUntil(other.hasFocus)
+        pictures.append(buttons[0].grab().toImage())
+    assert pictures[0] != pictures[1]

@@ -15,6 +15,7 @@ from PySide6.QtWidgets import QToolTip, QWidget
 from dsl_app.shared.plain_tip import plain_tip
 from dsl_app.shared.theme import DARK, Theme
 from dsl_app.shared.widgets.forms import quiet
+from dsl_app.shared.widgets.hints import FocusRing
 from dsl_app.shared.widgets.layouts import column_of
 from dsl_app.shared.widgets.pictures import PictureView, arrow_step
 from dsl_core.calibration.colour.patches import INNER, apply_homography, grid_corners
@@ -65,6 +66,7 @@ class ChartPicture(QWidget):
         self.setToolTip(plain_tip(tip))
         self.canvas = PictureView("")
         self.canvas.setFocusPolicy(Qt.FocusPolicy.NoFocus)
+        FocusRing(self, self.canvas)
         self.box, self.image = self.canvas.box, self.canvas.image
         # White on black, so that the outlines are seen on every patch.
         self.shadow, self.outlines = (

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
-from PySide6.QtWidgets import QTabWidget, QWidget
+from PySide6.QtWidgets import QWidget
 
 from dsl_app.calibrate.evidence.base import BackgroundReader, Evidence, side_by_side, stacked
 from dsl_app.calibrate.evidence.chart_picture import ChartPicture, Swatches, corners_in
@@ -25,8 +25,8 @@ from dsl_app.calibrate.evidence.charts import (
     draw_curves,
 )
 from dsl_app.calibrate.evidence.tables import Cell, NumberTable
-from dsl_app.shared.widgets.forms import label, named, push_button, set_role
-from dsl_app.shared.widgets.layouts import boxed, column_of, row_of
+from dsl_app.shared.widgets.forms import label, push_button, set_role
+from dsl_app.shared.widgets.layouts import boxed, column_of, row_of, tabs_of
 from dsl_app.shared.widgets.plots import RGB_COLOURS
 from dsl_core.calibration.colour.color_checker import WORST_PERCENT
 from dsl_core.model.calibration.color_checker import ORIENTATIONS, ColorCheckerCalibration
@@ -85,13 +85,18 @@ class ColorCheckerEvidence(Evidence[ColorCheckerCalibration]):
             "Wavelength (nm)",
         )  # fmt: skip
         self._reader = BackgroundReader(self)
-        self.tabs = named(QTabWidget(), "Evidence of the Color Checker")
-        self.tabs.setDocumentMode(True)
         self.again.setAccessibleName("Fit with these corners")
         self.back.setAccessibleName("Reset corners")
-        self.tabs.addTab(self._chart_tab(), "Chart")
-        self.tabs.addTab(self._patches_tab(), "Patches")
-        self.tabs.addTab(self._curves_tab(), "Curves")
+        self.tabs = tabs_of(
+            "Evidence of the Color Checker",
+            (
+                self._chart_tab(),
+                "Chart",
+                "Where the chart was found, and its patches next to what they should be",
+            ),
+            (self._patches_tab(), "Patches", "What was measured on each patch, and how far off it is"),
+            (self._curves_tab(), "Curves", "What was found from the patches, over wavelength"),
+        )
         column_of(self.tabs, on=self, margins=0)
         self.chart.moved.connect(self._corner_moved)
         self.again.clicked.connect(self._ask)

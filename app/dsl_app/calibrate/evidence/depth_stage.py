@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pyqtgraph as pg
 from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QTabWidget, QWidget
+from PySide6.QtWidgets import QWidget
 
 from dsl_app.calibrate.evidence.base import BackgroundReader, Evidence, side_by_side
 from dsl_app.calibrate.evidence.charts import (
@@ -26,8 +26,8 @@ from dsl_app.calibrate.evidence.charts import (
 )
 from dsl_app.calibrate.evidence.tables import Cell, NumberTable
 from dsl_app.shared.theme import Theme
-from dsl_app.shared.widgets.forms import label, named
-from dsl_app.shared.widgets.layouts import boxed, column_of
+from dsl_app.shared.widgets.forms import label
+from dsl_app.shared.widgets.layouts import boxed, column_of, tabs_of
 from dsl_core.campaign.depth_stage.figures import MAX_HELD_OUT_PX, MAX_STEP_MM
 from dsl_core.model.calibration.depth_stage import DepthStageCalibration
 from dsl_core.model.rig import Film
@@ -105,12 +105,16 @@ class DepthStageEvidence(Evidence[DepthStageCalibration]):
         )
         self.warnings = label("", "warn", wraps=True)
         self._reader = BackgroundReader(self)
-        self.tabs = named(QTabWidget(), "Evidence of the depth stage")
-        self.tabs.setDocumentMode(True)
         self.film.setMinimumHeight(FILM_PX)
-        self.tabs.addTab(_tab(side_by_side(self.planes, self.steps), self.film), "Planes and film")
-        self.tabs.addTab(_tab(side_by_side(self.held_out, self.shifts)), "First orders")
-        self.tabs.addTab(_tab(side_by_side(self.curve, self.difference)), "Columns over depth")
+        planes = _tab(side_by_side(self.planes, self.steps), self.film)
+        orders = _tab(side_by_side(self.held_out, self.shifts))
+        columns = _tab(side_by_side(self.curve, self.difference))
+        self.tabs = tabs_of(
+            "Evidence of the depth stage",
+            (planes, "Planes and film", "How flat the planes came out, and where the film was found"),
+            (orders, "First orders", "How far first orders are from where the film puts them"),
+            (columns, "Columns over depth", "Where lines are seen at each depth, against the model"),
+        )
         column_of(self.warnings, (self.tabs, 1), on=self, margins=0)
 
     def _begin(self, record: DepthStageCalibration, session: CalibrationSession) -> None:

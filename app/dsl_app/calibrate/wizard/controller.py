@@ -11,6 +11,7 @@ from dsl_app.calibrate.campaign_status import Recipes
 from dsl_app.calibrate.wizard.background_work import BackgroundWork, Captured, Opened
 from dsl_app.calibrate.wizard.ghost import keeps_still
 from dsl_app.calibrate.wizard.jobs import WizardJobs
+from dsl_app.calibrate.wizard.settings import trouble_in_titles
 from dsl_app.calibrate.wizard.state import Doing, Fit, Look, WizardState
 from dsl_app.connection.controller import RigController
 from dsl_app.connection.state import Link
@@ -61,6 +62,8 @@ class WizardController:
         def opened(found: Opened) -> None:
             self._take(found)
             self._unfollow = self._rig.state.devices.changed.connect(self._follow_devices)
+            # Without the picture nobody sees where the outline is that the target is to come to.
+            self.state.is_checking.set(self.state.waits_for_person)
             done()
 
         self._attach(devices)
@@ -141,6 +144,7 @@ class WizardController:
         """Look at the step repeatedly, beginning now, or stop that."""
         if self.state.status is not None:
             self.state.is_checking.set(on)
+            self.state.is_awaited.set(True)
             self._look_if_due(self._clock() + LOOK_PAUSE_S)
 
     def take_news(self) -> None:
@@ -169,15 +173,16 @@ class WizardController:
         if status is None or status.step.key != look.key:
             return
         state.look.set(look)
+        if not look.is_in_place:
+            # One that lies there already may have been left: with the film still on, for what is known.
+            state.is_awaited.set(True)
         if before is not None and self._is_still_right(before, look):
             self._begin_capture(hands_free=True)
 
     def _is_still_right(self, before: Look, look: Look) -> bool:
         """Whether a person holds the target where it is wanted, and has since the look before."""
-        state = self.state
-        is_asked = state.is_checking.value and state.captures_itself.value and state.waits_for_person
         is_right = look.is_good and look.is_in_place
-        return is_asked and is_right and keeps_still(before.points_px, look.points_px)
+        return self.state.will_capture_itself and is_right and keeps_still(before.points_px, look.points_px)
 
     def capture_itself(self, on: bool) -> None:
         """Whether a target that is right and still is captured without a click."""
@@ -322,7 +327,7 @@ class WizardController:
 
         def refused(error: Exception) -> None:
             self._jobs.forget_queued()
-            self.state.settings_trouble.set(sentence_of(error))
+            self.state.settings_trouble.set(trouble_in_titles(sentence_of(error), self.state.name))
             if then_fit:
                 self._jobs.fail(error)
 

@@ -255,8 +255,7 @@ def _step_verdict(state: WizardState) -> Verdict:
 def _verdict_on_good(state: WizardState, look: Look) -> Verdict:
     if state.status is not None and state.status.state == "captured":
         return "Everything is right. It is captured already; redo it only if the target was moved.", "good"
-    by_itself = state.waits_for_person and state.captures_itself.value and state.is_checking.value
-    if not by_itself:
+    if not state.will_capture_itself:
         return "Everything is right: capture.", "good"
     if look.is_in_place:
         return "Everything is right. Keep it still: it is captured by itself.", "good"

@@ -125,3 +125,18 @@ def setting_title(key: str) -> str:
     if words and last in _UNITS:
         return f"{' '.join(words).capitalize()} ({_UNITS[last]})"
     return " ".join((*words, last)).capitalize()
+
+
+def trouble_in_titles(text: str, name: str) -> str:
+    """What is wrong with a setting of the calibration ``name``, called as the window calls the setting.
+
+    >>> trouble_in_titles("A setting of spectralon is wrong: depth_mm must be a number.", "spectralon")
+    'Distance of the target (mm) must be a number.'
+    >>> trouble_in_titles("A setting of geometry is wrong: board.columns must be 3.", "geometry")
+    'Board: columns must be 3.'
+    """
+    wrong = text.removeprefix(f"A setting of {name} is wrong: ")
+    found = re.match(r"(\w+)(\.?)", wrong)
+    if wrong == text or found is None:
+        return text
+    return setting_title(found[1]) + ": " * bool(found[2]) + wrong[found.end() :]

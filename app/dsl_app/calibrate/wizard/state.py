@@ -97,7 +97,8 @@ class WizardState:
     fit. ``allowed`` are figures that a person accepts although some are outside their limits.
     ``is_automatic`` runs all steps without a person. ``outlines`` are where targets are wanted in the
     camera's picture, by the keys of steps; a target that is right and still there is captured by itself if
-    ``captures_itself``. ``covered`` are the points of what was captured since the wizard opened. ``closed``
+    ``captures_itself``, once ``is_awaited``: a person asked for checks, or moved it since the wizard opened.
+    ``covered`` are the points of what was captured since the wizard opened. ``closed``
     fires once, when the last work ended.
     """
 
@@ -122,6 +123,7 @@ class WizardState:
         self.is_automatic = Value(False)
         self.outlines: Value[Mapping[str, PointsPx]] = Value({})
         self.captures_itself = Value(True)
+        self.is_awaited = Value(False)
         self.covered: Value[PointsPx] = Value(())
         #: The calibration that comes after this one, and whether a person goes on to it; empty: none.
         self.following, self.following_title = "", ""
@@ -159,6 +161,12 @@ class WizardState:
         status = self.status
         is_open = status is not None and status.state != "captured"
         return is_open and bool(self.outline) and not self.places_itself.value
+
+    @property
+    def will_capture_itself(self) -> bool:
+        """Whether the target is captured without a click as soon as it is right and still."""
+        is_asked = self.is_checking.value and self.captures_itself.value and self.is_awaited.value
+        return is_asked and self.waits_for_person
 
     @property
     def may_accept(self) -> bool:

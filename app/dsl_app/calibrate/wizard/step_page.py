@@ -20,6 +20,7 @@ from dsl_core.capture.preview import MANY_SATURATED
 
 TABLE_PX = 166
 DASHES = Qt.PenStyle.DashLine
+NO_FIGURES = "What a check finds is listed here: figures, their limits, and what to do about those outside."
 NO_PICTURE = "No picture yet. It comes with the first check."
 
 
@@ -36,10 +37,11 @@ class StepPage(QWidget):
         self.verdict = label("", "muted", wraps=True, name="Whether the target is right")
         self.figures = FiguresTable("What the check found")
         self.figures.setFixedHeight(TABLE_PX)
+        self.figures.empty_text = NO_FIGURES
         self._lay_out()
         shown = (
             *(state.at, state.statuses, state.look, state.doing, state.is_checking),
-            *(state.captures_itself, state.outlines, state.covered, state.places_itself),
+            *(state.captures_itself, state.is_awaited, state.outlines, state.covered, state.places_itself),
         )
         self.stops = [*follow_any(self._show, *shown), state.seen.follow(self.picture.show_seen)]
 

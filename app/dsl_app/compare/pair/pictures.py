@@ -17,6 +17,7 @@ from dsl_app.shared.spectrum import Pixel
 from dsl_app.shared.theme import DARK, Theme
 from dsl_app.shared.widgets.deferred import call_deferred
 from dsl_app.shared.widgets.forms import ChoiceBox, label, named, quiet
+from dsl_app.shared.widgets.hints import FocusRing
 from dsl_app.shared.widgets.layouts import STRETCH, column_of, row_of
 from dsl_app.shared.widgets.pictures import (
     DEPTH,
@@ -47,6 +48,7 @@ class PairPictures(QWidget):
         tip = "A, B and A minus B. Drag to pan, wheel to zoom; arrow keys move the cursor."
         self.canvas = Canvas("A, B and their difference", tip)
         self.canvas.setFocusProxy(self)
+        FocusRing(self, self.canvas)
         self.titles = [pg.LabelItem(text, justify="left") for text in ("A", "B", "A − B")]
         self.boxes = [pg.ViewBox(lockAspect=True, invertY=True, enableMenu=False) for _ in range(3)]
         self.no_values = [NoValues(box) for box in self.boxes]

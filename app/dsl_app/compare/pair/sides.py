@@ -12,7 +12,7 @@ from dsl_app.shared.evented import follow_any
 from dsl_app.shared.theme import DARK, Theme
 from dsl_app.shared.widgets.forms import label
 from dsl_app.shared.widgets.layouts import column_of, row_of
-from dsl_app.shared.widgets.pictures import DEPTH, colour_map
+from dsl_app.shared.widgets.pictures import DEPTH, colour_map, hatch
 from dsl_app.shared.widgets.recent_list import RecentList
 from dsl_core.optics.levels import spread_of
 
@@ -75,7 +75,7 @@ class SmallDepth(QWidget):
         return self._pixmap.isNull()
 
     def show_depth(self, depth_mm: Floats | None) -> None:
-        """Show depths (h, w); those without a value let the ground be seen."""
+        """Show depths (h, w); where there is none the ground is hatched, as in the pictures of a pair."""
         self._pixmap = QPixmap() if depth_mm is None else _pixmap(depth_mm)
         self.update()
 
@@ -90,6 +90,7 @@ class SmallDepth(QWidget):
         size = self._pixmap.size().scaled(self.size(), Qt.AspectRatioMode.KeepAspectRatio)
         place = QRect(0, 0, size.width(), size.height())
         place.moveCenter(self.rect().center())
+        hatch(painter, place, self._theme)
         painter.drawPixmap(place, self._pixmap)
 
     def apply_theme(self, theme: Theme) -> None:

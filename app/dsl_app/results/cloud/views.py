@@ -26,6 +26,7 @@ from dsl_app.results.cloud.render_window import Colours, MouseButton, Rendering,
 from dsl_app.results.cloud.renderer import CloudRenderer
 from dsl_app.shared.theme import DARK, Theme
 from dsl_app.shared.widgets.forms import label
+from dsl_app.shared.widgets.hints import FocusRing
 from dsl_app.shared.widgets.layouts import column_of
 from dsl_app.shared.widgets.pictures import arrow_step
 
@@ -142,6 +143,7 @@ class InteractiveCloud(CloudView):
         self.setMouseTracking(True)
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self.setAttribute(Qt.WidgetAttribute.WA_OpaquePaintEvent)
+        FocusRing(self)
         self._drawn.connect(self._take)
         self.renderer = CloudRenderer(self._drawn.emit)
 

@@ -85,12 +85,21 @@ class ExportController:
         self._runner.submit(Job(f"Export {result.path.stem}", work, self._exported))
 
     def _exported(self, written: Sequence[Path]) -> None:
-        megabytes = sum(path.stat().st_size for path in written if path.is_file()) / 1e6
+        size = size_words(sum(path.stat().st_size for path in written if path.is_file()))
         self._notifier.tell(
             "info",
-            f"Wrote {counted(len(written), 'file')}, {megabytes:.1f} MB, to {written[0].parent}.",
+            f"Wrote {counted(len(written), 'file')}, {size}, to {written[0].parent}.",
             "\n".join(str(path) for path in written),
         )
+
+
+def size_words(count: int) -> str:
+    """A number of bytes as text, never as nothing.
+
+    >>> size_words(8_643), size_words(46_096_080), size_words(12)
+    ('9 kB', '46.1 MB', '1 kB')
+    """
+    return f"{count / 1e6:.1f} MB" if count >= 1e6 else f"{max(round(count / 1e3), 1)} kB"
 
 
 def picture_look(state: ResultsState) -> dict[str, Any]:

@@ -25,6 +25,7 @@ from dsl_app.shared.plain_tip import plain_tip
 from dsl_app.shared.settings import folder_for
 from dsl_app.shared.theme import DARK, Theme
 from dsl_app.shared.widgets.forms import label, named, push_button, quiet
+from dsl_app.shared.widgets.hints import FocusRing
 from dsl_app.shared.widgets.icons import SWATCH_PX, swatch
 from dsl_app.shared.widgets.layouts import STRETCH, column_of, row_of
 from dsl_app.shared.widgets.save_dialog import ask_target
@@ -79,6 +80,7 @@ class MarksPanel(QWidget):
         # A label would lay out a long table several times.
         tip = "The selected mark compared with references, and its distance from other pins"
         self.figures = named(QTextBrowser(), "Comparison with references", tip)
+        FocusRing(self.figures)
         self.figures.setFrameShape(QFrame.Shape.NoFrame)
         self.figures.viewport().setAutoFillBackground(False)
         self.tree.setMinimumHeight(88)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from itertools import pairwise
 
+import shiboken6
 from PySide6.QtCore import QSize, Qt
 from PySide6.QtGui import QFontDatabase, QIcon, QShowEvent
 from PySide6.QtWidgets import (
@@ -27,7 +28,10 @@ SHARE = 0.65
 
 
 def confirm(parent: QWidget, title: str, text: str, go: str, stay: str) -> bool:
-    """Whether a person wants what ends something: the button ``go``; Enter and Escape mean ``stay``."""
+    """Whether a person wants what ends something: the button ``go``; Enter and Escape mean ``stay``.
+
+    So does a window that is gone before its question is answered, as when all are closed.
+    """
     box = QMessageBox(parent)
     box.setIcon(QMessageBox.Icon.Question)
     box.setWindowTitle(title)
@@ -39,6 +43,8 @@ def confirm(parent: QWidget, title: str, text: str, go: str, stay: str) -> bool:
     box.setEscapeButton(safe)
     set_role(safe, "primary")
     box.exec()
+    if not shiboken6.isValid(box):
+        return False
     chosen = box.clickedButton()
     # It must not go before its answer is read, nor live as long as its parent.
     box.deleteLater()

@@ -6,11 +6,11 @@ from typing import Any
 
 import numpy as np
 import pyqtgraph as pg
-from PySide6.QtCore import QEvent, Qt
+from PySide6.QtCore import QEvent, QRect, QRectF, Qt
 from PySide6.QtGui import QBrush, QColor, QDragLeaveEvent, QKeyEvent, QPainter, QPen
 from PySide6.QtWidgets import QGraphicsRectItem
 
-from dsl_app.shared.theme import Theme
+from dsl_app.shared.theme import DARK, Theme
 from dsl_app.shared.widgets.hints import hint, is_said_below
 
 #: Perceptually uniform maps of pyqtgraph: grey for a band, colours for quantities that are not light.
@@ -61,7 +61,7 @@ class NoValues(QGraphicsRectItem):
         super().__init__()
         self.setPen(QPen(Qt.PenStyle.NoPen))
         self.setZValue(-10)
-        self._ground = QColor()
+        self._theme = DARK
         self.setAcceptedMouseButtons(Qt.MouseButton.NoButton)
         self.hide()
         box.addItem(self, ignoreBounds=True)
@@ -73,18 +73,23 @@ class NoValues(QGraphicsRectItem):
 
     def apply_theme(self, theme: Theme) -> None:
         """Apply the colours of a theme."""
-        self._ground = QColor(theme.line)
-        self.setBrush(QBrush(QColor(theme.muted), Qt.BrushStyle.BDiagPattern))
+        self._theme = theme
+        self.update()
 
     def paint(self, painter: QPainter, *_: object) -> None:
         """Hatch in pixels of the screen: the zoom of the picture would make beams of the lines."""
         place = painter.transform().mapRect(self.rect())
         painter.save()
         painter.resetTransform()
-        # A single pixel may lie between two lines.
-        painter.fillRect(place, self._ground)
-        painter.fillRect(place, self.brush())
+        hatch(painter, place, self._theme)
         painter.restore()
+
+
+def hatch(painter: QPainter, place: QRectF | QRect, theme: Theme) -> None:
+    """Hatch a place, in pixels of the painter, as the ground of a picture that has pixels without a value."""
+    # A single pixel may lie between two lines.
+    painter.fillRect(place, QColor(theme.line))
+    painter.fillRect(place, QBrush(QColor(theme.muted), Qt.BrushStyle.BDiagPattern))
 
 
 class PictureView(Canvas):

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from itertools import product
 
 from PySide6.QtCore import QModelIndex, QPersistentModelIndex, QSize, Qt, QTimer
-from PySide6.QtGui import QColor, QFont, QResizeEvent
+from PySide6.QtGui import QColor, QFont, QPainter, QPaintEvent, QResizeEvent
 from PySide6.QtWidgets import (
     QAbstractItemView,
     QHeaderView,
@@ -50,6 +50,8 @@ class ReadTable(QTableWidget):
         super().__init__(rows, len(heads))
         self._wrapped: int | None = None
         self._widened: int | None = None
+        #: Said in its middle while it has no rows.
+        self.empty_text = ""
         self.theme = DARK
         self.setAccessibleName(name)
         self.setToolTip(plain_tip(tip))
@@ -102,6 +104,15 @@ class ReadTable(QTableWidget):
         self._fit_widened()
         if self._wrapped is not None:
             self.fit_rows.start(0)
+
+    def paintEvent(self, event: QPaintEvent) -> None:
+        """Paint the rows, or what will be there."""
+        super().paintEvent(event)
+        if self.rowCount() == 0 and self.empty_text:
+            painter = QPainter(self.viewport())
+            painter.setPen(QColor(self.theme.muted))
+            middle = Qt.AlignmentFlag.AlignCenter | Qt.TextFlag.TextWordWrap
+            painter.drawText(self.viewport().rect().adjusted(8, 0, -8, 0), middle, self.empty_text)
 
     def _fit_widened(self) -> None:
         if self._widened is not None:

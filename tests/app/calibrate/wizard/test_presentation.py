@@ -71,6 +71,8 @@ def names(shown: Buttons, what: str) -> set[str]:
 
 
 OUTLINES = {"a": ((0.0, 0.0), (10.0, 0.0), (10.0, 10.0), (0.0, 10.0))}
+#: A target that is captured by itself once it is in its outline.
+AWAITED: dict[str, Any] = {"outlines": OUTLINES, "is_checking": True, "is_awaited": True}
 CAPTURED: tuple[State, State] = ("captured", "captured")
 HALF: tuple[State, State] = ("captured", "missing")
 
@@ -308,12 +310,17 @@ def test_a_step_shows_where_the_target_is_wanted_and_what_was_found_of_it() -> N
         (wizard(FIRST, outlines=OUTLINES), "Start the check, then bring the target into", "muted"),
         (wizard(FIRST, outlines=OUTLINES, captures_itself=False), "Place the target, then", "muted"),
         (
-            wizard(FIRST, outlines=OUTLINES, is_checking=True, look=Look("a", (GOOD,), shared=0.5)),
+            wizard(FIRST, **AWAITED, look=Look("a", (GOOD,), shared=0.5)),
             "Well seen. Bring it into the dashed outline (50 %, wanted 80 %)",
             "warn",
         ),
         (
             wizard(FIRST, outlines=OUTLINES, is_checking=True, look=Look("a", (GOOD,), shared=0.9)),
+            "Everything is right: capture.",
+            "good",
+        ),
+        (
+            wizard(FIRST, **AWAITED, look=Look("a", (GOOD,), shared=0.9)),
             "Everything is right. Keep it still",
             "good",
         ),

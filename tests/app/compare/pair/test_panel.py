@@ -3,9 +3,11 @@ from __future__ import annotations
 from collections.abc import Iterator
 from pathlib import Path
 
+import numpy as np
 import pytest
 from dsl_app.compare.pair.controller import PairController
 from dsl_app.compare.pair.panel import PairPanel
+from dsl_app.compare.pair.sides import SmallDepth
 from dsl_app.compare.pair.state import PairQuantity, PairState
 from dsl_app.shared.jobs.qt_runner import QtRunner
 from dsl_app.shared.settings import RecentFiles, Settings
@@ -62,6 +64,22 @@ def test_an_empty_page_says_what_to_do(bench: Bench) -> None:
     assert not page.truth.isEnabled()
     assert not page.report.isEnabled()
     assert not page.parts.isVisible()
+
+
+def test_a_result_alone_is_hatched_where_it_has_no_depth(qtbot: QtBot) -> None:
+    picture = SmallDepth()
+    qtbot.addWidget(picture)
+    picture.apply_theme(DARK)
+    picture.resize(200, 100)
+    picture.show_depth(np.array([[np.nan, 700.0]]))
+    image = picture.grab().toImage()
+    without, valued = (
+        {image.pixelColor(x, y).name() for x in range(first, first + 80) for y in range(10, 90)}
+        for first in (10, 110)
+    )
+    # Hatched, as in the pictures of a pair: the ground of the page would look like a dark surface.
+    assert without >= {DARK.line, DARK.muted}
+    assert len(valued) == 1
 
 
 def test_recent_results_are_compared_by_a_double_click(qtbot: QtBot, bench: Bench, chart: Path) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import pytest
+import shiboken6
 from dsl_app.shared.widgets.dialogs import confirm, dialog_buttons
 from dsl_app.shared.widgets.layouts import column_of
 from PySide6.QtCore import Qt, QTimer
@@ -64,6 +65,14 @@ def test_only_the_button_that_names_it_ends_something(
 
     QTimer.singleShot(0, look)
     assert confirm(parent, "Jobs", "A <b>scan</b> runs.", "Stop and quit", "Keep working") is goes
+
+
+def test_a_question_whose_window_goes_is_answered_by_staying(qapp: QApplication) -> None:
+    parent = QWidget()
+    parent.show()
+    # As a dialog does that is deleted when it closes.
+    QTimer.singleShot(0, lambda: shiboken6.delete(parent))
+    assert not confirm(parent, "Unsaved", "Close it?", "Close unsaved", "Keep editing")
 
 
 class _WithIcons(QProxyStyle):

@@ -6,6 +6,7 @@ import pytest
 from dsl_app.shared.theme import DARK, LIGHT
 from dsl_app.shared.widgets.read_table import LEAST_WRAPPED_PX, RIGHT, ReadTable, cell
 from PySide6.QtCore import Qt
+from PySide6.QtGui import QColor
 from pytestqt.qtbot import QtBot
 
 
@@ -25,6 +26,24 @@ def test_a_narrow_table_scrolls_instead_of_wrapping_single_words(
     assert header.sectionSize(2) >= LEAST_WRAPPED_PX
     if not scrolls:
         assert header.length() == table.viewport().width()
+
+
+def test_a_table_without_rows_says_what_will_be_there(qtbot: QtBot) -> None:
+    table = ReadTable("Figures", "What was found", ("Name", "Verdict"))
+    qtbot.addWidget(table)
+    table.resize(300, 120)
+    table.show()
+
+    def colours() -> set[int]:
+        image = table.viewport().grab().toImage()
+        return {image.pixel(x, y) for x in range(image.width()) for y in range(40, image.height())}
+
+    assert len(colours()) == 1
+    table.empty_text = "What a check finds is listed here."
+    said = colours()
+    assert QColor(DARK.muted).rgb() in said
+    table.show_rows([[cell("depth"), cell("good")]])
+    assert QColor(DARK.muted).rgb() not in colours()
 
 
 def test_cells_with_a_role_follow_the_theme_and_tell_nobody(qtbot: QtBot) -> None:
