@@ -27,6 +27,9 @@ DOWN, ACROSS = 4, 24
 LEAST, SIGMAS = 0.1, 6.0
 #: The same for parts of all rows together, two of them beside each other.
 LEAST_OF_COLUMNS = 0.06
+#: One of them alone, as of the last few lines of a small picture, is as far off as `LEAST`, by so many
+#: deviations, and by so many times what most parts are: light that flickers leaves none as it was.
+SIGMAS_ALONE, STANDS_OUT = 7.5, 5.0
 #: Parts that have to be off, and pixels that a part needs.
 FEWEST_PARTS, FEWEST = 3, 24
 #: What parts beside each other leave of their differences (a share of the squares) if all rows are alike.
@@ -152,6 +155,9 @@ def _worst_columns(
     off = np.abs(apart) > np.maximum(LEAST_OF_COLUMNS, SIGMAS * std)
     beside = off[1:] & off[:-1] & (apart[1:] * apart[:-1] > 0)
     off = np.append(beside, False) | np.insert(beside, 0, False)
+    known = np.isfinite(std)
+    least = max(LEAST, STANDS_OUT * float(np.median(np.abs(apart[known])))) if known.any() else LEAST
+    off |= np.abs(apart) > np.maximum(least, SIGMAS_ALONE * std)
     return _told(apart, std, off, when[off[column]], lines, True) if off.any() else None
 
 

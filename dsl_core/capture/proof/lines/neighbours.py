@@ -18,12 +18,14 @@ from dsl_core.capture.proof.raster import Counts
 from dsl_core.optics.seen_noise import NORMAL
 
 Bands = NDArray[np.float64]
-#: Parts of the height that are compared, and lines that say what is usual.
-BANDS, USUAL_OF, FEWEST_USUAL = 4, 7, 3
-#: Variance of a difference beyond noise, in units of that of noise: the least that says anything.
-LEAST_CHANGE = 0.4
-#: A picture changes suddenly less if it changes by this share of the usual.
-LITTLE = 0.3
+#: Parts of the height that are compared, coarse and fine, and lines that say what is usual. An eighth of a
+#: picture that is late leaves a coarse part much of its change, and a fine one none.
+BANDS, FINE, USUAL_OF, FEWEST_USUAL = 4, 16, 7, 3
+#: Variance of a difference beyond noise, in units of that of noise: the least that says anything, of coarse
+#: and of fine parts, whose few pixels are less certain.
+LEAST_CHANGE, LEAST_FINE = 0.4, 1.0
+#: A picture changes suddenly less if it changes by this share of the usual, in coarse and in fine parts.
+LITTLE, LITTLE_FINE = 0.3, 0.1
 #: Light relative to that of the lines before that is no surprise.
 SAME_LINES = (0.6, 1.6)
 #: Light counts from so many deviations on.
@@ -59,9 +61,15 @@ class LineNeighbours:
             return False
         change = self.change(seen, before[1])
         usual = self._usual()
-        doubtful = bool(((change < LITTLE * usual) & (usual > LEAST_CHANGE)).any())
+        little, least = (
+            _of_parts(change, *each) for each in ((LITTLE, LITTLE_FINE), (LEAST_CHANGE, LEAST_FINE))
+        )
+        if usual.size > BANDS:
+            # Where lines share the few pixels of a fine part now and then, none is missed in it.
+            usual[BANDS:] = np.min(self._changes, axis=0)[BANDS:]
+        odd = (change < little * usual) & (usual > least)
         self._changes.append(change)
-        return self._has_other_light(seen, black) or doubtful
+        return self._has_other_light(seen, black) or bool(odd.any())
 
     @property
     def are_few(self) -> bool:
@@ -91,21 +99,28 @@ class LineNeighbours:
         usual = self._usual()
         step = np.subtract(one, other, dtype=np.float32)
         change = self.change(one, other + _of_most(step))
-        return bool(((change > 0.5 * usual) & (usual > LEAST_CHANGE) & (change > LEAST_CHANGE)).any())
+        least = _of_parts(change, LEAST_CHANGE, LEAST_FINE)
+        return bool(((change > 0.5 * usual) & (usual > least) & (change > least)).any())
 
     def change(self, one: Counts, other: Counts | NDArray[np.float32]) -> Bands:
-        """Variance of the difference beyond noise, in units of that of noise, in every part of the height."""
+        """Variance of the difference beyond noise, in units of that of noise, in every part of the height.
+
+        The coarse parts come first; there are no more fine ones than rows.
+        """
         step2 = np.subtract(one, other, dtype=np.float32)
         np.square(step2, out=step2)
         step2 /= self._noise.variance(one) + self._noise.variance(other)
         np.minimum(step2, np.float32(_CLIP**2), out=step2)
         rows = step2.reshape(-1, self._columns) @ np.full(self._columns, 1 / self._columns, np.float32)
-        return np.array([float(part.mean()) - 1.0 for part in np.array_split(rows, BANDS)])
+        sums = np.append(0.0, np.cumsum(rows, dtype=np.float64))
+        counts = (min(parts, rows.size) for parts in (BANDS, FINE))
+        edges = (np.arange(count + 1) * rows.size // count for count in counts)
+        return np.concatenate([np.diff(sums[at]) / np.diff(at) - 1 for at in edges])
 
     def _usual(self) -> Bands:
         if len(self._changes) < FEWEST_USUAL:
-            return np.zeros(BANDS)
-        return np.array([median(band) for band in zip(*self._changes, strict=True)])
+            return np.zeros(1)
+        return np.asarray(np.median(self._changes, axis=0))
 
     def _has_other_light(self, seen: Counts, black: Counts | None) -> bool:
         if black is None:
@@ -122,6 +137,11 @@ class LineNeighbours:
         # No line takes light away: below black, the exposure was shorter or the room is darker.
         is_below_black = light < min(usual, 0.0) - enough
         return is_below_black or (usual > enough and not low * usual < light < high * usual)
+
+
+def _of_parts(changes: Bands, coarse: float, fine: float) -> Bands:
+    """One value for the coarse parts and one for the fine ones of so many."""
+    return np.where(np.arange(changes.size) < BANDS, coarse, fine)
 
 
 def _of_most(light: NDArray[np.float32]) -> np.float32:

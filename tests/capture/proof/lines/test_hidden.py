@@ -42,6 +42,13 @@ def test_somebody_who_walks_by_is_told_for_as_long_as_they_are_there(
     assert hides(picture(1, 20), *passing, picture(9, 30)) == [False, *3 * [is_told], False]
 
 
+def test_a_shadow_with_soft_edges_over_half_of_the_picture_is_not_taken_for_noise() -> None:
+    seen = picture(2, 21).reshape(-1, WIDTH) - LEVEL
+    left = 1 - 0.65 * np.exp(-(((np.arange(WIDTH) / WIDTH - 0.5) / 0.3) ** 2))
+    shaded = np.rint(LEVEL + left * seen).astype(np.uint16).ravel()
+    assert hides(picture(1, 20), shaded) == [False, True]
+
+
 def test_a_darker_room_hides_nothing() -> None:
     assert hides(picture(1, 20), picture(2, 21, room_dn=20.0), picture(3, 22)) == 3 * [False]
 

@@ -96,6 +96,14 @@ def test_little_is_not_told_of_one_part_nor_of_some_that_differ_both_ways() -> N
     assert found(lambda at, light, *_: light * (1 + 0.08 * (-1) ** (at // 2))) is None
 
 
+def test_more_is_told_of_one_part_alone() -> None:
+    """The last few lines of a small picture, for which a lamp dims, light no more than that."""
+    seen = found(lambda at, light, *_: light * (0.85 if 45 <= at < 47 else 1.0))
+    assert seen is not None
+    assert seen.all_rows
+    assert seen.share == pytest.approx(0.85, abs=0.03)
+
+
 def test_frames_are_named_where_several_lines_are_shown_at_once() -> None:
     def shadow(
         at: int, light: NDArray[np.float64], down: NDArray[np.float64], _: object

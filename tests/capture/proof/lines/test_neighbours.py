@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections import deque
+
 import numpy as np
 import pytest
 
@@ -102,6 +104,40 @@ def test_a_change_by_less_than_three_tenths_of_the_usual_is_doubted_where_that_s
 
 
 @pytest.mark.parametrize(
+    ("usual", "change", "is_doubtful"),
+    [(2.0, 0.21, False), (2.0, 0.19, True), (1.01, 0.05, True), (0.99, 0.05, False)],
+)
+def test_a_fine_part_is_doubted_where_next_to_nothing_changed_and_much_usually_does(
+    usual: float, change: float, is_doubtful: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    changes = np.full(20, 9.0)
+    changes[12] = change
+    monkeypatch.setattr(LineNeighbours, "change", lambda *_: changes)
+    neighbours = told_by(*3 * [usual])
+    neighbours._changes = deque(np.full(20, usual) for _ in range(3))
+    assert neighbours.is_doubtful(8, flat(100), None) == is_doubtful
+
+
+def test_a_fine_part_that_some_lines_share_with_the_one_before_is_not_doubted(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    changes = np.full(20, 9.0)
+    changes[12] = 0.1
+    monkeypatch.setattr(LineNeighbours, "change", lambda *_: changes)
+    neighbours = told_by(*3 * [2.0])
+    neighbours._changes = deque([changes, *(np.full(20, 9.0) for _ in range(4))])
+    assert not neighbours.is_doubtful(8, flat(100), None)
+
+
+def test_an_eighth_of_a_line_that_shows_the_one_before_is_doubted() -> None:
+    neighbours, usual, late = _told(), _picture(32.0, 50), _picture(28.0, 51)
+    banded, rows = usual.copy(), slice(10 * COLUMNS, 13 * COLUMNS)
+    banded[rows] = late[rows]
+    assert neighbours.is_doubtful(8, banded, BLACK)
+    assert neighbours.differ(banded, usual)
+
+
+@pytest.mark.parametrize(
     ("usual", "change", "differs"),
     [(2.0, 1.1, True), (2.0, 0.9, False), (0.5, 0.39, False), (0.39, 9.0, False)],
 )
@@ -119,7 +155,11 @@ def test_a_change_is_the_variance_beyond_noise_in_each_part_of_the_height_up_to_
     other[:6] -= 6
     other[6:12, ::2] = 3000
     found = neighbours.change(one.ravel(), other.ravel())
-    assert found == pytest.approx([36 / 18.2 - 1, 100 / 2 - 1, -1, -1], rel=1e-4)
+    assert found[:4] == pytest.approx([36 / 18.2 - 1, 100 / 2 - 1, -1, -1], rel=1e-4)
+    # Sixteen parts of 24 rows are one row and two in turn.
+    assert found[4:] == pytest.approx(np.repeat(found[:4], 4), rel=1e-4)
+    few = neighbours.change(one[:5].ravel(), other[:5].ravel())
+    assert few == pytest.approx(np.full(4 + 5, 36 / 18.2 - 1), rel=1e-4), "no more fine parts than rows"
 
 
 @pytest.mark.parametrize(("light", "is_other"), [(0.61, False), (0.59, True), (1.59, False), (1.61, True)])
