@@ -15,8 +15,8 @@ stated 95 % band; RMSE and angle (rad) of patch means; RMSE of pixels, 99th and 
 of reflectance over pixels and bands, and the share of these inside their band; width of peaks (nm) with
 ``--scene filters``; median chi-square; shares flagged POOR_FIT and DEPTH_EDGE; seconds of the reconstruction;
 and the parts of the model of which the result itself says that they do not fit. ``--sphere`` scans a ball
-instead, matt and glossy, and prints its mean reflectance over the true one, the scatter of that, and the
-angle, by incidence of the light.
+instead, matt and glossy, and prints its mean reflectance over the true one, the scatter of that, the angle,
+the share inside the stated 95 % band and the share of pixels with any flag, by incidence of the light.
 """
 
 from __future__ import annotations
@@ -63,7 +63,7 @@ HEADER = (
 #: What the scene of a ball is made of.
 BALL = {"yellow", "diffuser"}
 #: Edges of the classes of incidence, degrees.
-INCIDENCE_DEG = (0, 15, 30, 45, 60)
+INCIDENCE_DEG = (0, 10, 20, 30, 40, 50, 60)
 
 
 @dataclass(frozen=True)
@@ -235,11 +235,11 @@ def reflectance_errors(result: xr.Dataset, truth: Truth) -> Floats:
 
 
 def by_incidence(result: xr.Dataset, taken: Captured) -> list[dict[str, float]]:
-    """Reflectance of the ball over its true one, by angle of incidence."""
+    """Reflectance of the ball over its true one, by angle of incidence, and whether its band holds it."""
     truth = taken.truth
     assert truth.material is not None
     assert truth.spectra is not None
-    cube = result["reflectance"].values
+    cube, std = result["reflectance"].values, result["reflectance_std"].values
     wanted = truth.spectra[truth.names.index("yellow")]
     ball = interior(truth.material) & (truth.material == truth.names.index("yellow")) & truth.lit
     ball &= np.isfinite(cube).all(0)
@@ -250,6 +250,7 @@ def by_incidence(result: xr.Dataset, taken: Captured) -> list[dict[str, float]]:
             continue
         seen = cube[:, here].astype(np.float64)
         ratio = seen.mean(0) / wanted.mean()
+        inside = np.abs(seen - wanted[:, None]) < 1.96 * std[:, here]
         cosine = (wanted @ seen) / np.linalg.norm(wanted) / np.linalg.norm(seen, axis=0)
         rows.append(
             {
@@ -258,6 +259,8 @@ def by_incidence(result: xr.Dataset, taken: Captured) -> list[dict[str, float]]:
                 "ratio": float(ratio.mean()),
                 "scatter": float(ratio.std()),
                 "angle_rad": float(np.arccos(np.clip(cosine, -1, 1)).mean()),
+                "in_band": float(inside.mean()),
+                "flagged": float((result["flags"].values[here] > 0).mean()),
             }
         )
     return rows

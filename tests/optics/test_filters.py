@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from dsl_core.optics.filters import FINE_NM, nominal_filter, passed
+from dsl_core.optics.filters import FINE_NM, nominal_filter, passed, through_filter
 from dsl_core.optics.spectra import chain_response
 from dsl_core.simulation.published_rig import published_rig
 
@@ -30,3 +30,17 @@ def test_light_through_a_filter_is_that_of_white_times_its_transmission_and_none
     flat = curve.model_copy(update={"values": (0.5,) * len(curve.values)})
     assert passed(rig, flat)[:, FINE_NM < 490].max() == 0.0
     assert passed(rig, flat)[:, FINE_NM > 610].max() == 0.0
+
+
+def test_a_band_seen_at_angles_is_the_mean_of_bands_that_are_shifted() -> None:
+    curve = nominal_filter(550.0)
+    straight = through_filter(curve)
+    assert straight == pytest.approx(np.where(np.abs(FINE_NM - 550) <= 60, curve.at(FINE_NM), 0.0))
+    shift = np.array([0.0, -0.01])
+    moved = np.interp(FINE_NM / 0.99, curve.wavelengths_nm, curve.values, 0.0, 0.0)
+    assert FINE_NM[moved.argmax()] == pytest.approx(544.5, abs=1)
+    assert through_filter(curve, shift) == pytest.approx((straight + moved) / 2)
+    assert through_filter(curve, shift, np.array([1.0, 3.0])) == pytest.approx((straight + 3 * moved) / 4)
+    assert through_filter(curve, shift, np.zeros(2)) == pytest.approx((straight + moved) / 2)
+    rig = published_rig()
+    assert passed(rig, curve, shift[1:]) == pytest.approx(chain_response(rig, 0, FINE_NM).sum(1) * moved)

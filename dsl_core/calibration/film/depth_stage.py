@@ -24,6 +24,7 @@ from dsl_core.calibration.film.order_columns import fit_columns, search_columns
 from dsl_core.calibration.film.order_paths import LineFrames, filter_passband
 from dsl_core.calibration.film.order_samples import OrderSamples, grating_columns
 from dsl_core.calibration.film.residual import MIN_GAIN, choose_residual
+from dsl_core.calibration.film.zero_place import require_still
 from dsl_core.calibration.geometry.plane_refinement import PlaneRefinement, refine_planes
 from dsl_core.calibration.geometry.stage_planes import with_unsure_zero
 from dsl_core.errors import CalibrationError
@@ -103,6 +104,9 @@ def calibrate_depth_stage(
         known = np.array(rig.geometry_covariance).reshape(24, 24)
         covariance = with_unsure_zero(known, zero_std_px(lean_px))
     planes = refine_planes(rig, data.positions_mm, data.columns, covariance, data.stage_std_mm)
+    every = range(len(data.filters))
+    names = [[data.name(k, n) for n in every] for k in range(len(data.positions_mm))]
+    require_still(planes.rig, planes.planes, names, data.frames)
     film, samples = fit_first_orders(planes.rig, planes.planes, data, progress)
     fitted = planes.rig.model_copy(update={"film": film.film})
     film = with_geometry(film, fitted, samples, planes.variants(), progress)

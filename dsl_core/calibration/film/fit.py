@@ -14,19 +14,19 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from dsl_core.calibration.film.filter_angle import (
-    ANGLE_STD,
-    NO_SHIFT,
-    FilterAngle,
-    columns_per_share,
-    relative_shift,
-    shift_slopes,
-    shift_terms,
-)
+from dsl_core.calibration.film.filter_angle import columns_per_share
 from dsl_core.calibration.film.form import FIELDS, FilmForm
 from dsl_core.calibration.film.order_samples import OrderSamples, grating_columns
 from dsl_core.errors import CalibrationError
 from dsl_core.model.rig import Film, Rig
+from dsl_core.optics.filters import (
+    ANGLE_STD,
+    NO_SHIFT,
+    FilterAngle,
+    relative_shift,
+    shift_slopes,
+    shift_terms,
+)
 from dsl_core.optics.pinhole import pixel_rays
 from dsl_core.optics.shading import Plane
 from dsl_core.progress import NoProgress, Progress

@@ -24,14 +24,23 @@ from dsl_core.calibration.orders.filter_check import (
     found_wavelengths,
     verdict,
 )
+from dsl_core.calibration.orders.filter_shift import angle_of_view, cell_terms
 from dsl_core.calibration.orders.order_light import FilterLight
-from dsl_core.calibration.orders.order_place import PlanePixels, of_colours
-from dsl_core.calibration.orders.response import BandSample, fit_response
+from dsl_core.calibration.orders.order_place import PlanePixels, cell_means, of_colours
+from dsl_core.calibration.orders.response import BandSample, fit_response, shift_of_all
 from dsl_core.errors import CalibrationError
 from dsl_core.model.calibration.bandpass import BandpassCalibration, FilterSample, OrderSample
 from dsl_core.model.rig import Rig
 from dsl_core.model.spectral import SpectralCurve
-from dsl_core.optics.filters import FINE_NM, passed
+from dsl_core.optics.filters import (
+    FINE_NM,
+    NO_SHIFT,
+    FilterAngle,
+    passed,
+    relative_shift,
+    shift_terms,
+    through_filter,
+)
 from dsl_core.optics.spectra import ORDERS, SECOND_ORDERS
 from dsl_core.optics.unlit import unlit_px
 from dsl_core.progress import Progress
@@ -102,11 +111,24 @@ def fit_bandpass(
     """
     if not filters:
         raise CalibrationError("No filter was captured. Capture at least two of different wavelengths.")
-    lights = [passed(rig, each.transmission) for each in filters]
-    placed = [_placed(each, light) for each, light in zip(filters, lights, strict=True)]
+    angle, shift = _angle(rig, scan, filters)
+    lights = [passed(rig, each.transmission, shift) for each in filters]
+    # Orders are placed in the middle of the image.
+    middle = relative_shift(shift_terms(rig, _middle(rig)), np.array(angle.values))
+    placed = [_placed(each, passed(rig, each.transmission, middle)) for each in filters]
     found = found_wavelengths(rig, placed)
     warnings = _check(filters, placed, found)
-    fits = {order: fit_efficiency(order, _ratios(order, filters, lights)) for order in ORDERS}
+    fits = {
+        order: fit_efficiency(
+            order,
+            _ratios(
+                order,
+                filters,
+                [passed(rig, each.transmission, shift, each.light.orders[order].cells) for each in filters],
+            ),
+        )
+        for order in ORDERS
+    }
     share, share_std = second_order_share(_second(filters, lights, fits))
     white, white_std = _white(rig, profile_scan(scan), profile)
     bands = [
@@ -114,6 +136,8 @@ def fit_bandpass(
         for each, light in zip(filters, lights, strict=True)
     ]
     refined = fit_response(rig, bands, white, white_std, reflectance)
+    through = [through_filter(each.transmission, shift) for each in filters]
+    off_nm, off_std_nm = shift_of_all(rig, bands, through, white, white_std, reflectance)
     efficiency = {order: fit.curve for order, fit in fits.items()}
     if np.isfinite(share_std):
         for order in ORDERS:
@@ -137,8 +161,28 @@ def fit_bandpass(
         halo_decay_std_px=profile.std[2],
         spread=profile.response.spread,
         field=profile.response.field,
+        filters_off_nm=off_nm,
+        filters_off_std_nm=off_std_nm,
+        filter_index=angle.index,
         warnings=tuple(warnings),
     )
+
+
+def _angle(rig: Rig, scan: LineScan, filters: Sequence[SeenFilter]) -> tuple[FilterAngle, Floats]:
+    """How filters shift with the angle of view, none where that is in doubt; and the shift of each cell."""
+    pixels = plane_pixels(rig, scan, 550.0)
+    terms = cell_terms(rig, pixels, scan.pixels)
+    white = cell_means(pixels, scan.amplitude / scan.shading)
+    found = angle_of_view(
+        rig, [each.transmission for each in filters], [each.light for each in filters], white, terms
+    )
+    angle = found if found.is_of_filters else NO_SHIFT
+    return angle, relative_shift(terms, np.array(angle.values))
+
+
+def _middle(rig: Rig) -> NDArray[np.int64]:
+    """Flat index of the pixel in the middle of the image, (1,)."""
+    return np.array([rig.camera.height_px // 2 * rig.camera.width_px + rig.camera.width_px // 2])
 
 
 def _placed(each: SeenFilter, light: Floats) -> PlacedFilter:

@@ -8,12 +8,13 @@ up, and the first orders stand out as peaks on either side.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dsl_core.calibration.orders.order_place import (
+    CELLS,
     MIN_PIXELS,
     ORDER_HALF_PX,
     SECOND_HALF_PX,
@@ -22,6 +23,7 @@ from dsl_core.calibration.orders.order_place import (
     OrderPlace,
     PlanePixels,
     by_cell,
+    cell_means,
     find_order,
     find_second,
     line_graph,
@@ -40,7 +42,7 @@ class OrderLight:
     ``ratio`` and ``std`` are those of the three colours (NaN, infinite: not seen). ``offset_px`` is the
     distance of the peak from the zero order in the middle of the image, with its deviation (NaN: not found);
     ``share`` how much of all light where first orders may be is in the peak, with its deviation; ``width_px``
-    its rms width.
+    its rms width. ``cells`` is how much each cell of the image contributes.
     """
 
     order: int
@@ -52,6 +54,11 @@ class OrderLight:
     width_px: float
     pixels: int
     share_std: float = 0.0
+    cells: Floats = field(default_factory=lambda: np.zeros(CELLS[0] * CELLS[1]))
+
+
+def _unseen() -> Floats:
+    return np.full((3, CELLS[0] * CELLS[1]), np.nan)
 
 
 @dataclass(frozen=True)
@@ -59,7 +66,8 @@ class FilterLight:
     """What one filter passes: ``zero`` (3,) zero-order signal at unit shading, DN per ms, and its deviation.
 
     ``shift_px`` is how far the zero order moved against the capture without filter, and its deviation;
-    ``saturated`` the share of pixels whose zero order is saturated.
+    ``saturated`` the share of pixels whose zero order is saturated. ``cells`` (3, cells) is the zero order in
+    each cell of the image, NaN where it was not seen, with its deviation.
     """
 
     zero: Floats
@@ -67,6 +75,8 @@ class FilterLight:
     orders: dict[int, OrderLight]
     shift_px: tuple[float, float]
     saturated: float
+    cells: Floats = field(default_factory=_unseen)
+    cells_std: Floats = field(default_factory=_unseen)
 
 
 def filter_light(
@@ -102,7 +112,7 @@ def filter_light(
         orders[sign] = _light(graph, sign, first, ORDER_HALF_PX)
         orders[2 * sign] = _light(graph, 2 * sign, find_second(graph, sign, first), SECOND_HALF_PX)
     share = float(saturated[inside].mean()) if inside.any() else 1.0
-    return FilterLight(zero, zero_std, orders, shift, share)
+    return FilterLight(zero, zero_std, orders, shift, share, *cell_means(chosen, relative))
 
 
 def _light(graph: LineGraph, order: int, place: OrderPlace | None, half_px: float) -> OrderLight:
@@ -138,4 +148,5 @@ def _light(graph: LineGraph, order: int, place: OrderPlace | None, half_px: floa
         place.width_px,
         int(use.sum()),
         place.share_std,
+        np.bincount(graph.pixels.cell[use], graph.amplitude[use], graph.pixels.cells).astype(float),
     )

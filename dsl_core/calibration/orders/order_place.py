@@ -68,6 +68,11 @@ class PlanePixels:
         )
         return np.asarray(down * CELLS[1] + across)
 
+    @property
+    def cells(self) -> int:
+        """How many cells the image has."""
+        return CELLS[0] * CELLS[1]
+
     def at(self, which: NDArray[np.bool_]) -> PlanePixels:
         """The pixels that are chosen."""
         whole = {order: inside[which] for order, inside in self.whole.items()}
@@ -153,6 +158,20 @@ def of_colours(
         if len(cells) > 1:
             mean[colour], std[colour] = np.mean(cells), np.std(cells) / np.sqrt(len(cells) - 1)
     return mean, std
+
+
+def cell_means(pixels: PlanePixels, values: Floats) -> tuple[Floats, Floats]:
+    """Mean of values (P,) by colour and cell with its deviation, (3, cells); NaN, infinite for too few."""
+    key = pixels.colour * pixels.cells + pixels.cell
+    count, total, square = (
+        np.bincount(key, each, 3 * pixels.cells).reshape(3, -1)
+        for each in (np.ones(len(values)), values, values**2)
+    )
+    enough = count >= MIN_PIXELS
+    count = np.maximum(count, 2)
+    mean = total / count
+    std = np.sqrt(np.maximum(square / count - mean**2, 0.0) / (count - 1))
+    return np.where(enough, mean, np.nan), np.where(enough, std, np.inf)
 
 
 @dataclass(frozen=True)

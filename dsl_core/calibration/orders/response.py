@@ -11,12 +11,13 @@ filter, whose colours are known better than any curve, ties the functions togeth
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dsl_core.calibration.common.spectral_nodes import NODES_NM, SMOOTHNESS
+from dsl_core.calibration.orders.filter_check import MEASURED_NM, NOMINAL_NM
 from dsl_core.model.rig import Rig
 from dsl_core.model.spectral import SpectralCurve
 from dsl_core.optics.filters import FINE_NM
@@ -38,6 +39,10 @@ MEASURED_STD, NOMINAL_STD, DRIVE_STD, SCALE_STD = 0.005, 0.15, 0.01, 0.3
 #: Least relative deviation of a signal, and the share of the brightest colour below which one is not used.
 LEAST_STD, LEAST_SHARE = 1e-3, 0.01
 ROUNDS = 3
+#: Prior deviation of a shift that all filters share, its rounds, the most that one moves it, and the step of
+#: differences over it, nm.
+SHIFT_STD_NM, SHIFT_ROUNDS, MOST_NM, SHIFT_STEP_NM = 5.0, 6, 3.0, 0.1
+HATS = hat_functions(FINE_NM, NODES_NM)
 
 
 @dataclass(frozen=True)
@@ -60,32 +65,87 @@ def fit_response(
 
     ``white`` (3,) is the zero order of white at unit shading, DN per ms.
     """
-    nm = FINE_NM
-    hats = hat_functions(nm, NODES_NM)
-    in_white = chain_response(rig, 0, nm).sum(1) * reflectance
+    in_white = chain_response(rig, 0, FINE_NM).sum(1) * reflectance
     change = np.zeros((3, len(NODES_NM)))
     for _ in range(ROUNDS):
-        design, target, std = [], [], []
-        for i, sample in enumerate(samples):
-            for colour in _usable(sample):
-                row, value = _equation(sample.expected[colour], sample.seen[colour], hats, change[colour])
-                design.append(_place(row, colour, len(samples), i))
-                target.append(value)
-                std.append(np.hypot(sample.std[colour] / sample.seen[colour], LEAST_STD))
-        for colour in range(3):
-            row, value = _equation(in_white[colour], white[colour], hats, change[colour])
-            design.append(_place(row, colour, len(samples), None))
-            target.append(value)
-            std.append(np.hypot(white_std[colour] / white[colour], LEAST_STD))
-        known = [MEASURED_STD if sample.measured_curve else NOMINAL_STD for sample in samples]
-        solution = solve_smooth(
-            Equations.of(np.array(design), np.array(target), np.array(std)),
-            [SmoothPrior(NODES_NM, LEVEL_STD, RISE_STD)] * 3,
-            [*known, DRIVE_STD, SCALE_STD],
-            **SMOOTHNESS,
-        )
+        solution = _solve(samples, _data(samples, in_white, white, white_std, change))
         change = solution.values[: 3 * len(NODES_NM)].reshape(3, -1)
-    return _result(rig, solution, in_white[1] @ hats / in_white[1].sum())
+    return _result(rig, solution, in_white[1] @ HATS / in_white[1].sum())
+
+
+def shift_of_all(
+    rig: Rig,
+    samples: Sequence[BandSample],
+    through: Sequence[Floats],
+    white: Floats,
+    white_std: Floats,
+    reflectance: float,
+) -> tuple[float, float]:
+    """By how many nm all filters pass longer wavelengths than stated, against the LEDs' spectra; deviation.
+
+    ``through`` are the filters' transmissions at `FINE_NM`; the rest is as for `fit_response`. On one flank
+    of an LED's spectrum such a shift makes light brighter, on the other one darker, in all colours of the
+    camera; a response that does so is not smooth. An error of the spectroradiometer's wavelengths looks
+    alike.
+    """
+    in_white = chain_response(rig, 0, FINE_NM).sum(1) * reflectance
+    change, shift_nm = np.zeros((3, len(NODES_NM))), 0.0
+    for _ in range(SHIFT_ROUNDS):
+        moved, further = (
+            [replace(s, expected=in_white * _moved(t, nm)) for s, t in zip(samples, through, strict=True)]
+            for nm in (shift_nm, shift_nm + SHIFT_STEP_NM)
+        )
+        here, there = (_data(each, in_white, white, white_std, change) for each in (moved, further))
+        slope = (here.target - there.target) / SHIFT_STEP_NM
+        design = np.concatenate([here.design, slope[:, None]], 1)
+        solution = _solve(samples, _Data(design, here.target + slope * shift_nm, here.std), [SHIFT_STD_NM])
+        change = solution.values[: 3 * len(NODES_NM)].reshape(3, -1)
+        shift_nm = float(np.clip(solution.values[-1], shift_nm - MOST_NM, shift_nm + MOST_NM))
+    centres = [MEASURED_NM if sample.measured_curve else NOMINAL_NM for sample in samples]
+    return shift_nm, float(np.hypot(solution.std[-1], np.linalg.norm(centres) / len(samples)))
+
+
+@dataclass(frozen=True)
+class _Data:
+    """Equations of all samples and of white: design (n, unknowns), target and deviation (n,)."""
+
+    design: Floats
+    target: Floats
+    std: Floats
+
+
+def _data(
+    samples: Sequence[BandSample], in_white: Floats, white: Floats, white_std: Floats, change: Floats
+) -> _Data:
+    design, target, std = [], [], []
+    for i, sample in enumerate(samples):
+        for colour in _usable(sample):
+            row, value = _equation(sample.expected[colour], sample.seen[colour], change[colour])
+            design.append(_place(row, colour, len(samples), i))
+            target.append(value)
+            std.append(np.hypot(sample.std[colour] / sample.seen[colour], LEAST_STD))
+    for colour in range(3):
+        row, value = _equation(in_white[colour], white[colour], change[colour])
+        design.append(_place(row, colour, len(samples), None))
+        target.append(value)
+        std.append(np.hypot(white_std[colour] / white[colour], LEAST_STD))
+    return _Data(np.array(design), np.array(target), np.array(std))
+
+
+def _solve(samples: Sequence[BandSample], data: _Data, more_std: Sequence[float] = ()) -> SmoothSolution:
+    """The most likely unknowns; ``more_std`` are prior deviations of those behind the usual ones."""
+    known = [MEASURED_STD if sample.measured_curve else NOMINAL_STD for sample in samples]
+    return solve_smooth(
+        Equations.of(data.design, data.target, data.std),
+        [SmoothPrior(NODES_NM, LEVEL_STD, RISE_STD)] * 3,
+        [*known, DRIVE_STD, SCALE_STD, *more_std],
+        **SMOOTHNESS,
+    )
+
+
+def _moved(through: Floats, shift_nm: float) -> Floats:
+    """A transmission at `FINE_NM` whose band is so many nm further to the red."""
+    return np.interp(FINE_NM - shift_nm, FINE_NM, through)
 
 
 def _usable(sample: BandSample) -> list[int]:
@@ -99,10 +159,10 @@ def _usable(sample: BandSample) -> list[int]:
     ]
 
 
-def _equation(expected: Floats, seen: float, hats: Floats, change: Floats) -> tuple[Floats, float]:
+def _equation(expected: Floats, seen: float, change: Floats) -> tuple[Floats, float]:
     """Weights of the function's nodes in a signal, and the value of their sum that would explain it."""
-    light = expected * np.exp(hats @ change)
-    row = light @ hats / light.sum()
+    light = expected * np.exp(HATS @ change)
+    row = light @ HATS / light.sum()
     return row, float(np.log(seen / light.sum()) + row @ change)
 
 

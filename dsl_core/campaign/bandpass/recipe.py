@@ -43,6 +43,8 @@ from dsl_core.words import sentence
 
 PLANE = "plane"
 CURVE_NAME = "filter.json"
+#: Filters may all be off by this much (nm), or by this many deviations, the larger.
+MAX_OFF_NM, OFF_SIGMAS = 1.0, 3.0
 FILTERS_NM = tuple(float(nm) for nm in range(430, 661, 10))
 
 
@@ -246,9 +248,35 @@ def bandpass_figures(record: BandpassCalibration, done: Collection[str] = ()) ->
             high=2.0,
             advice="Focus the projector on the target.",
         ),
+        *_of_filters(record),
         doubts("filters in doubt", record.warnings),
     ]
     return tuple(figures)
+
+
+def _of_filters(record: BandpassCalibration) -> list[Figure]:
+    """What all filters have in common: other wavelengths than stated, and a shift with the angle of view."""
+    figures = []
+    if record.filters_off_nm is not None:
+        limit = max(MAX_OFF_NM, OFF_SIGMAS * record.filters_off_std_nm)
+        figures.append(
+            Figure(
+                name="all filters against the LEDs' spectra",
+                value=record.filters_off_nm,
+                unit="nm",
+                std=record.filters_off_std_nm,
+                low=-limit,
+                high=limit,
+                advice="All filters pass other wavelengths than stated, or the spectroradiometer's are off."
+                " Check that the transmissions are those of these filters, seen straight on, and that the"
+                " filters are flat in front of the lens; check the spectroradiometer by a lamp with known"
+                " lines.",
+            )
+        )
+    if record.filter_index is not None:
+        value, std = record.filter_index
+        figures.append(_plain("index of the filters, by their shift with the angle of view", "", value, std))
+    return figures
 
 
 def _response_advice(record: BandpassCalibration, done: Collection[str]) -> str:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from dsl_core.calibration.film.form import FilmForm
+from dsl_core.model.calibration.chain import ChainCorrection
 from dsl_core.model.calibration.depth_stage import DepthStageCalibration, StagePosition
 from dsl_core.model.figure import Figure, doubts
 
@@ -22,6 +23,8 @@ MAX_FILTERS_NM, FILTER_SIGMAS, MIDDLE_NM = 0.8, 3.0, 550.0
 #: Largest correction of the chain: curves of response, emission and efficiency that are each off their data
 #: sheet by 5 % come to 16 % together, and second orders beyond what filters show to some percent more.
 MAX_CORRECTION_PERCENT = 20.0
+#: Orders of a film that was turned over change by opposite shares that differ by this much (logarithm).
+TURNED_OVER = 0.2
 
 
 def depth_stage_figures(record: DepthStageCalibration) -> tuple[Figure, ...]:
@@ -125,7 +128,7 @@ def _chain(record: DepthStageCalibration) -> tuple[Figure, ...]:
         value=100 * chain.largest_correction,
         unit="%",
         high=MAX_CORRECTION_PERCENT,
-        advice="Calibrate Spectralon, Color Checker and bandpass filters again.",
+        advice=_turned_over(chain) or "Calibrate Spectralon, Color Checker and bandpass filters again.",
     )
     if chain.wavelength_scale is None:
         return (correction,)
@@ -144,6 +147,31 @@ def _chain(record: DepthStageCalibration) -> tuple[Figure, ...]:
         " flat in front of the lens, and check their transmissions and the spectroradiometer's wavelengths.",
     )
     return correction, filters
+
+
+def _turned_over(chain: ChainCorrection) -> str:
+    """What the orders say of a film that was turned over since the filters, empty where they do not.
+
+    A film that is turned over sends the light of one first order to the other: what one gains, the other
+    loses.
+    """
+    plus, minus = (
+        float(np.mean(np.log(chain.efficiency_factors[order].values)))
+        if order in chain.efficiency_factors
+        else 0.0
+        for order in (1, -1)
+    )
+    if abs(plus - minus) < TURNED_OVER or abs(plus + minus) > ALONE * abs(plus - minus):
+        return ""
+    changes = " and ".join(
+        f"order {order:+d} {abs(np.expm1(value)):.0%} {'brighter' if value > 0 else 'darker'}"
+        for order, value in ((1, plus), (-1, minus))
+    )
+    return (
+        f"Since the bandpass filters were captured, {changes}: the film was probably turned over or"
+        " exchanged. Mount it as it was and capture these positions again, or calibrate the bandpass filters"
+        " again."
+    )
 
 
 def _filter_index(record: DepthStageCalibration) -> tuple[Figure, ...]:

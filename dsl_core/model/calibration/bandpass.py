@@ -43,7 +43,10 @@ class BandpassCalibration(Record):
     The response keeps the scale that green had before; ``white_scale`` belongs to it. ``misfit`` is the
     factor by which the scatter of the efficiency exceeds its stated deviations, by order. Where the lines
     call for another curve than a Gaussian, ``spread`` is that curve, of the rms width ``blur_px``, and where
-    its width varies over the projector's frame, ``field`` says how.
+    its width varies over the projector's frame, ``field`` says how. ``filters_off_nm`` is by how much longer
+    wavelengths than stated all filters pass, judged by the LEDs' spectra, with its deviation, None where it
+    was not judged; ``filter_index`` is the effective index of the filters' layers by their shift with the
+    angle of view, with its deviation, None where none is seen.
     """
 
     filters: tuple[FilterSample, ...]
@@ -62,6 +65,9 @@ class BandpassCalibration(Record):
     halo_decay_std_px: float = Field(ge=0)
     spread: LineSpread | None = None
     field: SpreadField | None = None
+    filters_off_nm: float | None = None
+    filters_off_std_nm: float = Field(default=0.0, ge=0)
+    filter_index: tuple[float, float] | None = None
     warnings: tuple[str, ...] = ()
 
 

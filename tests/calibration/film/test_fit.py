@@ -7,12 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from dsl_core.calibration.film.filter_angle import (
-    SIGNIFICANT,
-    FilterAngle,
-    columns_per_share,
-    seen_straight,
-)
+from dsl_core.calibration.film.filter_angle import columns_per_share, seen_straight
 from dsl_core.calibration.film.fit import (
     COMMON_PX,
     _common_offsets,
@@ -23,6 +18,7 @@ from dsl_core.calibration.film.form import FIELDS, SLOPE_STD, FilmForm
 from dsl_core.calibration.film.order_samples import grating_columns
 from dsl_core.errors import CalibrationError
 from dsl_core.model.rig import SHAPE_POWERS, Film, FilmShape, Rig
+from dsl_core.optics.filters import SIGNIFICANT, FilterAngle
 from tests.cases.film_samples import (
     NOISE_PX,
     mounted,

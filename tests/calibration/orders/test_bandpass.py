@@ -23,12 +23,13 @@ from dsl_core.calibration.orders.bandpass import (
     profile_scan,
 )
 from dsl_core.calibration.orders.filter_check import PlacedFilter
+from dsl_core.calibration.orders.filter_shift import cell_terms
 from dsl_core.calibration.orders.order_light import FilterLight, OrderLight
 from dsl_core.errors import CalibrationError
 from dsl_core.model.calibration.bandpass import BandpassCalibration, apply_bandpass
 from dsl_core.model.plan import ScanLines
 from dsl_core.optics.correspondence import GratingModel
-from dsl_core.optics.filters import FINE_NM, nominal_filter, passed
+from dsl_core.optics.filters import FINE_NM, nominal_filter, passed, relative_shift
 from dsl_core.optics.sensor import bayer_channels
 from dsl_core.optics.spectra import chain_response
 from dsl_core.simulation.published_rig import published_rig
@@ -234,3 +235,49 @@ def test_second_orders_are_compared_with_the_first_at_the_same_light() -> None:
     assert len(found) == 3, "green of one, red and green of the other"
     first = float(light[1] @ curve.at(FINE_NM) / light[1].sum())
     assert found[0] == pytest.approx((second.ratio[1], 1e-4, first))
+
+
+def at_an_angle(centre: float, scan: LineScan, index: float) -> SeenFilter:
+    """The filter of an index, whose band shifts with the angle of view; no noise."""
+    terms = cell_terms(RIG, plane_pixels(RIG, scan, 550.0), scan.pixels)
+    shift = relative_shift(terms, np.array([index**-2, 0.0, 0.0]))
+    cells = np.stack([REFLECTANCE * passed(RIG, nominal_filter(centre), s[None]).sum(1) for s in shift], 1)
+    light = passed(RIG, nominal_filter(centre), shift)
+    straight = seen(centre)
+    orders = {
+        order: replace(
+            straight.light.orders[order],
+            ratio=light @ RIG.efficiency[order].at(FINE_NM) / light.sum(1),
+            cells=np.ones(24),
+        )
+        for order in (1, -1)
+    }
+    zero = REFLECTANCE * light.sum(1)
+    seen_light = FilterLight(zero, NOISE * zero, orders, (0.0, 0.01), 0.0, cells, NOISE * cells)
+    orders |= {order: straight.light.orders[order] for order in (2, -2)}
+    return replace(straight, light=seen_light)
+
+
+def test_filters_seen_at_an_angle_are_taken_as_they_pass_light() -> None:
+    scan, profile = without_filter()
+    filters = [at_an_angle(nm, scan, 1.9) for nm in CENTRES]
+    found = fit_bandpass(RIG, scan, profile, filters, REFLECTANCE)
+    assert found.filter_index is not None
+    assert found.filter_index[0] == pytest.approx(1.9, abs=0.05)
+    assert found.filters_off_nm == pytest.approx(0.0, abs=0.3)
+    nm = np.arange(450.0, 641.0, 10.0)
+    after = apply_bandpass(found, RIG)
+    for truth, curve in zip(RIG.response, after.response, strict=True):
+        bright = truth.at(nm) > 0.3 * max(truth.values)
+        scale = after.white_scale / RIG.white_scale
+        assert scale * curve.at(nm)[bright] == pytest.approx(truth.at(nm)[bright], rel=0.01)
+    for order in (1, -1):
+        assert found.efficiency[order].at(nm) == pytest.approx(RIG.efficiency[order].at(nm), rel=5e-3)
+
+
+def test_filters_that_are_all_off_alike_are_told(record: BandpassCalibration) -> None:
+    scan, profile = without_filter()
+    found = fit_bandpass(RIG, scan, profile, [seen(nm, nm - 6.0) for nm in CENTRES], REFLECTANCE)
+    assert found.filters_off_nm == pytest.approx(-6.0, abs=0.4)
+    assert record.filters_off_nm == pytest.approx(0.0, abs=0.3)
+    assert record.filter_index is None

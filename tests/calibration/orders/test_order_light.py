@@ -87,3 +87,14 @@ def test_cells_that_differ_widen_the_deviation() -> None:
     light = seen(uneven=0.1).orders[1]
     # Every cell is a tenth off; those whose light comes from beside the frame are missing.
     assert light.std == pytest.approx(0.1 * RATIO[1] / np.sqrt(15), rel=0.25)
+
+
+def test_cells_say_where_the_zero_order_and_each_order_were_seen(found: FilterLight) -> None:
+    assert found.cells.shape == (3, 24)
+    assert found.cells == pytest.approx(np.repeat(found.zero, 24).reshape(3, 24), rel=0.02)
+    assert 1e-5 < float(np.nanmax(found.cells_std / found.cells)) < 0.02
+    # Light of the order on the right is outside the frame for pixels on the right, and the other way round.
+    by_column = {order: found.orders[order].cells.reshape(4, 6).sum(0) for order in (1, -1)}
+    assert by_column[1][5] == 0.0
+    assert by_column[-1][0] == 0.0
+    assert by_column[1][0] > 0.9 * by_column[1][1] > 0

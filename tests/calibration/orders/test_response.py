@@ -8,10 +8,17 @@ import numpy as np
 import pytest
 
 from dsl_core.calibration.common.spectral_nodes import NODES_NM, SMOOTHNESS
-from dsl_core.calibration.orders.response import BandSample, _place, _result, _usable, fit_response
+from dsl_core.calibration.orders.response import (
+    BandSample,
+    _place,
+    _result,
+    _usable,
+    fit_response,
+    shift_of_all,
+)
 from dsl_core.model.rig import Rgb, Rig
 from dsl_core.model.spectral import SpectralCurve
-from dsl_core.optics.filters import FINE_NM, nominal_filter, passed
+from dsl_core.optics.filters import FINE_NM, nominal_filter, passed, through_filter
 from dsl_core.optics.spectra import chain_response
 from dsl_core.simulation.published_rig import published_rig
 from dsl_core.solve.smooth_functions import Equations, SmoothSolution, solve_smooth
@@ -55,6 +62,36 @@ def test_response_times_scale_comes_near_the_truth(measured: bool, factor: float
         after = found.white_scale * found.response[colour].at(NM) / true - 1
         assert np.abs(before[bright]).max() > 0.05
         assert np.sqrt(np.mean(after[bright] ** 2)) < 0.012
+
+
+@pytest.mark.parametrize("off_nm", [-6.0, 0.0, 2.0])
+@pytest.mark.parametrize("centres", [CENTRES, (450, 480, 540, 590, 640)])
+def test_filters_that_are_all_off_alike_disagree_with_the_leds(off_nm: float, centres: Any) -> None:
+    """The response is off as well, and none of it is taken for a shift."""
+    known, truth, rng = published_rig(), true_rig(), np.random.default_rng(1)
+    samples, through = [], []
+    for nm in centres:
+        seen = passed(truth, nominal_filter(nm + off_nm)).sum(1) * (1 + 1e-3 * rng.standard_normal(3))
+        samples.append(BandSample(seen, 1e-3 * seen, passed(known, nominal_filter(nm)), True))
+        through.append(through_filter(nominal_filter(nm)))
+    white = chain_response(truth, 0, FINE_NM).sum((1, 2))
+    found, std = shift_of_all(known, samples, through, white, 1e-3 * white, 1.0)
+    assert abs(found - off_nm) < 0.4
+    assert 0.5 / np.sqrt(len(samples)) <= std < 0.4
+
+
+def test_nominal_curves_say_less_of_a_shift_than_measured_ones() -> None:
+    known = published_rig()
+    found = []
+    for measured in (True, False):
+        lights = [passed(known, nominal_filter(nm)) for nm in CENTRES]
+        samples = [BandSample(x.sum(1), 1e-3 * x.sum(1), x, measured) for x in lights]
+        white = chain_response(known, 0, FINE_NM).sum((1, 2))
+        through = [through_filter(nominal_filter(nm)) for nm in CENTRES]
+        found.append(shift_of_all(known, samples, through, white, 1e-3 * white, 1.0))
+    assert [abs(value) < 1e-6 for value, _ in found] == [True, True]
+    assert found[1][1] > 2 * found[0][1]
+    assert found[1][1] >= 1.5 / np.sqrt(len(CENTRES))
 
 
 def test_what_white_makes_green_see_stays_in_the_response() -> None:

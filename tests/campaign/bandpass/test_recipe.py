@@ -109,6 +109,29 @@ def test_response_comes_near_the_truth(bench: Bench, record: BandpassCalibration
         assert np.sqrt(np.mean(errors[1] ** 2)) < 0.5 * np.sqrt(np.mean(errors[0] ** 2))
 
 
+@pytest.mark.parametrize(
+    ("off_nm", "std_nm", "passes"),
+    [(0.9, 0.1, True), (-6.0, 0.1, False), (1.2, 0.1, False), (2.0, 0.8, True)],
+)
+def test_filters_that_are_all_off_alike_are_refused(
+    record: BandpassCalibration, off_nm: float, std_nm: float, passes: bool
+) -> None:
+    off = record.model_copy(update={"filters_off_nm": off_nm, "filters_off_std_nm": std_nm})
+    refused = [f for f in failures(RECIPE.figures(off)) if "LEDs" in f.name]
+    assert passes == (not refused)
+    if refused:
+        assert f"{off_nm:.2f} ± {std_nm:.2f} nm" in str(refused[0])
+        assert "spectroradiometer" in refused[0].advice
+
+
+def test_the_index_of_filters_is_told_where_they_shift(record: BandpassCalibration) -> None:
+    assert record.filter_index is None, "the twin's own filters do not shift"
+    shifting = record.model_copy(update={"filter_index": (1.9, 0.05)})
+    (told,) = [f for f in RECIPE.figures(shifting) if f.name.startswith("index of the filters")]
+    assert (told.value, told.std, told.passed) == (1.9, 0.05, True)
+    assert not [f for f in RECIPE.figures(record) if f.name.startswith("index of the filters")]
+
+
 def test_figures_pass_and_record_goes_through_json(record: BandpassCalibration) -> None:
     assert failures(RECIPE.figures(record)) == ()
     assert BandpassCalibration.model_validate_json(record.model_dump_json()) == record

@@ -5,17 +5,24 @@ from __future__ import annotations
 import pytest
 
 from dsl_core.campaign.depth_stage.figures import depth_stage_figures
+from dsl_core.model.calibration.chain import ChainCorrection
 from dsl_core.model.calibration.depth_stage import DepthStageCalibration, HeldOutError, StagePosition
 from dsl_core.model.figure import Figure
+from dsl_core.model.spectral import SpectralCurve
 from dsl_core.simulation.published_rig import published_rig
 
 RIG = published_rig()
 #: Millimetres a column at 600 and 900 mm.
 MM_PER_PX = {600.0: 6.5, 900.0: 14.6}
+FILM_STD = dict.fromkeys(
+    ("lines_per_mm", "distance_mm", "tilt_x_deg", "tilt_y_deg", "roll_deg", "bend_per_mm"), 0.1
+)
 
 
-def plane_figure(rms_px: dict[float, float], limit_px: float = 0.04) -> Figure:
-    """The figure of planes whose columns scatter by so much at each position."""
+def figure_of(
+    name: str, rms_px: dict[float, float], limit_px: float, chain: ChainCorrection | None
+) -> Figure:
+    """A figure of planes whose columns scatter by so much at each position."""
     positions = tuple(
         StagePosition(
             position_mm=mm,
@@ -32,18 +39,21 @@ def plane_figure(rms_px: dict[float, float], limit_px: float = 0.04) -> Figure:
     record = DepthStageCalibration.model_construct(
         positions=positions,
         film=RIG.film,
-        film_std=dict.fromkeys(
-            ("lines_per_mm", "distance_mm", "tilt_x_deg", "tilt_y_deg", "roll_deg", "bend_per_mm"), 0.1
-        ),
+        film_std=FILM_STD,
         geometry_pull=1.0,
         bow_mm=None,
         depth_std_mm=0.1,
         held_out=(HeldOutError(kept_out="x", grating_px=0.1, hybrid_px=0.1, noise_px=0.1),),
-        chain=None,
+        chain=chain,
         filter_index=None,
         warnings=(),
     )
-    return next(each for each in depth_stage_figures(record) if each.name == "scatter about the plane")
+    return next(each for each in depth_stage_figures(record) if each.name == name)
+
+
+def plane_figure(rms_px: dict[float, float], limit_px: float = 0.04) -> Figure:
+    """The figure of the planes themselves."""
+    return figure_of("scatter about the plane", rms_px, limit_px, None)
 
 
 def test_the_same_error_of_columns_passes_at_every_distance() -> None:
@@ -65,3 +75,37 @@ def test_a_plane_that_is_worse_than_all_others_is_named() -> None:
     figure = plane_figure({600.0: 0.09, 900.0: 0.01})
     assert not figure.passed
     assert "worst at 600 mm and much less elsewhere: check the target there" in figure.advice
+
+
+def chain_figure(plus: float, minus: float) -> Figure:
+    """The figure of a chain that is 60 % off, with factors of both first orders."""
+    flat = SpectralCurve.of([400.0, 700.0], [1.0, 1.0])
+    chain = ChainCorrection(
+        efficiency_factors={
+            order: SpectralCurve.of([400.0, 700.0], [factor] * 2)
+            for order, factor in ((1, plus), (-1, minus))
+        },
+        response_factors=(flat, flat, flat),
+        white_scale_factor=1.0,
+        white_scale_rel_std=0.001,
+        chain_rel_std=flat,
+        largest_correction=0.6,
+        pixels=100,
+        chi_square=1.0,
+    )
+    figure = figure_of("largest correction of the chain", {600.0: 0.01, 900.0: 0.01}, 0.04, chain)
+    assert not figure.passed
+    return figure
+
+
+def test_a_film_that_was_turned_over_since_the_filters_is_named_with_both_orders() -> None:
+    advice = chain_figure(0.71, 1.39).advice
+    assert "order +1 29% darker and order -1 39% brighter: the film was probably turned over" in advice
+    assert "order +1 40% brighter and order -1 29% darker" in chain_figure(1.4, 0.71).advice
+
+
+@pytest.mark.parametrize(("plus", "minus"), [(1.6, 1.6), (1.6, 1.0), (0.95, 1.05), (0.6, 0.8)])
+def test_orders_that_do_not_change_by_opposite_shares_blame_no_film(plus: float, minus: float) -> None:
+    assert (
+        chain_figure(plus, minus).advice == "Calibrate Spectralon, Color Checker and bandpass filters again."
+    )
