@@ -145,6 +145,11 @@ class Sensor(Record):
         most = int(2**self.bit_depth - 1)
         return most if self.saturation_dn is None else min(self.saturation_dn, most)
 
+    @property
+    def rounds_light(self) -> bool:
+        """Whether noise is too small to carry light across steps: means of many values are rounded too."""
+        return self.step_dn > 1 and self.step_dn > self.read_noise_dn * 12**0.5
+
 
 class ProjectorResponse(Record):
     """From drive level to light: ``radiance = level ** gamma``, black level, blur and halo.

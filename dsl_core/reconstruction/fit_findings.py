@@ -470,7 +470,7 @@ def _gains(causes: Causes, corrected: bool) -> Iterator[FitFinding]:
         "1",
         MOST_GAIN,
         f"The brightness of both first orders differs by {common:+.1%} from what the zero order predicts: the"
-        " response to level or exposure is not as calibrated.",
+        " response to level or exposure is not as calibrated. Deviations of reflectance contain it.",
         "Repeat the self-test.",
     )
 

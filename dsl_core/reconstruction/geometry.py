@@ -211,15 +211,19 @@ def geometry_of(
     surface_window_px: int | None = None,
     spread_doubt: SpreadDoubt | None = None,
     shared_errors: bool = True,
+    code_wave_px: float = 0.0,
 ) -> Geometry:
     """Depth and surface from the columns of a whole picture of a shape, which it takes over.
 
-    ``spread_doubt`` is what columns may be off by through the line spread.
+    ``spread_doubt`` is what columns may be off by through the line spread, ``code_wave_px`` what the binary
+    code says that they are.
     """
     maps, flags = found.maps, found.flags
     waves = wave_std_px(maps.column_px.reshape(shape), maps.refined.reshape(shape), lines).ravel()
     if spread_doubt is not None:
         waves = np.hypot(waves, np.where(maps.refined, spread_doubt.at(maps.column_px), np.float32(0.0)))
+    # It is of the same waves.
+    waves = np.maximum(waves, np.where(maps.refined, np.float32(code_wave_px), np.float32(0.0)))
     common = math.hypot(rig.column_std_px, _zero_std_px(rig)) if shared_errors else 0.0
     colours = material_std_px(rig, maps.column_px)
     good = (flags & int(DEPTH_INVALID)) == 0

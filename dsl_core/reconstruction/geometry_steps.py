@@ -14,6 +14,7 @@ from dsl_core.patterns.gray_code import DecodedCode
 from dsl_core.progress import Progress
 from dsl_core.reconstruction.camera_spot import follow_spot, spot_finding
 from dsl_core.reconstruction.code_agreement import NamedPlaces, code_agreement
+from dsl_core.reconstruction.code_wave import code_wave
 from dsl_core.reconstruction.columns.column import MODEL_ERROR
 from dsl_core.reconstruction.columns.line_spread import own_spread, spread_pixels, with_own_spread
 from dsl_core.reconstruction.columns.peak_error import own_peak_error
@@ -78,8 +79,18 @@ class GeometrySteps:
         columns = columns_by_rows(self.rig, options, frames, code, white, peak_error, self._progress)
         named = NamedPlaces.of(code)
         del code, white
-        refined_by = lines if options.refine_columns else None
-        geometry = geometry_of(self.rig, refined_by, columns, frames.shape, options.surface_window_px, doubt)
+        wave = code_wave(lines, named.column, columns.maps) if refines_rig else None
+        if wave is not None:
+            self.findings.append(wave.finding())
+        geometry = geometry_of(
+            self.rig,
+            lines if options.refine_columns else None,
+            columns,
+            frames.shape,
+            options.surface_window_px,
+            doubt,
+            code_wave_px=0.0 if wave is None else wave.error_px,
+        )
         del columns
         require_pixels(geometry.flags)
         if not refines_rig:

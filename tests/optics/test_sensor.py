@@ -94,3 +94,13 @@ def test_shot_noise_starts_at_black() -> None:
     sensor = Sensor(read_noise_dn=2.0, electrons_per_dn=8.0)
     found = raw_variance(sensor, np.array([-50.0, 0.0, 16.0]))
     assert found == pytest.approx([4 + 1 / 12, 4 + 1 / 12, 6 + 1 / 12])
+
+
+@pytest.mark.parametrize(
+    ("step_dn", "read_noise_dn", "rounds"),
+    [(1, 0.1, False), (16, 0.5, True), (16, 4.5, True), (16, 4.7, False)],
+)
+def test_light_is_rounded_where_noise_is_smaller_than_that_of_steps(
+    step_dn: int, read_noise_dn: float, rounds: bool
+) -> None:
+    assert Sensor(step_dn=step_dn, read_noise_dn=read_noise_dn).rounds_light == rounds

@@ -87,6 +87,16 @@ def test_depth_is_as_sure_as_the_column_and_what_all_columns_share() -> None:
         np.testing.assert_array_equal((found.flags & int(Flag.DEPTH_EDGE)) > 0, found.surface.edge)
 
 
+def test_depth_is_as_unsure_as_the_code_says_of_columns_that_lines_refined() -> None:
+    rig = published_rig()
+    rig = rig.model_copy(update={"camera": rig.camera.resized(16, 12), "column_std_px": 0.0})
+    coarse = np.arange(COUNT) < 20
+    maps = FoundColumns(maps_of(refined=~coarse), np.zeros(COUNT, np.uint16))
+    found = geometry_of(rig, None, maps, SHAPE, 5, code_wave_px=0.1)
+    assert found.column_std_px.ravel()[coarse] == pytest.approx(0.03)
+    assert found.column_std_px.ravel()[~coarse] == pytest.approx(np.hypot(0.03, 0.1))
+
+
 def test_depth_is_less_sure_where_a_peak_is_unusual_or_materials_move_it() -> None:
     rig = published_rig()
     rig = rig.model_copy(update={"camera": rig.camera.resized(16, 12), "column_std_px": 0.0})

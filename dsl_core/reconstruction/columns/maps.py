@@ -134,6 +134,9 @@ class ColumnFinder:
         widths = widths_at(self.rig, self._places(where, start), start)
         column, offset, offset_std = _on_lines(start, y, std, self.lines, self.rig, widths, self.peak_error)
         known = offset_std < OFFSET_KNOWN * black_std
+        if self.rig.sensor.rounds_light:
+            # Lines round their faint light as much as dark frames do, and all lines of a pixel alike.
+            known, offset_std = torch.zeros_like(known), black_std
         return column, offset, torch.where(known, 0.0, torch.minimum(offset_std, black_std))
 
     def _of_patterns(self, where: Indices | slice, start: Tensor, y: Tensor, std: Tensor) -> Column:

@@ -297,7 +297,7 @@ def _settings_finding(course: LightCourse) -> FitFinding:
 
 def _of_settings(scan: Pictures) -> Iterator[Witness]:
     sensor = scan.rig.sensor
-    if sensor.step_dn > 1 and sensor.step_dn > sensor.read_noise_dn * np.sqrt(12):
+    if sensor.rounds_light:
         return  # black is rounded too, and that is much of what a faint setting shows
     for (role, pattern), ratios in sorted(scan.ratios.items()):
         shots = scan.shots_of(role, pattern)

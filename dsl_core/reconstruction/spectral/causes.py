@@ -25,6 +25,8 @@ MOST_DRIFT, MOST_CURVES = 0.014, 0.015
 LARGEST_DRIFT = 0.3
 #: Rms of a level that changes steadily from that of the start, relative to its change.
 SINCE_START = 3**-0.5
+#: How much more first orders are off bright light of the calibration than they are off the zero order.
+FROM_BRIGHT = 2.0
 #: What a parameter is held at zero by.
 NONE_STD = 1e-5
 #: Where chi-squares of most pixels exceed one by more than this, frames lack something: a cause must explain
@@ -124,7 +126,17 @@ def common_error(probe: Probe, causes: Causes) -> float:
     light = fit_evenness(probe)
     uneven = light.error if light is not None and light.matters else 0.0
     drift = SINCE_START * causes.drift if causes.drifts else 0.0
-    return float(np.linalg.norm([share, uneven, drift]))
+    return float(np.linalg.norm([share, uneven, drift, _response_error(causes)]))
+
+
+def _response_error(causes: Causes) -> float:
+    """Relative error of the light of both first orders by a response that the zero order shows to be off.
+
+    The calibration measured brighter light than either: what they differ by, the first orders differ by as
+    much again from that.
+    """
+    gain = causes.common_gain
+    return FROM_BRIGHT * abs(gain) if matters(gain, causes.common_std, MOST_GAIN) and causes.brighter else 0.0
 
 
 def fit_causes(probe: Probe) -> Causes:

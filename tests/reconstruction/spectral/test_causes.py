@@ -185,3 +185,15 @@ def test_curves_and_drift_add_to_what_no_pixel_sees() -> None:
         assert found == pytest.approx(np.hypot(share, drift))
     assert common_error(probe(None), CAUSES) == pytest.approx(drift)
     assert common_error(probe(None), replace(CAUSES, drift=0.001)) == 0.0
+
+
+def test_a_response_that_is_off_is_more_so_far_from_where_it_was_measured() -> None:
+    probe: Any = SimpleNamespace(sideways=None, curves=None)
+    quiet = replace(CAUSES, drift=0.0, gain=np.array([0.05, 0.04]), common_std=0.002)
+    assert common_error(probe, quiet) == pytest.approx(2 * 0.04)
+    assert common_error(probe, replace(quiet, gain=-quiet.gain)) == pytest.approx(2 * 0.04)
+    # One order alone is no response; nor is chance, nor what explains little.
+    assert common_error(probe, replace(quiet, gain=np.array([0.05, -0.04]))) == 0
+    assert common_error(probe, replace(quiet, common_std=0.02)) == 0
+    assert common_error(probe, replace(quiet, gain=np.array([0.014, 0.014]))) == 0
+    assert common_error(probe, replace(quiet, explained=(1.0, 0.1, 1.0, 1.0))) == 0

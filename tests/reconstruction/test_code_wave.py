@@ -1,0 +1,87 @@
+"""Waves that a wrong line spread leaves in columns, seen by the binary code."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from dsl_core import pipeline
+from dsl_core.model.options import Options
+from dsl_core.model.presets import preset_plan
+from dsl_core.optics.lines.line_set import LineSet
+from dsl_core.reconstruction.code_wave import code_wave
+from dsl_core.reconstruction.columns.maps import ColumnMaps
+from dsl_core.simulation.sim_devices import open_twin
+from tests.cases.twin_scan import capture
+
+LINES = LineSet(width_px=5, step_px=5, first_px=2.0, lines=40, frames=40)
+PIXELS, WAVE_PX = 4000, 0.15
+TRUE_PX = np.random.default_rng(5).uniform(3, 190, PIXELS)
+NAMED_PX = np.round(TRUE_PX).astype(np.int32)
+SINE = np.sin(2 * math.pi / LINES.step_px * (TRUE_PX - LINES.first_px))
+
+
+def maps_of(column_px: NDArray[np.floating], std_px: float = 0.01) -> ColumnMaps:
+    maps = ColumnMaps.empty(len(column_px))
+    maps.column_px[:], maps.column_std_px[:], maps.refined[:] = column_px, std_px, True
+    return maps
+
+
+def test_a_wave_is_as_large_as_it_is() -> None:
+    found = code_wave(LINES, NAMED_PX, maps_of(TRUE_PX + WAVE_PX * SINE))
+    assert found is not None
+    assert found.error_px == pytest.approx(WAVE_PX / math.sqrt(2), rel=0.2)
+    # The boundaries are half a column to the side of the middle, one and a half, and so on.
+    at = 2 * math.pi / 5 * (np.arange(5) + 0.5 - LINES.first_px)
+    assert found.apart_px == pytest.approx(WAVE_PX * np.sin(at), abs=0.03)
+    told = found.finding()
+    assert told.significant
+    assert told.part == "profile"
+
+
+@pytest.mark.parametrize("moved_px", [0.0, 0.3])
+def test_what_moves_all_columns_alike_is_no_wave(moved_px: float) -> None:
+    found = code_wave(LINES, NAMED_PX, maps_of(TRUE_PX + moved_px))
+    assert found is not None
+    assert found.error_px == 0
+    assert not found.finding().significant
+
+
+def test_a_wave_that_chance_or_nobody_minds_widens_nothing() -> None:
+    small = code_wave(LINES, NAMED_PX, maps_of(TRUE_PX + 0.055 * SINE))
+    assert small is not None
+    assert small.rms_px < 0.04
+    assert small.error_px == 0
+
+
+def test_nothing_is_said_where_nothing_is_known() -> None:
+    waved = TRUE_PX + WAVE_PX * SINE
+    assert code_wave(None, NAMED_PX, maps_of(waved)) is None
+    # Lines that overlap show their spread; combs have other lines beneath them.
+    assert code_wave(replace(LINES, width_px=6), NAMED_PX, maps_of(waved)) is None
+    assert code_wave(replace(LINES, frames=8), NAMED_PX, maps_of(waved)) is None
+    # Noise draws columns to the middles of lines.
+    assert code_wave(LINES, NAMED_PX, maps_of(waved, std_px=0.2)) is None
+    assert code_wave(LINES, np.full_like(NAMED_PX, -1), maps_of(waved)) is None
+    unusual, coarse = maps_of(waved), maps_of(waved)
+    unusual.unusual[:] = True
+    coarse.refined[:] = False
+    assert code_wave(LINES, NAMED_PX, unusual) is None
+    assert code_wave(LINES, NAMED_PX, coarse) is None
+
+
+def test_a_scan_with_other_lines_says_so() -> None:
+    devices = open_twin({"size": "64x44", "foreign": "spread-square"})
+    plan = preset_plan("coarse")
+    assert plan is not None
+    scan = capture(devices, pipeline.fit_plan(plan, devices))
+    rig = devices.camera.world.rig  # type: ignore[attr-defined]
+    found, as_calibrated = (
+        pipeline.reconstruct(scan, rig, Options(spectra=False, as_calibrated=each)) for each in (False, True)
+    )
+    assert "Between the middles of lines" in found.attrs["fit"]
+    assert "Between the middles of lines" not in as_calibrated.attrs["fit"]
