@@ -25,6 +25,8 @@ Draw: TypeAlias = "Callable[[NDArray[np.uint16]], NDArray[np.uint8]]"
 Drawn: TypeAlias = "tuple[Draw, NDArray[np.uint8]]"
 #: Drive level of the first trial picture.
 LEVEL = 0.8
+#: What is wrong with a part of an LED cycle.
+COLOURS_VARY = "colours vary"
 _LINK_ROLES = {Link.OPEN: "good", Link.OPENING: "warn", Link.LOST: "bad", Link.CLOSED: "muted"}
 
 _LINK_BUTTONS = {Link.OPEN: "Disconnect", Link.OPENING: "Connecting…"}
@@ -82,6 +84,7 @@ def rig_view(rig: RigState, live: LiveState) -> RigView:
     has_devices = devices is not None
     # Of a rig that is lost, nothing can be asked before it is connected again.
     can_look = has_devices and link is not Link.LOST
+    cycles = cycles_text(live.exposure_ms.value, rig.cycle_ms)
     is_live, is_calibrated = rig.live.value, devices is not None and devices.calibration is not None
     return RigView(
         link=LabelState(f"● {link.value}", _LINK_ROLES[link]),
@@ -102,7 +105,7 @@ def rig_view(rig: RigState, live: LiveState) -> RigView:
         scan=ButtonState(is_enabled=can_look, is_primary=is_live and is_calibrated),
         exposure=has_devices,
         auto=can_look and not live.is_exposing.value,
-        cycles=LabelState(cycles_text(live.exposure_ms.value, rig.cycle_ms), "muted"),
+        cycles=LabelState(cycles, "warn" if cycles.endswith(COLOURS_VARY) else "muted"),
     )
 
 
@@ -132,7 +135,7 @@ def cycles_text(exposure_ms: float, cycle_ms: float | None) -> str:
     # The box rounds to a hundredth of a millisecond.
     if whole and abs(exposure_ms - whole * cycle_ms) < 0.006:
         return counted(whole, "LED cycle")
-    return f"{cycles:.2f} LED cycles: colours vary"
+    return f"{cycles:.2f} LED cycles: {COLOURS_VARY}"
 
 
 NO_RIG = "No picture yet. Connect a rig and start the live view."

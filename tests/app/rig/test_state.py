@@ -54,6 +54,9 @@ def test_a_page_with_a_rig_names_its_devices_and_offers_to_expose() -> None:
     assert view.exposure
     assert view.auto
     assert "LED cycle" in view.cycles.text
+    assert view.cycles.role == "muted"
+    live.exposure_ms.set(60.0)
+    assert rig_view(rig, live).cycles.role == "warn", "colours that vary are no remark"
     rig.live.set(True)
     live.is_exposing.set(True)
     view = rig_view(rig, live)

@@ -139,7 +139,8 @@ def activity(state: WizardState) -> Activity:
 def _activity_text(doing: Doing, told: JobProgress) -> str:
     if doing is Doing.STOPPING:
         return "stopping at the next safe point"
-    parts = [told.stage or doing.value]
+    # Frames are captured by what captures scans, and nobody scans here.
+    parts = [doing.value if told.stage in ("", "scan") else told.stage]
     if told.total:
         parts.append(f"{told.done} of {told.total}")
         if told.remaining_s is not None and told.remaining_s >= 2:

@@ -247,6 +247,7 @@ def test_the_activity_is_what_runs_else_the_note() -> None:
     assert (activity(looking).text, activity(looking).is_busy) == ("Captured.", False)
     told = {
         JobProgress(): "capturing",
+        JobProgress("scan", 9, 40): "capturing · 9 of 40",
         JobProgress("white"): "white",
         JobProgress("white", 2, 8): "white · 2 of 8",
         JobProgress("white", 2, 8, 1.9): "white · 2 of 8",

@@ -25,7 +25,7 @@ def test_settings_are_typed_and_wrong_ones_explained(stage: Stage) -> None:
     QTest.keyClicks(field, "much")
     click(wizard.buttons.back)
     QTest.keyClick(field, Qt.Key.Key_Tab)
-    stage.wait(lambda: "scale must be a number" in wizard.settings._trouble.text())
+    stage.wait(lambda: "Scale must be a number" in wizard.settings._trouble.text())
     assert wizard.stack.currentWidget() is wizard.settings
     field.setFocus()
     field.selectAll()
