@@ -65,4 +65,4 @@ class HiddenParts:
         return self._darker(seen, black, max(np.float32(np.median(lost)), _NOTHING), more)
 
     def _sigma(self, seen: Counts, black: Counts) -> Floats:
-        return np.sqrt(self._noise.variance(seen) + self._noise.variance(black))
+        return np.asarray(np.sqrt(self._noise.variance(seen) + self._noise.variance(black)))
