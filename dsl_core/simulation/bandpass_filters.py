@@ -20,8 +20,10 @@ _NM = np.arange(390.0, 711.0, 0.5)
 
 
 @lru_cache(maxsize=256)
-def true_transmission(label_nm: float, seed: int = 0, tilt_deg: float = 0.0) -> SpectralCurve:
-    """Transmission of a filter in the beam: three cavities; a tilt moves it to the blue.
+def true_transmission(
+    label_nm: float, seed: int = 0, tilt_deg: float = 0.0, off_nm: float = 0.0
+) -> SpectralCurve:
+    """Transmission of a filter in the beam: three cavities, to the blue by a tilt, to the red by ``off_nm``.
 
     ``centre sqrt(1 - (sin tilt / index)^2)`` (Macleod, Thin-Film Optical Filters). Raises `DeviceError` for a
     label that the set does not have.
@@ -35,6 +37,7 @@ def true_transmission(label_nm: float, seed: int = 0, tilt_deg: float = 0.0) -> 
     centre = label_nm + CENTRE_STD_NM * rng.standard_normal()
     fwhm = 10.0 + FWHM_STD_NM * rng.standard_normal()
     peak = rng.uniform(0.72, 0.88)
+    centre += off_nm
     centre *= np.sqrt(1 - (np.sin(np.radians(tilt_deg)) / INDEX) ** 2)
     return SpectralCurve.of(_NM, peak / (1 + (2 * np.abs(_NM - centre) / fwhm) ** 6))
 

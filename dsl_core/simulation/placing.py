@@ -50,8 +50,8 @@ class TwinHand:
             setup = self.world.setup
             own = self.world.scene_at, self.world.position_mm
             self._before = _Before(*own, setup.film, setup.filter, self.world.noise_key)
-        tilt = self.mishaps.filter_tilt_deg
-        curve = None if label is None else true_transmission(float(label), self.filter_seed, tilt)
+        askew = self.mishaps.filter_tilt_deg, self.mishaps.filter_off_nm
+        curve = None if label is None else true_transmission(float(label), self.filter_seed, *askew)
         if placement.target != "as it is":
             scene_at, position = self._scene(placement)
             asked = (placement.target, dict(placement.options))

@@ -108,6 +108,9 @@ class TwinOptions(Record):
         default=None, description="filter in the beam, whichever was requested"
     )
     filter_tilt_deg: Number = Field(default=0.0, description="tilt of the filters")
+    filter_off_nm: Number = Field(
+        default=0.0, description="how much longer wavelengths than measured all filters pass"
+    )
     bow_mm: Number = Field(default=0.0, description="how far diffusers bulge over 300 mm")
     stage_scale: Number = Field(
         default=1.0, description="how far the stage moves from 700 mm, relative to what it reports"

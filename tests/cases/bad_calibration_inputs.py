@@ -247,6 +247,15 @@ CASES = (
         quick=False,
     ),
     BadInput(
+        "all filters off alike",
+        "figures of the bandpass filters",
+        _redo("bandpass", "filter-450", "filter-640"),
+        r"Bandpass filters was not accepted: .*all filters against the LEDs' spectra 6\.\d+ ± 0\.\d+ nm",
+        {"filter_off_nm": "6"},
+        touched=("bandpass/filter-450", "bandpass/filter-640"),
+        quick=False,
+    ),
+    BadInput(
         "plane not flat at one position",
         "capture of the plane",
         _redo("depth-stage", "position-740"),

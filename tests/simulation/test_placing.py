@@ -178,6 +178,16 @@ def test_mishaps_happen(mishap: str, value: str) -> None:
         assert np.abs(good[1].truth.depth_mm - bad[1].truth.depth_mm).max() > 1
 
 
+def test_all_filters_can_pass_longer_wavelengths_than_measured() -> None:
+    rig, world = twin(filter_off_nm="6")
+    place(rig, PLANE.model_copy(update={"filter_nm": 540.0}))
+    inserted, usual = world.setup.filter, true_transmission(540.0)
+    assert inserted is not None
+    nm = np.arange(450.0, 640.0)
+    assert inserted.at(nm + 6) == pytest.approx(usual.at(nm), abs=1e-9)
+    assert rig.filters == twin()[0].filters, "what a spectrometer said of them"
+
+
 def test_a_wrong_filter_is_in_the_beam() -> None:
     wrong, right = twin(wrong_filter_nm="640"), twin()
     place(wrong[0], PLANE.model_copy(update={"filter_nm": 450.0}))
