@@ -130,8 +130,11 @@ def is_over_white(seen: Counts, lit: Lit, wanted: Floats) -> bool:
     if unlit.size < FEWEST_UNLIT:
         return False
     over = seen[lit.index[unlit]] - lit.black[unlit] - lit.contrast[unlit]
-    least = np.maximum(OVER_WHITE * np.median(lit.contrast), OVER_WHITE_SIGMAS * lit.sigma[unlit])
-    return int((over > least).sum()) >= FEWEST_BRIGHT
+    over = over[over > OVER_WHITE_SIGMAS * lit.sigma[unlit]]
+    return (
+        over.size >= FEWEST_BRIGHT
+        and int((over > OVER_WHITE * np.median(lit.contrast)).sum()) >= FEWEST_BRIGHT
+    )
 
 
 def black_gained(seen: Counts, lit: Lit, wanted: Floats, noise: Noise) -> np.float32:

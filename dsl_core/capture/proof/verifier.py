@@ -135,7 +135,8 @@ class FrameProof:
         found = self._unless_repeated(self._judge(shot, seen), seen)
         if shot.role == "spectral" and not found.is_wrong:
             wrong = self._unless_black_is_bright(found, seen) or self._unless_hidden(found, seen)
-            found = wrong or self._with_doubt(found, seen)
+            # A doubt asks for a second picture.
+            found = wrong or (found if self._at_the_end else self._with_doubt(found, seen))
         self._remember(found, seen)
         return found
 

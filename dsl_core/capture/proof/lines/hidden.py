@@ -10,13 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dsl_core.capture.proof.noise import Noise
-from dsl_core.capture.proof.raster import Counts
+from dsl_core.capture.proof.raster import Counts, Floats
 from dsl_core.optics.seen_noise import NORMAL
 
 #: A pixel is darker by so many deviations, and by this share of what the room gives it.
 SIGMAS, SHARE = 4.0, 0.35
 #: So many pixels that the line before left as they were, as a share of all and at least.
 FEWEST_SHARE, FEWEST = 0.01, 12
+_NOTHING = np.float32(0)
 
 
 class HiddenParts:
@@ -25,7 +26,7 @@ class HiddenParts:
     def __init__(self, noise: Noise) -> None:
         """Start without any line."""
         self._noise = noise
-        self._before: tuple[int, NDArray[np.bool_]] | None = None
+        self._before: tuple[int, Counts, Counts] | None = None
 
     def is_hidden(self, setting: int, seen: Counts, black: Counts) -> bool:
         """Whether a part of a line is darker than black that was not in the line before of this setting.
@@ -33,18 +34,35 @@ class HiddenParts:
         What was dark there already says more of black, which may have been too bright. A picture in which
         nothing is hidden is remembered for the next.
         """
+        fewest = max(FEWEST, FEWEST_SHARE * seen.size)
+        found = False
+        # Most lines have too few pixels as dark, whatever the noise and the room have become.
+        if int(self._darker(seen, black).sum()) >= fewest:
+            dark = self._dark(seen, black)
+            known = self._before is not None and self._before[0] == setting
+            before = self._dark(*self._before[1:]) if self._before is not None and known else dark
+            found = int((dark & ~before).sum()) >= fewest
+        if not found:
+            self._before = setting, seen, black
+        return found
+
+    def _darker(
+        self, seen: Counts, black: Counts, room_dn: np.float32 = _NOTHING, more: float = 1.0
+    ) -> NDArray[np.bool_]:
+        """Pixels darker than black, of which the room has lost so many DN, by ``more`` noise than stated."""
         room = np.subtract(black, np.float32(self._noise.sensor.black_level_dn), dtype=np.float32)
         lost = np.subtract(black, seen, dtype=np.float32)
-        middle = np.float32(np.median(lost))
-        sigma = np.sqrt(self._noise.variance(seen) + self._noise.variance(black))
+        lost -= room_dn
+        return np.asarray((lost > SHARE * room) & (lost > SIGMAS * more * self._sigma(seen, black)))
+
+    def _dark(self, seen: Counts, black: Counts) -> NDArray[np.bool_]:
+        """The same, by what the picture says itself of noise and room."""
+        lost, sigma = np.subtract(black, seen, dtype=np.float32), self._sigma(seen, black)
         # A camera that has more noise than it is said to have says so itself, by pixels of one colour beside
         # each other: a shadow over half of the picture is no noise.
         step = np.abs(lost[2:] - lost[:-2]) / np.hypot(sigma[2:], sigma[:-2])
         more = max(float(np.median(step)) / NORMAL, 1.0)
-        lost -= max(middle, np.float32(0))
-        dark = np.asarray((lost > SIGMAS * more * sigma) & (lost > SHARE * room))
-        before = self._before[1] if self._before is not None and self._before[0] == setting else dark
-        found = int((dark & ~before).sum()) >= max(FEWEST, FEWEST_SHARE * dark.size)
-        if not found:
-            self._before = setting, dark
-        return found
+        return self._darker(seen, black, max(np.float32(np.median(lost)), _NOTHING), more)
+
+    def _sigma(self, seen: Counts, black: Counts) -> Floats:
+        return np.asarray(np.sqrt(self._noise.variance(seen) + self._noise.variance(black)))
