@@ -23,8 +23,8 @@ Floats = NDArray[np.float64]
 
 #: Columns that noise moves farther than this (px) gather at the middles of lines, which looks like a wave.
 MOST_NOISE_PX = 0.1
-#: How well a boundary must be known (px), and of how many a wave is told.
-TELLING_PX, FEWEST = 0.1, 3
+#: How well a boundary must be known (px): less well, noise is taken for a wave. Boundaries that tell of one.
+TELLING_PX, FEWEST = 0.04, 3
 #: A wave (rms, px) that matters.
 MOST_WAVE_PX = 0.04
 
