@@ -133,8 +133,9 @@ def probed(monkeypatch: pytest.MonkeyPatch, share: float, varied: bool, **model:
     size = model.pop("pixels", 100)
     scan: Any = SimpleNamespace(
         model=SimpleNamespace(**given | model),
-        pixels=SimpleNamespace(valid=np.ones(size, bool), column_px=np.zeros(size), amplitude=np.ones(size)),
-        radiance=None, std=None,
+        pixels=SimpleNamespace(
+            valid=np.ones(size, bool), column_px=np.zeros(size), amplitude=np.ones((1, size)),
+        ), radiance=None, std=None,
     )  # fmt: skip
     found = probe_module.probe(scan)
     assert found is None or asked == [48, 48, 4]
