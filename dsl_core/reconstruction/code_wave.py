@@ -23,29 +23,26 @@ Floats = NDArray[np.float64]
 
 #: Columns that noise moves farther than this (px) gather at the middles of lines, which looks like a wave.
 MOST_NOISE_PX = 0.1
-#: How well a boundary must be known (px), and of how many a wave is told.
-TELLING_PX, FEWEST = 0.1, 3
+#: How well a boundary must be known (px): less well, noise is taken for a wave.
+TELLING_PX = 0.04
 #: A wave (rms, px) that matters.
 MOST_WAVE_PX = 0.04
 
 
 @dataclass(frozen=True)
 class CodeWave:
-    """By how much columns are displaced, with deviations, at boundaries of the code between two lines, px."""
+    """By how much columns are displaced away from the middles of lines, px, with deviations.
 
-    shift_px: Floats
+    Each value is of one boundary of the code to the right of a middle and its mirror image on the left.
+    """
+
+    away_px: Floats
     std_px: Floats
-
-    @property
-    def apart_px(self) -> Floats:
-        """Displacements less what all have in common: that is no wave, and a motion explains it as well."""
-        weight = self.std_px**-2.0
-        return self.shift_px - float(weight @ self.shift_px / weight.sum())
 
     @property
     def rms_px(self) -> float:
         """Root mean square of the wave, less what chance explains."""
-        return math.sqrt(max(float(np.mean(self.apart_px**2 - self.std_px**2)), 0.0))
+        return math.sqrt(max(float(np.mean(self.away_px**2 - self.std_px**2)), 0.0))
 
     @property
     def rms_std_px(self) -> float:
@@ -59,7 +56,7 @@ class CodeWave:
 
     def finding(self) -> FitFinding:
         """What is told of it."""
-        most_px = float(np.abs(self.apart_px).max())
+        most_px = float(np.abs(self.away_px).max())
         return FitFinding.judged(
             "profile",
             "columns between lines against the binary code",
@@ -88,6 +85,17 @@ def code_wave(lines: LineSet | None, named_px: NDArray[np.integer], maps: Column
     # Each place between two middles of the projector's pixels has one boundary of the code.
     place = np.floor(exact).astype(np.int64) % lines.step_px
     shift, std = displacement(named_px[known], exact, place, lines.step_px)
+    left, right = _mirrored(lines)
+    # What has moved displaces both sides alike, and cancels.
+    away, away_std = (shift[left] - shift[right]) / 2, np.hypot(std[left], std[right]) / 2
     with np.errstate(invalid="ignore"):
-        telling = std < TELLING_PX
-    return CodeWave(-shift[telling], std[telling]) if telling.sum() >= FEWEST else None
+        telling = np.maximum(std[left], std[right]) < TELLING_PX
+    return CodeWave(away[telling], away_std[telling]) if telling.any() else None
+
+
+def _mirrored(lines: LineSet) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Places left and right of the middle of a line whose boundaries are equally far from it, (pairs,)."""
+    place = np.arange(lines.step_px)
+    right_px = (place + 0.5 - lines.first_px) % lines.step_px
+    right = place[(right_px > 0) & (right_px < lines.step_px / 2)]
+    return np.asarray((round(2 * lines.first_px) - 1 - right) % lines.step_px), right

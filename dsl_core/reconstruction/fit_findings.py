@@ -357,7 +357,7 @@ def cause_findings(
             "Calibrate the curves on this rig; those of data sheets are typically off by 5 %.",
         )
         yield _wide_bands(probe, probe.curves)
-    usual = float(np.median(probe.chi_square))
+    usual = probe.usual_chi_square
     yield FitFinding.judged(
         "profile",
         "misfit of most pixels",

@@ -32,12 +32,11 @@ def maps_of(column_px: NDArray[np.floating], std_px: float = 0.01) -> ColumnMaps
 
 
 def test_a_wave_is_as_large_as_it_is() -> None:
-    found = code_wave(LINES, NAMED_PX, maps_of(TRUE_PX + WAVE_PX * SINE))
+    found = code_wave(LINES, NAMED_PX, maps_of(TRUE_PX - WAVE_PX * SINE))
     assert found is not None
-    assert found.error_px == pytest.approx(WAVE_PX / math.sqrt(2), rel=0.2)
-    # The boundaries are half a column to the side of the middle, one and a half, and so on.
-    at = 2 * math.pi / 5 * (np.arange(5) + 0.5 - LINES.first_px)
-    assert found.apart_px == pytest.approx(WAVE_PX * np.sin(at), abs=0.03)
+    assert found.error_px == pytest.approx(WAVE_PX / math.sqrt(2), rel=0.3)
+    # The boundaries to the right of the middle are half a column away, and one and a half.
+    assert found.away_px == pytest.approx(-WAVE_PX * np.sin(2 * math.pi / 5 * np.array([0.5, 1.5])), abs=0.03)
     told = found.finding()
     assert told.significant
     assert told.part == "profile"

@@ -51,6 +51,8 @@ ONE_OF, PIXELS_PER_CELL = 6000, (8, 12)
 FEWEST, CHUNK = 40, 48
 #: Pixels whose chi-square exceeds the usual one by this factor see several surfaces.
 MIXED_FROM = 5.0
+#: Light around a pixel is even where it differs by less than this share, as on a curved surface.
+EVEN = 0.2
 #: A picture less wide than this (share of the distance) is a small piece, and spectra whose shapes differ by
 #: less are of one colour.
 ONE_VIEW, ONE_COLOUR = 0.2, 0.05
@@ -71,7 +73,8 @@ class Probe:
     logarithm of the light changes along 1 nm. ``places`` is whether pixels can tell where the orders are:
     on a small piece of one colour an error of its spectrum looks like a shift. ``sideways`` (n, 2) is by how
     much lines of each order are farther to the sides of the projector's frame than the pixel's own column:
-    the difference of squares, one at the side, mean over bands; None where nobody traced them.
+    the difference of squares, one at the side, mean over bands; None where nobody traced them. ``uneven``
+    (n,) is how much darker the darkest of neighbours of a pixel's colour is than the brightest, a share.
     """
 
     normal: Floats
@@ -91,6 +94,16 @@ class Probe:
     with_curves: tuple[Floats, Floats] | None = None
     freedom: Floats | None = None
     sideways: Floats | None = None
+    uneven: Floats | None = None
+
+    @property
+    def usual_chi_square(self) -> float:
+        """Median of chi-squares where light is even around pixels; of all where that is hardly anywhere.
+
+        Along edges pixels see two materials, and in small pictures most pixels are at one.
+        """
+        even = np.zeros(len(self.pixel), bool) if self.uneven is None else self.uneven < EVEN
+        return float(np.median(self.chi_square[even] if even.sum() >= FEWEST else self.chi_square))
 
     @cached_property
     def sound(self) -> NDArray[np.bool_]:
@@ -151,7 +164,22 @@ def probe(scan: ProbedScan) -> Probe | None:
         lines=probe_lines(lines, response, scan.pixels, scan.radiance, scan.std, targets, widths),
         nm_per_px=_nm_per_px(scan, traced[ORDERS[0]][0]),
         sideways=_sideways(scan, column, traced),
+        uneven=unevenness(scan.pixels.amplitude, targets),
     )
+
+
+def unevenness(amplitude: NDArray[np.float32], targets: Indices) -> Floats:
+    """Differences of the light (rows, columns) around pixels (flat indices, (n,)), relative to the brightest.
+
+    Every other row and column has the same colour.
+    """
+    rows, columns = amplitude.shape
+    y, x = np.divmod(targets, columns)
+    beside = np.array([-2, 0, 2])
+    down, across = ((at[:, None] + beside).clip(0, size - 1) for at, size in ((y, rows), (x, columns)))
+    light = np.nan_to_num(amplitude[down[:, :, None], across[:, None]]).reshape(-1, beside.size**2).clip(0)
+    high = light.max(1)
+    return np.asarray((high - light.min(1)) / np.maximum(high, 1e-12), np.float64)
 
 
 def _steepness(scan: ProbedScan) -> float:

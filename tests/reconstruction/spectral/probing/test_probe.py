@@ -133,7 +133,9 @@ def probed(monkeypatch: pytest.MonkeyPatch, share: float, varied: bool, **model:
     size = model.pop("pixels", 100)
     scan: Any = SimpleNamespace(
         model=SimpleNamespace(**given | model),
-        pixels=SimpleNamespace(valid=np.ones(size, bool), column_px=np.zeros(size)), radiance=None, std=None,
+        pixels=SimpleNamespace(
+            valid=np.ones(size, bool), column_px=np.zeros(size), amplitude=np.ones((1, size)),
+        ), radiance=None, std=None,
     )  # fmt: skip
     found = probe_module.probe(scan)
     assert found is None or asked == [48, 48, 4]
@@ -197,3 +199,29 @@ def test_lines_to_the_sides_of_own_columns_are_those_that_arrive() -> None:
     traced = probe_module._columns(scan, np.array([2, 0]))
     found = probe_module._sideways(scan, torch.tensor([300.0, 200.0]), traced)
     assert found == pytest.approx(np.array([[own, own], [other, other]]))
+
+
+def test_the_usual_fit_is_that_of_pixels_in_even_light() -> None:
+    count, few = 100, probe_module.FEWEST
+    chi_square, uneven = np.full(count, 30.0), np.full(count, 0.9)
+    chi_square[:few], uneven[:few] = 1.1, 0.1
+    found = probe_of(chi_square=chi_square, pixel=np.arange(count), uneven=uneven)
+    assert found.usual_chi_square == 1.1
+    # Too few say nothing for all, and nobody may have looked.
+    uneven = np.where(np.arange(count) == 0, 0.9, uneven)
+    for other in (uneven, None):
+        few_even = probe_of(chi_square=chi_square, pixel=np.arange(count), uneven=other)
+        assert few_even.usual_chi_square == 30.0
+
+
+def test_light_is_uneven_by_neighbours_of_the_same_colour() -> None:
+    # A mosaic whose colours differ, with an edge between columns 5 and 6, and one pixel without light.
+    light = np.tile(np.array([[1.0, 3.0], [3.0, 2.0]], np.float32), (5, 6))
+    light[:, 6:] *= np.float32(0.25)
+    light[9, 0] = np.nan
+    even, beside, corner, dark = (
+        np.ravel_multi_index(at, light.shape) for at in ((4, 2), (4, 5), (0, 11), (9, 2))
+    )
+    targets = np.array([even, beside, corner, dark])
+    assert probe_module.unevenness(light, targets).tolist() == [0.0, 0.75, 0.0, 1.0]
+    assert probe_module.unevenness(np.zeros_like(light), targets).tolist() == [0.0] * 4
