@@ -48,7 +48,7 @@ SWAPS: dict[type[ast.AST], str] = {
     ast.BitAnd: "|",
     ast.BitOr: "&",
 }
-LIMIT_S = 900.0
+LIMIT_S = 1800.0
 #: Half as much again of a guard against zero is as good a guard, so numbers below this become one.
 TINY = 1e-5
 #: Whole numbers up to this become one more, larger ones half as much again, as other numbers do.
