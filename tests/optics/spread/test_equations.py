@@ -14,6 +14,7 @@ from dsl_core.optics.spread.equations import (
     MAX_SHIFT_PX,
     MIN_PIXELS,
     MODEL_ERROR,
+    Fixed,
     Peaks,
     View,
     _normal,
@@ -47,6 +48,16 @@ def test_shapes_are_those_of_a_line_through_narrow_gaussians(wide: float | None)
     edges = [((distance.numpy() + side) / by)[..., None] - CENTRES for side in (2.5, -2.5)]
     wanted = ndtr(edges[0] / 0.125) - ndtr(edges[1] / 0.125)
     assert found == pytest.approx(wanted, abs=2e-3)
+
+
+def test_known_light_is_that_of_all_its_gaussians_near_and_far() -> None:
+    distance = torch.linspace(-6, 6, 12, dtype=torch.float64).reshape(3, 4)
+    centres = np.linspace(-40, 40, 81)
+    shares = np.random.default_rng(5).uniform(0.5, 1.5, 81) / 81
+    found = Fixed(centres, shares).light(WIDTH_PX, distance, None)
+    wanted = _shapes(WIDTH_PX, distance, centres, None).numpy() @ shares
+    assert found.numpy() == pytest.approx(wanted, abs=1e-12)
+    assert Fixed(centres + 100, shares).light(WIDTH_PX, distance, None).abs().max() == 0
 
 
 @pytest.mark.parametrize("std_px", [0.003, 1e3])
