@@ -282,6 +282,26 @@ def test_evidence_is_the_quadratic_form_less_the_logarithm_of_the_determinant(is
     assert not found["bad"].any()
 
 
+@pytest.mark.parametrize("is_broad", [False, True])
+def test_the_gradient_is_that_of_data_prior_and_broad_bands(is_broad: bool) -> None:
+    band, rng = 2, np.random.default_rng(6)
+    data, broad = rng.normal(size=(BANDS, band + 1, LANES)), rng.normal(size=(BANDS, ROWS, LANES))
+    right, weight = rng.normal(size=(BANDS, LANES)), rng.uniform(5, 9, LANES)
+    x, found = np.zeros((2, BANDS + 2 * band, LANES))
+    x[band:-band] = rng.normal(size=(BANDS, LANES))
+    kernels.gradient(
+        data.ravel(), right.ravel(), broad.ravel(), is_broad, PRIOR, weight, (0, 0), x.ravel(),
+        found.reshape(-1),
+    )  # fmt: skip
+    for lane in range(LANES):
+        seen = broad[:, :, lane] * is_broad
+        second = sum(np.diag(PRIOR[o, : BANDS - o], o) for o in (1, 2))
+        whole = dense(data[:, :, lane]) + seen @ seen.T + np.diag(PRIOR[3])
+        whole += weight[lane] * (np.diag(PRIOR[0]) + second + second.T)
+        wanted = whole @ x[band:-band, lane] - right[:, lane]
+        assert found[band:-band, lane] == pytest.approx(wanted)
+
+
 def test_pivots_of_single_precision_are_multiplied_eight_at_a_time() -> None:
     """Nine of the largest would be more than a double holds, and eight take fewer logarithms than seven."""
     matrix, nothing = np.tile(np.eye(BANDS), (LANES, 1, 1)) * 3e38, np.zeros((LANES, BANDS))

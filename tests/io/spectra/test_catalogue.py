@@ -180,3 +180,14 @@ def test_repeated_values_of_a_packed_file_are_counted(tmp_path: Path) -> None:
     path = write(tmp_path / "a.jdx", f"{head}##XYDATA=(X++(Y..Y))\n400A00J0Ul0%T\n##END=")
     (spectrum,) = read_spectra(path)
     np.testing.assert_allclose(spectrum.values * 1e5, [100, 110, 120, 130, 100, 100, 100])
+
+
+@pytest.mark.parametrize(("titles", "scale"), [("nm\tsample", 0.01), ("nm\tsample\twhite", 1.0)])
+def test_what_a_header_says_of_all_is_believed_where_there_is_one_column(
+    tmp_path: Path, titles: str, scale: float
+) -> None:
+    rows = ["\t".join([f"{nm:g}", *["40"] * titles.count("\t")]) for nm in range(400, 701, 10)]
+    (tmp_path / "leaf.txt").write_text("\n".join(["Reflectance [%]", titles, *rows]), encoding="utf-8")
+    found = read_spectra(tmp_path / "leaf.txt")
+    assert len(found) == titles.count("\t")
+    assert found[0].values == pytest.approx(40 * scale)

@@ -41,7 +41,7 @@ def test_tiles_shrink_with_the_bands_so_that_memory_stays() -> None:
 
 def test_an_offset_that_looks_like_a_grey_makes_spectra_as_unsure() -> None:
     prior = Prior()
-    matrix = torch.full((1, BANDS, 1), 1e8)
+    matrix = torch.full((1, BANDS, 1), 3.0)
     like_grey = matrix[0] + prior.level_std**-2
     spectra = Spectra.empty(torch.zeros((BANDS, 1)))
     spectra.std[:] = 0.004

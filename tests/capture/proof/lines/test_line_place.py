@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from dsl_core.capture.proof.contest import Contest
 from dsl_core.capture.proof.finding import Finding, Verdict
-from dsl_core.capture.proof.lines.line_place import LinePlaces, moved
+from dsl_core.capture.proof.lines.line_place import LEAST_MEAN, LinePlaces, moved
 from dsl_core.capture.proof.verifier import FrameProof
 from dsl_core.model.plan import CapturePlan, GrayCode, ScanLines, Setting, Shot
 from dsl_core.model.rig import Rig
@@ -46,6 +46,13 @@ def test_a_single_frame_says_nothing_however_many_pixels_it_has() -> None:
 
 def test_lines_that_are_half_way_are_left_to_the_reconstruction() -> None:
     assert told(LinePlaces(), dict.fromkeys(range(50), -0.2), 4000) is None
+
+
+def test_lines_are_told_from_a_third_of_the_way_on() -> None:
+    voters, frames = 4000, 2
+    just = LEAST_MEAN * (1 + 0.5 / (voters * frames))
+    assert told(LinePlaces(), dict.fromkeys(range(frames), -just), voters) == (1, [*range(frames)])
+    assert told(LinePlaces(), dict.fromkeys(range(frames), -LEAST_MEAN * 0.9999), voters) is None
 
 
 def test_frames_taken_again_count_as_they_are_now() -> None:
