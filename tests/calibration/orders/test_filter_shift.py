@@ -29,10 +29,16 @@ def pixels() -> tuple[PlanePixels, np.ndarray]:
 TERMS = cell_terms(RIG, *pixels())
 
 
-def found(centres: tuple[float, ...], index: float = np.inf, tilt_deg: float = 0.0) -> FilterAngle:
+def found(
+    centres: tuple[float, ...],
+    index: float = np.inf,
+    tilt_deg: float = 0.0,
+    stated: tuple[float, float] = (NOISE, NOISE),
+) -> FilterAngle:
     """What filters of an index say whose cells are seen at the exact angle, by the usual formula.
 
-    White is darker towards one corner, and so is each filter.
+    White is darker towards one corner, and so is each filter; ``stated`` are the deviations of filters and
+    white.
     """
     rng = np.random.default_rng(3)
     uneven = 1 - 0.3 * np.linspace(0, 1, 24)
@@ -46,9 +52,10 @@ def found(centres: tuple[float, ...], index: float = np.inf, tilt_deg: float = 0
         through = np.stack([np.interp(FINE_NM / r, *bands(nm), 0.0, 0.0) for r in ratio])
         cells = 0.7 * (white @ through.T) * uneven * (1 + NOISE * rng.standard_normal((3, 24)))
         zero = cells.mean(1)
-        lights.append(FilterLight(zero, NOISE * zero, {}, (0.0, 0.0), 0.0, cells, NOISE * cells))
+        lights.append(FilterLight(zero, NOISE * zero, {}, (0.0, 0.0), 0.0, cells, stated[0] * cells))
     bright = np.ones((3, 24)) * uneven
-    return angle_of_view(RIG, [nominal_filter(nm) for nm in centres], lights, (bright, NOISE * bright), TERMS)
+    curves, white_seen = [nominal_filter(nm) for nm in centres], (bright, stated[1] * bright)
+    return angle_of_view(RIG, curves, lights, white_seen, TERMS)
 
 
 def bands(centre_nm: float) -> tuple[tuple[float, ...], tuple[float, ...]]:
@@ -73,6 +80,12 @@ def test_filters_that_do_not_shift_are_left_alone() -> None:
     assert angle.index is None
     assert abs(angle.values[0]) < 4 * angle.std[0]
     assert angle.std[0] < 0.01
+
+
+@pytest.mark.parametrize("stated", [(5 * NOISE, NOISE), (NOISE, 5 * NOISE)])
+def test_an_unsure_filter_and_an_unsure_white_make_the_angle_unsure(stated: tuple[float, float]) -> None:
+    centres = (450.0, 480.0, 540.0, 590.0, 640.0)
+    assert found(centres, stated=stated).std[0] > 2 * found(centres).std[0]
 
 
 def test_filters_that_show_nothing_leave_what_was_assumed() -> None:
