@@ -295,9 +295,8 @@ def test_the_gradient_is_that_of_data_prior_and_broad_bands(is_broad: bool) -> N
     )  # fmt: skip
     for lane in range(LANES):
         seen = broad[:, :, lane] * is_broad
-        second = sum(np.diag(PRIOR[o, : BANDS - o], o) for o in (1, 2))
         whole = dense(data[:, :, lane]) + seen @ seen.T + np.diag(PRIOR[3])
-        whole += weight[lane] * (np.diag(PRIOR[0]) + second + second.T)
+        whole += weight[lane] * dense(PRIOR[:3].T)
         wanted = whole @ x[band:-band, lane] - right[:, lane]
         assert found[band:-band, lane] == pytest.approx(wanted)
 
