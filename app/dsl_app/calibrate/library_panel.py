@@ -78,6 +78,7 @@ class LibraryPanel(QGroupBox):
         )
         self.export = push_button("E&xport…", "Export it for another computer or program", self._export)
         self.import_ = push_button("&Import…", "Import a calibration's file into the library", self._import)
+        self._drift_window: DriftWindow | None = None
         self._lay_out()
         self._connect()
 
@@ -219,7 +220,9 @@ class LibraryPanel(QGroupBox):
 
     def _show_drift(self, verdict: DriftVerdict | None) -> None:
         if verdict is not None:
-            DriftWindow(verdict, self._commands, self.table.theme, self).open()
+            # Without a name it is now and then gone before it is seen.
+            self._drift_window = DriftWindow(verdict, self._commands, self.table.theme, self)
+            self._drift_window.open()
 
 
 class DriftWindow(QDialog):
