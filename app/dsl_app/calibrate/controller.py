@@ -148,7 +148,7 @@ class CalibrateController:
         )
         self._wizard = wizard
         self.state.opening.set(title)
-        # It was read by now, and the wizard tells it anew.
+        # It has been read by now, and the wizard says it again.
         self.state.outcome.set(LabelState())
         state.closed.connect(lambda _: self._left(state))
 
