@@ -97,12 +97,12 @@ class Disagreement:
     @property
     def rms_px(self) -> float:
         """Root mean square of the shifts, less what their deviations explain."""
-        return math.sqrt(max(float(np.mean(self.shift_px**2 - self.std_px**2)), 0.0))
+        return rms_beyond_chance(self.shift_px, self.std_px)[0]
 
     @property
     def rms_std_px(self) -> float:
         """Deviation of the root mean square."""
-        return float(np.sqrt(np.mean(self.std_px**2) / len(self.std_px)))
+        return rms_beyond_chance(self.shift_px, self.std_px)[1]
 
     def smooth(self) -> Floats:
         """Shifts averaged over neighbouring groups, px: what moves does so along the columns, or at once."""
@@ -145,6 +145,12 @@ def code_agreement(
     if error_px > 0:
         geometry = geometry.by(rig, np.full(geometry.depth_mm.shape, np.float32(error_px)), window_px)
     return geometry, findings
+
+
+def rms_beyond_chance(shift_px: Floats, std_px: Floats) -> tuple[float, float]:
+    """Root mean square of shifts (n,), less what their deviations explain, and its deviation."""
+    rms = math.sqrt(max(float(np.mean(shift_px**2 - std_px**2)), 0.0))
+    return rms, float(np.sqrt(np.mean(std_px**2) / len(std_px)))
 
 
 def displacement(

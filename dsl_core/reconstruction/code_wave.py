@@ -8,7 +8,6 @@ displaced there.
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,7 +15,7 @@ from numpy.typing import NDArray
 
 from dsl_core.model.fit import FitFinding, matters
 from dsl_core.optics.lines.line_set import LineSet
-from dsl_core.reconstruction.code_agreement import displacement
+from dsl_core.reconstruction.code_agreement import displacement, rms_beyond_chance
 from dsl_core.reconstruction.columns.maps import ColumnMaps
 
 Floats = NDArray[np.float64]
@@ -42,12 +41,12 @@ class CodeWave:
     @property
     def rms_px(self) -> float:
         """Root mean square of the wave, less what chance explains."""
-        return math.sqrt(max(float(np.mean(self.away_px**2 - self.std_px**2)), 0.0))
+        return rms_beyond_chance(self.away_px, self.std_px)[0]
 
     @property
     def rms_std_px(self) -> float:
         """Deviation of the root mean square."""
-        return float(np.sqrt(np.mean(self.std_px**2) / len(self.std_px)))
+        return rms_beyond_chance(self.away_px, self.std_px)[1]
 
     @property
     def error_px(self) -> float:
