@@ -192,6 +192,17 @@ def test_pixels_that_see_something_else_hardly_bend_the_field() -> None:
     assert found.std < 0.004
 
 
+def test_a_fit_knows_its_deviation_before_it_has_settled(monkeypatch: pytest.MonkeyPatch) -> None:
+    peaks, column, place = seen(KNOWN, FIELD)
+    view = View(peaks, column, column.clone(), peaks.y.amax(0))
+    settled = FieldFamily(place).fit(view, KNOWN)
+    monkeypatch.setattr("dsl_core.optics.spread.field.STEPS", 1)
+    first = FieldFamily(place).fit(view, KNOWN)
+    assert settled is not None
+    assert first is not None
+    assert first.std == pytest.approx(settled.std, rel=0.25)
+
+
 def test_what_a_pixel_asks_for_leaves_its_own_amplitude_and_column_free() -> None:
     """Against least squares of the residuals and of the change of width on profile and slope."""
     peaks, column, _ = seen(KNOWN, FLAT)
