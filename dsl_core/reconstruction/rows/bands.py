@@ -13,8 +13,8 @@ from dsl_core.model.plan import CapturePlan, Shot
 
 T = TypeVar("T")
 
-#: Memory for the merged line frames of a band. Frames are decompressed by blocks of rows, 64 of a full sensor;
-#: those at the edge of a band are so once more for the next one.
+#: Memory for the merged line frames of a band. Frames are decompressed by blocks of rows (64 of a full
+#: sensor); those at the edge of a band are so once more for the next one.
 BAND_BYTES = 512 << 20
 #: Bytes of a value in one of them: radiance, and its deviation in half precision.
 VALUE_BYTES = 6
