@@ -131,7 +131,7 @@ def test_bands_cover_the_picture_once_and_begin_at_multiples() -> None:
     rows = np.concatenate([np.arange(band.rows.start, band.rows.stop) for band in bands])
     assert rows.tolist() == list(range(1536))
     assert all(band.rows.start % 64 == 0 for band in bands)
-    assert max(band.near.stop - band.near.start for band in bands) == 128 + 2 * BESIDE
+    assert max(band.near.stop - band.near.start for band in bands) == 64 + 2 * BESIDE
     assert bands[1].own == slice(BESIDE, BESIDE + bands[1].rows.stop - bands[1].rows.start)
     assert len(bands_of(plan, multiple=None)) == 1
     assert len(bands_of(plan.model_copy(update={"camera_size_px": (112, 72)}), multiple=64)) == 1
