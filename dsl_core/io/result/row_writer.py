@@ -65,14 +65,14 @@ class RowWriter:
         wavelengths_nm: NDArray[np.float64],
         bands: Sequence[slice],
     ) -> None:
-        """Expect the rows of a picture of a shape, in bands all but the last of which are of equal height.
+        """Expect the rows of a picture of a shape, in bands like the first; some may be higher or less high.
 
         Raises `StoreError` where another process writes to the same place, or the disk fails.
         """
         make_folder(self.work)
         self._lock = FolderLock(self.work / _LOCK)
         self._shape, self._origin, self._nm = shape, origin, wavelengths_nm
-        self._height = bands[0].stop
+        self._bands, self._height = tuple(bands), bands[0].stop
         key = f"{self._key}\n{shape} {origin} {self._height} {wavelengths_nm.tolist()}".encode()
         with self._writing():
             if self._is_of(key):
@@ -122,9 +122,9 @@ class RowWriter:
             array = self._widen(group, name, part)
         packed = packing if "scale_factor" in array.attrs else None
         array[..., rows, :] = encoded(values, array.dtype, packed)
-        place = ["0"] * (array.ndim - 1)
-        place[array.ndim - 2 :] = [str(rows.start // self._height), "0"]
-        make_safe(self.work / _ARRAYS / name / "c" / Path(*place))
+        before = ["0"] * (array.ndim - 2)
+        for chunk in range(rows.start // self._height, -(-rows.stop // self._height)):
+            make_safe(self.work / _ARRAYS / name / "c" / Path(*before, str(chunk), "0"))
 
     def _create(self, group: zarr.Group, name: str, part: xr.Variable, fitting: bool) -> zarr.Array[Any]:
         kind, encoding = stored_as(name, part, fitting)
@@ -137,8 +137,7 @@ class RowWriter:
         os.replace(self.work / _ARRAYS / name, aside)
         old = zarr.open_array(aside, mode="r", zarr_format=3)
         wide = self._create(group, name, part, fitting=False)
-        for start in range(0, self._shape[0], self._height):
-            rows = slice(start, min(start + self._height, self._shape[0]))
+        for rows in self._bands:
             if self._note(rows).is_file():
                 steps = np.asarray(old[..., rows, :])
                 values = steps.astype(np.float32) * np.float32(packing.step)

@@ -13,8 +13,9 @@ from dsl_core.model.plan import CapturePlan, Shot
 
 T = TypeVar("T")
 
-#: Memory for the merged line frames of a band.
-BAND_BYTES = 320 << 20
+#: Memory for the merged line frames of a band. Frames are decompressed by blocks of rows (64 of a full
+#: sensor); those at the edge of a band are so once more for the next one.
+BAND_BYTES = 384 << 20
 #: Bytes of a value in one of them: radiance, and its deviation in half precision.
 VALUE_BYTES = 6
 #: Further rows on either side that belong to the neighbourhood of a band's pixels; even, as the mosaic is.
@@ -37,24 +38,31 @@ class Band:
 
 
 def bands_of(plan: CapturePlan, rows: int | None = None, multiple: int | None = 2) -> list[Band]:
-    """Bands of about equal height, as few as memory allows, or of at most so many ``rows``.
+    """Bands of equal height, as few as memory allows, or of at most so many ``rows``; the last may be longer.
 
-    Their height is a ``multiple`` of that of what is worked on together; None: there is one band.
+    Their height is a ``multiple`` of that of what is worked on together; None: there is one band. The last
+    one, whose frames are still there when spectra begin, takes what is left over where that fits.
     """
     width, height = plan.camera_size_px
     if multiple is None:
         return [Band(slice(0, height), slice(0, height))]
     fit = rows or BAND_BYTES // (width * VALUE_BYTES * max(plan.spectral_count, FEWEST_FRAMES)) - 2 * BESIDE
-    parts = -(-height // multiple)
-    count = -(-parts // max(fit // multiple, 1)) if fit < height else 1
-    step = -(-parts // count) * multiple
+    starts = _starts(height, fit, multiple)
     return [
-        Band(
-            slice(start, min(start + step, height)),
-            slice(max(start - BESIDE, 0), min(start + step + BESIDE, height)),
-        )
-        for start in range(0, height, step)
+        Band(slice(start, stop), slice(max(start - BESIDE, 0), min(stop + BESIDE, height)))
+        for start, stop in zip(starts, (*starts[1:], height), strict=True)
     ]
+
+
+def _starts(height: int, fit: int, multiple: int) -> range:
+    """First rows of the fewest bands that fit, whose height is a multiple of something."""
+    parts, most = -(-height // multiple), max(fit // multiple, 1)
+    for count in range(max(-(-height // max(fit, 1)), 1), parts):
+        for step in (height // multiple // count, -(-parts // count)):
+            start = (count - 1) * step * multiple
+            if 0 < step <= most and 0 < height - start <= max(fit, multiple):
+                return range(0, start + 1, step * multiple)
+    return range(0, height, multiple)
 
 
 @dataclass(frozen=True)

@@ -12,6 +12,7 @@ import pytest
 import xarray as xr
 
 from dsl_core.errors import StoreError
+from dsl_core.io.result import row_writer
 from dsl_core.io.result.result_file import load_result, save_result
 from dsl_core.io.result.row_writer import RowWriter
 from dsl_core.model.result import build_result
@@ -40,15 +41,17 @@ def some(given: Maps, rows: slice) -> Maps:
     return {name: values[..., rows, :] for name, values in given.items()}
 
 
-def begin(sink: ResultSink) -> None:
-    sink.begin(SHAPE, (4, 2), NM, BANDS)
+def begin(sink: ResultSink, bands: tuple[slice, ...] = BANDS) -> None:
+    sink.begin(SHAPE, (4, 2), NM, bands)
 
 
-def write(target: Path, given: Maps, key: str = "a", overwrite: bool = False) -> xr.Dataset:
+def write(
+    target: Path, given: Maps, key: str = "a", overwrite: bool = False, bands: tuple[slice, ...] = BANDS
+) -> xr.Dataset:
     """Put what is not there yet, the last rows first."""
     with RowWriter(target, key, overwrite=overwrite) as writer:
-        begin(writer)
-        for rows in reversed(BANDS):
+        begin(writer, bands)
+        for rows in reversed(bands):
             if writer.note_of(rows) is None:
                 writer.put(rows, some(given, rows), f"{rows}")
         result = writer.finish(ATTRIBUTES)
@@ -73,6 +76,19 @@ def test_rows_make_the_result_that_is_saved_at_once(tmp_path: Path, highest: flo
     assert found.attrs == wanted.attrs
     assert found["reflectance"].dtype == wanted["reflectance"].dtype
     assert [path.name for path in tmp_path.glob(".*")] == []
+
+
+def test_a_longer_last_band_is_kept_where_earlier_rows_are_too_bright_to_be_packed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    given = maps()
+    given["reflectance"][:, :4] *= 9.0
+    safe: set[str] = set()
+    monkeypatch.setattr(row_writer, "make_safe", lambda file: safe.add(file.parts[-2]))
+    found = write(tmp_path / "r.zarr", given, bands=(slice(0, 4), slice(4, 10)))
+    np.testing.assert_allclose(found["reflectance"], given["reflectance"], atol=3e-5, rtol=0)
+    # Rows 8 and 9 are in a file of their own.
+    assert safe == {"0", "1", "2"}
 
 
 def test_rows_that_are_there_are_not_asked_for_again(tmp_path: Path) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass
 from typing import Any
 
@@ -17,16 +18,19 @@ PLAN = CapturePlan(camera_size_px=(890, 580), code=GrayCode(rows=False), spectra
 
 def test_a_band_has_four_rows_beside_it_on_either_side() -> None:
     bands = bands_of(PLAN, rows=200)
-    assert [(band.rows.start, band.rows.stop) for band in bands] == [(0, 194), (194, 388), (388, 580)]
-    assert [(band.near.start, band.near.stop) for band in bands] == [(0, 198), (190, 392), (384, 580)]
-    assert [(band.own.start, band.own.stop) for band in bands] == [(0, 194), (4, 198), (4, 196)]
+    assert [(band.rows.start, band.rows.stop) for band in bands] == [(0, 192), (192, 384), (384, 580)]
+    assert [(band.near.start, band.near.stop) for band in bands] == [(0, 196), (188, 388), (380, 580)]
+    assert [(band.own.start, band.own.stop) for band in bands] == [(0, 192), (4, 196), (4, 200)]
 
 
 @pytest.mark.parametrize(
     ("rows", "multiple", "starts"),
     [
         (580, 2, [0]), (579, 2, [0, 290]), (9, None, [0]), (130, 64, [0, 128, 256, 384, 512]),
-        (100, 64, [0, 64, 128, 192, 256, 320, 384, 448, 512, 576]),
+        # Four rows more in the last one, where they fit.
+        (196, 64, [0, 192, 384]), (195, 64, [0, 192, 384, 576]),
+        (68, 64, [0, 64, 128, 192, 256, 320, 384, 448, 512]),
+        (67, 64, [0, 64, 128, 192, 256, 320, 384, 448, 512, 576]),
         (1, 64, [0, 64, 128, 192, 256, 320, 384, 448, 512, 576]),
     ],
 )  # fmt: skip
@@ -38,16 +42,29 @@ def test_bands_are_whole_numbers_of_what_is_worked_on_together(
     assert bands[-1].rows.stop == 580
 
 
+def test_bands_are_no_higher_than_fits_and_alike_but_for_the_last() -> None:
+    for height, fit, multiple in itertools.product(
+        (1, 9, 10, 63, 130, 299), (1, 5, 64, 100, 200), (1, 2, 64)
+    ):
+        plan = PLAN.model_copy(update={"camera_size_px": (8, height)})
+        heights = [band.rows.stop - band.rows.start for band in bands_of(plan, fit, multiple)]
+        assert sum(heights) == height
+        assert min(heights) > 0
+        assert max(heights) <= max(fit, multiple)
+        assert len(set(heights[:-1])) <= 1
+        assert all(each % multiple == 0 for each in heights[:-1])
+
+
 def test_memory_decides_how_high_bands_are() -> None:
-    # 890 columns of 318 frames in six bytes: 320 MiB hold 197 rows, of which eight are neighbours.
+    # 890 columns of 318 frames in six bytes: 384 MiB hold 237 rows, of which eight are neighbours.
     assert PLAN.spectral_count == 318
-    fit = (320 << 20) // (890 * 6 * 318) - 8
-    assert fit == 189
-    assert [band.rows.start for band in bands_of(PLAN)] == [0, 146, 292, 438]
-    # At least as if 64 frames were held: 981 rows.
+    fit = (384 << 20) // (890 * 6 * 318) - 8
+    assert fit == 229
+    assert [band.rows.start for band in bands_of(PLAN)] == [0, 192, 384]
+    # At least as if 64 frames were held: 1178 rows.
     few = PLAN.model_copy(update={"spectral": NoSpectral()})
-    assert len(bands_of(few.model_copy(update={"camera_size_px": (890, 973)}))) == 1
-    assert len(bands_of(few.model_copy(update={"camera_size_px": (890, 974)}))) == 2
+    assert len(bands_of(few.model_copy(update={"camera_size_px": (890, 1170)}))) == 1
+    assert len(bands_of(few.model_copy(update={"camera_size_px": (890, 1171)}))) == 2
 
 
 @dataclass(frozen=True)
