@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from dsl_core.capture.proof.code.code_sum import CodeSum, code_sum
 from dsl_core.capture.proof.code.first_code import FirstCode
+from dsl_core.capture.proof.colour_again import ColourAgain, colour_again
 from dsl_core.capture.proof.contest import Contest
 from dsl_core.capture.proof.control import choose_pairs, edges_moved, is_same, is_unchanged
 from dsl_core.capture.proof.finding import Finding, Light, Verdict, displaced
@@ -210,6 +211,10 @@ class FrameProof:
     def white_again(self) -> WhiteAgain | None:
         """The white, captured again, that differs most from the first in a part of the picture."""
         return white_again(self._plan, self._kept, self._noise, self._raster)
+
+    def colour_again(self) -> ColourAgain | None:
+        """The white, captured again, whose colour differs most from that of the first."""
+        return colour_again(self._plan, self._kept, self._noise, self._raster.channels(self._bayer))
 
     @property
     def settled(self) -> str:
