@@ -57,7 +57,7 @@ def test_white_in_another_colour_is_told_with_the_light_of_each() -> None:
 
 
 @pytest.mark.parametrize("colours", [(0.9, 0.9, 0.9), (1.02, 1.0, 0.98), (1.0, 1.0, 1.0)])
-def test_light_that_all_colours_lose_alike_is_no_change_of_colour(colours: tuple[float, ...]) -> None:
+def test_light_that_all_colours_lose_is_no_change_of_colour(colours: tuple[float, float, float]) -> None:
     assert found(*colours) is None
 
 
