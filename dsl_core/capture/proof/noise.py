@@ -44,6 +44,11 @@ class Noise:
             )
         )
 
+    @property
+    def least_variance(self) -> float:
+        """Variance of counts without any light, DN^2: no pixel has less."""
+        return self.sensor.read_noise_dn**2 + 0.1
+
     def variance(self, counts: Counts | Floats) -> Floats:
         """Variance of counts, DN^2; those of pictures that cannot change are remembered."""
         known = self._known.get(id(counts))
@@ -53,7 +58,7 @@ class Noise:
         found = np.asarray(np.subtract(counts, np.float32(sensor.black_level_dn), dtype=np.float32))
         np.maximum(found, 0, out=found)
         found /= np.float32(sensor.electrons_per_dn)
-        found += np.float32(sensor.read_noise_dn**2 + 0.1)
+        found += np.float32(self.least_variance)
         if not counts.flags.writeable:
             found.flags.writeable = False
             if len(self._known) >= _REMEMBERED:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -40,6 +41,12 @@ BODY_SHARE = 0.5
 EXPLAINED = 0.25
 #: Of the pixels that a rival leaves bright or dark, every so many are asked where there are plenty.
 PLENTY = 4000
+#: So many of the pixels that tell predictions apart are enough to leave others unasked.
+ENOUGH = 500
+#: Medians and shares are of so many pixels, spread over the picture, where there are plenty.
+SPREAD = 2000
+#: Pixels are looked up by their columns if these are in fewer runs than this.
+_RUNS = 16
 _NOTHING = np.float32(0)
 
 
@@ -52,6 +59,43 @@ class Lit:
     black: Floats
     contrast: Floats
     sigma: Floats
+
+    def where(self, keys: NDArray[np.bool_]) -> NDArray[np.intp]:
+        """The pixels (count,) of all keys that are marked, flat (3 width,), in their order."""
+        order, starts = self._by_key
+        marked = np.flatnonzero(keys[: starts.size - 1])
+        if marked.size == 0:
+            return marked
+        # A line lights a few columns side by side: most pixels need not be looked at.
+        ends = np.flatnonzero(marked[1:] - marked[:-1] > 1)
+        if ends.size >= _RUNS or 3 * marked.size > starts.size:
+            return np.flatnonzero(keys[self.key])
+        lower = [starts[marked[0]], *starts[marked[ends + 1]]]
+        upper = [*starts[marked[ends] + 1], starts[marked[-1] + 1]]
+        found = np.concatenate([order[a:b] for a, b in zip(lower, upper, strict=True)])
+        found.sort()
+        return found
+
+    def unlit(self, wanted: Floats) -> NDArray[np.intp]:
+        """Pixels, spread over the picture, that a `line_profile` leaves dark."""
+        some, keys = self._spread
+        return some[wanted[keys] <= 0]
+
+    @cached_property
+    def over_white(self) -> Floats:
+        """Counts above which pixels are brighter than white."""
+        return np.asarray(self.black + self.contrast + np.float32(OVER_WHITE_SIGMAS) * self.sigma)
+
+    @cached_property
+    def _by_key(self) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+        """Pixels in the order of their keys, and where those of each key begin and end."""
+        starts = np.append(0, np.cumsum(np.bincount(self.key)))
+        return np.argsort(self.key, kind="stable"), starts
+
+    @cached_property
+    def _spread(self) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+        some = thinned(np.arange(self.key.size), SPREAD)
+        return some, self.key[some]
 
 
 def line_profile(plan: CapturePlan, shot: Shot) -> Floats | None:
@@ -71,8 +115,7 @@ def line_profile(plan: CapturePlan, shot: Shot) -> Floats | None:
 
 def contest_of_lines(seen: Counts, lit: Lit, wanted: Floats, rival: Floats) -> Contest:
     """Which of two patterns of columns (`line_profile`) a picture shows."""
-    chosen = np.flatnonzero(np.take(np.abs(wanted - rival) > APART, lit.key))
-    chosen = thinned(chosen, PLENTY)
+    chosen = thinned(lit.where(np.abs(wanted - rival) > APART), PLENTY)
     black, contrast = lit.black[chosen], lit.contrast[chosen]
     key = lit.key[chosen]
     return vote(
@@ -84,7 +127,7 @@ def contest_of_lines(seen: Counts, lit: Lit, wanted: Floats, rival: Floats) -> C
 
 @dataclass(frozen=True)
 class Places:
-    """Which pixels of known columns a pattern lights, and which it does not, as indices into a `Lit`."""
+    """Which pixels of known columns a pattern lights, and some that it does not, as indices into a `Lit`."""
 
     lit: NDArray[np.intp]
     unlit: NDArray[np.intp]
@@ -92,8 +135,7 @@ class Places:
     @classmethod
     def of(cls, lit: Lit, wanted: Floats) -> Places:
         """Those of a `line_profile`."""
-        light = np.take(wanted, lit.key)
-        return cls(np.flatnonzero(light > LIT_SHARE), np.flatnonzero(light <= 0))
+        return cls(lit.where(wanted > LIT_SHARE), lit.unlit(wanted))
 
 
 def brightness_of_lines(seen: Counts, lit: Lit, wanted: Floats, noise: Noise) -> float | None:
@@ -115,7 +157,7 @@ def is_lit_elsewhere(seen: Counts, lit: Lit, wanted: Floats) -> bool:
 
     A single edge of a code in place of a line leaves most pixels dark, so that votes do not tell it.
     """
-    unlit = Places.of(lit, wanted).unlit
+    unlit = lit.unlit(wanted)
     bright = seen[lit.index[unlit]] - lit.black[unlit] > BRIGHT_SHARE * lit.contrast[unlit]
     return int(bright.sum()) > max(FEWEST_UNLIT, ELSEWHERE * unlit.size)
 
@@ -126,15 +168,14 @@ def is_over_white(seen: Counts, lit: Lit, wanted: Floats) -> bool:
     A window of another program may be there, which hardly any votes are against. White is all lines together,
     so that none of them is brighter; ``lit`` holds the black and the contrast of the picture's setting.
     """
-    unlit = Places.of(lit, wanted).unlit
-    if unlit.size < FEWEST_UNLIT:
+    if lit.unlit(wanted).size < FEWEST_UNLIT:
         return False
-    over = seen[lit.index[unlit]] - lit.black[unlit] - lit.contrast[unlit]
-    over = over[over > OVER_WHITE_SIGMAS * lit.sigma[unlit]]
-    return (
-        over.size >= FEWEST_BRIGHT
-        and int((over > OVER_WHITE * np.median(lit.contrast)).sum()) >= FEWEST_BRIGHT
-    )
+    over = np.flatnonzero(seen[lit.index] > lit.over_white)
+    over = over[wanted[lit.key[over]] <= 0]
+    if over.size < FEWEST_BRIGHT:
+        return False
+    more = seen[lit.index[over]] - lit.black[over] - lit.contrast[over]
+    return int((more > OVER_WHITE * np.median(lit.contrast)).sum()) >= FEWEST_BRIGHT
 
 
 def black_gained(seen: Counts, lit: Lit, wanted: Floats, noise: Noise) -> np.float32:
@@ -143,7 +184,7 @@ def black_gained(seen: Counts, lit: Lit, wanted: Floats, noise: Noise) -> np.flo
     ``wanted`` is its `line_profile`. First orders reach some of the pixels that a line does not light, so
     that those with the least light tell.
     """
-    unlit = Places.of(lit, wanted).unlit
+    unlit = lit.unlit(wanted)
     if unlit.size < FEWEST_UNLIT:
         return _NOTHING
     black = lit.black[unlit]
@@ -172,6 +213,11 @@ class Expected:
 
     counts: Floats
     variance: Floats
+
+    @cached_property
+    def least_variance(self) -> np.float32:
+        """That of the pixel that is known best."""
+        return np.float32(self.variance.min())
 
 
 def rescaled(
@@ -202,17 +248,23 @@ def rescaled(
 
 
 def contest_of_places(
-    seen: Counts, wanted: Expected, lit: Lit, light: Floats, profiles: tuple[Floats, Floats], noise: Noise
+    seen: Counts,
+    wanted: Expected,
+    lit: Lit,
+    dark: tuple[Floats, float],
+    profiles: tuple[Floats, Floats],
+    noise: Noise,
 ) -> Contest:
     """Whether a predicted picture is seen, or one whose pattern is displaced, for which there is no picture.
 
-    The latter follows from ``light``, the counts (n,) that white adds to black at the places of ``lit``, and
-    the ``profiles`` of the pattern in its place and out of it. Only pixels are asked whose prediction the
-    former explains: most are brighter, by what lenses and a film spread.
+    The latter follows from ``dark``: the black picture, flat, and how much stronger light is than in ``lit``;
+    and from the ``profiles`` of the pattern in its place and out of it. Only pixels are asked whose
+    prediction the former explains: most are brighter, by what lenses and a film spread.
     """
-    chosen = np.flatnonzero(np.take(np.abs(profiles[0] - profiles[1]) > APART, lit.key))
+    chosen = lit.where(np.abs(profiles[0] - profiles[1]) > APART)
     key, at, full = lit.key[chosen], lit.index[chosen], np.float32(noise.sensor.full_scale_dn)
-    usual, rival = (np.minimum(lit.black[chosen] + light[chosen] * each[key], full) for each in profiles)
+    black, light = dark[0][at], np.float32(dark[1]) * lit.contrast[chosen]
+    usual, rival = (np.minimum(black + light * each[key], full) for each in profiles)
     expected, counts = wanted.counts[at], seen[at].astype(np.float32)
     apart = np.abs(expected - rival)
     variance = noise.variance(seen)[at] + wanted.variance[at]
@@ -225,7 +277,7 @@ def contest_of_pictures(
     wanted: Expected,
     rival: Expected,
     black: Floats,
-    least: Floats,
+    least: Floats | None,
     noise: Noise,
     raster: Raster,
 ) -> Contest:
@@ -235,31 +287,42 @@ def contest_of_pictures(
 
     Where pixels are too noisy to tell, means over blocks are asked.
     """
-    found = _contest(seen.astype(np.float32), noise.variance(seen), wanted, rival, black, least)
+    found = _contest(seen, noise.variance(seen), wanted, rival, black, least, noise.least_variance)
     if found.is_told:
         return found
     share = np.float32(1 / raster.pooled)
     variance = raster.pool(noise.variance(seen)) * share
     one, other = (Expected(raster.pool(e.counts), raster.pool(e.variance) * share) for e in (wanted, rival))
-    return _contest(raster.pool(seen), variance, one, other, raster.pool(black), raster.pool(least))
+    least = None if least is None else raster.pool(least)
+    return _contest(raster.pool(seen), variance, one, other, raster.pool(black), least)
 
 
 def _contest(
-    seen: Floats, variance: Floats, wanted: Expected, rival: Expected, black: Floats, least: Floats
+    seen: Counts | Floats,
+    variance: Floats,
+    wanted: Expected,
+    rival: Expected,
+    black: Floats,
+    least: Floats | None,
+    least_variance: float = 0.0,
 ) -> Contest:
-    # In place, as hundreds of pictures are judged, each against several.
+    """The contest of pixels that tell predictions apart; none seen has less than ``least_variance``."""
+    # Hundreds of pictures are judged, each against several, and most pixels are the same in both.
     apart = wanted.counts - rival.counts
     np.abs(apart, out=apart)
-    light = np.maximum(wanted.counts, rival.counts)
-    light -= black
-    light *= np.float32(APART)
-    asked = apart > np.maximum(light, least, out=light)
-    noise = np.add(variance, wanted.variance, out=light)
-    noise += rival.variance
-    noise *= np.float32(SIGMAS**2)
-    asked &= np.square(apart, out=apart) > noise
-    chosen = np.flatnonzero(asked)
-    return vote(seen[chosen], wanted.counts[chosen], rival.counts[chosen])
+    least_variance += float(wanted.least_variance + rival.least_variance)
+    likely = np.flatnonzero(apart > np.float32(SIGMAS * np.sqrt(least_variance)))
+    chosen = likely
+    for some in (thinned(likely, PLENTY), likely):
+        light = APART * (np.maximum(wanted.counts[some], rival.counts[some]) - black[some])
+        if least is not None:
+            np.maximum(light, least[some], out=light)
+        noise = variance[some] + wanted.variance[some] + rival.variance[some]
+        between = apart[some]
+        chosen = some[(between > light) & (between**2 > np.float32(SIGMAS**2) * noise)]
+        if chosen.size >= ENOUGH or some.size == likely.size:
+            break
+    return vote(seen[chosen].astype(np.float32), wanted.counts[chosen], rival.counts[chosen])
 
 
 def brightness_of_picture(
@@ -273,14 +336,13 @@ def brightness_of_picture(
     those that are expected too bright.
     """
     full = noise.sensor.full_scale_dn
-    light, gain = wanted.counts - black, seen - black
-    sound = (seen < full) & (wanted.counts < 0.9 * full)
+    variance, room, gained = noise.variance(seen), _NOTHING, _NOTHING
     if lit is not None and profile is not None:
         at = Places.of(lit, profile)
-        dark = lit.index[at.unlit]
-        light, gain = light - _of_room(light[dark]), gain - _of_room(gain[dark])
-        lights = np.zeros_like(sound)
-        lights[lit.index[at.lit]] = True
-        sound &= lights
-    variance = (wanted.variance + noise.variance(seen))[sound]
-    return _ratio(gain[sound], light[sound], variance)
+        dark, lights = lit.index[at.unlit], lit.index[at.lit]
+        room, gained = (_of_room(each[dark] - black[dark]) for each in (wanted.counts, seen))
+        seen, black, variance = seen[lights], black[lights], variance[lights]
+        wanted = Expected(wanted.counts[lights], wanted.variance[lights])
+    sound = (seen < full) & (wanted.counts < 0.9 * full)
+    light, gain = wanted.counts - black - room, seen - black - gained
+    return _ratio(gain[sound], light[sound], (wanted.variance + variance)[sound])

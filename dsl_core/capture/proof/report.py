@@ -63,8 +63,7 @@ class SeenFrames:
                     proof.substitute(number, pair)
         whole = light_sentence(proof.code_sum(), proof.line_sum())
         light = [whole] if whole else []
-        again = proof.white_again()
-        light += [] if again is None else [again.sentence]
+        light += [each.sentence for each in (proof.white_again(), proof.colour_again()) if each is not None]
         light += [each.sentence for each in proof.local_sums()]
         return ProofReport(judged, together(wrong), untold, tuple(light))
 

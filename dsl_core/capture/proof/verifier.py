@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from dsl_core.capture.proof.code.code_sum import CodeSum, code_sum
 from dsl_core.capture.proof.code.first_code import FirstCode
+from dsl_core.capture.proof.colour_again import ColourAgain, colour_again
 from dsl_core.capture.proof.contest import Contest
 from dsl_core.capture.proof.control import choose_pairs, edges_moved, is_same, is_unchanged
 from dsl_core.capture.proof.finding import Finding, Light, Verdict, displaced
@@ -17,7 +18,7 @@ from dsl_core.capture.proof.later_settings import LaterSettings
 from dsl_core.capture.proof.light_steps import LightSteps
 from dsl_core.capture.proof.lines.bright_black import BrightBlack
 from dsl_core.capture.proof.lines.hidden import HiddenParts
-from dsl_core.capture.proof.lines.line_place import SIDES, LinePlaces, moved
+from dsl_core.capture.proof.lines.line_place import LinePlaces, contests_of_sides, moved
 from dsl_core.capture.proof.lines.line_shown import line_shown
 from dsl_core.capture.proof.lines.line_sum import LineSum, line_sum
 from dsl_core.capture.proof.lines.local_sum import LocalSum, local_sum
@@ -37,12 +38,11 @@ from dsl_core.capture.proof.prediction import (
     line_profile,
 )
 from dsl_core.capture.proof.raster import Counts, Floats, Raster
-from dsl_core.capture.proof.recent import Recent
 from dsl_core.capture.proof.sentinel import SentinelProof
 from dsl_core.capture.proof.usual_light import LEAST_LIGHT, UsualLight
 from dsl_core.capture.proof.white_again import WhiteAgain, white_again
 from dsl_core.model.captured_code import CapturedCode
-from dsl_core.model.plan import CapturePlan, NoCode, ScanLines, Shot, describe_shot
+from dsl_core.model.plan import CapturePlan, NoCode, Role, ScanLines, Shot, describe_shot
 from dsl_core.model.rig import Rig
 
 #: Where several rivals won, the picture before is blamed if its votes are nearly as many (their mean), and
@@ -110,7 +110,7 @@ class FrameProof:
         )
         #: The picture that came for two patterns, for as long as it comes.
         self._repeated: Counts | None = None
-        self._profiles = Recent[Floats | None]()
+        self._profiles: dict[tuple[Role, int], Floats | None] = {}
         self._bright_black = BrightBlack(self._noise)
         self._hidden = HiddenParts(self._noise)
         self._neighbours = LineNeighbours(self._noise, self._raster.shape[1])
@@ -211,6 +211,10 @@ class FrameProof:
     def white_again(self) -> WhiteAgain | None:
         """The white, captured again, that differs most from the first in a part of the picture."""
         return white_again(self._plan, self._kept, self._noise, self._raster)
+
+    def colour_again(self) -> ColourAgain | None:
+        """The white, captured again, whose colour differs most from that of the first."""
+        return colour_again(self._plan, self._kept, self._noise, self._raster.channels(self._bayer))
 
     @property
     def settled(self) -> str:
@@ -366,7 +370,7 @@ class FrameProof:
         if not found.is_wrong and is_over_white(seen, lit, wanted):
             return Finding(shot, Verdict.OTHER, (shot,), "a part of it is brighter than white")
         wanted = usual * wanted
-        places = {side: contest_of_lines(seen, lit, wanted, moved(wanted, side)) for side in SIDES}
+        places = contests_of_sides(lambda side: contest_of_lines(seen, lit, wanted, moved(wanted, side)))
         return self._in_place(found, contests, places)
 
     def _in_place(
@@ -385,8 +389,12 @@ class FrameProof:
         return found if told is None else displaced(found.shot, told[1], told[0])
 
     def _profile(self, shot: Shot) -> Floats | None:
-        """The `line_profile` of a shot, which is a rival of its neighbours as well."""
-        return self._profiles.get(shot.index, (), lambda: line_profile(self._plan, shot))
+        """The `line_profile` of a shot, which is a rival of its neighbours as well, at every setting."""
+        shot = self._plan.original(shot)
+        key = shot.role, shot.pattern
+        if key not in self._profiles:
+            self._profiles[key] = line_profile(self._plan, shot)
+        return self._profiles[key]
 
     def _rivals(self, shot: Shot) -> list[tuple[Verdict, Shot]]:
         """The shots whose pattern a picture most likely shows instead."""
@@ -431,7 +439,7 @@ class FrameProof:
         black = dark.counts
         # Before its own black is there, only what is bright can be relied on.
         has_black = shot.role != "black" and self._blacks[shot.setting] in self._kept
-        least = np.float32(0 if has_black else APART) * (white.counts - black)
+        least = None if has_black else np.float32(APART) * (white.counts - black)
         rivals = [
             (verdict, later.expected(rival, shot, less_gained)) for verdict, rival in self._rivals(shot)
         ]
@@ -462,13 +470,13 @@ class FrameProof:
         profile = self._profile(shot)
         if lit is None or profile is None:
             return {}
-        now = replace(lit, black=black[lit.index])
-        light = np.float32(self._later.scale(shot)) * lit.contrast
+        dark = black, self._later.scale(shot)
         profile = np.float32(self._learned.usual.share(replace(shot, setting=self._first))) * profile
-        return {
-            side: contest_of_places(seen, wanted, now, light, (profile, moved(profile, side)), self._noise)
-            for side in SIDES
-        }
+        return contests_of_sides(
+            lambda side: contest_of_places(
+                seen, wanted, lit, dark, (profile, moved(profile, side)), self._noise
+            )
+        )
 
     def _level_of_code(self, shot: Shot) -> float:
         """Light of a picture of the first code over that of white; 1 for other shots."""

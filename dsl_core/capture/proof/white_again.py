@@ -5,7 +5,7 @@ A lamp that fades does so all over the picture, and is corrected for; what moved
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -66,21 +66,28 @@ def white_again(
 
     ``kept`` are the rasters of shots, by index.
     """
+    size_px = plan.camera_size_px
+    found = (
+        _compared(shot, before, now, size_px, noise, raster) for shot, before, now in repeats(plan, kept)
+    )
+    differ = (one for one in found if one is not None)
+    return max(differ, key=lambda one: abs(one.share - one.usual), default=None)
+
+
+def repeats(
+    plan: CapturePlan, kept: Mapping[int, Counts]
+) -> Iterator[tuple[Shot, tuple[Counts, Counts], tuple[Counts, Counts]]]:
+    """Every white that was captured again: its shot, the first white and this one, each with its black."""
     old = {s.index: plan.original(s) for s in plan.shots() if s.role == "sentinel" and s.index in kept}
     blacks = {index: shot for index, shot in old.items() if shot.role == "black"}
-    found = []
     for shot in plan.shots():
         first = old.get(shot.index)
         near = [index for index in blacks if abs(index - shot.index) < NEAR]
         if first is None or first.role != "white" or not near:
             continue
-        if not {first.index, blacks[near[0]].index} <= kept.keys():
-            continue
-        before = kept[first.index], kept[blacks[near[0]].index]
-        now = kept[shot.index], kept[near[0]]
-        found.append(_compared(shot, before, now, plan.camera_size_px, noise, raster))
-    differ = (one for one in found if one is not None)
-    return max(differ, key=lambda one: abs(one.share - one.usual), default=None)
+        black = blacks[near[0]].index
+        if {first.index, black} <= kept.keys():
+            yield shot, (kept[first.index], kept[black]), (kept[shot.index], kept[near[0]])
 
 
 def _compared(

@@ -86,6 +86,17 @@ def test_pixels_vote_where_two_patterns_differ_by_three_tenths() -> None:
     assert contest_of_lines(seen, lit(30), wanted, wanted - floats(0.29)).count == 0
 
 
+@pytest.mark.parametrize(
+    "marked", [[], [4], [4, 5, 6], [0, 1, 7, 29], [29], list(range(0, 20, 2)), list(range(30))]
+)
+def test_pixels_of_marked_columns_are_found_in_their_order(marked: list[int]) -> None:
+    key = np.random.default_rng(3).integers(0, 28, 400)
+    flat = floats(np.ones(key.size))
+    keys = np.isin(np.arange(30), marked)
+    found = Lit(np.arange(key.size), key, flat, flat, flat).where(keys)
+    assert found.tolist() == np.flatnonzero(keys[key]).tolist()
+
+
 @pytest.mark.parametrize(("count", "asked"), [(7999, 7999), (8000, 2667), (12000, 4000)])
 def test_of_many_pixels_some_thousand_are_asked(count: int, asked: int) -> None:
     ones, none = floats(np.ones(count)), floats(np.zeros(count))
@@ -143,23 +154,23 @@ def test_places_are_told_by_pixels_whose_prediction_the_columns_explain() -> Non
     counts, seen = floats(np.full(80, 120)), np.full(80, 120, np.uint16)
     counts[::2] += light * right
     seen[::2] += (light * away).astype(np.uint16)
-    wanted = Expected(counts, floats(np.full(80, 9)))
-    contest = contest_of_places(seen, wanted, some, light, (right, away), NOISE)
+    wanted, dark = Expected(counts, floats(np.full(80, 9))), (floats(np.full(80, 120)), 1.0)
+    contest = contest_of_places(seen, wanted, some, dark, (right, away), NOISE)
     assert (contest.count, contest.mean) == (40, -1.0)
-    as_wanted = contest_of_places(counts.astype(np.uint16), wanted, some, light, (right, away), NOISE)
+    as_wanted = contest_of_places(counts.astype(np.uint16), wanted, some, dark, (right, away), NOISE)
     assert (as_wanted.count, as_wanted.mean) == (40, 1.0)
     counts[:10] += 400  # light beyond the line
-    assert contest_of_places(seen, wanted, some, light, (right, away), NOISE).count == 35
+    assert contest_of_places(seen, wanted, some, dark, (right, away), NOISE).count == 35
     noisy = Expected(counts, floats(np.full(80, 1e6)))
-    assert contest_of_places(seen, noisy, some, light, (right, away), NOISE).count == 0
+    assert contest_of_places(seen, noisy, some, dark, (right, away), NOISE).count == 0
 
 
 def test_a_place_whose_light_saturates_either_way_says_nothing() -> None:
     some, full = lit(40), NOISE.sensor.full_scale_dn
-    light, one, other = floats(np.full(40, 1e5)), floats(np.ones(40)), floats(np.full(40, 0.15))
+    dark, one, other = (floats(np.full(80, 120)), 100.0), floats(np.ones(40)), floats(np.full(40, 0.15))
     wanted = Expected(floats(np.full(80, full)), floats(np.full(80, 9)))
     seen = np.full(80, full, np.uint16)
-    assert contest_of_places(seen, wanted, some, light, (one, other), NOISE).count == 0
+    assert contest_of_places(seen, wanted, some, dark, (one, other), NOISE).count == 0
 
 
 def pictures(
@@ -191,6 +202,16 @@ def test_pictures_are_told_apart_by_six_deviations_of_all_three(apart: float, is
         np.full(50, 90, np.uint16), wanted, rival, black, floats(np.zeros(50)), NOISE, Raster((10, 5))
     )
     assert (found.count == 50) == is_told
+
+
+@pytest.mark.parametrize(("apart", "asked"), [(9000, 3000), (60, 60)])
+def test_pictures_are_told_apart_by_some_of_many_pixels_and_by_all_of_few(apart: int, asked: int) -> None:
+    wanted, rival, black = pictures(500.0, 500.0, 4.0, 9000)
+    known = np.arange(9000) < apart
+    rival = Expected(rival.counts, np.where(known, rival.variance, np.float32(1e9)))
+    seen = wanted.counts.astype(np.uint16)
+    found = contest_of_pictures(seen, wanted, rival, black, None, NOISE, Raster((100, 90)))
+    assert (found.count, found.mean) == (asked, 1.0)
 
 
 def test_where_pixels_are_too_noisy_blocks_are_asked() -> None:

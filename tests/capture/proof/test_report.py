@@ -6,6 +6,7 @@ from itertools import islice
 
 import pytest
 
+from dsl_core.capture.proof.colour_again import ColourAgain
 from dsl_core.capture.proof.finding import ProofReport, Verdict
 from dsl_core.capture.proof.lines.line_sum import LineSum
 from dsl_core.capture.proof.report import SeenFrames, prove
@@ -59,6 +60,14 @@ def test_lines_that_do_not_add_up_to_white_are_told(
     monkeypatch.setattr(FrameProof, "line_sum", lambda proof: LineSum(0.8, 0.01, 0.1))
     (sentence,) = _judged(scene, frames).sentences
     assert sentence.startswith("All lines together have 0.80 ± 0.01 times the light of white")
+
+
+def test_white_of_another_colour_is_told(
+    scene: RenderedScene, frames: MemorySink, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    seen = ColourAgain(next(iter(scene.plan.shots())), (1.1, 1.0, 0.9), 0.1)
+    monkeypatch.setattr(FrameProof, "colour_again", lambda proof: seen)
+    assert _judged(scene, frames).sentences == (seen.sentence,)
 
 
 def test_one_wrong_pair_leaves_the_lines_to_be_judged(scene: RenderedScene, frames: MemorySink) -> None:

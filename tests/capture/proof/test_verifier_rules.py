@@ -199,7 +199,7 @@ def test_dark_pixels_are_asked_once_the_black_of_a_later_setting_is_there(
     judge._kept.update({at: counts(2000 if at == 10 else 100 + at) for at in range(16)})
 
     def contest(*parts: Any) -> Contest:
-        asked.append(float(parts[4].max()))
+        asked.append(0.0 if parts[4] is None else float(parts[4].max()))
         return WON
 
     monkeypatch.setattr("dsl_core.capture.proof.verifier.contest_of_pictures", contest)

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from dsl_core.capture.proof.noise import Noise
 from dsl_core.capture.proof.raster import Counts, Floats
+from dsl_core.capture.proof.recent import Recent
 from dsl_core.optics.seen_noise import NORMAL
 
 #: A pixel is darker by so many deviations, and by this share of what the room gives it.
@@ -27,6 +28,7 @@ class HiddenParts:
         """Start without any line."""
         self._noise = noise
         self._before: tuple[int, Counts, Counts] | None = None
+        self._limits = Recent[Floats]()
 
     def is_hidden(self, setting: int, seen: Counts, black: Counts) -> bool:
         """Whether a part of a line is darker than black that was not in the line before of this setting.
@@ -37,7 +39,8 @@ class HiddenParts:
         fewest = max(FEWEST, FEWEST_SHARE * seen.size)
         found = False
         # Most lines have too few pixels as dark, whatever the noise and the room have become.
-        if int(self._darker(seen, black).sum()) >= fewest:
+        limit = self._limits.get(setting, (black,), lambda: self._limit(black))
+        if np.count_nonzero(seen < limit) >= fewest and int(self._darker(seen, black).sum()) >= fewest:
             dark = self._dark(seen, black)
             known = self._before is not None and self._before[0] == setting
             before = self._dark(*self._before[1:]) if self._before is not None and known else dark
@@ -45,6 +48,12 @@ class HiddenParts:
         if not found:
             self._before = setting, seen, black
         return found
+
+    def _limit(self, black: Counts) -> Floats:
+        """Counts below which pixels may be darker than black, as no picture has less noise."""
+        room = np.subtract(black, np.float32(self._noise.sensor.black_level_dn), dtype=np.float32)
+        noise = SIGMAS * np.sqrt(self._noise.variance(black) + np.float32(self._noise.least_variance))
+        return np.asarray(black - np.maximum(SHARE * room, noise))
 
     def _darker(
         self, seen: Counts, black: Counts, room_dn: np.float32 = _NOTHING, more: float = 1.0

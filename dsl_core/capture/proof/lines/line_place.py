@@ -7,7 +7,7 @@ frame, so that frames since some shot are asked together; which shot that is, th
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 
 import numpy as np
 
@@ -20,6 +20,8 @@ SIDES = (-1, 1, -2, 2)
 #: Votes for the other place, net of those for the right one, and what they are per voter at least: lines
 #: in their place have nearly one net vote against it per voter, blurred ones less, but above zero.
 FEWEST_VOTES, LEAST_MEAN = 20.0, 0.3
+#: Voters, and their mean, that say that a line is not a column away, and so not two.
+SURE_VOTES, SURE_MEAN = 12, 0.6
 #: Pictures in a row that have to agree: a single one may light little but edges of surfaces.
 FEWEST_PICTURES = 2
 
@@ -33,6 +35,20 @@ def moved(profile: Floats, columns: int) -> Floats:
     else:
         found[:columns] = wide[-columns:]
     return found.ravel()
+
+
+def contests_of_sides(contest: Callable[[int], Contest]) -> dict[int, Contest]:
+    """The contest of a line's place with each of `SIDES`.
+
+    A line that is two columns away is nearer to one column away than to its place as well: where that is
+    surely not so, the farther contest is taken to be like the nearer one, for speed.
+    """
+    found: dict[int, Contest] = {}
+    for side in SIDES:
+        near = found.get(side // 2)
+        is_sure = near is not None and near.count >= SURE_VOTES and near.mean > SURE_MEAN
+        found[side] = near if near is not None and is_sure else contest(side)
+    return found
 
 
 class LinePlaces:

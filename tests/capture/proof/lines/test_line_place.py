@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from dsl_core.capture.proof.contest import Contest
 from dsl_core.capture.proof.finding import Finding, Verdict
-from dsl_core.capture.proof.lines.line_place import LEAST_MEAN, LinePlaces, moved
+from dsl_core.capture.proof.lines.line_place import LEAST_MEAN, LinePlaces, contests_of_sides, moved
 from dsl_core.capture.proof.verifier import FrameProof
 from dsl_core.model.plan import CapturePlan, GrayCode, ScanLines, Setting, Shot
 from dsl_core.model.rig import Rig
@@ -135,3 +135,26 @@ def test_lines_shown_two_columns_away_are_found_at_once(columns: int, setting: i
 @pytest.mark.parametrize("setting", [0, 1])
 def test_lines_in_their_place_are_right(setting: int) -> None:
     assert _wrong(0, setting) == []
+
+
+@pytest.mark.parametrize(
+    ("near", "asked"),
+    [
+        (Contest(12, 0.61), [-1, 1]),
+        (Contest(11, 0.9), [-1, 1, -2, 2]),
+        (Contest(40, 0.6), [-1, 1, -2, 2]),
+        (Contest(40, -0.9), [-1, 1, -2, 2]),
+    ],
+)
+def test_two_columns_away_is_asked_unless_one_column_away_is_out_of_the_question(
+    near: Contest, asked: list[int]
+) -> None:
+    sides: list[int] = []
+
+    def contest(side: int) -> Contest:
+        sides.append(side)
+        return near if abs(side) == 1 else Contest(5, 0.5)
+
+    found = contests_of_sides(contest)
+    assert (sides, sorted(found)) == (asked, [-2, -1, 1, 2])
+    assert found[2] == (Contest(5, 0.5) if 2 in asked else near)

@@ -1,0 +1,74 @@
+"""White, captured again, in another colour: a lamp or a display that changes one colour and not another."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from dsl_core.capture.proof.colour_again import ColourAgain, colour_again
+from dsl_core.capture.proof.noise import Noise
+from dsl_core.capture.proof.raster import Counts, Raster
+from dsl_core.model.plan import CapturePlan, GrayCode, ScanLines, Sentinels, Setting
+from dsl_core.model.rig import Sensor
+
+SIZE, BLACK, WHITE = (64, 48), 300.0, 1500.0
+PLAN = CapturePlan(
+    camera_size_px=SIZE,
+    projector_size_px=(64, 18),
+    code=GrayCode(rows=False),
+    spectral=ScanLines(width_px=2, step_px=2),
+    settings=(Setting(exposure_ms=10.0, level=1.0),),
+    code_settings=(0,),
+    sentinels=Sentinels(every=16),
+)
+WHITES = [s.index for s in PLAN.shots() if s.role == "sentinel" and PLAN.original(s).role == "white"]
+
+
+def of_colours(red: float, green: float, blue: float) -> NDArray[np.float64]:
+    """A mosaic (rows, columns) with these values of red, green and blue pixels."""
+    mosaic = np.full(SIZE[::-1], green)
+    mosaic[::2, ::2], mosaic[1::2, 1::2] = red, blue
+    return mosaic
+
+
+def found(
+    red: float, green: float, blue: float, since: int = 0, light: NDArray[np.float64] | float = WHITE
+) -> ColourAgain | None:
+    """With so many times the light of each colour in whites from one on."""
+    rng, kept, raster = np.random.default_rng(1), dict[int, Counts](), Raster(SIZE)
+    for shot in PLAN.shots():
+        is_later = shot.role == "sentinel" and shot.index >= since
+        factor = of_colours(red, green, blue) if is_later else 1.0
+        shown = light * factor if PLAN.original(shot).role == "white" else 0.0
+        pixels = np.rint(BLACK + shown + rng.normal(0, 4, SIZE[::-1])).clip(0, 4095).astype(np.uint16)
+        kept[shot.index] = raster.take(pixels)
+    return colour_again(PLAN, kept, Noise.of(Sensor(), 12), raster.channels("RGGB"))
+
+
+def test_white_in_another_colour_is_told_with_the_light_of_each() -> None:
+    seen = found(1.05, 1.0, 0.94, since=WHITES[-1])
+    assert seen is not None
+    assert seen.shot.index == WHITES[-1]
+    assert seen.ratios == pytest.approx((1.05, 1.0, 0.94), abs=0.003)
+    assert seen.apart == pytest.approx(0.06, abs=0.003)
+    assert f"captured again as frame {WHITES[-1] + 1}, has another colour" in seen.sentence
+    assert "1.05 times in red, 1.00 times in green, 0.94 times in blue" in seen.sentence
+
+
+@pytest.mark.parametrize("colours", [(0.9, 0.9, 0.9), (1.02, 1.0, 0.98), (1.0, 1.0, 1.0)])
+def test_light_that_all_colours_lose_is_no_change_of_colour(colours: tuple[float, float, float]) -> None:
+    assert found(*colours) is None
+
+
+def test_a_colour_that_saturates_or_is_missing_says_nothing() -> None:
+    bright = of_colours(5000.0, WHITE, WHITE)
+    seen = found(0.5, 1.0, 0.9, light=bright)
+    assert seen is not None
+    assert "in red" not in seen.sentence
+    assert found(0.5, 1.0, 1.0, light=of_colours(0.5, WHITE, WHITE)) is None
+    assert found(1.0, 1.0, 0.9, light=of_colours(WHITE, 5000.0, WHITE)) is None
+
+
+def test_light_that_noise_outshines_says_nothing() -> None:
+    assert found(1.0, 1.0, 0.9, light=0.3) is None
