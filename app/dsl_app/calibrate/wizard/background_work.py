@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from dsl_app.calibrate.campaign_status import Recipes
 from dsl_app.calibrate.wizard.ghost import PointsPx, as_points, ghost, shared_part
@@ -21,7 +22,7 @@ from dsl_core.campaign.session import CalibrationSession, StepStatus
 from dsl_core.capture.display import Display
 from dsl_core.capture.preview import MANY_SATURATED, quick_picture, statistics
 from dsl_core.devices.base import Camera, CameraInfo, DeviceRig
-from dsl_core.errors import CalibrationError, Cancelled, DslError
+from dsl_core.errors import CalibrationError, Cancelled, DslError, StoreError
 from dsl_core.io.calibration_library import CalibrationLibrary
 from dsl_core.io.campaign_folder import CampaignFolder
 from dsl_core.model.figure import failures
@@ -161,6 +162,18 @@ class BackgroundWork:
             return Captured(self.session.statuses(), error)
         return Captured(self.session.statuses())
 
+    def kept_picture(self, step: Step) -> Seen | None:
+        """What the camera saw when a step was captured; None where no frames of it are kept."""
+        try:
+            scan = self.session.bench.scan_of(step)
+            shots = list(scan.plan.shots())
+            # Lit by lines a target is dark: in the middle of the frame they are most likely to be on it.
+            white = next((shot for shot in shots if shot.role == "white"), shots[len(shots) // 2])
+            pixels = scan.read(white)
+        except StoreError:
+            return None
+        return self.camera.as_seen(pixels)
+
     def fit(self, progress: Progress) -> Fit:
         """Fit the captures of all steps."""
         fitted = self.session.fit(progress)
@@ -253,11 +266,13 @@ class WatchedCamera(Camera):
     def take_seen(self) -> Seen | None:
         """The latest frame since the last call as people look at it; None without one."""
         frame = self.take_frame()
-        if frame is None:
-            return None
+        return None if frame is None else self.as_seen(frame.pixels)
+
+    def as_seen(self, pixels: NDArray[np.uint16]) -> Seen:
+        """A raw mosaic of this camera, shape (rows, columns), as people look at it."""
         full_scale = 2**self.info.bit_depth - 1
-        picture = quick_picture(frame.pixels, self.info.bayer, full_scale, True, AS_SEEN)
-        return Seen(picture, max(statistics(frame.pixels, self.info.bayer, full_scale).saturated))
+        picture = quick_picture(pixels, self.info.bayer, full_scale, True, AS_SEEN)
+        return Seen(picture, max(statistics(pixels, self.info.bayer, full_scale).saturated))
 
     def close(self) -> None:
         """Close the camera."""
