@@ -15,6 +15,7 @@ from dsl_app.calibrate.campaign_status import Recipes
 from dsl_app.calibrate.wizard.ghost import PointsPx, as_points, ghost, shared_part
 from dsl_app.calibrate.wizard.settings import changed_settings, setting_rows
 from dsl_app.calibrate.wizard.state import Fit, Look, Seen, SettingRow
+from dsl_app.shared.notify import sentence_of
 from dsl_core.campaign.common.recipe import AnyRecipe, Step
 from dsl_core.campaign.guide import calibrated_rig
 from dsl_core.campaign.products import Products, write_products
@@ -138,7 +139,7 @@ class BackgroundWork:
         try:
             figures = self.session.look(step, lambda points_px: seen.append(as_points(points_px)))
         except CalibrationError as error:
-            return Look(step.key, (), str(error))
+            return Look(step.key, (), sentence_of(error))
         points_px = seen[-1] if seen else ()
         wanted = ghost(step.placement, self.session.bench.rig.camera)
         return Look(step.key, figures, "", points_px, shared_part(wanted, points_px))
