@@ -128,6 +128,8 @@ class BackgroundWork:
         """Let the rig place the target if it can, once for each step."""
         if self._placed != step.key:
             self._placed = ""
+            # What stood there before may be brighter, and would be shown below what is found now.
+            self.camera.forget()
             self.session.place(step)
             self._placed = step.key
 
@@ -257,6 +259,12 @@ class WatchedCamera(Camera):
         if light_dn < BLACK_SHARE * (self._brightest_dn - self._offset_dn):
             return 0.0
         return light_dn * share
+
+    def forget(self) -> None:
+        """Forget what was seen: another target comes, and its first frame is worth showing."""
+        with self._lock:
+            self._frame = None
+            self._best, self._brightest_dn = (0.0, 1.0), 0.0
 
     def take_frame(self) -> Frame | None:
         """The latest frame since the last call; None without one."""
