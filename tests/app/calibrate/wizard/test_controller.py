@@ -10,7 +10,7 @@ from dsl_app.calibrate.state import RowState
 from dsl_app.calibrate.wizard.controller import WizardController
 from dsl_app.calibrate.wizard.ghost import PointsPx, as_points, ghost
 from dsl_app.calibrate.wizard.presentation import NONE_KEPT, step_display
-from dsl_app.calibrate.wizard.state import Doing, Seen, WizardState
+from dsl_app.calibrate.wizard.state import Doing, WizardState
 
 from dsl_core.devices.base import DeviceRig
 from dsl_core.errors import CalibrationError, DeviceError, StoreError
@@ -72,8 +72,9 @@ def test_a_wizard_goes_from_placement_to_acceptance_and_writes_the_rig(bench: Ca
     assert [line.name for line in bench.state.library.value] == ["campaign"]
 
 
-def seen_of(state: WizardState) -> Seen | None:
-    return state.seen.value
+def mean_seen(state: WizardState) -> float:
+    assert state.seen.value is not None
+    return float(state.seen.value.picture.mean())
 
 
 #: A board where `FRONT` wants it in the twin's picture of 32 x 24 pixels, near it, and elsewhere.
@@ -357,20 +358,17 @@ def test_a_captured_step_that_is_visited_again_shows_its_own_picture(bench: Cali
     shown = []
     for step in (1, 2):
         control.go_to(step)
-        assert state.seen.value is not None
-        shown.append(float(state.seen.value.picture.mean()))
+        shown.append(mean_seen(state))
     assert shown[1] > 1.2 * shown[0]
     control.leave()
     state, control = bench.wizard("selftest")
-    assert state.seen.value is None
     control.go_to(1)
-    assert state.seen.value is not None, "it is read from disk"
-    assert float(state.seen.value.picture.mean()) == shown[0]
+    assert mean_seen(state) == shown[0], "it is read from disk"
     # A step that is not captured yet shows nothing of another one.
     control.change_settings({"keys": "dim,night"})
     control.go_to(2)
     assert not is_on(state.is_checking)
-    assert seen_of(state) is None
+    assert state.seen.value is None
 
 
 def test_a_captured_step_without_frames_says_so(bench: CalibrateBench) -> None:
