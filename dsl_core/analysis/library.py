@@ -7,14 +7,10 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-import numpy as np
-
 from dsl_core.errors import CalibrationError
 from dsl_core.io.reading import read_bounded
 from dsl_core.io.spectra.catalogue import format_of, suffixes
-from dsl_core.io.spectra.records import Spectrum
-from dsl_core.io.spectra.reference_file import as_references
-from dsl_core.io.spectra.spectrum_file import of_kind
+from dsl_core.io.spectra.reference_file import as_references, shares_of
 from dsl_core.model.spectral import SpectralCurve
 from dsl_core.progress import NoProgress, Progress
 
@@ -60,8 +56,8 @@ def read_library(
 ) -> SpectralLibrary:
     """Read all reflectances of files and of folders with everything below them.
 
-    ``grouping`` is one of `GROUPINGS`; "auto" takes the folder where there are several, and else the name,
-    so that entries of one name are one class. A ``table`` (CSV with the columns ``name`` and ``group``)
+    ``grouping`` is one of `GROUPINGS`; "auto" takes the subfolder, and for what is in none the name, so
+    that entries of one name are one class. A ``table`` (CSV with the columns ``name`` and ``group``)
     decides for the entries that it names. A file that cannot be read is left out with a note. Raises
     `CalibrationError` when nothing is left.
     """
@@ -80,7 +76,7 @@ def read_library(
         listed = ", ".join(str(path) for path in paths)
         because = f" {notes[0]}" if notes else " There is no file of a format that is read here."
         raise CalibrationError(f"There is no reflectance spectrum in {listed}.{because}")
-    group_of = _grouped(grouping, [file for _, _, file in found], table)
+    group_of = _grouped(grouping, paths, [file for _, _, file in found], table)
     entries = (Entry(name, group_of(name, file), curve, file) for name, curve, file in found)
     return SpectralLibrary(tuple(entries), tuple(notes))
 
@@ -114,8 +110,9 @@ def _is_beside(file: Path) -> bool:
 
 def _entries(file: Path, note: Callable[[str], None]) -> list[tuple[str, SpectralCurve]]:
     kind = format_of(file)
-    spectra = of_kind(file, raw := kind.read(file), radiance=False, all_unstated=True)
-    spectra = _of_one_scale(file, raw, spectra, note)
+    spectra, as_percent = shares_of(file, kind.read(file))
+    if as_percent is not None:
+        note(f"{file.name}: values up to {as_percent:.3g} are read as percent.")
     if len(spectra) == 1 and not kind.is_library:
         # The title over a single column is mostly "reflectance".
         spectra = [replace(spectra[0], name=file.stem)]
@@ -125,42 +122,26 @@ def _entries(file: Path, note: Callable[[str], None]) -> list[tuple[str, Spectra
     return [(reference.name, reference.curve) for reference in content.references]
 
 
-def _of_one_scale(
-    file: Path, raw: list[Spectrum], spectra: list[Spectrum], note: Callable[[str], None]
-) -> list[Spectrum]:
-    """Percentages told, and given as shares where another spectrum of the file shows that they are."""
-    as_read = {id(each) for each in raw}
-    percent = [each for each in spectra if id(each) not in as_read]
-    if not percent:
-        return spectra
-    most = 100 * max(float(np.nanmax(each.values, initial=0.0)) for each in percent)
-    note(f"{file.name}: values up to {most:.3g} are read as percent.")
-    # A dark spectrum in percent looks like a share; its neighbours tell.
-    return [
-        Spectrum(each.name, each.nm, each.values * 0.01, each.quantity, True)
-        if id(each) in as_read and not each.scaled
-        else each
-        for each in spectra
-    ]
-
-
-def _grouped(grouping: str, files: list[Path], table: Path | None) -> Callable[[str, Path], str]:
+def _grouped(
+    grouping: str, paths: Sequence[Path], files: list[Path], table: Path | None
+) -> Callable[[str, Path], str]:
     named = {} if table is None else read_groups(table)
-    if grouping == "auto":
-        grouping = "folder" if len({file.parent for file in files}) > 1 else "repeated"
+    has_folders = len({file.parent for file in files}) > 1
+    # What lies beside the subfolders of a library has nothing in common but that.
+    tops = {path for path in paths if path.is_dir()}
 
     def group_of(name: str, file: Path) -> str:
         if name in named:
             return named[name]
         match grouping:
-            case "folder":
+            case "auto" if not has_folders or (file.parent in tops and len(tops) == 1):
+                return _REPEATED.sub("", name) or name
+            case "auto" | "folder":
                 return file.parent.name
             case "file":
                 return file.stem
             case "none":
                 return name
-            case "repeated":
-                return _REPEATED.sub("", name) or name
         return _NUMBER.sub("", name) or name
 
     return group_of

@@ -32,6 +32,14 @@ def test_folders_are_groups_and_any_format_is_read(tmp_path: Path) -> None:
     assert not notes
 
 
+def test_what_lies_beside_the_subfolders_of_a_library_is_no_class_of_its_own(tmp_path: Path) -> None:
+    for name in ("leaf", "sea"):
+        _csv(tmp_path / f"{name}.csv", SHARE, titles=("reflectance",))
+    _csv(tmp_path / "stone" / "a.csv", SHARE, titles=("reflectance",))
+    assert read_library([tmp_path]).groups == ("leaf", "sea", "stone")
+    assert read_library([tmp_path], "folder").groups == (tmp_path.name, "stone")
+
+
 def test_percent_is_told_and_dark_spectra_of_such_a_file_are_percent_too(tmp_path: Path) -> None:
     _csv(tmp_path / "two.csv", SHARE * 100, SHARE * 2, titles=("bright", "dark"))
     library = read_library([tmp_path / "two.csv"])

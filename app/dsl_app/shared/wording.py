@@ -57,12 +57,19 @@ def short_name(name: str, most: int = MOST_CHARACTERS) -> str:
     return f"{name[:ahead].rstrip()}…{name[len(name) - (most - 1 - ahead) :].lstrip()}"
 
 
+#: An "x" between two numbers, which terminals of all kinds show.
+_TIMES = re.compile(r"(?<=\d) x (?=\d)")
+
+
 def in_window(text: str) -> str:
-    """A sentence without options of commands.
+    """A sentence without options of commands, and with the sign that the window writes between sizes.
 
     >>> in_window("The scan contains no calibration. Name one with --calibration FILE.")
     'The scan contains no calibration. Choose one.'
+    >>> in_window("The board of 7 x 5 inner corners was not found.")
+    'The board of 7 × 5 inner corners was not found.'
     """
+    text = _TIMES.sub(" × ", text)
     if "--" in text or "'dsl-scan " in text:
         for typed, clicked in PHRASES:
             text = text.replace(typed, clicked)

@@ -22,7 +22,7 @@ def screens() -> list[str]:
     found = []
     for screen in application.screens():
         size, ratio = screen.size(), screen.devicePixelRatio()
-        real = f"{round(size.width() * ratio)} x {round(size.height() * ratio)} px"
+        real = f"{round(size.width() * ratio)} × {round(size.height() * ratio)} px"
         found.append(f"{screen.name()} {real}, scale {ratio:g}, {screen.refreshRate():.0f} Hz")
     return found
 

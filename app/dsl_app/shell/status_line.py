@@ -23,6 +23,7 @@ class StatusLine(QStatusBar):
 
     def __init__(self) -> None:
         super().__init__()
+        self._painted_text = ""
         self._keep_height()
 
     def _keep_height(self) -> None:
@@ -45,14 +46,17 @@ class StatusLine(QStatusBar):
 
     def paintEvent(self, event: QPaintEvent) -> None:
         """Paint the background and the hint."""
+        text = self.shown_text
+        if text != self._painted_text:
+            # What moved may have uncovered a part only; beside it, the old text would stay.
+            self._painted_text = text
+            self.update()
         option = QStyleOption()
         option.initFrom(self)
         painter = QPainter(self)
         self.style().drawPrimitive(QStyle.PrimitiveElement.PE_PanelStatusBar, option, painter, self)
         painter.setPen(self.palette().windowText().color())
-        painter.drawText(
-            self.room, Qt.AlignmentFlag.AlignVCenter | Qt.AlignmentFlag.AlignLeft, self.shown_text
-        )
+        painter.drawText(self.room, Qt.AlignmentFlag.AlignVCenter | Qt.AlignmentFlag.AlignLeft, text)
 
     def event(self, event: QEvent) -> bool:
         """Paint again when jobs come and go, which moves the room of the hint."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import unicodedata
 from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -68,6 +69,18 @@ def provenance_of(attributes: Mapping[str, Any]) -> dict[str, str]:
     return {**plain, "exported_by": f"dsl-scan {__version__}"}
 
 
+#: What letters without an accent to take off, and signs, are written as in ASCII.
+_IN_ASCII = str.maketrans(
+    {"ß": "ss", "æ": "ae", "ø": "o", "ł": "l", "−": "-", "–": "-", "×": "x", "±": "+-", "µ": "u", "μ": "u"}
+)
+
+
 def ascii_text(text: str) -> str:
-    """Text for headers that know only ASCII; other characters become ``?``."""
-    return text.encode("ascii", "replace").decode("ascii")
+    """Text for headers that know only ASCII, without accents; other characters become ``?``.
+
+    >>> ascii_text("groß, Blätter, 5 × 3 µm, 葉")
+    'gross, Blatter, 5 x 3 um, ?'
+    """
+    parts = unicodedata.normalize("NFKD", text.translate(_IN_ASCII))
+    plain = "".join(each for each in parts if not unicodedata.combining(each))
+    return plain.encode("ascii", "replace").decode("ascii")

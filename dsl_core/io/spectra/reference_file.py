@@ -30,19 +30,42 @@ class Reference:
 
 @dataclass(frozen=True)
 class ReferenceFile:
-    """The spectra of a file, and the names of those without values."""
+    """The spectra of a file, and the names of those without values.
+
+    ``as_percent`` is the largest value (%) of a file that states no unit, where that made it percent.
+    """
 
     references: tuple[Reference, ...]
     empty: tuple[str, ...] = ()
+    as_percent: float | None = None
 
 
 def read_references(path: Path) -> ReferenceFile:
     """All reflectances of a file, whatever range they cover; raises `CalibrationError`."""
     kind = format_of(path)
-    spectra = of_kind(path, kind.read(path), radiance=False, all_unstated=True)
+    spectra, as_percent = shares_of(path, kind.read(path))
     if len(spectra) == 1 and not kind.is_library:
         spectra = [replace(spectra[0], name="")]
-    return as_references(path, spectra)
+    return replace(as_references(path, spectra), as_percent=as_percent)
+
+
+def shares_of(path: Path, raw: list[Spectrum]) -> tuple[list[Spectrum], float | None]:
+    """The spectra of a file as shares, and the largest value (%) if they had to be guessed to be percent.
+
+    A dark spectrum in percent looks like a share; others of its file tell. Raises `CalibrationError`.
+    """
+    spectra, as_read = of_kind(path, raw, radiance=False, all_unstated=True), {id(each) for each in raw}
+    percent = [each for each in spectra if id(each) not in as_read]
+    if not percent:
+        return spectra, None
+    most = 100 * max(float(np.nanmax(each.values, initial=0.0)) for each in percent)
+    shares = [
+        Spectrum(each.name, each.nm, each.values * 0.01, each.quantity, True)
+        if id(each) in as_read and not each.scaled
+        else each
+        for each in spectra
+    ]
+    return shares, most
 
 
 def read_reference(path: Path, name: str = "") -> SpectralCurve:

@@ -64,6 +64,11 @@ def test_errors_labels_and_banners_say_what_to_click(qtbot: QtBot) -> None:
         assert text.endswith("or tick 'Use despite different settings'.")
 
 
+def test_sizes_are_written_with_the_sign_of_the_window() -> None:
+    assert in_window("7 x 5 corners, 640 x 360 px; x 3, a x b") == "7 × 5 corners, 640 × 360 px; x 3, a x b"
+    assert sentence_of(CalibrationError("It is 64 x 48 px.")) == "It is 64 × 48 px."
+
+
 def test_a_long_name_keeps_its_ends() -> None:
     name = "sample of the second day, third try, with the new film"
     short = short_name(name)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dsl_app.shell.status_line import GAP_PX, StatusLine
+from PySide6.QtGui import QPaintEvent
 from PySide6.QtWidgets import QLabel
 from pytestqt.qtbot import QtBot
 
@@ -28,3 +29,32 @@ def test_a_hint_ends_in_an_ellipsis_before_a_job(qtbot: QtBot) -> None:
     assert line.fontMetrics().horizontalAdvance(line.shown_text) <= line.room.width()
     line.clearMessage()
     assert line.shown_text == ""
+
+
+class Watched(StatusLine):
+    """A status line that keeps how far left each painting went."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.lefts: list[int] = []
+
+    def paintEvent(self, event: QPaintEvent) -> None:
+        self.lefts.append(event.rect().left())
+        super().paintEvent(event)
+
+
+def test_a_hint_with_more_room_is_painted_whole_and_not_only_where_room_came(qtbot: QtBot) -> None:
+    line = Watched()
+    qtbot.addWidget(line)
+    line.resize(1200, 30)
+    job = QLabel("Predict the accuracy", line)
+    job.setGeometry(400, 0, 700, 30)
+    line.show()
+    line.showMessage(HINT)
+    qtbot.waitUntil(lambda: bool(line.lefts))
+    qtbot.wait(20)
+    assert line.shown_text.endswith("…")
+    line.lefts.clear()
+    job.move(900, 0)
+    assert line.shown_text == HINT
+    qtbot.waitUntil(lambda: 0 in line.lefts, timeout=1000)

@@ -115,6 +115,9 @@ def test_what_does_not_fit_is_told_with_its_figure(known: Any) -> None:
     for words in ("Look at the light of the diffraction orders", "0.08 ± 0.01", "brighter", "orders again"):
         assert words in text
     assert "findings" not in text
+    # The verdict comes first; its figures, which few people read, after what was measured.
+    told = [text.index(words) for words in ("Look at the light", "Pictures", "Spectra", "Fit of the model")]
+    assert told == sorted(told)
 
 
 def test_what_a_calibration_missed_is_told_and_not_as_provenance(known: Any) -> None:

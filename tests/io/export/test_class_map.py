@@ -14,7 +14,7 @@ from tests.cases.small_result import COLUMNS, ROWS, small_result
 VALUES = (np.arange(ROWS * COLUMNS).reshape(ROWS, COLUMNS) % 3).astype(np.uint8)
 FOUND = Classified(
     values=VALUES,
-    labels=("none", "leaf, {green}", "stone"),
+    labels=("none", "leaf, {green}", "Großstein ü"),
     colours=("#000000", "#10a020", "#8090ff"),
     fit=np.linspace(0, 1, VALUES.size, dtype=np.float32).reshape(VALUES.shape),
     margin=np.linspace(2, 3, VALUES.size, dtype=np.float32).reshape(VALUES.shape),
@@ -35,7 +35,7 @@ def test_an_envi_classification_has_its_classes_with_names_and_colours(tmp_path:
         "0",
     )
     assert (header["header offset"], header["interleave"], header["classes"]) == ("0", "bsq", "3")
-    assert header["class names"] == ["none", "leaf; (green)", "stone"]
+    assert header["class names"] == ["none", "leaf; (green)", "Grossstein u"]
     assert [int(level) for level in header["class lookup"]] == [0, 0, 0, 16, 160, 32, 128, 144, 255]
     assert header["description"].startswith("nearest angle; (library)")
     assert "scan_id: 2026-05-04-chart" in header["description"]

@@ -81,7 +81,7 @@ def test_ply_keeps_a_missing_band_as_nan_and_names_the_scan(tmp_path: Path) -> N
     assert np.isnan(meshio.read(path).point_data["scalar_432.5nm"]).sum() == 1
     header = path.read_bytes().split(b"end_header")[0].decode("ascii")
     assert "comment scan_id: 2026-05-04-chart\n" in header
-    assert "comment calibration: twin ?-rig\n" in header
+    assert "comment calibration: twin u-rig\n" in header
     assert "comment exported_by: dsl-scan" in header
 
 

@@ -161,3 +161,13 @@ def test_a_table_of_this_program_holds_several(tmp_path: Path) -> None:
     path.write_text(path.read_text("utf-8").replace("\n500,", "\nfive,"), "utf-8")
     with pytest.raises(CalibrationError, match=r"table\.csv: a cell is not a number"):
         read_references(path)
+
+
+def test_a_dark_spectrum_of_a_file_in_percent_is_percent_too(tmp_path: Path) -> None:
+    path = tmp_path / "two.csv"
+    path.write_text("\n".join(["nm,white,black", *(f"{nm},90,1.5" for nm in range(400, 701, 10))]))
+    found = read_references(path)
+    assert [each.curve.values[0] for each in found.references] == [0.9, 0.015]
+    assert found.as_percent == 90
+    path.write_text(path.read_text().replace(",90,1.5", ",0.9,0.015"))
+    assert read_references(path).as_percent is None

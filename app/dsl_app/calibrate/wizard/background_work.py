@@ -9,11 +9,13 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from dsl_app.calibrate.campaign_status import Recipes
 from dsl_app.calibrate.wizard.ghost import PointsPx, as_points, ghost, shared_part
 from dsl_app.calibrate.wizard.settings import changed_settings, setting_rows
 from dsl_app.calibrate.wizard.state import Fit, Look, Seen, SettingRow
+from dsl_app.shared.notify import sentence_of
 from dsl_core.campaign.common.recipe import AnyRecipe, Step
 from dsl_core.campaign.guide import calibrated_rig
 from dsl_core.campaign.products import Products, write_products
@@ -21,7 +23,7 @@ from dsl_core.campaign.session import CalibrationSession, StepStatus
 from dsl_core.capture.display import Display
 from dsl_core.capture.preview import MANY_SATURATED, quick_picture, statistics
 from dsl_core.devices.base import Camera, CameraInfo, DeviceRig
-from dsl_core.errors import CalibrationError, Cancelled, DslError
+from dsl_core.errors import CalibrationError, Cancelled, DslError, StoreError
 from dsl_core.io.calibration_library import CalibrationLibrary
 from dsl_core.io.campaign_folder import CampaignFolder
 from dsl_core.model.figure import failures
@@ -126,6 +128,8 @@ class BackgroundWork:
         """Let the rig place the target if it can, once for each step."""
         if self._placed != step.key:
             self._placed = ""
+            # What stood there before may be brighter, and would be shown below what is found now.
+            self.camera.forget()
             self.session.place(step)
             self._placed = step.key
 
@@ -137,7 +141,7 @@ class BackgroundWork:
         try:
             figures = self.session.look(step, lambda points_px: seen.append(as_points(points_px)))
         except CalibrationError as error:
-            return Look(step.key, (), str(error))
+            return Look(step.key, (), sentence_of(error))
         points_px = seen[-1] if seen else ()
         wanted = ghost(step.placement, self.session.bench.rig.camera)
         return Look(step.key, figures, "", points_px, shared_part(wanted, points_px))
@@ -160,6 +164,18 @@ class BackgroundWork:
         except (DslError, OSError) as error:
             return Captured(self.session.statuses(), error)
         return Captured(self.session.statuses())
+
+    def kept_picture(self, step: Step) -> Seen | None:
+        """What the camera saw when a step was captured; None where no frames of it are kept."""
+        try:
+            scan = self.session.bench.scan_of(step)
+            shots = list(scan.plan.shots())
+            # Lit by lines a target is dark: in the middle of the frame they are most likely to be on it.
+            white = next((shot for shot in shots if shot.role == "white"), shots[len(shots) // 2])
+            pixels = scan.read(white)
+        except StoreError:
+            return None
+        return self.camera.as_seen(pixels)
 
     def fit(self, progress: Progress) -> Fit:
         """Fit the captures of all steps."""
@@ -244,6 +260,12 @@ class WatchedCamera(Camera):
             return 0.0
         return light_dn * share
 
+    def forget(self) -> None:
+        """Forget what was seen: another target comes, and its first frame is worth showing."""
+        with self._lock:
+            self._frame = None
+            self._best, self._brightest_dn = (0.0, 1.0), 0.0
+
     def take_frame(self) -> Frame | None:
         """The latest frame since the last call; None without one."""
         with self._lock:
@@ -253,11 +275,13 @@ class WatchedCamera(Camera):
     def take_seen(self) -> Seen | None:
         """The latest frame since the last call as people look at it; None without one."""
         frame = self.take_frame()
-        if frame is None:
-            return None
+        return None if frame is None else self.as_seen(frame.pixels)
+
+    def as_seen(self, pixels: NDArray[np.uint16]) -> Seen:
+        """A raw mosaic of this camera, shape (rows, columns), as people look at it."""
         full_scale = 2**self.info.bit_depth - 1
-        picture = quick_picture(frame.pixels, self.info.bayer, full_scale, True, AS_SEEN)
-        return Seen(picture, max(statistics(frame.pixels, self.info.bayer, full_scale).saturated))
+        picture = quick_picture(pixels, self.info.bayer, full_scale, True, AS_SEEN)
+        return Seen(picture, max(statistics(pixels, self.info.bayer, full_scale).saturated))
 
     def close(self) -> None:
         """Close the camera."""

@@ -12,7 +12,7 @@ from dsl_app.calibrate.wizard.background_work import BackgroundWork, Captured, O
 from dsl_app.calibrate.wizard.ghost import keeps_still
 from dsl_app.calibrate.wizard.jobs import WizardJobs
 from dsl_app.calibrate.wizard.settings import trouble_in_titles
-from dsl_app.calibrate.wizard.state import Doing, Fit, Look, WizardState
+from dsl_app.calibrate.wizard.state import Doing, Fit, Look, Seen, WizardState
 from dsl_app.connection.controller import RigController
 from dsl_app.connection.state import Link
 from dsl_app.shared.jobs.base import JobRunner
@@ -135,8 +135,26 @@ class WizardController:
         state.at.set(page)
         status = state.status
         # A captured step needs no look; at any other the person places the next target.
-        needs_look = status is not None and status.state != "captured"
+        is_captured = status is not None and status.state == "captured"
+        needs_look = status is not None and not is_captured
         state.is_checking.set(needs_look and (was_checking or state.places_itself.value))
+        if not state.is_checking.value:
+            # What was seen of another step is not what this one's outline is for.
+            state.seen.set(None)
+        if is_captured:
+            self._jobs.after_look(self._show_capture)
+
+    def _show_capture(self) -> None:
+        """Show what the camera saw when the step that is shown was captured."""
+        status, work = self.state.status, self._the_work
+        if status is None or status.state != "captured":
+            return
+
+        def read(seen: Seen | None) -> None:
+            if self.state.status is not None and self.state.status.step.key == status.step.key:
+                self.state.seen.set(seen)
+
+        self._jobs.start(Doing.READING, "Read", lambda _: work.kept_picture(status.step), read)
 
     # Look ------------------------------------------------------------------------------------------
 

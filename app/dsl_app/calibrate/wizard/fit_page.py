@@ -20,6 +20,11 @@ from dsl_app.shared.widgets.inside import apply_theme_inside
 from dsl_app.shared.widgets.layouts import column_of, splitter
 from dsl_core.campaign.session import CalibrationSession
 
+NO_FIT = (
+    "A fit takes seconds to minutes and changes nothing yet. Its figures are listed here against their"
+    " limits, below pictures of what they rest on; then you accept it, or redo a step."
+)
+
 
 class FitPage(QWidget):
     """Follows the fit of a wizard; ``settings_requested`` passes on what a person changed on the evidence."""
@@ -35,6 +40,7 @@ class FitPage(QWidget):
         self.verdict.setAccessibleName("Verdict on the fit")
         self.figures = FiguresTable("Key figures of the fit")
         self.figures.setMinimumHeight(120)
+        self.figures.empty_text = NO_FIT
         self.allow = QCheckBox("Accept although figures are outside their limits")
         self.allow.setToolTip("The report and the library continue to show that these figures are missed")
         self.allow.toggled.connect(self._allow)
@@ -54,7 +60,8 @@ class FitPage(QWidget):
         shown = fit_display(self._state)
         self.verdict.setText(shown.verdict)
         set_role(self.verdict, shown.role)
-        self.figures.setVisible(shown.has_fit)
+        # A misfit has evidence of its own, which needs the room.
+        self.figures.setVisible(shown.has_fit or self._state.misfit.value is None)
         self.allow.setVisible(shown.can_allow)
         with quiet(self.allow):
             self.allow.setChecked(shown.is_allowed)
@@ -101,6 +108,7 @@ class FitPage(QWidget):
 
     def _show_misfit(self, session: CalibrationSession | None) -> None:
         """Show captures that gave no fit, where a look at them helps."""
+        self._show()
         if session is None or self._state.fit.value is not None:
             return
         made = self._evidence or self._make_evidence()

@@ -67,7 +67,7 @@ class WizardJobs:
         if self.is_free:
             self.state.is_checking.set(False)
             then()
-        elif self.state.doing.value in (Doing.LOOKING, Doing.OPENING):
+        elif self.state.doing.value in (Doing.LOOKING, Doing.READING, Doing.OPENING):
             self.state.is_checking.set(False)
             self._queued = then
 

@@ -10,7 +10,7 @@ from dsl_app.calibrate.wizard.state import Doing, Fit, Look, WizardState
 from dsl_app.shared.jobs.base import JobProgress
 from dsl_app.shared.notify import describe_seconds
 from dsl_app.shared.widget_state import ButtonState
-from dsl_core.campaign.session import State
+from dsl_core.campaign.session import State, StepStatus
 from dsl_core.model.figure import Figure, failures
 from dsl_core.model.placement import Placement
 
@@ -20,6 +20,9 @@ Verdict = tuple[str, str]
 Main = Literal["back", "next", "all", "check", "capture", "fit", "accept", "following", "leave"]
 #: The page of the settings, and that of the first step.
 SETTINGS_PAGE, FIRST_PAGE = 0, 1
+NO_PICTURE = "No picture yet. It comes with the first check."
+READING = "Reading the picture…"
+NONE_KEPT = "Figures of this step are kept, and no picture. A check shows what the camera sees now."
 ADVANCED_TIP = "Settings of this calibration: the target's size, distances, how much is captured"
 _MARKS: dict[State, str] = {"missing": "○", "captured": "✓", "refused": "✗"}
 _MARK_ROLES = {"✓": "good", "✗": "bad"}
@@ -193,6 +196,7 @@ class StepDisplay:
     points: Points
     verdict: str
     role: str
+    why_no_picture: str
 
 
 @dataclass(frozen=True)
@@ -226,7 +230,16 @@ def step_display(state: WizardState) -> StepDisplay | None:
     figures = () if look is None else look.figures
     found = () if look is None else look.points_px
     points = Points(state.outline, found, state.covered.value)
-    return StepDisplay(step.title, step.instruction, step.placement, figures, points, *_step_verdict(state))
+    why = _why_no_picture(state, status)
+    return StepDisplay(
+        step.title, step.instruction, step.placement, figures, points, *_step_verdict(state), why
+    )
+
+
+def _why_no_picture(state: WizardState, status: StepStatus) -> str:
+    if state.doing.value is Doing.READING:
+        return READING
+    return NONE_KEPT if status.state == "captured" else NO_PICTURE
 
 
 def _step_verdict(state: WizardState) -> Verdict:

@@ -24,6 +24,7 @@ class Doing(Enum):
     OPENING = "opening"
     IDLE = ""
     LOOKING = "looking"
+    READING = "reading the picture"
     CAPTURING = "capturing"
     STOPPING = "stopping"
     FITTING = "fitting"

@@ -9,7 +9,7 @@ from PySide6.QtWidgets import QWidget
 from dsl_app.calibrate.figures_table import FiguresTable
 from dsl_app.calibrate.wizard.ghost import PointsPx
 from dsl_app.calibrate.wizard.placement_drawing import PlacementDrawing
-from dsl_app.calibrate.wizard.presentation import Points, step_display
+from dsl_app.calibrate.wizard.presentation import NO_PICTURE, Points, step_display
 from dsl_app.calibrate.wizard.state import Seen, WizardState
 from dsl_app.shared.evented import follow_any
 from dsl_app.shared.theme import DARK, Theme
@@ -21,7 +21,6 @@ from dsl_core.capture.preview import MANY_SATURATED
 TABLE_PX = 166
 DASHES = Qt.PenStyle.DashLine
 NO_FIGURES = "What a check finds is listed here: figures, their limits, and what to do about those outside."
-NO_PICTURE = "No picture yet. It comes with the first check."
 
 
 class StepPage(QWidget):
@@ -59,6 +58,7 @@ class StepPage(QWidget):
         self.drawing.show_placement(shown.placement)
         self.figures.show_figures(shown.figures)
         self.picture.show_points(shown.points)
+        self.picture.say_why_empty(shown.why_no_picture)
         self.verdict.setText(shown.verdict)
         set_role(self.verdict, shown.role)
 
@@ -76,12 +76,12 @@ class LiveFrameView(QWidget):
         self.view.setMinimumSize(220, 150)
         self.view.box.setMouseEnabled(False, False)
         self._theme = DARK
-        self._points = Points()
+        self._points, self._why_empty = Points(), NO_PICTURE
         self._wanted = pg.PlotCurveItem(antialias=True)
         self._found, self._covered = pg.ScatterPlotItem(size=7), pg.ScatterPlotItem(size=5)
         for item in (self._covered, self._wanted, self._found):
             self.view.box.addItem(item, ignoreBounds=True)
-        self._text = label(NO_PICTURE, "muted", wraps=True)
+        self._text = label(self._why_empty, "muted", wraps=True)
         self.legend = [label("") for _ in range(3)]
         column_of((self.view, 1), row_of((self._text, 1), *self.legend), on=self, margins=0)
 
@@ -90,7 +90,7 @@ class LiveFrameView(QWidget):
         if seen is None:
             self.view.image.clear()
             self._draw(has_picture=False)
-            self._text.setText(NO_PICTURE)
+            self._text.setText(self._why_empty)
             set_role(self._text, "muted")
             return
         self._draw(has_picture=True)
@@ -98,6 +98,12 @@ class LiveFrameView(QWidget):
         self.view.fit()
         self._text.setText(f"saturated {100 * seen.saturated:.2f} %")
         set_role(self._text, "bad" if seen.saturated > MANY_SATURATED else "muted")
+
+    def say_why_empty(self, text: str) -> None:
+        """Say below the place of the picture why there is none, while there is none."""
+        self._why_empty = text
+        if self.view.image.image is None:
+            self._text.setText(text)
 
     def show_points(self, points: Points) -> None:
         """Draw points over the picture, as far as there is one."""

@@ -171,8 +171,8 @@ def require_sizes(rig: Rig | None, mapping: Mapping, camera_px: Size) -> None:
         size = device.width_px, device.height_px
         if tuple(given) != size:
             raise CalibrationError(
-                f"{what} {given[0]} x {given[1]} px; the calibration {rig.name!r} is for"
-                f" {size[0]} x {size[1]} px. Choose the calibration of these pictures, or none."
+                f"{what} {given[0]} × {given[1]} px; the calibration {rig.name!r} is for"
+                f" {size[0]} × {size[1]} px. Choose the calibration of these pictures, or none."
             )
 
 

@@ -67,6 +67,14 @@ class MarksController:
         def done(content: ReferenceFile) -> None:
             if self.state.result.value is not result:
                 return
+            if content.as_percent is not None:
+                most = content.as_percent
+                self._notifier.tell(
+                    "info",
+                    f"{path.name} states no unit: values up to {most:.3g} are read as percent, {most:.3g} as"
+                    f" a reflectance of {most / 100:.3g}. If that is wrong, divide them by those of a white"
+                    " standard.",
+                )
             if len(content.references) == 1:
                 self.add_references(path, content.references)
             else:

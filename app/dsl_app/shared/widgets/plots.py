@@ -34,6 +34,7 @@ class CalmPlot(pg.PlotWidget):  # type: ignore[misc]
         for side, text in (("left", left), ("bottom", bottom)):
             item.setLabel(side, text)
             item.getAxis(side).enableAutoSIPrefix(False)
+            write_minus(item.getAxis(side))
             # Drawn once, and not again with every curve that moves over their grid.
             item.getAxis(side).setCacheMode(QGraphicsItem.CacheMode.DeviceCoordinateCache)
         item.getAxis("left").setWidth(left_width)
@@ -63,10 +64,23 @@ def colour_legend(legend: Any, colour: str) -> None:
         text.setText(text.text, color=colour)
 
 
+def write_minus(axis: Any) -> None:
+    """Let an axis of pyqtgraph write a minus before negative numbers, as tables do, and not a hyphen."""
+    if "tickStrings" in vars(axis):
+        return
+    plain = axis.tickStrings
+
+    def strings(values: list[float], scale: float, spacing: float) -> list[str]:
+        return [text.replace("-", "−") for text in plain(values, scale, spacing)]
+
+    axis.tickStrings = strings
+
+
 def theme_bar(bar: Any, theme: Theme) -> None:
     """Apply the colours of a theme to a colour bar of pyqtgraph."""
     for side in ("left", "right"):
         axis = bar.getAxis(side)
+        write_minus(axis)
         axis.setTextPen(theme.text)
         axis.setPen(theme.line)
         axis.labelStyle["color"] = theme.text

@@ -96,3 +96,15 @@ def test_the_brightest_frame_is_forgotten_after_a_while(info: CameraInfo) -> Non
     camera.snap()
     assert camera.take_frame() is not None
     assert camera.take_frame() is None, "a frame is taken once"
+
+
+def test_a_darker_target_is_shown_at_once_after_another_one(info: CameraInfo) -> None:
+    camera = WatchedCamera(Scripted([frame(level) for level in (1000, 400, 1000, 400)], info))
+    for forgets in (False, True):
+        camera.snap()
+        if forgets:
+            camera.forget()
+        camera.snap()
+        taken = camera.take_frame()
+        assert taken is not None
+        assert taken.pixels[0, 0] == (400 if forgets else 1000)

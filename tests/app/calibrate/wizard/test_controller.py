@@ -9,7 +9,8 @@ import pytest
 from dsl_app.calibrate.state import RowState
 from dsl_app.calibrate.wizard.controller import WizardController
 from dsl_app.calibrate.wizard.ghost import PointsPx, as_points, ghost
-from dsl_app.calibrate.wizard.state import Doing
+from dsl_app.calibrate.wizard.presentation import NONE_KEPT, step_display
+from dsl_app.calibrate.wizard.state import Doing, WizardState
 
 from dsl_core.devices.base import DeviceRig
 from dsl_core.errors import CalibrationError, DeviceError, StoreError
@@ -69,6 +70,11 @@ def test_a_wizard_goes_from_placement_to_acceptance_and_writes_the_rig(bench: Ca
     assert all(row.state.is_accepted for row in bench.state.rows.value)
     assert bench.library.names() == ("campaign",)
     assert [line.name for line in bench.state.library.value] == ["campaign"]
+
+
+def mean_seen(state: WizardState) -> float:
+    assert state.seen.value is not None
+    return float(state.seen.value.picture.mean())
 
 
 #: A board where `FRONT` wants it in the twin's picture of 32 x 24 pixels, near it, and elsewhere.
@@ -342,6 +348,39 @@ def test_a_rig_that_places_targets_captures_all_steps_by_itself(bench: Calibrate
     control.change_settings({"keys": "night"})
     control.capture_all()
     assert "'night picture' does not look right" in state.trouble.value
+
+
+def test_a_captured_step_that_is_visited_again_shows_its_own_picture(bench: CalibrateBench) -> None:
+    state, control = bench.wizard("selftest")
+    for _ in range(2):
+        control.capture()
+    control.take_news()
+    shown = []
+    for step in (1, 2):
+        control.go_to(step)
+        shown.append(mean_seen(state))
+    assert shown[1] > 1.2 * shown[0]
+    control.leave()
+    state, control = bench.wizard("selftest")
+    control.go_to(1)
+    assert mean_seen(state) == shown[0], "it is read from disk"
+    # A step that is not captured yet shows nothing of another one.
+    control.change_settings({"keys": "dim,night"})
+    control.go_to(2)
+    assert not is_on(state.is_checking)
+    assert state.seen.value is None
+
+
+def test_a_captured_step_without_frames_says_so(bench: CalibrateBench) -> None:
+    state, control = bench.wizard("selftest")
+    control.capture()
+    (bench.campaign / "selftest" / "dim" / "scan.dsl" / "manifest.json").rename(bench.folder / "away")
+    work = control._the_work
+    assert work.kept_picture(work.session.steps[0]) is None
+    control.go_to(1)
+    shown = step_display(state)
+    assert shown is not None
+    assert shown.why_no_picture == NONE_KEPT
 
 
 def test_leaving_while_something_runs_waits_for_its_end(bench: CalibrateBench) -> None:

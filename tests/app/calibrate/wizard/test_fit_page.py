@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 from dsl_app.calibrate.evidence.base import PlainEvidence
-from dsl_app.calibrate.wizard.fit_page import FitPage
+from dsl_app.calibrate.wizard.fit_page import NO_FIT, FitPage
 from dsl_app.calibrate.wizard.state import Fit, WizardState
 from pytestqt.qtbot import QtBot
 
@@ -30,6 +30,8 @@ def test_captures_without_a_fit_are_shown_where_that_helps(
         page = FitPage(state)
         qtbot.addWidget(page)
         page.show()
+        assert page.figures.isVisible()
+        assert page.figures.empty_text == NO_FIT
         session = session_of({})
         state.misfit.set(session)
         assert page.evidence is not None

@@ -99,7 +99,7 @@ def test_results_of_other_sizes_are_refused_in_a_sentence(results: tuple[Path, P
     compare.open(results[0])
     compare.open(results[2])
     assert compare.state.pair.value is None
-    assert "64 x 48 and 36 x 24 pixels" in compare.state.trouble.value
+    assert "64 × 48 and 36 × 24 pixels" in compare.state.trouble.value
 
 
 def test_sides_change_places(results: tuple[Path, Path, Path]) -> None:

@@ -68,7 +68,7 @@ def test_pictures_of_other_sizes_are_named(folder: Path, tmp_path: Path) -> None
     write(copy, {"im_05.png": np.full((10, 8), 9, np.uint16)})
     control = control_of(tmp_path)
     control.open(copy)
-    assert "im_05.png is 8 x 10 px" in troubles(control)[Place.FOLDER]
+    assert "im_05.png is 8 × 10 px" in troubles(control)[Place.FOLDER]
 
 
 def test_a_change_is_checked_and_what_is_not_possible_is_not_done(control: CapturesController) -> None:

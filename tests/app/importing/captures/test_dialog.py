@@ -118,7 +118,7 @@ def test_a_wrong_folder_and_calibration_are_said_beside_them(
     QTest.keyClick(dialog.calibration, Qt.Key.Key_Down)
     settle(qtbot, dialog)
     assert dialog._state.request.value.calibration == NOMINAL
-    assert "The pictures are 64 x 48 px" in dialog.about_calibration.text()
+    assert "The pictures are 64 × 48 px" in dialog.about_calibration.text()
     assert dialog.about_calibration.property("role") == "bad"
     QTest.keyClick(dialog, Qt.Key.Key_Escape)
     assert not dialog.isVisible()

@@ -131,10 +131,10 @@ def test_what_a_calibration_lacks_is_named(folder: Path, tmp_path: Path) -> None
 
 def test_a_calibration_for_other_sizes_is_refused(folder: Path, tmp_path: Path) -> None:
     nominal = replace(request_for(folder, tmp_path), calibration=NOMINAL)
-    assert "The pictures are 64 x 48 px" in listed(nominal, tmp_path)[1][Place.CALIBRATION]
+    assert "The pictures are 64 × 48 px" in listed(nominal, tmp_path)[1][Place.CALIBRATION]
     rig = small_rig()
     camera_px = rig.camera.width_px, rig.camera.height_px
-    with pytest.raises(CalibrationError, match="The projector of the mapping is 32 x 24 px"):
+    with pytest.raises(CalibrationError, match="The projector of the mapping is 32 × 24 px"):
         require_sizes(rig, MAPPING, camera_px)
 
 

@@ -63,7 +63,7 @@ def test_doubts_are_told_without_options_of_commands(tmp_path: Path) -> None:
     doubts = ("a projector of 32 x 24 px is assumed; give --projector", "rows fall")
     state.stated.set(Stated(MAPPING.model_copy(update={"unsure": doubts})))
     said = captures_view(state).mapping
-    assert said.text == "Unsure: a projector of 32 x 24 px is assumed; rows fall."
+    assert said.text == "Unsure: a projector of 32 × 24 px is assumed; rows fall."
     assert said.role == "warn"
 
 

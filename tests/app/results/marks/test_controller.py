@@ -118,6 +118,15 @@ def test_a_reference_beside_the_bands_is_told(bench: Bench, tmp_path: Path) -> N
     assert len(bench.names) == 1
 
 
+def test_values_without_a_unit_that_are_taken_for_percent_are_told(bench: Bench, tmp_path: Path) -> None:
+    bench.control.marks.add_reference(write_reference(tmp_path / "tile.csv", 100 * BLUE))
+    most = 100 * float(np.max(BLUE))
+    assert f"values up to {most:.3g} are read as percent" in bench.told
+    (listed,) = bench.state.marks.value
+    assert listed.curve is not None
+    np.testing.assert_allclose(max(listed.curve.values), np.max(BLUE), atol=1e-6)
+
+
 def test_a_file_without_spectrum_is_told(bench: Bench, tmp_path: Path) -> None:
     (tmp_path / "a.csv").write_text("hello")
     assert bench.control.open(tmp_path / "a.csv")

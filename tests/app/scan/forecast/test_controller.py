@@ -272,6 +272,6 @@ def test_a_look_of_another_size_says_so(bench: ScanBench, tmp_path: Path, counte
     control = forecast(bench, tmp_path)
     control.look(write_small_result(tmp_path))
     assert control.state.points.value == ()
-    assert "pixels; rig 'twin' takes pictures of 64 x 48. Name the rig" in control.state.trouble.value
+    assert "pixels; rig 'twin' takes pictures of 64 × 48. Name the rig" in control.state.trouble.value
     control.look(None)
     assert [control.state.trouble.value] == [""]

@@ -27,7 +27,7 @@ def written(material: str, surface: Surface = SURFACE) -> list[str]:
 def test_a_surface_with_a_texture_counts_from_one_and_from_the_lower_left() -> None:
     assert written("scan.mtl") == [
         "# unit mm, camera frame: x right, y down, z forward",
-        "# rig: twin ? rig",
+        "# rig: twin u rig",
         f"# plan: {'x' * 200}",
         "mtllib scan.mtl",
         "usemtl surface",
