@@ -78,8 +78,17 @@ class GeometrySteps:
             doubt = spread_doubt(self.rig, lines, code, white, frames, spread)
         columns = columns_by_rows(self.rig, options, frames, code, white, peak_error, self._progress)
         named = NamedPlaces.of(code)
-        del code, white
         wave = code_wave(lines, named.column, columns.maps) if refines_rig else None
+        if wave is not None and doubt is not None:
+            own = wave.own_width(doubt)
+            doubt = own.known(doubt)
+            if own.changed:
+                self.findings.append(own.finding())
+                self.rig = own.of(self.rig)
+                peak_error = own_peak_error(self.rig, lines, code, white, frames)
+                columns = columns_by_rows(self.rig, options, frames, code, white, peak_error, self._progress)
+                wave = code_wave(lines, named.column, columns.maps)
+        del code, white
         if wave is not None:
             self.findings.append(wave.finding())
         geometry = geometry_of(
