@@ -31,6 +31,8 @@ TELLING_PX = 0.04
 MOST_WAVE_PX = 0.04
 #: A difference from the calibrated width that is followed.
 MOST_WIDER = 0.03
+#: Parts of the picture, down and across, whose widths are compared.
+PARTS = (3, 3)
 
 
 @dataclass(frozen=True)
@@ -148,6 +150,31 @@ def code_wave(lines: LineSet | None, named_px: NDArray[np.integer], maps: Column
     with np.errstate(invalid="ignore"):
         telling = np.maximum(std[left], std[right]) < TELLING_PX
     return CodeWave(off[telling], away[telling], away_std[telling]) if telling.any() else None
+
+
+def with_varying_width(
+    doubt: SpreadDoubt, lines: LineSet | None, named_px: NDArray[np.integer], maps: ColumnMaps
+) -> SpreadDoubt:
+    """A doubt that holds by how much widths of parts of the picture (rows, columns) differ, if that matters.
+
+    One width for all is off in most places of a lens that blurs its corners, and waves of opposite signs
+    cancel in the whole picture. Other arguments are those of `code_wave`.
+    """
+    row, column = (np.arange(size) * parts // size for size, parts in zip(named_px.shape, PARTS, strict=True))
+    part = (row[:, None] * PARTS[1] + column).ravel()
+    waves = [
+        code_wave(lines, named_px.ravel()[part == each], maps.of(part == each))
+        for each in range(PARTS[0] * PARTS[1])
+    ]
+    free = replace(doubt, relative=1.0)
+    widths = [wave.own_width(free) for wave in waves if wave is not None]
+    if len(widths) < 2:
+        return doubt
+    wider, std = (np.array([getattr(each, name) for each in widths]) for name in ("wider", "std"))
+    varies, varies_std = rms_beyond_chance(wider - np.average(wider, weights=std**-2), std)
+    if not matters(varies, varies_std, MOST_WIDER):
+        return doubt
+    return replace(doubt, relative=math.hypot(doubt.relative, varies))
 
 
 def _mirrored(lines: LineSet) -> tuple[NDArray[np.int64], NDArray[np.int64]]:

@@ -14,7 +14,7 @@ from dsl_core import pipeline
 from dsl_core.model.options import Options
 from dsl_core.model.presets import preset_plan
 from dsl_core.optics.lines.line_set import LineSet
-from dsl_core.reconstruction.code_wave import OwnWidth, code_wave
+from dsl_core.reconstruction.code_wave import OwnWidth, code_wave, with_varying_width
 from dsl_core.reconstruction.columns.maps import ColumnMaps
 from dsl_core.reconstruction.columns.spread_doubt import PLACES, SpreadDoubt
 from dsl_core.simulation.sim_devices import open_twin
@@ -116,6 +116,25 @@ def test_a_wave_of_another_shape_says_less_of_the_width() -> None:
     assert found is not None
     other = replace(found, away_px=found.away_px * np.array([1.0, -1.0]))
     assert other.own_width(doubt_of(1.0)).std > 3 * found.own_width(doubt_of(1.0)).std
+
+
+def test_widths_that_differ_over_the_picture_are_doubted() -> None:
+    """Lines of the left part are wider, those of the right narrower: no width of all is off."""
+    rng = np.random.default_rng(6)
+    true_px = rng.uniform(3, 190, (60, 150))
+    sine = np.sin(2 * math.pi / LINES.step_px * (true_px - LINES.first_px))
+    wider = np.linspace(0.15, -0.15, 150)
+    named = np.round(true_px).astype(np.int32)
+    before = doubt_of(0.01)
+    varied, even = (
+        with_varying_width(before, LINES, named, maps_of((true_px - each * sine).ravel()))
+        for each in (wider, 0.1)
+    )
+    # The means of three parts are .1, 0 and -.1.
+    assert varied.relative == pytest.approx(0.1 * math.sqrt(2 / 3), rel=0.25)
+    assert even is before
+    unknown = with_varying_width(before, LINES, np.full_like(named, -1), maps_of(true_px.ravel()))
+    assert unknown is before
 
 
 def test_a_scan_with_wider_lines_says_so_and_follows_them() -> None:
