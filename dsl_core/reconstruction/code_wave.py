@@ -144,7 +144,7 @@ def code_wave(lines: LineSet | None, named_px: NDArray[np.integer], maps: Column
     place = np.floor(exact).astype(np.int64) % lines.step_px
     shift, std = displacement(named_px[known], exact, place, lines.step_px)
     left, right = _mirrored(lines)
-    off = (right + 0.5 - lines.first_px) % lines.step_px
+    off = np.asarray((right + 0.5 - lines.first_px) % lines.step_px, np.float64)
     # What has moved displaces both sides alike, and cancels.
     away, away_std = (shift[left] - shift[right]) / 2, np.hypot(std[left], std[right]) / 2
     with np.errstate(invalid="ignore"):
