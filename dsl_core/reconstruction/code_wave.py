@@ -3,20 +3,23 @@
 Lines that lie side by side add up to the same light at every place, however wide they are: nothing in them
 says how wide. A spread that is off displaces columns to or from the middles of lines. The code has fewer
 places, but they do not depend on the lines: at each of its boundaries, pixels tell by how much columns are
-displaced there.
+displaced there. A width that explains this is the scan's own.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import math
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dsl_core.model.fit import FitFinding, matters
+from dsl_core.model.rig import Rig
 from dsl_core.optics.lines.line_set import LineSet
 from dsl_core.reconstruction.code_agreement import displacement, rms_beyond_chance
 from dsl_core.reconstruction.columns.maps import ColumnMaps
+from dsl_core.reconstruction.columns.spread_doubt import SpreadDoubt
 
 Floats = NDArray[np.float64]
 
@@ -26,15 +29,60 @@ MOST_NOISE_PX = 0.1
 TELLING_PX = 0.04
 #: A wave (rms, px) that matters.
 MOST_WAVE_PX = 0.04
+#: A difference from the calibrated width that is followed.
+MOST_WIDER = 0.03
+#: Parts of the picture, down and across, whose widths are compared.
+PARTS = (3, 3)
+
+
+@dataclass(frozen=True)
+class OwnWidth:
+    """By how much of the calibrated width lines are wider than that, and the deviation of it."""
+
+    wider: float
+    std: float
+
+    @property
+    def changed(self) -> bool:
+        """Whether that matters, and is more than chance."""
+        return matters(self.wider, self.std, MOST_WIDER)
+
+    def of(self, rig: Rig) -> Rig:
+        """The rig with lines of this width."""
+        response = rig.projector_response
+        own = response.of_width((1 + self.wider) * response.blur_px)
+        return rig.model_copy(update={"projector_response": own})
+
+    def known(self, doubt: SpreadDoubt) -> SpreadDoubt:
+        """What is left of a doubt about the width; what is not followed is doubted as well."""
+        left = math.hypot(self.std, 0.0 if self.changed else self.wider)
+        return replace(doubt, relative=min(left, doubt.relative))
+
+    def finding(self) -> FitFinding:
+        """What is told of it."""
+        return FitFinding.judged(
+            "profile",
+            "width of lines by the binary code",
+            (100 * self.wider, 100 * self.std),
+            "% of the width",
+            100 * MOST_WIDER,
+            f"The light of lines is {100 * abs(self.wider):.0f} ± {100 * self.std:.0f} %"
+            f" {'wider' if self.wider > 0 else 'narrower'} than calibrated, as the binary code shows between"
+            " them. The result follows it.",
+            "If a flat matt target shows it, too, focus the projector as for its calibration, or calibrate"
+            " again.",
+        )
 
 
 @dataclass(frozen=True)
 class CodeWave:
     """By how much columns are displaced away from the middles of lines, px, with deviations.
 
-    Each value is of one boundary of the code to the right of a middle and its mirror image on the left.
+    Each value is of one boundary of the code, ``off_px`` to the right of a middle, and its mirror image on
+    the left.
     """
 
+    off_px: Floats
     away_px: Floats
     std_px: Floats
 
@@ -52,6 +100,17 @@ class CodeWave:
     def error_px(self) -> float:
         """What columns are off by, rms; 0 where that is little or chance explains it."""
         return self.rms_px if matters(self.rms_px, self.rms_std_px, MOST_WAVE_PX) else 0.0
+
+    def own_width(self, doubt: SpreadDoubt) -> OwnWidth:
+        """The width that explains the wave best, with what was known of it."""
+        moved = (doubt.moved_at(self.off_px) - doubt.moved_at(-self.off_px)) / 2
+        weight = self.std_px**-2
+        seen, prior = float(weight @ moved**2), doubt.relative**-2
+        # A wider spread would take back what columns are displaced by.
+        wider = -float(weight @ (moved * self.away_px)) / (seen + prior)
+        # A wave of another shape than a width makes says less of it.
+        left = float(weight @ (self.away_px + wider * moved) ** 2) / max(len(moved) - 1, 1)
+        return OwnWidth(wider, (seen / max(left, 1.0) + prior) ** -0.5)
 
     def finding(self) -> FitFinding:
         """What is told of it."""
@@ -85,11 +144,37 @@ def code_wave(lines: LineSet | None, named_px: NDArray[np.integer], maps: Column
     place = np.floor(exact).astype(np.int64) % lines.step_px
     shift, std = displacement(named_px[known], exact, place, lines.step_px)
     left, right = _mirrored(lines)
+    off = np.asarray((right + 0.5 - lines.first_px) % lines.step_px, np.float64)
     # What has moved displaces both sides alike, and cancels.
     away, away_std = (shift[left] - shift[right]) / 2, np.hypot(std[left], std[right]) / 2
     with np.errstate(invalid="ignore"):
         telling = np.maximum(std[left], std[right]) < TELLING_PX
-    return CodeWave(away[telling], away_std[telling]) if telling.any() else None
+    return CodeWave(off[telling], away[telling], away_std[telling]) if telling.any() else None
+
+
+def with_varying_width(
+    doubt: SpreadDoubt, lines: LineSet | None, named_px: NDArray[np.integer], maps: ColumnMaps
+) -> SpreadDoubt:
+    """A doubt that holds by how much widths of parts of the picture (rows, columns) differ, if that matters.
+
+    One width for all is off in most places of a lens that blurs its corners, and waves of opposite signs
+    cancel in the whole picture. Other arguments are those of `code_wave`.
+    """
+    row, column = (np.arange(size) * parts // size for size, parts in zip(named_px.shape, PARTS, strict=True))
+    part = (row[:, None] * PARTS[1] + column).ravel()
+    waves = [
+        code_wave(lines, named_px.ravel()[part == each], maps.of(part == each))
+        for each in range(PARTS[0] * PARTS[1])
+    ]
+    free = replace(doubt, relative=1.0)
+    widths = [wave.own_width(free) for wave in waves if wave is not None]
+    if len(widths) < 2:
+        return doubt
+    wider, std = (np.array([getattr(each, name) for each in widths]) for name in ("wider", "std"))
+    varies, varies_std = rms_beyond_chance(wider - np.average(wider, weights=std**-2), std)
+    if not matters(varies, varies_std, MOST_WIDER):
+        return doubt
+    return replace(doubt, relative=math.hypot(doubt.relative, varies))
 
 
 def _mirrored(lines: LineSet) -> tuple[NDArray[np.int64], NDArray[np.int64]]:

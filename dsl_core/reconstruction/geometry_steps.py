@@ -14,7 +14,7 @@ from dsl_core.patterns.gray_code import DecodedCode
 from dsl_core.progress import Progress
 from dsl_core.reconstruction.camera_spot import follow_spot, spot_finding
 from dsl_core.reconstruction.code_agreement import NamedPlaces, code_agreement
-from dsl_core.reconstruction.code_wave import code_wave
+from dsl_core.reconstruction.code_wave import code_wave, with_varying_width
 from dsl_core.reconstruction.columns.column import MODEL_ERROR
 from dsl_core.reconstruction.columns.line_spread import own_spread, spread_pixels, with_own_spread
 from dsl_core.reconstruction.columns.peak_error import own_peak_error
@@ -78,8 +78,18 @@ class GeometrySteps:
             doubt = spread_doubt(self.rig, lines, code, white, frames, spread)
         columns = columns_by_rows(self.rig, options, frames, code, white, peak_error, self._progress)
         named = NamedPlaces.of(code)
-        del code, white
         wave = code_wave(lines, named.column, columns.maps) if refines_rig else None
+        if wave is not None and doubt is not None:
+            own = wave.own_width(doubt)
+            doubt = own.known(doubt)
+            if own.changed:
+                self.findings.append(own.finding())
+                self.rig = own.of(self.rig)
+                peak_error = own_peak_error(self.rig, lines, code, white, frames)
+                columns = columns_by_rows(self.rig, options, frames, code, white, peak_error, self._progress)
+                wave = code_wave(lines, named.column, columns.maps)
+            doubt = with_varying_width(doubt, lines, named.column, columns.maps)
+        del code, white
         if wave is not None:
             self.findings.append(wave.finding())
         geometry = geometry_of(

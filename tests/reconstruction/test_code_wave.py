@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 from dataclasses import replace
 
@@ -13,11 +14,14 @@ from dsl_core import pipeline
 from dsl_core.model.options import Options
 from dsl_core.model.presets import preset_plan
 from dsl_core.optics.lines.line_set import LineSet
-from dsl_core.reconstruction.code_wave import code_wave
+from dsl_core.reconstruction.code_wave import OwnWidth, code_wave, with_varying_width
 from dsl_core.reconstruction.columns.maps import ColumnMaps
+from dsl_core.reconstruction.columns.spread_doubt import PLACES, SpreadDoubt
 from dsl_core.simulation.sim_devices import open_twin
+from tests.cases.small_rig import small_rig
 from tests.cases.twin_scan import capture
 
+RIG = small_rig()
 LINES = LineSet(width_px=5, step_px=5, first_px=2.0, lines=40, frames=40)
 PIXELS, WAVE_PX = 4000, 0.15
 TRUE_PX = np.random.default_rng(5).uniform(3, 190, PIXELS)
@@ -73,14 +77,84 @@ def test_nothing_is_said_where_nothing_is_known() -> None:
     assert code_wave(LINES, NAMED_PX, coarse) is None
 
 
-def test_a_scan_with_other_lines_says_so() -> None:
-    devices = open_twin({"size": "64x44", "foreign": "spread-square"})
+def doubt_of(relative: float) -> SpreadDoubt:
+    """Columns of a width twice as large would move by a sine of 1 px."""
+    sine = np.sin(2 * math.pi * np.arange(PLACES) / PLACES)
+    return SpreadDoubt(LINES, relative, sine, np.abs(sine))
+
+
+@pytest.mark.parametrize("wider", [-0.1, 0.1])
+def test_a_width_that_explains_the_wave_is_found(wider: float) -> None:
+    # Too narrow a spread leaves columns where they would be moved from.
+    found = code_wave(LINES, NAMED_PX, maps_of(TRUE_PX - wider * SINE))
+    assert found is not None
+    own = found.own_width(doubt_of(1.0))
+    assert own.wider == pytest.approx(wider, abs=3 * own.std)
+    assert 0.005 < own.std < 0.03
+    assert own.changed
+    assert own.known(doubt_of(1.0)).relative == own.std
+    assert own.of(RIG).projector_response.blur_px == pytest.approx(0.6 * (1 + own.wider))
+    assert ("wider" if wider > 0 else "narrower") in own.finding().sentence
+    # Who knows the width already learns nothing new.
+    known = found.own_width(doubt_of(0.001))
+    assert known.std == pytest.approx(0.001, rel=0.01)
+    assert abs(known.wider) < 0.002
+
+
+def test_columns_as_the_code_names_them_change_no_width() -> None:
+    found = code_wave(LINES, NAMED_PX, maps_of(TRUE_PX))
+    assert found is not None
+    own = found.own_width(doubt_of(0.06))
+    assert not own.changed
+    # What is seen and not followed is doubted; what was known better before stays.
+    assert OwnWidth(0.02, 0.01).known(doubt_of(0.06)).relative == pytest.approx(math.hypot(0.02, 0.01))
+    assert OwnWidth(0.02, 0.01).known(doubt_of(0.005)).relative == 0.005
+
+
+def test_a_wave_of_another_shape_says_less_of_the_width() -> None:
+    found = code_wave(LINES, NAMED_PX, maps_of(TRUE_PX - 0.1 * SINE))
+    assert found is not None
+    other = replace(found, away_px=found.away_px * np.array([1.0, -1.0]))
+    assert other.own_width(doubt_of(1.0)).std > 3 * found.own_width(doubt_of(1.0)).std
+
+
+def test_widths_that_differ_over_the_picture_are_doubted() -> None:
+    """Lines of the left part are wider, those of the right narrower: no width of all is off."""
+    rng = np.random.default_rng(6)
+    true_px = rng.uniform(3, 190, (60, 150))
+    sine = np.sin(2 * math.pi / LINES.step_px * (true_px - LINES.first_px))
+    wider = np.linspace(0.15, -0.15, 150)
+    named = np.round(true_px).astype(np.int32)
+    before = doubt_of(0.01)
+    varied, even = (
+        with_varying_width(before, LINES, named, maps_of((true_px - each * sine).ravel()))
+        for each in (wider, 0.1)
+    )
+    # The means of three parts are .1, 0 and -.1.
+    assert varied.relative == pytest.approx(0.1 * math.sqrt(2 / 3), rel=0.25)
+    assert even is before
+    unknown = with_varying_width(before, LINES, np.full_like(named, -1), maps_of(true_px.ravel()))
+    assert unknown is before
+
+
+def test_a_scan_with_wider_lines_says_so_and_follows_them() -> None:
+    devices = open_twin({"size": "64x44", "foreign": "blur", "scene": "plane"})
     plan = preset_plan("coarse")
     assert plan is not None
     scan = capture(devices, pipeline.fit_plan(plan, devices))
-    rig = devices.camera.world.rig  # type: ignore[attr-defined]
+    world = devices.camera.world  # type: ignore[attr-defined]
     found, as_calibrated = (
-        pipeline.reconstruct(scan, rig, Options(spectra=False, as_calibrated=each)) for each in (False, True)
+        pipeline.reconstruct(scan, world.rig, Options(spectra=False, as_calibrated=each))
+        for each in (False, True)
     )
     assert "Between the middles of lines" in found.attrs["fit"]
+    told = next(f for f in json.loads(found.attrs["fit"])["findings"] if "width of lines" in f["name"])
+    # They are 8 % wider. Pixels this coarse see some of that as their own.
+    assert 3 < told["value"] < 9
+    off_mm, as_calibrated_off_mm = (
+        np.nanmedian(np.abs(each["depth_mm"].values - world.truth.depth_mm))
+        for each in (found, as_calibrated)
+    )
+    assert off_mm < 0.7 * as_calibrated_off_mm
     assert "Between the middles of lines" not in as_calibrated.attrs["fit"]
+    assert "width of lines" not in as_calibrated.attrs["fit"]

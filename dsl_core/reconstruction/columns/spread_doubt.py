@@ -35,15 +35,27 @@ LARGEST_PX = 3.0
 
 @dataclass(frozen=True)
 class SpreadDoubt:
-    """Deviation of columns (px) at ``PLACES`` places between two lines, the first on the middle of one."""
+    """What columns are off by at ``PLACES`` places between two lines, the first on the middle of one.
+
+    ``relative`` is the deviation of the width. With a width twice as large, columns of these places would
+    move by ``moved_px`` (PLACES,) on average, and by ``rms_px`` (PLACES,) rms.
+    """
 
     lines: LineSet
-    std_px: NDArray[np.float64]
+    relative: float
+    moved_px: NDArray[np.float64]
+    rms_px: NDArray[np.float64]
 
     def at(self, column_px: NDArray[np.floating]) -> NDArray[np.float32]:
         """Deviation at columns of any shape, px; 0 where they are NaN."""
         place = _places(self.lines, torch.as_tensor(np.nan_to_num(column_px)))
-        return np.where(np.isfinite(column_px), self.std_px[place.numpy()], 0.0).astype(np.float32)
+        std_px = self.relative * self.rms_px
+        return np.where(np.isfinite(column_px), std_px[place.numpy()], 0.0).astype(np.float32)
+
+    def moved_at(self, off_px: NDArray[np.float64]) -> NDArray[np.float64]:
+        """By how much columns so far (n,) to the right of a line's middle would move, px."""
+        step_px = self.lines.step_px
+        return np.interp(off_px, step_px / PLACES * np.arange(PLACES), self.moved_px, period=step_px)
 
 
 def spread_doubt(
@@ -73,10 +85,10 @@ def spread_doubt(
     place = _places(lines, usual.column_px[both]).numpy()
     moved = ((wider.column_px - usual.column_px)[both] / STEP).numpy().clip(-LARGEST_PX, LARGEST_PX)
     count = np.bincount(place, minlength=PLACES)
-    square = np.bincount(place, moved**2, PLACES) / np.maximum(count, 1)
+    mean, square = (np.bincount(place, each, PLACES) / np.maximum(count, 1) for each in (moved, moved**2))
     # Where no column is, lines say nothing: neighbours stand for it.
     square[count == 0] = square[count > 0].max(initial=0.0)
-    return SpreadDoubt(lines, relative * np.sqrt(square))
+    return SpreadDoubt(lines, relative, mean, np.sqrt(square))
 
 
 def _places(lines: LineSet, column_px: torch.Tensor) -> torch.Tensor:

@@ -67,14 +67,29 @@ def test_what_a_scan_says_of_the_width_counts_and_where_it_is_sure_nothing_is_do
     alone, together = doubt(None), doubt(width_found(FOCUS_STD))
     assert alone is not None
     assert together is not None
-    assert together.std_px == pytest.approx(alone.std_px / np.sqrt(2))
+    assert together.relative == pytest.approx(alone.relative / np.sqrt(2))
+    assert together.rms_px == pytest.approx(alone.rms_px)
     assert doubt(width_found(0.001)) is None
     assert doubt(None, None) is None
 
 
 def test_columns_that_nobody_knows_are_not_doubted_further() -> None:
-    found = SpreadDoubt(LINES, np.linspace(0.01, 0.16, 16))
+    found = SpreadDoubt(LINES, 0.1, np.zeros(16), np.linspace(0.1, 1.6, 16))
     middle = float(LINES.centre_px(torch.tensor(20)))
     assert found.at(np.array([np.nan, middle, middle + 5.0, middle - 5 / 16])).tolist() == pytest.approx(
         [0.0, 0.01, 0.01, 0.16]
     )
+
+
+def test_a_wider_spread_moves_columns_as_it_moves_those_that_were_seen() -> None:
+    stated = doubt(None)
+    assert stated is not None
+    seen, std = (torch.as_tensor(each) for each in lines_seen(RESPONSE))
+    peaks = LinePeaks(torch.as_tensor(COLUMN.ravel().round()), seen, std, LINES, RESPONSE)
+    moved_px = (refine(peaks.wider(1.02)).column_px.numpy() - COLUMN.ravel()) / 0.02
+    off_px = (COLUMN.ravel() - LINES.first_px) % LINES.step_px
+    # Where columns move much and not by chance: to the sides of the middle between two lines.
+    sides = (np.abs(off_px - 1.5) < 0.3) | (np.abs(off_px - 3.5) < 0.3)
+    assert np.abs(stated.moved_at(off_px)[sides]).min() > 0.1
+    assert np.median(moved_px[sides] / stated.moved_at(off_px)[sides]) == pytest.approx(1.0, abs=0.2)
+    assert stated.moved_at(off_px + LINES.step_px) == pytest.approx(stated.moved_at(off_px))
