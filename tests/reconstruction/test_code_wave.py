@@ -148,9 +148,11 @@ def test_a_scan_with_wider_lines_says_so_and_follows_them() -> None:
         for each in (False, True)
     )
     assert "Between the middles of lines" in found.attrs["fit"]
-    told = next(f for f in json.loads(found.attrs["fit"])["findings"] if "width of lines" in f["name"])
+    told = {each["name"]: each["value"] for each in json.loads(found.attrs["fit"])["findings"]}
     # They are 8 % wider. Pixels this coarse see some of that as their own.
-    assert 3 < told["value"] < 9
+    assert 3 < told["width of lines by the binary code"] < 9
+    # What is left between the middles of lines is told as well.
+    assert 0.0 < told["columns between lines against the binary code"] < 0.07
     off_mm, as_calibrated_off_mm = (
         np.nanmedian(np.abs(each["depth_mm"].values - world.truth.depth_mm))
         for each in (found, as_calibrated)
