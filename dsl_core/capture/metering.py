@@ -12,7 +12,7 @@ from dsl_core.capture.overexposure import by_colour, full_scale_dn
 from dsl_core.devices.base import DeviceRig
 from dsl_core.errors import DeviceError
 from dsl_core.model.plan import CapturePlan, Setting, Shot
-from dsl_core.model.rig import ProjectorResponse
+from dsl_core.model.rig import BayerPattern, ProjectorResponse, colour_sites
 from dsl_core.progress import CancelToken
 
 #: What white is to reach where exposures are shortened, as a share of full scale in its dimmest colour: lines
@@ -30,6 +30,11 @@ DIM = 0.4
 MOST_LONGER = 4.0
 #: Shares of the picture that may be brighter: highlights, and small bright things in a dark scene.
 _BRIGHTER, _BRIGHTER_IN_DARK = 0.05, 0.005
+#: A colour whose light is less than this share of the brightest colour's, even where there is most of it, is
+#: missing: hardly any surface reflects as little, and a scene has others. In pictures whose brightest colour
+#: does not reach that share of full scale nothing is said, as the black level is not known so well.
+NO_LIGHT, ENOUGH = 0.01, 0.1
+_COLOURS = ("red", "green", "blue")
 #: A saturated picture says only that it is too bright: the next is exposed for this much less.
 _SHORTEN = 8.0
 _MOST_FRAMES = 4
@@ -75,7 +80,7 @@ def meter(
     black_dn = 0.0 if known is None else known.sensor.black_level_dn
     taker = ShotTaker(rig, plan, pattern_image, RetryPolicy(), token)
     try:
-        seen = _measure(taker, white, fit, full_scale_dn(rig), black_dn)
+        seen = _measure(taker, white, fit, full_scale_dn(rig), black_dn, rig.camera.info.bayer)
     except DeviceError as error:
         raise DeviceError(
             f"White could not be measured before the scan: {error.__cause__ or error} Nothing is saved yet."
@@ -90,16 +95,32 @@ class _White:
     """White in the darkest setting of a plan, as shares of full scale above black, which may exceed 1.
 
     ``lost`` is the share of the picture that exceeds `MOST` even in its dimmest colour. ``is_clipped`` says
-    that even the shortest exposure saturates, so that it may be brighter still.
+    that even the shortest exposure saturates, so that it may be brighter still. ``missing`` are the colours
+    without light.
     """
 
     by_dimmest: float
     lost: float
     by_brightest: float
     is_clipped: bool
+    missing: tuple[str, ...] = ()
+
+    @property
+    def sentence(self) -> str:
+        """What to say of missing colours; empty if there are none."""
+        if not self.missing:
+            return ""
+        named = " and ".join(self.missing)
+        return (
+            f"White has no {named} light: less than {NO_LIGHT:.0%} of the brightest colour's. Take filters"
+            " off, and look whether the projector shows white, and whether camera and cables pass on all"
+            " colours: where one is missing, reflectance cannot be measured."
+        )
 
 
-def _measure(taker: ShotTaker, white: Shot, fit: _Fit, full_dn: int, black_dn: float) -> _White:
+def _measure(
+    taker: ShotTaker, white: Shot, fit: _Fit, full_dn: int, black_dn: float, bayer: BayerPattern
+) -> _White:
     darkest = fit.darkest
     exposure_ms = darkest.exposure_ms
     is_clipped = False
@@ -118,7 +139,20 @@ def _measure(taker: ShotTaker, white: Shot, fit: _Fit, full_dn: int, black_dn: f
     # What saturates even then may be brighter by any factor.
     most = full_dn - 1 if is_clipped else black_dn + MOST / scale
     lost = float(np.mean(colours.min(axis=0) > most))
-    return _White(max(dimmest, 0.0) * scale, lost, max(brightest, 0.0) * scale, is_clipped)
+    missing = _missing(colours, bayer, black_dn, ENOUGH * (full_dn - black_dn))
+    return _White(max(dimmest, 0.0) * scale, lost, max(brightest, 0.0) * scale, is_clipped, missing)
+
+
+def _missing(
+    colours: NDArray[np.unsignedinteger], bayer: BayerPattern, black_dn: float, enough_dn: float
+) -> tuple[str, ...]:
+    """Colours without light, of the pixels of each cell (4, rows, columns) of a mosaic, DN."""
+    of_site = np.array(colour_sites(bayer))
+    light = {each: _exceeded_by(_BRIGHTER, colours[of_site == each]) - black_dn for each in set(of_site)}
+    most = max(light.values())
+    if most < enough_dn:
+        return ()
+    return tuple(_COLOURS[each] for each in sorted(light) if light[each] < NO_LIGHT * most)
 
 
 def _exceeded_by(share: float, values: NDArray[np.unsignedinteger]) -> float:
@@ -150,6 +184,13 @@ class _Fit:
         return max(cycles, int(np.ceil(low_ms / self.period_ms - 1e-6)), 1) * self.period_ms
 
     def to(self, white: _White) -> Metered:
+        """The plan for this white."""
+        found = self._suited(white)
+        if not white.missing:
+            return found
+        return Metered(found.plan, f"{white.sentence} {found.sentence}", is_told=True)
+
+    def _suited(self, white: _White) -> Metered:
         """The plan for white of this brightness."""
         most_light = max(map(self.light, self.plan.settings)) / self.light(self.darkest)
         if white.lost > MOST_LOST:

@@ -32,6 +32,7 @@ class Bench(Camera, Projector):
     exposures_ms: list[float] = field(default_factory=list)
     shown: list[int] = field(default_factory=list)
     frames: int = 0
+    colours: NDArray[np.float64] = field(default_factory=COLOURS.copy)
 
     @property
     def info(self) -> CameraInfo:  # type: ignore[override]
@@ -48,7 +49,7 @@ class Bench(Camera, Projector):
 
     def snap(self, timeout_ms: float = 5000.0) -> Frame:
         light = (self.shown[-1] / 255) ** 2.2 * self.exposures_ms[-1] * self.dn_per_ms
-        signal = light * np.tile(COLOURS, (10, 20))
+        signal = light * np.tile(self.colours, (10, 20))
         signal[:, : round(40 * self.highlights)] *= 50
         pixels = np.clip(signal + BLACK_DN, 0, FULL_DN).astype(np.uint16)
         self.frames += 1
@@ -112,6 +113,35 @@ def test_white_that_fits_keeps_the_plan_and_is_not_told(share: float) -> None:
     assert found.plan == plan
     assert not found.is_told
     assert "as planned" in found.notes["exposures"]
+
+
+@pytest.mark.parametrize(
+    ("colours", "named"),
+    [
+        ([[0.5, 1.0], [1.0, 0.008]], "no blue light"),
+        ([[0.0, 1.0], [1.0, 0.0]], "no red and blue light"),
+        ([[0.5, 0.0], [0.0, 0.8]], "no green light"),
+    ],
+)
+def test_a_colour_that_is_missing_is_told_before_the_scan(colours: list[list[float]], named: str) -> None:
+    found = meter(rig_of(Bench(18.0, colours=np.array(colours))), plan_of((200.0, 1.0)))
+    assert found.is_told
+    assert named in found.sentence
+    assert "as planned" in found.sentence
+
+
+def test_a_colour_that_is_weak_is_no_missing_one_nor_is_that_of_a_monochrome_camera(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    rig = rig_of(Bench(18.0, colours=np.array([[0.5, 1.0], [1.0, 0.013]])))
+    assert "no blue" not in meter(rig, plan_of((200.0, 1.0))).sentence
+    # In a dark picture the black level, which is not known so well, looks like light or its absence.
+    dark = rig_of(Bench(0.5, colours=np.array([[0.5, 1.0], [1.0, 0.0]])))
+    assert "no blue" not in meter(dark, plan_of((200.0, 1.0))).sentence
+    grey = CameraInfo("bench", "1", 40, 20, "MONO", 12, (1.0, 2000.0))
+    monkeypatch.setattr(Bench, "info", property(lambda bench: grey))
+    found = meter(rig_of(Bench(18.0, colours=np.ones((2, 2)))), plan_of((200.0, 1.0)))
+    assert found.sentence.startswith("White reaches")
 
 
 def test_the_darkest_setting_counts_by_its_light_not_by_its_level() -> None:
