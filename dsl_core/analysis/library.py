@@ -127,7 +127,7 @@ def _grouped(
 ) -> Callable[[str, Path], str]:
     named = {} if table is None else read_groups(table)
     has_folders = len({file.parent for file in files}) > 1
-    # What lies beside the subfolders of a library has nothing in common but that.
+    # Files next to the subfolders of a library are not a class of their own.
     tops = {path for path in paths if path.is_dir()}
 
     def group_of(name: str, file: Path) -> str:

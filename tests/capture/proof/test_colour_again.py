@@ -8,21 +8,8 @@ from numpy.typing import NDArray
 
 from dsl_core.capture.proof.colour_again import ColourAgain, colour_again
 from dsl_core.capture.proof.noise import Noise
-from dsl_core.capture.proof.raster import Counts, Raster
-from dsl_core.model.plan import CapturePlan, GrayCode, ScanLines, Sentinels, Setting
 from dsl_core.model.rig import Sensor
-
-SIZE, BLACK, WHITE = (64, 48), 300.0, 1500.0
-PLAN = CapturePlan(
-    camera_size_px=SIZE,
-    projector_size_px=(64, 18),
-    code=GrayCode(rows=False),
-    spectral=ScanLines(width_px=2, step_px=2),
-    settings=(Setting(exposure_ms=10.0, level=1.0),),
-    code_settings=(0,),
-    sentinels=Sentinels(every=16),
-)
-WHITES = [s.index for s in PLAN.shots() if s.role == "sentinel" and PLAN.original(s).role == "white"]
+from tests.cases.repeated_white import PLAN, RASTER, SIZE, WHITE_DN, WHITES, rasters
 
 
 def of_colours(red: float, green: float, blue: float) -> NDArray[np.float64]:
@@ -33,17 +20,14 @@ def of_colours(red: float, green: float, blue: float) -> NDArray[np.float64]:
 
 
 def found(
-    red: float, green: float, blue: float, since: int = 0, light: NDArray[np.float64] | float = WHITE
+    red: float, green: float, blue: float, since: int = 0, light: NDArray[np.float64] | float = WHITE_DN
 ) -> ColourAgain | None:
     """With so many times the light of each colour in whites from one on."""
-    rng, kept, raster = np.random.default_rng(1), dict[int, Counts](), Raster(SIZE)
-    for shot in PLAN.shots():
-        is_later = shot.role == "sentinel" and shot.index >= since
-        factor = of_colours(red, green, blue) if is_later else 1.0
-        shown = light * factor if PLAN.original(shot).role == "white" else 0.0
-        pixels = np.rint(BLACK + shown + rng.normal(0, 4, SIZE[::-1])).clip(0, 4095).astype(np.uint16)
-        kept[shot.index] = raster.take(pixels)
-    return colour_again(PLAN, kept, Noise.of(Sensor(), 12), raster.channels("RGGB"))
+
+    def light_of(is_white: bool, is_later: bool) -> NDArray[np.float64] | float:
+        return light * (of_colours(red, green, blue) if is_later else 1.0) if is_white else 0.0
+
+    return colour_again(PLAN, rasters(light_of, since), Noise.of(Sensor(), 12), RASTER.channels("RGGB"))
 
 
 def test_white_in_another_colour_is_told_with_the_light_of_each() -> None:
@@ -62,12 +46,12 @@ def test_light_that_all_colours_lose_is_no_change_of_colour(colours: tuple[float
 
 
 def test_a_colour_that_saturates_or_is_missing_says_nothing() -> None:
-    bright = of_colours(5000.0, WHITE, WHITE)
+    bright = of_colours(5000.0, WHITE_DN, WHITE_DN)
     seen = found(0.5, 1.0, 0.9, light=bright)
     assert seen is not None
     assert "in red" not in seen.sentence
-    assert found(0.5, 1.0, 1.0, light=of_colours(0.5, WHITE, WHITE)) is None
-    assert found(1.0, 1.0, 0.9, light=of_colours(WHITE, 5000.0, WHITE)) is None
+    assert found(0.5, 1.0, 1.0, light=of_colours(0.5, WHITE_DN, WHITE_DN)) is None
+    assert found(1.0, 1.0, 0.9, light=of_colours(WHITE_DN, 5000.0, WHITE_DN)) is None
 
 
 def test_light_that_noise_outshines_says_nothing() -> None:

@@ -7,36 +7,21 @@ import pytest
 from numpy.typing import NDArray
 
 from dsl_core.capture.proof.noise import Noise
-from dsl_core.capture.proof.raster import Counts, Raster
 from dsl_core.capture.proof.white_again import WhiteAgain, white_again
-from dsl_core.model.plan import CapturePlan, GrayCode, ScanLines, Sentinels, Setting
 from dsl_core.model.rig import Sensor
-
-SIZE, BLACK, WHITE = (64, 48), 300.0, 1500.0
-PLAN = CapturePlan(
-    camera_size_px=SIZE,
-    projector_size_px=(64, 18),
-    code=GrayCode(rows=False),
-    spectral=ScanLines(width_px=2, step_px=2),
-    settings=(Setting(exposure_ms=10.0, level=1.0),),
-    code_settings=(0,),
-    sentinels=Sentinels(every=16),
-)
-WHITES = [s.index for s in PLAN.shots() if s.role == "sentinel" and PLAN.original(s).role == "white"]
+from tests.cases.repeated_white import PLAN, RASTER, SIZE, WHITE_DN, WHITES, rasters
 
 
 def found(
     later: NDArray[np.float64] | float, since: int = 0, more: NDArray[np.float64] | float = 0.0
 ) -> WhiteAgain | None:
     """With so many times the light (rows, columns) in whites from one on, and so much ``more`` black, DN."""
-    rng, kept, raster = np.random.default_rng(1), dict[int, Counts](), Raster(SIZE)
-    for shot in PLAN.shots():
-        is_later = shot.role == "sentinel" and shot.index >= since
-        light = (WHITE if PLAN.original(shot).role == "white" else 0.0) * (later if is_later else 1.0)
-        light = light + BLACK + (more if is_later else 0.0)
-        pixels = np.rint(light + rng.normal(0, 4, SIZE[::-1])).astype(np.uint16)
-        kept[shot.index] = raster.take(pixels)
-    return white_again(PLAN, kept, Noise.of(Sensor(), 12), raster)
+
+    def light_of(is_white: bool, is_later: bool) -> NDArray[np.float64] | float:
+        light = (WHITE_DN if is_white else 0.0) * (later if is_later else 1.0)
+        return light + (more if is_later else 0.0)
+
+    return white_again(PLAN, rasters(light_of, since), Noise.of(Sensor(), 12), RASTER)
 
 
 def spot(share: float) -> NDArray[np.float64]:
