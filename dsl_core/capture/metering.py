@@ -11,6 +11,7 @@ from dsl_core.capture.exposure import PatternImage, RetryPolicy, ShotTaker
 from dsl_core.capture.overexposure import by_colour, full_scale_dn
 from dsl_core.devices.base import DeviceRig
 from dsl_core.errors import DeviceError
+from dsl_core.model.conditions import COLOUR_NAMES
 from dsl_core.model.plan import CapturePlan, Setting, Shot
 from dsl_core.model.rig import BayerPattern, ProjectorResponse, colour_sites
 from dsl_core.progress import CancelToken
@@ -34,7 +35,6 @@ _BRIGHTER, _BRIGHTER_IN_DARK = 0.05, 0.005
 #: missing: hardly any surface reflects as little, and a scene has others. In pictures whose brightest colour
 #: does not reach that share of full scale nothing is said, as the black level is not known so well.
 NO_LIGHT, ENOUGH = 0.01, 0.1
-_COLOURS = ("red", "green", "blue")
 #: A saturated picture says only that it is too bright: the next is exposed for this much less.
 _SHORTEN = 8.0
 _MOST_FRAMES = 4
@@ -152,7 +152,7 @@ def _missing(
     most = max(light.values())
     if most < enough_dn:
         return ()
-    return tuple(_COLOURS[each] for each in sorted(light) if light[each] < NO_LIGHT * most)
+    return tuple(COLOUR_NAMES[each] for each in sorted(light) if light[each] < NO_LIGHT * most)
 
 
 def _exceeded_by(share: float, values: NDArray[np.unsignedinteger]) -> float:

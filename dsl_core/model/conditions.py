@@ -9,6 +9,8 @@ from dsl_core.model.base import Record
 
 #: Order of the colours of a mosaic; ``MONO`` is a sensor without one, whose pixels all measure brightness.
 BayerPattern = Literal["RGGB", "BGGR", "GRBG", "GBRG", "MONO"]
+#: Names of the colours of a mosaic, by their number.
+COLOUR_NAMES = ("red", "green", "blue")
 Region = tuple[int, int, int, int]
 
 

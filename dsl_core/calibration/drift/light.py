@@ -14,6 +14,7 @@ import torch
 from numpy.typing import NDArray
 
 from dsl_core.errors import CalibrationError
+from dsl_core.model.conditions import COLOUR_NAMES
 from dsl_core.model.figure import Figure
 from dsl_core.model.rig import Rig
 from dsl_core.model.spectral import WavelengthGrid
@@ -57,7 +58,7 @@ def light_drift(rig: Rig, white: PlaneSignals, reflectance: float) -> list[Figur
     expected = _Plane(rig, white, reflectance).signals()[0]
     usable = np.isfinite(white.std[0]) & (expected > 0.2 * np.median(expected))
     figures = []
-    for colour, name in enumerate(("red", "green", "blue")):
+    for colour, name in enumerate(COLOUR_NAMES):
         mine = usable & (white.colours == colour)
         if mine.sum() < _MIN_SIGNALS // 4:
             raise CalibrationError(

@@ -32,6 +32,7 @@ from dsl_core.campaign.common.white_shot import (
 )
 from dsl_core.errors import CalibrationError
 from dsl_core.model.calibration.bandpass import BandpassCalibration, apply_bandpass
+from dsl_core.model.conditions import COLOUR_NAMES
 from dsl_core.model.figure import Figure, doubts
 from dsl_core.model.placement import Placement
 from dsl_core.model.plan import CapturePlan, GrayCode, NoCode, ScanLines, Setting
@@ -229,7 +230,7 @@ def bandpass_figures(record: BandpassCalibration, done: Collection[str] = ()) ->
             high=5.0,
             advice=_response_advice(record, done),
         )
-        for colour, curve in zip(("red", "green", "blue"), record.response, strict=True)
+        for colour, curve in zip(COLOUR_NAMES, record.response, strict=True)
     ]
     halo = 200 * record.halo_decay_px
     figures += [

@@ -15,11 +15,11 @@ from numpy.typing import NDArray
 from dsl_core.capture.proof.noise import Noise
 from dsl_core.capture.proof.raster import Counts
 from dsl_core.capture.proof.white_again import repeats
+from dsl_core.model.conditions import COLOUR_NAMES
 from dsl_core.model.plan import CapturePlan, Shot
 
 #: How far the light of a colour may be from that of green, as a share, and in deviations.
 LEAST, SIGMAS = 0.03, 6.0
-_COLOURS = ("red", "green", "blue")
 
 
 @dataclass(frozen=True)
@@ -36,7 +36,7 @@ class ColourAgain:
     @property
     def sentence(self) -> str:
         """What is wrong, and what to do."""
-        known = [(n, r) for n, r in zip(_COLOURS, self.ratios, strict=True) if np.isfinite(r)]
+        known = [(n, r) for n, r in zip(COLOUR_NAMES, self.ratios, strict=True) if np.isfinite(r)]
         each = ", ".join(f"{ratio:.2f} times in {name}" for name, ratio in known)
         return (
             f"White, captured again as frame {self.shot.number}, has another colour than at the beginning:"
