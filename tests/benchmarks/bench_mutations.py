@@ -28,7 +28,7 @@ PLACES = {
     "dsl_core/optics": ("tests/optics",),
     "dsl_core/solve": ("tests/solve", "tests/stability"),
     "dsl_core/reconstruction": ("tests/reconstruction",),
-    "dsl_core/calibration": ("tests/calibration",),
+    "dsl_core/calibration": ("tests/calibration", "tests/campaign/test_kept_figures.py"),
     "dsl_core/capture": ("tests/capture",),
     "dsl_core/io": ("tests/io",),
 }
@@ -187,8 +187,13 @@ def tests_of(fault: Fault) -> list[str]:
         imports = f"from {dotted} import" in test.read_text(encoding="utf-8")
         return (not named, not imports, not (inner and inner[0] in test.parts))
 
-    found = [path for tests in PLACES[place] for path in sorted((ROOT / tests).rglob("test_*.py"))]
+    found = [path for name in PLACES[place] for path in files_of(ROOT / name)]
     return [path.relative_to(ROOT).as_posix() for path in sorted(found, key=distance)]
+
+
+def files_of(tests: Path) -> list[Path]:
+    """Test files of a folder; a file alone."""
+    return [tests] if tests.is_file() else sorted(tests.rglob("test_*.py"))
 
 
 def is_caught(fault: Fault, tree: Path) -> bool | None:
