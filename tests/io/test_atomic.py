@@ -124,6 +124,14 @@ def test_another_failure_is_not_called_a_full_disk(tmp_path: Path) -> None:
         assert "permissions" in str(store_error(tmp_path / "b.img", error))
 
 
+@pytest.mark.skipif(not Path("/proc/self/fd").is_dir(), reason="lists open files as Linux does")
+def test_no_write_leaves_a_file_open(tmp_path: Path) -> None:
+    before = len(os.listdir("/proc/self/fd"))
+    for number in range(20):
+        write_atomic(tmp_path / str(number), b"content")
+    assert len(os.listdir("/proc/self/fd")) < before + 10
+
+
 def test_a_link_in_the_place_of_the_neighbour_is_not_followed(tmp_path: Path) -> None:
     (tmp_path / "theirs").write_text("theirs")
     (tmp_path / "file.partial").symlink_to(tmp_path / "theirs")

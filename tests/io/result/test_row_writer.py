@@ -103,6 +103,19 @@ def test_rows_that_are_there_are_not_asked_for_again(tmp_path: Path) -> None:
     xr.testing.assert_identical(write(target, given), write(tmp_path / "again.zarr", given))
 
 
+def test_rows_are_counted_as_they_come_and_those_of_an_earlier_run_with_them(tmp_path: Path) -> None:
+    given, seen, target = maps(), list[tuple[int, int]](), tmp_path / "r.zarr"
+    with RowWriter(target, "a") as writer:
+        begin(writer)
+        writer.put(BANDS[1], some(given, BANDS[1]), "middle")
+    with RowWriter(target, "a", seen_rows=lambda done, of: seen.append((done, of))) as writer:
+        begin(writer)
+        for rows in reversed(BANDS):
+            if writer.note_of(rows) is None:
+                writer.put(rows, some(given, rows), "")
+    assert seen == [(2, 10), (6, 10), (10, 10)]
+
+
 def test_what_a_killed_run_left_half_written_is_not_in_the_result(tmp_path: Path) -> None:
     given, target = maps(), tmp_path / "r.zarr"
     with RowWriter(target, "a") as writer:

@@ -43,9 +43,12 @@ def test_a_step_where_no_difference_is_known_has_no_date() -> None:
     assert date_of_step(Change(0, 8, 1.0), *differences(jump(6))) is None
 
 
-def test_several_changes_are_no_single_one() -> None:
-    course = jump(20) + jump(40, -1.0) + jump(50)
-    assert date_of_step(CHANGE, *differences(course)) is None
+@pytest.mark.parametrize("scale", [0.02, 1.0, 50.0])
+def test_several_changes_are_no_single_one_whatever_their_unit(scale: float) -> None:
+    change = Change(CHANGE.after, CHANGE.before, scale)
+    several, one = differences(jump(20) + jump(40, -1.0) + jump(50)), differences(jump(20))
+    assert date_of_step(change, *(scale * each for each in several)) is None
+    assert date_of_step(change, *(scale * each for each in one)) == 20
 
 
 def test_a_faint_step_is_dated_where_something_else_changed() -> None:

@@ -41,5 +41,5 @@ def test_nothing_is_told_by_noise_or_of_a_film_with_one_order(chart: Lines) -> N
     turned = chart.rig.model_copy(update={"efficiency": {**orders, 1: orders[-1], -1: orders[1]}})
     noisy = replace(chart.picked, std=1000 * chart.picked.std)
     assert order_balance_finding(turned, chart.light(noisy)) is None
-    one = chart.rig.model_copy(update={"efficiency": {1: orders[1]}})
-    assert order_balance_finding(one, chart.light()) is None
+    for one in ({1: orders[-1], -2: orders[-1]}, {-1: orders[1], 2: orders[1]}):
+        assert order_balance_finding(chart.rig.model_copy(update={"efficiency": one}), chart.light()) is None
