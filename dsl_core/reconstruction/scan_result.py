@@ -61,7 +61,7 @@ def maps_of_rows(
         flags |= _spectral_flags(spectra)
         arrays.update(
             reflectance=spectra.reflectance,
-            reflectance_std=with_calibration(rig, grid, spectra),
+            reflectance_std=with_highlight(here, with_calibration(rig, grid, spectra)),
             data_share=spectra.data_share,
             reach=spectra.reach,
             rgb=reflectance_to_srgb(spectra.reflectance, grid.centres_nm).astype(np.float32),
@@ -96,6 +96,11 @@ def with_calibration(rig: Rig, grid: WavelengthGrid, spectra: SpectralMaps) -> N
     if not share.any():
         return spectra.std
     return np.asarray(np.hypot(spectra.std, share[:, None, None] * spectra.reflectance), np.float32)
+
+
+def with_highlight(geometry: Geometry, std: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Deviation of the reflectance (bands, rows, columns), with what a highlight adds to all bands."""
+    return std if geometry.highlight is None else np.hypot(std, geometry.highlight)
 
 
 def _spectral_flags(spectra: SpectralMaps) -> NDArray[np.uint16]:
