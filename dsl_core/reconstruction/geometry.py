@@ -221,7 +221,8 @@ def geometry_of(
     code says that they are.
     """
     maps, flags = found.maps, found.flags
-    waves = wave_std_px(maps.column_px.reshape(shape), maps.refined.reshape(shape), lines).ravel()
+    column_px, noise_px = maps.column_px.reshape(shape), maps.column_std_px.reshape(shape)
+    waves = wave_std_px(column_px, noise_px, maps.refined.reshape(shape), lines).ravel()
     if spread_doubt is not None:
         waves = np.hypot(waves, np.where(maps.refined, spread_doubt.at(maps.column_px), np.float32(0.0)))
     # It is of the same waves.
