@@ -12,10 +12,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from dsl_core.model.conditions import colour_sites
 from dsl_core.model.fit import FitFinding
 from dsl_core.model.result import Flag
 from dsl_core.model.rig import Rig
-from dsl_core.optics.pinhole import pixel_rays
+from dsl_core.optics.pinhole import rays_in
 from dsl_core.optics.sensor import bayer_channels, relative_gain
 from dsl_core.optics.spectra import chain_response
 from dsl_core.reconstruction.geometry import Geometry
@@ -30,6 +31,8 @@ LEAST, SIGMAS, WHITE_SHARE = 0.01, 4.0, 0.3
 #: Cells of 2 x 2 pixels, one of each colour, are compared with those so many cells away; with at most so
 #: many pairs. Neighbouring pairs err alike: deviations are those between blocks of so many cells a side.
 LAG, MOST_PAIRS, BLOCK = 2, 40_000, 8
+#: Rows of a picture that are looked at together.
+SLAB = 128
 #: What differs from cell to cell without any highlight: a share of reflectance, and reflectance.
 TEXTURE, FLOOR = 0.02, 0.002
 #: Beyond so many deviations a pair is at an edge, and pulls no more than there.
@@ -53,9 +56,9 @@ class Highlight:
     peak_std: float
     colours: tuple[float, float, float]
 
-    def at(self, towards: Floats) -> Floats:
+    def at(self, towards: NDArray[np.floating]) -> NDArray[np.floating]:
         """Its reflectance where the cosine between normal and mirror direction is ``towards``."""
-        return self.peak * _lobe(towards, self.roughness)
+        return np.asarray(self.peak * _lobe(towards, self.roughness))
 
 
 def follow_highlights(rig: Rig, geometry: Geometry) -> tuple[Geometry, list[FitFinding]]:
@@ -82,16 +85,19 @@ def follow_highlights(rig: Rig, geometry: Geometry) -> tuple[Geometry, list[FitF
     return replace(geometry, highlight=added), [told]
 
 
-def towards_mirror(rig: Rig, geometry: Geometry) -> Floats:
+def towards_mirror(rig: Rig, geometry: Geometry) -> NDArray[np.float32]:
     """Cosine between the normal and the direction that mirrors the projector into the camera, NaN unknown."""
-    points = pixel_rays(rig.camera) * geometry.depth_mm
-    to_light = rig.pose.projector_centre_mm[:, None, None] - points
-    half = to_light / np.linalg.norm(to_light, axis=0) - points / np.linalg.norm(points, axis=0)
-    half /= np.linalg.norm(half, axis=0)
-    return np.asarray((geometry.surface.normals * half).sum(0).clip(0, 1), np.float64)
+    towards = np.empty(geometry.depth_mm.shape, np.float32)
+    for rows in _slabs(len(towards)):
+        points = rays_in(rig.camera, rows) * geometry.depth_mm[rows]
+        to_light = rig.pose.projector_centre_mm[:, None, None] - points
+        half = to_light / np.linalg.norm(to_light, axis=0) - points / np.linalg.norm(points, axis=0)
+        half /= np.linalg.norm(half, axis=0)
+        towards[rows] = (geometry.surface.normals[:, rows] * half).sum(0).clip(0, 1)
+    return towards
 
 
-def find_highlight(rig: Rig, geometry: Geometry, towards: Floats) -> Highlight | None:
+def find_highlight(rig: Rig, geometry: Geometry, towards: NDArray[np.floating]) -> Highlight | None:
     """The highlight that explains best how brightness changes with ``towards``; None where none does."""
     pairs = _pairs(rig, geometry, towards)
     if pairs is None:
@@ -114,45 +120,67 @@ class _Pairs:
     block: NDArray[np.int64]
 
 
-def _lobe(towards: Floats, roughness: float) -> Floats:
+def _lobe(towards: NDArray[np.floating], roughness: float) -> NDArray[np.floating]:
     """The GGX distribution over its value in the mirror direction."""
     alpha_sq = roughness**4
     return np.asarray((alpha_sq / (towards**2 * (alpha_sq - 1) + 1)) ** 2)
 
 
-def _pairs(rig: Rig, geometry: Geometry, towards: Floats) -> _Pairs | None:
-    """Pairs of cells of which all is known; None where there are too few."""
-    channel = bayer_channels(rig.sensor.bayer, *geometry.flags.shape)
-    shading = geometry.surface.shading
-    with np.errstate(invalid="ignore"):
-        usable = ((geometry.flags & int(_DOUBTFUL)) == 0) & np.isfinite(towards) & (shading > LEAST_SHADING)
+def _pairs(rig: Rig, geometry: Geometry, towards: NDArray[np.floating]) -> _Pairs | None:
+    """Pairs of cells of which all is known; None where there are too few, or a camera has no colours."""
+    if len(set(colour_sites(rig.sensor.bayer))) < 3:
+        return None
+    gain = np.broadcast_to(relative_gain(rig), towards.shape)
+    white = chain_response(rig, 0, _NM).sum((1, 2))
+    # Of large pictures some pairs are enough, and all of them much memory.
+    every = max(1, towards.size // 2 // MOST_PAIRS)
+    parts = [
+        _pairs_of(rig, white, gain[rows], geometry.of_rows(rows), towards[rows], rows.start, every)
+        for rows in _slabs(len(towards))
+    ]
+    found = _Pairs(*(np.concatenate(each, -1) for each in zip(*parts, strict=True)))
+    return found if len(found.here) >= FEWEST_PAIRS else None
+
+
+def _slabs(rows: int) -> list[slice]:
+    """Slices of rows, an even number each, so that maps of a large picture need no room of their own."""
+    return [slice(top, min(top + SLAB, rows)) for top in range(0, rows, SLAB)]
+
+
+def _pairs_of(
+    rig: Rig,
+    white: Floats,
+    gain: Floats,
+    geometry: Geometry,
+    towards: NDArray[np.floating],
+    top: int,
+    every: int,
+) -> tuple[Floats, Floats, Floats, Floats, NDArray[np.int64]]:
+    """What `_Pairs` holds, of the rows of a picture from ``top`` on: one of so many pairs."""
+    channel, shading = bayer_channels(rig.sensor.bayer, *towards.shape), geometry.surface.shading
+    usable = ((geometry.flags & int(_DOUBTFUL)) == 0) & np.isfinite(towards) & (shading > LEAST_SHADING)
     usable &= np.isfinite(geometry.amplitude) & np.isfinite(geometry.amplitude_std)
-    white = chain_response(rig, 0, _NM).sum((1, 2))[channel] * relative_gain(rig)
-    per_white = np.where(usable, 1 / np.where(usable, shading * white, 1.0), 0.0)
-    seen, std = (
-        np.where(usable, each, 0.0) * per_white for each in (geometry.amplitude, geometry.amplitude_std)
-    )
+    per_white = np.where(usable, 1 / np.where(usable, shading * white[channel] * gain, 1.0), 0.0)
+    light = geometry.amplitude, geometry.amplitude_std
+    seen, std = (_cells(np.where(usable, each, 0.0) * per_white) for each in light)
     of = [_cells(channel == colour) for colour in range(3)]
-    colours = np.stack([(_cells(seen) * mine).sum(-1) / mine.sum(-1) for mine in of])
-    noise = np.stack([np.sqrt((_cells(std) ** 2 * mine).sum(-1)) / mine.sum(-1) for mine in of])
+    colours = np.stack([(seen * mine).sum(-1) / mine.sum(-1) for mine in of])
+    noise = np.stack([np.sqrt((std**2 * mine).sum(-1)) / mine.sum(-1) for mine in of])
     known: NDArray[np.bool_] = _cells(usable).min(-1) > 0
     facing = _cells(np.where(usable, towards, 0.0)).mean(-1)
     rows, columns = known.shape
     parts = []
     for down, across in ((LAG, 0), (0, LAG)):
         first = slice(down, None), slice(across, None)
-        second = slice(None, rows - down), slice(None, columns - across)
-        row, column = np.nonzero(known[first] & known[second])
+        second = slice(None, max(rows - down, 0)), slice(None, max(columns - across, 0))
+        row, column = (each[::every] for each in np.nonzero(known[first] & known[second]))
         a, b = (colours[:, *part][:, row, column] for part in (first, second))
         da, db = (noise[:, *part][:, row, column] for part in (first, second))
         own = np.sqrt(da**2 + db**2 + (TEXTURE * (a + b) / 2) ** 2 + FLOOR**2)
-        block = row // BLOCK * columns + column // BLOCK
+        block = (top // 2 + row) // BLOCK * columns + column // BLOCK
         parts.append((facing[first][row, column], facing[second][row, column], a - b, own, block))
     here, there, differs, own, block = (np.concatenate(part, -1) for part in zip(*parts, strict=True))
-    if len(here) < FEWEST_PAIRS:
-        return None
-    some = slice(None, None, max(1, -(-len(here) // MOST_PAIRS)))
-    return _Pairs(here[some], there[some], differs[:, some], own[:, some], block[some])
+    return here, there, differs, own, block
 
 
 def _cells(values: NDArray[np.generic]) -> Floats:

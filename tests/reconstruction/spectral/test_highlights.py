@@ -14,6 +14,7 @@ from dsl_core.optics.sensor import bayer_channels, relative_gain
 from dsl_core.optics.spectra import chain_response
 from dsl_core.reconstruction.geometry import Geometry
 from dsl_core.reconstruction.scan_result import with_highlight
+from dsl_core.reconstruction.spectral import highlights
 from dsl_core.reconstruction.spectral.highlights import (
     find_highlight,
     follow_highlights,
@@ -79,7 +80,7 @@ def test_a_highlight_is_found_with_its_width_and_height(ball: tuple[Rig, Geometr
 
 
 @pytest.mark.parametrize(
-    ("gloss", "share"), [(0.0, (1, 1, 1)), (0.0005, (1, 1, 1)), (0.02, (1, 0, 0)), (0.02, (1, 0.7, 0.08))]
+    ("gloss", "share"), [(0.0, (1, 1, 1)), (0.0009, (1, 1, 1)), (0.02, (1, 0, 0)), (0.02, (1, 0.7, 0.08))]
 )
 def test_what_is_faint_or_not_white_is_none(
     ball: tuple[Rig, Geometry], gloss: float, share: tuple[float, float, float]
@@ -110,3 +111,26 @@ def test_too_few_pixels_say_nothing(ball: tuple[Rig, Geometry]) -> None:
     seen = lit(rig, geometry, coloured(rig, geometry, 0.02))
     saturated = replace(seen, flags=np.full_like(seen.flags, int(Flag.SATURATED)))
     assert find_highlight(rig, saturated, towards) is None
+
+
+def test_a_camera_without_colours_cannot_tell_white_light(ball: tuple[Rig, Geometry]) -> None:
+    rig, geometry = ball
+    towards = towards_mirror(rig, geometry)
+    seen = lit(rig, geometry, coloured(rig, geometry, 0.02))
+    grey = rig.model_copy(update={"sensor": rig.sensor.model_copy(update={"bayer": "MONO"})})
+    assert find_highlight(grey, seen, towards) is None
+
+
+def test_large_pictures_are_asked_in_slabs_and_say_the_same(
+    ball: tuple[Rig, Geometry], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    rig, geometry = ball
+    seen = lit(rig, geometry, coloured(rig, geometry, 0.02))
+    whole = find_highlight(rig, seen, towards_mirror(rig, seen))
+    monkeypatch.setattr(highlights, "SLAB", 24)
+    monkeypatch.setattr(highlights, "MOST_PAIRS", 2500)
+    parts = find_highlight(rig, seen, towards_mirror(rig, seen))
+    assert whole is not None
+    assert parts is not None
+    assert parts.roughness == whole.roughness
+    assert parts.peak == pytest.approx(whole.peak, rel=0.05)
