@@ -263,7 +263,10 @@ class Rig(Record):
     ``geometry_covariance`` is that of the 24 parameters of lenses and pose (see `GeometryCalibration`).
     ``fitted_lean_px`` is the lean of the lines whose columns they are fitted to, None if these are of a code.
     ``white_scale_rel_std`` and, for each wavelength, ``chain_rel_std`` are relative standard deviations that
-    the calibration leaves in every reflectance.
+    the calibration leaves in every reflectance; ``reference_rel_std`` is that of the white which all of them
+    refer to, and which no picture shows.
+    ``filter_index`` is the effective index of the bandpass filters with its deviation, None where they shift
+    nothing.
     """
 
     schema_version: Literal[1] = 1
@@ -279,6 +282,7 @@ class Rig(Record):
     projector_response: ProjectorResponse = ProjectorResponse()
     white_scale: float = Field(gt=0)
     white_scale_rel_std: float = Field(default=0.0, ge=0)
+    reference_rel_std: float = Field(default=0.0, ge=0)
     chain_rel_std: SpectralCurve | None = None
     reference_distance_mm: float = Field(default=700.0, gt=0)
     frame_period_ms: float = Field(default=1000.0 / 60.0, gt=0)
@@ -290,6 +294,7 @@ class Rig(Record):
     lateral_colour: LateralColour | None = None
     geometry_covariance: tuple[float, ...] | None = None
     fitted_lean_px: float | None = None
+    filter_index: tuple[float, float] | None = None
     provenance: Provenance = Provenance()
     conditions: CaptureConditions | None = None
     calibrations: tuple[CalibrationNote, ...] = ()

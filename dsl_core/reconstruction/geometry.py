@@ -56,7 +56,8 @@ class Geometry:
     """Maps (rows, columns) of columns, depths, zero-order amplitudes, dark offsets, deviations, and flags.
 
     Where light comes from next to a pixel's centre, its column is ``displaced_px`` from that of the pixel,
-    and depth is that of the pixel; ``seen_depth_mm`` is what the column alone leads to.
+    and depth is that of the pixel; ``seen_depth_mm`` is what the column alone leads to. ``highlight`` is the
+    reflectance that gloss may add, None where surfaces are matt.
     """
 
     column_px: NDArray[np.float32]
@@ -71,6 +72,7 @@ class Geometry:
     surface: Surface
     displaced_px: NDArray[np.float32] | None = None
     seen_depth_mm: NDArray[np.float64] | None = None
+    highlight: NDArray[np.float32] | None = None
 
     def by(self, rig: Rig, column_error_px: NDArray[np.floating], window_px: int | None = None) -> Geometry:
         """Depth and surface from the same columns with another rig.
@@ -219,7 +221,8 @@ def geometry_of(
     code says that they are.
     """
     maps, flags = found.maps, found.flags
-    waves = wave_std_px(maps.column_px.reshape(shape), maps.refined.reshape(shape), lines).ravel()
+    column_px, noise_px = maps.column_px.reshape(shape), maps.column_std_px.reshape(shape)
+    waves = wave_std_px(column_px, noise_px, maps.refined.reshape(shape), lines).ravel()
     if spread_doubt is not None:
         waves = np.hypot(waves, np.where(maps.refined, spread_doubt.at(maps.column_px), np.float32(0.0)))
     # It is of the same waves.

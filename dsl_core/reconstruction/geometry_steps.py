@@ -26,6 +26,7 @@ from dsl_core.reconstruction.lenses import follow_lenses
 from dsl_core.reconstruction.light.followed import follow_light, unsure_level
 from dsl_core.reconstruction.rows.columns import columns_by_rows
 from dsl_core.reconstruction.rows.frames import ScanFrames
+from dsl_core.reconstruction.spectral.highlights import follow_highlights
 from dsl_core.reconstruction.spread_findings import spread_findings
 
 
@@ -118,6 +119,9 @@ class GeometrySteps:
         blur_px = calibrated.blur_px
         geometry, found = code_agreement(self.rig, frames.plan, named, geometry, window_px, blur_px)
         self.findings += found
+        if options.spectra:
+            geometry, found = follow_highlights(self.rig, geometry)
+            self.findings += found
         return geometry
 
     def _taken(self) -> tuple[DecodedCode, MergedFrame]:

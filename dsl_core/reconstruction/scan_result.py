@@ -61,7 +61,7 @@ def maps_of_rows(
         flags |= _spectral_flags(spectra)
         arrays.update(
             reflectance=spectra.reflectance,
-            reflectance_std=with_calibration(rig, grid, spectra),
+            reflectance_std=with_highlight(here, with_calibration(rig, grid, spectra)),
             data_share=spectra.data_share,
             reach=spectra.reach,
             rgb=reflectance_to_srgb(spectra.reflectance, grid.centres_nm).astype(np.float32),
@@ -87,14 +87,20 @@ def attributes_of(rig: Rig, plan: CapturePlan, fit: Fit) -> dict[str, str | int 
 def with_calibration(rig: Rig, grid: WavelengthGrid, spectra: SpectralMaps) -> NDArray[np.float32]:
     """Deviation of the reflectance (bands, rows, columns), calibration included.
 
-    What the calibration leaves open is a share of the reflectance: one for all wavelengths
-    (``white_scale_rel_std``) and one for each (``chain_rel_std``).
+    What the calibration leaves open is a share of the reflectance: two for all wavelengths
+    (``white_scale_rel_std``, ``reference_rel_std``) and one for each (``chain_rel_std``).
     """
     chain = 0.0 if rig.chain_rel_std is None else rig.chain_rel_std.at(grid.centres_nm)
-    share = np.broadcast_to(np.hypot(chain, rig.white_scale_rel_std), grid.count).astype(np.float32)
+    level = np.hypot(rig.white_scale_rel_std, rig.reference_rel_std)
+    share = np.broadcast_to(np.hypot(chain, level), grid.count).astype(np.float32)
     if not share.any():
         return spectra.std
     return np.asarray(np.hypot(spectra.std, share[:, None, None] * spectra.reflectance), np.float32)
+
+
+def with_highlight(geometry: Geometry, std: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Deviation of the reflectance (bands, rows, columns), with what a highlight adds to all bands."""
+    return std if geometry.highlight is None else np.hypot(std, geometry.highlight)
 
 
 def _spectral_flags(spectra: SpectralMaps) -> NDArray[np.uint16]:

@@ -18,6 +18,7 @@ from dsl_core.errors import CalibrationError
 from dsl_core.model.calibration.color_checker import ColorCheckerCalibration
 from dsl_core.model.calibration.spectralon import SpectralonCalibration
 from dsl_core.model.figure import failures
+from dsl_core.model.frames import Frame
 from dsl_core.model.placement import Placement
 from dsl_core.model.rig import Rig
 from dsl_core.optics.sensor import relative_gain
@@ -207,3 +208,40 @@ def test_an_impossible_reflectance_and_chart_are_told(module_folder: Path) -> No
         SpectralonRecipe(reflectance=99.0).fit(bench, NONE)
     with pytest.raises(CalibrationError, match="choose BabelColor Average"):
         ColorCheckerRecipe(chart="SG").steps(bench)
+
+
+def with_lamp(devices: DeviceRig, after: int, dn: int) -> None:
+    """Let a lamp add light to all pictures from a shot on."""
+    camera = devices.camera
+    prepare, snap, shots = camera.prepare, camera.snap, [0]
+
+    def prepared(shot_index: int, attempt: int = 0) -> None:
+        shots[0] = shot_index
+        prepare(shot_index, attempt)
+
+    def lit(timeout_ms: float = 5000.0) -> Frame:
+        frame = snap(timeout_ms)
+        # Test shots are numbered far above those of a scan.
+        return replace(frame, pixels=frame.pixels + np.uint16(dn * (after <= shots[0] < 1_000_000)))
+
+    camera.prepare, camera.snap = prepared, lit  # type: ignore[method-assign]
+
+
+@pytest.mark.parametrize("after", [1_000_000, 26])
+def test_a_lamp_that_comes_on_between_the_pictures_is_told(after: int, tmp_path: Path) -> None:
+    devices = open_twin({"size": "64x42", "truth": "1"})
+    with_lamp(devices, after, 15)
+    recipe = SpectralonRecipe()
+    assert devices.nominal is not None
+    record = calibrate(recipe, devices, devices.nominal, tmp_path)
+    bad = [f.name for f in failures(recipe.figures(record))]
+    assert ("change of other light during the pictures" in bad) is (after < 1_000_000)
+
+
+def test_what_is_not_known_of_the_spectralon_is_part_of_every_reflectance(module_folder: Path) -> None:
+    start, rig, _ = spectralon(1, module_folder / "spectralon-1")
+    assert rig.reference_rel_std == SpectralonRecipe().reflectance_rel_std
+    with pytest.raises(CalibrationError, match="cannot be 2; give a share such as"):
+        SpectralonRecipe(reflectance_rel_std=2.0).fit(
+            Bench(twin(1), module_folder / "spectralon-1", start), NONE
+        )

@@ -95,6 +95,17 @@ def _misprinted(folder: Path) -> None:
     assert ending.code == 0, ending.err
 
 
+def _yellowed(folder: Path) -> None:
+    """The Spectralon reflects 5 % less blue than its curve says; nothing before the chart can tell."""
+    file = folder / "certificate.csv"
+    rows = [f"{nm};{0.99 * (1 + 0.05 * min(max((560 - nm) / 130, 0), 1)):.6g}" for nm in range(380, 781, 10)]
+    file.write_text("\n".join(["nm;reflectance", *rows]), encoding="utf-8")
+    campaign = CampaignFolder.open(folder)
+    campaign.with_settings("spectralon", {"reflectance_file": str(file)}).save()
+    ending = give("calibrate", "spectralon", str(folder), "--yes")
+    assert ending.code == 0, ending.err
+
+
 def _spectra(header: str, last_nm: float = 780.0) -> Prepare:
     """Files of five spectra beside the campaign, under a header and up to a wavelength."""
 
@@ -197,6 +208,30 @@ CASES = (
         _redo("spectralon", "emission"),
         r"red\.csv covers 400 to 640 nm; 430 to 660 nm are needed",
         prepare=_spectra("nm;W/(sr m2 nm)", last_nm=640.0),
+    ),
+    BadInput(
+        "Spectralon not flat",
+        "figures of the Spectralon",
+        _redo("spectralon", "pictures"),
+        r"Spectralon was not accepted: bulge of the Spectralon over 300 mm [12]\.\d+ ± 0\.\d+ mm",
+        {"bow_mm": "2"},
+        touched=("spectralon/pictures",),
+    ),
+    BadInput(
+        "Spectralon yellower than stated",
+        "figures of the Color Checker",
+        ("color-checker",),
+        r"Color Checker was not accepted: colour of the light on the chart against the Spectralon [34]\.",
+        prepare=_yellowed,
+    ),
+    BadInput(
+        "target at the filters not flat",
+        "figures of the bandpass filters",
+        _redo("bandpass", "plane", "filter-450", "filter-640"),
+        r"Bandpass filters was not accepted: .*bulge of the target over 300 mm [45]\.\d+ ± 0\.\d+ mm",
+        {"bow_mm": "5"},
+        touched=("bandpass/plane", "bandpass/filter-450", "bandpass/filter-640"),
+        quick=False,
     ),
     BadInput(
         "checker upside down",

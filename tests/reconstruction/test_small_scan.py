@@ -161,10 +161,11 @@ def test_calibration_widens_the_deviation_and_nothing_else(scanned: tuple[Device
     rig = devices.calibration
     assert rig is not None
     chain = SpectralCurve.of([430.0, 660.0], [0.01, 0.05])
-    unsure = rig.model_copy(update={"chain_rel_std": chain, "white_scale_rel_std": 0.02})
+    level = {"white_scale_rel_std": 0.02, "reference_rel_std": 0.03}
+    unsure = rig.model_copy(update={"chain_rel_std": chain, **level})
     sure, wide = (pipeline.reconstruct(scan, r, pipeline.Options(grid=GRID)) for r in (rig, unsure))
     np.testing.assert_array_equal(sure["reflectance"].values, wide["reflectance"].values)
-    share = np.hypot(chain.at(GRID.centres_nm), 0.02)[:, None, None]
+    share = np.hypot(chain.at(GRID.centres_nm), np.hypot(0.02, 0.03))[:, None, None]
     wanted = np.hypot(sure["reflectance_std"].values, share * sure["reflectance"].values)
     np.testing.assert_allclose(wide["reflectance_std"].values, wanted, rtol=1e-5)
     assert np.nanmedian(wide["reflectance_std"].values - sure["reflectance_std"].values) > 0

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dsl_core.calibration.colour.patches import ChartPose, PatchSamples, PatchSignals, patch_signals
+from dsl_core.calibration.common.room_light import light_change_figure
 from dsl_core.calibration.light.spectral_refinement import (
     FINE_NM,
     PUBLISHED_WEIGHT,
@@ -23,6 +24,7 @@ from dsl_core.calibration.light.spectral_refinement import (
 from dsl_core.errors import CalibrationError
 from dsl_core.model.calibration.color_checker import ColorCheckerCalibration, PatchResult
 from dsl_core.model.figure import Figure
+from dsl_core.model.geometry import Row3
 from dsl_core.model.rig import Rig
 from dsl_core.model.spectral import SpectralCurve
 from dsl_core.optics.charts import chart_reflectance
@@ -45,6 +47,11 @@ WHITE_FLOOR = 2e-4
 RESIDUAL_PERCENT, WORST_PERCENT = 1.5, 4.0
 #: The chart may be lit so much otherwise (%) than the Spectralon, and tilted so much (degrees).
 LEVEL_PERCENT, MAX_TILT_DEG = 3.0, 20.0
+#: It may be so much brighter (%) under one LED than under another: two tables of the chart differ by 1.8 %.
+COLOUR_PERCENT = 3.0
+#: A patch is grey where its reflectance varies by less than this share of its mean over `BANDS_NM`, and
+#: light enough to be judged by.
+GREY_SHARE, GREY_FROM = 0.15, 0.15
 #: Where curves are judged, nm.
 BANDS_NM = (430.0, 660.0)
 
@@ -130,6 +137,7 @@ def refine_on_chart(
         for p, name in enumerate(names)
     )
     published = _held_out(rig, data, PUBLISHED_WEIGHT, None, progress)
+    levels = led_levels(rig, signal, chart)
     a, b, c, d = ((float(x), float(y)) for x, y in pose.corners_px)
     return ColorCheckerCalibration(
         chart=chart,
@@ -142,10 +150,35 @@ def refine_on_chart(
         weight=found.weight,
         reflectance_error=found.reflectance_error,
         chart_level=float(np.expm1(found.chart_level)),
+        led_levels=levels,
+        reference_rel_std=float(np.hypot(rig.reference_rel_std, disagreement(levels))),
         published_held_out=rms(published),
         tilt_deg=plane.tilt_deg,
         distance_mm=plane.distance_mm,
     )
+
+
+def led_levels(rig: Rig, signal: Floats, chart: str) -> Row3:
+    """Signals of grey patches over those that the rig gives them, minus one, under each LED alone.
+
+    ``signal`` (24, channels, lights) is DN per ms at unit shading. The rig gives a white under each LED what
+    the Spectralon showed, so that no curve of camera or LEDs comes in where a patch is grey.
+    """
+    data = _surfaces(chart)
+    given, _ = SpectralModel(rig).predict(_zero(), data)
+    seen = data.reflectance[:, (BANDS_NM[0] <= FINE_NM) & (BANDS_NM[1] >= FINE_NM)]
+    mean = seen.mean(1)
+    grey = (np.ptp(seen, axis=1) < GREY_SHARE * mean) & (mean > GREY_FROM)
+    red, green, blue, _ = np.median(signal[grey].sum(1) / given[grey].sum(1), axis=0).tolist()
+    return red - 1, green - 1, blue - 1
+
+
+def disagreement(levels: Row3) -> float:
+    """What two whites leave open of each, relative deviation, where chart and Spectralon differ by levels.
+
+    Nothing says which of the two is off, so that each has its part of the difference.
+    """
+    return float(np.abs(levels).max() / np.sqrt(2))
 
 
 def _zero() -> Floats:
@@ -278,8 +311,31 @@ def color_checker_figures(record: ColorCheckerCalibration) -> tuple[Figure, ...]
             high=LEVEL_PERCENT,
             advice="Avoid other light and shadows, and check the Spectralon's certified reflectance.",
         ),
+        *_colour(record),
+        *light_change_figure(record.light_change),
         Figure(
             name="tilt of the chart", value=record.tilt_deg, unit="degrees", high=MAX_TILT_DEG,
             advice="Turn the chart to face the camera.",
         ),
     )  # fmt: skip
+
+
+def _colour(record: ColorCheckerCalibration) -> tuple[Figure, ...]:
+    """How much brighter the chart is under one LED than under another, and what that leaves of the white."""
+    if record.led_levels is None or record.reference_rel_std is None:
+        return ()
+    return (
+        Figure(
+            name="colour of the light on the chart against the Spectralon",
+            value=100 * float(np.ptp(record.led_levels)),
+            unit="%",
+            high=COLOUR_PERCENT,
+            advice="The Spectralon or the chart has another colour than stated, as when it has yellowed:"
+            " clean or replace it, or give the Spectralon's measured reflectance (reflectance_file).",
+        ),
+        Figure(
+            name="deviation of white itself, by certificate and chart",
+            value=100 * record.reference_rel_std,
+            unit="%",
+        ),
+    )

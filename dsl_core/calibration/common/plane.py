@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dsl_core.errors import CalibrationError
+from dsl_core.model.figure import Figure
 from dsl_core.model.rig import Rig
 from dsl_core.optics.pinhole import pixel_rays
 from dsl_core.optics.shading import Plane
@@ -22,6 +23,10 @@ ROUNDS = 8
 MIN_PIXELS = 200
 #: Planes through three pixels that the start is chosen from, and pixels that each is judged by.
 TRIALS, JUDGES = 200, 2000
+#: Half of what a bulge is stated over, mm, and parts along each side of the picture, left out in turn.
+HALF_SPAN_MM, PARTS = 150.0, 4
+#: A bulge is none within so many of its deviations.
+BULGE_SIGMAS = 4.0
 #: Pixels must spread this much across their longest extent, relative to it.
 LEAST_WIDTH = 0.02
 
@@ -59,6 +64,55 @@ def fit_plane(rig: Rig, depth_mm: Floats, usable: Mask, start: Mask | None = Non
             break
     off = (miss * depth_mm)[on_plane]
     return TargetPlane(plane, on_plane, float(np.sqrt(np.mean(off**2))))
+
+
+def bulge_mm(rig: Rig, depth_mm: Floats, found: TargetPlane) -> tuple[float, float]:
+    """How far a target bulges towards the camera over 300 mm, and its deviation (mm), by depths of pixels.
+
+    A paraboloid is fitted to the distances from the plane. What lenses and rounded columns leave differs from
+    part to part of the picture, so that leaving out one after the other says how well it is known.
+    """
+    rays = pixel_rays(rig.camera)[:, found.on_plane]
+    points = rays * depth_mm[found.on_plane]
+    size = np.linalg.norm(found.plane.inverse)
+    height = (1 - found.plane.inverse @ points) / size
+    along = points - (found.plane.inverse / size)[:, None] * (found.plane.inverse @ points / size)
+    along = (along - along.mean(1, keepdims=True)) / HALF_SPAN_MM
+    terms = np.stack([np.ones(len(height)), along[0], along[1], -(along**2).sum(0)])
+    rows, columns = np.nonzero(found.on_plane)
+    part = rows * PARTS // depth_mm.shape[0] * PARTS + columns * PARTS // depth_mm.shape[1]
+    normal, right = np.zeros((PARTS**2, 4, 4)), np.zeros((PARTS**2, 4))
+    for k in range(PARTS**2):
+        mine = terms[:, part == k]
+        normal[k], right[k] = mine @ mine.T, mine @ height[part == k]
+    full_normal, full_right = normal.sum(0), right.sum(0)
+    value = float(np.linalg.solve(full_normal, full_right)[3])
+    used = np.bincount(part, minlength=PARTS**2) > 0
+    left_out = np.linalg.solve(full_normal - normal[used], (full_right - right[used])[..., None])[:, 3, 0]
+    return value, float(np.sqrt((len(left_out) - 1) * np.mean((left_out - value) ** 2)))
+
+
+def bulge_figure(name: str, bulge: tuple[float, float] | None, most_mm: float) -> tuple[Figure, ...]:
+    """A bulge and its deviation (mm), against limits of ``most_mm`` or some deviations, the larger.
+
+    No figure where it was not measured.
+    """
+    if bulge is None:
+        return ()
+    value, std = bulge
+    limit = max(most_mm, BULGE_SIGMAS * std)
+    return (
+        Figure(
+            name=name,
+            value=value,
+            unit="mm",
+            std=std,
+            low=-limit,
+            high=limit,
+            advice="Use a flat target, as its sides are lit from other angles than the fit assumes. If it is"
+            " flat, calibrate the geometry again.",
+        ),
+    )
 
 
 def _near_first_plane(rays: Floats, inverse: Floats, on_plane: Mask) -> Mask:

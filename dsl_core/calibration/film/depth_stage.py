@@ -134,6 +134,7 @@ def calibrate_depth_stage(
         film_std=film.std,
         scatter_px=film.scatter_px,
         filter_index=film.angle.index,
+        filter_index_before=rig.filter_index,
         filters=seen,
         lateral_colour=rig.lateral_colour,
         residual=residual,

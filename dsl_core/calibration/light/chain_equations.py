@@ -44,7 +44,8 @@ class LineScan:
     ``pixels`` are flat indices into the camera image (P,); ``depth_mm``, ``shading``, ``column_px``,
     ``amplitude`` (zero order in the pixel's own colour, DN per ms) and ``offset`` (dark signal, DN per ms)
     are (P,); ``radiance`` and its deviation ``std`` (infinite: saturated) are (frames, P), DN per ms, of
-    the frames from ``first_line`` on.
+    the frames from ``first_line`` on. ``bulge_mm`` is how far the target bulges, with its deviation, None
+    where nobody asked (see `calibration.common.plane.bulge_mm`).
     """
 
     lines: ScanLines
@@ -57,6 +58,7 @@ class LineScan:
     radiance: NDArray[np.floating]
     std: NDArray[np.floating]
     first_line: int = 0
+    bulge_mm: tuple[float, float] | None = None
 
     @property
     def centres_px(self) -> Floats:

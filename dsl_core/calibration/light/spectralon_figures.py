@@ -5,6 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from dsl_core.calibration.common.plane import bulge_figure
+from dsl_core.calibration.common.room_light import light_change_figure
 from dsl_core.model.calibration.spectralon import SpectralonCalibration
 from dsl_core.model.figure import Figure
 from dsl_core.model.rig import Rig
@@ -13,6 +15,9 @@ from dsl_core.optics.sensor import bayer_channels
 #: Limits: scatter of blocks in the middle (%), tilt (degrees).
 UNEVEN_PERCENT, MAX_TILT_DEG = 1.0, 15.0
 LOOK_UNEVEN_PERCENT = 25.0
+#: A bulge over 300 mm: this one tilts the target's sides by half a degree, and corners of the flat field are
+#: off by .9 %.
+BULGE_MM = 1.0
 
 
 def unevenness_of_middle(picture: NDArray[np.float64], rig: Rig) -> Figure:
@@ -120,4 +125,12 @@ def _picture_figures(record: SpectralonCalibration) -> list[Figure]:
             advice="Fill more of the picture with the Spectralon and expose longer.",
         ),
         Figure(name="range of the flat field", value=100 * float(np.ptp(gain)), unit="%"),
+        *light_change_figure(record.light_change),
+        *bulge_figure("bulge of the Spectralon over 300 mm", record.bulge_mm, BULGE_MM),
+        Figure(
+            name="stated reflectance of the Spectralon, which no picture shows",
+            value=100 * float(np.mean(record.reflectance.values)),
+            unit="%",
+            std=100 * record.reflectance_rel_std * float(np.mean(record.reflectance.values)),
+        ),
     ]

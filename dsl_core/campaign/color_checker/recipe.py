@@ -108,12 +108,14 @@ class ColorCheckerRecipe(Recipe[ColorCheckerCalibration]):
         return color_checker_figures(record)
 
     def apply(self, record: ColorCheckerCalibration, rig: Rig) -> Rig:
-        """The rig with refined response, emission and the white scale that goes with them."""
+        """The rig with refined response, emission, the white scale that goes with them, and its deviation."""
+        unsure = rig.reference_rel_std if record.reference_rel_std is None else record.reference_rel_std
         return rig.model_copy(
             update={
                 "response": record.response,
                 "emission": record.emission,
                 "white_scale": record.white_scale,
+                "reference_rel_std": unsure,
             }
         )
 
@@ -130,7 +132,8 @@ class ColorCheckerRecipe(Recipe[ColorCheckerCalibration]):
         pictures = ChartPictures(target.radiance, target.saturated, light)
         seen = measure_patches(pictures, rig, samples, self.chart)
         assert len(seen) == len(LIGHTS)
-        return refine_on_chart(rig, seen, pose, plane, self.chart, progress)
+        record = refine_on_chart(rig, seen, pose, plane, self.chart, progress)
+        return record.model_copy(update={"light_change": target.light_change(on_chart)})
 
     def _pose(self, white: np.ndarray, rig: Rig, name: str) -> ChartPose:
         expected = expected_colours(rig, self.chart)

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dsl_core.calibration.colour.color_checker import LIGHTS
-from dsl_core.calibration.common.plane import TargetPlane, fit_plane
+from dsl_core.calibration.common.plane import TargetPlane, bulge_mm, fit_plane
 from dsl_core.calibration.light.chain import LineScan
 from dsl_core.campaign.common.recipe import Bench, Step
 from dsl_core.campaign.common.white_shot import bracket, shoot_white
@@ -27,6 +27,8 @@ if TYPE_CHECKING:
 
 #: Which of the lights is white.
 WHITE = 3
+#: What is shown after all others: it tells whether the light of the room is what it was.
+BLACK = (0.0, 0.0, 0.0)
 #: Pixels that are used of each scan of lines: with more, noise no longer limits the correction.
 PIXELS = 6000
 #: A flat target that fills the picture has at least this share of the lit pixels on one plane.
@@ -38,6 +40,8 @@ class TargetPictures:
     """Mosaics (lights, rows, columns), DN per ms at full drive, their variance, and where any is saturated.
 
     ``depth_mm`` (rows, columns) comes from whole projector columns; ``lit`` marks where it means something.
+    ``dark`` is the mosaic of black after all others, minus that before them, with its variance: None in
+    captures without it.
     """
 
     radiance: NDArray[np.float64]
@@ -45,6 +49,18 @@ class TargetPictures:
     saturated: NDArray[np.bool_]
     depth_mm: NDArray[np.float64]
     lit: NDArray[np.bool_]
+    dark: tuple[NDArray[np.float64], NDArray[np.float64]] | None = None
+
+    def light_change(self, pixels: NDArray[np.bool_]) -> tuple[float, float] | None:
+        """By how much the light of the room changed meanwhile, as a share of white, and its deviation.
+
+        Means over ``pixels`` (rows, columns); None where black was not captured again.
+        """
+        if self.dark is None:
+            return None
+        change, variance = (float(each[pixels].mean()) for each in self.dark)
+        white = float(self.radiance[WHITE][pixels].mean())
+        return change / white, float(np.sqrt(variance / max(pixels.sum(), 1))) / white
 
     def plane(
         self, rig: Rig, start: NDArray[np.bool_], within: NDArray[np.bool_] | None = None
@@ -57,7 +73,7 @@ class TargetPictures:
 
 
 def capture_uniform(bench: Bench, step: Step, ratio: float, progress: Progress) -> None:
-    """Code and uniform pictures of a step; a scan that was begun continues as it was planned.
+    """Code and uniform pictures of a step, black last; a scan that was begun continues as it was planned.
 
     Exposures follow a test shot; ``ratio`` above one adds an exposure that much longer, for dark patches.
     """
@@ -67,7 +83,7 @@ def capture_uniform(bench: Bench, step: Step, ratio: float, progress: Progress) 
         return CapturePlan(
             name=step.title,
             code=GrayCode(rows=False),
-            spectral=Columns(levels=tuple((tuple(light),) * width for light in LIGHTS.tolist())),
+            spectral=Columns(levels=tuple((tuple(light),) * width for light in (*LIGHTS.tolist(), BLACK))),
             settings=bracket(bench.rig, shoot_white(bench), step.title, ratio),
             code_settings=(0,),
         )
@@ -91,7 +107,10 @@ def read_uniform(source: FrameSource, rig: Rig, progress: Progress) -> TargetPic
     with one_kernel_thread():
         columns = torch.as_tensor(code.likely_column.ravel().astype(float))
         depth, _ = triangulate(rig, torch.arange(columns.numel()), columns)
-    pictures = [merged.merge("spectral", light) for light in range(len(LIGHTS))]
+    count = len(LIGHTS)
+    pictures = [merged.merge("spectral", light) for light in range(count)]
+    # Captures of earlier versions have no black after the others.
+    last = merged.merge("spectral", count) if source.plan.spectral_count > count else None
     lit = white.saturated | (white.radiance > LIT_SIGMAS * np.sqrt(white.variance))
     low, high = rig.depth_range_mm
     depth_mm = depth.numpy().reshape(shape)
@@ -101,6 +120,7 @@ def read_uniform(source: FrameSource, rig: Rig, progress: Progress) -> TargetPic
         np.any([picture.saturated for picture in pictures], axis=0),
         depth_mm,
         lit & ~code.undecided & (depth_mm > low) & (depth_mm < high),
+        None if last is None else (last.radiance.astype(float), last.variance.astype(float)),
     )
 
 
@@ -173,6 +193,7 @@ def diffuser_lines(
         offset=known.offset.ravel()[chosen].astype(float),
         radiance=stack.radiance.reshape(len(stack.radiance), -1)[:, chosen],
         std=stack.std.reshape(len(stack.std), -1)[:, chosen].astype(np.float32),
+        bulge_mm=bulge_mm(rig, geometry.depth_mm.astype(np.float64), flat),
     )
 
 

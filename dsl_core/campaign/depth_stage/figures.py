@@ -23,6 +23,9 @@ MAX_FILTERS_NM, FILTER_SIGMAS, MIDDLE_NM = 0.8, 3.0, 550.0
 #: Largest correction of the chain: curves of response, emission and efficiency that are each off their data
 #: sheet by 5 % come to 16 % together, and second orders beyond what filters show to some percent more.
 MAX_CORRECTION_PERCENT = 20.0
+#: What two indices of one set of filters may differ by, or in deviations, the larger: at the corners of the
+#: picture this one shifts light by a nm and a half.
+MAX_INDEX, INDEX_SIGMAS = 0.1, 4.0
 #: Orders of a film that was turned over change by opposite shares that differ by this much (logarithm).
 TURNED_OVER = 0.2
 
@@ -178,14 +181,26 @@ def _filter_index(record: DepthStageCalibration) -> tuple[Figure, ...]:
     if record.filter_index is None:
         return ()
     value, std = record.filter_index
-    return (
-        Figure(
-            name="index of the filters, by their shift with the angle of view",
-            value=value,
-            unit="",
-            std=std,
-        ),
+    found = Figure(
+        name="index of the filters, by their shift with the angle of view", value=value, unit="", std=std
     )
+    if record.filter_index_before is None:
+        return (found,)
+    before, before_std = record.filter_index_before
+    apart_std = float(np.hypot(std, before_std))
+    limit = max(MAX_INDEX, INDEX_SIGMAS * apart_std)
+    apart = Figure(
+        name="index of the filters against that at the bandpass filters' step",
+        value=value - before,
+        unit="",
+        std=apart_std,
+        low=-limit,
+        high=limit,
+        advice="The filters' light shifts otherwise with the angle of view than before: they are others, or"
+        " stood askew at one of the two. Put the same filters flat in front of the lens, and capture the step"
+        " again at which they were not.",
+    )
+    return found, apart
 
 
 def _bow(record: DepthStageCalibration) -> tuple[Figure, ...]:

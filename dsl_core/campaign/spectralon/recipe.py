@@ -6,6 +6,7 @@ from collections.abc import Collection
 from dataclasses import dataclass
 from pathlib import Path
 
+from dsl_core.calibration.common.plane import bulge_mm
 from dsl_core.calibration.light.emission import measured_emission
 from dsl_core.calibration.light.spectralon import (
     UniformPictures,
@@ -36,9 +37,11 @@ class SpectralonRecipe(Recipe[SpectralonCalibration]):
     """The calibration with a Spectralon.
 
     ``reflectance`` is the certified reflectance of the Spectralon; ``reflectance_file`` is a text file of
-    reflectance against wavelength, used instead. ``readings`` is how many times the spectroradiometer
-    reads each picture; ``emission_folder`` holds text files ``red*``, ``green*``, ``blue*``, ``white*``,
-    ``black*`` from an instrument that is not connected. ``depth_mm`` is the distance of the target.
+    reflectance against wavelength, used instead. ``reflectance_rel_std`` is the relative deviation of either:
+    no picture shows it, and all reflectances of scans contain it. ``readings`` is how many times the
+    spectroradiometer reads each picture; ``emission_folder`` holds text files ``red*``, ``green*``,
+    ``blue*``, ``white*``, ``black*`` from an instrument that is not connected. ``depth_mm`` is the distance
+    of the target.
     """
 
     name = "spectralon"
@@ -49,6 +52,8 @@ class SpectralonRecipe(Recipe[SpectralonCalibration]):
 
     reflectance: float = 0.99
     reflectance_file: str = ""
+    # Certificates state half a percent, which is two deviations.
+    reflectance_rel_std: float = 0.0025
     readings: int = 16
     emission_folder: str = ""
     depth_mm: float = 700.0
@@ -102,7 +107,13 @@ class SpectralonRecipe(Recipe[SpectralonCalibration]):
 
     def apply(self, record: SpectralonCalibration, rig: Rig) -> Rig:
         """Emission, flat field, and responses and white scale that reproduce the white signals."""
-        known = rig.model_copy(update={"emission": record.emission.curves, "flat_field": record.flat_field})
+        known = rig.model_copy(
+            update={
+                "emission": record.emission.curves,
+                "flat_field": record.flat_field,
+                "reference_rel_std": record.reflectance_rel_std,
+            }
+        )
         return match_whites(known, record.white, record.reflectance)
 
     def _pictures(
@@ -122,12 +133,25 @@ class SpectralonRecipe(Recipe[SpectralonCalibration]):
             usable=target.lit & found.on_plane,
             sensor=bench.rig.sensor,
         )
-        return spectralon_calibration(
+        record = spectralon_calibration(
             reflectance, emission, uniform, measure_white(uniform), found, middle(target.lit.shape)
+        )
+        return record.model_copy(
+            update={
+                "reflectance_rel_std": self.reflectance_rel_std,
+                "light_change": target.light_change(uniform.usable),
+                "bulge_mm": bulge_mm(bench.rig, target.depth_mm, found),
+            }
         )
 
     def _reflectance(self) -> SpectralCurve:
         """The certified reflectance over wavelength; raises `CalibrationError`."""
+        if not 0 <= self.reflectance_rel_std < 0.2:
+            raise CalibrationError(
+                f"The relative deviation of the Spectralon's reflectance cannot be"
+                f" {self.reflectance_rel_std:g}; give a share such as 0.0025, half of what its certificate"
+                " states for 95 %."
+            )
         if self.reflectance_file:
             return read_spectrum(Path(self.reflectance_file), radiance=False)
         if not 0.05 < self.reflectance <= 1.05:

@@ -32,6 +32,7 @@ _MEASURED_OF_BASE = {
     "column_std_px": "uncertainty of columns",
     "chain_rel_std": "uncertainty of the spectra",
     "white_scale_rel_std": "uncertainty of the white scale",
+    "reference_rel_std": "uncertainty of its white",
 }
 
 

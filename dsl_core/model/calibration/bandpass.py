@@ -46,7 +46,8 @@ class BandpassCalibration(Record):
     its width varies over the projector's frame, ``field`` says how. ``filters_off_nm`` is by how much longer
     wavelengths than stated all filters pass, judged by the LEDs' spectra, with its deviation, None where it
     was not judged; ``filter_index`` is the effective index of the filters' layers by their shift with the
-    angle of view, with its deviation, None where none is seen.
+    angle of view, with its deviation, None where none is seen. ``bulge_mm`` is by how much the target bulges
+    towards the camera over 300 mm, with its deviation (None in older records).
     """
 
     filters: tuple[FilterSample, ...]
@@ -68,6 +69,7 @@ class BandpassCalibration(Record):
     filters_off_nm: float | None = None
     filters_off_std_nm: float = Field(default=0.0, ge=0)
     filter_index: tuple[float, float] | None = None
+    bulge_mm: tuple[float, float] | None = None
     warnings: tuple[str, ...] = ()
 
 
@@ -89,5 +91,6 @@ def apply_bandpass(record: BandpassCalibration, rig: Rig) -> Rig:
             "white_scale": record.white_scale,
             "white_scale_rel_std": record.white_scale_rel_std,
             "projector_response": response,
+            "filter_index": record.filter_index,
         }
     )

@@ -7,6 +7,7 @@ from typing import Literal
 from pydantic import Field
 
 from dsl_core.model.base import Record
+from dsl_core.model.geometry import Row3
 from dsl_core.model.rig import Rgb
 
 Point = tuple[float, float]
@@ -40,7 +41,10 @@ class ColorCheckerCalibration(Record):
     and white; ``quarter_turns`` says how far the chart was turned clockwise. ``weight`` of Eq. 1 and the
     relative ``reflectance_error`` of the patches are those the data chose; ``published_held_out`` is the
     held-out residual (rms over patches) with the published weight. ``chart_level`` is the light on the chart
-    over that on the Spectralon, minus one.
+    over that on the Spectralon, minus one; ``led_levels`` are those of single LEDs by the grey patches (None
+    in older records). ``reference_rel_std`` is the relative deviation of the white that both disagree about.
+    ``light_change`` is by how much the light of the room changed during the pictures, over white, with its
+    deviation (None in older records).
     """
 
     schema_version: Literal[1] = 1
@@ -54,6 +58,9 @@ class ColorCheckerCalibration(Record):
     weight: float
     reflectance_error: float
     chart_level: float
+    led_levels: Row3 | None = None
+    reference_rel_std: float | None = Field(default=None, ge=0)
+    light_change: tuple[float, float] | None = None
     published_held_out: float
     tilt_deg: float
     distance_mm: float

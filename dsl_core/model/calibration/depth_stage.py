@@ -72,7 +72,8 @@ class DepthStageCalibration(Record):
     (None in older records).
     ``film_std`` are deviations by the film's fields, what the geometry leaves open included. ``scatter_px``
     is that of single samples of first orders. ``filter_index`` is the effective index of the filters, with
-    its deviation, by how their light shifts with the angle of view; None where it does not.
+    its deviation, by how their light shifts with the angle of view; None where it does not;
+    ``filter_index_before`` is what the bandpass calibration found.
     ``lateral_colour`` is that of both lenses, None where none is seen; red and blue light of a line are
     ``colours_apart_px`` columns from each other, with its deviation. ``frames`` counts the exposures.
     """
@@ -93,6 +94,7 @@ class DepthStageCalibration(Record):
     film_std: dict[str, float]
     scatter_px: float
     filter_index: tuple[float, float] | None = None
+    filter_index_before: tuple[float, float] | None = None
     filters: tuple[FilterSeen, ...]
     lateral_colour: LateralColour | None = None
     colours_apart_px: tuple[float, float] | None = None

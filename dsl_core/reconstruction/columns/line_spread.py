@@ -39,6 +39,8 @@ EDGE_STEPS = 4.0
 REGIONS = (4, 6)
 #: Runs of a region, at least and at most, and how often they are asked: each time most of a wave is found.
 FEWEST, MOST, ASKED = 30, 400, 3
+#: Columns are quiet with less noise than this, px.
+QUIET_PX = 0.1
 #: Pixels of a run that lines refined, at least.
 MOST_OF_RUN = 7
 #: Runs that see lines as calibrated rather than as found explain them so many times better, and are at least
@@ -158,17 +160,25 @@ def _peaks(seen: PickedLines, lines: LineSet, column: torch.Tensor, rig: Rig) ->
 
 
 def wave_std_px(
-    column_px: NDArray[np.floating], refined: NDArray[np.bool_], lines: LineSet | None
+    column_px: NDArray[np.floating],
+    column_std_px: NDArray[np.floating],
+    refined: NDArray[np.bool_],
+    lines: LineSet | None,
 ) -> NDArray[np.float32]:
     """Rms of the waves around each pixel (rows, columns), px; 0 where there are none or nobody can tell.
 
-    ``column_px`` and ``refined`` (rows, columns) are the columns of all pixels and where lines refined them.
-    Regions too small to tell have what the whole picture tells.
+    ``column_px`` and ``column_std_px`` (rows, columns) are the columns of all pixels with their noise, and
+    ``refined`` where lines refined them. Regions too small to tell have what the whole picture tells.
+
+    On the flat middle of a line that is as wide as the step noise displaces columns by quarters of a pixel,
+    to either side of the middle, which is a wave, too: it is no other pixel's.
     """
     std = np.zeros(column_px.shape, np.float32)
     if lines is None or not lines.single:
         return std
-    usual = _rms(column_px, refined, lines.step_px) or 0.0
+    quiet = refined & (column_std_px < QUIET_PX)
+    usual = _rms(column_px, quiet, lines.step_px) or 0.0
+    noisy = _rms(column_px, refined, lines.step_px) or 0.0
     rows, columns = (
         np.linspace(0, size, parts + 1).astype(int)
         for size, parts in zip(column_px.shape, REGIONS, strict=True)
@@ -176,9 +186,9 @@ def wave_std_px(
     for top, bottom in pairwise(rows):
         for left, right in pairwise(columns):
             where = np.s_[top:bottom, left:right]
-            own = _rms(column_px[where], refined[where], lines.step_px)
+            own = _rms(column_px[where], quiet[where], lines.step_px)
             std[where] = usual if own is None else own
-    return std
+    return np.where(refined & ~quiet, np.float32(noisy), std)
 
 
 def _rms(column_px: NDArray[np.floating], refined: NDArray[np.bool_], period_px: float) -> float | None:

@@ -12,7 +12,9 @@ from dsl_core.calibration.colour.color_checker import (
     WORST_PERCENT,
     ChartPictures,
     color_checker_figures,
+    disagreement,
     expected_colours,
+    led_levels,
     measure_patches,
     patch_colours,
     refine_on_chart,
@@ -150,3 +152,39 @@ def test_patches_are_measured_at_unit_shading_and_saturated_or_small_ones_named(
     few = replace(samples, pixels=(samples.pixels[0][:12], *samples.pixels[1:]))
     with pytest.raises(CalibrationError, match=f"patch '{name}' of the Color Checker has only [0-7] pixels"):
         measure_patches(taken, rig, few, CHART)
+
+
+def whites(rig: Rig) -> np.ndarray:
+    """Signals of a perfect white (channels, LEDs)."""
+    response, emission = (np.stack([c.at(FINE_NM) for c in of]) for of in (rig.response, rig.emission))
+    return np.asarray(rig.white_scale * response @ emission.T)
+
+
+def lit(rig: Rig, reds: float, greens: float, blues: float) -> np.ndarray:
+    """Signals (24, channels, lights) of a chart that is so much brighter under each LED."""
+    alone = [factor * signals(rig, light) for light, factor in enumerate((reds, greens, blues))]
+    return np.stack([*alone, np.sum(alone, axis=0)], 2)
+
+
+def test_grey_patches_say_how_the_spectralon_differs_under_each_led() -> None:
+    assert led_levels(truth(), lit(truth(), 1.01, 1.0, 1.04), CHART) == pytest.approx(
+        (0.01, 0, 0.04), abs=1e-9
+    )
+    # A response that is off is none of it, as the rig gives white what was seen of it.
+    start, true = known(), truth()
+    seen_by = lit(true, 1.0, 1.0, 1.0)
+    seen_by[:, :, :3] *= (whites(start) / whites(true))[None]
+    assert np.abs(led_levels(start, seen_by, CHART)).max() < 0.01
+
+
+def test_a_spectralon_of_another_colour_than_stated_is_refused_and_white_is_less_sure(
+    record: ColorCheckerCalibration,
+) -> None:
+    name = "colour of the light on the chart against the Spectralon"
+    fair = record.model_copy(update={"led_levels": (0.02, 0.01, 0.035)})
+    assert name not in [figure.name for figure in failures(color_checker_figures(fair))]
+    yellow = record.model_copy(update={"led_levels": (0.0, 0.001, 0.032)})
+    assert name in [figure.name for figure in failures(color_checker_figures(yellow))]
+    assert disagreement((-0.01, 0.0, 0.03)) == pytest.approx(0.03 / 2**0.5)
+    assert record.led_levels is not None
+    assert record.reference_rel_std == pytest.approx(disagreement(record.led_levels))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from dsl_core.calibration.common.plane import _near_first_plane, fit_plane
+from dsl_core.calibration.common.plane import _near_first_plane, bulge_figure, bulge_mm, fit_plane
 from dsl_core.errors import CalibrationError
 from dsl_core.model.rig import Rig
 from dsl_core.optics.pinhole import pixel_rays
@@ -159,3 +159,24 @@ def test_the_rms_is_that_of_depths_in_millimetres(rig: Rig) -> None:
     depth = PLANE.depth_mm(rig) / (1 + 2e-3 * sign)
     found = fit_plane(rig, depth, np.ones((72, 112), bool))
     assert found.rms_mm == pytest.approx(2e-3 * np.sqrt(np.mean(depth**2)), rel=1e-3)
+
+
+@pytest.mark.parametrize("bulge", [-3.0, 0.0, 1.0, 5.0])
+def test_a_bulge_towards_the_camera_is_measured_over_300_mm(rig: Rig, bulge: float) -> None:
+    flat = PLANE.depth_mm(rig)
+    points = pixel_rays(rig.camera) * flat
+    across2 = ((points - points.mean((1, 2), keepdims=True)) ** 2).sum(0)
+    # Along the axis a step is longer than towards the plane, whose normal is a little askew.
+    towards = (bulge * (1 - across2 / 150.0**2)) * np.linalg.norm(PLANE.inverse) * 700.0
+    depth = flat - towards + 0.5 * np.random.default_rng(1).standard_normal(flat.shape)
+    found = bulge_mm(rig, depth, fit_plane(rig, depth, np.ones(flat.shape, bool)))
+    assert found[0] == pytest.approx(bulge, abs=0.1)
+    assert abs(found[0] - bulge) < 4 * found[1] + 0.02 * abs(bulge)
+    assert found[1] < 0.05 + 0.05 * abs(bulge)
+
+
+def test_a_bulge_is_refused_beyond_its_limit_and_its_deviations() -> None:
+    assert bulge_figure("bulge", None, 1.0) == ()
+    for value, std, passed in ((0.9, 0.01, True), (-1.1, 0.01, False), (1.1, 0.01, False), (1.1, 0.3, True)):
+        (figure,) = bulge_figure("bulge", (value, std), 1.0)
+        assert figure.passed is passed

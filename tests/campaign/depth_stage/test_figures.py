@@ -20,9 +20,16 @@ FILM_STD = dict.fromkeys(
 
 
 def figure_of(
-    name: str, rms_px: dict[float, float], limit_px: float, chain: ChainCorrection | None
+    name: str,
+    rms_px: dict[float, float],
+    limit_px: float,
+    chain: ChainCorrection | None,
+    indices: tuple[tuple[float, float], tuple[float, float]] | None = None,
 ) -> Figure:
-    """A figure of planes whose columns scatter by so much at each position."""
+    """A figure of planes whose columns scatter by so much at each position.
+
+    ``indices`` are the filters' index now and before, each with its deviation.
+    """
     positions = tuple(
         StagePosition(
             position_mm=mm,
@@ -45,7 +52,8 @@ def figure_of(
         depth_std_mm=0.1,
         held_out=(HeldOutError(kept_out="x", grating_px=0.1, hybrid_px=0.1, noise_px=0.1),),
         chain=chain,
-        filter_index=None,
+        filter_index=None if indices is None else indices[0],
+        filter_index_before=None if indices is None else indices[1],
         warnings=(),
     )
     return next(each for each in depth_stage_figures(record) if each.name == name)
@@ -109,3 +117,21 @@ def test_orders_that_do_not_change_by_opposite_shares_blame_no_film(plus: float,
     assert (
         chain_figure(plus, minus).advice == "Calibrate Spectralon, Color Checker and bandpass filters again."
     )
+
+
+@pytest.mark.parametrize(
+    ("now", "before", "passed"),
+    [
+        ((1.70, 0.01), (1.65, 0.01), True),
+        ((1.70, 0.01), (1.55, 0.01), False),
+        ((1.50, 0.01), (1.65, 0.01), False),
+        ((1.70, 0.04), (1.55, 0.04), True),
+    ],
+)
+def test_filters_that_shift_otherwise_than_before_are_told(
+    now: tuple[float, float], before: tuple[float, float], passed: bool
+) -> None:
+    name = "index of the filters against that at the bandpass filters' step"
+    figure = figure_of(name, {600.0: 0.01, 900.0: 0.01}, 0.04, None, (now, before))
+    assert figure.value == pytest.approx(now[0] - before[0])
+    assert figure.passed is passed

@@ -59,6 +59,7 @@ def test_what_the_base_measured_of_its_own_lenses_and_curves_is_left_out(tmp_pat
         "column_std_px": 0.011,
         "chain_rel_std": SpectralCurve.of([400.0, 700.0], [0.002, 0.002]),
         "white_scale_rel_std": 0.001,
+        "reference_rel_std": 0.0025,
     }
     again = load_calibration(tmp_path).rig(rig.model_copy(update=measured))
     bare = {name: getattr(again, name) for name in measured}

@@ -100,6 +100,10 @@ def test_only_single_lines_without_gaps_show_the_spread(scanned: Scanned) -> Non
 LINES = LineSet.of(CapturePlan(spectral=ScanLines(width_px=5, step_px=2)))
 
 
+#: Deviations of columns whose noise is little.
+QUIET = np.full((160, 240), 0.005)
+
+
 def columns() -> np.ndarray:
     """A tilted plane under noise, with a wave in the left half of the picture."""
     y, x = np.mgrid[:160, :240].astype(float)
@@ -109,32 +113,47 @@ def columns() -> np.ndarray:
 
 
 def test_waves_widen_the_deviation_where_they_are() -> None:
-    std = wave_std_px(columns(), np.ones((160, 240), bool), LINES)
+    std = wave_std_px(columns(), QUIET, np.ones((160, 240), bool), LINES)
     assert std[:, :120].min() > 0.9 * 0.06 / np.sqrt(2)
     assert std[:, :120].max() < 1.1 * 0.06 / np.sqrt(2)
     assert std[:, 120:].max() < 0.002
 
 
+def test_noise_that_goes_with_the_place_between_lines_widens_noisy_pixels_alone() -> None:
+    """Near the middle of a line as wide as the step, noise displaces columns to either side."""
+    lines = LineSet.of(CapturePlan(spectral=ScanLines(width_px=5, step_px=5)))
+    assert lines is not None
+    y, x = np.mgrid[:160, :240].astype(float)
+    column = 40 + 5.83 * x + 0.113 * y + 0.0004 * x**2
+    from_middle = (column - lines.first_px + 2.5) % 5 - 2.5
+    noisy = np.abs(from_middle) < 0.4
+    aside = np.where(noisy, 0.25 * np.sign(from_middle), 0.0)
+    column += aside + 0.005 * np.random.default_rng(0).standard_normal(column.shape)
+    std = wave_std_px(column, np.where(noisy, 0.25, 0.005), np.ones(column.shape, bool), lines)
+    assert std[~noisy].max() < 0.01
+    assert std[noisy].min() > 0.05
+
+
 def test_gaps_hide_no_waves_and_small_pictures_are_asked_as_a_whole() -> None:
     refined = np.ones((160, 240), bool)
     refined[:, ::7] = False
-    assert wave_std_px(columns(), refined, LINES)[:, :120].min() > 0.8 * 0.06 / np.sqrt(2)
-    small = wave_std_px(columns()[:40, :120], refined[:40, :120], LINES)
+    assert wave_std_px(columns(), QUIET, refined, LINES)[:, :120].min() > 0.8 * 0.06 / np.sqrt(2)
+    small = wave_std_px(columns()[:40, :120], QUIET[:40, :120], refined[:40, :120], LINES)
     assert small.min() == small.max() > 0.8 * 0.06 / np.sqrt(2)
 
 
 def test_nothing_is_said_of_pixels_that_no_single_lines_refined() -> None:
     refined = np.ones((160, 240), bool)
     refined[:, ::2] = False
-    assert not wave_std_px(columns(), refined, LINES).any()
-    assert not wave_std_px(columns(), ~refined, None).any()
+    assert not wave_std_px(columns(), QUIET, refined, LINES).any()
+    assert not wave_std_px(columns(), QUIET, ~refined, None).any()
     comb = LineSet.of(CapturePlan(spectral=LineComb(shifts_px=(0, 0, 0))))
-    assert not wave_std_px(columns(), np.ones((160, 240), bool), comb).any()
+    assert not wave_std_px(columns(), QUIET, np.ones((160, 240), bool), comb).any()
 
 
 @pytest.mark.parametrize("shape", [(8, 12), (3, 40)])
 def test_pictures_too_small_to_tell_have_none(shape: tuple[int, int]) -> None:
-    assert not wave_std_px(np.zeros(shape), np.ones(shape, bool), LINES).any()
+    assert not wave_std_px(np.zeros(shape), np.zeros(shape), np.ones(shape, bool), LINES).any()
 
 
 @pytest.mark.parametrize(("translucent", "follows"), [(0.8, False), (1.0, True)])

@@ -106,6 +106,7 @@ TITLES = {
     "readings": "Readings of each spectrum",
     "reflectance": "Reflectance of the target",
     "reflectance_file": "File with the target's reflectance",
+    "reflectance_rel_std": "Uncertainty of that reflectance (share)",
     "stage_std_mm": "Uncertainty of the stage (mm)",
     "wanted_ms": "Exposures that scans will use (ms)",
 }

@@ -1,0 +1,208 @@
+"""Highlights of glossy surfaces, which the model of a matt surface takes for reflectance.
+
+A highlight sends on the light of all orders alike, so that no pixel tells it from a brighter surface. But it
+is white, and grows as the surface turns towards the direction that mirrors the projector into the camera:
+where brightness does that from place to place by the same amount in all colours, surfaces are glossy.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dsl_core.model.conditions import colour_sites
+from dsl_core.model.fit import FitFinding
+from dsl_core.model.result import Flag
+from dsl_core.model.rig import Rig
+from dsl_core.optics.pinhole import rays_in
+from dsl_core.optics.sensor import bayer_channels, relative_gain
+from dsl_core.optics.spectra import chain_response
+from dsl_core.reconstruction.geometry import Geometry
+
+Floats = NDArray[np.float64]
+
+#: Widths of highlights: roughness, whose square is the alpha of B. Walter et al. (EGSR 2007).
+ROUGHNESS = (0.2, 0.3, 0.4, 0.5, 0.6)
+#: A highlight of so much reflectance matters, if it is so many deviations of its own from none, and every
+#: colour alone shows at least this share of it.
+LEAST, SIGMAS, WHITE_SHARE = 0.01, 4.0, 0.3
+#: Cells of 2 x 2 pixels, one of each colour, are compared with those so many cells away; with at most so
+#: many pairs. Neighbouring pairs err alike: deviations are those between blocks of so many cells a side.
+LAG, MOST_PAIRS, BLOCK = 2, 40_000, 8
+#: Rows of a picture that are looked at together.
+SLAB = 128
+#: What differs from cell to cell without any highlight: a share of reflectance, and reflectance.
+TEXTURE, FLOOR = 0.02, 0.002
+#: Beyond so many deviations a pair is at an edge, and pulls no more than there.
+HUBER, ROUNDS = 2.0, 6
+FEWEST_PAIRS = 200
+#: Pixels whose brightness or normal means nothing, and the least light that falls on a surface.
+_DOUBTFUL = Flag.SATURATED | Flag.DEPTH_EDGE | Flag.NOT_REFINED | Flag.CODES_DISAGREE | Flag.UNUSUAL_PEAK
+LEAST_SHADING = 0.1
+_NM = np.arange(400.0, 701.0)
+
+
+@dataclass(frozen=True)
+class Highlight:
+    """A highlight of reflectance ``peak`` in the mirror direction, with deviation, and its ``roughness``.
+
+    ``colours`` are what red, green and blue say of the peak by themselves.
+    """
+
+    roughness: float
+    peak: float
+    peak_std: float
+    colours: tuple[float, float, float]
+
+    def at(self, towards: NDArray[np.floating]) -> NDArray[np.floating]:
+        """Its reflectance where the cosine between normal and mirror direction is ``towards``."""
+        return np.asarray(self.peak * _lobe(towards, self.roughness))
+
+
+def follow_highlights(rig: Rig, geometry: Geometry) -> tuple[Geometry, list[FitFinding]]:
+    """Geometry that says what highlights add to reflectance, and what is told of them."""
+    towards = towards_mirror(rig, geometry)
+    found = find_highlight(rig, geometry, towards)
+    if found is None:
+        return geometry, []
+    added = np.nan_to_num(found.at(towards)).astype(np.float32)
+    brightest = float(added.max(initial=0.0))
+    concerned = float((added > LEAST).sum() / max(np.isfinite(geometry.depth_mm).sum(), 1))
+    told = FitFinding.judged(
+        "surfaces",
+        "highlights",
+        (brightest, brightest * found.peak_std / found.peak),
+        "reflectance",
+        LEAST,
+        f"Surfaces are glossy: towards the direction that mirrors the projector they look brighter, by up to"
+        f" {brightest:.2f} of reflectance and by more than {LEAST:g} in {concerned:.1%} of the pixels."
+        " Deviations of reflectance contain it.",
+        "Turn the object or move the projector so that the highlight falls elsewhere; a matt coat, such as"
+        " chalk spray, shows the surface itself.",
+    )
+    return replace(geometry, highlight=added), [told]
+
+
+def towards_mirror(rig: Rig, geometry: Geometry) -> NDArray[np.float32]:
+    """Cosine between the normal and the direction that mirrors the projector into the camera, NaN unknown."""
+    towards = np.empty(geometry.depth_mm.shape, np.float32)
+    for rows in _slabs(len(towards)):
+        points = rays_in(rig.camera, rows) * geometry.depth_mm[rows]
+        to_light = rig.pose.projector_centre_mm[:, None, None] - points
+        half = to_light / np.linalg.norm(to_light, axis=0) - points / np.linalg.norm(points, axis=0)
+        half /= np.linalg.norm(half, axis=0)
+        towards[rows] = (geometry.surface.normals[:, rows] * half).sum(0).clip(0, 1)
+    return towards
+
+
+def find_highlight(rig: Rig, geometry: Geometry, towards: NDArray[np.floating]) -> Highlight | None:
+    """The highlight that explains best how brightness changes with ``towards``; None where none does."""
+    pairs = _pairs(rig, geometry, towards)
+    if pairs is None:
+        return None
+    tried = [_fitted(pairs, roughness) for roughness in ROUGHNESS]
+    found = min(tried, key=lambda each: each[1])[0]
+    brightest = float(found.at(np.append(pairs.here, pairs.there)).max())
+    sure = found.peak > SIGMAS * found.peak_std and min(found.colours) > WHITE_SHARE * found.peak
+    return found if sure and brightest > LEAST else None
+
+
+@dataclass(frozen=True)
+class _Pairs:
+    """Pairs (n,) of cells: `towards_mirror` of each, how reflectance differs (3, n), and their block."""
+
+    here: Floats
+    there: Floats
+    differs: Floats
+    std: Floats
+    block: NDArray[np.int64]
+
+
+def _lobe(towards: NDArray[np.floating], roughness: float) -> NDArray[np.floating]:
+    """The GGX distribution over its value in the mirror direction."""
+    alpha_sq = roughness**4
+    return np.asarray((alpha_sq / (towards**2 * (alpha_sq - 1) + 1)) ** 2)
+
+
+def _pairs(rig: Rig, geometry: Geometry, towards: NDArray[np.floating]) -> _Pairs | None:
+    """Pairs of cells of which all is known; None where there are too few, or a camera has no colours."""
+    if len(set(colour_sites(rig.sensor.bayer))) < 3:
+        return None
+    gain = np.broadcast_to(relative_gain(rig), towards.shape)
+    white = chain_response(rig, 0, _NM).sum((1, 2))
+    # Of large pictures some pairs are enough, and all of them much memory.
+    every = max(1, towards.size // 2 // MOST_PAIRS)
+    parts = [
+        _pairs_of(rig, white, gain[rows], geometry.of_rows(rows), towards[rows], rows.start, every)
+        for rows in _slabs(len(towards))
+    ]
+    found = _Pairs(*(np.concatenate(each, -1) for each in zip(*parts, strict=True)))
+    return found if len(found.here) >= FEWEST_PAIRS else None
+
+
+def _slabs(rows: int) -> list[slice]:
+    """Slices of rows, an even number each, so that maps of a large picture need no room of their own."""
+    return [slice(top, min(top + SLAB, rows)) for top in range(0, rows, SLAB)]
+
+
+def _pairs_of(
+    rig: Rig,
+    white: Floats,
+    gain: Floats,
+    geometry: Geometry,
+    towards: NDArray[np.floating],
+    top: int,
+    every: int,
+) -> tuple[Floats, Floats, Floats, Floats, NDArray[np.int64]]:
+    """What `_Pairs` holds, of the rows of a picture from ``top`` on: one of so many pairs."""
+    channel, shading = bayer_channels(rig.sensor.bayer, *towards.shape), geometry.surface.shading
+    usable = ((geometry.flags & int(_DOUBTFUL)) == 0) & np.isfinite(towards) & (shading > LEAST_SHADING)
+    usable &= np.isfinite(geometry.amplitude) & np.isfinite(geometry.amplitude_std)
+    per_white = np.where(usable, 1 / np.where(usable, shading * white[channel] * gain, 1.0), 0.0)
+    light = geometry.amplitude, geometry.amplitude_std
+    seen, std = (_cells(np.where(usable, each, 0.0) * per_white) for each in light)
+    of = [_cells(channel == colour) for colour in range(3)]
+    colours = np.stack([(seen * mine).sum(-1) / mine.sum(-1) for mine in of])
+    noise = np.stack([np.sqrt((std**2 * mine).sum(-1)) / mine.sum(-1) for mine in of])
+    known: NDArray[np.bool_] = _cells(usable).min(-1) > 0
+    facing = _cells(np.where(usable, towards, 0.0)).mean(-1)
+    rows, columns = known.shape
+    parts = []
+    for down, across in ((LAG, 0), (0, LAG)):
+        first = slice(down, None), slice(across, None)
+        second = slice(None, max(rows - down, 0)), slice(None, max(columns - across, 0))
+        row, column = (each[::every] for each in np.nonzero(known[first] & known[second]))
+        a, b = (colours[:, *part][:, row, column] for part in (first, second))
+        da, db = (noise[:, *part][:, row, column] for part in (first, second))
+        own = np.sqrt(da**2 + db**2 + (TEXTURE * (a + b) / 2) ** 2 + FLOOR**2)
+        block = (top // 2 + row) // BLOCK * columns + column // BLOCK
+        parts.append((facing[first][row, column], facing[second][row, column], a - b, own, block))
+    here, there, differs, own, block = (np.concatenate(part, -1) for part in zip(*parts, strict=True))
+    return here, there, differs, own, block
+
+
+def _cells(values: NDArray[np.generic]) -> Floats:
+    """Cells of 2 x 2 pixels: (rows / 2, columns / 2, 4)."""
+    rows, columns = (n // 2 for n in values.shape)
+    cells = values[: 2 * rows, : 2 * columns].reshape(rows, 2, columns, 2)
+    return np.asarray(cells.transpose(0, 2, 1, 3).reshape(rows, columns, 4))
+
+
+def _fitted(pairs: _Pairs, roughness: float) -> tuple[Highlight, float]:
+    """The highlight of a roughness that fits best, robustly, and what it leaves over."""
+    rise = _lobe(pairs.here, roughness) - _lobe(pairs.there, roughness)
+    peak = 0.0
+    for _ in range(ROUNDS):
+        off = np.abs(pairs.differs - peak * rise) / pairs.std
+        weight = np.minimum(1.0, HUBER / np.maximum(off, 1e-12)) / pairs.std**2
+        of_colour = (weight * rise**2).sum(1)
+        peak = float((weight * rise * pairs.differs).sum() / max(of_colour.sum(), 1e-12))
+    pull = (weight * (pairs.differs - peak * rise) * rise).sum(0)
+    by_block = np.bincount(np.unique(pairs.block, return_inverse=True)[1], pull)
+    std = float(np.sqrt((by_block**2).sum()) / max(of_colour.sum(), 1e-12))
+    red, green, blue = ((weight * rise * pairs.differs).sum(1) / np.maximum(of_colour, 1e-12)).tolist()
+    off = np.abs(pairs.differs - peak * rise) / pairs.std
+    left = float(np.where(off < HUBER, off**2, HUBER * (2 * off - HUBER)).sum())
+    return Highlight(roughness, peak, std, (red, green, blue)), left

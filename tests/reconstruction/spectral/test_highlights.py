@@ -1,0 +1,136 @@
+"""A highlight is found by its white light and its place; matt, coloured and shaded surfaces have none."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from dsl_core.model.result import Flag
+from dsl_core.model.rig import Rig
+from dsl_core.optics.pinhole import pixel_rays
+from dsl_core.optics.sensor import bayer_channels, relative_gain
+from dsl_core.optics.spectra import chain_response
+from dsl_core.reconstruction.geometry import Geometry
+from dsl_core.reconstruction.scan_result import with_highlight
+from dsl_core.reconstruction.spectral import highlights
+from dsl_core.reconstruction.spectral.highlights import (
+    find_highlight,
+    follow_highlights,
+    towards_mirror,
+)
+from dsl_core.reconstruction.surface import Surface
+from dsl_core.simulation.effects.specular import highlight
+from dsl_core.simulation.scenes.truth import Finish
+from dsl_core.simulation.sim_devices import open_twin
+
+YELLOW = np.array([0.7, 0.5, 0.06])
+
+
+@pytest.fixture(scope="module")
+def ball() -> tuple[Rig, Geometry]:
+    """A ball as it is, before anything is known of its light."""
+    world = open_twin({"scene": "sphere", "size": "112x72"}).camera.world  # type: ignore[attr-defined]
+    truth, shape = world.truth, (72, 112)
+    on_ball = truth.material == truth.materials.names.index("yellow")
+    edge = ~on_ball
+    surface = Surface(
+        truth.normals.astype(np.float32), np.full(shape, 0.8, np.float32), np.zeros(shape, np.float32), edge
+    )
+    none, one = np.zeros(shape, np.float32), np.ones(shape, np.float32)
+    flags = np.where(edge, int(Flag.DEPTH_EDGE), 0).astype(np.uint16)
+    depth = np.asarray(truth.depth_mm, np.float64)
+    return world.rig, Geometry(one, one, depth, np.ones(shape), none, none, none, none, flags, surface)
+
+
+def lit(rig: Rig, geometry: Geometry, reflectance: np.ndarray) -> Geometry:
+    """The ball with a reflectance (3, rows, columns) in each colour, and noise of 0.5 % of white."""
+    channel = bayer_channels(rig.sensor.bayer, *geometry.flags.shape)
+    white = chain_response(rig, 0, np.arange(400.0, 701.0)).sum((1, 2))[channel] * relative_gain(rig)
+    own = np.take_along_axis(reflectance, channel[None], 0)[0]
+    noise = 0.005 * np.random.default_rng(0).standard_normal(own.shape)
+    light = (0.8 * white * (own + noise)).astype(np.float32)
+    return replace(geometry, amplitude=light, amplitude_std=(0.004 * white).astype(np.float32))
+
+
+def coloured(
+    rig: Rig, geometry: Geometry, gloss: float, share: tuple[float, float, float] = (1, 1, 1)
+) -> np.ndarray:
+    """Yellow with the twin's highlight, of which each colour shows a share."""
+    points = (pixel_rays(rig.camera) * geometry.depth_mm).reshape(3, -1)
+    normals = geometry.surface.normals.reshape(3, -1)
+    shine = highlight(Finish(gloss=gloss, roughness=0.4), points, normals, rig.pose.projector_centre_mm)
+    lobe = np.nan_to_num(shine.reshape(geometry.flags.shape))
+    return np.asarray(YELLOW[:, None, None] + np.array(share)[:, None, None] * lobe)
+
+
+def test_a_highlight_is_found_with_its_width_and_height(ball: tuple[Rig, Geometry]) -> None:
+    rig, geometry = ball
+    towards = towards_mirror(rig, geometry)
+    reflectance = coloured(rig, geometry, 0.02)
+    found = find_highlight(rig, lit(rig, geometry, reflectance), towards)
+    assert found is not None
+    assert found.roughness == 0.4
+    added = reflectance[0] - YELLOW[0]
+    assert np.nanmax(added) > 0.15
+    on_ball = geometry.flags == 0
+    assert np.abs(found.at(towards) - added)[on_ball].max() < 0.15 * np.nanmax(added)
+    assert found.colours == pytest.approx((found.peak,) * 3, rel=0.2)
+
+
+@pytest.mark.parametrize(
+    ("gloss", "share"), [(0.0, (1, 1, 1)), (0.0009, (1, 1, 1)), (0.02, (1, 0, 0)), (0.02, (1, 0.7, 0.08))]
+)
+def test_what_is_faint_or_not_white_is_none(
+    ball: tuple[Rig, Geometry], gloss: float, share: tuple[float, float, float]
+) -> None:
+    rig, geometry = ball
+    towards = towards_mirror(rig, geometry)
+    seen = lit(rig, geometry, coloured(rig, geometry, gloss, share))
+    assert find_highlight(rig, seen, towards) is None
+    same, told = follow_highlights(rig, seen)
+    assert same is seen
+    assert told == []
+
+
+def test_deviations_contain_what_is_added_and_it_is_told(ball: tuple[Rig, Geometry]) -> None:
+    rig, geometry = ball
+    wider, (told,) = follow_highlights(rig, lit(rig, geometry, coloured(rig, geometry, 0.02)))
+    assert told.significant
+    assert wider.highlight is not None
+    assert f"by up to {wider.highlight.max():.2f} of reflectance" in told.sentence
+    std = np.full((2, 72, 112), 0.03, np.float32)
+    np.testing.assert_allclose(with_highlight(wider, std), np.hypot(std, wider.highlight))
+    assert with_highlight(geometry, std) is std
+
+
+def test_too_few_pixels_say_nothing(ball: tuple[Rig, Geometry]) -> None:
+    rig, geometry = ball
+    towards = towards_mirror(rig, geometry)
+    seen = lit(rig, geometry, coloured(rig, geometry, 0.02))
+    saturated = replace(seen, flags=np.full_like(seen.flags, int(Flag.SATURATED)))
+    assert find_highlight(rig, saturated, towards) is None
+
+
+def test_a_camera_without_colours_cannot_tell_white_light(ball: tuple[Rig, Geometry]) -> None:
+    rig, geometry = ball
+    towards = towards_mirror(rig, geometry)
+    seen = lit(rig, geometry, coloured(rig, geometry, 0.02))
+    grey = rig.model_copy(update={"sensor": rig.sensor.model_copy(update={"bayer": "MONO"})})
+    assert find_highlight(grey, seen, towards) is None
+
+
+def test_large_pictures_are_asked_in_slabs_and_say_the_same(
+    ball: tuple[Rig, Geometry], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    rig, geometry = ball
+    seen = lit(rig, geometry, coloured(rig, geometry, 0.02))
+    whole = find_highlight(rig, seen, towards_mirror(rig, seen))
+    monkeypatch.setattr(highlights, "SLAB", 24)
+    monkeypatch.setattr(highlights, "MOST_PAIRS", 2500)
+    parts = find_highlight(rig, seen, towards_mirror(rig, seen))
+    assert whole is not None
+    assert parts is not None
+    assert parts.roughness == whole.roughness
+    assert parts.peak == pytest.approx(whole.peak, rel=0.05)
