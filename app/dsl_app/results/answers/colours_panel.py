@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QGuiApplication, QShowEvent
@@ -90,10 +92,10 @@ class ColoursPanel(QWidget):
                     at = at_bands(mark.curve, bands)
                 except CalibrationError:
                     continue
-                mean, std = at.values, at.std
+                mean, std = at.values, None if mark.curve.std is None else at.std
             if len(mean) == len(bands) and np.isfinite(mean).all():
-                none = np.zeros(len(bands))
-                spectra[name] = (np.asarray(mean, float), none if std is None else np.asarray(std, float))
+                unknown = np.full(len(bands), np.nan)
+                spectra[name] = np.asarray(mean, float), unknown if std is None else np.asarray(std, float)
         return colours_of(spectra, bands, lights, reference if reference in spectra else None)
 
     def copy_all(self) -> None:
@@ -115,5 +117,6 @@ class ColoursPanel(QWidget):
 
 
 def _value(value: float, std: float) -> str:
-    # Thin spaces: five columns have to fit next to the picture.
-    return f"{value:.2f}{THIN}±{THIN}{std:.2f}".replace("-", "−")
+    # Thin spaces: five columns have to fit next to the picture. A file that states no deviation has not 0.
+    deviation = "" if math.isnan(std) else f"{THIN}±{THIN}{std:.2f}"
+    return f"{value:.2f}{deviation}".replace("-", "−")

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
 from dsl_app.results.answers.colours_panel import EMPTY, ColoursPanel
 from dsl_app.shared.theme import LIGHT
@@ -12,6 +14,7 @@ from pytestqt.qtbot import QtBot
 from dsl_core.optics.colour import reflectance_to_lab
 from tests.app.support.results_controller import SQUARE, Bench
 from tests.app.support.results_controller import bench as bench
+from tests.app.support.small_result import BLUE, write_reference
 
 
 def test_marks_have_colours_and_differences_to_the_selected_one(qtbot: QtBot, bench: Bench) -> None:
@@ -35,6 +38,22 @@ def test_marks_have_colours_and_differences_to_the_selected_one(qtbot: QtBot, be
     lines = QGuiApplication.clipboard().text().splitlines()
     assert lines[0].startswith("place\tlight\tL*")
     assert len(lines) == 1 + 2 * panel.light.count()
+
+
+def test_a_reference_that_states_no_deviation_has_none(qtbot: QtBot, bench: Bench, tmp_path: Path) -> None:
+    panel = ColoursPanel(bench.state)
+    qtbot.addWidget(panel)
+    panel.show()
+    bench.control.marks.pin((30, 5))
+    bench.control.marks.add_reference(write_reference(tmp_path / "tile.csv", BLUE))
+    texts = [[panel.table.item(row, column).text() for column in (1, 4)] for row in range(2)]  # type: ignore[union-attr]
+    assert ["±" in text for text in texts[0]] == [True, True]
+    assert "±" not in texts[1][0]
+    assert float(texts[1][0]) > 0
+    panel.copy.click()
+    cells = QGuiApplication.clipboard().text().splitlines()[2].split("\t")
+    assert cells[0] == "tile"
+    assert [cell == "" for cell in cells[2:8]] == [False, True] * 3
 
 
 def test_names_are_read_in_a_narrow_table(qtbot: QtBot, bench: Bench) -> None:
