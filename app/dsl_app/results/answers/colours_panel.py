@@ -117,6 +117,9 @@ class ColoursPanel(QWidget):
 
 
 def _value(value: float, std: float) -> str:
-    # Thin spaces: five columns have to fit next to the picture. A file that states no deviation has not 0.
-    deviation = "" if math.isnan(std) else f"{THIN}±{THIN}{std:.2f}"
-    return f"{value:.2f}{deviation}".replace("-", "−")
+    """A figure to the second digit of its deviation, two places at most; without one if it is not known."""
+    if math.isnan(std):
+        return f"{value:.2f}".replace("-", "−")
+    places = 2 if std < 0.995 else 1 if std < 9.95 else 0
+    # Thin spaces: five columns have to fit next to the picture.
+    return f"{value:.{places}f}{THIN}±{THIN}{std:.{places}f}".replace("-", "−")

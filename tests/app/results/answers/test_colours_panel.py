@@ -5,9 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from dsl_app.results.answers.colours_panel import EMPTY, ColoursPanel
+from dsl_app.results.answers.colours_panel import EMPTY, THIN, ColoursPanel, _value
 from dsl_app.shared.theme import LIGHT
-from dsl_app.shared.widgets.read_table import LEAST_WIDE_PX
+from dsl_app.shared.widgets.read_table import LEAST_WIDE_PX, RIGHT, cell
 from PySide6.QtGui import QGuiApplication
 from pytestqt.qtbot import QtBot
 
@@ -69,3 +69,17 @@ def test_names_are_read_in_a_narrow_table(qtbot: QtBot, bench: Bench) -> None:
     assert not panel.table.horizontalScrollBar().isVisible()
     panel.resize(900, 300)
     assert panel.table.columnWidth(0) > 2 * LEAST_WIDE_PX
+
+
+def test_figures_of_many_marks_are_whole_in_a_window_of_1280_px(qtbot: QtBot, bench: Bench) -> None:
+    panel = ColoursPanel(bench.state)
+    qtbot.addWidget(panel)
+    panel.resize(436, 300)
+    panel.show()
+    figures = ((41.0, 0.42), (-44.05, 0.85), (-44.05, 12.85), (20.37, 10.2))
+    texts = [_value(*figure) for figure in figures]
+    assert [text.replace(THIN, "") for text in texts] == ["41.00±0.42", "−44.05±0.85", "−44±13", "20±10"]
+    panel.table.show()
+    panel.table.show_rows([(cell("pin 1"), *(cell(text, "", RIGHT) for text in texts)) for _ in range(40)])
+    wide = sum(panel.table.columnWidth(column) for column in range(5))
+    assert wide <= panel.table.viewport().width()
