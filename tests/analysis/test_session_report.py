@@ -32,6 +32,8 @@ def test_a_report_holds_marks_colours_and_materials_as_page_and_on_paper(tmp_pat
     names = ("A &lt;chart&gt;", "$sky_1$ &lt;b&gt;", "häut 木")
     for words in (*names, "Materials", "none of these", "LED-B3", "±"):
         assert words in page
+    # Nothing is known of what nobody knows the truth of.
+    assert "truth, where known" not in page
     # The pin on a pixel without light is told, and nothing else is lost.
     assert "dark: none of its 1 pixels has a spectrum" in page
     written = write_report(content, tmp_path / "r.pdf").read_bytes()
