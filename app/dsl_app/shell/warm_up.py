@@ -73,8 +73,12 @@ _LAST = (
     "vtkmodules.vtkViewsContext2D",
     "vtkmodules.vtkInteractionStyle",
 )
+#: What a first reconstruction on a computer would wait for; kept on the disk from then on.
+_COMPILED = ("dsl_core.reconstruction.spectral.solving.lane_solver:compile_early",)
 STEPS = tuple(
-    dict.fromkeys((*_LOOK, *_COMPARE, *_FIRST, *chain.from_iterable(PAGE_MODULES.values()), *_LAST))
+    dict.fromkeys(
+        (*_LOOK, *_COMPARE, *_FIRST, *chain.from_iterable(PAGE_MODULES.values()), *_LAST, *_COMPILED)
+    )
 )
 #: Pause between two steps, s, and how long all of them may be kept waiting by what a person waits for.
 REST_S, PATIENCE_S = 0.05, 20.0
