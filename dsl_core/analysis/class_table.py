@@ -14,13 +14,14 @@ from dsl_core.analysis.classify import ClassMap
 class ClassRow:
     """One line of the table: a label, its value in the map, its pixels, their share of those judged, area.
 
-    ``area_mm2`` is of the pixels with a point; None where the result has none.
+    ``share`` is None for pixels that were not judged. ``area_mm2`` is of the pixels with a point; None where
+    the result has none.
     """
 
     label: str
     value: int
     pixels: int
-    share: float
+    share: float | None
     area_mm2: float | None
 
 
@@ -37,7 +38,7 @@ def class_table(shown: ClassMap, areas_mm2: NDArray[np.floating] | None = None) 
             shown.labels[value],
             value,
             int(pixels[value]),
-            float(pixels[value] / judged) if value else 0.0,
+            float(pixels[value] / judged) if value else None,
             None if areas is None else float(areas[value]),
         )
         for value in (*range(1, size), 0)

@@ -7,6 +7,7 @@ spectrum. `dsl_core.optics.colour`, at 5 nm, is for pictures.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
@@ -41,7 +42,7 @@ HEADER = ("place", "light", "L*", "±L*", "a*", "±a*", "b*", "±b*", "ΔE00", "
 
 @dataclass(frozen=True)
 class Colour:
-    """A colour under a light: L*a*b* (3,) relative to the perfect diffuser, with deviations.
+    """A colour under a light: L*a*b* (3,) relative to the perfect diffuser; deviations NaN if not known.
 
     ``delta_e`` is CIEDE2000 to a reference under the same light; None without one.
     """
@@ -56,7 +57,8 @@ class Colour:
     @property
     def cells(self) -> tuple[str | float | None, ...]:
         """Its row in a table, as `HEADER` names the columns."""
-        pairs = (value for pair in zip(self.lab, self.lab_std, strict=True) for value in pair)
+        known = (None if math.isnan(std) else std for std in self.lab_std)
+        pairs = (value for pair in zip(self.lab, known, strict=True) for value in pair)
         return (self.name, self.light, *pairs, self.delta_e, self.delta_e_std)
 
 
@@ -94,6 +96,7 @@ def colours_of(
 ) -> list[Colour]:
     """The colour of each spectrum (values and deviations, bands each) under each light.
 
+    Deviations that are all NaN are not known: no colour has one then, and differences have that of the other.
     ``correlation`` (bands, bands) says how bands err together; the usual one of a result otherwise.
     Differences are to the spectrum named ``reference``. Raises `DecodeError` for unknown lights or names.
     """
@@ -111,7 +114,8 @@ def colours_of(
             difference: tuple[float | None, float | None] = (None, None)
             if reference is not None and name != reference:
                 difference = _difference(lab, covariance, *labs[reference])
-            deviations = np.sqrt(np.diag(covariance))
+            is_known = np.isfinite(spectra[name][1]).any()
+            deviations = np.sqrt(np.diag(covariance)) if is_known else np.full(3, np.nan)
             found.append(Colour(name, light, _three(lab), _three(deviations), *difference))
     return found
 

@@ -83,13 +83,13 @@ def _materials(found: Classification) -> tuple[ReportPicture, ReportTable]:
     table = np.zeros((len(colours), 4), np.uint8)
     for value, colour in enumerate(colours):
         table[value] = (*bytes.fromhex(colour[1:]), 255 if value else 0)
-    keys = tuple(Key(colours[row.value], row.label, row.share) for row in found.rows[:-1] if row.pixels)
+    keys = tuple(Key(colours[row.value], row.label, row.share) for row in found.rows if row.share)
     picture = ReportPicture("Materials", f"by {found.method}", png_uri(table[shown.values]), keys=keys)
     rows = tuple(
         (
             row.label,
             str(row.pixels),
-            f"{row.share:.1%}",
+            "–" if row.share is None else f"{100 * row.share:.1f} %",
             "–" if row.area_mm2 is None else f"{row.area_mm2:.1f}",
         )
         for row in found.rows

@@ -127,10 +127,12 @@ def classify(
     if len(notes) > _MOST_NOTES:
         output.say(f"... and {len(notes) - _MOST_NOTES} more notes on the library (see --json).")
     shown = [row for row in found.rows if row.pixels]
+    shares = ["-" if row.share is None else f"{row.share:.1%}" for row in shown]
     areas = ["-" if row.area_mm2 is None else f"{row.area_mm2:.1f}" for row in shown]
+    labels = [(row.label, row.pixels) for row in shown]
     output.table(
         ("class", "pixels", "share", "area (mm2)"),
-        [(r.label, r.pixels, f"{r.share:.1%}", area) for r, area in zip(shown, areas, strict=True)],
+        [(*label, share, area) for label, share, area in zip(labels, shares, areas, strict=True)],
     )
     output.say(f"By {found.method}.")
     if library and not library_error and _are_mostly_none(found):
@@ -153,8 +155,8 @@ def classify(
 
 def _are_mostly_none(found: Classification) -> bool:
     """Whether most judged pixels are none of the classes, by the probability."""
-    none = next(row.share for row in found.rows if row.label == found.shown.labels[-2])
-    return found.scores.measure.value == "probability" and none > _MOSTLY
+    none = next(row.share for row in found.rows if row.value == len(found.shown.labels) - 2)
+    return found.scores.measure.value == "probability" and (none or 0.0) > _MOSTLY
 
 
 def _classes(

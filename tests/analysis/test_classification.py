@@ -56,6 +56,7 @@ def test_areas_are_those_of_the_surface(found) -> None:  # type: ignore[no-untyp
         assert row.area_mm2 == pytest.approx(row.pixels, rel=1e-3)
     assert by_name["none of these"].pixels > 40 * 60
     assert by_name["not judged"].pixels == 61
+    assert by_name["not judged"].share is None
 
 
 def test_the_table_is_written_with_its_method(found, tmp_path: Path) -> None:  # type: ignore[no-untyped-def]

@@ -3,13 +3,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from dsl_core.analysis import pdf_report
 from dsl_core.analysis.classes import class_of_pixels
 from dsl_core.analysis.classification import classify_result
 from dsl_core.analysis.session_report import session_content, write_report
 from dsl_core.cli import main
 from dsl_core.errors import StoreError
+from dsl_core.evaluation.report.pictures import flag_picture
+from dsl_core.evaluation.report.scan_report import pictures_of
 from dsl_core.io.result.annotations_file import Annotations, PinRecord, RegionRecord, save_annotations
 from dsl_core.io.result.result_file import save_result
+from dsl_core.model.result import REASONS, Flag
 from tests.cases.chart_cube import chart_result
 
 MARKS = Annotations(
@@ -28,6 +32,8 @@ def test_a_report_holds_marks_colours_and_materials_as_page_and_on_paper(tmp_pat
     names = ("A &lt;chart&gt;", "$sky_1$ &lt;b&gt;", "häut 木")
     for words in (*names, "Materials", "none of these", "LED-B3", "±"):
         assert words in page
+    # Nothing is known of what nobody knows the truth of.
+    assert "truth, where known" not in page
     # The pin on a pixel without light is told, and nothing else is lost.
     assert "dark: none of its 1 pixels has a spectrum" in page
     written = write_report(content, tmp_path / "r.pdf").read_bytes()
@@ -38,6 +44,24 @@ def test_a_report_holds_marks_colours_and_materials_as_page_and_on_paper(tmp_pat
         write_report(content, tmp_path / "r.pdf")
     with pytest.raises(StoreError, match="does not end in"):
         write_report(content, tmp_path / "r.docx")
+
+
+def test_a_legend_on_paper_is_whole_and_stays_on_its_page() -> None:
+    flags = np.zeros((60, 90), np.uint32)
+    for place, flag in enumerate(Flag):
+        flags[place] = int(flag)
+    content = session_content("all flags", chart_result(), Annotations())
+    pictures = [*2 * pictures_of(content), flag_picture(flags, "Flags", "")]
+    pages = list(pdf_report._picture_pages(pictures))
+    texts = [text for page in pages for text in page.texts]
+    told = " ".join(text.get_text() for text in texts)
+    for flag in Flag:
+        assert REASONS[flag] in told
+    assert min(text.get_position()[1] for text in texts) > 0.02
+    # The ends of a scale mean nothing without its colours.
+    ends = [text.get_text() for text in texts if text.get_text().endswith(" mm")]
+    bars = [axis for page in pages for axis in page.axes if axis.get_position().height < 0.02]
+    assert len(bars) == len([each for each in pictures if each.gradient]) >= len(ends) / 2 > 0
 
 
 def test_the_commands_tell_colours_and_write_reports(

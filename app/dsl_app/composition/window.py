@@ -332,6 +332,9 @@ class Composition(QObject):
         state.phase.changed.connect(
             lambda phase: self._remember_folder(state) if phase is Phase.DONE else None
         )
+        state.phase.changed.connect(
+            lambda phase: self.session.scan_began() if phase is Phase.RUNNING else None
+        )
         state.finished.changed.connect(self._remember_scan)
         self.scans = controller = ScanController(
             state, rig, parts.runner, window.toasts, parts.undo, hidden=demo_folder(), pace=self._pace

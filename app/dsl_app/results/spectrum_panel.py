@@ -27,6 +27,8 @@ TOP = 1.08
 PADDING = 0.02
 #: With more marks than this, bands would cover all spectra: the selected mark alone keeps its own.
 MOST_BANDS = 12
+#: Width of the axis on the left, and what longer numbers take besides, px.
+LEFT_PX, MORE_PX = 48, 18
 #: The range that a transform fills at first; reflectance has that of the result.
 _RANGES = {
     Transform.NORMALISED: (0.0, 2.5),
@@ -47,7 +49,7 @@ class SpectrumPanel(QWidget):
             " the prior decides; regions: mean ± deviation of pixels. Drag the line to change the band.",
             "Reflectance",
             "Wavelength (nm)",
-            left_width=48,
+            left_width=LEFT_PX,
         )
         #: Why there will be no curve.
         self.note = label("", "muted", wraps=True)
@@ -105,27 +107,33 @@ class SpectrumPanel(QWidget):
 
     def _drawn(self, spectrum: Spectrum, place: int) -> Spectrum:
         """A spectrum as it is drawn, at a place among those that are stacked."""
-        transform = self._state.transform.value
-        raised = place * self._top / 4 if self._state.stacked.value else 0.0
+        transform, raised = self._state.transform.value, place * self._step
         if transform is Transform.NONE and not raised:
             return spectrum
         mean, std = transformed(spectrum.nm, spectrum.mean, spectrum.std, transform)
-        scale = _RANGES[transform][1] if transform in _RANGES else self._top
-        return replace(spectrum, mean=mean + raised * scale / self._top, std=std)
+        return replace(spectrum, mean=mean + raised, std=std)
+
+    @property
+    def _step(self) -> float:
+        """By how much each mark is drawn above the one before."""
+        high = _RANGES.get(self._state.transform.value, (0.0, self._top))[1]
+        return high / 4 if self._state.stacked.value else 0.0
 
     def _draw_again(self) -> None:
         """Draw all spectra in the chosen transform, and show the range that they fill."""
         transform = self._state.transform.value
         self.transform.choose(transform)
-        self.item.setLabel("left", capitalised(transform.value))
+        # Else the axis would claim reflectances that no pixel has.
+        raised = f" + {self._step:.2g} a mark" if self._step else ""
+        self.item.setLabel("left", capitalised(transform.value) + raised)
+        self.item.getAxis("left").setWidth(LEFT_PX + (MORE_PX if transform is Transform.DERIVATIVE else 0))
         for _, curve in self._curves.values():
             curve.remove()
         self._curves.clear()
         self._show_marks(self._state.marks.value)
         self._show_cursor(self._state.cursor.value)
         low, high = _RANGES.get(transform, (0.0, self._top))
-        if self._state.stacked.value:
-            high += len(self._curves) * high / 4
+        high += len(self._curves) * self._step
         # Old limits would cut the new range.
         self.item.getViewBox().setLimits(yMin=min(-0.5, 4 * low), yMax=max(3.0, 4 * high))
         self.item.setYRange(low, high, padding=PADDING)

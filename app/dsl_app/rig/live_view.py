@@ -6,23 +6,24 @@ import time
 from functools import partial
 
 import numpy as np
-import pyqtgraph as pg
+from numpy.typing import NDArray
 from PySide6.QtCore import QPointF, Qt
 from PySide6.QtGui import QKeyEvent
 from PySide6.QtWidgets import QCheckBox, QWidget
 
 from dsl_app.connection.state import RigState
 from dsl_app.rig.display_row import DisplayRow
+from dsl_app.rig.histogram import CountsHistogram
 from dsl_app.rig.state import NO_RIG, Draw, Drawn, FrameCounts, picture_note, rate_text
 from dsl_app.shared.evented import Value
 from dsl_app.shared.theme import Theme
+from dsl_app.shared.widgets.deferred import Deferred
 from dsl_app.shared.widgets.forms import check_box, label, push_button, set_role, show_label
 from dsl_app.shared.widgets.hints import FocusRing
 from dsl_app.shared.widgets.layouts import STRETCH, boxed, column_of, row_of
 from dsl_app.shared.widgets.pictures import PictureView, Region, RegionBox, arrow_step, cut, moved_within
-from dsl_app.shared.widgets.plots import colour_legend
 from dsl_app.shared.widgets.ticker import Ticker
-from dsl_core.capture.preview import BINS, MANY_SATURATED, Statistics, quick_picture, site_colour, statistics
+from dsl_core.capture.preview import MANY_SATURATED, quick_picture, site_colour, statistics
 from dsl_core.devices.base import CameraInfo
 from dsl_core.model.frames import Frame
 
@@ -35,8 +36,6 @@ RATE_MS = 500
 #: Side of the cell of raw pixels that is shown as one, px.
 CELL_PX = 2
 _CHANNELS = ("R", "G", "B")
-_NAMES = ("red", "green", "blue")
-_COLOURS = ("#d94545", "#3fa34d", "#3f7fd9")
 
 
 class LiveView(QWidget):
@@ -53,6 +52,8 @@ class LiveView(QWidget):
         self._frame: Frame | None = None
         self._times: list[float] = []
         self._figures_at = 0.0
+        #: Pixels of each colour by counts, as shown last.
+        self._pixels: NDArray[np.int64] | None = None
         self.view = PictureView(
             "Live picture",
             "Wheel to zoom, drag to pan, F to fit; arrow keys move the pixel that is read, with Shift by ten",
@@ -80,24 +81,10 @@ class LiveView(QWidget):
         self.fit = push_button("Fit", "Show the whole picture (F)", self.show_all)
         self.logarithmic = check_box("Logarithmic", "Show the histogram's counts on a logarithmic scale")
         self.logarithmic.toggled.connect(self._repaint)
-        self._histogram = pg.PlotWidget()
-        self._histogram.setMinimumHeight(LOW_PX)
-        self._histogram.setMaximumHeight(LOW_PX)
-        self._histogram.setMouseEnabled(False, False)
-        self._histogram.hideButtons()
-        self._histogram.setMenuEnabled(False)
-        self._histogram.setAccessibleName("Histogram of raw counts")
-        # No key does anything with it.
-        self._histogram.setFocusPolicy(Qt.FocusPolicy.NoFocus)
-        self._histogram.setLabel("bottom", "raw counts, DN")
-        # Room for half of the outermost numbers of the axes.
-        self._histogram.getPlotItem().setContentsMargins(0, 8, 14, 0)
-        self._histogram.setXRange(0, 4096, padding=0)
-        self._legend = self._histogram.addLegend(offset=(-4, 1), colCount=3, verSpacing=-6)
-        self._curves = [
-            self._histogram.plot(pen=pg.mkPen(colour, width=1), name=name)
-            for colour, name in zip(_COLOURS, _NAMES, strict=True)
-        ]
+        # Half of the time that all of this takes to make; the picture does not wait for it.
+        self.histogram = Deferred(self._make_histogram)
+        self.histogram.setMinimumHeight(LOW_PX)
+        self.histogram.setMaximumHeight(LOW_PX)
         self._rate = label("", "muted")
         self._rate_clock = Ticker(self, RATE_MS, self._show_rate)
         self._counts = label("", "muted")
@@ -115,14 +102,14 @@ class LiveView(QWidget):
         figures = row_of((self._saturated, 1), (self._focus, 0, Qt.AlignmentFlag.AlignTop), spacing=16)
         switches = row_of(self.saturation, self.logarithmic, self.region_box, self.fit, STRETCH, spacing=6)
         frames = row_of(self._rate, STRETCH, self._counts)
-        parts = (self.display, self._pixel, figures, frames, switches, self._histogram)
+        parts = (self.display, self._pixel, figures, frames, switches, self.histogram)
         #: What is said and set below the picture; a page with room shows it elsewhere.
-        self.controls = boxed(column_of(*parts[:-1], (self._histogram, 1), STRETCH, margins=0))
+        self.controls = boxed(column_of(*parts[:-1], (self.histogram, 1), STRETCH, margins=0))
         column_of((self.view, 1), self.controls, on=self, margins=0)
 
     def place_controls(self, beside: QWidget | None) -> None:
         """Put what is below the picture on another widget with a layout, or below the picture for None."""
-        self._histogram.setMaximumHeight(LOW_PX if beside is None else HIGH_PX)
+        self.histogram.setMaximumHeight(LOW_PX if beside is None else HIGH_PX)
         layout = (self if beside is None else beside).layout()
         assert layout is not None
         layout.addWidget(self.controls)
@@ -138,10 +125,8 @@ class LiveView(QWidget):
         self.region_box.setEnabled(camera is not None)
         for figure in (self._saturated, self._focus, self._rate, self._counts):
             figure.clear()
-        for curve in self._curves:
-            curve.setData([], [])
-        if camera is not None:
-            self._histogram.setXRange(0, 2**camera.bit_depth, padding=0)
+        self._pixels = None
+        self._show_histogram()
 
     def show_rig(self, rig: RigState) -> None:
         """Say over the picture what a person would else take for the present: no rig, a lost one, a stop."""
@@ -179,12 +164,7 @@ class LiveView(QWidget):
         """Apply the colours of a theme."""
         self.rectangle.apply_theme(theme)
         self.view.apply_theme(theme)
-        self._histogram.setBackground(theme.base)
-        for side in ("left", "bottom"):
-            axis = self._histogram.getAxis(side)
-            axis.setPen(theme.line)
-            axis.setTextPen(theme.muted)
-        colour_legend(self._legend, theme.muted)
+        self.histogram.apply_theme(theme)
 
     def _show_rate(self) -> None:
         self._rate.setText(rate_text(self._times, time.monotonic(), self._is_live))
@@ -225,7 +205,8 @@ class LiveView(QWidget):
         assert self._frame is not None
         pixels = cut(self._frame.pixels, self.region)
         found = statistics(pixels, self._camera.bayer, 2**self._camera.bit_depth - 1)
-        self._show_histogram(found)
+        self._pixels = found.histogram
+        self._show_histogram()
         worst = max(found.saturated)
         shares = "  ".join(
             f"{name} {100 * share:.2f} %" for name, share in zip(_CHANNELS, found.saturated, strict=True)
@@ -236,12 +217,15 @@ class LiveView(QWidget):
         self._show_rate()
         self._show_pixel()
 
-    def _show_histogram(self, found: Statistics) -> None:
-        assert self._camera is not None
-        positions = (np.arange(BINS) + 0.5) * 2**self._camera.bit_depth / BINS
-        for curve, counts in zip(self._curves, found.histogram, strict=True):
-            curve.setData(positions, np.log10(counts + 1) if self.logarithmic.isChecked() else counts)
-        self._histogram.setLabel("left", "log₁₀ pixels" if self.logarithmic.isChecked() else "pixels")
+    def _make_histogram(self) -> CountsHistogram:
+        self.histogram.made = CountsHistogram()
+        self._show_histogram()
+        return self.histogram.made
+
+    def _show_histogram(self) -> None:
+        if self.histogram.made is not None:
+            levels = 4096 if self._camera is None else 2**self._camera.bit_depth
+            self.histogram.made.show_counts(self._pixels, levels, self.logarithmic.isChecked())
 
     def _hover(self, position: QPointF) -> None:
         if self._frame is None or self._camera is None:

@@ -84,6 +84,11 @@ class Session(_Part):
         return tuple(found)
 
     @property
+    def is_a_plan(self) -> bool:
+        """Whether it holds a scan or the plan of one and nothing else."""
+        return self.scan is not None and not (self.results or self.compare or self.series)
+
+    @property
     def offer(self) -> str:
         """The sentence that offers to restore it."""
         return f"The program did not end normally last time. These were open: {', '.join(self.names)}."

@@ -31,6 +31,7 @@ class SessionRestore(QObject):
         self._window = window
         #: Whether a session is offered, which is then what a person does next.
         self.is_offered = Value(False)
+        self._offered: Session | None = None
         self.results: ResultsController | None = None
         self.scans: ScanController | None = None
         self.pair: PairController | None = None
@@ -72,6 +73,7 @@ class SessionRestore(QObject):
             self._window.toasts.tell("warning", trouble)
         if session is not None:
             self.is_offered.set(True)
+            self._offered = session
             self._window.toasts.offer_next(
                 session.offer,
                 {"Restore session": lambda: self.restore(session)},
@@ -85,6 +87,11 @@ class SessionRestore(QObject):
         """A page that is opened has a blue button of its own."""
         self.is_offered.set(False)
         self._window.toasts.be_calm(session.offer)
+
+    def scan_began(self) -> None:
+        """A scan was begun or resumed: offer a plan no longer, if nothing else was open."""
+        if self._offered is not None and self._offered.is_a_plan:
+            self._window.toasts.withdraw(self._offered.offer)
 
     def _end(self) -> None:
         self._timer.stop()

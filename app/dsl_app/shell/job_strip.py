@@ -17,6 +17,8 @@ from dsl_app.shared.widgets.layouts import STRETCH, row_of
 
 #: The widest line of a job's words, px: longer ones take two, and leave room for a message.
 WIDEST_PX = 320
+#: Parts of fewer letters are not broken.
+SHORT, NO_BREAK = 20, chr(0xA0)
 
 
 class JobStrip(QWidget):
@@ -55,7 +57,7 @@ class JobStrip(QWidget):
         if view is None:
             return
         self._shown = view.job
-        self._text.setText(view.text)
+        self._text.setText(_unbroken(view.text))
         self._text.setFixedWidth(min(self._text.fontMetrics().horizontalAdvance(view.text) + 4, WIDEST_PX))
         done, total = view.job.extent
         self._bar.setRange(0, total)
@@ -79,6 +81,12 @@ class JobStrip(QWidget):
             action = self._choices.addAction(job.title.replace("&", "&&"))
             action.setEnabled(not job.token.is_cancelled)
             action.triggered.connect(lambda _checked=False, job=job: self._stop(job))
+
+
+def _unbroken(text: str) -> str:
+    """The same text, whose short parts stay on one line: a time says nothing without its unit."""
+    parts = (part.replace(" ", NO_BREAK) if len(part) < SHORT else part for part in text.split(" · "))
+    return " · ".join(parts)
 
 
 @dataclass(frozen=True)

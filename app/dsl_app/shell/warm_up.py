@@ -1,4 +1,4 @@
-"""Imports what the window will soon need, in a thread, so that no click has to wait for it. No Qt here."""
+"""Imports and compiles what the window soon needs, in a thread, so that no click waits for it. No Qt here."""
 
 from __future__ import annotations
 
@@ -51,6 +51,7 @@ _FIRST = (
     "dsl_core.simulation.sim_devices",
     "dsl_core.simulation.rendering.kernels",
     "dsl_core.pipeline",
+    "dsl_core.simulation.rehearsal:rehearse",
 )
 #: Calibrations, results and the 3D view.
 _LAST = (
@@ -72,8 +73,12 @@ _LAST = (
     "vtkmodules.vtkViewsContext2D",
     "vtkmodules.vtkInteractionStyle",
 )
+#: What a first reconstruction on a computer would wait for; kept on the disk from then on.
+_COMPILED = ("dsl_core.reconstruction.spectral.solving.lane_solver:compile_early",)
 STEPS = tuple(
-    dict.fromkeys((*_LOOK, *_COMPARE, *_FIRST, *chain.from_iterable(PAGE_MODULES.values()), *_LAST))
+    dict.fromkeys(
+        (*_LOOK, *_COMPARE, *_FIRST, *chain.from_iterable(PAGE_MODULES.values()), *_LAST, *_COMPILED)
+    )
 )
 #: Pause between two steps, s, and how long all of them may be kept waiting by what a person waits for.
 REST_S, PATIENCE_S = 0.05, 20.0
@@ -82,7 +87,7 @@ _BULK = {"torch": "lib/libtorch_cpu.so", "cv2": "cv2.abi3.so"}
 
 
 class WarmUp:
-    """Runs the steps once; `stop` ends after the current step.
+    """Runs the steps once; `stop` ends after the current step. A step is a module, or ``module:function``.
 
     No step begins while ``gives_way``, called in the thread, says that a person waits for something else:
     imports keep Python's lock, which would double the time to the first picture of a live view.
@@ -118,9 +123,16 @@ class WarmUp:
                 if self._stop.wait(REST_S):
                     return
             try:
-                _import(name)
+                _do(name)
             except Exception as error:  # the module that needs it fails with a message
-                _log.debug("%s could not be imported early: %s", name, error)
+                _log.debug("%s could not be done early: %s", name, error)
+
+
+def _do(step: str) -> None:
+    name, _, function = step.partition(":")
+    _import(name)
+    if function:
+        getattr(sys.modules[name], function)()
 
 
 def import_early(names: Sequence[str]) -> None:

@@ -52,6 +52,9 @@ def spectrum_curve(
 ) -> Curve:
     """A reflectance spectrum with its 95 % band and, where known, the truth; all of shape (bands,)."""
     shown = [values] + ([truth] if truth is not None else [])
+    if std is not None:
+        # Most of the band has to fit, too; where it is wide for want of light, it may leave the drawing.
+        shown.append(np.full(1, np.nanmedian(values + BAND_95 * std)))
     # A dark patch is not drawn larger than this: its noise would fill the drawing.
     top = _nice_top(max(_LEAST_TOP, *(float(np.nanmax(each)) for each in shown)))
     x = (bands - bands[0]) / (bands[-1] - bands[0]) * WIDTH

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from dsl_core.solve.compiled import compiled
 
 Floats = NDArray[np.float32]
+Doubles = NDArray[np.float64]
 Integers = NDArray[np.int64]
 #: Widths of the blur beyond which an edge is no longer seen in single precision.
 BLURRED = 6.0
@@ -25,17 +26,16 @@ BESIDE_PX = 2.0
 
 @compiled
 def add_zero_runs(
-    signal: Floats, columns: Floats, runs: Floats, zero: Floats, material: Integers, blur_px: float,
-    halo_px: float, decay_px: float,
+    signal: Floats, columns: Floats, runs: Floats, shares: Doubles, zero: Floats, material: Integers,
+    blur_px: float, halo_px: float, decay_px: float,
 ) -> None:  # fmt: skip
     """Add the zero order of white columns to signals (P,).
 
-    ``runs`` (runs, 3) are start, stop (px) and radiance; ``zero`` the signal of every material and colour,
-    ``material`` (P,) which of them; ``halo_px`` the light of one side of the halo.
+    ``runs`` (runs, 3) are start, stop (px) and radiance, and of the halo beside each its far edge takes a
+    share of ``shares`` (runs,); ``zero`` the signal of every material and colour, ``material`` (P,) which of
+    them; ``halo_px`` the light of one side of the halo.
     """
     scale, end = 1 / (math.sqrt(2.0) * blur_px), BLURRED * blur_px
-    # Of the halo beside a run, its far edge takes this share.
-    shares = np.exp((runs[:, 0] - runs[:, 1]) / decay_px)
     for p in range(len(columns)):
         total = 0.0
         for r in range(len(runs)):

@@ -204,9 +204,12 @@ class Renderer:
         if by_pixel(signal) and response.spread is None:
             from dsl_core.simulation.rendering.kernels import add_zero_runs
 
+            # Not in the loops: compiling NumPy's exponential takes a tenth of the time to a first picture.
+            shares = np.exp(np.float64(bands[:, 0] - bands[:, 1]) / response.halo_decay_px)
             add_zero_runs(
-                signal.numpy(), self.column.numpy(), bands, zero.numpy(), self.material_channel.numpy(),
-                response.blur_px, response.halo_peak_per_px * response.halo_decay_px, response.halo_decay_px,
+                signal.numpy(), self.column.numpy(), bands, shares, zero.numpy(),
+                self.material_channel.numpy(), response.blur_px,
+                response.halo_peak_per_px * response.halo_decay_px, response.halo_decay_px,
             )  # fmt: skip
             return
         for start, stop, radiance in bands.tolist():

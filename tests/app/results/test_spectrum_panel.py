@@ -39,6 +39,20 @@ def test_transforms_are_drawn_with_their_deviations_and_stacked(bench: Bench) ->
     assert (second.getData()[1] > before + 0.5).all()
     bench.control.point_at((30, 5))
     assert np.mean(panel.live.solid.getData()[1]) == pytest.approx(1.0)
+    # No pixel has the values that the axis shows then.
+    assert panel.item.getAxis("left").labelText == "Normalised to mean 1 + 0.62 a mark"
+    panel.stacked.click()
+    assert panel.item.getAxis("left").labelText == "Normalised to mean 1"
+
+
+def test_numbers_of_a_derivative_do_not_touch_what_they_are(bench: Bench) -> None:
+    panel = bench.page.spectra.content
+    axis = panel.item.getAxis("left")
+    panel.transform.setCurrentIndex(2)
+    panel.transform.activated.emit(2)
+    texts = axis.tickStrings([-0.005, 0.005], 1.0, 0.005)
+    digits = max(panel.fontMetrics().horizontalAdvance(text) for text in texts)
+    assert axis.label.boundingRect().height() + digits <= axis.fixedWidth
 
 
 def test_of_many_marks_the_selected_one_alone_keeps_its_band(bench: Bench) -> None:

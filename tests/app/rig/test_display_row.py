@@ -40,4 +40,4 @@ def test_the_picture_follows_and_what_is_read_does_not(qtbot: QtBot) -> None:
     view.display.gain.setValue(view.display.gain.maximum())
     assert view._item.image.mean() > 3 * before
     assert view._pixel.text() == "column 4 px, row 3 px: 64 DN, green pixel"
-    assert [label.text for _, label in view._legend.items] == ["red", "green", "blue"]
+    assert [label.text for _, label in view.histogram.content.legend.items] == ["red", "green", "blue"]

@@ -16,7 +16,7 @@ def test_the_legend_can_be_read_in_either_theme(qtbot: QtBot) -> None:
     qtbot.addWidget(view)
     for theme in (DARK, LIGHT):
         view.apply_theme(theme)
-        names = [text.item.toHtml() for _, text in view._legend.items]
+        names = [text.item.toHtml() for _, text in view.histogram.content.legend.items]
         assert [theme.muted in name for name in names] == [True] * 3
 
 
@@ -36,6 +36,9 @@ def test_a_picture_that_was_made_is_shown_unless_settings_have_changed(qtbot: Qt
     assert view.draw.value is not draw
     view.show_frame(frame, (draw, made))
     assert view._item.image.max() < 77
-    assert all(curve.getData()[1].any() for curve in view._curves)
+    # The histogram is made later than the picture, and shows the same frame.
+    assert view.histogram.made is None
+    curves = view.histogram.content.curves
+    assert all(curve.getData()[1].any() for curve in curves)
     view.set_camera(None)
-    assert [curve.getData()[1] for curve in view._curves] == [None] * 3, "no counts of a camera that is gone"
+    assert [curve.getData()[1] for curve in curves] == [None] * 3, "no counts of a camera that is gone"

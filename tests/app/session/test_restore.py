@@ -8,10 +8,13 @@ from pathlib import Path
 import pytest
 from dsl_app.compare.page import ComparePage
 from dsl_app.composition.window import Composition, StartOptions
-from dsl_app.session.records import ResultsPart, SeriesPart, Session
+from dsl_app.scan.state import Phase
+from dsl_app.session.records import ResultsPart, ScanPart, SeriesPart, Session
+from dsl_app.session.store import SessionStore
 from PySide6.QtWidgets import QApplication, QPushButton
 from pytestqt.qtbot import QtBot
 
+from dsl_core.model.plan import CapturePlan
 from tests.app.support.small_result import write_small_result
 from tests.cases.stage_series import write_stage
 
@@ -78,6 +81,23 @@ def test_after_a_crash_the_window_offers_once_what_was_open(
     assert later.window.toasts.shown == ()
     later.window.close()
     crashed.window.close()
+
+
+@pytest.mark.parametrize("results", [None, LEAF.results])
+def test_a_plan_is_offered_no_longer_once_a_scan_runs(
+    qtbot: QtBot, tmp_path: Path, gone: int, results: ResultsPart | None
+) -> None:
+    plan = ScanPart(plan=CapturePlan(), target=tmp_path / "leaf.dsl")
+    SessionStore(tmp_path / "sessions", lambda: Session(page="scan", scan=plan, results=results), gone).save()
+    bench = Bench(qtbot, tmp_path)
+    bench.session.start()
+    bench.window.open_page("scan")
+    assert bench.session.scans is not None
+    assert len(bench.window.toasts.shown) == 1
+    bench.session.scans.state.phase.set(Phase.RUNNING)
+    assert len(bench.window.toasts.shown) == (0 if results is None else 1)
+    bench.session.scans.state.phase.set(Phase.DONE)
+    bench.window.close()
 
 
 def test_a_series_comes_back_where_it_is_seen(qtbot: QtBot, tmp_path: Path) -> None:

@@ -8,7 +8,7 @@ import pytest
 from dsl_app.shared.jobs.base import Job, JobProgress
 from dsl_app.shared.jobs.clock import TimeLeft
 from dsl_app.shared.jobs.qt_runner import QtRunner
-from dsl_app.shell.job_strip import JobStrip, strip_view
+from dsl_app.shell.job_strip import NO_BREAK, JobStrip, strip_view
 from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
 from pytestqt.qtbot import QtBot
@@ -34,7 +34,7 @@ class Bench:
 
     @property
     def text(self) -> str:
-        return self.strip._text.text()
+        return self.strip._text.text().replace(NO_BREAK, " ")
 
     def click(self) -> None:
         QTest.mouseClick(self.strip._cancel, Qt.MouseButton.LeftButton)
@@ -49,6 +49,13 @@ def bench(qtbot: QtBot) -> Iterator[Bench]:
     made = Bench(qtbot)
     yield made
     made.end()
+
+
+def test_a_time_is_not_torn_from_its_unit(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(Job, "left", TimeLeft(190.0, True))
+    bench.run("Calibrate everything: find the board")
+    assert bench.text.endswith("3 min left")
+    assert bench.strip._text.text().endswith(NO_BREAK.join(("3", "min", "left")))
 
 
 def test_work_that_runs_by_itself_does_not_hide_what_was_asked_for(bench: Bench) -> None:

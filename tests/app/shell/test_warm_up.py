@@ -4,6 +4,8 @@ import gc
 import importlib.util
 import subprocess
 import sys
+import threading
+from types import SimpleNamespace
 
 import pytest
 from dsl_app.shell import warm_up as early
@@ -12,7 +14,8 @@ from dsl_app.shell.warm_up import STEPS, WarmUp
 
 def test_everything_that_is_imported_early_exists() -> None:
     # A name that went away would be no warning to anybody.
-    code = f"import importlib.util as u; print([n for n in {STEPS!r} if u.find_spec(n) is None])"
+    modules = [step.partition(":")[0] for step in STEPS]
+    code = f"import importlib.util as u; print([n for n in {modules!r} if u.find_spec(n) is None])"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=100)
     assert done.stdout.strip() == "[]", done.stdout + done.stderr
 
@@ -28,6 +31,16 @@ def test_modules_are_there_afterwards_and_garbage_is_collected_again() -> None:
     assert warm_up.is_over
     assert "colorsys" in sys.modules
     assert gc.isenabled()
+
+
+def test_a_step_may_call_a_function(monkeypatch: pytest.MonkeyPatch) -> None:
+    called = list[str]()
+    module = SimpleNamespace(rehearse=lambda: called.append(threading.current_thread().name))
+    monkeypatch.setitem(sys.modules, "a_play", module)
+    warm_up = WarmUp(["a_play:rehearse"])
+    warm_up.start()
+    warm_up._thread.join(30)
+    assert called == ["warm-up"]
 
 
 def test_it_stops_between_two_steps_and_before_it_began() -> None:

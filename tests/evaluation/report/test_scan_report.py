@@ -78,6 +78,7 @@ def test_full_report_is_one_well_formed_page(full: ReportContent) -> None:
     page = Page(html)
     assert full.verdicts[0].std
     assert full.verdicts[0].words in page.text
+    assert "truth, where known" in html
     assert page.open == []
     assert page.references
     assert all(reference.startswith("data:image/png;base64,") for reference in page.references)

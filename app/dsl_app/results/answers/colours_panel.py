@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QGuiApplication, QShowEvent
@@ -90,10 +92,10 @@ class ColoursPanel(QWidget):
                     at = at_bands(mark.curve, bands)
                 except CalibrationError:
                     continue
-                mean, std = at.values, at.std
+                mean, std = at.values, None if mark.curve.std is None else at.std
             if len(mean) == len(bands) and np.isfinite(mean).all():
-                none = np.zeros(len(bands))
-                spectra[name] = (np.asarray(mean, float), none if std is None else np.asarray(std, float))
+                unknown = np.full(len(bands), np.nan)
+                spectra[name] = np.asarray(mean, float), unknown if std is None else np.asarray(std, float)
         return colours_of(spectra, bands, lights, reference if reference in spectra else None)
 
     def copy_all(self) -> None:
@@ -115,5 +117,9 @@ class ColoursPanel(QWidget):
 
 
 def _value(value: float, std: float) -> str:
+    """A figure to the second digit of its deviation, two places at most; without one if it is not known."""
+    if math.isnan(std):
+        return f"{value:.2f}".replace("-", "−")
+    places = 2 if std < 0.995 else 1 if std < 9.95 else 0
     # Thin spaces: five columns have to fit next to the picture.
-    return f"{value:.2f}{THIN}±{THIN}{std:.2f}".replace("-", "−")
+    return f"{value:.{places}f}{THIN}±{THIN}{std:.{places}f}".replace("-", "−")

@@ -186,7 +186,7 @@ class MaterialsPanel(QWidget):
             first.setIcon(swatch(colours[row.value] if row.value else "transparent"))
             digits = 1 if row.area_mm2 is not None and row.area_mm2 < LARGE_MM2 else 0
             area = "–" if row.area_mm2 is None else f"{row.area_mm2:,.{digits}f} mm²"
-            share = f"{100 * row.share:.1f} %" if row.label != "not judged" else ""
+            share = "" if row.share is None else f"{100 * row.share:.1f} %"
             figures = (cell(text, "", RIGHT) for text in (f"{row.pixels:,}", share, area))
             rows.append((first, *figures))
         self.table.show_rows(rows)

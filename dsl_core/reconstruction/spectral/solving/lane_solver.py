@@ -53,6 +53,13 @@ def solve_spectra(
     return found.spectra(right.dtype)
 
 
+def compile_early() -> None:
+    """Solve one pixel: the kernel that serves most pictures, ten seconds of compiling, is there then."""
+    data = torch.zeros((LEAST_DIAGONALS + 1, 2 * LEAST_DIAGONALS, 1), dtype=torch.float64)
+    data[0] = 1.0
+    solve_spectra(data, data[0], None, Prior())
+
+
 def diagonals_for(bandwidth: int) -> int:
     """Diagonals of the kernel that serves a bandwidth: each needs compiling, so that there are few."""
     size = LEAST_DIAGONALS

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
-from dsl_app.results.answers.colours_panel import EMPTY, ColoursPanel
+from dsl_app.results.answers.colours_panel import EMPTY, THIN, ColoursPanel, _value
 from dsl_app.shared.theme import LIGHT
-from dsl_app.shared.widgets.read_table import LEAST_WIDE_PX
+from dsl_app.shared.widgets.read_table import LEAST_WIDE_PX, RIGHT, cell
 from PySide6.QtGui import QGuiApplication
 from pytestqt.qtbot import QtBot
 
 from dsl_core.optics.colour import reflectance_to_lab
 from tests.app.support.results_controller import SQUARE, Bench
 from tests.app.support.results_controller import bench as bench
+from tests.app.support.small_result import BLUE, write_reference
 
 
 def test_marks_have_colours_and_differences_to_the_selected_one(qtbot: QtBot, bench: Bench) -> None:
@@ -37,6 +40,22 @@ def test_marks_have_colours_and_differences_to_the_selected_one(qtbot: QtBot, be
     assert len(lines) == 1 + 2 * panel.light.count()
 
 
+def test_a_reference_that_states_no_deviation_has_none(qtbot: QtBot, bench: Bench, tmp_path: Path) -> None:
+    panel = ColoursPanel(bench.state)
+    qtbot.addWidget(panel)
+    panel.show()
+    bench.control.marks.pin((30, 5))
+    bench.control.marks.add_reference(write_reference(tmp_path / "tile.csv", BLUE))
+    texts = [[panel.table.item(row, column).text() for column in (1, 4)] for row in range(2)]  # type: ignore[union-attr]
+    assert ["±" in text for text in texts[0]] == [True, True]
+    assert "±" not in texts[1][0]
+    assert float(texts[1][0]) > 0
+    panel.copy.click()
+    cells = QGuiApplication.clipboard().text().splitlines()[2].split("\t")
+    assert cells[0] == "tile"
+    assert [cell == "" for cell in cells[2:8]] == [False, True] * 3
+
+
 def test_names_are_read_in_a_narrow_table(qtbot: QtBot, bench: Bench) -> None:
     panel = ColoursPanel(bench.state)
     qtbot.addWidget(panel)
@@ -50,3 +69,17 @@ def test_names_are_read_in_a_narrow_table(qtbot: QtBot, bench: Bench) -> None:
     assert not panel.table.horizontalScrollBar().isVisible()
     panel.resize(900, 300)
     assert panel.table.columnWidth(0) > 2 * LEAST_WIDE_PX
+
+
+def test_figures_of_many_marks_are_whole_in_a_window_of_1280_px(qtbot: QtBot, bench: Bench) -> None:
+    panel = ColoursPanel(bench.state)
+    qtbot.addWidget(panel)
+    panel.resize(436, 300)
+    panel.show()
+    figures = ((41.0, 0.42), (-44.05, 0.85), (-44.05, 12.85), (20.37, 10.2))
+    texts = [_value(*figure) for figure in figures]
+    assert [text.replace(THIN, "") for text in texts] == ["41.00±0.42", "−44.05±0.85", "−44±13", "20±10"]
+    panel.table.show()
+    panel.table.show_rows([(cell("pin 1"), *(cell(text, "", RIGHT) for text in texts)) for _ in range(40)])
+    wide = sum(panel.table.columnWidth(column) for column in range(5))
+    assert wide <= panel.table.viewport().width()
