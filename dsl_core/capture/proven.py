@@ -94,7 +94,7 @@ class ProvenShots:
         self._since_sound: set[Shot] = set()
         self._doubts = 0
         self._has_seen_first = False
-        #: What is wrong with the light of the first code, as soon as that is known.
+        #: What is wrong with light and places of the first code, as soon as that is known.
         self._light = ""
         self._passed: deque[Shot] = deque(maxlen=MOST_UNTOLD)
         self._late_at: deque[int] = deque(maxlen=LATE_OFTEN)
@@ -342,7 +342,9 @@ class ProvenShots:
         if first is None or self._has_seen_first:
             return
         self._has_seen_first = True
-        self._light = light_sentence(proof.code_sum(), None)
+        # Calibrations scan through filters.
+        found = [light_sentence(proof.code_sum(), None), *proof.lasting(with_colours=False)]
+        self._light = " ".join(each for each in found if each)
         if self._light:
             _log.warning("%s", self._light)
         if not proof.is_displaced(first, self._taker.take(first, twice=self._is_late).pixels):

@@ -46,6 +46,7 @@ class Bench:
         self.settled = ""
         self.recalled: dict[int, str] = {}
         self.of_code: CodeSum | None = None
+        self.of_ends: list[str] = []
         parts: Any = self
         self.shots = ProvenShots(parts, parts, parts, parts, self.token)
 
@@ -61,6 +62,10 @@ class Bench:
 
     def code_sum(self) -> CodeSum | None:
         return self.of_code
+
+    def lasting(self, with_colours: bool = True) -> list[str]:
+        # Colours are left out: a filter of a calibration may take them away.
+        return ["No colour at all."] if with_colours else self.of_ends
 
     def controls(self) -> tuple[Shot, ...]:
         return (SHOTS[0], SHOTS[4])
@@ -183,6 +188,13 @@ def test_light_of_the_code_that_does_not_add_up_is_said_at_the_end() -> None:
     bench.shots.take(LINE)
     assert bench.shots.note.startswith(" Patterns and their inverses together have 1.30 ± 0.01 times")
     assert bench.shots.note.endswith(" The light has settled.")
+
+
+def test_what_was_wrong_from_the_first_picture_on_is_said_at_the_end() -> None:
+    bench = Bench(is_right)
+    bench.displaced, bench.of_ends = [False], ["Black is grey.", "Rows alternate."]
+    bench.shots.take(LINE)
+    assert bench.shots.note == " Black is grey. Rows alternate."
 
 
 @pytest.mark.parametrize(

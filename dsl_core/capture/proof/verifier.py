@@ -14,6 +14,8 @@ from dsl_core.capture.proof.colour_again import ColourAgain, colour_again
 from dsl_core.capture.proof.contest import Contest
 from dsl_core.capture.proof.control import choose_pairs, edges_moved, is_same, is_unchanged
 from dsl_core.capture.proof.finding import Finding, Light, Verdict, displaced
+from dsl_core.capture.proof.lasting.ends import sentences_of_ends
+from dsl_core.capture.proof.lasting.pair_places import pair_places
 from dsl_core.capture.proof.later_settings import LaterSettings
 from dsl_core.capture.proof.light_steps import LightSteps
 from dsl_core.capture.proof.lines.bright_black import BrightBlack
@@ -211,6 +213,45 @@ class FrameProof:
     def white_again(self) -> WhiteAgain | None:
         """The white, captured again, that differs most from the first in a part of the picture."""
         return white_again(self._plan, self._kept, self._noise, self._raster)
+
+    def lasting(self, with_colours: bool = True) -> list[str]:
+        """Sentences on what was wrong from the first picture on, of the darkest setting that is there.
+
+        Without ``with_colours``, those that a filter before the camera explains are left out.
+        """
+        found = [
+            n for n in {s.setting for s in self._shots if s.role == "white"} if self._ends_of(n) is not None
+        ]
+        setting = min(found, key=lambda n: self._plan.settings[n].level, default=None)
+        ends = None if setting is None else self._ends_of(setting)
+        said: list[str] = []
+        if ends is not None and setting is not None:
+            channels = self._raster.channels(self._bayer)
+            said = sentences_of_ends(
+                *ends,
+                self._plan,
+                setting,
+                self._calibration,
+                channels,
+                self._noise,
+                self._raster,
+                with_colours,
+            )
+        return [each for each in (*said, self._pair_places()) if each]
+
+    def _ends_of(self, setting: int) -> tuple[Counts, Counts] | None:
+        """White and black of a setting, if both are there."""
+        own = [s for s in self._shots if s.setting == setting and s.role in ("white", "black")]
+        kept = {shot.role: self._kept.get(shot.index) for shot in own}
+        white, black = kept.get("white"), kept.get("black")
+        return None if white is None or black is None else (white, black)
+
+    def _pair_places(self) -> str:
+        lit, code = (None, None) if self._code is None else (self._code.lit, self._plan.code)
+        if lit is None or code is None or isinstance(code, NoCode | CapturedCode):
+            return ""
+        found = pair_places(code, self._plan.projector_size_px, self._code_pairs(), lit)
+        return "" if found is None else found.sentence
 
     def colour_again(self) -> ColourAgain | None:
         """The white, captured again, whose colour differs most from that of the first."""
