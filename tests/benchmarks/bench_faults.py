@@ -153,7 +153,6 @@ class Work:
 
     folder: Path
     count: int = 0
-    metered: dict[Case, str] = field(default_factory=dict)
     clean: dict[Case, Path] = field(default_factory=dict)
     results: dict[Case, xr.Dataset] = field(default_factory=dict)
 
@@ -222,14 +221,14 @@ def judge_scan(work: Work, case: Case, kind: str, at: int, tear: float) -> tuple
     plan_file.write_text(plan.model_dump_json())
     said, corrected = "", 0
     try:
-        before = meter_white(work, case, kind) if kind.endswith(ALWAYS) else ""
+        notes = meter_white(case, kind, plan) if kind.endswith(ALWAYS) else {}
         with (
             open_lab(case, kind, at, tear, str(plan_file)) as rig,
-            pipeline.open_scan(rig, plan, folder) as runner,
+            pipeline.open_scan(rig, plan, folder, notes=notes) as runner,
         ):
             corrected = runner.run().corrected
     except DslError as error:
-        said, before = str(error), ""
+        said = str(error)
     except Exception as error:
         return "WRONG", f"not a sentence: {type(error).__name__}: {error}"
     end = "corrected" if corrected else "right"
@@ -248,7 +247,6 @@ def judge_scan(work: Work, case: Case, kind: str, at: int, tear: float) -> tuple
     shutil.rmtree(folder)
     if not wrong:
         return end, said
-    told = f"{before} {told}".strip()
     is_told = bool(told) if kind.endswith(ALWAYS) else bool(re.search(TOLD, told))
     if kind.removesuffix(ALWAYS) in CHANGES and is_told:
         end = "told"
@@ -259,17 +257,11 @@ def judge_scan(work: Work, case: Case, kind: str, at: int, tear: float) -> tuple
     return end, f"{wrong} {told} {said}"
 
 
-def meter_white(work: Work, case: Case, kind: str = "") -> str:
-    """What is said of white before a scan that is not said on a sound rig; exposures stay as they are."""
-    if case not in work.metered and kind:
-        work.metered[case] = ""
-        work.metered[case] = meter_white(work, case)
+def meter_white(case: Case, kind: str, plan: CapturePlan) -> dict[str, str]:
+    """What is noted of white before a scan on a rig that fails from the beginning; exposures stay."""
     with open_lab(case, kind) as rig:
-        said = pipeline.meter(rig, ScanReader(work.clean[case]).plan).sentence
-    usual = _NUMBER.sub("#", work.metered.get(case, ""))
-    # A sentence on exposures names no fault.
-    new = [each for each in re.split(r"(?<=\.) ", said) if _NUMBER.sub("#", each) not in usual]
-    return " ".join(each for each in new if not kind or "xposure" not in each)
+        notes = pipeline.meter(rig, plan).notes
+    return {name: text for name, text in notes.items() if name != "exposures"}
 
 
 def _wrong(work: Work, case: Case, folder: Path) -> tuple[str, str, bool]:
