@@ -14,13 +14,14 @@ import torch
 from dsl_core import pipeline
 from dsl_core.capture.metering import WHITE_IN_DOUBT
 from dsl_core.devices.registry import open_rig
+from dsl_core.io import MANIFEST_NAME
 from dsl_core.io.atomic import write_atomic
 from dsl_core.io.records import replace_record
 from dsl_core.io.result import row_writer
 from dsl_core.io.result.result_file import load_result
 from dsl_core.io.scan.folder import ScanReader
 from dsl_core.io.scan.lock import FolderLock
-from dsl_core.io.scan.manifest import MANIFEST_NAME, read_manifest
+from dsl_core.io.scan.manifest import read_manifest
 from dsl_core.io.scan.proof_file import PROOF_NAME, read_proof, save_proof
 from dsl_core.model.presets import PRESETS
 from dsl_core.model.result_sink import Maps

@@ -40,6 +40,7 @@ from dsl_core.capture.proof.prediction import (
     line_profile,
 )
 from dsl_core.capture.proof.raster import Counts, Floats, Raster
+from dsl_core.capture.proof.row_copies import has_row_copies
 from dsl_core.capture.proof.sentinel import SentinelProof
 from dsl_core.capture.proof.usual_light import LEAST_LIGHT, UsualLight
 from dsl_core.capture.proof.white_again import WhiteAgain, white_again
@@ -130,6 +131,8 @@ class FrameProof:
 
     def judge(self, shot: Shot, pixels: NDArray[np.uint16]) -> Finding:
         """What the raw mosaic of a shot shows; remembers it for the shots after it, unless it is wrong."""
+        if has_row_copies(pixels):
+            return Finding(shot, Verdict.ROWS_TWICE, (shot,))
         return self.judge_raster(shot, self._raster.take(pixels))
 
     def judge_raster(self, shot: Shot, seen: Counts) -> Finding:
