@@ -27,7 +27,7 @@ def said(scene: RenderedScene, fault: Fault, with_colours: bool = True) -> list[
     def taken(shot: Shot) -> Mosaic:
         rig.camera.configure(shot.exposure_ms)
         rig.projector.show(token_image(plan, shot))
-        return np.float64(rig.camera.snap().pixels) - scene.calibration.sensor.black_level_dn
+        return np.asarray(rig.camera.snap().pixels - scene.calibration.sensor.black_level_dn, np.float64)
 
     own = {shot.role: shot for shot in plan.shots() if shot.setting == setting}
     sensor, raster = scene.calibration.sensor, Raster(plan.camera_size_px)
