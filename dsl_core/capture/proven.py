@@ -370,7 +370,8 @@ class ProvenShots:
     def _withdraw(self, error: PictureError, latest: Shot | None = None) -> NoReturn:
         """Remove the pictures that may be wrong for the same reason, and say so.
 
-        The ``latest`` is among them if it was saved, because others were wrong.
+        The ``latest`` is among them if it was saved, because others were wrong. What was wrong with the first
+        code may be why, and is said as well.
         """
         doubted = {*self._untold, *self._recent, *(shot for shot in error.wrong if shot != latest)}
         if error.has_changed:
@@ -379,8 +380,9 @@ class ProvenShots:
         self._untold.clear()
         self._recent.clear()
         self._since_sound.clear()
+        known = f" {self._light}" if self._light else ""
         if not withdrawn:
-            raise error
+            raise PictureError(f"{error}{known}", error.wrong) from error
         self._sink.withdraw(withdrawn)
         first, last = withdrawn[0].number, withdrawn[-1].number
         which, them = f"{len(withdrawn)} frames between {first} and {last}", "them"
@@ -388,7 +390,7 @@ class ProvenShots:
             which, them = f"Frame {first}", "it"
         raise PictureError(
             f"{error} {which}, captured just before or not judged in full, may be wrong too; the resumed scan"
-            f" captures {them} again.",
+            f" captures {them} again.{known}",
             error.wrong,
         ) from error
 

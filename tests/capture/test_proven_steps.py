@@ -191,10 +191,13 @@ def test_light_of_the_code_that_does_not_add_up_is_said_at_the_end() -> None:
 
 
 def test_what_was_wrong_from_the_first_picture_on_is_said_at_the_end() -> None:
-    bench = Bench(is_right)
+    bench = Bench(is_right, late)
     bench.displaced, bench.of_ends = [False], ["Black is grey.", "Rows alternate."]
     bench.shots.take(LINE)
     assert bench.shots.note == " Black is grey. Rows alternate."
+    # Why a later picture stays wrong may be the same.
+    with pytest.raises(PictureError, match=r"after 4 exposures.* Black is grey\. Rows alternate\.$"):
+        bench.shots.take(SHOTS[14])
 
 
 @pytest.mark.parametrize(
