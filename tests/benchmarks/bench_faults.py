@@ -238,6 +238,8 @@ def judge_scan(work: Work, case: Case, kind: str, at: int, tear: float) -> tuple
         end = "stopped" if re.search(wanted, said) else "reason?"
         if kind == "cannot be opened":
             return end, said
+        if kind.endswith(ALWAYS) and end == "stopped":
+            return end, said  # what was captured was never right: nothing is resumed
         try:
             with open_lab(case) as sound, pipeline.open_scan(sound, plan, folder) as runner:
                 runner.run()
