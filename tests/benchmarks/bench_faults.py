@@ -291,7 +291,9 @@ def _wrong(work: Work, case: Case, folder: Path) -> tuple[str, str, bool]:
     except DslError as error:
         return f"{names}; no result", str(error), False
     usual = {_NUMBER.sub("#", sentence) for sentence in _sentences(wanted)}
-    told = " ".join(sorted(each for each in _sentences(result) if _NUMBER.sub("#", each) not in usual))
+    new = (each for each in _sentences(result) if _NUMBER.sub("#", each) not in usual)
+    # What is measured and corrected names no fault that is left.
+    told = " ".join(sorted(each for each in new if not each.rstrip().endswith("corrected for it.")))
     mended = pipeline.reconstruct(Mended(ours, theirs, frozenset(different)), calibration)
     bad, spectra, beyond = _apart(result, mended)
     if bad > DEPTH_SHARE or spectra > REFLECTANCE:
