@@ -333,13 +333,13 @@ class ProvenShots:
             self._since_sound.clear()
 
     def _see_first(self, proof: FrameProof) -> None:
-        """Once in a run, after the first code, see that the very first picture is where it was.
+        """Once in a run, after the first code, see that its very first pictures are where they were.
 
         A code that moved after its first pictures names columns that fit each other nearly everywhere, and
-        everything after it fits the code. Raises `PictureError` if it moved, for all of the code but that.
+        everything after it fits the code. Raises `PictureError` if it moved, for all of the code since then.
         """
-        first = proof.first_picture()
-        if first is None or self._has_seen_first:
+        pictures = proof.first_pictures()
+        if not pictures or self._has_seen_first:
             return
         self._has_seen_first = True
         # Calibrations scan through filters.
@@ -347,6 +347,11 @@ class ProvenShots:
         self._light = " ".join(each for each in found if each)
         if self._light:
             _log.warning("%s", self._light)
+        for first in pictures:
+            self._require_place(first, proof)
+
+    def _require_place(self, first: Shot, proof: FrameProof) -> None:
+        """See that a picture of the code, captured once more, is where it was."""
         if not proof.is_displaced(first, self._taker.take(first, twice=self._is_late).pixels):
             return
         if not proof.is_displaced(first, self._again(first).pixels):

@@ -53,6 +53,8 @@ from dsl_core.model.rig import Rig
 NEARLY = 0.3
 #: Where a line lights so few pixels, most may see an edge, and vote for nothing.
 FEW_VOTES = 60
+#: Two more exposures cost little in plans of so many shots.
+MANY_SHOTS = 100
 
 
 @dataclass
@@ -183,11 +185,17 @@ class FrameProof:
             return False
         return is_unchanged(self._raster.take(pixels), before, self._code_pairs(), self._noise)
 
-    def first_picture(self) -> Shot | None:
-        """The first picture of the first code, once that is whole; None in plans without one."""
-        if self._code is None or self._code.lit is None or self._places["code", 0] not in self._kept:
-            return None
-        return self._shots[self._places["code", 0]]
+    def first_pictures(self) -> tuple[Shot, ...]:
+        """The pictures of the first code to look at again, once that is whole; none in plans without one.
+
+        The very first one has an edge or two, which may fall between pixels, so that in plans of many shots
+        the first pictures of the next pairs are among them.
+        """
+        if self._code is None or self._code.lit is None:
+            return ()
+        patterns = (0, 2, 4) if len(self._shots) >= MANY_SHOTS else (0,)
+        places = (self._places.get(("code", pattern), -1) for pattern in patterns)
+        return tuple(self._shots[place] for place in places if place in self._kept)
 
     def code_after(self, first: Shot) -> tuple[Shot, ...]:
         """The shots of the first code, its white and its black that are captured after a shot."""
@@ -195,7 +203,7 @@ class FrameProof:
         return tuple(each for each in own if each.role != "spectral" and each.index > first.index)
 
     def is_displaced(self, first: Shot, pixels: NDArray[np.uint16]) -> bool:
-        """Whether a raw mosaic of `first_picture` shows its pattern elsewhere than when the scan began."""
+        """Whether a raw mosaic of one of the `first_pictures` shows its pattern elsewhere than at first."""
         seen, before = self._raster.take(pixels), self._kept[first.index]
         return edges_moved(seen, before, self._code_pairs(), self._noise, self._raster.shape)
 

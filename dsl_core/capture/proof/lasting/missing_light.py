@@ -13,12 +13,12 @@ from dsl_core.model.rig import Rig
 #: A colour that has less than this share of the light of another, wherever there is any, is missing.
 NO_LIGHT = 0.01
 #: An LED is out where its colour has no more than what others give it, and this share of its own light: of
-#: surfaces that reflect as little of it there is hardly any, and a scene has others.
+#: surfaces that reflect as little of it there is hardly any, and most scenes have others.
 HARDLY = 0.08
 #: An LED gives a colour at least this share of its light, else nothing is said.
 OWN = 0.4
 #: Share of the blocks of a picture that have to agree; how bright they are, in deviations; and their number.
-MOST, BRIGHT_SIGMAS, FEWEST = 0.95, 20.0, 8
+MOST, BRIGHT_SIGMAS, FEWEST = 0.8, 20.0, 8
 #: Blocks count where no more than this share of a colour saturates: what is left of it would be the darkest.
 SATURATED = 0.1
 
@@ -57,7 +57,7 @@ def missing_light(
     if not out:
         return ""
     return (
-        f"White has hardly any light of the {' and the '.join(out)} LED, wherever in the picture: less than"
+        f"White has hardly any light of the {' and the '.join(out)} LED in most of the picture: less than"
         f" {HARDLY:.0%} of what grey surfaces would return. Unless no surface reflects it, the LED is out, or"
         " a filter or a setting of projector or computer takes its light away. Look whether the projector"
         " shows white, and scan again."

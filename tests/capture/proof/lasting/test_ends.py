@@ -138,5 +138,18 @@ def test_a_dead_channel_is_told_unless_a_filter_may_explain_it(scene: RenderedSc
 
 def test_an_led_that_is_out_leaves_its_colour_what_others_give_it(scene: RenderedScene) -> None:
     (sentence,) = said(scene, of_colour(0, 0, 0.2))
-    assert sentence.startswith("White has hardly any light of the red LED, wherever in the picture")
+    assert sentence.startswith("White has hardly any light of the red LED in most of the picture")
     assert said(scene, of_colour(0, 0, 0.35)) == []
+
+
+@pytest.mark.parametrize(("share", "is_told"), [(0.1, True), (0.4, False)])
+def test_a_few_surfaces_of_another_colour_are_no_light_of_an_led(
+    scene: RenderedScene, share: float, is_told: bool
+) -> None:
+    def fault(white: Mosaic, black: Mosaic) -> tuple[Mosaic, Mosaic]:
+        changed, seen = of_colour(0, 0, 0.2)(white, black)
+        rows = round(share * len(white) / 2) * 2
+        changed[:rows] = white[:rows]
+        return changed, seen
+
+    assert bool(said(scene, fault)) == is_told
