@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from dsl_core.capture.proof.lasting.black_light import black_light, lit_black
 from dsl_core.capture.proof.lasting.missing_light import missing_light
+from dsl_core.capture.proof.lasting.sensor_parts import sensor_parts
 from dsl_core.capture.proof.noise import Noise
 from dsl_core.capture.proof.raster import Counts, Raster
 from dsl_core.model.plan import CapturePlan
@@ -29,7 +30,8 @@ def sentences_of_ends(
         return []
     level = plan.settings[setting].level
     glow = black_light(white, black, level, rig.projector_response, channels, noise, raster)
-    found = ["" if glow is None else glow.sentence]
+    parts = sensor_parts(white, black, channels, noise, raster, plan.camera_size_px[0])
+    found = [each.sentence for each in (glow, parts) if each is not None]
     if with_colours:
         found.append(missing_light(white, black, rig, channels, noise, raster))
     return [each for each in found if each]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 
 import numpy as np
@@ -153,3 +154,39 @@ def test_a_few_surfaces_of_another_colour_are_no_light_of_an_led(
         return changed, seen
 
     assert bool(said(scene, fault)) == is_told
+
+
+@pytest.mark.parametrize(("step_dn", "gain", "word"), [(6.0, 1.08, "higher"), (-6.0, 1.0, "lower")])
+def test_halves_of_a_sensor_that_differ_are_told_with_their_column(
+    scene: RenderedScene, step_dn: float, gain: float, word: str
+) -> None:
+    def fault(white: Mosaic, black: Mosaic) -> tuple[Mosaic, Mosaic]:
+        right = np.arange(white.shape[1]) >= 32
+        changed = [np.where(right, step_dn + gain * each, each) for each in (white, black)]
+        return changed[0], changed[1]
+
+    (sentence,) = said(scene, fault)
+    told = re.match(r"From column (\d+) of the picture on, black is (\d) DN (\w+), in all rows", sentence)
+    assert told is not None
+    assert (int(told[1]), told[3]) == (32, word)
+    assert int(told[2]) == pytest.approx(6, abs=1)
+
+
+def test_a_shadow_of_the_room_that_is_slanted_or_soft_or_ends_is_no_step(scene: RenderedScene) -> None:
+    def slanted(white: Mosaic, black: Mosaic) -> tuple[Mosaic, Mosaic]:
+        down, across = np.mgrid[: white.shape[0], : white.shape[1]]
+        room = 20.0 * (across > 20 + down / 2)
+        return white + room, black + room
+
+    def soft(white: Mosaic, black: Mosaic) -> tuple[Mosaic, Mosaic]:
+        room = 20.0 / (1 + np.exp((32 - np.arange(white.shape[1])) / 6))
+        return white + room, black + room
+
+    def in_most_rows(white: Mosaic, black: Mosaic) -> tuple[Mosaic, Mosaic]:
+        down, across = np.mgrid[: white.shape[0], : white.shape[1]]
+        room = 10.0 * ((across >= 32) & (down > 0.3 * white.shape[0]))
+        return white + room, black + room
+
+    assert said(scene, slanted) == []
+    assert said(scene, soft) == []
+    assert said(scene, in_most_rows) == []
