@@ -56,14 +56,26 @@ def sensor_parts(
         more, glow = ((each[:, 2:] - each[:, :-2])[both] for each in (light, rest))
         total = float(more @ more)
         grid[own] = (rest - light * (float(more @ glow) / total if total > 0 else 0.0))[own]
-    if grid.shape[1] < 8 * NEAR or bool(np.isnan(grid).mean() > 1 - MOST):
+    if grid.shape[1] < 8 * NEAR:
         return None
     edges = np.arange(NEAR, grid.shape[1] - NEAR + 1, 2)
+    is_known = np.isfinite(grid)
+    known = np.where(is_known, grid, np.float32(0))
     left, right = (
-        np.nanmean([grid[:, edges + at] for at in places], axis=0)
+        [
+            np.sum([values[:, edges + at] for at in places], axis=0)
+            for values in (known, is_known.astype(np.float32))
+        ]
         for places in (range(-NEAR, 0), range(NEAR))
     )
-    apart = right - left
+    both = (left[1] > 0) & (right[1] > 0)
+    apart = right[0] / np.maximum(right[1], 1) - left[0] / np.maximum(left[1], 1)
+    apart[~both] = np.nan
+    # Where much of a column saturates in white, nothing is said of it.
+    told = both.mean(axis=0) >= MOST
+    edges, apart = edges[told], apart[:, told]
+    if edges.size < 2 * NEAR:
+        return None
     steps = np.nanmedian(apart, axis=0)
     found = int(np.abs(steps).argmax())
     step = float(steps[found])

@@ -190,3 +190,16 @@ def test_a_shadow_of_the_room_that_is_slanted_or_soft_or_ends_is_no_step(scene: 
     assert said(scene, slanted) == []
     assert said(scene, soft) == []
     assert said(scene, in_most_rows) == []
+
+
+@pytest.mark.parametrize("columns", [slice(10, 20), slice(0, 64)])
+def test_parts_of_a_sensor_are_looked_for_where_white_does_not_saturate(
+    scene: RenderedScene, columns: slice
+) -> None:
+    def fault(white: Mosaic, black: Mosaic) -> tuple[Mosaic, Mosaic]:
+        step = 6.0 * (np.arange(white.shape[1]) >= 32)
+        bright = white + step
+        bright[:, columns] = 1e5
+        return bright, black + step
+
+    assert any("in all rows" in sentence for sentence in said(scene, fault)) == (columns.stop < 32)
