@@ -93,7 +93,7 @@ def _checked(
 ) -> StoredArray:
     _require_honest(array, folder)
     if not isinstance(array.metadata.attributes, dict):
-        raise ValueError(f"the attributes of {name} are no names with values")
+        raise ValueError(f"the attributes of {name} have no names")
     dims = array.metadata.dimension_names or ()  # type: ignore[union-attr]
     if len(dims) != array.ndim or None in dims:
         raise ValueError(f"{folder.name} does not name its axes")
