@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from dsl_core.capture.exposure import PatternImage, RetryPolicy, ShotTaker
 from dsl_core.capture.overexposure import by_colour, full_scale_dn
+from dsl_core.capture.white_levels import doubts_of_white
 from dsl_core.devices.base import DeviceRig
 from dsl_core.errors import DeviceError
 from dsl_core.model.conditions import COLOUR_NAMES
@@ -38,23 +39,28 @@ NO_LIGHT, ENOUGH = 0.01, 0.1
 #: A saturated picture says only that it is too bright: the next is exposed for this much less.
 _SHORTEN = 8.0
 _MOST_FRAMES = 4
+#: Note of a scan: what its white contradicts of the calibration, measured before the scan began.
+WHITE_IN_DOUBT = "white_in_doubt"
 
 
 @dataclass(frozen=True)
 class Metered:
     """A plan whose exposures suit the scene, and what was measured, in a sentence or two.
 
-    ``is_told`` says whether a person should read it: exposures have changed, or none is right.
+    ``is_told`` says whether a person should read it: exposures have changed, or none is right, or there is a
+    ``doubt``, a part of the sentences: white is not as it was when the rig was calibrated.
     """
 
     plan: CapturePlan
     sentence: str = ""
     is_told: bool = False
+    doubt: str = ""
 
     @property
     def notes(self) -> dict[str, str]:
-        """What a scan's manifest says of it."""
-        return {"exposures": self.sentence} if self.sentence else {}
+        """What a scan's manifest says of it; a doubt on its own, as its result repeats it."""
+        notes = {"exposures": self.sentence} if self.sentence else {}
+        return notes | ({WHITE_IN_DOUBT: self.doubt} if self.doubt else {})
 
 
 def meter(
@@ -65,7 +71,8 @@ def meter(
     They become shorter where white saturates in every colour in the darkest setting, and up to `MOST_LONGER`
     times longer where it stays dark even in the brightest. All are whole cycles of the projector and within
     what the camera can do; drive levels and the ratio of the settings stay. One frame is taken, and another
-    for each time that white saturates in it. A rig that plays back a scan keeps its exposures, and so does a
+    for each time that white saturates in it; of a calibrated rig black and a dimmer white as well, which have
+    to agree with the calibration. A rig that plays back a scan keeps its exposures, and so does a
     plan without white.
 
     Raises `DeviceError` when a picture cannot be taken, `Cancelled` when the ``token`` is.
@@ -79,15 +86,22 @@ def meter(
     fit = _Fit(plan, period_ms, rig.camera.info.exposure_range_ms, response)
     black_dn = 0.0 if known is None else known.sensor.black_level_dn
     taker = ShotTaker(rig, plan, pattern_image, RetryPolicy(), token)
+    doubt = ""
     try:
-        seen = _measure(taker, white, fit, full_scale_dn(rig), black_dn, rig.camera.info.bayer)
+        seen, shot, pixels = _measure(taker, white, fit, full_scale_dn(rig), black_dn, rig.camera.info.bayer)
+        if rig.calibration is not None and not seen.missing:
+            doubt = doubts_of_white(taker, shot, pixels, rig.calibration)
     except DeviceError as error:
         raise DeviceError(
             f"White could not be measured before the scan: {error.__cause__ or error} Nothing is saved yet."
         ) from error
     finally:
         taker.show_black()
-    return fit.to(seen)
+    found = fit.to(seen)
+    doubt = seen.sentence or doubt
+    if not doubt:
+        return found
+    return replace(found, sentence=f"{doubt} {found.sentence}", is_told=True, doubt=doubt)
 
 
 @dataclass(frozen=True)
@@ -120,13 +134,15 @@ class _White:
 
 def _measure(
     taker: ShotTaker, white: Shot, fit: _Fit, full_dn: int, black_dn: float, bayer: BayerPattern
-) -> _White:
+) -> tuple[_White, Shot, NDArray[np.uint16]]:
+    """White, and the shot and mosaic that it was measured by."""
     darkest = fit.darkest
     exposure_ms = darkest.exposure_ms
     is_clipped = False
     for _ in range(_MOST_FRAMES):
         shot = replace(white, exposure_ms=exposure_ms, level=darkest.level)
-        colours = by_colour(taker.take(shot).pixels)
+        pixels = taker.take(shot).pixels
+        colours = by_colour(pixels)
         is_saturated = float(np.mean(colours.min(axis=0) >= full_dn)) > _BRIGHTER
         shorter_ms = fit.exposure_ms(exposure_ms / _SHORTEN)
         is_clipped = is_saturated and shorter_ms >= exposure_ms
@@ -140,7 +156,8 @@ def _measure(
     most = full_dn - 1 if is_clipped else black_dn + MOST / scale
     lost = float(np.mean(colours.min(axis=0) > most))
     missing = _missing(colours, bayer, black_dn, ENOUGH * (full_dn - black_dn))
-    return _White(max(dimmest, 0.0) * scale, lost, max(brightest, 0.0) * scale, is_clipped, missing)
+    found = _White(max(dimmest, 0.0) * scale, lost, max(brightest, 0.0) * scale, is_clipped, missing)
+    return found, shot, pixels
 
 
 def _missing(
@@ -184,13 +201,6 @@ class _Fit:
         return max(cycles, int(np.ceil(low_ms / self.period_ms - 1e-6)), 1) * self.period_ms
 
     def to(self, white: _White) -> Metered:
-        """The plan for this white."""
-        found = self._suited(white)
-        if not white.missing:
-            return found
-        return Metered(found.plan, f"{white.sentence} {found.sentence}", is_told=True)
-
-    def _suited(self, white: _White) -> Metered:
         """The plan for white of this brightness."""
         most_light = max(map(self.light, self.plan.settings)) / self.light(self.darkest)
         if white.lost > MOST_LOST:

@@ -94,7 +94,7 @@ class ProvenShots:
         self._since_sound: set[Shot] = set()
         self._doubts = 0
         self._has_seen_first = False
-        #: What is wrong with the light of the first code, as soon as that is known.
+        #: What is wrong with light and places of the first code, as soon as that is known.
         self._light = ""
         self._passed: deque[Shot] = deque(maxlen=MOST_UNTOLD)
         self._late_at: deque[int] = deque(maxlen=LATE_OFTEN)
@@ -333,18 +333,25 @@ class ProvenShots:
             self._since_sound.clear()
 
     def _see_first(self, proof: FrameProof) -> None:
-        """Once in a run, after the first code, see that the very first picture is where it was.
+        """Once in a run, after the first code, see that its very first pictures are where they were.
 
         A code that moved after its first pictures names columns that fit each other nearly everywhere, and
-        everything after it fits the code. Raises `PictureError` if it moved, for all of the code but that.
+        everything after it fits the code. Raises `PictureError` if it moved, for all of the code since then.
         """
-        first = proof.first_picture()
-        if first is None or self._has_seen_first:
+        pictures = proof.first_pictures()
+        if not pictures or self._has_seen_first:
             return
         self._has_seen_first = True
-        self._light = light_sentence(proof.code_sum(), None)
+        # Calibrations scan through filters.
+        found = [light_sentence(proof.code_sum(), None), *proof.lasting(with_colours=False)]
+        self._light = " ".join(each for each in found if each)
         if self._light:
             _log.warning("%s", self._light)
+        for first in pictures:
+            self._require_place(first, proof)
+
+    def _require_place(self, first: Shot, proof: FrameProof) -> None:
+        """See that a picture of the code, captured once more, is where it was."""
         if not proof.is_displaced(first, self._taker.take(first, twice=self._is_late).pixels):
             return
         if not proof.is_displaced(first, self._again(first).pixels):
@@ -368,7 +375,8 @@ class ProvenShots:
     def _withdraw(self, error: PictureError, latest: Shot | None = None) -> NoReturn:
         """Remove the pictures that may be wrong for the same reason, and say so.
 
-        The ``latest`` is among them if it was saved, because others were wrong.
+        The ``latest`` is among them if it was saved, because others were wrong. What was wrong with the first
+        code may be why, and is said as well.
         """
         doubted = {*self._untold, *self._recent, *(shot for shot in error.wrong if shot != latest)}
         if error.has_changed:
@@ -377,8 +385,9 @@ class ProvenShots:
         self._untold.clear()
         self._recent.clear()
         self._since_sound.clear()
+        known = f" {self._light}" if self._light else ""
         if not withdrawn:
-            raise error
+            raise PictureError(f"{error}{known}", error.wrong) from error
         self._sink.withdraw(withdrawn)
         first, last = withdrawn[0].number, withdrawn[-1].number
         which, them = f"{len(withdrawn)} frames between {first} and {last}", "them"
@@ -386,7 +395,7 @@ class ProvenShots:
             which, them = f"Frame {first}", "it"
         raise PictureError(
             f"{error} {which}, captured just before or not judged in full, may be wrong too; the resumed scan"
-            f" captures {them} again.",
+            f" captures {them} again.{known}",
             error.wrong,
         ) from error
 

@@ -226,12 +226,19 @@ def _state(output: Output, plan: CapturePlan, folder: Path, devices: DeviceRig) 
 
 
 def _done(output: Output, target: Path, status: Status) -> None:
+    from dsl_core.workflows.scans import known_doubts
+
     output.say(f"All {status.total} frames are saved in {target} ({status.elapsed_s:.1f} s). {_next(target)}")
     if status.overexposed:  # said on standard error when it was seen
         output.put(overexposed=status.overexposed)
     if status.warning:
         output.say(status.warning)
         output.put(warning=status.warning)
+    doubts = [each for each in known_doubts(target) if each != status.warning]
+    for each in doubts:
+        output.say(each)
+    if doubts:
+        output.put(doubts=doubts)
     output.put(scan=target, frames=status.total, seconds=round(status.elapsed_s, 2), state="finished")
     output.finish()
 

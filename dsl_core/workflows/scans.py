@@ -9,6 +9,7 @@ from dataclasses import asdict, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from dsl_core.capture.metering import WHITE_IN_DOUBT
 from dsl_core.capture.movement import check_movement, pick_reference_shots
 from dsl_core.capture.proof.report import SeenFrames, WatchedSource, prove
 from dsl_core.capture.runner import Status
@@ -135,10 +136,11 @@ def reconstruct_scan(
         with timer.stage("compare frames with their patterns"):
             progress.report("compare frames with their patterns", 0, 0)
             proof = prove(reader, watched.seen, rig, rig.sensor.bit_depth, rig.sensor.bayer)
+    doubts = _doubts(reader, proof)
     return result.assign_attrs(
         {
             **reader.manifest.notes,  # first, so that no note of a stranger's scan hides what was found
-            **({DOUBTS: json.dumps(proof.doubts)} if proof.doubts else {}),
+            **({DOUBTS: json.dumps(doubts)} if doubts else {}),
             **({NOT_JUDGED: proof.not_judged} if proof.untold else {}),
             **model_notes(rig, options.correspondence),
             **_dated(result, rig, reader),
@@ -149,6 +151,18 @@ def reconstruct_scan(
             COSTS_ATTRIBUTE: json.dumps([asdict(stage) for stage in timer.stages]),
         }
     )
+
+
+def _doubts(reader: ScanReader, proof: ScanProof | None) -> list[str]:
+    """What was found before a scan began, and of its pictures, as far as that is known."""
+    before = reader.manifest.notes.get(WHITE_IN_DOUBT, "")
+    return [*([before] if before else []), *(() if proof is None else proof.doubts)]
+
+
+def known_doubts(folder: Path) -> list[str]:
+    """What was found before a scan began and when it ended, in sentences; raises `StoreError`."""
+    reader = ScanReader(folder)
+    return _doubts(reader, None if reader.calibration is None else read_proof(reader, reader.calibration))
 
 
 def _dated(result: xr.Dataset, rig: Rig, reader: ScanReader) -> dict[str, str]:

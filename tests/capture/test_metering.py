@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -13,6 +15,7 @@ from dsl_core.devices.base import Camera, CameraInfo, DeviceRig, Projector, Proj
 from dsl_core.errors import DeviceError, PlanError
 from dsl_core.model.frames import Frame
 from dsl_core.model.plan import CapturePlan, GrayCode, NoCode, ScanLines, Setting
+from dsl_core.model.rig import ProjectorResponse
 from dsl_core.pipeline import meter
 from tests.cases.small_rig import small_rig
 
@@ -33,6 +36,9 @@ class Bench(Camera, Projector):
     shown: list[int] = field(default_factory=list)
     frames: int = 0
     colours: NDArray[np.float64] = field(default_factory=COLOURS.copy)
+    #: What the projector makes of levels 0..1, and the light of the room relative to the brightest white.
+    curve: Callable[[float], float] = lambda level: level
+    room: float = 0.0
 
     @property
     def info(self) -> CameraInfo:  # type: ignore[override]
@@ -48,7 +54,7 @@ class Bench(Camera, Projector):
         self.shown.append(int(image.max()))
 
     def snap(self, timeout_ms: float = 5000.0) -> Frame:
-        light = (self.shown[-1] / 255) ** 2.2 * self.exposures_ms[-1] * self.dn_per_ms
+        light = (self.curve(self.shown[-1] / 255) ** 2.2 + self.room) * self.exposures_ms[-1] * self.dn_per_ms
         signal = light * np.tile(self.colours, (10, 20))
         signal[:, : round(40 * self.highlights)] *= 50
         pixels = np.clip(signal + BLACK_DN, 0, FULL_DN).astype(np.uint16)
@@ -211,3 +217,61 @@ def test_the_projector_is_dark_after_a_camera_that_failed() -> None:
     with pytest.raises(DeviceError, match=r"before the scan: no frame Nothing is saved yet\."):
         meter(rig_of(bench), plan_of((200.0, 1.0)))
     assert bench.shown[-1] == 0
+
+
+def doubt_of(bench: Bench, level: float = 0.5) -> str:
+    """Of a calibrated rig, at a drive level."""
+    rig = rig_of(bench)
+    response = ProjectorResponse(gamma=2.2, black_fraction=0.0)
+    assert rig.nominal is not None
+    camera, screen = rig.camera.info, rig.projector.info
+    known = rig.nominal
+    rig.calibration = known.model_copy(
+        update={
+            "projector_response": response,
+            "camera": known.camera.model_copy(
+                update={"width_px": camera.width_px, "height_px": camera.height_px}
+            ),
+            "projector": known.projector.model_copy(
+                update={"width_px": screen.width_px, "height_px": screen.height_px}
+            ),
+        }
+    )
+    found = meter(rig, plan_of((200.0, level)))
+    assert found.is_told or not found.doubt
+    assert found.notes.get("white_in_doubt", "") == found.doubt
+    assert found.sentence.startswith(found.doubt)
+    return found.doubt
+
+
+@pytest.mark.parametrize("room", [0.0, 0.05])
+@pytest.mark.parametrize("level", [0.25, 0.5, 1.0])
+def test_white_that_follows_its_level_is_not_doubted(level: float, room: float) -> None:
+    bench = Bench(light_for(0.5, 200.0, level), room=room * level**2.2)
+    assert doubt_of(bench, level) == ""
+    drive = round(255 * level)
+    assert bench.shown == [drive, 0, round(255 * level / 2), 0]
+
+
+@pytest.mark.parametrize(
+    ("curve", "share"),
+    [
+        (lambda level: level**0.8, 1.36),
+        (lambda level: (16 + 219 * level) / 255, 1.27),
+        (lambda level: level + 0.5 * level * (1 - level) * (2 * level - 1), 0.63),
+    ],
+    ids=["gamma", "limited", "vivid"],
+)
+@pytest.mark.parametrize(("brightness", "colours"), [(0.2, 3), (0.6, 2)])  # green saturates
+def test_levels_that_are_changed_on_their_way_are_doubted(
+    curve: Callable[[float], float], share: float, brightness: float, colours: int
+) -> None:
+    doubt = doubt_of(Bench(light_for(brightness, 200.0, 0.5) / curve(0.5) ** 2.2 * 0.5**2.2, curve=curve))
+    assert doubt.startswith("At half the drive level, white has another share of its light")
+    told = [float(each) for each in re.findall(r"(\d\.\d\d) in (?:red|green|blue)", doubt)]
+    assert told == pytest.approx([share] * len(told), abs=0.02)
+    assert len(told) == colours
+
+
+def test_faint_light_says_nothing_of_its_level() -> None:
+    assert doubt_of(Bench(light_for(0.002, 200.0, 0.5), curve=lambda level: level**0.8)) == ""

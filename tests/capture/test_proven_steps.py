@@ -42,10 +42,12 @@ class Bench:
         self.first_setting, self.token = 0, CancelToken()
         self.cause, self.is_quite_the_same = "", True
         self.displaced: list[bool] = []
+        self.first: tuple[Shot, ...] = (SHOTS[0],)
         self.alone = False
         self.settled = ""
         self.recalled: dict[int, str] = {}
         self.of_code: CodeSum | None = None
+        self.of_ends: list[str] = []
         parts: Any = self
         self.shots = ProvenShots(parts, parts, parts, parts, self.token)
 
@@ -61,6 +63,10 @@ class Bench:
 
     def code_sum(self) -> CodeSum | None:
         return self.of_code
+
+    def lasting(self, with_colours: bool = True) -> list[str]:
+        # Colours are left out: a filter of a calibration may take them away.
+        return ["No colour at all."] if with_colours else self.of_ends
 
     def controls(self) -> tuple[Shot, ...]:
         return (SHOTS[0], SHOTS[4])
@@ -95,14 +101,14 @@ class Bench:
     def is_at_first_level(self, shot: Shot) -> bool:
         return shot.level == CODE.level
 
-    def first_picture(self) -> Shot | None:
-        return SHOTS[0] if self.displaced else None
+    def first_pictures(self) -> tuple[Shot, ...]:
+        return self.first if self.displaced else ()
 
     def is_displaced(self, first: Shot, pixels: object) -> bool:
         return self.displaced.pop(0)
 
     def code_after(self, first: Shot) -> tuple[Shot, ...]:
-        return SHOTS[1:12]
+        return SHOTS[first.index + 1 : 12]
 
     def explain(self, snap: Callable[[Shot], object]) -> Explanation:
         if self.cause == "The lamp fails.":
@@ -183,6 +189,16 @@ def test_light_of_the_code_that_does_not_add_up_is_said_at_the_end() -> None:
     bench.shots.take(LINE)
     assert bench.shots.note.startswith(" Patterns and their inverses together have 1.30 ± 0.01 times")
     assert bench.shots.note.endswith(" The light has settled.")
+
+
+def test_what_was_wrong_from_the_first_picture_on_is_said_at_the_end() -> None:
+    bench = Bench(is_right, late)
+    bench.displaced, bench.of_ends = [False], ["Black is grey.", "Rows alternate."]
+    bench.shots.take(LINE)
+    assert bench.shots.note == " Black is grey. Rows alternate."
+    # Why a later picture stays wrong may be the same.
+    with pytest.raises(PictureError, match=r"after 4 exposures.* Black is grey\. Rows alternate\.$"):
+        bench.shots.take(SHOTS[14])
 
 
 @pytest.mark.parametrize(
@@ -508,6 +524,14 @@ def test_the_first_picture_is_looked_at_once_after_the_code(seen: list[bool], mo
     with pytest.raises(PictureError, match=r"Frame 1 .* is displaced .* 11 frames between 2 and 12"):
         take_all(bench, SHOTS[11:15])
     assert bench.withdrawn == list(range(1, 12))
+
+
+def test_later_pictures_of_the_code_may_show_what_the_first_does_not() -> None:
+    bench = Bench(is_right)
+    bench.first, bench.displaced = (SHOTS[0], SHOTS[2]), [False, True, True]
+    with pytest.raises(PictureError, match=r"Frame 3 .* is displaced .* 9 frames between 4 and 12"):
+        take_all(bench, SHOTS[11:15])
+    assert bench.withdrawn == list(range(3, 12))
 
 
 def test_all_since_the_last_control_is_withdrawn_where_something_moved() -> None:

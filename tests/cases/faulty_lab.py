@@ -244,6 +244,8 @@ class LabProjector(Projector):
 
     def show(self, image: NDArray[np.uint8]) -> None:
         self.shown += 1
+        if image.ndim == 2:
+            image = np.repeat(image[..., None], 3, axis=2)  # as is black between pictures
         last, self.last = image if self.last is None else self.last, image
         if self.shown >= self.at:
             match self.kind:

@@ -66,6 +66,8 @@ def test_a_changed_file_is_read_or_refused(sample: Sample, tmp_path: Path) -> No
     [
         ("scan: frames/zarr.json", rb"(?s).*", b"5"),
         ("result: reflectance/zarr.json", rb'"chunk_shape":\s*\[\s*1,', b'"chunk_shape": [0,'),
+        ("result: depth_mm/zarr.json", rb'"attributes":\s*\{[^}]*\}', b'"attributes": 48.5'),
+        ("result: depth_mm/zarr.json", rb'"attributes":\s*\{[^}]*\}', b'"attributes": [1]'),
         ("campaign: accepted", rb"(?s).*", b'{"name": "' + b"x" * 300 + b'", "title": "T", "record": {}}'),
         ("YAML", rb"\n(?=[A-Za-z])", b"\n\x8a"),
         ("campaign: accepted", rb"(?s).*", b'{"name": "\\u0000", "title": "T", "record": {}}'),

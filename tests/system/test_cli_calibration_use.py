@@ -17,6 +17,7 @@ from dsl_core.io.scan.folder import ScanReader
 from dsl_core.model.calibration.accepted import MISSED_ATTRIBUTE, CalibrationNote, read_missed
 from dsl_core.model.figure import Figure
 from dsl_core.model.rig import Rig
+from dsl_core.workflows import scans
 
 from .conftest import SMALL_RIG, Give
 
@@ -70,6 +71,17 @@ def test_a_scan_without_calibration_says_what_comes_before_its_reconstruction(
         in second
     )
     assert f"then dsl-scan reconstruct {tmp_path / 'second.dsl'} --calibration CAMPAIGN" in second
+
+
+def test_a_scan_ends_with_what_was_found_of_its_pictures(
+    give: Give, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    scan = tmp_path / "scan.dsl"
+    command = ["scan", scan, *SMALL_RIG, *QUICK]
+    assert give(*command).out.endswith(f"Next: dsl-scan reconstruct {scan}\n")
+    monkeypatch.setattr(scans, "known_doubts", lambda folder: ["Black is grey."] if folder == scan else [])
+    (scan / "frames" / "c.7.0.0").unlink()
+    assert give("resume", scan).out.endswith(f"Next: dsl-scan reconstruct {scan}\nBlack is grey.\n")
 
 
 def test_other_settings_are_refused_unless_overridden(give: Give, tmp_path: Path, calibrated: Rig) -> None:

@@ -12,12 +12,16 @@ import pytest
 import torch
 
 from dsl_core import pipeline
+from dsl_core.capture.metering import WHITE_IN_DOUBT
 from dsl_core.devices.registry import open_rig
+from dsl_core.io import MANIFEST_NAME
 from dsl_core.io.atomic import write_atomic
+from dsl_core.io.records import replace_record
 from dsl_core.io.result import row_writer
 from dsl_core.io.result.result_file import load_result
 from dsl_core.io.scan.folder import ScanReader
 from dsl_core.io.scan.lock import FolderLock
+from dsl_core.io.scan.manifest import read_manifest
 from dsl_core.io.scan.proof_file import PROOF_NAME, read_proof, save_proof
 from dsl_core.model.presets import PRESETS
 from dsl_core.model.result_sink import Maps
@@ -125,6 +129,22 @@ def test_a_finished_scan_knows_what_its_pictures_show(scan: Path, tmp_path: Path
     assert result.attrs[scans.NOT_JUDGED] == "2 of 9"
     (copy / PROOF_NAME).unlink()
     assert scans.DOUBTS not in scans.reconstruct_scan(copy, None, OPTIONS).attrs
+    assert scans.known_doubts(copy) == []
+
+
+def test_what_white_contradicted_before_a_scan_is_repeated_by_its_result(scan: Path, tmp_path: Path) -> None:
+    copy = shutil.copytree(scan, tmp_path / "a.dsl")
+    (copy / PROOF_NAME).unlink()
+    known = read_manifest(copy)
+    notes = known.notes | {WHITE_IN_DOUBT: "White is blue."}
+    replace_record(copy / MANIFEST_NAME, known.model_copy(update={"notes": notes}))
+    reader = ScanReader(copy)
+    assert reader.calibration is not None
+    kept = ScanProof(judged=9, untold=0, wrong=("Frame 7 is late.",))
+    save_proof(reader, reader.calibration, kept)
+    doubts = ["White is blue.", "Frame 7 is late."]
+    assert json.loads(scans.reconstruct_scan(copy, None, OPTIONS).attrs[scans.DOUBTS]) == doubts
+    assert scans.known_doubts(copy) == doubts
 
 
 def test_one_that_runs_or_whose_scan_is_gone_is_not_offered(killed: Path, tmp_path: Path) -> None:

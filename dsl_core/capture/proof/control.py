@@ -18,7 +18,7 @@ UNCHANGED, MORE_NOISE = 0.03, 0.5
 #: A pixel is lit with a contrast of so many deviations.
 LIT_SIGMAS = 12.0
 #: Edges of a pattern have moved from so many camera pixels and deviations on.
-MOVED_PX, MOVED_SIGMAS = 0.06, 6.0
+MOVED_PX, MOVED_SIGMAS = 0.06, 4.0
 #: Pixels are near an edge if light changes there by this share of the contrast from pixel to pixel; so many
 #: have to be.
 STEEP, FEWEST_NEAR = 0.15, 24

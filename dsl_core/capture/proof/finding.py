@@ -25,6 +25,7 @@ class Verdict(StrEnum):
     MIRRORED = "mirrored"
     DISPLACED = "displaced"
     HIDDEN = "partly hidden"
+    ROWS_TWICE = "rows twice"
     OTHER = "another picture"
 
 
@@ -47,6 +48,7 @@ _SEEN = {
     Verdict.MIRRORED: "columns of the projector run across the picture the wrong way round",
     Verdict.DISPLACED: "it is displaced from the pictures before",
     Verdict.HIDDEN: "a part of it is darker than the black picture, as if something were before it",
+    Verdict.ROWS_TWICE: "some of its rows come twice",
     Verdict.OTHER: "it shows something else",
 }
 _REMEDY = {
@@ -64,6 +66,8 @@ _REMEDY = {
     " and that the projector does not correct or scale its picture.",
     Verdict.HIDDEN: "Keep out of the way of camera, projector and lamps, and keep the light of the room as"
     " it was.",
+    Verdict.ROWS_TWICE: "Packets of the camera's link are lost or sent again: check its cable, its network"
+    " and the size of packets.",
     Verdict.OTHER: "Check that camera, target and light have not moved since the scan began.",
 }
 

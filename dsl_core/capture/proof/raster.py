@@ -28,15 +28,16 @@ class Raster:
         """For pictures of ``size_px`` = (width, height)."""
         width, height = size_px
         count = min(height, max(_ROWS, _PIXELS // width))
-        self._rows = np.unique(np.linspace(0, height - 1, count).round().astype(int))
+        #: Rows of the picture, in their order.
+        self.rows = np.unique(np.linspace(0, height - 1, count).round().astype(int))
         self._step = -(-width // _WIDTH)
         #: Rows and columns of the raster.
-        self.shape = (self._rows.size, -(-width // self._step))
-        self._mosaic = (self._rows[:, None] % 2) * 2 + np.arange(0, width, self._step)[None, :] % 2
+        self.shape = (self.rows.size, -(-width // self._step))
+        self._mosaic = (self.rows[:, None] % 2) * 2 + np.arange(0, width, self._step)[None, :] % 2
 
     def take(self, pixels: NDArray[np.uint16]) -> Counts:
         """The compared pixels of a raw mosaic (rows, columns), flat and not to be changed."""
-        taken = np.ascontiguousarray(pixels[self._rows, :: self._step]).ravel()
+        taken = np.ascontiguousarray(pixels[self.rows, :: self._step]).ravel()
         taken.flags.writeable = False
         return taken
 

@@ -63,6 +63,7 @@ class SeenFrames:
                     proof.substitute(number, pair)
         whole = light_sentence(proof.code_sum(), proof.line_sum())
         light = [whole] if whole else []
+        light += proof.lasting()
         light += [each.sentence for each in (proof.white_again(), proof.colour_again()) if each is not None]
         light += [each.sentence for each in proof.local_sums()]
         return ProofReport(judged, together(wrong), untold, tuple(light))

@@ -14,6 +14,8 @@ from dsl_core.capture.proof.colour_again import ColourAgain, colour_again
 from dsl_core.capture.proof.contest import Contest
 from dsl_core.capture.proof.control import choose_pairs, edges_moved, is_same, is_unchanged
 from dsl_core.capture.proof.finding import Finding, Light, Verdict, displaced
+from dsl_core.capture.proof.lasting.ends import sentences_of_ends
+from dsl_core.capture.proof.lasting.pair_places import pair_places
 from dsl_core.capture.proof.later_settings import LaterSettings
 from dsl_core.capture.proof.light_steps import LightSteps
 from dsl_core.capture.proof.lines.bright_black import BrightBlack
@@ -38,6 +40,7 @@ from dsl_core.capture.proof.prediction import (
     line_profile,
 )
 from dsl_core.capture.proof.raster import Counts, Floats, Raster
+from dsl_core.capture.proof.row_copies import has_row_copies
 from dsl_core.capture.proof.sentinel import SentinelProof
 from dsl_core.capture.proof.usual_light import LEAST_LIGHT, UsualLight
 from dsl_core.capture.proof.white_again import WhiteAgain, white_again
@@ -50,6 +53,8 @@ from dsl_core.model.rig import Rig
 NEARLY = 0.3
 #: Where a line lights so few pixels, most may see an edge, and vote for nothing.
 FEW_VOTES = 60
+#: Two more exposures cost little in plans of so many shots.
+MANY_SHOTS = 100
 
 
 @dataclass
@@ -128,6 +133,8 @@ class FrameProof:
 
     def judge(self, shot: Shot, pixels: NDArray[np.uint16]) -> Finding:
         """What the raw mosaic of a shot shows; remembers it for the shots after it, unless it is wrong."""
+        if has_row_copies(pixels):
+            return Finding(shot, Verdict.ROWS_TWICE, (shot,))
         return self.judge_raster(shot, self._raster.take(pixels))
 
     def judge_raster(self, shot: Shot, seen: Counts) -> Finding:
@@ -178,11 +185,17 @@ class FrameProof:
             return False
         return is_unchanged(self._raster.take(pixels), before, self._code_pairs(), self._noise)
 
-    def first_picture(self) -> Shot | None:
-        """The first picture of the first code, once that is whole; None in plans without one."""
-        if self._code is None or self._code.lit is None or self._places["code", 0] not in self._kept:
-            return None
-        return self._shots[self._places["code", 0]]
+    def first_pictures(self) -> tuple[Shot, ...]:
+        """The pictures of the first code to look at again, once that is whole; none in plans without one.
+
+        The very first one has an edge or two, which may fall between pixels, so that in plans of many shots
+        the first pictures of the next pairs are among them.
+        """
+        if self._code is None or self._code.lit is None:
+            return ()
+        patterns = (0, 2, 4) if len(self._shots) >= MANY_SHOTS else (0,)
+        places = (self._places.get(("code", pattern), -1) for pattern in patterns)
+        return tuple(self._shots[place] for place in places if place in self._kept)
 
     def code_after(self, first: Shot) -> tuple[Shot, ...]:
         """The shots of the first code, its white and its black that are captured after a shot."""
@@ -190,7 +203,7 @@ class FrameProof:
         return tuple(each for each in own if each.role != "spectral" and each.index > first.index)
 
     def is_displaced(self, first: Shot, pixels: NDArray[np.uint16]) -> bool:
-        """Whether a raw mosaic of `first_picture` shows its pattern elsewhere than when the scan began."""
+        """Whether a raw mosaic of one of the `first_pictures` shows its pattern elsewhere than at first."""
         seen, before = self._raster.take(pixels), self._kept[first.index]
         return edges_moved(seen, before, self._code_pairs(), self._noise, self._raster.shape)
 
@@ -211,6 +224,45 @@ class FrameProof:
     def white_again(self) -> WhiteAgain | None:
         """The white, captured again, that differs most from the first in a part of the picture."""
         return white_again(self._plan, self._kept, self._noise, self._raster)
+
+    def lasting(self, with_colours: bool = True) -> list[str]:
+        """Sentences on what was wrong from the first picture on, of the darkest setting that is there.
+
+        Without ``with_colours``, those that a filter before the camera explains are left out.
+        """
+        found = [
+            n for n in {s.setting for s in self._shots if s.role == "white"} if self._ends_of(n) is not None
+        ]
+        setting = min(found, key=lambda n: self._plan.settings[n].level, default=None)
+        ends = None if setting is None else self._ends_of(setting)
+        said: list[str] = []
+        if ends is not None and setting is not None:
+            channels = self._raster.channels(self._bayer)
+            said = sentences_of_ends(
+                *ends,
+                self._plan,
+                setting,
+                self._calibration,
+                channels,
+                self._noise,
+                self._raster,
+                with_colours,
+            )
+        return [each for each in (*said, self._pair_places()) if each]
+
+    def _ends_of(self, setting: int) -> tuple[Counts, Counts] | None:
+        """White and black of a setting, if both are there."""
+        own = [s for s in self._shots if s.setting == setting and s.role in ("white", "black")]
+        kept = {shot.role: self._kept.get(shot.index) for shot in own}
+        white, black = kept.get("white"), kept.get("black")
+        return None if white is None or black is None else (white, black)
+
+    def _pair_places(self) -> str:
+        lit, code = (None, None) if self._code is None else (self._code.lit, self._plan.code)
+        if lit is None or code is None or isinstance(code, NoCode | CapturedCode):
+            return ""
+        found = pair_places(code, self._plan.projector_size_px, self._code_pairs(), lit)
+        return "" if found is None else found.sentence
 
     def colour_again(self) -> ColourAgain | None:
         """The white, captured again, whose colour differs most from that of the first."""

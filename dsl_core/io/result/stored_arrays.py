@@ -92,6 +92,8 @@ def _checked(
     name: str, array: zarr.Array[Any], folder: Path, damaged: Callable[[Exception], StoreError]
 ) -> StoredArray:
     _require_honest(array, folder)
+    if not isinstance(array.metadata.attributes, dict):
+        raise ValueError(f"the attributes of {name} have no names")
     dims = array.metadata.dimension_names or ()  # type: ignore[union-attr]
     if len(dims) != array.ndim or None in dims:
         raise ValueError(f"{folder.name} does not name its axes")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import islice
 
 import pytest
@@ -88,3 +89,19 @@ def test_a_proof_says_what_frames_show_that_were_kept_while_they_were_taken(
     found = prove(frames, seen, scene.calibration)
     assert found.wrong == found.doubts == _judged(scene, spoiled).sentences
     assert (found.judged, found.moved) == (scene.plan.shot_count, ())
+
+
+def test_what_was_wrong_from_the_first_picture_on_is_told_of_the_darkest_setting(
+    scene: RenderedScene, frames: MemorySink
+) -> None:
+    dead = MemorySink(frames.plan)
+    levels = [setting.level for setting in scene.plan.settings]
+    for shot in scene.plan.shots():
+        frame = frames.frames[shot.index]
+        if shot.setting == levels.index(min(levels)):
+            pixels = frame.pixels.copy()
+            pixels[1::2, 1::2] = int(scene.calibration.sensor.black_level_dn)
+            frame = replace(frame, pixels=pixels)
+        dead.frames[shot.index] = frame
+    told = [sentence for sentence in _judged(scene, dead).sentences if "no blue light" in sentence]
+    assert len(told) == 1

@@ -310,11 +310,13 @@ def test_black_that_is_brighter_than_the_lines_is_taken_again_with_the_first_lin
     assert "black is brighter than the lines after it" in found[-1].sentence
 
 
-def test_the_first_picture_is_named_once_the_code_is_whole() -> None:
+def test_the_first_pictures_are_named_once_the_code_is_whole(monkeypatch: pytest.MonkeyPatch) -> None:
     judge: Any = proof()
-    assert judge.first_picture() is None
+    assert judge.first_pictures() == ()
     judge._code = SimpleNamespace(lit=object())
-    assert judge.first_picture() is None, "it is not there"
-    judge._kept[0] = counts(300)
-    assert judge.first_picture() == SHOTS[0]
-    assert [shot.index for shot in judge.code_after(SHOTS[0])] == list(range(1, 12))
+    assert judge.first_pictures() == (), "it is not there"
+    judge._kept[0] = judge._kept[2] = counts(300)
+    assert judge.first_pictures() == (SHOTS[0],)
+    monkeypatch.setattr("dsl_core.capture.proof.verifier.MANY_SHOTS", len(SHOTS))
+    assert judge.first_pictures() == (SHOTS[0], SHOTS[2])
+    assert [shot.index for shot in judge.code_after(SHOTS[2])] == list(range(3, 12))

@@ -150,7 +150,7 @@ class FirstCode:
         before = self._disputed[first], self._disputed[first + 1]
         if has_moved(before, (now[first], now[first + 1]), self._noise):
             return Finding(shot, Verdict.DISPLACED, again)
-        ratio = changed_light(self._disputed, now, self._noise)
+        ratio = changed_light(self._disputed, now, self._noise, self._channels)
         if ratio is None:
             self._disputed = {}
             return None

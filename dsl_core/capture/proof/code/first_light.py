@@ -44,11 +44,15 @@ SEEN_SHARE = 0.001
 _OF_THE_LAST = " times that of the last ones"
 
 
-def changed_light(before: Mapping[int, Counts], now: Mapping[int, Counts], noise: Noise) -> float | None:
+def changed_light(
+    before: Mapping[int, Counts], now: Mapping[int, Counts], noise: Noise, channels: NDArray[np.int8]
+) -> float | None:
     """By what factor the light of several pictures has changed, the median; None if it has not.
 
     ``before`` and ``now`` are pictures by the number of their pattern, of which the lowest two were taken
-    first. Pictures that show another pattern than before say nothing of the light.
+    first. Pictures that show another pattern than before say nothing of the light. Of colours that have
+    changed unlike, as those of a display that turns warmer, the one that did most counts; ``channels`` has
+    that of every pixel.
     """
     every = [*before.values(), *now.values()]
     level = np.float32(noise.sensor.black_level_dn)
@@ -63,9 +67,7 @@ def changed_light(before: Mapping[int, Counts], now: Mapping[int, Counts], noise
         one, other = (picture[lit].astype(np.float32) - level for picture in (old, now[pattern]))
         if float(one.mean()) < enough:
             continue
-        ratio, left = _scaled(one, other)
-        # An inverse is its pattern times -1.
-        is_same_pattern = ratio > -ALIKE and left < ALIKE * max(ratio, 1.0) * float(one.mean())
+        ratio, is_same_pattern = _factor(one, other, channels[lit])
         if is_same_pattern and not SAME_LIGHT[0] < ratio < SAME_LIGHT[1]:
             ratios.append(ratio)
         elif pattern in first:
@@ -125,6 +127,18 @@ def light_of_words(why: str) -> float | None:
     """The light in the note of such a picture; None in any other note."""
     found = re.search(rf"(\d+\.\d+){_OF_THE_LAST}", why)
     return None if found is None else float(found[1])
+
+
+def _factor(one: Floats, other: Floats, channels: NDArray[np.int8]) -> tuple[float, bool]:
+    """The factor from one picture to another in the colour where it is most, and whether both are alike."""
+    parts = [channels == colour for colour in np.unique(channels)]
+    parts = [own for own in parts if int(own.sum()) >= FEWEST_LIT and float(one[own].mean()) > 0]
+    found = [(*_scaled(one[own], other[own]), float(one[own].mean())) for own in parts]
+    found = found or [(*_scaled(one, other), float(one.mean()))]
+    # An inverse is its pattern times -1.
+    is_alike = all(ratio > -ALIKE and left < ALIKE * max(ratio, 1.0) * mean for ratio, left, mean in found)
+    # The most by its logarithm; light that went out altogether counts as a thousandth.
+    return max((ratio for ratio, *_ in found), key=lambda ratio: abs(np.log(max(ratio, 1e-3)))), is_alike
 
 
 def _scaled(one: Floats, other: Floats) -> tuple[float, float]:

@@ -20,6 +20,8 @@ from dsl_core.model.rig import Sensor
 
 SENSOR = Sensor()
 NOISE = Noise(SENSOR)
+#: Colours of 400 pixels, a third each.
+COLOURS = np.asarray(np.arange(400) % 3, np.int8)
 
 
 def pictures(light: float, order: tuple[int, ...] = (0, 1, 2, 3), gain: float = 1.0) -> dict[int, Counts]:
@@ -36,29 +38,37 @@ def pictures(light: float, order: tuple[int, ...] = (0, 1, 2, 3), gain: float = 
 @pytest.mark.parametrize("factor", [0.0, 0.5, 1.9])
 def test_light_that_changed_between_two_pairs_is_told_with_its_factor(factor: float) -> None:
     before = {**pictures(1000), **{n: p for n, p in pictures(1000 * factor).items() if n > 1}}
-    found = changed_light(before, pictures(1000 * factor), NOISE)
+    found = changed_light(before, pictures(1000 * factor), NOISE, COLOURS)
     assert found == pytest.approx(factor, abs=0.05)
 
 
 def test_a_gain_that_takes_the_black_level_with_it_is_told() -> None:
-    assert changed_light(pictures(800), pictures(800, gain=2.0), NOISE) == pytest.approx(2, abs=0.05)
+    assert changed_light(pictures(800), pictures(800, gain=2.0), NOISE, COLOURS) == pytest.approx(2, abs=0.05)
+
+
+def test_colours_that_changed_unlike_are_told_by_the_one_that_did_most() -> None:
+    warm = np.array([1.0, 0.85, 0.45])[COLOURS]
+    level = SENSOR.black_level_dn
+    now = {n: np.rint(level + (p - level) * warm).astype(np.uint16) for n, p in pictures(1000).items()}
+    before = {n: pictures(1000)[n] if n < 2 else now[n] for n in now}
+    assert changed_light(before, now, NOISE, COLOURS) == pytest.approx(0.45, abs=0.03)
 
 
 @pytest.mark.parametrize("factor", [0.0, 0.5, 1.9])
 def test_one_wrong_picture_is_no_change_of_the_light(factor: float) -> None:
     before = pictures(1000)
     before[2] = pictures(1000 * factor)[2]
-    assert changed_light(before, pictures(1000), NOISE) is None
+    assert changed_light(before, pictures(1000), NOISE, COLOURS) is None
 
 
 @pytest.mark.parametrize("order", [(0, 2, 1, 3), (0, 0, 2, 3), (0, 0, 1, 2), (0, 1, 1, 3)])
 def test_pictures_of_other_patterns_say_nothing_of_the_light(order: tuple[int, ...]) -> None:
-    assert changed_light(pictures(1000, order), pictures(1000), NOISE) is None
+    assert changed_light(pictures(1000, order), pictures(1000), NOISE, COLOURS) is None
 
 
 def test_little_light_and_drift_are_not_told() -> None:
-    assert changed_light(pictures(8), pictures(0), NOISE) is None
-    assert changed_light(pictures(1000), pictures(1300), NOISE) is None
+    assert changed_light(pictures(8), pictures(0), NOISE, COLOURS) is None
+    assert changed_light(pictures(1000), pictures(1300), NOISE, COLOURS) is None
 
 
 @pytest.mark.parametrize("light", [40, 1000])
@@ -85,7 +95,7 @@ def even(*light: float) -> dict[int, Counts]:
 
 
 def test_light_is_what_exceeds_the_black_level() -> None:
-    found = changed_light(even(1000, 0, 1000, 0), even(500, 0, 500, 0), NOISE)
+    found = changed_light(even(1000, 0, 1000, 0), even(500, 0, 500, 0), NOISE, COLOURS)
     assert found == pytest.approx(0.5, abs=0.01)
 
 
@@ -93,7 +103,7 @@ def test_light_is_what_exceeds_the_black_level() -> None:
 def test_a_first_picture_with_enough_light_says_that_nothing_has_changed(light: int, is_told: bool) -> None:
     # Three per cent of the light of all.
     before, now = even(1000, light, 1000, 0), even(500, light, 500, 0)
-    assert (changed_light(before, now, NOISE) is not None) == is_told
+    assert (changed_light(before, now, NOISE, COLOURS) is not None) == is_told
 
 
 def test_a_pair_is_unlit_if_no_pixel_prefers_the_pattern_or_its_inverse() -> None:

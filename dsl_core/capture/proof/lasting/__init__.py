@@ -1,0 +1,1 @@
+"""Faults that were there from the first picture on: none differs, but all contradict light or calibration."""

@@ -1,0 +1,170 @@
+"""What black pictures show: as much light as the projector gives without a pattern, and nothing else.
+
+White and black of one setting tell what no later picture does, where something is wrong all the time: levels
+that computer, cable and projector take differently, and what stays in the picture whatever is projected.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dsl_core.capture.proof.noise import Noise
+from dsl_core.capture.proof.raster import Counts, Raster
+from dsl_core.model.rig import ProjectorResponse
+from dsl_core.words import counted
+
+#: Light of a dark projector, as a share of full light, from which on it is not that of its calibration: so
+#: many times that, and so much more. Limited levels (16 of 255) have .0023 at the usual gamma.
+MANY_TIMES, MORE = 1.5, 0.001
+#: It is the projector's, not the room's, where it is the same share of white in all colours and all over the
+#: picture: what colours and blocks of the raster may differ by, as a share, and in deviations.
+SAME_COLOUR, SAME_PLACE, SIGMAS = 0.08, 0.15, 4.0
+#: Blocks needed to say so, and how bright their white has to be, as a share of what a tenth of them exceeds.
+FEWEST_BLOCKS, BRIGHT_BLOCK = 12, 0.3
+#: So many blocks, as a share, may be lit otherwise all the same.
+MOST_APART = 0.1
+#: What the black level may have changed by since its calibration, DN.
+LEVEL_DN = 2.0
+#: A pixel is lit in black if it has more than this share of usual white, and more than so many times what
+#: white adds to it.
+AS_WHITE, TIMES = 0.5, 2.0
+#: So many such pixels that have a neighbour among them: hot pixels of a sensor are alone.
+FEWEST_LIT = 5
+
+
+@dataclass(frozen=True)
+class BlackLight:
+    """Light of the projector's black as a share of its full light, with what its calibration says."""
+
+    share: float
+    std: float
+    calibrated: float
+
+    @property
+    def is_off(self) -> bool:
+        """Whether it is more than its calibration and noise explain."""
+        return self.share - SIGMAS * self.std > MANY_TIMES * self.calibrated + MORE
+
+    @property
+    def sentence(self) -> str:
+        """What is wrong, and what to do; empty if nothing is."""
+        if not self.is_off:
+            return ""
+        return (
+            f"In black pictures, every colour and every place has {self.share:.2%} of the projector's full"
+            f" light, and {self.calibrated:.2%} by its calibration: computer, cable or projector use limited"
+            " levels (16-235), so that black is grey and every level is off, or contrast and brightness of"
+            " the projector were changed. Set the output to full range (0-255) at both ends, and its picture"
+            " mode as it was when the self-test was done; then scan again."
+        )
+
+
+def black_light(
+    white: Counts, black: Counts, level: float, response: ProjectorResponse, channels: NDArray[np.int8],
+    noise: Noise, raster: Raster,
+) -> BlackLight | None:  # fmt: skip
+    """The projector's light in a black picture; None where it is the room's, or nobody knows what it was.
+
+    ``white`` and ``black`` are rasters of one setting, whose drive level ``level`` is, and ``channels`` the
+    colours of their pixels.
+    """
+    if response.black_fraction <= 0:
+        return None
+    dark_dn = np.float32(noise.sensor.black_level_dn)
+    sound = (white < noise.sensor.full_scale_dn) & (black < noise.sensor.full_scale_dn)
+    light, rest = white.astype(np.float32) - black, black.astype(np.float32) - dark_dn
+    shares, stds = [], []
+    for colour in np.unique(channels):
+        mask = np.asarray(sound & (channels == colour), np.float32)
+        count, bright, glow, variance = (
+            raster.pool(each * mask) * raster.pooled
+            for each in (np.float32(1), light, rest, noise.variance(black))
+        )
+        used = (count > 0) & (bright > 0)
+        used &= bright > BRIGHT_BLOCK * np.quantile(bright[used], 0.9) if used.any() else used
+        if int(used.sum()) < FEWEST_BLOCKS:
+            return None
+        count, bright, glow, variance = (each[used] for each in (count, bright, glow, variance))
+        mean = float(glow.sum() / bright.sum())
+        std = np.sqrt(variance + (LEVEL_DN * count) ** 2) / bright
+        apart = np.abs(glow / bright - mean)
+        if float(np.mean(apart > SAME_PLACE * mean + SIGMAS * std)) > MOST_APART:
+            return None
+        shares.append(mean)
+        stds.append(LEVEL_DN * float(count.sum() / bright.sum()))
+    share = float(np.mean(shares))
+    if max(shares) - min(shares) > SAME_COLOUR * share:
+        return None
+    full = float(response.radiance(level)) - response.black_fraction
+    return BlackLight(share * full, float(np.mean(stds)) * full, response.black_fraction)
+
+
+@dataclass(frozen=True)
+class LitBlack:
+    """Pixels that are as bright in black as in white: how many, and the camera pixels around them."""
+
+    count: int
+    columns: tuple[int, int]
+    rows: tuple[int, int]
+    is_in_stripes: bool
+
+    @property
+    def sentence(self) -> str:
+        """What is wrong, and what to do."""
+        if self.is_in_stripes:
+            return (
+                "In alternate rows of the picture, black is as bright as"
+                " white: these rows show the picture before, so that camera or projector deliver half of"
+                " the rows at a time (interlaced). Set both to progressive pictures, and scan again."
+            )
+        return (
+            f"Black is as bright as white at {counted(self.count, 'pixel')} in columns"
+            f" {self.columns[0]}-{self.columns[1]}, rows {self.rows[0]}-{self.rows[1]}: something is in the"
+            " projected picture all the time (mouse pointer, menu, window), or a lamp is in view. Nothing is"
+            " measured there, and its light falls on what is. Take it away, and scan again."
+        )
+
+
+def lit_black(
+    white: Counts, black: Counts, channels: NDArray[np.int8], noise: Noise, raster: Raster,
+    size_px: tuple[int, int],
+) -> LitBlack | None:  # fmt: skip
+    """Where black, raster of a setting as ``white`` is, has the light of white; None where that is nowhere.
+
+    ``size_px`` is the camera's (width, height).
+    """
+    dark_dn = np.float32(noise.sensor.black_level_dn)
+    gain, rest = white.astype(np.float32) - black, black.astype(np.float32) - dark_dn
+    usual = np.zeros(gain.shape, np.float32)
+    for colour in np.unique(channels):
+        own = channels == colour
+        usual[own] = np.quantile(gain[own] + rest[own], 0.75)
+    lit = (rest > AS_WHITE * usual) & (rest > TIMES * np.abs(gain)) & (usual > 0)
+    grid = lit.reshape(raster.shape)
+    near = np.zeros_like(grid)
+    for one, other in ((np.s_[:, 1:], np.s_[:, :-1]), (np.s_[1:], np.s_[:-1])):
+        both = grid[one] & grid[other]
+        near[one] |= both
+        near[other] |= both
+    if int(near.sum()) < FEWEST_LIT:
+        return None
+    down, across = np.nonzero(near)
+    rows = raster.rows[down]
+    in_rows = near.mean(1) > 0
+    is_in_stripes = _alternate(near, raster.rows) and float(in_rows.mean()) > 0.2
+    step = size_px[0] / raster.shape[1]
+    columns = int(across.min() * step), int((across.max() + 1) * step)
+    return LitBlack(int(lit.sum()), columns, (int(rows.min()), int(rows.max()) + 1), is_in_stripes)
+
+
+def _alternate(lit: NDArray[np.bool_], rows: NDArray[np.intp]) -> bool:
+    """Whether nearly all of what is lit lies in every other row, or every other row of the mosaic's cells."""
+    total = int(lit.sum())
+    for height in (1, 2):
+        odd = int(lit[rows // height % 2 == 1].sum())
+        if not 0.05 * total < odd < 0.95 * total:
+            return True
+    return False
