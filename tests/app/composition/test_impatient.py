@@ -95,11 +95,11 @@ def bench(qtbot: QtBot, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iter
 
 @pytest.fixture
 def gate(monkeypatch: pytest.MonkeyPatch) -> Iterator[threading.Event]:
-    """The camera waits for this before it hands over a frame beyond the fifth."""
+    """The camera waits for this before it hands over a frame beyond the seventh; metering takes three."""
     free, count, snap = threading.Event(), iter(range(10_000)), SimCamera.snap
 
     def slowly(self: SimCamera, timeout_ms: float = 5000.0) -> object:
-        if next(count) >= 5:
+        if next(count) >= 7:
             free.wait()
         return snap(self, timeout_ms)
 
