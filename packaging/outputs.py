@@ -20,8 +20,9 @@ BEFORE = {
     "dsl-scan demo": (),
     "dsl-scan evaluate small.zarr": ("dsl-scan plan", "dsl-scan scan", "dsl-scan reconstruct"),
 }
-#: A figure may differ by this share of itself or of its deviation, whichever is more: machines differ.
-TOLERANCE, OF_DEVIATION = 0.02, 0.5
+#: A figure may differ by this share of itself or of its deviation, whichever is more: machines differ. A
+#: deviation, which has two digits, may by this one.
+TOLERANCE, OF_DEVIATION, DEVIATION = 0.02, 0.5, 0.06
 _BLOCK = re.compile(r"<!-- printed by: (.*?) -->\n\n```\n(.*?)```", re.DOTALL)
 _NUMBER = re.compile(r"[+-]?\d+\.?\d*(?:e[+-]\d+)?")
 
@@ -57,13 +58,16 @@ def _alike(one: str, other: str) -> bool:
     if words[0] != words[1]:
         return False
     pairs = zip(_figures(one), _figures(other), strict=True)
-    return all(abs(a - b) <= max(TOLERANCE * abs(a), OF_DEVIATION * s) for (a, s), (b, _) in pairs)
+    return all(abs(a - b) <= slack for (a, slack), (b, _) in pairs)
 
 
 def _figures(line: str) -> list[tuple[float, float]]:
-    """The numbers of a line, each with the deviation that follows it, or 0."""
+    """The numbers of a line, each with what it may differ by."""
     numbers = [float(found) for found in _NUMBER.findall(line)]
-    return [(n, numbers[1] if i == 0 and "±" in line else 0.0) for i, n in enumerate(numbers)]
+    slack = [TOLERANCE * abs(number) for number in numbers]
+    if "±" in line and len(numbers) > 1:
+        slack[:2] = max(slack[0], OF_DEVIATION * numbers[1]), DEVIATION * numbers[1]
+    return list(zip(numbers, slack, strict=True))
 
 
 def excerpt(lines: list[str], printed: list[str]) -> list[str]:
