@@ -63,11 +63,9 @@ class LineSpread(Record):
 
     def _before(self, place_px: float) -> float:
         """Share of the light before a place."""
-        scale = 1 / (math.sqrt(2) * self.core_px)
-        places = (place_px - self.centres_px) * scale
-        return sum(
-            share * 0.5 * (1 + math.erf(place)) for share, place in zip(self.shares, places, strict=True)
-        )
+        from scipy.special import ndtr
+
+        return float(ndtr((place_px - self.centres_px) / self.core_px) @ self.shares)
 
     @property
     def rms_px(self) -> float:
