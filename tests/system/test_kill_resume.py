@@ -1,4 +1,4 @@
-"""``kill -9`` at twenty moments of a scan: every resumed scan equals the unbroken one, bit by bit."""
+"""``kill -9`` at many moments of a scan: every resumed scan equals the unbroken one, bit by bit."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from dsl_core.errors import StoreError
 from dsl_core.io.scan.check import find_problems
 from dsl_core.io.scan.folder import ScanReader
 
-KILLS = 20
+KILLS = 12
 ROOT = Path(__file__).parents[2]
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="Windows has neither fork nor SIGKILL")
@@ -87,7 +87,7 @@ def server(request: pytest.FixtureRequest) -> Iterator[Server]:
 
 
 @pytest.mark.timeout(300)
-def test_twenty_killed_scans_resume_to_the_unbroken_one(server: Server, tmp_path: Path) -> None:
+def test_killed_scans_resume_to_the_unbroken_one(server: Server, tmp_path: Path) -> None:
     duration_s = server.duration_s(tmp_path / "unbroken.dsl")
     unbroken = _frames(tmp_path / "unbroken.dsl")
     assert unbroken.std() > 0
