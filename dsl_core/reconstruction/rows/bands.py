@@ -15,7 +15,7 @@ T = TypeVar("T")
 
 #: Memory for the merged line frames of a band. Frames are decompressed by blocks of rows (64 of a full
 #: sensor); those at the edge of a band are so once more for the next one.
-BAND_BYTES = 384 << 20
+BAND_BYTES = 320 << 20
 #: Bytes of a value in one of them: radiance, and its deviation in half precision.
 VALUE_BYTES = 6
 #: Further rows on either side that belong to the neighbourhood of a band's pixels; even, as the mosaic is.

@@ -56,15 +56,15 @@ def test_bands_are_no_higher_than_fits_and_alike_but_for_the_last() -> None:
 
 
 def test_memory_decides_how_high_bands_are() -> None:
-    # 890 columns of 318 frames in six bytes: 384 MiB hold 237 rows, of which eight are neighbours.
+    # 890 columns of 318 frames in six bytes: 320 MiB hold 197 rows, of which eight are neighbours.
     assert PLAN.spectral_count == 318
-    fit = (384 << 20) // (890 * 6 * 318) - 8
-    assert fit == 229
-    assert [band.rows.start for band in bands_of(PLAN)] == [0, 192, 384]
-    # At least as if 64 frames were held: 1178 rows.
+    fit = (320 << 20) // (890 * 6 * 318) - 8
+    assert fit == 189
+    assert [band.rows.start for band in bands_of(PLAN)] == [0, 144, 288, 432]
+    # At least as if 64 frames were held: 973 rows.
     few = PLAN.model_copy(update={"spectral": NoSpectral()})
-    assert len(bands_of(few.model_copy(update={"camera_size_px": (890, 1170)}))) == 1
-    assert len(bands_of(few.model_copy(update={"camera_size_px": (890, 1171)}))) == 2
+    assert len(bands_of(few.model_copy(update={"camera_size_px": (890, 973)}))) == 1
+    assert len(bands_of(few.model_copy(update={"camera_size_px": (890, 974)}))) == 2
 
 
 @dataclass(frozen=True)
