@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from dsl_core.capture.exposure import PatternImage, RetryPolicy, ShotTaker
 from dsl_core.capture.overexposure import by_colour, full_scale_dn
+from dsl_core.capture.proof.lasting.missing_light import NO_LIGHT, no_light
 from dsl_core.capture.white_levels import doubts_of_white
 from dsl_core.devices.base import DeviceRig
 from dsl_core.errors import DeviceError
@@ -32,10 +33,9 @@ DIM = 0.4
 MOST_LONGER = 4.0
 #: Shares of the picture that may be brighter: highlights, and small bright things in a dark scene.
 _BRIGHTER, _BRIGHTER_IN_DARK = 0.05, 0.005
-#: A colour whose light is less than this share of the brightest colour's, even where there is most of it, is
-#: missing: hardly any surface reflects as little, and a scene has others. In pictures whose brightest colour
-#: does not reach that share of full scale nothing is said, as the black level is not known so well.
-NO_LIGHT, ENOUGH = 0.01, 0.1
+#: Colours are not missed in pictures whose brightest does not reach this share of full scale, as the black
+#: level is not known so well.
+ENOUGH = 0.1
 #: A saturated picture says only that it is too bright: the next is exposed for this much less.
 _SHORTEN = 8.0
 _MOST_FRAMES = 4
@@ -122,14 +122,7 @@ class _White:
     @property
     def sentence(self) -> str:
         """What to say of missing colours; empty if there are none."""
-        if not self.missing:
-            return ""
-        named = " and ".join(self.missing)
-        return (
-            f"White has no {named} light: less than {NO_LIGHT:.0%} of the brightest colour's. Take filters"
-            " off, and look whether the projector shows white, and whether camera and cables pass on all"
-            " colours: where one is missing, reflectance cannot be measured."
-        )
+        return no_light(self.missing) if self.missing else ""
 
 
 def _measure(

@@ -161,7 +161,7 @@ def lit_black(
 
 
 def _alternate(lit: NDArray[np.bool_], rows: NDArray[np.intp]) -> bool:
-    """Whether nearly all of what is lit lies in every other row, or every other row of the mosaic's cells."""
+    """Whether nearly all lit pixels are in every other row, or in every other row of the mosaic's cells."""
     total = int(lit.sum())
     for height in (1, 2):
         odd = int(lit[rows // height % 2 == 1].sum())

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -10,7 +12,8 @@ from dsl_core.capture.proof.raster import Counts, Raster
 from dsl_core.model.conditions import COLOUR_NAMES
 from dsl_core.model.rig import Rig
 
-#: A colour that has less than this share of the light of another, wherever there is any, is missing.
+#: A colour that has less than this share of the light of another, wherever there is any, is missing: hardly
+#: any surface reflects as little, and a scene has others.
 NO_LIGHT = 0.01
 #: An LED is out where its colour has no more than what others give it, and this share of its own light: of
 #: surfaces that reflect as little of it there is hardly any, and most scenes have others.
@@ -43,11 +46,7 @@ def missing_light(
     share = np.quantile(grey / grey.max(0), MOST, axis=1)
     dead = [COLOUR_NAMES[colour] for colour in range(3) if share[colour] < NO_LIGHT]
     if dead:
-        return (
-            f"White has no {' and '.join(dead)} light anywhere: less than {NO_LIGHT:.0%} of another colour's."
-            " Take filters off, and look whether the projector shows white, and whether camera and cables"
-            " pass on all colours; then scan again."
-        )
+        return no_light(dead)
     out = []
     for led, name in enumerate(COLOUR_NAMES):
         colour = int(parts[:, led].argmax())
@@ -61,6 +60,15 @@ def missing_light(
         f" {HARDLY:.0%} of what grey surfaces would return. Unless no surface reflects it, the LED is out, or"
         " a filter or a setting of projector or computer takes its light away. Look whether the projector"
         " shows white, and scan again."
+    )
+
+
+def no_light(colours: Sequence[str]) -> str:
+    """A sentence on colours that are missing from white, wherever it is looked at."""
+    return (
+        f"White has no {' and '.join(colours)} light anywhere: less than {NO_LIGHT:.0%} of another colour's."
+        " Take filters off, and look whether the projector shows white, and whether camera and cables pass on"
+        " all colours: where one is missing, reflectance cannot be measured."
     )
 
 
