@@ -107,11 +107,13 @@ def test_gains_of_colours_that_follow_the_picture_are_a_change(
 ROWS = 40
 
 
-def edge(at: float, low: float = 120.0, high: float = 280.0, seed: int = 0) -> np.ndarray:
+def edge(at: float, low: float = 120.0, high: float = 280.0, seed: int = 0, noise: float = 3.0) -> np.ndarray:
     """Light from one of sixteen columns on, in forty rows, as pixels see it that are a column wide."""
     share = np.clip(np.arange(16) + 1 - at, 0, 1)
     light = np.tile(low + (high - low) * share, (ROWS, 1))
-    return (light + np.random.default_rng(seed).normal(0, 3, light.shape)).round().astype(np.uint16).ravel()
+    return (
+        (light + np.random.default_rng(seed).normal(0, noise, light.shape)).round().astype(np.uint16).ravel()
+    )
 
 
 def moved(seen: np.ndarray, before: np.ndarray) -> bool:
@@ -131,3 +133,14 @@ def test_an_edge_that_is_displaced_has_moved_in_any_light(low: float, high: floa
 def test_without_an_edge_nothing_has_moved() -> None:
     assert not moved(edge(16, seed=1), edge(16))
     assert not moved(edge(8.4)[: 20 * 16].repeat(2), edge(16))
+
+
+def test_a_noisy_edge_has_moved_from_four_deviations_on() -> None:
+    """Noise of 40 DN leaves 0.022 px of doubt about an edge of 400 DN that pixels of forty rows see."""
+
+    def told(by_px: float) -> int:
+        pictures = (edge(8.4 + by_px, 400, 800, seed, 40) for seed in range(1, 31))
+        return sum(moved(seen, edge(8.4, 400, 800)) for seen in pictures)
+
+    assert [told(by_px) for by_px in (0, 0.05)] == [0, 0]
+    assert told(0.125) == 30
