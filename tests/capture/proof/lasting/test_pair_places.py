@@ -16,8 +16,13 @@ SIZE, ROWS, BLACK, WHITE = (256, 36), 12, 300.0, 1500.0
 CODE = GrayCode(rows=False)
 
 
-def found(columns: int, pairs: tuple[int, ...] = (0, 1, 2, 3, 4, 5), light: float = 1.0) -> PairPlaces | None:
-    """With inverses of some pairs displaced by so many columns, in so much of the light of patterns."""
+def found(
+    columns: int, pairs: tuple[int, ...] = (0, 1, 2, 3, 4, 5), light: float = 1.0, room: float = 0.0
+) -> PairPlaces | None:
+    """With inverses of some pairs displaced by so many columns, in so much of the light of patterns.
+
+    ``room`` is light of the room that came after black, as a share of the light.
+    """
     rng = np.random.default_rng(5)
     column = np.tile(np.arange(SIZE[0]), ROWS)
     surface = WHITE * rng.uniform(0.5, 1.0, column.size)
@@ -31,7 +36,7 @@ def found(columns: int, pairs: tuple[int, ...] = (0, 1, 2, 3, 4, 5), light: floa
     taken = {}
     for number in range(6):
         pattern = (binary_image(CODE, SIZE, 2 * number)[0] > 0).astype(np.float64)
-        inverse = light * np.roll(1 - pattern, columns if number in pairs else 0)
+        inverse = light * np.roll(1 - pattern, columns if number in pairs else 0) + room
         taken[number] = seen(pattern), seen(inverse)
     ones = np.ones(column.size, np.float32)
     black, contrast = BLACK * ones, surface.astype(np.float32)
@@ -52,6 +57,13 @@ def test_sound_pairs_and_light_that_changed_are_no_displacement(monkeypatch: pyt
     monkeypatch.setattr("dsl_core.capture.proof.lasting.pair_places.FEWEST", 1)
     assert found(0) is None
     assert found(0, light=1.1) is None
+    assert found(0, room=0.2) is None
+
+
+def test_a_room_that_became_brighter_hides_no_displacement() -> None:
+    one = found(1, room=0.2)
+    assert one is not None
+    assert one.columns == pytest.approx(1, rel=0.45)
 
 
 def test_a_single_pair_may_have_moved_for_itself() -> None:
