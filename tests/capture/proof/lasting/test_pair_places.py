@@ -61,7 +61,7 @@ def test_sound_pairs_and_light_that_changed_are_no_displacement(monkeypatch: pyt
 
 
 def test_a_room_that_became_brighter_hides_no_displacement() -> None:
-    one = found(1, room=0.2)
+    one = found(1, room=0.5)
     assert one is not None
     assert one.columns == pytest.approx(1, rel=0.45)
 
