@@ -23,10 +23,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
-#: Where faults are put -> tests that should notice them.
+#: Where faults are put -> tests that should notice them. What only a whole scan shows of optics and solver,
+#: the figures kept of two scans do.
 PLACES = {
-    "dsl_core/optics": ("tests/optics",),
-    "dsl_core/solve": ("tests/solve", "tests/stability"),
+    "dsl_core/optics": ("tests/optics", "tests/reconstruction/test_kept_figures.py"),
+    "dsl_core/solve": ("tests/solve", "tests/stability", "tests/reconstruction/test_kept_figures.py"),
     "dsl_core/reconstruction": ("tests/reconstruction",),
     "dsl_core/calibration": ("tests/calibration", "tests/campaign/test_kept_figures.py"),
     "dsl_core/capture": ("tests/capture",),
