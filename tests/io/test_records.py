@@ -62,3 +62,9 @@ def test_what_cannot_be_read_is_not_called_damaged(tmp_path: Path, content: byte
         path.write_bytes(content)
     with pytest.raises(StoreError, match=rf"plan\.json cannot be read \({says}"):
         read_record(path, CapturePlan)
+
+
+def test_of_many_wrong_fields_one_is_named_unless_more_are_asked_for(tmp_path: Path) -> None:
+    (tmp_path / "plan.json").write_text('{"name": 3, "a": 1, "b": 2}')
+    with pytest.raises(StoreError, match=r"name must be a text \(given 3\); and 2 more\."):
+        read_record(tmp_path / "plan.json", CapturePlan)

@@ -147,3 +147,9 @@ def test_weights_sum_over_every_nanometre_of_the_tables() -> None:
     hat = np.clip((nm - ours.CIE_NM[-2]) / (ours.CIE_NM[-1] - ours.CIE_NM[-2]), 0, 1)
     assert found[:, 2] == pytest.approx(matching @ hat / matching[1].sum(), rel=1e-9)
     assert found.sum(1) == pytest.approx(matching.sum(1) / matching[1].sum())
+
+
+def test_bands_may_be_close_together_but_not_equal() -> None:
+    ours.observer_weights(np.arange(500.0, 520.0, 0.5))
+    with pytest.raises(ValueError, match="rising"):
+        ours.observer_weights(np.array([500.0, 500.0, 505.0]))

@@ -14,6 +14,7 @@ from dsl_core.optics.sensor import relative_gain
 from dsl_core.reconstruction import flat_field
 from dsl_core.reconstruction.flat_field import (
     FlatFit,
+    _smooth,
     flat_finding,
     own_flat_field,
     unsure_gain,
@@ -177,3 +178,11 @@ def test_two_hundred_pairs_tell_a_slope(pixels: int, told: bool) -> None:
     if found is not None:
         assert found[0] == pytest.approx(0.3, abs=5 * found[1])
         assert found[1] == pytest.approx(0.001 / np.sqrt(pixels), rel=0.3)
+
+
+def test_pixels_that_nobody_knows_do_not_darken_those_around_them() -> None:
+    values = np.full((9, 11), 0.8)
+    values[2:5, 3:7] = np.nan
+    smooth = _smooth(values, 4)
+    np.testing.assert_allclose(smooth[np.isfinite(values)], 0.8)
+    assert np.isnan(smooth[np.isnan(values)]).all()

@@ -241,3 +241,11 @@ def test_curves_share_a_scale_and_what_is_left_at_their_ends_is_told(monkeypatch
     assert found.end_share == pytest.approx(0.2)
     assert found.smoothing_nm == (20.0, 30.0, 50.0)
     assert (found.additivity, found.additivity_std, found.readings) == (1.02, 0.01, 7)
+
+
+def test_leds_are_in_order_however_unevenly_wavelengths_are_spaced() -> None:
+    nm = np.concatenate([np.arange(400.0, 590.0), np.arange(590.0, 701.0, 5.0)])
+    leds = np.stack([curve.at(nm) for curve in published_rig().emission])
+    _check_leds(nm, leds)
+    with pytest.raises(CalibrationError, match="swapped"):
+        _check_leds(nm, leds[::-1])

@@ -140,3 +140,10 @@ def test_a_mapping_that_does_not_fit_yet_has_a_table_all_the_same(tmp_path: Path
     assert draft_table(folder, more)[3] == ("-", "columns, gray bit 0 inverse: no picture")
     lacking = mapping.model_copy(update={"missing": (1,), "files": ("0.png",)})
     assert draft_table(folder, lacking)[:1] == (("0.png", "columns, gray bit 0"),)
+
+
+def test_two_codes_of_rows_are_not_our_code(tmp_path: Path) -> None:
+    folder = _folder(tmp_path, [f"{i:02}.png" for i in range(14)])
+    columns, rows = StripePictures(bits=3), StripePictures(axis="rows", bits=2)
+    assert isinstance(_arranged(folder, columns, rows, Skipped(count=4)).code, GrayCode)
+    assert isinstance(_arranged(folder, columns, rows, rows).code, CapturedCode)

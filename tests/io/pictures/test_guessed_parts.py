@@ -10,7 +10,7 @@ import pytest
 
 from dsl_core.errors import StoreError
 from dsl_core.io.pictures.guessed_parts import _stripes, _unit, guessed_size, part_of
-from dsl_core.io.pictures.mapping import StripePictures, WhitePicture
+from dsl_core.io.pictures.mapping import PhasePictures, StripePictures, WhitePicture
 from dsl_core.model.captured_code import Axis
 from dsl_core.patterns.recognition.phase_sets import PhaseReading
 from dsl_core.patterns.recognition.probes import Lines, Probes
@@ -153,3 +153,15 @@ def test_sinusoids_that_agree_no_better_than_by_chance_are_refused(
         part, doubts = part_of(block, [block], (512, 384), Probes(lines, lines, 1.0))
         assert part.kind == "phases"
         assert any("hardly agree" in doubt for doubt in doubts) == (ends == "doubtful")
+
+
+def test_stripes_say_the_period_of_sinusoids_beside_them(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("dsl_core.io.pictures.guessed_parts.numbers_of", lambda *known: None)
+    monkeypatch.setattr("dsl_core.io.pictures.guessed_parts.turns_per_number", lambda *known: (0.25, 90.0))
+    lines = Lines(np.zeros((9, 2, 4), np.float32), np.ones((2, 4), np.bool_))
+    phases = Block(
+        "phases", tuple(range(9)), "columns", PhaseReading(3, "set", (8.0, 4.0, 1.0), 0.0, 1, 0.02, 0.3, 0.16)
+    )
+    part, _ = part_of(phases, [phases, stripes("columns", 9, 511)], (512, 384), Probes(lines, lines, 1.0))
+    assert isinstance(part, PhasePictures)
+    assert (part.fringes, part.start_deg) == ((128.0, 64.0, 16.0), 90.0)

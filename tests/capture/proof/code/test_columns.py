@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from dsl_core.capture.proof.code import columns
 from dsl_core.capture.proof.code.code_pairs import Pair
@@ -175,3 +176,22 @@ def test_only_neighbours_that_are_both_trusted_say_whether_columns_rise() -> Non
     row[71::2] -= 15
     trusted[71::2] = False
     assert _Neighbours((1, 90), trusted).judge(row) == (0.0, 1.0)
+
+
+@pytest.mark.parametrize("rises", [True, False])
+def test_columns_of_which_a_quarter_is_right_are_not_surely_mirrored(rises: bool) -> None:
+    pairs, trusted = _pairs(), np.ones(SHAPE[0] * SHAPE[1], bool)
+    for wrong, is_mirrored in ((0.75, False), (0.9, True)):
+        turned = {
+            number: tuple(_turned(one.reshape(SHAPE), wrong if rises else 1 - wrong).ravel() for one in pair)
+            for number, pair in pairs.items()
+        }
+        assert run_backwards(CODE, SIZE, turned, trusted, SHAPE, rises) == is_mirrored  # type: ignore[arg-type]
+
+
+def _turned(picture: NDArray[np.uint16], share: float) -> NDArray[np.uint16]:
+    """A picture whose upper rows, a share of all, run backwards."""
+    found = picture.copy()
+    rows = round(share * len(picture))
+    found[:rows] = picture[:rows, ::-1]
+    return found

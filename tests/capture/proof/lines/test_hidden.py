@@ -63,3 +63,12 @@ def test_lines_of_another_setting_begin_anew() -> None:
     assert not parts.is_hidden(0, picture(1, 20), BLACK)
     assert not parts.is_hidden(1, picture(2, 21, 12), BLACK)
     assert not parts.is_hidden(1, picture(3, 22, 12), BLACK)
+
+
+def test_a_third_of_a_bright_room_may_go_before_something_is_in_its_way() -> None:
+    black = picture(0, room_dn=600.0)
+    for share, is_told in ((0.7, False), (0.6, True)):
+        assert hides(picture(1, 20, room_dn=600.0), picture(2, 21, 12, 600.0, share), black=black) == [
+            False,
+            is_told,
+        ]
