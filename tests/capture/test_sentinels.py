@@ -187,3 +187,10 @@ def test_what_is_damaged_of_the_first_pictures_does_not_say_whether_all_is_back(
         runner.run()
     sink.withdraw([scene.plan.references()["code"]])
     assert again(scene, sink, [scene]).run().warning == ""
+
+
+def test_a_scan_without_sentinels_looks_at_its_first_pictures(scene: RenderedScene) -> None:
+    alone = scene.plan.model_copy(update={"sentinels": None})
+    references = {shot.index for shot in alone.references().values()}
+    assert len(references) == 3
+    assert SentinelWatch(alone).wanted == references

@@ -56,3 +56,9 @@ def test_a_colour_that_saturates_or_is_missing_says_nothing() -> None:
 
 def test_light_that_noise_outshines_says_nothing() -> None:
     assert found(1.0, 1.0, 0.9, light=0.3) is None
+
+
+def test_a_colour_that_saturates_only_later_says_nothing() -> None:
+    seen = found(1.5, 1.0, 0.9, light=of_colours(3500.0, WHITE_DN, WHITE_DN))
+    assert seen is not None
+    assert "in red" not in seen.sentence

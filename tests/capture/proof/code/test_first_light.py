@@ -5,7 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from dsl_core.capture.proof.code.code_pairs import ALIKE
 from dsl_core.capture.proof.code.first_light import (
+    _factor,
     changed_light,
     has_moved,
     is_unlit,
@@ -161,3 +163,13 @@ def test_of_light_that_changed_at_once_only_the_pair_of_both_is_taken_again(
 def test_the_light_of_first_pictures_is_read_from_why_they_were_taken_again() -> None:
     assert light_of_words(f"its brightness is wrong ({unsettled_words(0.913)})") == 0.91
     assert light_of_words("its brightness is wrong (0.91 times what was expected)") is None
+
+
+@pytest.mark.parametrize(("share", "is_alike"), [(0.7, True), (1.3, False)])
+def test_of_brighter_pictures_more_may_be_left(share: float, is_alike: bool) -> None:
+    """What a change of the light leaves of a pair, as a share of what is taken for another pattern."""
+    one = np.full(400, 100.0, np.float32)
+    other = 3 * one * (1 + share * ALIKE * np.where(np.arange(400) % 2, 1, -1).astype(np.float32))
+    factor, alike = _factor(one, other, np.zeros(400, np.int8))
+    assert factor == pytest.approx(3)
+    assert alike == is_alike
