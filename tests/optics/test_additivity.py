@@ -109,6 +109,9 @@ def test_verdicts_follow_from_excess_and_exponent(
 
 def test_three_deviations_may_be_linear() -> None:
     assert Additivity(0.2, 0.0, 1.59, 0.1, 6, 900).is_linear
+    assert not Additivity(0.2, 0.0, 1.61, 0.1, 6, 900).is_linear
+    assert Additivity(0.2, 0.0, 0.41, 0.1, 6, 900).is_linear
+    assert not Additivity(0.2, 0.0, 0.39, 0.1, 6, 900).is_linear
     assert Additivity(0.058, 0.01, 2.2, 0.0, 6, 900).is_linear
     assert not Additivity(0.062, 0.01, 2.2, 0.0, 6, 900).is_linear
 

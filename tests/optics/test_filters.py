@@ -5,7 +5,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from dsl_core.optics.filters import FINE_NM, nominal_filter, passed, through_filter
+from dsl_core.optics.filters import (
+    FINE_NM,
+    nominal_filter,
+    passed,
+    relative_shift,
+    shift_slopes,
+    through_filter,
+)
 from dsl_core.optics.spectra import chain_response
 from dsl_core.simulation.published_rig import published_rig
 
@@ -44,3 +51,18 @@ def test_a_band_seen_at_angles_is_the_mean_of_bands_that_are_shifted() -> None:
     assert through_filter(curve, shift, np.zeros(2)) == pytest.approx((straight + moved) / 2)
     rig = published_rig()
     assert passed(rig, curve, shift[1:]) == pytest.approx(chain_response(rig, 0, FINE_NM).sum(1) * moved)
+
+
+@pytest.mark.parametrize("values", [(0.3, 0.02, -0.05), (0.02, 0.1, 0.03)])
+def test_slopes_of_the_shift_are_its_derivatives(values: tuple[float, float, float]) -> None:
+    """Also where the index is larger than that of any filter."""
+    terms = np.random.default_rng(0).normal(0, 0.1, (5, 3))
+    point, step = np.array(values), 1e-6
+    numeric = np.stack(
+        [
+            (relative_shift(terms, point + change) - relative_shift(terms, point - change)) / (2 * step)
+            for change in step * np.eye(3)
+        ],
+        axis=1,
+    )
+    np.testing.assert_allclose(shift_slopes(terms, point), numeric, atol=1e-7)

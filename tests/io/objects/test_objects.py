@@ -153,6 +153,12 @@ def test_refusals_are_told_without_secrets(
         assert SECRET not in str(told.value) + repr(vars(objects)) + caplog.text
 
 
+def test_a_bucket_that_is_not_there_is_named(twin: ObjectStoreTwin) -> None:
+    twin.refuse = lambda method, name: 404
+    with pytest.raises(StoreError, match="the bucket bucket is not there"):
+        ObjectFolder(RESULT).listed()
+
+
 def test_a_large_object_is_written_in_parts(twin: ObjectStoreTwin) -> None:
     content = np.random.default_rng(1).bytes(12 << 20)
     ObjectFolder(RESULT).put("large", content)

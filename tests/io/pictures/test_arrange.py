@@ -102,6 +102,13 @@ def test_an_xor_code_as_ours_is_ours(tmp_path: Path) -> None:
     assert found.code == XorCode(rows=False, base_px=4)
 
 
+def test_a_code_of_more_digits_or_wider_stripes_than_ours_stays_what_it_is(tmp_path: Path) -> None:
+    folder = _folder(tmp_path, [f"{i}.png" for i in range(9)])
+    for part in (StripePictures(bits=4), StripePictures(bits=3, unit_px=2)):
+        found = _arranged(folder, part, Skipped(count=9 - 2 * part.bits)).code
+        assert isinstance(found, CapturedCode)
+
+
 @pytest.mark.parametrize(("code", "base_bit"), [("binary", 0), ("xor", 2)])
 def test_a_code_that_is_not_ours_stays_what_it_is(tmp_path: Path, code: Any, base_bit: int) -> None:
     folder = _folder(tmp_path, [f"{i}.png" for i in range(6)])
