@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from itertools import pairwise
 from types import SimpleNamespace
 from typing import cast
@@ -124,6 +125,10 @@ def test_lines_that_lie_beside_the_code_everywhere_are_told(scanned: tuple[Devic
     assert found["lines"].significant
     # All lines have the same second one beside them: that may as well be how the projector shows lines.
     assert "less even than calibrated, or the projector's picture" in found["lines"].sentence
+    # What a line lights is taken to be nearer to its own place than it is.
+    told = re.search(r"\(rms, at most ([+-]\d\.\d+)\)", found["lines"].sentence)
+    assert told is not None
+    assert -1.0 < float(told[1]) < -0.1
     assert 0.1 < found["lines"].value < 0.5
     assert held(evaluation) > 0.9
 

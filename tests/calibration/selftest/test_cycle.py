@@ -99,6 +99,8 @@ def test_spreads_without_a_cycle_give_no_period() -> None:
         table(exposures, BLACK_DN + exposures[:, None] * flicker * [20, 30, 25]), BLACK_DN
     )
     assert found.period_ms is None
+    # Of the eight repeats of an exposure, seven tell how much they differ.
+    assert found.modulation.std == pytest.approx(found.modulation.value / np.sqrt(14))
     quiet = 1 + 1e-4 * rng.standard_normal((len(exposures), 3))
     assert find_cycle_by_spread(
         table(exposures, BLACK_DN + 20 * exposures[:, None] * quiet), BLACK_DN
