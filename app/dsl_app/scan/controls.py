@@ -8,9 +8,11 @@ from dsl_app.scan.state import Facts, InterruptedScan, Phase, Reconnection
 from dsl_app.shared.notify import NO_RIG, describe_seconds
 from dsl_app.shared.widget_state import ButtonState, LabelState
 from dsl_core.capture.runner import Status
+from dsl_core.words import capitalised
 
 _PHASE_ROLES = {Phase.LOST: "bad", Phase.DONE: "good", Phase.PAUSED: "warn", Phase.STOPPED: "warn"}
 RESUME = "Resume at the first missing frame, after checking whether anything has moved"
+RESTART = "Start the scan again from its first frame: none of it is saved yet"
 RECONNECT = "Reconnect the rig, check whether anything has moved, and resume at the first missing frame"
 
 
@@ -104,14 +106,15 @@ def run_controls(
     )
 
 
-def banner_controls(reconnection: Reconnection) -> BannerControls:
-    """What the banner offers while a lost rig is reconnected."""
+def banner_controls(reconnection: Reconnection, has_frames: bool = True) -> BannerControls:
+    """What the banner offers while a lost rig is reconnected; without frames there is nothing to resume."""
     is_away = reconnection.is_away
+    again, tip = ("resume", RECONNECT if is_away else RESUME) if has_frames else ("start again", RESTART)
     return BannerControls(
         action=ButtonState(
             is_enabled=reconnection is not Reconnection.RESUMING,
-            text="Connect and resume" if is_away else "Resume",
-            tip=RECONNECT if is_away else RESUME,
+            text=f"Connect and {again}" if is_away else capitalised(again),
+            tip=tip,
         ),
         stop=ButtonState(reconnection.is_trying),
     )

@@ -133,6 +133,7 @@ class ScanPage(PageWidget):
         self.stops = [
             *follow_any(self._show_plan, state.plan, state.period_ms),
             state.interrupted.follow(lambda _: self._show_phase(state.phase.value)),
+            state.interrupted.changed.connect(lambda _: self._show_reconnection(state.reconnection.value)),
             state.phase.follow(self._show_phase),
             state.is_reconstructing.changed.connect(lambda _: self._keep_time()),
             state.trouble.follow(self.banner.say),
@@ -173,7 +174,7 @@ class ScanPage(PageWidget):
         self._keep_time()
 
     def _show_reconnection(self, reconnection: Reconnection) -> None:
-        shown = banner_controls(reconnection)
+        shown = banner_controls(reconnection, self._state.interrupted.value is not None)
         show_button(self.banner.action, shown.action)
         show_button(self.stop, shown.stop)
         self._keep_time()

@@ -101,6 +101,11 @@ def test_the_banner_follows_the_reconnection(
     assert shown.stop.is_visible is can_stop
 
 
+def test_the_banner_of_a_scan_that_saved_nothing_starts_it_again() -> None:
+    assert banner_controls(Reconnection.NONE, has_frames=False).action.text == "Start again"
+    assert banner_controls(Reconnection.TRYING, has_frames=False).action.text == "Connect and start again"
+
+
 def test_progress_is_empty_until_there_is_some() -> None:
     assert progress_text(Status(State.IDLE)).frames.text == ""
     half = Status(State.RUNNING, done=38, total=76, elapsed_s=20.0, remaining_s=20.0)

@@ -186,7 +186,7 @@ def test_a_lost_camera_is_said_over_the_page(
         assert "frames are safe" not in page.run.remarks.text()
         # The page itself makes one attempt after another.
         qtbot.waitUntil(lambda: "attempt 1 of" not in page.banner.text, timeout=60_000)
-        assert page.banner.action.text() == "Connect and resume"
+        assert page.banner.action.text() == "Connect and start again"
         assert page.stop.isVisible()
         click(page.stop)
         assert not page.stop.isVisible()
