@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from dsl_app.scan.state import Facts, InterruptedScan, Phase, Reconnection
+from dsl_app.scan.state import Facts, InterruptedScan, LivePicture, Phase, Reconnection
 from dsl_app.shared.notify import NO_RIG, describe_seconds
 from dsl_app.shared.widget_state import ButtonState, LabelState
 from dsl_core.capture.runner import Status
@@ -46,6 +46,16 @@ class ProgressText:
 
     frames: LabelState
     time: LabelState
+
+
+@dataclass(frozen=True)
+class FrameText:
+    """How the last frame is exposed, how long one takes, and how many were captured again."""
+
+    brightest: LabelState
+    saturated: LabelState
+    each: LabelState
+    again: LabelState
 
 
 def run_controls(
@@ -128,4 +138,21 @@ def progress_text(status: Status) -> ProgressText:
     time = f"took {spent}" if status.state.is_final else f"{spent} so far, {left} left"
     return ProgressText(
         LabelState(f"{status.done} of {status.total} frames saved", "muted"), LabelState(time, "muted")
+    )
+
+
+def frame_text(status: Status, shown: LivePicture | None) -> FrameText:
+    """The last frame in words; a dash for what is not known."""
+    left = status.total - status.done
+    each = f"{status.remaining_s / left:.2g} s" if left and status.remaining_s else "–"
+    again = LabelState("none", "muted")
+    if status.corrected:
+        again = LabelState(f"{status.corrected}: a picture did not show its pattern", "warn")
+    if shown is None:
+        return FrameText(LabelState("–"), LabelState("–"), LabelState(each), again)
+    return FrameText(
+        LabelState(f"{100 * shown.brightest:.0f} % of full scale"),
+        LabelState(f"{100 * shown.saturated:.1f} % of the pixels"),
+        LabelState(each),
+        again,
     )
