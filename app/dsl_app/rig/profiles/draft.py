@@ -125,11 +125,11 @@ def wrong_settings(draft: Draft) -> dict[Kind, dict[str, str]]:
         except DeviceError as error:
             faults = error.__cause__.errors() if isinstance(error.__cause__, ValidationError) else []
             # A list is what a person writes with commas.
-            said = {
-                str(fault["loc"][0]): what_is_wrong(fault).replace("a list", "values separated by commas")
-                for fault in reversed(faults)
-                if fault["loc"]
-            }
+            said: dict[str, str] = {}
+            for fault in faults:
+                if fault["loc"]:
+                    words = what_is_wrong(fault).replace("a list", "values separated by commas")
+                    said.setdefault(str(fault["loc"][0]), words)
             if said:
                 found[kind] = said
     return found
