@@ -16,8 +16,9 @@ from dsl_app.shared.evented import follow_any
 from dsl_app.shared.widgets.forms import label, named, show_parts
 from dsl_core.model.plan import CapturePlan
 
-#: Width of the pattern, px: that of the column less its margins.
-PATTERN_PX = 236
+#: Width and height of the pattern, px: as wide as the column, and so low that the smallest window has no need
+#: to scroll; lines are upright.
+PATTERN_PX = (236, 48)
 
 
 class FrameBox(QGroupBox):
@@ -65,5 +66,5 @@ def pattern_levels(plan: CapturePlan, shown: LivePicture) -> NDArray[np.uint8]:
 def _pixmap(levels: NDArray[np.uint8]) -> QPixmap:
     height, width = levels.shape[:2]
     image = QImage(np.ascontiguousarray(levels).data, width, height, 3 * width, QImage.Format.Format_RGB888)
-    smooth = Qt.TransformationMode.SmoothTransformation
-    return QPixmap.fromImage(image.scaledToWidth(PATTERN_PX, smooth))
+    ways = Qt.AspectRatioMode.IgnoreAspectRatio, Qt.TransformationMode.SmoothTransformation
+    return QPixmap.fromImage(image.scaled(*PATTERN_PX, *ways))
