@@ -54,13 +54,17 @@ def save_profile(profile: RigProfile, path: Path, *, overwrite: bool = False) ->
 def examine_profile(path: Path) -> list[Finding]:
     """Try the devices of a profile, and read its file ``nominal``; raises `DeviceError` for the profile."""
     profile = load_profile(path)
-    found = examine(profile)
+    return [*examine(profile), *examine_nominal(profile, path.parent)]
+
+
+def examine_nominal(profile: RigProfile, folder: Path) -> list[Finding]:
+    """Read the file ``nominal`` of a profile in a folder: what is wrong with it, or nothing."""
     if profile.nominal:
         try:
-            load_rig(path.parent / profile.nominal)
+            load_rig(folder / profile.nominal)
         except DslError as error:
-            found.append(Finding("nominal", Grade.BAD, str(error)))
-    return found
+            return [Finding("data sheets", Grade.BAD, str(error))]
+    return []
 
 
 def open_profile(path: Path) -> DeviceRig:

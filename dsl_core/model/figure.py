@@ -41,10 +41,14 @@ class Figure(Record):
         '1.8 to 2.6'
         >>> Figure(name="camera error", value=0.01, unit="px", high=0.5).limits
         'at most 0.5 px'
+        >>> Figure(name="stale frames", value=0, unit="", high=0).limits
+        'none allowed'
         """
         match self.low, self.high:
             case None, None:
                 return ""
+            case None, 0.0:
+                return "none allowed"
             case None, high:
                 return f"at most {high:.4g}{self._unit}"
             case low, None:

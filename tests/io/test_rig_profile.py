@@ -74,8 +74,8 @@ def test_the_doctor_tells_of_a_missing_nominal_rig_with_all_else(home: Path) -> 
     path = save_profile(profile(nominal="sheets.json"), home / "lab.json")
     found = {each.device: each for each in examine_profile(path)}
     assert "no driver 'absent'" in found["camera absent"].text
-    assert found["nominal"].grade == "bad"
-    assert "sheets.json cannot be read" in found["nominal"].text
+    assert found["data sheets"].grade == "bad"
+    assert "sheets.json cannot be read" in found["data sheets"].text
 
 
 def test_a_scan_remembers_its_profile_from_any_folder(home: Path, monkeypatch: pytest.MonkeyPatch) -> None:

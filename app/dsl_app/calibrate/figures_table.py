@@ -10,6 +10,7 @@ from PySide6.QtWidgets import QHeaderView, QTableWidgetItem
 from dsl_app.calibrate.presentation import name_words, value_words
 from dsl_app.shared.widgets.read_table import ReadTable, cell
 from dsl_core.model.figure import Figure
+from dsl_core.words import capitalised
 
 _COLUMNS = ("", "Figure", "Value", "Limits", "What to do")
 _MARK_PX = 26
@@ -26,8 +27,13 @@ class FiguresTable(ReadTable):
         self.wrap(len(_COLUMNS) - 1)
 
     def show_figures(self, figures: Sequence[Figure]) -> None:
-        """Show figures in their order."""
-        self.show_rows([_items(figure) for figure in figures])
+        """Show what misses its limits first, then what is within them, and last what only informs."""
+        self.show_rows([_items(figure) for figure in sorted(figures, key=_rank)])
+
+
+def _rank(figure: Figure) -> int:
+    # Five rows are seen at a time: what a person must act on is one of them.
+    return 0 if not figure.passed else (1 if figure.limits else 2)
 
 
 def _items(figure: Figure) -> tuple[QTableWidgetItem, ...]:
@@ -38,7 +44,7 @@ def _items(figure: Figure) -> tuple[QTableWidgetItem, ...]:
     first.setData(Qt.ItemDataRole.AccessibleTextRole, word)
     return (
         first,
-        cell(name_words(figure), "text"),
+        cell(capitalised(name_words(figure)), "text"),
         cell(value_words(figure), "text" if figure.passed else role),
         cell(figure.limits.replace("-", "−"), "muted"),
         cell("" if figure.passed else figure.advice, "text"),

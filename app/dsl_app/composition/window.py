@@ -247,7 +247,7 @@ class Composition(QObject):
             window.open_path,
             lambda key: self.demo.show(key),
             self._start_live,
-            lambda: window.open_page("rig"),
+            self._choose_rig,
             lambda: window.do("open"),
             lambda: window.do("import"),
             UnfinishedController(
@@ -267,6 +267,15 @@ class Composition(QObject):
         if self.rig.state.link.value not in (Link.OPEN, Link.OPENING):
             self.rig.connect(self.rig.state.choice.value)
         self.live.begin_when_open()
+
+    def _choose_rig(self) -> None:
+        """Show the rigs; where there are none but those of this program, begin with one of one's own."""
+        from dsl_app.rig.page import RigPage
+        from dsl_core.devices.registry import is_built_in, rig_names
+
+        page = self.window.open_page("rig")
+        if isinstance(page, RigPage) and all(map(is_built_in, rig_names())):
+            page.profile_requested.emit("")
 
     def _rig_page(self) -> PageWidget:
         from dsl_app.rig.page import RigPage

@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
-from PySide6.QtCore import Qt, Signal
+from PySide6.QtCore import Qt, QUrl, Signal
+from PySide6.QtGui import QDesktopServices
 from PySide6.QtWidgets import QDialog, QStackedWidget, QWidget
 
 from dsl_app.results.answers.colours_panel import ColoursPanel
@@ -168,6 +169,7 @@ class ResultsPage(PageWidget):
         state.busy.follow(lambda busy: news.run_while(bool(busy)))
         state.graph.changed.connect(self._show_graph)
         state.library.changed.connect(self._ask_library)
+        state.opened.connect(lambda path: QDesktopServices.openUrl(QUrl.fromLocalFile(str(path))))
         state.contrast.follow(self._show_contrast)
         state.view.follow(lambda view: self.cloud.setVisible(view is ResultView.CLOUD))
 

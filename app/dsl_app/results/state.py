@@ -12,7 +12,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from dsl_app.shared.evented import Value
+from dsl_app.shared.evented import Event, Value
 from dsl_app.shared.spectrum import Floats, Pixel, Spectrum, spectrum_of_pixel
 from dsl_core.analysis.classification import Classification
 from dsl_core.analysis.transforms import Transform
@@ -160,7 +160,7 @@ class ResultsState:
     has to choose from. ``depth_limits`` are the depths shown, mm; None for all. ``bands`` are shown as
     colours; None for true colours. ``levels`` has what a person set by the key of `layers.Contrast`, and
     ``contrast`` says whether a histogram is shown. The plot draws a ``transform`` of the spectra, one above
-    the other if ``stacked``.
+    the other if ``stacked``. ``opened`` fires with a file to open in the system's program.
     """
 
     def __init__(self) -> None:
@@ -190,6 +190,7 @@ class ResultsState:
         self.stacked = Value(False)
         self.graph: Value[IntensityGraph | None] = Value(None)
         self.library: Value[Library | None] = Value(None)
+        self.opened: Event[Path] = Event()
 
     @property
     def saved_result(self) -> ResultArrays | None:

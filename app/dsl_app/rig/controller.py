@@ -55,8 +55,14 @@ class LiveController:
         self._exposer = AutoExposer(
             rig.state, self.state, notifier, self.set_exposure, self._dim, lambda: self._picture[0] == "black"
         )
-        rig.state.devices.follow(lambda _: self.set_exposure(self.state.exposure_ms.value))
+        rig.state.devices.follow(self._devices_changed)
         rig.state.live.changed.connect(self._live_changed)
+
+    def _devices_changed(self, devices: DeviceRig | None) -> None:
+        # A twin of full size that nobody uses any more would keep 180 MB of its scene.
+        if devices is not self._looked_at:
+            self._looked_at = None
+        self.set_exposure(self.state.exposure_ms.value)
 
     # Live view -------------------------------------------------------------------------------------
 

@@ -108,6 +108,11 @@ class ScanController:
         self._reconnector.forget()
         for text in (state.trouble, state.note):
             text.set("")
+        if session is None:
+            # Frames and progress of the scan before would pass for this one's until its first frame.
+            state.status.set(Status(State.IDLE))
+            state.picture.set(None)
+            state.graph.set(None)
         state.phase.set(Phase.STARTING)
         self._job = Job(
             f"Scan {request.folder.stem}",

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from dsl_app.scan.state import Facts, InterruptedScan, Phase, Reconnection
+from dsl_app.scan.state import Facts, InterruptedScan, LivePicture, Phase, Reconnection
 from dsl_app.shared.notify import NO_RIG, describe_seconds
 from dsl_app.shared.widget_state import ButtonState, LabelState
 from dsl_core.capture.runner import Status
+from dsl_core.words import capitalised
 
 _PHASE_ROLES = {Phase.LOST: "bad", Phase.DONE: "good", Phase.PAUSED: "warn", Phase.STOPPED: "warn"}
 RESUME = "Resume at the first missing frame, after checking whether anything has moved"
+RESTART = "Start the scan again from its first frame: none of it is saved yet"
 RECONNECT = "Reconnect the rig, check whether anything has moved, and resume at the first missing frame"
 
 
@@ -44,6 +46,16 @@ class ProgressText:
 
     frames: LabelState
     time: LabelState
+
+
+@dataclass(frozen=True)
+class FrameText:
+    """How the last frame is exposed, how long one takes, and how many were captured again."""
+
+    brightest: LabelState
+    saturated: LabelState
+    each: LabelState
+    again: LabelState
 
 
 def run_controls(
@@ -104,14 +116,15 @@ def run_controls(
     )
 
 
-def banner_controls(reconnection: Reconnection) -> BannerControls:
-    """What the banner offers while a lost rig is reconnected."""
+def banner_controls(reconnection: Reconnection, has_frames: bool = True) -> BannerControls:
+    """What the banner offers while a lost rig is reconnected; without frames there is nothing to resume."""
     is_away = reconnection.is_away
+    again, tip = ("resume", RECONNECT if is_away else RESUME) if has_frames else ("start again", RESTART)
     return BannerControls(
         action=ButtonState(
             is_enabled=reconnection is not Reconnection.RESUMING,
-            text="Connect and resume" if is_away else "Resume",
-            tip=RECONNECT if is_away else RESUME,
+            text=f"Connect and {again}" if is_away else capitalised(again),
+            tip=tip,
         ),
         stop=ButtonState(reconnection.is_trying),
     )
@@ -125,4 +138,21 @@ def progress_text(status: Status) -> ProgressText:
     time = f"took {spent}" if status.state.is_final else f"{spent} so far, {left} left"
     return ProgressText(
         LabelState(f"{status.done} of {status.total} frames saved", "muted"), LabelState(time, "muted")
+    )
+
+
+def frame_text(status: Status, shown: LivePicture | None) -> FrameText:
+    """The last frame in words; a dash for what is not known."""
+    left = status.total - status.done
+    each = f"{status.remaining_s / left:.2g} s" if left and status.remaining_s else "–"
+    again = LabelState("none", "muted")
+    if status.corrected:
+        again = LabelState(f"{status.corrected}: a picture did not show its pattern", "warn")
+    if shown is None:
+        return FrameText(LabelState("–"), LabelState("–"), LabelState(each), again)
+    return FrameText(
+        LabelState(f"{100 * shown.brightest:.0f} % of full scale"),
+        LabelState(f"{100 * shown.saturated:.1f} % of the pixels"),
+        LabelState(each),
+        again,
     )

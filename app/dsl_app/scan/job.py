@@ -6,6 +6,8 @@ import threading
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+import numpy as np
+
 from dsl_app.scan.state import LivePicture
 from dsl_core.capture.preview import BlockGraph, BlockGraphs, quick_picture
 from dsl_core.capture.runner import Runner, Status
@@ -17,6 +19,8 @@ from dsl_core.progress import CancelToken, Progress
 
 #: Pictures wider than this are thinned before they are painted, cells.
 PICTURE_CELLS = 800
+#: The share of pixels that may be brighter than the brightest told: hot ones say nothing of the exposure.
+BRIGHTEST = 0.995
 
 
 @dataclass(frozen=True)
@@ -135,7 +139,9 @@ class ScanJob:
         picture = quick_picture(frame.pixels, camera.bayer, 2**camera.bit_depth - 1)
         thin = -(-picture.shape[1] // PICTURE_CELLS)
         with self._lock:
-            self._picture = LivePicture(shot, picture[::thin, ::thin], 2 * thin)
+            self._picture = LivePicture(
+                shot, picture[::thin, ::thin], 2 * thin, *_exposed(frame, 2**camera.bit_depth - 1)
+            )
 
     def _listen(self, status: Status) -> None:
         with self._lock:
@@ -171,3 +177,10 @@ class ScanJob:
             self._is_paused = on
             if self._runner is not None:
                 (self._runner.pause if on else self._runner.resume)()
+
+
+def _exposed(frame: Frame, full_scale_dn: int) -> tuple[float, float]:
+    """What the brightest pixels reach of full scale, and the share of pixels there; of every ninth pixel."""
+    # An odd step meets all colours of the mosaic.
+    some = frame.pixels[::3, ::3]
+    return float(np.quantile(some, BRIGHTEST)) / full_scale_dn, float((some >= full_scale_dn).mean())

@@ -15,6 +15,7 @@ from dsl_app.scan.effects.controller import EffectsController
 from dsl_app.scan.effects.panel import EffectsPanel
 from dsl_app.scan.effects.state import EffectsState
 from dsl_app.scan.forecast.panel import ForecastPanel
+from dsl_app.scan.frame_box import FrameBox
 from dsl_app.scan.plan_editor import PlanEditor
 from dsl_app.scan.run import CalibrationBox, RunBox, TargetBox
 from dsl_app.scan.state import Phase, Reconnection, ScanState
@@ -77,6 +78,8 @@ class ScanPage(PageWidget):
         set_help(self.calibration, "calibrating#using-a-calibration")
         self.target, self.run = TargetBox(state, controller), RunBox(state, controller)
         self.run.setObjectName("scan-run")
+        self.frame = FrameBox(state)
+        set_help(self.frame, "scanning#while-it-runs")
         set_help(self.target, "scanning#before-it-starts")
         set_help(self.run, "scanning#while-it-runs")
         self._timer = Ticker(self, FETCH_MS, controller.take_news)
@@ -90,7 +93,7 @@ class ScanPage(PageWidget):
             (self.view, FRAMES, FRAMES_TIP),
             (self.effects, "Effec&ts", "Effects of light that the simulated rig renders"),
         )
-        self._left, self._left_area = _side(LEFT_PX, self.plan)
+        self._left, self._left_area = _side(LEFT_PX, self.plan, self.frame)
         self._figures = QGroupBox("Expected accuracy")
         column_of(on=self._figures)
         self._figures.hide()
@@ -133,6 +136,7 @@ class ScanPage(PageWidget):
         self.stops = [
             *follow_any(self._show_plan, state.plan, state.period_ms),
             state.interrupted.follow(lambda _: self._show_phase(state.phase.value)),
+            state.interrupted.changed.connect(lambda _: self._show_reconnection(state.reconnection.value)),
             state.phase.follow(self._show_phase),
             state.is_reconstructing.changed.connect(lambda _: self._keep_time()),
             state.trouble.follow(self.banner.say),
@@ -173,7 +177,7 @@ class ScanPage(PageWidget):
         self._keep_time()
 
     def _show_reconnection(self, reconnection: Reconnection) -> None:
-        shown = banner_controls(reconnection)
+        shown = banner_controls(reconnection, self._state.interrupted.value is not None)
         show_button(self.banner.action, shown.action)
         show_button(self.stop, shown.stop)
         self._keep_time()

@@ -121,11 +121,16 @@ class Facts:
 
 @dataclass(frozen=True)
 class LivePicture:
-    """The last frame as RGB, one pixel for ``cell_px`` camera pixels."""
+    """The last frame as RGB, one pixel for ``cell_px`` camera pixels.
+
+    ``brightest`` is what its brightest pixels reach of full scale, ``saturated`` the share of pixels there.
+    """
 
     shot: Shot
     picture: NDArray[np.uint8]
     cell_px: int
+    brightest: float = 0.0
+    saturated: float = 0.0
 
 
 class ScanState:

@@ -43,6 +43,9 @@ class Rail(QFrame):
         if any(button.hasFocus() for button in self._buttons.values()):
             self._buttons[key].setFocus()
         self._buttons[key].setChecked(True)
+        for each, button in self._buttons.items():
+            # Qt moves the stop of the Tab key with the keyboard alone, not with pages opened otherwise.
+            button.setFocusPolicy(Qt.FocusPolicy.TabFocus if each == key else Qt.FocusPolicy.NoFocus)
 
     def paint_icons(self, theme: Theme) -> None:
         """Draw the icons in the colours of a theme."""

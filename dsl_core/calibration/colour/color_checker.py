@@ -274,7 +274,7 @@ def color_checker_figures(record: ColorCheckerCalibration) -> tuple[Figure, ...]
     worst = max(record.patches, key=lambda patch: patch.held_out)
     deviation = max(_deviation(curve) for curve in record.response)
     return (
-        Figure(name="patches found", value=len(record.patches), unit="", low=24, high=24),
+        Figure(name="patches found", value=len(record.patches), unit="", low=24),
         Figure(
             name="residual before the refinement", value=100 * record.start, unit="% of white"
         ),

@@ -84,7 +84,7 @@ class ColorCheckerRecipe(Recipe[ColorCheckerCalibration]):
         patch_samples(pose.corners_px, (white.picture.shape[0], white.picture.shape[1]))
         bench.found(np.asarray(pose.corners_px, float))
         return (
-            Figure(name="patches found", value=24, unit="", low=24, high=24),
+            Figure(name="patches found", value=24, unit="", low=24),
             Figure(
                 name=f"chart {ORIENTATIONS[pose.quarter_turns]}",
                 value=90.0 * pose.quarter_turns,

@@ -37,8 +37,8 @@ LONG_RATIO = 6.0
 LEVELS, CYCLES = (1.0, 0.8, 0.6, 0.5, 0.4, 0.3, 0.2), 6
 #: White dimmer than this share of the range in the longest exposure is too dark to measure.
 TOO_DARK = 0.02
-#: White after the shortest exposure (DN), and light that is not the projector's (% of white).
-LEAST_DN, MOST_OTHER = 0.5, 20.0
+#: Light that is not the projector's, % of white.
+MOST_OTHER = 20.0
 #: Colours that fit a filter this many nm away this much better (chi-square) are those of another filter.
 COLOUR_NM, COLOUR_GAIN = 14.0, 12.0
 #: White without a filter is at least this many times brighter than through one.
@@ -92,9 +92,14 @@ def shoot_white(bench: Bench) -> WhiteLevel:
     )
 
 
+def _longest_share(rig: Rig, white: WhiteLevel) -> float:
+    """White after the longest exposure, as a share of the camera's range."""
+    return LONGEST_MS * white.brightest / (rig.sensor.full_scale_dn - rig.sensor.black_level_dn)
+
+
 def require_bright(rig: Rig, white: WhiteLevel, what: str) -> None:
     """Raise `CalibrationError` where even the longest exposure sees next to nothing of white."""
-    longest = LONGEST_MS * white.brightest / (rig.sensor.full_scale_dn - rig.sensor.black_level_dn)
+    longest = _longest_share(rig, white)
     if longest < TOO_DARK:
         raise CalibrationError(
             f"{what} is too dark: in {LONGEST_MS / 1000:g} s white reaches {longest:.1%} of the camera's"
@@ -145,12 +150,12 @@ def _snap(devices: DeviceRig, drive: int, attempt: int) -> NDArray[np.uint16]:
 
 
 def brightness(white: WhiteLevel, rig: Rig, parts: str) -> Figure:
-    """White after the shortest safe exposure; ``parts`` are what to check when it is dark."""
+    """White after the longest exposure; ``parts`` are what to check when it is dark."""
     return Figure(
-        name="white after one LED cycle",
-        value=white.brightest * rig.frame_period_ms,
-        unit="DN",
-        low=LEAST_DN,
+        name=f"brightness of white in up to {LONGEST_MS / 1000:g} s",
+        value=100 * min(_longest_share(rig, white), 1.0),
+        unit="% of the camera's range",
+        low=100 * TOO_DARK,
         advice=f"The picture is dark. Check {parts}.",
     )
 

@@ -41,13 +41,20 @@ def look_at_board(white: WhiteLevel, board: Board, rig: Rig, title: str, found: 
     view = 100 * float(cv2.contourArea(hull)) / picture.size
     normal = board_normal(corner_positions_mm(board)[corners.ids], corners.points_px, rig.camera.matrix, what)
     total = int(np.prod(board.corner_grid))
+    # Nobody judges by how many pictures are not saturated.
+    saturated = Figure(
+        name="white pictures saturated",
+        value=1.0,
+        unit="",
+        high=0.0,
+        advice="Close the aperture or dim the projector: its darkest white is too bright.",
+    )
     return (
         Figure(
             name="corners found",
             value=len(corners.ids),
             unit="",
-            low=LEAST_CORNERS * total,
-            high=total,
+            low=np.ceil(LEAST_CORNERS * total),
             advice="Move the board until all of it is in view and lit.",
         ),
         Figure(
@@ -64,13 +71,7 @@ def look_at_board(white: WhiteLevel, board: Board, rig: Rig, title: str, found: 
             high=MOST_BLUR_PX,
             advice="Focus the camera and hold the board still.",
         ),
-        Figure(
-            name="white pictures saturated",
-            value=float(white.saturated),
-            unit="",
-            high=0.0,
-            advice="Close the aperture or dim the projector: its darkest white is too bright.",
-        ),
+        *((saturated,) if white.saturated else ()),
         other_light(white),
         Figure(name="tilt", value=float(np.degrees(np.arccos(min(abs(normal[2]), 1.0)))), unit="°"),
     )
@@ -88,7 +89,7 @@ def geometry_figures(record: GeometryCalibration) -> tuple[Figure, ...]:
         Figure(
             name="projector error", value=record.projector_rms_px, unit="px", high=GOOD_RMS_PX, advice=more
         ),
-        Figure(name="poses used", value=used, unit="", low=MIN_POSES, high=len(record.poses), advice=more),
+        Figure(name="poses used", value=used, unit="", low=MIN_POSES, advice=more),
         Figure(
             name="side of a square",
             value=squares.square_mm,
@@ -106,10 +107,10 @@ def geometry_figures(record: GeometryCalibration) -> tuple[Figure, ...]:
             advice=more,
         ),
         Figure(
-            name="distance from a plane, of the distance",
-            value=1e4 * record.plane_rms_share,
-            unit="10⁻⁴",
-            high=1e4 * PLANE_SHARE,
+            name="corners' distance from a plane",
+            value=100 * record.plane_rms_share,
+            unit="% of their distance",
+            high=100 * PLANE_SHARE,
             advice="Use a flat, stiff board, and keep it still.",
         ),
         Figure(

@@ -57,17 +57,17 @@ class SelfTestRecipe(Recipe[SelfTest]):
         return (
             Figure(
                 name="well lit share of the picture",
-                value=seen.lit_share,
-                unit="1",
-                low=_LIT_SHARE,
+                value=100 * seen.lit_share,
+                unit="%",
+                low=100 * _LIT_SHARE,
                 advice="Fill the camera's view with a white target, and light all of it.",
             ),
             Figure(
-                name="ambient light, of white",
-                value=seen.ambient_share,
-                std=seen.ambient_std,
-                unit="1",
-                high=AMBIENT + 3 * seen.ambient_std,
+                name="ambient light",
+                value=100 * seen.ambient_share,
+                std=100 * seen.ambient_std,
+                unit="% of white",
+                high=100 * (AMBIENT + 3 * seen.ambient_std),
                 advice="Switch off lamps and keep daylight out.",
             ),
         )

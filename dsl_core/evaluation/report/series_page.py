@@ -53,6 +53,7 @@ def stage_page(names: Sequence[str], targets: Sequence[SeenTarget], found: Stage
         verdicts=stage_table(found),
         plots=[("Deviation from the line", deviations)],
         table=stage_rows(names, targets, found),
+        pictures_title="Distance from the plane",
         pictures=sorted(pictures, key=lambda picture: picture.title),
     )
 
@@ -74,6 +75,7 @@ def sweep_page(points: Sequence[SweepPoint], reference: str) -> str:
         verdicts=(),
         plots=plots,
         table=sweep_rows(points),
+        pictures_title="",
         pictures=(),
     )
 

@@ -38,7 +38,8 @@ class NamedSpectrum:
     """A spectrum with its name, all arrays of shape (bands,).
 
     ``deviation`` is the scatter of the ``pixels`` that it is the mean of, ``uncertainty`` one standard
-    deviation as stated for a single pixel; None where it does not exist, as for a reference.
+    deviation as stated for a single pixel; None where it does not exist, as for a reference. ``where`` says
+    in words which part of the picture it is of, empty where it is of none.
     """
 
     name: str
@@ -47,6 +48,7 @@ class NamedSpectrum:
     deviation: Floats | None = None
     uncertainty: Floats | None = None
     pixels: int | None = None
+    where: str = ""
 
 
 def named_spectrum(spectrum: xr.Dataset) -> NamedSpectrum:
@@ -70,6 +72,7 @@ def export_spectra(
         draft.open("w", newline="", encoding="utf-8") as file,
     ):
         file.writelines(f"# {key}: {value}\n" for key, value in provenance_of(attributes).items())
+        file.writelines(f"# {' '.join(each.name.split())}: {each.where}\n" for each in spectra if each.where)
         csv.writer(file).writerows(_rows(spectra, "nan"))
     return path
 

@@ -1,7 +1,9 @@
 from __future__ import annotations
 
+import gc
 import threading
 import time
+import weakref
 from collections.abc import Callable
 from types import SimpleNamespace
 
@@ -44,6 +46,20 @@ def test_what_is_shown_reaches_the_camera() -> None:
         live.show(kind)
         means.append(float(devices.camera.snap().pixels.mean()))
     assert means[1] > means[0] + 50
+
+
+def test_a_rig_that_was_let_go_leaves_the_memory(monkeypatch: pytest.MonkeyPatch) -> None:
+    runner = InlineRunner()
+    live, _ = controller(runner)
+    monkeypatch.setattr(live.rig, "start_live", lambda work: None)
+    live.rig.connect(TWIN)
+    live.begin()
+    gone = weakref.ref(live.rig.state.devices.value)
+    live.rig.disconnect()
+    # The window's runner keeps no jobs.
+    runner.finished.clear()
+    gc.collect()
+    assert gone() is None
 
 
 def test_the_exposure_stays_within_the_camera() -> None:

@@ -248,6 +248,18 @@ def test_a_lost_camera_keeps_all_frames_and_the_scan_goes_on_later(
     assert ScanReader(tmp_path / "first.dsl").missing() == []
 
 
+def test_frames_of_the_scan_before_are_not_shown_as_those_of_one_that_saved_none(
+    bench: ScanBench, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    bench.scans.start()
+    bench.scans.take_news()
+    assert (bench.state.status.value.done, bench.state.picture.value is None) == (FRAMES, False)
+    fail_from(monkeypatch, 0)
+    bench.scans.start()
+    assert phase(bench) is Phase.LOST
+    assert (bench.state.status.value.done, bench.state.picture.value) == (0, None)
+
+
 def test_a_scan_goes_on_over_a_damaged_frame(
     bench: ScanBench, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:

@@ -5,12 +5,14 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
-from dsl_app.scan.controls import RECONNECT, RESUME, banner_controls, progress_text, run_controls
-from dsl_app.scan.state import Facts, InterruptedScan, Phase, Reconnection
+from dsl_app.scan.controls import RECONNECT, RESUME, banner_controls, frame_text, progress_text, run_controls
+from dsl_app.scan.state import Facts, InterruptedScan, LivePicture, Phase, Reconnection
 from dsl_app.shared.notify import NO_RIG
 
 from dsl_core.capture.runner import State, Status
+from dsl_core.model.presets import PRESETS
 
 FREE = Facts(76, 12.0, 1000, 10**9)
 BLOCKED = Facts(76, 12.0, 1000, 10**9, obstacles=("No rig is connected.", "The disk is full."))
@@ -99,6 +101,27 @@ def test_the_banner_follows_the_reconnection(
     shown = banner_controls(reconnection)
     assert (shown.action.text, shown.action.tip, shown.action.is_enabled) == (action, tip, is_enabled)
     assert shown.stop.is_visible is can_stop
+
+
+def test_the_banner_of_a_scan_that_saved_nothing_starts_it_again() -> None:
+    assert banner_controls(Reconnection.NONE, has_frames=False).action.text == "Start again"
+    assert banner_controls(Reconnection.TRYING, has_frames=False).action.text == "Connect and start again"
+
+
+def test_the_last_frame_tells_its_exposure_its_pace_and_what_came_twice() -> None:
+    shot = next(iter(PRESETS[0].plan.shots()))
+    shown = LivePicture(shot, np.zeros((2, 2, 3), np.uint8), 2, brightest=0.62, saturated=0.014)
+    half = Status(State.RUNNING, done=38, total=78, elapsed_s=20.0, remaining_s=20.0, corrected=2)
+    said = frame_text(half, shown)
+    assert [each.text for each in (said.brightest, said.saturated, said.each, said.again)] == [
+        "62 % of full scale",
+        "1.4 % of the pixels",
+        "0.5 s",
+        "2: a picture did not show its pattern",
+    ]
+    assert said.again.role == "warn"
+    before = frame_text(Status(State.IDLE), None)
+    assert (before.brightest.text, before.each.text, before.again.text) == ("–", "–", "none")
 
 
 def test_progress_is_empty_until_there_is_some() -> None:

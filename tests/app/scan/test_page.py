@@ -14,6 +14,7 @@ from dsl_app.scan.effects.state import EffectsState
 from dsl_app.scan.forecast.controller import ForecastController
 from dsl_app.scan.forecast.panel import ForecastPanel
 from dsl_app.scan.forecast.state import ForecastState
+from dsl_app.scan.frame_box import pattern_levels
 from dsl_app.scan.page import ScanPage
 from dsl_app.scan.state import LivePicture, Phase
 from dsl_app.scan.view import FramePicture
@@ -186,7 +187,7 @@ def test_a_lost_camera_is_said_over_the_page(
         assert "frames are safe" not in page.run.remarks.text()
         # The page itself makes one attempt after another.
         qtbot.waitUntil(lambda: "attempt 1 of" not in page.banner.text, timeout=60_000)
-        assert page.banner.action.text() == "Connect and resume"
+        assert page.banner.action.text() == "Connect and start again"
         assert page.stop.isVisible()
         click(page.stop)
         assert not page.stop.isVisible()
@@ -441,6 +442,19 @@ def test_a_scan_of_another_picture_size_fills_the_view(qtbot: QtBot) -> None:
         view = picture.box.viewRect()
         assert view.contains(QRectF(0, 0, width * cell_px, height * cell_px))
         assert view.height() < 1.2 * height * cell_px
+
+
+def test_the_pattern_beside_a_frame_is_that_of_its_shot_as_bright_as_can_be() -> None:
+    shots = list(SHORT.shots())
+    picture = np.zeros((20, 30, 3), np.uint8)
+    lines, white, repeated = (
+        next(each for each in shots if each.role == role) for role in ("spectral", "white", "sentinel")
+    )
+    drawn = [pattern_levels(SHORT, LivePicture(shot, picture, 2)) for shot in (lines, white, repeated)]
+    assert [(levels.min(), levels.max()) for levels in drawn[:2]] == [(0, 255), (255, 255)]
+    np.testing.assert_array_equal(
+        drawn[2], pattern_levels(SHORT, LivePicture(SHORT.original(repeated), picture, 2))
+    )
 
 
 def test_arrow_keys_come_back_into_a_smaller_picture(qtbot: QtBot) -> None:

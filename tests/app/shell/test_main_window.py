@@ -15,7 +15,7 @@ from dsl_app.shell.actions import ACTIONS, PAGES
 from dsl_app.shell.application import ExceptionHook, make_window, open_first_page
 from dsl_app.shell.main_window import MainWindow
 from dsl_app.shell.paged_window import first_size
-from PySide6.QtCore import QSize
+from PySide6.QtCore import QSize, Qt
 from PySide6.QtGui import QCursor
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QFileDialog, QLabel, QMenu, QVBoxLayout
@@ -101,6 +101,16 @@ def test_the_keyboard_goes_on_from_the_page_that_is_opened(window: MainWindow) -
     window.menuBar().setFocus()
     window.open_page(window.pages[0])
     assert window.focusWidget() is window.menuBar()
+
+
+def test_tab_comes_to_the_page_that_is_open_however_it_was_opened(window: MainWindow) -> None:
+    # The stop of the Tab key stays where the keyboard last was, and it has left from there.
+    window.rail._buttons[window.pages[0]].setFocus()
+    window.menuBar().setFocus()
+    for page in window.pages:
+        window.open_page(page)
+        buttons = window.rail._buttons.items()
+        assert [key for key, each in buttons if each.focusPolicy() & Qt.FocusPolicy.TabFocus] == [page]
 
 
 def test_the_open_page_is_remembered(window: MainWindow, tmp_path: Path) -> None:

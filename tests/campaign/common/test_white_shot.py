@@ -100,3 +100,15 @@ def test_light_that_is_too_weak_or_not_the_projectors_is_told() -> None:
     with pytest.raises(CalibrationError, match="It is too dark: in 4 s white reaches"):
         bracket(RIG, white(1e5), "It", 6.0)
     assert [figure.name for figure in failures(film_light(white(10.0, 0.3), RIG))] == ["other light"]
+
+
+def test_a_look_finds_too_dark_what_a_capture_would_refuse() -> None:
+    for cycles in (10.0, 1e5):
+        seen, _ = film_light(white(cycles), RIG)
+        try:
+            bracket(RIG, white(cycles), "It", 1.0)
+        except CalibrationError:
+            assert not seen.passed
+        else:
+            assert str(seen) == "brightness of white in up to 4 s 100 % of the camera's range"
+    assert seen.limits == "at least 2 % of the camera's range"

@@ -17,7 +17,7 @@ from dsl_core.model.placement import Placement
 #: A sentence and its role of the style sheet.
 Verdict = tuple[str, str]
 #: The buttons of which one is the main one at any time.
-Main = Literal["back", "next", "all", "check", "capture", "fit", "accept", "following", "leave"]
+Main = Literal["reconnect", "back", "next", "all", "check", "capture", "fit", "accept", "following", "leave"]
 #: The page of the settings, and that of the first step.
 SETTINGS_PAGE, FIRST_PAGE = 0, 1
 NO_PICTURE = "No picture yet. It comes with the first check."
@@ -33,7 +33,10 @@ _MARK_ROLES = {"✓": "good", "✗": "bad"}
 
 @dataclass(frozen=True)
 class Buttons:
-    """The row of buttons below every page; exactly one is primary, which the return key presses."""
+    """The row of buttons below every page; one is primary, which the return key presses.
+
+    None is while a device is lost: its message has the button that continues.
+    """
 
     leave: ButtonState
     back: ButtonState
@@ -84,7 +87,9 @@ def buttons(state: WizardState) -> Buttons:
 
 
 def main_button(state: WizardState) -> Main:
-    """The button that continues from the current page."""
+    """The button that continues from the current page, or that of the message of a lost device."""
+    if state.can_reconnect.value:
+        return "reconnect"
     status, fit = state.status, state.fit.value
     if status is not None and status.state != "captured":
         if state.trouble.value or (state.look.value is not None and not state.look.value.is_good):

@@ -97,7 +97,7 @@ class CalibrationWizard(QDialog):
             state.settings.follow(self.settings.show_settings),
             state.settings_trouble.follow(self.settings.say),
             state.trouble.follow(self.banner.say),
-            state.can_reconnect.follow(self.banner.action.setVisible),
+            state.can_reconnect.follow(self._offer_reconnection),
             state.doing.follow(self._show_doing),
         ]
 
@@ -115,6 +115,11 @@ class CalibrationWizard(QDialog):
         pages = {0: self.settings, self._state.last: self.fit}
         self.stack.setCurrentWidget(pages.get(at, self.step))
         self.steps.mark(at)
+
+    def _offer_reconnection(self, on: bool) -> None:
+        self.banner.action.setVisible(on)
+        # What the return key presses; the buttons below have none that is blue meanwhile.
+        self.banner.action.setDefault(on)
 
     def _show_doing(self, doing: Doing) -> None:
         # Reading settings again takes a moment in which a field must not lose the focus.
@@ -252,7 +257,7 @@ class WizardButtons(QWidget):
         self.accept.clicked.connect(commands.accept)
         shown = (
             *(state.at, state.doing, state.statuses, state.fit, state.allowed, state.look),
-            *(state.outlines, state.places_itself, state.trouble),
+            *(state.outlines, state.places_itself, state.trouble, state.can_reconnect),
         )
         self.stops = [
             *follow_any(self._show, *shown),

@@ -168,17 +168,18 @@ class PairController:
     # Report ----------------------------------------------------------------------------------------
 
     def write_report(self, target: Path) -> None:
-        """Write the report of A against its ground truth as an HTML page."""
+        """Write the report of A against its ground truth, or against another result, as an HTML page."""
         pair = self.state.pair.value
-        if pair is None or pair.second.truth is None:
+        if pair is None:
             self._notifier.tell(
-                "info",
-                "A report needs the ground truth. Choose Truth as B first.",
+                "info", "A report needs two results that can be compared. Choose A and B first."
             )
             return
         first, truth = pair.first, pair.second.truth
 
         def work(progress: Progress) -> Path:
+            if truth is None:
+                return _write_pair(pair, target, progress)
             from dsl_core import pipeline
             from dsl_core.evaluation.report.scan_report import report_content
             from dsl_core.io.result.result_file import load_result
@@ -246,3 +247,25 @@ def truth_arrays(result: ResultArrays, truth: Truth) -> ResultArrays:
         spectra = np.vstack([truth.spectra, np.full((1, truth.spectra.shape[1]), np.nan)]).astype(np.float32)
         arrays["reflectance"] = np.ascontiguousarray(spectra.T)[:, truth.material]
     return ResultArrays(result.path, result.wavelengths_nm, arrays)
+
+
+def _write_pair(pair: Pair, target: Path, progress: Progress) -> Path:
+    """Write a page about two results; raises `StoreError`."""
+    from dsl_core.evaluation.report.pair_page import PairMap, pair_page
+    from dsl_core.io.staging import write_text
+
+    progress.report("write the report", 0, 1)
+    maps = []
+    depths, means = pair.images(PairQuantity.DEPTH, 0), pair.mean_reflectance()
+    if depths is not None:
+        maps.append(PairMap("Depth", "mm", *depths))
+    if means is not None:
+        maps.append(PairMap("Mean reflectance", "", *means))
+    sides = pair.first, pair.second
+    page = pair_page(
+        (sides[0].name, sides[1].name),
+        (sides[0].arrays.attributes, sides[1].arrays.attributes),
+        pair.rows,
+        maps,
+    )
+    return write_text(target, lambda: page, overwrite=True)

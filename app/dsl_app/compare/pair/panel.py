@@ -46,7 +46,7 @@ class PairPanel(QWidget):
         )
         self.swap = push_button("S&wap", "Swap A and B", control.swap)
         self.report = push_button(
-            "Write re&port…", "Save figures and pictures of A against the ground truth as an HTML page"
+            "Write re&port…", "Save figures and pictures of the comparison as an HTML page"
         )
         self.hint = remark_line()
         # Slow to make: made when they are first seen.

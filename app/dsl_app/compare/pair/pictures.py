@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from html import escape
 from typing import Any
 
 import numpy as np
@@ -133,7 +134,7 @@ class PairPictures(QWidget):
         if pair is not None:
             names = f"A  {short_name(pair.first.name)}", f"B  {short_name(pair.second.name)}", "A − B"
         for title, name in zip(self.titles, names, strict=True):
-            title.setText(name, color=self._theme.text)
+            title.setText(escape(name), color=self._theme.text)
 
     def paint(self) -> None:
         """Paint what the state shows."""

@@ -70,6 +70,17 @@ class Pair:
         i, k = self.bands[band]
         return self.first.arrays["reflectance"][i], self.second.arrays["reflectance"][k]
 
+    def mean_reflectance(self) -> tuple[Floats, Floats] | None:
+        """Reflectance of A and B over their common bands, images (h, w); None where they have none."""
+        if not self.bands:
+            return None
+        sums: list[Any] = [0.0, 0.0]
+        for band in range(len(self.bands)):
+            images = self.images(PairQuantity.BAND, band)
+            assert images is not None
+            sums = [sum_ + np.asarray(image, np.float64) for sum_, image in zip(sums, images, strict=True)]
+        return sums[0] / len(self.bands), sums[1] / len(self.bands)
+
     def nm(self, band: int) -> float:
         """Wavelength of a common band."""
         return float(self.first.arrays.wavelengths_nm[self.bands[band][0]])
@@ -129,7 +140,7 @@ def pair_display(state: PairState) -> PairDisplay:
         at_hand=at_hand,
         truth=ButtonState(is_enabled=idle and first is not None, is_primary=takes_truth),
         swap=idle and pair is not None and not has_truth,
-        report=ButtonState(is_enabled=idle and pair is not None and has_truth, is_primary=has_truth),
+        report=ButtonState(is_enabled=idle and pair is not None, is_primary=has_truth),
     )
 
 

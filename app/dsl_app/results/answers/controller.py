@@ -14,6 +14,9 @@ from dsl_core.analysis.classify import Brightness, Limits, Measure
 from dsl_core.io.result.result_arrays import ResultArrays
 from dsl_core.progress import Progress
 
+#: How long a report that was written is offered to be opened, s.
+REPORT_STAYS_S = 30.0
+
 
 @dataclass(frozen=True)
 class Way:
@@ -161,7 +164,10 @@ class AnswersController:
             )
             return write_report(content, path, overwrite=overwrite)
 
-        done = lambda path: self._notifier.tell("info", f"The report is saved in {path.name}.")  # noqa: E731
+        def done(path: Path) -> None:
+            show = {"Open the report": lambda: self.state.opened.emit(path)}
+            self._notifier.offer(f"The report is saved in {path.name}.", show, REPORT_STAYS_S)
+
         self._runner.submit(Job(f"Write {path.name}", work, done))
 
 

@@ -51,7 +51,9 @@ def _named_spectrum(mark: Mark) -> NamedSpectrum:
     nm, mean, std = mark.spectrum.nm, mark.spectrum.mean, mark.spectrum.std
     match mark.kind:
         case "pin":
-            return NamedSpectrum(mark.name, nm, mean, uncertainty=std, pixels=1)
+            at = mark.pixel
+            where = "" if at is None else f"pixel at column {at[0]}, row {at[1]}, counted from 0"
+            return NamedSpectrum(mark.name, nm, mean, uncertainty=std, pixels=1, where=where)
         case "region":
             return NamedSpectrum(mark.name, nm, mean, std, mark.pixel_std, mark.used)
         case "reference":

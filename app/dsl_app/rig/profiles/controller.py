@@ -7,11 +7,21 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, TypeVar
 
-from dsl_app.rig.profiles.draft import Draft, DraftPart, draft_of, part_of, profile_of
+from dsl_app.rig.profiles.draft import (
+    Draft,
+    DraftPart,
+    caption,
+    draft_of,
+    part_of,
+    profile_of,
+    wrong_settings,
+)
 from dsl_app.rig.profiles.state import Found, ProfileState
 from dsl_app.shared.jobs.base import Job, JobRunner
 from dsl_app.shared.notify import sentence_of
+from dsl_core.devices.doctor import Finding
 from dsl_core.devices.driver_table import KINDS, Kind, driver_names, list_drivers
+from dsl_core.devices.profile import RigProfile
 from dsl_core.errors import DeviceError, DslError, TakenError
 from dsl_core.io.rig_profile import load_profile, save_profile
 from dsl_core.progress import Progress
@@ -30,6 +40,7 @@ class ProfileController:
         """Edit the profile of a file; None begins a new one."""
         self.state.findings.set(())
         self.state.trouble.set("")
+        self.state.wrong.set({})
         self.state.opened = Draft()
         if path is not None:
             try:
@@ -64,6 +75,8 @@ class ProfileController:
 
     def _set(self, draft: Draft) -> None:
         self.state.trouble.set("")
+        if self.state.wrong.value:
+            self.state.wrong.set(wrong_settings(draft))
         self.state.draft.set(draft)
 
     # Look and try ----------------------------------------------------------------------------------
@@ -79,22 +92,38 @@ class ProfileController:
     def try_devices(self) -> None:
         """Open and try every device of the draft."""
         from dsl_core.devices.doctor import examine
+        from dsl_core.io.rig_profile import examine_nominal
 
         if self._is_in_use():
             self.state.trouble.set("A rig is connected, and its devices are taken. Disconnect it, then try.")
             return
         draft = self.state.draft.value
-        try:
-            profile = profile_of(draft)
-        except DslError as error:
-            self.state.trouble.set(sentence_of(error))
+        # What a rig is called says nothing of its devices.
+        profile = self._profile(draft if draft.name else replace(draft, name="rig"))
+        if profile is None:
             return
+
+        def work(_progress: Progress) -> list[Finding]:
+            return [*examine(profile), *examine_nominal(profile, draft.target.parent)]
 
         def done(found: Any) -> None:
             self.state.tried.set(draft)
             self.state.findings.set(tuple(found))
 
-        self._run(f"Try the devices of {profile.name}", lambda _: examine(profile), done)
+        self._run(f"Try the devices of {profile.name}", work, done)
+
+    def _profile(self, draft: Draft) -> RigProfile | None:
+        """The profile that a draft means; None where it means none, and then why."""
+        wrong = wrong_settings(draft)
+        self.state.wrong.set(wrong)
+        try:
+            if not wrong:
+                return profile_of(draft)
+            told = (f"{caption(name)} {said[name]}" for said in wrong.values() for name in said)
+            self.state.trouble.set(f"{'; '.join(told)}.")
+        except DslError as error:
+            self.state.trouble.set(sentence_of(error))
+        return None
 
     def _run(self, title: str, work: Callable[[Progress], T], done: Callable[[T], object]) -> None:
         if self.state.busy.value:
@@ -117,8 +146,10 @@ class ProfileController:
     def save(self) -> bool:
         """Save the profile, whole or not at all; says why where that is not possible."""
         draft = self.state.draft.value
+        profile = self._profile(draft)
+        if profile is None:
+            return False
         try:
-            profile = profile_of(draft)
             draft.target.parent.mkdir(parents=True, exist_ok=True)
             # What was opened is replaced; nothing else is.
             save_profile(profile, draft.target, overwrite=draft.target == draft.path)

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-from PySide6.QtWidgets import QFormLayout, QLineEdit, QWidget
+from collections.abc import Mapping
+
+from PySide6.QtWidgets import QFormLayout, QLabel, QLineEdit, QWidget
 
 from dsl_app.rig.profiles.controller import ProfileController
-from dsl_app.rig.profiles.draft import NEEDED, DraftPart, text_of
+from dsl_app.rig.profiles.draft import NEEDED, DraftPart, caption, text_of
 from dsl_app.rig.profiles.state import Found
-from dsl_app.shared.widgets.forms import ChoiceBox, label, named, quiet
+from dsl_app.shared.widgets.forms import ChoiceBox, label, named, quiet, set_role
 from dsl_app.shared.widgets.layouts import boxed, column_of, scrolled
 from dsl_core.devices.driver_table import Kind, find_driver
 from dsl_core.errors import DeviceError
-from dsl_core.words import capitalised
+from dsl_core.words import capitalised, sentence
 
 NOTHING_FOUND, NOT_LOOKED = "nothing found", "not looked for yet"
 
@@ -23,7 +25,10 @@ class DeviceForm(QWidget):
         super().__init__()
         self.kind, self._commands = kind, commands
         self._shown: DraftPart | None = None
+        self._abouts: dict[str, str] = {}
         self.fields: dict[str, QLineEdit] = {}
+        #: What a setting is, or what is wrong with it, below its field.
+        self.notes: dict[str, QLabel] = {}
         tip = "Devices that the drivers see now; choosing one fills in its driver and its address"
         self.found = ChoiceBox(f"Found {kind}", tip, (), self._choose)
         none = "Choose a driver" if kind in NEEDED else f"No {kind}"
@@ -72,7 +77,7 @@ class DeviceForm(QWidget):
     def _make_fields(self, driver: str) -> None:
         while self.form.rowCount():
             self.form.removeRow(0)
-        self.fields = {}
+        self.fields, self.notes, self._abouts = {}, {}, {}
         self.about.clear()
         if not driver:
             return
@@ -81,7 +86,7 @@ class DeviceForm(QWidget):
         except DeviceError as error:
             self.about.setText(str(error))
             return
-        self.about.setText(found.summary + (f". Needs {found.brings}" if found.brings else ""))
+        self.about.setText(capitalised(found.summary) + (f". Needs {found.brings}" if found.brings else ""))
         for name, setting in found.settings.model_fields.items():
             field = named(QLineEdit(), name.replace("_", " "), setting.description or name)
             default = setting.get_default(call_default_factory=True)
@@ -93,20 +98,13 @@ class DeviceForm(QWidget):
                 field.setPlaceholderText(text_of(rounded))
             field.textEdited.connect(lambda text, name=name: self._commands.set_text(self.kind, name, text))
             self.fields[name] = field
-            about = label(setting.description or "", "muted", wraps=True)
-            self.form.addRow(caption(name), column_of(field, about, 4, margins=0, spacing=2))
+            self._abouts[name] = setting.description or ""
+            self.notes[name] = note = label(self._abouts[name], "muted", wraps=True)
+            self.form.addRow(caption(name), column_of(field, note, 4, margins=0, spacing=2))
 
-
-#: Endings of names that are units.
-_UNITS = {"ms": "ms", "s": "s", "px": "px", "mm": "mm", "db": "dB", "nm": "nm"}
-
-
-def caption(name: str) -> str:
-    """The name of a setting as words, with its unit.
-
-    >>> caption("frame_wait_s"), caption("gain_db"), caption("id")
-    ('Frame wait (s)', 'Gain (dB)', 'Id')
-    """
-    words, _, end = name.rpartition("_")
-    text = f"{words} ({_UNITS[end]})" if words and end in _UNITS else name
-    return capitalised(text.replace("_", " "))
+    def show_wrong(self, wrong: Mapping[str, str]) -> None:
+        """Say below each field what is wrong with its setting, which is told by its name."""
+        for name, note in self.notes.items():
+            about = self._abouts[name]
+            note.setText(f"{sentence(wrong[name])} {sentence(about)}" if name in wrong else about)
+            set_role(note, "bad" if name in wrong else "muted")

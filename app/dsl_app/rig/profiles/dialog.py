@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 from PySide6.QtWidgets import QDialog, QDialogButtonBox, QFileDialog, QFormLayout, QLineEdit, QWidget
 
 from dsl_app.rig.profiles.controller import ProfileController
@@ -16,7 +18,7 @@ from dsl_app.shared.widgets.inside import stop_following
 from dsl_app.shared.widgets.layouts import STRETCH, boxed, column_of, row_of, tabs_of
 from dsl_app.shared.widgets.read_table import ReadTable, cell
 from dsl_core.devices.doctor import Finding, Grade
-from dsl_core.devices.driver_table import KINDS
+from dsl_core.devices.driver_table import KINDS, Kind
 
 WIDTH_PX, HEIGHT_PX = 1060, 660
 _ROLES = {Grade.GOOD: "good", Grade.WARNING: "warn", Grade.BAD: "bad"}
@@ -27,7 +29,7 @@ class ProfileDialog(QDialog):
 
     def __init__(self, state: ProfileState, commands: ProfileController, parent: QWidget) -> None:
         super().__init__(parent)
-        self._state, self._commands = state, commands
+        self._state, self._commands, self._was_wrong = state, commands, False
         self.setWindowTitle("Rig profile")
         self.resize(WIDTH_PX, HEIGHT_PX)
         add_help_key(self, "connecting-devices")
@@ -67,9 +69,9 @@ class ProfileDialog(QDialog):
         form.addRow("Name", self.name)
         form.addRow("Data sheets", row_of((self.nominal, 1), self.browse))
         form.addRow("Note", self.note)
-        tabs = tabs_of("Devices", *((form, kind.capitalize(), "") for kind, form in self.forms.items()))
+        self.tabs = tabs_of("Devices", *((form, kind.capitalize(), "") for kind, form in self.forms.items()))
         right = boxed(column_of(row_of(self.test, STRETCH), self.verdict, (self.findings, 1), margins=0))
-        left = boxed(column_of(row_of(self.look, STRETCH), (tabs, 1), margins=0))
+        left = boxed(column_of(row_of(self.look, STRETCH), (self.tabs, 1), margins=0))
         column_of(form, (row_of((left, 1), (right, 1), spacing=16), 1), self.trouble, self.buttons, on=self)
 
     def _connect(self) -> None:
@@ -84,6 +86,7 @@ class ProfileDialog(QDialog):
             state.draft.follow(self._show_draft),
             state.found.follow(self._show_found),
             state.findings.follow(self._show_findings),
+            state.wrong.follow(self._show_wrong),
             *follow_any(self._show, state.draft, state.busy, state.trouble, state.findings, state.found),
         ]
 
@@ -102,6 +105,14 @@ class ProfileDialog(QDialog):
 
     def _show_findings(self, findings: tuple[Finding, ...]) -> None:
         self.findings.show_rows([[cell(f.device), cell(f.text, _ROLES[f.grade])] for f in findings])
+
+    def _show_wrong(self, wrong: Mapping[Kind, Mapping[str, str]]) -> None:
+        for kind, form in self.forms.items():
+            form.show_wrong(wrong.get(kind, {}))
+        if wrong and not self._was_wrong:
+            # The field may be on another tab than the one that is seen.
+            self.tabs.setCurrentWidget(self.forms[next(iter(wrong))])
+        self._was_wrong = bool(wrong)
 
     def _show(self) -> None:
         view = profile_view(self._state)

@@ -9,12 +9,15 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Union, get_args, get_origin
 
+from pydantic import ValidationError
 from pydantic.fields import FieldInfo
 
 from dsl_core.devices.driver_table import KINDS, FoundDevice, Kind, find_driver, read_settings
 from dsl_core.devices.profile import DevicePart, RigProfile
 from dsl_core.errors import DeviceError
 from dsl_core.io.rig_profile import SUFFIX, profiles_folder
+from dsl_core.model.base import what_is_wrong
+from dsl_core.words import capitalised
 
 #: Devices that a rig cannot do without.
 NEEDED: tuple[Kind, ...] = ("camera", "projector")
@@ -87,7 +90,11 @@ def require_name(name: str) -> None:
     """Raise `DeviceError` for a name that cannot be that of a file, or is that of an installed rig."""
     from dsl_core.devices.registry import is_built_in
 
-    if not name or name != name.strip() or name.startswith(".") or set(name) & set('/\\:*?"<>|'):
+    if not name.strip():
+        raise DeviceError(
+            "The rig has no name, which is that of its file. Enter one of letters, digits, spaces and dashes."
+        )
+    if name != name.strip() or name.startswith(".") or set(name) & set('/\\:*?"<>|'):
         raise DeviceError(
             f"The name of the rig is {name!r}; it names the file of the profile. Enter a name of letters,"
             " digits, spaces and dashes."
@@ -106,6 +113,26 @@ def settings_of(kind: Kind, part: DraftPart) -> dict[str, Any]:
     }
     read_settings(kind, part.driver, given)
     return given
+
+
+def wrong_settings(draft: Draft) -> dict[Kind, dict[str, str]]:
+    """What is wrong with settings that drivers refuse, in words, by kind of device and name of setting."""
+    found: dict[Kind, dict[str, str]] = {}
+    for kind in KINDS:
+        try:
+            if draft.part(kind).driver:
+                settings_of(kind, draft.part(kind))
+        except DeviceError as error:
+            faults = error.__cause__.errors() if isinstance(error.__cause__, ValidationError) else []
+            # A list is what a person writes with commas.
+            said: dict[str, str] = {}
+            for fault in faults:
+                if fault["loc"]:
+                    words = what_is_wrong(fault).replace("a list", "values separated by commas")
+                    said.setdefault(str(fault["loc"][0]), words)
+            if said:
+                found[kind] = said
+    return found
 
 
 def value_of(text: str, setting: FieldInfo) -> Any:
@@ -148,3 +175,18 @@ def text_of(value: object) -> str:
     if isinstance(value, list | tuple):
         return ", ".join(text_of(each) for each in value)
     return json.dumps(value)
+
+
+#: Endings of names that are units.
+_UNITS = {"ms": "ms", "s": "s", "px": "px", "mm": "mm", "db": "dB", "nm": "nm"}
+
+
+def caption(name: str) -> str:
+    """The name of a setting as words, with its unit.
+
+    >>> caption("frame_wait_s"), caption("gain_db"), caption("id")
+    ('Frame wait (s)', 'Gain (dB)', 'Id')
+    """
+    words, _, end = name.rpartition("_")
+    text = f"{words} ({_UNITS[end]})" if words and end in _UNITS else name
+    return capitalised(text.replace("_", " "))

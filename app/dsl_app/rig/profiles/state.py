@@ -26,9 +26,9 @@ class ProfileState:
 
     ``opened`` is the draft as it was read, before anything was changed.
     ``drivers`` are the names of drivers by kind, ``found`` the devices they see, None before anybody looked.
-    ``findings`` is what trying
-    the devices said, ``tried`` the draft that was tried. ``busy`` says what is being done (empty: nothing),
-    ``trouble`` what is wrong. ``saved`` fires with the file.
+    ``findings`` is what trying the devices said, ``tried`` the draft that was tried. ``busy`` says what is
+    being done (empty: nothing), ``trouble`` what is wrong, and ``wrong`` what is so with settings, by kind
+    and name. ``saved`` fires with the file.
     """
 
     def __init__(self) -> None:
@@ -40,6 +40,7 @@ class ProfileState:
         self.tried: Value[Draft | None] = Value(None)
         self.busy = Value("")
         self.trouble = Value("")
+        self.wrong: Value[Mapping[Kind, Mapping[str, str]]] = Value({})
         self.saved: Event[Path] = Event()
 
     @property
@@ -66,7 +67,7 @@ class ProfileView:
 def profile_view(state: ProfileState) -> ProfileView:
     """The dialog's texts for what is known now."""
     draft, busy, findings = state.draft.value, state.busy.value, state.findings.value
-    remark = f"{busy}…" if busy else f"Saves {draft.target}." if draft.name else ""
+    remark = f"{busy}…" if busy else (_not_found(state) or (f"Saves {draft.target}." if draft.name else ""))
     verdict, role = "Try opens every device and says what is wrong. Nothing is moved.", "muted"
     if findings:
         bad = sum(each.grade is Grade.BAD for each in findings)
@@ -83,6 +84,27 @@ def profile_view(state: ProfileState) -> ProfileView:
 
 def _following(state: ProfileState) -> str:
     draft = state.draft.value
-    if not all(draft.part(kind).driver for kind in NEEDED):
-        return "look"
-    return "save" if state.tried.value is draft else "try"
+    missing = _missing(state)
+    if missing:
+        is_found = state.found.value is not None and any(each.kind in missing for each in state.found.value)
+        # What was found is there to be chosen: looking again would find the same.
+        return "" if is_found else "look"
+    works = all(each.grade is not Grade.BAD for each in state.findings.value)
+    return "save" if state.tried.value is draft and works else "try"
+
+
+def _missing(state: ProfileState) -> list[Kind]:
+    """Devices that a rig needs and that have no driver yet."""
+    return [kind for kind in NEEDED if not state.draft.value.part(kind).driver]
+
+
+def _not_found(state: ProfileState) -> str:
+    """What to do where nothing was found of what a rig needs; empty before anybody looked."""
+    found = state.found.value
+    if found is None:
+        return ""
+    absent = [kind for kind in _missing(state) if all(each.kind != kind for each in found)]
+    if not absent:
+        return ""
+    what = " and no ".join(absent)
+    return f"No {what} was found. Check cables and power and look again, or choose the driver."

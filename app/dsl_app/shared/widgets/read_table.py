@@ -123,7 +123,12 @@ class ReadTable(QTableWidget):
         items = (self.item(row, self._wrapped) for row in range(self.rowCount()))
         has_text = any(item is not None and item.text() for item in items)
         self._stretch(self._wrapped, LEAST_WRAPPED_PX if has_text else 0)
-        self.resizeRowsToContents()
+        if has_text:
+            self.resizeRowsToContents()
+        else:
+            self.verticalHeader().setDefaultSectionSize(DENSE_PX)
+            for row in range(self.rowCount()):
+                self.setRowHeight(row, DENSE_PX)
 
     def _stretch(self, column: int, least_px: int) -> None:
         """Give a column what the others leave; if that is too little, scroll sideways."""

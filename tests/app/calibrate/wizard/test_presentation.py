@@ -223,6 +223,15 @@ def test_what_was_found_wrong_is_checked_before_it_is_captured(values: dict[str,
     assert main_button(wizard(FIRST, places_itself=True, **good)) == "all"
 
 
+@pytest.mark.parametrize("at", [FIRST, LAST])
+def test_a_lost_device_is_connected_before_anything_else(at: int) -> None:
+    state = wizard(at, places_itself=True)
+    state.can_reconnect.set(True)
+    shown = buttons(state)
+    assert main_button(state) == "reconnect"
+    assert not any(getattr(shown, each.name).is_primary for each in fields(Buttons))
+
+
 def test_the_next_calibration_is_the_main_button_once_this_one_is_accepted() -> None:
     done = wizard(LAST, CAPTURED, fit=fit(GOOD, accepted=True))
     assert not buttons(done).following.is_visible

@@ -34,7 +34,7 @@ def test_a_calibration_by_mouse_from_placing_to_accepting(stage: Stage) -> None:
     assert wizard.fit.verdict.text() == "All steps are captured. Fit them to see how good they are."
     click(buttons.fit)
     stage.wait(lambda: state.fit.value is not None)
-    assert cell(wizard.fit.figures, 0, 1) == "brightest"
+    assert cell(wizard.fit.figures, 0, 1) == "Brightest"
     assert "within their limits" in wizard.fit.verdict.text()
     click(buttons.accept)
     stage.wait(lambda: "The rig is saved in" in state.note.value)

@@ -112,13 +112,27 @@ def test_sides_change_places(results: tuple[Path, Path, Path]) -> None:
     assert (pair.first.name, pair.second.name) == ("near", "chart")
 
 
+def test_a_report_of_two_results_has_their_figures_and_where_they_differ(
+    results: tuple[Path, Path, Path], tmp_path: Path
+) -> None:
+    compare, notifier = controller()
+    compare.open(results[0])
+    compare.open(results[1])
+    compare.write_report(tmp_path / "pair.html")
+    page = (tmp_path / "pair.html").read_text(encoding="utf-8")
+    for words in ("chart compared with near", "Depth, RMS difference", "Mean reflectance, A − B"):
+        assert words in page
+    assert page.count("data:image/png") == 4
+    assert "pair.html" in notifier.told[-1][1]
+
+
 def test_what_is_not_a_result_is_left_to_others(tmp_path: Path) -> None:
     compare, notifier = controller()
     assert not compare.open(tmp_path)
     compare.open_side(tmp_path, second=True)
     assert "is not a result" in notifier.told[-1][1]
     compare.write_report(tmp_path / "r.html")
-    assert "needs the ground truth" in notifier.told[-1][1]
+    assert "needs two results" in notifier.told[-1][1]
 
 
 def test_the_cursor_stays_in_the_image(results: tuple[Path, Path, Path]) -> None:

@@ -106,6 +106,18 @@ def test_recent_results_are_compared_by_a_double_click(qtbot: QtBot, bench: Benc
     assert not page.empty.isVisible()
 
 
+def test_a_name_with_signs_of_markup_is_whole_above_its_picture(
+    qtbot: QtBot, bench: Bench, chart: Path
+) -> None:
+    page, state, control = bench
+    control.open_side(chart, False)
+    qtbot.waitUntil(lambda: not state.busy.value, timeout=20_000)
+    control.open_side(make_variant(chart, "Mitte <2>", 3.0), True)
+    qtbot.waitUntil(lambda: state.pair.value is not None, timeout=20_000)
+    titles = [title.item.toPlainText() for title in page.pictures.content.titles]
+    assert [" ".join(title.split()) for title in titles] == ["A chart", "B Mitte <2>", "A − B"]
+
+
 def test_figures_pictures_and_spectra_of_a_pair(qtbot: QtBot, bench: Bench, chart: Path) -> None:
     page, state, _ = bench
     with_truth(qtbot, bench, chart)

@@ -53,7 +53,7 @@ def state_of(sides: str, busy: str = "", trouble: str = "") -> PairState:
     [
         (state_of(""), ("–", "–"), "", "open"),
         (state_of("a"), ("chart", "–"), "", "open truth"),
-        (state_of("ab"), ("chart", "box"), "", "open truth swap"),
+        (state_of("ab"), ("chart", "box"), "", "open truth swap report"),
         (state_of("at"), ("chart", "truth"), "", "open truth report"),
         (state_of("at", busy="Compare"), ("chart", "truth"), "Compare…", ""),
     ],

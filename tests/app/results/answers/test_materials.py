@@ -126,6 +126,19 @@ def test_the_map_is_written(bench: Bench, tmp_path: Path) -> None:
     assert "already exists" in bench.told
 
 
+def test_a_report_that_was_written_can_be_opened(
+    bench: Bench, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path, opened = tmp_path / "report.html", list[Path]()
+    monkeypatch.setattr("dsl_core.analysis.session_report.session_content", lambda *_: None)
+    monkeypatch.setattr("dsl_core.analysis.session_report.write_report", lambda *_, **__: path)
+    bench.state.opened.connect(opened.append)
+    bench.control.answers.write_report(path)
+    assert bench.told == "The report is saved in report.html."
+    bench.notifier.offers["Open the report"]()
+    assert opened == [path]
+
+
 def test_another_result_has_no_materials(bench: Bench) -> None:
     bench.control.marks.pin((30, 5))
     bench.control.answers.from_marks(ANGLE)

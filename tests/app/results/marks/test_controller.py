@@ -163,6 +163,10 @@ def test_spectra_are_copied_and_exported_and_read_again_as_references(bench: Ben
     assert f"Wrote 1 spectrum to {path}" in bench.told
     marks.export_spectra(path, overwrite=False)
     assert "already exists" in bench.told
+    marks.show(True, bench.state.marks.value[1].key)
+    both = tmp_path / "both.csv"
+    marks.export_spectra(both, overwrite=False)
+    assert "\n# pin 1: pixel at column 3, row 3, counted from 0\n" in both.read_text(encoding="utf-8")
     assert bench.control.open(path)
     reference = bench.state.marks.value[-1]
     assert reference.kind == "reference"

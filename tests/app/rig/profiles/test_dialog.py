@@ -9,9 +9,10 @@ from dsl_app.composition.window import Composition, StartOptions
 from dsl_app.rig.page import RigPage
 from dsl_app.rig.profiles import controller
 from dsl_app.rig.profiles.controller import ProfileController
-from dsl_app.rig.profiles.device_form import caption
 from dsl_app.rig.profiles.dialog import ProfileDialog
+from dsl_app.rig.profiles.draft import caption
 from dsl_app.rig.profiles.state import Found, ProfileState, profile_view
+from dsl_app.start.page import StartPage
 from PySide6.QtCore import Qt, QTimer
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QMessageBox, QPushButton, QWidget
@@ -71,7 +72,7 @@ def test_a_profile_is_made_of_what_was_found_and_edited_again(bench: Bench) -> N
     assert camera.fields["size_px"].placeholderText() == "640, 480"
     QTest.keyClicks(camera.fields["size_px"], "wide")
     QTest.mouseClick(bench.dialog.save, LEFT)
-    assert "size_px" in bench.dialog.trouble.text()
+    assert bench.dialog.trouble.text() == "Size (px) must be values separated by commas."
     assert (profile_names(), bench.dialog.isVisible()) == ([], True)
     camera.fields["size_px"].clear()
     QTest.keyClicks(camera.fields["size_px"], "1280 x 720")
@@ -94,8 +95,8 @@ def test_a_profile_is_made_of_what_was_found_and_edited_again(bench: Bench) -> N
 def test_trying_says_beside_the_fields_what_works(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
     said = [Finding("camera uvc", Grade.GOOD, "640 x 480 px"), Finding("projector none", Grade.BAD, "None.")]
     monkeypatch.setattr(doctor, "examine", lambda profile: said)
-    QTest.mouseClick(bench.dialog.test, LEFT)
-    assert "The name of the rig is ''" in bench.dialog.trouble.text()
+    QTest.mouseClick(bench.dialog.save, LEFT)
+    assert "The rig has no name" in bench.dialog.trouble.text()
     bench.fill_in()
     bench.is_connected = True
     QTest.mouseClick(bench.dialog.test, LEFT)
@@ -127,6 +128,44 @@ def test_the_blue_button_leads_from_name_to_look_try_and_save(
     assert blue() == ["Save"]
     bench.control.change(note="new")
     assert blue() == ["&Try"]
+
+
+def test_what_is_wrong_with_a_setting_stands_below_its_field_until_it_is_right(bench: Bench) -> None:
+    bench.fill_in()
+    dialog, camera = bench.dialog, bench.dialog.forms["camera"]
+    QTest.keyClicks(camera.fields["size_px"], "wide")
+    dialog.tabs.setCurrentWidget(dialog.forms["stage"])
+    QTest.mouseClick(dialog.test, LEFT)
+    assert dialog.tabs.currentWidget() is camera
+    note = camera.notes["size_px"]
+    assert note.text() == "Must be values separated by commas. Width and height of its pictures."
+    assert (note.property("role"), camera.notes["index"].property("role")) == ("bad", "muted")
+    camera.fields["size_px"].clear()
+    QTest.keyClicks(camera.fields["size_px"], "640, 480")
+    assert (note.text(), note.property("role")) == ("width and height of its pictures", "muted")
+
+
+def test_devices_are_tried_without_a_name_and_with_their_data_sheets(
+    bench: Bench, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(doctor, "examine", lambda profile: [Finding("camera uvc", Grade.GOOD, "640 px")])
+    bench.fill_in()
+    bench.control.change(name="", nominal="nowhere.json")
+    QTest.mouseClick(bench.dialog.test, LEFT)
+    assert [each.device for each in bench.state.findings.value] == ["camera uvc", "data sheets"]
+    # What prevents a scan is not saved next, but tried again.
+    assert is_blue(bench.dialog.test)
+
+
+def test_who_finds_nothing_is_told_what_to_do(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
+    QTest.mouseClick(bench.dialog.look, LEFT)
+    # A camera was found: it is chosen next, not looked for again.
+    assert not is_blue(bench.dialog.look)
+    assert bench.dialog.trouble.text().startswith("No projector was found. Check cables")
+    monkeypatch.setattr(controller, "find_devices", lambda _: ())
+    QTest.mouseClick(bench.dialog.look, LEFT)
+    assert is_blue(bench.dialog.look)
+    assert "No camera and no projector was found" in bench.dialog.trouble.text()
 
 
 def test_defaults_are_shown_as_a_person_writes_them(bench: Bench) -> None:
@@ -194,3 +233,21 @@ def test_a_saved_profile_is_chosen_on_the_rig_page(
     assert [each.name.text() for each in again] == ["room 12"]
     again[0].reject()
     window.close()
+
+
+@pytest.mark.parametrize("has_rig", [False, True])
+def test_who_wants_to_connect_a_first_rig_begins_with_its_profile(
+    qtbot: QtBot, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, has_rig: bool
+) -> None:
+    monkeypatch.setenv("DSL_SCAN_HOME", str(tmp_path))
+    if has_rig:
+        profiles_folder().mkdir(parents=True)
+        (profiles_folder() / "bench.json").write_text("{}")
+    window = Composition(StartOptions()).open_window(tmp_path)
+    qtbot.addWidget(window)
+    window.show()
+    start = window.open_page("start")
+    assert isinstance(start, StartPage)
+    QTest.mouseClick(start.connect_rig, LEFT)
+    assert window.page == "rig"
+    assert bool(window.findChildren(ProfileDialog)) is not has_rig

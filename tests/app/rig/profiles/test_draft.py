@@ -56,7 +56,7 @@ def test_a_draft_is_the_profile_that_it_was_read_from() -> None:
     ("draft", "words"),
     [
         (replace(DRAFT, name="a/b"), "The name of the rig is 'a/b'.* Enter a name of letters"),
-        (replace(DRAFT, name=""), "The name of the rig is ''"),
+        (replace(DRAFT, name=""), "The rig has no name"),
         (replace(DRAFT, name="twin"), "'twin' is the name of a rig of this program"),
         (DRAFT.with_part("camera", DraftPart()), "has no camera. Choose its driver"),
         (
