@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import pytest
-from dsl_app.calibrate.library_panel import DriftWindow
+from dsl_app.calibrate.library_panel import DriftWindow, LibraryPanel
 from dsl_app.calibrate.state import DriftVerdict
 from PySide6.QtCore import QEvent
 from PySide6.QtWidgets import (
@@ -17,6 +17,12 @@ from dsl_core.model.figure import Figure
 from tests.app.calibrate.page_stage import Stage, cell, click
 
 LIMITED = Figure(name="error", value=0.8, std=0.1, unit="px", high=0.5, advice="Hold it still.")
+
+
+@pytest.fixture(autouse=True)
+def panel(stage: Stage) -> LibraryPanel:
+    """The list, which the page makes only once it is seen."""
+    return stage.page.library
 
 
 def test_a_drift_check_shows_its_figures(stage: Stage) -> None:
