@@ -1,4 +1,4 @@
-"""What a calibration that is weeks older than its scan leaves open of light and mounts, in words and figures."""
+"""What a calibration that is weeks older than its scan leaves open of light and mounts."""
 
 from __future__ import annotations
 

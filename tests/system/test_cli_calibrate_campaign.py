@@ -15,6 +15,7 @@ from dsl_core.io.calibration_library import CalibrationLibrary
 from dsl_core.io.rig_file import load_rig
 from dsl_core.io.scan.folder import ScanReader
 from dsl_core.io.sealed import unseal
+from dsl_core.model.calibration.light_check import LightCheck
 from tests.cases import fake_recipe
 
 from .conftest import Give
@@ -68,6 +69,12 @@ def test_one_command_makes_a_rig_a_report_and_a_library_entry(give: Give, tmp_pa
     assert give("calibrate", "all", folder, "--yes", "--name", "lab 3").code == 0
     assert (folder / "geometry" / "pose" / "capture.json").stat().st_mtime_ns == before
     assert len(CalibrationLibrary().stamps("lab 3")) == 1
+    # Nor does it for what a drift check has found of the light since.
+    check = LightCheck(checked="2026-03-22", calibrated="2026-03-01", levels=(1.0, 1.0, 1.0))
+    CalibrationLibrary().store("lab 3", rig.model_copy(update={"light_checks": (check,)}))
+    assert give("calibrate", "all", folder, "--yes", "--name", "lab 3").code == 0
+    assert CalibrationLibrary().find("lab 3").rig.light_checks == (check,)
+    assert len(CalibrationLibrary().stamps("lab 3")) == 2
     scan = [
         "scan",
         tmp_path / "a.dsl",
@@ -80,7 +87,7 @@ def test_one_command_makes_a_rig_a_report_and_a_library_entry(give: Give, tmp_pa
         "lab 3",
     ]
     assert give(*scan).code == 0
-    assert ScanReader(tmp_path / "a.dsl").calibration == rig
+    assert ScanReader(tmp_path / "a.dsl").calibration == CalibrationLibrary().find("lab 3").rig
 
 
 def test_a_late_refusal_leaves_the_rig_as_calibrated_so_far(give: Give, tmp_path: Path) -> None:
