@@ -121,12 +121,14 @@ class Fit(Record):
     as a share of reflectance, in cells of the picture; empty where nothing is known. ``level_rel_std`` is the
     part, as a share of all reflectance, that the light may have changed by since its level was measured. The
     rest is noise, and what the calibration itself left open.
+    ``measured`` says in what the calibration found the rig to be unlike the usual, which the result follows.
     ``unseen`` is what no finding can tell, in a sentence, such as the age of the calibration.
     """
 
     findings: tuple[FitFinding, ...] = ()
     model_error: tuple[tuple[tuple[float, ...], ...], ...] = ()
     level_rel_std: float = 0.0
+    measured: str = ""
     unseen: str = ""
 
     @classmethod
@@ -176,6 +178,8 @@ class Fit(Record):
         lines = [self.headline, *(f"{f.sentence} {f.advice}".strip() for f in self.significant)]
         if self.significant and self.model_error:
             lines.append(f"Deviations of reflectance contain {self.model_share:.1%} of it for the model.")
+        if self.measured:
+            lines.append(self.measured)
         if self.level_rel_std >= TOLD_LEVEL:
             lines.append(
                 f"Deviations of reflectance contain {self.level_rel_std:.1%} of it for what the light may"

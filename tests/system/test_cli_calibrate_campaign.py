@@ -16,6 +16,7 @@ from dsl_core.io.rig_file import load_rig
 from dsl_core.io.scan.folder import ScanReader
 from dsl_core.io.sealed import unseal
 from dsl_core.model.calibration.light_check import LightCheck
+from dsl_core.reconstruction.spectral import rig_traits
 from tests.cases import fake_recipe
 
 from .conftest import Give
@@ -44,6 +45,16 @@ def by_hand(monkeypatch: pytest.MonkeyPatch) -> None:
         return rig
 
     monkeypatch.setattr(registry, "open_rig", open_rig)
+
+
+def test_in_what_a_rig_is_unlike_the_usual_is_said(
+    give: Give, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(rig_traits, "_traits", lambda rig: iter(("a film is bent", "light is uneven")))
+    ending = give("calibrate", "all", tmp_path / "a", *TWIN, "--yes", "--no-library")
+    assert "Measured by the calibration, and followed: a film is bent; light is uneven." in ending.out
+    again = give("calibrate", "all", tmp_path / "a", "--yes", "--no-library", "--json").json
+    assert again["traits"] == ["a film is bent", "light is uneven"]
 
 
 def test_one_command_makes_a_rig_a_report_and_a_library_entry(give: Give, tmp_path: Path) -> None:
