@@ -13,6 +13,9 @@ from dsl_core.model.projector.tone_curve import ToneCurve
 
 Colour = Literal["white", "red", "green", "blue"]
 
+#: Name of the figure that says how far the projector's light is off a power law of the drive level, %.
+OFF_POWER_LAW = "ramps, rms distance from the power law"
+
 
 class Measured(Record):
     """A measured value and one standard deviation, both in the unit of the field that holds them."""

@@ -7,6 +7,8 @@ import pytest
 
 from dsl_core.model.calibration.accepted import CalibrationNote
 from dsl_core.model.calibration.lateral_colour import LateralColour
+from dsl_core.model.calibration.selftest import OFF_POWER_LAW
+from dsl_core.model.figure import Figure
 from dsl_core.model.projector.tone_curve import ToneCurve
 from dsl_core.model.rig import ColumnResidual, FilmShape, FlatField, Rig
 from dsl_core.model.spectral import SpectralCurve
@@ -15,7 +17,8 @@ from dsl_core.simulation.published_rig import published_rig
 
 
 def calibrated(**changes: object) -> Rig:
-    note = CalibrationNote(name="selftest", title="Self-test", accepted="2026-03-01")
+    other = Figure(name="gamma, difference between colours", value=0.9, unit="%")
+    note = CalibrationNote(name="selftest", title="Self-test", accepted="2026-03-01", figures=(other,))
     return published_rig().model_copy(update={"calibrations": (note,), **changes})
 
 
@@ -46,6 +49,12 @@ def with_tone(second: float) -> Rig:
     return calibrated(projector_response=response.model_copy(update={"tone": tone}))
 
 
+def with_ramps(percent: float, std: float) -> Rig:
+    figure = Figure(name=OFF_POWER_LAW, value=percent, std=std, unit="%")
+    note = CalibrationNote(name="selftest", title="Self-test", accepted="", figures=(figure,))
+    return calibrated(calibrations=(note,))
+
+
 def with_gain(corner: float) -> Rig:
     return calibrated(flat_field=FlatField(rows_px=(0.0,), columns_px=(0.0, 800.0), gain=((1.0, corner),)))
 
@@ -60,6 +69,7 @@ def with_colours(apart_px: float) -> Rig:
     ("rig", "said"),
     [
         (with_tone(0.01), "up to 2.6% off a power law of the drive level"),
+        (with_ramps(0.62, 0.05), "light is 0.62 % (rms) off a power law"),
         (with_second_orders(0.08), "second orders have 8.0% of the light of the first"),
         (calibrated(residual=residual(0.3)), "lie 0.30 columns (rms, at most 0.30)"),
         (with_colours(0.25), "red and blue light lie 0.25 columns apart"),
@@ -77,6 +87,8 @@ def test_each_trait_is_told_with_its_figure(rig: Rig, said: str) -> None:
     [
         calibrated(),
         with_tone(0.001),
+        with_ramps(0.15, 0.01),
+        with_ramps(0.62, 0.3),
         with_second_orders(0.05),
         calibrated(residual=residual(0.05)),
         with_colours(0.05),
