@@ -86,7 +86,7 @@ def wander_per_root_day(checks: tuple[LightCheck, ...]) -> float:
 
 def light_calibrated(rig: Rig) -> str:
     """When the level of a rig's light was calibrated, ISO 8601; empty where nobody noted it."""
-    dates = [note.accepted for note in rig.calibrations if note.name == LIGHT]
+    dates = [note.measured for note in rig.calibrations if note.name == LIGHT]
     return dates[-1] if dates else rig.provenance.created
 
 
@@ -141,7 +141,7 @@ def _apart(rig: Rig, captured: str, level: LightLevel) -> str:
 
 
 def _of_mounts(rig: Rig, captured: str) -> str:
-    dates = [note.accepted for note in rig.calibrations] or [rig.provenance.created]
+    dates = [note.measured for note in rig.calibrations] or [rig.provenance.created]
     scanned, accepted = _time(captured), [time for time in map(_time, dates) if time is not None]
     if scanned is None or not accepted:
         return ""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from dsl_core.model.calibration.accepted import CalibrationNote
+from dsl_core.model.calibration.accepted import AcceptedCalibration, CalibrationNote
 from dsl_core.model.calibration.light_check import LightCheck
 from dsl_core.model.rig import Provenance, Rig
 from dsl_core.reconstruction.calibration_age import (
@@ -82,6 +82,13 @@ def test_the_calibration_of_the_light_counts_not_another_part() -> None:
     said = unseen_since(rig, SCANNED)
     assert "days older" in said
     assert "light" not in said
+
+
+def test_pictures_that_were_fitted_again_are_as_old_as_they_are() -> None:
+    light = AcceptedCalibration(name="spectralon", title="Spectralon", accepted=SCANNED, captured=THREE_WEEKS)
+    rig = rig_of("").model_copy(update={"calibrations": (light.note,)})
+    assert aged(rig, SCANNED).reference_rel_std == pytest.approx(PER_ROOT_DAY * 20**0.5)
+    assert "is 21 days older than this scan" in unseen_since(rig, SCANNED)
 
 
 def test_a_calibration_after_the_scan_knows_its_light_no_better_than_one_before() -> None:

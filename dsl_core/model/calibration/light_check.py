@@ -10,8 +10,8 @@ from dsl_core.model.base import Record
 class LightCheck(Record):
     """Light of a known white over that of the calibration, by red, green and blue; one is no change.
 
-    ``checked`` is when it was measured and ``calibrated`` when the calibration that it was compared with was
-    accepted, both ISO 8601; ``std`` is the largest deviation of the three levels.
+    ``checked`` is when it was measured and ``calibrated`` when the light that it was compared with was, both
+    ISO 8601; ``std`` is the largest deviation of the three levels.
     """
 
     checked: str
