@@ -13,8 +13,12 @@ from dsl_core.model.projector.tone_curve import ToneCurve
 
 Colour = Literal["white", "red", "green", "blue"]
 
-#: Name of the figure that says how far the projector's light is off a power law of the drive level, %.
-OFF_POWER_LAW = "ramps, rms distance from the power law"
+#: Names of the figure that says how far the projector's light by drive level is off a power law, or off the
+#: curve that was measured instead, %.
+OFF_POWER_LAW, OFF_CURVE = (
+    "ramps, rms distance from the power law",
+    "ramps, rms distance from the measured curve",
+)
 
 
 class Measured(Record):

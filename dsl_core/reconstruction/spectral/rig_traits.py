@@ -12,7 +12,7 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from dsl_core.model.calibration.selftest import OFF_POWER_LAW
+from dsl_core.model.calibration.selftest import OFF_CURVE, OFF_POWER_LAW
 from dsl_core.model.fit import SIGMAS
 from dsl_core.model.rig import Rig
 from dsl_core.optics.correspondence import GratingModel, correspondence
@@ -22,7 +22,7 @@ from dsl_core.optics.spectra import ORDERS, SECOND_ORDERS
 #: columns of the first orders off those of a film that is a cylinder (px, rms), red and blue apart at the
 #: side of the projector's frame (px), and the range of the camera's gain over the picture.
 LEAST_TONE, LEAST_SECOND, LEAST_FILM_PX, LEAST_COLOUR_PX, LEAST_GAIN = 0.01, 0.06, 0.1, 0.1, 0.03
-#: Light off a power law by so little (%, rms) that no curve was measured.
+#: Light off the form that was taken for it by so much (%, rms) is told.
 LEAST_RAMP = 0.2
 #: Wavelengths at which orders are compared.
 _NM = np.linspace(450.0, 650.0, 5)
@@ -53,9 +53,10 @@ def _traits(rig: Rig) -> Iterator[str]:
     if tone > LEAST_TONE:
         yield f"the projector's light is up to {tone:.1%} off a power law of the drive level"
     for figure in (figure for note in rig.calibrations for figure in note.figures):
-        # Too little for a curve of its own, which would follow the noise of the ramps.
-        if figure.name == OFF_POWER_LAW and figure.value > max(LEAST_RAMP, SIGMAS * (figure.std or 0.0)):
-            yield f"the projector's light is {figure.value:.2f} % (rms) off a power law of the drive level"
+        form = {OFF_POWER_LAW: "a power law", OFF_CURVE: "a smooth curve"}.get(figure.name)
+        # Too little for a richer curve, which would follow the noise of the ramps.
+        if form is not None and figure.value > max(LEAST_RAMP, SIGMAS * (figure.std or 0.0)):
+            yield f"the projector's light is {figure.value:.2f} % (rms) off {form} of the drive level"
     second = second_order_share(rig)
     if second > LEAST_SECOND:
         yield f"second orders have {second:.1%} of the light of the first"

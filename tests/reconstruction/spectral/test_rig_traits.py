@@ -7,7 +7,7 @@ import pytest
 
 from dsl_core.model.calibration.accepted import CalibrationNote
 from dsl_core.model.calibration.lateral_colour import LateralColour
-from dsl_core.model.calibration.selftest import OFF_POWER_LAW
+from dsl_core.model.calibration.selftest import OFF_CURVE, OFF_POWER_LAW
 from dsl_core.model.figure import Figure
 from dsl_core.model.projector.tone_curve import ToneCurve
 from dsl_core.model.rig import ColumnResidual, FilmShape, FlatField, Rig
@@ -49,8 +49,8 @@ def with_tone(second: float) -> Rig:
     return calibrated(projector_response=response.model_copy(update={"tone": tone}))
 
 
-def with_ramps(percent: float, std: float) -> Rig:
-    figure = Figure(name=OFF_POWER_LAW, value=percent, std=std, unit="%")
+def with_ramps(percent: float, std: float, name: str = OFF_POWER_LAW) -> Rig:
+    figure = Figure(name=name, value=percent, std=std, unit="%")
     note = CalibrationNote(name="selftest", title="Self-test", accepted="", figures=(figure,))
     return calibrated(calibrations=(note,))
 
@@ -70,6 +70,7 @@ def with_colours(apart_px: float) -> Rig:
     [
         (with_tone(0.01), "up to 2.6% off a power law of the drive level"),
         (with_ramps(0.62, 0.05), "light is 0.62 % (rms) off a power law"),
+        (with_ramps(0.36, 0.03, OFF_CURVE), "light is 0.36 % (rms) off a smooth curve"),
         (with_second_orders(0.08), "second orders have 8.0% of the light of the first"),
         (calibrated(residual=residual(0.3)), "lie 0.30 columns (rms, at most 0.30)"),
         (with_colours(0.25), "red and blue light lie 0.25 columns apart"),
