@@ -57,6 +57,9 @@ def write_products(
     if library_name is not None:
         shelf, same = library or CalibrationLibrary(), {"provenance": rig.provenance}
         known = shelf.find(library_name).rig if library_name in shelf.names() else None
+        if known is not None:
+            # How the light wandered before says how it will.
+            rig = rig.model_copy(update={"light_checks": known.light_checks})
         if known is None or known.model_copy(update=same) != rig:
             shelf.store(library_name, rig, accepted, history)
     return Products(path, report, library_name)

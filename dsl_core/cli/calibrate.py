@@ -189,6 +189,7 @@ def all_(
     from dsl_core.campaign.products import write_products
     from dsl_core.campaign.recipes import load_recipe
     from dsl_core.io.calibration_library import check_name
+    from dsl_core.reconstruction.spectral.rig_traits import measured_traits, traits_in_words
 
     output, timer, settings = Output(json), StageTimer(), _settings_by_name(set_)
     name = name or campaign.absolute().name
@@ -217,9 +218,11 @@ def all_(
         made = write_products(folder, calibrated, calibrated.name if library else None, timer.stages)
     output.costs(timer.stages)
     output.say(f"The calibrated rig is saved in {made.rig}, its report in {made.report}.")
+    if traits := traits_in_words(calibrated):
+        output.say(traits)
     if made.entry is not None:
         output.say(f"In the library: {made.entry}. Next: dsl-scan scan SCAN.dsl --calibration {made.entry}")
-    output.put(rig=made.rig, report=made.report, library=made.entry)
+    output.put(rig=made.rig, report=made.report, library=made.entry, traits=measured_traits(calibrated))
     output.put(figures={note.name: figures_json(note.figures) for note in calibrated.calibrations})
     output.finish()
 

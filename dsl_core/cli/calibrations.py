@@ -98,12 +98,14 @@ def check(
 ) -> None:
     """Check with one quick capture of a flat target whether the rig still matches its calibration."""
     from dsl_core.campaign.drift_check import PLACEMENT, measure_drift
+    from dsl_core.campaign.light_history import keep_check
     from dsl_core.devices.conditions import with_calibration
     from dsl_core.devices.registry import open_rig
-    from dsl_core.io.calibration_library import load_calibration
+    from dsl_core.io.calibration_library import CalibrationLibrary, load_calibration
+    from dsl_core.io.campaign_folder import now
     from dsl_core.model.figure import failures
 
-    output, known = Output(json), load_calibration(name)
+    output, known, library = Output(json), load_calibration(name), CalibrationLibrary()
     with open_rig(rig, parse_options(option)) as devices, tempfile.TemporaryDirectory() as spare:
         own, overridden = with_calibration(devices, known, override)
         for clause in overridden:
@@ -116,7 +118,11 @@ def check(
         with output.progress() as progress:
             figures = measure_drift(own, known, keep or Path(spare) / "check.dsl", spectralon, progress)
     print_figures(output, figures)
-    output.put(name=name, figures=figures_json(figures), stable=not failures(figures))
+    is_listed = name.partition("@")[0] in library.names() and not Path(name).is_file()
+    kept = is_listed and not overridden and keep_check(library, name, figures, now())
+    if kept:
+        output.say(f"{name} now remembers this check: scans from now on state the light by it.")
+    output.put(name=name, figures=figures_json(figures), stable=not failures(figures), kept=kept)
     wrong = failures(figures)
     if wrong:
         clauses = "; ".join(f"{figure}. {figure.advice}".rstrip(". ") for figure in wrong)

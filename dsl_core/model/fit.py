@@ -33,6 +33,8 @@ Part = Literal[
     "noise",
 ]
 
+#: From which relative deviation the level of the light is worth words.
+TOLD_LEVEL = 0.005
 #: How many deviations of its own a figure must be away from zero.
 SIGMAS = 3.0
 
@@ -116,12 +118,17 @@ class Fit(Record):
     """What a result says about the fit of its model, from the worst finding to the best.
 
     ``model_error[band][row][column]`` is the part of the stated deviation of reflectance that is the model's,
-    as a share of reflectance, in cells of the picture; the rest is noise. Empty where nothing is known.
+    as a share of reflectance, in cells of the picture; empty where nothing is known. ``level_rel_std`` is the
+    part, as a share of all reflectance, that the light may have changed by since its level was measured. The
+    rest is noise, and what the calibration itself left open.
+    ``measured`` says in what the calibration found the rig to be unlike the usual, which the result follows.
     ``unseen`` is what no finding can tell, in a sentence, such as the age of the calibration.
     """
 
     findings: tuple[FitFinding, ...] = ()
     model_error: tuple[tuple[tuple[float, ...], ...], ...] = ()
+    level_rel_std: float = 0.0
+    measured: str = ""
     unseen: str = ""
 
     @classmethod
@@ -171,6 +178,13 @@ class Fit(Record):
         lines = [self.headline, *(f"{f.sentence} {f.advice}".strip() for f in self.significant)]
         if self.significant and self.model_error:
             lines.append(f"Deviations of reflectance contain {self.model_share:.1%} of it for the model.")
+        if self.measured:
+            lines.append(self.measured)
+        if self.level_rel_std >= TOLD_LEVEL:
+            lines.append(
+                f"Deviations of reflectance contain {self.level_rel_std:.1%} of it for what the light may"
+                " have changed by since its level was measured."
+            )
         if self.unseen:
             lines.append(self.unseen)
         return "\n".join(lines)

@@ -11,6 +11,7 @@ from pydantic import Field, model_validator
 from dsl_core.model.base import Record
 from dsl_core.model.calibration.accepted import CalibrationNote
 from dsl_core.model.calibration.lateral_colour import LateralColour
+from dsl_core.model.calibration.light_check import LightCheck
 from dsl_core.model.conditions import BayerPattern as BayerPattern
 from dsl_core.model.conditions import CaptureConditions
 from dsl_core.model.conditions import colour_sites as colour_sites
@@ -257,7 +258,8 @@ class Rig(Record):
     with the shading ``s = cos(incidence) * (reference_distance_mm / distance)**2``, times the camera's
     relative gain if it has a ``flat_field``, and the efficiency of order zero equal to one by definition.
     ``conditions`` are the settings under which all this holds, None where nobody noted them; ``calibrations``
-    say when each part was found and how well.
+    say when each part was found and how well, ``light_checks`` what drift checks found of the light since,
+    oldest first.
     ``lateral_colour`` is that of both lenses, None where nothing is known of it.
     ``residual`` corrects the columns of the grating equation; ``correspondence`` is the data-driven model.
     ``geometry_covariance`` is that of the 24 parameters of lenses and pose (see `GeometryCalibration`).
@@ -298,3 +300,4 @@ class Rig(Record):
     provenance: Provenance = Provenance()
     conditions: CaptureConditions | None = None
     calibrations: tuple[CalibrationNote, ...] = ()
+    light_checks: tuple[LightCheck, ...] = ()

@@ -2,22 +2,146 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
 
+import numpy as np
+
+from dsl_core.model.calibration.light_check import LightCheck
 from dsl_core.model.rig import Rig
 
 #: Within a week lamps hardly age, and people remember what they have touched.
 FRESH = timedelta(days=7)
+#: Within a day the light of a projector that has warmed up is that of its calibration.
+STEADY = timedelta(days=1)
+#: The level of the light wanders from then on: its relative deviation grows as the root of the days, by this
+#: much for one. LED projectors lose little by age, and change by dust, heat and how they are set: after three
+#: weeks 95 % of the levels are thought to be within 6.6 %. This is a default, not a measurement.
+PER_ROOT_DAY = 0.0075
+#: What a rig's own drift checks say counts against the default as much as this many of them would.
+DEFAULT_CHECKS = 3.0
+#: Changes of the light between two checks on one day tell of the checks, not of age.
+LEAST_DAYS = 1.0
+#: The calibration that measures the level of the light.
+LIGHT = "spectralon"
+
+
+@dataclass(frozen=True)
+class LightLevel:
+    """How well the level of the light is known in a scan.
+
+    ``rel_std`` is its relative deviation, ``days`` how far the scan is from when the level was last measured:
+    by a drift ``check``, or by the calibration where that is None.
+    """
+
+    rel_std: float
+    days: float
+    check: LightCheck | None = None
+
+
+def light_level(rig: Rig, captured: str) -> LightLevel | None:
+    """How well the light's level is known in a scan ``captured`` at a time (ISO 8601); None without dates.
+
+    What was measured nearest to the scan counts, before or after it.
+    """
+    scanned, calibrated = _time(captured), _time(light_calibrated(rig))
+    if scanned is None or calibrated is None:
+        return None
+    ages: list[tuple[timedelta, LightCheck | None]] = [(abs(scanned - calibrated), None)]
+    for check in rig.light_checks:
+        checked = _time(check.checked)
+        if checked is not None and _time(check.calibrated) == calibrated:
+            ages.append((abs(scanned - checked), check))
+    # Where both are as near, a check was made after the calibration, to see what had become of it.
+    age, nearest = min(ages, key=lambda each: (each[0], each[1] is None))
+    days = age / timedelta(days=1)
+    wander = wander_per_root_day(rig.light_checks) * max(days - STEADY / timedelta(days=1), 0) ** 0.5
+    found = (0.0, 0.0) if nearest is None else (nearest.largest_change, nearest.std)
+    return LightLevel(float(np.linalg.norm([wander, *found])), days, nearest)
+
+
+def wander_per_root_day(checks: tuple[LightCheck, ...]) -> float:
+    """Relative deviation of the light's level after a day, of which it grows as the root of the days.
+
+    From how the levels changed between a rig's own checks, and the default; an error of the checks themselves
+    counts as none of the light.
+
+    >>> round(wander_per_root_day(()), 6)
+    0.0075
+    """
+    squares = []
+    for calibrated in dict.fromkeys(check.calibrated for check in checks):
+        mine = [(_time(c.checked), c) for c in checks if c.calibrated == calibrated]
+        known = sorted(((time, c) for time, c in mine if time is not None), key=lambda each: each[0])
+        before, start = LightCheck(checked="", calibrated="", levels=(1.0, 1.0, 1.0)), _time(calibrated)
+        for time, check in known:
+            if start is not None and (days := (time - start) / timedelta(days=1)) >= LEAST_DAYS:
+                change = np.subtract(check.levels, before.levels)
+                own = check.std**2 + before.std**2
+                squares.append(max(float(np.mean(change**2)) - own, 0.0) / days)
+                before, start = check, time
+    weight = DEFAULT_CHECKS + len(squares)
+    return float(np.sqrt((DEFAULT_CHECKS * PER_ROOT_DAY**2 + sum(squares)) / weight))
+
+
+def light_calibrated(rig: Rig) -> str:
+    """When the level of a rig's light was calibrated, ISO 8601; empty where nobody noted it."""
+    dates = [note.measured for note in rig.calibrations if note.name == LIGHT]
+    return dates[-1] if dates else rig.provenance.created
+
+
+def aged(rig: Rig, captured: str) -> Rig:
+    """The rig whose stated white is as uncertain as its light is in a scan ``captured`` at a time."""
+    level = light_level(rig, captured)
+    if level is None or not level.rel_std:
+        return rig
+    unsure = float(np.hypot(rig.reference_rel_std, level.rel_std))
+    return rig.model_copy(update={"reference_rel_std": unsure})
 
 
 def unseen_since(rig: Rig, captured: str) -> str:
-    """A sentence on what a scan ``captured`` at a time (ISO 8601) leaves open; empty for a fresh calibration.
+    """Sentences on what a scan ``captured`` at a time (ISO 8601) leaves open; empty for a fresh calibration.
 
     Light that has become weaker looks like a darker surface, and a projector that has turned like a nearer or
-    farther one: no residual shows either. The oldest part of the calibration counts. Nothing is said where a
-    date is missing or cannot be read.
+    farther one: no residual shows either. The oldest part of the calibration counts for what has moved, the
+    last measurement of it for the light. Nothing is said where a date is missing or cannot be read.
     """
-    dates = [note.accepted for note in rig.calibrations] or [rig.provenance.created]
+    return " ".join(part for part in (_of_light(rig, captured), _of_mounts(rig, captured)) if part)
+
+
+def _of_light(rig: Rig, captured: str) -> str:
+    level = light_level(rig, captured)
+    if level is None:
+        return ""
+    known = (
+        f"no scan shows by itself whether its level has changed since. It is known to"
+        f" {1.96 * level.rel_std:.1%}, which deviations of reflectance contain."
+    )
+    remedy = " Run the drift check with the Spectralon, or calibrate with it again."
+    if level.check is not None:
+        change, std = level.check.largest_change, level.check.std
+        found = f"The drift check of {level.check.checked[:10]} found the light {change:+.1%} ± {std:.1%} off"
+        if abs(change) > max(2 * std, 0.01):
+            return f"{found}: reflectance is off by as much. Calibrate with the Spectralon again."
+        if level.days <= FRESH.days:
+            return ""
+        return f"The light was last checked {_apart(rig, captured, level)} this scan, and {known}{remedy}"
+    if level.days <= FRESH.days:
+        return ""
+    return f"The light was calibrated {_apart(rig, captured, level)} this scan, and {known}{remedy}"
+
+
+def _apart(rig: Rig, captured: str, level: LightLevel) -> str:
+    """How long before or after a scan the light was measured."""
+    measured = _time(light_calibrated(rig) if level.check is None else level.check.checked)
+    scanned = _time(captured)
+    assert measured is not None
+    assert scanned is not None
+    return f"{int(level.days)} days {'before' if measured <= scanned else 'after'}"
+
+
+def _of_mounts(rig: Rig, captured: str) -> str:
+    dates = [note.measured for note in rig.calibrations] or [rig.provenance.created]
     scanned, accepted = _time(captured), [time for time in map(_time, dates) if time is not None]
     if scanned is None or not accepted:
         return ""
@@ -25,9 +149,9 @@ def unseen_since(rig: Rig, captured: str) -> str:
     if age <= FRESH:
         return ""
     return (
-        f"The calibration is {age.days} days older than this scan. No scan shows by itself whether the light"
-        " has changed in level since, which puts reflectance off, or camera or projector have moved a little,"
-        " which puts depth off: run the drift check, or scan a surface that you know."
+        f"The calibration is {age.days} days older than this scan. No scan shows by itself whether camera or"
+        " projector have moved a little since, which puts depth off: run the drift check, or scan a surface"
+        " that you know."
     )
 
 

@@ -39,7 +39,7 @@ from dsl_core.model.spectral import WavelengthGrid
 from dsl_core.patterns.images import pattern_image
 from dsl_core.pipeline import Options, reconstruct, scan
 from dsl_core.progress import NoProgress, Progress
-from dsl_core.reconstruction.calibration_age import unseen_since
+from dsl_core.reconstruction.calibration_age import aged, light_level, unseen_since
 from dsl_core.version import __version__
 from dsl_core.workflows.captures import is_import, sensor_of_scan, with_imported_sensor
 
@@ -129,8 +129,10 @@ def reconstruct_scan(
     proof = read_proof(reader, rig)
     watched = WatchedSource(reader)
     progress = progress or NoProgress()
+    # An import is dated by when it was made, and nobody knows when its pictures were taken.
+    stated = rig if is_import(reader) else aged(rig, reader.manifest.created)
     result = reconstruct(
-        watched if proof is None else reader, rig, options, progress, timer, sink, seen_geometry
+        watched if proof is None else reader, stated, options, progress, timer, sink, seen_geometry
     )
     if proof is None:
         with timer.stage("compare frames with their patterns"):
@@ -167,12 +169,12 @@ def known_doubts(folder: Path) -> list[str]:
 
 def _dated(result: xr.Dataset, rig: Rig, reader: ScanReader) -> dict[str, str]:
     """The verdict of a result, with what its scan cannot tell of a calibration that is old."""
-    # An import is dated by when it was made, and nobody knows when its pictures were taken.
-    unseen = "" if is_import(reader) else unseen_since(rig, reader.manifest.created)
     fit = Fit.read({str(name): value for name, value in result.attrs.items()})
-    if fit is None or not unseen:
+    if fit is None or is_import(reader):
         return {}
-    return {FIT_ATTRIBUTE: fit.model_copy(update={"unseen": unseen}).model_dump_json()}
+    level, unseen = light_level(rig, reader.manifest.created), unseen_since(rig, reader.manifest.created)
+    found = {"unseen": unseen, "level_rel_std": 0.0 if level is None else level.rel_std}
+    return {FIT_ATTRIBUTE: fit.model_copy(update=found).model_dump_json()}
 
 
 def reconstruct_to(

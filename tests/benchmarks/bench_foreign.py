@@ -13,10 +13,11 @@ so that two versions of the code can be measured on the same captures. For an ol
 Columns: RMSE of depth (mm) per pixel, its 99th and 99.9th percentile, and the share of pixels inside the
 stated 95 % band; RMSE and angle (rad) of patch means; RMSE of pixels, 99th and 99.9th percentile of the error
 of reflectance over pixels and bands, and the share of these inside their band; width of peaks (nm) with
-``--scene filters``; median chi-square; shares flagged POOR_FIT and DEPTH_EDGE; seconds of the reconstruction;
-and the parts of the model of which the result itself says that they do not fit. ``--sphere`` scans a ball
-instead, matt and glossy, and prints its mean reflectance over the true one, the scatter of that, the angle,
-the share inside the stated 95 % band and the share of pixels with any flag, by incidence of the light.
+``--scene filters``; the share inside the band of patches darker than .15; median chi-square; shares flagged
+POOR_FIT and DEPTH_EDGE; seconds of the reconstruction; and the parts of the model of which the result itself
+says that they do not fit. ``--plans`` scans with presets. ``--sphere`` scans a ball instead, matt and glossy,
+and prints its mean reflectance over the true one, the scatter of that, the angle, the share inside the stated
+95 % band and the share of pixels with any flag, by incidence of the light.
 """
 
 from __future__ import annotations
@@ -27,7 +28,7 @@ import os
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -42,6 +43,7 @@ from dsl_core.errors import DslError
 from dsl_core.evaluation.summary import Truth, interior
 from dsl_core.io.rig_file import load_rig
 from dsl_core.model.plan import CapturePlan
+from dsl_core.model.presets import preset_plan
 from dsl_core.model.result import Flag
 from dsl_core.model.rig import Rig
 from dsl_core.model.spectral import WavelengthGrid
@@ -58,10 +60,12 @@ if TYPE_CHECKING:
 Floats = NDArray[np.float64]
 HEADER = (
     "variant", "seed", "depth mm", "p99", "p99.9", "band %", "patch", "angle", "pixel", "p99", "p99.9",
-    "band %", "FWHM", "chi2", "poor %", "edge %", "s", "said",
+    "band %", "FWHM", "dark %", "chi2", "poor %", "edge %", "s", "said",
 )  # fmt: skip
 #: What the scene of a ball is made of.
 BALL = {"yellow", "diffuser"}
+#: Mean reflectance below which a patch is dark.
+DARK = 0.15
 #: Edges of the classes of incidence, degrees.
 INCIDENCE_DEG = (0, 10, 20, 30, 40, 50, 60)
 
@@ -119,7 +123,9 @@ class Captured:
         return cls(MemoryScan(plan, frames), load_rig(folder / "rig.json"), truth, known["incidence_deg"])
 
 
-def capture_variant(variant: str, seed: int, size: str, look: dict[str, str]) -> Captured:
+def capture_variant(
+    variant: str, seed: int, size: str, look: dict[str, str], plan: CapturePlan | None = None
+) -> Captured:
     """Scan the scene with a foreign twin; the calibration is that of the twin without the variant."""
     from dsl_core.simulation.sim_devices import open_twin
 
@@ -127,7 +133,8 @@ def capture_variant(variant: str, seed: int, size: str, look: dict[str, str]) ->
     truth = scans.twin_truth(devices, WavelengthGrid())
     assert truth is not None
     world = devices.camera.world  # type: ignore[attr-defined]
-    return Captured(capture(devices, CapturePlan()), world.rig, truth, incidence_deg(world.rig, world.truth))
+    shown = plan or CapturePlan()
+    return Captured(capture(devices, shown), world.rig, truth, incidence_deg(world.rig, world.truth))
 
 
 def rig_options(variant: str, seed: int) -> dict[str, str]:
@@ -202,6 +209,7 @@ def measure(taken: Captured) -> dict[str, Any]:
         "error_p99": float(np.quantile(errors, 0.99)),
         "error_p999": float(np.quantile(errors, 0.999)),
         "spectral_band": None if spectral is None else spectral.coverage_95,
+        "dark_band": dark_band(result, taken.truth),
         "fwhm_nm": found.mean_fwhm_nm,
         "chi2": float(np.nanmedian(fits[0])),
         "poor_fit": float(((flags[known] & Flag.POOR_FIT) > 0).mean()),
@@ -225,13 +233,28 @@ def depth_errors(result: xr.Dataset, truth: Truth) -> tuple[Floats, NDArray[np.b
 
 def reflectance_errors(result: xr.Dataset, truth: Truth) -> Floats:
     """Absolute errors of reflectance of all bands inside the patches."""
+    error = _errors_and_std(result, truth, truth.targets or ())[0]
+    return np.asarray(error[np.isfinite(error)], np.float64)
+
+
+def dark_band(result: xr.Dataset, truth: Truth) -> float | None:
+    """Share of the reflectances of dark patches inside their band; None where there are none."""
+    assert truth.spectra is not None
+    dark = [target for target in truth.targets or () if truth.spectra[target].mean() < DARK]
+    error, std = _errors_and_std(result, truth, dark)
+    known = np.isfinite(error)
+    return float((error < 1.96 * std)[known].mean()) if known.any() else None
+
+
+def _errors_and_std(result: xr.Dataset, truth: Truth, targets: Sequence[int]) -> tuple[Floats, Floats]:
+    """Absolute errors of reflectance and its stated deviation, (bands, pixels), inside some patches."""
     assert truth.material is not None
     assert truth.spectra is not None
     assert truth.lit is not None
-    chosen = interior(truth.material) & np.isin(truth.material, truth.targets or ()) & truth.lit
+    chosen = interior(truth.material) & np.isin(truth.material, targets) & truth.lit
     wanted = truth.spectra[truth.material[chosen]].T
     error = np.abs(result["reflectance"].values[:, chosen] - wanted)
-    return np.asarray(error[np.isfinite(error)], np.float64)
+    return np.asarray(error, np.float64), np.asarray(result["reflectance_std"].values[:, chosen], np.float64)
 
 
 def by_incidence(result: xr.Dataset, taken: Captured) -> list[dict[str, float]]:
@@ -285,8 +308,8 @@ def row(variant: str, seed: int, figures: dict[str, Any]) -> list[str]:
         f"{f['depth_p999_mm']:.2f}", share(f["depth_band"]), f"{f['patch_rmse']:.4f}",
         f"{f['angle_rad']:.4f}", f"{f['pixel_rmse']:.4f}",
         f"{f['error_p99']:.3f}", f"{f['error_p999']:.3f}", share(f["spectral_band"]),
-        "-" if f["fwhm_nm"] is None else f"{f['fwhm_nm']:.1f}", f"{f['chi2']:.2f}", share(f["poor_fit"]),
-        share(f["depth_edge"]), f"{f['cpu_s']:.0f}", f["said"],
+        "-" if f["fwhm_nm"] is None else f"{f['fwhm_nm']:.1f}", share(f["dark_band"]),
+        f"{f['chi2']:.2f}", share(f["poor_fit"]), share(f["depth_edge"]), f"{f['cpu_s']:.0f}", f["said"],
     ]  # fmt: skip
 
 
@@ -306,14 +329,16 @@ def cases(arguments: argparse.Namespace) -> Iterator[tuple[str, str, int, Captur
     for seed in arguments.seeds:
         for variant in arguments.variants:
             for look, texts in ({"": {}} if arguments.scans else looks(arguments)).items():
-                folder = f"{variant}-{seed}-{arguments.size}{look}"
-                if not arguments.scans:
-                    taken = capture_variant(variant, seed, arguments.size, texts)
-                    if arguments.keep:
-                        taken.save(arguments.keep / folder)
-                    yield variant + look, variant, seed, taken
-                elif (arguments.scans / folder / "truth.npz").is_file():
-                    yield variant, variant, seed, Captured.load(arguments.scans / folder)
+                for plan in arguments.plans:
+                    name = variant + look + (f"-{plan}" if plan else "")
+                    folder = f"{variant}-{seed}-{arguments.size}{look}" + (f"-{plan}" if plan else "")
+                    if not arguments.scans:
+                        taken = capture_variant(variant, seed, arguments.size, texts, preset_plan(plan))
+                        if arguments.keep:
+                            taken.save(arguments.keep / folder)
+                        yield name, variant, seed, taken
+                    elif (arguments.scans / folder / "truth.npz").is_file():
+                        yield name, variant, seed, Captured.load(arguments.scans / folder)
 
 
 def main() -> None:
@@ -325,6 +350,7 @@ def main() -> None:
     )
     parser.add_argument("--seeds", type=lambda text: [int(s) for s in text.split(",")], default=[0])
     parser.add_argument("--scene", default="color-checker")
+    parser.add_argument("--plans", type=lambda text: text.split(","), default=[""], help="quick,coarse")
     parser.add_argument("--sphere", action="store_true", help="a matt and a glossy ball")
     parser.add_argument("--keep", type=Path, metavar="DIR")
     parser.add_argument("--scans", type=Path, metavar="DIR")

@@ -3,7 +3,8 @@
 Run ``python -m tests.benchmarks.bench_later [--size 222x145] [--seeds 0,1] [--changes film,all]`` from the
 repository's root. Seed 0 is the published rig, any other the rig drawn by that number. The twin is scanned as
 it is, once for each seed; the calibration is that of the rig before each change, so that nothing but the
-change is wrong. ``--keep`` and ``--scans`` store and read scans as `tests.benchmarks.bench_foreign` does.
+change is wrong. The scan is ``--days`` later than the calibration, by which the result states how well it
+knows the light. ``--keep`` and ``--scans`` store and read scans as `tests.benchmarks.bench_foreign` does.
 
 Columns: how it was reconstructed (``own`` follows what the scan finds, ``cal`` is ``as_calibrated``), RMSE of
 depth (mm) and share inside its 95 % band; RMSE and angle (rad) of patch means; RMSE of patch means with
@@ -16,6 +17,7 @@ from __future__ import annotations
 import argparse
 import time
 from collections.abc import Callable, Iterator
+from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from typing import Any
 
@@ -24,7 +26,9 @@ import numpy as np
 from dsl_core import pipeline
 from dsl_core.model.fit import Fit
 from dsl_core.model.options import Options
-from dsl_core.model.rig import Rig
+from dsl_core.model.rig import Provenance, Rig
+from dsl_core.model.spectral import SpectralCurve
+from dsl_core.reconstruction.calibration_age import aged
 from tests.benchmarks.bench_foreign import Captured, capture_variant, said
 from tests.benchmarks.common import options, print_table, write_json
 
@@ -43,9 +47,23 @@ def film(**changes: float) -> Callable[[Rig], Rig]:
     return before
 
 
-def darker(rig: Rig) -> Rig:
-    """The rig before its light fell by 5 %."""
-    return rig.model_copy(update={"white_scale": rig.white_scale / 0.95})
+def light(change: float) -> Callable[[Rig], Rig]:
+    """The rig before its light changed by a share."""
+    return lambda rig: rig.model_copy(update={"white_scale": rig.white_scale / (1 + change)})
+
+
+def red_darker(rig: Rig) -> Rig:
+    """The rig before its red LED fell by 5 %."""
+    red, green, blue = rig.emission
+    before = SpectralCurve.of(np.array(red.wavelengths_nm), np.array(red.values) / 0.95)
+    return rig.model_copy(update={"emission": (before, green, blue)})
+
+
+def days_later(rig: Rig, days: float) -> Rig:
+    """What a rig states of its white, so long after its calibration."""
+    begin = datetime(2026, 3, 1, 10, tzinfo=UTC)
+    dated = rig.model_copy(update={"provenance": Provenance(created=begin.isoformat())})
+    return aged(dated, (begin + timedelta(days=days)).isoformat())
 
 
 def blurred(rig: Rig) -> Rig:
@@ -61,9 +79,11 @@ CHANGES: dict[str, tuple[Callable[[Rig], Rig], ...]] = {
     "film .5 mm": (film(distance_mm=0.5),),
     "film .1 deg": (film(tilt_y_deg=0.1),),
     "film all": (film(tilt_x_deg=0.2, tilt_y_deg=0.2, roll_deg=0.2, bend_per_mm=0.0003, distance_mm=0.2),),
-    "light": (darker,),
+    "light": (light(-0.05),),
+    "light +5 %": (light(0.05),),
+    "red LED": (red_darker,),
     "blur": (blurred,),
-    "three weeks": (film(distance_mm=0.1, tilt_y_deg=0.1), darker, blurred),
+    "three weeks": (film(distance_mm=0.1, tilt_y_deg=0.1), light(-0.05), blurred),
 }  # fmt: skip
 
 
@@ -139,6 +159,7 @@ def main() -> None:
     parser.add_argument(
         "--changes", type=lambda text: text.split(","), default=list(CHANGES), help=", ".join(CHANGES)
     )
+    parser.add_argument("--days", type=float, default=21.0, help="age of the calibration")
     parser.add_argument("--keep", type=Path, metavar="DIR")
     parser.add_argument("--scans", type=Path, metavar="DIR")
     arguments = parser.parse_args()
@@ -150,6 +171,7 @@ def main() -> None:
             rig = taken.rig
             for before in CHANGES[change]:
                 rig = before(rig)
+            rig = days_later(rig, arguments.days)
             for as_calibrated in (True, False):
                 figures = measure(taken, rig, as_calibrated)
                 print("  ".join(row(change, seed, figures)), flush=True)

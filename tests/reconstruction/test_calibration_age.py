@@ -1,20 +1,39 @@
-"""A calibration that is weeks older than its scan is told; a fresh one, or one without a date, is not."""
+"""What a calibration that is weeks older than its scan leaves open of light and mounts."""
 
 from __future__ import annotations
 
 import pytest
 
-from dsl_core.model.calibration.accepted import CalibrationNote
+from dsl_core.model.calibration.accepted import AcceptedCalibration, CalibrationNote
+from dsl_core.model.calibration.light_check import LightCheck
 from dsl_core.model.rig import Provenance, Rig
-from dsl_core.reconstruction.calibration_age import unseen_since
+from dsl_core.reconstruction.calibration_age import (
+    DEFAULT_CHECKS,
+    PER_ROOT_DAY,
+    aged,
+    light_level,
+    unseen_since,
+    wander_per_root_day,
+)
 from dsl_core.simulation.published_rig import published_rig
 
+SCANNED = "2026-03-22T12:00:00+02:00"
+THREE_WEEKS = "2026-03-01T10:00:00+00:00"
 
-def rig_of(created: str, *accepted: str) -> Rig:
-    notes = tuple(CalibrationNote(name="spectralon", title="Spectralon", accepted=each) for each in accepted)
+
+def rig_of(created: str, *accepted: str, name: str = "spectralon") -> Rig:
+    notes = tuple(CalibrationNote(name=name, title="Spectralon", accepted=each) for each in accepted)
     return published_rig().model_copy(
         update={"provenance": Provenance(created=created), "calibrations": notes}
     )
+
+
+def checked(checked: str, level: float, std: float = 0.0, calibrated: str = THREE_WEEKS) -> LightCheck:
+    return LightCheck(checked=checked, calibrated=calibrated, levels=(level, level, level), std=std)
+
+
+def with_checks(*checks: LightCheck) -> Rig:
+    return rig_of(THREE_WEEKS).model_copy(update={"light_checks": checks})
 
 
 @pytest.mark.parametrize(
@@ -26,12 +45,97 @@ def rig_of(created: str, *accepted: str) -> Rig:
     ],
 )
 def test_an_old_calibration_is_told_with_its_age(rig: Rig, days: int) -> None:
-    said = unseen_since(rig, "2026-03-22T12:00:00+02:00")
+    said = unseen_since(rig, SCANNED)
     assert f"is {days} days older than this scan" in said
     assert "run the drift check" in said
 
 
-@pytest.mark.parametrize("created", ["2026-03-16T10:00:00+00:00", "2026-04-16T10:00:00+00:00", "", "spring"])
+@pytest.mark.parametrize("created", ["2026-03-16T10:00:00+00:00", "2026-03-26T10:00:00+00:00", "", "spring"])
 def test_nothing_is_said_of_a_fresh_calibration_or_one_without_a_date(created: str) -> None:
-    assert unseen_since(rig_of(created), "2026-03-22T12:00:00+00:00") == ""
+    assert unseen_since(rig_of(created), SCANNED) == ""
     assert unseen_since(rig_of("2026-03-01T10:00:00"), "long ago") == ""
+
+
+def test_the_light_is_the_less_known_the_longer_ago_it_was_calibrated() -> None:
+    """No wider within a day; after three weeks the level may well be 5 % off."""
+    for fresh in ("2026-03-22T09:00:00+00:00", "2026-03-21T11:00:00+00:00", "2026-03-23T09:00:00+00:00"):
+        assert aged(rig_of(fresh), SCANNED) == rig_of(fresh)
+    old = aged(rig_of(THREE_WEEKS), SCANNED)
+    assert old.reference_rel_std == pytest.approx(PER_ROOT_DAY * 20**0.5)
+    assert 1.96 * old.reference_rel_std == pytest.approx(0.066, abs=0.001)
+    white = rig_of(THREE_WEEKS).model_copy(update={"reference_rel_std": 0.04})
+    assert aged(white, SCANNED).reference_rel_std == pytest.approx((0.04**2 + 20 * PER_ROOT_DAY**2) ** 0.5)
+    for undated in (rig_of(""), rig_of("", THREE_WEEKS, name="geometry")):
+        assert aged(undated, SCANNED) == undated
+    said = unseen_since(rig_of(THREE_WEEKS), SCANNED)
+    assert "The light was calibrated 21 days before this scan" in said
+    assert "It is known to 6.6%" in said
+
+
+def test_the_calibration_of_the_light_counts_not_another_part() -> None:
+    notes = (
+        CalibrationNote(name="geometry", title="Geometry", accepted=THREE_WEEKS),
+        CalibrationNote(name="spectralon", title="Spectralon", accepted="2026-03-22T09:00:00+00:00"),
+    )
+    rig = rig_of(THREE_WEEKS).model_copy(update={"calibrations": notes})
+    assert aged(rig, SCANNED) == rig
+    said = unseen_since(rig, SCANNED)
+    assert "days older" in said
+    assert "light" not in said
+
+
+def test_pictures_that_were_fitted_again_are_as_old_as_they_are() -> None:
+    light = AcceptedCalibration(name="spectralon", title="Spectralon", accepted=SCANNED, captured=THREE_WEEKS)
+    rig = rig_of("").model_copy(update={"calibrations": (light.note,)})
+    assert aged(rig, SCANNED).reference_rel_std == pytest.approx(PER_ROOT_DAY * 20**0.5)
+    assert "is 21 days older than this scan" in unseen_since(rig, SCANNED)
+
+
+def test_a_calibration_after_the_scan_knows_its_light_no_better_than_one_before() -> None:
+    later = rig_of("2026-04-12T10:00:00+00:00")
+    assert aged(later, SCANNED).reference_rel_std == pytest.approx(PER_ROOT_DAY * 20**0.5)
+    assert "21 days after this scan" in unseen_since(later, SCANNED)
+
+
+def test_a_drift_check_sets_the_age_of_the_light_back() -> None:
+    rig = with_checks(checked("2026-03-22T09:00:00+00:00", 1.0, 0.002))
+    level = light_level(rig, SCANNED)
+    assert level is not None
+    assert level.rel_std == pytest.approx(0.002)
+    assert level.check == rig.light_checks[0]
+    assert "light" not in unseen_since(rig, SCANNED)
+    # A check of another calibration tells nothing of this one.
+    other = with_checks(checked("2026-03-22T09:00:00+00:00", 1.0, calibrated="2026-01-01T10:00:00+00:00"))
+    level = light_level(other, SCANNED)
+    assert level is not None
+    assert level.days == pytest.approx(21)
+
+
+def test_a_light_that_a_check_found_changed_is_contained_and_told() -> None:
+    rig = with_checks(checked("2026-03-22T09:00:00+00:00", 0.95, 0.003))
+    assert aged(rig, SCANNED).reference_rel_std == pytest.approx((0.05**2 + 0.003**2) ** 0.5)
+    assert "drift check of 2026-03-22 found the light -5.0% ± 0.3% off" in unseen_since(rig, SCANNED)
+    one = LightCheck(checked="", calibrated="", levels=(1.01, 1.0, 0.94))
+    assert one.largest_change == pytest.approx(-0.06)
+
+
+def test_checks_of_long_ago_are_told_with_their_age() -> None:
+    rig = with_checks(checked("2026-03-06T10:00:00+00:00", 1.0))
+    assert "The light was last checked 16 days before this scan" in unseen_since(rig, SCANNED)
+
+
+def test_a_rig_whose_checks_were_steady_is_trusted_for_longer() -> None:
+    steady = tuple(checked(f"2026-03-{day:02d}T10:00:00+00:00", 1.0) for day in (8, 15, 22))
+    wanted = PER_ROOT_DAY * (DEFAULT_CHECKS / (DEFAULT_CHECKS + 3)) ** 0.5
+    assert wander_per_root_day(steady) == pytest.approx(wanted)
+    wild = (checked("2026-03-10T10:00:00+00:00", 1.09), checked("2026-03-05T10:00:00+00:00", 1.06))
+    # 6 % in the first four days, 3 % in the next five, in whatever order they are kept.
+    squares = 3 * PER_ROOT_DAY**2 + 0.06**2 / 4 + 0.03**2 / 5
+    assert wander_per_root_day(wild) == pytest.approx((squares / 5) ** 0.5)
+
+
+def test_what_checks_get_wrong_themselves_is_not_taken_for_light() -> None:
+    unsure = (checked("2026-03-11T10:00:00+00:00", 1.02, 0.02),)
+    assert wander_per_root_day(unsure) == pytest.approx(PER_ROOT_DAY * (3 / 4) ** 0.5)
+    same_day = (checked("2026-03-01T12:00:00+00:00", 1.02),)
+    assert wander_per_root_day(same_day) == pytest.approx(PER_ROOT_DAY)

@@ -15,6 +15,8 @@ from dsl_core.io.calibration_library import CalibrationLibrary
 from dsl_core.io.rig_file import load_rig
 from dsl_core.io.scan.folder import ScanReader
 from dsl_core.io.sealed import unseal
+from dsl_core.model.calibration.light_check import LightCheck
+from dsl_core.reconstruction.spectral import rig_traits
 from tests.cases import fake_recipe
 
 from .conftest import Give
@@ -45,6 +47,16 @@ def by_hand(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(registry, "open_rig", open_rig)
 
 
+def test_in_what_a_rig_is_unlike_the_usual_is_said(
+    give: Give, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(rig_traits, "_traits", lambda rig: iter(("a film is bent", "light is uneven")))
+    ending = give("calibrate", "all", tmp_path / "a", *TWIN, "--yes", "--no-library")
+    assert "Measured by the calibration, and followed: a film is bent; light is uneven." in ending.out
+    again = give("calibrate", "all", tmp_path / "a", "--yes", "--no-library", "--json").json
+    assert again["traits"] == ["a film is bent", "light is uneven"]
+
+
 def test_one_command_makes_a_rig_a_report_and_a_library_entry(give: Give, tmp_path: Path) -> None:
     folder, setting = tmp_path / "campaign", "geometry.scale=1.5"
     ending = give("calibrate", "all", folder, *TWIN, "--yes", "--name", "lab 3", "--set", setting, "--json")
@@ -68,6 +80,12 @@ def test_one_command_makes_a_rig_a_report_and_a_library_entry(give: Give, tmp_pa
     assert give("calibrate", "all", folder, "--yes", "--name", "lab 3").code == 0
     assert (folder / "geometry" / "pose" / "capture.json").stat().st_mtime_ns == before
     assert len(CalibrationLibrary().stamps("lab 3")) == 1
+    # Nor does it for what a drift check has found of the light since.
+    check = LightCheck(checked="2026-03-22", calibrated="2026-03-01", levels=(1.0, 1.0, 1.0))
+    CalibrationLibrary().store("lab 3", rig.model_copy(update={"light_checks": (check,)}))
+    assert give("calibrate", "all", folder, "--yes", "--name", "lab 3").code == 0
+    assert CalibrationLibrary().find("lab 3").rig.light_checks == (check,)
+    assert len(CalibrationLibrary().stamps("lab 3")) == 2
     scan = [
         "scan",
         tmp_path / "a.dsl",
@@ -80,7 +98,7 @@ def test_one_command_makes_a_rig_a_report_and_a_library_entry(give: Give, tmp_pa
         "lab 3",
     ]
     assert give(*scan).code == 0
-    assert ScanReader(tmp_path / "a.dsl").calibration == rig
+    assert ScanReader(tmp_path / "a.dsl").calibration == CalibrationLibrary().find("lab 3").rig
 
 
 def test_a_late_refusal_leaves_the_rig_as_calibrated_so_far(give: Give, tmp_path: Path) -> None:

@@ -12,7 +12,7 @@ from dsl_core.io.calibration_library import CalibrationLibrary
 from dsl_core.io.rig_file import load_rig
 from dsl_core.model.calibration.accepted import CalibrationNote
 from dsl_core.model.figure import Figure
-from dsl_core.model.rig import Rig
+from dsl_core.model.rig import Provenance, Rig
 
 from .conftest import Give
 
@@ -86,7 +86,13 @@ def test_a_quick_shot_says_whether_the_rig_has_changed(give: Give, library: Cali
     assert ending.code == 0, ending.err
     assert ending.json["stable"] is True
     assert len(ending.json["figures"]) == 9
+    assert ending.json["kept"] is False  # nobody noted when this light was calibrated
     library.store("lab", calibrated(1.1))
+    dated = calibrated(1.1).model_copy(update={"provenance": Provenance(created="2026-03-01")})
+    library.store("lab", dated)
     ending = give("calibrations", "check", "lab", "--yes", *PLANE)
     assert ending.code == 2
     assert "The rig no longer matches lab: white signal, red" in ending.sentence
+    assert "lab now remembers this check" in ending.out
+    (found,) = library.find("lab").rig.light_checks
+    assert found.largest_change == pytest.approx(1 / 1.1 - 1, abs=0.01)

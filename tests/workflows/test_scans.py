@@ -15,7 +15,7 @@ from dsl_core.io.scan.origin import rig_notes
 from dsl_core.model.fit import Fit
 from dsl_core.model.frames import Frame
 from dsl_core.model.plan import CapturePlan, GrayCode, LineComb, Setting
-from dsl_core.model.rig import Provenance
+from dsl_core.model.rig import Provenance, Rig
 from dsl_core.patterns.images import pattern_image
 from dsl_core.workflows import scans
 from dsl_core.workflows.scans import prepare_resume, reopen_rig, resume, truth_of
@@ -122,4 +122,21 @@ def test_a_result_says_that_its_calibration_is_old_unless_its_pictures_have_no_d
     rig = small_rig().model_copy(update={"provenance": Provenance(created="2020-01-01")})
     found = Fit.read({**scans._dated(small_result().assign_attrs(fit=Fit().model_dump_json()), rig, reader)})
     assert (found is not None) == told
-    assert found is None or "days older than this scan" in found.words
+    assert found is None or ("days older than this scan" in found.words and found.level_rel_std > 0.1)
+
+
+@pytest.mark.parametrize(("notes", "told"), [({}, True), ({"imported_sensor": "{}"}, False)])
+def test_a_scan_long_after_its_calibration_is_reconstructed_with_a_light_that_is_less_known(
+    folder: Path, monkeypatch: pytest.MonkeyPatch, notes: dict[str, str], told: bool
+) -> None:
+    given: list[Rig] = []
+
+    def reconstruct(source: object, rig: Rig, *rest: object) -> object:
+        given.append(rig)
+        return small_result()
+
+    monkeypatch.setattr(scans, "reconstruct", reconstruct)
+    monkeypatch.setattr(scans, "is_import", lambda reader: bool(notes))
+    rig = small_rig().model_copy(update={"provenance": Provenance(created="2020-01-01")})
+    scans.reconstruct_scan(folder, rig)
+    assert (given[0].reference_rel_std > 0.1) == told

@@ -132,7 +132,9 @@ class LibraryController:
 
         def work(progress: Progress) -> DriftVerdict | _Differs:
             from dsl_core.campaign.drift_check import PLACEMENT, measure_drift
+            from dsl_core.campaign.light_history import keep_check
             from dsl_core.devices.conditions import check_conditions, with_calibration
+            from dsl_core.io.campaign_folder import now
 
             known = self._library.find(key).rig
             found = check_conditions(known, devices)
@@ -143,7 +145,8 @@ class LibraryController:
                 own.place(PLACEMENT)
             with tempfile.TemporaryDirectory(prefix="dsl-scan-check-") as spare:
                 figures = measure_drift(own, known, Path(spare) / "check.dsl", spectralon, progress)
-            return DriftVerdict(key, figures, spectralon, found)
+            kept = not found and keep_check(self._library, key, figures, now())
+            return DriftVerdict(key, figures, spectralon, found, kept)
 
         def done(said: DriftVerdict | _Differs) -> None:
             if isinstance(said, _Differs):
@@ -155,5 +158,7 @@ class LibraryController:
                 return
             self._state.note.set(said.sentence)
             self._state.drift.set(said)
+            if said.kept:
+                self.load()
 
         self._rig.run(Job(f"Check {key} for drift", work, done, exclusive=RIG))

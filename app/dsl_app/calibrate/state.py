@@ -103,13 +103,15 @@ class CampaignFacts:
 class DriftVerdict:
     """What a quick shot showed about a calibration of the library.
 
-    ``spectralon`` says that the target was one, ``overridden`` which settings differed and were ignored.
+    ``spectralon`` says that the target was one, ``overridden`` which settings differed and were ignored, and
+    ``kept`` that the calibration remembers what was found of the light.
     """
 
     name: str
     figures: tuple[Figure, ...]
     spectralon: bool = True
     overridden: tuple[str, ...] = ()
+    kept: bool = False
 
     @property
     def passed(self) -> bool:
@@ -119,7 +121,8 @@ class DriftVerdict:
     @property
     def sentence(self) -> str:
         """The verdict in words."""
-        return f"The rig {'matches' if self.passed else 'does not match'} the calibration {self.name}."
+        verdict = f"The rig {'matches' if self.passed else 'does not match'} the calibration {self.name}."
+        return f"{verdict} Scans from now on state the light by this check." if self.kept else verdict
 
 
 def empty_rows() -> tuple[Row, ...]:

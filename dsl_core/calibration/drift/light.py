@@ -24,6 +24,8 @@ from dsl_core.optics.spectra import ORDERS, SECOND_ORDERS, Bands
 
 Floats = NDArray[np.float64]
 
+#: Name of the figure of a colour.
+WHITE_SIGNAL = "white signal, {0}, over calibration"
 LIGHT_LIMIT, FILM_LIMIT_PX, EFFICIENCY_LIMIT = 0.03, 0.2, 0.05
 #: Bands of the prediction, without those that the model adds beyond both ends.
 GRID = WavelengthGrid(start_nm=430.0, stop_nm=675.0, step_nm=5.0)
@@ -69,7 +71,7 @@ def light_drift(rig: Rig, white: PlaneSignals, reflectance: float) -> list[Figur
         spread = 1.4826 * float(np.median(np.abs(ratio - np.median(ratio))))
         figures.append(
             Figure(
-                name=f"white signal, {name}, over calibration",
+                name=WHITE_SIGNAL.format(name),
                 value=float(np.median(ratio)),
                 std=float(np.hypot(1.2533 * spread / np.sqrt(mine.sum()), rig.white_scale_rel_std)),
                 unit="1",

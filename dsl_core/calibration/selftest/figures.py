@@ -9,6 +9,8 @@ import numpy as np
 from dsl_core.calibration.selftest.record import PUBLISHED_MS
 from dsl_core.calibration.selftest.tone import MOST_LEFT
 from dsl_core.model.calibration.selftest import (
+    OFF_CURVE,
+    OFF_POWER_LAW,
     CameraCheck,
     CycleCheck,
     FocusCheck,
@@ -127,7 +129,7 @@ def _projector(projector: ProjectorCheck) -> Iterator[Figure]:
         )
     worst = max((ramp.residual_percent for ramp in projector.ramps), key=lambda each: each.value)
     yield _figure(
-        f"ramps, rms distance from the {'power law' if tone is None else 'measured curve'}",
+        OFF_POWER_LAW if tone is None else OFF_CURVE,
         worst,
         "%",
         high=RAMP_PERCENT,

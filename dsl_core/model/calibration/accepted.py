@@ -20,12 +20,22 @@ LONGEST = 100
 
 
 class CalibrationNote(Record):
-    """What a calibrated rig remembers of one calibration: when it was accepted and what it reached."""
+    """What a calibrated rig remembers of one calibration: when it was accepted and what it reached.
+
+    ``captured`` is when its pictures were taken, empty where nobody noted it: they may have been fitted again
+    long after.
+    """
 
     name: str
     title: str
     accepted: str
+    captured: str = ""
     figures: tuple[Figure, ...] = ()
+
+    @property
+    def measured(self) -> str:
+        """When the rig was as this calibration says."""
+        return self.captured or self.accepted
 
     @property
     def failed(self) -> tuple[Figure, ...]:
@@ -85,4 +95,10 @@ class AcceptedCalibration(Record):
     @property
     def note(self) -> CalibrationNote:
         """What a rig remembers of it."""
-        return CalibrationNote(name=self.name, title=self.title, accepted=self.accepted, figures=self.figures)
+        return CalibrationNote(
+            name=self.name,
+            title=self.title,
+            accepted=self.accepted,
+            captured=self.captured,
+            figures=self.figures,
+        )

@@ -13,6 +13,13 @@ from dsl_core.model.projector.tone_curve import ToneCurve
 
 Colour = Literal["white", "red", "green", "blue"]
 
+#: Names of the figure that says how far the projector's light by drive level is off a power law, or off the
+#: curve that was measured instead, %.
+OFF_POWER_LAW, OFF_CURVE = (
+    "ramps, rms distance from the power law",
+    "ramps, rms distance from the measured curve",
+)
+
 
 class Measured(Record):
     """A measured value and one standard deviation, both in the unit of the field that holds them."""

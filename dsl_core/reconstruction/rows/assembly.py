@@ -21,6 +21,7 @@ from dsl_core.reconstruction.fit_findings import SpectralCounts, count_spectra, 
 from dsl_core.reconstruction.geometry import Geometry
 from dsl_core.reconstruction.rows.bands import Band
 from dsl_core.reconstruction.scan_result import attributes_of, maps_of_rows
+from dsl_core.reconstruction.spectral.rig_traits import traits_in_words
 from dsl_core.reconstruction.spectral.solvers import RowSolver
 from dsl_core.reconstruction.spectral.spectra import SpectralMaps
 
@@ -106,6 +107,7 @@ class Assembly:
             None if solver is None else solver.error,
             [*findings, *(() if solver is None else solver.findings)],
         )
+        fit = fit.model_copy(update={"measured": traits_in_words(self._rig)})
         return self._sink.finish(attributes_of(self._rig, self._plan, fit))
 
     def _place(self, band: Band) -> slice:

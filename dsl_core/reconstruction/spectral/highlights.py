@@ -2,12 +2,14 @@
 
 A highlight sends on the light of all orders alike, so that no pixel tells it from a brighter surface. But it
 is white, and grows as the surface turns towards the direction that mirrors the projector into the camera:
-where brightness does that from place to place by the same amount in all colours, surfaces are glossy.
+where brightness does that from place to place by the same amount in all colours, surfaces are glossy. Each
+surface between depth edges is judged by itself: a matt wall behind a glossy object says nothing of it.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,7 +29,7 @@ Floats = NDArray[np.float64]
 ROUGHNESS = (0.2, 0.3, 0.4, 0.5, 0.6)
 #: A highlight of so much reflectance matters, if it is so many deviations of its own from none, and every
 #: colour alone shows at least this share of it.
-LEAST, SIGMAS, WHITE_SHARE = 0.01, 4.0, 0.3
+LEAST, SIGMAS, WHITE_SHARE = 0.01, 6.0, 0.3
 #: Cells of 2 x 2 pixels, one of each colour, are compared with those so many cells away; with at most so
 #: many pairs. Neighbouring pairs err alike: deviations are those between blocks of so many cells a side.
 LAG, MOST_PAIRS, BLOCK = 2, 40_000, 8
@@ -37,7 +39,8 @@ SLAB = 128
 TEXTURE, FLOOR = 0.02, 0.002
 #: Beyond so many deviations a pair is at an edge, and pulls no more than there.
 HUBER, ROUNDS = 2.0, 6
-FEWEST_PAIRS = 200
+#: Pairs and blocks of a surface that say something.
+FEWEST_PAIRS, FEWEST_BLOCKS = 100, 5
 #: Pixels whose brightness or normal means nothing, and the least light that falls on a surface.
 _DOUBTFUL = Flag.SATURATED | Flag.DEPTH_EDGE | Flag.NOT_REFINED | Flag.CODES_DISAGREE | Flag.UNUSUAL_PEAK
 LEAST_SHADING = 0.1
@@ -64,16 +67,22 @@ class Highlight:
 def follow_highlights(rig: Rig, geometry: Geometry) -> tuple[Geometry, list[FitFinding]]:
     """Geometry that says what highlights add to reflectance, and what is told of them."""
     towards = towards_mirror(rig, geometry)
-    found = find_highlight(rig, geometry, towards)
-    if found is None:
+    surfaces = surfaces_between_edges(geometry, towards)
+    found = find_highlights(rig, geometry, towards, surfaces)
+    if not found:
         return geometry, []
-    added = np.nan_to_num(found.at(towards)).astype(np.float32)
+    added = np.zeros(towards.shape, np.float32)
+    own = _everywhere(surfaces, towards.shape)
+    for surface, light in found.items():
+        here = own == surface
+        added[here] = np.nan_to_num(light.at(towards[here]))
     brightest = float(added.max(initial=0.0))
+    surest = min(light.peak_std / light.peak for light in found.values())
     concerned = float((added > LEAST).sum() / max(np.isfinite(geometry.depth_mm).sum(), 1))
     told = FitFinding.judged(
         "surfaces",
         "highlights",
-        (brightest, brightest * found.peak_std / found.peak),
+        (brightest, brightest * surest),
         "reflectance",
         LEAST,
         f"Surfaces are glossy: towards the direction that mirrors the projector they look brighter, by up to"
@@ -97,13 +106,46 @@ def towards_mirror(rig: Rig, geometry: Geometry) -> NDArray[np.float32]:
     return towards
 
 
-def find_highlight(rig: Rig, geometry: Geometry, towards: NDArray[np.floating]) -> Highlight | None:
-    """The highlight that explains best how brightness changes with ``towards``; None where none does."""
-    pairs = _pairs(rig, geometry, towards)
+def surfaces_between_edges(geometry: Geometry, towards: NDArray[np.floating]) -> NDArray[np.int32]:
+    """Number from 1 of the surface that each cell of 2 x 2 pixels is on; 0 at depth edges and without depth.
+
+    ``towards`` is NaN where there is no depth.
+    """
+    from scipy.ndimage import label
+
+    inside = ((geometry.flags & int(Flag.DEPTH_EDGE)) == 0) & np.isfinite(towards)
+    rows, columns = (size // 2 for size in inside.shape)
+    whole = inside[: 2 * rows, : 2 * columns].reshape(rows, 2, columns, 2).all((1, 3))
+    return np.asarray(label(whole)[0], np.int32)
+
+
+def _everywhere(surfaces: NDArray[np.int32], shape: tuple[int, ...]) -> NDArray[np.int32]:
+    """The surface of each pixel of a picture: its cell's, or else that of the nearest cell which has one."""
+    from scipy.ndimage import distance_transform_edt
+
+    row, column = distance_transform_edt(surfaces == 0, return_distances=False, return_indices=True)
+    near = surfaces[row, column]
+    y, x = (np.minimum(np.arange(size) // 2, most - 1) for size, most in zip(shape, near.shape, strict=True))
+    return np.asarray(near[y[:, None], x])
+
+
+def find_highlights(
+    rig: Rig, geometry: Geometry, towards: NDArray[np.floating], surfaces: NDArray[np.int32]
+) -> dict[int, Highlight]:
+    """By the number of a surface, the highlight that explains best how its brightness changes."""
+    pairs = _pairs(rig, geometry, towards, surfaces)
     if pairs is None:
+        return {}
+    counts = np.bincount(pairs.surface)
+    each = {int(one): _highlight_of(pairs.on(int(one))) for one in np.flatnonzero(counts >= FEWEST_PAIRS)}
+    return {one: found for one, found in each.items() if found is not None}
+
+
+def _highlight_of(pairs: _Pairs) -> Highlight | None:
+    """The highlight of one surface; None where none explains its pairs."""
+    if len(np.unique(pairs.block)) < FEWEST_BLOCKS:
         return None
-    tried = [_fitted(pairs, roughness) for roughness in ROUGHNESS]
-    found = min(tried, key=lambda each: each[1])[0]
+    found = min((_fitted(pairs, roughness) for roughness in ROUGHNESS), key=lambda each: each[1])[0]
     brightest = float(found.at(np.append(pairs.here, pairs.there)).max())
     sure = found.peak > SIGMAS * found.peak_std and min(found.colours) > WHITE_SHARE * found.peak
     return found if sure and brightest > LEAST else None
@@ -111,13 +153,22 @@ def find_highlight(rig: Rig, geometry: Geometry, towards: NDArray[np.floating]) 
 
 @dataclass(frozen=True)
 class _Pairs:
-    """Pairs (n,) of cells: `towards_mirror` of each, how reflectance differs (3, n), and their block."""
+    """Pairs (n,) of cells: `towards_mirror` of each, and how reflectance differs (3, n) with its deviation.
+
+    With their block, and the surface that both are on.
+    """
 
     here: Floats
     there: Floats
     differs: Floats
     std: Floats
     block: NDArray[np.int64]
+    surface: NDArray[np.int32]
+
+    def on(self, surface: int) -> _Pairs:
+        """Those on one surface."""
+        mine = self.surface == surface
+        return _Pairs(*(getattr(self, field.name)[..., mine] for field in fields(self)))
 
 
 def _lobe(towards: NDArray[np.floating], roughness: float) -> NDArray[np.floating]:
@@ -126,8 +177,10 @@ def _lobe(towards: NDArray[np.floating], roughness: float) -> NDArray[np.floatin
     return np.asarray((alpha_sq / (towards**2 * (alpha_sq - 1) + 1)) ** 2)
 
 
-def _pairs(rig: Rig, geometry: Geometry, towards: NDArray[np.floating]) -> _Pairs | None:
-    """Pairs of cells of which all is known; None where there are too few, or a camera has no colours."""
+def _pairs(
+    rig: Rig, geometry: Geometry, towards: NDArray[np.floating], surfaces: NDArray[np.int32]
+) -> _Pairs | None:
+    """Pairs of cells of a surface of which all is known; None if too few, or if a camera has no colours."""
     if len(set(colour_sites(rig.sensor.bayer))) < 3:
         return None
     gain = np.broadcast_to(relative_gain(rig), towards.shape)
@@ -135,7 +188,16 @@ def _pairs(rig: Rig, geometry: Geometry, towards: NDArray[np.floating]) -> _Pair
     # Of large pictures some pairs are enough, and all of them much memory.
     every = max(1, towards.size // 2 // MOST_PAIRS)
     parts = [
-        _pairs_of(rig, white, gain[rows], geometry.of_rows(rows), towards[rows], rows.start, every)
+        _pairs_of(
+            rig,
+            white,
+            gain[rows],
+            geometry.of_rows(rows),
+            towards[rows],
+            surfaces[rows.start // 2 : rows.stop // 2],
+            rows.start,
+            every,
+        )
         for rows in _slabs(len(towards))
     ]
     found = _Pairs(*(np.concatenate(each, -1) for each in zip(*parts, strict=True)))
@@ -153,9 +215,10 @@ def _pairs_of(
     gain: Floats,
     geometry: Geometry,
     towards: NDArray[np.floating],
+    surfaces: NDArray[np.int32],
     top: int,
     every: int,
-) -> tuple[Floats, Floats, Floats, Floats, NDArray[np.int64]]:
+) -> tuple[NDArray[Any], ...]:
     """What `_Pairs` holds, of the rows of a picture from ``top`` on: one of so many pairs."""
     channel, shading = bayer_channels(rig.sensor.bayer, *towards.shape), geometry.surface.shading
     usable = ((geometry.flags & int(_DOUBTFUL)) == 0) & np.isfinite(towards) & (shading > LEAST_SHADING)
@@ -168,19 +231,23 @@ def _pairs_of(
     noise = np.stack([np.sqrt((std**2 * mine).sum(-1)) / mine.sum(-1) for mine in of])
     known: NDArray[np.bool_] = _cells(usable).min(-1) > 0
     facing = _cells(np.where(usable, towards, 0.0)).mean(-1)
+    # A normal that is off makes a surface look brighter or darker, too.
+    unsure = _cells(np.where(usable, geometry.surface.shading_rel_std, 0.0)).mean(-1)
     rows, columns = known.shape
     parts = []
     for down, across in ((LAG, 0), (0, LAG)):
         first = slice(down, None), slice(across, None)
         second = slice(None, max(rows - down, 0)), slice(None, max(columns - across, 0))
-        row, column = (each[::every] for each in np.nonzero(known[first] & known[second]))
+        alike = known[first] & known[second] & (surfaces[first] == surfaces[second])
+        row, column = (each[::every] for each in np.nonzero(alike))
         a, b = (colours[:, *part][:, row, column] for part in (first, second))
         da, db = (noise[:, *part][:, row, column] for part in (first, second))
-        own = np.sqrt(da**2 + db**2 + (TEXTURE * (a + b) / 2) ** 2 + FLOOR**2)
+        by_normals = (unsure[first][row, column] * a) ** 2 + (unsure[second][row, column] * b) ** 2
+        own = np.sqrt(da**2 + db**2 + by_normals + (TEXTURE * (a + b) / 2) ** 2 + FLOOR**2)
         block = (top // 2 + row) // BLOCK * columns + column // BLOCK
-        parts.append((facing[first][row, column], facing[second][row, column], a - b, own, block))
-    here, there, differs, own, block = (np.concatenate(part, -1) for part in zip(*parts, strict=True))
-    return here, there, differs, own, block
+        on = surfaces[first][row, column]
+        parts.append((facing[first][row, column], facing[second][row, column], a - b, own, block, on))
+    return tuple(np.concatenate(part, -1) for part in zip(*parts, strict=True))
 
 
 def _cells(values: NDArray[np.generic]) -> Floats:

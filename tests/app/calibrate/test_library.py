@@ -10,6 +10,7 @@ from dsl_app.connection.state import RigChoice
 
 from dsl_core.devices.conditions import current_conditions
 from dsl_core.io.calibration_library import CalibrationLibrary
+from dsl_core.model.rig import Provenance
 from tests.app.calibrate.calibrate_bench import (
     CalibrateBench,
     calibrate,
@@ -73,10 +74,13 @@ def plane(tmp_path: Path) -> CalibrateBench:
 
 def test_a_drift_check_of_the_twin_says_that_nothing_has_moved(plane: CalibrateBench) -> None:
     _, calibration = plane.calibrated
-    plane.library.store("own", calibration)
+    dated = calibration.model_copy(update={"provenance": Provenance(created="2026-03-01")})
+    plane.library.store("own", dated)
     plane.control.library.check("own")
     verdict = plane.state.drift.value
     assert verdict is not None, plane.told
+    assert len(plane.library.find("own").rig.light_checks) == 1
+    assert "state the light by this check" in plane.state.note.value
     assert {figure.name for figure in verdict.figures} >= {"row drift"}
     assert "The rig matches the calibration own." in plane.state.note.value
 

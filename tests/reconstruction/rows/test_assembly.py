@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from dsl_core.model.fit import Fit
 from dsl_core.model.options import Options
 from dsl_core.model.plan import CapturePlan
 from dsl_core.reconstruction.fit_findings import SpectralCounts
@@ -38,6 +39,9 @@ class Sink:
     def put(self, place: slice, maps: dict[str, Any], note: str) -> None:
         self.put_into.append((place, maps))
         self.notes[place.start, place.stop] = note
+
+    def finish(self, attributes: dict[str, Any]) -> Any:
+        return attributes
 
 
 def made(region_px: tuple[int, int, int, int] | None) -> tuple[Assembly, Sink]:
@@ -93,3 +97,14 @@ def test_of_a_band_the_rows_and_columns_of_the_part_are_put(
     assert maps["map"].tolist() == numbers[rows, 2:9].tolist()
     assert maps["cube"].tolist() == [numbers[rows, 2:9].tolist()]
     assert SpectralCounts(**json.loads(sink.notes[place])["counts"]) == SpectralCounts()
+
+
+def test_the_verdict_says_what_the_calibration_measured(monkeypatch: pytest.MonkeyPatch) -> None:
+    assembly, _ = made(None)
+    monkeypatch.setattr(module, "fit_of", lambda *given: Fit())
+    monkeypatch.setattr(module, "traits_in_words", lambda rig: f"{rig.name} is bent.")
+    assembly._geometry.depth_mm = np.zeros((16, 10))  # type: ignore[misc]
+    attributes: Any = assembly.finish(None, ())
+    found = Fit.read(attributes)
+    assert found is not None
+    assert found.measured == f"{published_rig().name} is bent."

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.ndimage import binary_dilation
 
 from dsl_core.model.result import Flag
 from dsl_core.model.rig import Rig
@@ -16,8 +17,10 @@ from dsl_core.reconstruction.geometry import Geometry
 from dsl_core.reconstruction.scan_result import with_highlight
 from dsl_core.reconstruction.spectral import highlights
 from dsl_core.reconstruction.spectral.highlights import (
-    find_highlight,
+    Highlight,
+    find_highlights,
     follow_highlights,
+    surfaces_between_edges,
     towards_mirror,
 )
 from dsl_core.reconstruction.surface import Surface
@@ -52,6 +55,12 @@ def lit(rig: Rig, geometry: Geometry, reflectance: np.ndarray) -> Geometry:
     noise = 0.005 * np.random.default_rng(0).standard_normal(own.shape)
     light = (0.8 * white * (own + noise)).astype(np.float32)
     return replace(geometry, amplitude=light, amplitude_std=(0.004 * white).astype(np.float32))
+
+
+def find_highlight(rig: Rig, geometry: Geometry, towards: np.ndarray) -> Highlight | None:
+    """That of the ball, which is the only surface."""
+    found = find_highlights(rig, geometry, towards, surfaces_between_edges(geometry, towards))
+    return found.get(1)
 
 
 def coloured(
@@ -134,3 +143,66 @@ def test_large_pictures_are_asked_in_slabs_and_say_the_same(
     assert parts is not None
     assert parts.roughness == whole.roughness
     assert parts.peak == pytest.approx(whole.peak, rel=0.05)
+
+
+def before_a_wall(geometry: Geometry) -> Geometry:
+    """The ball before a wall, with an edge between them and nothing unknown elsewhere."""
+    on_ball = geometry.flags == 0
+    edge = binary_dilation(on_ball, iterations=2) & ~on_ball
+    return replace(geometry, flags=np.where(edge, int(Flag.DEPTH_EDGE), 0).astype(np.uint16))
+
+
+def test_a_matt_wall_hides_no_highlight_before_it_and_gets_none(ball: tuple[Rig, Geometry]) -> None:
+    """A dark wall is sure of its brightness, and would outweigh the ball."""
+    rig, geometry = ball
+    both, on_ball = before_a_wall(geometry), geometry.flags == 0
+    reflectance = np.where(on_ball, coloured(rig, geometry, 0.02), 0.02)
+    wider, told = follow_highlights(rig, lit(rig, both, reflectance))
+    assert [finding.name for finding in told] == ["highlights"]
+    assert wider.highlight is not None
+    added = np.where(on_ball, coloured(rig, geometry, 0.02)[0] - YELLOW[0], 0)
+    assert wider.highlight[on_ball].max() == pytest.approx(added.max(), rel=0.25)
+    wall = ~binary_dilation(on_ball, iterations=4)
+    assert wider.highlight[wall].max() == 0
+    # As one surface, the wall says that there is none.
+    assert follow_highlights(rig, lit(rig, replace(both, flags=both.flags * 0), reflectance))[1] == []
+
+
+def test_pixels_at_an_edge_have_the_highlight_of_the_nearest_surface(ball: tuple[Rig, Geometry]) -> None:
+    rig, geometry = ball
+    wider, _ = follow_highlights(rig, lit(rig, geometry, coloured(rig, geometry, 0.02)))
+    assert wider.highlight is not None
+    towards = towards_mirror(rig, geometry)
+    surfaces = surfaces_between_edges(geometry, towards)
+    brightest = np.unravel_index(np.where(geometry.flags == 0, towards, 0).argmax(), towards.shape)
+    flags = geometry.flags.copy()
+    flags[brightest] = int(Flag.DEPTH_EDGE)
+    again, _ = follow_highlights(rig, lit(rig, replace(geometry, flags=flags), coloured(rig, geometry, 0.02)))
+    assert again.highlight is not None
+    assert again.highlight[brightest] == pytest.approx(wider.highlight[brightest], rel=0.1)
+    odd = highlights._everywhere(surfaces[:5, :5], (11, 10))
+    assert odd.shape == (11, 10)
+
+
+def test_where_normals_are_unsure_brightness_says_little_of_highlights(ball: tuple[Rig, Geometry]) -> None:
+    rig, geometry = ball
+    towards = towards_mirror(rig, geometry)
+    surfaces = surfaces_between_edges(geometry, towards)
+    seen = lit(rig, geometry, np.full((3, 72, 112), 0.5))
+    unsure = replace(seen.surface, shading_rel_std=np.full((72, 112), 0.3, np.float32))
+    sure = highlights._pairs(rig, seen, towards, surfaces)
+    doubted = highlights._pairs(rig, replace(seen, surface=unsure), towards, surfaces)
+    assert sure is not None
+    assert doubted is not None
+    assert np.median(np.sqrt(doubted.std**2 - sure.std**2)) == pytest.approx(0.3 * 0.5 * 2**0.5, rel=0.01)
+
+
+@pytest.mark.parametrize(("least", "count"), [("FEWEST_PAIRS", 1000), ("FEWEST_BLOCKS", 100)])
+def test_a_small_surface_says_nothing(
+    ball: tuple[Rig, Geometry], monkeypatch: pytest.MonkeyPatch, least: str, count: int
+) -> None:
+    """The ball has some hundred pairs, and the whole picture some thousand."""
+    rig, geometry = ball
+    monkeypatch.setattr(highlights, least, count)
+    reflectance = np.where(geometry.flags == 0, coloured(rig, geometry, 0.02), 0.02)
+    assert follow_highlights(rig, lit(rig, before_a_wall(geometry), reflectance))[1] == []
