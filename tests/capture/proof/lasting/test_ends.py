@@ -203,3 +203,33 @@ def test_parts_of_a_sensor_are_looked_for_where_white_does_not_saturate(
         return bright, black + step
 
     assert any("in all rows" in sentence for sentence in said(scene, fault)) == (columns.stop < 32)
+
+
+def numbers(row: int, count: int, full_dn: float = 3800.0) -> Fault:
+    """Numbers in the first pixels of a row, other ones in each picture."""
+
+    def fault(white: Mosaic, black: Mosaic) -> tuple[Mosaic, Mosaic]:
+        changed = [each.copy() for each in (white, black)]
+        for seed, each in enumerate(changed):
+            each[row, :count] = np.random.default_rng(seed).integers(0, int(full_dn), count)
+        return changed[0], changed[1]
+
+    return fault
+
+
+def test_numbers_that_a_camera_writes_into_its_first_row_are_no_light(scene: RenderedScene) -> None:
+    (sentence,) = said(scene, numbers(0, 20))
+    told = re.match(r"The first row of black holds numbers up to column (\d+), which no light", sentence)
+    assert told is not None
+    assert 18 <= int(told[1]) <= 21
+
+
+def test_light_at_the_upper_edge_and_a_few_hot_pixels_are_no_numbers(scene: RenderedScene) -> None:
+    def lamp(white: Mosaic, black: Mosaic) -> tuple[Mosaic, Mosaic]:
+        down, across = np.mgrid[: white.shape[0], : white.shape[1]]
+        room = 2000.0 * np.exp(-(down**2) / 2 - ((across - 20) / 12) ** 2)
+        return white + room, black + room
+
+    assert not any("numbers" in each for each in said(scene, lamp))
+    assert not any("numbers" in each for each in said(scene, numbers(0, 1)))
+    assert not any("numbers" in each for each in said(scene, numbers(1, 20)))
