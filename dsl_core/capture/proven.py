@@ -402,7 +402,7 @@ class ProvenShots:
 
 def _what_to_do(found: Finding, change: Explanation, proof: FrameProof) -> str:
     """Why a picture stays wrong as far as that is known, and what to do about it."""
-    if found.verdict is Verdict.HIDDEN:
+    if found.verdict is Verdict.HIDDEN and not change.is_of_all:
         # Who stands there is in the pictures that would say what has changed, too.
         return f"{found.remedy} Resume the scan afterwards."
     if change.is_as_at_first:

@@ -164,3 +164,39 @@ def test_a_dozen_lit_pixels_are_needed(lit: int, is_told: bool) -> None:
     white = np.zeros((48, 72))
     white[0, :lit] = 2000.0
     assert bool(what_changed(even(white, 20.0), even(white * 0.5, 20.0), SENSOR).sentence) == is_told
+
+
+def shaded(share: float, columns: slice = slice(0, 30)) -> References:
+    """Pictures whose white, and black, have this share of their light in some columns."""
+    sound = pictures()
+    made = []
+    for picture in sound.pictures:
+        light = picture.astype(float) - SENSOR.black_level_dn
+        light[:, columns] *= share
+        made.append(np.rint(light + SENSOR.black_level_dn).clip(0).astype(np.uint16))
+    return References(*made)
+
+
+def test_a_part_of_the_picture_that_lost_light_is_no_other_exposure() -> None:
+    found = what_changed(pictures(), shaded(0.4), SENSOR)
+    assert (
+        "White has lost light in columns 0-32, rows 0-64 of the picture, and not elsewhere" in found.sentence
+    )
+    assert "times" not in found.sentence
+    assert not found.is_of_all
+
+
+def test_all_of_the_picture_that_lost_light_is_in_the_way_of_nobody() -> None:
+    found = what_changed(pictures(), shaded(0.4, slice(None)), SENSOR)
+    assert "is 0.40 times" in found.sentence
+    assert found.is_of_all
+
+
+def test_a_colour_that_failed_is_no_white_balance() -> None:
+    before = pictures()
+    red = np.tile([[0.1, 1.0], [1.0, 1.0]], (32, 48))
+    later = (before.black + red * (before.white.astype(float) - before.black)).round().astype(np.uint16)
+    found = what_changed(before, References(later, before.black, before.code), SENSOR)
+    assert "Look whether the projector still shines in red" in found.sentence
+    assert "white balance" not in found.sentence
+    assert found.is_of_all

@@ -115,7 +115,7 @@ class Bench:
             snap(SHOTS[10])
         if self.cause == "unplugged":
             raise DeviceError("no camera")
-        return Explanation(self.cause, self.cause == "It moved.", self.cause == "")
+        return Explanation(self.cause, self.cause == "It moved.", self.cause == "", self.cause == "Turned.")
 
 
 def is_right(shot: Shot) -> Finding:
@@ -247,6 +247,13 @@ def test_who_hides_a_part_is_asked_away_whatever_else_seems_changed() -> None:
     with pytest.raises(
         PictureError, match=r"darker than the black picture.*\. Keep out of the way of camera"
     ):
+        bench.shots.take(LINE)
+
+
+def test_nobody_hides_a_part_of_a_picture_of_which_all_has_changed() -> None:
+    bench = Bench(lambda shot: Finding(shot, Verdict.HIDDEN, (shot,)))
+    bench.cause = "Turned."
+    with pytest.raises(PictureError, match=r"darker than the black picture.*\. Turned\. Frames before"):
         bench.shots.take(LINE)
 
 

@@ -45,6 +45,7 @@ from dsl_core.capture.proof.sentinel import SentinelProof
 from dsl_core.capture.proof.usual_light import LEAST_LIGHT, UsualLight
 from dsl_core.capture.proof.white_again import WhiteAgain, white_again
 from dsl_core.model.captured_code import CapturedCode
+from dsl_core.model.conditions import COLOUR_NAMES
 from dsl_core.model.plan import CapturePlan, NoCode, Role, ScanLines, Shot, describe_shot
 from dsl_core.model.rig import Rig
 
@@ -359,6 +360,10 @@ class FrameProof:
         black = self._kept.get(self._blacks[shot.setting])
         if black is None or not self._hidden.is_hidden(shot.setting, seen, black):
             return None
+        colours = self._hidden.colours(seen, black, self._raster.channels(self._bayer))
+        if colours:
+            named = " and ".join(COLOUR_NAMES[each] for each in colours)
+            return Finding(shot, Verdict.COLOURS, (shot,), f"only {named}")
         return Finding(shot, Verdict.HIDDEN, (shot,))
 
     def _with_doubt(self, found: Finding, seen: Counts) -> Finding:
