@@ -9,6 +9,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from dsl_core.capture.proof.lasting.written_row import written_row
+from dsl_core.capture.proof.noise import Noise
+from dsl_core.capture.proof.raster import Raster
 from dsl_core.model.rig import Sensor
 from dsl_core.optics.sensor import raw_variance
 
@@ -29,6 +32,9 @@ CLIPPED, BELOW_FULL = 0.01, 0.9
 #: White follows that of before by another power than one by so much, alike in every colour, and as closely as
 #: this correlation; pixels so many deviations bright are asked, and so many are needed.
 POWER, CLOSELY, BRIGHT_SIGMAS, FEWEST_BRIGHT = 0.08, 0.97, 20.0, 200
+#: Light differs from row to row from this much on (rms of its factors), by so much up and down; within rows,
+#: of so many parts, it differs by no more than this share of that.
+BANDS, UP_AND_DOWN, WITHIN, PARTS = 0.03, 0.03, 0.5, 6
 #: Values are coarser if there are less of them than this share of those before, which were at least so many.
 COARSER, FEWEST_VALUES = 0.3, 64
 #: Black is filtered with less than this share of its noise, where it was noise at first: so many times what
@@ -44,14 +50,22 @@ BEYOND_SIGMAS, BEYOND, SHARPENED, FEWEST_SHARPENED = 6.0, 0.1, 0.01, 8
 def alteration(before: Pictures, now: Pictures, sensor: Sensor) -> str:
     """What was done to pictures since ``before``, with what to do; empty if nothing shows."""
     return (
-        _turned(before[0], now[0], sensor)
+        _numbered(now[1], sensor)
+        or _turned(before[0], now[0], sensor)
         or _begun_elsewhere(before, now)
         or _dark_rows(before, now)
         or _clipped(before[0], now[0], sensor)
         or _coarser(before, now)
+        or _banded(before, now)
         or _filtered(before, now, sensor)
         or _curved(before, now, sensor)
     )
+
+
+def _numbered(black: Mosaic, sensor: Sensor) -> str:
+    raster = Raster((black.shape[1], black.shape[0]))
+    found = written_row(raster.take(black), Noise(sensor), raster, black.shape[1])
+    return "" if found is None else found.sentence
 
 
 def _turned(before: Mosaic, now: Mosaic, sensor: Sensor) -> str:
@@ -153,6 +167,32 @@ def _curved(before: Pictures, now: Pictures, sensor: Sensor) -> str:
         f"White follows the light of when the scan began by a power of {float(np.mean(powers)):.2f}: gamma,"
         " tone mapping or high dynamic range of the camera was switched on, or its black level changed. Set"
         " it to values that are proportional to light, and resume the scan."
+    )
+
+
+def _banded(before: Pictures, now: Pictures) -> str:
+    """Whether whole rows have more light than before and others less."""
+    parts = np.linspace(0, before[0].shape[1], PARTS + 1)[:-1].astype(int)
+    cells = np.arange(0, before[0].shape[0] - 1, 2)  # two rows of a mosaic have all its colours
+    old, new = (
+        np.add.reduceat(np.add.reduceat(white.astype(np.float64) - black, parts, axis=1), cells, axis=0)
+        for white, black, _ in (before, now)
+    )
+    lit = old.sum(1) > 0.25 * old.sum(1).max()
+    if int(lit.sum()) < len(lit) / 2 or min(old[lit].min(), new[lit].min()) <= 0:
+        return ""
+    of_rows = new[lit].sum(1) / old[lit].sum(1)
+    of_parts = new[lit] / old[lit] / of_rows[:, None]
+    usual = float(np.median(of_rows))
+    spread = float(np.std(of_rows)) / usual
+    is_both = max(of_rows) > (1 + UP_AND_DOWN) * usual and min(of_rows) < (1 - UP_AND_DOWN) * usual
+    if spread < BANDS or not is_both or float(np.std(of_parts)) > WITHIN * spread:
+        return ""
+    return (
+        f"Whole rows of white have other light than when the scan began, by {100 * spread:.0f} % up and down:"
+        " the light flickers, as that of the mains or of pulsed LEDs does, while the camera exposes one row"
+        " after the other. Expose for whole periods of the light, keep lamps of the room off, and resume the"
+        " scan."
     )
 
 

@@ -56,9 +56,21 @@ def dark_rows(counts: Counts) -> Counts:
     return made
 
 
+def numbers(counts: Counts) -> Counts:
+    made = counts.copy()
+    made[0, :30] = np.random.default_rng(7).integers(0, 4096, 30)
+    return made
+
+
+def in_bands(counts: Counts) -> Counts:
+    return over_black(lambda light: light * (1 + 0.1 * np.sin(np.arange(64) / 5))[:, None])(counts)
+
+
 @pytest.mark.parametrize(
     ("change", "said"),
     [
+        (numbers, "The first row of black holds numbers"),
+        (in_bands, "Whole rows of white have other light than when the scan began, by 7 % up and down"),
         (lambda c: c[:, ::-1], "picture is mirrored"),
         (lambda c: c[::-1], "picture is upside down"),
         (lambda c: c[::-1, ::-1], "picture is turned by 180 degrees"),
@@ -84,11 +96,23 @@ def test_an_alteration_is_named(change: Callable[[Counts], Counts], said: str) -
         over_black(lambda c: 0.5 * c),
         over_black(lambda c: c * np.tile([[0.6, 1.0], [1.0, 1.0]], (32, 48))),
         over_black(lambda c: c * np.where(np.arange(96) < 30, 0.3, 1.0)),
+        over_black(lambda c: c * np.where(np.arange(64) < 30, 0.6, 1.0)[:, None]),
+        over_black(lambda c: c * (1 + 0.3 * np.sin((np.arange(96) + 2 * np.arange(64)[:, None]) / 30))),
         lambda c: c + 40.0,
         lambda c: np.roll(c, 2, 1),
         of_colours(lambda c: (c + np.roll(c, 1, 1)) / 2),
     ],
-    ids=["noise", "half the light", "red", "somebody", "room", "motion", "half a pixel"],
+    ids=[
+        "noise",
+        "half the light",
+        "red",
+        "somebody",
+        "somebody above",
+        "aslant",
+        "room",
+        "motion",
+        "half a pixel",
+    ],
 )
 def test_other_changes_are_no_alteration(change: Callable[[Counts], Counts]) -> None:
     assert alteration(pictures(1), pictures(2, change), SENSOR) == ""  # type: ignore[arg-type]
