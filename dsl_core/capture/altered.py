@@ -30,8 +30,9 @@ NO_LIGHT, FEWEST_ROWS, MOST_ROWS = 0.05, 2, 0.7
 #: Pictures are clipped where this share of the pixels has the largest value, below this share of full scale.
 CLIPPED, BELOW_FULL = 0.01, 0.9
 #: White follows that of before by another power than one by so much, alike in every colour, and as closely as
-#: this correlation; pixels so many deviations bright are asked, and so many are needed.
-POWER, CLOSELY, BRIGHT_SIGMAS, FEWEST_BRIGHT = 0.08, 0.97, 20.0, 200
+#: this correlation; blocks of so many pixels of a colour a side are asked that are so many deviations bright,
+#: and so many are needed.
+POWER, CLOSELY, BLOCK_PX, BRIGHT_SIGMAS, FEWEST_BRIGHT = 0.08, 0.97, 4, 20.0, 24
 #: Light differs from row to row from this much on (rms of its factors), by so much up and down; within rows,
 #: of so many parts, it differs by no more than this share of that.
 BANDS, UP_AND_DOWN, WITHIN, PARTS = 0.03, 0.03, 0.5, 6
@@ -154,7 +155,8 @@ def _curved(before: Pictures, now: Pictures, sensor: Sensor) -> str:
     powers = []
     for site in ((0, 0), (0, 1), (1, 0), (1, 1)):
         place = np.s_[site[0] :: 2, site[1] :: 2]
-        x, y = (np.log(each[place][bright[place]]) for each in (old, new))
+        used = _blocks(bright[place].astype(np.float64)) == 1
+        x, y = (np.log(_blocks(each[place])[used]) for each in (old, new))
         if x.size < FEWEST_BRIGHT or x.std() == 0 or y.std() == 0:
             continue
         if float(np.corrcoef(x, y)[0, 1]) < CLOSELY:
@@ -168,6 +170,13 @@ def _curved(before: Pictures, now: Pictures, sensor: Sensor) -> str:
         " tone mapping or high dynamic range of the camera was switched on, or its black level changed. Set"
         " it to values that are proportional to light, and resume the scan."
     )
+
+
+def _blocks(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Means over blocks of `BLOCK_PX` a side."""
+    rows, columns = (size // BLOCK_PX for size in values.shape)
+    whole = values[: rows * BLOCK_PX, : columns * BLOCK_PX]
+    return np.asarray(whole.reshape(rows, BLOCK_PX, columns, BLOCK_PX).mean(axis=(1, 3)))
 
 
 def _banded(before: Pictures, now: Pictures) -> str:
