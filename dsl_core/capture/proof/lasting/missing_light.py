@@ -18,6 +18,9 @@ NO_LIGHT = 0.01
 #: An LED is out where its colour has no more than what others give it, and this share of its own light: of
 #: surfaces that reflect as little of it there is hardly any, and most scenes have others.
 HARDLY = 0.08
+#: Where surfaces have many colours, this much: what others give it is of brighter surfaces in places. There
+#: are many where its other two colours differ by this factor between a tenth of the blocks and another one.
+HARDLY_OF_MANY, MANY = 0.22, 2.0
 #: An LED gives a colour at least this share of its light, else nothing is said.
 OWN = 0.4
 #: Share of the blocks of a picture that have to agree; how bright they are, in deviations; and their number.
@@ -43,24 +46,32 @@ def missing_light(
     parts = _parts(rig)
     # What grey surfaces would give all colours alike.
     grey = np.maximum(light, 0) / parts.sum(1)[:, None]
-    share = np.quantile(grey / grey.max(0), MOST, axis=1)
+    share = np.quantile(grey / np.maximum(grey.max(0), 1e-9), MOST, axis=1)
     dead = [COLOUR_NAMES[colour] for colour in range(3) if share[colour] < NO_LIGHT]
     if dead:
         return no_light(dead)
-    out = []
+    out, least = [], HARDLY
     for led, name in enumerate(COLOUR_NAMES):
         colour = int(parts[:, led].argmax())
         own = float(parts[colour, led] / parts[colour].sum())
-        if own > OWN and share[colour] < (1 - own) + HARDLY * own:
+        hardly = HARDLY_OF_MANY if _has_many_colours(np.delete(grey, colour, 0)) else HARDLY
+        if own > OWN and share[colour] < (1 - own) + hardly * own:
             out.append(name)
+            least = max(least, hardly)
     if not out:
         return ""
     return (
         f"White has hardly any light of the {' and the '.join(out)} LED in most of the picture: less than"
-        f" {HARDLY:.0%} of what grey surfaces would return. Unless no surface reflects it, the LED is out, or"
+        f" {least:.0%} of what grey surfaces would return. Unless no surface reflects it, the LED is out, or"
         " a filter or a setting of projector or computer takes its light away. Look whether the projector"
         " shows white, and scan again."
     )
+
+
+def _has_many_colours(two: NDArray[np.float64]) -> bool:
+    """Whether two colours, shape (2, blocks), have another ratio in some blocks than in others."""
+    low, high = np.quantile(np.log(np.maximum(two[0], 1e-9) / np.maximum(two[1], 1e-9)), (0.1, 0.9))
+    return bool(high - low > np.log(MANY))
 
 
 def no_light(colours: Sequence[str]) -> str:

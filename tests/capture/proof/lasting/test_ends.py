@@ -143,6 +143,20 @@ def test_an_led_that_is_out_leaves_its_colour_what_others_give_it(scene: Rendere
     assert said(scene, of_colour(0, 0, 0.35)) == []
 
 
+@pytest.mark.parametrize(("colours", "is_told"), [(1.0, False), (3.0, True)])
+def test_among_many_colours_an_led_is_out_though_others_give_its_colour_more(
+    scene: RenderedScene, colours: float, is_told: bool
+) -> None:
+    def fault(white: Mosaic, black: Mosaic) -> tuple[Mosaic, Mosaic]:
+        changed = of_colour(0, 0, 0.33)(white, black)[0]
+        patches = np.indices(white.shape).sum(0) // 8 % 2 == 0  # green beside others
+        blue = np.where(patches, 1.0, 1 / colours)
+        changed[1::2, 1::2] *= blue[1::2, 1::2]
+        return changed, black
+
+    assert any("light of the red LED" in sentence for sentence in said(scene, fault)) == is_told
+
+
 @pytest.mark.parametrize(("share", "is_told"), [(0.1, True), (0.4, False)])
 def test_a_few_surfaces_of_another_colour_are_no_light_of_an_led(
     scene: RenderedScene, share: float, is_told: bool
