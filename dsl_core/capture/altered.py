@@ -31,8 +31,8 @@ NO_LIGHT, FEWEST_ROWS, MOST_ROWS = 0.05, 2, 0.7
 CLIPPED, BELOW_FULL = 0.01, 0.9
 #: White follows that of before by another power than one by so much, alike in every colour, and as closely as
 #: this correlation; blocks of so many pixels of a colour a side are asked that are so many deviations bright,
-#: and so many are needed.
-POWER, CLOSELY, BLOCK_PX, BRIGHT_SIGMAS, FEWEST_BRIGHT = 0.08, 0.97, 4, 20.0, 24
+#: and so many are needed, whose light (logarithm) deviates by so much.
+POWER, CLOSELY, BLOCK_PX, BRIGHT_SIGMAS, FEWEST_BRIGHT, RANGE = 0.08, 0.97, 4, 20.0, 24, 0.02
 #: Light differs from row to row from this much on (rms of its factors), by so much up and down; within rows,
 #: of so many parts, it differs by no more than this share of that.
 BANDS, UP_AND_DOWN, WITHIN, PARTS = 0.03, 0.03, 0.5, 6
@@ -157,7 +157,7 @@ def _curved(before: Pictures, now: Pictures, sensor: Sensor) -> str:
         place = np.s_[site[0] :: 2, site[1] :: 2]
         used = _blocks(bright[place].astype(np.float64)) == 1
         x, y = (np.log(_blocks(each[place])[used]) for each in (old, new))
-        if x.size < FEWEST_BRIGHT or x.std() == 0 or y.std() == 0:
+        if x.size < FEWEST_BRIGHT or min(x.std(), y.std()) < RANGE:
             continue
         if float(np.corrcoef(x, y)[0, 1]) < CLOSELY:
             return ""

@@ -38,6 +38,8 @@ ALIKE = 0.1
 TELLING_DN = 2.0
 #: Pixels needed to say anything.
 FEWEST = 12
+#: A frame of the code shows another pattern if its pixels differ by this share of white: noise makes less.
+OTHER_PATTERN = 0.08
 #: Something stands before tiles of the picture that have lost light to this share, so many, while others have
 #: kept it: a tenth of them within so much, and none has gained more than so much.
 SHADED, FEWEST_SHADED, ELSEWHERE, GAINED = 0.7, 2, 0.06, 0.15
@@ -117,9 +119,6 @@ def _of_pair(one: Mosaic, other: Mosaic) -> References:
 
 def what_changed(before: References, now: References, sensor: Sensor) -> Explanation:
     """What is different in later pictures."""
-    altered = alteration(before.pictures, now.pictures, sensor)
-    if altered:
-        return Explanation(altered, is_of_all=True)
     old, new = (each.white.astype(np.float64) - each.black for each in (before, now))
     # All of the picture but what is saturated: of bright pixels alone, a motion would dim many.
     full = 0.98 * sensor.full_scale_dn
@@ -133,6 +132,9 @@ def what_changed(before: References, now: References, sensor: Sensor) -> Explana
             "White and black now look the same: the projector gives no light, something covers it or the"
             " lens, or the camera repeats a picture. Check projector and camera, and resume the scan."
         )
+    altered = alteration(before.pictures, now.pictures, sensor)
+    if altered:
+        return Explanation(altered, is_of_all=True)
     shaded = _shaded(old, new, used)
     if shaded:
         return Explanation(shaded)
@@ -178,8 +180,23 @@ def what_changed(before: References, now: References, sensor: Sensor) -> Explana
     if moved is not None and not is_uneven:
         # Other colours look like motion where surfaces have colours.
         found.append(f"{moved.sentence} {ADVICE}")
+    if not found and moved is None and _is_other_pattern(before, now, old, used):
+        return Explanation(
+            "White and black look as they did, and a frame of the code does not: the projector or its"
+            " computer shows pictures elsewhere or in another size, or other pictures. Set mirroring,"
+            " scaling, keystone and refresh rate as they were, and resume the scan.",
+            has_moved=True,
+        )
     is_of_all = is_uneven or (moved is None and abs(light - 1) > LEAST_LIGHT)
     return Explanation(" ".join(found), moved is not None, not found, is_of_all)
+
+
+def _is_other_pattern(
+    before: References, now: References, white: NDArray[np.float64], used: NDArray[np.bool_]
+) -> bool:
+    """Whether the frame of the code differs, of pictures whose white, less black, is the same."""
+    first, second = (each.code.astype(np.float64) - each.black for each in (before, now))
+    return float(np.abs(second - first)[used].mean()) > OTHER_PATTERN * float(white[used].mean())
 
 
 def _shaded(old: NDArray[np.float64], new: NDArray[np.float64], used: NDArray[np.bool_]) -> str:

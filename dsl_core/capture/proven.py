@@ -54,6 +54,13 @@ _TONE = (
     " which measures how light follows the level, or use one level in all settings; or switch gamma,"
     " automatic exposure and gain of the camera off, and resume the scan."
 )
+#: The same of stripes of the code of which coarser ones show nothing wrong.
+_FINE = (
+    "Coarser stripes of the code are right and these are not: the projector's picture is scaled (a resolution"
+    " that is not its own, overscan, keystone) or sharpened, or something is out of focus or trembles. Send"
+    " the projector pictures of its own size, switch such corrections off, check the focus, and resume the"
+    " scan."
+)
 #: On resuming, so many shots before a missing one are captured again where nothing can be told of them.
 MOST_UNTOLD = 32
 _log = logging.getLogger(__name__)
@@ -410,6 +417,8 @@ def _what_to_do(found: Finding, change: Explanation, proof: FrameProof) -> str:
             return _DIMMED
         if found.verdict is Verdict.EXPOSURE and not proof.is_at_first_level(found.shot):
             return _TONE
+    if not change.sentence and proof.are_finest(found.again):
+        return _FINE
     return change.sentence or f"{found.remedy} Resume the scan afterwards."
 
 

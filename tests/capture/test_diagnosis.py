@@ -200,3 +200,23 @@ def test_a_colour_that_failed_is_no_white_balance() -> None:
     assert "Look whether the projector still shines in red" in found.sentence
     assert "white balance" not in found.sentence
     assert found.is_of_all
+
+
+def test_another_pattern_is_no_scene_as_at_first(monkeypatch: pytest.MonkeyPatch) -> None:
+    # As for most patterns that are far from their place, where no part of the picture follows them.
+    monkeypatch.setattr("dsl_core.capture.diagnosis.moved_between", lambda *pictures, **rest: None)
+    before = pictures()
+    inverse = before.black + (before.white - before.code)
+    found = what_changed(before, References(before.white, before.black, inverse), SENSOR)
+    assert "White and black look as they did, and a frame of the code does not" in found.sentence
+    assert found.has_moved
+    assert not found.is_as_at_first
+
+
+def test_white_that_is_gone_is_no_coarse_picture() -> None:
+    before = pictures()
+    dark = np.full_like(before.white, before.black[0, 0])
+    assert (
+        "White and black now look the same"
+        in what_changed(before, References(dark, dark, dark), SENSOR).sentence
+    )

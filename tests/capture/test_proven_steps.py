@@ -43,7 +43,7 @@ class Bench:
         self.cause, self.is_quite_the_same = "", True
         self.displaced: list[bool] = []
         self.first: tuple[Shot, ...] = (SHOTS[0],)
-        self.alone = False
+        self.alone = self.fine = False
         self.settled = ""
         self.recalled: dict[int, str] = {}
         self.of_code: CodeSum | None = None
@@ -100,6 +100,9 @@ class Bench:
 
     def is_at_first_level(self, shot: Shot) -> bool:
         return shot.level == CODE.level
+
+    def are_finest(self, shots: tuple[Shot, ...]) -> bool:
+        return self.fine
 
     def first_pictures(self) -> tuple[Shot, ...]:
         return self.first if self.displaced else ()
@@ -248,6 +251,16 @@ def test_who_hides_a_part_is_asked_away_whatever_else_seems_changed() -> None:
         PictureError, match=r"darker than the black picture.*\. Keep out of the way of camera"
     ):
         bench.shots.take(LINE)
+
+
+@pytest.mark.parametrize(
+    ("cause", "said"), [("", "Coarser stripes of the code are right"), ("It moved.", "It moved")]
+)
+def test_only_the_finest_stripes_are_wrong_where_pictures_are_scaled(cause: str, said: str) -> None:
+    bench = Bench(lambda shot: Finding(shot, Verdict.TORN, (shot,)))
+    bench.cause, bench.fine = cause, True
+    with pytest.raises(PictureError, match=rf"the rest another one\. {said}"):
+        bench.shots.take(CODE)
 
 
 def test_nobody_hides_a_part_of_a_picture_of_which_all_has_changed() -> None:
