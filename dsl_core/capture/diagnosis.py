@@ -36,6 +36,8 @@ NO_LIGHT = 0.02
 ALIKE = 0.1
 #: What black is above its level has to exceed this to tell a factor, DN.
 TELLING_DN = 2.0
+#: Share of saturated pixels from which on black is no black any more.
+SATURATED = 0.5
 #: Pixels needed to say anything.
 FEWEST = 12
 #: A frame of the code shows another pattern if its pixels differ by this share of white: noise makes less.
@@ -122,6 +124,13 @@ def what_changed(before: References, now: References, sensor: Sensor) -> Explana
     old, new = (each.white.astype(np.float64) - each.black for each in (before, now))
     # All of the picture but what is saturated: of bright pixels alone, a motion would dim many.
     full = 0.98 * sensor.full_scale_dn
+    bright = [float((each.black >= full).mean()) for each in (before, now)]
+    if bright[0] < SATURATED <= bright[1]:
+        return Explanation(
+            "Black saturates in most of the picture, and did not when the scan began: the projector or its"
+            " computer inverts pictures, or another lamp shines on the scene. Set them as they were, and"
+            " resume the scan."
+        )
     used = (before.white < full) & (now.white < full)
     lit = used & (old > 0.25 * np.percentile(old, 95))
     if lit.sum() < FEWEST:

@@ -220,3 +220,11 @@ def test_white_that_is_gone_is_no_coarse_picture() -> None:
         "White and black now look the same"
         in what_changed(before, References(dark, dark, dark), SENSOR).sentence
     )
+
+
+@pytest.mark.parametrize(("share", "is_told"), [(0.4, False), (0.6, True)])
+def test_black_that_saturates_is_told(share: float, is_told: bool) -> None:
+    before = pictures()
+    full = np.where(np.arange(96) < 96 * share, int(SENSOR.full_scale_dn), before.black).astype(np.uint16)
+    found = what_changed(before, References(np.maximum(before.white, full), full, full), SENSOR).sentence
+    assert ("Black saturates in most" in found) == is_told
