@@ -128,7 +128,7 @@ def _dark_rows(before: Pictures, now: Pictures) -> str:
     if not FEWEST_ROWS <= int(dark.sum()) <= MOST_ROWS * int(lit.sum()):
         return ""
     return (
-        f"{int(dark.sum())} rows of the picture have no light any more, the first of them row"
+        f"{int(dark.sum())} rows of the picture no longer have any light, the first of them is row"
         f" {int(np.flatnonzero(dark)[0])}: rows of the sensor failed, or their packets are lost. Check cable"
         " and driver of the camera, and resume the scan."
     )

@@ -36,7 +36,7 @@ NO_LIGHT = 0.02
 ALIKE = 0.1
 #: What black is above its level has to exceed this to tell a factor, DN.
 TELLING_DN = 2.0
-#: Share of saturated pixels from which on black is no black any more.
+#: Share of saturated pixels from which on black is no longer black.
 SATURATED = 0.5
 #: Pixels needed to say anything.
 FEWEST = 12

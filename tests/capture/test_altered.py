@@ -77,7 +77,7 @@ def in_bands(counts: Counts) -> Counts:
         (lambda c: np.roll(c, -1, 1), "begins one column later"),
         (lambda c: np.roll(c, -1, 0), "begins one row later"),
         (lambda c: np.roll(c, (-1, -1), (0, 1)), "begins one column and row later"),
-        (dark_rows, "6 rows of the picture have no light any more, the first of them row 20"),
+        (dark_rows, "6 rows of the picture no longer have any light, the first of them is row 20"),
         (lambda c: np.minimum(c, 1200), "No pixel of white has more than 1200 DN"),
         (lambda c: np.floor(c / 16) * 16, "come in steps of about 16 DN"),
         (lambda c: 4095 * (c / 4095) ** 0.55, "by a power of 0."),
