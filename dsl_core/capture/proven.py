@@ -99,6 +99,8 @@ class ProvenShots:
         self._recent: deque[Shot] = deque(maxlen=JUST_BEFORE)
         #: What was saved since an old picture, taken again, last looked as it did at first.
         self._since_sound: set[Shot] = set()
+        #: What was saved of the first code, until it is whole: its pictures are judged by each other.
+        self._of_code: set[Shot] = set()
         self._doubts = 0
         self._has_seen_first = False
         #: What is wrong with light and places of the first code, as soon as that is known.
@@ -226,6 +228,9 @@ class ProvenShots:
                 self._since_sound.clear()
         elif self._is_alone(shot):
             self._since_sound.add(shot)
+            self._of_code.clear()
+        else:
+            self._of_code.add(shot)
 
     def _is_alone(self, shot: Shot) -> bool:
         """Whether a shot is judged by itself: those of the first code are by what they are together."""
@@ -349,6 +354,7 @@ class ProvenShots:
         if not pictures or self._has_seen_first:
             return
         self._has_seen_first = True
+        self._of_code.clear()
         # Calibrations scan through filters.
         found = [light_sentence(proof.code_sum(), None), *proof.lasting(with_colours=False)]
         self._light = " ".join(each for each in found if each)
@@ -387,11 +393,13 @@ class ProvenShots:
         """
         doubted = {*self._untold, *self._recent, *(shot for shot in error.wrong if shot != latest)}
         if error.has_changed:
-            doubted |= self._since_sound
+            # A code of which some pictures are older than the change never fits its lines.
+            doubted |= self._since_sound | self._of_code
         withdrawn = sorted(doubted, key=lambda shot: shot.index)
         self._untold.clear()
         self._recent.clear()
         self._since_sound.clear()
+        self._of_code.clear()
         known = f" {self._light}" if self._light else ""
         if not withdrawn:
             raise PictureError(f"{error}{known}", error.wrong) from error

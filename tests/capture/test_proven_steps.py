@@ -583,3 +583,26 @@ def test_a_line_that_nothing_tells_is_compared_with_another_picture_of_it(differ
     assert bench.taken == [(13, 0, 0.0, False), (13, 1, 0.0, False), *(third if differs else [])]
     assert bench.written == {13: "two pictures of it differed" if differs else ""}
     assert bench.shots.corrected == differs
+
+
+@pytest.mark.parametrize(("cause", "first"), [("It moved.", 0), ("The exposure.", 2)])
+def test_a_code_in_which_something_moved_is_captured_again_from_its_first_picture(
+    cause: str, first: int
+) -> None:
+    bench = Bench(*10 * [is_right], lambda shot: Finding(shot, Verdict.TORN, (shot,)))
+    bench.cause = cause
+    for shot in SHOTS[:10]:
+        bench.shots.take(shot)
+    with pytest.raises(PictureError):
+        bench.shots.take(SHOTS[10])
+    assert bench.withdrawn == list(range(first, 10))
+
+
+def test_a_code_that_was_whole_is_kept_when_something_moves_later() -> None:
+    bench = Bench(*12 * [is_right], is_right, lambda shot: Finding(shot, Verdict.TORN, (shot,)))
+    bench.cause = "It moved."
+    for shot in (*SHOTS[:12], LINE):
+        bench.shots.take(shot)
+    with pytest.raises(PictureError):
+        bench.shots.take(SHOTS[LINE.index + 1])
+    assert 0 not in bench.withdrawn
