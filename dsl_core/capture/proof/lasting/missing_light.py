@@ -39,8 +39,9 @@ def missing_light(
     """
     if rig.sensor.bayer == "MONO":
         return ""
-    light, is_bright = _blocks(white, black, channels, noise, raster)
-    if int(is_bright.sum()) < FEWEST:
+    light, is_bright, is_saturated = _blocks(white, black, channels, noise, raster)
+    # Where most of the picture saturates, what is left is what one colour is dark in.
+    if int(is_bright.sum()) < max(FEWEST, int(is_saturated.sum())):
         return ""
     light = light[:, is_bright]
     parts = _parts(rig)
@@ -95,8 +96,8 @@ def _parts(rig: Rig) -> NDArray[np.float64]:
 
 def _blocks(
     white: Counts, black: Counts, channels: NDArray[np.int8], noise: Noise, raster: Raster
-) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
-    """Light of white by colour and block of the raster, DN, and which blocks are bright enough."""
+) -> tuple[NDArray[np.float64], NDArray[np.bool_], NDArray[np.bool_]]:
+    """Light of white by colour and block of the raster, DN; which blocks are bright enough, and saturate."""
     sound = white < noise.sensor.full_scale_dn
     gain = white.astype(np.float32) - black
     variance = noise.variance(white) + noise.variance(black)
@@ -110,4 +111,5 @@ def _blocks(
         is_whole.append((count > 0) & (count >= (1 - SATURATED) * own))
         is_lit.append(total > BRIGHT_SIGMAS * std)
         light.append(total / np.maximum(count, 1))
-    return np.array(light, np.float64), np.all(is_whole, 0) & np.any(is_lit, 0)
+    whole = np.all(is_whole, 0)
+    return np.array(light, np.float64), whole & np.any(is_lit, 0), ~whole

@@ -157,6 +157,18 @@ def test_among_many_colours_an_led_is_out_though_others_give_its_colour_more(
     assert any("light of the red LED" in sentence for sentence in said(scene, fault)) == is_told
 
 
+@pytest.mark.parametrize(("rows", "is_told"), [(32, False), (16, True)])
+def test_surfaces_that_most_of_the_picture_outshines_tell_of_no_led(
+    scene: RenderedScene, rows: int, is_told: bool
+) -> None:
+    def fault(white: Mosaic, black: Mosaic) -> tuple[Mosaic, Mosaic]:
+        changed = of_colour(0, 0, 0.2)(white, black)[0]
+        changed[:rows] = 1e5
+        return changed, black
+
+    assert any("light of the red LED" in sentence for sentence in said(scene, fault)) == is_told
+
+
 @pytest.mark.parametrize(("share", "is_told"), [(0.1, True), (0.4, False)])
 def test_a_few_surfaces_of_another_colour_are_no_light_of_an_led(
     scene: RenderedScene, share: float, is_told: bool
