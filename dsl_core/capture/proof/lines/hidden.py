@@ -57,7 +57,13 @@ class HiddenParts:
         ``channels`` has the colour of each pixel.
         """
         dark = self._dark(seen, black)
-        share = {int(each): float(dark[channels == each].mean()) for each in np.unique(channels)}
+        # Where the room gives too little, nobody sees that it is gone.
+        room = np.subtract(black, np.float32(self._noise.sensor.black_level_dn), dtype=np.float32)
+        tells = room > 2 * SIGMAS * self._sigma(seen, black)
+        each_tells = {int(each): tells & (channels == each) for each in np.unique(channels)}
+        if min(int(own.sum()) for own in each_tells.values()) < FEWEST_SHARE * dark.size:
+            return ()
+        share = {each: float(dark[own].mean()) for each, own in each_tells.items()}
         few = OTHERS * max(share.values())
         return tuple(each for each in share if share[each] > few) if min(share.values()) <= few else ()
 
