@@ -13,9 +13,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from dsl_core.capture.motion import moved_between
+from dsl_core.capture.altered import alteration
+from dsl_core.capture.motion import TILES, moved_between
 from dsl_core.capture.put_back import ADVICE
 from dsl_core.model.captured_code import CapturedCode
+from dsl_core.model.conditions import COLOUR_NAMES
 from dsl_core.model.plan import CapturePlan, Shot
 from dsl_core.model.rig import Sensor, colour_sites
 
@@ -26,14 +28,23 @@ LEAST_LIGHT, LEAST_ROOM = 0.05, 0.03
 #: Factors of the colours of white that differ by this share of each other are no change of all light, where
 #: each colour has had so much of it.
 UNEVEN, LEAST_COLOUR = 0.1, 0.05
+#: A colour has failed with less than this share of its light where others have kept theirs.
+LOST = 0.3
 #: With less light than this, as a share of what it was, white and black are the same picture.
 NO_LIGHT = 0.02
 #: Factors of white and of black that are this much alike have one cause: the exposure.
 ALIKE = 0.1
 #: What black is above its level has to exceed this to tell a factor, DN.
 TELLING_DN = 2.0
+#: Share of saturated pixels from which on black is no longer black.
+SATURATED = 0.5
 #: Pixels needed to say anything.
 FEWEST = 12
+#: A frame of the code shows another pattern if its pixels differ by this share of white: noise makes less.
+OTHER_PATTERN = 0.08
+#: Something stands before tiles of the picture that have lost light to this share, so many, while others have
+#: kept it: a tenth of them within so much, and none has gained more than so much.
+SHADED, FEWEST_SHADED, ELSEWHERE, GAINED = 0.7, 2, 0.06, 0.15
 
 
 @dataclass(frozen=True)
@@ -44,17 +55,24 @@ class References:
     black: Mosaic
     code: Mosaic
 
+    @property
+    def pictures(self) -> tuple[Mosaic, Mosaic, Mosaic]:
+        """All three, in this order."""
+        return self.white, self.black, self.code
+
 
 @dataclass(frozen=True)
 class Explanation:
     """What has changed, and what to do, as sentences (empty if nothing has); whether something moved.
 
-    ``is_as_at_first``: white, black and code were compared, and nothing has changed.
+    ``is_as_at_first``: white, black and code were compared, and nothing has changed. ``is_of_all``: all of
+    the picture has, alike, so that nothing stands before a part of it.
     """
 
     sentence: str = ""
     has_moved: bool = False
     is_as_at_first: bool = False
+    is_of_all: bool = False
 
 
 class Diagnosis:
@@ -106,6 +124,13 @@ def what_changed(before: References, now: References, sensor: Sensor) -> Explana
     old, new = (each.white.astype(np.float64) - each.black for each in (before, now))
     # All of the picture but what is saturated: of bright pixels alone, a motion would dim many.
     full = 0.98 * sensor.full_scale_dn
+    bright = [float((each.black >= full).mean()) for each in (before, now)]
+    if bright[0] < SATURATED <= bright[1]:
+        return Explanation(
+            "Black saturates in most of the picture, and did not when the scan began: the projector or its"
+            " computer inverts pictures, or another lamp shines on the scene. Set them as they were, and"
+            " resume the scan."
+        )
     used = (before.white < full) & (now.white < full)
     lit = used & (old > 0.25 * np.percentile(old, 95))
     if lit.sum() < FEWEST:
@@ -116,6 +141,12 @@ def what_changed(before: References, now: References, sensor: Sensor) -> Explana
             "White and black now look the same: the projector gives no light, something covers it or the"
             " lens, or the camera repeats a picture. Check projector and camera, and resume the scan."
         )
+    altered = alteration(before.pictures, now.pictures, sensor)
+    if altered:
+        return Explanation(altered, is_of_all=True)
+    shaded = _shaded(old, new, used)
+    if shaded:
+        return Explanation(shaded)
     dark_old, dark_new = (
         float(each.black.mean(dtype=np.float64)) - sensor.black_level_dn for each in (before, now)
     )
@@ -128,10 +159,18 @@ def what_changed(before: References, now: References, sensor: Sensor) -> Explana
     is_uneven = max(colours) > (1 + UNEVEN) * min(colours)
     if is_uneven:
         red, green, blue = colours
+        lost = [name for name, share in zip(COLOUR_NAMES, colours, strict=True) if share < LOST]
+        others = [share for share in colours if share >= LOST]
+        advice = "Switch white balance of the camera and night mode of the projector and of its computer off,"
+        advice += " check the projector's colours, and resume the scan."
+        if lost and others and max(abs(share - 1) for share in others) < LEAST_LIGHT:
+            advice = (
+                f"Look whether the projector still shines in {' and '.join(lost)}, and whether camera and"
+                " cables pass it on, and resume the scan."
+            )
         found.append(
             f"The light of white is {red:.2f} times what it was when the scan began in red, {green:.2f} times"
-            f" in green and {blue:.2f} times in blue. Switch white balance of the camera and night mode of"
-            " the projector and of its computer off, check the projector's colours, and resume the scan."
+            f" in green and {blue:.2f} times in blue. {advice}"
         )
     elif abs(light - 1) > LEAST_LIGHT:
         is_exposure = dark_old > TELLING_DN and abs(dark_new / dark_old / light - 1) < ALIKE
@@ -150,7 +189,46 @@ def what_changed(before: References, now: References, sensor: Sensor) -> Explana
     if moved is not None and not is_uneven:
         # Other colours look like motion where surfaces have colours.
         found.append(f"{moved.sentence} {ADVICE}")
-    return Explanation(" ".join(found), moved is not None, not found)
+    if not found and moved is None and _is_other_pattern(before, now, old, used):
+        return Explanation(
+            "White and black look as they did, and a frame of the code does not: the projector or its"
+            " computer shows pictures elsewhere or in another size, or other pictures. Set mirroring,"
+            " scaling, keystone and refresh rate as they were, and resume the scan.",
+            has_moved=True,
+        )
+    is_of_all = is_uneven or (moved is None and abs(light - 1) > LEAST_LIGHT)
+    return Explanation(" ".join(found), moved is not None, not found, is_of_all)
+
+
+def _is_other_pattern(
+    before: References, now: References, white: NDArray[np.float64], used: NDArray[np.bool_]
+) -> bool:
+    """Whether the frame of the code differs, of pictures whose white, less black, is the same."""
+    first, second = (each.code.astype(np.float64) - each.black for each in (before, now))
+    return float(np.abs(second - first)[used].mean()) > OTHER_PATTERN * float(white[used].mean())
+
+
+def _shaded(old: NDArray[np.float64], new: NDArray[np.float64], used: NDArray[np.bool_]) -> str:
+    """Whether white, less black, has lost light in a part of the picture alone."""
+    down, across = (np.arange(size) * count // size for size, count in zip(old.shape, TILES, strict=True))
+    tile = (down[:, None] * TILES[1] + across)[used]
+    before, after = (np.bincount(tile, each[used], TILES[0] * TILES[1]) for each in (old, new))
+    known = before > 0.25 * before.max()
+    ratio = after[known] / before[known]
+    lost = ratio < SHADED
+    is_kept = abs(float(np.quantile(ratio, 0.9)) - 1) < ELSEWHERE and float(ratio.max()) < 1 + GAINED
+    if int(lost.sum()) < FEWEST_SHADED or not is_kept:
+        return ""
+    rows, columns = np.divmod(np.flatnonzero(known)[lost], TILES[1])
+    spans = [
+        (int(at.min()) * size // count, (int(at.max()) + 1) * size // count)
+        for at, size, count in zip((columns, rows), old.shape[::-1], TILES[::-1], strict=True)
+    ]
+    return (
+        "White has lost light in columns {}-{}, rows {}-{} of the picture, and not elsewhere: something"
+        " stands in the way of projector, camera or lamps, or something came onto a lens. Take it away, and"
+        " resume the scan."
+    ).format(*spans[0], *spans[1])
 
 
 def _of_colours(

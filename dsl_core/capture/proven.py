@@ -54,6 +54,13 @@ _TONE = (
     " which measures how light follows the level, or use one level in all settings; or switch gamma,"
     " automatic exposure and gain of the camera off, and resume the scan."
 )
+#: The same of stripes of the code of which coarser ones show nothing wrong.
+_FINE = (
+    "Coarser stripes of the code are right and these are not: the projector's picture is scaled (a resolution"
+    " that is not its own, overscan, keystone) or sharpened, or something is out of focus or trembles. Send"
+    " the projector pictures of its own size, switch such corrections off, check the focus, and resume the"
+    " scan."
+)
 #: On resuming, so many shots before a missing one are captured again where nothing can be told of them.
 MOST_UNTOLD = 32
 _log = logging.getLogger(__name__)
@@ -92,6 +99,8 @@ class ProvenShots:
         self._recent: deque[Shot] = deque(maxlen=JUST_BEFORE)
         #: What was saved since an old picture, taken again, last looked as it did at first.
         self._since_sound: set[Shot] = set()
+        #: What was saved of the first code, until it is whole: its pictures are judged by each other.
+        self._of_code: set[Shot] = set()
         self._doubts = 0
         self._has_seen_first = False
         #: What is wrong with light and places of the first code, as soon as that is known.
@@ -219,6 +228,9 @@ class ProvenShots:
                 self._since_sound.clear()
         elif self._is_alone(shot):
             self._since_sound.add(shot)
+            self._of_code.clear()
+        else:
+            self._of_code.add(shot)
 
     def _is_alone(self, shot: Shot) -> bool:
         """Whether a shot is judged by itself: those of the first code are by what they are together."""
@@ -342,6 +354,7 @@ class ProvenShots:
         if not pictures or self._has_seen_first:
             return
         self._has_seen_first = True
+        self._of_code.clear()
         # Calibrations scan through filters.
         found = [light_sentence(proof.code_sum(), None), *proof.lasting(with_colours=False)]
         self._light = " ".join(each for each in found if each)
@@ -380,11 +393,13 @@ class ProvenShots:
         """
         doubted = {*self._untold, *self._recent, *(shot for shot in error.wrong if shot != latest)}
         if error.has_changed:
-            doubted |= self._since_sound
+            # A code of which some pictures are older than the change never fits its lines.
+            doubted |= self._since_sound | self._of_code
         withdrawn = sorted(doubted, key=lambda shot: shot.index)
         self._untold.clear()
         self._recent.clear()
         self._since_sound.clear()
+        self._of_code.clear()
         known = f" {self._light}" if self._light else ""
         if not withdrawn:
             raise PictureError(f"{error}{known}", error.wrong) from error
@@ -402,7 +417,7 @@ class ProvenShots:
 
 def _what_to_do(found: Finding, change: Explanation, proof: FrameProof) -> str:
     """Why a picture stays wrong as far as that is known, and what to do about it."""
-    if found.verdict is Verdict.HIDDEN:
+    if found.verdict is Verdict.HIDDEN and not change.is_of_all:
         # Who stands there is in the pictures that would say what has changed, too.
         return f"{found.remedy} Resume the scan afterwards."
     if change.is_as_at_first:
@@ -410,6 +425,8 @@ def _what_to_do(found: Finding, change: Explanation, proof: FrameProof) -> str:
             return _DIMMED
         if found.verdict is Verdict.EXPOSURE and not proof.is_at_first_level(found.shot):
             return _TONE
+    if not change.sentence and proof.are_finest(found.again):
+        return _FINE
     return change.sentence or f"{found.remedy} Resume the scan afterwards."
 
 

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from dsl_core.capture.exposure import ShotTaker
 from dsl_core.capture.proof.lasting.missing_light import missing_light
+from dsl_core.capture.proof.lasting.written_row import written_row
 from dsl_core.capture.proof.noise import Noise
 from dsl_core.capture.proof.raster import Raster
 from dsl_core.model.conditions import COLOUR_NAMES
@@ -35,6 +36,9 @@ def doubts_of_white(taker: ShotTaker, white: Shot, seen: NDArray[np.uint16], rig
     noise, channels = Noise.of(rig.sensor, rig.sensor.bit_depth), raster.channels(rig.sensor.bayer)
     half = replace(white, level=HALF * white.level)
     black, dim = (raster.take(taker.take(each).pixels) for each in (replace(white, role="black"), half))
+    written = written_row(black, noise, raster, seen.shape[1])
+    if written is not None:
+        return written.sentence
     bright = raster.take(seen)
     missing = missing_light(bright, black, rig, channels, noise, raster)
     if missing:

@@ -49,6 +49,7 @@ from dsl_core.simulation.scenes.catalogue import scene_catalogue
 from dsl_core.workflows.scans import DOUBTS, reconstruct_scan
 from tests.benchmarks.common import options, print_table, write_json
 from tests.cases.faulty_lab import CAMERA, OTHER, PROJECTOR, SHIFTS, SPECTRUM, STAGE, installed
+from tests.cases.lab_everyday import CAMERA_EVERYDAY, PROJECTOR_EVERYDAY
 from tests.cases.lab_links import CAMERA_LINKS, PROJECTOR_LINKS
 from tests.cases.lab_mishaps import CAMERA_MISHAPS, PROJECTOR_MISHAPS
 from tests.cases.lab_oddities import CAMERA_ODDITIES, PROJECTOR_ODDITIES
@@ -103,6 +104,7 @@ HABITS = (
     *(*CAMERA_HABITS, *PROJECTOR_HABITS, *CAMERA_MISHAPS, *PROJECTOR_MISHAPS),
     *(*CAMERA_SURPRISES, *PROJECTOR_SURPRISES, *CAMERA_ODDITIES, *PROJECTOR_ODDITIES),
     *(*CAMERA_WHIMS, *PROJECTOR_WHIMS, *CAMERA_LINKS, *PROJECTOR_LINKS),
+    *(*CAMERA_EVERYDAY, *PROJECTOR_EVERYDAY),
 )
 CHANGES = (*SPOILED, *SHIFTS, "projector squares its picture", *HABITS)
 #: Faults of the beginning of a scan, and between the last picture of the code and the first line.

@@ -164,3 +164,67 @@ def test_a_dozen_lit_pixels_are_needed(lit: int, is_told: bool) -> None:
     white = np.zeros((48, 72))
     white[0, :lit] = 2000.0
     assert bool(what_changed(even(white, 20.0), even(white * 0.5, 20.0), SENSOR).sentence) == is_told
+
+
+def shaded(share: float, columns: slice = slice(0, 30)) -> References:
+    """Pictures whose white, and black, have this share of their light in some columns."""
+    sound = pictures()
+    made = []
+    for picture in sound.pictures:
+        light = picture.astype(float) - SENSOR.black_level_dn
+        light[:, columns] *= share
+        made.append(np.rint(light + SENSOR.black_level_dn).clip(0).astype(np.uint16))
+    return References(*made)
+
+
+def test_a_part_of_the_picture_that_lost_light_is_no_other_exposure() -> None:
+    found = what_changed(pictures(), shaded(0.4), SENSOR)
+    assert (
+        "White has lost light in columns 0-32, rows 0-64 of the picture, and not elsewhere" in found.sentence
+    )
+    assert "times" not in found.sentence
+    assert not found.is_of_all
+
+
+def test_all_of_the_picture_that_lost_light_is_in_the_way_of_nobody() -> None:
+    found = what_changed(pictures(), shaded(0.4, slice(None)), SENSOR)
+    assert "is 0.40 times" in found.sentence
+    assert found.is_of_all
+
+
+def test_a_colour_that_failed_is_no_white_balance() -> None:
+    before = pictures()
+    red = np.tile([[0.1, 1.0], [1.0, 1.0]], (32, 48))
+    later = (before.black + red * (before.white.astype(float) - before.black)).round().astype(np.uint16)
+    found = what_changed(before, References(later, before.black, before.code), SENSOR)
+    assert "Look whether the projector still shines in red" in found.sentence
+    assert "white balance" not in found.sentence
+    assert found.is_of_all
+
+
+def test_another_pattern_is_no_scene_as_at_first(monkeypatch: pytest.MonkeyPatch) -> None:
+    # As for most patterns that are far from their place, where no part of the picture follows them.
+    monkeypatch.setattr("dsl_core.capture.diagnosis.moved_between", lambda *pictures, **rest: None)
+    before = pictures()
+    inverse = before.black + (before.white - before.code)
+    found = what_changed(before, References(before.white, before.black, inverse), SENSOR)
+    assert "White and black look as they did, and a frame of the code does not" in found.sentence
+    assert found.has_moved
+    assert not found.is_as_at_first
+
+
+def test_white_that_is_gone_is_no_coarse_picture() -> None:
+    before = pictures()
+    dark = np.full_like(before.white, before.black[0, 0])
+    assert (
+        "White and black now look the same"
+        in what_changed(before, References(dark, dark, dark), SENSOR).sentence
+    )
+
+
+@pytest.mark.parametrize(("share", "is_told"), [(0.4, False), (0.6, True)])
+def test_black_that_saturates_is_told(share: float, is_told: bool) -> None:
+    before = pictures()
+    full = np.where(np.arange(96) < 96 * share, int(SENSOR.full_scale_dn), before.black).astype(np.uint16)
+    found = what_changed(before, References(np.maximum(before.white, full), full, full), SENSOR).sentence
+    assert ("Black saturates in most" in found) == is_told

@@ -39,6 +39,8 @@ class Bench(Camera, Projector):
     #: What the projector makes of levels 0..1, and the light of the room relative to the brightest white.
     curve: Callable[[float], float] = lambda level: level
     room: float = 0.0
+    #: How many pixels of the first row hold numbers.
+    numbers: int = 0
 
     @property
     def info(self) -> CameraInfo:  # type: ignore[override]
@@ -59,6 +61,8 @@ class Bench(Camera, Projector):
         signal[:, : round(40 * self.highlights)] *= 50
         pixels = np.clip(signal + BLACK_DN, 0, FULL_DN).astype(np.uint16)
         self.frames += 1
+        written = np.random.default_rng(self.frames).integers(0, FULL_DN + 1, self.numbers)
+        pixels[0, : self.numbers] = written
         return Frame(pixels, self.exposures_ms[-1], 0.1 * self.frames, self.frames)
 
 
@@ -275,3 +279,7 @@ def test_levels_that_are_changed_on_their_way_are_doubted(
 
 def test_faint_light_says_nothing_of_its_level() -> None:
     assert doubt_of(Bench(light_for(0.002, 200.0, 0.5), curve=lambda level: level**0.8)) == ""
+
+
+def test_numbers_in_the_first_row_are_told_before_the_scan() -> None:
+    assert "first row of black holds numbers" in doubt_of(Bench(light_for(0.5, 200.0, 0.5), numbers=20))

@@ -43,7 +43,7 @@ class Bench:
         self.cause, self.is_quite_the_same = "", True
         self.displaced: list[bool] = []
         self.first: tuple[Shot, ...] = (SHOTS[0],)
-        self.alone = False
+        self.alone = self.fine = False
         self.settled = ""
         self.recalled: dict[int, str] = {}
         self.of_code: CodeSum | None = None
@@ -101,6 +101,9 @@ class Bench:
     def is_at_first_level(self, shot: Shot) -> bool:
         return shot.level == CODE.level
 
+    def are_finest(self, shots: tuple[Shot, ...]) -> bool:
+        return self.fine
+
     def first_pictures(self) -> tuple[Shot, ...]:
         return self.first if self.displaced else ()
 
@@ -115,7 +118,7 @@ class Bench:
             snap(SHOTS[10])
         if self.cause == "unplugged":
             raise DeviceError("no camera")
-        return Explanation(self.cause, self.cause == "It moved.", self.cause == "")
+        return Explanation(self.cause, self.cause == "It moved.", self.cause == "", self.cause == "Turned.")
 
 
 def is_right(shot: Shot) -> Finding:
@@ -247,6 +250,23 @@ def test_who_hides_a_part_is_asked_away_whatever_else_seems_changed() -> None:
     with pytest.raises(
         PictureError, match=r"darker than the black picture.*\. Keep out of the way of camera"
     ):
+        bench.shots.take(LINE)
+
+
+@pytest.mark.parametrize(
+    ("cause", "said"), [("", "Coarser stripes of the code are right"), ("It moved.", "It moved")]
+)
+def test_only_the_finest_stripes_are_wrong_where_pictures_are_scaled(cause: str, said: str) -> None:
+    bench = Bench(lambda shot: Finding(shot, Verdict.TORN, (shot,)))
+    bench.cause, bench.fine = cause, True
+    with pytest.raises(PictureError, match=rf"the rest another one\. {said}"):
+        bench.shots.take(CODE)
+
+
+def test_nobody_hides_a_part_of_a_picture_of_which_all_has_changed() -> None:
+    bench = Bench(lambda shot: Finding(shot, Verdict.HIDDEN, (shot,)))
+    bench.cause = "Turned."
+    with pytest.raises(PictureError, match=r"darker than the black picture.*\. Turned\. Frames before"):
         bench.shots.take(LINE)
 
 
@@ -563,3 +583,26 @@ def test_a_line_that_nothing_tells_is_compared_with_another_picture_of_it(differ
     assert bench.taken == [(13, 0, 0.0, False), (13, 1, 0.0, False), *(third if differs else [])]
     assert bench.written == {13: "two pictures of it differed" if differs else ""}
     assert bench.shots.corrected == differs
+
+
+@pytest.mark.parametrize(("cause", "first"), [("It moved.", 0), ("The exposure.", 2)])
+def test_a_code_in_which_something_moved_is_captured_again_from_its_first_picture(
+    cause: str, first: int
+) -> None:
+    bench = Bench(*10 * [is_right], lambda shot: Finding(shot, Verdict.TORN, (shot,)))
+    bench.cause = cause
+    for shot in SHOTS[:10]:
+        bench.shots.take(shot)
+    with pytest.raises(PictureError):
+        bench.shots.take(SHOTS[10])
+    assert bench.withdrawn == list(range(first, 10))
+
+
+def test_a_code_that_was_whole_is_kept_when_something_moves_later() -> None:
+    bench = Bench(*12 * [is_right], is_right, lambda shot: Finding(shot, Verdict.TORN, (shot,)))
+    bench.cause = "It moved."
+    for shot in (*SHOTS[:12], LINE):
+        bench.shots.take(shot)
+    with pytest.raises(PictureError):
+        bench.shots.take(SHOTS[LINE.index + 1])
+    assert 0 not in bench.withdrawn

@@ -30,6 +30,7 @@ from dsl_core.model.plan import CapturePlan
 from dsl_core.model.spectral import SpectralCurve
 from dsl_core.patterns.images import pattern_image
 from dsl_core.simulation.sim_devices import open_twin
+from tests.cases.lab_everyday import CAMERA_EVERYDAY, PROJECTOR_EVERYDAY
 from tests.cases.lab_links import CAMERA_LINKS, PROJECTOR_LINKS, CameraLink
 from tests.cases.lab_mishaps import CAMERA_MISHAPS, PROJECTOR_MISHAPS, CameraMishap
 from tests.cases.lab_oddities import CAMERA_ODDITIES, PROJECTOR_ODDITIES
@@ -218,12 +219,15 @@ CAMERA: dict[str, tuple[bool, Change]] = {
     **{kind: (False, _link(change)) for kind, change in CAMERA_LINKS.items()},
     **{
         kind: (False, _mishap(change))
-        for kind, change in (CAMERA_MISHAPS | CAMERA_SURPRISES | CAMERA_ODDITIES | CAMERA_WHIMS).items()
+        for each in (CAMERA_MISHAPS, CAMERA_SURPRISES, CAMERA_ODDITIES, CAMERA_WHIMS, CAMERA_EVERYDAY)
+        for kind, change in each.items()
     },
 }
 
 
-_OF_PROJECTOR = PROJECTOR_MISHAPS | PROJECTOR_SURPRISES | PROJECTOR_ODDITIES | PROJECTOR_WHIMS
+_OF_PROJECTOR = (
+    PROJECTOR_MISHAPS | PROJECTOR_SURPRISES | PROJECTOR_ODDITIES | PROJECTOR_WHIMS | PROJECTOR_EVERYDAY
+)
 
 
 class LabProjector(Projector):

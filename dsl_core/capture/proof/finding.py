@@ -25,6 +25,7 @@ class Verdict(StrEnum):
     MIRRORED = "mirrored"
     DISPLACED = "displaced"
     HIDDEN = "partly hidden"
+    COLOURS = "other colours"
     ROWS_TWICE = "rows twice"
     OTHER = "another picture"
 
@@ -48,6 +49,7 @@ _SEEN = {
     Verdict.MIRRORED: "columns of the projector run across the picture the wrong way round",
     Verdict.DISPLACED: "it is displaced from the pictures before",
     Verdict.HIDDEN: "a part of it is darker than the black picture, as if something were before it",
+    Verdict.COLOURS: "some of its colours are darker than in the black picture, and others are not",
     Verdict.ROWS_TWICE: "some of its rows come twice",
     Verdict.OTHER: "it shows something else",
 }
@@ -66,6 +68,8 @@ _REMEDY = {
     " and that the projector does not correct or scale its picture.",
     Verdict.HIDDEN: "Keep out of the way of camera, projector and lamps, and keep the light of the room as"
     " it was.",
+    Verdict.COLOURS: "Switch automatic white balance of the camera off, and look whether the light of the"
+    " room has changed its colour.",
     Verdict.ROWS_TWICE: "Packets of the camera's link are lost or sent again: check its cable, its network"
     " and the size of packets.",
     Verdict.OTHER: "Check that camera, target and light have not moved since the scan began.",

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -45,7 +45,8 @@ from dsl_core.capture.proof.sentinel import SentinelProof
 from dsl_core.capture.proof.usual_light import LEAST_LIGHT, UsualLight
 from dsl_core.capture.proof.white_again import WhiteAgain, white_again
 from dsl_core.model.captured_code import CapturedCode
-from dsl_core.model.plan import CapturePlan, NoCode, Role, ScanLines, Shot, describe_shot
+from dsl_core.model.conditions import COLOUR_NAMES
+from dsl_core.model.plan import CapturePlan, GrayCode, NoCode, Role, ScanLines, Shot, describe_shot
 from dsl_core.model.rig import Rig
 
 #: Where several rivals won, the picture before is blamed if its votes are nearly as many (their mean), and
@@ -53,6 +54,8 @@ from dsl_core.model.rig import Rig
 NEARLY = 0.3
 #: Where a line lights so few pixels, most may see an edge, and vote for nothing.
 FEW_VOTES = 60
+#: Stripes of a Gray code that blur, scaling and trembling change while wider ones look right: so many pairs.
+FINEST = 3
 #: Two more exposures cost little in plans of so many shots.
 MANY_SHOTS = 100
 
@@ -298,6 +301,17 @@ class FrameProof:
         """The setting whose code is judged by itself."""
         return self._first
 
+    def are_finest(self, shots: Sequence[Shot]) -> bool:
+        """Whether shots are of the finest `FINEST` pairs of a Gray code's columns or rows, and no others."""
+        if not isinstance(self._plan.code, GrayCode) or any(shot.role != "code" for shot in shots):
+            return False
+        columns, rows = self._plan.code_bits
+        fine = {
+            *range(columns - FINEST, columns),
+            *range(max(columns, columns + rows - FINEST), columns + rows),
+        }
+        return bool(shots) and {shot.pattern // 2 for shot in shots} <= fine
+
     def is_at_first_level(self, shot: Shot) -> bool:
         """Whether a shot drives the projector at the level of the first code."""
         return shot.level == self._plan.settings[self._first].level
@@ -359,6 +373,10 @@ class FrameProof:
         black = self._kept.get(self._blacks[shot.setting])
         if black is None or not self._hidden.is_hidden(shot.setting, seen, black):
             return None
+        colours = self._hidden.colours(seen, black, self._raster.channels(self._bayer))
+        if colours:
+            named = " and ".join(COLOUR_NAMES[each] for each in colours)
+            return Finding(shot, Verdict.COLOURS, (shot,), f"only {named}")
         return Finding(shot, Verdict.HIDDEN, (shot,))
 
     def _with_doubt(self, found: Finding, seen: Counts) -> Finding:

@@ -320,3 +320,11 @@ def test_the_first_pictures_are_named_once_the_code_is_whole(monkeypatch: pytest
     monkeypatch.setattr("dsl_core.capture.proof.verifier.MANY_SHOTS", len(SHOTS))
     assert judge.first_pictures() == (SHOTS[0], SHOTS[2])
     assert [shot.index for shot in judge.code_after(SHOTS[2])] == list(range(3, 12))
+
+
+@pytest.mark.parametrize(
+    ("indices", "is_fine"),
+    [((8, 9), True), ((4, 5), True), ((3, 4), False), ((2, 3), False), ((8, 10), False), ((), False)],
+)
+def test_the_finest_stripes_are_the_last_three_pairs(indices: tuple[int, ...], is_fine: bool) -> None:
+    assert proof().are_finest([SHOTS[index] for index in indices]) == is_fine

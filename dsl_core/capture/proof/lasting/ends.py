@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from dsl_core.capture.proof.lasting.black_light import black_light, lit_black
 from dsl_core.capture.proof.lasting.missing_light import missing_light
 from dsl_core.capture.proof.lasting.sensor_parts import sensor_parts
+from dsl_core.capture.proof.lasting.written_row import written_row
 from dsl_core.capture.proof.noise import Noise
 from dsl_core.capture.proof.raster import Counts, Raster
 from dsl_core.model.plan import CapturePlan
@@ -23,6 +24,9 @@ def sentences_of_ends(
     ``channels`` are the colours of their pixels. Without a calibration, nobody knows what is usual; without
     ``with_colours``, missing ones are left out, which a filter before the camera takes away.
     """
+    written = written_row(black, noise, raster, plan.camera_size_px[0])
+    if written is not None:
+        return [written.sentence]  # its numbers look like light
     lit = lit_black(white, black, channels, noise, raster, plan.camera_size_px)
     if lit is not None:
         return [lit.sentence]  # the rest would be judged by what is in the picture

@@ -18,6 +18,9 @@ NO_LIGHT = 0.01
 #: An LED is out where its colour has no more than what others give it, and this share of its own light: of
 #: surfaces that reflect as little of it there is hardly any, and most scenes have others.
 HARDLY = 0.08
+#: Where surfaces have many colours, this much: what others give it is of brighter surfaces in places. There
+#: are many where its other two colours differ by this factor between a tenth of the blocks and another one.
+HARDLY_OF_MANY, MANY = 0.22, 2.0
 #: An LED gives a colour at least this share of its light, else nothing is said.
 OWN = 0.4
 #: Share of the blocks of a picture that have to agree; how bright they are, in deviations; and their number.
@@ -36,31 +39,40 @@ def missing_light(
     """
     if rig.sensor.bayer == "MONO":
         return ""
-    light, is_bright = _blocks(white, black, channels, noise, raster)
-    if int(is_bright.sum()) < FEWEST:
+    light, is_bright, is_saturated = _blocks(white, black, channels, noise, raster)
+    # Where most of the picture saturates, what is left is what one colour is dark in.
+    if int(is_bright.sum()) < max(FEWEST, int(is_saturated.sum())):
         return ""
     light = light[:, is_bright]
     parts = _parts(rig)
     # What grey surfaces would give all colours alike.
     grey = np.maximum(light, 0) / parts.sum(1)[:, None]
-    share = np.quantile(grey / grey.max(0), MOST, axis=1)
+    share = np.quantile(grey / np.maximum(grey.max(0), 1e-9), MOST, axis=1)
     dead = [COLOUR_NAMES[colour] for colour in range(3) if share[colour] < NO_LIGHT]
     if dead:
         return no_light(dead)
-    out = []
+    out, least = [], HARDLY
     for led, name in enumerate(COLOUR_NAMES):
         colour = int(parts[:, led].argmax())
         own = float(parts[colour, led] / parts[colour].sum())
-        if own > OWN and share[colour] < (1 - own) + HARDLY * own:
+        hardly = HARDLY_OF_MANY if _has_many_colours(np.delete(grey, colour, 0)) else HARDLY
+        if own > OWN and share[colour] < (1 - own) + hardly * own:
             out.append(name)
+            least = max(least, hardly)
     if not out:
         return ""
     return (
         f"White has hardly any light of the {' and the '.join(out)} LED in most of the picture: less than"
-        f" {HARDLY:.0%} of what grey surfaces would return. Unless no surface reflects it, the LED is out, or"
+        f" {least:.0%} of what grey surfaces would return. Unless no surface reflects it, the LED is out, or"
         " a filter or a setting of projector or computer takes its light away. Look whether the projector"
         " shows white, and scan again."
     )
+
+
+def _has_many_colours(two: NDArray[np.float64]) -> bool:
+    """Whether two colours, shape (2, blocks), have another ratio in some blocks than in others."""
+    low, high = np.quantile(np.log(np.maximum(two[0], 1e-9) / np.maximum(two[1], 1e-9)), (0.1, 0.9))
+    return bool(high - low > np.log(MANY))
 
 
 def no_light(colours: Sequence[str]) -> str:
@@ -84,8 +96,8 @@ def _parts(rig: Rig) -> NDArray[np.float64]:
 
 def _blocks(
     white: Counts, black: Counts, channels: NDArray[np.int8], noise: Noise, raster: Raster
-) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
-    """Light of white by colour and block of the raster, DN, and which blocks are bright enough."""
+) -> tuple[NDArray[np.float64], NDArray[np.bool_], NDArray[np.bool_]]:
+    """Light of white by colour and block of the raster, DN; which blocks are bright enough, and saturate."""
     sound = white < noise.sensor.full_scale_dn
     gain = white.astype(np.float32) - black
     variance = noise.variance(white) + noise.variance(black)
@@ -99,4 +111,5 @@ def _blocks(
         is_whole.append((count > 0) & (count >= (1 - SATURATED) * own))
         is_lit.append(total > BRIGHT_SIGMAS * std)
         light.append(total / np.maximum(count, 1))
-    return np.array(light, np.float64), np.all(is_whole, 0) & np.any(is_lit, 0)
+    whole = np.all(is_whole, 0)
+    return np.array(light, np.float64), whole & np.any(is_lit, 0), ~whole

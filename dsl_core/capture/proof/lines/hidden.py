@@ -18,6 +18,8 @@ from dsl_core.optics.seen_noise import NORMAL
 SIGMAS, SHARE = 4.0, 0.35
 #: So many pixels that the line before left as they were, as a share of all and at least.
 FEWEST_SHARE, FEWEST = 0.01, 12
+#: Nobody stands there where another colour has less than this share of the dark pixels of the one with most.
+OTHERS = 0.2
 _NOTHING = np.float32(0)
 
 
@@ -48,6 +50,22 @@ class HiddenParts:
         if not found:
             self._before = setting, seen, black
         return found
+
+    def colours(self, seen: Counts, black: Counts, channels: NDArray[np.int8]) -> tuple[int, ...]:
+        """The colours that alone are darker than black; none where all of them are, as if hidden.
+
+        ``channels`` has the colour of each pixel.
+        """
+        dark = self._dark(seen, black)
+        # Where the room gives too little, nobody sees that it is gone.
+        room = np.subtract(black, np.float32(self._noise.sensor.black_level_dn), dtype=np.float32)
+        tells = room > 2 * SIGMAS * self._sigma(seen, black)
+        each_tells = {int(each): tells & (channels == each) for each in np.unique(channels)}
+        if min(int(own.sum()) for own in each_tells.values()) < FEWEST_SHARE * dark.size:
+            return ()
+        share = {each: float(dark[own].mean()) for each, own in each_tells.items()}
+        few = OTHERS * max(share.values())
+        return tuple(each for each in share if share[each] > few) if min(share.values()) <= few else ()
 
     def _limit(self, black: Counts) -> Floats:
         """Counts below which pixels may be darker than black, as no picture has less noise."""

@@ -143,6 +143,32 @@ def test_an_led_that_is_out_leaves_its_colour_what_others_give_it(scene: Rendere
     assert said(scene, of_colour(0, 0, 0.35)) == []
 
 
+@pytest.mark.parametrize(("colours", "is_told"), [(1.0, False), (3.0, True)])
+def test_among_many_colours_an_led_is_out_though_others_give_its_colour_more(
+    scene: RenderedScene, colours: float, is_told: bool
+) -> None:
+    def fault(white: Mosaic, black: Mosaic) -> tuple[Mosaic, Mosaic]:
+        changed = of_colour(0, 0, 0.33)(white, black)[0]
+        patches = np.indices(white.shape).sum(0) // 8 % 2 == 0  # green beside others
+        blue = np.where(patches, 1.0, 1 / colours)
+        changed[1::2, 1::2] *= blue[1::2, 1::2]
+        return changed, black
+
+    assert any("light of the red LED" in sentence for sentence in said(scene, fault)) == is_told
+
+
+@pytest.mark.parametrize(("rows", "is_told"), [(32, False), (16, True)])
+def test_surfaces_that_most_of_the_picture_outshines_tell_of_no_led(
+    scene: RenderedScene, rows: int, is_told: bool
+) -> None:
+    def fault(white: Mosaic, black: Mosaic) -> tuple[Mosaic, Mosaic]:
+        changed = of_colour(0, 0, 0.2)(white, black)[0]
+        changed[:rows] = 1e5
+        return changed, black
+
+    assert any("light of the red LED" in sentence for sentence in said(scene, fault)) == is_told
+
+
 @pytest.mark.parametrize(("share", "is_told"), [(0.1, True), (0.4, False)])
 def test_a_few_surfaces_of_another_colour_are_no_light_of_an_led(
     scene: RenderedScene, share: float, is_told: bool
@@ -203,3 +229,33 @@ def test_parts_of_a_sensor_are_looked_for_where_white_does_not_saturate(
         return bright, black + step
 
     assert any("in all rows" in sentence for sentence in said(scene, fault)) == (columns.stop < 32)
+
+
+def numbers(row: int, count: int, full_dn: float = 3800.0) -> Fault:
+    """Numbers in the first pixels of a row, other ones in each picture."""
+
+    def fault(white: Mosaic, black: Mosaic) -> tuple[Mosaic, Mosaic]:
+        changed = [each.copy() for each in (white, black)]
+        for seed, each in enumerate(changed):
+            each[row, :count] = np.random.default_rng(seed).integers(0, int(full_dn), count)
+        return changed[0], changed[1]
+
+    return fault
+
+
+def test_numbers_that_a_camera_writes_into_its_first_row_are_no_light(scene: RenderedScene) -> None:
+    (sentence,) = said(scene, numbers(0, 20))
+    told = re.match(r"The first row of black holds numbers up to column (\d+), which no light", sentence)
+    assert told is not None
+    assert 18 <= int(told[1]) <= 21
+
+
+def test_light_at_the_upper_edge_and_a_few_hot_pixels_are_no_numbers(scene: RenderedScene) -> None:
+    def lamp(white: Mosaic, black: Mosaic) -> tuple[Mosaic, Mosaic]:
+        down, across = np.mgrid[: white.shape[0], : white.shape[1]]
+        room = 2000.0 * np.exp(-(down**2) / 2 - ((across - 20) / 12) ** 2)
+        return white + room, black + room
+
+    assert not any("numbers" in each for each in said(scene, lamp))
+    assert not any("numbers" in each for each in said(scene, numbers(0, 1)))
+    assert not any("numbers" in each for each in said(scene, numbers(1, 20)))

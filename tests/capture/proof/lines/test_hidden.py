@@ -49,6 +49,20 @@ def test_a_shadow_with_soft_edges_over_half_of_the_picture_is_not_taken_for_nois
     assert hides(picture(1, 20), shaded) == [False, True]
 
 
+@pytest.mark.parametrize(
+    ("gains", "colours"),
+    [((0.4, 1.0, 1.0), (0,)), ((0.4, 1.0, 0.4), (0, 2)), ((0.4, 0.4, 0.4), ()), ((1.0, 1.0, 1.0), ())],
+)
+def test_colours_that_alone_are_dark_are_hidden_by_nobody(
+    gains: tuple[float, float, float], colours: tuple[int, ...]
+) -> None:
+    cells = np.array([[0, 1], [1, 2]], np.int8)
+    channels = np.tile(cells, (PIXELS // WIDTH // 2, WIDTH // 2)).ravel()
+    seen = LEVEL + (picture(1, 20) - LEVEL) * np.array(gains)[channels]
+    counts = np.rint(np.where(np.arange(PIXELS) % WIDTH < 25, seen, picture(1, 20))).astype(np.uint16)
+    assert HiddenParts(NOISE).colours(counts, BLACK, channels) == colours
+
+
 def test_a_darker_room_hides_nothing() -> None:
     assert hides(picture(1, 20), picture(2, 21, room_dn=20.0), picture(3, 22)) == 3 * [False]
 

@@ -1,0 +1,255 @@
+"""How pictures are altered on their way since a scan began: turned, begun elsewhere, coarser, filtered.
+
+White, black and a frame of the code, captured once more, hold the same scene, so that what a camera, its
+driver or its link do to them shows by the mark that each such alteration leaves.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dsl_core.capture.proof.lasting.written_row import written_row
+from dsl_core.capture.proof.noise import Noise
+from dsl_core.capture.proof.raster import Raster
+from dsl_core.model.rig import Sensor
+from dsl_core.optics.sensor import raw_variance
+
+Mosaic = NDArray[np.uint16]
+#: White, black and a frame of the code of one time, raw mosaics (rows, columns), DN.
+Pictures = tuple[Mosaic, Mosaic, Mosaic]
+
+#: A picture is the one of before, turned, if they differ by no more deviations (rms), and by this share of
+#: what they differ by as they are.
+SAME_SIGMAS, NEARER = 2.0, 0.5
+#: Places of a mosaic have changed if their light has by this much (natural logarithm), and have done so with
+#: each other if it then has not by this much.
+CHANGED, KEPT = 0.15, 0.05
+#: A row is dark with less than this share of its light; so many have to be, and no more than this share.
+NO_LIGHT, FEWEST_ROWS, MOST_ROWS = 0.05, 2, 0.7
+#: Pictures are clipped where this share of the pixels has the largest value, below this share of full scale.
+CLIPPED, BELOW_FULL = 0.01, 0.9
+#: White follows that of before by another power than one by so much, alike in every colour, and as closely as
+#: this correlation; blocks of so many pixels of a colour a side are asked that are so many deviations bright,
+#: and so many are needed, whose light (logarithm) deviates by so much.
+POWER, CLOSELY, BLOCK_PX, BRIGHT_SIGMAS, FEWEST_BRIGHT, RANGE = 0.08, 0.97, 4, 20.0, 24, 0.02
+#: Light differs from row to row from this much on (rms of its factors), by so much up and down; within rows,
+#: of so many parts, it differs by no more than this share of that.
+BANDS, UP_AND_DOWN, WITHIN, PARTS = 0.03, 0.03, 0.5, 6
+#: Values are coarser if there are less of them than this share of those before, which were at least so many.
+COARSER, FEWEST_VALUES = 0.3, 64
+#: Black is filtered with less than this share of its noise, where it was noise at first: so many times what
+#: the sensor explains. A picture that trembles by parts of a pixel has half of it.
+CALMER, MOSTLY_NOISE = 0.4, (0.6, 1.4)
+#: Share of the pixels that noise is measured by: others are at edges of what the room lights.
+CALM = 0.9
+#: A pixel is beyond black or white by so many deviations and this share of its contrast; where pictures are
+#: sharpened, this share of the lit ones is beyond either, and so many.
+BEYOND_SIGMAS, BEYOND, SHARPENED, FEWEST_SHARPENED = 6.0, 0.1, 0.01, 8
+
+
+def alteration(before: Pictures, now: Pictures, sensor: Sensor) -> str:
+    """What was done to pictures since ``before``, with what to do; empty if nothing shows."""
+    return (
+        _numbered(now[1], sensor)
+        or _turned(before[0], now[0], sensor)
+        or _begun_elsewhere(before, now)
+        or _dark_rows(before, now)
+        or _clipped(before[0], now[0], sensor)
+        or _coarser(before, now)
+        or _banded(before, now)
+        or _filtered(before, now, sensor)
+        or _curved(before, now, sensor)
+    )
+
+
+def _numbered(black: Mosaic, sensor: Sensor) -> str:
+    raster = Raster((black.shape[1], black.shape[0]))
+    found = written_row(raster.take(black), Noise(sensor), raster, black.shape[1])
+    return "" if found is None else found.sentence
+
+
+def _turned(before: Mosaic, now: Mosaic, sensor: Sensor) -> str:
+    usual = _apart(before, now, sensor)
+    turns = {
+        "mirrored": before[:, ::-1],
+        "upside down": before[::-1],
+        "turned by 180 degrees": before[::-1, ::-1],
+    }
+    for how, picture in turns.items():
+        apart = _apart(picture, now, sensor)
+        if apart < SAME_SIGMAS and apart < NEARER * usual:
+            return (
+                f"The camera's picture is {how}, and was not when the scan began. Switch mirroring and"
+                " turning off in the settings of the camera, and resume the scan."
+            )
+    return ""
+
+
+def _apart(one: Mosaic, other: Mosaic, sensor: Sensor) -> float:
+    """Rms of what pictures differ by where neither saturates, in deviations; infinite where both do."""
+    sound = np.maximum(one, other) < 0.98 * sensor.full_scale_dn
+    if not sound.any():
+        return np.inf
+    first, second = (each[sound].astype(np.float64) for each in (one, other))
+    noise = sum(raw_variance(sensor, np.maximum(each - sensor.black_level_dn, 0)) for each in (first, second))
+    return float(np.sqrt(np.mean((first - second) ** 2 / noise)))
+
+
+def _begun_elsewhere(before: Pictures, now: Pictures) -> str:
+    """Whether the colours of the mosaic have changed places, as where it begins a row or column later."""
+    old, new = (
+        np.array([[float(light[i::2, j::2].sum()) for j in (0, 1)] for i in (0, 1)])
+        for light in (pictures[0].astype(np.float64) - pictures[1] for pictures in (before, now))
+    )
+    if min(old.min(), new.min()) <= 0:
+        return ""
+
+    def changed(down: int, across: int) -> float:
+        return float(np.abs(np.log(new / np.roll(old, (down, across), (0, 1)))).max())
+
+    if changed(0, 0) < CHANGED:
+        return ""
+    moves = {"column": (0, 1), "row": (1, 0), "column and row": (1, 1)}
+    what = min(moves, key=lambda each: changed(*moves[each]))
+    if changed(*moves[what]) > KEPT:
+        return ""
+    return (
+        "The camera's pixels see other colours than when the scan began, as where its picture begins one"
+        f" {what} later: its region of interest or its format (order of the colours) was changed. Set both as"
+        " they were, and resume the scan."
+    )
+
+
+def _dark_rows(before: Pictures, now: Pictures) -> str:
+    old, new = ((white.astype(np.float64) - black).sum(1) for white, black, _ in (before, now))
+    lit = old > 0.1 * old.max()
+    dark = lit & (new < NO_LIGHT * old)
+    if not FEWEST_ROWS <= int(dark.sum()) <= MOST_ROWS * int(lit.sum()):
+        return ""
+    return (
+        f"{int(dark.sum())} rows of the picture no longer have any light, the first of them is row"
+        f" {int(np.flatnonzero(dark)[0])}: rows of the sensor failed, or their packets are lost. Check cable"
+        " and driver of the camera, and resume the scan."
+    )
+
+
+def _clipped(before: Mosaic, now: Mosaic, sensor: Sensor) -> str:
+    most = int(now.max())
+    shares = [float((each == each.max()).mean()) for each in (before, now)]
+    if most >= BELOW_FULL * sensor.full_scale_dn or shares[1] < CLIPPED or shares[0] > shares[1] / 4:
+        return ""
+    return (
+        f"No pixel of white has more than {most} DN, and {shares[1]:.0%} have just that: the camera saturates"
+        " below its full scale. Set gain, bit depth and limits of its driver as they were, and resume the"
+        " scan."
+    )
+
+
+def _curved(before: Pictures, now: Pictures, sensor: Sensor) -> str:
+    """Whether counts follow the light by another power than before."""
+    sound = np.maximum(before[0], now[0]) < 0.98 * sensor.full_scale_dn
+    old, new = (white.astype(np.float64) - black for white, black, _ in (before, now))
+    sigma = np.sqrt(2 * raw_variance(sensor, np.maximum(old, 0)))
+    bright = sound & (old > BRIGHT_SIGMAS * sigma) & (new > BRIGHT_SIGMAS)
+    powers = []
+    for site in ((0, 0), (0, 1), (1, 0), (1, 1)):
+        place = np.s_[site[0] :: 2, site[1] :: 2]
+        used = _blocks(bright[place].astype(np.float64)) == 1
+        x, y = (np.log(_blocks(each[place])[used]) for each in (old, new))
+        if x.size < FEWEST_BRIGHT or min(x.std(), y.std()) < RANGE:
+            continue
+        if float(np.corrcoef(x, y)[0, 1]) < CLOSELY:
+            return ""
+        powers.append(float(y.std() / x.std()))
+    off = [power - 1 for power in powers]
+    if not off or min(abs(each) for each in off) < POWER or min(off) < 0 < max(off):
+        return ""
+    return (
+        f"White follows the light of when the scan began by a power of {float(np.mean(powers)):.2f}: gamma,"
+        " tone mapping or high dynamic range of the camera was switched on, or its black level changed. Set"
+        " it to values that are proportional to light, and resume the scan."
+    )
+
+
+def _blocks(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Means over blocks of `BLOCK_PX` a side."""
+    rows, columns = (size // BLOCK_PX for size in values.shape)
+    whole = values[: rows * BLOCK_PX, : columns * BLOCK_PX]
+    return np.asarray(whole.reshape(rows, BLOCK_PX, columns, BLOCK_PX).mean(axis=(1, 3)))
+
+
+def _banded(before: Pictures, now: Pictures) -> str:
+    """Whether whole rows have more light than before and others less."""
+    parts = np.linspace(0, before[0].shape[1], PARTS + 1)[:-1].astype(int)
+    cells = np.arange(0, before[0].shape[0] - 1, 2)  # two rows of a mosaic have all its colours
+    old, new = (
+        np.add.reduceat(np.add.reduceat(white.astype(np.float64) - black, parts, axis=1), cells, axis=0)
+        for white, black, _ in (before, now)
+    )
+    lit = old.sum(1) > 0.25 * old.sum(1).max()
+    if int(lit.sum()) < len(lit) / 2 or min(old[lit].min(), new[lit].min()) <= 0:
+        return ""
+    of_rows = new[lit].sum(1) / old[lit].sum(1)
+    of_parts = new[lit] / old[lit] / of_rows[:, None]
+    usual = float(np.median(of_rows))
+    spread = float(np.std(of_rows)) / usual
+    is_both = max(of_rows) > (1 + UP_AND_DOWN) * usual and min(of_rows) < (1 - UP_AND_DOWN) * usual
+    if spread < BANDS or not is_both or float(np.std(of_parts)) > WITHIN * spread:
+        return ""
+    return (
+        f"Whole rows of white have other light than when the scan began, by {100 * spread:.0f} % up and down:"
+        " the light flickers, as that of the mains or of pulsed LEDs does, while the camera exposes one row"
+        " after the other. Expose for whole periods of the light, keep lamps of the room off, and resume the"
+        " scan."
+    )
+
+
+def _coarser(before: Pictures, now: Pictures) -> str:
+    old, new = (np.unique(np.concatenate([each.ravel() for each in pictures])) for pictures in (before, now))
+    span = [int(np.ptp(each)) for each in (old, new)]
+    # Less light has less values as well.
+    if old.size < FEWEST_VALUES or new.size * max(span[0], 1) > COARSER * old.size * max(span[1], 1):
+        return ""
+    step = max(round(span[1] / max(new.size - 1, 1)), 1)
+    return (
+        f"Values of the camera come in steps of about {step} DN, and did not when the scan began: it delivers"
+        " less bits, or compresses its pictures. Set its pixel format to raw values of all bits, and resume"
+        " the scan."
+    )
+
+
+def _filtered(before: Pictures, now: Pictures, sensor: Sensor) -> str:
+    """Whether noise or edges are not those of before: a filter smooths or sharpens pictures."""
+    white, black, code = (each.astype(np.float64) for each in now)
+    sigma = np.sqrt(2 * raw_variance(sensor, np.maximum(white - sensor.black_level_dn, 0)))
+    contrast = white - black
+    lit = contrast > 2 * BEYOND_SIGMAS * sigma
+    limit = np.maximum(BEYOND_SIGMAS * sigma, BEYOND * contrast)
+    fewest = max(SHARPENED * int(lit.sum()), FEWEST_SHARPENED)
+    if all(int((lit & beyond).sum()) > fewest for beyond in (code > white + limit, code < black - limit)):
+        return (
+            "Edges of the pattern are darker than black or brighter than white: camera or projector sharpens"
+            " its picture. Switch sharpening and edge enhancement off, and resume the scan."
+        )
+    (usual, expected), (noise, now_expected) = (_noise(pictures[1], sensor) for pictures in (before, now))
+    # Less light has less noise as well, and so it is judged by what the sensor explains and as it is.
+    share = noise / max(usual, 1e-9) * max(1.0, expected / now_expected)
+    if MOSTLY_NOISE[0] < usual / expected < MOSTLY_NOISE[1] and share < CALMER:
+        return (
+            f"Black has {share:.1f} times the noise that it had when the scan began: the camera filters"
+            " its pictures (noise reduction, median, compression). Switch that off, and resume the scan."
+        )
+    return ""
+
+
+def _noise(picture: Mosaic, sensor: Sensor) -> tuple[float, float]:
+    """How much most pixels differ from those of their colour beside them, and what noise explains, DN.
+
+    Others are at edges of what the room lights.
+    """
+    light = picture.astype(np.float64) - sensor.black_level_dn
+    step = np.abs(light[:, 2:] - light[:, :-2]).ravel()
+    # Mean distance of two normal values is 2 / sqrt(pi) of their deviation.
+    expected = 2 / np.sqrt(np.pi) * np.sqrt(np.mean(raw_variance(sensor, np.maximum(light, 0))))
+    return float(np.mean(np.sort(step)[: max(int(CALM * step.size), 1)])), float(expected)

@@ -1,0 +1,123 @@
+"""What is done to pictures on their way is named by the mark that it leaves, and nothing else is named so."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from scipy.ndimage import gaussian_filter, median_filter
+
+from dsl_core.capture.altered import alteration
+from dsl_core.model.rig import Sensor
+
+SENSOR = Sensor()
+Counts = NDArray[np.float64]
+
+
+def pictures(
+    seed: int, change: Callable[[Counts], Counts] = lambda counts: counts
+) -> tuple[NDArray[np.uint16], ...]:
+    """White, black and stripes on a scene with texture and colours, of which red has least light."""
+    rng = np.random.default_rng(seed)
+    texture = 1.5 + 4 * gaussian_filter(np.random.default_rng(4).normal(size=(64, 96)), 2.5)
+    colours = np.tile([[0.4, 1.0], [1.0, 0.7]], (32, 48))
+    stripes = gaussian_filter((np.arange(96) // 6 % 2).astype(float), 0.7)
+
+    def picture(pattern: Counts | float) -> NDArray[np.uint16]:
+        light = 60 * colours + 700 * texture.clip(0.2) * colours * pattern
+        sigma = np.sqrt(SENSOR.read_noise_dn**2 + light / SENSOR.electrons_per_dn)
+        counts = change(np.rint(SENSOR.black_level_dn + light + rng.normal(0, sigma)))
+        return np.rint(counts).clip(0, SENSOR.full_scale_dn).astype(np.uint16)
+
+    return picture(1.0), picture(0.0), picture(stripes)
+
+
+def of_colours(change: Callable[[Counts], Counts]) -> Callable[[Counts], Counts]:
+    """The change of each colour's own picture."""
+
+    def changed(counts: Counts) -> Counts:
+        made = counts.copy()
+        for at in ((0, 0), (0, 1), (1, 0), (1, 1)):
+            made[at[0] :: 2, at[1] :: 2] = change(counts[at[0] :: 2, at[1] :: 2])
+        return made
+
+    return changed
+
+
+def over_black(change: Callable[[Counts], Counts]) -> Callable[[Counts], Counts]:
+    return lambda counts: SENSOR.black_level_dn + change(counts - SENSOR.black_level_dn)
+
+
+def dark_rows(counts: Counts) -> Counts:
+    made = counts.copy()
+    made[20::8] = SENSOR.black_level_dn
+    return made
+
+
+def numbers(counts: Counts) -> Counts:
+    made = counts.copy()
+    made[0, :30] = np.random.default_rng(7).integers(0, 4096, 30)
+    return made
+
+
+def in_bands(counts: Counts) -> Counts:
+    return over_black(lambda light: light * (1 + 0.1 * np.sin(np.arange(64) / 5))[:, None])(counts)
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (numbers, "The first row of black holds numbers"),
+        (in_bands, "Whole rows of white have other light than when the scan began, by 7 % up and down"),
+        (lambda c: c[:, ::-1], "picture is mirrored"),
+        (lambda c: c[::-1], "picture is upside down"),
+        (lambda c: c[::-1, ::-1], "picture is turned by 180 degrees"),
+        (lambda c: np.roll(c, -1, 1), "begins one column later"),
+        (lambda c: np.roll(c, -1, 0), "begins one row later"),
+        (lambda c: np.roll(c, (-1, -1), (0, 1)), "begins one column and row later"),
+        (dark_rows, "6 rows of the picture no longer have any light, the first of them is row 20"),
+        (lambda c: np.minimum(c, 1200), "No pixel of white has more than 1200 DN"),
+        (lambda c: np.floor(c / 16) * 16, "come in steps of about 16 DN"),
+        (lambda c: 4095 * (c / 4095) ** 0.55, "by a power of 0."),
+        (of_colours(lambda c: 1.8 * c - 0.8 * gaussian_filter(c, 1.0)), "sharpens its picture"),
+        (of_colours(lambda c: median_filter(c, 3)), "Black has 0.2 times the noise"),
+    ],
+)  # fmt: skip
+def test_an_alteration_is_named(change: Callable[[Counts], Counts], said: str) -> None:
+    assert said in alteration(pictures(1), pictures(2, change), SENSOR)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        lambda c: c,
+        over_black(lambda c: 0.5 * c),
+        over_black(lambda c: c * np.tile([[0.6, 1.0], [1.0, 1.0]], (32, 48))),
+        over_black(lambda c: c * np.where(np.arange(96) < 30, 0.3, 1.0)),
+        over_black(lambda c: c * np.where(np.arange(64) < 30, 0.6, 1.0)[:, None]),
+        over_black(lambda c: c * (1 + 0.3 * np.sin((np.arange(96) + 2 * np.arange(64)[:, None]) / 30))),
+        lambda c: c + 40.0,
+        lambda c: np.roll(c, 2, 1),
+        of_colours(lambda c: (c + np.roll(c, 1, 1)) / 2),
+    ],
+    ids=[
+        "noise",
+        "half the light",
+        "red",
+        "somebody",
+        "somebody above",
+        "aslant",
+        "room",
+        "motion",
+        "half a pixel",
+    ],
+)
+def test_other_changes_are_no_alteration(change: Callable[[Counts], Counts]) -> None:
+    assert alteration(pictures(1), pictures(2, change), SENSOR) == ""  # type: ignore[arg-type]
+
+
+def test_pictures_that_tell_nothing_are_not_altered() -> None:
+    full = tuple(np.full((8, 8), int(SENSOR.full_scale_dn), np.uint16) for _ in range(3))
+    assert alteration(full, full, SENSOR) == ""  # type: ignore[arg-type]
