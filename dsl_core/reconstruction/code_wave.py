@@ -25,6 +25,9 @@ Floats = NDArray[np.float64]
 
 #: Columns that noise moves farther than this (px) gather at the middles of lines, which looks like a wave.
 MOST_NOISE_PX = 0.1
+#: Of the pixels beside a boundary of the code, this share has to have less noise: which do depends on where
+#: noise moved them, so that a few of them are off on the average.
+LEAST_KNOWN = 0.45
 #: How well a boundary must be known (px): less well, noise is taken for a wave.
 TELLING_PX = 0.04
 #: A wave (rms, px) that matters.
@@ -143,6 +146,7 @@ def code_wave(lines: LineSet | None, named_px: NDArray[np.integer], maps: Column
     # Each place between two middles of the projector's pixels has one boundary of the code.
     place = np.floor(exact).astype(np.int64) % lines.step_px
     shift, std = displacement(named_px[known], exact, place, lines.step_px)
+    std[_known_share(named_px, known, lines.step_px) < LEAST_KNOWN] = np.inf
     left, right = _mirrored(lines)
     off = np.asarray((right + 0.5 - lines.first_px) % lines.step_px, np.float64)
     # What has moved displaces both sides alike, and cancels.
@@ -150,6 +154,17 @@ def code_wave(lines: LineSet | None, named_px: NDArray[np.integer], maps: Column
     with np.errstate(invalid="ignore"):
         telling = np.maximum(std[left], std[right]) < TELLING_PX
     return CodeWave(off[telling], away[telling], away_std[telling]) if telling.any() else None
+
+
+def _known_share(named_px: NDArray[np.integer], known: NDArray[np.bool_], step_px: int) -> Floats:
+    """By place, the share of the pixels beside its boundary of the code whose columns are ``known``."""
+    named = named_px >= 0
+    own = named_px[named] % step_px
+    total, sure = (
+        np.bincount(own, weight, step_px) for weight in (np.ones(own.size), known[named].astype(np.float64))
+    )
+    beside, sure_beside = (each + np.roll(each, -1) for each in (total, sure))
+    return np.asarray(sure_beside / np.maximum(beside, 1))
 
 
 def with_varying_width(

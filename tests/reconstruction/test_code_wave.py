@@ -77,6 +77,19 @@ def test_nothing_is_said_where_nothing_is_known() -> None:
     assert code_wave(LINES, NAMED_PX, coarse) is None
 
 
+@pytest.mark.parametrize(("share", "told"), [(0.2, False), (0.35, True)])
+def test_a_boundary_that_few_pixels_know_is_left_out(share: float, told: bool) -> None:
+    """Those few are the ones that noise has moved to where lines say more. A quarter more is farther off."""
+    near = np.abs((TRUE_PX - LINES.first_px + 2.5) % 5 - 2.5) < 1.0
+    some = near & (np.random.default_rng(1).random(PIXELS) > share)
+    maps = maps_of(np.where(near, TRUE_PX + 0.15 * np.sign(SINE), TRUE_PX))
+    maps.column_std_px[some] = 0.2
+    found = code_wave(LINES, NAMED_PX, maps)
+    assert found is not None
+    assert (0.5 in found.off_px) == told
+    assert bool(found.error_px) == told
+
+
 def doubt_of(relative: float) -> SpreadDoubt:
     """Columns of a width twice as large would move by a sine of 1 px."""
     sine = np.sin(2 * math.pi * np.arange(PLACES) / PLACES)
