@@ -16,6 +16,7 @@ from dsl_core.capture.proof.code.first_light import (
     changed_light,
     has_moved,
     is_unlit,
+    light_of_first,
     light_of_pairs,
     light_of_words,
     unsettled_pairs,
@@ -152,6 +153,8 @@ class FirstCode:
             return Finding(shot, Verdict.DISPLACED, again)
         ratio = changed_light(self._disputed, now, self._noise, self._channels)
         if ratio is None:
+            # No other picture tells whether it was the light or this one that was wrong.
+            self.settled = light_of_first(self._disputed, now, self._noise, self._channels)
             self._disputed = {}
             return None
         return Finding(shot, Verdict.EXPOSURE, again, f"{ratio:.2g} times that of the first pictures")

@@ -37,6 +37,8 @@ FEWEST_CHANGED = 2
 LEAST_LIGHT = 0.03
 #: Deviation of a picture's light, as a share of its mean, from which on it has bright and dark parts.
 STRUCTURED = 0.3
+#: With less light than one in so many, or as much more, a picture was missing or of another scene.
+MOST_CHANGE = 5.0
 #: A picture shows light if its pixels differ from those of the inverse pattern by so many deviations ...
 SEEN_SIGMAS = 5.0
 #: ... and so many of them do, as a share of all.
@@ -75,6 +77,27 @@ def changed_light(
     if len(ratios) < FEWEST_CHANGED or min(ratios) < 1 < max(ratios):
         return None
     return float(np.median(ratios))
+
+
+def light_of_first(
+    before: Mapping[int, Counts], now: Mapping[int, Counts], noise: Noise, channels: NDArray[np.int8]
+) -> float:
+    """Light of the very first picture over that of the same pattern ``now``; 1 where it is alike or untold.
+
+    Arguments are those of `changed_light`. Light that changed just after the first picture is that of all
+    others, and of it itself once it was taken again.
+    """
+    first = min(before)
+    level = np.float32(noise.sensor.black_level_dn)
+    bright = np.maximum(before[first], now[first])
+    lit = bright.astype(np.float32) - level > LIT_SIGMAS * np.sqrt(noise.variance(bright))
+    lit &= bright < noise.sensor.full_scale_dn
+    if int(lit.sum()) < FEWEST_LIT:
+        return 1.0
+    old, new = (picture[first][lit].astype(np.float32) - level for picture in (before, now))
+    ratio, is_same_pattern = _factor(new, old, channels[lit])
+    is_missing = not 1 / MOST_CHANGE < ratio < MOST_CHANGE
+    return 1.0 if not is_same_pattern or is_missing or SAME_LIGHT[0] < ratio < SAME_LIGHT[1] else ratio
 
 
 def light_of_pairs(

@@ -201,6 +201,18 @@ def test_light_that_had_not_settled_is_known_from_why_the_first_picture_was_take
     assert [code.settled] == [0.8]
 
 
+@pytest.mark.parametrize(("blue", "settled"), [(0.5, 2.0), (0.1, 1.0), (0.9, 1.0)])
+def test_light_that_changed_just_after_the_very_first_picture_is_known(blue: float, settled: float) -> None:
+    """Of night mode, no frame shows how it was before; a tenth is a picture that was not there at all."""
+    code = first_code()
+    night = 2000.0 * np.where(bayer_channels("RGGB", 18, 32) == 2, blue, 1.0)
+    told = [code.add(SHOTS[0], seen(SHOTS[0]), None)]
+    told += [code.add(shot, seen(shot, night), None) for shot in SHOTS[1:4]]
+    assert told[-1].is_wrong == (blue < 0.9)
+    assert not any(code.add(shot, seen(shot, night), None).is_wrong for shot in (*told[-1].again, *SHOTS[4:]))
+    assert code.settled == pytest.approx(settled, abs=0.01)
+
+
 @pytest.mark.parametrize("at_the_end", [False, True])
 def test_light_that_changed_at_once_in_the_code_is_kept_and_known(at_the_end: bool) -> None:
     code = first_code(at_the_end)
