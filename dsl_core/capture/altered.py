@@ -151,7 +151,7 @@ def _curved(before: Pictures, now: Pictures, sensor: Sensor) -> str:
     sound = np.maximum(before[0], now[0]) < 0.98 * sensor.full_scale_dn
     old, new = (white.astype(np.float64) - black for white, black, _ in (before, now))
     sigma = np.sqrt(2 * raw_variance(sensor, np.maximum(old, 0)))
-    bright = sound & (old > BRIGHT_SIGMAS * sigma) & (new > BRIGHT_SIGMAS)
+    bright = sound & (np.minimum(old, new) > BRIGHT_SIGMAS * sigma)
     powers = []
     for site in ((0, 0), (0, 1), (1, 0), (1, 1)):
         place = np.s_[site[0] :: 2, site[1] :: 2]
