@@ -77,7 +77,7 @@ def test_gradient_of_the_objective_agrees_with_differences() -> None:
     assert torch.autograd.gradcheck(lambda x: objective(x, double, 0.3), spectra, eps=1e-7, atol=1e-5)
 
 
-def a_plane() -> tuple[PublishedReconstruction, PixelModel]:
+def a_plane(options: AdamOptions | None = None) -> tuple[PublishedReconstruction, PixelModel]:
     """The reconstruction of a plane whose pixels are all known, and the forward model of its frames."""
     rig = published_rig()
     rig = rig.model_copy(update={"camera": rig.camera.resized(112, 72)})
@@ -85,8 +85,15 @@ def a_plane() -> tuple[PublishedReconstruction, PixelModel]:
     depth, shading = (np.full((72, 112), value, np.float32) for value in (700.0, SHADING))
     none, frames = np.zeros_like(depth), np.zeros((plan.spectral_count, 72, 112), np.float32)
     known = Pixels(none, depth, shading, none, none, none, none, none, depth > 0)
-    solver = PublishedReconstruction(rig, plan, grid, model, frames, np.ones_like(frames), known)
+    solver = PublishedReconstruction(
+        rig, plan, grid, model, frames, np.ones_like(frames), known, options=options
+    )
     return solver, model_of_plan(rig, plan, grid, model)
+
+
+def test_steps_are_those_asked_for_and_else_the_usual_ones() -> None:
+    assert a_plane()[0].options == AdamOptions()
+    assert a_plane(AdamOptions(steps=7))[0].options.steps == 7
 
 
 def test_pixels_are_compared_through_the_order_that_reaches_more_of_their_bands() -> None:
