@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from dsl_core.capture.display import PLAIN, Display, Tone, display_tables
+from dsl_core.capture.display import FIRST, PLAIN, Display, Tone, display_tables
 from dsl_core.capture.preview import quick_picture
 
 FULL = 4095
@@ -21,6 +21,14 @@ def test_plain_tables_are_the_square_root_of_the_counts() -> None:
     (table, *others) = display_tables(PLAIN, _channels(4000, 4000, 4000), FULL)
     assert (table[0], table[1024], table[FULL]) == (0, 128, 255)
     assert all((each == table).all() for each in others)
+
+
+def test_a_dim_and_reddish_scene_is_first_seen_bright_and_grey() -> None:
+    channels = _channels(300, 200, 150)
+    tables = display_tables(FIRST, channels, FULL)
+    shown = [int(table[level]) for table, level in zip(tables, (300, 200, 150), strict=True)]
+    assert min(shown) > 200
+    assert max(shown) - min(shown) <= 2
 
 
 def test_a_first_order_of_a_thousandth_is_seen_when_logarithmic() -> None:

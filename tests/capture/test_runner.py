@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from dsl_core.capture.exposure import RetryPolicy
-from dsl_core.capture.runner import Runner, State, Status
+from dsl_core.capture.runner import Runner, State, Status, _Pace
 from dsl_core.devices.base import DeviceRig
 from dsl_core.errors import Cancelled, DeviceError, PlanError, StoreError
 from dsl_core.io.scan.folder import ScanReader, ScanWriter
@@ -465,3 +465,18 @@ def test_a_disk_that_keeps_losing_frames_does_not_finish_a_scan(
     with pytest.raises(StoreError, match=r"1 of \d+ frames are lost or damaged whenever they are read back"):
         runner.run()
     assert runner.status.state is State.FAILED
+
+
+def test_seconds_of_a_pause_are_no_seconds_of_the_scan() -> None:
+    now = [0.0]
+    pace, shots = _Pace(lambda: now[0], 500.0), [Shot(n, "white", 0, 0, 500.0, 1.0) for n in range(4)]
+    pace.start(shots)
+    now[0] = 2.0
+    pace.passed(shots[0])
+    assert pace.times() == (2.0, 6.0)
+    pace.hold()
+    now[0] = 60.0
+    assert pace.times() == (2.0, 6.0)
+    pace.restart()
+    now[0] = 61.0
+    assert pace.times() == (3.0, 9.0)
