@@ -141,7 +141,8 @@ def _without_effect(tree: ast.AST) -> Iterator[ast.AST]:
             yield node.returns
         if isinstance(node, ast.Call) and ast.unparse(node.func).endswith("default_rng"):
             yield from node.args
-        if isinstance(node, ast.keyword) and node.arg == "strict":
+        # Other systems alone have folders by the author of a program.
+        if isinstance(node, ast.keyword) and node.arg in ("strict", "appauthor"):
             yield node.value
 
 
@@ -232,6 +233,7 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--count", type=int, default=60)
     parser.add_argument("--part", default="1/1", help="which share to run, such as 1/2 beside 2/2")
+    parser.add_argument("--sound", action="store_true", help="the whole suite has just passed on this tree")
     parser.add_argument("--list", action="store_true", help="only list the faults")
     asked = parser.parse_args()
     part, parts = (int(number) for number in asked.part.split("/"))
@@ -245,7 +247,7 @@ def main() -> None:
         hidden = shutil.ignore_patterns(".git", ".venv", "__pycache__", ".*_cache", "dsl-demo*")
         shutil.copytree(ROOT, tree, ignore=hidden)
         for place in dict.fromkeys(map(place_of, faults)):
-            if not pass_in(tree, PLACES[place]):
+            if not (asked.sound or pass_in(tree, PLACES[place])):
                 raise SystemExit(f"The tests of {place} fail without a fault; nothing can be said of them.")
         for number, fault in enumerate(faults, 1):
             start = time.monotonic()

@@ -336,3 +336,11 @@ def test_a_writer_whose_empty_folder_was_taken_for_left_over_makes_it_again(
     monkeypatch.setattr(staging, "FolderLock", lock)
     write_text(tmp_path / "a.txt", "a")
     assert [each.name for each in tmp_path.iterdir()] == ["a.txt"]
+
+
+def test_a_text_replaces_another_only_where_that_is_said(tmp_path: Path) -> None:
+    path = write_text(tmp_path / "a.txt", "first")
+    with pytest.raises(StoreError, match="already exists"):
+        write_text(path, "second")
+    assert path.read_text() == "first"
+    assert write_text(path, lambda: "second", overwrite=True).read_text() == "second"
