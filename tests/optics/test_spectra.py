@@ -7,7 +7,7 @@ import pytest
 import torch
 
 from dsl_core.model.spectral import SpectralCurve, WavelengthGrid
-from dsl_core.optics.spectra import FADING_NM, Bands, chain_response, hat_moments, pads_nm
+from dsl_core.optics.spectra import FADING_NM, PAD_NM, Bands, chain_response, hat_moments, pads_nm
 from dsl_core.simulation.published_rig import published_rig
 
 RIG = published_rig()
@@ -78,6 +78,15 @@ def test_bands_end_where_the_curves_of_a_lamp_were_no_longer_measured() -> None:
     flat = SpectralCurve.of([400, 700], [1, 1])
     lamp = RIG.model_copy(update={"emission": (flat,) * 3, "response": (flat,) * 3})
     assert pads_nm(lamp, WavelengthGrid()) == pytest.approx((30 + FADING_NM, 40 + FADING_NM))
+
+
+@pytest.mark.parametrize(("share", "above_nm"), [(0.01, PAD_NM), (0.02, 40 + FADING_NM)])
+def test_light_counts_from_one_and_a_half_percent_of_the_brightest_on(share: float, above_nm: float) -> None:
+    flat = SpectralCurve.of([400, 700], [1, 1])
+    faint = SpectralCurve.of([400, 659, 661, 700], [1, 1, share, share])
+    even = {"response": (flat,) * 3, "efficiency": dict.fromkeys((1, -1), flat)}
+    lamp = RIG.model_copy(update=even | {"emission": (faint,) * 3})
+    assert pads_nm(lamp, WavelengthGrid(start_nm=400.0)) == pytest.approx((PAD_NM, above_nm), abs=1.0)
 
 
 def test_second_orders_count_where_the_rig_knows_them() -> None:
