@@ -206,3 +206,13 @@ def test_a_picture_of_the_code_is_unchanged_only_in_the_same_light(scene: Render
     assert proof.is_as_before(code, mist)
     assert not proof.is_unchanged(code, mist)
     assert not proof.is_unchanged(white, _take(rig, scene, white)), "it does not show what has moved"
+
+
+def test_only_pictures_of_the_code_are_its_finest(scene: RenderedScene) -> None:
+    proof, last = FrameProof(scene.plan, scene.calibration), scene.plan.code_count - 1
+    fine = _shot(scene, "code", last, 0)
+    assert proof.are_finest([fine])
+    assert not proof.are_finest([])
+    assert not proof.are_finest([fine, _shot(scene, "code", 0, 0)])
+    # Lines have numbers of their own.
+    assert not proof.are_finest([fine, _shot(scene, "spectral", 15, 0)])

@@ -191,3 +191,11 @@ def test_what_a_header_says_of_all_is_believed_where_there_is_one_column(
     found = read_spectra(tmp_path / "leaf.txt")
     assert len(found) == titles.count("\t")
     assert found[0].values == pytest.approx(40 * scale)
+
+
+@pytest.mark.parametrize(
+    ("kind", "quantity"), [(1, "reflectance"), (2, "radiance"), (4, "irradiance"), (8, "absorbance")]
+)
+def test_an_asd_says_what_it_measured(tmp_path: Path, kind: int, quantity: str) -> None:
+    path = write(tmp_path / "a.asd", made.asd(kind=kind, white=False, values=SHARE / 10))
+    assert [each.quantity for each in read_spectra(path)] == [quantity]
