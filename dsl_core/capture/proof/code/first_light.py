@@ -8,7 +8,7 @@ picture that was displaced meanwhile is so in both.
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -56,11 +56,8 @@ def changed_light(
     changed unlike, as those of a display that turns warmer, the one that did most counts; ``channels`` has
     that of every pixel.
     """
-    every = [*before.values(), *now.values()]
     level = np.float32(noise.sensor.black_level_dn)
-    bright = np.maximum.reduce(every)
-    lit = bright.astype(np.float32) - level > LIT_SIGMAS * np.sqrt(noise.variance(bright))
-    lit &= bright < noise.sensor.full_scale_dn
+    bright, lit = _lit([*before.values(), *now.values()], noise)
     if int(lit.sum()) < FEWEST_LIT:
         return None
     enough = LEAST_LIGHT * float((bright[lit] - level).mean())
@@ -89,9 +86,7 @@ def light_of_first(
     """
     first = min(before)
     level = np.float32(noise.sensor.black_level_dn)
-    bright = np.maximum(before[first], now[first])
-    lit = bright.astype(np.float32) - level > LIT_SIGMAS * np.sqrt(noise.variance(bright))
-    lit &= bright < noise.sensor.full_scale_dn
+    _, lit = _lit([before[first], now[first]], noise)
     if int(lit.sum()) < FEWEST_LIT:
         return 1.0
     old, new = (picture[first][lit].astype(np.float32) - level for picture in (before, now))
@@ -150,6 +145,14 @@ def light_of_words(why: str) -> float | None:
     """The light in the note of such a picture; None in any other note."""
     found = re.search(rf"(\d+\.\d+){_OF_THE_LAST}", why)
     return None if found is None else float(found[1])
+
+
+def _lit(pictures: Sequence[Counts], noise: Noise) -> tuple[Counts, NDArray[np.bool_]]:
+    """The brightest of each pixel, and which pixels are lit in one of the pictures and saturate in none."""
+    bright = np.maximum.reduce(pictures)
+    light = bright.astype(np.float32) - np.float32(noise.sensor.black_level_dn)
+    is_lit = light > LIT_SIGMAS * np.sqrt(noise.variance(bright))
+    return bright, is_lit & (bright < noise.sensor.full_scale_dn)
 
 
 def _factor(one: Floats, other: Floats, channels: NDArray[np.int8]) -> tuple[float, bool]:
