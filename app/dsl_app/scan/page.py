@@ -98,7 +98,9 @@ class ScanPage(PageWidget):
         column_of(on=self._figures)
         self._figures.hide()
         self._right, self._right_area = _side(RIGHT_PX, self.calibration, self.target, self.run)
-        self._views = splitter(Qt.Orientation.Horizontal, (self.middle, 1))
+        self._beside = QWidget()
+        self._frames = column_of(on=self._beside, margins=0)
+        self._views = splitter(Qt.Orientation.Horizontal, (self.middle, 1), (self._beside, 1))
         row = row_of(self._left_area, (self._views, 1), self._right_area)
         # Below, so that no button moves when the rig is lost.
         column_of((row, 1), self.banner, on=self)
@@ -118,13 +120,16 @@ class ScanPage(PageWidget):
         self.forecast.place_table(self._figures if self.is_tall else None)
         if self.is_wide:
             self.middle.removeTab(self.middle.indexOf(self.view))
-            self._views.addWidget(self.view)
-            self._views.setStretchFactor(1, 1)
+            self._frames.addWidget(self.view, 1)
+            # Below them, as the column of settings is as high as the window.
+            self._frames.addWidget(self.frame)
             self._views.setSizes([1000, 1000])
             self.view.show()
         else:
+            self._left.insertWidget(1, self.frame)
             self.middle.insertTab(1, self.view, FRAMES)
             self.middle.setTabToolTip(1, plain_tip(FRAMES_TIP))
+        self._beside.setVisible(self.is_wide)
 
     def _connect(self) -> None:
         state, controller = self._state, self._controller

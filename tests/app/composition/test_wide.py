@@ -50,6 +50,8 @@ def test_views_are_side_by_side_in_a_large_window_alone(
         assert (live.controls.parent() is rig.beside) == is_large
         tabs = [scan.middle.widget(place) for place in range(scan.middle.count())]
         assert (scan.view not in tabs) == is_large
+        # What is said of the last frame is below it, where it needs no scrolling.
+        assert (scan.frame.parent() is scan.view.parent()) == is_large
         assert scan.run.window() is window
         beside = calibrate.library.mapTo(calibrate, calibrate.library.rect().topLeft())
         rows = calibrate.rows["selftest"].mapTo(calibrate, calibrate.rows["selftest"].rect().topRight())
