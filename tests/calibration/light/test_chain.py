@@ -11,9 +11,11 @@ import pytest
 
 from dsl_core.calibration.light.chain import (
     MIN_PIXELS,
+    MODEL_STD,
     SCALE_STD,
     UNKNOWNS,
     LineScan,
+    _chain_std,
     _mean_ratios,
     _parts,
     _scale,
@@ -258,3 +260,19 @@ def test_an_image_has_three_parts_down_and_four_across(lines: LineScan) -> None:
         assert set((rows // 24).tolist()) == {down}
         assert set((columns // 28).tolist()) == {across}
     assert sum(len(part.pixels) for part in parts.values()) == len(lines.pixels)
+
+
+def test_the_chain_is_no_surer_than_its_model_whatever_frames_and_places_say(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr("dsl_core.calibration.light.chain._product", lambda *_: np.eye(2))
+
+    def std(covariance: float, of_mean: float, of_place: float) -> list[float]:
+        solution: Any = SimpleNamespace(covariance=covariance * np.eye(2))
+        left_out: Any = SimpleNamespace(
+            variance_of_mean=lambda _: np.full(2, of_mean), variance_of_place=lambda _: np.full(2, of_place)
+        )
+        return _chain_std(published_rig(), 1, solution, left_out).tolist()
+
+    assert std(0.0, 0.0, 0.0) == pytest.approx([MODEL_STD] * 2)
+    assert std(1e-4, 2e-4, 1e-4) == pytest.approx([np.hypot(0.02, MODEL_STD)] * 2)

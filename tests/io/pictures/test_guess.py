@@ -3,13 +3,23 @@
 from __future__ import annotations
 
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
 from dsl_core.errors import StoreError
-from dsl_core.io.pictures.guess import _bayer_of, _depth_of, guess_mapping
+from dsl_core.io.pictures.candidates import Candidate
+from dsl_core.io.pictures.guess import (
+    AS_ENCODED,
+    _alike_next,
+    _bayer_of,
+    _depth_of,
+    _recognised,
+    guess_mapping,
+)
 from dsl_core.io.pictures.mapping import BlackPicture, PhasePictures, StripePictures, WhitePicture
 from dsl_core.model.captured_code import Phases, Stripes
 from tests.cases.foreign_captures import PROJECTOR, frames, write
@@ -267,3 +277,43 @@ def test_inverses_may_be_told_by_the_ends_of_names(tmp_path: Path) -> None:
         for axis in ("columns", "rows")
     )
     assert not guess.others
+
+
+@pytest.mark.parametrize(
+    ("as_they_are", "decoded", "taken"),
+    [
+        (AS_ENCODED - 0.01, 0.1, "as they are"),
+        (AS_ENCODED, 0.1, "decoded"),
+        (AS_ENCODED, 0.7, "as they are"),
+        (None, 0.7, "decoded"),
+        (0.7, None, "as they are"),
+        (None, None, None),
+    ],
+)
+def test_values_that_make_sense_as_they_are_are_not_taken_for_those_of_a_screen(
+    monkeypatch: pytest.MonkeyPatch, as_they_are: float | None, decoded: float | None, taken: str | None
+) -> None:
+    misfits = {"as they are": as_they_are, "decoded": decoded}
+
+    def recognise(probes: str, _slots: tuple[int, ...]) -> object:
+        misfit = misfits[probes]
+        return None if misfit is None else SimpleNamespace(misfit=misfit, of=probes)
+
+    monkeypatch.setattr("dsl_core.io.pictures.guess.recognise", recognise)
+    look: Any = SimpleNamespace(probes="as they are", decoded="decoded")
+    found: Any = _recognised(look, (0, 1))
+    assert (found and found.of) == taken
+
+
+def test_looking_goes_on_for_absent_pictures_and_for_files_without_strays_alone() -> None:
+    def candidate(files: str, left_out: int = 0) -> Candidate:
+        return Candidate("a", (), (files,), left_out)
+
+    every, without_strays, other = candidate("*"), candidate("a*", 2), candidate("b*", 2)
+    absent = candidate("*")
+    whole = [every, without_strays]
+    assert _alike_next([every, absent], 0, whole)
+    assert _alike_next([every, without_strays], 0, whole)
+    assert not _alike_next([every, other], 0, whole)
+    assert not _alike_next([without_strays, every], 0, whole)
+    assert not _alike_next([every, without_strays], 1, whole)

@@ -61,3 +61,5 @@ def test_excess_is_nothing_for_noise_and_follows_the_chi_square() -> None:
     assert _excess(chi_square, used) == pytest.approx(0, abs=0.02)
     assert _excess(2 * chi_square, used) == pytest.approx(1, abs=0.04)
     assert _excess(np.array([np.nan, 9.0]), np.array([7, 3])) == 0
+    # Two samples more than are fitted tell something.
+    assert _excess(np.array([4 * (8 / 9) ** 3]), np.array([4])) == pytest.approx(3)
