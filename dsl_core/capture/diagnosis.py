@@ -124,8 +124,8 @@ def what_changed(before: References, now: References, sensor: Sensor) -> Explana
     old, new = (each.white.astype(np.float64) - each.black for each in (before, now))
     # All of the picture but what is saturated: of bright pixels alone, a motion would dim many.
     full = 0.98 * sensor.full_scale_dn
-    bright = [float((each.black >= full).mean()) for each in (before, now)]
-    if bright[0] < SATURATED <= bright[1]:
+    was_bright, is_bright = (float((each.black >= full).mean()) for each in (before, now))
+    if was_bright < SATURATED <= is_bright:
         return Explanation(
             "Black saturates in most of the picture, and did not when the scan began: the projector or its"
             " computer inverts pictures, or another lamp shines on the scene. Set them as they were, and"
@@ -154,33 +154,16 @@ def what_changed(before: References, now: References, sensor: Sensor) -> Explana
     moved = moved_between((before.white, before.black), (now.white, now.black), sensor, is_pattern=False)
     if moved is None and abs(light - 1) < LEAST_LIGHT:
         moved = moved_between((before.code, before.black), (now.code, now.black), sensor, is_pattern=True)
-    found = []
     colours = _of_colours(old, new, used, sensor)
     is_uneven = max(colours) > (1 + UNEVEN) * min(colours)
+    is_other_light = not is_uneven and abs(light - 1) > LEAST_LIGHT
+    is_exposure = is_other_light and dark_old > TELLING_DN and abs(dark_new / dark_old / light - 1) < ALIKE
+    found = []
     if is_uneven:
-        red, green, blue = colours
-        lost = [name for name, share in zip(COLOUR_NAMES, colours, strict=True) if share < LOST]
-        others = [share for share in colours if share >= LOST]
-        advice = "Switch white balance of the camera and night mode of the projector and of its computer off,"
-        advice += " check the projector's colours, and resume the scan."
-        if lost and others and max(abs(share - 1) for share in others) < LEAST_LIGHT:
-            advice = (
-                f"Look whether the projector still shines in {' and '.join(lost)}, and whether camera and"
-                " cables pass it on, and resume the scan."
-            )
-        found.append(
-            f"The light of white is {red:.2f} times what it was when the scan began in red, {green:.2f} times"
-            f" in green and {blue:.2f} times in blue. {advice}"
-        )
-    elif abs(light - 1) > LEAST_LIGHT:
-        is_exposure = dark_old > TELLING_DN and abs(dark_new / dark_old / light - 1) < ALIKE
-        what = "exposure or gain of the camera" if is_exposure else "light of the projector or the exposure"
-        found.append(
-            f"The {what} is {light:.2f} times what it was when the scan began. Switch automatic exposure"
-            " and gain of the camera off, check the lamp, and resume the scan."
-        )
-        room = 0.0 if is_exposure else room
-    if abs(room) > LEAST_ROOM:
+        found.append(_said_of_colours(colours))
+    elif is_other_light:
+        found.append(_said_of_light(light, is_exposure))
+    if abs(room) > LEAST_ROOM and not is_exposure:
         found.append(
             f"The light of the room has changed: without the projector the picture is at {dark_new:.0f} DN"
             f" above its black level, and was at {dark_old:.0f} DN when the scan began. Keep the room as it"
@@ -196,8 +179,38 @@ def what_changed(before: References, now: References, sensor: Sensor) -> Explana
             " scaling, keystone and refresh rate as they were, and resume the scan.",
             has_moved=True,
         )
-    is_of_all = is_uneven or (moved is None and abs(light - 1) > LEAST_LIGHT)
+    is_of_all = is_uneven or (moved is None and is_other_light)
     return Explanation(" ".join(found), moved is not None, not found, is_of_all)
+
+
+def _said_of_colours(colours: tuple[float, ...]) -> str:
+    """That colours of white have changed by different factors, and whether one of them has failed."""
+    red, green, blue = colours
+    lost = [name for name, share in zip(COLOUR_NAMES, colours, strict=True) if share < LOST]
+    others = [share for share in colours if share >= LOST]
+    if lost and others and max(abs(share - 1) for share in others) < LEAST_LIGHT:
+        advice = (
+            f"Look whether the projector still shines in {' and '.join(lost)}, and whether camera and"
+            " cables pass it on, and resume the scan."
+        )
+    else:
+        advice = (
+            "Switch white balance of the camera and night mode of the projector and of its computer off,"
+            " check the projector's colours, and resume the scan."
+        )
+    return (
+        f"The light of white is {red:.2f} times what it was when the scan began in red, {green:.2f} times"
+        f" in green and {blue:.2f} times in blue. {advice}"
+    )
+
+
+def _said_of_light(light: float, is_exposure: bool) -> str:
+    """That white has changed by a factor; that black has too says that it is the exposure."""
+    what = "exposure or gain of the camera" if is_exposure else "light of the projector or the exposure"
+    return (
+        f"The {what} is {light:.2f} times what it was when the scan began. Switch automatic exposure"
+        " and gain of the camera off, check the lamp, and resume the scan."
+    )
 
 
 def _is_other_pattern(
