@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from PIL import Image
 
 from dsl_core.errors import Cancelled, StoreError
 from dsl_core.io.export import Format, export, export_by_ending, export_csv, export_png, formats
@@ -408,3 +409,15 @@ def test_who_stops_an_export_finds_nothing_half_written(tmp_path: Path, name: st
     with pytest.raises(Cancelled):
         export(small_result(), tmp_path / "part" / f"x{SUFFIX[name]}", name, check=check)
     assert list(tmp_path.glob("part/*")) == []
+
+
+def test_three_bands_are_red_green_and_blue_of_a_picture_in_their_order(tmp_path: Path) -> None:
+    result = small_result()
+    shades = np.array([0.1, 0.2, 0.5, 0.9, 0.3])[:, None, None]
+    result["reflectance"].values[:] = np.broadcast_to(shades, result["reflectance"].shape)
+    chosen = tuple(float(WAVELENGTHS_NM[k]) for k in (3, 0, 2))
+    export_png(result, tmp_path / "view.png", bands_nm=chosen, bands_levels=(0.0, 1.0))
+    name = "_".join(f"{nm:g}" for nm in chosen)
+    picture = np.asarray(Image.open(tmp_path / f"view_{name}nm.png"))
+    red, green, blue = picture[0, 0] / 255
+    assert (red, green, blue) == pytest.approx((0.9, 0.1, 0.5), abs=0.01)

@@ -84,3 +84,8 @@ def test_strays_are_left_out_of_a_second_candidate(tmp_path: Path) -> None:
     assert [(len(each.pictures), each.left_out) for each in whole] == [(5, 0), (4, 1)]
     assert whole[1].files == ("im*.png",)
     assert [(each.name, len(each.pictures)) for each in single] == [("im", 4)]
+
+
+def test_pictures_named_by_numbers_alone_are_called_by_the_first(tmp_path: Path) -> None:
+    folder = folder_of(tmp_path / "scan", *numbered("", 1, 2, 3, 4), *numbered("white", 1, 2, 3, 4))
+    assert [each.name for each in candidates(folder)[1]] == ["1", "white"]

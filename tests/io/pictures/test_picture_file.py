@@ -14,6 +14,7 @@ from dsl_core.errors import StoreError
 from dsl_core.io.pictures import picture_file
 from dsl_core.io.pictures.mapping import Mapping, RawLayout, StripePictures
 from dsl_core.io.pictures.picture_file import Picture, load_mosaic, load_values, pictures_in
+from dsl_core.optics.colour import srgb_decode
 from tests.cases.foreign_captures import write
 
 MAPPING = Mapping(parts=(StripePictures(bits=3),), projector_size_px=(8, 4))
@@ -121,3 +122,14 @@ def test_pages_of_a_tiff_are_pictures_but_a_preview_is_none(tmp_path: Path) -> N
     preview = Image.fromarray(pages[1][:3, :4])
     first.save(tmp_path / "one.tif", save_all=True, append_images=[preview])
     assert pictures_in(tmp_path / "one.tif") == [Picture(tmp_path / "one.tif")]
+
+
+@pytest.mark.parametrize(("full_scale", "most"), [(None, 1.0), (1.0, 1.0), (255.0, 255.0)])
+def test_floats_for_screens_run_to_one_unless_their_end_is_stated(
+    tmp_path: Path, full_scale: float | None, most: float
+) -> None:
+    np.save(tmp_path / "f.npy", np.array([[0.0, 1.0], [0.5, 1.0]]) * most)
+    mapping = MAPPING.model_copy(update={"encoding": "srgb", "full_scale": full_scale, "bit_depth": 8})
+    frame = load_mosaic(Picture(tmp_path / "f.npy"), mapping, 16)
+    assert frame[0].tolist() == [0, 65535]
+    assert frame[1, 0] == pytest.approx(65535 * float(srgb_decode(np.array([128 / 255]))[0]), abs=1)

@@ -255,3 +255,12 @@ def test_a_cancelled_export_leaves_nothing_and_replaces_nothing(tmp_path: Path, 
     assert [path.name for path in tmp_path.iterdir()] == ["scene"]
     with pytest.raises(StoreError, match="already exists"):
         export_dataset(Memory(), folder)
+
+
+def test_other_pixels_make_another_dataset_and_another_place_does_not(tmp_path: Path, folder: Path) -> None:
+    before = open_dataset(folder).fingerprint()
+    elsewhere = shutil.copytree(folder, tmp_path / "elsewhere")
+    assert open_dataset(elsewhere).fingerprint() == before
+    file = elsewhere / "intensity1/capture_0000.png"
+    cv2.imwrite(str(file), np.asarray(cv2.imread(str(file), cv2.IMREAD_UNCHANGED)) ^ 1)
+    assert open_dataset(elsewhere).fingerprint() != before

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import struct
 from pathlib import Path
 
 import numpy as np
@@ -9,6 +10,7 @@ import pytest
 
 from dsl_core.errors import CalibrationError
 from dsl_core.io.spectra.catalogue import FORMATS, format_of, formats, read_spectra, suffixes
+from dsl_core.io.spectra.formats.sed import is_sed
 from dsl_core.io.spectra.records import Format
 from dsl_core.io.spectra.reference_file import read_reference, read_references
 from dsl_core.io.spectra.spectrum_file import read_radiances, read_spectrum
@@ -194,8 +196,49 @@ def test_what_a_header_says_of_all_is_believed_where_there_is_one_column(
 
 
 @pytest.mark.parametrize(
-    ("kind", "quantity"), [(1, "reflectance"), (2, "radiance"), (4, "irradiance"), (8, "absorbance")]
+    ("kind", "quantity"),
+    [(1, "reflectance"), (2, "radiance"), (4, "irradiance"), (6, "transmittance"), (8, "absorbance")],
 )
 def test_an_asd_says_what_it_measured(tmp_path: Path, kind: int, quantity: str) -> None:
     path = write(tmp_path / "a.asd", made.asd(kind=kind, white=False, values=SHARE / 10))
     assert [each.quantity for each in read_spectra(path)] == [quantity]
+
+
+@pytest.mark.parametrize(
+    ("at", "form", "value"),
+    [
+        (204, "<H", 1),
+        (195, "<f", 0.009),
+        (195, "<f", 1001.0),
+        (191, "<f", 0.0),
+        (191, "<f", 1.1e5),
+        (199, "B", 3),
+    ],
+)
+def test_a_header_that_no_asd_instrument_writes_is_refused(
+    tmp_path: Path, at: int, form: str, value: float
+) -> None:
+    content = bytearray(made.asd())
+    struct.pack_into(form, content, at, value)
+    with pytest.raises(CalibrationError, match="no ASD instrument writes this"):
+        read_spectra(write(tmp_path / "a.asd", bytes(content)))
+
+
+def test_empty_cells_of_an_exported_table_are_unknown(tmp_path: Path) -> None:
+    table = "wavelength_nm,leaf: reflectance (1),leaf: deviation (1)\n430,0.25,0.01\n435,,\n440,0.5,0.01\n"
+    (leaf,) = read_spectra(write(tmp_path / "a.csv", table))
+    assert leaf.name == "leaf"
+    np.testing.assert_array_equal(leaf.values, [0.25, np.nan, 0.5])
+
+
+@pytest.mark.parametrize(
+    ("head", "found"),
+    [
+        (b"Version: 1\nData:\nWvl\tReflect. %\n", True),
+        (b"Version: 1\nData: 3 columns\nChan.#\tWvl\n", True),
+        (b"Version: 1\nData:\nwavelength\n", False),
+        (b"Wvl\tReflect. %\n", False),
+    ],
+)
+def test_a_line_data_with_its_columns_below_is_of_spectral_evolution(head: bytes, found: bool) -> None:
+    assert is_sed(Path("a.txt"), head) is found

@@ -127,3 +127,11 @@ def test_wrong_files_are_named_with_the_reason(tmp_path: Path, text: str, told: 
 def test_missing_file(tmp_path: Path) -> None:
     with pytest.raises(CalibrationError, match="cannot be read"):
         read_spectrum(tmp_path / "blue.csv")
+
+
+@pytest.mark.parametrize(("largest", "found"), [(1.9, 1.9), (2.1, 0.021)])
+def test_shares_above_two_can_only_be_percent(tmp_path: Path, largest: float, found: float) -> None:
+    text = _table([f"{nm};{largest}" for nm in range(400, 701, 10)], "nm;reflectance")
+    path = tmp_path / "a.csv"
+    path.write_text(text, encoding="utf-8")
+    assert max(read_spectrum(path, radiance=False).values) == pytest.approx(found)

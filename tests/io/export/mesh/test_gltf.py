@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import io
 import json
 import struct
 from typing import Any
 
 import numpy as np
 import pytest
+from PIL import Image
 
 from dsl_core.io.export.mesh.gltf import _Buffer, glb_bytes
 from dsl_core.io.export.mesh.surface import Surface, png_bytes
@@ -92,3 +94,7 @@ def test_views_begin_at_multiples_of_four() -> None:
     assert [view["byteLength"] for view in buffer.views] == [5, 4, 1]
     assert (buffer.size, b"".join(buffer.parts)) == (16, b"abcde\0\0\0abcda\0\0\0")
     assert ("target" in buffer.views[0], buffer.views[2]["target"]) == (False, 7)
+
+
+def test_a_texture_is_the_same_picture_as_png() -> None:
+    np.testing.assert_array_equal(np.asarray(Image.open(io.BytesIO(png_bytes(TEXTURE)))), TEXTURE)

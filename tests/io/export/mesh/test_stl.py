@@ -30,3 +30,9 @@ def test_a_slanted_triangle_has_the_normal_of_its_plane() -> None:
     normal = np.cross(points[1] - points[0], points[2] - points[0])
     assert struct.unpack_from("<3f", made, 84) == pytest.approx(normal / np.linalg.norm(normal))
     assert made[:80] == b"binary STL, unit mm, ?".ljust(80)
+
+
+def test_triangles_of_any_size_have_unit_normals() -> None:
+    points = 0.2 * np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0]], np.float32)
+    made = stl_bytes(Surface(points, points, points[:, :2], np.array([[0, 1, 2]], np.int32), None), "")
+    assert struct.unpack_from("<3f", made, 84) == pytest.approx((0, 0, 1))
