@@ -60,6 +60,24 @@ def test_the_cause_is_named(later: References, said: str, not_said: str) -> None
     assert not_said not in found
 
 
+@pytest.mark.parametrize(
+    ("later", "of_all"),
+    [
+        (pictures(), False),
+        (pictures(light=1.4), True),
+        (pictures(shift_px=2), False),
+        (pictures(light=1.4, shift_px=2), False),
+    ],
+)
+def test_all_of_the_picture_has_changed_where_light_has_and_nothing_moved(
+    later: References, of_all: bool
+) -> None:
+    found = what_changed(pictures(), later, SENSOR)
+    assert found.is_of_all is of_all
+    if of_all:
+        assert not found.has_moved
+
+
 def test_colours_that_changed_unevenly_are_named_and_are_no_motion() -> None:
     rng, before = np.random.default_rng(1), pictures()
     gain = np.where(np.indices(before.white.shape)[0] % 2, 1.0, 0.6) * np.where(
