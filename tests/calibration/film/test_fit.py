@@ -13,13 +13,16 @@ from dsl_core.calibration.film.fit import (
     _common_offsets,
     fit_film,
     require_plausible,
+    with_geometry,
 )
 from dsl_core.calibration.film.form import FIELDS, SLOPE_STD, FilmForm
 from dsl_core.calibration.film.order_samples import grating_columns
 from dsl_core.errors import CalibrationError
 from dsl_core.model.rig import SHAPE_POWERS, Film, FilmShape, Rig
 from dsl_core.optics.filters import SIGNIFICANT, FilterAngle
+from dsl_core.optics.shading import Plane
 from tests.cases.film_samples import (
+    DEPTHS_MM,
     NOISE_PX,
     mounted,
     samples_of,
@@ -230,3 +233,22 @@ def test_samples_of_a_filter_and_order_have_an_offset_and_two_ramps_in_common() 
         assert own[mine, 0] == pytest.approx(1.0)
         assert own[mine, 1] == pytest.approx(3**0.5 * (columns[mine] / (rig.camera.width_px / 2) - 1))
         assert own[mine, 2] == pytest.approx(3**0.5 * (rows[mine] / (rig.camera.height_px / 2) - 1))
+
+
+def test_what_the_geometry_leaves_open_adds_to_the_deviations_of_the_film() -> None:
+    rig, samples = small_rig(), samples_of(small_rig(), NOISE_PX)
+    fit = fit_film(mounted(rig), samples, Film())
+    planes = tuple(Plane(np.array([0.0, 0.0, 1 / depth])) for depth in DEPTHS_MM)
+    same = with_geometry(fit, rig, samples, [(rig, planes)])
+    assert same.covariance == pytest.approx(fit.covariance, rel=1e-6)
+    nearer = tuple(Plane(plane.inverse * (1 + 1e-3)) for plane in planes)
+    here, there = (
+        grating_columns(rig.model_copy(update={"film": fit.film}), replace(samples, depth_mm=depth_mm))
+        for depth_mm in (samples.depth_mm, samples.depth_mm / (1 + 1e-3))
+    )
+    moved = fit.gain @ (here - there)
+    assert np.abs(moved).max() > 0
+    found = with_geometry(fit, rig, samples, [(rig, nearer), (rig, nearer)])
+    added = found.covariance - fit.covariance
+    assert added == pytest.approx(2 * np.outer(moved, moved), rel=1e-3, abs=1e-3 * np.abs(added).max())
+    assert found.film == fit.film

@@ -195,6 +195,23 @@ def test_edges_bend_by_the_curvature_of_three_corners() -> None:
     assert np.isfinite(found).all()
 
 
+def test_corners_of_an_enlarged_picture_stay_where_they_are(monkeypatch: pytest.MonkeyPatch) -> None:
+    import cv2
+
+    places = np.stack(np.meshgrid(8 * np.arange(5) + 9, 8 * np.arange(4) + 7), -1).reshape(-1, 2)
+    # The first two pixels of a row of the enlarged picture are the first one's, whose middle is at 0.
+    in_enlarged = (2 * places + 0.5).astype(np.float32)[:, None]
+
+    def found(picture: np.ndarray, *_: object, **__: object) -> tuple[bool, np.ndarray | None]:
+        is_enlarged = picture.shape == (96, 128)
+        return is_enlarged, in_enlarged if is_enlarged else None
+
+    monkeypatch.setattr(cv2, "findChessboardCornersSB", found)
+    monkeypatch.setattr("dsl_core.calibration.geometry.boards._refined", lambda _, at: at)
+    corners = find_corners(np.tile(np.arange(64.0, dtype=np.float32), (48, 1)), SMALL_BOARD, "the picture")
+    assert corners.points_px == pytest.approx(places)
+
+
 def test_a_board_in_a_small_picture_is_found_with_squares_of_four_pixels() -> None:
     import cv2
 

@@ -307,6 +307,22 @@ def test_fewer_than_three_poses_are_refused_with_the_reasons_where_there_are_any
     assert len(series(monkeypatch, 1.0, 1.0).seen) == 2
 
 
+def test_where_no_pose_shows_the_board_the_first_is_searched_for_another(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    module = "dsl_core.calibration.geometry.pose_series."
+
+    def none_seen(*_: Any) -> PoseObservation:
+        raise CalibrationError("No board.")
+
+    monkeypatch.setattr(module + "observe_pose", none_seen)
+    monkeypatch.setattr(module + "grey_of", lambda white, _: white)
+    monkeypatch.setattr(module + "other_board", lambda white, _: f" Another board in {white}.")
+    poses: Any = [SimpleNamespace(name=name, white=f"white of {name}", bayer="RGGB") for name in "abc"]
+    with pytest.raises(CalibrationError, match=r"3 are needed\. Another board in white of a\. No board\."):
+        observe_series(poses, case.BOARD, case.PROJECTOR_PX)
+
+
 def test_without_a_covariance_nothing_is_left_open_in_the_corners(found: GeometryCalibration) -> None:
     unknown = found.model_copy(update={"covariance": None})
     assert not any("distortion" in each for each in doubts(unknown, 40.0, None))
