@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
+from types import SimpleNamespace
+from typing import Any, Literal
 
 import numpy as np
 import pytest
@@ -24,7 +25,7 @@ from dsl_core.model.rig import Rig
 from dsl_core.optics.correspondence import zero_order
 from dsl_core.optics.sensor import digitise
 from dsl_core.patterns.images import pattern_image
-from dsl_core.reconstruction.columns.code_dispute import is_dark
+from dsl_core.reconstruction.columns.code_dispute import is_dark, settle
 from dsl_core.reconstruction.columns.maps import ColumnMaps
 from dsl_core.reconstruction.geometry import Geometry, reconstruct_geometry
 from dsl_core.reconstruction.hdr import MergedFrame
@@ -159,3 +160,36 @@ def test_lines_are_dark_that_surely_bring_less_than_a_fifth_of_the_white_light()
     white = MergedFrame(np.full(6, 10.0, np.float32), np.ones(6, np.float32), saturated)
     assert is_dark(maps, white).tolist() == [True, False, False, False, False, False]
     assert not is_dark(maps, MergedFrame(white.radiance, white.variance, ~saturated)).any()
+
+
+@pytest.mark.parametrize(
+    ("times", "apart_px", "taken", "disagree"),
+    [
+        (0.4, 100.0, False, False),
+        (0.6, 100.0, False, True),
+        (1.9, 100.0, False, True),
+        (2.1, 100.0, True, False),
+        (1.0, 0.4, False, False),
+        (1.0, 0.6, False, True),
+    ],
+)
+def test_of_two_places_one_is_right_with_twice_the_peak_of_the_other(
+    times: float, apart_px: float, taken: bool, disagree: bool
+) -> None:
+    def found(column_px: float, amplitude: float) -> ColumnMaps:
+        maps = ColumnMaps.empty(1)
+        maps.column_px[:], maps.amplitude[:], maps.refined[:] = column_px, amplitude, True
+        return maps
+
+    white = MergedFrame(
+        radiance=np.full((1, 1), 2.0), variance=np.zeros((1, 1)), saturated=np.zeros((1, 1), bool)
+    )
+    finder: Any = SimpleNamespace(
+        profiles="lines", white=white, find=lambda *_, **__: found(100.0 + apart_px, times)
+    )
+    code: Any = SimpleNamespace(straight=None, rival_column=np.full((1, 1), 7))
+    maps = found(100.0, 1.0)
+    settled = settle(code, maps, finder, np.ones(1, bool))
+    assert (maps.column_px[0] > 100.0) == taken
+    assert settled.disagree.tolist() == [disagree]
+    assert settled.straight.tolist() == [not disagree]

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from dsl_core.model.plan import CapturePlan, GrayCode, NoCode, ScanLines, Setting, Shot
 from dsl_core.model.rig import Sensor
 from dsl_core.optics.sensor import bayer_channels, raw_variance
-from dsl_core.reconstruction.light.own_sensor import own_sensor, step_of
+from dsl_core.reconstruction.light.own_sensor import SEEN, own_sensor, step_of
 
 SHAPE = (48, 64)
 SENSOR = Sensor(black_level_dn=250.0, read_noise_dn=1.0)
@@ -102,3 +102,13 @@ def test_a_step_is_that_between_values_that_many_pixels_have() -> None:
     counts[:] = 0
     counts[[3, 40, 80]] = 1000
     assert step_of(counts) == 1, "three values of light without noise"
+
+
+@pytest.mark.parametrize(("weight", "step"), [(6, 1), (7, 4)])
+def test_the_usual_step_is_that_of_half_of_all_pixels(weight: int, step: int) -> None:
+    # Fourteen steps of one with seven pixels each, and fifteen of four.
+    total = np.zeros(100, np.int64)
+    total[:15] = 7
+    total[14 : 14 + 4 * 15 : 4] = weight
+    total[14 + 4 * 15] = SEEN
+    assert step_of(total) == step
