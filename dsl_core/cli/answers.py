@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 
     from dsl_core.analysis.classes import SpectralClass
     from dsl_core.analysis.classification import Classification
+    from dsl_core.io.export.spectra import NamedSpectrum
     from dsl_core.progress import Progress
 
 Result = Annotated[Path, typer.Argument(metavar="RESULT.zarr", help="A result of 'reconstruct'.")]
@@ -196,6 +197,75 @@ def _classes(
         classes = list(marked_by(classes, colours_of_marks(load_annotations(path))))
     known, doubts = known_classes(classes, result.get("reflectance_std"))
     return list(known), [*doubts, *notes]
+
+
+def spectra(
+    path: Result,
+    pins: Annotated[bool, typer.Option("--pins", help="Places are the marked pins and regions.")] = False,
+    at: Annotated[
+        list[str],
+        typer.Option("--at", help="A place, as NAME=X,Y or NAME=X,Y,WIDTH,HEIGHT; can be repeated."),
+    ] = [],  # noqa: B006
+    table: Annotated[Path | None, typer.Option("--output", "-o", help="NAME.csv to write.")] = None,
+    force: Force = False,
+    json: Json = False,
+) -> None:
+    """Spectra of places, a row for each band: mean reflectance and what a pixel of the place is uncertain by.
+
+    The CSV file also has the number of pixels of each place and how much these differ from each other.
+    """
+    from dsl_core.analysis.places import require_spectra
+    from dsl_core.io.export.spectra import export_spectra
+    from dsl_core.io.result.result_file import load_result
+
+    output = Output(json)
+    if not (pins or at):
+        raise PlanError("Say which places: --pins, or --at NAME=X,Y.")
+    check_targets([] if table is None else [table], overwrite=force)
+    result = load_result(path)
+    require_spectra(result)
+    masks = _masks(path, result, pins, at)
+    found = {name: _named_spectrum(result, name, mask) for name, mask in masks.items()}
+    nm = result["wavelength_nm"].values
+    rows = zip(*map(_cells, found.values()), strict=True)
+    output.table(("nm", *found), [(f"{centre:g}", *row) for centre, row in zip(nm, rows, strict=True)])
+    if table is not None:
+        attributes = {str(name): value for name, value in result.attrs.items()}
+        output.say(f"Written: {export_spectra([*found.values()], table, attributes, overwrite=force)}")
+    listed = {
+        name: {"pixels": each.pixels, "reflectance": each.mean.tolist(), "reflectance_std": _stds(each)}
+        for name, each in found.items()
+    }
+    output.put(result=path, wavelength_nm=nm.tolist(), spectra=listed)
+    output.finish()
+
+
+def _named_spectrum(result: xr.Dataset, name: str, mask: NDArray[np.bool_]) -> NamedSpectrum:
+    """The mean spectrum of a place; raises `DecodeError` where no pixel has one."""
+    from dataclasses import replace
+
+    import numpy as np
+
+    from dsl_core.analysis.places import spectra_of_masks
+    from dsl_core.api.accessor import ResultAccessor
+    from dsl_core.io.export.spectra import NamedSpectrum, named_spectrum
+
+    if np.count_nonzero(mask) > 1:
+        return replace(named_spectrum(ResultAccessor(result).region(mask)), name=name)
+    mean, std = spectra_of_masks(result, {name: mask})[name]
+    (row, column), nm = np.argwhere(mask)[0], result["wavelength_nm"].values
+    where = f"pixel at column {result['x'].values[column]}, row {result['y'].values[row]}, counted from 0"
+    return NamedSpectrum(name, nm, mean, uncertainty=std, pixels=1, where=where)
+
+
+def _stds(spectrum: NamedSpectrum) -> list[float]:
+    """What a pixel of a place is uncertain by, at each band."""
+    return [] if spectrum.uncertainty is None else spectrum.uncertainty.tolist()
+
+
+def _cells(spectrum: NamedSpectrum) -> list[str]:
+    pairs = zip(spectrum.mean, _stds(spectrum), strict=True)
+    return ["-" if mean != mean else f"{mean:.4f} ± {std:.4f}" for mean, std in pairs]
 
 
 def colours(

@@ -81,6 +81,7 @@ for command in (
     results.export,
     results.mesh,
     answers.classify,
+    answers.spectra,
     answers.colours,
     answers.report,
 ):

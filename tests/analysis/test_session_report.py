@@ -1,3 +1,4 @@
+import json
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +14,7 @@ from dsl_core.evaluation.report.pictures import flag_picture
 from dsl_core.evaluation.report.scan_report import pictures_of
 from dsl_core.io.result.annotations_file import Annotations, PinRecord, RegionRecord, save_annotations
 from dsl_core.io.result.result_file import save_result
+from dsl_core.io.spectra.catalogue import read_spectra
 from dsl_core.model.result import REASONS, Flag
 from tests.cases.chart_cube import chart_result
 
@@ -81,6 +83,40 @@ def test_the_commands_tell_colours_and_write_reports(
         (["colours", str(path)], "Say which places"),
         (["colours", str(path), "--pins", "--light", "candle"], "no light 'candle'"),
         (["report", str(path), "-o", "x.docx"], "must end in"),
+    ):
+        assert main(wrong) == 2
+        assert words in capsys.readouterr().err
+
+
+def test_the_command_tells_spectra_of_places_with_what_a_pixel_is_uncertain_by(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    result = chart_result()
+    path = save_result(result, tmp_path / "chart.zarr")
+    save_annotations(MARKS.model_copy(update={"pins": MARKS.pins[:1]}), path)
+    csv = tmp_path / "s.csv"
+    places = ["--pins", "--at", "a patch=2,2,3,4", "--at", "a pixel=5,4"]
+    assert main(["spectra", str(path), *places, "-o", str(csv)]) == 0
+    told = capsys.readouterr().out
+    mean, std = (result[name].values[0, 4, 5] for name in ("reflectance", "reflectance_std"))
+    row = next(line for line in told.splitlines() if line.startswith("430 "))
+    assert row.split("  ")[-1].strip() == f"{mean:.4f} ± {std:.4f}"
+    by_name = {each.name: each for each in read_spectra(csv)}
+    assert list(by_name) == ["$sky_1$ <b>", "häut 木", "a patch", "a pixel"]
+    patch = result["reflectance"].values[:, 2:6, 2:5].mean((1, 2))
+    np.testing.assert_allclose(by_name["a patch"].values, patch, atol=1e-4)
+    assert "# a pixel: pixel at column 5, row 4, counted from 0" in csv.read_text(encoding="utf-8")
+    assert main(["spectra", str(path), "--at", "a pixel=5,4", "--json"]) == 0
+    listed = json.loads(capsys.readouterr().out)["spectra"]["a pixel"]
+    assert listed["pixels"] == 1
+    assert listed["reflectance_std"] == pytest.approx(
+        result["reflectance_std"].values[:, 4, 5].tolist(), abs=1e-4
+    )
+    for wrong, words in (
+        (["spectra", str(path)], "Say which places"),
+        (["spectra", str(path), "--at", "5,4"], "--at must be NAME=X,Y"),
+        (["spectra", str(path), "--at", "away=500,4"], "away"),
+        (["spectra", str(path), *places, "-o", str(csv)], "already exists"),
     ):
         assert main(wrong) == 2
         assert words in capsys.readouterr().err

@@ -222,6 +222,12 @@ COMMANDS = (
         always=("--at", "a=28,18"),
     ),
     Command(
+        "spectra",
+        (("result", "scan.zarr"),),
+        {"--at": ("place", "a=28,18"), "-o": ("table", "new.csv")},
+        always=("--at", "a=28,18"),
+    ),
+    Command(
         "colours",
         (("result", "scan.zarr"),),
         {"--at": ("place", "a=28,18"), "--light": ("light", "D65"), "--to": ("name", "a")}
