@@ -18,7 +18,7 @@ from dsl_app.shared.evented import follow_any
 from dsl_app.shared.widgets.deferred import Deferred
 from dsl_app.shared.widgets.forms import ChoiceBox, NumberBox, label, push_button, quiet, show_parts
 from dsl_app.shared.widgets.help_window import set_help
-from dsl_app.shared.widgets.layouts import STRETCH, boxed, column_of, row_of
+from dsl_app.shared.widgets.layouts import STRETCH, boxed, column_of, row_of, scrolled
 from dsl_app.shared.widgets.page import PageWidget
 from dsl_app.shared.widgets.ticker import Ticker
 from dsl_core.devices.base import DeviceRig
@@ -146,9 +146,10 @@ class RigPage(PageWidget):
         self.beside = QGroupBox("Picture")
         column_of(on=self.beside)
         self.beside.hide()
+        self._camera = camera
         self._left = column_of(devices, camera, STRETCH, margins=0)
         self._right = column_of(self.projector, (self.beside, 20), STRETCH, margins=0)
-        self._left_side, self._right_side = boxed(self._left), boxed(self._right)
+        self._left_side, self._right_side = scrolled(boxed(self._left)), boxed(self._right)
         for side in (self._left_side, self._right_side):
             side.setFixedWidth(SIDE_PX)
         # Of a very wide window the figures get a quarter of what the left side leaves.
@@ -163,8 +164,14 @@ class RigPage(PageWidget):
             self._left.insertWidget(2, self.projector)
         else:
             self._right.insertWidget(0, self.projector)
+        if self.is_small:
+            # The picture gets the room on the right; what comes next is seen without scrolling.
+            self._left.insertWidget(0, self._camera)
+            self._left.insertWidget(2, self.projector)
+        else:
+            self._left.insertWidget(1, self._camera)
         self._left_side.setFixedWidth(WIDE_SIDE_PX if self.is_tall else SIDE_PX)
-        self._right_side.setVisible(not self.is_tall)
+        self._right_side.setVisible(not (self.is_tall or self.is_small))
         column, place = (self._left, 3) if self.is_tall else (self._right, self._right.count() - 1)
         if self.beside.parentWidget() is not column.parentWidget():
             column.insertWidget(place, self.beside, 20)
