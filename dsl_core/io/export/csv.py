@@ -11,8 +11,6 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from dsl_core.errors import StoreError
 from dsl_core.io.export.common import provenance, require, require_suffix, wavelengths_nm
 from dsl_core.io.export.wording import deviation_text, figure_text, header_lines

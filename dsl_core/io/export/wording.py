@@ -1,4 +1,4 @@
-"""Figures and origins as tables for people say them: no more digits than are known, no records of programs."""
+"""Figures and origins as tables for people say them: the digits that are known, no records of programs."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ import numpy as np
 
 
 def header_lines(origin: Mapping[str, str]) -> list[str]:
-    """Lines of a table for people about its origin: what only programs read is left out.
+    r"""Lines of a table for people about its origin: what only programs read is left out.
 
     Options, which are a JSON object of plain texts, are written as words.
 
     >>> header_lines({"rig": "twin", "options": '{"scene": "leaf"}', "stage_costs": '[{"seconds": 3.2}]'})
-    ['# rig: twin\\n', '# options: scene leaf\\n']
+    ['# rig: twin\n', '# options: scene leaf\n']
     """
     said = ((key, _in_words(value)) for key, value in origin.items())
     return [f"# {key}: {words}\n" for key, words in said if words]
