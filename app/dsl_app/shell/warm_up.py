@@ -108,9 +108,14 @@ class WarmUp:
         self._thread.start()
 
     def stop(self) -> None:
-        """End after the current step, and wait for that."""
+        """End, within the current step where that is in Python, and wait for it: the program ends next.
+
+        Compiling takes ten seconds, most of them in Python, in which the process would linger without a window.
+        """
         self._stop.set()
-        if self._thread.ident is not None:
+        if self._thread.ident is not None and self._thread.is_alive():
+            interrupt = ctypes.pythonapi.PyThreadState_SetAsyncExc
+            interrupt(ctypes.c_ulong(self._thread.ident), ctypes.py_object(SystemExit))
             self._thread.join()
 
     def _run(self) -> None:
