@@ -110,7 +110,7 @@ class ScanPage(PageWidget):
 
     def arrange(self) -> None:
         """Show the frames next to the forecast, and all settings in one column, where there is room."""
-        boxes = (self.calibration, self.target, self.run)
+        boxes: tuple[QGroupBox, ...] = (self.calibration, self.target, self.run)
         if self.is_small:
             # What comes next is seen without scrolling.
             boxes = (self.run, self.calibration, self.target)

@@ -95,6 +95,10 @@ def test_what_comes_next_is_seen_on_a_magnified_screen(window: MainWindow, qtbot
             assert blue or key not in ("start", "rig", "scan"), key
             hidden = [each.text() for each in blue if each.visibleRegion().boundingRect() != each.rect()]
             assert not hidden, f"{key}: {hidden}"
+        # A side that scrolls takes more height than it needs, so that it does so only where it must.
+        rig = window.page_of("rig")
+        assert isinstance(rig, RigPage)
+        assert (rig._left_side.parentWidget() is rig) == (size == SMALL)
         # The plan is the first of the views where it has no column of its own.
         assert (scan.middle.indexOf(scan._left_area) == 0) == (size == MAGNIFIED)
         titles = [scan.middle.tabText(place) for place in range(scan.middle.count())]
