@@ -29,11 +29,15 @@ Form = Literal["entry", "rig", "published"]
 
 @dataclass(frozen=True)
 class Products:
-    """Where they are saved; ``entry`` is the name in the library, None where none was requested."""
+    """Where they are saved; ``entry`` is the name in the library, None where none was requested.
+
+    ``traits`` says in a sentence in what the rig is unlike the usual (empty: in nothing).
+    """
 
     rig: Path
     report: Path
     entry: str | None
+    traits: str = ""
 
 
 def write_products(
@@ -49,6 +53,8 @@ def write_products(
     ``library`` is that of this computer if not given. A rig that equals its current one but for the date
     is not stored a second time.
     """
+    from dsl_core.reconstruction.spectral.rig_traits import traits_in_words
+
     recipes = campaign_recipes(campaign) if recipes is None else recipes
     accepted = tuple(accepted_calibrations(campaign, recipes).values())
     history = tuple(old for recipe in recipes for old in campaign.history(recipe.name))
@@ -62,7 +68,7 @@ def write_products(
             rig = rig.model_copy(update={"light_checks": known.light_checks})
         if known is None or known.model_copy(update=same) != rig:
             shelf.store(library_name, rig, accepted, history)
-    return Products(path, report, library_name)
+    return Products(path, report, library_name, traits_in_words(rig))
 
 
 def write_calibration_report(

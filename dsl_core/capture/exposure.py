@@ -146,7 +146,7 @@ class ShotTaker:
         if attempt + 1 >= self._policy.attempts:
             raise DeviceError(
                 f"{describe_shot(shot).capitalize()} failed {attempt + 1} times: {error}"
-                " Everything before it is saved; resume the scan when the device works again."
+                " Resume the scan when the device works again."
             ) from error
         _log.warning("%s, attempt %d: %s", describe_shot(shot), attempt + 1, error)
         self._order.interrupted()

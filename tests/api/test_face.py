@@ -190,17 +190,20 @@ def test_spectra_become_tables_that_are_read_again(
     found = dsl.read_spectra(tmp_path / "pixels.csv")
     assert list(found) == ["x 46, y 28", "x 50, y 30"]
     expected = result["reflectance"].sel(x=46, y=28).values
-    np.testing.assert_allclose(found["x 46, y 28"], expected, rtol=1e-6)
+    # As many digits as the deviation knows.
+    known = result["reflectance_std"].sel(x=46, y=28).values / 100
+    assert (np.abs(found["x 46, y 28"] - expected) <= known).all()
     with pytest.raises(StoreError, match=r"No such pixel: \(3, 4\).*x runs from 44 to 55"):
         dsl.export(part, tmp_path / "other.csv", pixels=[(3, 4)])
     with pytest.raises(StoreError, match="Pixels are for csv, not for ply"):
         dsl.export(part, tmp_path / "a.ply", pixels=[(46, 28)])
     one = result.dsl.spectrum(50, 30)
     (path,) = dsl.export(one, tmp_path / "one.csv")
-    np.testing.assert_allclose(dsl.read_spectra(path)["x 50, y 30"], one["reflectance"], rtol=1e-6)
+    off = np.abs(dsl.read_spectra(path)["x 50, y 30"] - one["reflectance"])
+    assert (off <= one["reflectance_std"] / 100).all()
     with pytest.raises(StoreError, match="A spectrum is exported as csv, not as ply"):
         dsl.export(one, tmp_path / "one.ply")
-    assert float(abs(page["off"]).max()) < 1e-6
+    assert float(abs(page["off"]).max()) < 5e-5
 
 
 def test_what_is_not_in_a_result_is_told(result: xr.Dataset, scan: ScanReader) -> None:

@@ -92,7 +92,9 @@ def lost(stage: Stage) -> None:
     rig = stage.composition.rig
     devices = rig.state.devices.value
     assert devices is not None
-    rig.state.devices.set(with_faults(devices, FaultPlan(camera_gone_at=20)))
+    rig.state.devices.set(with_faults(devices, FaultPlan(camera_gone_at=40)))
+    # Frames that measure the scene would be lost before one is saved.
+    scan.state.meters.set(False)
     stage.press("Start scan", scan.page)
     stage.wait(lambda: scan.state.phase.value is Phase.LOST)
     stage.shoot()

@@ -198,6 +198,6 @@ def _parts(recipe: AnyRecipe, devices: DeviceRig, campaign: CampaignFolder) -> i
 
 
 def products_text(made: Products) -> str:
-    """Where a rig and its report were saved."""
+    """Where a rig and its report were saved, and in what the rig is unlike the usual."""
     kept = f" It is in the library as {made.entry!r}." if made.entry else ""
-    return f"The rig is saved in {made.rig}, next to its report.{kept}"
+    return f"The rig is saved in {made.rig}, next to its report.{kept} {made.traits}".rstrip()

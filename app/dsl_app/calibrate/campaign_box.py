@@ -17,6 +17,7 @@ from dsl_app.shared.known_files import first_free
 from dsl_app.shared.widgets.dialogs import dialog_buttons
 from dsl_app.shared.widgets.forms import label, push_button, set_role, show_parts
 from dsl_app.shared.widgets.layouts import STRETCH, column_of, row_of
+from dsl_app.shared.widgets.open_dialog import OpenDialog
 
 if TYPE_CHECKING:
     from dsl_app.calibrate.controller import CalibrateController
@@ -137,9 +138,9 @@ class CampaignBox(QFrame):
     def _ask_open(self) -> None:
         facts = self._state.campaign.value
         start = self._home if facts is None else facts.path.parent
-        name = QFileDialog.getExistingDirectory(self, "Open a campaign", str(start))
-        if name:
-            self._commands.open_campaign(Path(name))
+        path = OpenDialog.ask(self, "Open a campaign", str(start), takes_folders=True)
+        if path is not None:
+            self._commands.open_campaign(path)
 
     def _show(self) -> None:
         show_parts(self, campaign_head(self._state, self._rig.devices.value))

@@ -109,6 +109,8 @@ class CalibratePage(PageWidget):
         # They take the room that there is, up to a height at which they still read as rows.
         for row in self.rows.values():
             row.setMaximumHeight(TALL_ROW_PX if self.is_tall else HIGHEST_PX)
+            # Where its button would be beyond the edge, the library still says when each was accepted.
+            row.date.setVisible(not self.is_small)
         # What the camera sees is below the rows where those are narrow and alone.
         is_below, direction = self.is_wide and not self.is_tall, QBoxLayout.Direction
         self._top.setDirection(direction.TopToBottom if is_below else direction.LeftToRight)

@@ -13,6 +13,7 @@ from PySide6.QtWidgets import QFileDialog
 from dsl_app.composition.captures import CapturesAction
 from dsl_app.shared.known_files import has_pictures
 from dsl_app.shared.widgets.inside import apply_theme_inside
+from dsl_app.shared.widgets.open_dialog import ALL, SCANS, OpenDialog
 from dsl_app.shell.main_window import MainWindow
 
 if TYPE_CHECKING:
@@ -112,10 +113,8 @@ class ReconstructAgainAction:
 
     def _choose(self) -> Path | None:
         title = "Choose the scan to reconstruct again (NAME.dsl)"
-        name = QFileDialog.getExistingDirectory(
-            self._window, title, self._window.parts.settings.output_folder
-        )
-        return Path(name) if name else None
+        folder = self._window.parts.settings.output_folder
+        return OpenDialog.ask(self._window, title, folder, filters=(SCANS, ALL))
 
     def _ask(self) -> None:
         from dsl_app.results.reconstruct_again.dialog import ReconstructionDialog

@@ -38,7 +38,7 @@ from dsl_app.shared.widgets.figure_file import PlotFigure
 from dsl_app.shared.widgets.forms import label, push_button, show_label
 from dsl_app.shared.widgets.help_window import set_help
 from dsl_app.shared.widgets.layouts import boxed, column_of, row_of, splitter, tabs_of
-from dsl_app.shared.widgets.open_dialog import OpenDialog
+from dsl_app.shared.widgets.open_dialog import ALL, BOTH, OpenDialog
 from dsl_app.shared.widgets.page import PageWidget
 from dsl_app.shared.widgets.save_dialog import ask_target
 from dsl_app.shared.widgets.ticker import Ticker
@@ -235,7 +235,7 @@ class ResultsPage(PageWidget):
 
     def choose(self) -> None:
         """Ask for a result or scan."""
-        path = OpenDialog.ask(self, "Open a result (NAME.zarr) or a scan (NAME.dsl)")
+        path = OpenDialog.ask(self, "Open a result (NAME.zarr) or a scan (NAME.dsl)", filters=(BOTH, ALL))
         if path is not None:
             self.open_chosen.emit(path)
 

@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 
 from PySide6.QtCore import QTimer, Signal
 from PySide6.QtGui import QHideEvent, QShowEvent
-from PySide6.QtWidgets import QFormLayout, QGroupBox
+from PySide6.QtWidgets import QFormLayout, QGroupBox, QScrollArea, QStyle
 
 from dsl_app.connection.state import Link, RigChoice
 from dsl_app.rig.controller import LiveController
@@ -18,7 +18,7 @@ from dsl_app.shared.evented import follow_any
 from dsl_app.shared.widgets.deferred import Deferred
 from dsl_app.shared.widgets.forms import ChoiceBox, NumberBox, label, push_button, quiet, show_parts
 from dsl_app.shared.widgets.help_window import set_help
-from dsl_app.shared.widgets.layouts import STRETCH, boxed, column_of, row_of
+from dsl_app.shared.widgets.layouts import STRETCH, boxed, column_of, row_of, scrolled
 from dsl_app.shared.widgets.page import PageWidget
 from dsl_app.shared.widgets.ticker import Ticker
 from dsl_core.devices.base import DeviceRig
@@ -146,13 +146,15 @@ class RigPage(PageWidget):
         self.beside = QGroupBox("Picture")
         column_of(on=self.beside)
         self.beside.hide()
+        self._camera = camera
         self._left = column_of(devices, camera, STRETCH, margins=0)
         self._right = column_of(self.projector, (self.beside, 20), STRETCH, margins=0)
         self._left_side, self._right_side = boxed(self._left), boxed(self._right)
         for side in (self._left_side, self._right_side):
             side.setFixedWidth(SIDE_PX)
         # Of a very wide window the figures get a quarter of what the left side leaves.
-        row_of(self._left_side, (self.live, 3), (self._right_side, 1), on=self)
+        self._scrolled: QScrollArea | None = None
+        self._columns = row_of(self._left_side, (self.live, 3), (self._right_side, 1), on=self)
 
     def arrange(self) -> None:
         """Show controls and figures next to the picture where there is room."""
@@ -163,13 +165,33 @@ class RigPage(PageWidget):
             self._left.insertWidget(2, self.projector)
         else:
             self._right.insertWidget(0, self.projector)
-        self._left_side.setFixedWidth(WIDE_SIDE_PX if self.is_tall else SIDE_PX)
-        self._right_side.setVisible(not self.is_tall)
+        if self.is_small:
+            # The picture gets the room on the right; what comes next is seen without scrolling.
+            self._left.insertWidget(0, self._camera)
+            self._left.insertWidget(2, self.projector)
+        else:
+            self._left.insertWidget(1, self._camera)
+        self._scroll_left(self.is_small)
+        room_px = self.style().pixelMetric(QStyle.PixelMetric.PM_ScrollBarExtent) if self.is_small else 0
+        self._left_side.setFixedWidth(WIDE_SIDE_PX if self.is_tall else SIDE_PX - room_px)
+        self._right_side.setVisible(not (self.is_tall or self.is_small))
         column, place = (self._left, 3) if self.is_tall else (self._right, self._right.count() - 1)
         if self.beside.parentWidget() is not column.parentWidget():
             column.insertWidget(place, self.beside, 20)
         if self.live.made is not None:
             self.live.made.place_controls(self.beside if self.is_wide else None)
+
+    def _scroll_left(self, on: bool) -> None:
+        """Let the left side scroll, which would take more height than it needs where it need not."""
+        if on and self._scrolled is None:
+            self._scrolled = scrolled(self._left_side)
+            self._scrolled.setFixedWidth(SIDE_PX)
+            self._columns.insertWidget(0, self._scrolled)
+        elif self._scrolled is not None and not on:
+            self._columns.insertWidget(0, self._scrolled.takeWidget())
+            self._left_side.show()
+            self._scrolled.deleteLater()
+            self._scrolled = None
 
     def _connect(self) -> None:
         state, live, commands = self._state, self._live_state, self._commands

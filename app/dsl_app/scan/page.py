@@ -33,6 +33,9 @@ from dsl_app.shared.widgets.ticker import Ticker
 #: Interval at which the state of the scan is fetched, ms: ten pictures a second look live.
 FETCH_MS = 100
 LEFT_PX, RIGHT_PX, TALL_PX = 276, 292, 400
+#: No limit to a width.
+LARGEST_PX = 16_777_215
+PLAN, PLAN_TIP = "Plan", "Patterns and exposures of the scan"
 FRAMES, FRAMES_TIP = "Fra&mes", "Frames while the scan runs"
 PLANS = "Plans and pattern sets (*.json)"
 
@@ -101,19 +104,24 @@ class ScanPage(PageWidget):
         self._beside = QWidget()
         self._frames = column_of(on=self._beside, margins=0)
         self._views = splitter(Qt.Orientation.Horizontal, (self.middle, 1), (self._beside, 1))
-        row = row_of(self._left_area, (self._views, 1), self._right_area)
+        self._columns = row_of(self._left_area, (self._views, 1), self._right_area)
         # Below, so that no button moves when the rig is lost.
-        column_of((row, 1), self.banner, on=self)
+        column_of((self._columns, 1), self.banner, on=self)
 
     def arrange(self) -> None:
         """Show the frames next to the forecast, and all settings in one column, where there is room."""
-        boxes = (self.calibration, self.target, self.run)
+        boxes: tuple[QGroupBox, ...] = (self.calibration, self.target, self.run)
+        if self.is_small:
+            # What comes next is seen without scrolling.
+            boxes = (self.run, self.calibration, self.target)
         column, first = (self._left, 1) if self.is_wide else (self._right, 0)
         for place, box in enumerate(boxes, first):
             column.insertWidget(place, box)
         self._right_area.setVisible(not self.is_wide)
+        self._place_plan()
         width_px = RIGHT_PX if self.is_wide else LEFT_PX
-        self._left_area.setFixedWidth(TALL_PX if self.is_tall else width_px)
+        self._left_area.setMinimumWidth(TALL_PX if self.is_tall else width_px)
+        self._left_area.setMaximumWidth(LARGEST_PX if self.is_small else self._left_area.minimumWidth())
         # In a high window the figures of the plan are in its column, and their curve takes their place.
         self._figures.setVisible(self.is_tall)
         self._left.insertWidget(self._left.count() - 1, self._figures)
@@ -125,11 +133,24 @@ class ScanPage(PageWidget):
             self._frames.addWidget(self.frame)
             self._views.setSizes([1000, 1000])
             self.view.show()
-        else:
+        elif self.middle.indexOf(self.view) < 0:
             self._left.insertWidget(1, self.frame)
-            self.middle.insertTab(1, self.view, FRAMES)
-            self.middle.setTabToolTip(1, plain_tip(FRAMES_TIP))
+            place = self.middle.indexOf(self.forecast) + 1
+            self.middle.insertTab(place, self.view, FRAMES)
+            self.middle.setTabToolTip(place, plain_tip(FRAMES_TIP))
         self._beside.setVisible(self.is_wide)
+
+    def _place_plan(self) -> None:
+        """Show the plan as the first of the views where there is no room for a column of its own."""
+        is_tab = self.middle.indexOf(self._left_area) >= 0
+        if self.is_small and not is_tab:
+            self.middle.insertTab(0, self._left_area, PLAN)
+            self.middle.setTabToolTip(0, plain_tip(PLAN_TIP))
+            self.middle.setCurrentIndex(0)
+        elif is_tab and not self.is_small:
+            self.middle.removeTab(self.middle.indexOf(self._left_area))
+            self._columns.insertWidget(0, self._left_area)
+            self._left_area.show()
 
     def _connect(self) -> None:
         state, controller = self._state, self._controller

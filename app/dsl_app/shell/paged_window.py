@@ -28,6 +28,8 @@ from dsl_app.shell.toasts import Toasts
 
 _log = logging.getLogger(__name__)
 SMALLEST, USUAL = QSize(1024, 640), QSize(1280, 800)
+#: What pages need on any screen: that of a laptop at one and a half times the size has 853 x 533 px.
+LEAST = QSize(840, 480)
 #: What a desktop draws around a window, px: its frame is known only once the window is on screen.
 FRAME = QSize(8, 40)
 #: Increased when docks change, so that a layout of an older version is not restored.
@@ -71,8 +73,9 @@ class PagedWindow(QMainWindow):
         self._is_painted = False
         self._makers, self._made = makers, dict[str, PageWidget]()
         self.setWindowTitle("dsl-scan")
-        self.setMinimumSize(SMALLEST)
-        self.resize(first_size(self.screen().availableSize()))
+        room = self.screen().availableSize()
+        self.setMinimumSize(least_size(room))
+        self.resize(first_size(room))
         self.setAcceptDrops(True)
         line = StatusLine()
         self.setStatusBar(line)
@@ -253,7 +256,12 @@ class OpenQueue(QObject):
 
 def first_size(room: QSize) -> QSize:
     """The size of a window that was never opened: with its frame it fits into the room of the screen."""
-    return USUAL.boundedTo(room - FRAME).expandedTo(SMALLEST)
+    return USUAL.boundedTo(room - FRAME).expandedTo(least_size(room))
+
+
+def least_size(room: QSize) -> QSize:
+    """The smallest size of a window; a screen that is magnified may have room for less than is usual."""
+    return SMALLEST.boundedTo((room - FRAME).expandedTo(LEAST))
 
 
 def restore_layout(window: QMainWindow, settings: Settings) -> None:

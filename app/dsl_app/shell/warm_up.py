@@ -11,6 +11,7 @@ import os
 import sys
 import threading
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from itertools import chain
 from pathlib import Path
 
@@ -82,6 +83,8 @@ STEPS = tuple(
 )
 #: Pause between two steps, s, and how long all of them may be kept waiting by what a person waits for.
 REST_S, PATIENCE_S = 0.05, 20.0
+#: When a step that has not ended is asked again to, s.
+AGAIN_S = 0.5
 #: Large libraries of some packages: while the system loads them, Python's lock is free.
 _BULK = {"torch": "lib/libtorch_cpu.so", "cv2": "cv2.abi3.so"}
 
@@ -108,12 +111,22 @@ class WarmUp:
         self._thread.start()
 
     def stop(self) -> None:
-        """End after the current step, and wait for that."""
+        """End, within the current step where that is in Python, and wait for it: the program ends next.
+
+        Compiling takes ten seconds, most of them in Python; the process would linger without a window.
+        """
         self._stop.set()
-        if self._thread.ident is not None:
-            self._thread.join()
+        interrupt = ctypes.pythonapi.PyThreadState_SetAsyncExc
+        while self._thread.ident is not None and self._thread.is_alive():
+            interrupt(ctypes.c_ulong(self._thread.ident), ctypes.py_object(SystemExit))
+            # Compilers call back into Python, where an exception is lost.
+            self._thread.join(AGAIN_S)
 
     def _run(self) -> None:
+        with suppress(SystemExit):  # of `stop`
+            self._take_steps()
+
+    def _take_steps(self) -> None:
         given_way_s = 0.0
         for name in self._steps:
             if self._stop.wait(REST_S):

@@ -289,7 +289,7 @@ def color_checker_figures(record: ColorCheckerCalibration) -> tuple[Figure, ...]
             " the camera's lens.",
         ),
         Figure(
-            name="residual of patches held out, published weight",
+            name="residual of patches held out, regularised as published",
             value=100 * record.published_held_out,
             unit="% of white",
         ),

@@ -104,7 +104,7 @@ def _picture_figures(record: SpectralonCalibration) -> list[Figure]:
             advice="Turn the Spectralon to face the camera.",
         ),
         Figure(
-            name="unevenness about the smooth part",
+            name="unevenness after the flat field",
             value=100 * record.unevenness,
             unit="%",
             high=UNEVEN_PERCENT,

@@ -190,7 +190,7 @@ def _cycle(cycle: CycleCheck) -> Iterator[Figure]:
         worst = max((*beat.channels_percent, beat.ratio_percent), key=lambda each: each.value)
         published = beat.exposure_ms in PUBLISHED_MS and not cycle.is_advised(beat.exposure_ms)
         yield _figure(
-            f"beat at {beat.exposure_ms:.2f} ms",
+            f"modulation of the light at {beat.exposure_ms:.2f} ms",
             worst,
             "%",
             high=None if published else BEAT_PERCENT + 3 * beat.floor_percent,

@@ -281,7 +281,7 @@ def _of_filters(record: BandpassCalibration) -> list[Figure]:
         )
     if record.filter_index is not None:
         value, std = record.filter_index
-        figures.append(_plain("index of the filters, by their shift with the angle of view", "", value, std))
+        figures.append(_plain("refractive index of the filters, by angle of view", "", value, std))
     return figures
 
 

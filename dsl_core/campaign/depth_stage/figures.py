@@ -47,12 +47,12 @@ def depth_stage_figures(record: DepthStageCalibration) -> tuple[Figure, ...]:
             ("film's tilt about x", "tilt_x_deg", "degrees"),
             ("film's tilt about y", "tilt_y_deg", "degrees"),
             ("film's roll", "roll_deg", "degrees"),
-            ("film's bend", "bend_per_mm", "1/mm"),
+            ("film's curvature", "bend_per_mm", "1/mm"),
         )
     ]
     return (
         Figure(
-            name="scatter about the plane",
+            name="residual about the plane, rms",
             value=flat.plane_rms_mm,
             unit="mm",
             high=flat.plane_limit_mm,
@@ -67,15 +67,15 @@ def depth_stage_figures(record: DepthStageCalibration) -> tuple[Figure, ...]:
             advice=f"Check the stage at {step.position_mm:g} mm; repeat the geometry with more poses.",
         ),
         Figure(
-            name="pull of the planes on the geometry",
+            name="correction of the geometry by the planes",
             value=record.geometry_pull,
-            unit="deviations",
+            unit="standard deviations",
             high=MAX_PULL,
             advice="Use a flatter target, check the stage's scale and the board's printed size, or calibrate"
             " the geometry again: one of them is wrong.",
         ),
         *_bow(record),
-        Figure(name="depth left open by the geometry", value=record.depth_std_mm, unit="mm"),
+        Figure(name="standard deviation of depth from the geometry", value=record.depth_std_mm, unit="mm"),
         Figure(
             name="held-out error of first orders",
             value=record.held_out_px,
@@ -97,9 +97,7 @@ def _shape(record: DepthStageCalibration) -> tuple[Figure, ...]:
     if record.film.shape is None:
         return ()
     steepest = FilmForm.of(record.projector, record.film, shaped=True).steepest(record.film)
-    return (
-        Figure(name="film's steepest place besides its bend", value=np.degrees(steepest), unit="degrees"),
-    )
+    return (Figure(name="film's largest slope beyond curvature", value=np.degrees(steepest), unit="degrees"),)
 
 
 def _colours(record: DepthStageCalibration) -> tuple[Figure, ...]:
@@ -127,7 +125,7 @@ def _chain(record: DepthStageCalibration) -> tuple[Figure, ...]:
     if chain is None:
         return ()
     correction = Figure(
-        name="largest correction of the chain",
+        name="largest correction of response, emission and efficiency",
         value=100 * chain.largest_correction,
         unit="%",
         high=MAX_CORRECTION_PERCENT,
@@ -181,16 +179,14 @@ def _filter_index(record: DepthStageCalibration) -> tuple[Figure, ...]:
     if record.filter_index is None:
         return ()
     value, std = record.filter_index
-    found = Figure(
-        name="index of the filters, by their shift with the angle of view", value=value, unit="", std=std
-    )
+    found = Figure(name="refractive index of the filters, by angle of view", value=value, unit="", std=std)
     if record.filter_index_before is None:
         return (found,)
     before, before_std = record.filter_index_before
     apart_std = float(np.hypot(std, before_std))
     limit = max(MAX_INDEX, INDEX_SIGMAS * apart_std)
     apart = Figure(
-        name="index of the filters against that at the bandpass filters' step",
+        name="refractive index of the filters, change since the bandpass filters",
         value=value - before,
         unit="",
         std=apart_std,

@@ -58,7 +58,7 @@ def look_at_board(white: WhiteLevel, board: Board, rig: Rig, title: str, found: 
             advice="Move the board until all of it is in view and lit.",
         ),
         Figure(
-            name="view between the corners",
+            name="share of the picture within the corners",
             value=view,
             unit="%",
             low=LEAST_VIEW,
@@ -100,14 +100,14 @@ def geometry_figures(record: GeometryCalibration) -> tuple[Figure, ...]:
             advice="Measure the printed squares again.",
         ),
         Figure(
-            name="squares of a pose left out, worst",
+            name="side of a square without one pose, largest change",
             value=100 * unseen,
             unit="%",
             high=100 * SQUARE_SHARE,
             advice=more,
         ),
         Figure(
-            name="corners' distance from a plane",
+            name="flatness of the board, rms of its corners",
             value=100 * record.plane_rms_share,
             unit="% of their distance",
             high=100 * PLANE_SHARE,

@@ -11,10 +11,9 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from dsl_core.errors import StoreError
 from dsl_core.io.export.common import provenance, require, require_suffix, wavelengths_nm
+from dsl_core.io.export.wording import deviation_text, figure_text, header_lines
 from dsl_core.io.staging import staged
 from dsl_core.model.result import Reach, reasons
 from dsl_core.solve.many import Check, never
@@ -59,7 +58,7 @@ def export_csv(
         staged([path], overwrite=overwrite) as (draft,),
         draft.open("w", newline="", encoding="utf-8") as file,
     ):
-        file.writelines(f"# {key}: {value}\n" for key, value in provenance(result).items())
+        file.writelines(header_lines(provenance(result)))
         writer = csv.writer(file)
         writer.writerow(HEADER)
         for pixel in pixels:
@@ -97,20 +96,25 @@ def _rows(result: xr.Dataset, pixel: Pixel) -> Iterator[tuple[object, ...]]:
     xs, ys = _coordinates(result)
     spot = result.isel(x=xs.index(x), y=ys.index(y)).load()
     flags = int(spot["flags"]) if "flags" in spot else 0
-    depth = [_number(spot, "depth_mm"), _number(spot, "depth_std_mm")]
+    depth = _with_deviation(spot, "depth_mm", "depth_std_mm")
     for band, wavelength in enumerate(wavelengths_nm(result)):
         reach = _reach_in_words(int(spot["reach"][band])) if "reach" in spot else ""
-        spectrum = [_number(spot, name, band) for name in ("reflectance", "reflectance_std", "data_share")]
+        spectrum = _with_deviation(spot, "reflectance", "reflectance_std", band)
+        spectrum.append(deviation_text(_number(spot, "data_share", band)) or "nan")
         yield x, y, *depth, f"{wavelength:g}", *spectrum, reach, flags, "; ".join(reasons(flags))
 
 
-def _number(spot: xr.Dataset, name: str, band: int | None = None) -> str:
-    """Shortest text that reads back as the same float32; ``nan`` for what the result does not hold."""
+def _with_deviation(spot: xr.Dataset, name: str, std_name: str, band: int | None = None) -> list[str]:
+    """A value and its standard deviation, as `figure_text` says them; ``nan`` for what is not there."""
+    value, std = _number(spot, name, band), _number(spot, std_name, band)
+    return [figure_text(value, std) or "nan", deviation_text(std) or "nan"]
+
+
+def _number(spot: xr.Dataset, name: str, band: int | None = None) -> float:
     if name not in spot:
-        return "nan"
+        return float("nan")
     values = spot[name].values
-    # Not str(): colour-science sets NumPy's print options for the whole process, which cuts digits.
-    return np.format_float_positional(np.float32(values if band is None else values[band]), trim="0")
+    return float(values if band is None else values[band])
 
 
 def _reach_in_words(reach: int) -> str:

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from dsl_core.errors import StoreError
 from dsl_core.io.export.common import provenance_of, require_suffix
+from dsl_core.io.export.wording import deviation_text, figure_text, header_lines
 from dsl_core.io.spectra.formats.own_table import MEAN, WAVELENGTH
 from dsl_core.io.staging import staged
 
@@ -71,7 +72,7 @@ def export_spectra(
         staged([path], overwrite=overwrite) as (draft,),
         draft.open("w", newline="", encoding="utf-8") as file,
     ):
-        file.writelines(f"# {key}: {value}\n" for key, value in provenance_of(attributes).items())
+        file.writelines(header_lines(provenance_of(attributes)))
         file.writelines(f"# {' '.join(each.name.split())}: {each.where}\n" for each in spectra if each.where)
         csv.writer(file).writerows(_rows(spectra, "nan"))
     return path
@@ -96,16 +97,16 @@ def _rows(spectra: Sequence[NamedSpectrum], missing: str) -> Iterator[list[str]]
 
 
 def _columns(spectrum: NamedSpectrum) -> Iterator[tuple[str, list[str]]]:
-    yield MEAN, _texts(spectrum.mean)
-    if spectrum.deviation is not None:
-        yield DEVIATION, _texts(spectrum.deviation)
+    scatter, own, nothing = spectrum.deviation, spectrum.uncertainty, np.full(len(spectrum.mean), np.nan)
+    if scatter is not None and spectrum.pixels:
+        # That of the mean, of which the figure must not be cut.
+        known = scatter / np.sqrt(spectrum.pixels)
+    else:
+        known = nothing if own is None else own
+    yield MEAN, [figure_text(*each) for each in zip(spectrum.mean.tolist(), known.tolist(), strict=True)]
+    if scatter is not None:
+        yield DEVIATION, [deviation_text(each) for each in scatter.tolist()]
     if spectrum.pixels is not None:
         yield COUNT, [str(spectrum.pixels)] * len(spectrum.mean)
-    if spectrum.uncertainty is not None:
-        yield UNCERTAINTY, _texts(spectrum.uncertainty)
-
-
-def _texts(values: Floats) -> list[str]:
-    """Shortest texts that read back as the same numbers; empty for no answer."""
-    # Not str(): colour-science sets NumPy's print options for the whole process, which cuts digits.
-    return [np.format_float_positional(v, trim="0") if np.isfinite(v) else "" for v in values]
+    if own is not None:
+        yield UNCERTAINTY, [deviation_text(each) for each in own.tolist()]

@@ -7,7 +7,10 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from dsl_core.io.export.common import provenance, require_suffix
+from dsl_core.io.export.wording import figure_text, header_lines
 from dsl_core.io.staging import staged
 
 if TYPE_CHECKING:
@@ -32,8 +35,14 @@ def export_table(
         staged([path], overwrite=overwrite) as (draft,),
         draft.open("w", newline="", encoding="utf-8") as file,
     ):
-        file.writelines(f"# {key}: {value}\n" for key, value in {**notes, **provenance(result)}.items())
+        file.writelines(header_lines({**notes, **provenance(result)}))
         writer = csv.writer(file)
         writer.writerow(header)
-        writer.writerows(["" if cell is None else cell for cell in row] for row in rows)
+        writer.writerows([_text(cell) for cell in row] for row in rows)
     return [path]
+
+
+def _text(cell: object) -> object:
+    if cell is None:
+        return ""
+    return figure_text(float(cell)) if isinstance(cell, float | np.floating) else cell

@@ -17,13 +17,16 @@ from dsl_core.campaign.session import CalibrationSession
 from dsl_core.errors import DeviceError
 from dsl_core.model.figure import Figure
 from dsl_core.progress import CallbackProgress
+from dsl_core.reconstruction.spectral import rig_traits
 from tests.app.calibrate.calibrate_bench import (
     CalibrateBench,
     states,
 )
 
 
-def test_everything_runs_in_order_and_stops_with_the_reason(bench: CalibrateBench) -> None:
+def test_everything_runs_in_order_and_stops_with_the_reason(
+    bench: CalibrateBench, monkeypatch: pytest.MonkeyPatch
+) -> None:
     bench.control.run_everything()
     assert "cannot place its targets itself" in bench.told
     devices = bench.rig.state.devices.value
@@ -40,8 +43,11 @@ def test_everything_runs_in_order_and_stops_with_the_reason(bench: CalibrateBenc
     assert (outcome.role, bench.state.refused.value) == ("bad", "selftest")
     assert main_button(bench.state, devices) == "selftest"
     bench.wrong = {}
+    monkeypatch.setattr(rig_traits, "_traits", lambda rig: iter(("a film is bent", "light is uneven")))
     bench.control.run_everything()
-    assert "Everything is calibrated" in bench.state.outcome.value.text
+    told = bench.state.outcome.value.text
+    assert "Everything is calibrated" in told
+    assert told.endswith("Measured by the calibration, and followed: a film is bent; light is uneven.")
     assert all(row.state.is_accepted for row in bench.state.rows.value)
     assert bench.state.refused.value == ""
     assert bench.library.names() == ("campaign",)

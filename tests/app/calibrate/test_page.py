@@ -10,13 +10,13 @@ from dsl_app.calibrate.campaign_box import NewCampaignDialog
 from dsl_app.calibrate.state import ABOUT
 from dsl_app.calibrate.wizard.settings_page import SettingsPage
 from dsl_app.shared.theme import DARK
+from dsl_app.shared.widgets.open_dialog import OpenDialog
 from PySide6.QtCore import QPoint
 from PySide6.QtGui import QDesktopServices
 from PySide6.QtWidgets import (
     QAbstractButton,
     QAbstractSpinBox,
     QComboBox,
-    QFileDialog,
     QLineEdit,
 )
 from pytestqt.qtbot import QtBot
@@ -44,7 +44,7 @@ def test_a_campaign_is_begun_and_opened_from_the_page(
     stage.windows[-1].reject()
     assert (tmp_path / "first" / "campaign.json").is_file()
     stage.idle()
-    monkeypatch.setattr(QFileDialog, "getExistingDirectory", lambda *_: str(tmp_path / "taken"))
+    monkeypatch.setattr(OpenDialog, "ask", lambda *_, **__: tmp_path / "taken")
     click(stage.page.head.open)
     assert "is not a campaign" in stage.bench.told
     assert stage.bench.state.campaign.value is not None

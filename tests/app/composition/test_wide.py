@@ -12,7 +12,8 @@ from dsl_app.results.page import ResultsPage
 from dsl_app.rig.page import RigPage
 from dsl_app.scan.page import ScanPage
 from dsl_app.shell.main_window import MainWindow
-from PySide6.QtWidgets import QWidget
+from dsl_app.shell.paged_window import LEAST
+from PySide6.QtWidgets import QApplication, QPushButton, QWidget
 from pytestqt.qtbot import QtBot
 
 from tests.app.support.real_window import show_window
@@ -20,6 +21,8 @@ from tests.app.support.small_result import write_small_result
 
 PAGES = ("rig", "scan", "calibrate", "results")
 HUGE, LARGE, SMALL = (2560, 1440), (1920, 1080), (1280, 800)
+#: A laptop of 1280 x 800 px at one and a half times the size, less the frame of a window.
+MAGNIFIED = (845, 493)
 
 
 @pytest.fixture
@@ -75,6 +78,31 @@ def test_views_are_side_by_side_in_a_large_window_alone(
         assert (share > 0.7) == is_large
     qtbot.waitUntil(lambda: not window.parts.runner.active, timeout=30_000)
     window.close()
+
+
+def test_what_comes_next_is_seen_on_a_magnified_screen(window: MainWindow, qtbot: QtBot) -> None:
+    window.setMinimumSize(LEAST)
+    scan = window.page_of("scan")
+    assert isinstance(scan, ScanPage)
+    for size in (MAGNIFIED, SMALL, MAGNIFIED):
+        window.resize(*size)
+        for key in window.pages:
+            page = window.open_page(key)
+            QApplication.processEvents()
+            assert window.size().toTuple() == size, f"{key} does not fit"
+            buttons = page.findChildren(QPushButton)
+            blue = [each for each in buttons if each.isVisible() and each.property("role") == "primary"]
+            assert blue or key not in ("start", "rig", "scan"), key
+            hidden = [each.text() for each in blue if each.visibleRegion().boundingRect() != each.rect()]
+            assert not hidden, f"{key}: {hidden}"
+        # A side that scrolls takes more height than it needs, so that it does so only where it must.
+        rig = window.page_of("rig")
+        assert isinstance(rig, RigPage)
+        assert (rig._left_side.parentWidget() is rig) == (size == SMALL)
+        # The plan is the first of the views where it has no column of its own.
+        assert (scan.middle.indexOf(scan._left_area) == 0) == (size == MAGNIFIED)
+        titles = [scan.middle.tabText(place) for place in range(scan.middle.count())]
+        assert len(titles) == len(set(titles)) == 3 + (size == MAGNIFIED)
 
 
 def _fills_the_left(page: QWidget, low: QWidget) -> bool:

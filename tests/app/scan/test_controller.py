@@ -241,6 +241,7 @@ def test_a_lost_camera_keeps_all_frames_and_the_scan_goes_on_later(
     assert (session.done, session.total) == (30, FRAMES)
     assert "Check its cable" in bench.state.trouble.value
     assert f"30 of {FRAMES} frames are saved" in bench.state.trouble.value
+    assert bench.state.trouble.value.count(" saved") == 1, "nobody is told twice"
     assert bench.scans.command_line() == f"dsl-scan resume {tmp_path / 'first.dsl'}"
     bench.scans.start()
     assert phase(bench) is Phase.DONE

@@ -5,6 +5,7 @@ import importlib.util
 import subprocess
 import sys
 import threading
+import time
 from types import SimpleNamespace
 
 import pytest
@@ -73,3 +74,21 @@ def test_it_gives_way_to_what_a_person_waits_for_but_not_for_ever(monkeypatch: p
     patient.start()
     patient._thread.join(30)
     assert "colorsys" in sys.modules
+
+
+def test_it_ends_within_a_step_that_takes_long(monkeypatch: pytest.MonkeyPatch) -> None:
+    begun, ended = threading.Event(), list[str]()
+
+    def compile_for_ever() -> None:
+        begun.set()
+        for _ in range(3000):
+            time.sleep(0.001)
+        ended.append("compiled")
+
+    monkeypatch.setitem(sys.modules, "a_play", SimpleNamespace(compile=compile_for_ever))
+    warm_up = WarmUp(["a_play:compile"])
+    warm_up.start()
+    assert begun.wait(30)
+    warm_up.stop()
+    assert warm_up.is_over
+    assert not ended

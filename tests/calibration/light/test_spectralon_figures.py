@@ -78,7 +78,7 @@ def test_a_calibration_is_judged_by_its_figures_and_their_limits() -> None:
         "saturated pixels": (0.05, None, 0.1, "%"),
         "middle filled by the Spectralon": (95.0, 90.0, None, "%"),
         "tilt of the Spectralon": (12.0, None, 15.0, "degrees"),
-        "unevenness about the smooth part": (0.4, None, 1.0, "%"),
+        "unevenness after the flat field": (0.4, None, 1.0, "%"),
         "white over red + green + blue in the pictures, largest difference": (3.0, None, 2.0, "%"),
         "deviation of white": (100 * np.hypot(0.01, 0.02) / 6, None, 0.5, "%"),
         "range of the flat field": (25.0, None, None, "%"),

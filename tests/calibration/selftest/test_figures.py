@@ -97,8 +97,8 @@ def test_a_good_rig_passes_though_published_exposures_beat() -> None:
     figures = selftest_figures(GOOD)
     assert failures(figures) == ()
     by_name = {figure.name: figure for figure in figures}
-    assert by_name["beat at 160.00 ms"].high is None
-    assert "166.67 ms" in by_name["beat at 160.00 ms"].advice
+    assert by_name["modulation of the light at 160.00 ms"].high is None
+    assert "166.67 ms" in by_name["modulation of the light at 160.00 ms"].advice
     assert by_name["latency from show to light"].value == 25.0
     assert by_name["linearity, largest residual of full scale"].value == 0.2
 
@@ -144,7 +144,7 @@ def test_a_good_rig_passes_though_published_exposures_beat() -> None:
         (
             with_("cycle", beats=(beat(500 / 3, BEAT_PERCENT + 0.029),)),
             with_("cycle", beats=(beat(500 / 3, BEAT_PERCENT + 0.031),)),
-            "beat at 166.67 ms",
+            "modulation of the light at 166.67 ms",
         ),
         (
             with_("focus", worst_px=of(BLUR_PX)),
@@ -174,7 +174,7 @@ def test_bounds_follow_from_the_camera_and_the_projector() -> None:
     assert found["saturation"].low == pytest.approx(0.9 * 4095)
     assert found["black level"].low == pytest.approx(5 * 2.0)
     assert (found["gamma"].low, found["gamma"].high) == (1.0, 3.5)
-    assert found["beat at 166.67 ms"].high == pytest.approx(0.3 + 3 * 0.01)
+    assert found["modulation of the light at 166.67 ms"].high == pytest.approx(0.3 + 3 * 0.01)
     assert (LINEARITY_PERCENT, GAMMA_SPREAD_PERCENT, RAMP_PERCENT) == (0.5, 2.0, 1.0)
     assert (HOT, BLACK, AMBIENT, WAIT_MS, BLUR_PX) == (1e-3, 0.01, 0.01, 1.0, 1.5)
 
@@ -207,4 +207,4 @@ def test_only_published_exposures_that_are_not_advised_may_beat(
     exposure_ms: float, advised_ms: float, has_limit: bool
 ) -> None:
     cycle = with_("cycle", advised_ms=(advised_ms,), beats=(beat(exposure_ms, 4.0),))
-    assert (named(cycle)[f"beat at {exposure_ms:.2f} ms"].high is not None) == has_limit
+    assert (named(cycle)[f"modulation of the light at {exposure_ms:.2f} ms"].high is not None) == has_limit

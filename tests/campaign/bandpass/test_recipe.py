@@ -127,9 +127,9 @@ def test_filters_that_are_all_off_alike_are_refused(
 def test_the_index_of_filters_is_told_where_they_shift(record: BandpassCalibration) -> None:
     assert record.filter_index is None, "the twin's own filters do not shift"
     shifting = record.model_copy(update={"filter_index": (1.9, 0.05)})
-    (told,) = [f for f in RECIPE.figures(shifting) if f.name.startswith("index of the filters")]
+    (told,) = [f for f in RECIPE.figures(shifting) if f.name.startswith("refractive index of the filters")]
     assert (told.value, told.std, told.passed) == (1.9, 0.05, True)
-    assert not [f for f in RECIPE.figures(record) if f.name.startswith("index of the filters")]
+    assert not [f for f in RECIPE.figures(record) if f.name.startswith("refractive index of the filters")]
 
 
 def test_figures_pass_and_record_goes_through_json(record: BandpassCalibration) -> None:

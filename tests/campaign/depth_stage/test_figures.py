@@ -61,7 +61,7 @@ def figure_of(
 
 def plane_figure(rms_px: dict[float, float], limit_px: float = 0.04) -> Figure:
     """The figure of the planes themselves."""
-    return figure_of("scatter about the plane", rms_px, limit_px, None)
+    return figure_of("residual about the plane, rms", rms_px, limit_px, None)
 
 
 def test_the_same_error_of_columns_passes_at_every_distance() -> None:
@@ -101,7 +101,9 @@ def chain_figure(plus: float, minus: float) -> Figure:
         pixels=100,
         chi_square=1.0,
     )
-    figure = figure_of("largest correction of the chain", {600.0: 0.01, 900.0: 0.01}, 0.04, chain)
+    figure = figure_of(
+        "largest correction of response, emission and efficiency", {600.0: 0.01, 900.0: 0.01}, 0.04, chain
+    )
     assert not figure.passed
     return figure
 
@@ -131,7 +133,7 @@ def test_orders_that_do_not_change_by_opposite_shares_blame_no_film(plus: float,
 def test_filters_that_shift_otherwise_than_before_are_told(
     now: tuple[float, float], before: tuple[float, float], passed: bool
 ) -> None:
-    name = "index of the filters against that at the bandpass filters' step"
+    name = "refractive index of the filters, change since the bandpass filters"
     figure = figure_of(name, {600.0: 0.01, 900.0: 0.01}, 0.04, None, (now, before))
     assert figure.value == pytest.approx(now[0] - before[0])
     assert figure.passed is passed

@@ -128,7 +128,7 @@ def test_filters_that_are_all_off_alike_are_told_where_the_film_is_known(
 def test_a_film_that_is_no_cylinder_is_told_by_its_slope(record: DepthStageCalibration) -> None:
     def slopes(film: Film) -> list[float]:
         figures = RECIPE.figures(record.model_copy(update={"film": film}))
-        return [figure.value for figure in figures if figure.name == "film's steepest place besides its bend"]
+        return [figure.value for figure in figures if figure.name == "film's largest slope beyond curvature"]
 
     assert slopes(record.film) == []
     twist = FilmShape(factors=(0.004, 0.0, 0.0, 0.0, 0.0, 0.0))

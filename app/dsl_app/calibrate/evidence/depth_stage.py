@@ -149,7 +149,7 @@ class DepthStageEvidence(Evidence[DepthStageCalibration]):
         heights = np.array([position.column_rms_px for position in record.positions])
         limit_px = min(position.column_limit_px for position in record.positions)
         names = [f"{p.position_mm:g}" for p in record.positions]
-        left_open = f"depth left open by the geometry {record.depth_std_mm:.3f} mm"
+        left_open = f"standard deviation of depth from the geometry {record.depth_std_mm:.3f} mm"
         bars = Bars("", theme.pins[0], heights)
         draw_bars(box, [bars], names, limit_px, theme, (left_open, theme.text, ""))
 
@@ -162,7 +162,7 @@ class DepthStageEvidence(Evidence[DepthStageCalibration]):
         draw_points(box, at, error, std, theme.pins[0])
         box.item.setXRange(at.min(), at.max(), padding=0.1)
         range_about_zero(box, 1.2 * float((np.abs(error) + COVER * std).max()), MAX_STEP_MM, theme)
-        pull = f"pull of the planes on the geometry {record.geometry_pull:.2f} deviations"
+        pull = f"correction of the geometry by the planes {record.geometry_pull:.2f} standard deviations"
         box.name_curves((pull, theme.text, ""))
 
     # First orders ----------------------------------------------------------------------------------

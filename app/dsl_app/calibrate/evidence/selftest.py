@@ -55,7 +55,7 @@ class SelfTestEvidence(Evidence[SelfTest]):
             "Drive (of full)",
         )
         self.beat = ChartBox(
-            "Beat of the colour cycle",
+            "Modulation of the light",
             "Spread of the colour ratios over repeats at one exposure, with 95 % bars. Exposures of whole"
             " cycles have none; the advised ones are marked.",
             "Spread of ratios (%)",
@@ -146,7 +146,7 @@ class SelfTestEvidence(Evidence[SelfTest]):
     def _draw_beat(self, cycle: CycleCheck) -> None:
         box, beats = self.beat, sorted(cycle.beats, key=lambda beat: beat.exposure_ms)
         if not beats:
-            box.say("No exposures were repeated, so nothing is known about a beat.")
+            box.say("No exposures were repeated, so nothing is known about modulation of the light.")
             return
         box.begin()
         theme, at = self._theme, np.arange(len(beats))

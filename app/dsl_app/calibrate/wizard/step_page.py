@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pyqtgraph as pg
 from PySide6.QtCore import Qt
+from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import QWidget
 
 from dsl_app.calibrate.figures_table import FiguresTable
@@ -18,7 +19,8 @@ from dsl_app.shared.widgets.layouts import boxed, column_of, row_of, splitter
 from dsl_app.shared.widgets.pictures import PictureView
 from dsl_core.capture.preview import MANY_SATURATED
 
-TABLE_PX = 166
+#: Height of the table of figures, and in a page that is lower than this.
+TABLE_PX, LOW_TABLE_PX, LOW_PX = 166, 92, 560
 DASHES = Qt.PenStyle.DashLine
 NO_FIGURES = "What a check finds is listed here: figures, their limits, and what to do about those outside."
 
@@ -35,7 +37,6 @@ class StepPage(QWidget):
         self.picture = LiveFrameView()
         self.verdict = label("", "muted", wraps=True, name="Whether the target is right")
         self.figures = FiguresTable("What the check found")
-        self.figures.setFixedHeight(TABLE_PX)
         self.figures.empty_text = NO_FIGURES
         self._lay_out()
         shown = (
@@ -48,6 +49,11 @@ class StepPage(QWidget):
         left = boxed(column_of((self.drawing, 1), self.instruction, margins=0))
         split = splitter(Qt.Orientation.Horizontal, (left, 1), (self.picture, 1))
         column_of(self.title, (split, 1), self.verdict, self.figures, on=self, margins=(8, 0, 0, 0))
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        """Give drawing and instruction the room that a low window has; the table scrolls."""
+        super().resizeEvent(event)
+        self.figures.setFixedHeight(TABLE_PX if event.size().height() >= LOW_PX else LOW_TABLE_PX)
 
     def _show(self) -> None:
         shown = step_display(self._state)

@@ -59,8 +59,9 @@ class CalibrationWizard(QDialog):
         self.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         self.setWindowTitle(f"Calibrate: {state.title}")
         self.setWindowFlag(Qt.WindowType.WindowMaximizeButtonHint, True)
-        self.setMinimumSize(SMALLEST)
-        self.resize(_fitting(parent.window().size()))
+        room = parent.window().size()
+        self.setMinimumSize(SMALLEST.boundedTo(room))
+        self.resize(_fitting(room))
         self.banner = Banner(
             "Connect the rig again", "Open all devices of the rig again and continue here", commands.reconnect
         )
@@ -157,7 +158,7 @@ def _fitting(room: QSize) -> QSize:
     """A size for a wizard over a window: most of it, with its edges still visible."""
     most = QSize(round(0.84 * room.width()), round(0.88 * room.height()))
     inside = QSize(room.width() - 40, room.height() - 40)
-    return most.expandedTo(USUAL).boundedTo(inside).expandedTo(SMALLEST)
+    return most.expandedTo(USUAL).boundedTo(inside).expandedTo(SMALLEST.boundedTo(room))
 
 
 class PageList(QListWidget):

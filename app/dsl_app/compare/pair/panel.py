@@ -20,7 +20,7 @@ from dsl_app.shared.widgets.deferred import Deferred
 from dsl_app.shared.widgets.forms import label, push_button, remark_line, show_parts
 from dsl_app.shared.widgets.help_window import set_help
 from dsl_app.shared.widgets.layouts import STRETCH, boxed, column_of, row_of, splitter
-from dsl_app.shared.widgets.open_dialog import OpenDialog
+from dsl_app.shared.widgets.open_dialog import ALL, RESULTS, OpenDialog
 from dsl_app.shared.widgets.plots import CalmPlot, colour_legend
 from dsl_app.shared.widgets.recent_list import RecentList
 from dsl_app.shared.widgets.spectrum_curve import SpectrumCurve
@@ -89,7 +89,7 @@ class PairPanel(QWidget):
         ]
 
     def _choose(self, second: bool) -> None:
-        path = OpenDialog.ask(self, f"Open a result as {'B' if second else 'A'}")
+        path = OpenDialog.ask(self, f"Open a result as {'B' if second else 'A'}", filters=(RESULTS, ALL))
         if path is not None:
             self._control.open_side(path, second)
 

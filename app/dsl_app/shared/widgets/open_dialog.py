@@ -2,16 +2,24 @@
 
 from __future__ import annotations
 
+from fnmatch import fnmatch
 from pathlib import Path
 
-from PySide6.QtCore import QDir, QFileInfo
+from PySide6.QtCore import QDir, QFileInfo, QModelIndex, QPersistentModelIndex, QSortFilterProxyModel
 from PySide6.QtGui import QAbstractFileIconProvider, QIcon
-from PySide6.QtWidgets import QFileDialog, QFileIconProvider, QWidget
+from PySide6.QtWidgets import QFileDialog, QFileIconProvider, QFileSystemModel, QWidget
 
 from dsl_app.shared.known_files import Kind, kind_of, meant_by
 
 #: Folders that are opened whole.
 THINGS = (Kind.SCAN, Kind.RESULT, Kind.CAMPAIGN)
+#: What may be shown alone, in the words of Qt's filters.
+ALL, RESULTS, SCANS, BOTH = (
+    "All files (*)",
+    "Results (*.zarr)",
+    "Scans (*.dsl)",
+    "Results and scans (*.zarr *.dsl)",
+)
 
 
 class _Icons(QFileIconProvider):
@@ -34,14 +42,42 @@ def is_thing(path: Path) -> bool:
     return path.is_dir() and kind_of(path) in THINGS
 
 
+class _Things(QSortFilterProxyModel):
+    """Shows those scans and results that the chosen filter names; Qt's filters are for files alone."""
+
+    def __init__(self, dialog: QFileDialog) -> None:
+        super().__init__(dialog)
+        self._patterns = ["*"]
+
+    def show_filter(self, words: str) -> None:
+        """Show what a filter names from now on."""
+        self._patterns = words.rpartition("(")[2].rstrip(")").split()
+        self.invalidate()
+
+    def filterAcceptsRow(self, row: int, parent: QModelIndex | QPersistentModelIndex) -> bool:
+        """Whether a file or folder is shown; a folder without such an ending always is."""
+        model = self.sourceModel()
+        assert isinstance(model, QFileSystemModel)
+        path = Path(model.filePath(model.index(row, 0, parent)))
+        is_named = path.suffix.lower() in (".dsl", ".zarr")
+        return not is_named or any(fnmatch(path.name.lower(), pattern) for pattern in self._patterns)
+
+
 class OpenDialog(QFileDialog):
     """Ends with the thing that is double-clicked, or chosen with *Open*; other folders are entered.
 
-    Where ``takes_folders``, *Open* chooses any folder. It is Qt's own dialog: those of systems know only
-    folders.
+    Where ``takes_folders``, *Open* chooses any folder. ``filters`` are offered, the first is on. It is Qt's
+    own dialog: those of systems know only folders.
     """
 
-    def __init__(self, parent: QWidget | None, title: str, folder: str, takes_folders: bool) -> None:
+    def __init__(
+        self,
+        parent: QWidget | None,
+        title: str,
+        folder: str,
+        takes_folders: bool,
+        filters: tuple[str, ...] = (ALL, RESULTS, SCANS),
+    ) -> None:
         super().__init__(parent, title, folder)
         self._takes_folders = takes_folders
         self.chosen: Path | None = None
@@ -52,6 +88,11 @@ class OpenDialog(QFileDialog):
         self._icons = _Icons()
         self.setIconProvider(self._icons)
         self.setFilter(QDir.Filter.AllEntries | QDir.Filter.NoDotAndDotDot | QDir.Filter.AllDirs)
+        self._things = _Things(self)
+        self.setProxyModel(self._things)
+        self.setNameFilters(list(filters))
+        self.filterSelected.connect(self._things.show_filter)
+        self._things.show_filter(filters[0])
         self.directoryEntered.connect(self._entered)
 
     def _entered(self, folder: str) -> None:
@@ -73,10 +114,15 @@ class OpenDialog(QFileDialog):
 
     @classmethod
     def ask(
-        cls, parent: QWidget | None, title: str, folder: str = "", takes_folders: bool = False
+        cls,
+        parent: QWidget | None,
+        title: str,
+        folder: str = "",
+        takes_folders: bool = False,
+        filters: tuple[str, ...] = (ALL, RESULTS, SCANS),
     ) -> Path | None:
         """What a person chooses, None for nothing."""
-        dialog = cls(parent, title, folder, takes_folders)
+        dialog = cls(parent, title, folder, takes_folders, filters)
         dialog.exec()
         chosen = dialog.chosen
         dialog.deleteLater()

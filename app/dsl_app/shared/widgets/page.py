@@ -17,24 +17,27 @@ from dsl_app.shared.widgets.inside import apply_theme_inside, stop_following
 WIDE_PX = 1600
 #: A wide page of this height, px, has room for everything that is set or read in one column.
 TALL_PX = 1200
+#: Below this width or height, px, a page has no room for three columns, or for all boxes below each other.
+NARROW_PX, LOW_PX = 900, 520
 
 
 class PageWidget(QWidget):
     """A page. Everything is optional: a page overrides what applies to it."""
 
-    #: Whether the page is laid out for a wide window, and for one that is high, too.
-    is_wide = is_tall = False
+    #: Whether the page is laid out for a wide window, for one that is high, too, or for a small screen.
+    is_wide = is_tall = is_small = False
 
     def arrange(self) -> None:
-        """Lay the page out as `is_wide` and `is_tall` say; called when one of them changes."""
+        """Lay the page out as `is_wide`, `is_tall` and `is_small` say; called when one of them changes."""
 
     def resizeEvent(self, event: QResizeEvent) -> None:
         """Lay the page out for the size that it has now."""
         super().resizeEvent(event)
         is_wide = event.size().width() >= WIDE_PX
         is_tall = is_wide and event.size().height() >= TALL_PX
-        if (is_wide, is_tall) != (self.is_wide, self.is_tall):
-            self.is_wide, self.is_tall = is_wide, is_tall
+        is_small = not is_wide and (event.size().width() < NARROW_PX or event.size().height() < LOW_PX)
+        if (is_wide, is_tall, is_small) != (self.is_wide, self.is_tall, self.is_small):
+            self.is_wide, self.is_tall, self.is_small = is_wide, is_tall, is_small
             self.arrange()
 
     def page_actions(self) -> dict[str, Callable[[], object]]:

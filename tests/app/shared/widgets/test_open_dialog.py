@@ -5,8 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from dsl_app.shared.widgets.open_dialog import OpenDialog, is_thing
+from dsl_app.shared.widgets.open_dialog import ALL, SCANS, OpenDialog, is_thing
 from PySide6.QtCore import QFileInfo
+from PySide6.QtWidgets import QTreeView
 from pytestqt.qtbot import QtBot
 
 
@@ -65,3 +66,19 @@ def test_any_folder_may_be_meant(qtbot: QtBot, home: Path) -> None:
     dialog.selectFile(str(home / "plain"))
     dialog.accept()
     assert dialog.chosen == home / "plain"
+
+
+def test_a_filter_shows_scans_or_results_alone(qtbot: QtBot, home: Path) -> None:
+    dialog = OpenDialog(None, "Open", str(home), takes_folders=False, filters=(SCANS, ALL))
+    qtbot.addWidget(dialog)
+    dialog.show()
+    listed = dialog.findChild(QTreeView)
+    assert listed is not None
+
+    def names() -> set[str]:
+        model, root = listed.model(), listed.rootIndex()
+        return {str(model.index(row, 0, root).data()) for row in range(model.rowCount(root))}
+
+    qtbot.waitUntil(lambda: names() == {"leaf.dsl", "plain"})
+    dialog.filterSelected.emit(ALL)
+    qtbot.waitUntil(lambda: names() == {"leaf.dsl", "leaf.zarr", "plain"})
