@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from dsl_core.cli.options import parse_options
 from dsl_core.cli.output import Output
-from dsl_core.errors import CalibrationError, Cancelled
+from dsl_core.errors import CalibrationError, Cancelled, DeviceError
 
 if TYPE_CHECKING:
     from dsl_core.campaign.common.recipe import Step
@@ -112,11 +112,13 @@ def opened_campaign(
 
 @contextmanager
 def resumed_by(command: str) -> Iterator[None]:
-    """Turn Ctrl-C into a sentence with the command that resumes."""
+    """Turn Ctrl-C into a sentence with the command that resumes, and add it to that of a lost device."""
     try:
         yield
     except (KeyboardInterrupt, Cancelled):
         raise Cancelled(f"Stopped; everything captured is kept. Resume with: {command}") from None
+    except DeviceError as error:
+        raise type(error)(f"{error} Everything captured is kept. Resume with: {command}") from error
 
 
 def answer(output: Output, question: str) -> str:

@@ -13,6 +13,8 @@ import numpy as np
 import pytest
 
 from dsl_core.cli import main
+from dsl_core.cli.guidance import resumed_by
+from dsl_core.errors import DeviceError, DriftError
 from dsl_core.io.scan.folder import ScanReader
 
 from .conftest import SMALL_RIG, Give, without_progress
@@ -106,3 +108,15 @@ def test_a_scan_of_another_scene_is_not_mixed_in(give: Give, scan_copy: Path) ->
     assert ending.code == 2
     assert "changed since the scan stopped" in ending.sentence
     assert len(ScanReader(scan_copy).missing()) == 1
+
+
+@pytest.mark.parametrize("kind", [DeviceError, DriftError])
+def test_a_lost_device_ends_with_the_command_that_resumes(kind: type[DeviceError]) -> None:
+    with (
+        pytest.raises(
+            kind, match=r"No answer\. Everything captured is kept\. Resume with: dsl-scan resume a"
+        ) as told,
+        resumed_by("dsl-scan resume a"),
+    ):
+        raise kind("No answer.")
+    assert type(told.value) is kind
