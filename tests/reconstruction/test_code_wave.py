@@ -148,8 +148,14 @@ def test_widths_that_differ_over_the_picture_are_doubted() -> None:
         with_varying_width(before, LINES, named, maps_of((true_px - each * sine).ravel()))
         for each in (wider, 0.1)
     )
-    # The means of three parts are .1, 0 and -.1.
-    assert varied.relative == pytest.approx(0.1 * math.sqrt(2 / 3), rel=0.25)
+    # The means of three parts are .1, 0 and -.1; the middle is doubted as much as usual.
+    assert varied.relative == before.relative
+    assert varied.varies is not None
+    parts = varied.varies.reshape(true_px.shape)[:, [10, 75, 140]]
+    assert parts == pytest.approx(np.broadcast_to([0.1, 0.082, 0.1], parts.shape), rel=0.12)
+    middle = float(LINES.first_px) + 1.0
+    of_pixels = varied.at(np.full(true_px.size, middle)).reshape(true_px.shape)
+    assert of_pixels[0, 10] > 8 * before.at(np.array([middle]))[0]
     assert even is before
     unknown = with_varying_width(before, LINES, np.full_like(named, -1), maps_of(true_px.ravel()))
     assert unknown is before

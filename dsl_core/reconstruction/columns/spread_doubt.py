@@ -43,7 +43,8 @@ class SpreadDoubt:
 
     ``relative`` is the deviation of the width. With a width twice as large, columns of these places would
     move by ``moved_px`` (PLACES,) on average, and by ``rms_px`` (PLACES,) rms. ``unseen`` says that lines
-    saturate, so that it stands for their shape, which no measured width makes any surer.
+    saturate, so that it stands for their shape, which no measured width makes any surer. ``varies`` is what
+    the width of each pixel (pixels,) is off by, relative to the one for all; None where that is little.
     """
 
     lines: LineSet
@@ -51,12 +52,19 @@ class SpreadDoubt:
     moved_px: NDArray[np.float64]
     rms_px: NDArray[np.float64]
     unseen: bool = False
+    varies: NDArray[np.float64] | None = None
 
     def at(self, column_px: NDArray[np.floating]) -> NDArray[np.float32]:
-        """Deviation at columns of any shape, px; 0 where they are NaN."""
+        """Deviation at columns, px; 0 where they are NaN. Of any shape, or (pixels,) where widths vary."""
         place = _places(self.lines, torch.as_tensor(np.nan_to_num(column_px)))
-        std_px = self.relative * self.rms_px
-        return np.where(np.isfinite(column_px), std_px[place.numpy()], 0.0).astype(np.float32)
+        relative = self.relative if self.varies is None else np.hypot(self.relative, self.varies)
+        std_px = relative * self.rms_px[place.numpy()]
+        return np.where(np.isfinite(column_px), std_px, 0.0).astype(np.float32)
+
+    @property
+    def is_sure(self) -> bool:
+        """Whether widths are known so well that they move no column by as much as anybody minds."""
+        return self.relative < SURE and self.varies is None
 
     def moved_at(self, off_px: NDArray[np.float64]) -> NDArray[np.float64]:
         """By how much columns so far (n,) to the right of a line's middle would move, px."""
@@ -74,14 +82,15 @@ def spread_doubt(
 ) -> SpreadDoubt | None:
     """How far columns move with a width that is neither calibrated nor ``found`` any better.
 
-    None where single lines do not cover the picture, and where it is known well enough.
+    None where single lines do not cover the picture. Where it is known well enough, parts of the picture may
+    still differ (see `code_wave.with_varying_width`).
     """
     unseen = spread_pixels(lines, code, white).size == 0
     relative = UNSEEN_STD if unseen else FOCUS_STD
     if found is not None:
         seen = found.rms_std_px / found.response.blur_px
         relative *= seen / float(np.hypot(FOCUS_STD, seen))
-    if lines is None or relative < SURE:
+    if lines is None:
         return None
     with one_kernel_thread():
         peaks = smooth_peaks(rig, lines, code, white, stack)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -73,7 +74,12 @@ def test_what_a_scan_says_of_the_width_counts_and_where_it_is_sure_nothing_is_do
     assert together is not None
     assert together.relative == pytest.approx(alone.relative / np.sqrt(2))
     assert together.rms_px == pytest.approx(alone.rms_px)
-    assert doubt(width_found(0.001)) is None
+    assert not together.is_sure
+    surely = doubt(width_found(0.001))
+    assert surely is not None
+    assert surely.is_sure
+    # One width for all that is sure may be none of its parts'.
+    assert not replace(surely, varies=np.full(ROWS * COLUMNS, 0.05)).is_sure
     assert doubt(None, None) is None
 
 
