@@ -149,7 +149,7 @@ class Sensor(Record):
     @property
     def rounds_light(self) -> bool:
         """Whether noise is too small to carry light across steps: means of many values are rounded too."""
-        return self.step_dn > 1 and self.step_dn > self.read_noise_dn * 12**0.5
+        return self.step_dn > self.read_noise_dn * 12**0.5
 
 
 class ProjectorResponse(Record):

@@ -58,6 +58,8 @@ class OwnWidth:
 
     def known(self, doubt: SpreadDoubt) -> SpreadDoubt:
         """What is left of a doubt about the width; what is not followed is doubted as well."""
+        if doubt.unseen:
+            return doubt
         left = math.hypot(self.std, 0.0 if self.changed else self.wider)
         return replace(doubt, relative=min(left, doubt.relative))
 
@@ -170,7 +172,7 @@ def _known_share(named_px: NDArray[np.integer], known: NDArray[np.bool_], step_p
 def with_varying_width(
     doubt: SpreadDoubt, lines: LineSet | None, named_px: NDArray[np.integer], maps: ColumnMaps
 ) -> SpreadDoubt:
-    """A doubt that holds by how much widths of parts of the picture (rows, columns) differ, if that matters.
+    """A doubt that holds by how much the width in each part of the picture differs, if that matters.
 
     One width for all is off in most places of a lens that blurs its corners, and waves of opposite signs
     cancel in the whole picture. Other arguments are those of `code_wave`.
@@ -182,14 +184,18 @@ def with_varying_width(
         for each in range(PARTS[0] * PARTS[1])
     ]
     free = replace(doubt, relative=1.0)
-    widths = [wave.own_width(free) for wave in waves if wave is not None]
+    widths = {each: wave.own_width(free) for each, wave in enumerate(waves) if wave is not None}
     if len(widths) < 2:
         return doubt
-    wider, std = (np.array([getattr(each, name) for each in widths]) for name in ("wider", "std"))
-    varies, varies_std = rms_beyond_chance(wider - np.average(wider, weights=std**-2), std)
+    wider, std = (np.array([getattr(each, name) for each in widths.values()]) for name in ("wider", "std"))
+    off = wider - np.average(wider, weights=std**-2)
+    varies, varies_std = rms_beyond_chance(off, std)
     if not matters(varies, varies_std, MOST_WIDER):
         return doubt
-    return replace(doubt, relative=math.hypot(doubt.relative, varies))
+    # A part that says more than all together is off by what it says; the others may be as far off as usual.
+    of_part = np.full(len(waves), varies)
+    of_part[list(widths)] = np.maximum(np.abs(off), varies)
+    return replace(doubt, varies=of_part[part])
 
 
 def _mirrored(lines: LineSet) -> tuple[NDArray[np.int64], NDArray[np.int64]]:

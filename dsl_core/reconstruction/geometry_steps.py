@@ -81,6 +81,7 @@ class GeometrySteps:
         named = NamedPlaces.of(code)
         wave = code_wave(lines, named.column, columns.maps) if refines_rig else None
         if wave is not None and doubt is not None:
+            # One width may be well known, and yet be that of no part of a picture whose focus varies.
             own = wave.own_width(doubt)
             doubt = own.known(doubt)
             if own.changed:
@@ -99,7 +100,7 @@ class GeometrySteps:
             columns,
             frames.shape,
             options.surface_window_px,
-            doubt,
+            None if doubt is None or doubt.is_sure else doubt,
             code_wave_px=0.0 if wave is None else wave.error_px,
         )
         del columns

@@ -98,7 +98,7 @@ def test_shot_noise_starts_at_black() -> None:
 
 @pytest.mark.parametrize(
     ("step_dn", "read_noise_dn", "rounds"),
-    [(1, 0.1, False), (16, 0.5, True), (16, 4.5, True), (16, 4.7, False)],
+    [(1, 0.5, False), (1, 0.1, True), (16, 0.5, True), (16, 4.5, True), (16, 4.7, False)],
 )
 def test_light_is_rounded_where_noise_is_smaller_than_that_of_steps(
     step_dn: int, read_noise_dn: float, rounds: bool

@@ -124,6 +124,11 @@ def test_columns_as_the_code_names_them_change_no_width() -> None:
     assert OwnWidth(0.02, 0.01).known(doubt_of(0.005)).relative == 0.005
 
 
+def test_a_width_makes_the_shape_of_lines_that_saturate_no_surer() -> None:
+    unseen = replace(doubt_of(0.2), unseen=True)
+    assert OwnWidth(0.05, 0.01).known(unseen) == unseen
+
+
 def test_a_wave_of_another_shape_says_less_of_the_width() -> None:
     found = code_wave(LINES, NAMED_PX, maps_of(TRUE_PX - 0.1 * SINE))
     assert found is not None
@@ -143,8 +148,14 @@ def test_widths_that_differ_over_the_picture_are_doubted() -> None:
         with_varying_width(before, LINES, named, maps_of((true_px - each * sine).ravel()))
         for each in (wider, 0.1)
     )
-    # The means of three parts are .1, 0 and -.1.
-    assert varied.relative == pytest.approx(0.1 * math.sqrt(2 / 3), rel=0.25)
+    # The means of three parts are .1, 0 and -.1; the middle is doubted as much as usual.
+    assert varied.relative == before.relative
+    assert varied.varies is not None
+    parts = varied.varies.reshape(true_px.shape)[:, [10, 75, 140]]
+    assert parts == pytest.approx(np.broadcast_to([0.1, 0.082, 0.1], parts.shape), rel=0.12)
+    middle = float(LINES.first_px) + 1.0
+    of_pixels = varied.at(np.full(true_px.size, middle)).reshape(true_px.shape)
+    assert of_pixels[0, 10] > 8 * before.at(np.array([middle]))[0]
     assert even is before
     unknown = with_varying_width(before, LINES, np.full_like(named, -1), maps_of(true_px.ravel()))
     assert unknown is before

@@ -16,7 +16,7 @@ from dsl_core.optics.spread.field import widths_at
 from dsl_core.optics.unlit import unlit_px
 from dsl_core.patterns.gray_code import DecodedCode
 from dsl_core.reconstruction.columns.dark_offset import dark_offset
-from dsl_core.reconstruction.columns.line_spread import Pickable, spread_pixels
+from dsl_core.reconstruction.columns.line_spread import Pickable, overexposed_pixels, spread_pixels
 from dsl_core.reconstruction.hdr import MergedFrame
 
 
@@ -91,8 +91,13 @@ class LinePeaks:
 def smooth_peaks(
     rig: Rig, lines: LineSet | None, code: DecodedCode, white: MergedFrame, stack: Pickable
 ) -> LinePeaks | None:
-    """The peaks of bright pixels on smooth surfaces; None where single lines do not cover the picture."""
+    """The peaks of bright pixels on smooth surfaces; None where single lines do not cover the picture.
+
+    Of an overexposed picture without such pixels, those of any.
+    """
     pixels = spread_pixels(lines, code, white)
+    if pixels.size == 0:
+        pixels = overexposed_pixels(lines, white)
     if lines is None or pixels.size == 0:
         return None
     seen = stack.pick(pixels)

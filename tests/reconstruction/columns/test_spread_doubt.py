@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -14,7 +15,7 @@ from dsl_core.optics.lines.profile import zero_order_profile
 from dsl_core.optics.spread.fit import SpreadFit
 from dsl_core.reconstruction.columns.column import refine
 from dsl_core.reconstruction.columns.line_peaks import LinePeaks
-from dsl_core.reconstruction.columns.spread_doubt import FOCUS_STD, SpreadDoubt, spread_doubt
+from dsl_core.reconstruction.columns.spread_doubt import FOCUS_STD, UNSEEN_STD, SpreadDoubt, spread_doubt
 from dsl_core.reconstruction.merge import PickedLines
 from tests.cases.small_rig import small_rig
 
@@ -33,11 +34,15 @@ def lines_seen(response: ProjectorResponse) -> tuple[np.ndarray, np.ndarray]:
     return light, np.full_like(light, 0.002)
 
 
-def doubt(found: SpreadFit | None, lines: LineSet | None = LINES) -> SpreadDoubt | None:
+def doubt(
+    found: SpreadFit | None, lines: LineSet | None = LINES, overexposed: float = 0.0
+) -> SpreadDoubt | None:
+    """With the upper part of the picture, that share of it, brighter than the camera can tell."""
     light, std = lines_seen(RESPONSE)
-    known = np.zeros(SHAPE, bool)
-    code = SimpleNamespace(undecided=known, likely_column=COLUMN.round())
-    white = SimpleNamespace(saturated=known, radiance=np.ones(SHAPE))
+    saturated = np.broadcast_to(np.arange(ROWS)[:, None] < overexposed * ROWS, SHAPE)
+    std[(light > 0.9) & saturated.ravel()] = np.inf
+    code = SimpleNamespace(undecided=saturated, likely_column=COLUMN.round())
+    white = SimpleNamespace(saturated=saturated, radiance=np.ones(SHAPE))
 
     def pick(pixels: np.ndarray) -> PickedLines:
         return PickedLines(pixels, light[:, pixels], std[:, pixels], np.zeros(len(pixels), np.float32))
@@ -69,8 +74,25 @@ def test_what_a_scan_says_of_the_width_counts_and_where_it_is_sure_nothing_is_do
     assert together is not None
     assert together.relative == pytest.approx(alone.relative / np.sqrt(2))
     assert together.rms_px == pytest.approx(alone.rms_px)
-    assert doubt(width_found(0.001)) is None
+    assert not together.is_sure
+    surely = doubt(width_found(0.001))
+    assert surely is not None
+    assert surely.is_sure
+    # One width for all that is sure may be none of its parts'.
+    assert not replace(surely, varies=np.full(ROWS * COLUMNS, 0.05)).is_sure
     assert doubt(None, None) is None
+
+
+def test_where_all_lines_saturate_their_shape_is_doubted() -> None:
+    seen, unseen = doubt(None), doubt(None, overexposed=1.0)
+    assert seen is not None
+    assert unseen is not None
+    assert (seen.unseen, unseen.unseen) == (False, True)
+    assert unseen.relative == UNSEEN_STD
+    assert unseen.at(COLUMN).max() > 0.1
+    half = doubt(None, overexposed=0.5)
+    assert half is not None
+    assert (half.unseen, half.relative) == (False, FOCUS_STD)
 
 
 def test_columns_that_nobody_knows_are_not_doubted_further() -> None:
