@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from dsl_core.calibration.light.chain import (
     MIN_PIXELS,
@@ -267,12 +268,12 @@ def test_the_chain_is_no_surer_than_its_model_whatever_frames_and_places_say(
 ) -> None:
     monkeypatch.setattr("dsl_core.calibration.light.chain._product", lambda *_: np.eye(2))
 
-    def std(covariance: float, of_mean: float, of_place: float) -> list[float]:
+    def std(covariance: float, of_mean: float, of_place: float) -> NDArray[np.float64]:
         solution: Any = SimpleNamespace(covariance=covariance * np.eye(2))
         left_out: Any = SimpleNamespace(
             variance_of_mean=lambda _: np.full(2, of_mean), variance_of_place=lambda _: np.full(2, of_place)
         )
-        return _chain_std(published_rig(), 1, solution, left_out).tolist()
+        return _chain_std(published_rig(), 1, solution, left_out)
 
     assert std(0.0, 0.0, 0.0) == pytest.approx([MODEL_STD] * 2)
     assert std(1e-4, 2e-4, 1e-4) == pytest.approx([np.hypot(0.02, MODEL_STD)] * 2)

@@ -421,7 +421,8 @@ def test_three_bands_are_red_green_and_blue_of_a_picture_in_their_order(tmp_path
     result = small_result()
     shades = np.array([0.1, 0.2, 0.5, 0.9, 0.3])[:, None, None]
     result["reflectance"].values[:] = np.broadcast_to(shades, result["reflectance"].shape)
-    chosen = tuple(float(WAVELENGTHS_NM[k]) for k in (3, 0, 2))
+    red_nm, green_nm, blue_nm = (float(WAVELENGTHS_NM[k]) for k in (3, 0, 2))
+    chosen = red_nm, green_nm, blue_nm
     export_png(result, tmp_path / "view.png", bands_nm=chosen, bands_levels=(0.0, 1.0))
     name = "_".join(f"{nm:g}" for nm in chosen)
     picture = np.asarray(Image.open(tmp_path / f"view_{name}nm.png"))

@@ -182,7 +182,9 @@ def test_of_two_places_one_is_right_with_twice_the_peak_of_the_other(
         return maps
 
     white = MergedFrame(
-        radiance=np.full((1, 1), 2.0), variance=np.zeros((1, 1)), saturated=np.zeros((1, 1), bool)
+        radiance=np.full((1, 1), 2.0, np.float32),
+        variance=np.zeros((1, 1), np.float32),
+        saturated=np.zeros((1, 1), bool),
     )
     finder: Any = SimpleNamespace(
         profiles="lines", white=white, find=lambda *_, **__: found(100.0 + apart_px, times)
