@@ -11,6 +11,11 @@ from dsl_core.model.rig import BayerPattern, FlatField, Rig, Sensor, colour_site
 
 Floats = NDArray[np.float64]
 
+#: A value that fewer pixels have says nothing about the step to the next one.
+SEEN = 5
+#: So many steps of one size are no chance.
+ALIKE = 10
+
 
 def bayer_channels(bayer: BayerPattern, rows: int, columns: int) -> NDArray[np.int64]:
     """Colour (0 R, 1 G, 2 B) of every pixel of a mosaic, shape (rows, columns).
@@ -30,6 +35,19 @@ def raw_variance(sensor: Sensor, signal_dn: NDArray[np.floating]) -> NDArray[np.
     """
     floor = sensor.read_noise_dn**2 + sensor.step_dn**2 / 12
     return np.asarray(floor + np.maximum(signal_dn, 0) / sensor.electrons_per_dn)
+
+
+def step_of(total: NDArray[np.int64]) -> int:
+    """The usual distance between neighbouring values (DN), from how often each occurs, shape (values,)."""
+    values = np.flatnonzero(total >= SEEN)
+    if values.size < 2:
+        return 1
+    steps, weights = np.diff(values), total[values[:-1]]
+    order = np.argsort(steps)
+    middle = np.searchsorted(np.cumsum(weights[order]), weights.sum() / 2)
+    step = int(steps[order[middle]])
+    # Pictures converted from fewer bits have steps of two neighbouring sizes, such as 16 and 17.
+    return step if np.count_nonzero(np.abs(steps - step) <= 1) >= ALIKE else 1
 
 
 def digitise(

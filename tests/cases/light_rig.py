@@ -43,6 +43,7 @@ class LightWorld:
     bend: float = 0.0
     drop: int = 256
     clip_dn: float = 4095.0
+    step_dn: int = 1
     hot: int = 0
     jitter_ms: float = 0.0
     now_ms: float = 0.0
@@ -111,6 +112,7 @@ class LightCamera(Camera):
         )
         signal.flat[: world.hot * 7 : 7] += 300
         pixels = np.clip(np.rint(signal + BLACK_DN), 0, world.clip_dn).astype(np.uint16)
+        pixels -= pixels % world.step_dn
         delivered = self.before if world.stale and self.before is not None else pixels
         self.before = pixels
         world.now_ms += self.exposure_ms

@@ -23,6 +23,8 @@ from dsl_core.model.figure import Figure
 
 #: Limits: percent of full scale; times the read noise; share of full scale; share of pixels.
 LINEARITY_PERCENT, BLACK_NOISES, SATURATION, HOT = 0.5, 5.0, 0.9, 1e-3
+#: Values of fewer bits than these, given as ones of more, round the light that black and ramps are read from.
+FEWEST_BITS = 10
 #: Largest difference of gamma between colours, rms residual of a ramp, both percent; largest black.
 GAMMA_SPREAD_PERCENT, RAMP_PERCENT, BLACK = 2.0, 100 * MOST_LEFT, 0.01
 #: The new picture must be visible when ``show`` returns, within this; beat at the advised exposures, percent.
@@ -63,6 +65,17 @@ def _figure(
 
 
 def _camera(camera: CameraCheck) -> Iterator[Figure]:
+    if camera.step_dn > 1:
+        bits = camera.bit_depth - round(np.log2(camera.step_dn))
+        yield Figure(
+            name="distance of neighbouring values",
+            value=float(camera.step_dn),
+            unit="DN",
+            high=max(2.0 ** (camera.bit_depth - FEWEST_BITS), 1.0),
+            advice=f"The camera or its driver gives values of {bits} bits as ones of {camera.bit_depth}:"
+            " choose a pixel format with all bits of the sensor, such as Mono12 or BayerRG12, or state"
+            f" {bits} bits in the driver and pass values on as they are.",
+        )
     worst = max(camera.linearity_percent, key=lambda each: each.value)
     yield _figure(
         "linearity, largest residual of full scale",

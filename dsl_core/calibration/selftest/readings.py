@@ -53,11 +53,15 @@ CLIPPED_SHARE = 2e-4
 
 @dataclass(frozen=True)
 class RegionSizes:
-    """Pixels inside and outside the projected picture by colour, and the number format of the camera."""
+    """Pixels inside and outside the projected picture by colour, and the number format of the camera.
+
+    ``step_dn`` is the distance of neighbouring values.
+    """
 
     pixels: NDArray[np.int64]
     beside: NDArray[np.int64]
     bit_depth: int
+    step_dn: int = 1
 
     @property
     def full_scale_dn(self) -> float:

@@ -11,7 +11,7 @@ import json
 import zipfile
 import zlib
 from collections.abc import Callable
-from dataclasses import fields
+from dataclasses import fields, replace
 from math import ceil
 from pathlib import Path
 from typing import Any, TypeVar
@@ -42,6 +42,7 @@ from dsl_core.devices.base import DeviceRig
 from dsl_core.errors import CalibrationError, DeviceError, StoreError
 from dsl_core.io.atomic import make_folder, write_atomic
 from dsl_core.io.reading import require_plain
+from dsl_core.optics.sensor import step_of
 from dsl_core.progress import Progress
 
 SEED = 20240617
@@ -123,7 +124,7 @@ class SelfTestRun:
         recorder = self._recorder
         return SelfTestCapture(
             parts=self._parts,
-            sizes=seen.sizes,
+            sizes=replace(seen.sizes, step_dn=step_of(recorder.counts)),
             bars=bars,
             dark_frames=dark_frames,
             wanted_ms=self._wanted_ms,
@@ -162,7 +163,12 @@ def save_capture(capture: SelfTestCapture, folder: Path) -> Path:
     arrays |= {"bars": np.stack(capture.bars.bars), "inverse": np.stack(capture.bars.inverse)}
     arrays |= {"dark_frames": np.stack(capture.dark_frames)}
     about = {name: getattr(capture, name) for name in _NUMBERS}
-    about |= {"version": _VERSION, "bit_depth": capture.sizes.bit_depth, "parts": list(capture.parts)}
+    about |= {
+        "version": _VERSION,
+        "bit_depth": capture.sizes.bit_depth,
+        "step_dn": capture.sizes.step_dn,
+        "parts": list(capture.parts),
+    }
     buffer = io.BytesIO()
     np.savez_compressed(buffer, about=np.array(json.dumps(about)), **arrays)
     make_folder(folder)
@@ -197,7 +203,7 @@ def _unpacked(arrays: dict[str, Any], about: dict[str, Any]) -> SelfTestCapture:
     bars, inverse, dark = arrays["bars"], arrays["inverse"], arrays["dark_frames"]
     return SelfTestCapture(
         parts=parts,
-        sizes=RegionSizes(arrays["pixels"], arrays["beside"], about["bit_depth"]),
+        sizes=RegionSizes(arrays["pixels"], arrays["beside"], about["bit_depth"], about.get("step_dn", 1)),
         bars=BarFrames((bars[0], bars[1]), (inverse[0], inverse[1])),
         dark_frames=(dark[0], dark[1]),
         **{name: about[name] for name in _NUMBERS if name != "wanted_ms"},

@@ -24,6 +24,8 @@ _TIMEOUT_MS = 1500.0
 _EXPOSURE_TOLERANCE = 0.05
 #: Wait after a new picture until the latency is known.
 _FIRST_SETTLE_MS = 500.0
+#: Pixels of a frame whose values are counted.
+_COUNTED = 4000
 #: Pixels above this share of the largest number are clipped or about to be.
 CLIPPED_FROM = 0.985
 
@@ -47,7 +49,8 @@ class Recorder:
     """Records readings with camera and projector together.
 
     ``attempt`` tells the frames of a look from those that are kept; ``ceiling_dn`` is where signals end if
-    that is below the end of the scale.
+    that is below the end of the scale; ``counts`` is how often each value occurred, of some pixels of all
+    frames.
     """
 
     devices: DeviceRig
@@ -57,6 +60,7 @@ class Recorder:
     frames: int = 0
     show_s: list[float] = field(default_factory=list)
     times_s: list[float] = field(default_factory=list)
+    counts: NDArray[np.int64] = field(default_factory=lambda: np.zeros(2**16, np.int64))
     region: Region | None = None
     _started_s: float = field(default_factory=time.perf_counter)
     _drive: Drive = BLACK
@@ -126,6 +130,8 @@ class Recorder:
             )
         self.frames += 1
         self.times_s.append(frame.timestamp_s)
+        some = frame.pixels.ravel()[:: max(frame.pixels.size // _COUNTED, 1)]
+        self.counts += np.bincount(some, minlength=self.counts.size)
         return frame
 
     def read(self, exposure_ms: float, gap_ms: float = 0.0, pair: bool = False) -> Frame:

@@ -33,10 +33,12 @@ class CameraCheck(Record):
 
     ``linearity_percent`` is the largest distance from a straight line for red, green and blue, in percent of
     full scale, within the useful range: from ``black_level_dn`` to ``useful_dn``, the largest signal that no
-    pixel of the region clipped. ``intercept_dn`` is where the line meets an exposure of zero.
+    pixel of the region clipped. ``intercept_dn`` is where the line meets an exposure of zero. ``step_dn`` is
+    the distance of neighbouring values: more than one where pictures were converted from fewer bits.
     """
 
     bit_depth: int
+    step_dn: int = 1
     black_level_dn: Measured
     intercept_dn: Measured
     linearity_percent: tuple[Measured, Measured, Measured]

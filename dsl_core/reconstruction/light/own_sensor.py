@@ -16,7 +16,7 @@ from dsl_core.model.fit import FitFinding
 from dsl_core.model.frames import FrameSource
 from dsl_core.model.plan import CapturePlan, Shot
 from dsl_core.model.rig import Sensor
-from dsl_core.optics.sensor import bayer_channels
+from dsl_core.optics.sensor import bayer_channels, step_of
 from dsl_core.reconstruction.light.own_noise import own_noise
 from dsl_core.reconstruction.light.setting_ratios import compared_rows
 
@@ -32,10 +32,6 @@ OTHER_COLOUR = 0.1
 UPPER, ABOVE = 0.25, 0.01
 #: Values nearer to full scale than this share of it count as saturated anyway.
 MARGIN = 0.02
-#: A value that fewer pixels have says nothing about the step to the next one.
-SEEN = 5
-#: So many steps of one size are no chance.
-ALIKE = 10
 
 
 def own_sensor(source: FrameSource, sensor: Sensor) -> tuple[Sensor, tuple[FitFinding, ...]]:
@@ -70,19 +66,6 @@ def saturation_dn(counts: Counts, sensor: Sensor) -> int | None:
     if pile < PILE or pile < TIMES * below.mean() or total[end + 1 :].sum() > ABOVE * pile or not several:
         return None
     return end
-
-
-def step_of(total: Counts) -> int:
-    """The usual distance between values that occur, from how often each does."""
-    values = np.flatnonzero(total >= SEEN)
-    if values.size < 2:
-        return 1
-    steps, weights = np.diff(values), total[values[:-1]]
-    order = np.argsort(steps)
-    middle = np.searchsorted(np.cumsum(weights[order]), weights.sum() / 2)
-    step = int(steps[order[middle]])
-    # Pictures converted from fewer bits have steps of two neighbouring sizes, such as 16 and 17.
-    return step if np.count_nonzero(np.abs(steps - step) <= 1) >= ALIKE else 1
 
 
 def _counts(source: FrameSource, sensor: Sensor) -> Counts:

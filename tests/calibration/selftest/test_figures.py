@@ -118,6 +118,11 @@ def test_a_good_rig_passes_though_published_exposures_beat() -> None:
             "saturation",
         ),
         (with_("camera", hot_share=of(HOT)), with_("camera", hot_share=of(2 * HOT)), "hot pixels"),
+        (
+            with_("camera", step_dn=4),
+            with_("camera", step_dn=5),
+            "distance of neighbouring values",
+        ),
         (with_("projector", gamma=of(3.5)), with_("projector", gamma=of(3.6)), "gamma"),
         (
             with_("projector", ramps=ramps(gamma=of(2.2 * (1 + GAMMA_SPREAD_PERCENT / 101)))),

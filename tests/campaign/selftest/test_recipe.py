@@ -11,7 +11,7 @@ import pytest
 from dsl_core.calibration.selftest.record import analyse
 from dsl_core.campaign.common.recipe import Bench
 from dsl_core.campaign.recipes import load_recipe
-from dsl_core.campaign.selftest.capture import ARCHIVE_NAME, SelfTestRun
+from dsl_core.campaign.selftest.capture import ARCHIVE_NAME, SelfTestRun, load_capture, save_capture
 from dsl_core.campaign.selftest.recipe import SelfTestRecipe
 from dsl_core.devices.base import DeviceRig
 from dsl_core.errors import CalibrationError, Cancelled, DeviceError, StoreError
@@ -160,6 +160,19 @@ def test_what_is_wrong_fails_its_own_figure(world: LightWorld, names: list[str])
     assert all(figure.advice for figure in failures(figures))
     # Whatever else is wrong, the noise of the camera is still measured.
     assert found.camera.electrons_per_dn.value == pytest.approx(10.0, rel=0.02)
+
+
+@pytest.mark.parametrize(("step_dn", "bits"), [(4, 0), (16, 8)])
+def test_values_of_fewer_bits_are_named_before_what_they_upset(
+    tmp_path: Path, step_dn: int, bits: int
+) -> None:
+    run = SelfTestRun(light_rig(LightWorld(step_dn=step_dn)), NoProgress(), SelfTestRecipe().wanted_ms)
+    save_capture(run.capture(), tmp_path)
+    figures = RECIPE.figures(analyse(load_capture(tmp_path)))
+    assert figures[0].name == "distance of neighbouring values"
+    assert figures[0].value == step_dn
+    assert failed(figures)[:1] == (["distance of neighbouring values"] if bits else [])
+    assert not bits or f"gives values of {bits} bits as ones of 12" in figures[0].advice
 
 
 @pytest.mark.parametrize(

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from dsl_core.model.plan import CapturePlan, GrayCode, NoCode, ScanLines, Setting, Shot
 from dsl_core.model.rig import Sensor
-from dsl_core.optics.sensor import bayer_channels, raw_variance
-from dsl_core.reconstruction.light.own_sensor import SEEN, own_sensor, step_of
+from dsl_core.optics.sensor import SEEN, bayer_channels, raw_variance, step_of
+from dsl_core.reconstruction.light.own_sensor import own_sensor
 
 SHAPE = (48, 64)
 SENSOR = Sensor(black_level_dn=250.0, read_noise_dn=1.0)
