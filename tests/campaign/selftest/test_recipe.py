@@ -224,6 +224,18 @@ def test_captures_survive_on_disk_and_fit_needs_no_devices(tmp_path: Path, found
     assert again.model_dump(exclude={"latency"}) == found.model_dump(exclude={"latency"})
 
 
+def test_an_archive_that_claims_to_be_encrypted_is_damaged(tmp_path: Path) -> None:
+    path = tmp_path / ARCHIVE_NAME
+    np.savez_compressed(path, about=np.array("{}"))
+    content = bytearray(path.read_bytes())
+    # The first flag of the file's own header, and of the archive's list of files.
+    for header, flags in ((b"PK\x03\x04", 6), (b"PK\x01\x02", 8)):
+        content[content.index(header) + flags] |= 1
+    path.write_bytes(content)
+    with pytest.raises(StoreError, match=r"encrypted.*Capture the self-test again"):
+        load_capture(tmp_path)
+
+
 def test_an_interrupted_self_test_leaves_nothing_behind(tmp_path: Path) -> None:
     token = CancelToken()
     here = bench(light_rig(LightWorld()), tmp_path)
