@@ -16,8 +16,9 @@ from dsl_core.reconstruction.camera_spot import follow_spot, spot_finding
 from dsl_core.reconstruction.code_agreement import NamedPlaces, code_agreement
 from dsl_core.reconstruction.code_wave import code_wave, with_varying_width
 from dsl_core.reconstruction.columns.column import MODEL_ERROR
+from dsl_core.reconstruction.columns.line_peaks import smooth_peaks
 from dsl_core.reconstruction.columns.line_spread import own_spread, spread_pixels, with_own_spread
-from dsl_core.reconstruction.columns.peak_error import own_peak_error
+from dsl_core.reconstruction.columns.peak_error import peak_error
 from dsl_core.reconstruction.columns.spread_doubt import spread_doubt
 from dsl_core.reconstruction.fine_texture import follow_scatter
 from dsl_core.reconstruction.geometry import Geometry, geometry_of, require_light, require_pixels
@@ -71,13 +72,14 @@ class GeometrySteps:
         options, frames, lines = self._options, self._frames, self._lines
         code, white = self._taken()
         refines_rig = options.refine_columns and not options.as_calibrated
-        peak_error, calibrated, spread, doubt = MODEL_ERROR, self.rig.projector_response, None, None
+        error, calibrated, spread, doubt = MODEL_ERROR, self.rig.projector_response, None, None
         if refines_rig:
             spread = own_spread(self.rig, lines, code, white, frames)
             self.rig = with_own_spread(self.rig, spread)
-            peak_error = own_peak_error(self.rig, lines, code, white, frames)
-            doubt = spread_doubt(self.rig, lines, code, white, frames, spread)
-        columns = columns_by_rows(self.rig, options, frames, code, white, peak_error, self._progress)
+            peaks = smooth_peaks(self.rig, lines, code, white, frames)
+            error, doubt = peak_error(peaks), spread_doubt(peaks, spread)
+            del peaks
+        columns = columns_by_rows(self.rig, options, frames, code, white, error, self._progress)
         named = NamedPlaces.of(code)
         wave = code_wave(lines, named.column, columns.maps) if refines_rig else None
         if wave is not None and doubt is not None:
@@ -87,8 +89,8 @@ class GeometrySteps:
             if own.changed:
                 self.findings.append(own.finding())
                 self.rig = own.of(self.rig)
-                peak_error = own_peak_error(self.rig, lines, code, white, frames)
-                columns = columns_by_rows(self.rig, options, frames, code, white, peak_error, self._progress)
+                error = peak_error(smooth_peaks(self.rig, lines, code, white, frames))
+                columns = columns_by_rows(self.rig, options, frames, code, white, error, self._progress)
                 wave = code_wave(lines, named.column, columns.maps)
             doubt = with_varying_width(doubt, lines, named.column, columns.maps)
         del code, white

@@ -18,6 +18,7 @@ from dsl_core.patterns.gray_code import DecodedCode
 from dsl_core.reconstruction.columns.dark_offset import dark_offset
 from dsl_core.reconstruction.columns.line_spread import Pickable, overexposed_pixels, spread_pixels
 from dsl_core.reconstruction.hdr import MergedFrame
+from dsl_core.solve.threads import one_kernel_thread
 
 
 @dataclass(frozen=True)
@@ -26,7 +27,8 @@ class LinePeaks:
 
     ``radiance`` and ``std`` (frames, pixels) are in DN per ms, infinite where saturated; ``widths`` (pixels,)
     are those of the line spread relative to the response's, None where they are the same. ``offset``
-    (pixels,) is light that all line frames have alike, None where there is none.
+    (pixels,) is light that all line frames have alike, None where there is none. ``unseen`` says that nearly
+    all lines saturate: their flanks show where they are, but not how they are shaped.
     """
 
     coarse_px: Tensor
@@ -36,6 +38,7 @@ class LinePeaks:
     response: ProjectorResponse
     widths: Tensor | None = None
     offset: Tensor | None = None
+    unseen: bool = False
 
     def some(self, pixels: Tensor) -> LinePeaks:
         """Those of some pixels, by their indices."""
@@ -88,6 +91,7 @@ class LinePeaks:
         return torch.ones_like(self.coarse_px) if self.widths is None else self.widths
 
 
+@one_kernel_thread()
 def smooth_peaks(
     rig: Rig, lines: LineSet | None, code: DecodedCode, white: MergedFrame, stack: Pickable
 ) -> LinePeaks | None:
@@ -96,7 +100,8 @@ def smooth_peaks(
     Of an overexposed picture without such pixels, those of any.
     """
     pixels = spread_pixels(lines, code, white)
-    if pixels.size == 0:
+    unseen = pixels.size == 0
+    if unseen:
         pixels = overexposed_pixels(lines, white)
     if lines is None or pixels.size == 0:
         return None
@@ -104,5 +109,5 @@ def smooth_peaks(
     column = torch.as_tensor(code.likely_column.ravel()[pixels].astype(np.float64))
     y, std = (torch.as_tensor(values.astype(np.float64)) for values in (seen.radiance, seen.std))
     widths = widths_at(rig, torch.as_tensor(pixels), column)
-    peaks = LinePeaks(column, y, std, lines, rig.projector_response, widths)
+    peaks = LinePeaks(column, y, std, lines, rig.projector_response, widths, unseen=unseen)
     return peaks.without_offset(unlit_px(rig, lines.width_px))

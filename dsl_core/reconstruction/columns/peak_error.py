@@ -10,13 +10,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from dsl_core.model.rig import Rig
-from dsl_core.optics.lines.line_set import LineSet
-from dsl_core.patterns.gray_code import DecodedCode
 from dsl_core.reconstruction.columns.column import MODEL_ERROR, fit_peaks
-from dsl_core.reconstruction.columns.line_peaks import LinePeaks, smooth_peaks
-from dsl_core.reconstruction.columns.line_spread import Pickable
-from dsl_core.reconstruction.hdr import MergedFrame
+from dsl_core.reconstruction.columns.line_peaks import LinePeaks
 from dsl_core.solve.threads import one_kernel_thread
 
 #: Beyond this share of a peak pixels are judged one by one.
@@ -25,17 +20,14 @@ LARGEST = 0.03
 STEPS = 12
 
 
-def own_peak_error(
-    rig: Rig, lines: LineSet | None, code: DecodedCode, white: MergedFrame, stack: Pickable
-) -> float:
-    """Relative error of the modelled peak; the usual one where single lines do not cover the picture."""
-    with one_kernel_thread():
-        peaks = smooth_peaks(rig, lines, code, white, stack)
-        return MODEL_ERROR if peaks is None else peak_error(peaks)
+@one_kernel_thread()
+def peak_error(peaks: LinePeaks | None) -> float:
+    """The smallest relative error that leaves no more of the peaks than noise does, at most `LARGEST`.
 
-
-def peak_error(peaks: LinePeaks) -> float:
-    """The smallest relative error that leaves no more of the peaks than noise does, at most `LARGEST`."""
+    The usual one without peaks, where single lines do not cover the picture.
+    """
+    if peaks is None:
+        return MODEL_ERROR
 
     def excess(error: float) -> float:
         fit = fit_peaks(peaks, error)

@@ -13,14 +13,10 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from dsl_core.model.rig import Rig
 from dsl_core.optics.lines.line_set import LineSet
 from dsl_core.optics.spread.fit import SpreadFit
-from dsl_core.patterns.gray_code import DecodedCode
 from dsl_core.reconstruction.columns.column import refine
-from dsl_core.reconstruction.columns.line_peaks import smooth_peaks
-from dsl_core.reconstruction.columns.line_spread import Pickable, spread_pixels
-from dsl_core.reconstruction.hdr import MergedFrame
+from dsl_core.reconstruction.columns.line_peaks import LinePeaks
 from dsl_core.solve.threads import one_kernel_thread
 
 #: Relative deviation of the width of the spread from its calibration, before a scan is seen.
@@ -72,30 +68,19 @@ class SpreadDoubt:
         return np.interp(off_px, step_px / PLACES * np.arange(PLACES), self.moved_px, period=step_px)
 
 
-def spread_doubt(
-    rig: Rig,
-    lines: LineSet | None,
-    code: DecodedCode,
-    white: MergedFrame,
-    stack: Pickable,
-    found: SpreadFit | None,
-) -> SpreadDoubt | None:
+def spread_doubt(peaks: LinePeaks | None, found: SpreadFit | None) -> SpreadDoubt | None:
     """How far columns move with a width that is neither calibrated nor ``found`` any better.
 
-    None where single lines do not cover the picture. Where it is known well enough, parts of the picture may
-    still differ (see `code_wave.with_varying_width`).
+    None without peaks, where single lines do not cover the picture. Where it is known well enough, parts of
+    the picture may still differ (see `code_wave.with_varying_width`).
     """
-    unseen = spread_pixels(lines, code, white).size == 0
-    relative = UNSEEN_STD if unseen else FOCUS_STD
+    if peaks is None:
+        return None
+    lines, relative = peaks.lines, UNSEEN_STD if peaks.unseen else FOCUS_STD
     if found is not None:
         seen = found.rms_std_px / found.response.blur_px
         relative *= seen / float(np.hypot(FOCUS_STD, seen))
-    if lines is None:
-        return None
     with one_kernel_thread():
-        peaks = smooth_peaks(rig, lines, code, white, stack)
-        if peaks is None:
-            return None
         usual, wider = refine(peaks), refine(peaks.wider(1 + STEP))
     both = usual.refined & wider.refined
     place = _places(lines, usual.column_px[both]).numpy()
@@ -104,7 +89,7 @@ def spread_doubt(
     mean, square = (np.bincount(place, each, PLACES) / np.maximum(count, 1) for each in (moved, moved**2))
     # Where no column is, lines say nothing: neighbours stand for it.
     square[count == 0] = square[count > 0].max(initial=0.0)
-    return SpreadDoubt(lines, relative, mean, np.sqrt(square), unseen)
+    return SpreadDoubt(lines, relative, mean, np.sqrt(square), peaks.unseen)
 
 
 def _places(lines: LineSet, column_px: torch.Tensor) -> torch.Tensor:

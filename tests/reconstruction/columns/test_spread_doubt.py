@@ -14,7 +14,7 @@ from dsl_core.optics.lines.line_set import LineSet
 from dsl_core.optics.lines.profile import zero_order_profile
 from dsl_core.optics.spread.fit import SpreadFit
 from dsl_core.reconstruction.columns.column import refine
-from dsl_core.reconstruction.columns.line_peaks import LinePeaks
+from dsl_core.reconstruction.columns.line_peaks import LinePeaks, smooth_peaks
 from dsl_core.reconstruction.columns.spread_doubt import FOCUS_STD, UNSEEN_STD, SpreadDoubt, spread_doubt
 from dsl_core.reconstruction.merge import PickedLines
 from tests.cases.small_rig import small_rig
@@ -48,7 +48,8 @@ def doubt(
         return PickedLines(pixels, light[:, pixels], std[:, pixels], np.zeros(len(pixels), np.float32))
 
     stack = SimpleNamespace(pick=pick)
-    return spread_doubt(RIG, lines, code, white, stack, found)  # type: ignore[arg-type]
+    peaks = smooth_peaks(RIG, lines, code, white, stack)  # type: ignore[arg-type]
+    return spread_doubt(peaks, found)
 
 
 def width_found(rel_std: float) -> SpreadFit:
