@@ -27,6 +27,9 @@ FLOOR, FLOOR_NM = 0.014, 5.0
 #: Logarithm by which the light changes along 1 nm in a usual rig, root mean square, where it has at least
 #: this share of the brightest. What triangles leave grows with the square of it.
 USUAL_STEEPNESS, BRIGHT = 0.068, 0.05
+#: Where a colour has less light than that share of its brightest, its curve may be off by as much as this: it
+#: is steep there, and light of the neighbouring bands counts for more than its own.
+FAINT_STD = 0.3
 #: So many shapes, each with this share of the level, are those of many materials (a whole Color Checker has
 #: four, three patches of it have three), and second differences of straight spectra.
 MANY_SHAPES, LEAST_SHAPE, STRAIGHT = 4, 0.03, 0.05
@@ -59,6 +62,16 @@ def steepness_per_nm(white: Floats, step_nm: float) -> float:
     changes = np.diff(light)[lit[..., 1:] & lit[..., :-1]]
     found = float(np.sqrt(np.mean(changes**2))) / step_nm if changes.size else 0.0
     return max(found, USUAL_STEEPNESS)
+
+
+def bright_knots(white: Floats, centres_nm: Floats) -> NDArray[np.bool_]:
+    """At which knots colours have enough light to tell of their curves, of all colours one after another.
+
+    ``white`` (..., colours, bands) is the light of bands with these centres (bands,), nm.
+    """
+    light = white.reshape(-1, *white.shape[-2:]).sum(0)
+    at_knots = np.stack([np.interp(KNOTS_NM, centres_nm, each) for each in light])
+    return np.asarray((at_knots >= BRIGHT * light.max(1, keepdims=True)).ravel())
 
 
 def variety(reflectance: Floats) -> float:
@@ -117,15 +130,23 @@ def curve_misfit(
     prior_std: Floats,
     step_nm: float,
     steepness: float = USUAL_STEEPNESS,
+    bright: NDArray[np.bool_] | None = None,
 ) -> CurveMisfit | None:
     """How far curves are off, from equations of pixels (n, p + c, p + c) and (n, p + c) without the spectrum.
 
     First come p other parameters, which may take what they explain; ``prior_std`` (p,) is theirs.
     ``step_nm`` is the width of bands, ``steepness`` by how much the logarithm of the light changes along
-    1 nm. None where colours say too little.
+    1 nm, ``bright`` (c,) where curves count (see `bright_knots`), None for everywhere. None where colours say
+    too little.
     """
     used = weight > 0
     information, asked = np.tensordot(weight[used], normal[used], 1), weight[used] @ score[used]
+    if bright is not None:
+        # What is faint may take what it explains, too.
+        first, faint = len(prior_std), np.flatnonzero(~bright)
+        order = np.r_[np.arange(first), first + faint, first + np.flatnonzero(bright)]
+        information, asked = information[np.ix_(order, order)], asked[order]
+        prior_std = np.r_[prior_std, np.full(len(faint), FAINT_STD)]
     others = len(prior_std)
     own = information[:others, :others] + np.diag(1 / prior_std**2)
     taken = np.linalg.solve(own, information[:others, others:]).T

@@ -25,6 +25,7 @@ from dsl_core.optics.spread.field import widths_at
 from dsl_core.reconstruction.spectral.probing.curve_probe import (
     USUAL_STEEPNESS,
     CurveMisfit,
+    bright_knots,
     curve_changes,
     curve_misfit,
     normal_of_all_curves,
@@ -68,13 +69,14 @@ class Probe:
     ``correlation`` (n,) is by how much sums of neighbouring residuals vary more than independent ones;
     ``place`` (n, 2) is row and column from -1 to 1, ``cell`` (n,) the cell of `CELLS`, ``pixel`` (n,) the
     flat index. ``with_curves`` are ``normal`` and ``score`` of these parameters and of the curves after
-    them, None where nobody asked. ``lines`` is what the zero order of the same pixels says, ``nm_per_px``
-    how far apart columns of the first orders are, ``step_nm`` bands; ``steepness`` is by how much the
-    logarithm of the light changes along 1 nm. ``places`` is whether pixels can tell where the orders are:
-    on a small piece of one colour an error of its spectrum looks like a shift. ``sideways`` (n, 2) is by how
-    much lines of each order are farther to the sides of the projector's frame than the pixel's own column:
-    the difference of squares, one at the side, mean over bands; None where nobody traced them. ``uneven``
-    (n,) is how much darker the darkest of neighbours of a pixel's colour is than the brightest, a share.
+    them, None where nobody asked, ``bright`` (knots of all colours,) where these have light. ``lines`` says
+    what the zero order of the same pixels does, ``nm_per_px`` how far apart columns of the first orders are,
+    ``step_nm`` bands; ``steepness`` is by how much the logarithm of the light changes along 1 nm. ``places``
+    is whether pixels can tell where the orders are: on a small piece of one colour an error of its spectrum
+    looks like a shift. ``sideways`` (n, 2) is by how much lines of each order are farther to the sides of the
+    projector's frame than the pixel's own column: the difference of squares, one at the side, mean over
+    bands; None where nobody traced them. ``uneven`` (n,) is how much darker the darkest of neighbours of a
+    pixel's colour is than the brightest, a share.
     """
 
     normal: Floats
@@ -92,6 +94,7 @@ class Probe:
     step_nm: float = 5.0
     steepness: float = USUAL_STEEPNESS
     with_curves: tuple[Floats, Floats] | None = None
+    bright: NDArray[np.bool_] | None = None
     freedom: Floats | None = None
     sideways: Floats | None = None
     uneven: Floats | None = None
@@ -121,7 +124,9 @@ class Probe:
         if self.with_curves is None or not tells_of_curves(self.reflectance[self.sound]):
             return None
         prior_std = np.array(PRIOR_STD)
-        return curve_misfit(*self.with_curves, self.weight, prior_std, self.step_nm, self.steepness)
+        return curve_misfit(
+            *self.with_curves, self.weight, prior_std, self.step_nm, self.steepness, self.bright
+        )
 
 
 def probe_targets(valid: NDArray[np.bool_]) -> Indices:
@@ -152,14 +157,15 @@ def probe(scan: ProbedScan) -> Probe | None:
     camera = scan.model.rig.camera
     wide = camera.width_px / camera.fx_px > ONE_VIEW
     whole = together.pop("normal"), together.pop("score")
-    own = len(PARAMETERS)
+    own, white = len(PARAMETERS), _white(scan)
     return Probe(
         **together,
         places=wide or variety(together["reflectance"]) > ONE_COLOUR,
         normal=whole[0][:, :own, :own],
         score=whole[1][:, :own],
         step_nm=scan.model.bands.step_nm,
-        steepness=_steepness(scan),
+        steepness=steepness_per_nm(white, scan.model.bands.step_nm),
+        bright=bright_knots(white, scan.model.bands.centres_nm[scan.model.bands.reported]),
         with_curves=whole,
         lines=probe_lines(lines, response, scan.pixels, scan.radiance, scan.std, targets, widths),
         nm_per_px=_nm_per_px(scan, traced[ORDERS[0]][0]),
@@ -182,11 +188,10 @@ def unevenness(amplitude: NDArray[np.float32], targets: Indices) -> Floats:
     return np.asarray((high - light.min(1)) / np.maximum(high, 1e-12), np.float64)
 
 
-def _steepness(scan: ProbedScan) -> float:
-    """By how much the logarithm of the light of the first orders changes along 1 nm."""
+def _white(scan: ProbedScan) -> Floats:
+    """The light of the first orders, (orders, colours, bands)."""
     bands = scan.model.bands
-    white = np.stack([bands.moments[order].sum(1)[:, bands.reported] for order in ORDERS])
-    return steepness_per_nm(white, bands.step_nm)
+    return np.stack([bands.moments[order].sum(1)[:, bands.reported] for order in ORDERS])
 
 
 def _columns(scan: ProbedScan, targets: Indices) -> dict[int, tuple[Tensor, Tensor]]:

@@ -9,6 +9,7 @@ import torch
 from dsl_core.reconstruction.spectral.probing.curve_probe import (
     KNOTS_NM,
     USUAL_STEEPNESS,
+    bright_knots,
     curve_changes,
     curve_misfit,
     normal_of_all_curves,
@@ -48,6 +49,36 @@ def test_curves_are_off_by_what_colours_disagree() -> None:
     coarse = curve_misfit(*equations(0.04), prior, 10.0)
     assert coarse is not None
     assert coarse.rms == 0
+
+
+def test_a_curve_does_not_count_where_its_colour_is_faint() -> None:
+    prior, knots = np.full(OTHERS, 0.2), len(KNOTS_NM)
+    normal, score, weight = equations(0.0)
+    # The first colour disagrees by a tenth at three knots.
+    off = np.zeros(OTHERS + 3 * knots)
+    off[OTHERS : OTHERS + 3] = 0.1
+    known = normal, score + normal @ off, weight, prior, 5.0
+    bright = np.ones(3 * knots, bool)
+    everywhere = curve_misfit(*known, bright=bright)
+    assert everywhere == curve_misfit(*known)
+    assert everywhere is not None
+    assert everywhere.rms > 0.015
+    bright[:3] = False
+    without = curve_misfit(*known, bright=bright)
+    assert without is not None
+    assert without.rms == 0
+    # What is not faint counts as before.
+    more = curve_misfit(*equations(0.04), prior, 5.0, bright=bright)
+    assert more is not None
+    assert more.rms == pytest.approx(0.04 * (2 / 3) ** 0.5, rel=0.25)
+
+
+def test_knots_are_bright_from_a_twentieth_of_the_brightest_light_of_their_colour_on() -> None:
+    nm = np.arange(430.0, 661.0, 5.0)
+    rising, even = np.exp(0.1 * (nm - 660)), np.full(len(nm), 0.01)
+    found = bright_knots(np.stack([[rising, even], [0 * rising, even]]), nm).reshape(2, -1)
+    assert found[0].tolist() == (KNOTS_NM > 660 - 30).tolist()
+    assert found[1].all()
 
 
 def test_light_that_changes_twice_as_fast_leaves_four_times_as_much() -> None:

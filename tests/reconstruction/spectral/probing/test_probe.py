@@ -11,13 +11,14 @@ import torch
 
 from dsl_core.optics.spectra import ORDERS
 from dsl_core.reconstruction.spectral.probing import probe as probe_module
-from dsl_core.reconstruction.spectral.probing.curve_probe import variety
+from dsl_core.reconstruction.spectral.probing.curve_probe import KNOTS_NM, variety
 from dsl_core.reconstruction.spectral.probing.line_probe import LineProbe
 from dsl_core.reconstruction.spectral.probing.probe import ONE_COLOUR, Probe
 from dsl_core.reconstruction.spectral.probing.probed_light import PARAMETERS
 from dsl_core.reconstruction.spectral.probing.probed_pixels import samples_of
 
 RISING = np.linspace(0.2, 0.6, 24)
+NM = np.arange(430.0, 661.0, 5.0)
 
 
 def test_one_colour_at_many_levels_has_no_variety() -> None:
@@ -124,11 +125,11 @@ def probed(monkeypatch: pytest.MonkeyPatch, share: float, varied: bool, **model:
     monkeypatch.setattr(probe_module, "_columns", lambda *_: dict.fromkeys(ORDERS, (None, None)))
     monkeypatch.setattr(probe_module, "_nm_per_px", lambda *_: 2.0)
     monkeypatch.setattr(probe_module, "_sideways", lambda *_: None)
-    monkeypatch.setattr(probe_module, "_steepness", lambda *_: 0.1)
+    monkeypatch.setattr(probe_module, "_white", lambda *_: np.exp(0.1 * NM)[None, None])
     camera = SimpleNamespace(width_px=1000 * share, fx_px=1000.0)
     given = {
         "single": True, "lines": (), "response": lambda _: None, "rig": SimpleNamespace(camera=camera),
-        "bands": SimpleNamespace(step_nm=5.0),
+        "bands": SimpleNamespace(step_nm=5.0, centres_nm=NM, reported=slice(None)),
     }  # fmt: skip
     size = model.pop("pixels", 100)
     scan: Any = SimpleNamespace(
@@ -163,7 +164,11 @@ def test_the_parameters_come_first_and_curves_after_them(monkeypatch: pytest.Mon
     assert found.normal.tolist() == normal[:, :own, :own].tolist()
     assert found.score.tolist() == score[:, :own].tolist()
     assert found.pixel.tolist() == list(range(100))
-    assert (found.nm_per_px, found.step_nm, found.steepness) == (2.0, 5.0, 0.1)
+    assert (found.nm_per_px, found.step_nm) == (2.0, 5.0)
+    assert found.steepness == pytest.approx(0.1)
+    # Light of a twentieth of the brightest is 30 nm away from the end of the bands.
+    assert found.bright is not None
+    assert found.bright.tolist() == (KNOTS_NM > 660 - 30).tolist()
 
 
 @pytest.mark.parametrize("model", [{"single": False}, {"pixels": 39}])
