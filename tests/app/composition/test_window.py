@@ -117,6 +117,7 @@ def test_accuracy_is_predicted_in_the_background_and_closing_ends_it(
     composition = Composition(StartOptions(TWIN, predicts=True))
     window = composition.open_window(tmp_path)
     qtbot.addWidget(window)
+    window.resize(1280, 800)
     window.show()
     page = window.open_page("scan")
     assert isinstance(page, ScanPage)

@@ -10,6 +10,7 @@ from dsl_app.compare.page import ComparePage
 from dsl_app.composition.window import Composition, StartOptions
 from dsl_app.results.page import ResultsPage
 from dsl_app.results.reconstruct_again.dialog import ReconstructionDialog
+from dsl_app.shared.widgets.open_dialog import OpenDialog
 from dsl_app.shell.main_window import MainWindow
 from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
@@ -134,7 +135,7 @@ def test_elsewhere_it_asks_for_the_scan(
     qtbot: QtBot, window: MainWindow, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     window.open_page("rig")
-    monkeypatch.setattr(QFileDialog, "getExistingDirectory", lambda *_: str(tmp_path))
+    monkeypatch.setattr(OpenDialog, "ask", lambda *_, **__: tmp_path)
     window.do("reconstruct_again")
     qtbot.waitUntil(lambda: bool(window.toasts.shown), timeout=PATIENCE_MS)
     assert "is not a scan" in window.toasts.shown[-1].text
