@@ -120,13 +120,16 @@ class Probe:
 
     @property
     def curves(self) -> CurveMisfit | None:
-        """How far curves of camera and projector are off by what colours say; None where they say nothing."""
+        """How far curves of camera and projector are off by what colours say; None where they say nothing.
+
+        Where colours are faint, bands are coarse for their curves; without these places, what straight
+        spectra leave counts for more. Curves that are off show either way.
+        """
         if self.with_curves is None or not tells_of_curves(self.reflectance[self.sound]):
             return None
-        prior_std = np.array(PRIOR_STD)
-        return curve_misfit(
-            *self.with_curves, self.weight, prior_std, self.step_nm, self.steepness, self.bright
-        )
+        known = *self.with_curves, self.weight, np.array(PRIOR_STD), self.step_nm, self.steepness
+        found = [curve_misfit(*known, bright=bright) for bright in (None, self.bright)]
+        return min((each for each in found if each is not None), key=lambda each: each.rms, default=None)
 
 
 def probe_targets(valid: NDArray[np.bool_]) -> Indices:
