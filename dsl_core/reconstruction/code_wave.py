@@ -58,8 +58,6 @@ class OwnWidth:
 
     def known(self, doubt: SpreadDoubt) -> SpreadDoubt:
         """What is left of a doubt about the width; what is not followed is doubted as well."""
-        if doubt.unseen:
-            return doubt
         left = math.hypot(self.std, 0.0 if self.changed else self.wider)
         return replace(doubt, relative=min(left, doubt.relative))
 

@@ -124,11 +124,6 @@ def test_columns_as_the_code_names_them_change_no_width() -> None:
     assert OwnWidth(0.02, 0.01).known(doubt_of(0.005)).relative == 0.005
 
 
-def test_a_width_makes_the_shape_of_lines_that_saturate_no_surer() -> None:
-    unseen = replace(doubt_of(0.2), unseen=True)
-    assert OwnWidth(0.05, 0.01).known(unseen) == unseen
-
-
 def test_a_wave_of_another_shape_says_less_of_the_width() -> None:
     found = code_wave(LINES, NAMED_PX, maps_of(TRUE_PX - 0.1 * SINE))
     assert found is not None

@@ -106,7 +106,7 @@ def test_a_sweep_against_the_truth_of_the_twin(give: Give, finished: Path, tmp_p
     # Frames cost exposure and latency.
     assert slow["seconds"] / quick["seconds"] == pytest.approx((333.3 + 50) / (100 + 50), rel=0.01)
     assert 0 < slow["reflectance"] < 0.1
-    options = [*SMALL_RIG, "-O", "scene=plane", *SMALL_PLAN[:-1], "100@0.8"]
+    options = [*SMALL_RIG, "-O", "scene=plane", *SMALL_PLAN]
     assert give("scan", tmp_path / "plane.dsl", *options).code == 0
     assert give("reconstruct", tmp_path / "plane.dsl", "--bands", "430:660:10").code == 0
     ending = give("sweep", finished / "scan.zarr", tmp_path / "plane.zarr")

@@ -16,7 +16,7 @@ from dsl_core.optics.spread.field import widths_at
 from dsl_core.optics.unlit import unlit_px
 from dsl_core.patterns.gray_code import DecodedCode
 from dsl_core.reconstruction.columns.dark_offset import dark_offset
-from dsl_core.reconstruction.columns.line_spread import Pickable, overexposed_pixels, spread_pixels
+from dsl_core.reconstruction.columns.line_spread import Pickable, spread_pixels
 from dsl_core.reconstruction.hdr import MergedFrame
 from dsl_core.solve.threads import one_kernel_thread
 
@@ -27,8 +27,7 @@ class LinePeaks:
 
     ``radiance`` and ``std`` (frames, pixels) are in DN per ms, infinite where saturated; ``widths`` (pixels,)
     are those of the line spread relative to the response's, None where they are the same. ``offset``
-    (pixels,) is light that all line frames have alike, None where there is none. ``unseen`` says that nearly
-    all lines saturate: their flanks show where they are, but not how they are shaped.
+    (pixels,) is light that all line frames have alike, None where there is none.
     """
 
     coarse_px: Tensor
@@ -38,7 +37,6 @@ class LinePeaks:
     response: ProjectorResponse
     widths: Tensor | None = None
     offset: Tensor | None = None
-    unseen: bool = False
 
     def some(self, pixels: Tensor) -> LinePeaks:
         """Those of some pixels, by their indices."""
@@ -95,19 +93,13 @@ class LinePeaks:
 def smooth_peaks(
     rig: Rig, lines: LineSet | None, code: DecodedCode, white: MergedFrame, stack: Pickable
 ) -> LinePeaks | None:
-    """The peaks of bright pixels on smooth surfaces; None where single lines do not cover the picture.
-
-    Of an overexposed picture without such pixels, those of any.
-    """
+    """The peaks of bright pixels on smooth surfaces; None where single lines do not cover the picture."""
     pixels = spread_pixels(lines, code, white)
-    unseen = pixels.size == 0
-    if unseen:
-        pixels = overexposed_pixels(lines, white)
     if lines is None or pixels.size == 0:
         return None
     seen = stack.pick(pixels)
     column = torch.as_tensor(code.likely_column.ravel()[pixels].astype(np.float64))
     y, std = (torch.as_tensor(values.astype(np.float64)) for values in (seen.radiance, seen.std))
     widths = widths_at(rig, torch.as_tensor(pixels), column)
-    peaks = LinePeaks(column, y, std, lines, rig.projector_response, widths, unseen=unseen)
+    peaks = LinePeaks(column, y, std, lines, rig.projector_response, widths)
     return peaks.without_offset(unlit_px(rig, lines.width_px))

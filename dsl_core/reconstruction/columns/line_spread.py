@@ -33,8 +33,6 @@ from dsl_core.solve.threads import one_kernel_thread
 PIXELS, RUN = 4000, 10
 #: Pixels darker than this share of all lit ones are left out.
 DARKER = 0.3
-#: A picture is overexposed if more than this share of what is lit saturates.
-OVEREXPOSED = 0.5
 #: Pixels whose decoded column is so many times the usual step from a neighbour's are at an edge.
 EDGE_STEPS = 4.0
 #: Regions of the picture, down and across, in which waves are looked for.
@@ -132,20 +130,6 @@ def spread_pixels(lines: LineSet | None, code: DecodedCode, white: MergedFrame) 
     first = row * columns + starts[run]
     first = first[:: max(first.size * RUN // PIXELS, 1)]
     return np.asarray((first[:, None] + np.arange(RUN)).ravel())
-
-
-def overexposed_pixels(lines: LineSet | None, white: MergedFrame) -> NDArray[np.intp]:
-    """Flat indices of lit pixels, evenly thinned, of a picture of which most saturates; else none.
-
-    Only the flanks of their lines are measured, which say where lines are but not how these are shaped.
-    """
-    if lines is None or not lines.single or lines.step_px > lines.width_px:
-        return np.empty(0, np.intp)
-    lit = np.isfinite(white.radiance) & (white.radiance > 0)
-    pixels = np.flatnonzero(lit)
-    if not pixels.size or white.saturated[lit].mean() <= OVEREXPOSED:
-        return np.empty(0, np.intp)
-    return pixels[:: max(pixels.size // PIXELS, 1)]
 
 
 def _peaks(seen: PickedLines, lines: LineSet, column: torch.Tensor, rig: Rig) -> Peaks:

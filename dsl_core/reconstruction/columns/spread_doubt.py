@@ -21,10 +21,6 @@ from dsl_core.solve.threads import one_kernel_thread
 
 #: Relative deviation of the width of the spread from its calibration, before a scan is seen.
 FOCUS_STD = 0.06
-#: The same where every line saturates: nothing shows whether the light still is shaped as calibrated, and
-#: its far flanks, from which columns follow then, differ more between shapes than with the width. With
-#: heavy tails (an eighth of the light three times as wide) or skewed lines, 95 % bands hold 91 to 98 %.
-UNSEEN_STD = 0.2
 #: A width that is surer than this moves no column by as much as anybody minds.
 SURE = 0.003
 #: By how much the width is changed to see what moves, and places between two lines that are told apart.
@@ -38,16 +34,14 @@ class SpreadDoubt:
     """What columns are off by at ``PLACES`` places between two lines, the first on the middle of one.
 
     ``relative`` is the deviation of the width. With a width twice as large, columns of these places would
-    move by ``moved_px`` (PLACES,) on average, and by ``rms_px`` (PLACES,) rms. ``unseen`` says that lines
-    saturate, so that it stands for their shape, which no measured width makes any surer. ``varies`` is what
-    the width of each pixel (pixels,) is off by, relative to the one for all; None where that is little.
+    move by ``moved_px`` (PLACES,) on average, and by ``rms_px`` (PLACES,) rms. ``varies`` is what the width
+    of each pixel (pixels,) is off by, relative to the one for all; None where that is little.
     """
 
     lines: LineSet
     relative: float
     moved_px: NDArray[np.float64]
     rms_px: NDArray[np.float64]
-    unseen: bool = False
     varies: NDArray[np.float64] | None = None
 
     def at(self, column_px: NDArray[np.floating]) -> NDArray[np.float32]:
@@ -76,7 +70,7 @@ def spread_doubt(peaks: LinePeaks | None, found: SpreadFit | None) -> SpreadDoub
     """
     if peaks is None:
         return None
-    lines, relative = peaks.lines, UNSEEN_STD if peaks.unseen else FOCUS_STD
+    lines, relative = peaks.lines, FOCUS_STD
     if found is not None:
         seen = found.rms_std_px / found.response.blur_px
         relative *= seen / float(np.hypot(FOCUS_STD, seen))
@@ -89,7 +83,7 @@ def spread_doubt(peaks: LinePeaks | None, found: SpreadFit | None) -> SpreadDoub
     mean, square = (np.bincount(place, each, PLACES) / np.maximum(count, 1) for each in (moved, moved**2))
     # Where no column is, lines say nothing: neighbours stand for it.
     square[count == 0] = square[count > 0].max(initial=0.0)
-    return SpreadDoubt(lines, relative, mean, np.sqrt(square), peaks.unseen)
+    return SpreadDoubt(lines, relative, mean, np.sqrt(square))
 
 
 def _places(lines: LineSet, column_px: torch.Tensor) -> torch.Tensor:

@@ -15,7 +15,7 @@ from dsl_core.optics.lines.profile import zero_order_profile
 from dsl_core.optics.spread.fit import SpreadFit
 from dsl_core.reconstruction.columns.column import refine
 from dsl_core.reconstruction.columns.line_peaks import LinePeaks, smooth_peaks
-from dsl_core.reconstruction.columns.spread_doubt import FOCUS_STD, UNSEEN_STD, SpreadDoubt, spread_doubt
+from dsl_core.reconstruction.columns.spread_doubt import FOCUS_STD, SpreadDoubt, spread_doubt
 from dsl_core.reconstruction.merge import PickedLines
 from tests.cases.small_rig import small_rig
 
@@ -34,15 +34,11 @@ def lines_seen(response: ProjectorResponse) -> tuple[np.ndarray, np.ndarray]:
     return light, np.full_like(light, 0.002)
 
 
-def doubt(
-    found: SpreadFit | None, lines: LineSet | None = LINES, overexposed: float = 0.0
-) -> SpreadDoubt | None:
-    """With the upper part of the picture, that share of it, brighter than the camera can tell."""
+def doubt(found: SpreadFit | None, lines: LineSet | None = LINES) -> SpreadDoubt | None:
     light, std = lines_seen(RESPONSE)
-    saturated = np.broadcast_to(np.arange(ROWS)[:, None] < overexposed * ROWS, SHAPE)
-    std[(light > 0.9) & saturated.ravel()] = np.inf
-    code = SimpleNamespace(undecided=saturated, likely_column=COLUMN.round())
-    white = SimpleNamespace(saturated=saturated, radiance=np.ones(SHAPE))
+    known = np.zeros(SHAPE, bool)
+    code = SimpleNamespace(undecided=known, likely_column=COLUMN.round())
+    white = SimpleNamespace(saturated=known, radiance=np.ones(SHAPE))
 
     def pick(pixels: np.ndarray) -> PickedLines:
         return PickedLines(pixels, light[:, pixels], std[:, pixels], np.zeros(len(pixels), np.float32))
@@ -82,18 +78,6 @@ def test_what_a_scan_says_of_the_width_counts_and_where_it_is_sure_nothing_is_do
     # One width for all that is sure may be none of its parts'.
     assert not replace(surely, varies=np.full(ROWS * COLUMNS, 0.05)).is_sure
     assert doubt(None, None) is None
-
-
-def test_where_all_lines_saturate_their_shape_is_doubted() -> None:
-    seen, unseen = doubt(None), doubt(None, overexposed=1.0)
-    assert seen is not None
-    assert unseen is not None
-    assert (seen.unseen, unseen.unseen) == (False, True)
-    assert unseen.relative == UNSEEN_STD
-    assert unseen.at(COLUMN).max() > 0.1
-    half = doubt(None, overexposed=0.5)
-    assert half is not None
-    assert (half.unseen, half.relative) == (False, FOCUS_STD)
 
 
 def test_columns_that_nobody_knows_are_not_doubted_further() -> None:
