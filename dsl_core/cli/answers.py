@@ -24,6 +24,11 @@ if TYPE_CHECKING:
     from dsl_core.progress import Progress
 
 Result = Annotated[Path, typer.Argument(metavar="RESULT.zarr", help="A result of 'reconstruct'.")]
+Pins = Annotated[bool, typer.Option("--pins", help="Places are the marked pins and regions.")]
+Places = Annotated[
+    list[str],
+    typer.Option("--at", help="A place, as NAME=X,Y or NAME=X,Y,WIDTH,HEIGHT; can be repeated."),
+]
 #: So many notes on a library are printed; the rest is counted.
 _MOST_NOTES = 6
 #: From this share of "none of these" on, the library itself may be what does not fit.
@@ -201,11 +206,8 @@ def _classes(
 
 def spectra(
     path: Result,
-    pins: Annotated[bool, typer.Option("--pins", help="Places are the marked pins and regions.")] = False,
-    at: Annotated[
-        list[str],
-        typer.Option("--at", help="A place, as NAME=X,Y or NAME=X,Y,WIDTH,HEIGHT; can be repeated."),
-    ] = [],  # noqa: B006
+    pins: Pins = False,
+    at: Places = [],  # noqa: B006
     table: Annotated[Path | None, typer.Option("--output", "-o", help="NAME.csv to write.")] = None,
     force: Force = False,
     json: Json = False,
@@ -219,8 +221,7 @@ def spectra(
     from dsl_core.io.result.result_file import load_result
 
     output = Output(json)
-    if not (pins or at):
-        raise PlanError("Say which places: --pins, or --at NAME=X,Y.")
+    _require_places(pins, at)
     check_targets([] if table is None else [table], overwrite=force)
     result = load_result(path)
     require_spectra(result)
@@ -270,11 +271,8 @@ def _cells(spectrum: NamedSpectrum) -> list[str]:
 
 def colours(
     path: Result,
-    pins: Annotated[bool, typer.Option("--pins", help="Places are the marked pins and regions.")] = False,
-    at: Annotated[
-        list[str],
-        typer.Option("--at", help="A place, as NAME=X,Y or NAME=X,Y,WIDTH,HEIGHT; can be repeated."),
-    ] = [],  # noqa: B006
+    pins: Pins = False,
+    at: Places = [],  # noqa: B006
     light: Annotated[
         list[str], typer.Option("--light", help="A CIE illuminant, such as A, D50, D65, FL11 or LED-B3.")
     ] = [],  # noqa: B006
@@ -292,8 +290,7 @@ def colours(
     from dsl_core.io.result.result_file import load_result
 
     output = Output(json)
-    if not (pins or at):
-        raise PlanError("Say which places: --pins, or --at NAME=X,Y.")
+    _require_places(pins, at)
     check_targets([] if table is None else [table], overwrite=force)
     result = load_result(path)
     spectra = spectra_of_masks(result, _masks(path, result, pins, at))
@@ -347,6 +344,12 @@ def report(
     output.say(f"Written: {', '.join(str(target) for target in targets)}")
     output.put(files=[str(target) for target in targets])
     output.finish()
+
+
+def _require_places(pins: bool, at: Sequence[str]) -> None:
+    """Raise `PlanError` where no option names a place."""
+    if not (pins or at):
+        raise PlanError("Say which places: --pins, or --at NAME=X,Y.")
 
 
 def _masks(path: Path, result: xr.Dataset, pins: bool, at: Sequence[str]) -> dict[str, NDArray[np.bool_]]:
