@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pytest
 
@@ -11,6 +13,7 @@ from dsl_core.optics.filters import (
     passed,
     relative_shift,
     shift_slopes,
+    shift_terms,
     through_filter,
 )
 from dsl_core.optics.spectra import chain_response
@@ -66,3 +69,17 @@ def test_slopes_of_the_shift_are_its_derivatives(values: tuple[float, float, flo
         axis=1,
     )
     np.testing.assert_allclose(shift_slopes(terms, point), numeric, atol=1e-7)
+
+
+def test_a_filter_before_the_lens_passes_shorter_wavelengths_towards_every_corner() -> None:
+    """Seen at an angle, the band of a layer of index n is at ``sqrt(1 - sin(angle)^2 / n^2)`` of itself."""
+    rig, index = published_rig(), 2.0
+    lens = rig.camera
+    corners = [0, lens.width_px - 1, (lens.height_px - 1) * lens.width_px, lens.height_px * lens.width_px - 1]
+    found = relative_shift(shift_terms(rig, np.array(corners)), np.array([index**-2, 0.0, 0.0]))
+    for shift, at in zip(found, corners, strict=True):
+        row, column = divmod(at, lens.width_px)
+        ray = np.linalg.inv(lens.matrix) @ [column, row, 1.0]
+        sine = math.sin(math.atan(math.hypot(ray[0], ray[1]) / ray[2]))
+        # The lens distorts directions by up to 2 %, and shares of the band go with their squares.
+        assert shift == pytest.approx(math.sqrt(1 - (sine / index) ** 2) - 1, rel=0.05)
