@@ -159,6 +159,11 @@ def test_level_and_rise_are_as_unsure_as_stated() -> None:
     assert middle @ covariance @ middle == pytest.approx(0.5**2)
 
 
+def test_the_rise_is_that_over_all_nodes_whatever_their_unit() -> None:
+    metres = SmoothPrior(1e-9 * NODES, 0.5, 0.2).covariance(0.0, 60e-9)
+    assert metres == pytest.approx(SmoothPrior(NODES, 0.5, 0.2).covariance(0.0, 60.0))
+
+
 @pytest.mark.parametrize("size", [1, 2, 7, 40])
 def test_the_determinant_is_that_of_numpy_whatever_the_sign_and_the_matrix_left_as_it_was(size: int) -> None:
     matrix = np.random.default_rng(size).normal(size=(size, size))

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from dsl_core.model.spectral import SpectralCurve
+from dsl_core.reconstruction.spectral.first_order_light import NM, FirstOrderLight
 from dsl_core.reconstruction.spectral.order_balance import order_balance_finding
 
 from .conftest import Lines
@@ -43,3 +45,15 @@ def test_nothing_is_told_by_noise_or_of_a_film_with_one_order(chart: Lines) -> N
     assert order_balance_finding(turned, chart.light(noisy)) is None
     for one in ({1: orders[-1], -2: orders[-1]}, {-1: orders[1], 2: orders[1]}):
         assert order_balance_finding(chart.rig.model_copy(update={"efficiency": one}), chart.light()) is None
+
+
+@pytest.mark.parametrize("dim", [1, -1])
+def test_wavelengths_at_which_either_order_is_in_the_noise_say_nothing(dim: int, chart: Lines) -> None:
+    """A hundred pixels in whose one order there is hardly any light, as in front of a shield."""
+    shape = (len(NM), 100)
+    radiance = {order: np.full(shape, 0.5 if order == dim else 50.0) for order in (1, -1)}
+    variance = {order: np.full(shape, 1.0) for order in (1, -1)}
+    light = FirstOrderLight(np.zeros(100, np.intp), radiance, variance)
+    assert order_balance_finding(chart.rig, light) is None
+    sure = FirstOrderLight(light.site, radiance, {order: 0.01 * variance[order] for order in (1, -1)})
+    assert order_balance_finding(chart.rig, sure) is not None
