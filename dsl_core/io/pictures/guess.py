@@ -29,8 +29,9 @@ from dsl_core.words import counted
 LEAST_LIGHT = 0.02
 #: Readings worse than this make sense, but not much.
 DOUBTFUL = 0.8
-#: Readings worse than this may come from values that are encoded for screens: their stripes look uneven.
-AS_ENCODED = 0.5
+#: Readings worse than this may come from values that are encoded for screens: their stripes look uneven, and
+#: the finest, which a lens blurs, may pass for steps of sinusoids.
+AS_ENCODED = 0.1
 #: Mean values of the four places of a mosaic differ by at least this ratio, its two greens by less.
 MOSAIC_RATIO, GREEN_RATIO = 1.12, 1.05
 Size = tuple[int, int]
@@ -140,13 +141,16 @@ def _picture_name(candidate: Candidate, place: int) -> str:
     return picture.path.name if picture.index is None else f"{picture.path.name}[{picture.index}]"
 
 
-def _doubts_of_digits(candidate: Candidate, probes: Probes, found: Recognised) -> list[str]:
+def _doubts_of_digits(candidate: Candidate, look: _Look, found: Recognised) -> list[str]:
     """Pictures that are no pattern and inverse; raises `StoreError` where the picture of a digit is lost."""
     doubts = []
     for block in found.blocks:
         if not isinstance(block.reading, StripeReading):
             continue
-        lines = probes.across if block.axis == "columns" else probes.down
+        as_stored, decoded, lines = (
+            probes.across if block.axis == "columns" else probes.down
+            for probes in (look.probes, look.decoded, found.probes)
+        )
         if lost := lost_after(lines, block.slots, block.reading):
             one, other = (_picture_name(candidate, place) for place in lost)
             raise StoreError(
@@ -154,7 +158,9 @@ def _doubts_of_digits(candidate: Candidate, probes: Probes, found: Recognised) -
                 " digit between them is lost, or pictures are exchanged, so that no position is known."
                 " Correct that, or name only the pictures of the other axis in a mapping."
             )
-        for pair in odd_pairs(lines, block.slots, block.reading):
+        # Where stripes blur, pictures for screens are brighter than a pattern and its inverse would be.
+        odd = [odd_pairs(each, block.slots, block.reading) for each in (as_stored, decoded)]
+        for pair in (each for each in odd[0] if each in odd[1]):
             one, other = (_picture_name(candidate, place) for place in pair)
             doubts.append(
                 f"{one} and {other} should be a pattern and its inverse, but one of them shows something"
@@ -311,7 +317,7 @@ def _guess_of(
     names: Sequence[str],
     encoding: Encoding | None,
 ) -> Guess:
-    unsure = [*look.notes, *_doubts_of_digits(candidate, look.probes, found)]
+    unsure = [*look.notes, *_doubts_of_digits(candidate, look, found)]
     size, doubt = (size_px, "") if size_px else guessed_size(found.blocks)
     parts, turned = [], is_turned(found.blocks, size)
     if turned:
@@ -320,7 +326,7 @@ def _guess_of(
             " picture: the camera is taken to be turned by 90 degrees"
         )
     for block in found.blocks:
-        part, doubts = part_of(block, found.blocks, size, look.probes, turned)
+        part, doubts = part_of(block, found.blocks, size, found.probes, turned)
         parts.append(part)
         unsure += doubts
     if doubt:

@@ -53,10 +53,14 @@ BlocksOf = Callable[[Axis, Slots], tuple[list[Block], float]]
 
 @dataclass(frozen=True)
 class Recognised:
-    """Blocks in the order of the pictures; ``misfit`` is 0 for a capture that makes sense as a whole."""
+    """Blocks in the order of the pictures; ``misfit`` is 0 for a capture that makes sense as a whole.
+
+    ``probes`` are the pictures in which the blocks were seen.
+    """
 
     blocks: tuple[Block, ...]
     misfit: float
+    probes: Probes
 
     @property
     def digits(self) -> frozenset[tuple[Axis, int]]:
@@ -143,7 +147,8 @@ def _without_lights(
             blocks = [*blocks, (white, Block("white", (slots[white],)))]
         if black is not None:
             blocks = [*blocks, (black, Block("black", (slots[black],)))]
-        best = Recognised(tuple(block for _, block in sorted(blocks, key=lambda each: each[0])), total)
+        in_order = tuple(block for _, block in sorted(blocks, key=lambda each: each[0]))
+        best = Recognised(in_order, total, probes)
     return best
 
 

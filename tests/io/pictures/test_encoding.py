@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from PIL import Image, PngImagePlugin
+from scipy.ndimage import uniform_filter1d
 
 from dsl_core.io.pictures.encoding import encoding_of, noted_encoding
 from dsl_core.io.pictures.guess import guess_mapping
@@ -14,7 +15,7 @@ from dsl_core.io.pictures.mapping import BlackPicture, Mapping, StripePictures, 
 from dsl_core.io.pictures.picture_file import Picture, load_mosaic
 from dsl_core.io.pictures.source import open_pictures
 from dsl_core.model.captured_code import Stripes
-from dsl_core.optics.colour import srgb_decode
+from dsl_core.optics.colour import srgb_decode, srgb_encode
 from tests.cases.foreign_captures import PROJECTOR, blurred, for_screens, frames, write
 
 MAPPING = Mapping(parts=(StripePictures(bits=7), WhitePicture(), BlackPicture()), projector_size_px=PROJECTOR)
@@ -58,6 +59,22 @@ def test_a_guess_decodes_pictures_for_screens_and_says_so(folders: dict[str, Pat
     stated = guess_mapping(folders["srgb"], PROJECTOR, encoding="linear").mapping
     assert stated.encoding == "linear"
     assert not any("white and black" in each for each in stated.unsure)
+
+
+def test_stripes_that_a_lens_blurs_are_no_odd_pair_of_a_screens_pictures(tmp_path: Path) -> None:
+    """Where stripes of two projector pixels are finer than the camera's, sums are bright everywhere."""
+    pictures, white, black = frames([("columns", Stripes(bits=7))], camera=(64, 48))
+    small = [uniform_filter1d(each.astype(float), 3, axis=1) / 255 for each in (*pictures, white, black)]
+    stored = {
+        f"{i:02d}.png": np.rint(255 * srgb_encode(each)).astype(np.uint8) for i, each in enumerate(small)
+    }
+    guessed = guess_mapping(write(tmp_path / "right", stored), PROJECTOR).mapping
+    assert guessed.parts == MAPPING.parts
+    assert guessed.encoding == "srgb"
+    assert not any("should be a pattern and its inverse" in each for each in guessed.unsure)
+    wrong = {**stored, "11.png": stored["06.png"]}
+    guessed = guess_mapping(write(tmp_path / "wrong", wrong), PROJECTOR).mapping
+    assert any("10.png and 11.png should be a pattern and its inverse" in each for each in guessed.unsure)
 
 
 def test_values_for_screens_become_linear_channel_by_channel(tmp_path: Path) -> None:

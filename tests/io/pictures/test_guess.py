@@ -282,8 +282,8 @@ def test_inverses_may_be_told_by_the_ends_of_names(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("as_they_are", "decoded", "taken"),
     [
-        (AS_ENCODED - 0.01, 0.1, "as they are"),
-        (AS_ENCODED, 0.1, "decoded"),
+        (AS_ENCODED - 0.01, 0.01, "as they are"),
+        (AS_ENCODED, 0.01, "decoded"),
         (AS_ENCODED, 0.7, "as they are"),
         (None, 0.7, "decoded"),
         (0.7, None, "as they are"),
