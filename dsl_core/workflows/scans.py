@@ -137,7 +137,10 @@ def reconstruct_scan(
     if proof is None:
         with timer.stage("compare frames with their patterns"):
             progress.report("compare frames with their patterns", 0, 0)
-            proof = prove(reader, watched.seen, rig, rig.sensor.bit_depth, rig.sensor.bayer)
+            sensor = rig.sensor
+            proof = prove(
+                reader, watched.seen, rig, sensor.bit_depth, sensor.bayer, knows_light=not is_import(reader)
+            )
     doubts = _doubts(reader, proof)
     return result.assign_attrs(
         {
@@ -249,7 +252,11 @@ def prove_scan(folder: Path) -> ScanProof:
     seen.read_missing(reader)
     camera = reader.manifest.camera
     settings = (camera.bit_depth, camera.bayer) if camera else (12, "RGGB")
-    return prove(reader, seen, reader.calibration, *settings, missing=_absent(reader))
+    # Nobody knows how long pictures of other programs were exposed.
+    knows_light = not is_import(reader)
+    return prove(
+        reader, seen, reader.calibration, *settings, missing=_absent(reader), knows_light=knows_light
+    )
 
 
 def _absent(reader: ScanReader) -> set[int]:

@@ -44,18 +44,25 @@ class SeenFrames:
                 with suppress(StoreError):
                     self.keep(shot, source.read(shot))
 
-    def report(self, calibration: Rig | None, bit_depth: int = 12, bayer: str = "RGGB") -> ProofReport:
-        """What the frames kept so far show."""
-        proof = FrameProof(self.plan, calibration, bit_depth, bayer, at_the_end=True)
+    def report(
+        self,
+        calibration: Rig | None,
+        bit_depth: int = 12,
+        bayer: str = "RGGB",
+        knows_light: bool = True,
+    ) -> ProofReport:
+        """What the frames kept so far show, with the arguments of `FrameProof`."""
+        proof = FrameProof(self.plan, calibration, bit_depth, bayer, at_the_end=True, knows_light=knows_light)
         wrong: list[Finding] = []
-        judged = untold = 0
+        untold: list[Shot] = []
+        judged = 0
         for shot in self.plan.shots():
             seen = self._seen.get(shot.index)
             if seen is None:
                 continue
             found = proof.judge_raster(shot, seen)
             judged += 1
-            untold += found.verdict is Verdict.UNTOLD
+            untold += [shot] if found.verdict is Verdict.UNTOLD else []
             wrong += proof.reviewed or ([found] if found.is_wrong else [])
             for number in proof.lacking_pairs if shot.role == "black" else ():
                 pair = self._pair_elsewhere(number, shot.setting)
@@ -66,7 +73,7 @@ class SeenFrames:
         light += proof.lasting()
         light += [each.sentence for each in (proof.white_again(), proof.colour_again()) if each is not None]
         light += [each.sentence for each in proof.local_sums()]
-        return ProofReport(judged, together(wrong), untold, tuple(light))
+        return ProofReport(judged, together(wrong), sum(not proof.is_told(s) for s in untold), tuple(light))
 
     def _pair_elsewhere(self, number: int, setting: int) -> tuple[Counts, Counts] | None:
         """Pattern and inverse as another setting shows them."""
@@ -112,13 +119,15 @@ def prove(
     bit_depth: int = 12,
     bayer: str = "RGGB",
     missing: Iterable[int] = (),
+    knows_light: bool = True,
 ) -> ScanProof:
     """What the frames ``seen`` of a scan show, and what moved in it.
 
     Reads the sentinels, and what they repeat, from the ``source``, which has all frames but those
-    ``missing``. Raises `StoreError`.
+    ``missing``. Without ``knows_light``, the calibration does not say how bright they are. Raises
+    `StoreError`.
     """
-    found = seen.report(calibration, bit_depth, bayer)
+    found = seen.report(calibration, bit_depth, bayer, knows_light)
     moved = movement_of(source, None if calibration is None else calibration.sensor, missing)
     return ScanProof(
         judged=found.judged,

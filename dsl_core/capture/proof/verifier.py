@@ -89,12 +89,14 @@ class FrameProof:
         bit_depth: int = 12,
         bayer: str = "RGGB",
         at_the_end: bool = False,
+        knows_light: bool = True,
     ) -> None:
         """Without ``calibration``, camera and projector are taken to be usual ones.
 
         ``at_the_end``: nothing will be taken again, so the first code is judged once all of it is there.
+        Without ``knows_light``, the calibration does not say how bright pictures are.
         """
-        self._plan, self._calibration = plan, calibration
+        self._plan, self._calibration, self._knows_light = plan, calibration, knows_light
         self._shots = tuple(plan.shots())
         self._raster = Raster(plan.camera_size_px)
         self._noise = Noise.of(calibration.sensor if calibration else None, bit_depth)
@@ -111,7 +113,10 @@ class FrameProof:
         #: What the last picture said of the pairs of the first code, one by one.
         self.reviewed: list[Finding] = []
         self._learned = Learned(
-            UsualLight(self._first, calibration is not None), LightSteps(), LinePlaces(), set()
+            UsualLight(self._first, knows_light and calibration is not None),
+            LightSteps(),
+            LinePlaces(),
+            set(),
         )
         self._later = LaterSettings(
             plan, calibration, self._noise, self._kept, self._black_gained, self._level_of_code
@@ -172,6 +177,11 @@ class FrameProof:
         """Shots that show whether devices and scene are as they were; none before the first code."""
         numbers = choose_pairs(self._code_pairs(), self._raster.shape)
         return tuple(self._shots[self._places["code", 2 * number]] for number in numbers)
+
+    def is_told(self, shot: Shot) -> bool:
+        """Whether a picture of the first code, which said nothing by itself, fits the others by now."""
+        is_of_code = shot.setting == self._first and shot.role in ("code", "white", "black")
+        return is_of_code and self._code is not None and self._code.lit is not None
 
     def is_as_before(self, control: Shot, pixels: NDArray[np.uint16]) -> bool:
         """Whether a raw mosaic of the shot that `controls` named shows what it showed at first."""
@@ -245,7 +255,7 @@ class FrameProof:
                 *ends,
                 self._plan,
                 setting,
-                self._calibration,
+                self._calibration if self._knows_light else None,
                 channels,
                 self._noise,
                 self._raster,

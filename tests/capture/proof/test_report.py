@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from itertools import islice
 
+import numpy as np
 import pytest
 
 from dsl_core.capture.proof.colour_again import ColourAgain
@@ -43,6 +44,34 @@ def _judged(scene: RenderedScene, frames: MemorySink) -> ProofReport:
 def test_a_sound_scan_has_no_wrong_pictures(scene: RenderedScene, frames: MemorySink) -> None:
     report = _judged(scene, frames)
     assert (report.judged, report.wrong) == (scene.plan.shot_count, ())
+
+
+def test_pictures_of_a_code_that_fits_are_judged_by_each_other(
+    scene: RenderedScene, frames: MemorySink
+) -> None:
+    shots = list(scene.plan.shots())
+    assert _judged(scene, frames).untold == 0
+    dark = next(shot.index for shot in shots if shot.role == "black")
+    unlike = _with(frames, {shot.index: dark for shot in shots if shot.role in ("code", "white")})
+    assert _judged(scene, unlike).untold > sum(shot.role == "code" for shot in shots) / 2
+
+
+def test_light_is_not_judged_where_exposures_are_not_known(scene: RenderedScene, frames: MemorySink) -> None:
+    """A projector whose black glows, by what its calibration says."""
+    glowing = MemorySink(frames.plan)
+    ends = {
+        (shot.role, shot.setting): frames.read(shot).astype(float)
+        for shot in scene.plan.shots()
+        if shot.role in ("white", "black")
+    }
+    for shot in scene.plan.shots():
+        glow = 0.1 * (ends["white", shot.setting] - ends["black", shot.setting])
+        seen_dn = np.rint(frames.read(shot) + glow).clip(0, 4095).astype(np.uint16)
+        glowing.write(shot, replace(frames.frames[shot.index], pixels=seen_dn))
+    seen = SeenFrames(glowing.plan)
+    seen.read_missing(glowing)
+    assert "In black pictures" in " ".join(seen.report(scene.calibration).sentences)
+    assert not seen.report(scene.calibration, knows_light=False).sentences
 
 
 def test_pictures_in_the_places_of_others_are_named(scene: RenderedScene, frames: MemorySink) -> None:
