@@ -32,6 +32,8 @@ DOUBTFUL = 0.8
 #: Readings worse than this may come from values that are encoded for screens: their stripes look uneven, and
 #: the finest, which a lens blurs, may pass for steps of sinusoids.
 AS_ENCODED = 0.1
+#: More pictures than this are rarely those of a code alone: 11 digits of columns and of rows have 46.
+MANY = 64
 #: Mean values of the four places of a mosaic differ by at least this ratio, its two greens by less.
 MOSAIC_RATIO, GREEN_RATIO = 1.12, 1.05
 Size = tuple[int, int]
@@ -131,6 +133,11 @@ def _advice(tried: Sequence[Candidate], looked_at: tuple[Candidate, _Look] | Non
         return (
             f"{one} and {other} show the same. Keep one picture of each pattern, at one exposure; where the"
             " projector was late, capture again."
+        )
+    if tried and (count := len(tried[0].pictures)) > MANY:
+        return (
+            f"Most codes have fewer than {count} pictures: keep those of other patterns, such as scan lines,"
+            " in another folder, or state a mapping whose files are those of the code."
         )
     return "Check that all are of one camera and scene and not too noisy, or state a mapping."
 

@@ -266,6 +266,17 @@ def test_the_same_picture_twice_is_named_where_nothing_makes_sense(tmp_path: Pat
         guess_mapping(write(tmp_path, {f"{i:02d}.png": p for i, p in enumerate(both)}), PROJECTOR)
 
 
+def test_scan_lines_among_the_pictures_are_asked_to_be_kept_elsewhere(
+    tmp_path: Path, gray: Pictures, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("dsl_core.io.pictures.guess.MANY", len(gray))
+    monkeypatch.setattr("dsl_core.io.pictures.guess.recognise", lambda *_: None)
+    lines = [np.where(np.abs(np.arange(160) - 19 * k) < 2, gray[14], gray[15]) for k in range(8)]
+    named = {f"{i:02d}.png": each for i, each in enumerate([*gray, *lines])}
+    with pytest.raises(StoreError, match="Most codes have fewer than 24 pictures: keep those of other"):
+        guess_mapping(write(tmp_path, named), PROJECTOR)
+
+
 def test_inverses_may_be_told_by_the_ends_of_names(tmp_path: Path) -> None:
     named: dict[str, NDArray[np.uint16]] = {}
     for axis in ("columns", "rows"):
