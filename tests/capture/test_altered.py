@@ -118,6 +118,24 @@ def test_other_changes_are_no_alteration(change: Callable[[Counts], Counts]) -> 
     assert alteration(pictures(1), pictures(2, change), SENSOR) == ""  # type: ignore[arg-type]
 
 
+def test_black_that_holds_some_of_white_is_mixed_with_it() -> None:
+    white, black, code = (each.astype(float) for each in pictures(2))
+    mixed = (0.7 * white + 0.3 * code, 0.7 * black + 0.3 * white, 0.7 * code + 0.3 * black)
+    now = tuple(np.rint(each).astype(np.uint16) for each in mixed)
+    assert "Black, captured after white, holds 0.30 times" in alteration(pictures(1), now, SENSOR)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("light", [1.0, 0.7])
+def test_a_lamp_of_the_room_is_no_mixture(light: float) -> None:
+    """It gives most to what reflects most, as the projector does, and adds to white as to black."""
+    white, black, code = (each.astype(float) for each in pictures(2))
+    lamp = 0.3 * (white - black) * np.tile([[1.4, 1.0], [1.0, 0.5]], (32, 48))
+    now = tuple(
+        np.rint(black + light * (each - black) + lamp).astype(np.uint16) for each in (white, black, code)
+    )
+    assert "mixed" not in alteration(pictures(1), now, SENSOR)  # type: ignore[arg-type]
+
+
 def test_pictures_that_tell_nothing_are_not_altered() -> None:
     full = tuple(np.full((8, 8), int(SENSOR.full_scale_dn), np.uint16) for _ in range(3))
     assert alteration(full, full, SENSOR) == ""  # type: ignore[arg-type]

@@ -210,6 +210,18 @@ def test_all_of_the_picture_that_lost_light_is_in_the_way_of_nobody() -> None:
     assert found.is_of_all
 
 
+def test_light_that_changed_by_place_is_no_other_exposure() -> None:
+    before, share = pictures(), np.linspace(0.6, 0.9, 64)[:, None]
+    later = (
+        (each.astype(float) - before.black) * share + before.black for each in (before.white, before.code)
+    )
+    white, code = (each.round().astype(np.uint16) for each in later)
+    found = what_changed(before, References(white, before.black, code), SENSOR)
+    assert "is 0.64 times what it was when the scan began in some parts" in found.sentence
+    assert "exposure" not in found.sentence
+    assert not found.is_of_all
+
+
 def test_a_colour_that_failed_is_no_white_balance() -> None:
     before = pictures()
     red = np.tile([[0.1, 1.0], [1.0, 1.0]], (32, 48))
