@@ -45,6 +45,9 @@ OTHER_PATTERN = 0.08
 #: Something stands before tiles of the picture that have lost light to this share, so many, while others have
 #: kept it: a tenth of them within so much, and none has gained more than so much.
 SHADED, FEWEST_SHADED, ELSEWHERE, GAINED = 0.7, 2, 0.06, 0.15
+#: Stripes of the code are out of focus with less than this share of the contrast (squared) they had, and the
+#: light they had but for so much of white's.
+SOFTER, SAME_SHARE = 0.85, 0.03
 #: Light has changed by place if a tenth of the tiles have less, and another tenth more, than this share of
 #: all of it apart.
 BY_PLACE = 0.15
@@ -176,7 +179,13 @@ def what_changed(before: References, now: References, sensor: Sensor) -> Explana
             f" above its black level, and was at {dark_old:.0f} DN when the scan began. Keep the room as it"
             " was, and resume the scan."
         )
-    if moved is not None and not is_uneven:
+    is_soft = (moved is None or moved.is_pattern) and _has_softer_stripes(before, now, lit)
+    if is_soft:
+        found.append(
+            "Stripes of the code are softer than when the scan began: projector or camera is out of focus, or"
+            " something came onto a lens. Set the focus as it was, and resume the scan."
+        )
+    elif moved is not None and not is_uneven:
         # Other colours look like motion where surfaces have colours.
         found.append(f"{moved.sentence} {ADVICE}")
     if not found and moved is None and _is_other_pattern(before, now, old, used):
@@ -187,7 +196,7 @@ def what_changed(before: References, now: References, sensor: Sensor) -> Explana
             has_moved=True,
         )
     is_of_all = is_uneven or (moved is None and is_other_light and not by_place)
-    return Explanation(" ".join(found), moved is not None, not found, is_of_all)
+    return Explanation(" ".join(found), moved is not None or is_soft, not found, is_of_all)
 
 
 def _said_of_colours(colours: tuple[float, ...]) -> str:
@@ -238,6 +247,18 @@ def _said_of_places(tiles: NDArray[np.float64], light: float) -> str:
         f" and {high:.2f} times in others: moisture, haze or dust came before a lens, the film or the target,"
         " or a lamp of the room or the projector moved. Clear the way of the light, and resume the scan."
     )
+
+
+def _has_softer_stripes(before: References, now: References, lit: NDArray[np.bool_]) -> bool:
+    """Whether a frame of the code is nearer to half of white, with as much light: a motion leaves both."""
+    shares, contrasts = [], []
+    for each in (before, now):
+        white, code = (
+            picture.astype(np.float64)[lit] - each.black[lit] for picture in (each.white, each.code)
+        )
+        shares.append(float(code.sum() / white.sum()))
+        contrasts.append(float(np.square(2 * code - white).sum() / np.square(white).sum()))
+    return contrasts[1] < SOFTER * contrasts[0] and abs(shares[1] - shares[0]) < SAME_SHARE
 
 
 def _light_of_tiles(
