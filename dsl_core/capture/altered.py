@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 from dsl_core.capture.proof.lasting.written_row import written_row
 from dsl_core.capture.proof.noise import Noise
 from dsl_core.capture.proof.raster import Raster
-from dsl_core.model.rig import Sensor
+from dsl_core.model.conditions import COLOUR_NAMES
+from dsl_core.model.rig import Sensor, colour_sites
 from dsl_core.optics.sensor import raw_variance
 
 Mosaic = NDArray[np.uint16]
@@ -142,14 +143,34 @@ def _dark_rows(before: Pictures, now: Pictures) -> str:
 
 
 def _clipped(before: Mosaic, now: Mosaic, sensor: Sensor) -> str:
+    """Whether white ends below full scale, all of it or one colour."""
+    of_all = _limit_of(before.ravel(), now.ravel(), sensor)
+    if of_all is not None:
+        return _said_of_limit("", *of_all)
+    sites = np.array(colour_sites(sensor.bayer)).reshape(2, 2)
+    for colour, name in enumerate(COLOUR_NAMES):
+        own = np.tile(sites == colour, (now.shape[0] // 2 + 1, now.shape[1] // 2 + 1))
+        own = own[: now.shape[0], : now.shape[1]]
+        found = _limit_of(before[own], now[own], sensor) if own.any() else None
+        if found is not None:
+            return _said_of_limit(f" in {name}", *found)
+    return ""
+
+
+def _limit_of(before: Mosaic, now: Mosaic, sensor: Sensor) -> tuple[int, float] | None:
+    """The value that counts end at and did not before, and the share of pixels that have it; None if none."""
     most = int(now.max())
     shares = [float((each == each.max()).mean()) for each in (before, now)]
     if most >= BELOW_FULL * sensor.full_scale_dn or shares[1] < CLIPPED or shares[0] > shares[1] / 4:
-        return ""
+        return None
+    return most, shares[1]
+
+
+def _said_of_limit(where: str, most: int, share: float) -> str:
     return (
-        f"No pixel of white has more than {most} DN, and {shares[1]:.0%} have just that: the camera saturates"
-        " below its full scale. Set gain, bit depth and limits of its driver as they were, and resume the"
-        " scan."
+        f"No pixel of white{where} has more than {most} DN, and {share:.0%} have just that: the camera"
+        " saturates below its full scale. Set gain, bit depth and limits of its driver as they were, and"
+        " resume the scan."
     )
 
 

@@ -79,6 +79,10 @@ def in_bands(counts: Counts) -> Counts:
         (lambda c: np.roll(c, (-1, -1), (0, 1)), "begins one column and row later"),
         (dark_rows, "6 rows of the picture no longer have any light, the first of them is row 20"),
         (lambda c: np.minimum(c, 1200), "No pixel of white has more than 1200 DN"),
+        (
+            lambda c: np.minimum(c, np.tile([[500.0, 4095.0], [4095.0, 4095.0]], (32, 48))),
+            "No pixel of white in red has more than 500 DN",
+        ),
         (lambda c: np.floor(c / 16) * 16, "come in steps of about 16 DN"),
         (lambda c: 4095 * (c / 4095) ** 0.55, "by a power of 0."),
         (of_colours(lambda c: 1.8 * c - 0.8 * gaussian_filter(c, 1.0)), "sharpens its picture"),
