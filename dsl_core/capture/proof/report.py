@@ -44,6 +44,11 @@ class SeenFrames:
                 with suppress(StoreError):
                     self.keep(shot, source.read(shot))
 
+    @property
+    def unseen(self) -> frozenset[int]:
+        """Indices of the shots of which nothing is kept."""
+        return frozenset(shot.index for shot in self.plan.shots()) - self._seen.keys()
+
     def report(self, calibration: Rig | None, bit_depth: int = 12, bayer: str = "RGGB") -> ProofReport:
         """What the frames kept so far show."""
         proof = FrameProof(self.plan, calibration, bit_depth, bayer, at_the_end=True)
