@@ -271,7 +271,7 @@ def _light_of_tiles(
     known = before > max(0.25 * before.max(), 0.0)
     if not known.any():
         return np.ones(before.size)
-    return np.divide(after, before, out=np.full(before.size, np.nan), where=known)
+    return np.asarray(np.divide(after, before, out=np.full(before.size, np.nan), where=known))
 
 
 def _shaded(tiles: NDArray[np.float64], shape: tuple[int, ...]) -> str:
