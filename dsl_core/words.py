@@ -32,6 +32,15 @@ def sentence(clause: str) -> str:
     return f"{capitalised(clause)}."
 
 
+def ended(text: str) -> str:
+    """A text that ends as a sentence does, so that another one can follow.
+
+    >>> ended("USB reset"), ended("Is it on?")
+    ('USB reset.', 'Is it on?')
+    """
+    return text if text.endswith((".", "!", "?")) else f"{text}."
+
+
 def quoted(word: object) -> str:
     """A word of a command, such as a path, in quotes where a shell needs them.
 

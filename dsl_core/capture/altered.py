@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 from dsl_core.capture.proof.lasting.written_row import written_row
 from dsl_core.capture.proof.noise import Noise
 from dsl_core.capture.proof.raster import Raster
-from dsl_core.model.rig import Sensor
+from dsl_core.model.conditions import COLOUR_NAMES
+from dsl_core.model.rig import Sensor, colour_sites
 from dsl_core.optics.sensor import raw_variance
 
 Mosaic = NDArray[np.uint16]
@@ -36,6 +37,8 @@ POWER, CLOSELY, BLOCK_PX, BRIGHT_SIGMAS, FEWEST_BRIGHT, RANGE = 0.08, 0.97, 4, 2
 #: Light differs from row to row from this much on (rms of its factors), by so much up and down; within rows,
 #: of so many parts, it differs by no more than this share of that.
 BANDS, UP_AND_DOWN, WITHIN, PARTS = 0.03, 0.03, 0.5, 6
+#: Light that follows the row as closely as this correlation rises from one end to the other: no flicker does.
+RISING = 0.9
 #: Values are coarser if there are less of them than this share of those before, which were at least so many.
 COARSER, FEWEST_VALUES = 0.3, 64
 #: Black is filtered with less than this share of its noise, where it was noise at first: so many times what
@@ -46,6 +49,10 @@ CALM = 0.9
 #: A pixel is beyond black or white by so many deviations and this share of its contrast; where pictures are
 #: sharpened, this share of the lit ones is beyond either, and so many.
 BEYOND_SIGMAS, BEYOND, SHARPENED, FEWEST_SHARPENED = 6.0, 0.1, 0.01, 8
+#: Pictures are mixed where black has gained this share of the light of white, as closely as this correlation
+#: and in all colours alike but for so much of it, and white has lost so much of what black has gained. Light
+#: of the room takes nothing from white.
+MIXED, MIXED_CLOSELY, MIXED_ALIKE, MIXED_LOST = 0.05, 0.9, 0.3, 0.25
 
 
 def alteration(before: Pictures, now: Pictures, sensor: Sensor) -> str:
@@ -57,6 +64,7 @@ def alteration(before: Pictures, now: Pictures, sensor: Sensor) -> str:
         or _dark_rows(before, now)
         or _clipped(before[0], now[0], sensor)
         or _coarser(before, now)
+        or _mixed(before, now, sensor)
         or _banded(before, now)
         or _filtered(before, now, sensor)
         or _curved(before, now, sensor)
@@ -135,14 +143,34 @@ def _dark_rows(before: Pictures, now: Pictures) -> str:
 
 
 def _clipped(before: Mosaic, now: Mosaic, sensor: Sensor) -> str:
+    """Whether white ends below full scale, all of it or one colour."""
+    of_all = _limit_of(before.ravel(), now.ravel(), sensor)
+    if of_all is not None:
+        return _said_of_limit("", *of_all)
+    sites = np.array(colour_sites(sensor.bayer)).reshape(2, 2)
+    for colour, name in enumerate(COLOUR_NAMES):
+        own = np.tile(sites == colour, (now.shape[0] // 2 + 1, now.shape[1] // 2 + 1))
+        own = own[: now.shape[0], : now.shape[1]]
+        found = _limit_of(before[own], now[own], sensor) if own.any() else None
+        if found is not None:
+            return _said_of_limit(f" in {name}", *found)
+    return ""
+
+
+def _limit_of(before: Mosaic, now: Mosaic, sensor: Sensor) -> tuple[int, float] | None:
+    """The value that counts end at and did not before, and the share of pixels that have it; None if none."""
     most = int(now.max())
     shares = [float((each == each.max()).mean()) for each in (before, now)]
     if most >= BELOW_FULL * sensor.full_scale_dn or shares[1] < CLIPPED or shares[0] > shares[1] / 4:
-        return ""
+        return None
+    return most, shares[1]
+
+
+def _said_of_limit(where: str, most: int, share: float) -> str:
     return (
-        f"No pixel of white has more than {most} DN, and {shares[1]:.0%} have just that: the camera saturates"
-        " below its full scale. Set gain, bit depth and limits of its driver as they were, and resume the"
-        " scan."
+        f"No pixel of white{where} has more than {most} DN, and {share:.0%} have just that: the camera"
+        " saturates below its full scale. Set gain, bit depth and limits of its driver as they were, and"
+        " resume the scan."
     )
 
 
@@ -179,6 +207,34 @@ def _blocks(values: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.asarray(whole.reshape(rows, BLOCK_PX, columns, BLOCK_PX).mean(axis=(1, 3)))
 
 
+def _mixed(before: Pictures, now: Pictures, sensor: Sensor) -> str:
+    """Whether black, captured right after white, holds a share of it."""
+    sound = np.maximum(before[0], now[0]) < 0.98 * sensor.full_scale_dn
+    contrast = before[0].astype(np.float64) - before[1]
+    gained = now[1].astype(np.float64) - before[1]
+    lost = before[0].astype(np.float64) - now[0]
+    shares = []
+    for site in np.ndindex(2, 2):
+        own = np.zeros_like(sound)
+        own[site[0] :: 2, site[1] :: 2] = True
+        white, black = contrast[own & sound], gained[own & sound]
+        if white.size < FEWEST_BRIGHT or min(white.std(), black.std()) <= 0:
+            return ""
+        if float(np.corrcoef(white, black)[0, 1]) < MIXED_CLOSELY:
+            return ""
+        shares.append(float(black.sum() / white.sum()))
+    share = float(np.mean(shares))
+    if share < MIXED or max(abs(each - share) for each in shares) > MIXED_ALIKE * share:
+        return ""
+    if float(lost[sound].sum()) < MIXED_LOST * float(gained[sound].sum()):
+        return ""
+    return (
+        f"Black, captured after white, holds {share:.2f} times the light of white: pictures are mixed with"
+        " those before them (noise reduction over time, frames that are blended, afterglow). Switch that off"
+        " in camera, projector and computer, and resume the scan."
+    )
+
+
 def _banded(before: Pictures, now: Pictures) -> str:
     """Whether whole rows have more light than before and others less."""
     parts = np.linspace(0, before[0].shape[1], PARTS + 1)[:-1].astype(int)
@@ -196,6 +252,8 @@ def _banded(before: Pictures, now: Pictures) -> str:
     spread = float(np.std(of_rows)) / usual
     is_both = max(of_rows) > (1 + UP_AND_DOWN) * usual and min(of_rows) < (1 - UP_AND_DOWN) * usual
     if spread < BANDS or not is_both or float(np.std(of_parts)) > WITHIN * spread:
+        return ""
+    if abs(float(np.corrcoef(of_rows, np.arange(of_rows.size))[0, 1])) > RISING:
         return ""
     return (
         f"Whole rows of white have other light than when the scan began, by {100 * spread:.0f} % up and down:"

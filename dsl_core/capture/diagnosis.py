@@ -45,6 +45,12 @@ OTHER_PATTERN = 0.08
 #: Something stands before tiles of the picture that have lost light to this share, so many, while others have
 #: kept it: a tenth of them within so much, and none has gained more than so much.
 SHADED, FEWEST_SHADED, ELSEWHERE, GAINED = 0.7, 2, 0.06, 0.15
+#: Stripes of the code are out of focus with less than this share of the contrast (squared) they had, and the
+#: light they had but for so much of white's.
+SOFTER, SAME_SHARE = 0.85, 0.03
+#: Light has changed by place if a tenth of the tiles have less, and another tenth more, than this share of
+#: all of it apart.
+BY_PLACE = 0.15
 
 
 @dataclass(frozen=True)
@@ -144,7 +150,8 @@ def what_changed(before: References, now: References, sensor: Sensor) -> Explana
     altered = alteration(before.pictures, now.pictures, sensor)
     if altered:
         return Explanation(altered, is_of_all=True)
-    shaded = _shaded(old, new, used)
+    tiles = _light_of_tiles(old, new, used)
+    shaded = _shaded(tiles, used.shape)
     if shaded:
         return Explanation(shaded)
     dark_old, dark_new = (
@@ -158,9 +165,12 @@ def what_changed(before: References, now: References, sensor: Sensor) -> Explana
     is_uneven = max(colours) > (1 + UNEVEN) * min(colours)
     is_other_light = not is_uneven and abs(light - 1) > LEAST_LIGHT
     is_exposure = is_other_light and dark_old > TELLING_DN and abs(dark_new / dark_old / light - 1) < ALIKE
+    by_place = _said_of_places(tiles, light) if is_other_light and moved is None else ""
     found = []
     if is_uneven:
         found.append(_said_of_colours(colours))
+    elif by_place:
+        found.append(by_place)
     elif is_other_light:
         found.append(_said_of_light(light, is_exposure))
     if abs(room) > LEAST_ROOM and not is_exposure:
@@ -169,7 +179,13 @@ def what_changed(before: References, now: References, sensor: Sensor) -> Explana
             f" above its black level, and was at {dark_old:.0f} DN when the scan began. Keep the room as it"
             " was, and resume the scan."
         )
-    if moved is not None and not is_uneven:
+    is_soft = (moved is None or moved.is_pattern) and _has_softer_stripes(before, now, lit)
+    if is_soft:
+        found.append(
+            "Stripes of the code are softer than when the scan began: projector or camera is out of focus, or"
+            " something came onto a lens. Set the focus as it was, and resume the scan."
+        )
+    elif moved is not None and not is_uneven:
         # Other colours look like motion where surfaces have colours.
         found.append(f"{moved.sentence} {ADVICE}")
     if not found and moved is None and _is_other_pattern(before, now, old, used):
@@ -179,8 +195,8 @@ def what_changed(before: References, now: References, sensor: Sensor) -> Explana
             " scaling, keystone and refresh rate as they were, and resume the scan.",
             has_moved=True,
         )
-    is_of_all = is_uneven or (moved is None and is_other_light)
-    return Explanation(" ".join(found), moved is not None, not found, is_of_all)
+    is_of_all = is_uneven or (moved is None and is_other_light and not by_place)
+    return Explanation(" ".join(found), moved is not None or is_soft, not found, is_of_all)
 
 
 def _said_of_colours(colours: tuple[float, ...]) -> str:
@@ -196,7 +212,7 @@ def _said_of_colours(colours: tuple[float, ...]) -> str:
     else:
         advice = (
             "Switch white balance of the camera and night mode of the projector and of its computer off,"
-            " check the projector's colours, and resume the scan."
+            " check the projector's colours and that the film is where it was, and resume the scan."
         )
     return (
         f"The light of white is {red:.2f} times what it was when the scan began in red, {green:.2f} times"
@@ -221,21 +237,53 @@ def _is_other_pattern(
     return float(np.abs(second - first)[used].mean()) > OTHER_PATTERN * float(white[used].mean())
 
 
-def _shaded(old: NDArray[np.float64], new: NDArray[np.float64], used: NDArray[np.bool_]) -> str:
-    """Whether white, less black, has lost light in a part of the picture alone."""
+def _said_of_places(tiles: NDArray[np.float64], light: float) -> str:
+    """That parts of the picture have lost or gained more light than others; empty where all have alike."""
+    low, high = (float(each) for each in np.nanquantile(tiles, (0.1, 0.9)))
+    if high - low < BY_PLACE * light:
+        return ""
+    return (
+        f"The light of white is {low:.2f} times what it was when the scan began in some parts of the picture"
+        f" and {high:.2f} times in others: moisture, haze or dust came before a lens, the film or the target,"
+        " or a lamp of the room or the projector moved. Clear the way of the light, and resume the scan."
+    )
+
+
+def _has_softer_stripes(before: References, now: References, lit: NDArray[np.bool_]) -> bool:
+    """Whether a frame of the code is nearer to half of white, with as much light: a motion leaves both."""
+    shares, contrasts = [], []
+    for each in (before, now):
+        white, code = (
+            picture.astype(np.float64)[lit] - each.black[lit] for picture in (each.white, each.code)
+        )
+        shares.append(float(code.sum() / white.sum()))
+        contrasts.append(float(np.square(2 * code - white).sum() / np.square(white).sum()))
+    return contrasts[1] < SOFTER * contrasts[0] and abs(shares[1] - shares[0]) < SAME_SHARE
+
+
+def _light_of_tiles(
+    old: NDArray[np.float64], new: NDArray[np.float64], used: NDArray[np.bool_]
+) -> NDArray[np.float64]:
+    """White less black over what it was in each of `TILES`, flat; NaN where there is little light."""
     down, across = (np.arange(size) * count // size for size, count in zip(old.shape, TILES, strict=True))
     tile = (down[:, None] * TILES[1] + across)[used]
     before, after = (np.bincount(tile, each[used], TILES[0] * TILES[1]) for each in (old, new))
-    known = before > 0.25 * before.max()
-    ratio = after[known] / before[known]
-    lost = ratio < SHADED
-    is_kept = abs(float(np.quantile(ratio, 0.9)) - 1) < ELSEWHERE and float(ratio.max()) < 1 + GAINED
+    known = before > max(0.25 * before.max(), 0.0)
+    if not known.any():
+        return np.ones(before.size)
+    return np.asarray(np.divide(after, before, out=np.full(before.size, np.nan), where=known))
+
+
+def _shaded(tiles: NDArray[np.float64], shape: tuple[int, ...]) -> str:
+    """Whether white, less black, has lost light in a part of the picture alone."""
+    lost = tiles < SHADED
+    is_kept = abs(float(np.nanquantile(tiles, 0.9)) - 1) < ELSEWHERE and float(np.nanmax(tiles)) < 1 + GAINED
     if int(lost.sum()) < FEWEST_SHADED or not is_kept:
         return ""
-    rows, columns = np.divmod(np.flatnonzero(known)[lost], TILES[1])
+    rows, columns = np.divmod(np.flatnonzero(lost), TILES[1])
     spans = [
         (int(at.min()) * size // count, (int(at.max()) + 1) * size // count)
-        for at, size, count in zip((columns, rows), old.shape[::-1], TILES[::-1], strict=True)
+        for at, size, count in zip((columns, rows), shape[::-1], TILES[::-1], strict=True)
     ]
     return (
         "White has lost light in columns {}-{}, rows {}-{} of the picture, and not elsewhere: something"

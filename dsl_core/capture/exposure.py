@@ -18,6 +18,7 @@ from dsl_core.errors import Cancelled, DeviceError
 from dsl_core.model.frames import Frame
 from dsl_core.model.plan import CapturePlan, Shot, describe_shot
 from dsl_core.progress import CancelToken
+from dsl_core.words import ended
 
 PatternImage = Callable[[CapturePlan, Shot], NDArray[np.uint8]]
 _log = logging.getLogger(__name__)
@@ -145,7 +146,7 @@ class ShotTaker:
             ) from error
         if attempt + 1 >= self._policy.attempts:
             raise DeviceError(
-                f"{describe_shot(shot).capitalize()} failed {attempt + 1} times: {error}"
+                f"{describe_shot(shot).capitalize()} failed {attempt + 1} times: {ended(str(error))}"
                 " Resume the scan when the device works again."
             ) from error
         _log.warning("%s, attempt %d: %s", describe_shot(shot), attempt + 1, error)

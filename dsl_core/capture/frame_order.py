@@ -66,8 +66,8 @@ class FrameOrder:
                 return
             self._refused = frame
         raise StaleFrameError(
-            f"The camera delivered frame number {number} again (time {frame.timestamp_s:g} s)."
-            " Restart the camera; on a slow connection lower its frame rate."
+            f"The camera delivered frame number {number} {_why_old(frame, last)}. Restart the camera; on a"
+            " slow connection lower its frame rate."
         )
 
     def _note_gap(self, frame: Frame, last: Frame) -> None:
@@ -95,3 +95,15 @@ class FrameOrder:
         if what not in self._told:
             self._told.add(what)
             _log.warning("%s", sentence)
+
+
+def _why_old(frame: Frame, last: Frame) -> str:
+    """By what a frame is an old one: its number, or else its time."""
+    if frame.frame_id == last.frame_id:
+        return f"again (time {frame.timestamp_s:g} s)"
+    if frame.frame_id < last.frame_id:
+        return f"after number {last.frame_id}"
+    return (
+        f"with the time of number {last.frame_id}, {frame.timestamp_s:g} s: it is the picture before, or the"
+        " camera's clock stands still"
+    )

@@ -38,7 +38,7 @@ CONTROL_EVERY = 8
 JUST_BEFORE = 8
 #: Pictures that are wrong like this, though nothing has changed that anybody could name, may have become so
 #: slowly: nobody knows since when.
-CREEPING = (Verdict.EXPOSURE, Verdict.OTHER)
+CREEPING = (Verdict.EXPOSURE, Verdict.OTHER, Verdict.DISPLACED)
 #: Lines that are wrong like this while white, black and code look as at first have lost light of their own.
 DIM = (Verdict.DARK, Verdict.EXPOSURE)
 _DIMMED = (

@@ -254,9 +254,7 @@ def prove_scan(folder: Path) -> ScanProof:
     settings = (camera.bit_depth, camera.bayer) if camera else (12, "RGGB")
     # Nobody knows how long pictures of other programs were exposed.
     knows_light = not is_import(reader)
-    return prove(
-        reader, seen, reader.calibration, *settings, missing=_absent(reader), knows_light=knows_light
-    )
+    return prove(reader, seen, reader.calibration, *settings, missing=seen.unseen, knows_light=knows_light)
 
 
 def _absent(reader: ScanReader) -> set[int]:
@@ -267,11 +265,16 @@ def _absent(reader: ScanReader) -> set[int]:
 def linearity_of_scan(folder: Path) -> Linearity:
     """Whether the values of a scan are linear in light, by the sums of its patterns and inverses.
 
-    Imported pictures are judged as their mapping read them. Raises `StoreError`.
+    Imported pictures are judged as their mapping read them; damaged ones are left out. Raises `StoreError`.
     """
     reader = ScanReader(folder)
     sensor = sensor_of_scan(reader)
-    return linearity_of(reader, sensor.full_scale_dn, sensor.black_level_dn, _absent(reader))
+    levels = sensor.full_scale_dn, sensor.black_level_dn
+    try:
+        return linearity_of(reader, *levels, _absent(reader))
+    except StoreError:
+        every = {shot.index for shot in reader.plan.shots()}
+        return linearity_of(reader, *levels, every - reader.sound())
 
 
 def calibration_of(source: FrameSource, given: Rig | None = None) -> Rig:

@@ -79,6 +79,10 @@ def in_bands(counts: Counts) -> Counts:
         (lambda c: np.roll(c, (-1, -1), (0, 1)), "begins one column and row later"),
         (dark_rows, "6 rows of the picture no longer have any light, the first of them is row 20"),
         (lambda c: np.minimum(c, 1200), "No pixel of white has more than 1200 DN"),
+        (
+            lambda c: np.minimum(c, np.tile([[500.0, 4095.0], [4095.0, 4095.0]], (32, 48))),
+            "No pixel of white in red has more than 500 DN",
+        ),
         (lambda c: np.floor(c / 16) * 16, "come in steps of about 16 DN"),
         (lambda c: 4095 * (c / 4095) ** 0.55, "by a power of 0."),
         (of_colours(lambda c: 1.8 * c - 0.8 * gaussian_filter(c, 1.0)), "sharpens its picture"),
@@ -116,6 +120,24 @@ def test_an_alteration_is_named(change: Callable[[Counts], Counts], said: str) -
 )
 def test_other_changes_are_no_alteration(change: Callable[[Counts], Counts]) -> None:
     assert alteration(pictures(1), pictures(2, change), SENSOR) == ""  # type: ignore[arg-type]
+
+
+def test_black_that_holds_some_of_white_is_mixed_with_it() -> None:
+    white, black, code = (each.astype(float) for each in pictures(2))
+    mixed = (0.7 * white + 0.3 * code, 0.7 * black + 0.3 * white, 0.7 * code + 0.3 * black)
+    now = tuple(np.rint(each).astype(np.uint16) for each in mixed)
+    assert "Black, captured after white, holds 0.30 times" in alteration(pictures(1), now, SENSOR)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("light", [1.0, 0.7])
+def test_a_lamp_of_the_room_is_no_mixture(light: float) -> None:
+    """It gives most to what reflects most, as the projector does, and adds to white as to black."""
+    white, black, code = (each.astype(float) for each in pictures(2))
+    lamp = 0.3 * (white - black) * np.tile([[1.4, 1.0], [1.0, 0.5]], (32, 48))
+    now = tuple(
+        np.rint(black + light * (each - black) + lamp).astype(np.uint16) for each in (white, black, code)
+    )
+    assert "mixed" not in alteration(pictures(1), now, SENSOR)  # type: ignore[arg-type]
 
 
 def test_pictures_that_tell_nothing_are_not_altered() -> None:

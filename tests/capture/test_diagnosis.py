@@ -21,11 +21,16 @@ SENSOR = Sensor()
 
 
 def pictures(
-    *, light: float = 1.0, room_dn: float = 60.0, shift_px: int = 0, pattern_px: int = 0
+    *,
+    light: float = 1.0,
+    room_dn: float = 60.0,
+    shift_px: int = 0,
+    pattern_px: int = 0,
+    blur_px: float = 0.7,
 ) -> References:
     rng = np.random.default_rng(2)
     texture = 1.5 + 4 * gaussian_filter(np.random.default_rng(4).normal(size=(64, 96)), 1.5)
-    stripes = gaussian_filter((np.arange(96) // 6 % 2).astype(float), 0.7)
+    stripes = gaussian_filter((np.arange(96) // 6 % 2).astype(float), blur_px)
 
     def picture(pattern: np.ndarray | float) -> np.ndarray:
         lit = 600 * light * np.roll(texture.clip(0.3) * pattern, shift_px, 1)
@@ -52,6 +57,7 @@ def test_nothing_is_said_of_pictures_that_differ_by_noise() -> None:
             r"The pattern moved by (1\.9|2\.\d) ± 0\.\d px on the scene, since the scan",
             "room",
         ),
+        (pictures(blur_px=1.6), "Stripes of the code are softer than when the scan began", "moved"),
     ],
 )
 def test_the_cause_is_named(later: References, said: str, not_said: str) -> None:
@@ -208,6 +214,18 @@ def test_all_of_the_picture_that_lost_light_is_in_the_way_of_nobody() -> None:
     found = what_changed(pictures(), shaded(0.4, slice(None)), SENSOR)
     assert "is 0.40 times" in found.sentence
     assert found.is_of_all
+
+
+def test_light_that_changed_by_place_is_no_other_exposure() -> None:
+    before, share = pictures(), np.linspace(0.6, 0.9, 64)[:, None]
+    later = (
+        (each.astype(float) - before.black) * share + before.black for each in (before.white, before.code)
+    )
+    white, code = (each.round().astype(np.uint16) for each in later)
+    found = what_changed(before, References(white, before.black, code), SENSOR)
+    assert "is 0.64 times what it was when the scan began in some parts" in found.sentence
+    assert "exposure" not in found.sentence
+    assert not found.is_of_all
 
 
 def test_a_colour_that_failed_is_no_white_balance() -> None:

@@ -15,11 +15,19 @@ def _frame(number: int, time_s: float) -> Frame:
     return Frame(np.zeros((2, 2), np.uint16), 1.0, time_s, number)
 
 
-@pytest.mark.parametrize("second", [(5, 1.0), (5, 2.0), (6, 1.0), (4, 0.5)])
-def test_an_old_frame_is_refused(second: tuple[int, float]) -> None:
+@pytest.mark.parametrize(
+    ("second", "why"),
+    [
+        ((5, 1.0), "again"),
+        ((5, 2.0), "again"),
+        ((6, 1.0), "with the time of number 5, 1 s: it is the picture before, or the camera's clock stands"),
+        ((4, 0.5), "after number 5"),
+    ],
+)
+def test_an_old_frame_is_refused(second: tuple[int, float], why: str) -> None:
     order = FrameOrder()
     order.take(_frame(5, 1.0))
-    with pytest.raises(StaleFrameError, match=f"frame number {second[0]} again"):
+    with pytest.raises(StaleFrameError, match=f"frame number {second[0]} {why}"):
         order.take(_frame(*second))
     assert order.take(_frame(7, 3.0)).frame_id == 7
 

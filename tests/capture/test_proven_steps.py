@@ -447,6 +447,15 @@ def test_everything_since_an_old_picture_last_looked_the_same_is_withdrawn_when_
         assert bench.withdrawn == [at for at in range(first, 37) if at != again.index or first > again.index]
 
 
+def test_lines_that_left_their_place_unseen_are_withdrawn_since_all_was_sound() -> None:
+    """A projector that warms up moves its picture slowly: the first lines of it are hardly displaced."""
+    lines = tuple(PLAN.model_copy(update={"spectral": LineComb(width_px=1, step_px=1, period_px=40)}).shots())
+    bench = Bench(*[is_right] * 20, lambda shot: Finding(shot, Verdict.DISPLACED, (shot,)))
+    bench.cause = ""
+    with pytest.raises(PictureError, match="20 frames between 13 and 32, captured just before"):
+        take_all(bench, lines[12:33])
+
+
 def test_a_shot_found_wrong_on_the_way_is_taken_again_though_the_next_is_right() -> None:
     both = (SHOTS[12], LINE)
     bench = Bench(lambda shot: Finding(shot, Verdict.OTHER, both), late, is_right, is_right)

@@ -132,6 +132,16 @@ def test_a_finished_scan_knows_what_its_pictures_show(scan: Path, tmp_path: Path
     assert scans.known_doubts(copy) == []
 
 
+def test_damaged_pictures_are_left_out_of_what_a_scan_shows(scan: Path, tmp_path: Path) -> None:
+    copy = shutil.copytree(scan, tmp_path / "a.dsl")
+    reader = ScanReader(copy)
+    damaged = set(reader.plan.references().values())
+    for shot in damaged:
+        reader.store.path(shot.index).write_bytes(b"")
+    assert scans.prove_scan(copy).judged == reader.plan.shot_count - len(damaged)
+    assert "frames are missing" in scans.linearity_of_scan(copy).sentence
+
+
 def test_what_white_contradicted_before_a_scan_is_repeated_by_its_result(scan: Path, tmp_path: Path) -> None:
     copy = shutil.copytree(scan, tmp_path / "a.dsl")
     (copy / PROOF_NAME).unlink()

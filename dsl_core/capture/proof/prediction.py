@@ -13,6 +13,7 @@ from dsl_core.capture.proof.noise import Noise
 from dsl_core.capture.proof.raster import Counts, Floats, Raster
 from dsl_core.model.plan import CapturePlan, Shot
 from dsl_core.patterns.multiplexed import profile
+from dsl_core.solve.ranks import median, quantile
 from dsl_core.solve.thinned import thinned
 
 #: Two predictions tell a pixel apart if they differ by this share of its light and so many deviations.
@@ -85,6 +86,11 @@ class Lit:
     def over_white(self) -> Floats:
         """Counts above which pixels are brighter than white."""
         return np.asarray(self.black + self.contrast + np.float32(OVER_WHITE_SIGMAS) * self.sigma)
+
+    @cached_property
+    def usual_contrast(self) -> np.float32:
+        """The median of white over black."""
+        return median(self.contrast)
 
     @cached_property
     def _by_key(self) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
@@ -175,7 +181,7 @@ def is_over_white(seen: Counts, lit: Lit, wanted: Floats) -> bool:
     if over.size < FEWEST_BRIGHT:
         return False
     more = seen[lit.index[over]] - lit.black[over] - lit.contrast[over]
-    return int((more > OVER_WHITE * np.median(lit.contrast)).sum()) >= FEWEST_BRIGHT
+    return int((more > OVER_WHITE * lit.usual_contrast).sum()) >= FEWEST_BRIGHT
 
 
 def black_gained(seen: Counts, lit: Lit, wanted: Floats, noise: Noise) -> np.float32:
@@ -188,15 +194,15 @@ def black_gained(seen: Counts, lit: Lit, wanted: Floats, noise: Noise) -> np.flo
     if unlit.size < FEWEST_UNLIT:
         return _NOTHING
     black = lit.black[unlit]
-    sigma = np.float32(np.sqrt(2 * np.median(noise.variance(black))))
+    sigma = np.float32(np.sqrt(2 * median(noise.variance(black))))
     # What a normal distribution has its lowest quarter below.
-    gained = np.float32(np.quantile(seen[lit.index[unlit]] - black, NO_ORDERS)) + np.float32(0.674) * sigma
+    gained = quantile(seen[lit.index[unlit]] - black, NO_ORDERS) + np.float32(0.674) * sigma
     return gained if abs(gained) > LEAST_GAINED * sigma else _NOTHING
 
 
 def _of_room(gain: Floats) -> np.float32:
     """What the room's light has gained since black, from what unlit pixels have: their median."""
-    return np.float32(np.median(gain) if gain.size >= FEWEST_UNLIT else 0)
+    return median(gain) if gain.size >= FEWEST_UNLIT else _NOTHING
 
 
 def _ratio(seen: Floats, wanted: Floats, variance: Floats) -> float | None:

@@ -44,6 +44,11 @@ class SeenFrames:
                 with suppress(StoreError):
                     self.keep(shot, source.read(shot))
 
+    @property
+    def unseen(self) -> frozenset[int]:
+        """Indices of the shots of which nothing is kept."""
+        return frozenset(shot.index for shot in self.plan.shots()) - self._seen.keys()
+
     def report(
         self,
         calibration: Rig | None,

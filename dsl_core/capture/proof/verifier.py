@@ -384,7 +384,8 @@ class FrameProof:
         black = self._kept.get(self._blacks[shot.setting])
         if black is None or not self._hidden.is_hidden(shot.setting, seen, black):
             return None
-        colours = self._hidden.colours(seen, black, self._raster.channels(self._bayer))
+        channels, columns = self._raster.channels(self._bayer), self._raster.shape[1]
+        colours = self._hidden.colours(seen, black, channels, columns)
         if colours:
             named = " and ".join(COLOUR_NAMES[each] for each in colours)
             return Finding(shot, Verdict.COLOURS, (shot,), f"only {named}")

@@ -25,7 +25,8 @@ class LogEntry(Record):
     ``run`` counts how often the scan was opened for writing: frame numbers and clocks of a camera
     start again with it. ``attempts`` above one means that the frame was taken again before it was kept,
     and ``corrected`` why, where an earlier picture did not show the pattern. ``shown_s`` is the time of day
-    at which the pattern was visible, s; 0 in scans of earlier versions.
+    at which the pattern was visible, s; 0 in scans of earlier versions. ``scan`` is when the scan began that
+    the frame belongs to, as its manifest says; empty in scans of earlier versions.
     """
 
     shot: int = Field(ge=0)
@@ -39,6 +40,7 @@ class LogEntry(Record):
     run: int = 0
     darkest_dn: int = 0
     brightest_dn: int = 65535
+    scan: str = ""
 
 
 def read_log(path: Path) -> tuple[list[LogEntry], int]:

@@ -14,11 +14,12 @@ EXPOSURE_TOLERANCE = 0.05
 
 
 def find_problems(reader: ScanReader, verify: bool = False) -> list[str]:
-    """Sentences about missing, extra, repeated or wrongly exposed frames, in this order.
+    """Sentences about frames of other scans, missing, extra, wrongly exposed or repeated ones, in this order.
 
     With ``verify`` every frame is also read and compared with its checksum (truncated, damaged, swapped).
     """
-    found = [*_missing(reader), *_extra(reader), *_wrong_exposure(reader), *_repeated(reader)]
+    strangers = [reader.strangers] if reader.strangers else []
+    found = [*strangers, *_missing(reader), *_extra(reader), *_wrong_exposure(reader), *_repeated(reader)]
     return [*found, *_unreadable(reader)] if verify else found
 
 

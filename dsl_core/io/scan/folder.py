@@ -123,6 +123,19 @@ class ScanReader:
         entry = self.entries.get(shot.index)
         return "" if entry is None else entry.corrected
 
+    @property
+    def strangers(self) -> str:
+        """A sentence on frames that belong to another scan than the manifest; empty if none do."""
+        begun = self.manifest.created
+        others = [entry for entry in self.entries.values() if entry.scan not in ("", begun)]
+        if not others:
+            return ""
+        return (
+            f"{len(others)} of {self.plan.shot_count} frames in {self.folder} belong to a scan that began at"
+            f" {others[0].scan}, and {MANIFEST_NAME} to one that began at {begun}: files of two scans were"
+            " mixed. Restore them from copies."
+        )
+
     def _mismatch(self, shot: Shot, found: int) -> str:
         twins = [e.shot for e in self.entries.values() if e.crc32 == found and e.shot != shot.index]
         path = self.store.path(shot.index)
@@ -197,6 +210,8 @@ class ScanWriter:
         lock = FolderLock(folder / "lock")
         try:
             reader = ScanReader(folder)
+            if reader.strangers:
+                raise StoreError(reader.strangers)
             refuse_other_scan(folder, reader.manifest, describe_scan(plan or reader.plan, rig))
             remove_partials(reader.store.folder)
             done = reader.sound()
@@ -240,6 +255,7 @@ class ScanWriter:
             run=self._run,
             darkest_dn=int(frame.pixels.min()),
             brightest_dn=int(frame.pixels.max()),
+            scan=self.manifest.created,
         )
         self._log.append(entry)
         self._done.add(shot.index)

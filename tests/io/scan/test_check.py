@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import shutil
 from collections.abc import Callable
 from dataclasses import replace
@@ -11,9 +12,12 @@ import numpy as np
 import pytest
 
 from dsl_core.errors import StoreError
+from dsl_core.io.records import replace_record
+from dsl_core.io.scan.capture_log import read_log
 from dsl_core.io.scan.check import find_problems, require_complete
 from dsl_core.io.scan.folder import ScanReader, ScanWriter
 from dsl_core.io.scan.frame_store import FrameStore
+from dsl_core.io.sealed import seal
 from dsl_core.model.frames import Frame
 from dsl_core.model.plan import CapturePlan, Shot
 
@@ -157,3 +161,35 @@ def test_wrong_exposure(tmp_path: Path, plan: CapturePlan, frame_of: FrameOf) ->
     frames[4] = replace(frames[4], exposure_ms=12.0)
     _write(tmp_path / "scan.dsl", plan, frames)
     assert "exposed for 12 ms instead of 10 ms" in _only_problem(tmp_path / "scan.dsl")
+
+
+@pytest.mark.parametrize("name", ["manifest.json", "frames.jsonl"])
+def test_files_of_two_scans(session: Path, plan: CapturePlan, tmp_path: Path, name: str) -> None:
+    other = tmp_path / "other.dsl"
+    reader = ScanReader(session)
+    _write(
+        other,
+        plan,
+        {
+            shot.index: Frame(reader.read(shot), shot.exposure_ms, 1.0 + shot.index, 1 + shot.index)
+            for shot in plan.shots()
+        },
+    )
+    later = ScanReader(other).manifest.model_copy(update={"created": "2031-05-01T10:00:00+00:00"})
+    replace_record(other / "manifest.json", later)
+    log = other / "frames.jsonl"
+    lines = [entry.model_copy(update={"scan": later.created}) for entry in read_log(log)[0]]
+    log.write_bytes(b"".join(seal(line.model_dump_json()) for line in lines))
+    require_complete(ScanReader(other))
+    shutil.copy(other / name, session / name)
+    said = rf"{plan.shot_count} of {plan.shot_count} frames in .* belong to a scan that began at .*: files of"
+    assert re.search(said, find_problems(ScanReader(session))[0])
+    with pytest.raises(StoreError, match="files of two scans were mixed"):
+        ScanWriter.resume(session)
+
+
+def test_frames_of_earlier_versions_do_not_say_their_scan(session: Path) -> None:
+    log = session / "frames.jsonl"
+    lines = [entry.model_copy(update={"scan": ""}) for entry in read_log(log)[0]]
+    log.write_bytes(b"".join(seal(line.model_dump_json()) for line in lines))
+    require_complete(ScanReader(session))

@@ -13,13 +13,17 @@ from dsl_core.capture.proof.noise import Noise
 from dsl_core.capture.proof.raster import Counts, Floats
 from dsl_core.capture.proof.recent import Recent
 from dsl_core.optics.seen_noise import NORMAL
+from dsl_core.solve.ranks import median
 
 #: A pixel is darker by so many deviations, and by this share of what the room gives it.
 SIGMAS, SHARE = 4.0, 0.35
 #: So many pixels that the line before left as they were, as a share of all and at least.
 FEWEST_SHARE, FEWEST = 0.01, 12
 #: Nobody stands there where another colour has less than this share of the dark pixels of the one with most.
-OTHERS = 0.2
+#: Of each colour, as many pixels have to tell as this share of the dark ones.
+OTHERS, FEWEST_TELLING = 0.2, 0.1
+#: What is dark reaches so far along a row, and to the row above and below, which have all colours together.
+NEAR_PX = 2
 _NOTHING = np.float32(0)
 
 
@@ -51,17 +55,19 @@ class HiddenParts:
             self._before = setting, seen, black
         return found
 
-    def colours(self, seen: Counts, black: Counts, channels: NDArray[np.int8]) -> tuple[int, ...]:
+    def colours(
+        self, seen: Counts, black: Counts, channels: NDArray[np.int8], columns: int
+    ) -> tuple[int, ...]:
         """The colours that alone are darker than black; none where all of them are, as if hidden.
 
-        ``channels`` has the colour of each pixel.
+        ``channels`` has the colour of each pixel, in rows of so many ``columns``.
         """
         dark = self._dark(seen, black)
-        # Where the room gives too little, nobody sees that it is gone.
+        # Where the room gives too little, nobody sees that it is gone; nor does anybody away from what is.
         room = np.subtract(black, np.float32(self._noise.sensor.black_level_dn), dtype=np.float32)
-        tells = room > 2 * SIGMAS * self._sigma(seen, black)
+        tells = (room > 2 * SIGMAS * self._sigma(seen, black)) & _beside(dark, columns)
         each_tells = {int(each): tells & (channels == each) for each in np.unique(channels)}
-        if min(int(own.sum()) for own in each_tells.values()) < FEWEST_SHARE * dark.size:
+        if min(int(own.sum()) for own in each_tells.values()) < max(FEWEST, FEWEST_TELLING * dark.sum()):
             return ()
         share = {each: float(dark[own].mean()) for each, own in each_tells.items()}
         few = OTHERS * max(share.values())
@@ -88,8 +94,18 @@ class HiddenParts:
         # A camera that has more noise than it is said to have says so itself, by pixels of one colour beside
         # each other: a shadow over half of the picture is no noise.
         step = np.abs(lost[2:] - lost[:-2]) / np.hypot(sigma[2:], sigma[:-2])
-        more = max(float(np.median(step)) / NORMAL, 1.0)
-        return self._darker(seen, black, max(np.float32(np.median(lost)), _NOTHING), more)
+        more = max(float(median(step)) / NORMAL, 1.0)
+        return self._darker(seen, black, max(median(lost), _NOTHING), more)
 
     def _sigma(self, seen: Counts, black: Counts) -> Floats:
         return np.asarray(np.sqrt(self._noise.variance(seen) + self._noise.variance(black)))
+
+
+def _beside(dark: NDArray[np.bool_], columns: int) -> NDArray[np.bool_]:
+    """Pixels that are dark themselves, or have a dark one near them in their row or the row beside it."""
+    found = dark
+    for step in (*[1] * NEAR_PX, columns):
+        before, found = found, found.copy()
+        found[step:] |= before[:-step]
+        found[:-step] |= before[step:]
+    return found

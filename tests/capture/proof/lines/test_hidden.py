@@ -60,7 +60,20 @@ def test_colours_that_alone_are_dark_are_hidden_by_nobody(
     channels = np.tile(cells, (PIXELS // WIDTH // 2, WIDTH // 2)).ravel()
     seen = LEVEL + (picture(1, 20) - LEVEL) * np.array(gains)[channels]
     counts = np.rint(np.where(np.arange(PIXELS) % WIDTH < 25, seen, picture(1, 20))).astype(np.uint16)
-    assert HiddenParts(NOISE).colours(counts, BLACK, channels) == colours
+    assert HiddenParts(NOISE).colours(counts, BLACK, channels, WIDTH) == colours
+
+
+def test_a_colour_that_has_no_light_where_something_stands_says_nothing() -> None:
+    cells = np.array([[0, 1], [1, 2]], np.int8)
+    channels = np.tile(cells, (PIXELS // WIDTH // 2, WIDTH // 2)).ravel()
+    left = np.arange(PIXELS) % WIDTH < 15
+    room = np.where(left & (channels == 0), 5.0, 60.0)
+    rng = np.random.default_rng(5)
+    black, seen = (
+        np.rint(LEVEL + each + rng.normal(0, 3, PIXELS)).astype(np.uint16)
+        for each in (room, np.where(left, 0.2 * room, room))
+    )
+    assert HiddenParts(NOISE).colours(seen, black, channels, WIDTH) == ()
 
 
 def test_a_darker_room_hides_nothing() -> None:
