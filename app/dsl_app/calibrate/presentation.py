@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from datetime import datetime
 from html import escape
 
+from dsl_app.calibrate.setting_words import setting_words
 from dsl_app.calibrate.state import CalibrateState, Row, RowState
 from dsl_app.shared.known_files import breakable
 from dsl_app.shared.widget_state import ButtonState, LabelState
@@ -307,7 +308,7 @@ def _calibration(note: CalibrationNote, accepted: AcceptedCalibration | None) ->
         for figure in note.figures
     ]
     if accepted is not None:
-        own = (f"{key} {value}" for key, value in accepted.settings.items() if key != "rig")
+        own = (setting_words(key, value) for key, value in accepted.settings.items() if key != "rig")
         text = escape("; ".join(own))
         lines += [f"<i>{text}</i>"] if text else []
     head = f"<b>{escape(note.title)}</b>, {escape(short_date(note.accepted))}"

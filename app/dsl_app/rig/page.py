@@ -13,7 +13,7 @@ from dsl_app.rig.controller import LiveController
 from dsl_app.rig.live_view import LiveView
 from dsl_app.rig.options_form import OptionsForm
 from dsl_app.rig.projector_panel import ProjectorPanel
-from dsl_app.rig.state import rig_view
+from dsl_app.rig.state import CONNECT, rig_view
 from dsl_app.shared.evented import follow_any
 from dsl_app.shared.widgets.deferred import Deferred
 from dsl_app.shared.widgets.forms import ChoiceBox, NumberBox, label, push_button, quiet, show_parts
@@ -47,6 +47,8 @@ class RigPage(PageWidget):
         self._rig_commands, self._commands = live.rig, live
         self._state, self._live_state = live.rig.state, live.state
         self._looks_again = False
+        #: What the form showed when it was told last what is connected.
+        self._told: RigChoice | None = None
         self.stops: list[Callable[[], None]] = []
         self.live = Deferred(self._make_live)
         self.live.setObjectName("live-view")
@@ -69,9 +71,7 @@ class RigPage(PageWidget):
             lambda: self.profile_requested.emit(str(self._rig.currentData())),
         )
         self._rig.currentIndexChanged.connect(lambda _: self._show_profile())
-        self.connect_button = push_button(
-            "Connect", "Open or close the devices of this rig", self._toggle_link, "primary"
-        )
+        self.connect_button = push_button("Connect", CONNECT, self._toggle_link, "primary")
         self.link = label("")
         self.trouble = label("", wraps=True)
         self.camera_text, self.projector_text = label("–"), label("–")
@@ -196,6 +196,9 @@ class RigPage(PageWidget):
     def _connect(self) -> None:
         state, live, commands = self._state, self._live_state, self._commands
         self.exposure.valueChanged.connect(commands.set_exposure)
+        self._rig.currentIndexChanged.connect(lambda _: self._show())
+        self.options.text.textChanged.connect(lambda _: self._show())
+        self.options.text.returnPressed.connect(self._connect_form)
         self.projector.requested.connect(commands.show)
         # Once whoever serves the choice has made the screen the projector's.
         self.projector.screen_chosen.connect(lambda _: QTimer.singleShot(0, self, commands.show_again))
@@ -220,11 +223,20 @@ class RigPage(PageWidget):
         self.edit_profile.setEnabled(profile_path(str(self._rig.currentData())) is not None)
 
     def _toggle_link(self) -> None:
-        if self._state.link.value is Link.OPEN:
+        if self._state.link.value is Link.OPEN and not self._is_other:
             self._rig_commands.disconnect()
-            return
+        else:
+            self._connect_form()
+
+    def _connect_form(self) -> None:
+        """Connect what the form shows."""
         self._rig_commands.connect(self._choice)
         self._commands.begin_when_open()
+
+    @property
+    def _is_other(self) -> bool:
+        """Whether the form was changed since it was told what is connected."""
+        return self._told is not None and self._choice != self._told
 
     @property
     def _choice(self) -> RigChoice:
@@ -233,8 +245,7 @@ class RigPage(PageWidget):
     def _change_options(self) -> None:
         """Put another scene in front of a connected camera at once."""
         if self._state.link.value is Link.OPEN and not self._state.used_by.value:
-            self._rig_commands.connect(self._choice)
-            self._commands.begin_when_open()
+            self._connect_form()
 
     def _toggle_live(self) -> None:
         if self._state.live.value:
@@ -246,12 +257,14 @@ class RigPage(PageWidget):
         self._commands.expose_automatically(self.live.content.region)
 
     def _show(self) -> None:
-        show_parts(self, rig_view(self._state, self._live_state))
+        show_parts(self, rig_view(self._state, self._live_state, self._is_other))
 
     def _show_choice(self, choice: RigChoice) -> None:
         """Show what is connected, whichever page requested it."""
         self._rig.setCurrentIndex(max(self._rig.findData(choice.name), 0))
         self.options.show_options(choice.options)
+        self._told = self._choice
+        self._show()
 
     def _show_devices(self, devices: DeviceRig | None) -> None:
         camera = self._state.camera

@@ -23,6 +23,10 @@ from dsl_core.words import counted
 Floats = NDArray[np.floating[Any]]
 
 
+REPORT = "Save figures and pictures of the comparison as an HTML page"
+SWAP = "Swap A and B"
+#: Why there is nothing to swap or to write.
+NEEDS_BOTH = "Open A and B first."
 #: Characters of the names of A and B beside the buttons that open them.
 MOST_BESIDE = 20
 
@@ -116,7 +120,7 @@ class PairDisplay:
     open_second: ButtonState
     at_hand: ButtonState
     truth: ButtonState
-    swap: bool
+    swap: ButtonState
     report: ButtonState
 
 
@@ -139,9 +143,21 @@ def pair_display(state: PairState) -> PairDisplay:
         open_second=ButtonState(is_enabled=idle, is_primary=lacks_second and not takes_truth),
         at_hand=at_hand,
         truth=ButtonState(is_enabled=idle and first is not None, is_primary=takes_truth),
-        swap=idle and pair is not None and not has_truth,
-        report=ButtonState(is_enabled=idle and pair is not None, is_primary=has_truth),
+        swap=ButtonState(
+            is_enabled=idle and pair is not None and not has_truth, tip=_swap_tip(pair, has_truth)
+        ),
+        report=ButtonState(
+            is_enabled=idle and pair is not None,
+            is_primary=pair is not None,
+            tip=REPORT if pair is not None else f"{NEEDS_BOTH} {REPORT}",
+        ),
     )
+
+
+def _swap_tip(pair: Pair | None, has_truth: bool) -> str:
+    if pair is None:
+        return f"{NEEDS_BOTH} {SWAP}"
+    return "The truth is always B: differences are those of a result from it." if has_truth else SWAP
 
 
 def side_texts(state: PairState) -> tuple[tuple[str, str], tuple[str, str]]:

@@ -127,3 +127,9 @@ class OpenDialog(QFileDialog):
         chosen = dialog.chosen
         dialog.deleteLater()
         return chosen
+
+    @classmethod
+    def ask_folder(cls, parent: QWidget | None, title: str, folder: str = "") -> Path | None:
+        """A folder that a person chooses, who sees what is in it; a file stands for the folder it lies in."""
+        path = cls.ask(parent, title, folder, takes_folders=True, filters=(ALL,))
+        return path.parent if path is not None and path.is_file() else path

@@ -68,6 +68,22 @@ def test_any_folder_may_be_meant(qtbot: QtBot, home: Path) -> None:
     assert dialog.chosen == home / "plain"
 
 
+def test_a_folder_is_chosen_by_itself_or_by_what_lies_in_it(
+    qtbot: QtBot, home: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    chosen: Path | None = None
+    monkeypatch.setattr(OpenDialog, "exec", lambda self: setattr(self, "chosen", chosen))
+    for chosen in (home / "plain", home / "plain" / "notes.txt", None):
+        assert OpenDialog.ask_folder(None, "Import", str(home)) == (
+            None if chosen is None else home / "plain"
+        )
+    dialog = OpenDialog(None, "Import", str(home / "plain"), takes_folders=True, filters=(ALL,))
+    qtbot.addWidget(dialog)
+    dialog.selectFile(str(home / "plain" / "notes.txt"))
+    dialog.accept()
+    assert dialog.chosen == home / "plain" / "notes.txt"
+
+
 def test_a_filter_shows_scans_or_results_alone(qtbot: QtBot, home: Path) -> None:
     dialog = OpenDialog(None, "Open", str(home), takes_folders=False, filters=(SCANS, ALL))
     qtbot.addWidget(dialog)
