@@ -17,6 +17,7 @@ from dsl_core.io.calibration_library import LibraryLine
 from dsl_core.model.calibration.accepted import AcceptedCalibration, CalibrationNote
 from dsl_core.model.conditions import CaptureConditions
 from dsl_core.model.figure import Figure
+from dsl_core.words import capitalised
 
 #: What to do first, and then: by hand, or on a rig that places targets itself.
 CAMPAIGN_HINT = (
@@ -303,13 +304,18 @@ def _conditions(known: CaptureConditions | None) -> str:
 
 
 def _calibration(note: CalibrationNote, accepted: AcceptedCalibration | None) -> str:
-    lines = [
-        ("✓ " if figure.passed else "✗ ") * bool(figure.limits) + escape(figure_words(figure))
-        for figure in note.figures
-    ]
+    rows = "".join(map(_figure_row, note.figures))
+    lines = [f"<table>{rows}</table>"] if rows else []
     if accepted is not None:
         own = (setting_words(key, value) for key, value in accepted.settings.items() if key != "rig")
         text = escape("; ".join(own))
-        lines += [f"<i>{text}</i>"] if text else []
+        lines += [f"<p><i>{text}</i></p>"] if text else []
     head = f"<b>{escape(note.title)}</b>, {escape(short_date(note.accepted))}"
-    return f"<p>{head}<br>{'<br>'.join(lines)}</p>"
+    return f"<p>{head}</p>{''.join(lines)}"
+
+
+def _figure_row(figure: Figure) -> str:
+    """A figure as a row of a table: whether it passes, name, value, limits."""
+    mark = ("✓" if figure.passed else "✗") * bool(figure.limits)
+    cells = (mark, capitalised(name_words(figure)), value_words(figure), figure.limits.replace("-", "−"))
+    return "<tr>" + "".join(f"<td>{escape(text)}&nbsp;&nbsp;</td>" for text in cells) + "</tr>"

@@ -30,6 +30,8 @@ from dsl_app.shared.wording import in_window
 W = TypeVar("W", bound=QWidget)
 #: A function or signal that a click calls.
 Clicked = Callable[..., object] | SignalInstance | None
+#: By how much a primary button is higher than its text, px.
+PRIMARY_MORE_PX = 12
 _SCROLL = QStyle.PixelMetric.PM_ScrollBarExtent
 
 # A class has one base of Qt at most, so at run time the mixin is a plain class.
@@ -175,6 +177,12 @@ def push_button(text: str, tip: str, do: Clicked = None, role: str = "") -> QPus
     if role:
         made.setProperty("role", role)
     return made
+
+
+def keep_height(*buttons: QPushButton) -> None:
+    """Make buttons as high as a primary one, which they are at times: nothing around them moves then."""
+    for button in buttons:
+        button.setMinimumHeight(button.fontMetrics().height() + PRIMARY_MORE_PX)
 
 
 def check_box(text: str, tip: str) -> QCheckBox:
