@@ -14,6 +14,7 @@ from dsl_app.rig.live_view import LiveView
 from dsl_app.rig.options_form import OptionsForm
 from dsl_app.rig.projector_panel import ProjectorPanel
 from dsl_app.rig.state import CONNECT, rig_view
+from dsl_app.rig.traits import TraitsReader
 from dsl_app.shared.evented import follow_any
 from dsl_app.shared.widgets.deferred import Deferred
 from dsl_app.shared.widgets.forms import ChoiceBox, NumberBox, label, push_button, quiet, show_parts
@@ -41,11 +42,11 @@ class RigPage(PageWidget):
     scan_requested = Signal()
     profile_requested = Signal(str)
 
-    def __init__(self, live: LiveController, rigs: Sequence[str]) -> None:
-        """``rigs`` are the names of the rigs that are installed."""
+    def __init__(self, live: LiveController, rigs: Sequence[str], traits: TraitsReader | None = None) -> None:
+        """``rigs`` are the names of those installed; ``traits`` tells what is unusual in the connected one."""
         super().__init__()
         self._rig_commands, self._commands = live.rig, live
-        self._state, self._live_state = live.rig.state, live.state
+        self._state, self._live_state, self._traits = live.rig.state, live.state, traits
         self._looks_again = False
         #: What the form showed when it was told last what is connected.
         self._told: RigChoice | None = None
@@ -75,6 +76,7 @@ class RigPage(PageWidget):
         self.link = label("")
         self.trouble = label("", wraps=True)
         self.camera_text, self.projector_text = label("–"), label("–")
+        self.traits = label("", "muted", wraps=True)
         self.live_button = push_button(
             "Start live view",
             "Show the camera's picture until something else needs the camera",
@@ -133,6 +135,7 @@ class RigPage(PageWidget):
         form.addRow(self.trouble)
         form.addRow("Camera", self.camera_text)
         form.addRow("Projector", self.projector_text)
+        form.addRow(self.traits)
         form.addRow("", self.selftest)
         camera = QGroupBox("Camera")
         camera_form = QFormLayout(camera)
@@ -211,6 +214,10 @@ class RigPage(PageWidget):
             state.used_by.follow(self.projector.set_user),
             *follow_any(self._show, state.link, state.trouble, live.is_exposing),
         ]
+        if self._traits is None:
+            self._show_traits("")
+        else:
+            self.stops.append(self._traits.words.follow(self._show_traits))
 
     def offer_rig(self, name: str) -> None:
         """Choose a rig, which is added to the list if it is new."""
@@ -275,6 +282,13 @@ class RigPage(PageWidget):
         if camera is not None:
             self.exposure.setRange(*camera.exposure_range_ms)
 
+        if self._traits is not None and self.isVisible():
+            self._traits.read()
+
+    def _show_traits(self, words: str) -> None:
+        self.traits.setText(words)
+        self.traits.setVisible(bool(words))
+
     def _show_exposure(self, exposure_ms: float) -> None:
         # The box shows two decimals; the state keeps the exact value.
         with quiet(self.exposure):
@@ -308,6 +322,8 @@ class RigPage(PageWidget):
     def showEvent(self, event: QShowEvent) -> None:
         """Look again, if the page was left while it did and nobody needs the rig."""
         super().showEvent(event)
+        if self._traits is not None:
+            self._traits.read()
         looks_again, self._looks_again = self._looks_again, False
         if looks_again and self._state.link.value is Link.OPEN and not self._state.used_by.value:
             self._commands.start()
