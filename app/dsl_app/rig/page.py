@@ -43,7 +43,7 @@ class RigPage(PageWidget):
     profile_requested = Signal(str)
 
     def __init__(self, live: LiveController, rigs: Sequence[str], traits: TraitsReader | None = None) -> None:
-        """``rigs`` are the names of those installed; ``traits`` tells what is unusual in the connected one."""
+        """``rigs`` are the names of installed ones; ``traits`` tells what is unusual in the connected one."""
         super().__init__()
         self._rig_commands, self._commands = live.rig, live
         self._state, self._live_state, self._traits = live.rig.state, live.state, traits

@@ -7,9 +7,14 @@ from pathlib import Path
 
 import pytest
 from dsl_app.calibrate.campaign_box import NewCampaignDialog
+from dsl_app.calibrate.page import CalibratePage
+from dsl_app.calibrate.wizard.window import CalibrationWizard
 from dsl_app.composition.window import Composition, StartOptions
+from dsl_app.importing.dialog import ImportDialog
 from dsl_app.results.export.dialog import ExportDialog
 from dsl_app.results.page import ResultsPage
+from dsl_app.rig.page import RigPage
+from dsl_app.rig.profiles.dialog import ProfileDialog
 from dsl_app.shared.widgets.deferred import Deferred
 from dsl_app.shell.actions import PAGES
 from dsl_app.shell.main_window import MainWindow
@@ -34,6 +39,8 @@ from PySide6.QtWidgets import (
 )
 from pytestqt.qtbot import QtBot
 
+from dsl_core.io.campaign_folder import CampaignFolder
+from tests.app.importing.published_folders import make_folders
 from tests.app.support.small_result import write_small_result
 
 INTERACTIVE = (
@@ -172,6 +179,40 @@ def test_every_control_of_the_results_has_a_name_and_a_tooltip(
     assert complaints(page.graph) == []
     assert complaints(NewCampaignDialog(tmp_path, "twin", page)) == []
     assert complaints(page) == []
+
+
+def test_every_control_of_a_rig_profile_has_a_name_and_a_tooltip(window: MainWindow) -> None:
+    page = window.open_page("rig")
+    assert isinstance(page, RigPage)
+    page.profile_requested.emit("")
+    (dialog,) = window.findChildren(ProfileDialog)
+    for form in dialog.forms.values():
+        form.driver.setCurrentIndex(form.driver.count() - 1)
+        form.driver.activated.emit(form.driver.currentIndex())
+    assert complaints(dialog) == []
+
+
+def test_every_control_of_a_wizard_and_of_imports_has_a_name_and_a_tooltip(
+    qtbot: QtBot, window: MainWindow, tmp_path: Path
+) -> None:
+    campaign = CampaignFolder.begin(tmp_path / "room", "twin", {"size": "64x48"})
+    window.open_path(campaign.path)
+    page = window.open_page("calibrate")
+    assert isinstance(page, CalibratePage)
+    page.banner.action.click()
+    qtbot.waitUntil(lambda: page._rig.devices.value is not None, timeout=60_000)
+    page.run("geometry")
+    qtbot.waitUntil(lambda: bool(window.findChildren(CalibrationWizard)), timeout=60_000)
+    (wizard,) = window.findChildren(CalibrationWizard)
+    qtbot.waitUntil(lambda: not window.parts.runner.active, timeout=60_000)
+    assert complaints(wizard) == []
+    wizard.reject()
+    window.open_path(make_folders(tmp_path / "published").scene)
+    qtbot.waitUntil(lambda: bool(window.findChildren(ImportDialog)), timeout=60_000)
+    (dialog,) = window.findChildren(ImportDialog)
+    assert complaints(dialog) == []
+    dialog.reject()
+    qtbot.waitUntil(lambda: not window.parts.runner.active, timeout=60_000)
 
 
 @pytest.mark.parametrize("action", ["help_page", "shortcuts", "about", "show_command"])
