@@ -82,9 +82,20 @@ def campaign_head(state: CalibrateState, devices: DeviceRig | None) -> CampaignH
         open=ButtonState(is_enabled=not is_running),
         keep=ButtonState(facts is not None and not is_running, usable and has_accepted, main == "keep"),
         cancel=ButtonState(is_running),
-        everything=ButtonState(not is_running, usable and places_itself, main == "everything"),
+        everything=ButtonState(
+            not is_running, usable and places_itself, main == "everything", why=_why_not(state, devices)
+        ),
         scan=ButtonState(main == "scan", is_primary=True),
     )
+
+
+def _why_not(state: CalibrateState, devices: DeviceRig | None) -> str:
+    """Why not everything can be calibrated at once."""
+    if state.campaign.value is None:
+        return "Begin or open a campaign first."
+    if devices is None or state.foreign.value:
+        return "Connect the campaign's rig first."
+    return "This rig does not place targets itself: work through rows 1 to 6."
 
 
 def main_button(state: CalibrateState, devices: DeviceRig | None) -> str:

@@ -13,11 +13,11 @@ from dsl_app.rig.controller import LiveController
 from dsl_app.rig.live_view import LiveView
 from dsl_app.rig.options_form import OptionsForm
 from dsl_app.rig.projector_panel import ProjectorPanel
-from dsl_app.rig.state import CONNECT, rig_view
+from dsl_app.rig.state import CONNECT, CONNECT_FIRST, rig_view
 from dsl_app.rig.traits import TraitsReader
 from dsl_app.shared.evented import follow_any
 from dsl_app.shared.widgets.deferred import Deferred
-from dsl_app.shared.widgets.forms import ChoiceBox, NumberBox, label, push_button, quiet, show_parts
+from dsl_app.shared.widgets.forms import ChoiceBox, NumberBox, allow, label, push_button, quiet, show_parts
 from dsl_app.shared.widgets.help_window import set_help
 from dsl_app.shared.widgets.layouts import STRETCH, boxed, column_of, row_of, scrolled
 from dsl_app.shared.widgets.page import PageWidget
@@ -227,7 +227,8 @@ class RigPage(PageWidget):
 
     def _show_profile(self) -> None:
         """Only rigs of a profile can be edited."""
-        self.edit_profile.setEnabled(profile_path(str(self._rig.currentData())) is not None)
+        has_profile = profile_path(str(self._rig.currentData())) is not None
+        allow(self.edit_profile, has_profile, "This rig comes with the program and has no profile.")
 
     def _toggle_link(self) -> None:
         if self._state.link.value is Link.OPEN and not self._is_other:
@@ -264,7 +265,9 @@ class RigPage(PageWidget):
         self._commands.expose_automatically(self.live.content.region)
 
     def _show(self) -> None:
-        show_parts(self, rig_view(self._state, self._live_state, self._is_other))
+        view = rig_view(self._state, self._live_state, self._is_other)
+        show_parts(self, view)
+        allow(self.auto, view.auto, CONNECT_FIRST)
 
     def _show_choice(self, choice: RigChoice) -> None:
         """Show what is connected, whichever page requested it."""

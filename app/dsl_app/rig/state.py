@@ -29,6 +29,7 @@ LEVEL = 0.8
 COLOURS_VARY = "colours vary"
 _LINK_ROLES = {Link.OPEN: "good", Link.OPENING: "warn", Link.LOST: "bad", Link.CLOSED: "muted"}
 
+CONNECT_FIRST = "Connect a rig first."
 CONNECT = "Open or close the devices of this rig"
 CONNECT_OTHER = "Close the rig that is connected, and open the one that the form shows now"
 _LINK_BUTTONS = {Link.OPEN: "Disconnect", Link.OPENING: "Connecting…"}
@@ -106,9 +107,16 @@ def rig_view(rig: RigState, live: LiveState, is_other: bool = False) -> RigView:
             is_enabled=can_look,
             is_primary=can_look and not is_live and not is_other,
             text="Stop live view" if is_live else "Start live view",
+            why=CONNECT_FIRST,
         ),
-        selftest=ButtonState(is_enabled=can_look, is_primary=is_live and not (is_calibrated or is_other)),
-        scan=ButtonState(is_enabled=can_look, is_primary=is_live and is_calibrated and not is_other),
+        selftest=ButtonState(
+            is_enabled=can_look,
+            is_primary=is_live and not (is_calibrated or is_other),
+            why=CONNECT_FIRST,
+        ),
+        scan=ButtonState(
+            is_enabled=can_look, is_primary=is_live and is_calibrated and not is_other, why=CONNECT_FIRST
+        ),
         exposure=has_devices,
         auto=can_look and not live.is_exposing.value,
         cycles=LabelState(cycles, "warn" if cycles.endswith(COLOURS_VARY) else "muted"),

@@ -11,6 +11,8 @@ from dsl_core.capture.runner import Status
 from dsl_core.words import capitalised
 
 _PHASE_ROLES = {Phase.LOST: "bad", Phase.DONE: "good", Phase.PAUSED: "warn", Phase.STOPPED: "warn"}
+#: Why there is nothing to pause or to cancel.
+NO_SCAN = "No scan is running."
 RESUME = "Resume at the first missing frame, after checking whether anything has moved"
 RESTART = "Start the scan again from its first frame: none of it is saved yet"
 RECONNECT = "Reconnect the rig, check whether anything has moved, and resume at the first missing frame"
@@ -102,6 +104,7 @@ def run_controls(
             is_enabled=phase in (Phase.RUNNING, Phase.PAUSED),
             is_primary=phase is Phase.PAUSED,
             text="Cont&inue" if phase is Phase.PAUSED else "&Pause",
+            why=NO_SCAN,
         ),
         cancel=phase.is_busy and phase is not Phase.STOPPING,
         renew=ButtonState(is_resumable),

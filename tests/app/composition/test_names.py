@@ -32,6 +32,7 @@ from PySide6.QtWidgets import (
     QHeaderView,
     QLineEdit,
     QPlainTextEdit,
+    QPushButton,
     QScrollBar,
     QTabBar,
     QTextBrowser,
@@ -124,6 +125,25 @@ def test_every_control_of_a_page_has_a_name_and_a_tooltip(window: MainWindow, ke
     page = window.open_page(key)
     assert complaints(page) == []
     assert given_twice(window, page) == []
+
+
+def test_a_button_that_cannot_be_pressed_says_why(window: MainWindow) -> None:
+    silent = list[str]()
+    for page in PAGES:
+        shown = window.open_page(page.key)
+        for room in shown.findChildren(Deferred):
+            _ = room.content
+        silent += [
+            f"{page.key}: {button.text()}"
+            for button in shown.findChildren(QPushButton)
+            if button.isVisible() and not button.isEnabled() and not _has_reason(button)
+        ]
+    assert silent == []
+
+
+def _has_reason(button: QPushButton) -> bool:
+    own = button.property("own-tip")
+    return own is not None and button.toolTip() != own
 
 
 def given_twice(window: MainWindow, page: QWidget) -> list[str]:

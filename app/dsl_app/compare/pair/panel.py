@@ -10,7 +10,7 @@ from PySide6.QtWidgets import QFileDialog, QSizePolicy, QSplitter, QWidget
 from dsl_app.compare.pair.controller import PairController
 from dsl_app.compare.pair.pictures import PairControls, PairPictures
 from dsl_app.compare.pair.sides import PairSides
-from dsl_app.compare.pair.state import REPORT, SWAP, Pair, PairState, pair_display
+from dsl_app.compare.pair.state import Pair, PairState, pair_display
 from dsl_app.compare.verdict_table import VerdictTable
 from dsl_app.shared.evented import follow_any
 from dsl_app.shared.settings import RecentFiles
@@ -47,8 +47,10 @@ class PairPanel(QWidget):
         self.at_hand = push_button(
             "Open result", "Compare the result that is open on the Results page", self._use_at_hand
         )
-        self.swap = push_button("S&wap", SWAP, control.swap)
-        self.report = push_button("Write re&port…", REPORT)
+        self.swap = push_button("S&wap", "Swap A and B", control.swap)
+        self.report = push_button(
+            "Write re&port…", "Save figures and pictures of the comparison as an HTML page"
+        )
         self.hint = remark_line()
         # Slow to make: made when they are first seen.
         self.pictures = Deferred(lambda: PairPictures(state, control))

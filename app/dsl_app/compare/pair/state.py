@@ -23,10 +23,9 @@ from dsl_core.words import counted
 Floats = NDArray[np.floating[Any]]
 
 
-REPORT = "Save figures and pictures of the comparison as an HTML page"
-SWAP = "Swap A and B"
-#: Why there is nothing to swap or to write.
-NEEDS_BOTH = "Open A and B first."
+#: Why there is nothing to compare with, to write or to swap.
+OPEN_A, OPEN_BOTH = "Open A first.", "Open A and B first."
+TRUTH_IS_B = "The truth is always B: differences are those of a result from it."
 #: Characters of the names of A and B beside the buttons that open them.
 MOST_BESIDE = 20
 
@@ -142,22 +141,16 @@ def pair_display(state: PairState) -> PairDisplay:
         open_first=ButtonState(is_enabled=idle, is_primary=first is None and not at_hand.is_visible),
         open_second=ButtonState(is_enabled=idle, is_primary=lacks_second and not takes_truth),
         at_hand=at_hand,
-        truth=ButtonState(is_enabled=idle and first is not None, is_primary=takes_truth),
+        truth=ButtonState(is_enabled=idle and first is not None, is_primary=takes_truth, why=OPEN_A),
         swap=ButtonState(
-            is_enabled=idle and pair is not None and not has_truth, tip=_swap_tip(pair, has_truth)
+            is_enabled=idle and pair is not None and not has_truth, why=TRUTH_IS_B if has_truth else OPEN_BOTH
         ),
         report=ButtonState(
             is_enabled=idle and pair is not None,
             is_primary=pair is not None,
-            tip=REPORT if pair is not None else f"{NEEDS_BOTH} {REPORT}",
+            why=OPEN_BOTH,
         ),
     )
-
-
-def _swap_tip(pair: Pair | None, has_truth: bool) -> str:
-    if pair is None:
-        return f"{NEEDS_BOTH} {SWAP}"
-    return "The truth is always B: differences are those of a result from it." if has_truth else SWAP
 
 
 def side_texts(state: PairState) -> tuple[tuple[str, str], tuple[str, str]]:

@@ -24,7 +24,7 @@ from dsl_app.results.state import Mark, ResultsState
 from dsl_app.shared.plain_tip import plain_tip
 from dsl_app.shared.settings import folder_for
 from dsl_app.shared.theme import DARK, Theme
-from dsl_app.shared.widgets.forms import label, named, push_button, quiet
+from dsl_app.shared.widgets.forms import allow, label, named, push_button, quiet
 from dsl_app.shared.widgets.hints import FocusRing
 from dsl_app.shared.widgets.icons import SWATCH_PX, swatch
 from dsl_app.shared.widgets.layouts import STRETCH, column_of, row_of
@@ -227,7 +227,7 @@ class MarksPanel(QWidget):
         self._later.start()
 
     def _show_removable(self) -> None:
-        self.remove.setEnabled(bool(self._chosen))
+        allow(self.remove, bool(self._chosen), "Select a pin, region or reference first.")
 
     def _show_band(self) -> None:
         mark = self._state.selected_mark

@@ -32,6 +32,8 @@ W = TypeVar("W", bound=QWidget)
 Clicked = Callable[..., object] | SignalInstance | None
 #: By how much a primary button is higher than its text, px.
 PRIMARY_MORE_PX = 12
+#: Where a button keeps the tooltip that it has while it can be pressed.
+_OWN_TIP = "own-tip"
 _SCROLL = QStyle.PixelMetric.PM_ScrollBarExtent
 
 # A class has one base of Qt at most, so at run time the mixin is a plain class.
@@ -217,11 +219,25 @@ def show_button(button: QAbstractButton, state: ButtonState) -> None:
         button.setText(state.text)
     if state.tip is not None:
         button.setToolTip(plain_tip(state.tip))
+        button.setProperty(_OWN_TIP, None)
     if state.name is not None:
         button.setAccessibleName(state.name)
     button.setVisible(state.is_visible)
-    button.setEnabled(state.is_enabled)
+    allow(button, state.is_enabled, state.why)
     set_role(button, "primary" if state.is_primary else "")
+
+
+def allow(button: QAbstractButton, on: bool, why: str = "") -> None:
+    """Let a button be pressed; else its tooltip begins with the reason ``why`` it cannot be."""
+    button.setEnabled(on)
+    own = button.property(_OWN_TIP)
+    if not on and why:
+        if own is None:
+            own = button.toolTip()
+            button.setProperty(_OWN_TIP, own)
+        button.setToolTip(f"{why} {own}")
+    elif own is not None:
+        button.setToolTip(own)
 
 
 def show_label(line: QLabel, state: LabelState) -> None:
