@@ -86,12 +86,14 @@ def run_controls(
     is_ready = phase is not Phase.PLANNING or not obstacles
     lacks_rig = NO_RIG in obstacles
     can_run, connects = not phase.is_busy and not obstacles, facts is not None and facts.connects
+    why = "A scan is running." if phase.is_busy else " ".join(obstacles)
     return RunControls(
         connect_rig=ButtonState(lacks_rig, is_primary=True),
         start=ButtonState(
             session is None,
             can_run,
             is_primary=not (is_raw or lacks_rig or is_reconstructing or phase is Phase.PAUSED),
+            why=why,
         ),
         resume=ButtonState(
             session is not None,
@@ -99,6 +101,7 @@ def run_controls(
             is_primary=True,
             text="Co&nnect and resume" if connects else "Resume sca&n",
             tip=RECONNECT if connects else RESUME,
+            why=why,
         ),
         pause=ButtonState(
             is_enabled=phase in (Phase.RUNNING, Phase.PAUSED),

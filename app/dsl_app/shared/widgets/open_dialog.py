@@ -78,7 +78,9 @@ class OpenDialog(QFileDialog):
         takes_folders: bool,
         filters: tuple[str, ...] = (ALL, RESULTS, SCANS),
     ) -> None:
-        super().__init__(parent, title, folder)
+        place = Path(folder)
+        # One that does not exist yet would be taken for a name that was typed, and nothing could be chosen.
+        super().__init__(parent, title, folder if place.is_dir() or not folder else str(place.parent))
         self._takes_folders = takes_folders
         self.chosen: Path | None = None
         self.setOption(QFileDialog.Option.DontUseNativeDialog)

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 from dsl_app.shared.widgets.open_dialog import ALL, SCANS, OpenDialog, is_thing
 from PySide6.QtCore import QFileInfo
-from PySide6.QtWidgets import QTreeView
+from PySide6.QtWidgets import QLineEdit, QTreeView
 from pytestqt.qtbot import QtBot
 
 
@@ -82,6 +82,14 @@ def test_a_folder_is_chosen_by_itself_or_by_what_lies_in_it(
     dialog.selectFile(str(home / "plain" / "notes.txt"))
     dialog.accept()
     assert dialog.chosen == home / "plain" / "notes.txt"
+
+
+def test_a_folder_that_is_not_there_yet_is_no_name_that_was_typed(qtbot: QtBot, home: Path) -> None:
+    dialog = _dialog(qtbot, home / "dsl-scans", takes_folders=True)
+    assert dialog.directory().absolutePath() == str(home)
+    typed = dialog.findChild(QLineEdit)
+    assert typed is not None
+    assert typed.text() == ""
 
 
 def test_a_filter_shows_scans_or_results_alone(qtbot: QtBot, home: Path) -> None:
