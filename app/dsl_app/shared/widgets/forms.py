@@ -22,7 +22,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from dsl_app.shared.plain_tip import plain_tip
+from dsl_app.shared.plain_tip import plain_tip, text_of_tip
 from dsl_app.shared.widget_state import ButtonState, LabelState
 from dsl_app.shared.widgets.layouts import row_of
 from dsl_app.shared.wording import in_window
@@ -233,11 +233,11 @@ def allow(button: QAbstractButton, on: bool, why: str = "") -> None:
     own = button.property(_OWN_TIP)
     if not on and why:
         if own is None:
-            own = button.toolTip()
+            own = text_of_tip(button.toolTip())
             button.setProperty(_OWN_TIP, own)
-        button.setToolTip(f"{why} {own}")
+        button.setToolTip(plain_tip(f"{why} {own}"))
     elif own is not None:
-        button.setToolTip(own)
+        button.setToolTip(plain_tip(own))
 
 
 def show_label(line: QLabel, state: LabelState) -> None:

@@ -52,6 +52,8 @@ def test_a_button_that_cannot_be_pressed_says_why_before_what_it_does(qtbot: QtB
     assert tips == [f"Open it first. {own}", own, f"Connect it. {own}", own]
     show_button(button, ButtonState(is_enabled=False, tip="Goes on", why="Wait."))
     assert button.toolTip() == "Wait. Goes on"
+    allow(button, False, "The scan <b>1 is open.")
+    assert button.toolTip() == "<p>The scan &lt;b&gt;1 is open. Goes on</p>", "names are no markup"
     show_button(button, ButtonState(tip="Goes on"))
     assert button.toolTip() == "Goes on"
 
