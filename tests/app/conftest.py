@@ -8,12 +8,12 @@ from __future__ import annotations
 
 import gc
 import os
-from collections.abc import Generator
+from collections.abc import Generator, Iterator
 from pathlib import Path
 
 import pytest
 
-from tests.app.support.questions import answering_questions
+from tests.app.support.questions import answering_questions, no_dialog_waits_for_ever
 
 os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
 os.environ.setdefault("QT_API", "pyside6")
@@ -44,3 +44,11 @@ def pytest_runtest_teardown(item: pytest.Item, nextitem: pytest.Item | None) -> 
     gc.collect(2 if is_last or _ended % TESTS_PER_FULL == 0 else 1)
     if is_last:
         gc.enable()
+
+
+@pytest.fixture(autouse=True)
+def _answered() -> Iterator[None]:
+    """Fail a test with a dialog that it does not answer, and go on with the others."""
+    with no_dialog_waits_for_ever() as given_up:
+        yield
+    assert not given_up, "nobody answered these dialogs"

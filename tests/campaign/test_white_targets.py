@@ -235,7 +235,7 @@ def test_a_lamp_that_comes_on_between_the_pictures_is_told(after: int, tmp_path:
     assert devices.nominal is not None
     record = calibrate(recipe, devices, devices.nominal, tmp_path)
     bad = [f.name for f in failures(recipe.figures(record))]
-    assert ("change of other light during the pictures" in bad) is (after < 1_000_000)
+    assert ("change of ambient light during the pictures" in bad) is (after < 1_000_000)
 
 
 def test_what_is_not_known_of_the_spectralon_is_part_of_every_reflectance(module_folder: Path) -> None:

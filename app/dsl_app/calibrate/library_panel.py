@@ -28,7 +28,7 @@ from dsl_app.shared.plain_tip import plain_tip
 from dsl_app.shared.theme import Theme
 from dsl_app.shared.widget_state import LabelState
 from dsl_app.shared.widgets.dialogs import dialog_buttons
-from dsl_app.shared.widgets.forms import label, push_button, set_role, show_label
+from dsl_app.shared.widgets.forms import allow, label, push_button, set_role, show_label
 from dsl_app.shared.widgets.help_window import add_help_key
 from dsl_app.shared.widgets.hints import FocusRing
 from dsl_app.shared.widgets.layouts import STRETCH, column_of, row_of, splitter
@@ -166,8 +166,8 @@ class LibraryPanel(QGroupBox):
     def _select(self) -> None:
         shown = library_selection(self.line)
         for button in (self.use, self.report, self.check, self.export):
-            button.setEnabled(shown.can_use)
-        self.restore.setEnabled(shown.can_restore)
+            allow(button, shown.can_use, "Select a calibration of the list first.")
+        allow(self.restore, shown.can_restore, "Select an older version of the list first.")
         set_role(self.use, "primary" if self._next is not None and self.line == self._next else "")
         # It takes a while to lay out, and a list that is read selects its version several times.
         if shown.details != self._told:

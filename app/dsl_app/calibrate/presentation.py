@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from datetime import datetime
 from html import escape
 
+from dsl_app.calibrate.setting_words import setting_words
 from dsl_app.calibrate.state import CalibrateState, Row, RowState
 from dsl_app.shared.known_files import breakable
 from dsl_app.shared.widget_state import ButtonState, LabelState
@@ -16,6 +17,7 @@ from dsl_core.io.calibration_library import LibraryLine
 from dsl_core.model.calibration.accepted import AcceptedCalibration, CalibrationNote
 from dsl_core.model.conditions import CaptureConditions
 from dsl_core.model.figure import Figure
+from dsl_core.words import capitalised
 
 #: What to do first, and then: by hand, or on a rig that places targets itself.
 CAMPAIGN_HINT = (
@@ -80,9 +82,20 @@ def campaign_head(state: CalibrateState, devices: DeviceRig | None) -> CampaignH
         open=ButtonState(is_enabled=not is_running),
         keep=ButtonState(facts is not None and not is_running, usable and has_accepted, main == "keep"),
         cancel=ButtonState(is_running),
-        everything=ButtonState(not is_running, usable and places_itself, main == "everything"),
+        everything=ButtonState(
+            not is_running, usable and places_itself, main == "everything", why=_why_not(state, devices)
+        ),
         scan=ButtonState(main == "scan", is_primary=True),
     )
+
+
+def _why_not(state: CalibrateState, devices: DeviceRig | None) -> str:
+    """Why not everything can be calibrated at once."""
+    if state.campaign.value is None:
+        return "Begin or open a campaign first."
+    if devices is None or state.foreign.value:
+        return "Connect the campaign's rig first."
+    return "This rig does not place targets itself: work through rows 1 to 6."
 
 
 def main_button(state: CalibrateState, devices: DeviceRig | None) -> str:
@@ -302,13 +315,18 @@ def _conditions(known: CaptureConditions | None) -> str:
 
 
 def _calibration(note: CalibrationNote, accepted: AcceptedCalibration | None) -> str:
-    lines = [
-        ("✓ " if figure.passed else "✗ ") * bool(figure.limits) + escape(figure_words(figure))
-        for figure in note.figures
-    ]
+    rows = "".join(map(_figure_row, note.figures))
+    lines = [f"<table>{rows}</table>"] if rows else []
     if accepted is not None:
-        own = (f"{key} {value}" for key, value in accepted.settings.items() if key != "rig")
+        own = (setting_words(key, value) for key, value in accepted.settings.items() if key != "rig")
         text = escape("; ".join(own))
-        lines += [f"<i>{text}</i>"] if text else []
+        lines += [f"<p><i>{text}</i></p>"] if text else []
     head = f"<b>{escape(note.title)}</b>, {escape(short_date(note.accepted))}"
-    return f"<p>{head}<br>{'<br>'.join(lines)}</p>"
+    return f"<p>{head}</p>{''.join(lines)}"
+
+
+def _figure_row(figure: Figure) -> str:
+    """A figure as a row of a table: whether it passes, name, value, limits."""
+    mark = ("✓" if figure.passed else "✗") * bool(figure.limits)
+    cells = (mark, capitalised(name_words(figure)), value_words(figure), figure.limits.replace("-", "−"))
+    return "<tr>" + "".join(f"<td>{escape(text)}&nbsp;&nbsp;</td>" for text in cells) + "</tr>"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -16,8 +17,9 @@ _log = logging.getLogger(__name__)
 class CalibrationInUse:
     """Serves whichever of the two pages have been opened."""
 
-    def __init__(self, settings: Settings) -> None:
-        self._settings = settings
+    def __init__(self, settings: Settings, save: Callable[[], object] = lambda: None) -> None:
+        """``save`` writes the settings: the choice must outlive a computer that loses its power."""
+        self._settings, self._save = settings, save
         self._library: CalibrateState | None = None
         self._scans: ScanController | None = None
 
@@ -35,7 +37,7 @@ class CalibrationInUse:
         scans.state.calibration.changed.connect(lambda choice: self._chosen(choice.key))
 
     def _use(self, key: str) -> None:
-        self._settings.calibration = key
+        self._remember(key)
         if self._scans is not None and key:
             self._choose(self._scans, key)
 
@@ -51,6 +53,11 @@ class CalibrationInUse:
 
     def _chosen(self, key: str) -> None:
         """Remember what was chosen on the Scan page."""
-        self._settings.calibration = key
+        self._remember(key)
         if self._library is not None:
             self._library.in_use.set(key)
+
+    def _remember(self, key: str) -> None:
+        if key != self._settings.calibration:
+            self._settings.calibration = key
+            self._save()

@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QFileDialog
 
 from dsl_app.composition.captures import CapturesAction
 from dsl_app.shared.known_files import has_pictures
@@ -51,9 +50,9 @@ class ImportAction:
     def begin(self) -> None:
         """Choose a folder and look at it; the dialog follows."""
         title = "Import a folder of pictures, or a scan or calibration in the published layout"
-        name = QFileDialog.getExistingDirectory(self._window, title, str(self._home))
-        if name:
-            self.look(Path(name))
+        folder = OpenDialog.ask_folder(self._window, title, str(self._home))
+        if folder is not None:
+            self.look(folder)
 
     def look(self, folder: Path) -> None:
         """Look at a folder that was chosen or dropped; the dialog follows."""

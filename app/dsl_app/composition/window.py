@@ -223,7 +223,7 @@ class Composition(QObject):
     @cached_property
     def calibration_in_use(self) -> CalibrationInUse:
         """The calibration that scans use."""
-        return CalibrationInUse(self.window.parts.settings)
+        return CalibrationInUse(self.window.parts.settings, self.window.save_early)
 
     @cached_property
     def reconstruct_again(self) -> ReconstructAgainAction:
@@ -279,9 +279,13 @@ class Composition(QObject):
 
     def _rig_page(self) -> PageWidget:
         from dsl_app.rig.page import RigPage
+        from dsl_app.rig.traits import TraitsReader
         from dsl_core.devices.registry import rig_names
 
-        page = RigPage(self.live, rig_names())
+        parts = self.window.parts
+        # Settings always hold what the other pages chose last.
+        traits = TraitsReader(self.rig.state, parts.runner, lambda: parts.settings.calibration)
+        page = RigPage(self.live, rig_names(), traits)
         self.screens.serve(page)
         profiles = ProfileAction(self.window, self.rig.state, page.offer_rig)
         # The signal would not keep the action.

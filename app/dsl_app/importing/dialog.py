@@ -23,6 +23,7 @@ from dsl_app.shared.widgets.dialogs import JobDialog, use_room
 from dsl_app.shared.widgets.forms import ChoiceBox, WholeBox, label, named, push_button
 from dsl_app.shared.widgets.help_window import add_help_key
 from dsl_app.shared.widgets.layouts import STRETCH, row_of
+from dsl_app.shared.widgets.open_dialog import OpenDialog
 from dsl_app.shared.widgets.read_table import ReadTable, cell
 
 if TYPE_CHECKING:
@@ -176,9 +177,9 @@ class ImportDialog(JobDialog):
     def _choose_folder(self) -> None:
         found = self._state.found.value
         start = "" if found is None else str(found.folder.parent)
-        name = QFileDialog.getExistingDirectory(self, "Import a folder", start)
-        if name:
-            self.other_chosen.emit(Path(name))
+        folder = OpenDialog.ask_folder(self, "Import a folder", start)
+        if folder is not None:
+            self.other_chosen.emit(folder)
 
     def _choose_file(self) -> None:
         name, _ = QFileDialog.getOpenFileName(self, "Choose a calibration", "", "Calibrations (*.json)")

@@ -35,7 +35,7 @@ from dsl_app.shared.widget_state import LabelState
 from dsl_app.shared.widgets.clipped_label import ClippedLabel
 from dsl_app.shared.widgets.deferred import Deferred
 from dsl_app.shared.widgets.figure_file import PlotFigure
-from dsl_app.shared.widgets.forms import label, push_button, show_label
+from dsl_app.shared.widgets.forms import allow, label, push_button, show_label
 from dsl_app.shared.widgets.help_window import set_help
 from dsl_app.shared.widgets.layouts import boxed, column_of, row_of, splitter, tabs_of
 from dsl_app.shared.widgets.open_dialog import ALL, BOTH, OpenDialog
@@ -181,7 +181,7 @@ class ResultsPage(PageWidget):
         self.stack.setCurrentIndex(summary.content)
         self.offer.show_offer(summary.message, summary.can_reconstruct)
         for button in (self.reconstruct_again, self._inspect, self._report, self._export):
-            button.setEnabled(summary.has_result)
+            allow(button, summary.has_result, "Open a result first.")
         self.title.setText(short_name(summary.title))
         self.title.setToolTip(plain_tip(summary.title))
         self.about.setText(summary.about)

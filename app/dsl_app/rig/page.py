@@ -13,10 +13,11 @@ from dsl_app.rig.controller import LiveController
 from dsl_app.rig.live_view import LiveView
 from dsl_app.rig.options_form import OptionsForm
 from dsl_app.rig.projector_panel import ProjectorPanel
-from dsl_app.rig.state import rig_view
+from dsl_app.rig.state import CONNECT, CONNECT_FIRST, rig_view
+from dsl_app.rig.traits import TraitsReader
 from dsl_app.shared.evented import follow_any
 from dsl_app.shared.widgets.deferred import Deferred
-from dsl_app.shared.widgets.forms import ChoiceBox, NumberBox, label, push_button, quiet, show_parts
+from dsl_app.shared.widgets.forms import ChoiceBox, NumberBox, allow, label, push_button, quiet, show_parts
 from dsl_app.shared.widgets.help_window import set_help
 from dsl_app.shared.widgets.layouts import STRETCH, boxed, column_of, row_of, scrolled
 from dsl_app.shared.widgets.page import PageWidget
@@ -41,12 +42,14 @@ class RigPage(PageWidget):
     scan_requested = Signal()
     profile_requested = Signal(str)
 
-    def __init__(self, live: LiveController, rigs: Sequence[str]) -> None:
-        """``rigs`` are the names of the rigs that are installed."""
+    def __init__(self, live: LiveController, rigs: Sequence[str], traits: TraitsReader | None = None) -> None:
+        """``rigs`` are the names of installed ones; ``traits`` tells what is unusual in the connected one."""
         super().__init__()
         self._rig_commands, self._commands = live.rig, live
-        self._state, self._live_state = live.rig.state, live.state
+        self._state, self._live_state, self._traits = live.rig.state, live.state, traits
         self._looks_again = False
+        #: What the form showed when it was told last what is connected.
+        self._told: RigChoice | None = None
         self.stops: list[Callable[[], None]] = []
         self.live = Deferred(self._make_live)
         self.live.setObjectName("live-view")
@@ -69,12 +72,11 @@ class RigPage(PageWidget):
             lambda: self.profile_requested.emit(str(self._rig.currentData())),
         )
         self._rig.currentIndexChanged.connect(lambda _: self._show_profile())
-        self.connect_button = push_button(
-            "Connect", "Open or close the devices of this rig", self._toggle_link, "primary"
-        )
+        self.connect_button = push_button("Connect", CONNECT, self._toggle_link, "primary")
         self.link = label("")
         self.trouble = label("", wraps=True)
         self.camera_text, self.projector_text = label("–"), label("–")
+        self.traits = label("", "muted", wraps=True)
         self.live_button = push_button(
             "Start live view",
             "Show the camera's picture until something else needs the camera",
@@ -133,6 +135,7 @@ class RigPage(PageWidget):
         form.addRow(self.trouble)
         form.addRow("Camera", self.camera_text)
         form.addRow("Projector", self.projector_text)
+        form.addRow(self.traits)
         form.addRow("", self.selftest)
         camera = QGroupBox("Camera")
         camera_form = QFormLayout(camera)
@@ -196,6 +199,9 @@ class RigPage(PageWidget):
     def _connect(self) -> None:
         state, live, commands = self._state, self._live_state, self._commands
         self.exposure.valueChanged.connect(commands.set_exposure)
+        self._rig.currentIndexChanged.connect(lambda _: self._show())
+        self.options.text.textChanged.connect(lambda _: self._show())
+        self.options.text.returnPressed.connect(self._connect_form)
         self.projector.requested.connect(commands.show)
         # Once whoever serves the choice has made the screen the projector's.
         self.projector.screen_chosen.connect(lambda _: QTimer.singleShot(0, self, commands.show_again))
@@ -208,6 +214,10 @@ class RigPage(PageWidget):
             state.used_by.follow(self.projector.set_user),
             *follow_any(self._show, state.link, state.trouble, live.is_exposing),
         ]
+        if self._traits is None:
+            self._show_traits("")
+        else:
+            self.stops.append(self._traits.words.follow(self._show_traits))
 
     def offer_rig(self, name: str) -> None:
         """Choose a rig, which is added to the list if it is new."""
@@ -217,14 +227,24 @@ class RigPage(PageWidget):
 
     def _show_profile(self) -> None:
         """Only rigs of a profile can be edited."""
-        self.edit_profile.setEnabled(profile_path(str(self._rig.currentData())) is not None)
+        has_profile = profile_path(str(self._rig.currentData())) is not None
+        allow(self.edit_profile, has_profile, "This rig comes with the program and has no profile.")
 
     def _toggle_link(self) -> None:
-        if self._state.link.value is Link.OPEN:
+        if self._state.link.value is Link.OPEN and not self._is_other:
             self._rig_commands.disconnect()
-            return
+        else:
+            self._connect_form()
+
+    def _connect_form(self) -> None:
+        """Connect what the form shows."""
         self._rig_commands.connect(self._choice)
         self._commands.begin_when_open()
+
+    @property
+    def _is_other(self) -> bool:
+        """Whether the form was changed since it was told what is connected."""
+        return self._told is not None and self._choice != self._told
 
     @property
     def _choice(self) -> RigChoice:
@@ -233,8 +253,7 @@ class RigPage(PageWidget):
     def _change_options(self) -> None:
         """Put another scene in front of a connected camera at once."""
         if self._state.link.value is Link.OPEN and not self._state.used_by.value:
-            self._rig_commands.connect(self._choice)
-            self._commands.begin_when_open()
+            self._connect_form()
 
     def _toggle_live(self) -> None:
         if self._state.live.value:
@@ -246,12 +265,16 @@ class RigPage(PageWidget):
         self._commands.expose_automatically(self.live.content.region)
 
     def _show(self) -> None:
-        show_parts(self, rig_view(self._state, self._live_state))
+        view = rig_view(self._state, self._live_state, self._is_other)
+        show_parts(self, view)
+        allow(self.auto, view.auto, CONNECT_FIRST)
 
     def _show_choice(self, choice: RigChoice) -> None:
         """Show what is connected, whichever page requested it."""
         self._rig.setCurrentIndex(max(self._rig.findData(choice.name), 0))
         self.options.show_options(choice.options)
+        self._told = self._choice
+        self._show()
 
     def _show_devices(self, devices: DeviceRig | None) -> None:
         camera = self._state.camera
@@ -261,6 +284,13 @@ class RigPage(PageWidget):
         self._show_exposure(self._live_state.exposure_ms.value)
         if camera is not None:
             self.exposure.setRange(*camera.exposure_range_ms)
+
+        if self._traits is not None and self.isVisible():
+            self._traits.read()
+
+    def _show_traits(self, words: str) -> None:
+        self.traits.setText(words)
+        self.traits.setVisible(bool(words))
 
     def _show_exposure(self, exposure_ms: float) -> None:
         # The box shows two decimals; the state keeps the exact value.
@@ -295,6 +325,8 @@ class RigPage(PageWidget):
     def showEvent(self, event: QShowEvent) -> None:
         """Look again, if the page was left while it did and nobody needs the rig."""
         super().showEvent(event)
+        if self._traits is not None:
+            self._traits.read()
         looks_again, self._looks_again = self._looks_again, False
         if looks_again and self._state.link.value is Link.OPEN and not self._state.used_by.value:
             self._commands.start()

@@ -29,6 +29,9 @@ LEVEL = 0.8
 COLOURS_VARY = "colours vary"
 _LINK_ROLES = {Link.OPEN: "good", Link.OPENING: "warn", Link.LOST: "bad", Link.CLOSED: "muted"}
 
+CONNECT_FIRST = "Connect a rig first."
+CONNECT = "Open or close the devices of this rig"
+CONNECT_OTHER = "Close the rig that is connected, and open the one that the form shows now"
 _LINK_BUTTONS = {Link.OPEN: "Disconnect", Link.OPENING: "Connecting…"}
 
 
@@ -75,16 +78,19 @@ class RigView:
     cycles: LabelState
 
 
-def rig_view(rig: RigState, live: LiveState) -> RigView:
+def rig_view(rig: RigState, live: LiveState, is_other: bool = False) -> RigView:
     """Texts and buttons of the Rig page for what is known now.
 
-    Once the picture is live, the next thing is a scan on a calibrated rig, and the self-test on any other.
+    While the form ``is_other`` than the rig that is connected, connecting that comes next: what the form
+    shows is not what the camera sees. Once the picture is live, the next thing is a scan on a calibrated
+    rig, and the self-test on any other.
     """
     link, devices = rig.link.value, rig.devices.value
     has_devices = devices is not None
     # Of a rig that is lost, nothing can be asked before it is connected again.
     can_look = has_devices and link is not Link.LOST
     cycles = cycles_text(live.exposure_ms.value, rig.cycle_ms)
+    is_other = is_other and link is Link.OPEN
     is_live, is_calibrated = rig.live.value, devices is not None and devices.calibration is not None
     return RigView(
         link=LabelState(f"● {link.value}", _LINK_ROLES[link]),
@@ -93,16 +99,24 @@ def rig_view(rig: RigState, live: LiveState) -> RigView:
         projector_text=_describe(rig.projector),
         connect_button=ButtonState(
             is_enabled=link is not Link.OPENING,
-            is_primary=link is not Link.OPEN,
-            text=_LINK_BUTTONS.get(link, "Connect"),
+            is_primary=link is not Link.OPEN or is_other,
+            text="Connect" if is_other else _LINK_BUTTONS.get(link, "Connect"),
+            tip=CONNECT_OTHER if is_other else CONNECT,
         ),
         live_button=ButtonState(
             is_enabled=can_look,
-            is_primary=can_look and not is_live,
+            is_primary=can_look and not is_live and not is_other,
             text="Stop live view" if is_live else "Start live view",
+            why=CONNECT_FIRST,
         ),
-        selftest=ButtonState(is_enabled=can_look, is_primary=is_live and not is_calibrated),
-        scan=ButtonState(is_enabled=can_look, is_primary=is_live and is_calibrated),
+        selftest=ButtonState(
+            is_enabled=can_look,
+            is_primary=is_live and not (is_calibrated or is_other),
+            why=CONNECT_FIRST,
+        ),
+        scan=ButtonState(
+            is_enabled=can_look, is_primary=is_live and is_calibrated and not is_other, why=CONNECT_FIRST
+        ),
         exposure=has_devices,
         auto=can_look and not live.is_exposing.value,
         cycles=LabelState(cycles, "warn" if cycles.endswith(COLOURS_VARY) else "muted"),

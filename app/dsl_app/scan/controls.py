@@ -11,6 +11,8 @@ from dsl_core.capture.runner import Status
 from dsl_core.words import capitalised
 
 _PHASE_ROLES = {Phase.LOST: "bad", Phase.DONE: "good", Phase.PAUSED: "warn", Phase.STOPPED: "warn"}
+#: Why there is nothing to pause or to cancel.
+NO_SCAN = "No scan is running."
 RESUME = "Resume at the first missing frame, after checking whether anything has moved"
 RESTART = "Start the scan again from its first frame: none of it is saved yet"
 RECONNECT = "Reconnect the rig, check whether anything has moved, and resume at the first missing frame"
@@ -84,12 +86,14 @@ def run_controls(
     is_ready = phase is not Phase.PLANNING or not obstacles
     lacks_rig = NO_RIG in obstacles
     can_run, connects = not phase.is_busy and not obstacles, facts is not None and facts.connects
+    why = "A scan is running." if phase.is_busy else " ".join(obstacles)
     return RunControls(
         connect_rig=ButtonState(lacks_rig, is_primary=True),
         start=ButtonState(
             session is None,
             can_run,
             is_primary=not (is_raw or lacks_rig or is_reconstructing or phase is Phase.PAUSED),
+            why=why,
         ),
         resume=ButtonState(
             session is not None,
@@ -97,11 +101,13 @@ def run_controls(
             is_primary=True,
             text="Co&nnect and resume" if connects else "Resume sca&n",
             tip=RECONNECT if connects else RESUME,
+            why=why,
         ),
         pause=ButtonState(
             is_enabled=phase in (Phase.RUNNING, Phase.PAUSED),
             is_primary=phase is Phase.PAUSED,
             text="Cont&inue" if phase is Phase.PAUSED else "&Pause",
+            why=NO_SCAN,
         ),
         cancel=phase.is_busy and phase is not Phase.STOPPING,
         renew=ButtonState(is_resumable),

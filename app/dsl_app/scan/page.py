@@ -7,7 +7,7 @@ from pathlib import Path
 
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QHideEvent, QShowEvent
-from PySide6.QtWidgets import QFileDialog, QGroupBox, QScrollArea, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QFileDialog, QGroupBox, QVBoxLayout, QWidget
 
 from dsl_app.scan.controller import ScanController
 from dsl_app.scan.controls import banner_controls
@@ -26,15 +26,13 @@ from dsl_app.shared.widgets.deferred import Deferred
 from dsl_app.shared.widgets.figure_file import PlotFigure
 from dsl_app.shared.widgets.forms import Banner, show_button
 from dsl_app.shared.widgets.help_window import set_help
-from dsl_app.shared.widgets.layouts import STRETCH, boxed, column_of, row_of, scrolled, splitter, tabs_of
+from dsl_app.shared.widgets.layouts import STRETCH, SideArea, boxed, column_of, row_of, splitter, tabs_of
 from dsl_app.shared.widgets.page import PageWidget
 from dsl_app.shared.widgets.ticker import Ticker
 
 #: Interval at which the state of the scan is fetched, ms: ten pictures a second look live.
 FETCH_MS = 100
 LEFT_PX, RIGHT_PX, TALL_PX = 276, 292, 400
-#: No limit to a width.
-LARGEST_PX = 16_777_215
 PLAN, PLAN_TIP = "Plan", "Patterns and exposures of the scan"
 FRAMES, FRAMES_TIP = "Fra&mes", "Frames while the scan runs"
 PLANS = "Plans and pattern sets (*.json)"
@@ -120,8 +118,7 @@ class ScanPage(PageWidget):
         self._right_area.setVisible(not self.is_wide)
         self._place_plan()
         width_px = RIGHT_PX if self.is_wide else LEFT_PX
-        self._left_area.setMinimumWidth(TALL_PX if self.is_tall else width_px)
-        self._left_area.setMaximumWidth(LARGEST_PX if self.is_small else self._left_area.minimumWidth())
+        self._left_area.set_width(TALL_PX if self.is_tall else width_px, may_grow=self.is_small)
         # In a high window the figures of the plan are in its column, and their curve takes their place.
         self._figures.setVisible(self.is_tall)
         self._left.insertWidget(self._left.count() - 1, self._figures)
@@ -274,8 +271,6 @@ class ScanPage(PageWidget):
         self._controller.close()
 
 
-def _side(width_px: int, *boxes: QWidget) -> tuple[QVBoxLayout, QScrollArea]:
+def _side(width_px: int, *boxes: QWidget) -> tuple[QVBoxLayout, SideArea]:
     column = column_of(*boxes, STRETCH, margins=(0, 0, 4, 0))
-    area = scrolled(boxed(column))
-    area.setFixedWidth(width_px)
-    return column, area
+    return column, SideArea(boxed(column), width_px)

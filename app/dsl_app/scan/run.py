@@ -16,13 +16,22 @@ from PySide6.QtWidgets import (
 
 from dsl_app.scan.command_line import named_target
 from dsl_app.scan.controller import ScanController
-from dsl_app.scan.controls import RESUME, progress_text, run_controls
+from dsl_app.scan.controls import NO_SCAN, RESUME, progress_text, run_controls
 from dsl_app.scan.forecast.figures import minutes, volume
 from dsl_app.scan.reconstruction_time import about
 from dsl_app.scan.state import CalibrationChoice, Facts, Phase, ScanState
 from dsl_app.shared.evented import follow_any
 from dsl_app.shared.known_files import breakable
-from dsl_app.shared.widgets.forms import ChoiceBox, check_box, label, named, push_button, set_role, show_parts
+from dsl_app.shared.widgets.forms import (
+    ChoiceBox,
+    allow,
+    check_box,
+    label,
+    named,
+    push_button,
+    set_role,
+    show_parts,
+)
 from dsl_app.shared.widgets.layouts import column_of, row_of
 from dsl_core.capture.runner import Status
 from dsl_core.model.plan import Columns
@@ -233,6 +242,7 @@ class RunBox(QGroupBox):
             state.lacks_calibration.value and not state.has_library,
         )
         show_parts(self, shown)
+        allow(self.cancel, shown.cancel, NO_SCAN)
         facts = state.facts.value
         # What is ticked is remembered for the next scan that has a calibration.
         self.then.setEnabled(facts is None or facts.is_calibrated)

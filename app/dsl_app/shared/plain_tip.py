@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from html import escape
+from html import escape, unescape
 
 
 def plain_tip(text: str) -> str:
@@ -15,3 +15,14 @@ def plain_tip(text: str) -> str:
     """
     is_mistakable = "<" in text or "&lt;" in text
     return f"<p>{escape(text, quote=False)}</p>".replace("\n", "<br>") if is_mistakable else text
+
+
+def text_of_tip(tip: str) -> str:
+    r"""The text of a tooltip that `plain_tip` made.
+
+    >>> text_of_tip(plain_tip("a <b>\nleaf")), text_of_tip("leaf")
+    ('a <b>\nleaf', 'leaf')
+    """
+    if not tip.startswith("<p>"):
+        return tip
+    return unescape(tip.removeprefix("<p>").removesuffix("</p>").replace("<br>", "\n"))

@@ -19,7 +19,7 @@ RECENT_COUNT = 12
 #: Names another folder for settings, for tests and for portable installations.
 HOME_VARIABLE = "DSL_SCAN_HOME"
 #: What a program that is killed must know next time; the page that was open is offered again.
-EARLY = ("rig", "rig_options", "recent", "tour_seen", "campaign", "campaigns_folder")
+EARLY = ("rig", "rig_options", "recent", "tour_seen", "campaign", "campaigns_folder", "calibration")
 
 
 class Settings(BaseModel):

@@ -9,8 +9,8 @@ from dataclasses import dataclass
 class ButtonState:
     """What a button shows; a text, tip or name of None leaves the one that it was made with.
 
-    ``is_primary`` marks the button that does what a person most likely wants next. Screen readers tell the
-    ``name`` in place of the text.
+    ``why`` is said before the tip while the button cannot be pressed. ``is_primary`` marks the button that
+    does what a person most likely wants next. Screen readers tell the ``name`` in place of the text.
     """
 
     is_visible: bool = True
@@ -19,6 +19,7 @@ class ButtonState:
     text: str | None = None
     tip: str | None = None
     name: str | None = None
+    why: str = ""
 
 
 @dataclass(frozen=True)

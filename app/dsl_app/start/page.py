@@ -8,11 +8,11 @@ from pathlib import Path
 
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QResizeEvent, QShowEvent
-from PySide6.QtWidgets import QFrame, QPushButton
+from PySide6.QtWidgets import QFrame, QPushButton, QStyle
 
 from dsl_app.shared.evented import follow_any
 from dsl_app.shared.settings import RecentFiles
-from dsl_app.shared.widgets.forms import label, push_button, set_role
+from dsl_app.shared.widgets.forms import keep_height, label, push_button, set_role
 from dsl_app.shared.widgets.layouts import STRETCH, boxed, column_of, row_of, scrolled
 from dsl_app.shared.widgets.page import PageWidget
 from dsl_app.shared.widgets.recent_list import RecentList
@@ -22,10 +22,10 @@ from dsl_app.start.unfinished_list import UnfinishedList
 
 #: Height of what is shown at least, px: a third of what a window has beyond that is above it.
 CONTENT_PX = 520
-#: By how much a primary button is higher than its text, px.
-PRIMARY_MORE_PX = 12
 #: Width of a card, and that in a wide window, px.
 CARD_PX, WIDE_CARD_PX, GAP_PX = 286, 380, 16
+#: Width of a card at least, and what is left free around everything, px.
+LEAST_CARD_PX, MARGIN_PX = 180, 12
 
 
 class StartPage(PageWidget):
@@ -52,7 +52,7 @@ class StartPage(PageWidget):
         }
         # As high as a primary button, which it is not while something else comes first.
         first = self.examples[EXAMPLES[0].key]
-        first.setMinimumHeight(first.fontMetrics().height() + PRIMARY_MORE_PX)
+        keep_height(first)
         self.live = push_button(
             "Start the live view",
             "Connect the rig, expose and show its camera",
@@ -130,13 +130,16 @@ class StartPage(PageWidget):
             STRETCH,
         )
         self._middle = boxed(self._column)
-        content = boxed(row_of(STRETCH, self._middle, STRETCH, margins=12))
+        content = boxed(row_of(STRETCH, self._middle, STRETCH, margins=MARGIN_PX))
         column_of(scrolled(content), on=self, margins=0)
         self.arrange()
 
     def arrange(self) -> None:
-        """Larger cards where there is room."""
-        card = WIDE_CARD_PX if self.is_wide else CARD_PX
+        """Larger cards where there is room, and smaller ones where there is not."""
+        usual = WIDE_CARD_PX if self.is_wide else CARD_PX
+        # All three are seen on a small screen, too: their texts take more lines there.
+        room = self.width() - 2 * MARGIN_PX - self.style().pixelMetric(QStyle.PixelMetric.PM_ScrollBarExtent)
+        card = min(usual, max((room - 2 * GAP_PX) // 3, LEAST_CARD_PX))
         for each in self._cards:
             each.setFixedWidth(card)
         width = 3 * card + 2 * GAP_PX
@@ -147,6 +150,7 @@ class StartPage(PageWidget):
     def resizeEvent(self, event: QResizeEvent) -> None:
         """Leave room above by the height of the window alone, whatever is listed or told below."""
         super().resizeEvent(event)
+        self.arrange()
         above = max((self.window().height() - CONTENT_PX) // 3, 0)
         self._column.setContentsMargins(0, above, 0, 0)
 

@@ -310,7 +310,7 @@ def color_checker_figures(record: ColorCheckerCalibration) -> tuple[Figure, ...]
             unit="%",
             low=-LEVEL_PERCENT,
             high=LEVEL_PERCENT,
-            advice="Avoid other light and shadows, and check the Spectralon's certified reflectance.",
+            advice="Avoid ambient light and shadows, and check the Spectralon's certified reflectance.",
         ),
         *_colour(record),
         *light_change_figure(record.light_change),

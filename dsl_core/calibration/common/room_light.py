@@ -16,7 +16,7 @@ def light_change_figure(change: tuple[float, float] | None) -> tuple[Figure, ...
     limit = max(LIGHT_PERCENT, SIGMAS * std)
     return (
         Figure(
-            name="change of other light during the pictures",
+            name="change of ambient light during the pictures",
             value=value,
             unit="% of white",
             std=std,

@@ -125,7 +125,7 @@ def verdict(
     if width_px > BROAD_PX or share < BROAD_SHARE:
         return True, (
             f"{name}: the light of the first orders is spread over {2 * width_px:.0f} columns, as without a"
-            " narrow filter. Put the filter in front of the camera, shade other light, and capture the step"
+            " narrow filter. Put the filter in front of the camera, shade ambient light, and capture the step"
             " again"
         )
     if found is None:

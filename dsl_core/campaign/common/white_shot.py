@@ -163,7 +163,7 @@ def brightness(white: WhiteLevel, rig: Rig, parts: str) -> Figure:
 def other_light(white: WhiteLevel, shade: str = "") -> Figure:
     """Light that stays when the projector shows black; ``shade`` is what to darken as well as the room."""
     return Figure(
-        name="other light",
+        name="ambient light",
         value=100 * white.ambient,
         unit="% of white",
         high=MOST_OTHER,

@@ -46,7 +46,7 @@ def depth_stage_figures(record: DepthStageCalibration) -> tuple[Figure, ...]:
             ("film's distance", "distance_mm", "mm"),
             ("film's tilt about x", "tilt_x_deg", "degrees"),
             ("film's tilt about y", "tilt_y_deg", "degrees"),
-            ("film's roll", "roll_deg", "degrees"),
+            ("film's rotation in its plane", "roll_deg", "degrees"),
             ("film's curvature", "bend_per_mm", "1/mm"),
         )
     ]
@@ -105,7 +105,7 @@ def _colours(record: DepthStageCalibration) -> tuple[Figure, ...]:
     if record.colours_apart_px is None:
         return ()
     apart_px, std_px = record.colours_apart_px
-    return (Figure(name="distance of red and blue", value=apart_px, unit="px", std=std_px),)
+    return (Figure(name="red and blue light apart", value=apart_px, unit="px", std=std_px),)
 
 
 def _plane_advice(record: DepthStageCalibration, worst: StagePosition) -> str:

@@ -145,7 +145,7 @@ def lateral_finding(found: LateralFit) -> FitFinding:
     """What the scan says about the lateral colour of its lenses."""
     return FitFinding(
         part="lateral colour",
-        name="distance of red and blue",
+        name="red and blue light apart",
         value=found.apart_px,
         std=found.apart_std_px,
         unit="px",

@@ -105,7 +105,7 @@ def test_everything_by_one_button_and_the_library_shows_it(
     library = stage.page.library
     assert cell(library.table, 0, 0) == "campaign"
     assert cell(library.table, 0, 3) == "TWIN-C, 32 × 24 px"
-    assert "brightest" in library.details.toPlainText()
+    assert "Brightest" in library.details.toPlainText()
     shown: list[str] = []
     monkeypatch.setattr(QDesktopServices, "openUrl", lambda url: shown.append(url.toLocalFile()))
     click(library.report)

@@ -24,7 +24,7 @@ from dsl_app.connection.state import RigChoice
 
 from dsl_core.devices.base import DeviceRig
 from dsl_core.io.calibration_library import LibraryEntry, LibraryLine
-from dsl_core.model.calibration.accepted import CalibrationNote
+from dsl_core.model.calibration.accepted import AcceptedCalibration, CalibrationNote
 from dsl_core.model.figure import Figure
 from dsl_core.simulation.published_rig import published_rig
 
@@ -248,6 +248,30 @@ def test_what_can_be_done_with_a_version() -> None:
     assert not damaged.can_restore
     assert damaged.details == "<p><b>&lt;lab&gt;</b></p><p>It is cut off.</p>"
     assert version_texts(broken, "")[3:] == ("damaged", "", "")
+
+
+def test_the_details_say_with_which_settings_in_words() -> None:
+    line, note = (
+        version(),
+        CalibrationNote(name="geometry", title="Geometry", accepted="2026-03-01T10:20:30+00:00"),
+    )
+    assert line.entry is not None
+    board = '{"kind":"charuco","columns":9,"rows":6,"square_mm":20.5,"marker_mm":15.0,"legacy":false}'
+    settings = {
+        "rig": "twin",
+        "board": board,
+        "positions_mm": "650,700",
+        "grid": "true",
+        "corners_px": "[[1, 2]]",
+    }
+    accepted = AcceptedCalibration(name="geometry", title="Geometry", settings=settings)
+    rig = line.entry.rig.model_copy(update={"calibrations": (note,)})
+    entry = line.entry.model_copy(update={"rig": rig, "accepted": (accepted,)})
+    details = library_selection(replace(line, entry=entry)).details
+    assert (
+        "Board: 9 × 6 squares with markers, squares of 20.5 mm, markers of 15 mm; Positions of the"
+        " stage: 650, 700 mm; Model columns from the data, too: yes; Corners of the chart by hand: (1, 2) px"
+    ) in details
 
 
 def test_a_drift_check_is_passed_when_all_figures_are() -> None:

@@ -7,9 +7,14 @@ from pathlib import Path
 
 import pytest
 from dsl_app.calibrate.campaign_box import NewCampaignDialog
+from dsl_app.calibrate.page import CalibratePage
+from dsl_app.calibrate.wizard.window import CalibrationWizard
 from dsl_app.composition.window import Composition, StartOptions
+from dsl_app.importing.dialog import ImportDialog
 from dsl_app.results.export.dialog import ExportDialog
 from dsl_app.results.page import ResultsPage
+from dsl_app.rig.page import RigPage
+from dsl_app.rig.profiles.dialog import ProfileDialog
 from dsl_app.shared.widgets.deferred import Deferred
 from dsl_app.shell.actions import PAGES
 from dsl_app.shell.main_window import MainWindow
@@ -27,6 +32,7 @@ from PySide6.QtWidgets import (
     QHeaderView,
     QLineEdit,
     QPlainTextEdit,
+    QPushButton,
     QScrollBar,
     QTabBar,
     QTextBrowser,
@@ -34,6 +40,8 @@ from PySide6.QtWidgets import (
 )
 from pytestqt.qtbot import QtBot
 
+from dsl_core.io.campaign_folder import CampaignFolder
+from tests.app.importing.published_folders import make_folders
 from tests.app.support.small_result import write_small_result
 
 INTERACTIVE = (
@@ -119,6 +127,25 @@ def test_every_control_of_a_page_has_a_name_and_a_tooltip(window: MainWindow, ke
     assert given_twice(window, page) == []
 
 
+def test_a_button_that_cannot_be_pressed_says_why(window: MainWindow) -> None:
+    silent = list[str]()
+    for page in PAGES:
+        shown = window.open_page(page.key)
+        for room in shown.findChildren(Deferred):
+            _ = room.content
+        silent += [
+            f"{page.key}: {button.text()}"
+            for button in shown.findChildren(QPushButton)
+            if button.isVisible() and not button.isEnabled() and not _has_reason(button)
+        ]
+    assert silent == []
+
+
+def _has_reason(button: QPushButton) -> bool:
+    own = button.property("own-tip")
+    return own is not None and button.toolTip() != own
+
+
 def given_twice(window: MainWindow, page: QWidget) -> list[str]:
     """Letters that Alt gives to a menu and to a part of a page, or to two parts that are seen at once."""
     menus = {letter(action.text()): action.text() for action in window.menuBar().actions()}
@@ -172,6 +199,40 @@ def test_every_control_of_the_results_has_a_name_and_a_tooltip(
     assert complaints(page.graph) == []
     assert complaints(NewCampaignDialog(tmp_path, "twin", page)) == []
     assert complaints(page) == []
+
+
+def test_every_control_of_a_rig_profile_has_a_name_and_a_tooltip(window: MainWindow) -> None:
+    page = window.open_page("rig")
+    assert isinstance(page, RigPage)
+    page.profile_requested.emit("")
+    (dialog,) = window.findChildren(ProfileDialog)
+    for form in dialog.forms.values():
+        form.driver.setCurrentIndex(form.driver.count() - 1)
+        form.driver.activated.emit(form.driver.currentIndex())
+    assert complaints(dialog) == []
+
+
+def test_every_control_of_a_wizard_and_of_imports_has_a_name_and_a_tooltip(
+    qtbot: QtBot, window: MainWindow, tmp_path: Path
+) -> None:
+    campaign = CampaignFolder.begin(tmp_path / "room", "twin", {"size": "64x48"})
+    window.open_path(campaign.path)
+    page = window.open_page("calibrate")
+    assert isinstance(page, CalibratePage)
+    page.banner.action.click()
+    qtbot.waitUntil(lambda: page._rig.devices.value is not None, timeout=60_000)
+    page.run("geometry")
+    qtbot.waitUntil(lambda: bool(window.findChildren(CalibrationWizard)), timeout=60_000)
+    (wizard,) = window.findChildren(CalibrationWizard)
+    qtbot.waitUntil(lambda: not window.parts.runner.active, timeout=60_000)
+    assert complaints(wizard) == []
+    wizard.reject()
+    window.open_path(make_folders(tmp_path / "published").scene)
+    qtbot.waitUntil(lambda: bool(window.findChildren(ImportDialog)), timeout=60_000)
+    (dialog,) = window.findChildren(ImportDialog)
+    assert complaints(dialog) == []
+    dialog.reject()
+    qtbot.waitUntil(lambda: not window.parts.runner.active, timeout=60_000)
 
 
 @pytest.mark.parametrize("action", ["help_page", "shortcuts", "about", "show_command"])

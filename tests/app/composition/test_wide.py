@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from functools import partial
+from itertools import combinations
 from pathlib import Path
 
 import pytest
@@ -13,12 +15,16 @@ from dsl_app.rig.page import RigPage
 from dsl_app.scan.page import ScanPage
 from dsl_app.shell.main_window import MainWindow
 from dsl_app.shell.paged_window import LEAST
-from PySide6.QtWidgets import QApplication, QPushButton, QWidget
+from PySide6.QtWidgets import QAbstractButton, QAbstractItemView, QApplication, QPushButton, QTabBar, QWidget
 from pytestqt.qtbot import QtBot
 
 from tests.app.support.real_window import show_window
 from tests.app.support.small_result import write_small_result
 
+#: What a person presses or reads in rows.
+PARTS = (QAbstractButton, QAbstractItemView)
+#: What of it may be beyond an edge: no text is there, px.
+EDGE_PX = 2
 PAGES = ("rig", "scan", "calibrate", "results")
 HUGE, LARGE, SMALL = (2560, 1440), (1920, 1080), (1280, 800)
 #: A laptop of 1280 x 800 px at one and a half times the size, less the frame of a window.
@@ -103,6 +109,46 @@ def test_what_comes_next_is_seen_on_a_magnified_screen(window: MainWindow, qtbot
         assert (scan.middle.indexOf(scan._left_area) == 0) == (size == MAGNIFIED)
         titles = [scan.middle.tabText(place) for place in range(scan.middle.count())]
         assert len(titles) == len(set(titles)) == 3 + (size == MAGNIFIED)
+
+
+def test_nothing_is_cut_or_covered_on_a_magnified_screen(
+    window: MainWindow, qtbot: QtBot, tmp_path: Path
+) -> None:
+    window.setMinimumSize(LEAST)
+    window.open_path(write_small_result(tmp_path))
+    qtbot.waitUntil(lambda: not window.parts.runner.active, timeout=30_000)
+    for size in (MAGNIFIED, SMALL):
+        window.resize(*size)
+        for key in window.pages:
+            page = window.open_page(key)
+            QApplication.processEvents()
+            parts = [each for each in page.findChildren(QWidget) if isinstance(each, PARTS)]
+            # The arrows of a row of tabs lie over it.
+            seen = [each for each in parts if _is_seen(each) and not isinstance(each.parent(), QTabBar)]
+            assert not [_text(each) for each in seen if _seen_px(each) < each.width() - EDGE_PX], (
+                f"{key} {size}: cut"
+            )
+            assert not list(_covering(seen)), f"{key} {size}: one over the other"
+    qtbot.waitUntil(lambda: not window.parts.runner.active, timeout=30_000)
+
+
+def _is_seen(part: QWidget) -> bool:
+    return not part.visibleRegion().isEmpty()
+
+
+def _text(part: QWidget) -> str:
+    return part.text() if isinstance(part, QAbstractButton) else part.accessibleName()
+
+
+def _seen_px(part: QWidget) -> int:
+    return part.visibleRegion().boundingRect().width()
+
+
+def _covering(parts: list[QWidget]) -> Iterator[tuple[str, str]]:
+    """Parts of one widget that share a place."""
+    for one, other in combinations(parts, 2):
+        if one.parent() is other.parent() and one.geometry().intersects(other.geometry()):
+            yield _text(one), _text(other)
 
 
 def _fills_the_left(page: QWidget, low: QWidget) -> bool:

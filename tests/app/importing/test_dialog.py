@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 from dsl_app.composition.window import Composition, StartOptions
 from dsl_app.importing.dialog import ImportDialog
+from dsl_app.shared.widgets.open_dialog import OpenDialog
 from dsl_app.shell.main_window import MainWindow
 from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
@@ -82,7 +83,7 @@ def test_a_dropped_scan_is_taken_in_and_offered(
 def test_a_calibration_ends_in_the_library(
     qtbot: QtBot, window: MainWindow, made: Folders, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(QFileDialog, "getExistingDirectory", lambda *_: str(made.rig))
+    monkeypatch.setattr(OpenDialog, "ask", lambda *_, **__: made.rig)
     window.do("import")
     dialog = opened(qtbot, window)
     assert dialog._size.isVisible()
@@ -101,7 +102,7 @@ def test_another_folder_is_shown_in_the_same_dialog(
     window.open_path(made.rig)
     dialog = opened(qtbot, window)
     (tmp_path / "empty").mkdir()
-    monkeypatch.setattr(QFileDialog, "getExistingDirectory", lambda *_: str(tmp_path / "empty"))
+    monkeypatch.setattr(OpenDialog, "ask", lambda *_, **__: tmp_path / "empty")
     dialog.other.click()
     qtbot.waitUntil(lambda: "is not a published dataset" in dialog.text.text(), timeout=PATIENCE_MS)
     assert "ldr_exposure1/" in texts(dialog, 0)

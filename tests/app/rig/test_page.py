@@ -150,6 +150,20 @@ def test_a_wrong_option_is_told_on_the_page(qtbot: QtBot, bench: Bench) -> None:
     assert page.connect_button.text() == "Connect"
 
 
+def test_typed_options_are_not_shown_as_if_they_were_connected(qtbot: QtBot, bench: Bench) -> None:
+    page, state, _, _ = bench
+    connect(qtbot, page, state)
+    assert page.connect_button.text() == "Disconnect"
+    page.options.text.setText("size=32x24")
+    assert page.connect_button.text() == "Connect"
+    page.options.text.clear()
+    assert page.connect_button.text() == "Disconnect"
+    page.options.text.setText("size=32x24")
+    QTest.keyClick(page.options.text, Qt.Key.Key_Return)
+    qtbot.waitUntil(lambda: page.camera_text.text().endswith("32 × 24 px"), timeout=90_000)
+    assert page.connect_button.text() == "Disconnect"
+
+
 def test_pictures_reach_the_projector(qtbot: QtBot, bench: Bench) -> None:
     page, state, _, _ = bench
     connect(qtbot, page, state)

@@ -71,6 +71,18 @@ def test_a_page_with_a_rig_names_its_devices_and_offers_to_expose() -> None:
     assert (view.selftest.is_primary, view.scan.is_primary) == (True, False)
 
 
+def test_a_form_that_shows_another_rig_is_connected_next() -> None:
+    controller = RigController(RigState(TWIN), InlineRunner(), RecordingNotifier())
+    controller.connect(TWIN)
+    rig, live = controller.state, LiveState()
+    for is_live in (False, True):
+        rig.live.set(is_live)
+        view = rig_view(rig, live, is_other=True)
+        assert view.connect_button.text == "Connect"
+        buttons = (view.connect_button, view.live_button, view.selftest, view.scan)
+        assert [each.is_primary for each in buttons] == [True, False, False, False]
+
+
 def test_a_lost_rig_can_be_connected_again_and_says_why_it_is_lost() -> None:
     controller = RigController(RigState(TWIN), InlineRunner(), RecordingNotifier())
     controller.connect(TWIN)

@@ -82,7 +82,7 @@ def test_a_calibration_is_judged_by_its_figures_and_their_limits() -> None:
         "white over red + green + blue in the pictures, largest difference": (3.0, None, 2.0, "%"),
         "deviation of white": (100 * np.hypot(0.01, 0.02) / 6, None, 0.5, "%"),
         "range of the flat field": (25.0, None, None, "%"),
-        "change of other light during the pictures": (0.1, -0.2, 0.2, "% of white"),
+        "change of ambient light during the pictures": (0.1, -0.2, 0.2, "% of white"),
         "bulge of the Spectralon over 300 mm": (-1.5, -2.0, 2.0, "mm"),
         "stated reflectance of the Spectralon, which no picture shows": (250.0, None, None, "%"),
     }

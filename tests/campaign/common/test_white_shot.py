@@ -99,7 +99,7 @@ def test_a_bracket_has_one_level_and_the_ratio_of_exposures() -> None:
 def test_light_that_is_too_weak_or_not_the_projectors_is_told() -> None:
     with pytest.raises(CalibrationError, match="It is too dark: in 4 s white reaches"):
         bracket(RIG, white(1e5), "It", 6.0)
-    assert [figure.name for figure in failures(film_light(white(10.0, 0.3), RIG))] == ["other light"]
+    assert [figure.name for figure in failures(film_light(white(10.0, 0.3), RIG))] == ["ambient light"]
 
 
 def test_a_look_finds_too_dark_what_a_capture_would_refuse() -> None:

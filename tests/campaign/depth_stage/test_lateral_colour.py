@@ -35,7 +35,7 @@ def test_it_is_measured_and_goes_with_the_rig(bench: Bench, record: DepthStageCa
     assert record.colours_apart_px is not None
     apart_px, std_px = record.colours_apart_px
     assert apart_px > 5 * std_px > 0
-    (figure,) = (each for each in RECIPE.figures(record) if each.name == "distance of red and blue")
+    (figure,) = (each for each in RECIPE.figures(record) if each.name == "red and blue light apart")
     assert (figure.value, figure.std, figure.unit) == (apart_px, std_px, "px")
     colour = RECIPE.apply(record, bench.rig).lateral_colour
     assert colour is not None

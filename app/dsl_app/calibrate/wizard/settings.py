@@ -11,6 +11,7 @@ from typing import Any
 
 from pydantic import BaseModel
 
+from dsl_app.calibrate.setting_words import setting_title
 from dsl_app.calibrate.wizard.state import SettingRow
 from dsl_core.campaign.common.recipe import AnyRecipe
 from dsl_core.words import capitalised
@@ -83,49 +84,6 @@ def _doc(kind: type[Any], name: str) -> str:
             plain = sentence.replace(f"``{name}``", "this").strip(" ,.;")
         return f"{capitalised(plain)}."
     return ""
-
-
-#: Settings in words, where their keys do not say what they are.
-TITLES = {
-    "chain": "Correct the chain of light",
-    "chart": "Reflectances of the chart",
-    "code_step_px": "Step of the lines without filter (px)",
-    "corners_px": "Corners of the chart by hand (px)",
-    "depth_mm": "Distance of the target (mm)",
-    "emission_folder": "Folder with spectra of the LEDs",
-    "filter_step_px": "Step of the lines through a filter (px)",
-    "filters_nm": "Centres of the filters (nm)",
-    "grid": "Model columns from the data, too",
-    "left_out": "Steps to leave out of the fit",
-    "line_px": "Width of a line (px)",
-    "long_ratio": "Second exposure, times the first",
-    "pixels": "Camera pixels that are used",
-    "poses": "Poses of the board",
-    "positions_mm": "Positions of the stage (mm)",
-    "ratio": "Second exposure, times the first",
-    "readings": "Readings of each spectrum",
-    "reflectance": "Reflectance of the target",
-    "reflectance_file": "File with the target's reflectance",
-    "reflectance_rel_std": "Uncertainty of that reflectance (share)",
-    "stage_std_mm": "Uncertainty of the stage (mm)",
-    "wanted_ms": "Exposures that scans will use (ms)",
-}
-#: Units that end names of settings, and how the window shows them.
-_UNITS = {"nm": "nm", "mm": "mm", "ms": "ms", "px": "px", "deg": "°"}
-
-
-def setting_title(key: str) -> str:
-    """The name of a setting as the window shows it.
-
-    >>> setting_title("stage_std_mm"), setting_title("tilt_deg"), setting_title("board")
-    ('Uncertainty of the stage (mm)', 'Tilt (°)', 'Board')
-    """
-    if key in TITLES:
-        return TITLES[key]
-    *words, last = key.split("_")
-    if words and last in _UNITS:
-        return f"{' '.join(words).capitalize()} ({_UNITS[last]})"
-    return " ".join((*words, last)).capitalize()
 
 
 def trouble_in_titles(text: str, name: str) -> str:

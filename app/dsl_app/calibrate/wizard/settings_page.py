@@ -10,7 +10,7 @@ from pydantic import TypeAdapter, ValidationError
 from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QCheckBox, QFormLayout, QHBoxLayout, QLineEdit, QWidget
 
-from dsl_app.calibrate.wizard.settings import setting_title
+from dsl_app.calibrate.setting_words import setting_title
 from dsl_app.calibrate.wizard.state import SettingRow
 from dsl_app.shared.widgets.forms import ChoiceBox, NumberBox, WholeBox, label, named, quiet, remark_line
 from dsl_app.shared.widgets.layouts import STRETCH, boxed, column_of, row_of, scrolled

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QFileDialog, QSplitter, QWidget
+from PySide6.QtWidgets import QFileDialog, QSizePolicy, QSplitter, QWidget
 
 from dsl_app.compare.pair.controller import PairController
 from dsl_app.compare.pair.pictures import PairControls, PairPictures
@@ -16,8 +16,9 @@ from dsl_app.shared.evented import follow_any
 from dsl_app.shared.settings import RecentFiles
 from dsl_app.shared.spectrum import spectrum_of_pixel
 from dsl_app.shared.theme import Theme
+from dsl_app.shared.widgets.clipped_label import ClippedLabel
 from dsl_app.shared.widgets.deferred import Deferred
-from dsl_app.shared.widgets.forms import label, push_button, remark_line, show_parts
+from dsl_app.shared.widgets.forms import push_button, remark_line, set_role, show_parts
 from dsl_app.shared.widgets.help_window import set_help
 from dsl_app.shared.widgets.layouts import STRETCH, boxed, column_of, row_of, splitter
 from dsl_app.shared.widgets.open_dialog import ALL, RESULTS, OpenDialog
@@ -26,6 +27,8 @@ from dsl_app.shared.widgets.recent_list import RecentList
 from dsl_app.shared.widgets.spectrum_curve import SpectrumCurve
 
 RESULT_SUFFIX = ".zarr"
+#: Width of a name at least, px.
+NAME_PX = 60
 
 
 class PairPanel(QWidget):
@@ -35,7 +38,7 @@ class PairPanel(QWidget):
         super().__init__()
         self._state, self._control = state, control
         self.recent = RecentList(recent, self._use, self._is_free)
-        self.name_a, self.name_b = label("", "heading"), label("", "heading")
+        self.name_a, self.name_b = _name(), _name()
         self.open_first = push_button("Open &A…", "Choose a result as A", lambda: self._choose(second=False))
         self.open_second = push_button("Open &B…", "Choose a result to compare A with")
         self.truth = push_button(
@@ -118,6 +121,15 @@ class PairPanel(QWidget):
 
     def _show(self) -> None:
         show_parts(self, pair_display(self._state))
+
+
+def _name() -> ClippedLabel:
+    """The name of a side, whole where there is room, else cut in its middle."""
+    made = ClippedLabel()
+    made.setSizePolicy(QSizePolicy.Policy.Maximum, made.sizePolicy().verticalPolicy())
+    made.setMinimumWidth(NAME_PX)
+    set_role(made, "heading")
+    return made
 
 
 class PairFigures(QSplitter):

@@ -23,6 +23,9 @@ from dsl_core.words import counted
 Floats = NDArray[np.floating[Any]]
 
 
+#: Why there is nothing to compare with, to write or to swap.
+OPEN_A, OPEN_BOTH = "Open A first.", "Open A and B first."
+TRUTH_IS_B = "The truth is always B: differences are those of a result from it."
 #: Characters of the names of A and B beside the buttons that open them.
 MOST_BESIDE = 20
 
@@ -116,7 +119,7 @@ class PairDisplay:
     open_second: ButtonState
     at_hand: ButtonState
     truth: ButtonState
-    swap: bool
+    swap: ButtonState
     report: ButtonState
 
 
@@ -138,9 +141,15 @@ def pair_display(state: PairState) -> PairDisplay:
         open_first=ButtonState(is_enabled=idle, is_primary=first is None and not at_hand.is_visible),
         open_second=ButtonState(is_enabled=idle, is_primary=lacks_second and not takes_truth),
         at_hand=at_hand,
-        truth=ButtonState(is_enabled=idle and first is not None, is_primary=takes_truth),
-        swap=idle and pair is not None and not has_truth,
-        report=ButtonState(is_enabled=idle and pair is not None, is_primary=has_truth),
+        truth=ButtonState(is_enabled=idle and first is not None, is_primary=takes_truth, why=OPEN_A),
+        swap=ButtonState(
+            is_enabled=idle and pair is not None and not has_truth, why=TRUTH_IS_B if has_truth else OPEN_BOTH
+        ),
+        report=ButtonState(
+            is_enabled=idle and pair is not None,
+            is_primary=pair is not None,
+            why=OPEN_BOTH,
+        ),
     )
 
 

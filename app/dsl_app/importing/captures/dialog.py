@@ -29,6 +29,7 @@ from dsl_app.shared.widgets.forms import (
 )
 from dsl_app.shared.widgets.help_window import add_help_key
 from dsl_app.shared.widgets.layouts import STRETCH, boxed, column_of, row_of
+from dsl_app.shared.widgets.open_dialog import OpenDialog
 from dsl_core.model.plan import MOST_PX
 
 if TYPE_CHECKING:
@@ -243,9 +244,9 @@ class CapturesDialog(JobDialog):
     def _choose_folder(self) -> None:
         folder = self._state.request.value.folder
         start = "" if folder is None else str(folder.parent)
-        name = QFileDialog.getExistingDirectory(self, "Choose the folder of a capture", start)
-        if name:
-            self._commands.open(Path(name))
+        chosen = OpenDialog.ask_folder(self, "Choose the folder of a capture", start)
+        if chosen is not None:
+            self._commands.open(chosen)
 
     def _choose_home(self) -> None:
         name = QFileDialog.getExistingDirectory(self, "Save in", self.home.text())

@@ -12,7 +12,7 @@ from dsl_app.results.state import Materials, ResultsState
 from dsl_app.shared.plain_tip import plain_tip
 from dsl_app.shared.settings import folder_for
 from dsl_app.shared.theme import DARK, Theme
-from dsl_app.shared.widgets.forms import ChoiceBox, NumberBox, check_box, label, push_button, quiet
+from dsl_app.shared.widgets.forms import ChoiceBox, NumberBox, allow, check_box, label, push_button, quiet
 from dsl_app.shared.widgets.icons import swatch
 from dsl_app.shared.widgets.layouts import STRETCH, column_of, row_of
 from dsl_app.shared.widgets.read_table import RIGHT, ReadTable, cell
@@ -169,7 +169,7 @@ class MaterialsPanel(QWidget):
 
     def _show(self, materials: Materials | None) -> None:
         for button in (self.clear, self.write):
-            button.setEnabled(materials is not None)
+            allow(button, materials is not None, "Name the materials first.")
         self.table.setVisible(materials is not None)
         self.text.setText(HINT if materials is None else materials_text(materials))
         self.text.setToolTip(plain_tip("" if materials is None else _method(materials)))

@@ -39,7 +39,7 @@ def _table(head: list[str], rows: list[str], theme: Theme) -> str:
     first, *rest = head
     cells = f"<td>{first}</td>" + "".join(f"<td align='right'>{cell}</td>" for cell in rest)
     return (
-        f"<table cellspacing='0' cellpadding='3' width='100%'>"
+        f"<table cellspacing='0' cellpadding='3' width='99%'>"
         f"<tr style='color:{theme.muted}'>{cells}</tr>{''.join(rows)}</table>"
     )
 

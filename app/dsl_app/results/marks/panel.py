@@ -24,7 +24,7 @@ from dsl_app.results.state import Mark, ResultsState
 from dsl_app.shared.plain_tip import plain_tip
 from dsl_app.shared.settings import folder_for
 from dsl_app.shared.theme import DARK, Theme
-from dsl_app.shared.widgets.forms import label, named, push_button, quiet
+from dsl_app.shared.widgets.forms import allow, label, named, push_button, quiet
 from dsl_app.shared.widgets.hints import FocusRing
 from dsl_app.shared.widgets.icons import SWATCH_PX, swatch
 from dsl_app.shared.widgets.layouts import STRETCH, column_of, row_of
@@ -32,6 +32,8 @@ from dsl_app.shared.widgets.save_dialog import ask_target
 from dsl_core.io.spectra.catalogue import formats, suffixes
 
 KEY = Qt.ItemDataRole.UserRole
+#: Height of the list at least, px: its head and a row.
+LEAST_TREE_PX = 60
 EMPTY = (
     "Click the picture to pin a spectrum, draw a region with the tools above it, or drop a file with a"
     " reference spectrum here."
@@ -83,7 +85,6 @@ class MarksPanel(QWidget):
         FocusRing(self.figures)
         self.figures.setFrameShape(QFrame.Shape.NoFrame)
         self.figures.viewport().setAutoFillBackground(False)
-        self.tree.setMinimumHeight(88)
         self.reference = push_button(
             "Add reference…",
             "Open a file with reflectance to compare with: text, CSV, ENVI, ASD, SVC, JCAMP-DX, CGATS",
@@ -170,7 +171,10 @@ class MarksPanel(QWidget):
     def _show_hint(self) -> None:
         """Say what to do while nothing is marked, or why nothing can be."""
         self.hint.setText(self._state.no_spectra or EMPTY)
-        self.hint.setVisible(not self._state.marks.value)
+        is_empty = not self._state.marks.value
+        self.hint.setVisible(is_empty)
+        # On a small screen the hint has the room of an empty list: a layout counts one line of it.
+        self.tree.setMinimumHeight(0 if is_empty else LEAST_TREE_PX)
 
     def _put(self, place: int, mark: Mark) -> None:
         shown, item = self._rows.get(mark.key, (None, None))
@@ -223,7 +227,7 @@ class MarksPanel(QWidget):
         self._later.start()
 
     def _show_removable(self) -> None:
-        self.remove.setEnabled(bool(self._chosen))
+        allow(self.remove, bool(self._chosen), "Select a pin, region or reference first.")
 
     def _show_band(self) -> None:
         mark = self._state.selected_mark

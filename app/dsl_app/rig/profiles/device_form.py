@@ -88,7 +88,7 @@ class DeviceForm(QWidget):
             return
         self.about.setText(capitalised(found.summary) + (f". Needs {found.brings}" if found.brings else ""))
         for name, setting in found.settings.model_fields.items():
-            field = named(QLineEdit(), name.replace("_", " "), setting.description or name)
+            field = named(QLineEdit(), caption(name), setting.description or name)
             default = setting.get_default(call_default_factory=True)
             if setting.is_required() or default in (None, "", {}):
                 field.setPlaceholderText("needed" if setting.is_required() else "not set")

@@ -12,7 +12,7 @@ from dsl_app.rig.profiles.draft import Draft
 from dsl_app.rig.profiles.state import ProfileState, profile_view
 from dsl_app.shared.evented import follow_any
 from dsl_app.shared.widgets.dialogs import command_window, confirm, dialog_buttons
-from dsl_app.shared.widgets.forms import label, named, push_button, set_role
+from dsl_app.shared.widgets.forms import keep_height, label, named, push_button, set_role
 from dsl_app.shared.widgets.help_window import add_help_key
 from dsl_app.shared.widgets.inside import stop_following
 from dsl_app.shared.widgets.layouts import STRETCH, boxed, column_of, row_of, tabs_of
@@ -60,6 +60,7 @@ class ProfileDialog(QDialog):
         self.save.setToolTip("Save the profile, whole or not at all")
         self.command = self.buttons.addButton("Show command line", QDialogButtonBox.ButtonRole.ActionRole)
         self.command.setToolTip("Show the command that tries the devices of the saved profile")
+        keep_height(self.look, self.test)
         self._lay_out()
         self._connect()
         self.name.setFocus()
@@ -123,6 +124,8 @@ class ProfileDialog(QDialog):
         for name, button in (("look", self.look), ("try", self.test), ("save", self.save)):
             button.setEnabled(view.can_act)
             set_role(button, "primary" if name == view.following else "")
+            # The Return key in a field does what comes next, and saves nothing half done.
+            button.setDefault(name == view.following)
 
     # Do --------------------------------------------------------------------------------------------
 

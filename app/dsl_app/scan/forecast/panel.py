@@ -14,7 +14,7 @@ from dsl_app.shared.evented import follow_any
 from dsl_app.shared.plain_tip import plain_tip
 from dsl_app.shared.widget_state import LabelState
 from dsl_app.shared.widgets.deferred import Deferred
-from dsl_app.shared.widgets.forms import ChoiceBox, NumberBox, label, push_button, show_label
+from dsl_app.shared.widgets.forms import ChoiceBox, NumberBox, allow, label, push_button, show_label
 from dsl_app.shared.widgets.layouts import STRETCH, column_of, row_of
 from dsl_app.shared.widgets.read_table import LEFT, RIGHT, ReadTable, cell
 from dsl_app.shared.widgets.ticker import Ticker
@@ -220,7 +220,9 @@ class ForecastPanel(QWidget):
     def _enable_search(self) -> None:
         for box in (self.wish, self.budget, self.error):
             box.setEnabled(not self._is_fixed)
-        self.ask.setEnabled(not self._is_fixed and bool(self._state.points.value))
+        # The plan of a scan that runs, or that was begun, stays as it is.
+        why = "The plan of a scan is fixed." if self._is_fixed else "Predict plans first."
+        allow(self.ask, not self._is_fixed and bool(self._state.points.value), why)
 
     def release(self) -> None:
         """Disconnect from all state."""

@@ -22,7 +22,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from dsl_app.shared.plain_tip import plain_tip
+from dsl_app.shared.plain_tip import plain_tip, text_of_tip
 from dsl_app.shared.widget_state import ButtonState, LabelState
 from dsl_app.shared.widgets.layouts import row_of
 from dsl_app.shared.wording import in_window
@@ -30,6 +30,10 @@ from dsl_app.shared.wording import in_window
 W = TypeVar("W", bound=QWidget)
 #: A function or signal that a click calls.
 Clicked = Callable[..., object] | SignalInstance | None
+#: By how much a primary button is higher than its text, px.
+PRIMARY_MORE_PX = 12
+#: Where a button keeps the tooltip that it has while it can be pressed.
+_OWN_TIP = "own-tip"
 _SCROLL = QStyle.PixelMetric.PM_ScrollBarExtent
 
 # A class has one base of Qt at most, so at run time the mixin is a plain class.
@@ -177,6 +181,12 @@ def push_button(text: str, tip: str, do: Clicked = None, role: str = "") -> QPus
     return made
 
 
+def keep_height(*buttons: QPushButton) -> None:
+    """Make buttons as high as a primary one, which they are at times: nothing around them moves then."""
+    for button in buttons:
+        button.setMinimumHeight(button.fontMetrics().height() + PRIMARY_MORE_PX)
+
+
 def check_box(text: str, tip: str) -> QCheckBox:
     """A check box with its tooltip."""
     made = QCheckBox(text)
@@ -209,11 +219,25 @@ def show_button(button: QAbstractButton, state: ButtonState) -> None:
         button.setText(state.text)
     if state.tip is not None:
         button.setToolTip(plain_tip(state.tip))
+        button.setProperty(_OWN_TIP, None)
     if state.name is not None:
         button.setAccessibleName(state.name)
     button.setVisible(state.is_visible)
-    button.setEnabled(state.is_enabled)
+    allow(button, state.is_enabled, state.why)
     set_role(button, "primary" if state.is_primary else "")
+
+
+def allow(button: QAbstractButton, on: bool, why: str = "") -> None:
+    """Let a button be pressed; else its tooltip begins with the reason ``why`` it cannot be."""
+    button.setEnabled(on)
+    own = button.property(_OWN_TIP)
+    if not on and why:
+        if own is None:
+            own = text_of_tip(button.toolTip())
+            button.setProperty(_OWN_TIP, own)
+        button.setToolTip(plain_tip(f"{why} {own}"))
+    elif own is not None:
+        button.setToolTip(plain_tip(own))
 
 
 def show_label(line: QLabel, state: LabelState) -> None:

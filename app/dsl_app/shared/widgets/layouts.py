@@ -21,7 +21,10 @@ from PySide6.QtWidgets import (
 
 from dsl_app.shared.plain_tip import plain_tip
 
+A = TypeVar("A", bound=QScrollArea)
 B = TypeVar("B", bound=QBoxLayout)
+#: No limit to a width.
+LARGEST_PX = 16_777_215
 Margins = int | tuple[int, int, int, int]
 
 
@@ -109,11 +112,34 @@ def splitter(direction: Qt.Orientation, *parts: tuple[QWidget, int], sizes: Sequ
 
 
 def scrolled(content: QWidget) -> QScrollArea:
-    """Content that scrolls up and down where it is higher than its room, without a frame.
+    """Content that scrolls up and down where it is higher than its room, without a frame."""
+    return _scrolling(QScrollArea(), content)
 
-    It follows the focus of what is inside and takes none itself, which nobody would see.
-    """
-    area = QScrollArea()
+
+class SideArea(QScrollArea):
+    """Content of a width that scrolls up and down; a scroll bar takes none of that width."""
+
+    def __init__(self, content: QWidget, width_px: int) -> None:
+        super().__init__()
+        _scrolling(self, content)
+        self._width_px, self._may_grow = width_px, False
+        self.verticalScrollBar().rangeChanged.connect(lambda low, high: self._fit())
+        self._fit()
+
+    def set_width(self, width_px: int, may_grow: bool = False) -> None:
+        """Give the content another width, exactly or at least."""
+        self._width_px, self._may_grow = width_px, may_grow
+        self._fit()
+
+    def _fit(self) -> None:
+        bar = self.verticalScrollBar()
+        width_px = self._width_px + bar.sizeHint().width() * (bar.maximum() > 0)
+        self.setMinimumWidth(width_px)
+        self.setMaximumWidth(LARGEST_PX if self._may_grow else width_px)
+
+
+def _scrolling(area: A, content: QWidget) -> A:
+    """An area that follows the focus of what is inside and takes none itself, which nobody would see."""
     area.setFocusPolicy(Qt.FocusPolicy.NoFocus)
     area.setWidget(content)
     area.setWidgetResizable(True)

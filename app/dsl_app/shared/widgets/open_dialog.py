@@ -78,7 +78,9 @@ class OpenDialog(QFileDialog):
         takes_folders: bool,
         filters: tuple[str, ...] = (ALL, RESULTS, SCANS),
     ) -> None:
-        super().__init__(parent, title, folder)
+        place = Path(folder)
+        # One that does not exist yet would be taken for a name that was typed, and nothing could be chosen.
+        super().__init__(parent, title, folder if place.is_dir() or not folder else str(place.parent))
         self._takes_folders = takes_folders
         self.chosen: Path | None = None
         self.setOption(QFileDialog.Option.DontUseNativeDialog)
@@ -127,3 +129,9 @@ class OpenDialog(QFileDialog):
         chosen = dialog.chosen
         dialog.deleteLater()
         return chosen
+
+    @classmethod
+    def ask_folder(cls, parent: QWidget | None, title: str, folder: str = "") -> Path | None:
+        """A folder that a person chooses, who sees what is in it; a file stands for the folder it lies in."""
+        path = cls.ask(parent, title, folder, takes_folders=True, filters=(ALL,))
+        return path.parent if path is not None and path.is_file() else path

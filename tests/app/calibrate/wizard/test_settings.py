@@ -6,12 +6,11 @@ from dataclasses import dataclass, field
 from typing import Any, cast
 
 import pytest
+from dsl_app.calibrate.setting_words import TITLES, setting_title
 from dsl_app.calibrate.wizard.settings import (
-    TITLES,
     as_text,
     changed_settings,
     setting_rows,
-    setting_title,
 )
 
 from dsl_core.campaign.common.recipe import AnyRecipe

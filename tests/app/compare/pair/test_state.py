@@ -66,7 +66,7 @@ def test_buttons_and_hint_follow_the_state(
     assert shown.hint == LabelState(hint, "muted")
     buttons = (shown.open_first, shown.open_second, shown.report)
     assert [each.is_enabled for each in buttons] == ["open" in usable, "open" in usable, "report" in usable]
-    assert (shown.truth.is_enabled, shown.swap) == ("truth" in usable, "swap" in usable)
+    assert (shown.truth.is_enabled, shown.swap.is_enabled) == ("truth" in usable, "swap" in usable)
 
 
 @pytest.mark.parametrize(
@@ -77,7 +77,7 @@ def test_buttons_and_hint_follow_the_state(
         ("a", "box.zarr", "open_second"),
         ("a", "chart.zarr", "open_second"),
         ("at", "box.zarr", "report"),
-        ("ab", None, ""),
+        ("ab", None, "report"),
     ],
 )
 def test_the_blue_button_is_what_a_person_does_next(sides: str, at_hand: str | None, following: str) -> None:

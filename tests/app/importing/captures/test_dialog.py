@@ -9,6 +9,7 @@ from dsl_app.composition.window import Composition, StartOptions
 from dsl_app.importing.captures.dialog import CapturesDialog
 from dsl_app.importing.captures.state import NOMINAL
 from dsl_app.importing.dialog import ImportDialog
+from dsl_app.shared.widgets.open_dialog import OpenDialog
 from dsl_app.shell.main_window import MainWindow
 from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
@@ -105,10 +106,10 @@ def test_dropped_pictures_are_corrected_by_mouse_and_become_a_scan(
 def test_a_wrong_folder_and_calibration_are_said_beside_them(
     qtbot: QtBot, window: MainWindow, folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(QFileDialog, "getExistingDirectory", lambda *_: str(folder))
+    monkeypatch.setattr(OpenDialog, "ask", lambda *_, **__: folder)
     QTest.mouseClick(window.page_of("start").captures, LEFT)  # type: ignore[attr-defined]
     dialog = opened(qtbot, window)
-    monkeypatch.setattr(QFileDialog, "getExistingDirectory", lambda *_: str(tmp_path))
+    monkeypatch.setattr(OpenDialog, "ask", lambda *_, **__: tmp_path)
     QTest.mouseClick(dialog.choose, LEFT)
     settle(qtbot, dialog)
     assert "contains 0 pictures" in dialog.about_folder.text()
@@ -129,7 +130,7 @@ def test_import_opens_the_dialog_that_fits_the_folder(
 ) -> None:
     (tmp_path / "empty").mkdir()
     answers = [tmp_path / "empty", folder.parent]
-    monkeypatch.setattr(QFileDialog, "getExistingDirectory", lambda *_: str(answers.pop(0)))
+    monkeypatch.setattr(OpenDialog, "ask", lambda *_, **__: answers.pop(0))
     window.do("import")
     published: list[ImportDialog] = []
 

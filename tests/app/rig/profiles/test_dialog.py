@@ -63,6 +63,20 @@ def bench(qtbot: QtBot, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Benc
     return Bench(qtbot)
 
 
+def test_the_return_key_does_what_is_blue(bench: Bench) -> None:
+    dialog = bench.dialog
+    buttons = (dialog.look, dialog.test, dialog.save)
+    QTest.keyClicks(dialog.name, "bench")
+    QTest.keyClick(dialog.name, Qt.Key.Key_Return)
+    assert bench.state.found.value == (WEBCAM,), "Return looked for devices"
+    assert profile_names() == []
+    bench.fill_in()
+    assert [button.isDefault() for button in buttons] == [is_blue(button) for button in buttons]
+    assert len({button.minimumHeight() for button in (dialog.look, dialog.test)}) == 1
+    field = dialog.forms["camera"].fields["size_px"]
+    assert field.accessibleName() == "Size (px)"
+
+
 def test_a_profile_is_made_of_what_was_found_and_edited_again(bench: Bench) -> None:
     saved: list[Path] = []
     bench.state.saved.connect(saved.append)

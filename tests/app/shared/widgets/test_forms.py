@@ -1,7 +1,18 @@
 from __future__ import annotations
 
 import pytest
-from dsl_app.shared.widgets.forms import ChoiceBox, NumberBox, check_box, label, named, push_button, quiet
+from dsl_app.shared.widget_state import ButtonState
+from dsl_app.shared.widgets.forms import (
+    ChoiceBox,
+    NumberBox,
+    allow,
+    check_box,
+    label,
+    named,
+    push_button,
+    quiet,
+    show_button,
+)
 from dsl_app.shared.widgets.read_table import RIGHT, ReadTable, cell
 from PySide6.QtCore import QLocale, Qt
 from PySide6.QtTest import QTest
@@ -29,6 +40,22 @@ def test_an_entry_is_chosen_by_what_it_stands_for(qtbot: QtBot) -> None:
     qtbot.addWidget(box)
     box.choose(9)
     assert (box.currentText(), box.accessibleName(), box.toolTip()) == ("Blue", "Colour", "Colour")
+
+
+def test_a_button_that_cannot_be_pressed_says_why_before_what_it_does(qtbot: QtBot) -> None:
+    button, own, tips = push_button("&Start", "Begins the work"), "Begins the work", list[str]()
+    qtbot.addWidget(button)
+    for on, why in ((False, "Open it first."), (True, "Open it first."), (False, "Connect it."), (False, "")):
+        allow(button, on, why)
+        assert button.isEnabled() == on
+        tips.append(button.toolTip())
+    assert tips == [f"Open it first. {own}", own, f"Connect it. {own}", own]
+    show_button(button, ButtonState(is_enabled=False, tip="Goes on", why="Wait."))
+    assert button.toolTip() == "Wait. Goes on"
+    allow(button, False, "The scan <b>1 is open.")
+    assert button.toolTip() == "<p>The scan &lt;b&gt;1 is open. Goes on</p>", "names are no markup"
+    show_button(button, ButtonState(tip="Goes on"))
+    assert button.toolTip() == "Goes on"
 
 
 def test_a_button_says_and_does_what_it_was_made_for(qtbot: QtBot) -> None:

@@ -2,6 +2,7 @@ from __future__ import annotations
 
 from dsl_app.shared.widgets.layouts import (
     STRETCH,
+    SideArea,
     Stretch,
     boxed,
     column_of,
@@ -31,6 +32,21 @@ def test_parts_keep_their_order_stretch_and_side(qtbot: QtBot) -> None:
     assert inner.parent() is home, "widgets of inner layouts belong to the widget, too"
     margins = made.contentsMargins()
     assert {margins.left(), margins.top(), margins.right(), margins.bottom()} == {5}
+
+
+def test_a_side_is_not_cut_by_its_scroll_bar(qtbot: QtBot) -> None:
+    content = QWidget()
+    content.setMinimumHeight(300)
+    home, area = QWidget(), SideArea(content, 120)
+    row_of(area, STRETCH, on=home, margins=0)
+    qtbot.addWidget(home)
+    home.show()
+    for height_px, is_scrolled in ((400, False), (200, True), (400, False)):
+        home.resize(400, height_px)
+        qtbot.waitUntil(lambda: area.viewport().width() == 120)
+        assert (area.width() > 120) == is_scrolled
+    area.set_width(90, may_grow=True)
+    assert (area.minimumWidth(), area.maximumWidth() > 400) == (90, True)
 
 
 def test_a_column_in_a_box_has_its_own_margins_and_spacing(qtbot: QtBot) -> None:

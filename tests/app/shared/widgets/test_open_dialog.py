@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 from dsl_app.shared.widgets.open_dialog import ALL, SCANS, OpenDialog, is_thing
 from PySide6.QtCore import QFileInfo
-from PySide6.QtWidgets import QTreeView
+from PySide6.QtWidgets import QLineEdit, QTreeView
 from pytestqt.qtbot import QtBot
 
 
@@ -66,6 +66,30 @@ def test_any_folder_may_be_meant(qtbot: QtBot, home: Path) -> None:
     dialog.selectFile(str(home / "plain"))
     dialog.accept()
     assert dialog.chosen == home / "plain"
+
+
+def test_a_folder_is_chosen_by_itself_or_by_what_lies_in_it(
+    qtbot: QtBot, home: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    chosen: Path | None = None
+    monkeypatch.setattr(OpenDialog, "exec", lambda self: setattr(self, "chosen", chosen))
+    for chosen in (home / "plain", home / "plain" / "notes.txt", None):
+        assert OpenDialog.ask_folder(None, "Import", str(home)) == (
+            None if chosen is None else home / "plain"
+        )
+    dialog = OpenDialog(None, "Import", str(home / "plain"), takes_folders=True, filters=(ALL,))
+    qtbot.addWidget(dialog)
+    dialog.selectFile(str(home / "plain" / "notes.txt"))
+    dialog.accept()
+    assert dialog.chosen == home / "plain" / "notes.txt"
+
+
+def test_a_folder_that_is_not_there_yet_is_no_name_that_was_typed(qtbot: QtBot, home: Path) -> None:
+    dialog = _dialog(qtbot, home / "dsl-scans", takes_folders=True)
+    assert dialog.directory().absolutePath() == str(home)
+    typed = dialog.findChild(QLineEdit)
+    assert typed is not None
+    assert typed.text() == ""
 
 
 def test_a_filter_shows_scans_or_results_alone(qtbot: QtBot, home: Path) -> None:
