@@ -34,21 +34,34 @@ TELLING_PX = 0.04
 MOST_WAVE_PX = 0.04
 #: A difference from the calibrated width that is followed.
 MOST_WIDER = 0.03
+#: Share of the squares of a wave that a width has to explain to be followed, whatever it leaves.
+EXPLAINS = 0.4
 #: Parts of the picture, down and across, whose widths are compared.
 PARTS = (3, 3)
 
 
 @dataclass(frozen=True)
 class OwnWidth:
-    """By how much of the calibrated width lines are wider than that, and the deviation of it."""
+    """By how much of the calibrated width lines are wider than that, and the deviation of it.
+
+    ``noise`` is the part of the deviation that is chance, ``explains`` the share of the wave's squares that
+    goes with the width.
+    """
 
     wider: float
     std: float
+    noise: float
+    explains: float
 
     @property
     def changed(self) -> bool:
         """Whether that matters, and is more than chance."""
-        return matters(self.wider, self.std, MOST_WIDER)
+        return matters(self.wider, self._telling_std, MOST_WIDER)
+
+    @property
+    def _telling_std(self) -> float:
+        """The deviation that says whether to follow: a width that takes much of a wave away is better."""
+        return self.noise if self.explains > EXPLAINS else self.std
 
     def of(self, rig: Rig) -> Rig:
         """The rig with lines of this width."""
@@ -66,7 +79,7 @@ class OwnWidth:
         return FitFinding.judged(
             "profile",
             "width of lines by the binary code",
-            (100 * self.wider, 100 * self.std),
+            (100 * self.wider, 100 * self._telling_std),
             "% of the width",
             100 * MOST_WIDER,
             f"The light of lines is {100 * abs(self.wider):.0f} ± {100 * self.std:.0f} %"
@@ -112,8 +125,11 @@ class CodeWave:
         # A wider spread would take back what columns are displaced by.
         wider = -float(weight @ (moved * self.away_px)) / (seen + prior)
         # A wave of another shape than a width makes says less of it.
-        left = float(weight @ (self.away_px + wider * moved) ** 2) / max(len(moved) - 1, 1)
-        return OwnWidth(wider, (seen / max(left, 1.0) + prior) ** -0.5)
+        square = float(weight @ (self.away_px + wider * moved) ** 2)
+        left = square / max(len(moved) - 1, 1)
+        std = (seen / max(left, 1.0) + prior) ** -0.5
+        explains = 1 - square / max(float(weight @ self.away_px**2), 1e-12)
+        return OwnWidth(wider, std, (seen + prior) ** -0.5, explains)
 
     def finding(self) -> FitFinding:
         """What is told of it."""

@@ -26,7 +26,7 @@ MOST_LOSS, SIGMAS, AGREED = 0.015, 6.0, 0.25
 FORM = 0.15
 #: Pixels are compared that are this share of the width apart, an even number, so that colours are the same.
 APART = 1 / 19
-#: Steps of level and of shading (both relative) that are another material, or another surface.
+#: Steps of level and of smoothed shading (both relative) that are another material, or another surface.
 ALIKE, EVEN = 0.06, 0.1
 #: Pairs that are looked at in each direction, about; fewer in a quarter say nothing.
 PAIRS, FEWEST = 30_000, 200
@@ -134,7 +134,7 @@ def _pairs(rig: Rig, amplitude: NDArray[np.floating], shading: Floats) -> tuple[
 
     def seen(where: tuple[slice, slice]) -> tuple[Floats, NDArray[np.intp]]:
         rows, columns = np.meshgrid(np.arange(height)[where[0]], np.arange(width)[where[1]], indexing="ij")
-        seen = [levels[where], _square(rig, rows, columns), smooth[where], lights[where]]
+        seen = [levels[where], _square(rig, rows, columns), smooth[where]]
         return np.stack(seen), np.stack([rows, columns])
 
     # Single pixels, evenly thinned: the stride keeps no colour out.
@@ -146,10 +146,12 @@ def _pairs(rig: Rig, amplitude: NDArray[np.floating], shading: Floats) -> tuple[
             second = np.s_[down::stride, across::stride]
             (here, (rows, columns)), (there, _) = seen(first), seen(second)
             found = there - here
+            # By the shading of single pixels slopes would seem even where noise hides them, and from the
+            # middle of a ball light falls to all sides.
             with np.errstate(invalid="ignore"):
-                alike = (np.abs(found[0]) < ALIKE) & (np.abs(found[3]) < EVEN)
+                alike = (np.abs(found[0]) < ALIKE) & (np.abs(found[2]) < EVEN)
             quarter = 2 * (rows + down / 2 > height / 2) + (columns + across / 2 > width / 2)
-            yield np.concatenate([found[:3, alike], quarter[alike][None]])
+            yield np.concatenate([found[:, alike], quarter[alike][None]])
 
     return tuple(np.concatenate(list(steps()), 1))
 

@@ -80,6 +80,16 @@ def test_noise_of_the_shading_hides_no_gain_and_makes_none(rig: Rig) -> None:
             assert corner == pytest.approx(np.log(1 - loss), abs=0.02)
 
 
+def test_a_ball_with_noisy_normals_in_the_middle_is_no_lens_that_loses_light(rig: Rig) -> None:
+    ball = np.sqrt(1 - 0.9 * square(rig))
+    level, shading = scene(rig, ball)
+    noise = 1 + 0.1 * np.random.default_rng(9).standard_normal(shading.shape)
+    found = own_flat_field(rig, level, shading * ball * noise)
+    assert found is not None
+    assert not found.present
+    assert abs(found.corner) < 0.02
+
+
 def test_an_even_camera_and_light_from_one_side_are_left_alone(rig: Rig) -> None:
     columns = np.linspace(-1, 1, rig.camera.width_px)[None]
     for change in (1.0, 1 + 0.06 * columns, 1 - 0.08 * np.where(columns > 0, columns, 0) ** 2):

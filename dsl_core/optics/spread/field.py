@@ -135,7 +135,9 @@ class FieldFamily:
                 break
         left = (score - information * (shapes @ change))[:, None] * shapes
         common = left.reshape(-1, run, shapes.shape[1]).sum(1)
-        covariance = inverse @ (common.T @ common) @ inverse
+        # Scatter alone is blind where each pixel sees no more lines than it has unknowns, and fits them
+        # exactly: there only the errors that are stated say how little is known of the width.
+        covariance = inverse @ (common.T @ common) @ inverse + inverse
         # A width that all share belongs to the curve.
         found[0] -= float((shapes @ found)[used].mean())
         apart = shapes[used] - shapes[used].mean(0)

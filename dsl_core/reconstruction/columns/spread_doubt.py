@@ -71,7 +71,8 @@ def spread_doubt(peaks: LinePeaks | None, found: SpreadFit | None) -> SpreadDoub
     if peaks is None:
         return None
     lines, relative = peaks.lines, FOCUS_STD
-    if found is not None:
+    # Of lines side by side that look as calibrated, columns explain all that another width would change.
+    if found is not None and (found.changed or lines.step_px < lines.width_px):
         seen = found.rms_std_px / found.response.blur_px
         relative *= seen / float(np.hypot(FOCUS_STD, seen))
     with one_kernel_thread():

@@ -85,6 +85,28 @@ def test_one_width_for_all_stays_one() -> None:
     assert fitted(KNOWN, SKEWED, FLAT).field is None
 
 
+def test_lines_side_by_side_say_nothing_of_widths() -> None:
+    """A pixel that sees two such lines has amplitude and column to explain both, whatever the width."""
+    random = torch.Generator().manual_seed(6)
+
+    def drawn(low: float, high: float, each: int = 1) -> torch.Tensor:
+        return low + (high - low) * torch.rand((160, each), generator=random, dtype=torch.float64)
+
+    column = (drawn(60, 560) + torch.arange(RUN) * drawn(3.5, 4.5)).ravel()
+    row = drawn(10, 350).expand(-1, RUN).ravel()
+    centres = (column / WIDTH_PX).round() * WIDTH_PX + WIDTH_PX * torch.arange(-1, 2)[:, None]
+    distance = column - centres
+    light = LineTable(WIDTH_PX, KNOWN, 12.0, column, None).at(distance)[0]
+    std = 0.01 * light + 6e-5
+    y = light + std * torch.randn(light.shape, generator=random, dtype=torch.float64)
+    peaks = Peaks(y, std**2, centres, WIDTH_PX, WIDTH_PX, RUN)
+    view = View(peaks, column.round(), column.round(), y.amax(0))
+    found = FieldFamily(torch.stack([column, row])).fit(view, KNOWN)
+    assert found is not None
+    assert found.std > 0.1
+    assert not found.matters()
+
+
 def test_a_known_field_stands_until_lines_say_otherwise() -> None:
     known = KNOWN.model_copy(update={"field": FIELD})
     assert not fitted(known, KNOWN, FIELD).changed

@@ -48,8 +48,8 @@ def doubt(found: SpreadFit | None, lines: LineSet | None = LINES) -> SpreadDoubt
     return spread_doubt(peaks, found)
 
 
-def width_found(rel_std: float) -> SpreadFit:
-    return SpreadFit(RESPONSE, False, rel_std * RESPONSE.blur_px, 1.0, 1.0, 900)
+def width_found(rel_std: float, changed: bool = True) -> SpreadFit:
+    return SpreadFit(RESPONSE, changed, rel_std * RESPONSE.blur_px, 1.0, 1.0, 900)
 
 
 def test_deviations_are_what_a_width_off_by_one_deviation_moves() -> None:
@@ -78,6 +78,13 @@ def test_what_a_scan_says_of_the_width_counts_and_where_it_is_sure_nothing_is_do
     # One width for all that is sure may be none of its parts'.
     assert not replace(surely, varies=np.full(ROWS * COLUMNS, 0.05)).is_sure
     assert doubt(None, None) is None
+
+
+def test_lines_side_by_side_that_look_as_calibrated_leave_the_width_open() -> None:
+    # Columns explain what another width would change, so that a fit seems sure of any.
+    stated = doubt(width_found(0.001, changed=False))
+    assert stated is not None
+    assert stated.relative == FOCUS_STD
 
 
 def test_columns_that_nobody_knows_are_not_doubted_further() -> None:
