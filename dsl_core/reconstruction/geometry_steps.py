@@ -20,6 +20,7 @@ from dsl_core.reconstruction.columns.line_peaks import smooth_peaks
 from dsl_core.reconstruction.columns.line_spread import own_spread, spread_pixels, with_own_spread
 from dsl_core.reconstruction.columns.peak_error import peak_error
 from dsl_core.reconstruction.columns.spread_doubt import spread_doubt
+from dsl_core.reconstruction.findings.spread_findings import spread_findings
 from dsl_core.reconstruction.fine_texture import follow_scatter
 from dsl_core.reconstruction.geometry import Geometry, geometry_of, require_light, require_pixels
 from dsl_core.reconstruction.hdr import MergedFrame
@@ -28,7 +29,6 @@ from dsl_core.reconstruction.light.followed import follow_light, unsure_level
 from dsl_core.reconstruction.rows.columns import columns_by_rows
 from dsl_core.reconstruction.rows.frames import ScanFrames
 from dsl_core.reconstruction.spectral.highlights import follow_highlights
-from dsl_core.reconstruction.spread_findings import spread_findings
 
 
 class GeometrySteps:

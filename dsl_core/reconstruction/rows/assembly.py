@@ -17,7 +17,8 @@ from dsl_core.model.plan import CapturePlan
 from dsl_core.model.result import Flag
 from dsl_core.model.result_sink import ResultSink
 from dsl_core.model.rig import Rig
-from dsl_core.reconstruction.fit_findings import SpectralCounts, count_spectra, fit_of
+from dsl_core.reconstruction.findings.fit import fit_of
+from dsl_core.reconstruction.findings.flag_findings import SpectralCounts, count_spectra
 from dsl_core.reconstruction.geometry import Geometry
 from dsl_core.reconstruction.rows.bands import Band
 from dsl_core.reconstruction.scan_result import attributes_of, maps_of_rows

@@ -13,7 +13,7 @@ import pytest
 from dsl_core.model.fit import Fit
 from dsl_core.model.options import Options
 from dsl_core.model.plan import CapturePlan
-from dsl_core.reconstruction.fit_findings import SpectralCounts
+from dsl_core.reconstruction.findings.flag_findings import SpectralCounts
 from dsl_core.reconstruction.rows import assembly as module
 from dsl_core.reconstruction.rows.assembly import Assembly
 from dsl_core.reconstruction.rows.bands import Band

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from dsl_core.reconstruction.fit_findings import cause_findings
+from dsl_core.reconstruction.findings.model_findings import cause_findings
 from dsl_core.reconstruction.spectral.causes import common_error, fit_causes
 from dsl_core.reconstruction.spectral.evenness import MOST_UNEVEN, fit_evenness
 from dsl_core.reconstruction.spectral.probing.line_probe import LineProbe

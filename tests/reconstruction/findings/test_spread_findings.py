@@ -10,7 +10,7 @@ from dsl_core.model.projector.spread_field import SpreadField
 from dsl_core.model.rig import ProjectorResponse
 from dsl_core.optics.spread.field import FieldFit
 from dsl_core.optics.spread.fit import SpreadFit
-from dsl_core.reconstruction.spread_findings import spread_findings
+from dsl_core.reconstruction.findings.spread_findings import spread_findings
 
 KNOWN = ProjectorResponse(blur_px=0.6)
 

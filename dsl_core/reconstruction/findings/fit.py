@@ -1,0 +1,44 @@
+"""Everything found about the fit of a result: by its flags, its bands and its scan's probed pixels."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dsl_core.model.fit import Fit, FitFinding
+from dsl_core.model.plan import CapturePlan
+from dsl_core.model.rig import Rig
+from dsl_core.model.spectral import WavelengthGrid
+from dsl_core.reconstruction.findings.band_findings import band_findings, line_width_nm
+from dsl_core.reconstruction.findings.flag_findings import SpectralCounts, share_findings
+from dsl_core.reconstruction.findings.model_findings import cause_findings
+from dsl_core.reconstruction.spectral.model_error import ModelError
+from dsl_core.reconstruction.spectral.self_correction import Followed
+
+
+def fit_of(
+    rig: Rig,
+    plan: CapturePlan,
+    grid: WavelengthGrid,
+    depth_mm: NDArray[np.floating],
+    flags: NDArray[np.integer],
+    spectra: SpectralCounts | None,
+    followed: Followed | None = None,
+    error: ModelError | None = None,
+    earlier: Iterable[FitFinding] = (),
+) -> Fit:
+    """The verdict on a result with these depths and flags (rows, columns), and what was found on the way.
+
+    ``followed`` is what its scan says of the model, where it can say anything, and ``error`` what is left.
+    """
+    findings = [*earlier]
+    blurred = any(finding.significant and finding.part == "focus" for finding in findings)
+    findings += share_findings(flags, spectra, blurred)
+    width_nm = line_width_nm(rig, plan, grid, depth_mm)
+    if spectra is not None and width_nm is not None:
+        findings += band_findings(grid.step_nm, width_nm, spectra)
+    if followed is not None:
+        findings += cause_findings(followed.probe, followed.balanced, followed.motion)
+    return Fit.of(findings, () if error is None else np.round(error.relative, 4).tolist())

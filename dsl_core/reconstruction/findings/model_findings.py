@@ -1,0 +1,228 @@
+"""What the probed pixels of a scan say about each part of the model, in sentences."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from dsl_core.model.fit import SIGMAS, FitFinding, matters
+from dsl_core.reconstruction.spectral.causes import (
+    MOST_CURVES,
+    MOST_DRIFT,
+    MOST_GAIN,
+    MOST_SHIFT_PX,
+    Causes,
+    fit_causes,
+)
+from dsl_core.reconstruction.spectral.evenness import MOST_UNEVEN, fit_evenness
+from dsl_core.reconstruction.spectral.film_motion import LEAST_MOTION_PX, FilmMotion, coarseness
+from dsl_core.reconstruction.spectral.probing.curve_probe import USUAL_STEEPNESS, CurveMisfit
+from dsl_core.reconstruction.spectral.probing.line_probe import PROFILE
+from dsl_core.reconstruction.spectral.probing.probe import Probe
+
+#: Blur and tail of the lines below which neither is worth a finding.
+MOST_BLUR, MOST_TAIL = 0.03, 0.004
+#: Relative deviation of a blur beyond which lines, side by side in few frames, do not show it: what they seem
+#: to show then is light that translucent surfaces spread.
+UNSURE_BLUR = 0.1
+#: Chi-square of most pixels above which no cause explains the frames.
+MOST_CHI_SQUARE = 1.5
+#: Share of one order's displacement that the other's must have if uneven lines may be the cause.
+ALIKE = 0.4
+#: Added to findings whose effect the spectra of the result already allow for.
+CORRECTED = " The spectra of this result are corrected for it."
+#: Words, decimals and unit of the numbers of a film, as in `FIELDS`.
+_MOTIONS = (
+    ("tilted about the horizontal", 2, "°"),
+    ("tilted about the vertical", 2, "°"),
+    ("turned in its plane", 2, "°"),
+    ("bent", 5, "/mm"),
+    ("away from the projector", 2, " mm"),
+)
+_CALIBRATE = "run the drift check; calibrate again the part that it names."
+#: Turned by 0.05 degrees, a camera displaces orders like a film 0.3 mm farther away, and depth by 1 %.
+_OR_TURNED = (
+    " A camera or projector that has turned a little displaces the orders alike, and then depth is off, too:"
+    " measure a surface at a known distance."
+)
+
+
+def cause_findings(
+    probe: Probe, corrected: bool | None = None, motion: FilmMotion | None = None
+) -> Iterator[FitFinding]:
+    """What the probed pixels of a scan say about each part of the model.
+
+    ``corrected`` results follow what was found of the orders' light; where that was tried and did not make
+    the frames fit better (False), it is not a finding. ``motion`` is that of the film, which the model of
+    the probe follows already.
+    """
+    causes = fit_causes(probe)
+    if motion is not None:
+        yield _motion(motion, probe)
+    place = _film(causes, probe)
+    told = place.significant and probe.places and causes.displaced
+    yield place.model_copy(update={"significant": told})
+    for finding in _gains(causes, bool(corrected)):
+        unequal = corrected is not False and causes.unequal
+        refuted = not (unequal if finding.part == "orders" else causes.brighter)
+        yield finding.model_copy(update={"significant": finding.significant and not refuted})
+    for index, (value, std) in enumerate(zip(probe.lines.values, probe.lines.std, strict=True)):
+        yield _profile(PROFILE[index], float(value), float(std))
+    drift = FitFinding.judged(
+        "light",
+        "change of the light over the scan",
+        (causes.drift, causes.drift_std),
+        "1",
+        MOST_DRIFT,
+        f"The light has changed by {causes.drift:+.1%} from the first line to the last.",
+        "Let the projector warm up for longer.",
+    )
+    yield drift.model_copy(update={"significant": causes.drifts})
+    yield from _evenness(probe)
+    if probe.curves is not None:
+        yield FitFinding.judged(
+            "curves",
+            "disagreement of the colours",
+            (probe.curves.rms, probe.curves.std),
+            "1",
+            MOST_CURVES,
+            "The colours of the camera disagree about the same light: curves of camera and projector are off"
+            f" by about {probe.curves.rms:.1%}, and so are spectra.",
+            "Calibrate the curves on this rig; those of data sheets are typically off by 5 %.",
+        )
+        yield _wide_bands(probe, probe.curves)
+    usual = probe.usual_chi_square
+    yield FitFinding.judged(
+        "profile",
+        "misfit of most pixels",
+        float(np.sqrt(usual)),
+        "deviations",
+        MOST_CHI_SQUARE**0.5,
+        f"Frames of most pixels differ from the model by {np.sqrt(usual):.1f} times their noise.",
+        f"Surfaces that light each other, and translucent ones, do that. If there are none: {_CALIBRATE}",
+    )
+
+
+def _evenness(probe: Probe) -> Iterator[FitFinding]:
+    light = fit_evenness(probe)
+    if light is None:
+        return
+    found = FitFinding.judged(
+        "light",
+        "evenness of the projector's light",
+        (light.change, light.std),
+        "1",
+        MOST_UNEVEN,
+        f"The projector's light changes by {light.change:+.1%} from the middle of its frame to its left and"
+        f" right. Lines of one wavelength are brighter than those of another: reflectances are off by about"
+        f" {light.error:.1%}, as stated.",
+        "Scan with the object in the middle of the projector's frame, where its light is even; no flat field"
+        " of the camera corrects this.",
+    )
+    yield found.model_copy(update={"significant": light.matters})
+
+
+def _wide_bands(probe: Probe, curves: CurveMisfit) -> FitFinding:
+    """Whether colours disagree because the light changes much from one band to the next."""
+    fine_nm = probe.step_nm * USUAL_STEEPNESS / probe.steepness
+    found = FitFinding.judged(
+        "bands",
+        "disagreement of the colours by bands",
+        (curves.whole_rms, curves.std),
+        "1",
+        MOST_CURVES,
+        f"The light of this rig's LEDs changes {probe.steepness / USUAL_STEEPNESS:.1f} times as fast with the"
+        f" wavelength as is usual. Bands of {probe.step_nm:g} nm are coarse for it: where there is little"
+        f" light, spectra are off by about {curves.whole_rms:.1%}, as stated.",
+        f"Reconstruct with bands of at most {fine_nm:.2g} nm.",
+    )
+    # What no width of bands explains is told of the curves.
+    by_curves = matters(curves.rms, curves.std, MOST_CURVES)
+    return found.model_copy(update={"significant": found.significant and not by_curves})
+
+
+def _motion(motion: FilmMotion, probe: Probe) -> FitFinding:
+    surely = np.abs(motion.values) > SIGMAS * motion.std
+    clauses = [
+        f"{words} by {value:+.{digits}f} ± {std:.{digits}f}{unit}"
+        for (words, digits, unit), value, std, sure in zip(
+            _MOTIONS, motion.values, motion.std, surely, strict=True
+        )
+        if sure
+    ]
+    return FitFinding(
+        part="film",
+        name="movement of the film",
+        value=motion.shift_px,
+        std=motion.shift_std_px,
+        unit="px",
+        limit=LEAST_MOTION_PX,
+        significant=True,
+        sentence=f"The film has moved since the calibration: {', '.join(clauses)}. This displaces wavelengths"
+        f" by {motion.shift_px * probe.nm_per_px:.2f} nm." + CORRECTED,
+        advice="Fix the film so that it cannot slip; if it moves further, repeat the depth-stage calibration."
+        " The level of the light may have changed, too, which no scan can tell: the drift check with the"
+        " Spectralon does." + _OR_TURNED,
+    )
+
+
+def _film(causes: Causes, probe: Probe) -> FitFinding:
+    plus, minus = causes.mean_px
+    # Light that is brighter on one side of a line displaces both orders to that side.
+    alike = plus * minus > 0 and min(abs(plus), abs(minus)) > ALIKE * max(abs(plus), abs(minus))
+    lines = ", or the light of lines is less even than calibrated" if alike else ""
+    return FitFinding.judged(
+        "film",
+        "place of the first orders",
+        (causes.rms_px, causes.rms_std_px),
+        "px",
+        MOST_SHIFT_PX * coarseness(probe.step_nm),
+        f"Wavelengths are off by {causes.rms_px * probe.nm_per_px:.2f} nm: order +1 lies {plus:+.3f} columns"
+        f" from its place, order -1 {minus:+.3f}, on average; the film has moved or is bent"
+        f" otherwise{lines}.",
+        "Run the drift check, and calibrate the depth stage again." + _OR_TURNED,
+    )
+
+
+def _gains(causes: Causes, corrected: bool) -> Iterator[FitFinding]:
+    plus, minus = causes.gain
+    common = causes.common_gain
+    yield FitFinding.judged(
+        "orders",
+        "difference between the gains of the orders",
+        (float(plus - minus), causes.difference_std),
+        "1",
+        MOST_GAIN,
+        f"The brightness of order +1 differs by {plus:+.1%} and that of order -1 by {minus:+.1%} from what"
+        " the zero order predicts." + CORRECTED * corrected,
+        "Calibrate the efficiency of the orders again with the bandpass filters.",
+    )
+    yield FitFinding.judged(
+        "response",
+        "gain of both orders against the zero order",
+        (common, causes.common_std),
+        "1",
+        MOST_GAIN,
+        f"The brightness of both first orders differs by {common:+.1%} from what the zero order predicts: the"
+        " response to level or exposure is not as calibrated. Deviations of reflectance contain it.",
+        "Repeat the self-test.",
+    )
+
+
+def _profile(name: str, value: float, std: float) -> FitFinding:
+    blur = name == "blur"
+    made = FitFinding.judged(
+        "profile",
+        f"{name} of the lines",
+        (value, std),
+        "1",
+        MOST_BLUR if blur else MOST_TAIL,
+        f"The blur of lines differs by {value:+.1%} from that of the calibration."
+        if blur
+        else f"The tails of lines hold {abs(value):.1%} {'more' if value > 0 else 'less'} of their light than"
+        " the calibration says.",
+        "Repeat the self-test with the projector in focus.",
+    )
+    shows = not blur or std < UNSURE_BLUR
+    return made.model_copy(update={"significant": made.significant and shows})
