@@ -12,6 +12,8 @@ from dsl_core.simulation.foreign.variants import Foreign
 Floats = NDArray[np.float64]
 #: Largest relative deviation of a curve, and how far apart its turns are, nm.
 CURVE_SHARE, CURVE_TURNS_NM = 0.05, 70.0
+#: Where red begins, and how far from there it has risen to three quarters, nm; what remains below.
+EDGE_NM, EDGE_WIDTH_NM, BELOW_EDGE = 575.0, 4.4, 0.002
 #: What the first order's efficiency gives the second beyond what the record says.
 SECOND_SHARE = 0.04
 #: Loss of gain in the farthest corner; it rises with the square of the distance from the middle.
@@ -26,6 +28,8 @@ def true_rig(rig: Rig, foreign: Foreign) -> Rig:
     if foreign.has("curves"):
         rng = np.random.default_rng([foreign.seed, 4099])
         update["response"], update["emission"] = _wavy(rig.response, rng), _wavy(rig.emission, rng)
+    elif foreign.has("red-edge"):
+        update["response"] = (_with_edge(rig.response[0]), *rig.response[1:])
     if foreign.has("second-order"):
         update["efficiency"] = {
             **rig.efficiency,
@@ -74,6 +78,12 @@ def _wavy(curves: Rgb, rng: np.random.Generator) -> Rgb:
         found.append(SpectralCurve.of(nm, np.array(curve.values) * factor))
     red, green, blue = found
     return red, green, blue
+
+
+def _with_edge(red: SpectralCurve) -> SpectralCurve:
+    nm = np.array(red.wavelengths_nm)
+    risen = 1 / (1 + 3.0 ** ((EDGE_NM - nm) / EDGE_WIDTH_NM))
+    return SpectralCurve.of(nm, np.array(red.values) * np.maximum(risen, BELOW_EDGE))
 
 
 def _with_share(first: SpectralCurve, second: SpectralCurve | None) -> SpectralCurve:

@@ -26,6 +26,7 @@ VARIANTS: Mapping[str, str] = MappingProxyType(
         "vignetting": "gain of the camera that falls by 8 % to the corner",
         "second-order": "second orders brighter than the calibration says by 4 % of the first",
         "curves": "smooth deviations of up to 5 % of all curves of camera and LEDs",
+        "red-edge": "a camera whose red begins at 575 nm, within 16 nm; its data sheet rounds that off",
         "filter-angle": "bandpass filters tilted by 3 degrees and seen at an angle",
         "bend-s": "film bent in an S",
         "bend-twist": "twisted film",
@@ -33,8 +34,9 @@ VARIANTS: Mapping[str, str] = MappingProxyType(
         "flicker": "lamps of the room whose light differs from frame to frame",
     }
 )
-#: What is not among ``all``: a projector has one curve, and nobody scans before the self-test measured it.
-_ALONE = frozenset({"tone-s", "tone-srgb"})
+#: What is not among ``all``: a projector has one curve, and nobody scans before the self-test measured it; a
+#: camera has its own edges or the usual ones.
+_ALONE = frozenset({"tone-s", "tone-srgb", "red-edge"})
 
 
 @dataclass(frozen=True)
@@ -46,7 +48,7 @@ class Foreign:
 
     @classmethod
     def of(cls, text: str, seed: int = 0) -> Foreign | None:
-        """Variants from names with commas between, or ``all`` but other tone curves; None for no text.
+        """Variants from names with commas between, or ``all`` but those that stand alone; None for no text.
 
         Raises `DeviceError` for other names.
 

@@ -188,3 +188,17 @@ def test_a_spectralon_of_another_colour_than_stated_is_refused_and_white_is_less
     assert disagreement((-0.01, 0.0, 0.03)) == pytest.approx(0.03 / 2**0.5)
     assert record.led_levels is not None
     assert record.reference_rel_std == pytest.approx(disagreement(record.led_levels))
+
+
+@pytest.mark.parametrize(("share", "is_accepted"), [(0.05, True), (0.2, False)])
+def test_detail_of_curves_that_patches_leave_open_is_stated_and_not_refused(
+    record: ColorCheckerCalibration, share: float, is_accepted: bool
+) -> None:
+    """Where red has another edge than the data sheet says, patches are explained and 5 % of the peak open."""
+    unsure = tuple(
+        curve.model_copy(update={"std": (share * max(curve.values),) * len(curve.values)})
+        for curve in record.response
+    )
+    found = failures(color_checker_figures(record.model_copy(update={"response": unsure})))
+    named = [figure.name for figure in found]
+    assert ("deviation of the response, of its peak" not in named) == is_accepted

@@ -10,11 +10,11 @@ from dsl_core.simulation.sim_devices import open_twin
 from dsl_core.simulation.twin_options import TwinOptions
 
 
-def test_names_are_read_and_all_is_all_but_other_tone_curves() -> None:
+def test_names_are_read_and_all_is_all_but_those_that_stand_alone() -> None:
     assert Foreign.of("") is None
     assert Foreign.of(" ") is None
     assert Foreign.of("blur, prnu", 3) == Foreign(frozenset({"blur", "prnu"}), 3)
-    assert Foreign.of("all") == Foreign(frozenset(VARIANTS) - {"tone-s", "tone-srgb"})
+    assert Foreign.of("all") == Foreign(frozenset(VARIANTS) - {"tone-s", "tone-srgb", "red-edge"})
 
 
 def test_an_unknown_name_is_refused_with_those_that_there_are() -> None:
