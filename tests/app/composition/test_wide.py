@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from functools import partial
 from itertools import combinations
 from pathlib import Path
@@ -144,7 +144,7 @@ def _seen_px(part: QWidget) -> int:
     return part.visibleRegion().boundingRect().width()
 
 
-def _covering(parts: list[QWidget]) -> Iterator[tuple[str, str]]:
+def _covering(parts: Sequence[QWidget]) -> Iterator[tuple[str, str]]:
     """Parts of one widget that share a place."""
     for one, other in combinations(parts, 2):
         if one.parent() is other.parent() and one.geometry().intersects(other.geometry()):
