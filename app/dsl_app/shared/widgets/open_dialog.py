@@ -132,6 +132,6 @@ class OpenDialog(QFileDialog):
 
     @classmethod
     def ask_folder(cls, parent: QWidget | None, title: str, folder: str = "") -> Path | None:
-        """A folder that a person chooses, who sees what is in it; a file stands for the folder it lies in."""
+        """A folder that a person chooses, who sees what is in it; a file stands for its folder."""
         path = cls.ask(parent, title, folder, takes_folders=True, filters=(ALL,))
         return path.parent if path is not None and path.is_file() else path
