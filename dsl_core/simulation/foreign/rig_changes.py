@@ -25,11 +25,12 @@ LED_SHARES = (0.02, -0.012, -0.02)
 def true_rig(rig: Rig, foreign: Foreign) -> Rig:
     """The rig that light goes through, of which the calibration is ``rig``."""
     update: dict[str, object] = {}
+    response = rig.response
     if foreign.has("curves"):
         rng = np.random.default_rng([foreign.seed, 4099])
-        update["response"], update["emission"] = _wavy(rig.response, rng), _wavy(rig.emission, rng)
-    elif foreign.has("red-edge"):
-        update["response"] = (_with_edge(rig.response[0]), *rig.response[1:])
+        response, update["emission"] = _wavy(rig.response, rng), _wavy(rig.emission, rng)
+    if foreign.has("red-edge"):
+        response = _with_edge(response[0]), *response[1:]
     if foreign.has("second-order"):
         update["efficiency"] = {
             **rig.efficiency,
@@ -37,7 +38,7 @@ def true_rig(rig: Rig, foreign: Foreign) -> Rig:
         }
     if foreign.has("vignetting"):
         update["flat_field"] = _darker_corners(rig)
-    return rig.model_copy(update=update)
+    return rig.model_copy(update={**update, "response": response})
 
 
 def led_radiance(response: ProjectorResponse, levels: Floats, foreign: Foreign | None) -> Floats:

@@ -43,12 +43,12 @@ def test_curves_deviate_smoothly_by_five_percent() -> None:
 
 
 def test_red_begins_at_an_edge_and_the_rest_stays() -> None:
-    ours = changed("red-edge")
-    share = ours.response[0].at(np.array([550.0, 570.6, 575.0, 579.4, 600.0])) / RIG.response[0].at(
-        np.array([550.0, 570.6, 575.0, 579.4, 600.0])
-    )
-    assert share == pytest.approx([0.002, 0.25, 0.5, 0.75, 1.0], abs=0.01)
-    assert (ours.response[1:], ours.emission) == (RIG.response[1:], RIG.emission)
+    ours, at_nm = changed("red-edge"), np.array([550.0, 570.6, 575.0, 579.4, 600.0])
+    wavy, both = changed("curves"), changed("curves", "red-edge")
+    for with_edge, without in ((ours, RIG), (both, wavy)):
+        share = with_edge.response[0].at(at_nm) / without.response[0].at(at_nm)
+        assert share == pytest.approx([0.002, 0.25, 0.5, 0.75, 1.0], abs=0.01)
+        assert (with_edge.response[1:], with_edge.emission) == (without.response[1:], without.emission)
 
 
 def test_second_orders_gain_a_share_of_the_first() -> None:
