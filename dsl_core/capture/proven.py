@@ -224,7 +224,7 @@ class ProvenShots:
     def _date(self, shot: Shot, pixels: NDArray[np.uint16], proof: FrameProof) -> None:
         """Note since when nobody has seen that devices, light and scene are as they were."""
         if shot.role == "sentinel":
-            if proof.is_unchanged(replace(shot, index=shot.pattern), pixels):
+            if proof.scene.is_unchanged(replace(shot, index=shot.pattern), pixels):
                 self._since_sound.clear()
         elif self._is_alone(shot):
             self._since_sound.add(shot)
@@ -326,10 +326,10 @@ class ProvenShots:
     def _require_control(self, proof: FrameProof) -> None:
         """Raise `DeviceError` unless a picture of the first code still looks as it did at first."""
         is_sound = True
-        for control in proof.controls():
+        for control in proof.scene.controls():
             frame = self._again(control)
-            if proof.is_as_before(control, frame.pixels):
-                is_sound &= proof.is_unchanged(control, frame.pixels)
+            if proof.scene.is_as_before(control, frame.pixels):
+                is_sound &= proof.scene.is_unchanged(control, frame.pixels)
                 continue
             reason = self._explain().sentence or (
                 "Projector, camera, light or target have changed since. Check that the projector follows,"
@@ -350,13 +350,13 @@ class ProvenShots:
         A code that moved after its first pictures names columns that fit each other nearly everywhere, and
         everything after it fits the code. Raises `PictureError` if it moved, for all of the code since then.
         """
-        pictures = proof.first_pictures()
+        pictures = proof.scene.first_pictures()
         if not pictures or self._has_seen_first:
             return
         self._has_seen_first = True
         self._of_code.clear()
         # Calibrations scan through filters.
-        found = [light_sentence(proof.code_sum(), None), *proof.lasting(with_colours=False)]
+        found = [light_sentence(proof.whole.code_sum(), None), *proof.whole.lasting(with_colours=False)]
         self._light = " ".join(each for each in found if each)
         if self._light:
             _log.warning("%s", self._light)
@@ -365,15 +365,15 @@ class ProvenShots:
 
     def _require_place(self, first: Shot, proof: FrameProof) -> None:
         """See that a picture of the code, captured once more, is where it was."""
-        if not proof.is_displaced(first, self._taker.take(first, twice=self._is_late).pixels):
+        if not proof.scene.is_displaced(first, self._taker.take(first, twice=self._is_late).pixels):
             return
-        if not proof.is_displaced(first, self._again(first).pixels):
+        if not proof.scene.is_displaced(first, self._again(first).pixels):
             return
         raise PictureError(
             f"{describe_shot(first).capitalize()}, captured once more, is displaced from where it was:"
             " projector, camera or target moved while the code was captured, or the projector corrects or"
             f" scales its picture. {self._explain().sentence or ADVICE} Frame {first.number} is kept.",
-            tuple(proof.code_after(first)),
+            tuple(proof.scene.code_after(first)),
             has_changed=True,
         )
 

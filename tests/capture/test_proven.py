@@ -181,7 +181,7 @@ def test_a_picture_torn_in_its_last_rows_is_taken_again(
 def test_a_control_tells_whether_everything_is_as_it_was(scene: RenderedScene, is_changed: bool) -> None:
     rig = scene.open()
     proof = FrameProof(scene.plan, scene.calibration)
-    assert proof.controls() == ()
+    assert proof.scene.controls() == ()
 
     def picture(shot: Shot, shift_px: int = 0) -> NDArray[np.uint16]:
         rig.projector.show(token_image(scene.plan, shot))
@@ -190,9 +190,9 @@ def test_a_control_tells_whether_everything_is_as_it_was(scene: RenderedScene, i
 
     for shot in scene.plan.shots():
         proof.judge(shot, picture(shot))
-    for control in proof.controls():
+    for control in proof.scene.controls():
         assert control.role == "code"
-        assert proof.is_as_before(control, picture(control, 6 if is_changed else 0)) is not is_changed
+        assert proof.scene.is_as_before(control, picture(control, 6 if is_changed else 0)) is not is_changed
         inverse = next(s for s in scene.plan.shots() if (s.role, s.pattern) == ("code", control.pattern ^ 1))
-        assert not proof.is_as_before(control, picture(inverse))
-    assert len(proof.controls()) == 2
+        assert not proof.scene.is_as_before(control, picture(inverse))
+    assert len(proof.scene.controls()) == 2

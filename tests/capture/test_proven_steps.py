@@ -48,6 +48,7 @@ class Bench:
         self.recalled: dict[int, str] = {}
         self.of_code: CodeSum | None = None
         self.of_ends: list[str] = []
+        self.scene = self.whole = self
         parts: Any = self
         self.shots = ProvenShots(parts, parts, parts, parts, self.token)
 

@@ -73,11 +73,15 @@ class SeenFrames:
                 pair = self._pair_elsewhere(number, shot.setting)
                 if pair is not None:
                     proof.substitute(number, pair)
-        whole = light_sentence(proof.code_sum(), proof.line_sum())
+        whole = light_sentence(proof.whole.code_sum(), proof.whole.line_sum())
         light = [whole] if whole else []
-        light += proof.lasting()
-        light += [each.sentence for each in (proof.white_again(), proof.colour_again()) if each is not None]
-        light += [each.sentence for each in proof.local_sums()]
+        light += proof.whole.lasting()
+        light += [
+            each.sentence
+            for each in (proof.whole.white_again(), proof.whole.colour_again())
+            if each is not None
+        ]
+        light += [each.sentence for each in proof.whole.local_sums()]
         return ProofReport(judged, together(wrong), sum(not proof.is_told(s) for s in untold), tuple(light))
 
     def _pair_elsewhere(self, number: int, setting: int) -> tuple[Counts, Counts] | None:

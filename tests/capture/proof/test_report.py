@@ -12,7 +12,7 @@ from dsl_core.capture.proof.colour_again import ColourAgain
 from dsl_core.capture.proof.finding import ProofReport, Verdict
 from dsl_core.capture.proof.lines.line_sum import LineSum
 from dsl_core.capture.proof.report import SeenFrames, prove
-from dsl_core.capture.proof.verifier import FrameProof
+from dsl_core.capture.proof.whole_scan import WholeScan
 from dsl_core.model.plan import describe_shot
 from tests.cases.memory_sink import MemorySink
 from tests.cases.rendered_rig import RenderedScene, token_image
@@ -87,7 +87,7 @@ def test_pictures_in_the_places_of_others_are_named(scene: RenderedScene, frames
 def test_lines_that_do_not_add_up_to_white_are_told(
     scene: RenderedScene, frames: MemorySink, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(FrameProof, "line_sum", lambda proof: LineSum(0.8, 0.01, 0.1))
+    monkeypatch.setattr(WholeScan, "line_sum", lambda scan: LineSum(0.8, 0.01, 0.1))
     (sentence,) = _judged(scene, frames).sentences
     assert sentence.startswith("All lines together have 0.80 ± 0.01 times the light of white")
 
@@ -96,7 +96,7 @@ def test_white_of_another_colour_is_told(
     scene: RenderedScene, frames: MemorySink, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     seen = ColourAgain(next(iter(scene.plan.shots())), (1.1, 1.0, 0.9), 0.1)
-    monkeypatch.setattr(FrameProof, "colour_again", lambda proof: seen)
+    monkeypatch.setattr(WholeScan, "colour_again", lambda scan: seen)
     assert _judged(scene, frames).sentences == (seen.sentence,)
 
 

@@ -185,7 +185,7 @@ def test_columns_rise_unless_the_projector_is_mirrored(
     def noted(*parts: object) -> None:
         asked.append(parts[-2])
 
-    monkeypatch.setattr("dsl_core.capture.proof.verifier.FirstCode", noted)
+    monkeypatch.setattr("dsl_core.capture.proof.judging.known.FirstCode", noted)
     rig = scene.calibration
     turned = np.diag([across, 1.0, across])
     pose = rig.pose.model_copy(update={"rotation": tuple(map(tuple, (turned @ rig.pose.matrix).tolist()))})
@@ -197,15 +197,15 @@ def test_columns_rise_unless_the_projector_is_mirrored(
 def test_a_picture_of_the_code_is_unchanged_only_in_the_same_light(scene: RenderedScene) -> None:
     rig, proof = scene.open(3), FrameProof(scene.plan, scene.calibration)
     code, white = _shot(scene, "code", 8, 0), _shot(scene, "white", 0, 0)
-    assert not proof.is_unchanged(code, _take(rig, scene, code)), "nothing is known of it yet"
+    assert not proof.scene.is_unchanged(code, _take(rig, scene, code)), "nothing is known of it yet"
     for shot in list(scene.plan.shots())[: _shot(scene, "black", 0, 0).index + 1]:
         proof.judge(shot, _take(rig, scene, shot))
     now = _take(rig, scene, code)
-    assert proof.is_unchanged(code, now)
+    assert proof.scene.is_unchanged(code, now)
     mist = (now.mean() + 0.95 * (now - now.mean())).astype(np.uint16)
-    assert proof.is_as_before(code, mist)
-    assert not proof.is_unchanged(code, mist)
-    assert not proof.is_unchanged(white, _take(rig, scene, white)), "it does not show what has moved"
+    assert proof.scene.is_as_before(code, mist)
+    assert not proof.scene.is_unchanged(code, mist)
+    assert not proof.scene.is_unchanged(white, _take(rig, scene, white)), "it does not show what has moved"
 
 
 def test_only_pictures_of_the_code_are_its_finest(scene: RenderedScene) -> None:

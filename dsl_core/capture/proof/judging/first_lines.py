@@ -1,0 +1,51 @@
+"""Lines of the first setting, judged by their columns: those, white and black are known."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from dsl_core.capture.proof.finding import Finding, Verdict
+from dsl_core.capture.proof.judging.decision import decide, in_place
+from dsl_core.capture.proof.judging.known import Known
+from dsl_core.capture.proof.lines.line_place import contests_of_sides, moved
+from dsl_core.capture.proof.lines.line_shown import line_shown
+from dsl_core.capture.proof.prediction import (
+    Lit,
+    brightness_of_lines,
+    contest_of_lines,
+    is_lit_elsewhere,
+    is_over_white,
+)
+from dsl_core.capture.proof.raster import Counts
+from dsl_core.model.plan import Shot
+
+
+def judge_line(known: Known, shot: Shot, seen: Counts) -> Finding:
+    """What a picture of lines shows, which is not remembered yet."""
+    lit, wanted = known.lit, known.profile(shot)
+    if lit is None or wanted is None:
+        return Finding(shot, Verdict.UNTOLD)
+    share = brightness_of_lines(seen, lit, wanted, known.noise)
+    usual = np.float32(known.learned.usual.share(shot))
+    rivals = [(verdict, known.profile(rival)) for verdict, rival in known.rivals(shot)]
+    rivals += [(Verdict.DARK, np.zeros_like(wanted)), (Verdict.OTHER, np.ones_like(wanted))]
+    contests = {
+        verdict: contest_of_lines(seen, lit, usual * wanted, usual * rival)
+        for verdict, rival in rivals
+        if rival is not None
+    }
+    found = decide(shot, contests, share, known.learned, lambda: _line_shown(known, lit, seen, shot))
+    if not found.is_wrong and is_lit_elsewhere(seen, lit, wanted):
+        return Finding(shot, Verdict.OTHER, (shot,), "it is bright where it should be dark")
+    if not found.is_wrong and is_over_white(seen, lit, wanted):
+        return Finding(shot, Verdict.OTHER, (shot,), "a part of it is brighter than white")
+    wanted = usual * wanted
+    places = contests_of_sides(lambda side: contest_of_lines(seen, lit, wanted, moved(wanted, side)))
+    return in_place(found, contests, places, known.learned)
+
+
+def _line_shown(known: Known, lit: Lit, seen: Counts, shot: Shot) -> Shot | None:
+    """The shot of the same setting whose line it is that a picture shows."""
+    own = [s for s in known.shots if s.setting == shot.setting and s.role != "sentinel"]
+    lines = ((each, profile) for each in own if (profile := known.profile(each)) is not None)
+    return line_shown(seen, lit, lines, known.plan.projector_size_px[0])

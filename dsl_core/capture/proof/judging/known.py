@@ -1,0 +1,125 @@
+"""What the pictures of a scan have shown so far, with which the next ones are compared."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from dsl_core.capture.proof.code.first_code import FirstCode
+from dsl_core.capture.proof.finding import Verdict
+from dsl_core.capture.proof.light_steps import LightSteps
+from dsl_core.capture.proof.lines.line_place import LinePlaces
+from dsl_core.capture.proof.noise import Noise
+from dsl_core.capture.proof.prediction import Lit, line_profile
+from dsl_core.capture.proof.raster import Counts, Floats, Raster
+from dsl_core.capture.proof.usual_light import UsualLight
+from dsl_core.model.captured_code import CapturedCode
+from dsl_core.model.plan import CapturePlan, NoCode, Role, Shot
+from dsl_core.model.rig import Rig
+
+
+@dataclass
+class Learned:
+    """What the pictures so far say of those to come, as far as it follows from their findings."""
+
+    usual: UsualLight
+    steps: LightSteps
+    places: LinePlaces
+    #: Shots of later settings that were found wrong before.
+    contested: set[int]
+
+    def copy(self) -> Learned:
+        """Another one, which further pictures change alone."""
+        return Learned(self.usual.copy(), self.steps.copy(), self.places.copy(), self.contested.copy())
+
+
+class Known:
+    """A scan's plan and calibration, its right pictures so far, and what follows from them."""
+
+    def __init__(
+        self,
+        plan: CapturePlan,
+        calibration: Rig | None,
+        bit_depth: int,
+        bayer: str,
+        at_the_end: bool,
+        knows_light: bool,
+    ) -> None:
+        """The arguments are those of `FrameProof`."""
+        self.plan, self.calibration = plan, calibration
+        self.at_the_end, self.knows_light = at_the_end, knows_light
+        self.shots = tuple(plan.shots())
+        self.raster = Raster(plan.camera_size_px)
+        self.noise = Noise.of(calibration.sensor if calibration else None, bit_depth)
+        self.bayer = calibration.sensor.bayer if calibration else bayer
+        #: The setting whose code is judged by itself.
+        self.first = min(plan.code_settings)
+        #: Indices of the shots of that setting by role and pattern, and of black by setting.
+        self.places = {(s.role, s.pattern): s.index for s in self.shots if s.setting == self.first}
+        self.blacks = {s.setting: s.index for s in self.shots if s.role == "black"}
+        #: The right pictures by the index of their shot, and which of them said nothing by themselves.
+        self.kept: dict[int, Counts] = {}
+        self.untold: set[int] = set()
+        self.learned = Learned(
+            UsualLight(self.first, knows_light and calibration is not None),
+            LightSteps(),
+            LinePlaces(),
+            set(),
+        )
+        self.code = self._first_code()
+        self._profiles: dict[tuple[Role, int], Floats | None] = {}
+
+    def _first_code(self) -> FirstCode | None:
+        plan = self.plan
+        # Codes of other programs are imported, complete or not: no frame can be taken again.
+        if isinstance(plan.code, NoCode | CapturedCode):
+            return None
+        own = [s for s in self.shots if s.setting == self.first and s.role in ("code", "white", "black")]
+        rises = None if self.calibration is None else self.calibration.pose.matrix[0, 0] > 0
+        return FirstCode(plan, plan.code, own, self.raster, self.noise, self.bayer, rises, self.at_the_end)
+
+    @property
+    def lit(self) -> Lit | None:
+        """The projector's columns that pixels see; None until the first code is there."""
+        return None if self.code is None else self.code.lit
+
+    def profile(self, shot: Shot) -> Floats | None:
+        """The `line_profile` of a shot, which is a rival of its neighbours as well, at every setting."""
+        shot = self.plan.original(shot)
+        key = shot.role, shot.pattern
+        if key not in self._profiles:
+            self._profiles[key] = line_profile(self.plan, shot)
+        return self._profiles[key]
+
+    def rivals(self, shot: Shot) -> list[tuple[Verdict, Shot]]:
+        """The shots whose pattern a picture most likely shows instead, and what that would be called."""
+        found = []
+        if shot.index + 1 < len(self.shots):
+            found.append((Verdict.SWAPPED, self.shots[shot.index + 1]))
+        if shot.index > 0:
+            found.append((Verdict.LATE, self.shots[shot.index - 1]))
+        return found
+
+    def black(self, shot: Shot) -> Counts | None:
+        """The black picture of a shot's setting, if it is there."""
+        return self.kept.get(self.blacks[shot.setting])
+
+    def ends(self, setting: int) -> tuple[Counts, Counts] | None:
+        """White and black of a setting, if both are there."""
+        own = [s for s in self.shots if s.setting == setting and s.role in ("white", "black")]
+        kept = {shot.role: self.kept.get(shot.index) for shot in own}
+        white, black = kept.get("white"), kept.get("black")
+        return None if white is None or black is None else (white, black)
+
+    def code_pairs(self) -> dict[int, tuple[Counts, Counts]]:
+        """Pattern and inverse of the first code by the number of the pair, as far as both are there."""
+        kept = {n: self.kept.get(at) for (role, n), at in self.places.items() if role == "code"}
+        pairs = {n // 2: (one, kept.get(n + 1)) for n, one in kept.items() if n % 2 == 0}
+        return {n: (one, other) for n, (one, other) in pairs.items() if one is not None and other is not None}
+
+    def remember(self, shot: Shot, seen: Counts, again: tuple[Shot, ...], is_told: bool) -> None:
+        """Keep a picture unless it is among those to take again, all of which are forgotten."""
+        for wrong in again:
+            self.kept.pop(wrong.index, None)
+        if shot not in again:
+            self.kept[shot.index] = seen
+            (self.untold.discard if is_told else self.untold.add)(shot.index)

@@ -1,0 +1,86 @@
+"""What pictures say only together: whether light was lost, changed colour, or was wrong from the start."""
+
+from __future__ import annotations
+
+from dsl_core.capture.proof.code.code_sum import CodeSum, code_sum
+from dsl_core.capture.proof.colour_again import ColourAgain, colour_again
+from dsl_core.capture.proof.judging.known import Known
+from dsl_core.capture.proof.lasting.ends import sentences_of_ends
+from dsl_core.capture.proof.lasting.pair_places import pair_places
+from dsl_core.capture.proof.lines.line_sum import LineSum, line_sum
+from dsl_core.capture.proof.lines.local_sum import LocalSum, local_sum
+from dsl_core.capture.proof.white_again import WhiteAgain, white_again
+from dsl_core.model.captured_code import CapturedCode
+from dsl_core.model.plan import NoCode
+
+
+class WholeScan:
+    """Questions on all that is known of a scan; each has an answer as soon as its pictures are there."""
+
+    def __init__(self, known: Known) -> None:
+        """``known`` grows as pictures come."""
+        self._known = known
+
+    def code_sum(self) -> CodeSum | None:
+        """What patterns and inverses of the first code are together; None while that says nothing."""
+        known = self._known
+        ends = [known.kept.get(known.places.get((role, 0), -1)) for role in ("white", "black")]
+        if known.lit is None or ends[0] is None or ends[1] is None:
+            return None
+        return code_sum(known.code_pairs(), (ends[0], ends[1]), known.lit, known.noise)
+
+    def line_sum(self) -> LineSum | None:
+        """What all lines of the first setting are together; None while that says nothing."""
+        known = self._known
+        if known.lit is None:
+            return None
+        return line_sum(known.plan, known.first, known.kept, known.lit, known.noise)
+
+    def local_sums(self) -> list[LocalSum]:
+        """Where lines of each setting do not add up to white though most of the picture does."""
+        known, lit = self._known, self._known.lit
+        if lit is None:
+            return []
+        settings = range(len(known.plan.settings))
+        found = (local_sum(known.plan, n, known.kept, lit, known.noise, known.raster) for n in settings)
+        return [each for each in found if each is not None]
+
+    def white_again(self) -> WhiteAgain | None:
+        """The white, captured again, that differs most from the first in a part of the picture."""
+        return white_again(self._known.plan, self._known.kept, self._known.noise, self._known.raster)
+
+    def colour_again(self) -> ColourAgain | None:
+        """The white, captured again, whose colour differs most from that of the first."""
+        known = self._known
+        return colour_again(known.plan, known.kept, known.noise, known.raster.channels(known.bayer))
+
+    def lasting(self, with_colours: bool = True) -> list[str]:
+        """Sentences on what was wrong from the first picture on, of the darkest setting that is there.
+
+        Without ``with_colours``, those that a filter before the camera explains are left out.
+        """
+        known = self._known
+        found = {s.setting for s in known.shots if s.role == "white"}
+        levels = {n: known.plan.settings[n].level for n in sorted(found) if known.ends(n) is not None}
+        setting = min(levels, key=lambda n: levels[n], default=None)
+        ends = None if setting is None else known.ends(setting)
+        said: list[str] = []
+        if ends is not None and setting is not None:
+            said = sentences_of_ends(
+                *ends,
+                known.plan,
+                setting,
+                known.calibration if known.knows_light else None,
+                known.raster.channels(known.bayer),
+                known.noise,
+                known.raster,
+                with_colours,
+            )
+        return [each for each in (*said, self._pair_places()) if each]
+
+    def _pair_places(self) -> str:
+        known, code = self._known, self._known.plan.code
+        if known.lit is None or isinstance(code, NoCode | CapturedCode):
+            return ""
+        found = pair_places(code, known.plan.projector_size_px, known.code_pairs(), known.lit)
+        return "" if found is None else found.sentence
