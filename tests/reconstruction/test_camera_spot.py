@@ -148,6 +148,24 @@ def test_a_displacement_is_doubted_by_the_scatter_of_the_spot_but_never_wholly()
         assert found.doubt == pytest.approx(doubt, rel=0.02)
 
 
+@pytest.mark.parametrize(("slope", "away_px"), [(3.0, 0.75), (6.0, 1.0)])
+def test_light_comes_from_no_farther_than_two_widths_of_the_spot(
+    monkeypatch: pytest.MonkeyPatch, slope: float, away_px: float
+) -> None:
+    spot = CameraSpot(0.25, 0.001, 0.0, 0.5)
+    monkeypatch.setattr("dsl_core.reconstruction.camera_spot.fit_spot", lambda *_: spot)
+    plain = rig().model_copy(update={"sensor": rig().sensor.model_copy(update={"bayer": "MONO"})})
+    before, _ = geometry(plain, 0.0)
+    # Up and down again, so that the darkest light is well above none.
+    rise = np.abs((np.arange(COLUMNS) + 2) % 4 - 2.0)
+    light = np.broadcast_to(np.exp(slope * rise).astype(np.float32), SHAPE)
+    after, _ = follow_spot(plain, LINES, replace(before, amplitude=light, amplitude_std=0 * light))
+    assert after.displaced_px is not None
+    steps = column_slopes(before.column_px)[0]
+    uphill = np.s_[10:-10, 13:-10:4]
+    assert np.abs(after.displaced_px / steps)[uphill] == pytest.approx(away_px, rel=1e-5)
+
+
 def test_slopes_of_a_ramp_are_exact_with_and_without_a_mosaic() -> None:
     y, x = np.mgrid[:20, :30].astype(float)
     colour = np.where((y + x) % 2 == 0, 1.0, 0.4)

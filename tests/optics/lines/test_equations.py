@@ -218,3 +218,23 @@ def test_bands_that_no_pixel_has_inside_the_frame_stay_without_light(stop: int) 
     full = banded.to_dense(system.matrix)
     assert not full[:, :, stop:].any()
     assert (full[:, stop - 2, stop - 1] > 0).all()
+
+
+def test_the_first_and_the_last_of_the_frames_that_are_given_count_as_all_others() -> None:
+    rig = published_rig()
+    bands = Bands.of(rig, WavelengthGrid())
+    lines = LineSet(5, 2, 2.0, 320, 320)
+    columns = 100.0 + 2.5 * torch.arange(bands.count, dtype=torch.float64)[:, None].expand(-1, 2)
+    inside = torch.ones_like(columns, dtype=torch.bool)
+    first, last = 60, 80
+    weight = torch.zeros((lines.frames, 2), dtype=torch.float64)
+    weight[first : last + 1] = 1.0
+    found = []
+    for part in (slice(None), slice(first, last + 1)):
+        system = LineEquations(bands, lines, rig.projector_response.blur_px, torch.tensor([1, 1]), columns[0])
+        system.add(1, columns, inside, weight[part], weight[part], part.start or 0)
+        found.append((system.matrix, system.right))
+    whole, some = found
+    assert whole[1].any()
+    assert torch.equal(whole[0], some[0])
+    assert torch.equal(whole[1], some[1])
