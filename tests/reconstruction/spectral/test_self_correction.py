@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -106,6 +108,15 @@ def test_a_model_is_taken_only_if_frames_fit_it_better(
     assert fits_better(before, less)
     assert not fits_better(before, same)
     assert not fits_better(less, before)
+
+
+@pytest.mark.parametrize(("pixels", "is_enough"), [(0, False), (1, False), (2, True)])
+def test_two_pixels_that_agree_say_whether_frames_fit_better(pixels: int, is_enough: bool) -> None:
+    sound = np.arange(4) < pixels
+    before, after = (
+        cast("Any", SimpleNamespace(sound=sound, chi_square=np.full(4, fit))) for fit in (1.3, 1.1)
+    )
+    assert fits_better(before, after) == is_enough
 
 
 def test_what_both_orders_share_is_left_to_the_responses(
