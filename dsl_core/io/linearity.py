@@ -1,4 +1,4 @@
-"""Whether the values of a scan are linear in light, asked of the patterns and inverses of its code."""
+"""Whether the values of a scan are linear in light, asked of the stripes of its code."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ from math import isfinite
 from typing import Literal
 
 from dsl_core.model.frames import FrameSource
-from dsl_core.optics.additivity import Additivity, MixedLight, additivity, mixed_light
-from dsl_core.patterns.inverse_pairs import inverse_pairs
+from dsl_core.optics.additivity import Additivity, Telling, additivity, mixed_light, stripe_light
+from dsl_core.patterns.inverse_pairs import inverse_pairs, lone_stripes
 
-#: The finest stripes mix most light: so many pairs of each set are read.
-PAIRS_OF_A_SET = 3
+#: The finest stripes mix most light: so many digits of each set are read.
+DIGITS_OF_A_SET = 3
 #: Exponents are not better known than this, whatever pairs agree on: projectors sharpen stripes.
 LEAST_STD = 0.1
 #: The words by which sentences about this are known.
@@ -42,7 +42,7 @@ class Linearity:
 def linearity_of(
     source: FrameSource, full_scale_dn: float, black_level_dn: float, absent: Collection[int] = ()
 ) -> Linearity:
-    """Read white, black and the finest pairs of a scan, and say what their sums tell.
+    """Read white, black and the finest stripes of a scan, and say what their sums tell.
 
     ``full_scale_dn`` is the value of a saturated pixel; ``absent`` are indices of shots that cannot be read.
     Raises what reading the others raises.
@@ -54,27 +54,30 @@ def linearity_of(
         for shot in plan.shots()
         if shot.setting == setting and shot.index not in absent
     }
-    sets = inverse_pairs(plan.code, plan.projector_size_px)
+    sets: tuple[tuple[tuple[int, ...], ...], ...] = inverse_pairs(plan.code, plan.projector_size_px)
+    sets = sets or tuple(tuple((each,) for each in lone) for lone in lone_stripes(plan.code))
     if not sets:
-        return Linearity("unknown", None, f"no pattern has an inverse, so {_UNKNOWN}")
-    pairs = [pair for each in sets for pair in each[-PAIRS_OF_A_SET:]]
-    pairs = [pair for pair in pairs if all(("code", number) in shots for number in pair)]
-    if not pairs or ("white", 0) not in shots or ("black", 0) not in shots:
+        return Linearity("unknown", None, f"the code has no stripes, so {_UNKNOWN}")
+    digits = [digit for each in sets for digit in each[-DIGITS_OF_A_SET:]]
+    digits = [digit for digit in digits if all(("code", number) in shots for number in digit)]
+    if not digits or ("white", 0) not in shots or ("black", 0) not in shots:
         return Linearity("unknown", None, f"frames are missing, so {_UNKNOWN}")
-    white, black = source.read(shots["white", 0]), source.read(shots["black", 0])
+    ends = source.read(shots["white", 0]), source.read(shots["black", 0])
 
-    def seen(pair: tuple[int, int]) -> MixedLight | None:
-        one, other = (source.read(shots["code", number]) for number in pair)
-        return mixed_light((one, other), white, black, full_scale_dn, black_level_dn)
+    def seen(digit: tuple[int, ...]) -> Telling | None:
+        frames = [source.read(shots["code", number]) for number in digit]
+        if len(frames) == 2:
+            return mixed_light((frames[0], frames[1]), *ends, full_scale_dn, black_level_dn)
+        return stripe_light(frames[0], *ends, full_scale_dn, black_level_dn)
 
-    return _judged(additivity(map(seen, pairs)))
+    return _judged(additivity(map(seen, digits)))
 
 
 def _judged(found: Additivity | None) -> Linearity:
     if found is None:
         words = f"too few pixels see bright and dark stripes at once above the noise, so {_UNKNOWN}"
         return Linearity("unknown", None, words)
-    figure = f"pattern and inverse together are {found.figure} white and black together where stripes meet"
+    figure = found.figure
     if isfinite(found.exponent) and not found.is_linear:
         std = max(found.exponent_std, LEAST_STD)
         figure += f"; light goes with the value to the power {found.exponent:.1f} ± {std:.1f}"

@@ -1,14 +1,17 @@
-"""Whether values of pictures are linear in light, from patterns and their inverses.
+"""Whether values of pictures are linear in light, from stripes that lens or surface mix.
 
-Light adds up: where the lens or a surface mixes bright and dark stripes, a pattern and its inverse together
-are white and black together. Only linear values keep that. Pictures for screens, such as sRGB, store half
-the light as almost three quarters of the range, so that the sum is too bright by up to half the contrast.
+Light adds up: where bright and dark stripes mix, a pattern and its inverse together are white and black
+together. Only linear values keep that. Pictures for screens, such as sRGB, store half the light as almost
+three quarters of the range, so that the sum is too bright by up to half the contrast. Stripes without their
+inverse tell it as well: as bright and dark ones are equally wide, a picture of many of them has, on average,
+half the light of white.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,6 +34,10 @@ NEIGHBOURS = 9
 LINEAR, NOTICEABLE = (0.7, 1.3), 0.03
 #: Exponents that pass for sRGB.
 SRGB = (1.6, 3.0)
+#: Parts of a picture along each side, whose means say how far that of the whole may be off; and the fewest.
+PARTS, FEWEST_PARTS = 4, 4
+#: The exponent of sRGB, nearly: stripes tell something where this would change their mean.
+ALMOST_SRGB = 2.2
 #: Exponents that are looked for, and how often their interval is halved.
 _BOUNDS, _HALVINGS = (0.2, 6.0), 16
 #: Standard deviation of a normal distribution for one of its median absolute deviation; the median's for
@@ -43,7 +50,8 @@ class Additivity:
     """By how much pattern and inverse together exceed white and black together, of all ``pairs``.
 
     ``excess`` and ``excess_std`` are shares of the contrast. ``exponent`` is the power of the values that is
-    linear in light (1: they are as they are; sRGB: about 2), NaN if there is none between 0.2 and 6.
+    linear in light (1: they are as they are; sRGB: about 2), NaN if there is none between 0.2 and 6. Patterns
+    that are ``alone`` exceed half of white by half of that.
     """
 
     excess: float
@@ -52,6 +60,7 @@ class Additivity:
     exponent_std: float
     pairs: int
     pixels: int
+    alone: bool = False
 
     @property
     def is_linear(self) -> bool:
@@ -70,11 +79,29 @@ class Additivity:
     def figure(self) -> str:
         """The excess in words.
 
-        >>> Additivity(0.27, 0.01, 2.1, 0.1, 6, 900).figure
-        '27.0 ± 1.0 % of the contrast brighter than'
+        >>> Additivity(0.27, 0.01, 2.1, 0.1, 6, 900, alone=True).figure
+        'fine stripes are, on average, 13.5 ± 0.5 % of the contrast brighter than half of white'
         """
-        where = "brighter" if self.excess > 0 else "darker"
-        return f"{100 * abs(self.excess):.1f} ± {100 * self.excess_std:.1f} % of the contrast {where} than"
+        where, share = "brighter" if self.excess > 0 else "darker", 50 if self.alone else 100
+        off = f"{share * abs(self.excess):.1f} ± {share * self.excess_std:.1f} % of the contrast {where} than"
+        if self.alone:
+            return f"fine stripes are, on average, {off} half of white"
+        return f"pattern and inverse together are {off} white and black together where stripes meet"
+
+
+class Telling(Protocol):
+    """Pixels of a pair, or of a pattern without its inverse, that can tell whether light adds up."""
+
+    def excess(self, exponent: float) -> float:
+        """By how much the light exceeds what it would be, for this power of the values."""
+
+    @property
+    def noise(self) -> float:
+        """Deviation of the excess of the values as they are."""
+
+    @property
+    def pixels(self) -> int:
+        """How many pixels tell it."""
 
 
 @dataclass(frozen=True)
@@ -86,6 +113,58 @@ class MixedLight:
 
     mixed: Floats
     pure: Floats
+
+    def excess(self, exponent: float) -> float:
+        """The median sum where light is mixed, relative to where it is not: the lamp's drift is in both."""
+        # Values below the black level have no power.
+        mixed, pure = (np.maximum(values, 1e-6) ** exponent for values in (self.mixed, self.pure))
+        reference = float(np.median(_sums(pure))) if pure.shape[1] >= FEWEST else 0.0
+        return float(np.median(_sums(mixed))) - reference
+
+    @property
+    def noise(self) -> float:
+        """Deviation of the median sum."""
+        sums = _sums(self.mixed)
+        spread = _MAD * float(np.median(np.abs(sums - np.median(sums))))
+        return float(_MEDIAN * spread / np.sqrt(sums.size / NEIGHBOURS))
+
+    @property
+    def pixels(self) -> int:
+        """Pixels that see bright and dark stripes at once."""
+        return int(self.mixed.shape[1])
+
+
+@dataclass(frozen=True)
+class StripeLight:
+    """Pattern, white and black of stripes without an inverse, shares of the full scale, shape (3, n).
+
+    ``part`` (n,) is the number of the part of the picture that a pixel is in.
+    """
+
+    values: Floats
+    part: NDArray[np.intp]
+
+    def excess(self, exponent: float) -> float:
+        """Twice what the mean share of white's light exceeds a half by."""
+        return float(self._shares(exponent).mean())
+
+    @property
+    def noise(self) -> float:
+        """Deviation of the mean, as parts of the picture differ."""
+        sums = np.bincount(self.part, self._shares(1.0))
+        count = np.bincount(self.part)
+        means = sums[count >= FEWEST] / count[count >= FEWEST]
+        return float(means.std(ddof=1) / np.sqrt(means.size)) if means.size >= FEWEST_PARTS else np.inf
+
+    @property
+    def pixels(self) -> int:
+        """Pixels whose mean is taken."""
+        return int(self.values.shape[1])
+
+    def _shares(self, exponent: float) -> Floats:
+        pattern, white, black = np.maximum(self.values, 1e-6) ** exponent
+        shares: Floats = 2 * (pattern - black) / (white - black) - 1
+        return shares
 
 
 def mixed_light(
@@ -115,23 +194,47 @@ def mixed_light(
     return MixedLight(_some(mixed), _some(values[:, apart > PURE]))
 
 
-def additivity(pairs: Iterable[MixedLight | None]) -> Additivity | None:
-    """What pairs say together; None when none says anything."""
+def stripe_light(
+    pattern: Counts, white: Counts, black: Counts, full_scale_dn: float, black_level_dn: float = 0.0
+) -> StripeLight | None:
+    """What stripes without an inverse can tell, of frames (rows, columns) in DN; None if that is nothing.
+
+    They have to be so many that any part of the picture has as many bright as dark ones, and so fine that
+    their light is mixed.
+    """
+    frames = np.stack([pattern, white, black]).astype(np.float64)
+    sound = (frames < SATURATED * full_scale_dn).all(axis=0)
+    values = (frames - black_level_dn) / max(full_scale_dn - black_level_dn, 1.0)
+    sound &= values[1] - values[2] > LEAST_CONTRAST
+    rows, columns = (np.arange(size) * PARTS // size for size in pattern.shape)
+    found = StripeLight(values[:, sound], (PARTS * rows[:, None] + columns)[sound])
+    if found.pixels < FEWEST:
+        return None
+    telling = abs(found.excess(ALMOST_SRGB) - found.excess(1.0))
+    return found if telling > NOTICEABLE + 3 * found.noise else None
+
+
+def additivity(pairs: Iterable[Telling | None]) -> Additivity | None:
+    """What pairs, or patterns without inverse, say together; None when none says anything."""
     told = [pair for pair in pairs if pair is not None]
     if not told:
         return None
-    excesses = np.array([_excess(pair, 1.0) for pair in told])
-    noises = np.array([_noise(pair) for pair in told])
+    excesses = np.array([pair.excess(1.0) for pair in told])
+    noises = np.array([pair.noise for pair in told])
     exponents = np.array([_exponent(pair) for pair in told])
     found = exponents[np.isfinite(exponents)]
     known = 2 * found.size > exponents.size
+    alone = isinstance(told[0], StripeLight)
+    noise = float(np.sqrt(np.mean(noises**2)))
     return Additivity(
         float(excesses.mean()),
-        _deviation(excesses, float(np.sqrt(np.mean(noises**2)))),
+        # The finer stripes are, the more of their light is mixed.
+        noise / len(told) ** 0.5 if alone else _deviation(excesses, noise),
         float(np.mean(found)) if known else float("nan"),
         _deviation(found, 0.0) if known else float("nan"),
         len(told),
-        sum(pair.mixed.shape[1] for pair in told),
+        sum(pair.pixels for pair in told),
+        alone,
     )
 
 
@@ -157,28 +260,14 @@ def _sums(values: Floats) -> Floats:
     return sums
 
 
-def _excess(pair: MixedLight, exponent: float) -> float:
-    """The median sum where light is mixed, relative to where it is not: the lamp's drift is in both."""
-    # Values below the black level have no power.
-    mixed, pure = (np.maximum(values, 1e-6) ** exponent for values in (pair.mixed, pair.pure))
-    reference = float(np.median(_sums(pure))) if pure.shape[1] >= FEWEST else 0.0
-    return float(np.median(_sums(mixed))) - reference
-
-
-def _noise(pair: MixedLight) -> float:
-    sums = _sums(pair.mixed)
-    spread = _MAD * float(np.median(np.abs(sums - np.median(sums))))
-    return float(_MEDIAN * spread / np.sqrt(sums.size / NEIGHBOURS))
-
-
-def _exponent(pair: MixedLight) -> float:
+def _exponent(pair: Telling) -> float:
     """The power of the values that adds up: with higher powers the sum falls."""
     low, high = _BOUNDS
-    if not _excess(pair, low) > 0 > _excess(pair, high):
+    if not pair.excess(low) > 0 > pair.excess(high):
         return float("nan")
     for _ in range(_HALVINGS):
         middle = (low * high) ** 0.5
-        low, high = (middle, high) if _excess(pair, middle) > 0 else (low, middle)
+        low, high = (middle, high) if pair.excess(middle) > 0 else (low, middle)
     return float((low * high) ** 0.5)
 
 

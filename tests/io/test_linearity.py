@@ -70,3 +70,12 @@ def test_real_pictures_are_linear_until_they_are_encoded(tmp_path: Path, power: 
     assert found.verdict == verdict
     assert found.figures is not None
     assert found.figures.exponent == pytest.approx(1 / power, rel=0.1)
+    # The same pictures without inverses say the same.
+    files = tuple(f"{place}.png" for place in (0, 2, 4, 6, 7))
+    parts = (StripePictures(bits=3, inverse="none"), WhitePicture(), BlackPicture())
+    scan = open_pictures(tmp_path, Mapping(files=files, parts=parts, projector_size_px=(1024, 768)))
+    alone = linearity_of(scan, 255, 0)
+    assert alone.verdict == verdict
+    assert alone.figures is not None
+    assert alone.figures.alone
+    assert alone.figures.exponent == pytest.approx(1 / power, rel=0.1)

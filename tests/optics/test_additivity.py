@@ -8,7 +8,14 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from dsl_core.optics.additivity import Additivity, MixedLight, additivity, mixed_light
+from dsl_core.optics.additivity import (
+    Additivity,
+    MixedLight,
+    StripeLight,
+    additivity,
+    mixed_light,
+    stripe_light,
+)
 from dsl_core.optics.colour import srgb_decode, srgb_encode
 
 Floats = NDArray[np.float64]
@@ -139,3 +146,38 @@ def test_of_a_large_picture_only_some_pixels_are_kept() -> None:
 def test_decoding_undoes_encoding() -> None:
     light = np.linspace(0, 1, 33)
     np.testing.assert_allclose(srgb_decode(srgb_encode(light)), light, atol=2e-5)
+
+
+def lone(encode: Encoding, period_px: float, blur_px: int = 9) -> StripeLight | None:
+    """A wall under slanted stripes of a period without their inverse, blurred by the lens."""
+    x = (np.arange(240 + blur_px - 1) + 0.3 * np.arange(60)[:, None]) / period_px
+    stripes = (x % 1 < 0.5).astype(float)
+    share = np.stack([np.convolve(row, np.ones(blur_px) / blur_px, "valid") for row in stripes])
+    albedo = np.linspace(0.4, 1.0, 60)[:, None]
+
+    def frame(light: Floats) -> NDArray[np.uint16]:
+        return np.asarray(np.rint(encode(0.02 + 0.8 * light) * FULL_DN), np.uint16)
+
+    return stripe_light(frame(albedo * share), frame(albedo + 0 * share), frame(0 * share), FULL_DN)
+
+
+@pytest.mark.parametrize(
+    ("encode", "exponent"), [(linear, 1.0), (srgb_encode, 2.2), (lambda light: light ** (1 / 1.5), 1.5)]
+)
+def test_fine_stripes_without_inverse_have_half_of_white_in_linear_values(
+    encode: Encoding, exponent: float
+) -> None:
+    found = additivity(lone(encode, period) for period in (12.0, 17.0, 24.0))
+    assert found is not None
+    assert found.alone
+    assert found.pairs == 3
+    assert found.exponent == pytest.approx(exponent, abs=0.15)
+    assert found.is_linear == (exponent == 1)
+    assert found.is_srgb == (exponent == 2.2)
+    assert "% of the contrast" in found.figure
+
+
+def test_few_or_sharp_stripes_without_inverse_say_nothing() -> None:
+    assert lone(linear, 150.0) is None, "parts of the picture see more bright than dark ones"
+    assert lone(linear, 24.0, blur_px=1) is None, "no light is mixed"
+    assert lone(linear, 24.0) is not None

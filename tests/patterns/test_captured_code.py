@@ -75,7 +75,24 @@ def test_the_deviation_holds_the_errors_of_noisy_digits() -> None:
     assert found.fine_std_px is not None
     error = found.fine_column_px - _columns()
     assert np.mean(np.abs(error) > 1) > 0.01
-    assert 0.5 < np.sqrt(np.mean((error / found.fine_std_px) ** 2)) < 3
+    stated = np.sqrt(np.mean(found.fine_std_px**2))
+    assert stated == pytest.approx(1.2 * np.sqrt(np.mean(error**2)), rel=0.2)
+    assert np.mean(np.abs(error) < 1.96 * found.fine_std_px) > 0.95
+
+
+@pytest.mark.parametrize("kind", ["gray", "binary"])
+def test_digits_that_a_pixel_sees_at_an_edge_are_as_unsure_as_what_they_change(kind: str) -> None:
+    code = CapturedCode(column_sets=(Stripes(bits=7, code=kind, inverse=False),))
+    frames = [(value.copy(), variance) for value, variance in _frames(code, 1, 1e-3)]
+    # Half of column 31 and half of 32: of Gray code one digit is between, of binary code six.
+    for value, _ in frames:
+        value[:, 31] = 0.49 * value[:, 32] + 0.51 * value[:, 31]
+    white = (np.ones((SIZE[1], SIZE[0]), np.float32), np.full((SIZE[1], SIZE[0]), 1e-6, np.float32))
+    found = decode_captured(code, SIZE, frames, white)
+    assert found.fine_std_px is not None
+    std = float(np.median(found.fine_std_px[:, 31]))
+    assert (0.4 < std < 1) if kind == "gray" else std > 10
+    assert np.median(found.fine_std_px[:, 40]) == pytest.approx(1 / np.sqrt(12), rel=0.01)
 
 
 def test_a_tie_between_neighbours_keeps_its_column_and_another_does_not() -> None:

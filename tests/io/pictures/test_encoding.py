@@ -61,6 +61,18 @@ def test_a_guess_decodes_pictures_for_screens_and_says_so(folders: dict[str, Pat
     assert not any("white and black" in each for each in stated.unsure)
 
 
+@pytest.mark.parametrize("stored", ["linear", "srgb"])
+def test_stripes_without_inverse_tell_pictures_for_screens_by_their_mean(stored: str, tmp_path: Path) -> None:
+    pictures, white, black = frames([("columns", Stripes(bits=7, inverse=False))])
+    change = for_screens if stored == "srgb" else blurred
+    write(tmp_path, {f"{i:02d}.png": change(p) for i, p in enumerate([*pictures, white, black])})
+    guessed = guess_mapping(tmp_path, PROJECTOR).mapping
+    assert guessed.encoding == stored
+    assert any("fine stripes are, on average" in each for each in guessed.unsure) == (stored == "srgb")
+    found, _ = encoding_of(open_pictures(tmp_path, guessed))
+    assert found.verdict == "linear"
+
+
 def test_stripes_that_a_lens_blurs_are_no_odd_pair_of_a_screens_pictures(tmp_path: Path) -> None:
     """Where stripes of two projector pixels are finer than the camera's, sums are bright everywhere."""
     pictures, white, black = frames([("columns", Stripes(bits=7))], camera=(64, 48))
@@ -89,17 +101,17 @@ def test_values_for_screens_become_linear_channel_by_channel(tmp_path: Path) -> 
     assert load_mosaic(Picture(tmp_path / "a.png"), green, 16)[0, 0] == pytest.approx(14146, abs=2)
 
 
-def test_files_that_note_their_encoding_are_named_where_no_inverse_tells(tmp_path: Path) -> None:
-    pictures, white, black = frames([("columns", Stripes(bits=7, inverse=False))])
+def test_files_that_note_their_encoding_are_named_where_no_stripes_tell(tmp_path: Path) -> None:
+    pictures, white, black = frames([("columns", Stripes(bits=3, unit_px=16, inverse=False))])
     noted = PngImagePlugin.PngInfo()
     noted.add(b"sRGB", b"\0")
     for index, picture in enumerate([*pictures, white, black]):
         Image.fromarray(picture.astype(np.uint8)).save(tmp_path / f"{index:02d}.png", pnginfo=noted)
-    parts = (StripePictures(bits=7, inverse="none"), WhitePicture(), BlackPicture())
+    parts = (StripePictures(bits=3, unit_px=16, inverse="none"), WhitePicture(), BlackPicture())
     mapping = Mapping(parts=parts, projector_size_px=PROJECTOR)
     found, said = encoding_of(open_pictures(tmp_path, mapping))
     assert found.verdict == "unknown"
-    assert said.startswith("the files note sRGB, and no pattern has an inverse")
+    assert said.startswith("the files note sRGB, and too few pixels see bright and dark stripes")
     Image.fromarray(white.astype(np.uint8)).save(tmp_path / "plain.png")
     Image.fromarray(white.astype(np.uint8)).save(tmp_path / "a.jpg")
     assert noted_encoding(tmp_path / "plain.png") == ""
