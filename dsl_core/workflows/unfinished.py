@@ -25,7 +25,9 @@ from dsl_core.workflows.scans import reconstruct_to
 
 _ENDING, _KEY, _LOCK = ".unfinished", "key.json", "writer.lock"
 #: After the facts, a key ends with shape, origin, height of a band of rows, and wavelengths.
-_LAYOUT = re.compile(r"\((\d+), \d+\) \(\d+, \d+\) (\d+) \[")
+_LAYOUT = re.compile(r"\((\d+), \d+\) \(\d+, \d+\) ([1-9]\d*) \[")
+#: What reading a damaged key raises; the last two are for what is nested too deeply.
+_UNREADABLE = (DslError, OSError, ValueError, SyntaxError, TypeError, RecursionError, MemoryError)
 
 
 @dataclass(frozen=True)
@@ -79,7 +81,7 @@ def unfinished_results(folder: Path) -> tuple[UnfinishedResult, ...]:
     found = []
     for work in sorted(folder.glob(f".*{_ENDING}")):
         if not _is_in_use(work / _LOCK):
-            with contextlib.suppress(DslError, OSError, ValueError, SyntaxError, TypeError):
+            with contextlib.suppress(*_UNREADABLE):
                 found.append(_read(work))
     return tuple(found)
 

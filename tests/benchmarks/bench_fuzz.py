@@ -1,7 +1,8 @@
 """Every reader against files that are wrong on purpose: sentences, crashes, the slowest, and memory.
 
-``python -m tests.benchmarks.bench_fuzz SECONDS [--only NAME]`` gives each reader that many seconds, each in a
-process of its own, so that a crash of a library is seen. What is found belongs into the tests of its reader.
+``python -m tests.benchmarks.bench_fuzz SECONDS [--only NAME] [--seed 7]`` gives each reader that many
+seconds, each in a process of its own, so that a crash of a library is seen; another seed, other changes.
+What is found belongs into the tests of its reader.
 Seconds are those of the processor, which do not depend on what else the computer does.
 """
 
@@ -34,17 +35,27 @@ def main() -> int:
     parser = options(__doc__)
     parser.add_argument("seconds", type=float, nargs="?", default=5.0)
     parser.add_argument("--only", default="", help="readers whose names hold this")
+    parser.add_argument("--seed", type=int, default=0, help="which changes are made")
     parser.add_argument("--worker", default="", help="used by itself")
     chosen = parser.parse_args()
     if chosen.worker:
-        print(json.dumps(fuzz(next(s for s in (*SAMPLES, *MORE) if s.name == chosen.worker), chosen.seconds)))
+        sample = next(s for s in (*SAMPLES, *MORE) if s.name == chosen.worker)
+        print(json.dumps(fuzz(sample, chosen.seconds, chosen.seed)))
         return 0
     seconds = min(chosen.seconds, 0.5) if chosen.quick else chosen.seconds
     rows, found, bad = [], {}, 0
     for sample in (*SAMPLES, *MORE):
         if chosen.only not in sample.name:
             continue
-        command = [sys.executable, "-m", "tests.benchmarks.bench_fuzz", str(seconds), "--worker", sample.name]
+        command = [
+            sys.executable,
+            "-m",
+            "tests.benchmarks.bench_fuzz",
+            str(seconds),
+            "--seed",
+            str(chosen.seed),
+        ]
+        command += ["--worker", sample.name]
         try:
             ended = subprocess.run(
                 command, capture_output=True, text=True, check=False, timeout=TIMES * seconds + PATIENCE_S
@@ -68,9 +79,10 @@ def main() -> int:
     return int(bad > 0)
 
 
-def fuzz(sample: Sample, seconds: float) -> dict[str, object]:
-    """Change the sample's file and read it until the time is over."""
-    read = told = round_number = 0
+def fuzz(sample: Sample, seconds: float, first: int = 0) -> dict[str, object]:
+    """Change the sample's file and read it until the time is over; ``first`` says which changes are made."""
+    read = told = 0
+    round_number = 1_000_000 * first
     crashes: dict[str, str] = {}
     slowest = 0.0
     with tempfile.TemporaryDirectory(prefix="dsl-fuzz-") as room:

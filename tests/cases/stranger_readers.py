@@ -15,6 +15,7 @@ import numpy as np
 
 from tests.cases.small_result import small_result
 from tests.cases.small_rig import small_rig
+from tests.cases.stranger_folders import FOLDERS
 from tests.cases.strangers import Sample, make_scan, small_plan
 
 #: Attributes of a result, each JSON of its own, with something in it.
@@ -356,4 +357,5 @@ MORE = (
     Sample("predictions", _make_predictions, "kept.json", _read_predictions),
     Sample("settings", _make_home, "settings.json", _read_settings),
     Sample("session", _make_home, "session.json", _read_session),
+    *FOLDERS,
 )

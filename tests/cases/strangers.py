@@ -281,7 +281,8 @@ def _read_spectra(name: str) -> Callable[[Path], object]:
     return read
 
 
-def _make_dataset(folder: Path) -> None:
+def make_dataset(folder: Path) -> None:
+    """A dataset in the published layout with four pictures, and its plan."""
     import cv2
 
     image = np.full((8, 12, 3), 9000, np.uint16)
@@ -349,7 +350,7 @@ SAMPLES = (
     Sample("ENVI header", _make_spectra, "a.hdr", _read_spectra("a.hdr")),
     Sample("ENVI data", _make_spectra, "a.sli", _read_spectra("a.sli")),
     *(Sample(f"spectra: {name}", write_all, name, reader_of(name)) for name in SPECTRA_FILES),
-    Sample("dataset: image", _make_dataset, "ldr_exposure1/capture_0000.png", _read_dataset),
-    Sample("dataset: plan", _make_dataset, "plan.json", _read_dataset),
+    Sample("dataset: image", make_dataset, "ldr_exposure1/capture_0000.png", _read_dataset),
+    Sample("dataset: plan", make_dataset, "plan.json", _read_dataset),
     Sample("pattern set", _make_patterns, "set.json", _read_patterns),
 )

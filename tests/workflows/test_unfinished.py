@@ -35,6 +35,7 @@ from dsl_core.workflows.unfinished import (
     unfinished_results,
     unfinished_scans,
 )
+from tests.cases.stranger_folders import FOLDERS
 
 OPTIONS = Options(spectra=False, refine_columns=False, band_rows=16)
 
@@ -163,6 +164,26 @@ def test_one_that_runs_or_whose_scan_is_gone_is_not_offered(killed: Path, tmp_pa
     lock.release()
     assert len(unfinished_results(tmp_path)) == 1
     shutil.rmtree(killed)
+    assert unfinished_results(tmp_path) == ()
+
+
+@pytest.mark.parametrize(
+    ("part", "instead"),
+    [
+        (") 4 [", ") 0 ["),
+        ("[", "[" * 5000),
+        ("Options(", "Options(a=" + "-" * 20_000),
+        ("Options(", "Options(a=" + "f(" * 150),
+        ("(8, 12)", f"({'9' * 6000}, 12)"),
+    ],
+    ids=["no height", "nested facts", "nested options", "nested calls", "long number"],
+)
+def test_a_damaged_beginning_of_a_result_is_left_out(tmp_path: Path, part: str, instead: str) -> None:
+    begun = next(each for each in FOLDERS if each.name == "begun result")
+    begun.make(tmp_path)
+    assert len(unfinished_results(tmp_path)) == 1
+    key = tmp_path / begun.file
+    key.write_text(key.read_text().replace(part, instead, 1))
     assert unfinished_results(tmp_path) == ()
 
 
