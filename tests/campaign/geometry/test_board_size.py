@@ -25,7 +25,7 @@ def seen_at(scale: float) -> Rig:
     return rig.model_copy(update={"pose": pose, "depth_range_mm": (scale * low, scale * high)})
 
 
-@pytest.mark.parametrize(("scale", "square_mm"), [(0.5, 10.0), (0.75, 15.0), (1.0, 20.0), (2.0, 40.0)])
+@pytest.mark.parametrize(("scale", "square_mm"), [(0.5, 15.0), (1.0, 20.0), (2.0, 60.0)])
 def test_squares_follow_the_view_of_a_rig(scale: float, square_mm: float) -> None:
     found = fitting_board(USUAL_BOARD, seen_at(scale), 4)
     assert found == USUAL_BOARD.model_copy(update={"square_mm": square_mm})
