@@ -191,7 +191,9 @@ def _check_axes(poses: Sequence[PoseObservation]) -> None:
 def _require_one_way_up(poses: Sequence[PoseObservation]) -> None:
     """Devices that do not move keep the same way up; pictures that were turned later do not."""
     slopes = np.array([_affine(pose.camera_px, pose.projector_px) for pose in poses])
-    turned = (slopes[:, 0, 0] < 0) & (slopes[:, 1, 1] < 0)
+    # Cosine and sine of the turn between both pictures, which is any, but alike in all poses.
+    turns = np.stack([slopes[:, 0, 0] + slopes[:, 1, 1], slopes[:, 1, 0] - slopes[:, 0, 1]], 1)
+    turned = turns @ np.linalg.svd(turns, full_matrices=False)[2][0] < 0
     few = turned if 2 * turned.sum() <= turned.size else ~turned
     if few.any():
         names = ", ".join(pose.name for pose, odd in zip(poses, few, strict=True) if odd)

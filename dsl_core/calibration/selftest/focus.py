@@ -48,7 +48,7 @@ def bar_levels(width_px: int, level: int, inverse: bool) -> NDArray[np.uint8]:
 
 def check_focus(frames: BarFrames, black_dn: float) -> FocusCheck:
     """Blur of the edges, over all and by thirds; raises `CalibrationError` when no edges are seen."""
-    first, second, light = _shares(frames, black_dn)
+    first, second, light = _upright(*_shares(frames, black_dn))
     edges = _find_edges(first, second, light)
     scale = BAR_PX / edges.pitch_px
     mean = _blur(edges, np.ones(len(edges.row), bool))
@@ -73,6 +73,16 @@ def _shares(frames: BarFrames, black_dn: float) -> tuple[Floats, Floats, NDArray
     safe = np.where(light, white, 1.0)
     shares = [(bars + (safe - inverse)) / (2 * safe) for bars, inverse in pairs]
     return shares[0], shares[1], light
+
+
+def _upright(
+    first: Floats, second: Floats, light: NDArray[np.bool_]
+) -> tuple[Floats, Floats, NDArray[np.bool_]]:
+    """Shares of light and where they mean something, turned so that bars that lie in the picture stand."""
+    share = np.where(light, (first + second) / 2, 0.5)
+    # From cell to cell of a mosaic, whose colours may see different shares.
+    across, down = np.abs(share[:, 2:] - share[:, :-2]).mean(), np.abs(share[2:] - share[:-2]).mean()
+    return (first, second, light) if across >= down else (first.T, second.T, light.T)
 
 
 def _find_edges(first: Floats, second: Floats, light: NDArray[np.bool_]) -> _Edges:

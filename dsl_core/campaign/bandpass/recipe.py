@@ -17,6 +17,7 @@ from dsl_core.calibration.light.chain import LineScan
 from dsl_core.calibration.light.zero_order import ZeroOrderFit
 from dsl_core.calibration.orders.bandpass import SeenFilter, fit_bandpass, plane_pixels, plane_profile
 from dsl_core.calibration.orders.order_light import filter_light
+from dsl_core.campaign.common.depths import target_depth_mm
 from dsl_core.campaign.common.flat_target import diffuser_lines, line_frames, scan_lines_of
 from dsl_core.campaign.common.recipe import Bench, Recipe, Step, naming
 from dsl_core.campaign.common.white_shot import (
@@ -58,8 +59,8 @@ class BandpassRecipe(Recipe[BandpassCalibration]):
 
     ``filters_nm`` are the nominal centres of the filters; ``line_px`` is the width and step of the lines
     through a filter, which must tile the frame; ``long_ratio`` above 1 adds a second, longer exposure, for
-    noisy cameras; ``pixels`` is how many camera pixels are used; ``depth_mm`` is the distance of the target;
-    ``reflectance`` is the reflectance of the target.
+    noisy cameras; ``pixels`` is how many camera pixels are used; ``depth_mm`` is the distance of the target,
+    by default two fifths into the rig's depth range; ``reflectance`` is the reflectance of the target.
     """
 
     name = "bandpass"
@@ -72,19 +73,20 @@ class BandpassRecipe(Recipe[BandpassCalibration]):
     line_px: int = 5
     long_ratio: float = 1.0
     pixels: int = 20_000
-    depth_mm: float = 700.0
+    depth_mm: float | None = None
     reflectance: float = 0.99
 
     def steps(self, bench: Bench) -> tuple[Step, ...]:
         """The target without filter, then through each filter, from blue to red."""
         if len(set(self.filters_nm)) < 2:
             raise CalibrationError("Bandpass filters: at least two different filters are needed.")
-        where: dict[str, float | str] = {"depth_mm": self.depth_mm}
+        depth_mm = target_depth_mm(bench.rig, self.depth_mm)
+        where: dict[str, float | str] = {"depth_mm": depth_mm}
         first = Step(
             PLANE,
             "White target without filter",
             "Mount the film in front of the projector. Place the Spectralon or another even white target"
-            f" about {self.depth_mm / 10:g} cm from the camera, facing it; it must not move until the last"
+            f" about {depth_mm / 10:g} cm from the camera, facing it; it must not move until the last"
             " filter is done. No filter in front of the camera.",
             Placement(target="spectralon", film=True, options=where),
         )

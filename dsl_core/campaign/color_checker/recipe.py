@@ -24,6 +24,7 @@ from dsl_core.calibration.colour.patches import (
     orient_chart,
     patch_samples,
 )
+from dsl_core.campaign.common.depths import target_depth_mm
 from dsl_core.campaign.common.flat_target import WHITE, capture_uniform, read_uniform
 from dsl_core.campaign.common.recipe import Bench, Recipe, Step, naming
 from dsl_core.campaign.common.white_shot import other_light, shoot_white
@@ -48,7 +49,8 @@ class ColorCheckerRecipe(Recipe[ColorCheckerCalibration]):
 
     ``chart`` is the name of the chart's reflectances in colour-science; ``corners_px`` are column and row of
     the four outer corners of the patches, in cyclic order from any of them, if the chart is not found
-    automatically; ``depth_mm`` is the distance of the chart.
+    automatically; ``depth_mm`` is the distance of the chart, by default two fifths into the
+    rig's depth range.
     """
 
     name = "color-checker"
@@ -59,7 +61,7 @@ class ColorCheckerRecipe(Recipe[ColorCheckerCalibration]):
 
     chart: str = "BabelColor Average"
     corners_px: _Corners | None = None
-    depth_mm: float = 700.0
+    depth_mm: float | None = None
 
     def steps(self, bench: Bench) -> tuple[Step, ...]:
         """One step: code and uniform pictures of the chart."""
@@ -67,13 +69,14 @@ class ColorCheckerRecipe(Recipe[ColorCheckerCalibration]):
             raise CalibrationError(
                 f"There are no reflectances for a chart {self.chart!r}; choose {', '.join(chart_names())}."
             )
+        depth_mm = target_depth_mm(bench.rig, self.depth_mm)
         return (
             Step(
                 "chart",
                 "Color Checker",
-                f"Film off. Place the chart about {self.depth_mm / 10:g} cm from the camera, facing it, all"
+                f"Film off. Place the chart about {depth_mm / 10:g} cm from the camera, facing it, all"
                 " 24 patches in view. Keep the room dark and avoid reflections.",
-                Placement(target="color-checker", film=False, options={"depth_mm": self.depth_mm}),
+                Placement(target="color-checker", film=False, options={"depth_mm": depth_mm}),
             ),
         )
 

@@ -7,6 +7,14 @@ import numpy as np
 from dsl_core.devices.base import Stage
 from dsl_core.model.rig import Rig
 
+#: Share of the depth range at which a single flat target stands.
+USUAL = 0.4
+
+
+def target_depth_mm(rig: Rig, wanted_mm: float | None) -> float:
+    """Where a flat target stands: at ``wanted_mm``, or where the rig has most room before and behind it."""
+    return float(np.round(depths_mm(rig, USUAL)[0])) if wanted_mm is None else wanted_mm
+
 
 def depths_mm(rig: Rig, *shares: float) -> tuple[float, ...]:
     """Depths at these shares (0 near, 1 far) of the rig's depth range, mm."""

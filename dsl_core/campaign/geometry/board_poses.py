@@ -113,10 +113,13 @@ def default_poses(board: Board, rig: Rig, count: int) -> tuple[BoardPose, ...]:
         raise CalibrationError(
             f"The geometry calibration needs 3 to {MOST_POSES} poses of the board, not {count}."
         )
-    poses = tuple(_fitted(board, rig, wish) for wish in _WISHES[:count])
-    if None in poses:
-        raise CalibrationError(_too_large(board, rig))
-    return tuple(pose for pose in poses if pose is not None)
+    poses = []
+    for wish in _WISHES[:count]:
+        pose = _fitted(board, rig, wish)
+        if pose is None:
+            raise CalibrationError(_too_large(board, rig))
+        poses.append(pose)
+    return tuple(poses)
 
 
 def _too_large(board: Board, rig: Rig) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -11,11 +11,13 @@ from dsl_core.calibration.geometry.bundle import SHARED
 from dsl_core.calibration.geometry.pose_series import MIN_POSES, exposure_warning, observe_series
 from dsl_core.calibration.geometry.projector_corners import observe_pose
 from dsl_core.calibration.geometry.solve import calibrate_geometry
-from dsl_core.campaign.common.recipe import Bench, Recipe, Step
+from dsl_core.campaign.common.recipe import SCAN_NAME, Bench, Recipe, Step
 from dsl_core.campaign.common.white_shot import bracket, shoot_white
 from dsl_core.campaign.geometry.board_poses import default_poses
+from dsl_core.campaign.geometry.board_size import BoardNote, fitting_board
 from dsl_core.campaign.geometry.figures import geometry_figures, look_at_board
 from dsl_core.errors import CalibrationError
+from dsl_core.io.records import read_record
 from dsl_core.model.board import Board, Checkerboard
 from dsl_core.model.calibration.geometry import GeometryCalibration, LeftOut
 from dsl_core.model.calibration.pose_frames import PoseFrames
@@ -24,12 +26,17 @@ from dsl_core.model.plan import CapturePlan, GrayCode, NoSpectral
 from dsl_core.model.rig import Rig
 from dsl_core.progress import Progress
 
+#: The board that nobody has chosen: a rig that places boards itself may get one with other squares.
+USUAL_BOARD = Checkerboard(columns=11, rows=7, square_mm=20.0)
+BOARD_NAME = "board.json"
+
 
 @dataclass(frozen=True)
 class GeometryRecipe(Recipe[GeometryCalibration]):
     """The calibration of both lenses and their pose.
 
-    ``board`` is the printed board with its squares as measured; ``poses`` is how many poses to capture.
+    ``board`` is the printed board with its squares as measured, for a rig that places the usual one itself
+    with squares that suit its view; ``poses`` is how many poses to capture.
     ``ratio`` is how many times longer a second exposure is, 1 for none: one exposure covers both paper and
     ink, which reflects a twentieth as much. ``left_out`` are the steps, such as ``pose-03``, that the fit
     leaves out; their captures are kept.
@@ -39,23 +46,24 @@ class GeometryRecipe(Recipe[GeometryCalibration]):
     title = "Geometry"
     record_type = GeometryCalibration
 
-    board: Board = field(default_factory=lambda: Checkerboard(columns=11, rows=7, square_mm=20.0))
+    board: Board = USUAL_BOARD
     poses: int = 10
     ratio: float = 1.0
     left_out: tuple[str, ...] = ()
 
     def steps(self, bench: Bench) -> tuple[Step, ...]:
         """A step for each pose."""
-        found = default_poses(self.board, bench.rig, self.poses)
+        board = self._board(bench)
+        found = default_poses(board, bench.rig, self.poses)
         return tuple(
-            Step(f"pose-{i:02d}", f"Pose {i}", pose.instruction(bench.rig), pose.placement(self.board))
+            Step(f"pose-{i:02d}", f"Pose {i}", pose.instruction(bench.rig), pose.placement(board))
             for i, pose in enumerate(found, 1)
         )
 
     def look(self, bench: Bench, step: Step) -> tuple[Figure, ...]:
         """Whether the board is whole, sharp and not over-exposed, how it stands, and the room's light."""
         white = shoot_white(bench)
-        return look_at_board(white, self.board, bench.rig, step.title, bench.found)
+        return look_at_board(white, self._board(bench), bench.rig, step.title, bench.found)
 
     def capture(self, bench: Bench, step: Step, progress: Progress) -> None:
         """Choose an exposure by a test shot and capture the code; a scan that was begun continues.
@@ -65,7 +73,7 @@ class GeometryRecipe(Recipe[GeometryCalibration]):
         """
         plan = bench.scan(step, lambda: self._plan(bench, step), progress)
         frames = read_pose(bench, step)
-        doubt = exposure_warning(frames, observe_pose(frames, self.board, plan.projector_size_px))
+        doubt = exposure_warning(frames, observe_pose(frames, self._board(bench), plan.projector_size_px))
         if doubt:
             raise CalibrationError(doubt)
 
@@ -93,11 +101,12 @@ class GeometryRecipe(Recipe[GeometryCalibration]):
                 yield read_pose(bench, step)
 
         plan = bench.scan_of(steps[0]).plan
-        series = observe_series(pictures(), self.board, plan.projector_size_px)
+        board = self._board(bench)
+        series = observe_series(pictures(), board, plan.projector_size_px)
         progress.report("adjust lenses and pose", 0, 1)
         record = calibrate_geometry(
             series.seen,
-            self.board,
+            board,
             plan.camera_size_px,
             plan.projector_size_px,
             baseline_mm=float(np.linalg.norm(bench.rig.pose.translation_mm)),
@@ -124,8 +133,20 @@ class GeometryRecipe(Recipe[GeometryCalibration]):
         )
         return known.model_copy(update={"column_std_px": open_columns_px(known)})
 
+    def _board(self, bench: Bench) -> Board:
+        """The board that is placed: once one was captured, it stays that one."""
+        if self.board != USUAL_BOARD or bench.devices.place is None:
+            return self.board
+        captured = sorted(each.parent for each in bench.folder.glob(f"pose-*/{SCAN_NAME}"))
+        if captured:
+            # Without a note it was captured when there was only one.
+            note = captured[0] / BOARD_NAME
+            return read_record(note, BoardNote).board if note.exists() else self.board
+        return fitting_board(self.board, bench.rig, self.poses)
+
     def _plan(self, bench: Bench, step: Step) -> CapturePlan:
-        """The plan of a pose by a test shot."""
+        """The plan of a pose by a test shot; keeps which board it is of."""
+        bench.keep(step, BOARD_NAME, BoardNote(board=self._board(bench)))
         white = shoot_white(bench)
         settings = bracket(bench.rig, white, f"The board of {step.title}", self.ratio)
         return CapturePlan(

@@ -15,6 +15,7 @@ from dsl_core.calibration.light.spectralon import (
     spectralon_calibration,
 )
 from dsl_core.calibration.light.spectralon_figures import spectralon_figures, unevenness_of_middle
+from dsl_core.campaign.common.depths import target_depth_mm
 from dsl_core.campaign.common.flat_target import capture_uniform, middle, read_uniform
 from dsl_core.campaign.common.recipe import Bench, Recipe, Step, naming
 from dsl_core.campaign.common.white_shot import brightness, other_light, shoot_white
@@ -41,7 +42,7 @@ class SpectralonRecipe(Recipe[SpectralonCalibration]):
     no picture shows it, and all reflectances of scans contain it. ``readings`` is how many times the
     spectroradiometer reads each picture; ``emission_folder`` holds text files ``red*``, ``green*``,
     ``blue*``, ``white*``, ``black*`` from an instrument that is not connected. ``depth_mm`` is the distance
-    of the target.
+    of the target, by default two fifths into the rig's depth range.
     """
 
     name = "spectralon"
@@ -56,13 +57,14 @@ class SpectralonRecipe(Recipe[SpectralonCalibration]):
     reflectance_rel_std: float = 0.0025
     readings: int = 16
     emission_folder: str = ""
-    depth_mm: float = 700.0
+    depth_mm: float | None = None
 
     def steps(self, bench: Bench) -> tuple[Step, ...]:
         """Spectra of the LEDs, then pictures."""
-        place = Placement(target="spectralon", film=False, options={"depth_mm": self.depth_mm})
+        depth_mm = target_depth_mm(bench.rig, self.depth_mm)
+        place = Placement(target="spectralon", film=False, options={"depth_mm": depth_mm})
         where = (
-            f"Take the film off. Place the Spectralon about {self.depth_mm / 10:g} cm from the camera, facing"
+            f"Take the film off. Place the Spectralon about {depth_mm / 10:g} cm from the camera, facing"
             " it, so that it fills at least the middle half of the picture."
         )
         aim = " Aim the spectroradiometer at the middle of the Spectralon."

@@ -22,11 +22,19 @@ from dsl_core.reconstruction.columns.loose_columns import LOOSE_PX, loose_column
 ITERATIONS, STEP_PX = 6, 0.7
 #: Where the fit of a measured spread starts, from the decoded column, px.
 ASIDE_PX = 0.35
+#: Where it starts again where it has not led to the peak, px: just within the ends of the column.
+ENDS_PX = (-0.45, 0.45)
 #: Relative error of the modelled peak (blur, halo, neighbouring pixels), added to each variance, where a scan
 #: was not asked for its own (`peak_error`).
 MODEL_ERROR = 0.0015
 #: The same for combs, where the first orders of other lines are under the peak.
 COMB_ERROR = 0.05
+#: A column is loose, whatever its fit says, unless the line next to its own lights it by so many deviations:
+#: without, the fit has stopped where the slope of that line would begin.
+SEEN_SIGMAS = 3.0
+#: Out of the column that the code names, by so many px from its middle, noise might be taken for that light:
+#: there it must be as clear as this.
+APART_PX, CLEAR_SIGMAS = 0.65, 8.0
 #: A refined column this far from the decoded one is not the same peak.
 MAX_SHIFT_PX = 2.0
 #: Above this reduced chi-square the profile does not fit (two surfaces in one pixel, motion).
@@ -66,8 +74,14 @@ def refine(peaks: LinePeaks, model_error: float = MODEL_ERROR) -> Column:
     """
     coarse_px, single = peaks.coarse_px, peaks.lines.single
     fit = fit_peaks(peaks, model_error)
-    unusual = (fit.chi_square > MAX_CHI_SQUARE) & (fit.used > 3) & (fit.amplitude > 0)
+    unusual = _is_unusual(fit)
     poor = torch.nonzero(unusual).ravel()
+    if single and len(poor):
+        # Sharp lines show no slope but at their ends, where a fit may have to begin.
+        again = peaks.some(poor)
+        fit = _best_of(fit, poor, (fit_peaks(again, model_error, aside) for aside in ENDS_PX))
+        unusual = _is_unusual(fit)
+        poor = torch.nonzero(unusual).ravel()
     if single and len(poor):
         unlike = peaks.some(poor)
         fit = _best_of(fit, poor, (fit_peaks(unlike.wider(focus), UNUSUAL_ERROR) for focus in FOCI))
@@ -77,7 +91,9 @@ def refine(peaks: LinePeaks, model_error: float = MODEL_ERROR) -> Column:
     good = (fit.used > 3) & (fit.amplitude > 0) & (chi_square < limit) & (std_px < 1 / math.sqrt(12))
     good &= ((q - coarse_px).abs() < MAX_SHIFT_PX) & torch.isfinite(q)
     otherwise = torch.where(fit.measured, fit.brightest, torch.maximum(fit.amplitude, fit.brightest))
-    loose = torch.nonzero(good & ~unusual & (std_px > LOOSE_PX)).ravel()
+    apart = (q - coarse_px).abs() > APART_PX
+    is_loose = (std_px > LOOSE_PX) | (fit.beside < torch.where(apart, CLEAR_SIGMAS, SEEN_SIGMAS))
+    loose = torch.nonzero(good & ~unusual & is_loose).ravel()
     if single and len(loose):
         scale = chi_square[loose].clip(min=1)
         q[loose], std_px[loose] = loose_columns(peaks.some(loose), model_error, fit.amplitude[loose], scale)
@@ -98,8 +114,8 @@ def refine(peaks: LinePeaks, model_error: float = MODEL_ERROR) -> Column:
 class PeakFit:
     """Column (px) and amplitude of some peaks as they were fitted, each (pixels,).
 
-    With the information on the column (1/px2), reduced chi-square, frames used, the brightest of them, and
-    whether all of them were measured.
+    With the information on the column (1/px2), reduced chi-square, frames used, the brightest of them,
+    whether all of them were measured, and by how many of its deviations the second brightest is lit.
     """
 
     column_px: Tensor
@@ -110,6 +126,12 @@ class PeakFit:
     used: Tensor
     brightest: Tensor
     measured: Tensor
+    beside: Tensor
+
+
+def _is_unusual(fit: PeakFit) -> Tensor:
+    """Which peaks do not have the shape that was fitted (pixels,), bool."""
+    return (fit.chi_square > MAX_CHI_SQUARE) & (fit.used > 3) & (fit.amplitude > 0)
 
 
 def _best_of(fit: PeakFit, poor: Tensor, again: Iterable[PeakFit]) -> PeakFit:
@@ -122,11 +144,15 @@ def _best_of(fit: PeakFit, poor: Tensor, again: Iterable[PeakFit]) -> PeakFit:
     return PeakFit(**found)
 
 
-def fit_peaks(peaks: LinePeaks, model_error: float) -> PeakFit:
-    """Fit column and amplitude, with the arguments of `refine`, and judge nothing."""
+def fit_peaks(peaks: LinePeaks, model_error: float, aside_px: float | None = None) -> PeakFit:
+    """Fit column and amplitude, with the arguments of `refine`, and judge nothing.
+
+    The fit starts ``aside_px`` from the decoded column, or where the spread asks for.
+    """
     y, variance, centres = peaks.window()
     # Measured spreads may end sharply: from the middle between two frames no frame shows a slope.
-    q = peaks.coarse_px.clone() if peaks.response.spread is None else peaks.coarse_px + ASIDE_PX
+    usual_px = 0.0 if peaks.response.spread is None else ASIDE_PX
+    q = peaks.coarse_px + (usual_px if aside_px is None else aside_px)
     brightest = amplitude = y.amax(0)
     error = model_error if peaks.lines.single else COMB_ERROR
     # No distance grows by more than the steps of all iterations.
@@ -143,6 +169,9 @@ def fit_peaks(peaks: LinePeaks, model_error: float) -> PeakFit:
         information = (amplitude**2 * (weight * along * along).sum(0)).clip(min=1e-12)
         q = q + (amplitude * (weight * along * residual).sum(0) / information).clip(-STEP_PX, STEP_PX)
     used = (weight > 0).sum(0)
+    beside = (amplitude * g * torch.sqrt(weight)).topk(2, 0).values[1]
     chi_square = (weight * residual**2).sum(0) / (used - 2).clip(min=1)
     measured = torch.isfinite(variance).all(0)
-    return PeakFit(q, amplitude, 1 / torch.sqrt(gg), information, chi_square, used, brightest, measured)
+    return PeakFit(
+        q, amplitude, 1 / torch.sqrt(gg), information, chi_square, used, brightest, measured, beside
+    )

@@ -20,6 +20,9 @@ from dsl_core.reconstruction.columns.line_spread import Pickable, spread_pixels
 from dsl_core.reconstruction.hdr import MergedFrame
 from dsl_core.solve.threads import one_kernel_thread
 
+#: Frames on either side of a peak that are looked at where lines leave nothing out.
+FEWEST_BESIDE = 2
+
 
 @dataclass(frozen=True)
 class LinePeaks:
@@ -74,6 +77,9 @@ class LinePeaks:
         """Values, variances and line centres (px) of the frames around the peak, each (window, pixels)."""
         widest_px = self.response.blur_px * (1.0 if self.widths is None else float(self.widths.max()))
         half = math.ceil((self.lines.width_px / 2 + 3 * widest_px + 1) / self.lines.step_px)
+        if self.lines.step_px <= self.lines.width_px:
+            # However sharp lines are: that the next ones are dark is what says where the edge is.
+            half = max(half, FEWEST_BESIDE)
         offsets = torch.arange(-half, half + 1, device=self.coarse_px.device)[:, None]
         line = self.lines.nearest(self.coarse_px) + offsets
         frame = self.lines.frame(line)

@@ -12,6 +12,7 @@ import pytest
 from numpy.typing import NDArray
 
 from dsl_core.calibration.geometry.bundle import Adjustment, Problem, rotation_of, vector_of
+from dsl_core.calibration.geometry.pose_series import _require_one_way_up
 from dsl_core.calibration.geometry.projector_corners import PoseObservation
 from dsl_core.calibration.geometry.solve import HARMFUL_PX, _fitting, calibrate_geometry, initial, without
 from dsl_core.errors import CalibrationError
@@ -175,6 +176,22 @@ def test_a_picture_that_was_turned_later_is_told() -> None:
     poses[1].camera_px[:] = np.array(CAMERA_PX) - 1 - poses[1].camera_px
     with pytest.raises(CalibrationError, match="In pose_1 the camera's picture is upside down, unlike"):
         calibrated(poses)
+
+
+@pytest.mark.parametrize("turned", [None, 1])
+def test_on_its_side_a_camera_is_told_from_a_picture_that_was_turned_later(turned: int | None) -> None:
+    poses = poses_seen()
+    for i, pose in enumerate(poses):
+        x, y = pose.camera_px.T
+        # Tilted boards turn a little either way.
+        little = 0.2 * (-1) ** i
+        pose.camera_px[:] = np.stack([y + little * x, CAMERA_PX[0] - 1 - x + little * y], 1)
+    if turned is None:
+        _require_one_way_up(poses)
+        return
+    poses[turned].camera_px[:] = np.array(CAMERA_PX) - 1 - poses[turned].camera_px
+    with pytest.raises(CalibrationError, match="In pose_1 the camera's picture is upside down, unlike"):
+        _require_one_way_up(poses)
 
 
 def test_a_camera_that_hangs_upside_down_is_as_good() -> None:

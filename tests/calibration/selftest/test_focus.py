@@ -50,6 +50,12 @@ def test_the_blur_of_edges_is_measured_without_bias(blur_px: float, pitch_px: fl
     assert found.worst_px.value >= found.projector_px.value * 0.99
 
 
+def test_a_camera_on_its_side_sees_bars_that_lie() -> None:
+    upright = bar_frames(1.07, 30.0)
+    lying = BarFrames((upright.bars[0].T, upright.bars[1].T), (upright.inverse[0].T, upright.inverse[1].T))
+    assert check_focus(lying, BLACK_DN) == check_focus(upright, BLACK_DN)
+
+
 def test_a_picture_without_edges_is_refused() -> None:
     flat = np.full((100, 200), 1000, np.uint16)
     with pytest.raises(CalibrationError, match="No clear edges"):

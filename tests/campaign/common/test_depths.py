@@ -1,0 +1,33 @@
+"""Targets stand where a rig is for, whatever its distance."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from dsl_core.campaign.common.recipe import AnyRecipe, Bench
+from dsl_core.campaign.recipes import load_recipe
+from dsl_core.simulation.published_rig import published_rig
+from dsl_core.simulation.sim_devices import open_twin
+
+
+@pytest.mark.parametrize("name", ["spectralon", "color-checker", "bandpass"])
+@pytest.mark.parametrize(
+    ("depth_range_mm", "depth_mm"),
+    [((500.0, 1000.0), 700.0), ((280.0, 580.0), 400.0), ((1050.0, 2175.0), 1500.0)],
+)
+def test_flat_targets_stand_within_the_depths_of_their_rig(
+    name: str, depth_range_mm: tuple[float, float], depth_mm: float, tmp_path: Path
+) -> None:
+    rig = published_rig().model_copy(update={"depth_range_mm": depth_range_mm})
+    bench = Bench(open_twin({"size": "30x20"}), tmp_path, rig)
+
+    def where(recipe: AnyRecipe) -> set[object]:
+        return {step.placement.options["depth_mm"] for step in recipe.steps(bench)}
+
+    assert where(load_recipe(name)) == {depth_mm}
+    assert all(
+        f"about {depth_mm / 10:g} cm" in step.instruction for step in load_recipe(name).steps(bench)[:1]
+    )
+    assert where(load_recipe(name, {"depth_mm": "655"})) == {655.0}
