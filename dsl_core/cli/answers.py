@@ -134,11 +134,12 @@ def classify(
         output.say(f"... and {len(notes) - _MOST_NOTES} more notes on the library (see --json).")
     shown = [row for row in found.rows if row.pixels]
     shares = ["-" if row.share is None else f"{row.share:.1%}" for row in shown]
-    areas = ["-" if row.area_mm2 is None else f"{row.area_mm2:.1f}" for row in shown]
-    labels = [(row.label, row.pixels) for row in shown]
     output.table(
         ("class", "pixels", "share", "area (mm2)"),
-        [(*label, share, area) for label, share, area in zip(labels, shares, areas, strict=True)],
+        [
+            (row.label, row.pixels_text, share, row.area_text)
+            for row, share in zip(shown, shares, strict=True)
+        ],
     )
     output.say(f"By {found.method}.")
     if library and not library_error and _are_mostly_none(found):
