@@ -117,6 +117,9 @@ def classify(
         raise PlanError(f"{wrong[0]} must end in {', '.join(ENDINGS)}: choose one for --output.")
     check_targets(outputs, overwrite=force)
     limits = Limits.chosen(Measure(measure), worst, margin)
+    if not (library or pins or at):
+        raise PlanError("Say what to look for: --library FOLDER, --pins, or --at NAME=X,Y.")
+    _check_places(at)
     result = load_result(path)
     if span is not None:
         result = within_nm(result, *parse_span("--range", span))
@@ -183,8 +186,6 @@ def _classes(
     from dsl_core.analysis.places import colours_of_marks, require_spectra
     from dsl_core.io.result.annotations_file import load_annotations
 
-    if not (library or pins or at):
-        raise PlanError("Say what to look for: --library FOLDER, --pins, or --at NAME=X,Y.")
     require_spectra(result)
     classes: list[SpectralClass] = []
     notes: list[str] = []
@@ -351,6 +352,13 @@ def _require_places(pins: bool, at: Sequence[str]) -> None:
     """Raise `PlanError` where no option names a place."""
     if not (pins or at):
         raise PlanError("Say which places: --pins, or --at NAME=X,Y.")
+    _check_places(at)
+
+
+def _check_places(at: Sequence[str]) -> None:
+    """Raise `PlanError` for a place that cannot be read, before a result is, which takes long."""
+    for text in at:
+        parse_place("--at", text)
 
 
 def _masks(path: Path, result: xr.Dataset, pins: bool, at: Sequence[str]) -> dict[str, NDArray[np.bool_]]:
