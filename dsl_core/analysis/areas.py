@@ -35,6 +35,14 @@ def pixel_areas_mm2(points_mm: Cube, normals: Cube | None = None) -> Map:
     return np.asarray(area / faces)
 
 
+def depth_relative_std(points_mm: Cube, depth_std_mm: Cube | None) -> Map | None:
+    """Deviation of each pixel's depth as a share of it, (rows, columns); None where it is not stated."""
+    if depth_std_mm is None:
+        return None
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.asarray(depth_std_mm.astype(np.float64) / points_mm[2])
+
+
 def _gradient(ray: Map, known: NDArray[np.bool_]) -> tuple[Map, Map]:
     """Change of a ray's slope from column to column and from row to row, of a cubic fit to all pixels."""
     rows, columns = known.shape

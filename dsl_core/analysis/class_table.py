@@ -1,4 +1,4 @@
-"""How much of a result is of which class: pixels, shares and areas."""
+"""How much of a result is of which class: pixels, shares and areas, with deviations."""
 
 from __future__ import annotations
 
@@ -7,7 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from dsl_core.analysis.area_deviation import ClassDeviations
 from dsl_core.analysis.classify import ClassMap
+
+#: Areas and their deviations from here on are told in whole mm2.
+_LARGE_MM2, _LARGE_STD_MM2 = 100.0, 10.0
 
 
 @dataclass(frozen=True)
@@ -15,7 +19,7 @@ class ClassRow:
     """One line of the table: a label, its value in the map, its pixels, their share of those judged, area.
 
     ``share`` is None for pixels that were not judged. ``area_mm2`` is of the pixels with a point; None where
-    the result has none.
+    the result has none. Deviations are as `area_deviation` derives them, None where they are not known.
     """
 
     label: str
@@ -23,9 +27,42 @@ class ClassRow:
     pixels: int
     share: float | None
     area_mm2: float | None
+    pixels_std: float | None = None
+    area_std_mm2: float | None = None
+
+    @property
+    def pixels_text(self) -> str:
+        """The pixels with their deviation.
+
+        >>> ClassRow("red", 1, 1308, 0.5, 98.04, 41.7, 3.04).pixels_text
+        '1,308 ± 42'
+        """
+        return f"{self.pixels:,}{_deviation(self.pixels_std, 0)}"
+
+    @property
+    def area_text(self) -> str:
+        """The area with its deviation, mm2, without its unit; a dash where there is none.
+
+        >>> ClassRow("red", 1, 1308, 0.5, 98.04, 41.7, 3.04).area_text
+        '98.0 ± 3.0'
+        """
+        if self.area_mm2 is None:
+            return "–"
+        spread = self.area_std_mm2
+        # Without a deviation, edges of a large area are known to no tenth.
+        digits = int((self.area_mm2 < _LARGE_MM2) if spread is None else spread < _LARGE_STD_MM2)
+        return f"{self.area_mm2:,.{digits}f}{_deviation(spread, digits)}"
 
 
-def class_table(shown: ClassMap, areas_mm2: NDArray[np.floating] | None = None) -> tuple[ClassRow, ...]:
+def _deviation(std: float | None, digits: int) -> str:
+    return "" if std is None else f" ± {std:,.{digits}f}"
+
+
+def class_table(
+    shown: ClassMap,
+    areas_mm2: NDArray[np.floating] | None = None,
+    deviations: ClassDeviations | None = None,
+) -> tuple[ClassRow, ...]:
     """A row for each class, also without pixels, then none of these, undecided and not judged."""
     size = len(shown.labels)
     pixels = np.bincount(shown.values.ravel(), minlength=size)
@@ -33,6 +70,7 @@ def class_table(shown: ClassMap, areas_mm2: NDArray[np.floating] | None = None) 
     areas: NDArray[np.float64] | None = None
     if areas_mm2 is not None:
         areas = np.bincount(shown.values.ravel(), np.nan_to_num(areas_mm2.ravel()), size).astype(np.float64)
+    pixels_std, areas_std = (None, None) if deviations is None else (deviations.pixels, deviations.areas_mm2)
     return tuple(
         ClassRow(
             shown.labels[value],
@@ -40,6 +78,12 @@ def class_table(shown: ClassMap, areas_mm2: NDArray[np.floating] | None = None) 
             int(pixels[value]),
             float(pixels[value] / judged) if value else None,
             None if areas is None else float(areas[value]),
+            _known(pixels_std, value),
+            _known(areas_std, value),
         )
         for value in (*range(1, size), 0)
     )
+
+
+def _known(values: NDArray[np.float64] | None, value: int) -> float | None:
+    return None if values is None or not np.isfinite(values[value]) else float(values[value])

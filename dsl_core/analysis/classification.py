@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from dsl_core.analysis.areas import pixel_areas_mm2
+from dsl_core.analysis.area_deviation import class_deviations
+from dsl_core.analysis.areas import Cube, depth_relative_std, pixel_areas_mm2
 from dsl_core.analysis.class_table import ClassRow, class_table
 from dsl_core.analysis.classes import SpectralClass, class_of_pixels
 from dsl_core.analysis.classify import FEWEST_BANDS, Brightness, ClassMap, Limits, Measure, Scores, score
@@ -33,6 +34,23 @@ ENDINGS = {".hdr": "ENVI classification", ".ply": "points with their class", ".c
 
 
 @dataclass(frozen=True)
+class PixelAreas:
+    """Area of each pixel, mm2, and the deviation of its depth as a share of it, (rows, columns)."""
+
+    mm2: NDArray[np.float64]
+    depth_relative_std: NDArray[np.float64] | None = None
+
+    @classmethod
+    def of(
+        cls, points_mm: Cube | None, normals: Cube | None = None, depth_std_mm: Cube | None = None
+    ) -> PixelAreas | None:
+        """The areas of points (3, rows, columns); None without points."""
+        if points_mm is None:
+            return None
+        return cls(pixel_areas_mm2(points_mm, normals), depth_relative_std(points_mm, depth_std_mm))
+
+
+@dataclass(frozen=True)
 class Classification:
     """Scores, the map under limits, and its table."""
 
@@ -41,7 +59,7 @@ class Classification:
     shown: ClassMap
     rows: tuple[ClassRow, ...]
     brightness: Brightness
-    areas_mm2: NDArray[np.float64] | None = None
+    areas: PixelAreas | None = None
 
     @classmethod
     def of(
@@ -49,16 +67,18 @@ class Classification:
         scores: Scores,
         limits: Limits | None = None,
         brightness: Brightness = "stated",
-        areas_mm2: NDArray[np.float64] | None = None,
+        areas: PixelAreas | None = None,
     ) -> Classification:
-        """The map of scores under limits, with the areas (rows, columns) of its pixels."""
+        """The map of scores under limits, with the areas of its pixels."""
         limits = limits or Limits.usual(scores.measure)
         shown = ClassMap.of(scores, limits)
-        return cls(scores, limits, shown, class_table(shown, areas_mm2), brightness, areas_mm2)
+        mm2, by_depth = (None, None) if areas is None else (areas.mm2, areas.depth_relative_std)
+        table = class_table(shown, mm2, class_deviations(scores, shown, mm2, by_depth))
+        return cls(scores, limits, shown, table, brightness, areas)
 
     def under(self, limits: Limits) -> Classification:
         """The same scores under other limits, in milliseconds."""
-        return Classification.of(self.scores, limits, self.brightness, self.areas_mm2)
+        return Classification.of(self.scores, limits, self.brightness, self.areas)
 
     @property
     def method(self) -> str:
@@ -116,13 +136,10 @@ def within_nm(result: xr.Dataset, low_nm: float, high_nm: float) -> xr.Dataset:
     return result.isel(wavelength_nm=kept)
 
 
-def areas_of(result: xr.Dataset) -> NDArray[np.float64] | None:
-    """Areas of the pixels, mm2; None for a result without points."""
-    if "points_mm" not in result:
-        return None
-    return pixel_areas_mm2(
-        result["points_mm"].values, result["normals"].values if "normals" in result else None
-    )
+def areas_of(result: xr.Dataset) -> PixelAreas | None:
+    """Areas of the pixels; None for a result without points."""
+    names = ("points_mm", "normals", "depth_std_mm")
+    return PixelAreas.of(*(result[name].values if name in result else None for name in names))
 
 
 def classes_of_masks(result: xr.Dataset, masks: Mapping[str, Mask]) -> tuple[SpectralClass, ...]:
@@ -143,8 +160,11 @@ def write_classification(
     shown = found.shown
     colours = shown.palette()
     if path.suffix.lower() == ".csv":
-        header = ("class", "colour", "pixels", "share_of_judged", "area_mm2")
-        rows = [(row.label, colours[row.value], row.pixels, row.share, row.area_mm2) for row in found.rows]
+        header = ("class", "colour", "pixels", "share_of_judged", "area_mm2", "pixels_std", "area_std_mm2")
+        rows = [
+            (r.label, colours[r.value], r.pixels, r.share, r.area_mm2, r.pixels_std, r.area_std_mm2)
+            for r in found.rows
+        ]
         return export_table(result, header, rows, {"method": found.method}, path, overwrite=overwrite)
     scores = found.scores
     made = Classified(shown.values, shown.labels, colours, scores.fit, scores.margin, found.method)

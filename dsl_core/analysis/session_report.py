@@ -88,13 +88,13 @@ def _materials(found: Classification) -> tuple[ReportPicture, ReportTable]:
     rows = tuple(
         (
             row.label,
-            str(row.pixels),
+            row.pixels_text,
             "–" if row.share is None else f"{100 * row.share:.1f} %",
-            "–" if row.area_mm2 is None else f"{row.area_mm2:.1f}",
+            row.area_text,
         )
         for row in found.rows
     )
-    note = f"By {found.method}."
+    note = f"By {found.method}; ± one deviation."
     return picture, ReportTable("Materials", ("Material", "Pixels", "Share", "Area, mm²"), rows, note)
 
 

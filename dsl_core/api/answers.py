@@ -46,9 +46,9 @@ def classify(
     spectra as a share of reflectance, such as 0.02 where another instrument measured them.
 
     The dataset holds ``class`` (y, x), an index into the coordinate ``label``, ``fit`` and ``margin`` (y, x),
-    and for each label ``pixels`` and ``area_mm2``; the attribute ``notes`` lists what was converted or left
-    out of the library. Raises `CalibrationError` for a library without usable spectra and `DecodeError` for
-    places without spectra or a result that has none.
+    and for each label ``pixels`` and ``area_mm2``, with ``pixels_std`` and ``area_std_mm2``; the attribute
+    ``notes`` lists what was converted or left out of the library. Raises `CalibrationError` for a library
+    without usable spectra and `DecodeError` for places without spectra or a result that has none.
     """
     import xarray as xr
 
@@ -91,8 +91,17 @@ def classify(
     }
     if made.rows[0].area_mm2 is not None:
         variables["area_mm2"] = ("label", [rows[label].area_mm2 for label in labels], {"units": "mm2"})
+    if made.rows[0].pixels_std is not None:
+        variables["pixels_std"] = ("label", [_or_nan(rows[label].pixels_std) for label in labels])
+    if made.rows[0].area_std_mm2 is not None:
+        stds = [_or_nan(rows[label].area_std_mm2) for label in labels]
+        variables["area_std_mm2"] = ("label", stds, {"units": "mm2"})
     coords = {"label": labels, "y": result["y"], "x": result["x"]}
     return xr.Dataset(variables, coords=coords, attrs={"method": made.method, "notes": notes})
+
+
+def _or_nan(value: float | None) -> float:
+    return float("nan") if value is None else value
 
 
 def colours(

@@ -117,6 +117,9 @@ def classify(
         raise PlanError(f"{wrong[0]} must end in {', '.join(ENDINGS)}: choose one for --output.")
     check_targets(outputs, overwrite=force)
     limits = Limits.chosen(Measure(measure), worst, margin)
+    if not (library or pins or at):
+        raise PlanError("Say what to look for: --library FOLDER, --pins, or --at NAME=X,Y.")
+    _check_places(at)
     result = load_result(path)
     if span is not None:
         result = within_nm(result, *parse_span("--range", span))
@@ -134,11 +137,12 @@ def classify(
         output.say(f"... and {len(notes) - _MOST_NOTES} more notes on the library (see --json).")
     shown = [row for row in found.rows if row.pixels]
     shares = ["-" if row.share is None else f"{row.share:.1%}" for row in shown]
-    areas = ["-" if row.area_mm2 is None else f"{row.area_mm2:.1f}" for row in shown]
-    labels = [(row.label, row.pixels) for row in shown]
     output.table(
         ("class", "pixels", "share", "area (mm2)"),
-        [(*label, share, area) for label, share, area in zip(labels, shares, areas, strict=True)],
+        [
+            (row.label, row.pixels_text, share, row.area_text)
+            for row, share in zip(shown, shares, strict=True)
+        ],
     )
     output.say(f"By {found.method}.")
     if library and not library_error and _are_mostly_none(found):
@@ -182,8 +186,6 @@ def _classes(
     from dsl_core.analysis.places import colours_of_marks, require_spectra
     from dsl_core.io.result.annotations_file import load_annotations
 
-    if not (library or pins or at):
-        raise PlanError("Say what to look for: --library FOLDER, --pins, or --at NAME=X,Y.")
     require_spectra(result)
     classes: list[SpectralClass] = []
     notes: list[str] = []
@@ -350,6 +352,13 @@ def _require_places(pins: bool, at: Sequence[str]) -> None:
     """Raise `PlanError` where no option names a place."""
     if not (pins or at):
         raise PlanError("Say which places: --pins, or --at NAME=X,Y.")
+    _check_places(at)
+
+
+def _check_places(at: Sequence[str]) -> None:
+    """Raise `PlanError` for a place that cannot be read, before a result is, which takes long."""
+    for text in at:
+        parse_place("--at", text)
 
 
 def _masks(path: Path, result: xr.Dataset, pins: bool, at: Sequence[str]) -> dict[str, NDArray[np.bool_]]:

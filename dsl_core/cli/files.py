@@ -19,6 +19,8 @@ if TYPE_CHECKING:
 
 #: Attributes of a result with more characters are left out for a person.
 LONGEST = 120
+#: Exit code where a scan that was to be verified is not in order, as for other wrong input.
+_WRONG = 2
 
 
 def import_(
@@ -114,6 +116,7 @@ def import_(
         return
     if not source.is_dir():
         raise StoreError(f"{source} is not a folder. Give the folder of a published dataset or calibration.")
+    exchange.refuse_empty(source)
     _refuse(
         f"{source} is a folder", of_stereo, "a stereo file. Name the XML, YAML or JSON file with the lenses"
     )
@@ -186,7 +189,10 @@ def info(
     ] = False,
     json: Json = False,
 ) -> None:
-    """Show what a folder or file contains and whether it is complete."""
+    """Show what a folder or file contains and whether it is complete.
+
+    With --verify, the exit code is 2 if anything is wrong with a scan.
+    """
     from dsl_core.io.describe import describe
     from dsl_core.io.objects.rooms import brought
 
@@ -197,10 +203,13 @@ def info(
         facts = describe(folder, verify)
         if verify and facts["kind"] == "scan":
             facts |= _proof_of(folder)
+    is_wrong = verify and any(facts.get(name) for name in ("problems", "moved", "wrong_pictures"))
     for name, value in facts.items():
         output.say(f"{name.replace('_', ' '):18s} {_in_words(name, value)}")
     output.put(**facts)
     output.finish()
+    if is_wrong:
+        raise typer.Exit(_WRONG)
 
 
 def _in_words(name: str, value: Any) -> str:
@@ -231,7 +240,7 @@ def _proof_of(path: Path) -> dict[str, Any]:
     found = prove_scan(path)
     return {
         "values": linearity_of_scan(path).sentence,
-        "moved": list(found.moved) or "nothing",
+        "moved": list(found.moved),
         "wrong_pictures": list(found.wrong),
         "pictures_not_judged": found.not_judged or "none",
     }

@@ -51,10 +51,12 @@ class FolderLook:
 def look_at(root: Path, base: Rig, camera_size_px: tuple[int, int] | None = None) -> FolderLook:
     """Look at a folder in the published layout, or one that should be, without writing anything.
 
-    ``base`` as for `import_scan` and `import_calibration`. Raises `StoreError` when there is no such folder.
+    ``base`` as for `import_scan` and `import_calibration`. Raises `StoreError` when there is no such folder,
+    or nothing in it.
     """
     if not root.is_dir():
         raise StoreError(f"{root} is not a folder. Choose the folder of a published dataset or calibration.")
+    refuse_empty(root)
     if not holds_calibration(root):
         return _look_at_scan(root, base)
     try:
@@ -62,6 +64,15 @@ def look_at(root: Path, base: Rig, camera_size_px: tuple[int, int] | None = None
     except DslError as error:
         return FolderLook("calibration", check_calibration(root), str(error))
     return FolderLook("calibration", check_calibration(root))
+
+
+def refuse_empty(root: Path) -> None:
+    """Raise `StoreError` for a folder in which a person sees no file, and say what is wanted instead."""
+    if all(entry.name.startswith(".") for entry in root.iterdir()):
+        raise StoreError(
+            f"{root} is empty. Choose the folder that holds the pictures of a scan, or a published dataset"
+            " or calibration."
+        )
 
 
 def _look_at_scan(root: Path, base: Rig) -> FolderLook:

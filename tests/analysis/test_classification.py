@@ -54,6 +54,8 @@ def test_areas_are_those_of_the_surface(found) -> None:  # type: ignore[no-untyp
     # Pixels of a plane at 700 mm are 1 mm apart.
     for row in made.rows[:-1]:
         assert row.area_mm2 == pytest.approx(row.pixels, rel=1e-3)
+        assert row.area_std_mm2 is None or row.area_std_mm2 == pytest.approx(row.pixels_std, rel=1e-3)
+    assert all((row.pixels_std is None) == (row.label not in NAMES) for row in made.rows)
     assert by_name["none of these"].pixels > 40 * 60
     assert by_name["not judged"].pixels == 61
     assert by_name["not judged"].share is None

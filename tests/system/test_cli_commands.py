@@ -269,6 +269,7 @@ def test_info_of_a_scan_and_a_result(give: Give, finished: Path) -> None:
     scan = give("info", finished / "scan.dsl", "--verify", "--json").json
     assert (scan["kind"], scan["complete"], scan["frames_stored"]) == ("scan", True, 154)
     assert scan["notes"]["scanned_with"] == "twin"
+    assert (scan["problems"], scan["moved"], scan["wrong_pictures"]) == ([], [], [])
     assert scan["values"].startswith("linear in light")
     result = give("info", finished / "scan.zarr", "--json").json
     assert (result["kind"], result["size_px"]) == ("result", [112, 72])
@@ -279,6 +280,15 @@ def test_info_of_a_scan_and_a_result(give: Give, finished: Path) -> None:
     assert result["attributes"]["fit"].startswith("{")
     assert f"verdict            {result['verdict']}" in told
     assert f"to {result['depth_mm'][2]}, median {result['depth_mm'][1]}" in told
+
+
+def test_info_ends_as_for_wrong_input_where_a_verified_scan_is_damaged(give: Give, scan_copy: Path) -> None:
+    frames = (file for file in scan_copy.rglob("*") if file.is_file() and "frames" in file.parts)
+    max(frames, key=lambda file: file.stat().st_size).unlink()
+    assert give("info", scan_copy).code == 0, "it says what there is, and judges nothing"
+    found = give("info", scan_copy, "--verify", "--json")
+    assert found.code == 2
+    assert found.json["problems"]
 
 
 def test_a_plan_is_a_preset_by_name_or_a_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -120,6 +120,8 @@ def summary_of(kind: str, records: Sequence[FileRecord]) -> str:
     from dsl_core.io.published.layout import as_published
 
     good, expected = as_published(records)
+    if not any(record.found for record in records):
+        return f"Not a published {KINDS[kind]}: none of the {expected} entries it has was found."
     return f"A published {KINDS[kind]}: {good} of {expected} entries are as published."
 
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from PySide6.QtCore import QSize, Qt
-from PySide6.QtWidgets import QButtonGroup, QFrame, QLabel, QSlider, QToolButton, QWidget
+from PySide6.QtGui import QResizeEvent
+from PySide6.QtWidgets import QBoxLayout, QButtonGroup, QFrame, QLabel, QLayout, QSlider, QToolButton, QWidget
 
 from dsl_app.results.controller import ResultsController
 from dsl_app.results.state import NEED_SPECTRA, QualityMap, ResultsState, ResultView, Tool
@@ -49,6 +50,8 @@ TOOLS = (
 CLOUD_COLOURS = tuple((text, view) for view, text, _ in VIEWS if view is not ResultView.CLOUD)
 #: Size of the tools' icons, and the smallest width of a choice, px.
 ICON_PX, CHOICE_PX = 18, 110
+#: Between the views and the tools, px.
+_GAP_PX = 6
 _NEEDS_BAND = (QualityMap.ORDERS, QualityMap.SHARE, QualityMap.SPREAD)
 
 
@@ -113,6 +116,14 @@ class ViewBar(QWidget):
         self._lay_out()
         self._connect()
 
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        """Put the tools below the views where there is no room beside them: no word is cut."""
+        super().resizeEvent(event)
+        are_beside = self.width() >= self._beside_px
+        way = QBoxLayout.Direction
+        self._top.setDirection(way.LeftToRight if are_beside else way.TopToBottom)
+        self._line.setVisible(are_beside)
+
     def apply_theme(self, theme: Theme) -> None:
         """Draw the icons in the colours of a theme."""
         drawn = {tool.value: button for tool, button in self.tools.items()} | {"contrast": self.contrast}
@@ -142,9 +153,20 @@ class ViewBar(QWidget):
     def _lay_out(self) -> None:
         line = QFrame()
         line.setFrameShape(QFrame.Shape.VLine)
-        top = row_of(
-            *self.views.values(), 4, line, 4, *self.tools.values(), 4, self.contrast, STRETCH, spacing=2
-        )
+        views = boxed(row_of(*self.views.values(), margins=0, spacing=2))
+        tools = boxed(row_of(line, 4, *self.tools.values(), 4, self.contrast, STRETCH, margins=0, spacing=2))
+        self._line, self._beside_px = line, views.sizeHint().width() + tools.sizeHint().width() + _GAP_PX
+        for button in self.views.values():
+            button.setMinimumWidth(button.sizeHint().width())
+        self._top = QBoxLayout(QBoxLayout.Direction.LeftToRight)
+        self._top.setSpacing(_GAP_PX)
+        self._top.setContentsMargins(0, 0, 0, 0)
+        self._top.addWidget(views, 0, Qt.AlignmentFlag.AlignLeft)
+        self._top.addWidget(tools, 1)
+        # Side by side they must not be what keeps the bar so wide that they never come below each other.
+        self._top.setSizeConstraint(QLayout.SizeConstraint.SetNoConstraint)
+        top = boxed(self._top)
+        top.setMinimumWidth(views.sizeHint().width())
         self._light_label, self._cloud_label = QLabel("Light"), QLabel("Colour by")
         self._quality_label = QLabel("Show")
         cloud = (self._cloud_label, self.cloud_by)

@@ -13,6 +13,7 @@ import subprocess
 import sys
 import time
 from dataclasses import replace
+from importlib.util import find_spec
 from typing import Any
 
 import numpy as np
@@ -126,4 +127,10 @@ _GONE = (
     "The program that shows patterns has ended. Check that a desktop is running, or give platform in the"
     " profile (linuxfb or eglfs on a server); then open the rig again."
 )
-DRIVER = Driver("a window on the projector's screen", ScreenSettings, ScreenProjector, None, BRINGS)
+DRIVER = Driver(
+    "a window on the projector's screen",
+    ScreenSettings,
+    ScreenProjector,
+    # Whoever reads this in the window has its libraries.
+    brings="" if find_spec("PySide6") else BRINGS,
+)

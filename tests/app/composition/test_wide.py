@@ -11,10 +11,12 @@ import pytest
 from dsl_app.calibrate.page import CalibratePage
 from dsl_app.composition.window import Composition, StartOptions
 from dsl_app.results.page import ResultsPage
+from dsl_app.results.state import Tool
 from dsl_app.rig.page import RigPage
 from dsl_app.scan.page import ScanPage
 from dsl_app.shell.main_window import MainWindow
 from dsl_app.shell.paged_window import LEAST
+from PySide6.QtCore import QPoint
 from PySide6.QtWidgets import QAbstractButton, QAbstractItemView, QApplication, QPushButton, QTabBar, QWidget
 from pytestqt.qtbot import QtBot
 
@@ -130,6 +132,26 @@ def test_nothing_is_cut_or_covered_on_a_magnified_screen(
             )
             assert not list(_covering(seen)), f"{key} {size}: one over the other"
     qtbot.waitUntil(lambda: not window.parts.runner.active, timeout=30_000)
+
+
+def test_no_word_on_a_view_is_cut_where_the_bar_is_narrow(
+    window: MainWindow, qtbot: QtBot, tmp_path: Path
+) -> None:
+    window.setMinimumSize(LEAST)
+    window.open_path(write_small_result(tmp_path))
+    qtbot.waitUntil(lambda: not window.parts.runner.active, timeout=30_000)
+    page = window.open_page("results")
+    assert isinstance(page, ResultsPage)
+    rows = {}
+    for size in (MAGNIFIED, LARGE):
+        window.resize(*size)
+        QApplication.processEvents()
+        views, pin = page.bar.views.values(), page.bar.tools[Tool.PIN]
+        cut = [each.text() for each in views if each.width() < each.sizeHint().width()]
+        assert not cut, size
+        rows[size] = pin.mapTo(page, QPoint()).y() - next(iter(views)).mapTo(page, QPoint()).y()
+    assert rows[MAGNIFIED] > 10, "tools are below the views where there is no room beside them"
+    assert abs(rows[LARGE]) < 5, "and beside them where there is"
 
 
 def _is_seen(part: QWidget) -> bool:

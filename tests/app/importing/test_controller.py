@@ -154,10 +154,18 @@ def test_a_folder_of_other_images_says_what_is_wanted(bench: Bench, tmp_path: Pa
     (tmp_path / "holiday" / "cat.jpeg").write_bytes(b"\xff\xd8")
     bench.look(tmp_path / "holiday")
     assert "is not a published dataset" in bench.trouble
+    assert "none of the 8 entries" in bench.found.summary
     assert {row.status for row in bench.found.rows} == {"missing", "optional"}
     assert {"intensity1/", "black_exposure1/", "ldr_exposure1/"} <= {r.expected for r in bench.found.rows}
     bench.look(tmp_path / "gone")
     assert "is not a folder" in bench.notifier.told[-1][1]
+
+
+def test_an_empty_folder_is_called_empty_and_says_what_is_wanted(bench: Bench, tmp_path: Path) -> None:
+    (tmp_path / "new").mkdir()
+    (tmp_path / "new" / ".DS_Store").touch()
+    bench.look(tmp_path / "new")
+    assert "is empty. Choose the folder that holds the pictures" in bench.notifier.told[-1][1]
 
 
 def test_poses_of_a_board_are_not_taken_for_a_scan(bench: Bench, tmp_path: Path) -> None:

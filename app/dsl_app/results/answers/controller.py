@@ -79,9 +79,8 @@ class AnswersController:
         title, colours = f"Materials by {name}", {mark.name: mark.colour for mark in self.state.marks.value}
 
         def work(progress: Progress) -> Materials:
-            from dsl_core.analysis.areas import pixel_areas_mm2
             from dsl_core.analysis.classes import known_classes, marked_by
-            from dsl_core.analysis.classification import Classification
+            from dsl_core.analysis.classification import Classification, PixelAreas
             from dsl_core.analysis.classify import score
 
             asked, notes = classes(result, progress)
@@ -97,9 +96,8 @@ class AnswersController:
                 way.brightness,
                 progress,
             )
-            points = result.known("points_mm")
-            areas = None if points is None else pixel_areas_mm2(points, result.known("normals"))
-            made = Classification.of(scores, brightness=way.brightness, areas_mm2=areas)
+            areas = PixelAreas.of(*(result.known(name) for name in ("points_mm", "normals", "depth_std_mm")))
+            made = Classification.of(scores, brightness=way.brightness, areas=areas)
             return Materials(name, made, (*doubts, *notes))
 
         def done(materials: Materials) -> None:

@@ -25,8 +25,6 @@ HINT = (
     "Name the material of every pixel: choose a folder or file of spectra, or mark known materials and use"
     " those."
 )
-#: Areas from here on are told in whole mm²: their edges are known to no tenth.
-LARGE_MM2 = 100.0
 #: As many rows of the legend are seen without scrolling.
 ROWS = 5
 #: Lines of the hint, and of what a map rests on.
@@ -85,7 +83,9 @@ class MaterialsPanel(QWidget):
             "Write…", "Write the map as ENVI classification, as points (PLY), or the areas as CSV"
         )
         self.table = ReadTable(
-            "Materials", "Classes with their pixels and areas", ("Material", "Pixels", "Share", "Area")
+            "Materials",
+            "Classes with their pixels and areas, ± one deviation",
+            ("Material", "Pixels", "Share", "Area, mm²"),
         )
         self.table.widen(0)
         self.table.be_dense()
@@ -184,10 +184,8 @@ class MaterialsPanel(QWidget):
                 continue
             first = cell(row.label)
             first.setIcon(swatch(colours[row.value] if row.value else "transparent"))
-            digits = 1 if row.area_mm2 is not None and row.area_mm2 < LARGE_MM2 else 0
-            area = "–" if row.area_mm2 is None else f"{row.area_mm2:,.{digits}f} mm²"
             share = "" if row.share is None else f"{100 * row.share:.1f} %"
-            figures = (cell(text, "", RIGHT) for text in (f"{row.pixels:,}", share, area))
+            figures = (cell(text, "", RIGHT) for text in (row.pixels_text, share, row.area_text))
             rows.append((first, *figures))
         self.table.show_rows(rows)
 

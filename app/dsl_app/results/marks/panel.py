@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from PySide6.QtCore import QModelIndex, QSize, Qt, QTimer
-from PySide6.QtGui import QBrush, QColor, QGuiApplication, QKeySequence, QShortcut
+from PySide6.QtGui import QBrush, QColor, QGuiApplication, QKeySequence, QShortcut, QTextOption
 from PySide6.QtWidgets import (
     QAbstractItemView,
     QFileDialog,
@@ -76,6 +76,8 @@ class MarksPanel(QWidget):
         header = self.tree.header()
         header.setStretchLastSection(False)
         header.setSectionResizeMode(0, QHeaderView.ResizeMode.Stretch)
+        # A tick, a swatch and a name: where places are long words, these scroll, and names stay.
+        header.setMinimumSectionSize(header.fontMetrics().horizontalAdvance("region 00") + 3 * SWATCH_PX)
         for column in (1, 2):
             header.setSectionResizeMode(column, QHeaderView.ResizeMode.ResizeToContents)
         self.hint = label(EMPTY, "muted", wraps=True)
@@ -83,6 +85,8 @@ class MarksPanel(QWidget):
         tip = "The selected mark compared with references, and its distance from other pins"
         self.figures = named(QTextBrowser(), "Comparison with references", tip)
         FocusRing(self.figures)
+        # In a narrow panel a figure is scrolled to, not broken in two.
+        self.figures.setWordWrapMode(QTextOption.WrapMode.WordWrap)
         self.figures.setFrameShape(QFrame.Shape.NoFrame)
         self.figures.viewport().setAutoFillBackground(False)
         self.reference = push_button(

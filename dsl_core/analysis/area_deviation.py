@@ -1,0 +1,119 @@
+"""By how much the pixels and areas of classes may be off, from what is known of each pixel.
+
+Three causes, by what the map itself shows:
+
+- **Edges.** A pixel is of one class, but edges run through pixels. Between two classes each pixel along a
+  straight piece of the edge is wrong by the same part, spread evenly over one pixel: 1/12 px^2, and pixels of
+  a straight piece err together. Beside pixels without a class the edge lies somewhere within these, all round
+  in the same sense: they may hold anything from nothing to all, 1/sqrt(3) px about what is counted.
+- **Classes.** A pixel is of its class with a probability, independently of others; pixels that are called
+  undecided are missing by the probability of the class, all of them together.
+- **Depth.** An area goes with the square of the depth. Errors of depth are taken to be shared by all pixels,
+  which is the most that they can do.
+
+Angles and differences are no probabilities: maps by them have no deviations. Errors of normals are not known.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dsl_core.analysis.classify import ClassMap, Measure, Scores
+
+Values = NDArray[np.intp]
+Map = NDArray[np.float64]
+
+#: Variance of what is spread evenly over one pixel, px^2; and its mean square from one end, px^2.
+_EVENLY, _FROM_END = 1 / 12, 1 / 3
+
+
+@dataclass(frozen=True)
+class ClassDeviations:
+    """One standard deviation by the values of a map: pixels, and area in mm2 (None without points).
+
+    NaN for what is no class.
+    """
+
+    pixels: Map
+    areas_mm2: Map | None
+
+
+def class_deviations(
+    scores: Scores, shown: ClassMap, areas_mm2: Map | None = None, depth_relative_std: Map | None = None
+) -> ClassDeviations | None:
+    """Deviations of a map's classes; None where the scores are no probabilities.
+
+    ``areas_mm2`` and ``depth_relative_std`` (rows, columns): area of each pixel, and the deviation of its
+    depth as a share of it, 0 if it is not given.
+    """
+    if scores.measure is not Measure.PROBABILITY:
+        return None
+    pixels = np.sqrt(_variance(scores, shown, np.ones(shown.values.shape)))
+    pixels[[0, shown.none, shown.unsure]] = np.nan
+    if areas_mm2 is None:
+        return ClassDeviations(pixels, None)
+    weights = np.nan_to_num(areas_mm2)
+    variance = _variance(scores, shown, weights)
+    if depth_relative_std is not None:
+        by_depth = 2 * weights * np.nan_to_num(depth_relative_std)
+        variance += np.bincount(shown.values.ravel(), by_depth.ravel(), len(variance)) ** 2
+    variance[[0, shown.none, shown.unsure]] = np.nan
+    return ClassDeviations(pixels, np.sqrt(variance))
+
+
+def _variance(scores: Scores, shown: ClassMap, weights: Map) -> Map:
+    """Variance of the sum of weights (rows, columns) for each value of a map, without that of depth."""
+    values, size = shown.values.astype(np.intp), len(shown.labels)
+    variance, missing = np.zeros(size), np.zeros(size)
+    beside = np.zeros(0, np.intp)
+    index = np.arange(values.size).reshape(values.shape)
+    for ours, theirs, weight, at in _sides(values, weights, index):
+        is_edge = (ours != theirs) & _is_class(ours, shown)
+        between = is_edge & _is_class(theirs, shown)
+        # A straight piece errs as one.
+        begins = between.copy()
+        begins[1:] &= ~(between[:-1] & (ours[:-1] == ours[1:]))
+        piece = np.cumsum(begins.T).reshape(begins.T.shape).T - 1
+        lengths = np.bincount(piece[between], weight[between], int(begins.sum()))
+        variance += np.bincount(ours.T[begins.T], _EVENLY * lengths**2, size)
+        alone = is_edge & ~between
+        beside = np.concatenate([beside, at[alone] * size + ours[alone]])
+    beside = np.unique(beside)
+    pixel, value = np.divmod(beside, size)
+    missing += np.sqrt(_FROM_END) * np.bincount(value, weights.ravel()[pixel], size)
+    _add_classes(scores, shown, weights, beside, variance, missing)
+    return np.asarray(variance + missing**2)
+
+
+def _sides(values: Values, weights: Map, index: Values) -> Iterator[tuple[Values, Values, Map, Values]]:
+    """Each pixel, one neighbour, and its index, turned so that straight edges run along the first axis."""
+    for turn in (False, True):
+        v, w, i = (np.asarray(a.T if turn else a) for a in (values, weights, index))
+        yield v[:, :-1], v[:, 1:], w[:, :-1], i[:, 1:]
+        yield v[:, 1:], v[:, :-1], w[:, 1:], i[:, :-1]
+
+
+def _is_class(values: Values, shown: ClassMap) -> NDArray[np.bool_]:
+    return np.asarray((values > 0) & (values < shown.none))
+
+
+def _add_classes(
+    scores: Scores, shown: ClassMap, weights: Map, beside: Values, variance: Map, missing: Map
+) -> None:
+    """Add what probabilities leave open; ``beside`` (pixel times values, plus value) is counted before."""
+    size = len(shown.labels)
+    judged = np.flatnonzero(scores.best >= 0)
+    best, second = (a.ravel()[judged].astype(np.intp) + 1 for a in (scores.best, scores.second))
+    value, weight = shown.values.ravel()[judged], weights.ravel()[judged]
+    sure = np.clip(scores.margin.ravel()[judged].astype(np.float64), 0, 1)
+    for other, probability in ((best, sure), (second, 1 - sure)):
+        # A second class of 0 is none: there is one class only.
+        named = (other > 0) & (value > 0) & (value < shown.none)
+        chance = weight**2 * probability * (1 - probability)
+        variance += np.bincount(other[named], chance[named], size)
+        unsure = (other > 0) & (value == shown.unsure) & ~np.isin(judged * size + other, beside)
+        missing += np.bincount(other[unsure], (weight * probability)[unsure], size)

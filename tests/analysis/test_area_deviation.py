@@ -1,0 +1,80 @@
+"""Stated deviations of classes hold where shapes of known area are put on the grid of pixels by chance."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from dsl_core.analysis.area_deviation import class_deviations
+from dsl_core.analysis.classify import ClassMap, Limits, Measure, Scores
+
+SIZE, FINE = 40, 8
+MARGIN = 0.97
+
+
+def _covered(shape: str, radius: float, centre: tuple[float, float]) -> np.ndarray:
+    """Share of each pixel that a disc or a square covers, by many points in each."""
+    y, x = ((np.mgrid[0 : SIZE * FINE, 0 : SIZE * FINE] + 0.5) / FINE).astype(float)
+    dy, dx = y - centre[0], x - centre[1]
+    inside = np.hypot(dx, dy) < radius if shape == "disc" else np.maximum(abs(dx), abs(dy)) < radius
+    return inside.reshape(SIZE, FINE, SIZE, FINE).mean(axis=(1, 3))
+
+
+def _scores(
+    best: np.ndarray, margin: np.ndarray | float = 1.0, measure: Measure = Measure.PROBABILITY
+) -> Scores:
+    ones = np.ones(best.shape, np.float32)
+    return Scores(
+        measure, ("one", "two"), (0, 1), best.astype(np.int16), (1 - best).astype(np.int16), ones,
+        (ones * margin).astype(np.float32),
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("shape", ["disc", "square"])
+@pytest.mark.parametrize("mixed", ["nearest", "none"])
+def test_nine_of_ten_shapes_on_the_grid_are_within_their_two_deviations(shape: str, mixed: str) -> None:
+    rng, held, ratios = np.random.default_rng(5), [], []
+    for _ in range(40):
+        radius, centre = rng.uniform(8, 13), rng.uniform(18, 22, 2)
+        share = _covered(shape, radius, tuple(centre))
+        scores = _scores(np.where(share > 0.5, 0, 1))
+        if mixed == "none":
+            # What an edge runs through is of neither colour.
+            scores.fit[(share > 0.02) & (share < 0.98)] = 0
+        shown = ClassMap.of(scores)
+        found = class_deviations(scores, shown)
+        assert found is not None
+        off = (shown.values == 1).sum() - share.sum()
+        held.append(abs(off) <= 2 * found.pixels[1])
+        ratios.append(found.pixels[1] / (np.pi * radius**2))
+    assert np.mean(held) >= 0.9
+    # Nor is it an empty promise: by the nearest colour, a square of 21 pixels is off by 0.035 pi r^2.
+    assert np.median(ratios) < (0.04 if mixed == "nearest" else 0.15)
+
+
+def test_probabilities_and_depth_add_to_edges() -> None:
+    best = np.zeros((SIZE, SIZE), int)
+    scores = _scores(best, MARGIN)
+    shown, areas = ClassMap.of(scores), np.full(best.shape, 2.0)
+    found = class_deviations(scores, shown, areas, np.full(best.shape, 0.01))
+    assert found is not None
+    assert found.areas_mm2 is not None
+    chance = SIZE * np.sqrt(MARGIN * (1 - MARGIN))
+    assert found.pixels[1] == pytest.approx(chance, rel=1e-3)
+    # One per cent of depth is two of the area.
+    assert found.areas_mm2[1] == pytest.approx(2 * np.hypot(chance, 0.02 * SIZE**2), rel=1e-3)
+    assert np.isnan(found.pixels[[0, shown.none, shown.unsure]]).all()
+
+
+def test_what_is_undecided_may_be_of_either_class() -> None:
+    best = np.zeros((SIZE, SIZE), int)
+    scores = _scores(best, 0.6)
+    shown = ClassMap.of(scores)
+    found = class_deviations(scores, shown)
+    assert found is not None
+    np.testing.assert_allclose(found.pixels[1:3], [0.6 * SIZE**2, 0.4 * SIZE**2], rtol=1e-3)
+
+
+def test_angles_are_no_probabilities() -> None:
+    scores = _scores(np.zeros((4, 4), int), measure=Measure.ANGLE)
+    assert class_deviations(scores, ClassMap.of(scores, Limits(2, 0))) is None
