@@ -53,7 +53,7 @@ def read_stripes(spec: Stripes, count: int, frames: Iterator[Measured], white: M
         weakest[weaker] = spec.bits - 1 - bit
         np.minimum(margin, np.abs(difference), out=margin)
         np.minimum(sigmas, ratio, out=sigmas)
-        most = white[0] if len(seen) == 2 else white[0] / 2
+        most = white[0] * np.float32(1 if len(seen) == 2 else 0.5)
         chances.append(_chance_of_turning(difference, variance, most, _mixed(spec, bit)))
     number = number_of(spec, word)
     jump = _jump(spec, word, number, 1 << weakest)

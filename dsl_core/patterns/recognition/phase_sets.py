@@ -76,9 +76,13 @@ def is_sinusoid(lines: Lines, pictures: Sequence[int]) -> float | None:
     return spread + drift
 
 
-def sinusoid_run(lines: Lines, pictures: Sequence[int]) -> tuple[int, int, int] | None:
-    """Steps, start and end of the longest run of whole sets among pictures in their order, or None."""
-    best: tuple[int, float, int, int, int] | None = None
+def sinusoid_runs(lines: Lines, pictures: Sequence[int]) -> list[tuple[int, int, int]]:
+    """Steps, start and end of the longest run of whole sets for each number of steps, the longest first.
+
+    Stripes beside sinusoids may lengthen a run of another number of steps, so that the longest is not always
+    the right one.
+    """
+    best: dict[int, tuple[int, float, int, int]] = {}
     for steps in STEPS:
         for start in range(max(len(pictures) - steps + 1, 0)):
             end, off = start, 0.0
@@ -88,10 +92,9 @@ def sinusoid_run(lines: Lines, pictures: Sequence[int]) -> tuple[int, int, int] 
                     break
                 end, off = end + steps, off + found
             if end > start:
-                rank = (start - end, off * steps / (end - start))
-                if best is None or rank < best[:2]:
-                    best = (*rank, steps, start, end)
-    return None if best is None else best[2:]
+                rank = (start - end, off * steps / (end - start), start, end)
+                best[steps] = min(rank, best.get(steps, rank))
+    return [(steps, *rank[2:]) for steps, rank in sorted(best.items(), key=lambda each: each[1][:2])]
 
 
 def steps_of_strided(lines: Lines, pictures: Sequence[int]) -> int | None:

@@ -12,11 +12,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dsl_core.model.captured_code import Axis
+from dsl_core.patterns.recognition.odd_pictures import odd_pairs
 from dsl_core.patterns.recognition.phase_sets import (
     MOST_OFF_RAD,
     PhaseReading,
     read_phase_sets,
-    sinusoid_run,
+    sinusoid_runs,
     steps_of_strided,
 )
 from dsl_core.patterns.recognition.probes import Lines, Probes
@@ -33,6 +34,11 @@ UNLIKELY = 0.02
 FROM_END = 2
 #: Splits that are tried, and the share of pictures that must speak for one; what speaking against it costs.
 MOST_SPLITS, LEAST_SUPPORT, AXIS_DOUBT = 5, 0.4, 0.5
+#: Runs of sinusoids that are tried.
+MOST_RUNS = 3
+#: What speaks against stripes for each of their pairs that is no pattern and its inverse: steps of sinusoids
+#: after a code with inverses pass for its finest digits.
+ODD_PAIR = 0.25
 #: Sinusoids of one period agree with nothing, so that any steps fit them.
 UNTESTED = 0.3
 Slots = tuple[int | None, ...]
@@ -197,15 +203,13 @@ def _axis_blocks(probes: Probes, axis: Axis, slots: Sequence[int | None]) -> tup
     present = [p for p in slots if p is not None]
     stripes = read_set(lines, slots)
     if stripes is not None:
-        found, cost = [Block("stripes", tuple(slots), axis, stripes)], _cost(stripes)
+        odd = odd_pairs(lines, slots, stripes)
+        found, cost = [Block("stripes", tuple(slots), axis, stripes)], _cost(stripes) + ODD_PAIR * len(odd)
     else:
         found, cost = [], np.inf
     if len(present) < len(slots):
         return found, cost
-    others = []
-    run = sinusoid_run(lines, present)
-    if run is not None:
-        others.append(_with_phases(lines, axis, present, run))
+    others = [_with_phases(lines, axis, present, run) for run in sinusoid_runs(lines, present)[:MOST_RUNS]]
     strided = steps_of_strided(lines, present)
     if strided is not None:
         reading = read_phase_sets(lines, present, strided, "step")

@@ -146,3 +146,15 @@ def test_noisy_sinusoids_are_not_taken_for_finer_ones_that_fit_anything() -> Non
     assert isinstance(reading, PhaseReading)
     assert (reading.fringes, reading.start_deg) == ((1.0, 16.0), 0.0)
     assert reading.rival_rad > 1.1 * reading.off_rad
+
+
+def test_steps_after_stripes_with_inverses_are_no_finer_digits() -> None:
+    code = Stripes(bits=4, unit_px=8)
+    sets: list[tuple[str, Stripes | Phases]] = [("columns", code)]
+    sets += [("columns", Phases(periods_px=(8.0,), steps=4))]
+    pictures, white, black = frames(sets, camera=(120, 90))
+    found = _recognised([white, black, *pictures])
+    assert found is not None
+    assert [(kind, count) for kind, _, count in found.content] == [
+        ("white", 1), ("black", 1), ("stripes", 8), ("phases", 4)
+    ]  # fmt: skip
