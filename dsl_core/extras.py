@@ -49,13 +49,17 @@ def missing_package(error: ModuleNotFoundError) -> MissingPackageError | None:
 
 def require_package(module: str) -> None:
     """Raise `MissingPackageError` now where a package of an extra is missing that is imported only later."""
-    try:
-        found = find_spec(module)
-    except ModuleNotFoundError:
-        found = None
-    missing = missing_package(ModuleNotFoundError(name=module)) if found is None else None
+    missing = None if has_package(module) else missing_package(ModuleNotFoundError(name=module))
     if missing is not None:
         raise missing
+
+
+def has_package(module: str) -> bool:
+    """Whether a package is there; nothing is imported."""
+    try:
+        return find_spec(module) is not None
+    except ModuleNotFoundError:
+        return False
 
 
 def names_missing_packages(function: Callable[P, R]) -> Callable[P, R]:

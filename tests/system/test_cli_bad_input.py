@@ -233,7 +233,7 @@ def test_frames_that_show_nothing(
         ("export absent.zarr ply a.ply --pixel 1,2", "--pixel is for csv"),
         ("export absent.zarr csv a.csv --pixel 1;2", "--pixel must be x,y"),
         ("import absent", "is not a folder"),
-        ("import folder", "no image was found"),
+        ("import folder", "folder is empty. Choose the folder"),
         ("info absent", "does not exist"),
         ("info folder", "is neither a scan"),
         ("info empty.json", "is not JSON"),

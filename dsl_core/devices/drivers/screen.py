@@ -13,7 +13,6 @@ import subprocess
 import sys
 import time
 from dataclasses import replace
-from importlib.util import find_spec
 from typing import Any
 
 import numpy as np
@@ -23,6 +22,7 @@ from pydantic import Field
 from dsl_core.devices.base import Projector, ProjectorInfo
 from dsl_core.devices.driver_table import Driver
 from dsl_core.errors import DeviceError
+from dsl_core.extras import has_package
 from dsl_core.model.base import Record
 
 BRINGS = "the window's libraries: pip install 'dsl-scan[gui]'"
@@ -132,5 +132,5 @@ DRIVER = Driver(
     ScreenSettings,
     ScreenProjector,
     # Whoever reads this in the window has its libraries.
-    brings="" if find_spec("PySide6") else BRINGS,
+    brings="" if has_package("PySide6") else BRINGS,
 )

@@ -35,11 +35,21 @@ def loose_columns(
     for row, place in zip(likely, places, strict=True):
         g, _ = table.at(coarse_px + place - centres)
         wg = weight * g
-        row[:] = -(weight * y * y).sum(0) + (wg * y).sum(0) ** 2 / (wg * g).sum(0).clip(min=1e-30)
+        row[:] = -in_order(weight * y * y) + in_order(wg * y) ** 2 / in_order(wg * g).clip(min=1e-30)
     # The code names a column, and is not sure at its ends.
     named = torch.special.log_ndtr((0.5 - places.abs()) / CODE_STD_PX)
-    share = torch.softmax(likely / (2 * scale) + named[:, None], 0)
+    chance = likely / (2 * scale) + named[:, None]
+    share = torch.exp(chance - chance.amax(0))
+    share /= in_order(share)
     away = places[:, None]
-    mean = (share * away).sum(0)
-    spread = (share * (away - mean) ** 2).sum(0)
+    mean = in_order(share * away)
+    spread = in_order(share * (away - mean) ** 2)
     return coarse_px + mean, torch.sqrt(spread + (places[1] - places[0]) ** 2 / 12)
+
+
+def in_order(values: Tensor) -> Tensor:
+    """Sum of rows, one after the other: that of a pixel does not depend on the others with it."""
+    total = values[0].clone()
+    for row in values[1:]:
+        total += row
+    return total
