@@ -102,6 +102,7 @@ def test_another_folder_is_shown_in_the_same_dialog(
     window.open_path(made.rig)
     dialog = opened(qtbot, window)
     (tmp_path / "empty").mkdir()
+    (tmp_path / "empty" / "notes.txt").touch()
     monkeypatch.setattr(OpenDialog, "ask", lambda *_, **__: tmp_path / "empty")
     dialog.other.click()
     qtbot.waitUntil(lambda: "is not a published dataset" in dialog.text.text(), timeout=PATIENCE_MS)

@@ -129,6 +129,7 @@ def test_import_opens_the_dialog_that_fits_the_folder(
     qtbot: QtBot, window: MainWindow, folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     (tmp_path / "empty").mkdir()
+    (tmp_path / "empty" / "notes.txt").touch()
     answers = [tmp_path / "empty", folder.parent]
     monkeypatch.setattr(OpenDialog, "ask", lambda *_, **__: answers.pop(0))
     window.do("import")
