@@ -78,7 +78,7 @@ def _shares(frames: BarFrames, black_dn: float) -> tuple[Floats, Floats, NDArray
 def _upright(
     first: Floats, second: Floats, light: NDArray[np.bool_]
 ) -> tuple[Floats, Floats, NDArray[np.bool_]]:
-    """Shares of light and where they mean something, turned so that bars that lie in the picture stand."""
+    """Shares of light and where they can be judged, transposed if the bars run across the picture."""
     share = np.where(light, (first + second) / 2, 0.5)
     # From cell to cell of a mosaic, whose colours may see different shares.
     across, down = np.abs(share[:, 2:] - share[:, :-2]).mean(), np.abs(share[2:] - share[:-2]).mean()

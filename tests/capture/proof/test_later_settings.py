@@ -10,18 +10,9 @@ import pytest
 from dsl_core.capture.proof.later_settings import LaterSettings
 from dsl_core.capture.proof.noise import Noise
 from dsl_core.capture.proof.raster import Counts
-from dsl_core.model.plan import CapturePlan, GrayCode, LineComb, Setting
 from dsl_core.simulation.published_rig import published_rig
+from tests.cases.proof_rules import PLAN, SHOTS
 
-#: Shots 0 to 9 are the code, 10 white, 11 black, 12 to 15 lines; from 16 on the same at another setting.
-PLAN = CapturePlan(
-    camera_size_px=(32, 18),
-    projector_size_px=(32, 18),
-    code=GrayCode(rows=False),
-    spectral=LineComb(width_px=2, step_px=2, period_px=8),
-    settings=(Setting(exposure_ms=10.0, level=1.0), Setting(exposure_ms=30.0, level=0.5)),
-)
-SHOTS = tuple(PLAN.shots())
 LINE, LATER_BLACK, LATER_LINE = SHOTS[13], SHOTS[27], SHOTS[29]
 RIG = published_rig()
 NOISE = Noise(RIG.sensor)
