@@ -92,7 +92,7 @@ def _variance(scores: Scores, shown: ClassMap, weights: Map) -> Map:
 def _sides(values: Values, weights: Map, index: Values) -> Iterator[tuple[Values, Values, Map, Values]]:
     """Each pixel, one neighbour, and its index, turned so that straight edges run along the first axis."""
     for turn in (False, True):
-        v, w, i = (np.asarray(a.T if turn else a) for a in (values, weights, index))
+        v, w, i = (values.T, weights.T, index.T) if turn else (values, weights, index)
         yield v[:, :-1], v[:, 1:], w[:, :-1], i[:, 1:]
         yield v[:, 1:], v[:, :-1], w[:, 1:], i[:, :-1]
 

@@ -17,7 +17,7 @@ def _covered(shape: str, radius: float, centre: tuple[float, float]) -> np.ndarr
     y, x = ((np.mgrid[0 : SIZE * FINE, 0 : SIZE * FINE] + 0.5) / FINE).astype(float)
     dy, dx = y - centre[0], x - centre[1]
     inside = np.hypot(dx, dy) < radius if shape == "disc" else np.maximum(abs(dx), abs(dy)) < radius
-    return inside.reshape(SIZE, FINE, SIZE, FINE).mean(axis=(1, 3))
+    return np.asarray(inside.reshape(SIZE, FINE, SIZE, FINE).mean(axis=(1, 3)))
 
 
 def _scores(
