@@ -146,6 +146,24 @@ def cgats(kind: str = "", norm: str = "") -> str:
     return "\n".join([*head, *table, "BEGIN_DATA", *rows, "END_DATA", ""])
 
 
+def light_meter(label: str = "Spectral Data {:.0f}[nm]") -> str:
+    """An export of a hand-held light meter: figures of the light, then the spectrum coarsely and finely."""
+    head = ["Title,lamp 3262 K", "", "Viewing Angle [°],2", "Peak Wavelength [nm],560", "SSI1,---", ""]
+    fine = [f"{label.format(nm)},{r / 100:.9f}" for nm, r in zip(NM, SHARE, strict=True)]
+    return "\r\n".join([*head, *fine[::3], "", *fine, ""])
+
+
+def tm27(quantity: str = "reflectance") -> str:
+    """A document of the lighting industry."""
+    values = [
+        f'<SpectralData wavelength="{nm:.1f}">{r:.6f}</SpectralData>' for nm, r in zip(NM, SHARE, strict=True)
+    ]
+    head = ['<?xml version="1.0"?>', '<IESTM2714 xmlns="iestm2714" version="1.0">']
+    head += ["<Header><Description>leaf</Description></Header><SpectralDistribution>"]
+    said = f"<SpectralQuantity>{quantity}</SpectralQuantity>"
+    return "\n".join([*head, said, *values, "</SpectralDistribution></IESTM2714>", ""])
+
+
 #: A file of each kind by the name under which it is found.
 SPECTRA_FILES: dict[str, str | bytes] = {
     "leaf.asd": asd(),
@@ -158,6 +176,8 @@ SPECTRA_FILES: dict[str, str | bytes] = {
     "packed.jdx": jcamp("packed"),
     "pairs.dx": jcamp("pairs"),
     "patches.cgats": cgats(),
+    "meter.csv": light_meter(),
+    "leaf.spdx": tm27(),
 }
 
 

@@ -19,11 +19,13 @@ from dsl_core.io.spectra.formats import (
     envi,
     jcamp,
     konica_minolta,
+    light_meter,
     ocean,
     own_table,
     sed,
     spreadsheet,
     svc,
+    tm27,
 )
 from dsl_core.io.spectra.records import HEAD_BYTES, Format, Spectrum
 
@@ -35,11 +37,13 @@ FORMATS: tuple[Format, ...] = (
     own_table.FORMAT,
     svc.FORMAT,
     jcamp.FORMAT,
+    tm27.FORMAT,
     cgats.FORMAT,
     sed.FORMAT,
     ocean.FORMAT,
     avantes.FORMAT,
     konica_minolta.FORMAT,
+    light_meter.FORMAT,
     columns.FORMAT,
 )
 GROUP = "dsl_scan.spectra"

@@ -165,6 +165,11 @@ def _over(header: list[str], width: int, separator: str) -> tuple[tuple[str, ...
     if above is not None and all(_UNIT.fullmatch(cell) for cell in nearest if cell):
         titles = tuple(f"{a} {b}".strip() for a, b in zip(above, nearest, strict=True))
         return titles, tuple(above)
+    if above is not None and len(set(nearest)) < width and "" in above[:-1]:
+        # One name over the two columns of each spectrum: its wavelengths and its values.
+        return tuple(nearest), tuple(
+            cell or before for before, cell in zip(["", *above], above, strict=False)
+        )
     return tuple(nearest), tuple(nearest)
 
 

@@ -27,7 +27,8 @@ COVERS = 401.0, 699.0
         *(("leaf.asd", "ASD FieldSpec"), ("leaf.sig", "SVC"), ("leaf.sed", "Spectral Evolution")),
         *(("ocean.txt", "Ocean"), ("avantes.txt", "Avantes"), ("cs2000.csv", "Konica Minolta CS-2000")),
         *(("plain.jdx", "JCAMP-DX"), ("packed.jdx", "JCAMP-DX"), ("pairs.dx", "JCAMP-DX")),
-        ("patches.cgats", "CGATS, ArgyllCMS"),
+        *(("patches.cgats", "CGATS, ArgyllCMS"), ("leaf.spdx", "IES TM-27")),
+        ("meter.csv", "light meter (Sekonic, UPRtek)"),
     ],
 )
 def test_a_format_is_recognised_whatever_its_ending(tmp_path: Path, name: str, format_name: str) -> None:
@@ -56,7 +57,10 @@ def test_a_package_adds_a_format_by_one_entry_point(tmp_path: Path, monkeypatch:
 
 @pytest.mark.parametrize(
     "name",
-    ["leaf.asd", "leaf.sig", "leaf.sed", "ocean.txt", "avantes.txt", "plain.jdx", "packed.jdx", "pairs.dx"],
+    [
+        *("leaf.asd", "leaf.sig", "leaf.sed", "leaf.spdx", "ocean.txt", "avantes.txt"),
+        *("plain.jdx", "packed.jdx", "pairs.dx"),
+    ],
 )
 def test_reflectance_is_a_share_over_nanometres(tmp_path: Path, name: str) -> None:
     curve = read_spectrum(write(tmp_path / name, SPECTRA_FILES[name]), COVERS, radiance=False)
@@ -242,3 +246,11 @@ def test_empty_cells_of_an_exported_table_are_unknown(tmp_path: Path) -> None:
 )
 def test_a_line_data_with_its_columns_below_is_of_spectral_evolution(head: bytes, found: bool) -> None:
     assert is_sed(Path("a.txt"), head) is found
+
+
+def test_names_over_pairs_of_columns_are_those_of_the_spectra(tmp_path: Path) -> None:
+    rows = [f"{nm:.2f},{100 * r:.5f},{nm:.2f},{50 * r:.5f}," for nm, r in zip(NM, SHARE, strict=True)]
+    head = ["Azurite,,Malachite,,", "Wavelength (nm),%R,Wavelength (nm),%R,"]
+    spectra = read_spectra(write(tmp_path / "cary.csv", "\n".join([*head, *rows, "", "Cary 5000"])))
+    assert [each.name for each in spectra] == ["Azurite", "Malachite"]
+    np.testing.assert_allclose(spectra[1].values, SHARE / 2, atol=1e-6)
