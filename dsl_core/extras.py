@@ -19,6 +19,7 @@ EXTRA_OF = {
     "cv2": "reconstruct",
     "distributed": "cluster",
     "obstore": "s3",
+    "rawpy": "raw",
     "PySide6": "gui",
     "pyqtgraph": "gui",
     "pyvista": "gui",
@@ -32,6 +33,7 @@ _PURPOSE = {
     "gui": "the window",
     "cluster": "batches on a cluster of Dask",
     "s3": "scans and results in an object store",
+    "raw": "pictures as photographic cameras store them",
 }
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import zip_longest
 from pathlib import Path, PurePosixPath
@@ -11,6 +11,7 @@ from pathlib import Path, PurePosixPath
 from pydantic import ValidationError
 
 from dsl_core.errors import StoreError
+from dsl_core.io.pictures.camera_raw import SUFFIXES as CAMERA_RAWS
 from dsl_core.io.pictures.mapping import (
     MOST_PICTURES,
     BlackPicture,
@@ -115,9 +116,16 @@ def picture_files(folder: Path, patterns: Iterable[str], with_raw: bool = False)
                 )
             if path.suffix.lower() in known and not path.name.startswith(".") and not path.is_dir():
                 matches.append(path)
+        matches = _without_copies(matches)
         matches.sort(key=lambda path: natural(path.relative_to(folder).as_posix()))
         found += [path for path in matches if path not in found]
     return found
+
+
+def _without_copies(paths: Sequence[Path]) -> list[Path]:
+    """Files without the pictures that a camera keeps next to its raw ones, of the same name."""
+    raw = {path.with_suffix("") for path in paths if path.suffix.lower() in CAMERA_RAWS}
+    return [path for path in paths if path.suffix.lower() in CAMERA_RAWS or path.with_suffix("") not in raw]
 
 
 def _listed(folder: Path, patterns: Iterable[str], mapping: Mapping) -> list[Picture]:

@@ -53,8 +53,8 @@ def candidates(folder: Path) -> tuple[list[Candidate], list[Candidate]]:
     pictures = [picture for path in files for picture in pictures_in(path)]
     if len(pictures) < FEWEST:
         raise StoreError(
-            f"{folder} contains {counted(len(pictures), 'picture')} (PNG, TIFF, JPEG, BMP, PGM or NPY);"
-            f" a capture has at least {FEWEST}. {_advice(folder)}"
+            f"{folder} contains {counted(len(pictures), 'picture')} (PNG, TIFF, JPEG, BMP, PGM, NPY,"
+            f" camera raw); a capture has at least {FEWEST}. {_advice(folder)}"
         )
     groups: dict[str, list[Path]] = {}
     for path in files:
@@ -84,7 +84,7 @@ def _advice(folder: Path) -> str:
         if known is not None and path.is_file():
             what, advice = known
             return f"{path.name} is {what}, which is not read. {advice}."
-    return "Give the folder of one capture, convert camera raw files to TIFF, or state raw in a mapping."
+    return "Give the folder of one capture; for pixels without a header, state raw in a mapping."
 
 
 def _variants(folder: Path, group: Sequence[Path], files: Sequence[Path], name: str) -> Iterator[Candidate]:

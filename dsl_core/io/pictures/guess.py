@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -11,11 +11,13 @@ from numpy.typing import NDArray
 
 from dsl_core.errors import StoreError
 from dsl_core.io.pictures.arrange import arrange
+from dsl_core.io.pictures.camera_raw import BITS
+from dsl_core.io.pictures.camera_raw import SUFFIXES as CAMERA_RAWS
 from dsl_core.io.pictures.candidates import FEWEST, Candidate, candidates, jump_of
 from dsl_core.io.pictures.encoding import guessed_encoding
 from dsl_core.io.pictures.guessed_parts import guessed_size, is_turned, part_of
 from dsl_core.io.pictures.mapping import Encoding, Mapping
-from dsl_core.io.pictures.picture_file import ARRAYS, load_values
+from dsl_core.io.pictures.picture_file import ARRAYS, bayer_of, load_values
 from dsl_core.model.rig import BayerPattern
 from dsl_core.optics.colour import srgb_decode
 from dsl_core.patterns.recognition.odd_pictures import lost_after, odd_pairs, same_in_a_row
@@ -268,7 +270,8 @@ def _look_at(candidate: Candidate) -> _Look:
             brightest = float(grey.mean()), grey
         taker.add(grey)
     assert brightest is not None
-    depth, aligned = _depth_of(bits, most, is_wide, floats)
+    stated = bayer_of(next(each for each in candidate.pictures if each is not None))
+    depth, aligned = _depth_of(bits, most, is_wide, floats) if stated is None else (BITS, False)
     scale = most if floats else float((1 << (16 if aligned else depth or 8)) - 1)
     probes = taker.finish(max(scale, 1e-9))
     decoded = taker.finish(max(scale, 1e-9), srgb_decode)
@@ -277,9 +280,9 @@ def _look_at(candidate: Candidate) -> _Look:
             f"The pictures of {candidate.name} change by {probes.range_share:.1%} of their range: no"
             " projector's light is seen. Give the folder of a capture, or expose longer."
         )
-    notes = ["JPEG has changed values near edges of stripes"] if _has_jpeg(candidate) else []
-    bayer = None if colour else _bayer_of(brightest[1])
-    if bayer is not None:
+    notes = ["JPEG has changed values near edges of stripes"] if _has(candidate, {".jpg", ".jpeg"}) else []
+    bayer = stated or (None if colour else _bayer_of(brightest[1]))
+    if bayer is not None and stated is None:
         notes.append(
             f"neighbouring pixels look like a colour mosaic; {bayer} is assumed (red and blue unsure)"
         )
@@ -311,8 +314,8 @@ def _bayer_of(picture: NDArray[np.float32]) -> BayerPattern | None:
     return "RGGB" if ratios[0] < ratios[1] else "GRBG"
 
 
-def _has_jpeg(candidate: Candidate) -> bool:
-    return any(p is not None and p.path.suffix.lower() in {".jpg", ".jpeg"} for p in candidate.pictures)
+def _has(candidate: Candidate, suffixes: Collection[str]) -> bool:
+    return any(p is not None and p.path.suffix.lower() in suffixes for p in candidate.pictures)
 
 
 def _guess_of(
@@ -355,6 +358,8 @@ def _guess_of(
         left_aligned=look.left_aligned,
         full_scale=look.full_scale,
     )
+    if encoding is None and _has(candidate, CAMERA_RAWS):
+        encoding = "linear"
     if encoding is None:
         mapping, doubts_of_values = guessed_encoding(folder, mapping)
         unsure += doubts_of_values

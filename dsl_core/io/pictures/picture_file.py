@@ -5,22 +5,27 @@ from __future__ import annotations
 import errno
 import struct
 import warnings
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from dsl_core.errors import StoreError
+from dsl_core.errors import MissingPackageError, StoreError
+from dsl_core.io.pictures import camera_raw
 from dsl_core.io.pictures.mapping import MOST_PICTURES, Mapping, RawLayout
 from dsl_core.io.png_parts import declares_too_much
 from dsl_core.io.reading import read_array, read_bounded, require_plain
+from dsl_core.model.conditions import BayerPattern
 from dsl_core.model.plan import MOST_PX
 from dsl_core.optics.colour import srgb_decode
 
-PICTURES = {".png", ".tif", ".tiff", ".bmp", ".jpg", ".jpeg", ".pgm", ".ppm"}
+T = TypeVar("T")
+
+PICTURES = {".png", ".tif", ".tiff", ".bmp", ".jpg", ".jpeg", ".pgm", ".ppm", *camera_raw.SUFFIXES}
 ARRAYS, RAWS = {".npy"}, {".raw", ".bin"}
 #: Formats whose files may hold several pictures as pages.
 PAGED = {".tif", ".tiff"}
@@ -31,10 +36,6 @@ NOT_READ = {
     ".npz": ("an archive of arrays", "Save the array with the pictures as a file .npy"),
     ".mat": ("a file of MATLAB", "Save its pictures as PNG or as one file .npy"),
     **dict.fromkeys((".h5", ".hdf5"), ("a file of HDF5", "Save its pictures as PNG or as one file .npy")),
-    **dict.fromkeys(
-        (".cr2", ".cr3", ".nef", ".arw", ".dng", ".raf", ".rw2"),
-        ("camera raw", "Convert it to TIFF of 16 bits without a curve"),
-    ),
     **dict.fromkeys((".webp", ".heic", ".jxl", ".exr", ".jp2"), ("a picture", "Save it as PNG or TIFF")),
     **dict.fromkeys((".zip", ".7z", ".rar", ".gz"), ("an archive", "Unpack it")),
 }
@@ -89,6 +90,8 @@ def load_values(picture: Picture, raw: RawLayout | None = None) -> NDArray[Any]:
         values = values if picture.index is None else values[picture.index]
     elif suffix in RAWS:
         values = _raw(path, raw)
+    elif suffix in camera_raw.SUFFIXES:
+        values = _from_camera(path, camera_raw.read_mosaic)
     else:
         values = _image(path, picture.index)
     if values.ndim == 3 and values.shape[2] == 1:
@@ -103,6 +106,13 @@ def load_values(picture: Picture, raw: RawLayout | None = None) -> NDArray[Any]:
     if not 0 < values.shape[0] * values.shape[1] <= MOST_PIXELS or max(values.shape) > MOST_PX:
         raise StoreError(f"{picture} is {values.shape[1]} x {values.shape[0]} px, which no camera has.")
     return values
+
+
+def bayer_of(picture: Picture) -> BayerPattern | None:
+    """The mosaic that a file itself states, None where its format states none; raises `StoreError`."""
+    if picture.path.suffix.lower() not in camera_raw.SUFFIXES:
+        return None
+    return _from_camera(picture.path, camera_raw.bayer_of)
 
 
 def load_mosaic(picture: Picture, mapping: Mapping, bit_depth: int) -> NDArray[np.uint16]:
@@ -201,6 +211,19 @@ def _raw(path: Path, layout: RawLayout | None) -> NDArray[Any]:
         )
     values = np.frombuffer(data, kind, offset=layout.header_bytes)
     return values.reshape(layout.height_px, layout.width_px).astype(kind.newbyteorder("="))
+
+
+def _from_camera(path: Path, read: Callable[[bytes, int], T]) -> T:
+    """What is read of a file of camera raw; raises `StoreError`."""
+    advice = "Convert it to TIFF of 16 bits without a curve"
+    try:
+        return read(_bytes(path), MOST_PIXELS)
+    except MissingPackageError as error:
+        raise StoreError(f"{path} is camera raw. {error} {advice}, or install that.") from error
+    except (ValueError, OSError) as error:
+        raise StoreError(
+            f"{path} cannot be read as camera raw ({error}). {advice}, or leave it out."
+        ) from error
 
 
 def _too_many(path: Path, count: int) -> StoreError:

@@ -130,7 +130,7 @@ def test_stripes_count_the_periods_of_every_sinusoid(tmp_path: Path) -> None:
 def test_folders_of_no_capture_end_in_a_sentence(tmp_path: Path) -> None:
     empty = tmp_path / "empty"
     empty.mkdir()
-    with pytest.raises(StoreError, match=r"contains 0 pictures .*convert camera raw files"):
+    with pytest.raises(StoreError, match=r"contains 0 pictures .*state raw in a mapping"):
         guess_mapping(empty)
     with pytest.raises(StoreError, match="is not a folder"):
         guess_mapping(tmp_path / "nowhere")
@@ -233,7 +233,6 @@ def test_sinusoids_leave_their_way_open_and_wide_stripes_are_told(tmp_path: Path
     [
         ("scan.avi", "a video, which is not read. Save its frames as pictures"),
         ("scan.npz", "an archive of arrays, which is not read. Save the array"),
-        ("IMG_1.CR2", "camera raw, which is not read. Convert it to TIFF"),
     ],
 )
 def test_what_is_not_read_is_named_with_what_to_do(tmp_path: Path, name: str, said: str) -> None:

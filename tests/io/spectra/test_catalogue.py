@@ -28,7 +28,7 @@ COVERS = 401.0, 699.0
         *(("ocean.txt", "Ocean"), ("avantes.txt", "Avantes"), ("cs2000.csv", "Konica Minolta CS-2000")),
         *(("plain.jdx", "JCAMP-DX"), ("packed.jdx", "JCAMP-DX"), ("pairs.dx", "JCAMP-DX")),
         *(("patches.cgats", "CGATS, ArgyllCMS"), ("leaf.spdx", "IES TM-27")),
-        ("meter.csv", "light meter (Sekonic, UPRtek)"),
+        ("meter.csv", "Sekonic, UPRtek"),
     ],
 )
 def test_a_format_is_recognised_whatever_its_ending(tmp_path: Path, name: str, format_name: str) -> None:

@@ -49,4 +49,4 @@ def _tables(text: str) -> list[list[tuple[float, float]]]:
     return tables
 
 
-FORMAT = Format("light meter (Sekonic, UPRtek)", (".csv", ".xls", ".txt"), is_light_meter, read_light_meter)
+FORMAT = Format("Sekonic, UPRtek", (".csv", ".xls", ".txt"), is_light_meter, read_light_meter)
