@@ -14,7 +14,7 @@ from dsl_core.model.rig import Rig
 from dsl_core.model.spectral import WavelengthGrid
 from dsl_core.reconstruction.geometry import Geometry
 from dsl_core.reconstruction.spectral.solving.tile_frames import Pixels
-from dsl_core.reconstruction.spectral.spectra import SpectralMaps
+from dsl_core.reconstruction.spectral.spectral_maps import SpectralMaps
 from dsl_core.version import __version__
 
 #: Bands with less than this share of data count as decided by the prior.

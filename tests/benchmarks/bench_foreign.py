@@ -49,7 +49,7 @@ from dsl_core.model.rig import Rig
 from dsl_core.model.spectral import WavelengthGrid
 from dsl_core.reconstruction.rows.assembly import Assembly
 from dsl_core.reconstruction.rows.bands import Band
-from dsl_core.reconstruction.spectral.spectra import SpectralMaps
+from dsl_core.reconstruction.spectral.spectral_maps import SpectralMaps
 from dsl_core.workflows import scans
 from tests.benchmarks.common import options, print_table, write_json
 from tests.cases.twin_scan import MemoryScan, capture

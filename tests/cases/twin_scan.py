@@ -23,7 +23,7 @@ from dsl_core.reconstruction.rows.bands import bands_of
 from dsl_core.reconstruction.scan_result import known_pixels
 from dsl_core.reconstruction.spectral.solvers import RowSolver
 from dsl_core.reconstruction.spectral.solving.tile_frames import Pixels
-from dsl_core.reconstruction.spectral.spectra import SpectralMaps
+from dsl_core.reconstruction.spectral.spectral_maps import SpectralMaps
 from dsl_core.simulation.sim_devices import open_twin
 
 if TYPE_CHECKING:

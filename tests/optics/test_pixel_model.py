@@ -194,7 +194,7 @@ def test_the_solvers_equations_are_those_of_the_operator(
         given.append(data.clone())
         raise Seen
 
-    for solve in ("solving.dense_solver.solve_dense", "spectra.solve_spectra"):
+    for solve in ("solving.dense_solver.solve_dense", "solving.tensor_tiles.solve_spectra"):
         monkeypatch.setattr(f"dsl_core.reconstruction.spectral.{solve}", watched)
     solver = readers.solver()
     with pytest.raises(Seen):

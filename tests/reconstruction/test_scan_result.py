@@ -8,7 +8,7 @@ import pytest
 from dsl_core.model.result import Flag
 from dsl_core.model.spectral import SpectralCurve, WavelengthGrid
 from dsl_core.reconstruction.scan_result import _spectral_flags, with_calibration
-from dsl_core.reconstruction.spectral.spectra import SpectralMaps
+from dsl_core.reconstruction.spectral.spectral_maps import SpectralMaps
 from dsl_core.simulation.published_rig import published_rig
 
 GRID = WavelengthGrid(start_nm=500.0, stop_nm=520.0, step_nm=10.0)

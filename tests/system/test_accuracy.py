@@ -20,7 +20,8 @@ from dsl_core.model.rig import Rig
 from dsl_core.model.spectral import WavelengthGrid
 from dsl_core.optics.correspondence import correspondence
 from dsl_core.reconstruction.spectral import spectra
-from dsl_core.reconstruction.spectral.spectra import SpectralMaps, SpectralReconstruction
+from dsl_core.reconstruction.spectral.spectra import SpectralReconstruction
+from dsl_core.reconstruction.spectral.spectral_maps import SpectralMaps
 from dsl_core.solve.threads import one_kernel_thread
 from dsl_core.workflows import scans
 from tests.cases.crop import cropped_twin

@@ -24,7 +24,7 @@ from dsl_core.reconstruction.rows.bands import Band
 from dsl_core.reconstruction.scan_result import attributes_of, maps_of_rows
 from dsl_core.reconstruction.spectral.rig_traits import traits_in_words
 from dsl_core.reconstruction.spectral.solvers import RowSolver
-from dsl_core.reconstruction.spectral.spectra import SpectralMaps
+from dsl_core.reconstruction.spectral.spectral_maps import SpectralMaps
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -19,7 +19,7 @@ from dsl_core.optics.spectra import hat_moments
 from dsl_core.progress import Progress
 from dsl_core.reconstruction.spectral.published_objective import LineData, PublishedReconstruction
 from dsl_core.reconstruction.spectral.solving.tile_frames import Pixels
-from dsl_core.reconstruction.spectral.spectra import SpectralMaps
+from dsl_core.reconstruction.spectral.spectral_maps import SpectralMaps
 
 #: Functions of the basis, as in Li et al., "Pro-Cam SSfM" (ICCV 2019), after Park et al. (ICCV 2007).
 BASIS_FUNCTIONS = 8

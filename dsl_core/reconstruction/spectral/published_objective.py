@@ -31,7 +31,8 @@ from dsl_core.optics.lines.profile import step_edge
 from dsl_core.optics.spectra import ORDERS, chain_response, hat_moments
 from dsl_core.progress import NoProgress, Progress
 from dsl_core.reconstruction.spectral.solving.tile_frames import Pixels
-from dsl_core.reconstruction.spectral.spectra import SpectralMaps, blurred_mask
+from dsl_core.reconstruction.spectral.spectra import blurred_mask
+from dsl_core.reconstruction.spectral.spectral_maps import SpectralMaps
 from dsl_core.solve.many import Check, work_through
 from dsl_core.solve.threads import one_kernel_thread
 

@@ -30,7 +30,8 @@ from dsl_core.reconstruction.spectral.probing.probe import probed_pixels
 from dsl_core.reconstruction.spectral.published_objective import PublishedReconstruction, require_single_lines
 from dsl_core.reconstruction.spectral.self_correction import Followed
 from dsl_core.reconstruction.spectral.solving.tile_frames import Pixels
-from dsl_core.reconstruction.spectral.spectra import SpectralMaps, SpectralReconstruction, tile_shape
+from dsl_core.reconstruction.spectral.spectra import SpectralReconstruction, tile_shape
+from dsl_core.reconstruction.spectral.spectral_maps import SpectralMaps
 
 _NONE = np.empty(0, np.intp)
 _KINDS = {"published": PublishedReconstruction, "nearest-line": NearestLine}

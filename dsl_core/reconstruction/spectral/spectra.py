@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, fields, replace
-from typing import Any
+from dataclasses import replace
 
 import numpy as np
 import torch
@@ -15,9 +14,7 @@ from dsl_core.model.plan import CapturePlan
 from dsl_core.model.result import Reach
 from dsl_core.model.rig import Rig
 from dsl_core.model.spectral import WavelengthGrid
-from dsl_core.optics.colour_neighbours import ColourNeighbours, bayer_colours
 from dsl_core.optics.correspondence import Correspondence, Footprint, like
-from dsl_core.optics.lines.equations import LineEquations
 from dsl_core.optics.lines.line_set import LineSet
 from dsl_core.optics.pixel_model import COLOUR_ERROR, DIRECT_ERROR, PixelModel, Traced
 from dsl_core.optics.spectra import ORDERS, Bands
@@ -28,21 +25,21 @@ from dsl_core.reconstruction.spectral.model_error import ModelError, model_error
 from dsl_core.reconstruction.spectral.probing.picked_cube import PickedCube
 from dsl_core.reconstruction.spectral.probing.probed_light import ProbedScan
 from dsl_core.reconstruction.spectral.self_correction import Followed, follow
-from dsl_core.reconstruction.spectral.solving.compiled_tiles import PARAMETERS, CompiledTiles
-from dsl_core.reconstruction.spectral.solving.lane_solver import solve_spectra
+from dsl_core.reconstruction.spectral.solving.compiled_tiles import CompiledTiles
 from dsl_core.reconstruction.spectral.solving.prior import Prior
 from dsl_core.reconstruction.spectral.solving.solution import Spectra
+from dsl_core.reconstruction.spectral.solving.tensor_tiles import TensorTiles
 from dsl_core.reconstruction.spectral.solving.tile_frames import Pixels, TileFrames
-from dsl_core.solve.banded import multiply
+from dsl_core.reconstruction.spectral.spectral_maps import SpectralMaps, put_pixels
 from dsl_core.solve.many import Check, work_through
 from dsl_core.solve.threads import one_kernel_thread
 
 #: Pixels of a tile of up to `TILE_BANDS` bands, and of the smallest; even numbers keep the Bayer phase.
 TILE, TILE_BANDS, LEAST_TILE = (64, 96), 60, (16, 24)
+#: Rows of a tile whose full matrices are in memory at once.
+DENSE_ROWS = 16
 #: Pixels whose light is traced at a time, where all are.
 CHUNK = 1 << 18
-#: Pixels whose full matrices are solved at a time, and rows of a tile whose matrices are in memory at once.
-DENSE_PIXELS, DENSE_ROWS = 512, 16
 #: Chi-square that noise alone does not reach: what exceeds it is misfit that neighbouring lines share.
 SURE_MISFIT = 1.3
 #: Chi-square from which a pixel may see several surfaces, and the most that it is then unsure by.
@@ -63,37 +60,6 @@ def zero_order_error(rig: Rig, plan: CapturePlan) -> float:
     """Relative error granted to the zero order in frames that light a pixel by several orders at once."""
     # Lines are either dark or fully lit, which no rounding of drive levels changes.
     return DIRECT_ERROR if LineSet.of(plan) is not None else max(DIRECT_ERROR, rounding_error(rig, plan))
-
-
-@dataclass(frozen=True)
-class SpectralMaps:
-    """Cubes (bands, rows, columns) of the reported bands, and maps (rows, columns); NaN where invalid.
-
-    ``followed`` is what the scan says about its model, where it can say anything, and the model that spectra
-    are those of; ``error`` is what is left.
-    """
-
-    reflectance: NDArray[np.float32]
-    std: NDArray[np.float32]
-    data_share: NDArray[np.float32]
-    reach: NDArray[np.uint8]
-    at_bound: NDArray[np.bool_]
-    chi_square: NDArray[np.float32]
-    followed: Followed | None = None
-    error: ModelError | None = None
-
-    @classmethod
-    def empty(cls, bands: int, shape: tuple[int, int]) -> SpectralMaps:
-        """Maps full of NaN, to be filled by tiles."""
-        cube = (bands, *shape)
-        return cls(
-            reflectance=np.full(cube, np.nan, np.float32),
-            std=np.full(cube, np.nan, np.float32),
-            data_share=np.full(cube, np.nan, np.float32),
-            reach=np.zeros(cube, np.uint8),
-            at_bound=np.zeros(shape, bool),
-            chi_square=np.zeros(shape, np.float32),
-        )
 
 
 class SpectralReconstruction:
@@ -121,7 +87,7 @@ class SpectralReconstruction:
         self.rig, self.pixels = rig, pixels
         self.model = model_of_plan(rig, plan, grid, model)
         self.bands = self.model.bands
-        self.radiance, self.std, self.direct_error = radiance, std, zero_order_error(rig, plan)
+        self.radiance, self.std = radiance, std
         self.prior = prior or Prior().at_step(grid.step_nm)
         self.device, self.dtype = torch.device(device), dtype
         self.colour_weight = self._colour_weight()
@@ -131,6 +97,7 @@ class SpectralReconstruction:
         usual = self.device.type == "cpu" and dtype == torch.float32
         #: Tensors are for a GPU, and for other precisions.
         self._compiled = CompiledTiles(self.prior) if usual and self.model.single else None
+        self._tensors = TensorTiles(self.prior, zero_order_error(rig, plan))
         self._as_calibrated = as_calibrated
         #: The row of the picture that the stacks begin with.
         self._first_row = 0
@@ -220,10 +187,14 @@ class SpectralReconstruction:
     def frames(self, rows: slice, columns: slice) -> TileFrames:
         """What is measured of the valid pixels of a part of the picture."""
         like = torch.empty(0, device=self.device, dtype=self.dtype)
+        radiance, std, first_row = self._stacks()
+        return TileFrames(self.rig, radiance, std, self.pixels, rows, columns, like, first_row)
+
+    def _stacks(self) -> tuple[NDArray[np.float32], NDArray[np.floating], int]:
+        """Radiance and deviation (frames, rows, columns), and the row of the picture they begin with."""
         assert isinstance(self.radiance, np.ndarray)
         assert isinstance(self.std, np.ndarray)
-        stacks = self.radiance, self.std
-        return TileFrames(self.rig, *stacks, self.pixels, rows, columns, like, self._first_row)
+        return self.radiance, self.std, self._first_row
 
     def trace(self, frames: TileFrames) -> Traced:
         """Where the light of pixels comes from."""
@@ -248,71 +219,13 @@ class SpectralReconstruction:
         )
         traced = self.trace(near)
         check()
-        solve = self._dense
-        if self.model.single:
-            solve = self._banded if self._compiled is None else self._compiled_tile
-        spectra, misfit = solve(frames, near, traced, check)
+        colour = self._colour_roots(frames) if self.model.single else None
+        if self._compiled is None:
+            found = self._tensors.solve(self.model, frames, near, traced, colour, check)
+        else:
+            found = self._compiled.solve(self.model, self._stacks(), frames, near, traced, colour, check)
         own = torch.as_tensor(np.searchsorted(near.flat, frames.flat), device=self.device)
-        self._store(spectra, misfit, frames, (traced, own), out, first_row)
-
-    def _compiled_tile(
-        self, frames: TileFrames, near: TileFrames, traced: Traced, check: Check
-    ) -> tuple[Spectra, Tensor]:
-        """As `_banded`, without tensors."""
-        assert self._compiled is not None
-        assert isinstance(self.radiance, np.ndarray)
-        assert isinstance(self.std, np.ndarray)
-        stacks, colour = (self.radiance, self.std, self._first_row), self._colour_roots(frames)
-        return self._compiled.solve(self.model, stacks, frames, near, traced, colour, check)
-
-    def _banded(
-        self, frames: TileFrames, near: TileFrames, traced: Traced, check: Check
-    ) -> tuple[Spectra, Tensor]:
-        """Spectra and reduced chi-square of a tile from the samples ``near`` it, whose light was traced."""
-        shading = frames.known("shading")
-        system, offset = self._samples(near, traced, check)
-        gather = self._gather(frames, near)
-        matrix, right, square, samples = (
-            gather.sum(values)
-            for values in (system.positive_matrix(), system.right, system.square, system.samples)
-        )
-        scaled = right * shading
-        rows = self._colour_rows(frames, shading, scaled)
-        check()
-        spectra = solve_spectra(matrix * shading**2, scaled, rows, self.prior, check)
-        if offset is not None:
-            spectra = with_offset(spectra, matrix * shading**2, gather.sum(offset) * shading**2, self.prior)
-        radiance = spectra.nodes * shading
-        explained = (radiance * (2 * right - multiply(matrix, radiance))).sum(0)
-        return spectra, (square - explained) / (samples - PARAMETERS).clip(min=1)
-
-    def _samples(
-        self, frames: TileFrames, traced: Traced, check: Check
-    ) -> tuple[LineEquations, Tensor | None]:
-        """Equations of the pixels' own colours alone, and the variance that offsets give their right side."""
-        variance = frames.known("offset_std") ** 2
-        colour = torch.as_tensor(bayer_colours(self.rig.sensor.bayer, *frames.place()), device=self.device)
-        system = self.model.line_equations(colour, variance, bool(variance.any()))
-        for order, footprint in traced.orders.items():
-            inside = self.model.inside(footprint)
-            lit = self.model.frames(footprint.columns, inside)
-            if lit and self.model.lines is not None:
-                check()
-                radiance, weight = frames.samples(lit, self.model.lines)
-                width = self.model.width(footprint, inside)
-                system.add(order, footprint.columns, inside, radiance, weight, lit.start, width)
-        return system, None if system.offset is None else variance * system.offset**2
-
-    def _colour_rows(self, frames: TileFrames, shading: Tensor, right: Tensor) -> Tensor | None:
-        """Weighted zero-order equations (bands, 3, pixels), added to ``right``; None if unneeded."""
-        found = self._colour_roots(frames)
-        if found is None:
-            return None
-        colour, root = found
-        moments = like(self.bands.moments[0].sum(1).T, right)
-        rows = moments[:, :, None] * (root * shading)
-        right += torch.einsum("jcp,cp->jp", rows, colour * root)
-        return rows
+        self._store(*found, frames, (traced, own), out, first_row)
 
     def _colour_roots(self, frames: TileFrames) -> tuple[Tensor, Tensor] | None:
         """Zero-order colour of a tile and the roots of its weights, (3, pixels); None if they are zero."""
@@ -321,50 +234,6 @@ class SpectralReconstruction:
             return None
         colour, variance = frames.zero_order_colour()
         return colour, (kappa / (variance + (COLOUR_ERROR * colour) ** 2)).sqrt()
-
-    def _dense(
-        self, frames: TileFrames, near: TileFrames, traced: Traced, check: Check
-    ) -> tuple[Spectra, Tensor]:
-        """As `_banded`, for patterns that couple distant bands."""
-        from dsl_core.reconstruction.spectral.solving.dense_solver import solve_dense
-
-        parts: list[tuple[Tensor, ...]] = []
-        samples = self._dense_samples(near, traced)
-        # Full matrices take long: a part of the pixels at a time, so that a cancel need not wait.
-        for start in range(0, len(near.flat), DENSE_PIXELS):
-            check()
-            part = slice(start, start + DENSE_PIXELS)
-            colour, radiance, weight, variance = (each[..., part] for each in samples)
-            made = self.model.equations(traced.part(part), colour, radiance, weight, variance)
-            parts.append((*made, (weight > 0).sum(0).to(radiance)))
-        gather = self._gather(frames, near)
-        matrix, right, square, number = (gather.sum(torch.cat(each, -1)) for each in zip(*parts, strict=True))
-        shading, freedom = frames.known("shading"), (number - PARAMETERS).clip(min=1)
-        found, misfit = [], []
-        for start in range(0, len(shading), DENSE_PIXELS):
-            check()
-            part = slice(start, start + DENSE_PIXELS)
-            lit, own, side = shading[part], matrix[..., part].permute(2, 0, 1), right[:, part].T
-            spectra = solve_dense(own * (lit**2)[:, None, None], side * lit[:, None], self.prior)
-            found.append(spectra)
-            nodes = (spectra.nodes * lit).T
-            explained = (nodes * (2 * side - (own @ nodes[..., None])[..., 0])).sum(1)
-            misfit.append((square[part] - explained) / freedom[part])
-        return _joined(found), torch.cat(misfit)
-
-    def _dense_samples(self, near: TileFrames, traced: Traced) -> tuple[Tensor, Tensor, Tensor, Tensor]:
-        """Own colours (samples,), radiance and weight (frames, samples), variance of offsets (samples,)."""
-        colour = torch.as_tensor(bayer_colours(self.rig.sensor.bayer, *near.place()), device=self.device)
-        radiance, weight = near.own()
-        light = self.model.zero_light(near.known("shading"))
-        direct = self.model.direct_light(light, traced.column_px, near.zero_order_colour()[0])
-        direct = direct.gather(0, colour.expand(1, len(radiance), -1))[0]
-        weight = 1 / (1 / weight + (self.direct_error * direct) ** 2)
-        return colour, radiance, weight, near.known("offset_std") ** 2
-
-    def _gather(self, frames: TileFrames, near: TileFrames) -> ColourNeighbours:
-        """Sums over the samples that belong to a tile's pixels."""
-        return ColourNeighbours(frames.rows, frames.columns, near.place(), frames.place(), frames.shares())
 
     def _map(self, values: NDArray[np.float32], flat: NDArray[np.intp]) -> Tensor:
         return torch.as_tensor(values.ravel()[flat], device=self.device, dtype=self.dtype)
@@ -422,28 +291,6 @@ def _reach(model: PixelModel, traced: Traced, reported: slice) -> Tensor:
     return reach.masked_fill_(reach == 0, int(Reach.ZERO_ONLY))
 
 
-def put_pixels(maps: NDArray[Any], flat: NDArray[np.intp], values: NDArray[Any]) -> None:
-    """Put values (n, pixels) at flat, rising places of maps (n, rows, columns).
-
-    >>> maps = np.zeros((1, 2, 3), int)
-    >>> put_pixels(maps, np.array([1, 2, 4, 5]), np.array([[1, 2, 3, 4]]))
-    >>> maps.tolist()
-    [[[0, 1, 2], [0, 3, 4]]]
-    >>> put_pixels(maps, np.array([0, 2, 3]), np.array([[7, 8, 9]]))
-    >>> maps.tolist()
-    [[[7, 1, 8], [9, 3, 4]]]
-    """
-    top, left = divmod(int(flat[0]), maps.shape[-1])
-    bottom, right = divmod(int(flat[-1]), maps.shape[-1])
-    shape = bottom - top + 1, right - left + 1
-    corner = np.arange(left, right + 1) + np.arange(top, bottom + 1)[:, None] * maps.shape[-1]
-    if shape[1] > 0 and np.array_equal(flat, corner.ravel()):
-        # A whole rectangle takes a tenth of the time that pixels take which are looked up one by one.
-        maps[:, top : bottom + 1, left : right + 1] = values.reshape(-1, *shape)
-    else:
-        maps.reshape(len(maps), -1)[:, flat] = values
-
-
 def _wanted(tile: tuple[slice, slice], part: tuple[slice, slice], shape: tuple[int, ...]) -> bool:
     """Whether a tile has pixels of a part of a picture."""
     for own, wanted, size in zip(tile, part, shape, strict=True):
@@ -451,15 +298,6 @@ def _wanted(tile: tuple[slice, slice], part: tuple[slice, slice], shape: tuple[i
         if own.start >= stop or own.stop <= start:
             return False
     return True
-
-
-def with_offset(spectra: Spectra, matrix: Tensor, variance: Tensor, prior: Prior) -> Spectra:
-    """Spectra less sure by unknown offsets that all frames of a sample share.
-
-    ``variance`` (bands, pixels) is theirs in the right side. An offset looks like a grey that gives the same.
-    """
-    grey = multiply(matrix, torch.ones_like(spectra.std)) + prior.level_std**-2
-    return replace(spectra, std=torch.hypot(spectra.std, variance.sqrt() / grey))
 
 
 def blurred_mask(mask: NDArray[np.float32]) -> NDArray[np.float32]:
@@ -476,9 +314,3 @@ def tile_shape(bands: int) -> tuple[int, int]:
         max(2 * int(side * share / 2), least) for side, least in zip(TILE, LEAST_TILE, strict=True)
     )
     return min(rows, TILE[0]), min(columns, TILE[1])
-
-
-def _joined(parts: list[Spectra]) -> Spectra:
-    """Spectra of some pixels after the other."""
-    maps = ([getattr(part, field.name) for part in parts] for field in fields(Spectra))
-    return Spectra(*(torch.cat(each, -1) for each in maps))

@@ -17,7 +17,8 @@ from dsl_core.optics.correspondence import correspondence
 from dsl_core.reconstruction.spectral import self_correction
 from dsl_core.reconstruction.spectral.film_motion import with_film
 from dsl_core.reconstruction.spectral.self_correction import fits_better
-from dsl_core.reconstruction.spectral.spectra import SpectralMaps, SpectralReconstruction
+from dsl_core.reconstruction.spectral.spectra import SpectralReconstruction
+from dsl_core.reconstruction.spectral.spectral_maps import SpectralMaps
 from tests.cases.twin_scan import MemoryScan, solver_input, twin_scan
 
 #: Most of these tests need no finer ones.

@@ -1,4 +1,4 @@
-"""How a scan is cut into tiles, and what an offset that all frames share makes of spectra."""
+"""How a scan is cut into tiles, and where their spectra go."""
 
 from __future__ import annotations
 
@@ -12,19 +12,17 @@ import torch
 from dsl_core.model.result import Reach
 from dsl_core.optics.correspondence import Footprint
 from dsl_core.optics.pixel_model import COLOUR_ERROR
-from dsl_core.reconstruction.spectral import spectra as spectra_module
 from dsl_core.reconstruction.spectral.solving.prior import Prior
 from dsl_core.reconstruction.spectral.solving.solution import Spectra
 from dsl_core.reconstruction.spectral.spectra import (
     LEAST_TILE,
     TILE,
-    SpectralMaps,
     SpectralReconstruction,
     _wanted,
     blurred_mask,
     tile_shape,
-    with_offset,
 )
+from dsl_core.reconstruction.spectral.spectral_maps import SpectralMaps
 
 BANDS = 4
 
@@ -37,16 +35,6 @@ def test_tiles_shrink_with_the_bands_so_that_memory_stays() -> None:
         assert LEAST_TILE[1] <= columns < TILE[1]
         assert rows % 2 == columns % 2 == 0, "the Bayer phase would change from tile to tile"
     assert tile_shape(465) == LEAST_TILE
-
-
-def test_an_offset_that_looks_like_a_grey_makes_spectra_as_unsure() -> None:
-    prior = Prior()
-    matrix = torch.full((1, BANDS, 1), 3.0)
-    like_grey = matrix[0] + prior.level_std**-2
-    spectra = Spectra.empty(torch.zeros((BANDS, 1)))
-    spectra.std[:] = 0.004
-    variance = (0.003 * like_grey) ** 2
-    assert with_offset(spectra, matrix, variance, prior).std.numpy() == pytest.approx(0.005)
 
 
 @pytest.mark.parametrize(("width", "blur_px"), [(900, 10.0), (360, 4.0), (60, 1.0)])
@@ -79,34 +67,6 @@ def test_tiles_of_a_part_of_the_picture_are_those_that_reach_into_it() -> None:
 )
 def test_a_tile_has_even_sides_in_proportion_to_its_bands(bands: int, shape: tuple[int, int]) -> None:
     assert tile_shape(bands) == shape
-
-
-def test_spectra_of_dense_patterns_can_be_stopped_at_every_part_of_a_tile(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    monkeypatch.setattr(spectra_module, "DENSE_PIXELS", 2)
-    pixels = 5
-    frames = SimpleNamespace(flat=torch.arange(pixels), known=lambda name: torch.ones(pixels))
-    values = torch.zeros((1, pixels))
-
-    def equations(
-        traced: object, colour: object, radiance: torch.Tensor, *more: object
-    ) -> tuple[torch.Tensor, ...]:
-        many = radiance.shape[-1]
-        matrix = torch.eye(BANDS)[..., None].expand(-1, -1, many)
-        return matrix, torch.ones((BANDS, many)), torch.ones(many)
-
-    solver = SimpleNamespace(
-        model=SimpleNamespace(equations=equations),
-        prior=Prior(),
-        _dense_samples=lambda near, traced: (values[0], values, values + 1, values[0]),
-        _gather=lambda *tiles: SimpleNamespace(sum=lambda each: each),
-    )
-    asked = []
-    traced = SimpleNamespace(part=lambda part: part)
-    own = SpectralReconstruction._dense(solver, frames, frames, traced, lambda: asked.append(len(asked)))  # type: ignore[arg-type]
-    assert own[0].nodes.shape == (BANDS, pixels)
-    assert len(asked) == 3 + 3, "for the equations of each part, and for its spectra"
 
 
 def stored(misfit: list[float], error: Any = None, **more: Any) -> SpectralMaps:

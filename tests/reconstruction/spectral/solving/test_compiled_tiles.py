@@ -15,10 +15,12 @@ from dsl_core.optics.correspondence import correspondence
 from dsl_core.reconstruction.geometry import reconstruct_geometry
 from dsl_core.reconstruction.scan_result import known_pixels
 from dsl_core.reconstruction.spectral import spectra
+from dsl_core.reconstruction.spectral.solving import tensor_tiles
 from dsl_core.reconstruction.spectral.solving.compiled_tiles import on_grid
 from dsl_core.reconstruction.spectral.solving.solver import solve_tensors
 from dsl_core.reconstruction.spectral.solving.tile_frames import Pixels
-from dsl_core.reconstruction.spectral.spectra import SpectralMaps, SpectralReconstruction
+from dsl_core.reconstruction.spectral.spectra import SpectralReconstruction
+from dsl_core.reconstruction.spectral.spectral_maps import SpectralMaps
 from tests.stability.bench import GRID, WINDOW_PX, Patch, Staged, staged
 
 
@@ -51,7 +53,7 @@ def solved(monkeypatch: pytest.MonkeyPatch, compiled: bool, **changes: Any) -> S
     assert (solver._compiled is not None) == compiled
     with monkeypatch.context() as patch:
         if not compiled:
-            patch.setattr(spectra, "solve_spectra", solve_tensors)
+            patch.setattr(tensor_tiles, "solve_spectra", solve_tensors)
         return solver.run(threads=1)
 
 
