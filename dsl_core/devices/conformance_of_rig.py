@@ -81,7 +81,8 @@ class RigParts:
             assert rig.standing is not None
             before = rig.standing()
             require(bool(before.strip()), "standing says nothing")
-            where: dict[str, float | str] = {"depth_mm": 700.0}
+            known = rig.calibration or rig.nominal
+            where: dict[str, float | str] = {} if known is None else {"depth_mm": known.usual_depth_mm}
             asked = [
                 Placement(target="nothing", film=False),
                 Placement(target="spectralon", film=False, options=where),

@@ -23,6 +23,8 @@ from dsl_core.model.spectral import SpectralCurve
 
 Range = tuple[float, float]
 Rgb = tuple[SpectralCurve, SpectralCurve, SpectralCurve]
+#: Share of the depth range at which a single flat target is, with room before and behind it.
+USUAL_DEPTH = 0.4
 #: Relative difference granted between the stated width of a measured line spread and its own.
 WIDTH_MISMATCH = 1e-3
 
@@ -301,3 +303,9 @@ class Rig(Record):
     conditions: CaptureConditions | None = None
     calibrations: tuple[CalibrationNote, ...] = ()
     light_checks: tuple[LightCheck, ...] = ()
+
+    @property
+    def usual_depth_mm(self) -> float:
+        """Where a single flat target is, and the plane that predictions are for: whole mm."""
+        low, high = self.depth_range_mm
+        return float(round(low + USUAL_DEPTH * (high - low)))

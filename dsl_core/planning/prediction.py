@@ -33,8 +33,6 @@ Floats = NDArray[np.float64]
 MODEL_FLOOR = 0.003
 #: Spectral step of the truth behind the width of narrow peaks, nm, and samples that state it.
 FINE_STEP_NM, PEAK_SAMPLES = 1.0, 4
-#: Where the plane of a default view stands, mm.
-REFERENCE_MM = 700.0
 #: Core seconds a million pixels at `BANDS` bands, least squares over 68 reconstructions of small pieces of
 #: the twin: single lines, fixed and an exposure (scatter 24 %); all other sets, fixed and a pattern (11 %).
 #: Pieces pay the start of every tile, so that whole pictures take less.
@@ -54,15 +52,15 @@ def predict(
 ) -> Prediction:
     """Expected figures of a plan on a rig.
 
-    ``view`` is by default a plane at `REFERENCE_MM` with the classic chart's spectra; a view of a quick look
-    brings its own. Raises `PlanError` for plans without spectral patterns or binary code, and
+    ``view`` is by default a plane at the rig's usual depth with the classic chart's spectra; a view of a
+    quick look brings its own. Raises `PlanError` for plans without spectral patterns or binary code, and
     patterns that do not fit.
     """
     if isinstance(plan.spectral, NoSpectral) or plan.code_count == 0:
         raise PlanError(f"The plan {plan.name!r} has no spectral patterns or no binary code to predict for.")
     grid, plan = grid or WavelengthGrid(), plan.sized(rig.camera, rig.projector)
     with one_kernel_thread():
-        return _predict(rig, plan, view or plane_samples(rig, REFERENCE_MM), grid, latency_ms, peaks)
+        return _predict(rig, plan, view or plane_samples(rig), grid, latency_ms, peaks)
 
 
 def _predict(

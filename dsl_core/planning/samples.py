@@ -54,8 +54,12 @@ class SamplePixels:
         )
 
 
-def plane_samples(rig: Rig, depth_mm: float = 700.0, grid: tuple[int, int] = GRID) -> SamplePixels:
-    """A plane that faces the camera, where the projector lights it; raises `PlanError` if nowhere."""
+def plane_samples(rig: Rig, depth_mm: float | None = None, grid: tuple[int, int] = GRID) -> SamplePixels:
+    """A plane that faces the camera, where the projector lights it; raises `PlanError` if nowhere.
+
+    Without ``depth_mm`` it is at the rig's usual depth.
+    """
+    depth_mm = rig.usual_depth_mm if depth_mm is None else depth_mm
     depth = _plane(depth_mm).depth_mm(rig)
     lit = _inside(rig, depth)
     if not lit.any():

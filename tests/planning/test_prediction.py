@@ -49,6 +49,15 @@ def test_every_preset_has_an_error_that_is_a_number(preset: Preset) -> None:
     assert 0 < found.depth_std_mm < 10
 
 
+def test_predictions_are_for_the_depths_that_the_rig_is_for() -> None:
+    near = published_rig()
+    assert near.usual_depth_mm == 700
+    rig = near.model_copy(update={"depth_range_mm": (900.0, 1400.0)})
+    assert plane_samples(rig).depth_mm == pytest.approx(1100, abs=1e-6)
+    found = [predict(each, plan(ScanLines(width_px=16, step_px=8)), peaks=False) for each in (near, rig)]
+    assert found[1].depth_std_mm > 1.3 * found[0].depth_std_mm
+
+
 def test_time_and_bytes_are_those_of_the_plan() -> None:
     made = plan(ScanLines(step_px=4))
     found = figures(ScanLines(step_px=4))

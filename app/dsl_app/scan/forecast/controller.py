@@ -101,6 +101,8 @@ class ForecastController:
         self._stop()
         self._of, self._known, self._refused, self._is_complete = now, {}, {}, False
         self._wants_all = False
+        if now is not None:
+            self.state.depth_mm.set(now.rig.usual_depth_mm)
         self.state.points.set(())
         self.state.left.set(0)
         self._show_current()

@@ -28,7 +28,6 @@ NOTHING_YET = (
     "Nothing is predicted yet. Predictions need a connected rig with a calibration, and no running scan."
 )
 _HEADS = ("Figure", "This plan", "Published", "Last scan")
-CHART = "a Color Checker at 700 mm"
 
 
 class ForecastPanel(QWidget):
@@ -184,7 +183,8 @@ class ForecastPanel(QWidget):
         elif not state.points.value:
             text = "Predicting…" if total else NOTHING_YET
         else:
-            scene = CHART if state.look.value is None else f"the scene of {state.look.value.stem}"
+            chart = f"a Color Checker at {state.depth_mm.value:.0f} mm"
+            scene = chart if state.look.value is None else f"the scene of {state.look.value.stem}"
             origin = f"Expected from the calibration, for {scene} (press F1 to read how)."
             text = f"{done} of {total} plans predicted. {origin}" if total > 1 else origin
         self._note.setText(text)

@@ -71,7 +71,7 @@ class ForecastState:
     ``trouble`` or, for this plan alone, ``refusal`` says why). ``progress`` counts plans done and in total
     (0 of 0: nothing is computed), ``left`` those that are predicted on request only. ``answer`` answers a
     budget of time or error. ``look`` is the result whose scene is planned for (None: a Color Checker),
-    ``last_look`` the latest one.
+    ``last_look`` the latest one; ``depth_mm`` is where the Color Checker would be.
     """
 
     def __init__(self) -> None:
@@ -84,6 +84,7 @@ class ForecastState:
         self.answer = Value("")
         self.look: Value[Path | None] = Value(None)
         self.last_look: Value[Path | None] = Value(None)
+        self.depth_mm = Value(0.0)
         self.measured: Value[MeasuredScan | None] = Value(None)
 
     @property

@@ -89,6 +89,7 @@ def test_presets_and_candidates_are_predicted_once_and_remembered(
 ) -> None:
     control = forecast(bench, tmp_path)
     assert len(control.state.points.value) == len(PRESETS)
+    assert control.state.depth_mm.value == bench.calibration.usual_depth_mm
     assert control.state.left.value == 1
     control.predict_all()
     points = control.state.points.value
