@@ -26,6 +26,7 @@ _OF_EXTRAS = (
     "vtk",
     "pyvista",
     "pyqtgraph",
+    "rawpy",
 )
 _PACKAGES = ("numpy", "scipy", "zarr", "numcodecs", "xarray", "pydantic", "typer", "OpenEXR")
 _DRIVERS = ("pyserial", "zaber-motion", "seabreeze", "pypylon", "genicam", "harvesters")
