@@ -28,6 +28,8 @@ SAME_SIGMAS, NEARER = 2.0, 0.5
 CHANGED, KEPT = 0.15, 0.05
 #: A row is dark with less than this share of its light; so many have to be, and no more than this share.
 NO_LIGHT, FEWEST_ROWS, MOST_ROWS = 0.05, 2, 0.7
+#: Rows of which pixels work have this share of the noise of black that they had, and black but for so much.
+ALIVE, SAME_BLACK_DN = 0.6, 2.0
 #: Pictures are clipped where this share of the pixels has the largest value, below this share of full scale.
 CLIPPED, BELOW_FULL = 0.01, 0.9
 #: White follows that of before by another power than one by so much, alike in every colour, and as closely as
@@ -61,7 +63,7 @@ def alteration(before: Pictures, now: Pictures, sensor: Sensor) -> str:
         _numbered(now[1], sensor)
         or _turned(before[0], now[0], sensor)
         or _begun_elsewhere(before, now)
-        or _dark_rows(before, now)
+        or _dark_rows(before, now, sensor)
         or _clipped(before[0], now[0], sensor)
         or _coarser(before, now)
         or _mixed(before, now, sensor)
@@ -129,16 +131,26 @@ def _begun_elsewhere(before: Pictures, now: Pictures) -> str:
     )
 
 
-def _dark_rows(before: Pictures, now: Pictures) -> str:
+def _dark_rows(before: Pictures, now: Pictures, sensor: Sensor) -> str:
     old, new = ((white.astype(np.float64) - black).sum(1) for white, black, _ in (before, now))
     lit = old > 0.1 * old.max()
     dark = lit & (new < NO_LIGHT * old)
     if not FEWEST_ROWS <= int(dark.sum()) <= MOST_ROWS * int(lit.sum()):
         return ""
+    count, first = int(dark.sum()), int(np.flatnonzero(dark)[0])
+    was, black = (pictures[1][dark] for pictures in (before, now))
+    gained = float(black.mean(dtype=np.float64)) - float(was.mean(dtype=np.float64))
+    if abs(gained) < SAME_BLACK_DN and _noise(black, sensor)[0] > ALIVE * _noise(was, sensor)[0]:
+        return (
+            f"{count} rows of the picture no longer have any light of the projector, the first of them is row"
+            f" {first}, and their pixels work: the projector leaves a part of its picture dark (another"
+            " window or size, a failed part), or something stands in its way. Set its picture as it was,"
+            " clear the way, and resume the scan."
+        )
     return (
-        f"{int(dark.sum())} rows of the picture no longer have any light, the first of them is row"
-        f" {int(np.flatnonzero(dark)[0])}: rows of the sensor failed, or their packets are lost. Check cable"
-        " and driver of the camera, and resume the scan."
+        f"{count} rows of the picture no longer have any light, the first of them is row {first}: rows of"
+        " the sensor failed, or their packets are lost. Check cable and driver of the camera, and resume the"
+        " scan."
     )
 
 

@@ -93,6 +93,15 @@ def test_an_alteration_is_named(change: Callable[[Counts], Counts], said: str) -
     assert said in alteration(pictures(1), pictures(2, change), SENSOR)  # type: ignore[arg-type]
 
 
+def test_rows_that_only_the_projector_left_dark_are_not_taken_for_failed_ones() -> None:
+    white, black, code = pictures(2)
+    for each, seed in ((white, 3), (code, 4)):
+        each[:17] = pictures(seed)[1][:17]
+    said = alteration(pictures(1), (white, black, code), SENSOR)  # type: ignore[arg-type]
+    assert said.startswith("17 rows of the picture no longer have any light of the projector")
+    assert "their pixels work" in said
+
+
 @pytest.mark.parametrize(
     "change",
     [
