@@ -82,8 +82,9 @@ class Finding:
 
     ``again`` are the shots to take again, in the order of the plan: more than one where only together they
     are known to be wrong. ``detail`` says what was seen in more words, such as which other shot. A picture
-    ``is_doubtful`` if it cannot be told and is unlike its neighbours, if a few rows
-    of it do not show its pattern, or if its ``light`` has changed; a second picture says if it was right.
+    ``is_doubtful`` if it cannot be told and is unlike its neighbours, if a few rows of it do not show its
+    pattern or its line seems to be beside its place, which ``detail`` then says, or if its ``light`` has
+    changed; a second picture says if it was right.
     """
 
     shot: Shot

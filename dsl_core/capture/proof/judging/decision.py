@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 
 from dsl_core.capture.proof.contest import Contest
 from dsl_core.capture.proof.finding import Finding, Light, Verdict, displaced
 from dsl_core.capture.proof.judging.known import Learned
+from dsl_core.capture.proof.lines.line_place import is_aside
 from dsl_core.capture.proof.usual_light import LEAST_LIGHT
 from dsl_core.model.plan import Shot, describe_shot
 
@@ -51,6 +53,7 @@ def decide(
     return Finding(
         shot,
         Verdict.RIGHT if is_told else Verdict.UNTOLD,
+        detail="a few rows of it showed another pattern" if is_frayed else "",
         is_doubtful=is_frayed or light is Light.STEP,
         light=light,
     )
@@ -80,4 +83,8 @@ def in_place(
     if found.is_wrong and min((each.mean for each in places.values()), default=1.0) > best - NEARLY:
         return found
     told = learned.places.judge(found.shot, places, found.is_wrong)
-    return found if told is None else displaced(found.shot, told[1], told[0])
+    if told is not None:
+        return displaced(found.shot, told[1], told[0])
+    if not found.is_wrong and is_aside(places):
+        return replace(found, is_doubtful=True, detail="its line was beside its place")
+    return found

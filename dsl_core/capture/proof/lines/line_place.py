@@ -24,6 +24,9 @@ FEWEST_VOTES, LEAST_MEAN = 20.0, 0.3
 SURE_VOTES, SURE_MEAN = 12, 0.6
 #: Pictures in a row that have to agree: a single one may light little but edges of surfaces.
 FEWEST_PICTURES = 2
+#: A single one is taken again with `SURE_VOTES` whose mean is as much against its place. Those of lines in
+#: their place have always been for it, whatever the scene.
+ASIDE = 0.5
 
 
 def moved(profile: Floats, columns: int) -> Floats:
@@ -49,6 +52,11 @@ def contests_of_sides(contest: Callable[[int], Contest]) -> dict[int, Contest]:
         is_sure = near is not None and near.count >= SURE_VOTES and near.mean > SURE_MEAN
         found[side] = near if near is not None and is_sure else contest(side)
     return found
+
+
+def is_aside(contests: Mapping[int, Contest]) -> bool:
+    """Whether a picture by itself seems to be out of its place, from its contests with `SIDES`."""
+    return any(each.count >= SURE_VOTES and each.mean < -ASIDE for each in contests.values())
 
 
 class LinePlaces:

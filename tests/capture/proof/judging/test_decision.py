@@ -8,7 +8,7 @@ import pytest
 
 from dsl_core.capture.proof.contest import Contest
 from dsl_core.capture.proof.finding import Finding, Light, Verdict
-from dsl_core.capture.proof.judging.decision import decide, named
+from dsl_core.capture.proof.judging.decision import decide, in_place, named
 from dsl_core.model.plan import Shot, describe_shot
 from tests.cases.proof_rules import LINE, LOST, SHOTS, WON, known
 
@@ -53,7 +53,10 @@ def test_what_a_picture_is_follows_from_its_contests(
 
 def test_a_few_odd_rows_make_a_picture_doubtful_unless_it_is_wrong() -> None:
     doubtful = {Verdict.LATE: WON, Verdict.OTHER: DOUBTFUL}
-    assert decided(doubtful, 0.8) == Finding(LINE, Verdict.RIGHT, is_doubtful=True, light=Light.USUAL)
+    rows = "a few rows of it showed another pattern"
+    assert decided(doubtful, 0.8) == Finding(
+        LINE, Verdict.RIGHT, detail=rows, is_doubtful=True, light=Light.USUAL
+    )
     assert not decided(doubtful, 0.1).is_doubtful
     only = decided({Verdict.OTHER: DOUBTFUL}, 0.8)
     assert only.verdict is Verdict.UNTOLD
@@ -113,3 +116,14 @@ def test_a_line_that_lights_a_few_pixels_at_edges_is_not_another_one(
     found = decided({Verdict.SWAPPED: lost, Verdict.LATE: WON}, 0.8, lambda: shown)
     assert found.verdict is verdict
     assert found.is_doubtful == (verdict is Verdict.UNTOLD)
+
+
+@pytest.mark.parametrize(
+    ("place", "is_doubtful"),
+    [(Contest(12, -0.51), True), (Contest(11, -0.9), False), (Contest(40, -0.5), False), (WON, False)],
+)
+def test_a_single_line_that_seems_beside_its_place_is_asked_again(place: Contest, is_doubtful: bool) -> None:
+    right = Finding(LINE, Verdict.RIGHT)
+    found = in_place(right, {Verdict.LATE: WON}, {1: place, -1: WON}, known().learned)
+    assert (found.verdict, found.is_wrong, found.is_doubtful) == (Verdict.RIGHT, False, is_doubtful)
+    assert found.detail == ("its line was beside its place" if is_doubtful else "")
