@@ -32,6 +32,8 @@ ON_END = 3
 #: So many pictures that are late within so many shots, with right ones between: a display that drops every so
 #: many. Those of which nothing could be told may have been late as well.
 LATE_OFTEN, LATE_WITHIN = 3, 64
+#: Pictures on end that are wrong like this may be late in a part of the picture alone.
+IN_PART = (Verdict.TORN, Verdict.EXPOSURE)
 #: Of doubtful pictures that come out the same again, every so many are followed by a control.
 CONTROL_EVERY = 8
 #: A change may begin a little before it shows: so many pictures before one that stays wrong are withdrawn.
@@ -94,7 +96,7 @@ class ProvenShots:
         self._diagnosis = diagnosis
         self._failures = 0
         self._unlike_at = 0
-        self._is_late = False
+        self._is_late = self._is_in_part = False
         self._untold: list[Shot] = []
         self._recent: deque[Shot] = deque(maxlen=JUST_BEFORE)
         #: What was saved since an old picture, taken again, last looked as it did at first.
@@ -190,8 +192,9 @@ class ProvenShots:
             self._save(shot, frame, found)
         if found.is_wrong:
             self._failures += 1
+            self._is_in_part |= found.verdict in IN_PART
         elif found.verdict is Verdict.RIGHT:
-            self._failures = 0
+            self._failures, self._is_in_part = 0, False
         if _is_sure(found):
             self._passed.extend(self._untold)
             self._untold.clear()
@@ -243,15 +246,11 @@ class ProvenShots:
         second = self._again(doubt.shot)
         differs = proof.differ(frame.pixels, second.pixels)
         found = proof.judge(doubt.shot, second.pixels)
-        is_cured = doubt.verdict is Verdict.RIGHT and not found.is_doubtful
-        if differs or is_cured:
+        has_mark = doubt.verdict is Verdict.RIGHT or bool(doubt.detail)
+        if differs or (has_mark and not found.is_doubtful):
             self._count_unlike(found)
             self.corrected += 1
-            was_torn = is_cured and doubt.light is not Light.STEP
-            reason = (
-                "a few rows of it showed another pattern" if was_torn else "it was unlike those before it"
-            )
-            return replace(second, corrected=reason), found
+            return replace(second, corrected=doubt.detail or "it was unlike those before it"), found
         if found.light is Light.STEP or self._doubts % CONTROL_EVERY == 0:
             self._require_control(proof)
             proof.believe_light(doubt.shot)
@@ -322,6 +321,12 @@ class ProvenShots:
                 self.corrected += 1
             self._correct(found, proof)
         self._untold.clear()
+        if self._is_in_part:
+            # A line says that it is right where it lights the scene itself. Its orders, too faint to tell,
+            # may have been late elsewhere.
+            lines = proof.lines_before(shot)
+            self._sink.withdraw(lines)
+            self.corrected += len(lines)
 
     def _require_control(self, proof: FrameProof) -> None:
         """Raise `DeviceError` unless a picture of the first code still looks as it did at first."""

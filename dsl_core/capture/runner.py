@@ -167,6 +167,8 @@ class Runner:
             if self._stored is not None:
                 self._shots.learn(self._stored, {shot.index for shot in missing})
             self._take_all(missing)
+            # Later pictures may have cast doubt on earlier ones.
+            self._take_all(list(self._sink.missing()))
             self._shots.conclude()
             self._complete()
         except (Cancelled, KeyboardInterrupt) as error:
@@ -336,6 +338,7 @@ class _Pace:
 
     def start(self, missing: list[Shot]) -> None:
         self._cost_left_s = sum(map(self._cost_s, missing))
+        self._spent_s = self.times()[0]
         self._since_s = self._clock()
 
     def passed(self, shot: Shot) -> None:

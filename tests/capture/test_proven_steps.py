@@ -81,6 +81,9 @@ class Bench:
     def write(self, shot: Shot, frame: Frame) -> None:
         self.written[shot.index] = frame.corrected
 
+    def lines_before(self, shot: Shot) -> tuple[Shot, ...]:
+        return SHOTS[12 : shot.index]
+
     def believe_light(self, shot: Shot) -> None:
         self.believed.append(shot.index)
 
@@ -143,7 +146,15 @@ def doubtful(shot: Shot) -> Finding:
 
 
 def frayed(shot: Shot) -> Finding:
-    return Finding(shot, Verdict.RIGHT, is_doubtful=True)
+    return Finding(shot, Verdict.RIGHT, detail="a few rows of it showed another pattern", is_doubtful=True)
+
+
+def beside(shot: Shot) -> Finding:
+    return Finding(shot, Verdict.UNTOLD, detail="its line was beside its place", is_doubtful=True)
+
+
+def torn(shot: Shot) -> Finding:
+    return Finding(shot, Verdict.TORN, (shot,))
 
 
 def stepped(shot: Shot) -> Finding:
@@ -313,6 +324,17 @@ def test_what_could_not_be_told_before_devices_were_late_is_taken_again_after_a_
     assert bench.taken[-1] == (14, 0, 0.0, True)
 
 
+@pytest.mark.parametrize(("first", "withdrawn"), [(torn, [12, 13, 14]), (late, [])])
+def test_lines_before_those_that_are_late_in_part_are_taken_again_at_the_end(
+    first: Tell, withdrawn: list[int]
+) -> None:
+    # Where a line lights the scene itself it may be right, and late where its orders are.
+    bench = Bench(is_right, is_right, first, is_right, late, is_right)
+    take_all(bench, SHOTS[12:16])
+    assert bench.withdrawn == withdrawn
+    assert bench.shots.corrected == 2 + len(withdrawn)
+
+
 @pytest.mark.parametrize(("before", "is_late"), [(LATE_WITHIN, True), (LATE_WITHIN + 1, False)])
 def test_pictures_that_are_late_now_and_then_cast_doubt_on_untold_ones_before(
     before: int, is_late: bool
@@ -382,6 +404,8 @@ def test_a_doubtful_picture_is_taken_a_second_time_and_every_eighth_with_a_contr
         ((doubtful, doubtful), True, "it was unlike those before it"),
         ((frayed, is_right), False, "a few rows of it showed another pattern"),
         ((frayed, frayed), False, ""),
+        ((beside, untold), False, "its line was beside its place"),
+        ((beside, beside), False, ""),
         ((stepped, is_right), False, "it was unlike those before it"),
         ((doubtful, untold), False, ""),
     ],

@@ -96,6 +96,12 @@ class FrameProof:
         black = known.kept[known.blacks[shot.setting]]
         return self._neighbours.differ_at_first(known.raster.take(one), known.raster.take(other), black)
 
+    def lines_before(self, shot: Shot) -> tuple[Shot, ...]:
+        """Lines before a shot whose pictures were believed."""
+        known = self._known
+        before = known.shots[: shot.index]
+        return tuple(each for each in before if each.role == "spectral" and each.index in known.kept)
+
     def believe_light(self, shot: Shot) -> None:
         """Take the light of a shot for usual from now on, though it was unlike the pictures before."""
         self._known.learned.steps.believe(shot)
