@@ -12,6 +12,7 @@ from dsl_core.calibration.geometry.boards import grey_of, other_board, saturated
 from dsl_core.calibration.geometry.bundle import LENS
 from dsl_core.calibration.geometry.code_model import code_light
 from dsl_core.calibration.geometry.columns_only import of_columns_only, require_columns
+from dsl_core.calibration.geometry.common_view import wanted_coverage
 from dsl_core.calibration.geometry.plausible import implausible
 from dsl_core.calibration.geometry.projector_corners import PoseObservation, observe_pose
 from dsl_core.errors import CalibrationError
@@ -262,8 +263,10 @@ def doubts(found: GeometryCalibration, tilt_deg: float, baseline_mm: float | Non
         for pose in found.poses
         if not pose.used
     ]
-    for what, share in (("camera", found.camera_coverage), ("projector", found.projector_coverage)):
-        if share < MIN_COVERAGE:
+    covered = (found.camera_coverage, found.projector_coverage)
+    least = wanted_coverage(found, MIN_COVERAGE)
+    for what, share, wanted in zip(("camera", "projector"), covered, least, strict=True):
+        if share < wanted:
             sentences.append(
                 f"Corners cover {share:.0%} of the {what}'s picture; distortion outside is a guess."
                 " Add poses with the board near the edges."

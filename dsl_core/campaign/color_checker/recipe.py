@@ -24,7 +24,7 @@ from dsl_core.calibration.colour.patches import (
     orient_chart,
     patch_samples,
 )
-from dsl_core.campaign.common.depths import target_depth_mm
+from dsl_core.campaign.common.depths import seen_whole_mm
 from dsl_core.campaign.common.flat_target import WHITE, capture_uniform, read_uniform
 from dsl_core.campaign.common.recipe import Bench, Recipe, Step, naming
 from dsl_core.campaign.common.white_shot import other_light, shoot_white
@@ -40,6 +40,8 @@ from dsl_core.progress import Progress
 
 #: The long exposure against the short one, for dark patches.
 RATIO = 6.0
+#: Width and height of the 24 patches of a large chart, with which it must be in view.
+PATCHES_MM = (312.0, 208.0)
 _Corners = tuple[tuple[float, float], tuple[float, float], tuple[float, float], tuple[float, float]]
 
 
@@ -50,7 +52,7 @@ class ColorCheckerRecipe(Recipe[ColorCheckerCalibration]):
     ``chart`` is the name of the chart's reflectances in colour-science; ``corners_px`` are column and row of
     the four outer corners of the patches, in cyclic order from any of them, if the chart is not found
     automatically; ``depth_mm`` is the distance of the chart, by default two fifths into the
-    rig's depth range.
+    rig's depth range, or farther where a narrow view shows all patches only there.
     """
 
     name = "color-checker"
@@ -69,7 +71,7 @@ class ColorCheckerRecipe(Recipe[ColorCheckerCalibration]):
             raise CalibrationError(
                 f"There are no reflectances for a chart {self.chart!r}; choose {', '.join(chart_names())}."
             )
-        depth_mm = target_depth_mm(bench.rig, self.depth_mm)
+        depth_mm = seen_whole_mm(bench.rig, PATCHES_MM) if self.depth_mm is None else self.depth_mm
         return (
             Step(
                 "chart",

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from dsl_core.calibration.geometry.boards import find_corners, grey_of, refine_corners
+from dsl_core.calibration.geometry.common_view import wanted_coverage
 from dsl_core.calibration.geometry.pose_series import GOOD_RMS_PX, MIN_POSES, board_normal
 from dsl_core.campaign.common.recipe import Found
 from dsl_core.campaign.common.white_shot import WhiteLevel, other_light
@@ -117,7 +118,7 @@ def geometry_figures(record: GeometryCalibration) -> tuple[Figure, ...]:
             name="picture covered, camera",
             value=100 * record.camera_coverage,
             unit="%",
-            low=100 * COVERAGE,
+            low=100 * wanted_coverage(record, COVERAGE)[0],
             advice=more,
         ),
         Figure(name="picture covered, projector", value=100 * record.projector_coverage, unit="%"),

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from dsl_core.calibration.geometry.bundle import rotation_of
+from dsl_core.calibration.geometry.common_view import wanted_coverage
 from dsl_core.calibration.geometry.pose_series import (
     PoseSeries,
     _bent,
@@ -248,6 +249,22 @@ def test_both_sides_of_how_much_of_a_picture_corners_cover(
     good = found.model_copy(update={"camera_coverage": 0.6, "projector_coverage": 0.6})
     assert not any("cover" in each for each in doubts(good.model_copy(update=changes), 40.0, None))
     assert any("cover 29%" in each for each in doubts(good.model_copy(update=words), 40.0, None))
+
+
+def test_corners_need_not_cover_what_the_other_device_does_not_see(found: GeometryCalibration) -> None:
+    covered = found.model_copy(update={"camera_coverage": 0.6, "projector_coverage": 0.25})
+    least = wanted_coverage(covered, 0.3)
+    assert least == (0.3, 0.3)
+    # A camera of thrice the focal length sees a ninth of the area.
+    longer = {name: 3 * getattr(found.camera, name) for name in ("fx_px", "fy_px")}
+    narrow = covered.model_copy(update={"camera": found.camera.model_copy(update=longer)})
+    assert any("cover 25% of the projector" in each for each in doubts(covered, 40.0, None))
+    assert not any("cover 25%" in each for each in doubts(narrow, 40.0, None))
+    assert wanted_coverage(narrow, 0.3)[0] == 0.3
+    assert 0.02 < wanted_coverage(narrow, 0.3)[1] < 0.12
+    # What is lit of a picture is all that can be asked of the camera.
+    lit = covered.model_copy(update={"projector": found.projector.model_copy(update={"width_px": 100})})
+    assert wanted_coverage(lit, 0.35)[0] < 0.2
 
 
 def test_both_sides_of_the_tilt_of_the_focal_length_and_of_the_error(found: GeometryCalibration) -> None:

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+from dsl_core.campaign.common.depths import seen_whole_mm
 from dsl_core.campaign.common.recipe import AnyRecipe, Bench
 from dsl_core.campaign.recipes import load_recipe
 from dsl_core.simulation.published_rig import published_rig
@@ -31,3 +32,14 @@ def test_flat_targets_stand_within_the_depths_of_their_rig(
         f"about {depth_mm / 10:g} cm" in step.instruction for step in load_recipe(name).steps(bench)[:1]
     )
     assert where(load_recipe(name, {"depth_mm": "655"})) == {655.0}
+
+
+def test_a_chart_stands_farther_away_where_a_narrow_view_shows_all_of_it(tmp_path: Path) -> None:
+    rig = published_rig()
+    longer = {"fx_px": 1.25 * rig.camera.fx_px, "fy_px": 1.25 * rig.camera.fy_px}
+    narrow = rig.model_copy(update={"camera": rig.camera.model_copy(update=longer)})
+    (step,) = load_recipe("color-checker").steps(Bench(open_twin({"size": "30x20"}), tmp_path, narrow))
+    assert step.placement.options["depth_mm"] == 800.0
+    assert seen_whole_mm(narrow, (370.0, 208.0)) == 950.0
+    # What nothing shows as a whole stands where the rig has most room.
+    assert seen_whole_mm(narrow, (900.0, 208.0)) == 700.0
