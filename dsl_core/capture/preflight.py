@@ -9,6 +9,8 @@ from dsl_core.devices.conditions import check_conditions
 from dsl_core.errors import PlanError
 from dsl_core.model.plan import CapturePlan
 from dsl_core.model.presets import on_cycles
+from dsl_core.model.rig import Rig
+from dsl_core.optics.parallax import parallax_of
 
 
 def fit_plan(plan: CapturePlan, rig: DeviceRig) -> CapturePlan:
@@ -27,6 +29,14 @@ def fit_plan(plan: CapturePlan, rig: DeviceRig) -> CapturePlan:
 def find_obstacles(rig: DeviceRig, plan: CapturePlan) -> list[str]:
     """Everything that keeps the rig from doing the plan, one clause each; empty when it can start."""
     return [*_sizes(rig, plan), *_exposures(rig, plan), *_calibration(rig)]
+
+
+def find_remarks(calibration: Rig | None) -> list[str]:
+    """What a scan with a calibration will suffer from although it can start, in sentences."""
+    if calibration is None:
+        return []
+    found = parallax_of(calibration)
+    return [f"{found.sentence} {found.advice}"] if found.is_small else []
 
 
 def require_possible(rig: DeviceRig, plan: CapturePlan) -> None:

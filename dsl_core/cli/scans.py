@@ -216,13 +216,19 @@ def _metered(output: Output, devices: DeviceRig, plan: CapturePlan) -> tuple[Cap
 
 
 def _state(output: Output, plan: CapturePlan, folder: Path, devices: DeviceRig) -> None:
-    """Say what a plan will take."""
+    """Say what a plan will take, and what its scan will suffer from."""
+    from dsl_core.capture.preflight import find_remarks
     from dsl_core.io.scan.estimate import estimate
 
     needs = estimate(plan, folder, devices.projector.info.latency_ms)
     output.say(f"{devices.name}: {needs}.")
     output.put(frames=needs.frames, minutes=round(needs.seconds / 60, 3))
     output.put(needed_bytes=needs.needed_bytes, free_bytes=needs.free_bytes)
+    remarks = find_remarks(devices.calibration)
+    for each in remarks:
+        output.say(each)
+    if remarks:
+        output.put(remarks=remarks)
 
 
 def _done(output: Output, target: Path, status: Status) -> None:

@@ -319,7 +319,9 @@ def read_plan(path: Path, now: CapturePlan) -> CapturePlan:
 def find_facts(
     devices: DeviceRig | None, plan: CapturePlan, target: Path, calibration: Rig | None, override: bool
 ) -> Facts:
-    """Frames, seconds and bytes of a plan, with a sentence for each obstacle."""
+    """Frames, seconds and bytes of a plan, with a sentence for each obstacle and remark."""
+    from dsl_core.capture.preflight import find_remarks
+
     latency_ms = 0.0 if devices is None else devices.projector.info.latency_ms
     needs = estimate(plan, target, latency_ms)
     differ = devices is not None and calibration is not None and bool(check_conditions(calibration, devices))
@@ -333,7 +335,7 @@ def find_facts(
         needs.needed_bytes,
         needs.free_bytes,
         tuple(obstacles),
-        () if is_calibrated else (NO_CALIBRATION,),
+        (*(() if is_calibrated else (NO_CALIBRATION,)), *find_remarks(calibration)),
         differ,
         is_calibrated=is_calibrated,
     )

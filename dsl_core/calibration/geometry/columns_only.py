@@ -29,6 +29,7 @@ from dsl_core.calibration.geometry.plausible import OUTSIDE
 from dsl_core.calibration.geometry.projector_corners import INLIER_PX, PoseObservation, off_most
 from dsl_core.errors import CalibrationError
 from dsl_core.model.calibration.geometry import GeometryCalibration
+from dsl_core.optics.parallax import LEAST_PX
 from dsl_core.solve.robust import robust_std
 
 Floats = NDArray[np.float64]
@@ -49,8 +50,6 @@ HEIGHT_SHARE = 0.2
 TANGENTIAL, TANGENTIAL_STD = PROJECTOR.start + 6, 0.005
 #: Rounds of the linear fit, and corners that are misread: so many deviations off a smooth map of their board.
 ROUNDS, MISREAD_SIGMAS = 4, 5.0
-#: By how many columns a change of distance by a hundredth must move a point for depth to be worth it.
-LEAST_PARALLAX_PX = 0.1
 
 
 def of_columns_only(poses: Sequence[PoseObservation]) -> bool:
@@ -193,7 +192,7 @@ def columns_only_doubts(found: GeometryCalibration, poses: Sequence[PoseObservat
             " other way."
         )
     parallax = _parallax_px(found, poses)
-    if parallax < LEAST_PARALLAX_PX:
+    if parallax < LEAST_PX:
         sentences.append(
             f"A point 1 % farther away is seen only {parallax:.2f} columns elsewhere: camera and projector"
             " stand one above the other, along the stripes. Move one of them to the side, or project rows."

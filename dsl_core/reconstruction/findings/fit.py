@@ -11,6 +11,7 @@ from dsl_core.model.fit import Fit, FitFinding
 from dsl_core.model.plan import CapturePlan
 from dsl_core.model.rig import Rig
 from dsl_core.model.spectral import WavelengthGrid
+from dsl_core.optics.parallax import parallax_of
 from dsl_core.reconstruction.findings.band_findings import band_findings, line_width_nm
 from dsl_core.reconstruction.findings.flag_findings import SpectralCounts, share_findings
 from dsl_core.reconstruction.findings.model_findings import cause_findings
@@ -36,9 +37,24 @@ def fit_of(
     findings = [*earlier]
     blurred = any(finding.significant and finding.part == "focus" for finding in findings)
     findings += share_findings(flags, spectra, blurred)
+    findings.append(_of_parallax(rig, depth_mm))
     width_nm = line_width_nm(rig, plan, grid, depth_mm)
     if spectra is not None and width_nm is not None:
         findings += band_findings(grid.step_nm, width_nm, spectra)
     if followed is not None:
         findings += cause_findings(followed.probe, followed.balanced, followed.motion)
     return Fit.of(findings, () if error is None else np.round(error.relative, 4).tolist())
+
+
+def _of_parallax(rig: Rig, depth_mm: NDArray[np.floating]) -> FitFinding:
+    """What a column stands for at the depths (rows, columns) that were found."""
+    found = parallax_of(rig, depth_mm)
+    return FitFinding.judged(
+        "geometry",
+        "depth for a column",
+        found.mm_per_column,
+        "mm per column",
+        found.most_mm,
+        found.sentence if found.is_small else f"A column stands for {found.mm_per_column:.1f} mm of depth.",
+        found.advice,
+    )

@@ -1,0 +1,70 @@
+"""How much depth a column of the projector stands for: what a rig's geometry makes of the columns' errors.
+
+Codes tell columns alone. A camera above or below the projector sees the same column at every depth.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dsl_core.model.rig import Rig
+from dsl_core.optics.pinhole import project, rays_at
+
+#: By how many columns a point moves at least that is farther away by a hundredth.
+LEAST_PX = 0.25
+#: About so many pixels are asked.
+MOST_PIXELS = 500
+
+
+@dataclass(frozen=True)
+class Parallax:
+    """Depth (mm) that a column stands for, median of a picture, and ``most_mm``, from where it is said."""
+
+    mm_per_column: float
+    most_mm: float
+
+    @property
+    def is_small(self) -> bool:
+        """Whether depth depends so little on columns that it is hardly measured."""
+        return self.mm_per_column > self.most_mm
+
+    @property
+    def sentence(self) -> str:
+        """What a column stands for, and why."""
+        return (
+            f"A column of the projector stands for {self.mm_per_column:.0f} mm of depth, more than"
+            f" {self.most_mm:.0f} mm: camera and projector stand one above the other, along the stripes, or"
+            " close together, so that small errors of columns are large ones of depth, as stated."
+        )
+
+    @property
+    def advice(self) -> str:
+        """What to do about it."""
+        return "Move the camera to the side, across the stripes, and calibrate again."
+
+
+def parallax_of(rig: Rig, depth_mm: NDArray[np.floating] | None = None) -> Parallax:
+    """The parallax of a rig at the depths (rows, columns) of its camera's picture, NaN where there is none.
+
+    In the middle of the rig's depths where none are given.
+    """
+    shape = rig.camera.height_px, rig.camera.width_px
+    if depth_mm is None or not np.isfinite(depth_mm).any():
+        depth_mm = np.full(shape, np.mean(rig.depth_range_mm))
+    some = np.flatnonzero(np.isfinite(depth_mm))
+    some = some[:: max(1, len(some) // MOST_PIXELS)]
+    depth = np.asarray(depth_mm, np.float64).ravel()[some]
+    rays = rays_at(rig.camera, (some % shape[1]).astype(float), (some // shape[1]).astype(float))
+    near, far = (_columns(rig, rays * depth * by) for by in (0.995, 1.005))
+    one_percent_mm = 0.01 * float(np.median(depth))
+    moved_px = max(float(np.median(np.abs(far - near))), 1e-6)
+    return Parallax(one_percent_mm / moved_px, one_percent_mm / LEAST_PX)
+
+
+def _columns(rig: Rig, points_mm: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Columns of the projector that light points (3, n) of the camera's frame."""
+    column, _ = project(rig.projector, *(rig.pose.matrix @ points_mm + rig.pose.vector_mm[:, None]))
+    return np.asarray(column)
