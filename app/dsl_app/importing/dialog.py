@@ -20,7 +20,7 @@ from dsl_app.importing.state import PUBLISHED, FileRow, Found, ImportRequest, Im
 from dsl_app.shared.evented import follow_any
 from dsl_app.shared.known_files import breakable
 from dsl_app.shared.widgets.dialogs import JobDialog, use_room
-from dsl_app.shared.widgets.forms import ChoiceBox, WholeBox, label, named, push_button
+from dsl_app.shared.widgets.forms import ChoiceBox, WholeBox, label, named, push_button, set_role
 from dsl_app.shared.widgets.help_window import add_help_key
 from dsl_app.shared.widgets.layouts import STRETCH, row_of
 from dsl_app.shared.widgets.open_dialog import OpenDialog
@@ -168,6 +168,8 @@ class ImportDialog(JobDialog):
     def _judge(self) -> None:
         view = import_view(self._state)
         self.show_status(view.trouble, view.remark, view.is_busy)
+        set_role(self.other, "primary" if view.is_hopeless else "")
+        (self.other if view.is_hopeless else self.go).setDefault(True)
 
     # Do --------------------------------------------------------------------------------------------
 

@@ -153,12 +153,16 @@ def command_of(found: Found, request: ImportRequest) -> str:
 
 @dataclass(frozen=True)
 class ImportView:
-    """What the dialog says below its form: ``trouble`` prevents the import, ``remark`` says what it makes."""
+    """What the dialog says below its form: ``trouble`` prevents the import, ``remark`` says what it makes.
+
+    Nothing on the form helps a folder that ``is_hopeless``: another one has to be chosen.
+    """
 
     trouble: str
     remark: str
     is_busy: bool
     asks_size: bool
+    is_hopeless: bool
 
 
 def import_view(state: ImportState) -> ImportView:
@@ -169,5 +173,9 @@ def import_view(state: ImportState) -> ImportView:
     if is_calibration:
         remark += " The calibration is also added to the library."
     return ImportView(
-        "" if busy else state.trouble.value, f"{busy}…" if busy else remark, bool(busy), is_calibration
+        "" if busy else state.trouble.value,
+        f"{busy}…" if busy else remark,
+        bool(busy),
+        is_calibration,
+        not busy and found is not None and bool(found.obstacle),
     )

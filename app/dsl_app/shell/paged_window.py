@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from PySide6.QtCore import QByteArray, QObject, QSize, QTimer, Signal
-from PySide6.QtGui import QCloseEvent, QDragEnterEvent, QDropEvent, QPaintEvent
+from PySide6.QtGui import QCloseEvent, QDragEnterEvent, QDropEvent, QKeyEvent, QPaintEvent
 from PySide6.QtWidgets import QMainWindow, QStackedWidget
 
 from dsl_app.shared.jobs.qt_runner import QtRunner
@@ -20,6 +20,7 @@ from dsl_app.shared.widgets.dialogs import confirm
 from dsl_app.shared.widgets.layouts import boxed, row_of
 from dsl_app.shared.widgets.page import PageWidget, dropped_paths
 from dsl_app.shell.actions import PAGES, Page
+from dsl_app.shell.enter_key import button_of_enter, is_enter
 from dsl_app.shell.job_strip import JobStrip
 from dsl_app.shell.log import LogRecords
 from dsl_app.shell.rail import Rail
@@ -127,6 +128,14 @@ class PagedWindow(QMainWindow):
             self._made[key].apply_theme(self.theme)
             self.stack.addWidget(self._made[key])
         return self._made[key]
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        """Enter, where no part has a use of its own for it, presses a button as a click would."""
+        button = button_of_enter(self.page_of(self.page), self.focusWidget()) if is_enter(event) else None
+        if button is None:
+            super().keyPressEvent(event)
+        else:
+            button.click()
 
     # Files -----------------------------------------------------------------------------------------
 

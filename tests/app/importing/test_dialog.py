@@ -109,4 +109,12 @@ def test_another_folder_is_shown_in_the_same_dialog(
     assert "ldr_exposure1/" in texts(dialog, 0)
     assert dialog.name.text() == "empty"
     assert not dialog.go.isEnabled()
+    # Nothing else helps.
+    assert dialog.other.property("role") == "primary"
+    assert dialog.other.isDefault()
+    monkeypatch.setattr(OpenDialog, "ask", lambda *_, **__: made.rig)
+    dialog.other.click()
+    qtbot.waitUntil(lambda: dialog.go.isEnabled(), timeout=PATIENCE_MS)
+    assert dialog.other.property("role") == ""
+    assert dialog.go.isDefault()
     dialog.reject()

@@ -13,11 +13,15 @@ def show_window(qtbot: QtBot, window: MainWindow) -> None:
 
     pytest-qt closes widgets before it lets fixtures go on after their ``yield``. A window closed by then
     no longer hears of the jobs it stopped, so that a fixture that waits for them there may wait for ever.
+    Jobs are stopped again and again: a rig that has just been connected starts its live view.
     """
 
-    def end_jobs(_: object) -> None:
+    def is_quiet() -> bool:
         window.parts.runner.cancel_all()
-        qtbot.waitUntil(lambda: not window.parts.runner.active, timeout=PATIENCE_MS)
+        return not window.parts.runner.active
+
+    def end_jobs(_: object) -> None:
+        qtbot.waitUntil(is_quiet, timeout=PATIENCE_MS)
 
     qtbot.addWidget(window, before_close_func=end_jobs)
     window.show()
