@@ -274,7 +274,7 @@ class CalibrateController:
 
     def _take_lock(self, path: Path) -> bool:
         user = next((job for job in self._runner.active if job.exclusive == RIG), None)
-        if user is not None and not self._rig.state.live.value:
+        if user is not None and not self._rig.gives_way(user):
             self._notifier.tell(
                 "warning", f"{user.title} is using the rig. Wait until it ends, or cancel it."
             )

@@ -13,17 +13,17 @@ from dsl_app.connection.state import Link, RigChoice, RigState
 from dsl_app.shared.jobs.base import Job, JobRunner
 from dsl_app.shared.notify import Notifier
 from dsl_core.devices.base import DeviceRig, Projector
-from dsl_core.errors import DeviceError, DslError
+from dsl_core.errors import DslError
 from dsl_core.progress import Progress
 
 _log = logging.getLogger(__name__)
 #: What only one job may use at a time.
 RIG = "the rig"
-DISCONNECT = "Disconnect"
+DISCONNECT, LIVE = "Disconnect", "Live view"
 
 
 class RigController:
-    """Connects a rig and lends it to jobs; a live view gives way to them.
+    """Connects a rig and lends it to jobs; a live view gives way to them, and so does what takes a moment.
 
     ``wrap_projector`` may put another projector before the rig's own, such as a real second screen.
     """
@@ -38,6 +38,7 @@ class RigController:
         self.state, self._runner, self._notifier = state, runner, notifier
         self._wrap = wrap_projector
         self._live_job: Job[None] | None = None
+        self._brief_job: Job[None] | None = None
         self._waiting: list[tuple[Job[Any], Callable[[str], object], Callable[[], object]]] = []
 
     # Connect ---------------------------------------------------------------------------------------
@@ -109,7 +110,7 @@ class RigController:
                 state.link.set(link)
             refused(text)
 
-        if self._live_job is not None:
+        if self._is_yielding:
             # No second request is accepted while the live view stops.
             state.link.set(Link.OPENING)
         title = f"Connect {choice.name}"
@@ -152,13 +153,13 @@ class RigController:
         refused: Callable[[str], object] | None = None,
         accepted: Callable[[], object] = lambda: None,
     ) -> bool:
-        """Run a job that uses the rig, after the live view has stopped; False when another job uses it.
+        """Run a job that uses the rig, after what gives way has ended; False when another job uses it.
 
         ``refused`` (default: show a message) is told why, now or when the live view has stopped.
         ``accepted`` is called instead as soon as the rig is the job's.
         """
         refused = refused or self._tell_refused
-        if self._live_job is not None:
+        if self._is_yielding:
             self._waiting.append((job, refused, accepted))
             self.stop_live()
             return True
@@ -176,28 +177,69 @@ class RigController:
             return False
         return True
 
+    def waits(self, job: Job[Any]) -> bool:
+        """Whether a job waits until what gives way has ended."""
+        return any(job is each for each, *_ in self._waiting)
+
+    def gives_way(self, job: Job[Any]) -> bool:
+        """Whether a job that uses the rig lets others have it soon."""
+        return job is self._live_job or job is self._brief_job
+
+    @property
+    def _is_yielding(self) -> bool:
+        return self._live_job is not None or self._brief_job is not None
+
     def _tell_refused(self, text: str) -> None:
         self._notifier.tell("warning", text)
 
+    def do_briefly(self, title: str, work: Callable[[], None], failed: Callable[[Exception], object]) -> None:
+        """Let ``work`` use the rig for a moment, not in the window's thread: a device may hang.
+
+        Jobs that need the rig meanwhile wait for its end.
+        """
+
+        def ended() -> None:
+            self._brief_job = None
+            self._run_waiting()
+
+        def ended_badly(error: Exception) -> None:
+            failed(error)
+            ended()
+
+        job = Job(
+            title,
+            lambda _progress: work(),
+            lambda _: ended(),
+            ended_badly,
+            ended,
+            exclusive=RIG,
+            is_minor=True,
+            is_told_elsewhere=True,
+        )
+
+        def accepted() -> None:
+            self._brief_job = job
+
+        self.run(job, accepted=accepted)
+
     def start_live(self, look: Callable[[Progress], None]) -> None:
         """Let ``look`` use the rig until `stop_live`, or until a job needs the rig."""
-        if self._live_job is not None:
+        if self._live_job is not None or any(job.title == LIVE for job, *_ in self._waiting):
             return
         job = Job(
-            "Live view",
+            LIVE,
             look,
             on_failed=self._live_failed,
             on_cancelled=self._live_ended,
             exclusive=RIG,
             is_minor=True,
         )
-        try:
-            self._runner.submit(job)
-        except DeviceError as error:
-            self._notifier.tell("warning", str(error))
-            return
-        self._live_job = job
-        self.state.live.set(True)
+
+        def accepted() -> None:
+            self._live_job = job
+            self.state.live.set(True)
+
+        self.run(job, accepted=accepted)
 
     def stop_live(self) -> None:
         """Stop the live view after the current frame."""
@@ -207,6 +249,9 @@ class RigController:
     def _live_ended(self) -> None:
         self._live_job = None
         self.state.live.set(False)
+        self._run_waiting()
+
+    def _run_waiting(self) -> None:
         waiting, self._waiting = self._waiting, []
         for job, refused, accepted in waiting:
             self.run(job, refused, accepted)

@@ -10,16 +10,18 @@ from dataclasses import replace
 from dsl_app.connection.controller import RigController
 from dsl_app.connection.state import Link, RigState
 from dsl_app.rig.state import LEVEL, Drawn, FrameCounts, LiveState, exposure_text
-from dsl_app.shared.notify import Notifier
+from dsl_app.shared.notify import Notifier, sentence_of
 from dsl_core.capture.auto_exposure import ExposureSearch
 from dsl_core.devices.base import DeviceRig
-from dsl_core.errors import DeviceError, DslError
+from dsl_core.errors import DeviceError
 from dsl_core.model.frames import Frame
 from dsl_core.patterns.trial_pictures import KINDS, PictureKind, trial_picture
 from dsl_core.progress import Progress
 
 #: x, y, width, height in pixels of the camera.
 Region = tuple[int, int, int, int]
+#: A trial picture: its kind, its drive level and its column, px.
+Picture = tuple[PictureKind, float, int]
 NO_CAMERA = "No camera is connected. Connect a rig first."
 #: Lost frames in a row after which a camera counts as lost.
 LOST_AFTER = 3
@@ -51,7 +53,9 @@ class LiveController:
         #: The devices that were exposed for since they were connected.
         self._looked_at: DeviceRig | None = None
         #: What the panel names before anything is chosen on it.
-        self._picture: tuple[PictureKind, float, int] = KINDS[0], LEVEL, 0
+        self._picture: Picture = KINDS[0], LEVEL, 0
+        #: What the projector has yet to show.
+        self._wanted: Picture | None = None
         self._exposer = AutoExposer(
             rig.state, self.state, notifier, self.set_exposure, self._dim, lambda: self._picture[0] == "black"
         )
@@ -78,7 +82,7 @@ class LiveController:
         """Project the picture that was asked for last, find the exposure for it and start the live view."""
         if not self.rig.state.used_by.value:
             self._looked_at = self.rig.state.devices.value
-            self.show_again()
+            self._want(*self._picture)
             self.expose_automatically(None)
 
     def look(self) -> None:
@@ -87,8 +91,8 @@ class LiveController:
         if state.devices.value is not self._looked_at and not state.used_by.value:
             self.begin()
             return
-        if not state.used_by.value:
-            self.show_again()
+        if state.devices.value is not None and not state.used_by.value:
+            self._want(*self._picture)
         self.start()
 
     def begin_when_open(self) -> None:
@@ -122,6 +126,7 @@ class LiveController:
     def _look(self, devices: DeviceRig, progress: Progress) -> None:
         lost, self._counts = 0, FrameCounts()
         while True:
+            self._show_wanted(devices)
             progress.report("", self._counts.shown, 0)
             start = time.monotonic()
             try:
@@ -174,22 +179,40 @@ class LiveController:
             self.show(*self._picture)
 
     def show(self, kind: PictureKind, level: float = 1.0, column_px: int = 0) -> None:
-        """Project a trial picture, unless it would spoil frames; the live view continues meanwhile."""
+        """Project a trial picture, unless it would spoil frames: the live view does, or a job of its own."""
+        devices = self.rig.state.devices.value
+        if not self._want(kind, level, column_px) or self.rig.state.live.value:
+            return
+        assert devices is not None
+        self.rig.do_briefly("Show a picture", lambda: self._show_wanted(devices), self._not_shown)
+
+    def _want(self, kind: PictureKind, level: float, column_px: int) -> bool:
+        """Note a picture that the live view shows next; False, and a message, where none can be shown."""
         self._picture = kind, level, column_px
         self.state.level.set(level)
-        user, devices = self.rig.state.used_by.value, self.rig.state.devices.value
+        user = self.rig.state.used_by.value
         if user:
             self._notifier.tell("info", f"{user} is using the projector. Wait until it ends, or cancel it.")
-            return
-        if devices is None:
+            return False
+        if self.rig.state.devices.value is None:
             self._notifier.tell("info", "No projector is connected. Connect a rig first.")
-            return
-        info = devices.projector.info
-        try:
-            picture = trial_picture(kind, (info.width_px, info.height_px), level, column_px)
-            devices.projector.show(picture)
-        except DslError as error:
-            self._notifier.tell("error", str(error))
+            return False
+        with self._lock:
+            self._wanted = self._picture
+        return True
+
+    def _show_wanted(self, devices: DeviceRig) -> None:
+        """Project what was asked for last; called where a projector that hangs holds up nothing else."""
+        with self._lock:
+            wanted, self._wanted = self._wanted, None
+        if wanted is not None:
+            info, (kind, *how) = devices.projector.info, wanted
+            devices.projector.show(trial_picture(kind, (info.width_px, info.height_px), *how))
+
+    def _not_shown(self, error: Exception) -> None:
+        if isinstance(error, DeviceError):
+            self.rig.lose(sentence_of(error))
+        self._notifier.tell("error", sentence_of(error))
 
     def _dim(self) -> bool:
         """Project the picture with about half the light; False where that is not possible or too little."""

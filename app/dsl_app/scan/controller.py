@@ -198,9 +198,9 @@ class ScanController:
         self._notifier.tell("warning", status.warning + more)
 
     def _was_refused(self) -> bool:
-        """Whether the scan waited for the live view and then found the rig taken."""
+        """Whether the scan waited for what gives way, and then found the rig taken."""
         job = self._job
-        if job is None or job.state is not JobState.WAITING or self._rig.state.live.value:
+        if job is None or job.state is not JobState.WAITING or self._rig.waits(job):
             return False
         return job not in self._runner.active
 

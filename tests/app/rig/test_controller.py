@@ -22,7 +22,7 @@ from dsl_core.errors import DeviceError
 from dsl_core.model.frames import Frame
 from dsl_core.patterns.trial_pictures import PictureKind
 from dsl_core.progress import NoProgress
-from dsl_core.simulation.sim_devices import SimCamera
+from dsl_core.simulation.sim_devices import SimCamera, SimProjector
 from tests.app.support.doubles import InlineRunner, RecordingNotifier
 
 Start = Callable[[], tuple[LiveController, RecordingNotifier, QtRunner]]
@@ -85,15 +85,19 @@ def test_a_live_view_lights_the_scene_and_is_exposed_for_it_once(monkeypatch: py
     live, _ = controller()
     live.rig.connect(TWIN)
     shown: list[object] = []
-    monkeypatch.setattr(live.rig, "start_live", lambda _look: live.rig.state.live.set(True))
-    monkeypatch.setattr(live, "show", lambda *picture: shown.append(picture))
+
+    def start(_look: object) -> None:
+        live.rig.state.live.set(True)
+        shown.append(live._wanted)
+
+    monkeypatch.setattr(live.rig, "start_live", start)
     exposes = []
     for _ in range(2):
         live.look()
         exposes.append(live.state.is_exposing.value)
         live.rig.state.live.set(False)
     assert exposes == [True, False], "an exposure that was set by hand stays"
-    assert len(shown) == 2
+    assert shown == [live._picture] * 2
 
 
 @pytest.fixture
@@ -283,6 +287,7 @@ def test_no_picture_reaches_the_projector_while_a_job_has_the_rig(qtbot: QtBot) 
     assert devices is not None
     world = devices.camera.world  # type: ignore[attr-defined]
     live.show("black")
+    qtbot.waitUntil(lambda: runner.active == ())
     before = world.image
     rig.run(Job("Scan first", lambda progress: gate.wait(60), exclusive=RIG))
     assert rig.state.used_by.value == "Scan first"
@@ -296,5 +301,54 @@ def test_no_picture_reaches_the_projector_while_a_job_has_the_rig(qtbot: QtBot) 
     qtbot.waitUntil(lambda: runner.active == ())
     assert rig.state.used_by.value == ""
     live.show("white")
+    qtbot.waitUntil(lambda: runner.active == ())
     assert world.image is not before
+    runner.shut_down()
+
+
+def test_a_projector_that_hangs_holds_up_neither_the_window_nor_what_comes_next(
+    qtbot: QtBot, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    runner, gate = QtRunner(), threading.Event()
+    live, notifier = controller(runner)
+    live.rig.connect(TWIN)
+    qtbot.waitUntil(lambda: live.rig.state.link.value is Link.OPEN and runner.active == (), timeout=60_000)
+    shown: list[float] = []
+
+    def show(self: SimProjector, image: NDArray[np.uint8]) -> None:
+        assert gate.wait(30)
+        shown.append(float(image.max()))
+
+    monkeypatch.setattr(SimProjector, "show", show)
+    live.show("white", 0.2)
+    live.start()
+    scanned: list[int] = []
+    scan = Job("Scan first", lambda _: scanned.append(len(shown)), exclusive=RIG)
+    live.rig.run(scan)
+    assert live.rig.waits(scan)
+    assert live.rig.gives_way(runner.active[0])
+    gate.set()
+    qtbot.waitUntil(lambda: scanned == [1])
+    assert notifier.told == []
+    qtbot.waitUntil(lambda: runner.active == ())
+    runner.shut_down()
+
+
+@pytest.mark.parametrize("is_live", [False, True])
+def test_a_projector_that_fails_is_lost_like_a_camera(
+    qtbot: QtBot, start: Start, monkeypatch: pytest.MonkeyPatch, is_live: bool
+) -> None:
+    def gone(self: SimProjector, image: NDArray[np.uint8]) -> None:
+        raise DeviceError("The projector is gone. Check its cable.")
+
+    live, notifier, runner = start()
+    if not is_live:
+        live.stop()
+        qtbot.waitUntil(lambda: runner.active == ())
+    monkeypatch.setattr(SimProjector, "show", gone)
+    live.show("white")
+    qtbot.waitUntil(lambda: live.rig.state.link.value is Link.LOST and runner.active == ())
+    assert "Check its cable" in live.rig.state.trouble.value
+    assert "Check its cable" in notifier.told[-1][1]
+    assert not live.rig.state.live.value
     runner.shut_down()

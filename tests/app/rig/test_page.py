@@ -172,8 +172,8 @@ def test_pictures_reach_the_projector(qtbot: QtBot, bench: Bench) -> None:
     panel._column.setValue(100)
     devices = state.devices.value
     assert devices is not None
-    shown = devices.projector.world.image  # type: ignore[attr-defined]
-    assert shown[0, 99:106, 0].tolist() == [0, 204, 204, 204, 204, 204, 0]
+    world = devices.projector.world  # type: ignore[attr-defined]
+    qtbot.waitUntil(lambda: world.image[0, 99:106, 0].tolist() == [0, 204, 204, 204, 204, 204, 0])
 
 
 def test_the_line_wanders_and_stops(qtbot: QtBot, bench: Bench) -> None:
