@@ -5,27 +5,20 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from dsl_app.results.cloud.measuring import Measure
-from PySide6.QtWidgets import QTabWidget, QWidget
 
-from tests.screens.results_scenes import marked, opened, wait_for_cloud
+from tests.screens.results_scenes import marked, opened, show_tab, wait_for_cloud
 from tests.screens.stage import Stage
-
-
-def _show_tab(page: QWidget, tab: QWidget) -> None:
-    tabs = page.findChild(QTabWidget)
-    assert tabs is not None
-    tabs.setCurrentWidget(tab)
 
 
 def answers(stage: Stage) -> None:
     """Which material is where, before and after the classes are chosen, and the colours of the marks."""
     page, _ = marked(stage)
-    _show_tab(page, page.materials)
+    show_tab(page, page.materials)
     stage.shoot("materials-empty")
     stage.press("From marks", page)
     stage.idle()
     stage.shoot("materials")
-    _show_tab(page, page.colours)
+    show_tab(page, page.colours)
     stage.shoot("colours")
     stage.shoot_question("report", page.report)
 

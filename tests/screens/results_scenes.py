@@ -12,7 +12,7 @@ from dsl_app.results.marks.library_dialog import LibraryDialog
 from dsl_app.results.page import ResultsPage
 from dsl_app.results.reconstruct_again.dialog import ReconstructionDialog
 from dsl_app.results.state import QualityMap, ResultsState, ResultView, SearchMode
-from PySide6.QtWidgets import QDialog, QTabWidget
+from PySide6.QtWidgets import QDialog, QTabWidget, QWidget
 
 from tests.io.spectra.test_reference_file import write_library
 from tests.screens.stage import Stage
@@ -150,13 +150,18 @@ def graph(stage: Stage) -> None:
     stage.shoot()
 
 
+def show_tab(page: ResultsPage, shown: QWidget) -> None:
+    """Show the tab of a widget, which may scroll."""
+    tabs = page.findChild(QTabWidget)
+    assert tabs is not None
+    tabs.setCurrentIndex(next(i for i in range(tabs.count()) if tabs.widget(i).isAncestorOf(shown)))
+
+
 def search(stage: Stage) -> None:
     """Where a spectrum occurs, and where only its colour does."""
     page, state = marked(stage)
     state.selected.set(state.marks.value[0].key)
-    tabs = page.findChild(QTabWidget)
-    assert tabs is not None
-    tabs.setCurrentWidget(page.search)
+    show_tab(page, page.search)
     # The tab is made when it is seen.
     stage.settle()
     for mode in SearchMode:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from PySide6.QtCore import Qt, QUrl
+from PySide6.QtCore import QSize, Qt, QUrl
 from PySide6.QtGui import QDesktopServices
 from PySide6.QtWidgets import (
     QAbstractItemView,
@@ -27,7 +27,7 @@ from dsl_app.shared.evented import follow_any
 from dsl_app.shared.plain_tip import plain_tip
 from dsl_app.shared.theme import Theme
 from dsl_app.shared.widget_state import LabelState
-from dsl_app.shared.widgets.dialogs import dialog_buttons
+from dsl_app.shared.widgets.dialogs import dialog_buttons, resize_within
 from dsl_app.shared.widgets.forms import allow, label, push_button, set_role, show_label
 from dsl_app.shared.widgets.help_window import add_help_key
 from dsl_app.shared.widgets.hints import FocusRing
@@ -234,7 +234,7 @@ class DriftWindow(QDialog):
         super().__init__(parent)
         self.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         self.setWindowTitle(f"Drift check of {verdict.name}")
-        self.resize(860, 420)
+        resize_within(self, QSize(860, 420))
         add_help_key(self, "calibrating#what-the-drift-check-measures")
         self.table = FiguresTable("Figures of the drift check")
         self.table.apply_theme(theme)

@@ -187,7 +187,7 @@ class Layers:
         if self.lacks(what):
             return None
         if what is QualityMap.DEPTH_SPREAD:
-            return self._map("depth_std_mm", DEPTH, "Standard deviation of depth (mm)", "mm")
+            return self._map("depth_std_mm", DEPTH, "Deviation (mm)", "mm")
         if what is QualityMap.FLAGS or not self.result.has_spectra:
             layer: Layer = self._once("flags", self._flags)
             return layer
@@ -195,7 +195,7 @@ class Layers:
             return self._orders(band)
         if what is QualityMap.SHARE:
             return self._share(band)
-        return self._of_band("reflectance_std", band, SHARE, "Standard deviation of reflectance")
+        return self._of_band("reflectance_std", band, SHARE, "Deviation")
 
     def lacks(self, what: QualityMap) -> str:
         """Why there is nothing to show of the quality; empty where there is."""

@@ -37,7 +37,7 @@ from dsl_app.shared.widgets.deferred import Deferred
 from dsl_app.shared.widgets.figure_file import PlotFigure
 from dsl_app.shared.widgets.forms import allow, label, push_button, show_label
 from dsl_app.shared.widgets.help_window import set_help
-from dsl_app.shared.widgets.layouts import boxed, column_of, row_of, splitter, tabs_of
+from dsl_app.shared.widgets.layouts import HighArea, boxed, column_of, row_of, splitter, tabs_of
 from dsl_app.shared.widgets.open_dialog import ALL, BOTH, OpenDialog
 from dsl_app.shared.widgets.page import PageWidget
 from dsl_app.shared.widgets.save_dialog import ask_target
@@ -138,11 +138,11 @@ class ResultsPage(PageWidget):
         tabs = tabs_of(
             "Marks and answers",
             (self.marks, "Marks", "Pins, regions and references"),
-            (self.materials, "Materials", "Which material is where, with areas"),
-            (self.colours, "Colours", "Colours of the marks under several lights"),
-            (self.search, "Search", ""),
+            # In a low window they scroll: the plot stays as high with any of them.
+            (HighArea(self.materials), "Materials", "Which material is where, with areas"),
+            (HighArea(self.colours), "Colours", "Colours of the marks under several lights"),
+            (HighArea(self.search), "Search", ""),
         )
-        # In the smallest window the highest tab has just its room: the plot stays as high with any of them.
         right = splitter(Qt.Orientation.Vertical, (self.spectra, 3), (tabs, 2), sizes=(350, 345))
         self._sides = splitter(Qt.Orientation.Horizontal, (left, 1), (right, 1))
         self.arrange()

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 from PySide6.QtCore import Qt
+from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import QFrame
 
 from dsl_app.results.state import ResultsState
@@ -16,6 +17,10 @@ from dsl_core.evaluation.marks import explain_pixel
 from dsl_core.io.result.result_arrays import ResultArrays
 
 HINT = "Point at the picture to read a pixel."
+#: What is between two values of a pixel.
+BETWEEN = "   ·   "
+#: As long as the values of a pixel may be.
+LONGEST = "pixel 0000, 0000   ·   x −000.0  y −000.0  z 0000.00 ± 0.00 mm   ·   000 nm  0.000 ± 0.000"
 
 
 def pixel_text(result: ResultArrays, pixel: Pixel, band: int) -> str:
@@ -34,7 +39,7 @@ def pixel_text(result: ResultArrays, pixel: Pixel, band: int) -> str:
         value_text = f"{number_text(value, 3)} ± {number_text(std, 3)}"
         known = value_text if math.isfinite(value) else "no reflectance"
         parts.append(f"{result.wavelengths_nm[band]:g} nm  {known}")
-    return "   ·   ".join(parts)
+    return BETWEEN.join(parts)
 
 
 def limits_text(result: ResultArrays, pixel: Pixel) -> str:
@@ -53,7 +58,8 @@ class PixelInfo(QFrame):
     def __init__(self, state: ResultsState) -> None:
         super().__init__()
         self._state = state
-        self.values = label(HINT, name="Pixel under the cursor", can_be_copied=True)
+        self.values = label(HINT, wraps=True, name="Pixel under the cursor", can_be_copied=True)
+        self.values.setAlignment(Qt.AlignmentFlag.AlignTop)
         self.reasons = label("", "muted", wraps=True, name="Why this pixel is limited", can_be_copied=True)
         self.reasons.setAlignment(Qt.AlignmentFlag.AlignTop)
         self.reasons.setMinimumHeight(2 * self.reasons.fontMetrics().lineSpacing() + 2)
@@ -63,11 +69,20 @@ class PixelInfo(QFrame):
         column_of(self.values, self.reasons, on=self, margins=(0, 2, 0, 0), spacing=2)
         follow_any(self._show, state.cursor, state.band)
 
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        """Keep the room of a second line where the values need one: nothing moves with the cursor."""
+        super().resizeEvent(event)
+        metrics = self.values.fontMetrics()
+        lines = 1 if event.size().width() >= metrics.horizontalAdvance(LONGEST) else 2
+        self.values.setMinimumHeight(lines * metrics.lineSpacing() + 2)
+
     def _show(self) -> None:
         result, pixel = self._state.result.value, self._state.cursor.value
         if result is None or pixel is None:
             self.values.setText(HINT)
             self.reasons.setText("")
             return
-        self.values.setText(pixel_text(result, pixel, self._state.band.value))
+        parts = pixel_text(result, pixel, self._state.band.value).split(BETWEEN)
+        # A line ends between two values, and not before a unit or a deviation.
+        self.values.setText(BETWEEN.join(part.replace(" ", chr(0xA0)) for part in parts))
         self.reasons.setText(limits_text(result, pixel))

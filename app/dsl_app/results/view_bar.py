@@ -104,7 +104,7 @@ class ViewBar(QWidget):
         for box in (self.near, self.far):
             # Narrow, as the colour choice is in the same row; arrow keys replace the buttons.
             box.setButtonSymbols(NumberBox.ButtonSymbols.NoButtons)
-            box.setFixedWidth(box.fontMetrics().horizontalAdvance("00000.0 mm") + 16)
+            box.setFixedWidth(box.fontMetrics().horizontalAdvance("0000.0 mm") + 14)
         self.automatic = check_box(
             "Auto", "Show all depths; the colours cover nearly all pixels, outliers get the end colours"
         )
@@ -176,7 +176,7 @@ class ViewBar(QWidget):
         triples = zip(self._band_labels, self.bands, strict=True)
         three = (self.colours, 4, *(part for pair in triples for part in pair))
         quality = (self._quality_label, self.quality)
-        depth = row_of(*cloud, *limits, STRETCH, margins=0, spacing=8)
+        depth = row_of(*cloud, *limits, STRETCH, margins=0, spacing=6)
         colours = row_of(
             *three, *light, *quality, self.nm, (self.slider, 1000), STRETCH, margins=0, spacing=8
         )

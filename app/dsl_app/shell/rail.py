@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from PySide6.QtCore import QSize, Qt, Signal
+from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import QFrame, QToolButton, QWidget
 
 from dsl_app.shared.theme import Theme
@@ -12,6 +13,9 @@ from dsl_app.shared.widgets.forms import named
 from dsl_app.shared.widgets.icons import icon
 from dsl_app.shared.widgets.layouts import STRETCH, column_of
 from dsl_app.shell.actions import Page
+
+#: Height that an icon with its name needs, px.
+LEAST_PX = 64
 
 
 class Rail(QFrame):
@@ -37,6 +41,14 @@ class Rail(QFrame):
         named(button, page.title, f"{page.tip} (Ctrl+{number})")
         button.clicked.connect(lambda _checked, key=page.key: self.chosen.emit(key))
         return button
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        """Show the icons alone where their names have no room, as over the log on a small screen."""
+        super().resizeEvent(event)
+        style = Qt.ToolButtonStyle
+        has_room = event.size().height() >= LEAST_PX * len(self._buttons)
+        for button in self._buttons.values():
+            button.setToolButtonStyle(style.ToolButtonTextUnderIcon if has_room else style.ToolButtonIconOnly)
 
     def mark(self, key: str) -> None:
         """Mark a page as open; the keyboard goes on from it if it was at another one."""

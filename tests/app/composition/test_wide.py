@@ -16,8 +16,16 @@ from dsl_app.rig.page import RigPage
 from dsl_app.scan.page import ScanPage
 from dsl_app.shell.main_window import MainWindow
 from dsl_app.shell.paged_window import LEAST
-from PySide6.QtCore import QPoint
-from PySide6.QtWidgets import QAbstractButton, QAbstractItemView, QApplication, QPushButton, QTabBar, QWidget
+from PySide6.QtCore import QPoint, Qt
+from PySide6.QtWidgets import (
+    QAbstractButton,
+    QAbstractItemView,
+    QApplication,
+    QPushButton,
+    QTabBar,
+    QToolButton,
+    QWidget,
+)
 from pytestqt.qtbot import QtBot
 
 from tests.app.support.real_window import show_window
@@ -152,6 +160,43 @@ def test_no_word_on_a_view_is_cut_where_the_bar_is_narrow(
         rows[size] = pin.mapTo(page, QPoint()).y() - next(iter(views)).mapTo(page, QPoint()).y()
     assert rows[MAGNIFIED] > 10, "tools are below the views where there is no room beside them"
     assert abs(rows[LARGE]) < 5, "and beside them where there is"
+
+
+def test_spectra_are_read_with_any_tab_on_a_magnified_screen(
+    window: MainWindow, qtbot: QtBot, tmp_path: Path
+) -> None:
+    window.setMinimumSize(LEAST)
+    window.open_path(write_small_result(tmp_path))
+    qtbot.waitUntil(lambda: not window.parts.runner.active, timeout=30_000)
+    page = window.open_page("results")
+    assert isinstance(page, ResultsPage)
+    window.resize(*MAGNIFIED)
+    window.do("view_cloud")
+    page._state.cursor.set((3, 3))
+    for each in (page.materials, page.colours, page.search):
+        _ = each.content
+    QApplication.processEvents()
+    bar = next(each for each in page.findChildren(QTabBar) if each.accessibleName() == "Marks and answers")
+    assert not [each for each in bar.findChildren(QToolButton) if each.isVisible()], "tabs have arrows"
+    for tab in range(bar.count()):
+        bar.setCurrentIndex(tab)
+        QApplication.processEvents()
+        assert page.spectra.height() > 0.35 * page._sides.height(), bar.tabText(tab)
+    values = page.pixel_info.values
+    assert "nm" in values.text()
+    assert values.height() >= values.heightForWidth(values.width())
+    qtbot.waitUntil(lambda: not window.parts.runner.active, timeout=30_000)
+
+
+def test_pages_are_chosen_by_their_icons_where_their_names_have_no_room(window: MainWindow) -> None:
+    window.setMinimumSize(LEAST)
+    button = window.rail.findChildren(QToolButton)[0]
+    for size, style in (
+        (SMALL, Qt.ToolButtonStyle.ToolButtonTextUnderIcon),
+        ((845, 360), Qt.ToolButtonStyle.ToolButtonIconOnly),
+    ):
+        window.rail.resize(84, size[1])
+        assert button.toolButtonStyle() is style
 
 
 def _is_seen(part: QWidget) -> bool:

@@ -121,8 +121,8 @@ def test_flags_have_a_legend_with_their_shares(layers: Layers) -> None:
     ("quality", "value", "label"),
     [
         (QualityMap.SHARE, 0.1, "Data share"),
-        (QualityMap.SPREAD, 0.01, "Standard deviation of reflectance"),
-        (QualityMap.DEPTH_SPREAD, 0.25, "Standard deviation of depth (mm)"),
+        (QualityMap.SPREAD, 0.01, "Deviation"),
+        (QualityMap.DEPTH_SPREAD, 0.25, "Deviation (mm)"),
     ],
 )
 def test_maps_of_quality_show_their_figure(

@@ -14,7 +14,7 @@ def test_pointing_shows_the_pixel_and_its_spectrum(bench: Bench, qtbot: QtBot) -
     move(bench.view, bench.at((20, 7)))
     move(bench.view, bench.at((20, 8)))
     qtbot.waitUntil(lambda: bench.state.cursor.value == (20, 8))
-    text = bench.page.pixel_info.values.text()
+    text = bench.page.pixel_info.values.text().replace(chr(0xA0), " ")
     assert "pixel 20, 8" in text
     assert "z 710.00 ± 0.25 mm" in text
     assert "545 nm  0.400 ± 0.010" in text
@@ -25,7 +25,11 @@ def test_pointing_shows_the_pixel_and_its_spectrum(bench: Bench, qtbot: QtBot) -
 
 def test_a_bad_pixel_says_why(bench: Bench) -> None:
     bench.control.point_at(DARK)
-    assert bench.page.pixel_info.values.text().endswith("no depth   ·   545 nm  no reflectance")
+    assert (
+        bench.page.pixel_info.values.text()
+        .replace(chr(0xA0), " ")
+        .endswith("no depth   ·   545 nm  no reflectance")
+    )
     assert "too little projector light" in bench.page.pixel_info.reasons.text()
     assert not bench.page.spectra.content.live.solid.isVisible()
     bench.control.point_at(UNREACHED)

@@ -45,8 +45,8 @@ class PlacementDrawing(QWidget):
         self.show_placement(self._placement)
 
     def sizeHint(self) -> QSize:
-        """A comfortable size next to an instruction."""
-        return QSize(420, 300)
+        """A comfortable size next to an instruction; it takes what room there is besides."""
+        return QSize(420, 220)
 
     def show_placement(self, placement: Placement) -> None:
         """Draw a placement."""

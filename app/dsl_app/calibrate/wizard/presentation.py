@@ -221,7 +221,7 @@ class Points:
         every = (
             (self.wanted, "┅ wanted here", "accent"),
             (self.found, "● found", "good"),
-            (self.covered, "● captured before", "muted"),
+            (self.covered, "● captured", "muted"),
         )
         return tuple((words, role) for points, words, role in every if points)
 

@@ -15,7 +15,7 @@ from dsl_app.calibrate.wizard.state import Seen, WizardState
 from dsl_app.shared.evented import follow_any
 from dsl_app.shared.theme import DARK, Theme
 from dsl_app.shared.widgets.forms import label, set_role
-from dsl_app.shared.widgets.layouts import boxed, column_of, row_of, splitter
+from dsl_app.shared.widgets.layouts import HighArea, boxed, column_of, row_of, splitter
 from dsl_app.shared.widgets.pictures import PictureView
 from dsl_core.capture.preview import MANY_SATURATED
 
@@ -46,14 +46,18 @@ class StepPage(QWidget):
         self.stops = [*follow_any(self._show, *shown), state.seen.follow(self.picture.show_seen)]
 
     def _lay_out(self) -> None:
-        left = boxed(column_of((self.drawing, 1), self.instruction, margins=0))
+        # A low window has no room for all of it: it scrolls, and no line is drawn over another.
+        left = HighArea(boxed(column_of((self.drawing, 1), self.instruction, margins=0)))
         split = splitter(Qt.Orientation.Horizontal, (left, 1), (self.picture, 1))
         column_of(self.title, (split, 1), self.verdict, self.figures, on=self, margins=(8, 0, 0, 0))
 
     def resizeEvent(self, event: QResizeEvent) -> None:
         """Give drawing and instruction the room that a low window has; the table scrolls."""
         super().resizeEvent(event)
-        self.figures.setFixedHeight(TABLE_PX if event.size().height() >= LOW_PX else LOW_TABLE_PX)
+        is_low = event.size().height() < LOW_PX
+        self.figures.setFixedHeight(LOW_TABLE_PX if is_low else TABLE_PX)
+        # The list of steps names it, too.
+        self.title.setVisible(not is_low)
 
     def _show(self) -> None:
         shown = step_display(self._state)

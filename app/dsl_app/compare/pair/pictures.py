@@ -161,7 +161,7 @@ class PairPictures(QWidget):
         scale.setLevels(levels)
         difference.setLevels((-reach, reach))
         depth = self._state.shown.value is PairQuantity.DEPTH
-        texts = ("Depth (mm)", "Difference (mm)") if depth else ("Reflectance", "Difference in reflectance")
+        texts = ("Depth (mm)", "Difference (mm)") if depth else ("Reflectance", "Difference")
         for bar, text in zip(self.bars, texts, strict=True):
             bar.setLabel("left", text, color=self._theme.muted)
 

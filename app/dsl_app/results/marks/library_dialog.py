@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from PySide6.QtCore import Qt
+from PySide6.QtCore import QSize, Qt
 from PySide6.QtWidgets import (
     QAbstractItemView,
     QDialog,
@@ -15,7 +15,7 @@ from PySide6.QtWidgets import (
 
 from dsl_app.results.marks.controller import MarksController
 from dsl_app.results.state import Library
-from dsl_app.shared.widgets.dialogs import dialog_buttons
+from dsl_app.shared.widgets.dialogs import dialog_buttons, resize_within
 from dsl_app.shared.widgets.forms import label, named, set_role
 from dsl_app.shared.widgets.help_window import add_help_key
 from dsl_app.shared.widgets.layouts import column_of
@@ -62,7 +62,7 @@ class LibraryDialog(QDialog):
         self._show()
         # As high as the list needs, within bounds.
         rows = self.list.sizeHintForRow(0) * self.list.count()
-        self.resize(WIDTH_PX, LEAST_PX + min(rows, MOST_ROWS_PX))
+        resize_within(self, QSize(WIDTH_PX, LEAST_PX + min(rows, MOST_ROWS_PX)))
 
     @property
     def chosen(self) -> list[Reference]:

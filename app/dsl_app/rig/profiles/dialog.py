@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+from PySide6.QtCore import QSize
 from PySide6.QtWidgets import QDialog, QDialogButtonBox, QFileDialog, QFormLayout, QLineEdit, QWidget
 
 from dsl_app.rig.profiles.controller import ProfileController
@@ -11,7 +12,7 @@ from dsl_app.rig.profiles.device_form import DeviceForm
 from dsl_app.rig.profiles.draft import Draft
 from dsl_app.rig.profiles.state import ProfileState, profile_view
 from dsl_app.shared.evented import follow_any
-from dsl_app.shared.widgets.dialogs import command_window, confirm, dialog_buttons
+from dsl_app.shared.widgets.dialogs import command_window, confirm, dialog_buttons, resize_within
 from dsl_app.shared.widgets.forms import keep_height, label, named, push_button, set_role
 from dsl_app.shared.widgets.help_window import add_help_key
 from dsl_app.shared.widgets.inside import stop_following
@@ -31,7 +32,7 @@ class ProfileDialog(QDialog):
         super().__init__(parent)
         self._state, self._commands, self._was_wrong = state, commands, False
         self.setWindowTitle("Rig profile")
-        self.resize(WIDTH_PX, HEIGHT_PX)
+        resize_within(self, QSize(WIDTH_PX, HEIGHT_PX))
         add_help_key(self, "connecting-devices")
         tip = "The name by which the rig is chosen, and that of the profile's file"
         self.name = named(QLineEdit(), "Name of the rig", tip)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QHideEvent, QShowEvent
-from PySide6.QtWidgets import QAbstractItemView, QFrame, QHeaderView, QWidget
+from PySide6.QtWidgets import QAbstractItemView, QFrame, QHeaderView, QSizePolicy, QWidget
 
 from dsl_app.scan.forecast.controller import ForecastController
 from dsl_app.scan.forecast.figures import FIGURES
@@ -15,7 +15,7 @@ from dsl_app.shared.plain_tip import plain_tip
 from dsl_app.shared.widget_state import LabelState
 from dsl_app.shared.widgets.deferred import Deferred
 from dsl_app.shared.widgets.forms import ChoiceBox, NumberBox, allow, label, push_button, show_label
-from dsl_app.shared.widgets.layouts import STRETCH, column_of, row_of
+from dsl_app.shared.widgets.layouts import STRETCH, HighArea, boxed, column_of, row_of
 from dsl_app.shared.widgets.read_table import LEFT, RIGHT, ReadTable, cell
 from dsl_app.shared.widgets.ticker import Ticker
 
@@ -24,6 +24,8 @@ FETCH_MS = 200
 BUDGET, ERROR = "budget", "error"
 #: Height of a row of the table.
 ROW_PX = 19
+#: Least height of the curve, px.
+CURVE_PX = 180
 NOTHING_YET = (
     "Nothing is predicted yet. Predictions need a connected rig with a calibration, and no running scan."
 )
@@ -61,21 +63,20 @@ class ForecastPanel(QWidget):
 
     def _lay_out(self) -> None:
         wish = row_of(self.wish, self.budget, self.error, self.ask, STRETCH)
-        column_of(
-            (self.curve, 1),
-            self._note,
-            row_of(self.all, STRETCH),
-            wish,
-            self._answer,
-            self.table,
-            on=self,
-            margins=(0, 6, 0, 0),
-            spacing=5,
+        self._below = boxed(
+            column_of(
+                self._note, row_of(self.all, STRETCH), wish, self._answer, self.table, margins=0, spacing=5
+            )
         )
+        # In a low window they scroll, and the curve can still be read.
+        below = HighArea(self._below)
+        below.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Maximum)
+        self.curve.setMinimumHeight(CURVE_PX)
+        column_of((self.curve, 1), below, on=self, margins=(0, 6, 0, 0), spacing=5)
 
     def place_table(self, elsewhere: QWidget | None) -> None:
         """Put the figures on another widget with a layout, or back below the curve for None."""
-        layout = (self if elsewhere is None else elsewhere).layout()
+        layout = (self._below if elsewhere is None else elsewhere).layout()
         assert layout is not None
         layout.addWidget(self.table)
         self.table.show()

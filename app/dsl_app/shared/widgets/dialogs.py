@@ -25,6 +25,8 @@ from dsl_app.shared.widgets.layouts import column_of
 
 #: Share of the window that a dialog of tables or plots takes.
 SHARE = 0.65
+#: What a desktop draws around a dialog, px.
+FRAME = QSize(8, 40)
 
 
 def confirm(parent: QWidget, title: str, text: str, go: str, stay: str) -> bool:
@@ -77,7 +79,7 @@ def text_window(title: str, content: QWidget, parent: QWidget, width: int, heigh
     window = QDialog(parent)
     window.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
     window.setWindowTitle(title)
-    window.resize(width, height)
+    resize_within(window, QSize(width, height))
     buttons = dialog_buttons(QDialogButtonBox.StandardButton.Close)
     buttons.button(QDialogButtonBox.StandardButton.Close).setToolTip("Close this window (Escape)")
     buttons.rejected.connect(window.reject)
@@ -103,7 +105,12 @@ def command_window(command: str, parent: QWidget) -> QDialog:
 def use_room(dialog: QDialog, parent: QWidget, least: QSize) -> None:
     """Give a dialog of tables or plots most of the window it belongs to, and at least a size."""
     room = parent.window().size()
-    dialog.resize((room * SHARE).expandedTo(least))
+    resize_within(dialog, (room * SHARE).expandedTo(least))
+
+
+def resize_within(dialog: QDialog, size: QSize) -> None:
+    """Give a dialog a size, as far as its screen has room: its buttons must not be beyond the edge."""
+    dialog.resize(size.boundedTo(dialog.screen().availableSize() - FRAME))
 
 
 class JobDialog(QDialog):

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 from typing import TypeVar
 
-from PySide6.QtCore import Qt
+from PySide6.QtCore import QEvent, QObject, QSize, Qt
 from PySide6.QtWidgets import (
     QBoxLayout,
     QHBoxLayout,
@@ -23,6 +23,8 @@ from dsl_app.shared.plain_tip import plain_tip
 
 A = TypeVar("A", bound=QScrollArea)
 B = TypeVar("B", bound=QBoxLayout)
+#: Least height of content that scrolls, px.
+LEAST_HIGH_PX = 72
 #: No limit to a width.
 LARGEST_PX = 16_777_215
 Margins = int | tuple[int, int, int, int]
@@ -114,6 +116,29 @@ def splitter(direction: Qt.Orientation, *parts: tuple[QWidget, int], sizes: Sequ
 def scrolled(content: QWidget) -> QScrollArea:
     """Content that scrolls up and down where it is higher than its room, without a frame."""
     return _scrolling(QScrollArea(), content)
+
+
+class HighArea(QScrollArea):
+    """Content that scrolls up and down in a low window, at its full width; elsewhere as high as it likes."""
+
+    def __init__(self, content: QWidget) -> None:
+        super().__init__()
+        _scrolling(self, content)
+
+    def minimumSizeHint(self) -> QSize:
+        """As wide as the content with a scroll bar: nothing inside is cut at its side."""
+        bar_px = self.verticalScrollBar().sizeHint().width()
+        return QSize(self.widget().minimumSizeHint().width() + bar_px, LEAST_HIGH_PX)
+
+    def sizeHint(self) -> QSize:
+        """As high as the content likes to be."""
+        return self.widget().sizeHint().expandedTo(self.minimumSizeHint())
+
+    def eventFilter(self, watched: QObject, event: QEvent) -> bool:
+        """Ask for other room when the content does: it may be made later."""
+        if event.type() is QEvent.Type.LayoutRequest:
+            self.updateGeometry()
+        return super().eventFilter(watched, event)
 
 
 class SideArea(QScrollArea):

@@ -10,6 +10,7 @@ from PySide6.QtGui import QColor, QFont, QPainter, QPaintEvent, QResizeEvent
 from PySide6.QtWidgets import (
     QAbstractItemView,
     QHeaderView,
+    QSizePolicy,
     QStyledItemDelegate,
     QStyleOptionViewItem,
     QTableWidget,
@@ -91,6 +92,8 @@ class ReadTable(QTableWidget):
         self.setMinimumHeight(self.horizontalHeader().sizeHint().height() + rows_px + 2 * self.frameWidth())
         policy = self.sizePolicy()
         policy.setRetainSizeWhenHidden(True)
+        # It takes more where there is more, and asks for no more.
+        policy.setVerticalPolicy(QSizePolicy.Policy.Ignored)
         self.setSizePolicy(policy)
 
     def widen(self, column: int) -> None:

@@ -300,7 +300,7 @@ def test_a_step_shows_where_the_target_is_wanted_and_what_was_found_of_it() -> N
     assert shown is not None
     points = shown.points
     assert (points.wanted, points.found, points.covered) == (OUTLINES["a"], found, ((3.0, 4.0),))
-    assert [words for words, _ in points.legend] == ["┅ wanted here", "● found", "● captured before"]
+    assert [words for words, _ in points.legend] == ["┅ wanted here", "● found", "● captured"]
     other = step_display(wizard(SECOND, outlines=OUTLINES))
     assert other is not None
     assert other.points.wanted == ()

@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import pytest
 import shiboken6
-from dsl_app.shared.widgets.dialogs import confirm, dialog_buttons
+from dsl_app.shared.widgets.dialogs import confirm, dialog_buttons, text_window
 from dsl_app.shared.widgets.layouts import column_of
 from PySide6.QtCore import Qt, QTimer
 from PySide6.QtTest import QTest
@@ -14,6 +14,7 @@ from PySide6.QtWidgets import (
     QApplication,
     QDialog,
     QDialogButtonBox,
+    QLabel,
     QLineEdit,
     QMessageBox,
     QProxyStyle,
@@ -125,3 +126,12 @@ def test_what_windows_ask_while_tests_close_them_is_answered(qtbot: QtBot) -> No
     with answering_questions():
         assert confirm(window, "Jobs are running", "Stop?", go="Stop and quit", stay="Keep working")
         assert QDialog(window).exec() == QDialog.DialogCode.Rejected
+
+
+def test_a_dialog_is_no_larger_than_its_screen(qtbot: QtBot) -> None:
+    parent = QWidget()
+    qtbot.addWidget(parent)
+    window = text_window("Figures", QLabel("text"), parent, 5000, 5000)
+    room = window.screen().availableSize()
+    assert window.width() < room.width()
+    assert window.height() < room.height()
