@@ -27,6 +27,8 @@ from dsl_core.extras import missing_package
 from dsl_core.version import __version__
 
 GROUP = "dsl_scan.rigs"
+#: What keeps most devices from being opened.
+UNPLUGGED = "Check the cables and the power of its devices, and that no other program uses them."
 #: Stands for the package of rigs that are profiles.
 PROFILE = "profile"
 #: Rigs of this package, so that they are there in a source tree or a frozen app without metadata too.
@@ -119,7 +121,9 @@ def open_rig(name: str, options: dict[str, str] | None = None) -> DeviceRig:
     except DslError:
         raise
     except Exception as error:
-        raise DeviceError(_fault(points[0], f"failed to open: {type(error).__name__}: {error}")) from error
+        raise DeviceError(
+            _fault(points[0], f"failed to open: {type(error).__name__}: {error}", UNPLUGGED)
+        ) from error
     if not isinstance(rig, DeviceRig):
         raise DeviceError(_fault(points[0], f"opened as {type(rig).__name__} instead of DeviceRig"))
     return rig if is_unguarded else guarded(rig, thread)
@@ -181,9 +185,11 @@ def _load(point: EntryPoint) -> OpenRig:
     return function  # type: ignore[no-any-return]
 
 
-def _fault(point: EntryPoint, what: str) -> str:
+def _fault(point: EntryPoint, what: str, first: str = "") -> str:
     name, version = _package(point)
-    return f"The rig {point.name!r} of package {name} {version} {what}. Update or reinstall that package."
+    last = "If that does not help, update" if first else "Update"
+    story = f"The rig {point.name!r} of package {name} {version} {what}"
+    return " ".join(filter(None, (f"{story.rstrip('.')}.", first, f"{last} or reinstall that package.")))
 
 
 def _describe(point: EntryPoint) -> RigEntry:
