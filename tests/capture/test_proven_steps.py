@@ -150,7 +150,7 @@ def frayed(shot: Shot) -> Finding:
 
 
 def beside(shot: Shot) -> Finding:
-    return Finding(shot, Verdict.UNTOLD, detail="its line was beside its place", is_doubtful=True)
+    return Finding(shot, Verdict.UNTOLD, detail="its line was next to its place", is_doubtful=True)
 
 
 def torn(shot: Shot) -> Finding:
@@ -404,7 +404,7 @@ def test_a_doubtful_picture_is_taken_a_second_time_and_every_eighth_with_a_contr
         ((doubtful, doubtful), True, "it was unlike those before it"),
         ((frayed, is_right), False, "a few rows of it showed another pattern"),
         ((frayed, frayed), False, ""),
-        ((beside, untold), False, "its line was beside its place"),
+        ((beside, untold), False, "its line was next to its place"),
         ((beside, beside), False, ""),
         ((stepped, is_right), False, "it was unlike those before it"),
         ((doubtful, untold), False, ""),

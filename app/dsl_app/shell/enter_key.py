@@ -22,7 +22,7 @@ _ENDS_ENTRY = (QLineEdit, QAbstractSpinBox, QComboBox, QAbstractItemView, QPlain
 
 
 def is_enter(event: QKeyEvent) -> bool:
-    """Whether Enter was pressed alone and anew: a key that is held down starts nothing twice."""
+    """Whether Enter was pressed, alone: a key that is held down starts nothing twice."""
     keypad = Qt.KeyboardModifier.KeypadModifier
     is_key = event.key() in (Qt.Key.Key_Return, Qt.Key.Key_Enter)
     return is_key and not event.isAutoRepeat() and not event.modifiers() & ~keypad

@@ -164,7 +164,7 @@ def shortcuts_window(actions: Iterable[Action], parent: QWidget) -> QDialog:
         for action in actions
         if action.shortcut
     ]
-    rows.append("| Go on | Enter | Presses the blue button of the page, or the button with the focus |")
+    rows.append("| Continue | Enter | Presses the blue button of the page, or the button with the focus |")
     browser = named(QTextBrowser(), "Keyboard shortcuts", "Every action that has a shortcut")
     browser.setMarkdown("\n".join(["| Action | Shortcut | What it does |", "|---|---|---|", *rows]))
     return text_window("Keyboard shortcuts", browser, parent, 720, 620)

@@ -5,18 +5,16 @@ from __future__ import annotations
 import numpy as np
 
 from dsl_core.devices.base import Stage
-from dsl_core.model.rig import Rig
+from dsl_core.model.rig import USUAL_DEPTH, Rig
 from dsl_core.optics.pinhole import project
 
-#: Share of the depth range at which a single flat target stands.
-USUAL = 0.4
-#: Where else it stands if it is not seen as a whole there: farther away.
-FARTHER = np.arange(USUAL, 0.96, 0.05)
+#: Shares of the depth range at which a flat target stands that is not seen as a whole where it usually does.
+FARTHER = np.arange(USUAL_DEPTH + 0.05, 0.96, 0.05)
 
 
 def target_depth_mm(rig: Rig, wanted_mm: float | None) -> float:
     """Where a flat target stands: at ``wanted_mm``, or where the rig has most room before and behind it."""
-    return float(np.round(depths_mm(rig, USUAL)[0])) if wanted_mm is None else wanted_mm
+    return rig.usual_depth_mm if wanted_mm is None else wanted_mm
 
 
 def seen_whole_mm(rig: Rig, size_mm: tuple[float, float]) -> float:
@@ -26,8 +24,7 @@ def seen_whole_mm(rig: Rig, size_mm: tuple[float, float]) -> float:
     too, where no depth of the rig shows all of it.
     """
     corners = np.array([[-0.5, 0.5, 0.5, -0.5], [-0.5, -0.5, 0.5, 0.5]]) * np.array(size_mm)[:, None]
-    usual, *farther = np.round(depths_mm(rig, *FARTHER))
-    for depth in (usual, *farther):
+    for depth in (rig.usual_depth_mm, *np.round(depths_mm(rig, *FARTHER))):
         points = np.vstack([corners, np.full(4, depth)])
         views = (rig.camera, points), (rig.projector, rig.pose.matrix @ points + rig.pose.vector_mm[:, None])
         inside = True
@@ -37,7 +34,7 @@ def seen_whole_mm(rig: Rig, size_mm: tuple[float, float]) -> float:
             inside &= bool((column < lens.width_px - 1).all() and (row < lens.height_px - 1).all())
         if inside:
             return float(depth)
-    return float(usual)
+    return rig.usual_depth_mm
 
 
 def depths_mm(rig: Rig, *shares: float) -> tuple[float, ...]:

@@ -86,5 +86,5 @@ def in_place(
     if told is not None:
         return displaced(found.shot, told[1], told[0])
     if not found.is_wrong and is_aside(places):
-        return replace(found, is_doubtful=True, detail="its line was beside its place")
+        return replace(found, is_doubtful=True, detail="its line was next to its place")
     return found

@@ -126,4 +126,4 @@ def test_a_single_line_that_seems_beside_its_place_is_asked_again(place: Contest
     right = Finding(LINE, Verdict.RIGHT)
     found = in_place(right, {Verdict.LATE: WON}, {1: place, -1: WON}, known().learned)
     assert (found.verdict, found.is_wrong, found.is_doubtful) == (Verdict.RIGHT, False, is_doubtful)
-    assert found.detail == ("its line was beside its place" if is_doubtful else "")
+    assert found.detail == ("its line was next to its place" if is_doubtful else "")
