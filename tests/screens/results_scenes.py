@@ -154,7 +154,8 @@ def show_tab(page: ResultsPage, shown: QWidget) -> None:
     """Show the tab of a widget, which may scroll."""
     tabs = page.findChild(QTabWidget)
     assert tabs is not None
-    tabs.setCurrentIndex(next(i for i in range(tabs.count()) if tabs.widget(i).isAncestorOf(shown)))
+    pages = [tabs.widget(i) for i in range(tabs.count())]
+    tabs.setCurrentIndex(next(i for i, each in enumerate(pages) if each and each.isAncestorOf(shown)))
 
 
 def search(stage: Stage) -> None:

@@ -206,8 +206,9 @@ class LiveController:
         with self._lock:
             wanted, self._wanted = self._wanted, None
         if wanted is not None:
-            info, (kind, *how) = devices.projector.info, wanted
-            devices.projector.show(trial_picture(kind, (info.width_px, info.height_px), *how))
+            info, (kind, level, column_px) = devices.projector.info, wanted
+            size = info.width_px, info.height_px
+            devices.projector.show(trial_picture(kind, size, level, column_px))
 
     def _not_shown(self, error: Exception) -> None:
         if isinstance(error, DeviceError):

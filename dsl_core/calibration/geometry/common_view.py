@@ -32,7 +32,7 @@ def wanted_coverage(found: GeometryCalibration, share: float) -> tuple[float, fl
         points = start[:, None] + turned * ((depth - start[2]) / turned[2])
     projector = _seen(points, found.camera, np.eye(3), np.zeros(3))
     if found.columns_only:
-        projector = projector.any(0)
+        projector = np.asarray(projector.any(0))
     return min(share, REACHED * float(camera.mean())), min(share, REACHED * float(projector.mean()))
 
 

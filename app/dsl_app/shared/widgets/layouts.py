@@ -123,16 +123,17 @@ class HighArea(QScrollArea):
 
     def __init__(self, content: QWidget) -> None:
         super().__init__()
+        self._content = content
         _scrolling(self, content)
 
     def minimumSizeHint(self) -> QSize:
         """As wide as the content with a scroll bar: nothing inside is cut at its side."""
         bar_px = self.verticalScrollBar().sizeHint().width()
-        return QSize(self.widget().minimumSizeHint().width() + bar_px, LEAST_HIGH_PX)
+        return QSize(self._content.minimumSizeHint().width() + bar_px, LEAST_HIGH_PX)
 
     def sizeHint(self) -> QSize:
         """As high as the content likes to be."""
-        return self.widget().sizeHint().expandedTo(self.minimumSizeHint())
+        return self._content.sizeHint().expandedTo(self.minimumSizeHint())
 
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:
         """Ask for other room when the content does: it may be made later."""
