@@ -38,6 +38,8 @@ from dsl_core.model.result import Flag
 if TYPE_CHECKING:
     from dsl_app.results.cloud.section_plot import SectionPlot
 
+#: Height that the curve of a section leaves to the view in a low window, px.
+LEAST_VIEW_PX = 80
 #: Delay between the steps that fill a view, ms.
 STEP_MS = 20
 UNPREPARED = (
@@ -155,6 +157,7 @@ class CloudPanel(QWidget):
         self.tools.setEnabled(can_draw)
         self._show_hint()
         self.message.hide()
+        view.setMinimumHeight(LEAST_VIEW_PX)
         self._box.insertWidget(0, view, 1)
         # The widget gets its size, and with it the camera, in the event loop.
         QTimer.singleShot(STEP_MS, self, self._new_result)

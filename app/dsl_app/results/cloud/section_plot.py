@@ -4,14 +4,18 @@ from __future__ import annotations
 
 import numpy as np
 import pyqtgraph as pg
-from PySide6.QtGui import QColor
+from PySide6.QtCore import QSize
+from PySide6.QtGui import QColor, QResizeEvent
 
 from dsl_app.shared.theme import DARK, Theme
 from dsl_app.shared.widgets.plots import CalmPlot
 from dsl_core.evaluation.shape import Section
 
-#: Height of the plot, px, and deviations to either side of the band.
-HEIGHT_PX, BAND = 150, 1.96
+#: Height of the plot, in a low window, and from which on its axis has room for words, px.
+HEIGHT_PX, LEAST_PX, SPOKEN_PX = 150, 90, 130
+HEIGHT, UNIT = "Height (mm)", "mm"
+#: Deviations to either side of the band.
+BAND = 1.96
 
 
 class SectionPlot(CalmPlot):
@@ -19,8 +23,9 @@ class SectionPlot(CalmPlot):
 
     def __init__(self) -> None:
         tip = "Height of the surface above the straight line between the two points, towards the camera"
-        super().__init__("Section", tip, "Height (mm)", "Along the line (mm)")
-        self.setFixedHeight(HEIGHT_PX)
+        super().__init__("Section", tip, HEIGHT, "Along the line (mm)")
+        self.setMinimumHeight(LEAST_PX)
+        self.setMaximumHeight(HEIGHT_PX)
         item = self.getPlotItem()
         self._low, self._high = (pg.PlotCurveItem(pen=pg.mkPen(None)) for _ in range(2))
         self._band = pg.FillBetweenItem(self._low, self._high)
@@ -28,6 +33,18 @@ class SectionPlot(CalmPlot):
         for each in (self._low, self._high, self._band, self.curve):
             item.addItem(each)
         self.apply_theme(DARK)
+
+    def sizeHint(self) -> QSize:
+        """As high as it may be."""
+        return QSize(super().sizeHint().width(), HEIGHT_PX)
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        """Leave the unit alone at an axis that is too short for words."""
+        super().resizeEvent(event)
+        item = self.getPlotItem()
+        # pyqtgraph sets a size before it has axes.
+        if item is not None:
+            item.setLabel("left", HEIGHT if self.height() >= SPOKEN_PX else UNIT)
 
     def apply_theme(self, theme: Theme) -> None:
         """Apply the colours of a theme."""
