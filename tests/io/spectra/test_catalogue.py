@@ -86,6 +86,18 @@ def test_an_asd_is_divided_by_its_white_unless_it_is_done(
     np.testing.assert_allclose(curve.values, SHARE, atol=1e-5)
 
 
+def test_counts_of_target_and_white_are_divided_where_nothing_else_is_reflectance(tmp_path: Path) -> None:
+    text = made.sed("Norm. DN (Ref.)\tNorm. DN (Target)\tChan.#")
+    dark = text.replace("\t1.000000e-01\t", "\t0.000000e+00\t", 1)
+    for content, lost in ((text, 0), (dark, 1)):
+        found = {each.name: each for each in read_spectra(write(tmp_path / "a.sed", content))}
+        assert set(found) == {"reflectance", "Norm. DN (Target)"}
+        np.testing.assert_allclose(found["reflectance"].values[lost:], SHARE[lost:], atol=1e-5)
+        assert np.isnan(found["reflectance"].values[:lost]).all()
+    with pytest.raises(CalibrationError, match="no value at 400 nm"):
+        read_spectrum(tmp_path / "a.sed", (411.0, 699.0), radiance=False)
+
+
 @pytest.mark.parametrize(
     ("name", "content", "scale"),
     [
