@@ -198,6 +198,10 @@ def reader_of(name: str) -> Callable[[Path], object]:
 
     def read(folder: Path) -> object:
         path = folder / name
-        return of_kind(path, read_spectra(path), radiance="cs2000" in name, all_unstated=True)
+        found = read_spectra(path)
+        if "meter" in name:
+            # Irradiance is neither radiance nor a share.
+            return found
+        return of_kind(path, found, radiance="cs2000" in name, all_unstated=True)
 
     return read
