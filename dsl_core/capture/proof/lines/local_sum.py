@@ -27,6 +27,9 @@ DOWN, ACROSS = 4, 24
 LEAST, SIGMAS = 0.1, 6.0
 #: The same for parts of all rows together, two of them beside each other.
 LEAST_OF_COLUMNS = 0.06
+#: The mean of two beside each other, of which either is off by so many deviations and both by so many: a few
+#: dim lines seldom end where a part does.
+SIGMAS_EACH, SIGMAS_BOTH = 3.0, 7.5
 #: One of them alone, as of the last few lines of a small picture, is as far off as `LEAST`, by so many
 #: deviations, and by so many times what most parts are: light that flickers leaves none as it was.
 SIGMAS_ALONE, STANDS_OUT = 7.5, 5.0
@@ -153,7 +156,11 @@ def _worst_columns(
     """
     apart, std = _by_parts(column, ACROSS, light)
     off = np.abs(apart) > np.maximum(LEAST_OF_COLUMNS, SIGMAS * std)
-    beside = off[1:] & off[:-1] & (apart[1:] * apart[:-1] > 0)
+    alike = apart[1:] * apart[:-1] > 0
+    each = np.minimum(np.abs(apart[1:]) / std[1:], np.abs(apart[:-1]) / std[:-1])
+    both, both_std = (apart[1:] + apart[:-1]) / 2, np.hypot(std[1:], std[:-1]) / 2
+    is_off = np.abs(both) > np.maximum(LEAST_OF_COLUMNS, SIGMAS_BOTH * both_std)
+    beside = alike & ((off[1:] & off[:-1]) | (is_off & (each > SIGMAS_EACH)))
     off = np.append(beside, False) | np.insert(beside, 0, False)
     known = np.isfinite(std)
     least = max(LEAST, STANDS_OUT * float(np.median(np.abs(apart[known])))) if known.any() else LEAST

@@ -96,6 +96,15 @@ def test_little_is_not_told_of_one_part_nor_of_some_that_differ_both_ways() -> N
     assert found(lambda at, light, *_: light * (1 + 0.08 * (-1) ** (at // 2))) is None
 
 
+@pytest.mark.parametrize(("light_of_lines", "is_told"), [(0.88, True), (0.94, False)])
+def test_a_few_lines_that_lie_in_two_parts_are_told_by_both_together(
+    light_of_lines: float, is_told: bool
+) -> None:
+    """A kettle takes some light from the mains now and then; neither part has lost enough to tell."""
+    seen = found(lambda at, light, *_: light * (light_of_lines if 36 <= at < 38 else 1.0))
+    assert (seen is not None) == is_told
+
+
 def test_more_is_told_of_one_part_alone() -> None:
     """The last few lines of a small picture, for which a lamp dims, light no more than that."""
     seen = found(lambda at, light, *_: light * (0.85 if 45 <= at < 47 else 1.0))
