@@ -23,6 +23,8 @@ DRIFT_STD = (0.5, 0.3)
 NO_DRIFT = 1e-6
 #: Witnesses needed to say anything; so many are enough of pictures taken again, which see the light itself.
 FEWEST, FEWEST_AGAIN = 4, 2
+#: What a single one may be wrong by, as nothing says how much the light flickers.
+ALONE_STD = 0.005
 #: What settings may differ by through the response of the rig, and levels of lines by over the picture.
 SETTING_STD, SLOPE_STD = 0.01, 0.02
 #: The same of settings that are not as calibrated; witnesses must be so much likelier then (chi-square).
@@ -94,11 +96,12 @@ class LightCourse:
 def light_course(witnesses: Sequence[Witness], shots: int) -> LightCourse | None:
     """The course that fits all witnesses best; None with too few.
 
-    A drift that may be chance is left out: the curve is then zero, and other figures are those without it.
+    A single picture taken again says how far the light has come, and not on which way. A drift that may be
+    chance is left out: the curve is then zero, and other figures are those without it.
     """
     again = [each for each in witnesses if each.against is not None and each.setting is None]
     if len(witnesses) < FEWEST and len(again) < FEWEST_AGAIN:
-        return None
+        return _alone(again[0], shots) if again else None
     nothing = (NO_DRIFT, NO_DRIFT)
     found, apart = _course(witnesses, shots, DRIFT_STD), _course(witnesses, shots, nothing, APART_STD)
     flicker = min(found.flicker, apart.flicker)
@@ -111,6 +114,29 @@ def light_course(witnesses: Sequence[Witness], shots: int) -> LightCourse | None
     others = [each for each in witnesses if each.setting is None]
     rests_on_settings = len(others) < FEWEST or not _course(others, shots, DRIFT_STD).drifts
     return replace(found, settings=apart.settings if rests_on_settings else ())
+
+
+def _alone(again: Witness, shots: int) -> LightCourse | None:
+    """The course where the light may have changed at once at any shot between the two, or little by little.
+
+    None where it has not changed, but for flicker. With a step that is as likely at one shot as at another, a
+    shot has on average what a steady drift gives.
+    """
+    first = again.against or 0
+    passed = np.clip((np.arange(shots) - first) / max(again.shot - first, 1), 0, 1)
+    std = float(np.hypot(again.std, ALONE_STD))
+    of_step = abs(again.log) * np.sqrt(passed * (1 - passed))
+    found = LightCourse(
+        log=passed * again.log,
+        std=np.hypot(of_step, passed * std),
+        white=0.0,
+        slope=0.0,
+        drift=again.log,
+        drift_std=std,
+        flicker=0.0,
+        flicker_std=std,
+    )
+    return found if found.drifts else None
 
 
 def _misfit(

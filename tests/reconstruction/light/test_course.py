@@ -51,8 +51,26 @@ def test_two_pictures_taken_again_are_enough(drift: float, drifts: bool) -> None
     assert (course.drifts, course.flickers) == (drifts, False)
     if drifts:
         assert np.abs(course.log - drift * np.arange(SHOTS) / (SHOTS - 1)).max() < 0.006
-    assert light_course(again[1:], SHOTS) is None, "one may be a chance"
     assert light_course([replace(each, setting=0) for each in again], SHOTS) is None, "settings may differ"
+
+
+@pytest.mark.parametrize(("change", "drifts"), [(-0.1, True), (0.03, True), (0.02, False), (0.0, False)])
+def test_a_single_picture_taken_again_says_how_far_the_light_came_but_not_when(
+    change: float, drifts: bool
+) -> None:
+    course = light_course([Witness(150, 20, change, 0.001)], SHOTS)
+    assert (course is not None) == drifts
+    if course is None:
+        return
+    assert (course.drifts, course.flickers, course.drift) == (True, False, change)
+    assert not course.log[:21].any()
+    assert course.log[150:] == pytest.approx(change)
+    # A change at any one shot in between is within two deviations at nearly all others, as a steady one is.
+    at = np.arange(SHOTS)
+    for since in (30, 85, 140):
+        away = np.abs(np.where(at < since, 0.0, change) - course.log)[21:150]
+        assert np.mean(away <= 2 * course.std[21:150]) > 0.85
+    assert course.std[85] == pytest.approx(abs(change) / 2, rel=0.02)
 
 
 def test_settings_that_do_not_agree_are_not_taken_for_drift() -> None:
