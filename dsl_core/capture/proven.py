@@ -32,6 +32,8 @@ ON_END = 3
 #: So many pictures that are late within so many shots, with right ones between: a display that drops every so
 #: many. Those of which nothing could be told may have been late as well.
 LATE_OFTEN, LATE_WITHIN = 3, 64
+#: So many pictures that a second one cured within so many shots: most are late in a part.
+CURED_OFTEN, CURED_WITHIN = 8, 16
 #: Pictures on end that are wrong like this may be late in a part of the picture alone.
 IN_PART = (Verdict.TORN, Verdict.EXPOSURE)
 #: Of doubtful pictures that come out the same again, every so many are followed by a control.
@@ -109,6 +111,7 @@ class ProvenShots:
         self._light = ""
         self._passed: deque[Shot] = deque(maxlen=MOST_UNTOLD)
         self._late_at: deque[int] = deque(maxlen=LATE_OFTEN)
+        self._cured_at: deque[int] = deque(maxlen=CURED_OFTEN)
         #: Shots that were taken again because a picture did not show their pattern.
         self.corrected = 0
 
@@ -209,6 +212,9 @@ class ProvenShots:
             self._be_late(shot, self._proof)
         elif self._failures >= FAILURES:
             self._be_late(shot, self._proof)
+        elif len(self._cured_at) == CURED_OFTEN and shot.index - self._cured_at[0] < CURED_WITHIN:
+            self._is_in_part = True
+            self._be_late(shot, self._proof)
 
     def _again(self, shot: Shot, earlier: int = 0) -> Frame:
         """Another picture of a shot, shown twice and for longer; ``earlier`` is how often that was done."""
@@ -249,6 +255,7 @@ class ProvenShots:
         has_mark = doubt.verdict is Verdict.RIGHT or bool(doubt.detail)
         if differs or (has_mark and not found.is_doubtful):
             self._count_unlike(found)
+            self._cured_at.append(doubt.shot.index)
             self.corrected += 1
             return replace(second, corrected=doubt.detail or "it was unlike those before it"), found
         if found.light is Light.STEP or self._doubts % CONTROL_EVERY == 0:

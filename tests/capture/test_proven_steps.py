@@ -12,7 +12,7 @@ import pytest
 from dsl_core.capture.diagnosis import Explanation
 from dsl_core.capture.proof.code.code_sum import CodeSum
 from dsl_core.capture.proof.finding import Finding, Light, Verdict
-from dsl_core.capture.proven import LATE_WITHIN, ON_END, SETTLE_MS, PictureError, ProvenShots
+from dsl_core.capture.proven import CURED_OFTEN, LATE_WITHIN, ON_END, SETTLE_MS, PictureError, ProvenShots
 from dsl_core.errors import Cancelled, DeviceError
 from dsl_core.model.frames import Frame
 from dsl_core.model.plan import CapturePlan, GrayCode, LineComb, Shot
@@ -333,6 +333,16 @@ def test_lines_before_those_that_are_late_in_part_are_taken_again_at_the_end(
     take_all(bench, SHOTS[12:16])
     assert bench.withdrawn == withdrawn
     assert bench.shots.corrected == 2 + len(withdrawn)
+
+
+@pytest.mark.parametrize(("apart", "is_late"), [(1, True), (3, False)])
+def test_pictures_that_a_second_one_cures_on_end_are_late_in_part(apart: int, is_late: bool) -> None:
+    # A colour of a projector that is always one picture late is right the second time.
+    bench = Bench(*[frayed, is_right] * CURED_OFTEN, is_right)
+    shots = [replace(LINE, index=LINE.index + apart * n) for n in range(CURED_OFTEN)]
+    take_all(bench, shots)
+    assert ("captured twice" in bench.shots.note) == is_late
+    assert bool(bench.withdrawn) == is_late
 
 
 @pytest.mark.parametrize(("before", "is_late"), [(LATE_WITHIN, True), (LATE_WITHIN + 1, False)])

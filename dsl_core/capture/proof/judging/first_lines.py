@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+from dataclasses import replace
+
 import numpy as np
 
 from dsl_core.capture.proof.finding import Finding, Verdict
 from dsl_core.capture.proof.judging.decision import decide, in_place
 from dsl_core.capture.proof.judging.known import Known
-from dsl_core.capture.proof.lines.line_place import contests_of_sides, moved
+from dsl_core.capture.proof.lines.line_place import contests_of_sides, is_aside, moved
 from dsl_core.capture.proof.lines.line_shown import line_shown
 from dsl_core.capture.proof.prediction import (
     Lit,
@@ -16,7 +19,8 @@ from dsl_core.capture.proof.prediction import (
     is_lit_elsewhere,
     is_over_white,
 )
-from dsl_core.capture.proof.raster import Counts
+from dsl_core.capture.proof.raster import Counts, Floats
+from dsl_core.model.conditions import COLOUR_NAMES
 from dsl_core.model.plan import Shot
 
 
@@ -41,7 +45,25 @@ def judge_line(known: Known, shot: Shot, seen: Counts) -> Finding:
         return Finding(shot, Verdict.OTHER, (shot,), "a part of it is brighter than white")
     wanted = usual * wanted
     places = contests_of_sides(lambda side: contest_of_lines(seen, lit, wanted, moved(wanted, side)))
-    return in_place(found, contests, places, known.learned)
+    found = in_place(found, contests, places, known.learned)
+    others = [usual * rival for _, rival in rivals[:-2] if rival is not None]
+    colour = None if found.is_wrong else _colour_of_another(seen, lit, wanted, others)
+    return found if colour is None else replace(found, is_doubtful=True, detail=f"its {colour} was another's")
+
+
+def _colour_of_another(seen: Counts, lit: Lit, wanted: Floats, others: Iterable[Floats]) -> str | None:
+    """The colour of a picture that seems to be of one of the ``others``, such as the line before.
+
+    A colour of the projector may come late by itself, and so may packets of a camera that sends colours one
+    after the other.
+    """
+    for colour, name in enumerate(COLOUR_NAMES):
+        own = np.zeros_like(wanted)
+        own[colour::3] = 1
+        asked = {n: contest_of_lines(seen, lit, own * wanted, own * other) for n, other in enumerate(others)}
+        if is_aside(asked):
+            return name
+    return None
 
 
 def _line_shown(known: Known, lit: Lit, seen: Counts, shot: Shot) -> Shot | None:

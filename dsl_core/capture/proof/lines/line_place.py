@@ -55,7 +55,7 @@ def contests_of_sides(contest: Callable[[int], Contest]) -> dict[int, Contest]:
 
 
 def is_aside(contests: Mapping[int, Contest]) -> bool:
-    """Whether a picture by itself seems to be out of its place, from its contests with `SIDES`."""
+    """Whether a picture by itself seems to be another one, such as itself out of its place, from contests."""
     return any(each.count >= SURE_VOTES and each.mean < -ASIDE for each in contests.values())
 
 
