@@ -26,6 +26,8 @@ TOGETHER = 8
 MOST = (1 << 32) - 1
 #: Least variance of a band's reflectance, against rounding.
 LEAST_VARIANCE = 1e-12
+#: No more than this share of a pixel's samples goes into its spectrum: where they are few, the prior does.
+MOST_SHARE = 1 / 3
 #: What follows the window's columns: product of pivots, evidence, logarithms, whether a pivot is bad; what
 #: broad rows have in common (6) and see (3); the factor of their small system (6) and its solution (3).
 PRODUCT, EVIDENCE, LOGS, BAD, GRAM, SEEN, SMALL, INNER, SUMS = 0, 1, 2, 3, 4, 10, 13, 19, 22
@@ -494,7 +496,8 @@ def solve_blocks(
                     for j in range(count):
                         at = (j + band) * LANES + i
                         explained += x[at] * (2.0 * sums[at_right + j * LANES + i] - product[at])
-                    freedom = max(sums[at_square + LANES + i] - parameters, 1.0)
+                    samples = sums[at_square + LANES + i]
+                    freedom = max(samples - min(parameters, MOST_SHARE * samples), 1.0)
                     misfit[index[y, x0 + i]] = (sums[at_square + i] - explained) / freedom
             for j in range(count):
                 before, after = LANES if j else 0, LANES if j < count - 1 else 0

@@ -5,7 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from dsl_core.model.fit import Fit
 from dsl_core.model.plan import CapturePlan, GrayCode, ScanLines
+from dsl_core.model.result import Flag
 from dsl_core.model.rig import Rig
 from dsl_core.model.spectral import SpectralCurve, WavelengthGrid
 from dsl_core.pipeline import Options, evaluate, reconstruct
@@ -43,3 +45,9 @@ def test_depth_and_spectra_come_from_brightness_alone(monkeypatch: pytest.Monkey
     spectra = np.moveaxis(result["reflectance"].values, 0, -1)
     errors = spectra - truth.spectra[truth.material]
     assert np.sqrt(np.nanmean(errors**2)) < 0.05
+    # Each pixel has few samples, which its spectrum does not use up; and no colours that could disagree.
+    assert (result["flags"].values & int(Flag.POOR_FIT) != 0).mean() < 0.05
+    fit = Fit.read(result.attrs)
+    assert fit is not None
+    assert not {"profile", "surfaces"} & set(fit.parts)
+    assert not any(finding.part == "curves" for finding in fit.findings)

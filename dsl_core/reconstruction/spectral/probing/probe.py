@@ -169,7 +169,8 @@ def probe(scan: ProbedScan) -> Probe | None:
         step_nm=scan.model.bands.step_nm,
         steepness=steepness_per_nm(white, scan.model.bands.step_nm),
         bright=bright_knots(white, scan.model.bands.centres_nm[scan.model.bands.reported]),
-        with_curves=whole,
+        # A monochrome camera has no colours that could disagree.
+        with_curves=None if scan.model.rig.sensor.bayer == "MONO" else whole,
         lines=probe_lines(lines, response, scan.pixels, scan.radiance, scan.std, targets, widths),
         nm_per_px=_nm_per_px(scan, traced[ORDERS[0]][0]),
         sideways=_sideways(scan, column, traced),

@@ -25,6 +25,7 @@ from dsl_core.reconstruction.spectral.probing.picked_cube import PickedCube
 from dsl_core.reconstruction.spectral.probing.probed_pixels import Indices, samples_of
 from dsl_core.reconstruction.spectral.solving.dense_solver import solve_dense
 from dsl_core.reconstruction.spectral.solving.prior import Prior, roughness
+from dsl_core.reconstruction.spectral.solving.solution import freedom
 from dsl_core.reconstruction.spectral.solving.tile_frames import Pixels, weighted
 from dsl_core.solve import banded
 
@@ -47,8 +48,6 @@ PARAMETERS = (
 SHIFT_PX, BLUR_STEP = 0.05, 0.05
 #: Blur of the tail of a line, relative to its own.
 TAIL_BLUR = 4.0
-#: Degrees of freedom that a spectrum takes, roughly.
-SPECTRUM = 25
 #: Relative error of the zero order that neighbours need not share.
 ZERO_ERROR = 0.01
 
@@ -283,7 +282,7 @@ class SolvedPixels:
     @property
     def freedom(self) -> Tensor:
         """Degrees of freedom (n,) of the frames of each pixel."""
-        return (self.gather((self.light.weight > 0).double().sum(1)) - SPECTRUM).clip(min=1)
+        return freedom(self.gather((self.light.weight > 0).double().sum(1)))
 
     @property
     def chi_square(self) -> Tensor:

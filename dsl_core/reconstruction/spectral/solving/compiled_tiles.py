@@ -22,7 +22,7 @@ from dsl_core.reconstruction.spectral.solving.lane_solver import (
     whole_blocks,
 )
 from dsl_core.reconstruction.spectral.solving.prior import Prior
-from dsl_core.reconstruction.spectral.solving.solution import Spectra
+from dsl_core.reconstruction.spectral.solving.solution import PARAMETERS, Spectra
 from dsl_core.reconstruction.spectral.solving.tile_frames import TileFrames
 from dsl_core.solve.compiled import compiled
 from dsl_core.solve.halves import squares_of_halves
@@ -31,8 +31,6 @@ from dsl_core.solve.many import Check
 add_samples = compiled(line_sums.add_samples)
 #: Rows of a tile whose equations are in memory at once, so that they stay in the processor's cache.
 STRIP = 4
-#: Degrees of freedom that a spectrum takes from its data, roughly, in the reduced chi-square.
-PARAMETERS = 25
 
 
 class CompiledTiles:

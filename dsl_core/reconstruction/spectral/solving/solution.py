@@ -7,10 +7,19 @@ from dataclasses import dataclass, fields
 import torch
 from torch import Tensor
 
+from dsl_core.solve.lane_kernels import MOST_SHARE
+
 #: Deviation between centre and mean of a band, relative to the differences of its spectrum.
 WITHIN_BAND = 1 / 36
 #: Deviation against which local data are weighed in the data share.
 LOCAL_STD = 0.1
+#: Degrees of freedom that a spectrum takes from its data, roughly, in the reduced chi-square.
+PARAMETERS = 25
+
+
+def freedom(samples: Tensor) -> Tensor:
+    """Degrees of freedom that are left of so many samples, as the compiled kernels count them; at least 1."""
+    return (samples - (MOST_SHARE * samples).clip(max=PARAMETERS)).clip(min=1)
 
 
 @dataclass(frozen=True)

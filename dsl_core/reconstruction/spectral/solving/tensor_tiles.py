@@ -11,10 +11,9 @@ from dsl_core.optics.colour_neighbours import ColourNeighbours, bayer_colours
 from dsl_core.optics.correspondence import like
 from dsl_core.optics.lines.equations import LineEquations
 from dsl_core.optics.pixel_model import PixelModel, Traced
-from dsl_core.reconstruction.spectral.solving.compiled_tiles import PARAMETERS
 from dsl_core.reconstruction.spectral.solving.lane_solver import solve_spectra
 from dsl_core.reconstruction.spectral.solving.prior import Prior
-from dsl_core.reconstruction.spectral.solving.solution import Spectra
+from dsl_core.reconstruction.spectral.solving.solution import Spectra, freedom
 from dsl_core.reconstruction.spectral.solving.tile_frames import TileFrames
 from dsl_core.solve.banded import multiply
 from dsl_core.solve.many import Check
@@ -72,7 +71,7 @@ class TensorTiles:
             spectra = with_offset(spectra, matrix * shading**2, gather.sum(offset) * shading**2, self.prior)
         radiance = spectra.nodes * shading
         explained = (radiance * (2 * right - multiply(matrix, radiance))).sum(0)
-        return spectra, (square - explained) / (samples - PARAMETERS).clip(min=1)
+        return spectra, (square - explained) / freedom(samples)
 
     def _samples(
         self, model: PixelModel, frames: TileFrames, traced: Traced, check: Check
@@ -108,7 +107,7 @@ class TensorTiles:
             parts.append((*made, (weight > 0).sum(0).to(radiance)))
         gather = _gather(frames, near)
         matrix, right, square, number = (gather.sum(torch.cat(each, -1)) for each in zip(*parts, strict=True))
-        shading, freedom = frames.known("shading"), (number - PARAMETERS).clip(min=1)
+        shading, left = frames.known("shading"), freedom(number)
         found, misfit = [], []
         for start in range(0, len(shading), DENSE_PIXELS):
             check()
@@ -118,7 +117,7 @@ class TensorTiles:
             found.append(spectra)
             nodes = (spectra.nodes * lit).T
             explained = (nodes * (2 * side - (own @ nodes[..., None])[..., 0])).sum(1)
-            misfit.append((square[part] - explained) / freedom[part])
+            misfit.append((square[part] - explained) / left[part])
         return _joined(found), torch.cat(misfit)
 
     def _dense_samples(

@@ -127,8 +127,9 @@ def probed(monkeypatch: pytest.MonkeyPatch, share: float, varied: bool, **model:
     monkeypatch.setattr(probe_module, "_sideways", lambda *_: None)
     monkeypatch.setattr(probe_module, "_white", lambda *_: np.exp(0.1 * NM)[None, None])
     camera = SimpleNamespace(width_px=1000 * share, fx_px=1000.0)
+    rig = SimpleNamespace(camera=camera, sensor=SimpleNamespace(bayer="RGGB"))
     given = {
-        "single": True, "lines": (), "response": lambda _: None, "rig": SimpleNamespace(camera=camera),
+        "single": True, "lines": (), "response": lambda _: None, "rig": rig,
         "bands": SimpleNamespace(step_nm=5.0, centres_nm=NM, reported=slice(None)),
     }  # fmt: skip
     size = model.pop("pixels", 100)

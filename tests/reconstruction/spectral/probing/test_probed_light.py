@@ -109,10 +109,10 @@ def test_chi_square_is_per_degree_of_freedom_beyond_those_of_a_spectrum() -> Non
     residual = torch.full((3, 40), 2.0, dtype=torch.float64)
     nodes = torch.zeros((2, 5), dtype=torch.float64)
     solved = SolvedPixels(light, owner, one, one, one, residual, nodes, nodes.T, nodes, nodes == 0)
-    assert solved.chi_square.tolist() == pytest.approx([4 * 80 / 55, 4 * 35 / 10])
+    assert solved.chi_square.tolist() == pytest.approx([4 * 80 / 55, 4 * 35 / (35 - 35 / 3)])
     few: Any = SimpleNamespace(weight=weight * (torch.arange(40) < 5))
     again = SolvedPixels(few, owner, one, one, one, residual, nodes, nodes.T, nodes, nodes == 0)
-    assert float(again.chi_square[1]) == 20.0
+    assert float(again.chi_square[1]) == pytest.approx(4 * 5 / (5 - 5 / 3))
 
 
 def test_nodes_at_a_bound_do_not_give_way_to_what_data_ask() -> None:
