@@ -113,8 +113,8 @@ class _Line:
 
 def _tell_hanging(name: str, verb: str, seconds: float) -> NoReturn:
     raise _HangsError(
-        f"{name} was asked to {verb}, but has not returned for {seconds:g} s. Switch it off and on again or"
-        " reconnect its cable, then resume. If it is only slow, its package can state more patience."
+        f"{name} was asked to {verb}, but has not returned for {round(seconds, 1):g} s. Switch it off and on"
+        " again or reconnect its cable, then resume. If it is only slow, its package can state more patience."
     ) from None
 
 

@@ -25,6 +25,7 @@ from dsl_core.io.calibration_library import CalibrationLibrary
 Library = Callable[[], tuple[str | None, CalibrationLibrary]]
 #: Pause between two looks, s.
 LOOK_PAUSE_S = 0.8
+CONNECTING = "Connecting the rig again…"
 
 
 class WizardController:
@@ -114,9 +115,16 @@ class WizardController:
         self.state.can_reconnect.set(False)
 
     def reconnect(self) -> None:
-        """Open the rig again after a device was lost."""
+        """Open the rig again after a device was lost; why it is still lost is said where the person looks."""
         if self._jobs.is_free and self._rig.state.link.value is not Link.OPENING:
-            self._rig.connect(self._rig.state.choice.value)
+            self.state.note.set(CONNECTING)
+            self._rig.reconnect(
+                self._rig.state.choice.value, lambda: self.state.note.set(""), self._still_lost
+            )
+
+    def _still_lost(self, reason: str) -> None:
+        self.state.note.set("")
+        self.state.trouble.set(f"The rig could not be connected again: {reason}")
 
     # Move between pages ----------------------------------------------------------------------------
 

@@ -11,6 +11,7 @@ from dsl_app.calibrate.wizard.controller import WizardController
 from dsl_app.calibrate.wizard.ghost import PointsPx, as_points, ghost
 from dsl_app.calibrate.wizard.presentation import NONE_KEPT, step_display
 from dsl_app.calibrate.wizard.state import Doing, WizardState
+from dsl_app.connection.state import Link
 
 from dsl_core.devices.base import DeviceRig
 from dsl_core.errors import CalibrationError, DeviceError, StoreError
@@ -245,8 +246,15 @@ def test_a_lost_camera_is_a_sentence_and_the_rig_can_be_connected_again(
     with monkeypatch.context() as lost:
         lost.setattr(SimCamera, "snap", silent)
         control.capture()
-    assert "Check its cable" in state.trouble.value
-    assert is_on(state.can_reconnect)
+        assert "Check its cable" in state.trouble.value
+        assert is_on(state.can_reconnect)
+        # Its window lies over the messages of the main one.
+        control.reconnect()
+        assert state.trouble.value.startswith(
+            "The rig could not be connected again: The camera sent no frame"
+        )
+        assert is_on(state.can_reconnect)
+        assert bench.rig.state.link.value is Link.LOST
     before = bench.rig.state.devices.value
     control.reconnect()
     assert bench.rig.state.devices.value is not before
