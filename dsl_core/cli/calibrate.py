@@ -189,7 +189,6 @@ def all_(
     from dsl_core.campaign.products import write_products
     from dsl_core.campaign.recipes import load_recipe
     from dsl_core.io.calibration_library import check_name
-    from dsl_core.reconstruction.spectral.rig_traits import measured_traits, traits_in_words
 
     output, timer, settings = Output(json), StageTimer(), _settings_by_name(set_)
     name = name or campaign.absolute().name
@@ -199,8 +198,9 @@ def all_(
         load_recipe(each, values)  # wrong settings are reported before anything is written
     guide = ConsoleGuide(output, yes, accept_failed)
     with (
-        resumed_by(f"dsl-scan calibrate all {campaign}"),
+        # Before the devices are open there is nothing to resume.
         opened_campaign(campaign, rig, parse_options(option), settings) as (folder, devices),
+        resumed_by(f"dsl-scan calibrate all {campaign}"),
     ):
         with output.progress() as progress:
             try:
@@ -216,6 +216,9 @@ def all_(
                 _save_so_far(folder, devices, output, timer.stages)
                 raise
         made = write_products(folder, calibrated, calibrated.name if library else None, timer.stages)
+    # This loads torch, which a refusal does not wait for.
+    from dsl_core.reconstruction.spectral.rig_traits import measured_traits, traits_in_words
+
     output.costs(timer.stages)
     output.say(f"The calibrated rig is saved in {made.rig}, its report in {made.report}.")
     if traits := traits_in_words(calibrated):

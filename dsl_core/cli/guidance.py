@@ -156,8 +156,9 @@ def run_guided(
     command = f"dsl-scan {name if name == 'selftest' else f'calibrate {name}'} {campaign}"
     load_recipe(name, settings[name])  # wrong settings are reported before anything is written
     with (
-        resumed_by(command),
+        # Before the devices are open there is nothing to resume.
         opened_campaign(campaign, rig, parse_options(option), settings) as (folder, devices),
+        resumed_by(command),
     ):
         recipe = load_recipe(name, folder.info.settings.get(name))
         session = CalibrationSession(recipe, devices, folder)

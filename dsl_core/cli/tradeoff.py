@@ -105,8 +105,6 @@ def design(
     from dsl_core.devices.registry import open_rig
     from dsl_core.io.plan_file import save_plan
     from dsl_core.model.plan import CapturePlan, GrayCode, Sentinels
-    from dsl_core.planning.design import design as search
-    from dsl_core.planning.designed import DesignedSet, packed, save_design
 
     output = Output(json)
     check_targets([path for path in (target, plan) if path is not None], overwrite=force)
@@ -116,6 +114,10 @@ def design(
         base = base.sized(known.camera, known.projector)
         if plan is not None:
             require_possible(replace(devices, calibration=None), base)  # reported before the search
+    # These load torch, which a refusal does not wait for.
+    from dsl_core.planning.design import design as search
+    from dsl_core.planning.designed import DesignedSet, packed, save_design
+
     with output.progress() as progress:
         found = search(known, base, frames, orders=orders, progress=progress)
     made = DesignedSet(

@@ -111,9 +111,18 @@ class _Line:
             self.thread.end()
 
 
+def _two_digits(seconds: float) -> str:
+    """A time as people wait for it.
+
+    >>> _two_digits(4.56667), _two_digits(0.05), _two_digits(300.0)
+    ('4.6', '0.05', '300')
+    """
+    return f"{float(f'{seconds:.2g}'):g}"
+
+
 def _tell_hanging(name: str, verb: str, seconds: float) -> NoReturn:
     raise _HangsError(
-        f"{name} was asked to {verb}, but has not returned for {round(seconds, 1):g} s. Switch it off and on"
+        f"{name} was asked to {verb}, but has not returned for {_two_digits(seconds)} s. Switch it off and on"
         " again or reconnect its cable, then resume. If it is only slow, its package can state more patience."
     ) from None
 

@@ -220,4 +220,5 @@ def test_wrong_words_are_told_and_leave_nothing(
     ending = give(*arguments)
     assert ending.code == 2
     assert sentence in ending.sentence
+    assert "captured is kept" not in ending.sentence, "nothing was captured"
     assert not (tmp_path / "c").exists()

@@ -38,6 +38,18 @@ def test_help_and_version_need_no_heavy_library() -> None:
 
 
 @pytest.mark.parametrize(
+    "arguments",
+    ["design out.json --calibration missing.json", "calibrate all campaign --rig nothing"],
+)
+def test_a_refusal_does_not_wait_for_torch(arguments: str, tmp_path: Path) -> None:
+    code = (
+        f"import sys; from dsl_core.cli import main;print(main({arguments.split()}), 'torch' in sys.modules)"
+    )
+    answer = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, cwd=tmp_path)
+    assert answer.stdout.split() == ["2", "False"]
+
+
+@pytest.mark.parametrize(
     "command",
     [
         "demo",

@@ -38,7 +38,10 @@ PHRASES = (
     ("Correct --projector, or calibrate with that size.", "Correct the projector's size."),
 )
 #: The same with what changes in the middle of them.
-PATTERNS = ((r"'dsl-scan calibrate geometry .* --pictures' reads", "the calibration of the geometry reads"),)
+PATTERNS = (
+    (r"'dsl-scan calibrate geometry .* --pictures' reads", "the calibration of the geometry reads"),
+    (r"pip install 'dsl-scan\[(\w+)\]'", r"the extra \1 of dsl-scan"),
+)
 
 
 #: Characters of a name that a heading has room for in the smallest window.
@@ -68,9 +71,11 @@ def in_window(text: str) -> str:
     'The scan contains no calibration. Choose one.'
     >>> in_window("The board of 7 x 5 inner corners was not found.")
     'The board of 7 × 5 inner corners was not found.'
+    >>> in_window("Needs pip install 'dsl-scan[ocean]' (seabreeze)")
+    'Needs the extra ocean of dsl-scan (seabreeze)'
     """
     text = _TIMES.sub(" × ", text)
-    if "--" in text or "'dsl-scan " in text:
+    if "--" in text or "'dsl-scan" in text:
         for typed, clicked in PHRASES:
             text = text.replace(typed, clicked)
         for pattern, clicked in PATTERNS:

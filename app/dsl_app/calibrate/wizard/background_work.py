@@ -103,7 +103,8 @@ class BackgroundWork:
         statuses = session.statuses()
         # Nothing is kept before all of it has been read.
         self._session, self._all = session, recipes
-        settings = setting_rows(recipe, campaign.info.settings.get(self._name, {}))
+        first = next((each.placement for each in session.steps), None)
+        settings = setting_rows(recipe, campaign.info.settings.get(self._name, {}), first)
         places = self._devices.place is not None
         camera = session.bench.rig.camera
         outlines = {each.key: ghost(each.placement, camera) for each in session.steps}

@@ -14,21 +14,34 @@ from pydantic import BaseModel
 from dsl_app.calibrate.setting_words import setting_title
 from dsl_app.calibrate.wizard.state import SettingRow
 from dsl_core.campaign.common.recipe import AnyRecipe
+from dsl_core.model.placement import Placement
 from dsl_core.words import capitalised
 
 
-def setting_rows(recipe: AnyRecipe, settings: Mapping[str, str]) -> tuple[SettingRow, ...]:
-    """A row for each field of a recipe, with the value in the campaign or its default."""
+def setting_rows(
+    recipe: AnyRecipe, settings: Mapping[str, str], placement: Placement | None = None
+) -> tuple[SettingRow, ...]:
+    """A row for each field of a recipe, with the value in the campaign or its default.
+
+    A field that is empty by default has what the ``placement`` of the first step uses in its stead.
+    """
     kind: type[Any] = type(recipe)
     if not is_dataclass(kind):
         return ()
     plain = kind()
-    found = []
+    found, options = [], {} if placement is None else placement.options
     for each in fields(kind):
         default = getattr(plain, each.name)
         text = as_text(default)
         found.append(
-            SettingRow(each.name, _kind(default), text, settings.get(each.name, text), _doc(kind, each.name))
+            SettingRow(
+                each.name,
+                _kind(default),
+                text,
+                settings.get(each.name, text),
+                _doc(kind, each.name),
+                as_text(options.get(each.name)),
+            )
         )
     return tuple(found)
 

@@ -64,6 +64,7 @@ class SettingsPage(QWidget):
                 field.show_text(row.value)
             else:
                 field.setText(row.value)
+                field.setPlaceholderText(row.default or row.used or "none")
 
     def _build(self, rows: tuple[SettingRow, ...]) -> None:
         while self._form.rowCount():
@@ -93,7 +94,6 @@ class SettingsPage(QWidget):
             board.edited.connect(tell)
             return _named(board, name, tip)
         line = QLineEdit()
-        line.setPlaceholderText(row.default or "none")
         line.editingFinished.connect(lambda: tell(line.text()))
         return _named(line, name, tip)
 

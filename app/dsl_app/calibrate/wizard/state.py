@@ -73,13 +73,17 @@ class Fit:
 
 @dataclass(frozen=True)
 class SettingRow:
-    """A setting of the recipe as text; ``doc`` explains it, ``kind`` chooses how it is edited."""
+    """A setting of the recipe as text; ``doc`` explains it, ``kind`` chooses how it is edited.
+
+    ``used`` is what an empty field stands for where the rig decides that.
+    """
 
     key: str
     kind: str
     default: str
     value: str
     doc: str
+    used: str = ""
 
 
 @dataclass(frozen=True)

@@ -11,6 +11,7 @@ from dsl_app.rig.profiles.draft import NEEDED, DraftPart, caption, text_of
 from dsl_app.rig.profiles.state import Found
 from dsl_app.shared.widgets.forms import ChoiceBox, label, named, quiet, set_role
 from dsl_app.shared.widgets.layouts import boxed, column_of, scrolled
+from dsl_app.shared.wording import in_window
 from dsl_core.devices.driver_table import Kind, find_driver
 from dsl_core.errors import DeviceError
 from dsl_core.words import capitalised, sentence
@@ -86,7 +87,8 @@ class DeviceForm(QWidget):
         except DeviceError as error:
             self.about.setText(str(error))
             return
-        self.about.setText(capitalised(found.summary) + (f". Needs {found.brings}" if found.brings else ""))
+        needs = in_window(f". Needs {found.brings}") if found.brings else ""
+        self.about.setText(capitalised(found.summary) + needs)
         for name, setting in found.settings.model_fields.items():
             field = named(QLineEdit(), caption(name), setting.description or name)
             default = setting.get_default(call_default_factory=True)

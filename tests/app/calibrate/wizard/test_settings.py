@@ -16,6 +16,7 @@ from dsl_app.calibrate.wizard.settings import (
 from dsl_core.campaign.common.recipe import AnyRecipe
 from dsl_core.campaign.recipes import load_recipe, recipe_names
 from dsl_core.model.board import Board, Checkerboard
+from dsl_core.model.placement import Placement
 
 
 @dataclass
@@ -42,6 +43,13 @@ def test_every_field_is_a_row_with_its_default_and_value() -> None:
     assert ROWS["board"].default.startswith('{"kind":"checkerboard","columns":9')
     assert (ROWS["filters_nm"].default, ROWS["filters_nm"].value) == ("430,166.667", "430,166.667")
     assert (ROWS["is_slow"].default, ROWS["is_slow"].value) == ("false", "true")
+
+
+def test_what_the_rig_decides_is_shown_where_a_field_is_empty() -> None:
+    where = Placement(options={"silent": 700.0})
+    rows = {row.key: row for row in setting_rows(cast(AnyRecipe, Recipe()), {}, where)}
+    assert (rows["silent"].default, rows["silent"].used) == ("", "700")
+    assert rows["filters_nm"].used == ""
 
 
 def test_rows_are_explained_by_the_docstring() -> None:
