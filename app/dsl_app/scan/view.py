@@ -43,6 +43,9 @@ class FramePicture(QWidget):
         self._cursor: tuple[int, int] | None = None
         tip = "The last frame. Point at a pixel, or use arrow keys, to plot its intensity."
         self.view = PictureView("Last frame of the scan", tip)
+        # The keyboard comes to this widget, so that it is this one's name that is read.
+        self.setAccessibleName("Last frame of the scan")
+        self.setAccessibleDescription(tip)
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self.view.setFocusProxy(self)
         FocusRing(self, self.view)

@@ -19,6 +19,7 @@ from dsl_app.shared.widgets.deferred import Deferred
 from dsl_app.shell.actions import PAGES
 from dsl_app.shell.main_window import MainWindow
 from dsl_app.shell.toasts import Toast
+from PySide6.QtCore import Qt
 from PySide6.QtGui import QAccessible
 from PySide6.QtWidgets import (
     QAbstractButton,
@@ -111,6 +112,19 @@ def complaints(root: QWidget) -> list[str]:
     return found
 
 
+def nameless(root: QWidget) -> list[str]:
+    """What the Tab key comes to and a screen reader has no name for, plots and pictures included."""
+    found = []
+    for widget in root.findChildren(QWidget):
+        is_stop = widget.focusPolicy() & Qt.FocusPolicy.TabFocus and widget.focusProxy() is None
+        if not is_stop or widget.objectName().startswith("qt_") or is_part(widget):
+            continue
+        interface = QAccessible.queryAccessibleInterface(widget)
+        if interface is None or not interface.text(QAccessible.Text.Name):
+            found.append(where(widget))
+    return found
+
+
 def where(widget: QWidget) -> str:
     parts = []
     at: QWidget | None = widget
@@ -124,6 +138,7 @@ def where(widget: QWidget) -> str:
 def test_every_control_of_a_page_has_a_name_and_a_tooltip(window: MainWindow, key: str) -> None:
     page = window.open_page(key)
     assert complaints(page) == []
+    assert nameless(page) == []
     assert given_twice(window, page) == []
 
 
@@ -197,8 +212,10 @@ def test_every_control_of_the_results_has_a_name_and_a_tooltip(
     assert complaints(dialog) == []
     dialog.reject()
     assert complaints(page.graph) == []
+    assert nameless(page.graph) == []
     assert complaints(NewCampaignDialog(tmp_path, "twin", page)) == []
     assert complaints(page) == []
+    assert nameless(page) == []
 
 
 def test_every_control_of_a_rig_profile_has_a_name_and_a_tooltip(window: MainWindow) -> None:
@@ -226,6 +243,7 @@ def test_every_control_of_a_wizard_and_of_imports_has_a_name_and_a_tooltip(
     (wizard,) = window.findChildren(CalibrationWizard)
     qtbot.waitUntil(lambda: not window.parts.runner.active, timeout=60_000)
     assert complaints(wizard) == []
+    assert nameless(wizard) == []
     wizard.reject()
     window.open_path(make_folders(tmp_path / "published").scene)
     qtbot.waitUntil(lambda: bool(window.findChildren(ImportDialog)), timeout=60_000)

@@ -48,6 +48,9 @@ class PairPictures(QWidget):
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         tip = "A, B and A minus B. Drag to pan, wheel to zoom; arrow keys move the cursor."
         self.canvas = Canvas("A, B and their difference", tip)
+        # The keyboard comes to this widget, so that it is this one's name that is read.
+        self.setAccessibleName("A, B and their difference")
+        self.setAccessibleDescription(tip)
         self.canvas.setFocusProxy(self)
         FocusRing(self, self.canvas)
         self.titles = [pg.LabelItem(text, justify="left") for text in ("A", "B", "A − B")]
