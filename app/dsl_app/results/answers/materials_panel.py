@@ -19,7 +19,7 @@ from dsl_app.shared.widgets.read_table import RIGHT, ReadTable, cell
 from dsl_app.shared.widgets.save_dialog import ask_target
 from dsl_core.analysis.classify import Brightness, Limits, Measure
 from dsl_core.io.spectra.catalogue import suffixes
-from dsl_core.words import counted
+from dsl_core.words import capitalised, counted
 
 HINT = (
     "Name the material of every pixel: choose a folder or file of spectra, or mark known materials and use"
@@ -204,7 +204,11 @@ def materials_text(materials: Materials) -> str:
     classes = len(materials.found.shown.names)
     text = f"{counted(classes, 'class', 'classes')} by {materials.name}."
     if materials.notes:
-        first, colon, _ = materials.notes[0].partition(": ")
+        # The file that a note is about was named just before.
+        note, of_file = materials.notes[0], f"{materials.name}: "
+        if note.startswith(of_file):
+            note = capitalised(note.removeprefix(of_file))
+        first, colon, _ = note.partition(": ")
         others = f" and {counted(len(materials.notes) - 1, 'more note')}" if len(materials.notes) > 1 else ""
         text += f" {first.rstrip('.')}{others}" + ("; point here for why." if colon or others else ".")
     return text

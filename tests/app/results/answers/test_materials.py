@@ -184,6 +184,7 @@ def test_notes_are_two_lines_that_leave_the_legend_alone(qtbot: QtBot, bench: Be
     for notes, told in (
         ((reason,), "1 class by marks. pin 1 is left out; point here for why."),
         ((reason,) * 6, "1 class by marks. pin 1 is left out and 5 more notes; point here for why."),
+        (("marks: values up to 80 are percent.",), "1 class by marks. Values up to 80 are percent."),
         (("Two are alike.",), "1 class by marks. Two are alike."),
     ):
         bench.state.materials.set(replace(_shown(bench), notes=notes))
