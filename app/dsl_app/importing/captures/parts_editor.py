@@ -18,7 +18,8 @@ if TYPE_CHECKING:
     from dsl_app.importing.captures.controller import CapturesController
     from dsl_core.io.pictures.mapping import Mapping
 
-LIST_PX = 118
+#: Height of the list of parts, and the least, px.
+LIST_PX, LEAST_LIST_PX = 118, 70
 
 
 class PartsEditor(QWidget):
@@ -32,7 +33,9 @@ class PartsEditor(QWidget):
         self.parts = named(QListWidget(), "Parts of the capture", tip)
         self.parts.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
         self.parts.setTextElideMode(Qt.TextElideMode.ElideRight)
-        self.parts.setFixedHeight(LIST_PX)
+        # Less on a small screen, where the buttons of the dialog would else be beyond its edge.
+        self.parts.setMinimumHeight(LEAST_LIST_PX)
+        self.parts.setMaximumHeight(LIST_PX)
         self.parts.currentRowChanged.connect(lambda _: self._show_part())
         self.add = push_button("Add", "Add a part before the selected one")
         self.kinds = QMenu(self.add)
