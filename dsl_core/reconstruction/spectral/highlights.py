@@ -266,9 +266,13 @@ def _fitted(pairs: _Pairs, roughness: float) -> tuple[Highlight, float]:
         weight = np.minimum(1.0, HUBER / np.maximum(off, 1e-12)) / pairs.std**2
         of_colour = (weight * rise**2).sum(1)
         peak = float((weight * rise * pairs.differs).sum() / max(of_colour.sum(), 1e-12))
-    pull = (weight * (pairs.differs - peak * rise) * rise).sum(0)
-    by_block = np.bincount(np.unique(pairs.block, return_inverse=True)[1], pull)
-    std = float(np.sqrt((by_block**2).sum()) / max(of_colour.sum(), 1e-12))
+    pull = weight * (pairs.differs - peak * rise) * rise
+    by_block = np.bincount(np.unique(pairs.block, return_inverse=True)[1], pull.sum(0))
+    # Pulls of a few blocks may cancel by chance: no peak is surer than pairs that err independently make it.
+    variance = max(float((by_block**2).sum()), float((pull**2).sum()))
+    # Pairs at edges pull no more, whatever the peak.
+    near = np.abs(pairs.differs - peak * rise) < HUBER * pairs.std
+    std = float(np.sqrt(variance) / max(float((near / pairs.std**2 * rise**2).sum()), 1e-12))
     red, green, blue = ((weight * rise * pairs.differs).sum(1) / np.maximum(of_colour, 1e-12)).tolist()
     off = np.abs(pairs.differs - peak * rise) / pairs.std
     left = float(np.where(off < HUBER, off**2, HUBER * (2 * off - HUBER)).sum())

@@ -206,3 +206,19 @@ def test_a_small_surface_says_nothing(
     monkeypatch.setattr(highlights, least, count)
     reflectance = np.where(geometry.flags == 0, coloured(rig, geometry, 0.02), 0.02)
     assert follow_highlights(rig, lit(rig, before_a_wall(geometry), reflectance))[1] == []
+
+
+def test_pulls_that_cancel_within_blocks_make_no_peak_surer_than_its_pairs() -> None:
+    """Pairs across edges of paint, brighter here and darker there, as often in every block."""
+    count = 240
+    here = np.tile([1.0, 0.98, 0.96], count // 3)
+    far = np.where(np.arange(count) % 4 == 0, 0.5, 0.0) * np.where(np.arange(count) % 8 == 0, 1, -1)
+    one = np.ones((3, count))
+    pairs = highlights._Pairs(
+        here, np.full(count, 0.9), far * one, 0.01 * one, np.arange(count) // 24, np.ones(count, np.int32)
+    )
+    found = highlights._fitted(pairs, 0.4)[0]
+    # Three quarters of the pairs tell the peak; the others pull with two deviations each.
+    rise = highlights._lobe(pairs.here, 0.4) - highlights._lobe(pairs.there, 0.4)
+    assert abs(found.peak) < found.peak_std
+    assert found.peak_std == pytest.approx(0.01 * (4 / 4 / 3 / (0.75**2 * (rise**2).sum())) ** 0.5, rel=0.05)
