@@ -86,20 +86,19 @@ def _place(across: float, down: float) -> str:
 
 #: Place in what is free of the view (-1 to 1 each way), depth (0 near, 1 far), tilts x and y, roll (degrees).
 #: Tilts in all directions determine focal lengths (30 degrees left depths 0.14 mm off on one of five drawn
-#: rigs, 42 at most 0.04 mm), corners of the view the distortion. Rolls even out the print, and keep edges
-#: from lying along rows or columns of pixels: small pixels far apart would see them in steps, 0.3 px off.
+#: rigs, 42 at most 0.04 mm), corners of the view the distortion; rolls even out the print.
 _WISHES = (
-    (0.0, 0.0, 0.1, 0.0, 0.0, 8.0),
+    (0.0, 0.0, 0.1, 0.0, 0.0, 3.0),
     (-1.0, -1.0, 0.6, 35.0, -28.0, 8.0),
-    (1.0, -1.0, 0.6, 35.0, 28.0, -8.0),
+    (1.0, -1.0, 0.6, 35.0, 28.0, -6.0),
     (-1.0, 1.0, 0.5, -39.0, -31.0, -10.0),
     (1.0, 1.0, 0.5, -39.0, 31.0, 12.0),
-    (0.0, -1.0, 0.3, 42.0, 0.0, 10.0),
-    (0.0, 1.0, 0.3, -42.0, 7.0, -166.0),
-    (-1.0, 0.0, 0.4, 6.0, -42.0, -8.0),
-    (1.0, 0.0, 0.4, -6.0, 42.0, -8.0),
-    (0.3, 0.3, 1.0, 17.0, 17.0, 98.0),
-    (-1.0, 1.0, 1.0, 17.0, -17.0, 172.0),
+    (0.0, -1.0, 0.3, 42.0, 0.0, 0.0),
+    (0.0, 1.0, 0.3, -42.0, 7.0, 180.0),
+    (-1.0, 0.0, 0.4, 6.0, -42.0, 4.0),
+    (1.0, 0.0, 0.4, -6.0, 42.0, -4.0),
+    (0.3, 0.3, 1.0, 17.0, 17.0, 90.0),
+    (-1.0, 1.0, 1.0, 17.0, -17.0, 174.0),
     (1.0, -1.0, 1.0, -17.0, 20.0, -7.0),
 )
 MOST_POSES = len(_WISHES)
