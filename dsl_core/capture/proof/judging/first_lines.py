@@ -48,7 +48,11 @@ def judge_line(known: Known, shot: Shot, seen: Counts) -> Finding:
     found = in_place(found, contests, places, known.learned)
     others = [usual * rival for _, rival in rivals[:-2] if rival is not None]
     colour = None if found.is_wrong else _colour_of_another(seen, lit, wanted, others)
-    return found if colour is None else replace(found, is_doubtful=True, detail=f"its {colour} was another's")
+    return (
+        found
+        if colour is None
+        else replace(found, is_doubtful=True, detail=f"its {colour} was that of another pattern")
+    )
 
 
 def _colour_of_another(seen: Counts, lit: Lit, wanted: Floats, others: Iterable[Floats]) -> str | None:

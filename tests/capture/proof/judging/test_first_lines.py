@@ -41,4 +41,4 @@ def test_a_colour_of_the_line_before_is_asked_again(
 ) -> None:
     found = judged(monkeypatch, late)
     assert (found.verdict, found.is_doubtful) == (Verdict.RIGHT, True)
-    assert found.detail == f"its {colour} was another's"
+    assert found.detail == f"its {colour} was that of another pattern"
