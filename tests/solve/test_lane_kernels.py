@@ -210,7 +210,7 @@ def wanted(scene: Scene, y: int, x: int) -> SimpleNamespace:
     left = square - nodes @ (2 * own - data @ nodes)
     return SimpleNamespace(
         nodes=nodes, mean=MEAN @ nodes, std=std, share=near / (near + LOCAL), at_bound=held, tau=tau,
-        misfit=left / max(number - scene.parameters, 1.0), rounds=rounds,
+        misfit=left / max(number - min(scene.parameters, number / 3), 1.0), rounds=rounds,
     )  # fmt: skip
 
 
