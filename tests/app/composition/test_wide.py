@@ -48,6 +48,16 @@ def window(qtbot: QtBot, tmp_path: Path) -> MainWindow:
     return made
 
 
+def results_of(window: MainWindow, qtbot: QtBot, folder: Path) -> ResultsPage:
+    """The page of a small result, in a window that may be as small as any."""
+    window.setMinimumSize(LEAST)
+    window.open_path(write_small_result(folder))
+    qtbot.waitUntil(lambda: not window.parts.runner.active, timeout=30_000)
+    page = window.open_page("results")
+    assert isinstance(page, ResultsPage)
+    return page
+
+
 def test_views_are_side_by_side_in_a_large_window_alone(
     qtbot: QtBot, window: MainWindow, tmp_path: Path
 ) -> None:
@@ -145,11 +155,7 @@ def test_nothing_is_cut_or_covered_on_a_magnified_screen(
 def test_no_word_on_a_view_is_cut_where_the_bar_is_narrow(
     window: MainWindow, qtbot: QtBot, tmp_path: Path
 ) -> None:
-    window.setMinimumSize(LEAST)
-    window.open_path(write_small_result(tmp_path))
-    qtbot.waitUntil(lambda: not window.parts.runner.active, timeout=30_000)
-    page = window.open_page("results")
-    assert isinstance(page, ResultsPage)
+    page = results_of(window, qtbot, tmp_path)
     rows = {}
     for size in (MAGNIFIED, LARGE):
         window.resize(*size)
@@ -165,11 +171,7 @@ def test_no_word_on_a_view_is_cut_where_the_bar_is_narrow(
 def test_spectra_are_read_with_any_tab_on_a_magnified_screen(
     window: MainWindow, qtbot: QtBot, tmp_path: Path
 ) -> None:
-    window.setMinimumSize(LEAST)
-    window.open_path(write_small_result(tmp_path))
-    qtbot.waitUntil(lambda: not window.parts.runner.active, timeout=30_000)
-    page = window.open_page("results")
-    assert isinstance(page, ResultsPage)
+    page = results_of(window, qtbot, tmp_path)
     window.resize(*MAGNIFIED)
     window.do("view_cloud")
     page._state.cursor.set((3, 3))
