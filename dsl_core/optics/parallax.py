@@ -51,13 +51,16 @@ def parallax_of(rig: Rig, depth_mm: NDArray[np.floating] | None = None) -> Paral
 
     In the middle of the rig's depths where none are given.
     """
-    shape = rig.camera.height_px, rig.camera.width_px
-    if depth_mm is None or not np.isfinite(depth_mm).any():
-        depth_mm = np.full(shape, np.mean(rig.depth_range_mm))
-    some = np.flatnonzero(np.isfinite(depth_mm))
-    some = some[:: max(1, len(some) // MOST_PIXELS)]
-    depth = np.asarray(depth_mm, np.float64).ravel()[some]
-    rays = rays_at(rig.camera, (some % shape[1]).astype(float), (some // shape[1]).astype(float))
+    width, height = rig.camera.width_px, rig.camera.height_px
+    known = None if depth_mm is None else np.flatnonzero(np.isfinite(depth_mm))
+    if depth_mm is None or known is None or not known.size:
+        # The window asks at every change of a plan: no array of the picture's size is made for it.
+        some = np.arange(0, width * height, max(1, width * height // MOST_PIXELS))
+        depth = np.full(some.size, np.mean(rig.depth_range_mm))
+    else:
+        some = known[:: max(1, known.size // MOST_PIXELS)]
+        depth = depth_mm.ravel()[some].astype(np.float64)
+    rays = rays_at(rig.camera, (some % width).astype(float), (some // width).astype(float))
     near, far = (_columns(rig, rays * depth * by) for by in (0.995, 1.005))
     one_percent_mm = 0.01 * float(np.median(depth))
     moved_px = max(float(np.median(np.abs(far - near))), 1e-6)

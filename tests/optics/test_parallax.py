@@ -37,6 +37,12 @@ def test_a_column_stands_for_what_triangulation_makes_of_it() -> None:
     assert parallax_of(SIDE, far).mm_per_column == pytest.approx(4 * found.mm_per_column, rel=0.1)
 
 
+def test_without_depths_the_middle_of_the_rigs_own_counts() -> None:
+    middle = float(np.mean(SIDE.depth_range_mm))
+    wanted = parallax_of(SIDE, np.full((58, 89), middle))
+    assert parallax_of(SIDE) == parallax_of(SIDE, np.full((58, 89), np.nan)) == wanted
+
+
 def test_a_camera_above_the_projector_is_told_before_the_scan_and_with_its_result() -> None:
     assert find_remarks(None) == find_remarks(SIDE) == []
     (remark,) = find_remarks(ABOVE)

@@ -33,7 +33,7 @@ def test_a_mosaic_is_what_was_stored_and_knows_its_colours(bayer: str) -> None:
     assert np.abs(read_mosaic(content, MOST_PX) / 65535 - MOSAIC / 16383).max() < 1e-5
 
 
-def test_what_is_beyond_the_white_level_is_full(tmp_path: Path) -> None:
+def test_what_is_beyond_the_white_level_is_full() -> None:
     found = read_mosaic(dng(MOSAIC, white=12000), MOST_PX)
     assert np.array_equal(found == 65535, MOSAIC >= 12000)
 

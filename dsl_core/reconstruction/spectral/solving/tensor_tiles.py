@@ -42,20 +42,8 @@ class TensorTiles:
 
         ``colour`` is zero-order colour and roots of its weights, (3, pixels), where single lines need them.
         """
-        if model.single:
-            return self._banded(model, frames, near, traced, colour, check)
-        return self._dense(model, frames, near, traced, check)
-
-    def _banded(
-        self,
-        model: PixelModel,
-        frames: TileFrames,
-        near: TileFrames,
-        traced: Traced,
-        colour: tuple[Tensor, Tensor] | None,
-        check: Check,
-    ) -> tuple[Spectra, Tensor]:
-        """Spectra where each frame lights a pixel by few neighbouring bands."""
+        if not model.single:
+            return self._dense(model, frames, near, traced, check)
         shading = frames.known("shading")
         system, offset = self._samples(model, near, traced, check)
         gather = _gather(frames, near)
