@@ -10,6 +10,7 @@ from pathlib import Path
 from dsl_core.errors import CalibrationError
 from dsl_core.io.reading import read_bounded
 from dsl_core.io.spectra.catalogue import format_of, suffixes
+from dsl_core.io.spectra.formats.one_column import describes_others
 from dsl_core.io.spectra.reference_file import as_references, shares_of
 from dsl_core.model.spectral import SpectralCurve
 from dsl_core.progress import NoProgress, Progress
@@ -105,7 +106,8 @@ def _is_hidden(file: Path, root: Path) -> bool:
 
 def _is_beside(file: Path) -> bool:
     """Whether a file only describes, or is described by, another that is read."""
-    return file.suffix.lower() == ".hdr" or file.name.lower() in ("groups.csv", "readme.txt")
+    is_note = file.suffix.lower() == ".hdr" or file.name.lower() in ("groups.csv", "readme.txt")
+    return is_note or describes_others(file)
 
 
 def _entries(file: Path, note: Callable[[str], None]) -> list[tuple[str, SpectralCurve]]:

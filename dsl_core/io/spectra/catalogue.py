@@ -21,6 +21,7 @@ from dsl_core.io.spectra.formats import (
     konica_minolta,
     light_meter,
     ocean,
+    one_column,
     own_table,
     sed,
     spreadsheet,
@@ -44,6 +45,7 @@ FORMATS: tuple[Format, ...] = (
     avantes.FORMAT,
     konica_minolta.FORMAT,
     light_meter.FORMAT,
+    one_column.FORMAT,
     columns.FORMAT,
 )
 GROUP = "dsl_scan.spectra"
