@@ -19,6 +19,7 @@ MIN_ROWS = 8
 MOST_CELLS = 20_000_000
 _NUMBER = re.compile(r"[-+]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][-+]?\d+)?|[-+]?(?:nan|inf)\b", re.IGNORECASE)
 _DECIMAL_COMMA = re.compile(r"[-+]?\d+(?:,\d+)?(?:[eE][-+]?\d+)?")
+_SEPARATOR = re.compile(r"[;\t|]")
 _UNIT = re.compile(r"[\[(].*[\])]|nm|um|µm|μm|%|counts?|1|[nmµuk]?W[/·* ].*", re.IGNORECASE)
 
 
@@ -53,14 +54,14 @@ def is_text(content: bytes) -> bool:
 
 
 def cells_of(line: str) -> list[str]:
-    """The cells of a line: by tabs or semicolons, else by commas, else by spaces; quotes are taken off.
+    """The cells of a line: by tabs, semicolons or bars, else by commas, else by spaces; quotes are taken off.
 
-    With tabs, semicolons, and between spaces where no other reading makes sense, a decimal comma becomes a
-    point.
+    With tabs, semicolons, bars, and between spaces where no other reading makes sense, a decimal comma
+    becomes a point.
     """
-    line = line.strip("\r\n ")
-    if ";" in line or "\t" in line:
-        cells = [_pointed(cell) for cell in re.split(r"[;\t]", line)]
+    line = line.strip(" \r\n|")
+    if _SEPARATOR.search(line):
+        cells = [_pointed(cell) for cell in _SEPARATOR.split(line)]
     elif '"' in line and "," in line:
         cells = [_pointed(cell) for cell in _quoted(line)]
     else:
@@ -110,7 +111,7 @@ def tables_of(path: Path, text: str) -> list[Table]:
 
     for number, line in enumerate(text.splitlines(), 1):
         cells = cells_of(line)
-        is_missing = bool(rows) and len(cells) == 1 and line.strip(" \r\n")[-1:] in (";", "\t", ",")
+        is_missing = bool(rows) and len(cells) == 1 and line.strip(" \r\n")[-1:] in (";", "\t", ",", "|")
         if is_row(cells) or (is_missing and _NUMBER.fullmatch(cells[0])):
             rows.append(cells)
             numbers.append(number)
@@ -149,14 +150,14 @@ def _table(path: Path, header: list[str], rows: list[list[str]], numbers: list[i
                 f"{path.name}, line {numbers[i]}: a value is not a finite number. Measure this spectrum"
                 " again, or leave out the range that the instrument does not cover."
             )
-    separator = ";" if re.search(r"[;\t]", first.strip()) else "," if "," in first else " "
+    separator = ";" if _SEPARATOR.search(first.strip(" |")) else "," if "," in first else " "
     titles, names = _over(header, width, separator)
     return Table("\n".join(header), titles, names, cells, tuple(numbers))
 
 
 def _over(header: list[str], width: int, separator: str) -> tuple[tuple[str, ...], tuple[str, ...]]:
     """What stands over the columns: titles with units, and names; empty words where nothing does."""
-    lines = [line for line in header[-6:] if line.strip(" \t;,\r#")]
+    lines = [line for line in header[-6:] if line.strip(" \t;,\r#|:=-")]
     found = [_fitting(line, width, separator) for line in reversed(lines)]
     nearest = found[0] if found else None
     if nearest is None:
@@ -175,9 +176,9 @@ def _over(header: list[str], width: int, separator: str) -> tuple[tuple[str, ...
 
 def _fitting(line: str, width: int, separator: str) -> list[str] | None:
     """The cells of a header's line if there is one for each column, but for an empty last one."""
-    line = line.strip("# \r")
+    line = line.strip("# \r|")
     if separator == ";":
-        readings = [re.split(r"[;\t]", line)]
+        readings = [_SEPARATOR.split(line)]
     elif separator == ",":
         readings = [_quoted(line)]
     else:

@@ -266,3 +266,11 @@ def test_names_over_pairs_of_columns_are_those_of_the_spectra(tmp_path: Path) ->
     spectra = read_spectra(write(tmp_path / "cary.csv", "\n".join([*head, *rows, "", "Cary 5000"])))
     assert [each.name for each in spectra] == ["Azurite", "Malachite"]
     np.testing.assert_allclose(spectra[1].values, SHARE / 2, atol=1e-6)
+
+
+def test_a_table_with_bars_around_its_cells_is_read(tmp_path: Path) -> None:
+    rows = [f"| {nm:.2f} | {100 * r:.5f} | {50 * r:.5f} |" for nm, r in zip(NM, SHARE, strict=True)]
+    head = ["| Wavelength (nm) | Azurite (%) | Malachite (%) |", "|---|:--:|---|"]
+    spectra = read_spectra(write(tmp_path / "report.md.txt", "\n".join([*head, *rows])))
+    assert [each.name for each in spectra] == ["Azurite (%)", "Malachite (%)"]
+    np.testing.assert_allclose(spectra[1].values, SHARE / 2, atol=1e-6)
