@@ -1,7 +1,8 @@
-"""Numbers of things, clauses and commands as people write them."""
+"""Numbers of things, clauses, names and commands as people write them."""
 
 from __future__ import annotations
 
+import re
 import shlex
 
 
@@ -48,3 +49,12 @@ def quoted(word: object) -> str:
     ('scan.dsl', "'my scan.dsl'")
     """
     return shlex.quote(str(word))
+
+
+def natural(name: str) -> list[tuple[int, str]]:
+    """What names are sorted by as people count.
+
+    >>> sorted(["im10", "im9"], key=natural)
+    ['im9', 'im10']
+    """
+    return [(int(p), "") if p.isdecimal() else (-1, p) for p in re.split(r"(\d+)", name) if p]

@@ -26,7 +26,7 @@ from dsl_core.model.plan import GrayCode
 from dsl_core.model.rig import BayerPattern
 from dsl_core.patterns.gray_code import bit_counts
 from dsl_core.progress import NoProgress, Progress
-from dsl_core.words import counted
+from dsl_core.words import counted, natural
 from dsl_core.workflows.mapped_poses import read_mapped_pose
 
 SUFFIXES = {".png", ".tif", ".tiff", ".bmp", ".jpg", ".jpeg", ".pgm"}
@@ -136,7 +136,7 @@ def pose_folders(folder: Path) -> list[Path]:
         raise CalibrationError(
             f"{folder} is not a folder. Give the folder that contains one folder per pose."
         )
-    found = sorted((path for path in folder.iterdir() if path.is_dir() and _pictures(path)), key=_natural)
+    found = _in_order(path for path in folder.iterdir() if path.is_dir() and _pictures(path))
     if not found:
         alone = len(_pictures(folder))
         instead = f" but {counted(alone, 'picture')}" if alone else ""
@@ -180,7 +180,11 @@ def require_one_size(sizes: Mapping[str, tuple[int, int]]) -> None:
 def _pictures(folder: Path) -> list[Path]:
     # Files that begin with a point are notes of a system, such as those of macOS on other disks.
     files = (path for path in folder.iterdir() if not path.name.startswith("."))
-    return sorted((path for path in files if path.suffix.lower() in SUFFIXES), key=_natural)
+    return _in_order(path for path in files if path.suffix.lower() in SUFFIXES)
+
+
+def _in_order(paths: Iterable[Path]) -> list[Path]:
+    return sorted(paths, key=lambda path: natural(path.name))
 
 
 def _check_numbers(folder: Path, pictures: list[Path], wanted: int) -> None:
@@ -214,8 +218,3 @@ def _read(path: Path) -> NDArray[Any]:
 
 def _size(frame: NDArray[Any]) -> str:
     return f"{frame.shape[1]} x {frame.shape[0]}"
-
-
-def _natural(path: Path) -> list[tuple[int, str]]:
-    """Sorts ``capture_10`` after ``capture_9``."""
-    return [(int(part), "") if part.isdigit() else (-1, part) for part in re.split(r"(\d+)", path.name)]

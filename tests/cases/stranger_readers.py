@@ -146,8 +146,9 @@ def _read_curves(folder: Path) -> object:
 
 
 def _make_pictures(folder: Path) -> None:
-    """Four bits of columns with their inverses, white and black, as files of four formats."""
+    """Four bits of columns with their inverses, white and black, as files of each format."""
     import cv2
+    import scipy.io
 
     height, width = 12, 32
     columns = np.repeat(np.arange(16) ^ (np.arange(16) >> 1), width // 16)
@@ -162,10 +163,12 @@ def _make_pictures(folder: Path) -> None:
         (folder / name).mkdir()
         for number, picture in enumerate(pictures):
             (folder / name / f"{number:02d}{ending}").write_bytes(cv2.imencode(ending, picture)[1].tobytes())
-    for name in ("paged", "npy", "raw"):
+    for name in ("paged", "npy", "npz", "mat", "raw"):
         (folder / name).mkdir()
     (folder / "paged" / "all.tif").write_bytes(cv2.imencodemulti(".tif", pictures)[1].tobytes())
     np.save(folder / "npy" / "all.npy", np.array(pictures))
+    np.savez_compressed(folder / "npz" / "all.npz", frames=np.array(pictures))
+    scipy.io.savemat(folder / "mat" / "all.mat", {"frames": np.stack(pictures, -1)})
     for number, picture in enumerate(pictures):
         (folder / "raw" / f"{number:02d}.raw").write_bytes(picture.tobytes())
     mapping = {
@@ -173,7 +176,7 @@ def _make_pictures(folder: Path) -> None:
         "parts": [{"kind": "stripes", "bits": 4, "unit_px": 1}, {"kind": "white"}, {"kind": "black"}],
         "projector_size_px": [16, 8],
     }
-    for name in ("png", "bmp", "pgm", "tif", "jpg", "paged", "npy"):
+    for name in ("png", "bmp", "pgm", "tif", "jpg", "paged", "npy", "npz", "mat"):
         (folder / f"{name}.json").write_text(json.dumps(mapping))
     raw = {"width_px": width, "height_px": height, "bits": 8}
     (folder / "raw.json").write_text(json.dumps(mapping | {"raw": raw}))
@@ -329,7 +332,7 @@ def _read_session(folder: Path) -> object:
 
 _PICTURE_FILES = (
     *(("png", "03.png"), ("bmp", "03.bmp"), ("pgm", "03.pgm"), ("tif", "03.tif"), ("jpg", "03.jpg")),
-    *(("paged", "all.tif"), ("npy", "all.npy"), ("raw", "03.raw")),
+    *(("paged", "all.tif"), ("npy", "all.npy"), ("npz", "all.npz"), ("mat", "all.mat"), ("raw", "03.raw")),
 )
 MORE = (
     Sample("attributes", _make_attributes, "attributes.json", _read_attributes),

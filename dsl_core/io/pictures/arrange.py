@@ -11,6 +11,7 @@ from pathlib import Path, PurePosixPath
 from pydantic import ValidationError
 
 from dsl_core.errors import StoreError
+from dsl_core.io.pictures.array_file import ARCHIVES
 from dsl_core.io.pictures.camera_raw import SUFFIXES as CAMERA_RAWS
 from dsl_core.io.pictures.mapping import (
     MOST_PICTURES,
@@ -26,6 +27,7 @@ from dsl_core.io.pictures.picture_file import ARRAYS, PICTURES, RAWS, Picture, p
 from dsl_core.model.base import problems_in_words
 from dsl_core.model.captured_code import Axis, CapturedCode, Phases, Stripes
 from dsl_core.model.plan import CodeSet, GrayCode, XorCode
+from dsl_core.words import natural
 
 #: A folder with more entries than this was chosen by mistake.
 MOST_ENTRIES = 100_000
@@ -97,11 +99,6 @@ def _pictures_of(folder: Path, mapping: Mapping) -> tuple[dict[int, list[Picture
     return own, [p for p in _listed(folder, mapping.files, mapping) if p not in taken]
 
 
-def natural(text: str) -> list[tuple[int, str]]:
-    """Sorts ``im10`` after ``im9``."""
-    return [(int(p), "") if p.isdecimal() else (-1, p) for p in re.split(r"(\d+)", text) if p]
-
-
 def picture_files(folder: Path, patterns: Iterable[str], with_raw: bool = False) -> list[Path]:
     """Files with pictures in a folder, pattern by pattern in natural order; raises `StoreError`."""
     if not folder.is_dir():
@@ -119,7 +116,8 @@ def picture_files(folder: Path, patterns: Iterable[str], with_raw: bool = False)
         matches = _without_copies(matches)
         matches.sort(key=lambda path: natural(path.relative_to(folder).as_posix()))
         found += [path for path in matches if path not in found]
-    return found
+    # Next to pictures, an archive is something else, such as a calibration.
+    return [path for path in found if path.suffix.lower() not in ARCHIVES] or found
 
 
 def _without_copies(paths: Sequence[Path]) -> list[Path]:

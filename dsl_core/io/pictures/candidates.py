@@ -9,9 +9,9 @@ from itertools import pairwise
 from pathlib import Path
 
 from dsl_core.errors import StoreError
-from dsl_core.io.pictures.arrange import natural, picture_files
+from dsl_core.io.pictures.arrange import picture_files
 from dsl_core.io.pictures.picture_file import ARRAYS, NOT_READ, PAGED, Picture, pictures_in
-from dsl_core.words import counted
+from dsl_core.words import counted, natural
 
 #: Fewer pictures are no code, more are several captures.
 FEWEST, MOST = 4, 512
@@ -53,8 +53,8 @@ def candidates(folder: Path) -> tuple[list[Candidate], list[Candidate]]:
     pictures = [picture for path in files for picture in pictures_in(path)]
     if len(pictures) < FEWEST:
         raise StoreError(
-            f"{folder} contains {counted(len(pictures), 'picture')} (PNG, TIFF, JPEG, BMP, PGM, NPY,"
-            f" camera raw); a capture has at least {FEWEST}. {_advice(folder)}"
+            f"{folder} contains {counted(len(pictures), 'picture')} (PNG, TIFF, JPEG, BMP, PGM, NPY, NPZ,"
+            f" MAT, camera raw); a capture has at least {FEWEST}. {_advice(folder)}"
         )
     groups: dict[str, list[Path]] = {}
     for path in files:

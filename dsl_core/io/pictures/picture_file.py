@@ -15,10 +15,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dsl_core.errors import MissingPackageError, StoreError
-from dsl_core.io.pictures import camera_raw
+from dsl_core.io.pictures import array_file, camera_raw
 from dsl_core.io.pictures.mapping import MOST_PICTURES, Mapping, RawLayout
 from dsl_core.io.png_parts import declares_too_much
-from dsl_core.io.reading import read_array, read_bounded, require_plain
+from dsl_core.io.reading import read_bounded, require_plain
 from dsl_core.model.conditions import BayerPattern
 from dsl_core.model.plan import MOST_PX
 from dsl_core.optics.colour import srgb_decode
@@ -26,15 +26,13 @@ from dsl_core.optics.colour import srgb_decode
 T = TypeVar("T")
 
 PICTURES = {".png", ".tif", ".tiff", ".bmp", ".jpg", ".jpeg", ".pgm", ".ppm", *camera_raw.SUFFIXES}
-ARRAYS, RAWS = {".npy"}, {".raw", ".bin"}
+ARRAYS, RAWS = array_file.SUFFIXES, {".raw", ".bin"}
 #: Formats whose files may hold several pictures as pages.
 PAGED = {".tif", ".tiff"}
 #: What holds pictures and is not read, and what makes readable ones of it.
 _FRAMES = "Save its frames as pictures without loss, such as PNG"
 NOT_READ = {
     **dict.fromkeys((".avi", ".mp4", ".mov", ".mkv", ".wmv", ".mjpg", ".gif"), ("a video", _FRAMES)),
-    ".npz": ("an archive of arrays", "Save the array with the pictures as a file .npy"),
-    ".mat": ("a file of MATLAB", "Save its pictures as PNG or as one file .npy"),
     **dict.fromkeys((".h5", ".hdf5"), ("a file of HDF5", "Save its pictures as PNG or as one file .npy")),
     **dict.fromkeys((".webp", ".heic", ".jxl", ".exr", ".jp2"), ("a picture", "Save it as PNG or TIFF")),
     **dict.fromkeys((".zip", ".7z", ".rar", ".gz"), ("an archive", "Unpack it")),
@@ -184,16 +182,8 @@ def _stamp(path: Path) -> tuple[int, int]:
 
 @lru_cache(maxsize=1)
 def _array(path: Path, stamp: tuple[int, int]) -> NDArray[Any]:
-    """A NumPy file; the last is kept, because one file may hold all pictures."""
-    if stamp[0] > MOST_BYTES:
-        raise StoreError(f"{path} is larger than {MOST_BYTES / 1e9:.0f} GB. Save its pictures one by one.")
-    try:
-        values = read_array(path)
-    except (OSError, ValueError, EOFError) as error:
-        raise StoreError(f"{path} is not an array that NumPy can read ({error}). Save it again.") from error
-    if values.dtype.kind not in "uifb":
-        raise StoreError(f"{path} does not hold numbers but {values.dtype}. Save it again as numbers.")
-    return values
+    """An array of pictures; the last is kept, because one file may hold all pictures."""
+    return array_file.read_pictures(path)
 
 
 def _raw(path: Path, layout: RawLayout | None) -> NDArray[Any]:

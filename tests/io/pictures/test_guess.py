@@ -232,7 +232,7 @@ def test_sinusoids_leave_their_way_open_and_wide_stripes_are_told(tmp_path: Path
     ("name", "said"),
     [
         ("scan.avi", "a video, which is not read. Save its frames as pictures"),
-        ("scan.npz", "an archive of arrays, which is not read. Save the array"),
+        ("scan.h5", "a file of HDF5, which is not read. Save its pictures"),
     ],
 )
 def test_what_is_not_read_is_named_with_what_to_do(tmp_path: Path, name: str, said: str) -> None:
