@@ -235,25 +235,26 @@ def _fit(
     """Peaks of all cells around a centre (P,), and the quadratic through them."""
     distance = sign * (graph.distance - centre)
     use = np.ones(len(centre), bool) if before is None else graph.holds(centre, INSIDE_PX)
-    peaks, values, places = [], [], []
+    peaks, offsets, values, places = [], [], [], []
     cells = np.where(use, graph.pixels.cell, -1)
     found = _peaks(graph, cells, CELLS[0] * CELLS[1], distance, reach_px, ORDER_HALF_PX)
     for cell, peak in enumerate(found):
         if peak is not None:
             which = cells == cell
             peaks.append(peak)
-            values.append(sign * peak.centre_px + (float(centre[which].mean()) if before is None else 0.0))
+            offsets.append(sign * peak.centre_px)
+            values.append(offsets[-1] + float(centre[which].mean()))
             places.append(graph.pixels.place[:, which].mean(1))
     if not peaks:
         return None
-    value, place = np.array(values), np.array(places).T
-    near = np.abs(value - np.median(value)) < (3 * OUTLIER_PX if before is None else OUTLIER_PX)
+    value, offset, place = np.array(values), np.array(offsets), np.array(places).T
+    near = np.abs(offset - np.median(offset)) < (3 * OUTLIER_PX if before is None else OUTLIER_PX)
     terms = _terms(place[:, near])
-    # Few cells carry a constant only; a little damping keeps a quadratic from bending where no cell is.
+    # Few cells carry a constant only; a little damping keeps a quadratic from bending where no cell is. It is
+    # fitted anew each time: a change to the rough one would keep what cells at the edge had bent it by.
     damping = np.diag([1e-9] + [(CELL_PX / TERM_PX) ** 2 if near.sum() > TERMS else 1e3] * (TERMS - 1))
-    change = np.linalg.solve(terms.T @ terms + damping, terms.T @ value[near])
-    left = value[near] - terms @ change
-    coefficients = change if before is None else before.coefficients + change
+    coefficients = np.linalg.solve(terms.T @ terms + damping, terms.T @ value[near])
+    left = value[near] - terms @ coefficients
     share = float(np.median([peak.share for peak in peaks])) if before is None else before.share
     share_std = float(np.median([peak.share_std for peak in peaks])) / np.sqrt(len(peaks))
     share_std = share_std if before is None else before.share_std

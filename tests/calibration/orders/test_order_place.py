@@ -46,6 +46,30 @@ def test_an_order_that_leaves_the_frame_is_placed_by_the_pixels_that_see_all_of_
     assert found.std_px < 2
 
 
+def on_its_side(distance_px: float) -> LineGraph:
+    """A camera on its side sees few columns: those of one or two rows of cells have the order in the frame."""
+    down, across = np.meshgrid(np.linspace(0.01, 0.99, 60), np.linspace(0.01, 0.99, 160), indexing="ij")
+    place = np.stack([down.ravel(), across.ravel()])
+    column = 430 - 225 * place[0]
+    lines = (LINE_PX - 1) / 2 + np.arange(0, FRAME_PX, LINE_PX)
+    y, x = place - 0.5
+    at = distance_px - 21 * y - 20 * x + 18 * x**2
+    signal = np.exp(-0.5 * ((lines[:, None] - column - at) / 4.0) ** 2)
+    signal += 0.02 * np.random.default_rng(2).standard_normal(signal.shape)
+    pixels = PlanePixels(column, np.ones(len(column)), np.zeros(len(column), int), place, {})
+    std = np.full(signal.shape, 4e-4)
+    return LineGraph(signal, std, lines[:, None] - column, np.ones(len(column)), pixels, FRAME_PX)
+
+
+@pytest.mark.parametrize("distance_px", [306.0, 310.0, 313.0, 316.0, 319.0])
+def test_cells_that_see_a_part_of_an_order_do_not_bend_its_place(distance_px: float) -> None:
+    found = find_order(on_its_side(distance_px), 1, REACH_PX)
+    assert found is not None
+    middle = float(found.at(np.array([[0.5], [0.5]]))[0])
+    assert abs(middle - distance_px) < 2 * found.std_px
+    assert found.std_px < 2
+
+
 def test_light_that_is_none_has_no_place() -> None:
     dark = graph_of(200.0, 0.0)
     assert find_order(LineGraph(dark.signal * 0, *list(vars(dark).values())[1:]), 1, REACH_PX) is None
