@@ -23,11 +23,12 @@ from dsl_core.calibration.geometry.code_model import (
     gray_code_of,
     refine_maps,
 )
+from dsl_core.calibration.geometry.code_places import CodePlaces, code_places
 from dsl_core.errors import CalibrationError
 from dsl_core.model.board import Board, corner_positions_mm
 from dsl_core.model.calibration.pose_frames import PoseFrames
 from dsl_core.model.plan import GrayCode
-from dsl_core.patterns.gray_code import DecodedCode, GrayDecoder, bit_counts, lit_mask
+from dsl_core.patterns.gray_code import bit_counts
 
 Floats = NDArray[np.float64]
 
@@ -40,10 +41,6 @@ REACH, MIN_REACH_PX, MAX_REACH_PX = 0.8, 4.0, 24.0
 INLIER_PX, INLIER_SIGMAS = 1.5, 3.0
 #: Steps of the fit by least absolute residuals, which wrong pixels do not draw.
 ROBUST_ROUNDS = 10
-#: A bit counts when it differs from its inverse by this share of the light on its pixel.
-MIN_MARGIN = 0.05
-#: Pixels with less light than this share of the brightest ones are in shadow.
-MIN_LIGHT = 0.03
 #: Share of readable pixels that may decode to places outside the projector.
 MAX_OUTSIDE = 0.02
 
@@ -94,19 +91,16 @@ def observe_pose(frames: PoseFrames, board: Board, projector_size_px: tuple[int,
     check_frames(frames, projector_size_px)
     corners = find_corners(grey_of(frames.white, frames.bayer), board, f"the white picture of {frames.name}")
     corners, blur_px = refine_corners(frames, corners, board)
-    if frames.places_px is None:
-        code = decode_pose(frames, projector_size_px)
-        projector_px, slope = corners_on_projector(places_of(code), corners, frames, projector_size_px)
-    else:
-        projector_px, slope = corners_on_projector(frames.places_px, corners, frames, projector_size_px)
+    code = code_places(frames, projector_size_px) if frames.places_px is None else None
+    projector_px, slope = corners_on_projector(frames, corners, projector_size_px, code)
     known = np.isfinite(projector_px[:, 0])
     if known.sum() < max(6, MIN_READ * len(known)):
         raise CalibrationError(
             f"{frames.name}: the board was found ({len(known)} corners), but the projector's code can be"
             f" read around only {known.sum()} of them. {explain(frames, corners, projector_size_px)}"
         )
-    if frames.places_px is None:
-        check_projector_size(code, frames.name, projector_size_px)
+    if code is not None:
+        check_projector_size(code.outside, frames.name, projector_size_px)
     seen = PoseObservation(
         frames.name,
         corners.ids,
@@ -120,25 +114,24 @@ def observe_pose(frames: PoseFrames, board: Board, projector_size_px: tuple[int,
 
 
 def corners_on_projector(
-    places_px: NDArray[np.floating],
-    corners: Corners,
-    frames: PoseFrames,
-    projector_size_px: tuple[int, int],
+    frames: PoseFrames, corners: Corners, projector_size_px: tuple[int, int], code: CodePlaces | None
 ) -> tuple[Floats, Floats]:
     """Column and row (px) of every corner on the projector, (corners, 2), and their slopes (corners, 2, 2).
 
-    ``places_px`` is what pixels decoded to, see `PoseFrames`. NaN where too few pixels decode, and for rows
-    that are not coded; see `PoseObservation` for the slopes.
+    ``code`` is what the pictures decode to; None where they come decoded. NaN where too few pixels decode,
+    and for rows that are not coded; see `PoseObservation` for the slopes.
     """
+    places_px, std_px = (frames.places_px, frames.places_std_px) if code is None else (code.px, code.std_px)
+    assert places_px is not None
     windows = windows_around(places_px[0].shape, corners)
-    starts = [decoded_maps(places_px, window, frames.places_std_px) for window in windows]
+    starts = [decoded_maps(places_px, window, std_px) for window in windows]
     known = [k for k, start in enumerate(starts) if start is not None]
     found, slopes = np.full((len(windows), 2), np.nan), np.zeros((len(windows), 2, 2))
     if not known:
         return found, slopes
     chosen = [windows[k] for k in known]
     by_axis = np.stack([start for start in starts if start is not None], 1)
-    if frames.places_px is None:
+    if code is not None:
         # Grey values of pictures tell more than their digits.
         lights = code_light(frames, projector_size_px)
         by_axis = np.stack(
@@ -148,12 +141,6 @@ def corners_on_projector(
         found[known, axis] = maps[:, 0]
         slopes[known, axis] = maps[:, 1:3] / np.array([each.radius_px for each in chosen])[:, None]
     return found, slopes
-
-
-def places_of(code: DecodedCode) -> Floats:
-    """Columns, and rows if they are coded, of all pixels as `PoseFrames` has them."""
-    axes = [code.column] if code.row is None else [code.column, code.row]
-    return np.where(code.undecided, np.nan, np.stack(axes).astype(float))
 
 
 def check_frames(frames: PoseFrames, projector_size_px: tuple[int, int]) -> None:
@@ -184,26 +171,8 @@ def check_frames(frames: PoseFrames, projector_size_px: tuple[int, int]) -> None
         )
 
 
-def decode_pose(frames: PoseFrames, projector_size_px: tuple[int, int]) -> DecodedCode:
-    """Projector column and row of every camera pixel; undecided in shadow and where a bit is unclear.
-
-    A mosaic is decoded pixel by pixel, since a pixel is compared with itself only.
-    """
-    decoder = GrayDecoder(gray_code_of(frames, projector_size_px), projector_size_px)
-    light = grey_of(frames.white) - grey_of(frames.black)
-    bright = float(np.quantile(light, 0.99))
-    # Noise of a bit over the light it is made of: the limit is a share, so each pixel has its own scale.
-    scale = np.where(lit_mask(light, 0, MIN_LIGHT * bright), light, np.inf)
-    for pattern, inverse in zip(frames.pairs[::2], frames.pairs[1::2], strict=True):
-        decoder.add(grey_of(pattern), grey_of(inverse), scale)
-    return decoder.finish(min_sigmas=MIN_MARGIN)
-
-
-def check_projector_size(code: DecodedCode, name: str, projector_size_px: tuple[int, int]) -> None:
+def check_projector_size(outside: float, name: str, projector_size_px: tuple[int, int]) -> None:
     """Raise `CalibrationError` when clear bits lead outside the projector: then its size is wrong."""
-    assert code.margin_sigmas is not None
-    clear = code.margin_sigmas >= MIN_MARGIN
-    outside = float((code.undecided & clear).sum() / max(clear.sum(), 1))
     if outside > MAX_OUTSIDE:
         width, height = projector_size_px
         raise CalibrationError(
@@ -212,10 +181,10 @@ def check_projector_size(code: DecodedCode, name: str, projector_size_px: tuple[
         )
 
 
-def readable_share(code: DecodedCode, corners: Corners) -> float:
+def readable_share(code: CodePlaces, corners: Corners) -> float:
     """Share of the corners around which the code can be read."""
-    places = places_of(code)
-    maps = [decoded_maps(places, window) for window in windows_around(code.undecided.shape, corners)]
+    windows = windows_around(code.px.shape[1:], corners)
+    maps = [decoded_maps(code.px, window, code.std_px) for window in windows]
     return sum(each is not None for each in maps) / max(len(maps), 1)
 
 
@@ -284,7 +253,7 @@ def explain(frames: PoseFrames, corners: Corners, projector_size_px: tuple[int, 
     bits = bit_counts(gray_code_of(frames, projector_size_px), projector_size_px)
     orders = _other_orders(list(frames.pairs), bits[0]) if frames.places_px is None else []
     for words, pairs in orders:
-        code = decode_pose(replace(frames, pairs=pairs), projector_size_px)
+        code = code_places(replace(frames, pairs=pairs), projector_size_px)
         read = readable_share(code, corners)
         if read > 0.8:
             return f"It can be read if {words}: the order of the patterns is wrong. Correct it."

@@ -10,12 +10,11 @@ import numpy as np
 import pytest
 
 from dsl_core.calibration.geometry.boards import Corners, find_corners, grey_of
+from dsl_core.calibration.geometry.code_places import code_places
 from dsl_core.calibration.geometry.pose_series import exposure_warning
 from dsl_core.calibration.geometry.projector_corners import (
     corners_on_projector,
-    decode_pose,
     observe_pose,
-    places_of,
 )
 from dsl_core.errors import CalibrationError
 from dsl_core.model.board import Charuco
@@ -45,16 +44,14 @@ def test_corners_are_where_they_were_drawn(frames: PoseFrames) -> None:
 
 def test_undecided_pixels_are_done_without(frames: PoseFrames) -> None:
     rng = np.random.default_rng(1)
-    code = decode_pose(frames, SMALL_PROJECTOR_PX)
-    lost = rng.random(code.undecided.shape) < 0.5
-    wrong = rng.random(code.undecided.shape) < 0.1
-    assert code.row is not None
-    damaged = replace(
-        code, undecided=code.undecided | lost, column=np.where(wrong, code.column ^ 64, code.column)
-    )
+    code = code_places(frames, SMALL_PROJECTOR_PX)
+    lost = rng.random(code.px.shape[1:]) < 0.5
+    wrong = rng.random(code.px.shape[1:]) < 0.1
+    px = np.where(lost, np.nan, code.px)
+    px[0] += np.where(wrong, 64.0, 0.0)
     points = _true_corners()
     corners = Corners(np.arange(20), points)
-    found, _ = corners_on_projector(places_of(damaged), corners, frames, SMALL_PROJECTOR_PX)
+    found, _ = corners_on_projector(frames, corners, SMALL_PROJECTOR_PX, replace(code, px=px))
     assert np.abs(found - np.stack(on_projector(points), 1)).max() < 0.2
 
 

@@ -47,7 +47,7 @@ def test_an_order_that_leaves_the_frame_is_placed_by_the_pixels_that_see_all_of_
 
 
 def on_its_side(distance_px: float) -> LineGraph:
-    """A camera on its side sees few columns: those of one or two rows of cells have the order in the frame."""
+    """A camera on its side sees few columns: in one or two rows of cells the order is in the frame."""
     down, across = np.meshgrid(np.linspace(0.01, 0.99, 60), np.linspace(0.01, 0.99, 160), indexing="ij")
     place = np.stack([down.ravel(), across.ravel()])
     column = 430 - 225 * place[0]
