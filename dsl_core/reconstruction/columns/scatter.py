@@ -3,6 +3,10 @@
 A pixel whose spot a texture fills by halves sees a place beside its middle. Where the texture is finer than
 pixels no picture shows that, but neighbours are displaced by other parts of it: their columns scatter about
 a smooth surface by more than noise makes them.
+
+Errors that go with the place between two scan lines are no such scatter, and deviations hold them already.
+Where that place alternates from pixel to pixel, so do they, and differences of neighbours show them as twice
+what they are, those of every second pixel as none: the mean of both is nearly what a pixel is off.
 """
 
 from __future__ import annotations
@@ -13,8 +17,9 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-#: Differences of five neighbours that leave no plane and no even curve, and the pixels of a tile.
-DIFFERENCES, TILE_PX = (1.0, -4.0, 6.0, -4.0, 1.0), 16
+#: Differences of five neighbours that leave no plane and no even curve, how far apart these are, and the
+#: pixels of a tile.
+DIFFERENCES, APART_PX, TILE_PX = (1.0, -4.0, 6.0, -4.0, 1.0), (1, 2), 16
 #: Differences that a tile must have, and by how many times they exceed what deviations say if it matters.
 FEWEST, MATTERS = 40, 3.0
 #: Median of the absolute value of a normal deviate.
@@ -37,7 +42,8 @@ def scatter_of(
     Only ``usable`` pixels, of smooth surfaces, are asked; what most of a tile asks for holds for all of it.
     """
     own = np.where(usable, std_px, np.nan)
-    differences = [_over_deviation(np.where(usable, column_px, np.nan), own, axis) for axis in (0, 1)]
+    column = np.where(usable, column_px, np.nan)
+    differences = [[_over_deviation(column, own, axis, apart) for apart in APART_PX] for axis in (0, 1)]
     ratio = np.ones(column_px.shape, np.float32)
     rows, columns = (
         np.linspace(0, size, max(round(size / TILE_PX), 1) + 1).astype(int) for size in column_px.shape
@@ -46,7 +52,7 @@ def scatter_of(
         for left, right in pairwise(columns):
             where = np.s_[top:bottom, left:right]
             # Textures may lie along rows, or along columns.
-            found = [_scale(each[where]) for each in differences]
+            found = [_both(*(_scale(each[where]) for each in of_axis)) for of_axis in differences]
             ratio[where] = max(*found, 1.0)
     ratio[ratio < MATTERS] = 1.0
     if not (ratio > 1).any():
@@ -56,17 +62,22 @@ def scatter_of(
 
 
 def _over_deviation(
-    column_px: NDArray[np.floating], std_px: NDArray[np.floating], axis: int
+    column_px: NDArray[np.floating], std_px: NDArray[np.floating], axis: int, apart_px: int
 ) -> NDArray[np.float64]:
     """Differences along an axis over their deviations, (rows, columns); NaN where a pixel is missing."""
     total, variance = np.zeros((2, *column_px.shape))
     for away, factor in zip((-2, -1, 0, 1, 2), DIFFERENCES, strict=True):
-        total += factor * np.roll(column_px, away, axis)
-        variance += (factor * np.roll(std_px, away, axis)) ** 2
+        total += factor * np.roll(column_px, away * apart_px, axis)
+        variance += (factor * np.roll(std_px, away * apart_px, axis)) ** 2
     ends = [slice(None)] * 2
-    for ends[axis] in (slice(0, 2), slice(-2, None)):
+    for ends[axis] in (slice(0, 2 * apart_px), slice(-2 * apart_px, None)):
         total[tuple(ends)] = np.nan
     return np.asarray(total / np.sqrt(variance))
+
+
+def _both(next_ones: float, second_ones: float) -> float:
+    """Scatter by differences of next neighbours and of every second one, which see more of the surface."""
+    return float(np.sqrt((next_ones**2 + min(next_ones, second_ones) ** 2) / 2))
 
 
 def _scale(differences: NDArray[np.float64]) -> float:

@@ -36,6 +36,14 @@ def test_a_texture_finer_than_pixels_is_what_deviations_lack_where_it_is(texture
     assert (found.error_px[SHAPE[1] // 2 + 2 < X] == 0).all()
 
 
+def test_errors_that_alternate_with_the_place_between_lines_are_no_texture() -> None:
+    # Lines every 5 columns and 2.4 columns a pixel: the error jumps where a line is as near as the next.
+    column = 2.4 * Y + 0.01 * X
+    error = 0.16 * (np.mod(column, 5) / 5 - 0.5)
+    stated = np.full(SHAPE, 0.8 * float(error.std()))
+    assert scatter_of(column + error + noise(0.01), stated, EVERYWHERE) is None
+
+
 def test_a_few_edges_and_what_is_not_asked_say_nothing_of_the_rest() -> None:
     jumps = BALL + noise(0.02) + 5.0 * (X > 40) + 3.0 * (Y > 30)
     assert scatter_of(jumps, STD_PX, EVERYWHERE) is None
