@@ -87,22 +87,22 @@ def open_scan(
         )  # fmt: skip
         yield runner
         if watches.seen is not None and runner.status.state is State.FINISHED:
-            settled = "" if watches.proof is None else watches.proof.settled
-            _keep_proof(ScanReader(folder), watches.seen, settled)
+            past = () if watches.proof is None else watches.proof.past
+            _keep_proof(ScanReader(folder), watches.seen, past)
 
 
-def _keep_proof(reader: ScanReader, seen: SeenFrames, settled: str = "") -> None:
+def _keep_proof(reader: ScanReader, seen: SeenFrames, past: tuple[str, ...] = ()) -> None:
     """Judge the pictures of a finished scan once and for all; without a calibration, each result does.
 
-    ``settled`` is a sentence on light that the frames do not show any more.
+    ``past`` are sentences on what no frame of the scan shows, or no longer.
     """
     if reader.calibration is None or read_proof(reader, reader.calibration) is not None:
         return
     seen.read_missing(reader)
     sensor = reader.calibration.sensor
     found = prove_frames(reader, seen, reader.calibration, sensor.bit_depth, sensor.bayer)
-    if settled:
-        found = found.model_copy(update={"wrong": (*found.wrong, settled)})
+    if past:
+        found = found.model_copy(update={"wrong": (*found.wrong, *past)})
     try:
         save_proof(reader, reader.calibration, found)
     except StoreError as error:

@@ -92,10 +92,14 @@ class ProvenShots:
         diagnosis: Diagnosis,
         sink: FrameSink,
         token: CancelToken,
+        only_repeats: bool = False,
     ) -> None:
-        """Keep the parts; the ``diagnosis`` says why pictures are wrong that stay so."""
+        """Keep the parts; the ``diagnosis`` says why pictures are wrong that stay so.
+
+        Rigs that ``only_repeats`` cannot show what the plan has not.
+        """
         self._taker, self._proof, self._sink, self._token = taker, proof, sink, token
-        self._diagnosis = diagnosis
+        self._diagnosis, self._only_repeats = diagnosis, only_repeats
         self._failures = 0
         self._unlike_at = 0
         self._is_late = self._is_in_part = False
@@ -123,8 +127,13 @@ class ProvenShots:
             what = "1 was" if self.corrected == 1 else f"{self.corrected} were"
             found.append(f"{what} captured again, because a picture did not show its pattern.")
             found += ["Everything was captured twice, since pictures came one late."] if self._is_late else []
-        found += [self._light, "" if self._proof is None else self._proof.settled]
-        return "".join(f" {each}" for each in found if each)
+        return "".join(f" {each}" for each in (*found, *self._known_wrong))
+
+    @property
+    def _known_wrong(self) -> list[str]:
+        """Sentences on what is wrong with the light and places of the first code."""
+        past = () if self._proof is None else self._proof.past
+        return [each for each in (self._light, *past) if each]
 
     def learn(self, stored: FrameSource, missing: Collection[int]) -> None:
         """Judge the frames of earlier runs, all but those ``missing``; wrong ones are taken again.
@@ -374,6 +383,23 @@ class ProvenShots:
             _log.warning("%s", self._light)
         for first in pictures:
             self._require_place(first, proof)
+        if not self._only_repeats:
+            self._see_levels(proof)
+
+    def _see_levels(self, proof: FrameProof) -> None:
+        """See that white at half its level is as bright as the calibration says, or keep what is wrong.
+
+        A scan at one level would be brighter or darker throughout, as of another scene.
+        """
+        shots = proof.scene.whites()
+        if shots is None:
+            return
+        white, dim = shots
+        if proof.scene.compare_whites(self._taker.take(dim, twice=self._is_late).pixels):
+            return
+        # The picture may be late, and the light may have changed since white.
+        if not proof.scene.compare_whites(self._again(dim).pixels, self._again(white).pixels):
+            _log.warning("%s", proof.scene.levels)
 
     def _require_place(self, first: Shot, proof: FrameProof) -> None:
         """See that a picture of the code, captured once more, is where it was."""
@@ -412,7 +438,7 @@ class ProvenShots:
         self._recent.clear()
         self._since_sound.clear()
         self._of_code.clear()
-        known = f" {self._light}" if self._light else ""
+        known = "".join(f" {each}" for each in self._known_wrong)
         if not withdrawn:
             raise PictureError(f"{error}{known}", error.wrong) from error
         self._sink.withdraw(withdrawn)

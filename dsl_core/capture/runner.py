@@ -113,7 +113,9 @@ class Runner:
         self._token = token or CancelToken()
         self._taker = ShotTaker(rig, plan, pattern_image, policy or RetryPolicy(), self._token)
         sensor = rig.calibration.sensor if rig.calibration else Sensor()
-        self._shots = ProvenShots(self._taker, proof, Diagnosis(plan, sensor), sink, self._token)
+        self._shots = ProvenShots(
+            self._taker, proof, Diagnosis(plan, sensor), sink, self._token, rig.only_repeats
+        )
         self._stored = stored
         self._progress = progress or NoProgress()
         self._pace = _Pace(clock, rig.projector.info.latency_ms)

@@ -161,7 +161,10 @@ def reconstruct_scan(
 def _doubts(reader: ScanReader, proof: ScanProof | None) -> list[str]:
     """What was found before a scan began, and of its pictures, as far as that is known."""
     before = reader.manifest.notes.get(WHITE_IN_DOUBT, "")
-    return [*([before] if before else []), *(() if proof is None else proof.doubts)]
+    found = () if proof is None else proof.doubts
+    # The scan may have found the same once more, in other figures.
+    is_said = any(each.startswith(before.split(":")[0]) for each in found)
+    return [*([before] if before and not is_said else []), *found]
 
 
 def known_doubts(folder: Path) -> list[str]:

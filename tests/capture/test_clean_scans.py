@@ -36,7 +36,7 @@ def test_every_picture_of_a_white_wall_shows_its_pattern(preset: str, tmp_path: 
 def test_light_that_no_frame_shows_any_more_is_kept_with_the_scan(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(FrameProof, "settled", "The light has settled.")
+    monkeypatch.setattr(FrameProof, "past", ("The light has settled.",))
     plan = preset_plan("preview")
     assert plan is not None
     rig = open_twin({"size": "48x32", "scene": "plane"})

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from dsl_core.capture.proof import contest
 from dsl_core.capture.proof.finding import Finding, Verdict
+from dsl_core.capture.proof.lasting.levels import at_half_level
 from dsl_core.capture.proof.raster import Counts
 from dsl_core.capture.proof.verifier import FrameProof
 from dsl_core.capture.proven import JUST_BEFORE, SETTLE_MS
@@ -196,3 +197,19 @@ def test_a_control_tells_whether_everything_is_as_it_was(scene: RenderedScene, i
         inverse = next(s for s in scene.plan.shots() if (s.role, s.pattern) == ("code", control.pattern ^ 1))
         assert not proof.scene.is_as_before(control, picture(inverse))
     assert len(proof.scene.controls()) == 2
+
+
+@pytest.mark.parametrize(("light", "is_told"), [(0.95, False), (0.8, True)])
+def test_a_projector_that_changes_levels_is_told_even_in_a_scan_at_one_level(
+    scene: RenderedScene, light: float, is_told: bool
+) -> None:
+    """Its scan is darker or brighter throughout, as of another scene."""
+    white = next(shot for shot in scene.plan.shots() if shot.role == "white")
+    dim = token_image(scene.plan, at_half_level(white)).tobytes()
+    spoiled = replace(scene, rates={**scene.rates, dim: scene.rates[dim] * np.float32(light)})
+    sink = MemorySink(scene.plan)
+    runner, _ = _run(spoiled, sink)
+    message = runner.run().message
+    assert ("At half the drive level, white has another share of its light" in message) == is_told
+    # Of light above black, which a dark projector gives as well.
+    assert ("0.78 in green" in message) == is_told

@@ -44,7 +44,9 @@ class Bench:
         self.displaced: list[bool] = []
         self.first: tuple[Shot, ...] = (SHOTS[0],)
         self.alone = self.fine = False
-        self.settled = ""
+        self.past: tuple[str, ...] = ()
+        #: How often white at half its level is compared, and what that says.
+        self.whites_seen, self.levels = list[bool](), ""
         self.recalled: dict[int, str] = {}
         self.of_code: CodeSum | None = None
         self.of_ends: list[str] = []
@@ -113,6 +115,12 @@ class Bench:
 
     def is_displaced(self, first: Shot, pixels: object) -> bool:
         return self.displaced.pop(0)
+
+    def whites(self) -> tuple[Shot, Shot] | None:
+        return (SHOTS[10], replace(SHOTS[10], level=0.5)) if self.whites_seen else None
+
+    def compare_whites(self, dim: object, white: object = None) -> bool:
+        return self.whites_seen.pop(0)
 
     def code_after(self, first: Shot) -> tuple[Shot, ...]:
         return SHOTS[first.index + 1 : 12]
@@ -200,7 +208,7 @@ def test_why_frames_of_an_earlier_run_were_taken_again_is_looked_at() -> None:
 def test_light_of_the_code_that_does_not_add_up_is_said_at_the_end() -> None:
     bench = Bench(is_right)
     bench.displaced = [False]
-    bench.of_code, bench.settled = CodeSum(1.3, 0.01, 0.03, 0.0, 0.01), "The light has settled."
+    bench.of_code, bench.past = CodeSum(1.3, 0.01, 0.03, 0.0, 0.01), ("The light has settled.",)
     bench.shots.take(LINE)
     assert bench.shots.note.startswith(" Patterns and their inverses together have 1.30 ± 0.01 times")
     assert bench.shots.note.endswith(" The light has settled.")
@@ -214,6 +222,32 @@ def test_what_was_wrong_from_the_first_picture_on_is_said_at_the_end() -> None:
     # Why a later picture stays wrong may be the same.
     with pytest.raises(PictureError, match=r"after 4 exposures.* Black is grey\. Rows alternate\.$"):
         bench.shots.take(SHOTS[14])
+
+
+@pytest.mark.parametrize(
+    ("seen", "taken"),
+    [
+        ([True], [(0, 0), (10, 0), (13, 0)]),
+        ([False, True], [(0, 0), (10, 0), (10, 1), (10, 1), (13, 0)]),
+        ([False, False], [(0, 0), (10, 0), (10, 1), (10, 1), (13, 0)]),
+    ],
+)
+def test_white_at_half_its_level_is_compared_before_the_first_line_twice_if_it_is_wrong(
+    seen: list[bool], taken: list[tuple[int, int]]
+) -> None:
+    bench = Bench(is_right)
+    bench.displaced, bench.whites_seen = [False], seen
+    bench.shots.take(LINE)
+    assert [each[:2] for each in bench.taken] == taken
+    assert bench.whites_seen == []
+
+
+def test_a_rig_that_only_repeats_is_not_asked_for_other_levels() -> None:
+    bench = Bench(is_right)
+    bench.displaced, bench.whites_seen = [False], [False]
+    parts: Any = bench
+    ProvenShots(parts, parts, parts, parts, bench.token, only_repeats=True).take(LINE)
+    assert bench.whites_seen == [False]
 
 
 @pytest.mark.parametrize(

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from dsl_core.capture.proof.lasting.levels import at_half_level
 from dsl_core.devices.base import Camera, CameraInfo, DeviceRig, Projector, ProjectorInfo
 from dsl_core.model.frames import Frame
 from dsl_core.model.plan import CapturePlan, Shot
@@ -50,7 +51,7 @@ def render(plan: CapturePlan, **options: str) -> RenderedScene:
         plan, world, calibration = fit_plan(plan, rig), rig.camera.world, rig.calibration  # type: ignore[attr-defined]
         assert calibration is not None
         rates: dict[bytes, NDArray[np.float32]] = {}
-        for shot in plan.shots():
+        for shot in (*plan.shots(), *(at_half_level(each) for each in plan.shots() if each.role == "white")):
             key = token_image(plan, shot).tobytes()
             if key not in rates:
                 world.show(pattern_image(plan, shot))

@@ -147,15 +147,19 @@ def test_what_white_contradicted_before_a_scan_is_repeated_by_its_result(scan: P
     copy = shutil.copytree(scan, tmp_path / "a.dsl")
     (copy / PROOF_NAME).unlink()
     known = read_manifest(copy)
-    notes = known.notes | {WHITE_IN_DOUBT: "White is blue."}
+    notes = known.notes | {WHITE_IN_DOUBT: "White is blue: 3 times."}
     replace_record(copy / MANIFEST_NAME, known.model_copy(update={"notes": notes}))
     reader = ScanReader(copy)
     assert reader.calibration is not None
     kept = ScanProof(judged=9, untold=0, wrong=("Frame 7 is late.",))
     save_proof(reader, reader.calibration, kept)
-    doubts = ["White is blue.", "Frame 7 is late."]
+    doubts = ["White is blue: 3 times.", "Frame 7 is late."]
     assert json.loads(scans.reconstruct_scan(copy, None, OPTIONS).attrs[scans.DOUBTS]) == doubts
     assert scans.known_doubts(copy) == doubts
+    (copy / PROOF_NAME).unlink()
+    again = ScanProof(judged=9, untold=0, wrong=("White is blue: 2 times.",))
+    save_proof(reader, reader.calibration, again)
+    assert scans.known_doubts(copy) == ["White is blue: 2 times."]
 
 
 def test_one_that_runs_or_whose_scan_is_gone_is_not_offered(killed: Path, tmp_path: Path) -> None:

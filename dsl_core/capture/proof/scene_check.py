@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from dsl_core.capture.proof.control import choose_pairs, edges_moved, is_same, is_unchanged
 from dsl_core.capture.proof.judging.known import Known
+from dsl_core.capture.proof.lasting.levels import at_half_level, doubt_of_levels
 from dsl_core.model.plan import Shot
 
 #: Two more exposures cost little in plans of so many shots.
@@ -19,6 +20,8 @@ class SceneCheck:
     def __init__(self, known: Known) -> None:
         """``known`` grows as pictures come."""
         self._known = known
+        #: What white at half its level contradicts of the calibration, which no frame of the scan shows.
+        self.levels = ""
 
     def controls(self) -> tuple[Shot, ...]:
         """Shots that show whether devices and scene are as they were; none before the first code."""
@@ -66,3 +69,35 @@ class SceneCheck:
         known = self._known
         seen, before = known.raster.take(pixels), known.kept[first.index]
         return edges_moved(seen, before, known.code_pairs(), known.noise, known.raster.shape)
+
+    def whites(self) -> tuple[Shot, Shot] | None:
+        """White of the first code, and white at half its level, by which `compare_whites` knows the levels.
+
+        None before that white is there, and without a calibration.
+        """
+        known = self._known
+        white = known.places.get(("white", 0), -1)
+        if known.calibration is None or not known.knows_light or known.ends(known.first) is None:
+            return None
+        return known.shots[white], at_half_level(known.shots[white])
+
+    def compare_whites(self, dim: NDArray[np.uint16], white: NDArray[np.uint16] | None = None) -> bool:
+        """Whether a raw mosaic of white at half its level has the light that the calibration says.
+
+        ``white`` is one at its full level, or else that of the scan. What is wrong is kept as ``levels``.
+        """
+        known = self._known
+        ends = known.ends(known.first)
+        if known.calibration is None or ends is None:
+            return True
+        bright = ends[0] if white is None else known.raster.take(white)
+        self.levels = doubt_of_levels(
+            bright,
+            ends[1],
+            known.raster.take(dim),
+            known.plan.settings[known.first].level,
+            known.calibration.projector_response,
+            known.raster.channels(known.bayer),
+            known.noise,
+        )
+        return not self.levels

@@ -112,7 +112,12 @@ class FrameProof:
         return is_of_code and self._known.lit is not None
 
     @property
-    def settled(self) -> str:
+    def past(self) -> tuple[str, ...]:
+        """What pictures that are no part of the scan, or no longer, have shown to be wrong, in sentences."""
+        return tuple(each for each in (self._settled, self.scene.levels) if each)
+
+    @property
+    def _settled(self) -> str:
         """That the light changed while the first code was captured, of which no frame shows it any more."""
         ratio = 1.0 if self._known.code is None else self._known.code.settled
         if ratio == 1:
