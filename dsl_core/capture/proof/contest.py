@@ -55,20 +55,29 @@ class Contest:
 
 
 def vote(seen: Floats, wanted: Floats, rival: Floats) -> Contest:
-    """Let pixels vote, each between -1 and 1; flat arrays, row after row, of pixels that tell them apart.
+    """The contest of two predictions; the arguments are those of `ballots`."""
+    return counted(ballots(seen, wanted, rival))
+
+
+def ballots(seen: Floats, wanted: Floats, rival: Floats) -> Floats:
+    """Votes of pixels, each between -1 and 1; flat arrays, row after row, of pixels that tell them apart.
 
     A pixel half way between both predictions has no opinion; one at or beyond a prediction votes for it.
     """
-    if seen.size == 0:
-        return Contest()
     votes = 2 * seen - wanted
     votes -= rival
     votes /= wanted - rival
-    np.minimum(np.maximum(votes, -1, out=votes), 1, out=votes)
+    return np.minimum(np.maximum(votes, -1, out=votes), 1, out=votes)
+
+
+def counted(votes: Floats) -> Contest:
+    """What votes of pixels, row after row, say together."""
+    if votes.size == 0:
+        return Contest()
     sums = np.cumsum(votes, dtype=np.float64)
     total = float(sums[-1])
     # What is left after the best beginning is the worst end.
     peaks = np.maximum(np.maximum.accumulate(sums), 0)
     run = min(float((sums - peaks).min()), 0.0)
     end = min(float(sums.min()), total - float(sums.max()), 0.0)
-    return Contest(seen.size, total / seen.size, end, run)
+    return Contest(votes.size, total / votes.size, end, run)

@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from dsl_core.capture.proof.contest import Contest, vote
+from dsl_core.capture.proof.contest import Contest, ballots, counted, vote
 from dsl_core.capture.proof.noise import Noise
 from dsl_core.capture.proof.raster import Counts, Floats, Raster
 from dsl_core.model.plan import CapturePlan, Shot
@@ -119,16 +119,34 @@ def line_profile(plan: CapturePlan, shot: Shot) -> Floats | None:
     return np.asarray((1 - 2 * BLUR) * sharp + BLUR * (wide[2:] + wide[:-2])).ravel()
 
 
-def contest_of_lines(seen: Counts, lit: Lit, wanted: Floats, rival: Floats) -> Contest:
-    """Which of two patterns of columns (`line_profile`) a picture shows."""
+@dataclass(frozen=True)
+class LineBallots:
+    """Votes of pixels, row after row, on which of two patterns of columns they see, and their keys."""
+
+    votes: Floats
+    key: NDArray[np.intp]
+
+    def of_colour(self, colour: int) -> Contest:
+        """What the pixels of one colour say together."""
+        return counted(self.votes[self.key % 3 == colour])
+
+
+def ballots_of_lines(seen: Counts, lit: Lit, wanted: Floats, rival: Floats) -> LineBallots:
+    """Which of two patterns of columns (`line_profile`) pixels see, of those that can tell."""
     chosen = thinned(lit.where(np.abs(wanted - rival) > APART), PLENTY)
     black, contrast = lit.black[chosen], lit.contrast[chosen]
     key = lit.key[chosen]
-    return vote(
+    votes = ballots(
         seen[lit.index[chosen]].astype(np.float32),
         black + contrast * wanted[key],
         black + contrast * rival[key],
     )
+    return LineBallots(votes, key)
+
+
+def contest_of_lines(seen: Counts, lit: Lit, wanted: Floats, rival: Floats) -> Contest:
+    """Which of two patterns of columns (`line_profile`) a picture shows."""
+    return counted(ballots_of_lines(seen, lit, wanted, rival).votes)
 
 
 @dataclass(frozen=True)

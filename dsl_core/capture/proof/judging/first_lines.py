@@ -2,24 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
 
+from dsl_core.capture.proof.contest import counted
 from dsl_core.capture.proof.finding import Finding, Verdict
 from dsl_core.capture.proof.judging.decision import decide, in_place
 from dsl_core.capture.proof.judging.known import Known
-from dsl_core.capture.proof.lines.line_place import contests_of_sides, is_aside, moved
+from dsl_core.capture.proof.lines.line_place import ASIDE, SURE_VOTES, contests_of_sides, is_aside, moved
 from dsl_core.capture.proof.lines.line_shown import line_shown
 from dsl_core.capture.proof.prediction import (
+    LineBallots,
     Lit,
+    ballots_of_lines,
     brightness_of_lines,
     contest_of_lines,
     is_lit_elsewhere,
     is_over_white,
 )
-from dsl_core.capture.proof.raster import Counts, Floats
+from dsl_core.capture.proof.raster import Counts
 from dsl_core.model.conditions import COLOUR_NAMES
 from dsl_core.model.plan import Shot
 
@@ -33,11 +36,12 @@ def judge_line(known: Known, shot: Shot, seen: Counts) -> Finding:
     usual = np.float32(known.learned.usual.share(shot))
     rivals = [(verdict, known.profile(rival)) for verdict, rival in known.rivals(shot)]
     rivals += [(Verdict.DARK, np.zeros_like(wanted)), (Verdict.OTHER, np.ones_like(wanted))]
-    contests = {
-        verdict: contest_of_lines(seen, lit, usual * wanted, usual * rival)
+    asked = {
+        verdict: ballots_of_lines(seen, lit, usual * wanted, usual * rival)
         for verdict, rival in rivals
         if rival is not None
     }
+    contests = {verdict: counted(each.votes) for verdict, each in asked.items()}
     found = decide(shot, contests, share, known.learned, lambda: _line_shown(known, lit, seen, shot))
     if not found.is_wrong and is_lit_elsewhere(seen, lit, wanted):
         return Finding(shot, Verdict.OTHER, (shot,), "it is bright where it should be dark")
@@ -46,26 +50,23 @@ def judge_line(known: Known, shot: Shot, seen: Counts) -> Finding:
     wanted = usual * wanted
     places = contests_of_sides(lambda side: contest_of_lines(seen, lit, wanted, moved(wanted, side)))
     found = in_place(found, contests, places, known.learned)
-    others = [usual * rival for _, rival in rivals[:-2] if rival is not None]
-    colour = None if found.is_wrong else _colour_of_another(seen, lit, wanted, others)
-    return (
-        found
-        if colour is None
-        else replace(found, is_doubtful=True, detail=f"its {colour} was that of another pattern")
-    )
+    colour = None if found.is_wrong else _colour_of_another(asked)
+    if colour is None:
+        return found
+    return replace(found, is_doubtful=True, detail=f"its {colour} was that of another pattern")
 
 
-def _colour_of_another(seen: Counts, lit: Lit, wanted: Floats, others: Iterable[Floats]) -> str | None:
-    """The colour of a picture that seems to be of one of the ``others``, such as the line before.
+def _colour_of_another(asked: Mapping[Verdict, LineBallots]) -> str | None:
+    """The colour of a picture that seems to be of the line before or after.
 
     A colour of the projector may come late by itself, and so may packets of a camera that sends colours one
     after the other.
     """
+    others = [asked[each] for each in (Verdict.SWAPPED, Verdict.LATE) if each in asked]
+    # Of nearly every picture, hardly any pixel votes for them.
+    others = [each for each in others if float(np.minimum(each.votes, 0).sum()) < -ASIDE * SURE_VOTES]
     for colour, name in enumerate(COLOUR_NAMES):
-        own = np.zeros_like(wanted)
-        own[colour::3] = 1
-        asked = {n: contest_of_lines(seen, lit, own * wanted, own * other) for n, other in enumerate(others)}
-        if is_aside(asked):
+        if is_aside({n: each.of_colour(colour) for n, each in enumerate(others)}):
             return name
     return None
 
