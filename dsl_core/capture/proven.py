@@ -29,8 +29,8 @@ FAILURES = 2
 #: Pictures of which nothing can be told are unlike those before them on end within so many shots. None of
 #: them is ever right, so that a lamp that flickers now and then would else add up over a scan.
 ON_END = 3
-#: So many pictures that are late within so many shots, with right ones between: a display that drops every so
-#: many. Those of which nothing could be told may have been late as well.
+#: So many pictures that are late, or a colour of them, within so many shots, with right ones between: a
+#: display that drops every so many. Those of which nothing could be told may have been late as well.
 LATE_OFTEN, LATE_WITHIN = 3, 64
 #: So many pictures that a second one cured within so many shots: most are late in a part.
 CURED_OFTEN, CURED_WITHIN = 8, 16
@@ -102,7 +102,7 @@ class ProvenShots:
         self._diagnosis, self._only_repeats = diagnosis, only_repeats
         self._failures = 0
         self._unlike_at = 0
-        self._is_late = self._is_in_part = False
+        self._is_late = self._is_in_part = self._has_late_colour = False
         self._untold: list[Shot] = []
         self._recent: deque[Shot] = deque(maxlen=JUST_BEFORE)
         #: What was saved since an old picture, taken again, last looked as it did at first.
@@ -210,8 +210,8 @@ class ProvenShots:
         if _is_sure(found):
             self._passed.extend(self._untold)
             self._untold.clear()
-        if found.verdict is Verdict.LATE:
-            self._late_at.append(shot.index)
+        if found.verdict is Verdict.LATE or found.colour:
+            self._count_late(found)
         self._correct(found, self._proof)
         if self._is_late:
             return
@@ -264,6 +264,9 @@ class ProvenShots:
         has_mark = doubt.verdict is Verdict.RIGHT or bool(doubt.detail)
         if differs or (has_mark and not found.is_doubtful):
             self._count_unlike(found)
+            colour = doubt.colour or proof.late_colour(doubt.shot, frame.pixels, second.pixels)
+            if colour:
+                self._count_late(replace(doubt, colour=colour))
             self._cured_at.append(doubt.shot.index)
             self.corrected += 1
             return replace(second, corrected=doubt.detail or "it was unlike those before it"), found
@@ -272,6 +275,11 @@ class ProvenShots:
             proof.believe_light(doubt.shot)
         self._doubts += 1
         return second, found
+
+    def _count_late(self, found: Finding) -> None:
+        """Count a picture that is late, or a colour of one."""
+        self._late_at.append(found.shot.index)
+        self._has_late_colour |= bool(found.colour)
 
     def _count_unlike(self, found: Finding) -> None:
         """Count a picture that another one of its shot was unlike as one of a run, or as the first of one."""
@@ -337,7 +345,7 @@ class ProvenShots:
                 self.corrected += 1
             self._correct(found, proof)
         self._untold.clear()
-        if self._is_in_part:
+        if self._is_in_part or self._has_late_colour:
             # A line says that it is right where it lights the scene itself. Its orders, too faint to tell,
             # may have been late elsewhere.
             lines = proof.lines_before(shot)

@@ -12,7 +12,15 @@ import pytest
 from dsl_core.capture.diagnosis import Explanation
 from dsl_core.capture.proof.code.code_sum import CodeSum
 from dsl_core.capture.proof.finding import Finding, Light, Verdict
-from dsl_core.capture.proven import CURED_OFTEN, LATE_WITHIN, ON_END, SETTLE_MS, PictureError, ProvenShots
+from dsl_core.capture.proven import (
+    CURED_OFTEN,
+    LATE_OFTEN,
+    LATE_WITHIN,
+    ON_END,
+    SETTLE_MS,
+    PictureError,
+    ProvenShots,
+)
 from dsl_core.errors import Cancelled, DeviceError
 from dsl_core.model.frames import Frame
 from dsl_core.model.plan import CapturePlan, GrayCode, LineComb, Shot
@@ -44,6 +52,8 @@ class Bench:
         self.displaced: list[bool] = []
         self.first: tuple[Shot, ...] = (SHOTS[0],)
         self.alone = self.fine = False
+        #: The colour that the first of two pictures of a shot has of the one before.
+        self.colour = ""
         self.past: tuple[str, ...] = ()
         #: How often white at half its level is compared, and what that says.
         self.whites_seen, self.levels = list[bool](), ""
@@ -97,6 +107,9 @@ class Bench:
 
     def keep(self, shot: Shot, pixels: object) -> None:
         self.kept.append(shot.index)
+
+    def late_colour(self, shot: Shot, one: object, other: object) -> str:
+        return self.colour
 
     def is_alone(self, found: Finding) -> bool:
         return self.alone
@@ -375,6 +388,21 @@ def test_pictures_that_a_second_one_cures_on_end_are_late_in_part(apart: int, is
     bench = Bench(*[frayed, is_right] * CURED_OFTEN, is_right)
     shots = [replace(LINE, index=LINE.index + apart * n) for n in range(CURED_OFTEN)]
     take_all(bench, shots)
+    assert ("captured twice" in bench.shots.note) == is_late
+    assert bool(bench.withdrawn) == is_late
+
+
+@pytest.mark.parametrize(
+    ("told", "seen", "is_late"), [("blue", "", True), ("", "red", True), ("", "", False)]
+)
+def test_a_colour_that_is_late_now_and_then_casts_doubt_on_all_lines_before(
+    told: str, seen: str, is_late: bool
+) -> None:
+    # Faint orders of other lines may have been late as well.
+    doubt = [lambda shot: replace(frayed(shot), colour=told), is_right]
+    bench = Bench(*doubt * LATE_OFTEN, is_right)
+    bench.colour = seen
+    take_all(bench, [replace(LINE, index=LINE.index + 4 * n) for n in range(LATE_OFTEN)])
     assert ("captured twice" in bench.shots.note) == is_late
     assert bool(bench.withdrawn) == is_late
 

@@ -84,7 +84,7 @@ class Finding:
     are known to be wrong. ``detail`` says what was seen in more words, such as which other shot. A picture
     ``is_doubtful`` if it cannot be told and is unlike its neighbours, if a few rows of it do not show its
     pattern or its line seems to be beside its place, which ``detail`` then says, or if its ``light`` has
-    changed; a second picture says if it was right.
+    changed; a second picture says if it was right. ``colour`` is one that seems to be of another pattern.
     """
 
     shot: Shot
@@ -93,6 +93,7 @@ class Finding:
     detail: str = ""
     is_doubtful: bool = False
     light: Light = Light.UNTOLD
+    colour: str = ""
 
     @property
     def is_wrong(self) -> bool:
@@ -123,6 +124,11 @@ class Finding:
     def remedy(self) -> str:
         """What a person can do."""
         return _REMEDY.get(self.verdict, "")
+
+
+def of_another_pattern(colour: str) -> str:
+    """What to say of a colour that seems to be of another pattern, as a `Finding.detail`."""
+    return f"its {colour} was that of another pattern"
 
 
 def displaced(shot: Shot, again: tuple[Shot, ...], columns: int) -> Finding:

@@ -311,17 +311,17 @@ def contest_of_pictures(
 
     Where pixels are too noisy to tell, means over blocks are asked.
     """
-    found = _contest(seen, noise.variance(seen), wanted, rival, black, least, noise.least_variance)
+    found = contest_of_pixels(seen, noise.variance(seen), wanted, rival, black, least, noise.least_variance)
     if found.is_told:
         return found
     share = np.float32(1 / raster.pooled)
     variance = raster.pool(noise.variance(seen)) * share
     one, other = (Expected(raster.pool(e.counts), raster.pool(e.variance) * share) for e in (wanted, rival))
     least = None if least is None else raster.pool(least)
-    return _contest(raster.pool(seen), variance, one, other, raster.pool(black), least)
+    return contest_of_pixels(raster.pool(seen), variance, one, other, raster.pool(black), least)
 
 
-def _contest(
+def contest_of_pixels(
     seen: Counts | Floats,
     variance: Floats,
     wanted: Expected,
@@ -330,7 +330,10 @@ def _contest(
     least: Floats | None,
     least_variance: float = 0.0,
 ) -> Contest:
-    """The contest of pixels that tell predictions apart; none seen has less than ``least_variance``."""
+    """The contest of pixels that tell predictions apart; none seen has less than ``least_variance``.
+
+    All arrays are flat and of the same pixels, ``variance`` that of their counts.
+    """
     # Hundreds of pictures are judged, each against several, and most pixels are the same in both.
     apart = wanted.counts - rival.counts
     np.abs(apart, out=apart)

@@ -8,8 +8,10 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 import numpy as np
+from numpy.typing import NDArray
 
-from dsl_core.capture.proof.finding import Finding, Verdict
+from dsl_core.capture.proof.finding import Finding, Verdict, of_another_pattern
+from dsl_core.capture.proof.late_colour import late_colour
 from dsl_core.capture.proof.noise import Noise
 from dsl_core.capture.proof.prediction import Expected, contest_of_pictures
 from dsl_core.capture.proof.raster import Counts, Raster
@@ -22,9 +24,9 @@ REFUSALS = 2
 class SentinelProof:
     """Judges sentinels by the pictures that they repeat."""
 
-    def __init__(self, noise: Noise, raster: Raster) -> None:
-        """For pictures of this raster."""
-        self._noise, self._raster = noise, raster
+    def __init__(self, noise: Noise, raster: Raster, channels: NDArray[np.int8]) -> None:
+        """For pictures of this raster, ``channels`` the colours of their pixels: 0 red, 1 green, 2 blue."""
+        self._noise, self._raster, self._channels = noise, raster, channels
         self._refused: dict[int, int] = {}
 
     def judge(
@@ -42,11 +44,18 @@ class SentinelProof:
             )
             told |= found.is_told
             if found.is_lost or found.is_torn or found.is_doubtful:
-                self._refused[shot.index] = self._refused.get(shot.index, 0) + 1
-                if self._refused[shot.index] > REFUSALS:
-                    return Finding(shot, Verdict.UNTOLD)
-                return Finding(shot, verdict if found.is_lost else Verdict.TORN, (shot,))
+                return self._refuse(Finding(shot, verdict if found.is_lost else Verdict.TORN, (shot,)))
+            colour = late_colour(seen, old, rival, black, self._channels, self._noise)
+            if colour:
+                detail = of_another_pattern(colour)
+                return self._refuse(Finding(shot, Verdict.TORN, (shot,), detail, colour=colour))
         return Finding(shot, Verdict.RIGHT if told else Verdict.UNTOLD)
+
+    def _refuse(self, found: Finding) -> Finding:
+        """A finding on a sentinel that is wrong, but for one that stays so."""
+        index = found.shot.index
+        self._refused[index] = self._refused.get(index, 0) + 1
+        return found if self._refused[index] <= REFUSALS else Finding(found.shot, Verdict.UNTOLD)
 
     def _expected(self, picture: Counts) -> Expected:
         return Expected(picture.astype(np.float32), self._noise.variance(picture))

@@ -12,6 +12,7 @@ from dsl_core.capture.proof.finding import Finding, Verdict
 from dsl_core.capture.proof.judging.first_lines import judge_line
 from dsl_core.capture.proof.judging.known import Known
 from dsl_core.capture.proof.judging.later_pictures import LaterPictures
+from dsl_core.capture.proof.late_colour import late_colour
 from dsl_core.capture.proof.lines.bright_black import BrightBlack
 from dsl_core.capture.proof.lines.hidden import HiddenParts
 from dsl_core.capture.proof.lines.neighbours import LineNeighbours
@@ -55,7 +56,7 @@ class FrameProof:
         #: What the last picture said of the pairs of the first code, one by one.
         self.reviewed: list[Finding] = []
         self._later = LaterPictures(known)
-        self._sentinels = SentinelProof(known.noise, known.raster)
+        self._sentinels = SentinelProof(known.noise, known.raster, known.raster.channels(known.bayer))
         self._bright_black = BrightBlack(known.noise)
         self._hidden = HiddenParts(known.noise)
         self._neighbours = LineNeighbours(known.noise, known.raster.shape[1])
@@ -84,6 +85,18 @@ class FrameProof:
         """Whether two pictures of one shot of lines, as raw mosaics, show different patterns."""
         raster = self._known.raster
         return self._neighbours.differ(raster.take(one), raster.take(other))
+
+    def late_colour(self, shot: Shot, one: NDArray[np.uint16], other: NDArray[np.uint16]) -> str:
+        """The colour of a picture that shows the pattern before, unlike another one of its shot; or "".
+
+        Both are raw mosaics.
+        """
+        known = self._known
+        before, black = known.kept.get(shot.index - 1), known.black(shot)
+        if before is None or black is None:
+            return ""
+        seen, wanted = known.raster.take(one), known.raster.take(other)
+        return late_colour(seen, wanted, before, black, known.raster.channels(known.bayer), known.noise)
 
     def is_alone(self, found: Finding) -> bool:
         """Whether nothing tells a line: neither its columns, which are not seen, nor lines before it."""

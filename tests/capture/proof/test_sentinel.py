@@ -12,6 +12,8 @@ from dsl_core.capture.proof.sentinel import REFUSALS, SentinelProof
 from dsl_core.model.plan import Shot
 
 SIZE = (48, 40)
+RASTER = Raster(SIZE)
+CHANNELS = RASTER.channels("RGGB")
 SHOT = Shot(90, "sentinel", 20, 0, 10.0, 1.0)
 
 
@@ -31,13 +33,13 @@ def judge(pictures: dict[str, np.ndarray], seen: np.ndarray, proof: SentinelProo
 
 
 def test_a_repeat_is_believed_even_if_the_light_has_changed(pictures: dict[str, np.ndarray]) -> None:
-    proof = SentinelProof(Noise.of(None, 12), Raster(SIZE))
+    proof = SentinelProof(Noise.of(None, 12), RASTER, CHANNELS)
     assert judge(pictures, pictures["again"], proof) is Verdict.RIGHT
     assert judge(pictures, (0.85 * pictures["again"]).astype(np.uint16), proof) is Verdict.RIGHT
 
 
 def test_another_picture_is_named_and_refused_a_few_times_only(pictures: dict[str, np.ndarray]) -> None:
-    proof = SentinelProof(Noise.of(None, 12), Raster(SIZE))
+    proof = SentinelProof(Noise.of(None, 12), RASTER, CHANNELS)
     for _ in range(REFUSALS):
         assert judge(pictures, pictures["line"], proof) is Verdict.LATE
     assert judge(pictures, pictures["line"], proof) is Verdict.UNTOLD
@@ -50,17 +52,17 @@ def test_another_picture_is_named_and_refused_a_few_times_only(pictures: dict[st
 def test_stale_rows_in_the_middle_are_refused(pictures: dict[str, np.ndarray]) -> None:
     again, line = pictures["again"], pictures["line"]
     stale = np.concatenate([again[:960], line[960:1200], again[1200:]])
-    assert judge(pictures, stale, SentinelProof(Noise.of(None, 12), Raster(SIZE))) is Verdict.TORN
+    assert judge(pictures, stale, SentinelProof(Noise.of(None, 12), RASTER, CHANNELS)) is Verdict.TORN
 
 
 def test_nothing_is_said_without_the_picture_of_before(pictures: dict[str, np.ndarray]) -> None:
-    proof = SentinelProof(Noise.of(None, 12), Raster(SIZE))
+    proof = SentinelProof(Noise.of(None, 12), RASTER, CHANNELS)
     found = proof.judge(SHOT, pictures["line"], None, pictures["black"], [])
     assert found.verdict is Verdict.UNTOLD
 
 
 def test_a_sentinel_is_right_only_where_a_rival_can_be_told_apart(pictures: dict[str, np.ndarray]) -> None:
-    proof = SentinelProof(Noise.of(None, 12), Raster(SIZE))
+    proof = SentinelProof(Noise.of(None, 12), RASTER, CHANNELS)
     white, black = pictures["white"], pictures["black"]
     assert proof.judge(SHOT, pictures["again"], white, black, []).verdict is Verdict.UNTOLD
     assert proof.judge(SHOT, pictures["again"], white, black, [white]).verdict is Verdict.UNTOLD
@@ -69,6 +71,24 @@ def test_a_sentinel_is_right_only_where_a_rival_can_be_told_apart(pictures: dict
 
 
 def test_two_takes_are_refused_and_the_third_is_believed(pictures: dict[str, np.ndarray]) -> None:
-    proof = SentinelProof(Noise.of(None, 12), Raster(SIZE))
+    proof = SentinelProof(Noise.of(None, 12), RASTER, CHANNELS)
     found = [judge(pictures, pictures["line"], proof) for _ in range(4)]
     assert found == [Verdict.LATE, Verdict.LATE, Verdict.UNTOLD, Verdict.UNTOLD]
+
+
+@pytest.mark.parametrize(("late", "colour"), [(0, "red"), (2, "blue")])
+def test_a_colour_that_is_of_the_picture_before_is_refused(
+    pictures: dict[str, np.ndarray], late: int, colour: str
+) -> None:
+    proof = SentinelProof(Noise.of(None, 12), RASTER, CHANNELS)
+    seen = np.where(late == CHANNELS, pictures["line"], pictures["again"])
+    rivals = [pictures["line"], pictures["black"]]
+    found = proof.judge(SHOT, seen, pictures["white"], pictures["black"], rivals)
+    assert (found.colour, found.again, found.detail) == (
+        colour,
+        (SHOT,),
+        f"its {colour} was that of another pattern",
+    )
+    # Half of its light is gone: the white balance has changed.
+    half = (np.where(late == CHANNELS, 0.6, 1) * pictures["again"]).astype(np.uint16)
+    assert not proof.judge(replace(SHOT, index=91), half, pictures["white"], pictures["black"], rivals).colour

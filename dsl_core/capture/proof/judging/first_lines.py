@@ -8,10 +8,11 @@ from dataclasses import replace
 import numpy as np
 
 from dsl_core.capture.proof.contest import counted
-from dsl_core.capture.proof.finding import Finding, Verdict
+from dsl_core.capture.proof.finding import Finding, Verdict, of_another_pattern
 from dsl_core.capture.proof.judging.decision import decide, in_place
 from dsl_core.capture.proof.judging.known import Known
-from dsl_core.capture.proof.lines.line_place import ASIDE, SURE_VOTES, contests_of_sides, is_aside, moved
+from dsl_core.capture.proof.late_colour import FEWEST_VOTES, MOST_MEAN, is_of_another
+from dsl_core.capture.proof.lines.line_place import contests_of_sides, moved
 from dsl_core.capture.proof.lines.line_shown import line_shown
 from dsl_core.capture.proof.prediction import (
     LineBallots,
@@ -53,7 +54,7 @@ def judge_line(known: Known, shot: Shot, seen: Counts) -> Finding:
     colour = None if found.is_wrong else _colour_of_another(asked)
     if colour is None:
         return found
-    return replace(found, is_doubtful=True, detail=f"its {colour} was that of another pattern")
+    return replace(found, is_doubtful=True, detail=of_another_pattern(colour), colour=colour)
 
 
 def _colour_of_another(asked: Mapping[Verdict, LineBallots]) -> str | None:
@@ -64,9 +65,9 @@ def _colour_of_another(asked: Mapping[Verdict, LineBallots]) -> str | None:
     """
     others = [asked[each] for each in (Verdict.SWAPPED, Verdict.LATE) if each in asked]
     # Of nearly every picture, hardly any pixel votes for them.
-    others = [each for each in others if float(np.minimum(each.votes, 0).sum()) < -ASIDE * SURE_VOTES]
+    others = [each for each in others if float(np.minimum(each.votes, 0).sum()) < FEWEST_VOTES * MOST_MEAN]
     for colour, name in enumerate(COLOUR_NAMES):
-        if is_aside({n: each.of_colour(colour) for n, each in enumerate(others)}):
+        if any(is_of_another(each.of_colour(colour)) for each in others):
             return name
     return None
 
