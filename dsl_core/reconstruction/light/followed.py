@@ -42,6 +42,8 @@ MOST_MISFIT = 0.2
 LEVEL_ERROR = 0.004
 #: Settings that differ by more are told, and what that is called.
 LEAST_APART, APART = 0.01, "settings against each other"
+#: What changes of black are called.
+BLACK_AGAIN = "black taken again"
 #: Share of white's values that those of first orders have, roughly.
 FAINT = 0.1
 #: Settings whose light (logarithm) is closer to each other say nothing of a camera's curve.
@@ -180,7 +182,7 @@ def black_wander(
         what = f" It did so {often}, {_since(sudden.black)}; the frames are corrected for that."
     return FitFinding.judged(
         "light",
-        "black taken again",
+        BLACK_AGAIN,
         (float(np.sqrt(np.mean(means**2))), float(np.sqrt(np.mean(stds**2)))),
         "DN",
         max(MOST_BLACK_DN, USUAL_FLICKERS * flicker_dn),

@@ -19,6 +19,7 @@ from dsl_core.model.result_sink import ResultSink
 from dsl_core.model.rig import Rig
 from dsl_core.reconstruction.findings.fit import fit_of
 from dsl_core.reconstruction.findings.flag_findings import SpectralCounts, count_spectra
+from dsl_core.reconstruction.findings.known_causes import with_known_causes
 from dsl_core.reconstruction.geometry import Geometry
 from dsl_core.reconstruction.rows.bands import Band
 from dsl_core.reconstruction.scan_result import attributes_of, maps_of_rows
@@ -106,7 +107,7 @@ class Assembly:
             None if solver is None else self.counts,
             None if solver is None else solver.followed,
             None if solver is None else solver.error,
-            [*findings, *(() if solver is None else solver.findings)],
+            with_known_causes([*findings, *(() if solver is None else solver.findings)]),
         )
         fit = fit.model_copy(update={"measured": traits_in_words(self._rig)})
         return self._sink.finish(attributes_of(self._rig, self._plan, fit))

@@ -16,6 +16,8 @@ from dsl_core.reconstruction.spectral.first_order_light import NM, FirstOrderLig
 SIGMAS, FEWEST = 20.0, 6
 #: By how much the ratio of the orders may be off for spectra to be right, and what is followed with them.
 LIMIT, FOLLOWED = 0.05, 0.25
+#: What their ratio is called.
+BALANCE = "ratio of the orders"
 
 
 def order_balance_finding(rig: Rig, light: FirstOrderLight) -> FitFinding | None:
@@ -35,7 +37,7 @@ def order_balance_finding(rig: Rig, light: FirstOrderLight) -> FitFinding | None
         return None
     return FitFinding.judged(
         "orders",
-        "ratio of the orders",
+        BALANCE,
         ratio - 1,
         "1",
         LIMIT,

@@ -1,0 +1,32 @@
+"""Findings that follow from others: what a person can act on is said alone."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from dsl_core.model.fit import FitFinding
+from dsl_core.reconstruction.light.followed import BLACK_AGAIN
+from dsl_core.reconstruction.spectral.order_balance import BALANCE
+
+
+def with_known_causes(findings: Iterable[FitFinding]) -> list[FitFinding]:
+    """The same findings, where a changed black explains why the first orders share the light otherwise.
+
+    They are a few numbers bright, and a pixel sees them early and late in a scan.
+    """
+    found = list(findings)
+    if not any(each.significant and each.name == BLACK_AGAIN for each in found):
+        return found
+    return [_by_black(each) if each.name == BALANCE else each for each in found]
+
+
+def _by_black(finding: FitFinding) -> FitFinding:
+    """Of the orders: they are not the film's fault."""
+    return finding.model_copy(
+        update={
+            "sentence": f"Order +1 is {1 + finding.value:.2f} times as bright against order -1 as calibrated:"
+            " what black has changed by during the scan is much of their faint light.",
+            "advice": "Scan again with steady black and light. If the orders still differ, look whether the"
+            " film was turned over.",
+        }
+    )

@@ -1,0 +1,24 @@
+"""Orders that share the light otherwise are the film's fault only where black has not changed."""
+
+from __future__ import annotations
+
+import pytest
+
+from dsl_core.model.fit import FitFinding
+from dsl_core.reconstruction.findings.known_causes import with_known_causes
+from dsl_core.reconstruction.light.followed import BLACK_AGAIN
+from dsl_core.reconstruction.spectral.order_balance import BALANCE
+
+
+def finding(name: str, value: float, sentence: str) -> FitFinding:
+    return FitFinding.judged("light", name, value, "1", 0.5, sentence, "Do it.")
+
+
+@pytest.mark.parametrize(("black_dn", "is_film"), [(0.4, True), (0.8, False)])
+def test_a_changed_black_explains_faint_orders(black_dn: float, is_film: bool) -> None:
+    black = finding(BLACK_AGAIN, black_dn, "Black changed.")
+    orders = finding(BALANCE, -0.26, "The film has been turned over.")
+    found = with_known_causes([black, orders])
+    assert found[0] == black
+    assert (found[1] == orders) == is_film
+    assert ("0.74 times as bright against order -1" in found[1].sentence) == (not is_film)
