@@ -6,8 +6,10 @@ from pathlib import Path
 
 import pytest
 
+from dsl_core import pipeline
 from dsl_core.campaign.common.recipe import Bench, Step, naming
 from dsl_core.campaign.common.white_shot import FilterNote, note_of_filter
+from dsl_core.capture.proven import PictureError
 from dsl_core.errors import CalibrationError, Cancelled, DecodeError, StoreError
 from dsl_core.model.placement import Placement
 from dsl_core.model.plan import CapturePlan, Columns, NoCode, Setting
@@ -40,6 +42,26 @@ def test_a_scan_is_planned_once_and_complete_afterwards(bench: Bench) -> None:
     assert bench.scan(STEP, plan, NoProgress()) == made
     assert bench.scan_of(STEP).entries == entries
     assert len(planned) == 1
+
+
+def test_a_step_that_fails_does_not_speak_of_a_scan(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Who calibrates has no scan to resume."""
+
+    def fails(*_: object) -> None:
+        raise PictureError("White is dim. Check the lamp, and resume the scan.", has_changed=True)
+
+    monkeypatch.setattr(pipeline, "scan", fails)
+    levels = (((1.0,) * 3,) * bench.devices.projector.info.width_px,)
+    plan = CapturePlan(
+        name="one",
+        code=NoCode(),
+        spectral=Columns(levels=levels),
+        settings=(Setting(exposure_ms=5.0, level=1.0),),
+        code_settings=(0,),
+    )
+    with pytest.raises(PictureError, match=r"lamp, and capture this step again\.$") as caught:
+        bench.scan(STEP, lambda: plan, NoProgress())
+    assert caught.value.has_changed
 
 
 def test_a_record_is_kept_next_to_the_scan(bench: Bench) -> None:

@@ -13,6 +13,8 @@ from dsl_app.calibrate.wizard.presentation import NONE_KEPT, step_display
 from dsl_app.calibrate.wizard.state import Doing, WizardState
 from dsl_app.connection.state import Link
 
+from dsl_core import pipeline
+from dsl_core.capture.proven import PictureError
 from dsl_core.devices.base import DeviceRig
 from dsl_core.errors import CalibrationError, DeviceError, StoreError
 from dsl_core.io.campaign_folder import CampaignFolder
@@ -248,6 +250,8 @@ def test_a_lost_camera_is_a_sentence_and_the_rig_can_be_connected_again(
         control.capture()
         assert "Check its cable" in state.trouble.value
         assert is_on(state.can_reconnect)
+        assert bench.rig.state.link.value is Link.LOST, "other pages would still call it connected"
+        assert bench.rig.state.trouble.value == state.trouble.value
         # Its window lies over the messages of the main one.
         control.reconnect()
         assert state.trouble.value.startswith(
@@ -263,6 +267,22 @@ def test_a_lost_camera_is_a_sentence_and_the_rig_can_be_connected_again(
     control.capture()
     assert not state.trouble.value
     assert state.statuses.value[0].state == "captured"
+
+
+def test_a_camera_whose_pictures_are_wrong_is_not_lost(
+    bench: CalibrateBench, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    state, control = bench.wizard("selftest")
+    control.go_to(1)
+
+    def wrong(*_: object) -> None:
+        raise PictureError("White does not show its pattern. Switch automatic exposure off.")
+
+    monkeypatch.setattr(pipeline, "scan", wrong)
+    control.capture()
+    assert "automatic exposure" in state.trouble.value
+    assert not is_on(state.can_reconnect)
+    assert bench.rig.state.link.value is Link.OPEN
 
 
 def test_a_full_disk_costs_nothing_captured(bench: CalibrateBench, monkeypatch: pytest.MonkeyPatch) -> None:
