@@ -31,6 +31,7 @@ from dsl_app.shared.widgets.dialogs import dialog_buttons, resize_within
 from dsl_app.shared.widgets.forms import allow, label, push_button, set_role, show_label
 from dsl_app.shared.widgets.help_window import add_help_key
 from dsl_app.shared.widgets.hints import FocusRing
+from dsl_app.shared.widgets.inside import apply_theme_inside, apply_theme_to
 from dsl_app.shared.widgets.layouts import STRETCH, column_of, row_of, splitter
 from dsl_app.shared.widgets.read_table import ReadTable, cell
 from dsl_core.io.calibration_library import LibraryLine
@@ -108,6 +109,11 @@ class LibraryPanel(QGroupBox):
         """Show the details below the list, for a panel that is higher than wide, or next to it."""
         self._split.setOrientation(Qt.Orientation.Vertical if on else Qt.Orientation.Horizontal)
         self._split.setSizes([1000, 2000] if on else [3000, 2000])
+
+    def apply_theme(self, theme: Theme) -> None:
+        """Apply the colours of a theme, to the list wherever it is."""
+        apply_theme_to(self.table, theme)
+        apply_theme_inside(self, theme)
 
     def place_table(self, elsewhere: QWidget | None) -> None:
         """Put the list on another widget with a layout, or back before the details for None."""

@@ -17,6 +17,8 @@ class VerdictTable(ReadTable):
     def __init__(self, name: str, tip: str) -> None:
         super().__init__(name, tip, ("Figure", "Value", "Unit"))
         self.setMinimumWidth(TABLE_PX)
+        # In a wide window values stay next to the names that they belong to.
+        self.wrap(0, fills=False)
 
     def show_verdicts(self, verdicts: Iterable[Verdict]) -> None:
         """Show other figures."""

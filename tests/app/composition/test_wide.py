@@ -14,6 +14,7 @@ from dsl_app.results.page import ResultsPage
 from dsl_app.results.state import Tool
 from dsl_app.rig.page import RigPage
 from dsl_app.scan.page import ScanPage
+from dsl_app.shared.widgets.read_table import ReadTable
 from dsl_app.shell.main_window import MainWindow
 from dsl_app.shell.paged_window import LEAST
 from PySide6.QtCore import QPoint, Qt
@@ -103,6 +104,20 @@ def test_views_are_side_by_side_in_a_large_window_alone(
         share = results._sides.sizes()[0] / sum(results._sides.sizes())
         assert (share > 0.7) == is_large
     qtbot.waitUntil(lambda: not window.parts.runner.active, timeout=30_000)
+    window.close()
+
+
+def test_what_is_made_in_a_large_window_has_its_colours(qtbot: QtBot, tmp_path: Path) -> None:
+    """Parts that stand elsewhere in a large window would otherwise keep the colours of a dark one."""
+    window = Composition(StartOptions()).open_window(tmp_path / "home", "light")
+    show_window(qtbot, window)
+    window.resize(*HUGE)
+    calibrate = window.open_page("calibrate")
+    assert isinstance(calibrate, CalibratePage)
+    qtbot.waitUntil(lambda: calibrate._library.made is not None)
+    tables = window.findChildren(ReadTable)
+    assert calibrate.library.table in tables
+    assert not [table.accessibleName() for table in tables if table.theme is not window.theme]
     window.close()
 
 

@@ -149,7 +149,6 @@ class PairFigures(QSplitter):
         for curve, name in zip(self.curves, "AB", strict=True):
             self.legend.addItem(curve.solid, name)
         self.table = VerdictTable("Figures of the comparison", "Differences are A minus B")
-        self.table.wrap(0)
         set_help(self.table, "comparing#figures")
         self.setChildrenCollapsible(False)
         self.addWidget(self.plot)

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QKeySequence, QShortcut
-from PySide6.QtWidgets import QFileDialog, QHeaderView, QWidget
+from PySide6.QtWidgets import QFileDialog, QWidget
 
 from dsl_app.compare.series.controller import SeriesController
 from dsl_app.compare.series.picture import SeriesPicture
@@ -49,8 +49,6 @@ class SeriesPanel(QWidget):
         self.hint.setAlignment(Qt.AlignmentFlag.AlignTop)
         self.table = SeriesTable(state, control)
         self.figures = VerdictTable("Figures of the series", "The figures of all positions together")
-        self.figures.verticalHeader().setDefaultSectionSize(24)
-        self.figures.horizontalHeader().setSectionResizeMode(0, QHeaderView.ResizeMode.Stretch)
         # Slow to make: made when they are first seen.
         self.plot = Deferred(lambda: SeriesPlot(state))
         self.picture = Deferred(lambda: SeriesPicture(state, control))

@@ -50,6 +50,7 @@ class ReadTable(QTableWidget):
     def __init__(self, name: str, tip: str, heads: Sequence[str], rows: int = 0) -> None:
         super().__init__(rows, len(heads))
         self._wrapped: int | None = None
+        self._fills = True
         self._widened: int | None = None
         #: Said in its middle while it has no rows.
         self.empty_text = ""
@@ -66,9 +67,12 @@ class ReadTable(QTableWidget):
         header.setDefaultAlignment(LEFT)
         header.setSectionResizeMode(QHeaderView.ResizeMode.ResizeToContents)
 
-    def wrap(self, column: int) -> None:
-        """Let a column take the remaining width, but not less than `LEAST_WRAPPED_PX`, and wrap its lines."""
-        self._wrapped = column
+    def wrap(self, column: int, fills: bool = True) -> None:
+        """Let a column take the remaining width, but not less than `LEAST_WRAPPED_PX`, and wrap its lines.
+
+        One that does not fill takes no more than its texts need: what stands beside them stays near.
+        """
+        self._wrapped, self._fills = column, fills
         self.setItemDelegate(_Roomy(self))
         header = self.horizontalHeader()
         header.setSectionResizeMode(column, QHeaderView.ResizeMode.Stretch)
@@ -137,7 +141,12 @@ class ReadTable(QTableWidget):
         """Give a column what the others leave; if that is too little, scroll sideways."""
         header = self.horizontalHeader()
         others = sum(header.sectionSize(i) for i in range(header.count()) if i != column)
-        if least_px and self.viewport().width() - others < least_px:
+        left_px = self.viewport().width() - others
+        if not self._fills:
+            needed_px = max(self.sizeHintForColumn(column), header.sectionSizeHint(column))
+            header.setSectionResizeMode(column, QHeaderView.ResizeMode.Fixed)
+            header.resizeSection(column, max(least_px, min(left_px, needed_px)))
+        elif least_px and left_px < least_px:
             header.setSectionResizeMode(column, QHeaderView.ResizeMode.Fixed)
             header.resizeSection(column, least_px)
         else:

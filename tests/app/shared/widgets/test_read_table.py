@@ -28,6 +28,23 @@ def test_a_narrow_table_scrolls_instead_of_wrapping_single_words(
         assert header.length() == table.viewport().width()
 
 
+@pytest.mark.parametrize("width_px", [900, 300])
+def test_values_stay_next_to_names_that_are_wrapped_where_there_is_less_room(
+    qtbot: QtBot, width_px: int
+) -> None:
+    table = ReadTable("figures", "", ("Figure", "Value"))
+    table.wrap(0, fills=False)
+    qtbot.addWidget(table)
+    table.show_rows([[cell("Straightness with the slope fixed to one"), cell("0.0197 ± 0.0004", side=RIGHT)]])
+    table.resize(width_px, 200)
+    table.show()
+    header = table.horizontalHeader()
+    needed_px = table.sizeHintForColumn(0)
+    qtbot.waitUntil(lambda: header.sectionSize(0) == needed_px if width_px == 900 else header.length() < 300)
+    assert table.horizontalScrollBar().maximum() == 0
+    assert (table.rowHeight(0) > 2 * table.fontMetrics().height()) is (width_px == 300)
+
+
 def test_a_table_without_rows_says_what_will_be_there(qtbot: QtBot) -> None:
     table = ReadTable("Figures", "What was found", ("Name", "Verdict"))
     qtbot.addWidget(table)
