@@ -115,13 +115,13 @@ def _entries(file: Path, note: Callable[[str], None]) -> list[tuple[str, Spectra
     spectra, as_percent = shares_of(file, kind.read(file))
     if as_percent is not None:
         note(f"{file.name}: values up to {as_percent:.3g} are read as percent.")
-    if len(spectra) == 1 and not kind.is_library:
+    if len(spectra) == 1 and not kind.is_named:
         # The title over a single column is mostly "reflectance".
         spectra = [replace(spectra[0], name=file.stem)]
     content = as_references(file, spectra)
     if content.empty:
         note(f"{file.name}: without values and left out: {', '.join(content.empty[:5])}.")
-    return [(reference.name, reference.curve) for reference in content.references]
+    return [(reference.name or file.stem, reference.curve) for reference in content.references]
 
 
 def _grouped(

@@ -32,6 +32,16 @@ def test_folders_are_groups_and_any_format_is_read(tmp_path: Path) -> None:
     assert not notes
 
 
+@pytest.mark.parametrize(("title", "name"), [("Malachite, natural", "Malachite, natural"), ("", "m17")])
+def test_a_spectrum_alone_in_its_file_keeps_its_title_where_the_format_has_one(
+    tmp_path: Path, title: str, name: str
+) -> None:
+    head = f"##TITLE={title}\n##JCAMP-DX=4.24\n##XUNITS=NANOMETERS\n##YUNITS=REFLECTANCE\n"
+    values = "\n".join(f"{nm:g} {share:g}" for nm, share in zip(NM, SHARE, strict=True))
+    (tmp_path / "m17.jdx").write_text(f"{head}##XYPOINTS=(XY..XY)\n{values}\n##END=\n", encoding="utf-8")
+    assert [entry.name for entry in read_library([tmp_path]).entries] == [name]
+
+
 def test_what_lies_beside_the_subfolders_of_a_library_is_no_class_of_its_own(tmp_path: Path) -> None:
     for name in ("leaf", "sea"):
         _csv(tmp_path / f"{name}.csv", SHARE, titles=("reflectance",))

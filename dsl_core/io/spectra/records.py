@@ -45,14 +45,14 @@ class Format:
     """A kind of file: how to recognise it by its content, and how to read it.
 
     ``recognises`` gets the first `HEAD_BYTES` of the file; ``read`` returns every spectrum and raises
-    `CalibrationError`. In a library, the name of a spectrum says more than that of the file.
+    `CalibrationError`. ``is_named``: the name of a spectrum says more than that of its file, even alone.
     """
 
     name: str
     suffixes: tuple[str, ...]
     recognises: Callable[[Path, bytes], bool]
     read: Callable[[Path], list[Spectrum]]
-    is_library: bool = False
+    is_named: bool = False
 
 
 def content_of(path: Path) -> bytes:

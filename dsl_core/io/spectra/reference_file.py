@@ -44,7 +44,7 @@ def read_references(path: Path) -> ReferenceFile:
     """All reflectances of a file, whatever range they cover; raises `CalibrationError`."""
     kind = format_of(path)
     spectra, as_percent = shares_of(path, kind.read(path))
-    if len(spectra) == 1 and not kind.is_library:
+    if len(spectra) == 1 and not kind.is_named:
         spectra = [replace(spectra[0], name="")]
     return replace(as_references(path, spectra), as_percent=as_percent)
 

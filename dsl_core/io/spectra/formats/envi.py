@@ -21,5 +21,5 @@ FORMAT = Format(
     SUFFIXES,
     lambda path, head: path.suffix.lower() in SUFFIXES or head.startswith(b"ENVI\n"),
     read_envi,
-    is_library=True,
+    is_named=True,
 )

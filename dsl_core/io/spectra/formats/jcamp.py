@@ -152,4 +152,5 @@ FORMAT = Format(
     (".jdx", ".dx", ".jcm", ".jcamp"),
     lambda path, head: bool(re.search(rb"^\s*##\s*(?:TITLE|JCAMP)", head[:2048], re.IGNORECASE)),
     read_jcamp,
+    is_named=True,
 )

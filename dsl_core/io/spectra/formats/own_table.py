@@ -66,4 +66,4 @@ def _of_pixels(path: Path, head: list[str], rows: list[list[str]]) -> list[Spect
     return spectra
 
 
-FORMAT = Format("table of dsl-scan", (".csv",), is_own, read_own, is_library=True)
+FORMAT = Format("table of dsl-scan", (".csv",), is_own, read_own, is_named=True)
