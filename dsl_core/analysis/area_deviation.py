@@ -21,6 +21,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import distance_transform_edt
 
 from dsl_core.analysis.classify import ClassMap, Measure, Scores
 
@@ -47,8 +48,8 @@ def class_deviations(
 ) -> ClassDeviations | None:
     """Deviations of a map's classes; None where the scores are no probabilities.
 
-    ``areas_mm2`` and ``depth_relative_std`` (rows, columns): area of each pixel, and the deviation of its
-    depth as a share of it, 0 if it is not given.
+    ``areas_mm2`` and ``depth_relative_std`` (rows, columns): area of each pixel, NaN without a point, and the
+    deviation of its depth as a share of it, 0 if it is not given.
     """
     if scores.measure is not Measure.PROBABILITY:
         return None
@@ -56,13 +57,28 @@ def class_deviations(
     pixels[[0, shown.none, shown.unsure]] = np.nan
     if areas_mm2 is None:
         return ClassDeviations(pixels, None)
-    weights = np.nan_to_num(areas_mm2)
+    weights = _everywhere(areas_mm2)
     variance = _variance(scores, shown, weights)
+    # Pixels of a class that have no point are missing from its area.
+    pointless = np.where(np.isfinite(areas_mm2), 0.0, weights)
+    variance += np.bincount(shown.values.ravel(), pointless.ravel(), len(variance)) ** 2
     if depth_relative_std is not None:
         by_depth = 2 * weights * np.nan_to_num(depth_relative_std)
         variance += np.bincount(shown.values.ravel(), by_depth.ravel(), len(variance)) ** 2
     variance[[0, shown.none, shown.unsure]] = np.nan
     return ClassDeviations(pixels, np.sqrt(variance))
+
+
+def _everywhere(areas_mm2: Map) -> Map:
+    """Areas of all pixels: one without a point is as large as the nearest that has one.
+
+    Where nothing was measured a class may go on, for as much as elsewhere.
+    """
+    known = np.isfinite(areas_mm2)
+    if known.all() or not known.any():
+        return np.nan_to_num(areas_mm2)
+    nearest = distance_transform_edt(~known, return_distances=False, return_indices=True)
+    return np.asarray(areas_mm2[tuple(nearest)])
 
 
 def _variance(scores: Scores, shown: ClassMap, weights: Map) -> Map:

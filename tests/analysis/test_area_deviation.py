@@ -66,6 +66,21 @@ def test_probabilities_and_depth_add_to_edges() -> None:
     assert np.isnan(found.pixels[[0, shown.none, shown.unsure]]).all()
 
 
+@pytest.mark.parametrize("is_judged", [False, True])
+def test_pixels_without_a_point_may_hold_area_all_the_same(is_judged: bool) -> None:
+    """Saturated pixels in a white patch have neither class nor depth, and the patch goes on in them."""
+    scores = _scores(np.zeros((SIZE, SIZE), int))
+    lost = np.zeros((SIZE, SIZE), bool)
+    lost[4:36:4, 4:36:4] = True
+    if not is_judged:
+        scores.fit[lost] = 0
+    found = class_deviations(scores, ClassMap.of(scores), np.where(lost, np.nan, 2.0))
+    assert found is not None
+    assert found.areas_mm2 is not None
+    expected_mm2 = 2 * lost.sum() if is_judged else 2 * found.pixels[1]
+    assert found.areas_mm2[1] == pytest.approx(expected_mm2, rel=1e-3)
+
+
 def test_what_is_undecided_may_be_of_either_class() -> None:
     best = np.zeros((SIZE, SIZE), int)
     scores = _scores(best, 0.6)
