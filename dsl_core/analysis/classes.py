@@ -121,8 +121,8 @@ def classes_of_library(
     kept = tuple(summed_up(name, found) for name, found in members.items() if found)
     if not kept:
         raise CalibrationError(
-            f"No spectrum of the library covers {bands_nm[0]:g} to {bands_nm[-1]:g} nm. {notes[0]} Give the"
-            " range that library and result share, or choose another library."
+            f"No spectrum of the library covers {bands_nm[0]:g} to {bands_nm[-1]:g} nm. {notes[0]}"
+            " Choose a library that covers them, or give the command line the range that both have."
         )
     return kept, tuple(notes)
 

@@ -22,12 +22,14 @@ REPORT_STAYS_S = 30.0
 class Way:
     """How spectra are compared with classes.
 
-    ``library_error`` is the standard deviation of the spectra of a library, as a share of them.
+    ``library_error`` is the standard deviation of the spectra of a library, as a share of them; ``grouping``
+    says what of a library makes a class.
     """
 
     measure: Measure = Measure.PROBABILITY
     brightness: Brightness = "stated"
     library_error: float = 0.0
+    grouping: str = "auto"
 
 
 #: Reads or makes the classes for a result, with notes.
@@ -61,7 +63,7 @@ class AnswersController:
             from dsl_core.analysis.classes import classes_of_library
             from dsl_core.analysis.library import read_library
 
-            library = read_library([path], progress=progress)
+            library = read_library([path], way.grouping, progress=progress)
             found, left_out = classes_of_library(
                 library, result.wavelengths_nm, relative_error=way.library_error
             )

@@ -34,6 +34,15 @@ _MEASURES = (
     ("Spectral angle", Measure.ANGLE),
     ("Difference", Measure.RMSE),
 )
+_GROUPINGS = (
+    ("Classes: usual", "auto"),
+    ("Classes: names without numbers", "name"),
+    ("Classes: folders", "folder"),
+    ("Classes: files", "file"),
+    ("Classes: each spectrum", "none"),
+)
+#: With a larger share of undecided pixels, what to do about them matters more than any note.
+MOSTLY = 0.5
 #: Name, range, decimals, unit and explanation of the first limit.
 _WORST = {
     Measure.PROBABILITY: (
@@ -55,6 +64,7 @@ class MaterialsPanel(QWidget):
     def __init__(self, state: ResultsState, control: AnswersController) -> None:
         super().__init__()
         self._state, self._control, self._theme = state, control, DARK
+        self._library: Path | None = None
         self.measure = ChoiceBox(
             "By",
             "How spectra are compared: the probability by the deviations of the bands, the spectral angle, or"
@@ -73,6 +83,14 @@ class MaterialsPanel(QWidget):
             "What spectra of a library may be off by (standard deviation), such as 2 % where another"
             " instrument measured them; it widens what the probability allows",
         )
+        self.grouping = ChoiceBox(
+            "Classes of a library",
+            "What of a folder or file becomes a class: usually each subfolder or each name; 'leaf 1' and"
+            " 'leaf 2' are one class by names without numbers",
+            _GROUPINGS,
+            lambda _: self._regroup(),
+        )
+        self.grouping.be_narrow()
         self.worst = NumberBox("Limit", 0, 1, 0.01, "", 3)
         self.margin = NumberBox("Margin", 0, 1, 0.95, "", 2)
         self.folder = push_button("Folder…", "Classes are the spectra of a folder; its subfolders are groups")
@@ -96,7 +114,7 @@ class MaterialsPanel(QWidget):
         # "By" is not written: the smallest window has no room for it next to its picture.
         ways = row_of((self.measure, 1), self.free)
         limits = row_of(label("Limit"), self.worst, label("Margin"), self.margin, STRETCH)
-        error = row_of(label("Library error"), self.error, STRETCH)
+        error = row_of(label("Library error"), self.error, (self.grouping, 1))
         map_row = row_of(self.write, self.clear, STRETCH)
         column_of(sources, ways, error, limits, self.text, (self.table, 1), map_row, on=self, margins=0)
         self._keep_room()
@@ -120,13 +138,14 @@ class MaterialsPanel(QWidget):
     def way(self) -> Way:
         """How to compare, as it is chosen."""
         brightness: Brightness = "free" if self.free.isChecked() else "stated"
-        return Way(Measure(self.measure.currentData()), brightness, self.error.value() / 100)
+        error, grouping = self.error.value() / 100, self.grouping.currentData()
+        return Way(Measure(self.measure.currentData()), brightness, error, grouping)
 
     def choose_folder(self) -> None:
         """Ask for the folder of a library."""
         name = QFileDialog.getExistingDirectory(self, "A folder of spectra; its subfolders are groups")
         if name:
-            self._control.from_library(Path(name), self.way)
+            self.use_library(Path(name))
 
     def choose_file(self) -> None:
         """Ask for the file of a library."""
@@ -134,7 +153,18 @@ class MaterialsPanel(QWidget):
         kinds = f"Spectra ({kinds});;All files (*)"
         name, _ = QFileDialog.getOpenFileName(self, "A file of spectra", "", kinds)
         if name:
-            self._control.from_library(Path(name), self.way)
+            self.use_library(Path(name))
+
+    def use_library(self, path: Path) -> None:
+        """Look for the spectra of a file or folder."""
+        self._library = path
+        self._control.from_library(path, self.way)
+
+    def _regroup(self) -> None:
+        """Show the map by other classes of the same library, if it is by one."""
+        materials = self._state.materials.value
+        if materials is not None and self._library is not None and materials.name == self._library.name:
+            self._control.from_library(self._library, self.way)
 
     def choose_target(self) -> None:
         """Ask for a file and write the map."""
@@ -150,8 +180,8 @@ class MaterialsPanel(QWidget):
     def _new_measure(self) -> None:
         """Other limits belong to another measure; a map that is shown keeps its own."""
         measure = Measure(self.measure.currentData())
-        self.free.setEnabled(measure is Measure.PROBABILITY)
-        self.error.setEnabled(measure is Measure.PROBABILITY)
+        for box in (self.free, self.error):
+            allow(box, measure is Measure.PROBABILITY, "Belongs to the probability; choose that above.")
         self._offer_limits(measure, Limits.usual(measure))
 
     def _offer_limits(self, measure: Measure, limits: Limits) -> None:
@@ -203,6 +233,9 @@ def materials_text(materials: Materials) -> str:
     """
     classes = len(materials.found.shown.names)
     text = f"{counted(classes, 'class', 'classes')} by {materials.name}."
+    undecided = _undecided(materials)
+    if undecided > MOSTLY:
+        return f"{text} {100 * undecided:.0f} % undecided: classes are alike. Choose above what is one class."
     if materials.notes:
         # The file that a note is about was named just before.
         note, of_file = materials.notes[0], f"{materials.name}: "
@@ -212,6 +245,12 @@ def materials_text(materials: Materials) -> str:
         others = f" and {counted(len(materials.notes) - 1, 'more note')}" if len(materials.notes) > 1 else ""
         text += f" {first.rstrip('.')}{others}" + ("; point here for why." if colon or others else ".")
     return text
+
+
+def _undecided(materials: Materials) -> float:
+    """The share of judged pixels that are undecided."""
+    shown = materials.found.shown
+    return next((row.share or 0.0 for row in materials.found.rows if row.value == shown.unsure), 0.0)
 
 
 def _method(materials: Materials) -> str:

@@ -227,8 +227,8 @@ def show_button(button: QAbstractButton, state: ButtonState) -> None:
     set_role(button, "primary" if state.is_primary else "")
 
 
-def allow(button: QAbstractButton, on: bool, why: str = "") -> None:
-    """Let a button be pressed; else its tooltip begins with the reason ``why`` it cannot be."""
+def allow(button: QWidget, on: bool, why: str = "") -> None:
+    """Let a button be pressed or a value be set; else its tooltip begins with the reason ``why`` not."""
     button.setEnabled(on)
     own = button.property(_OWN_TIP)
     if not on and why:

@@ -23,7 +23,7 @@ from tests.app.support.results_bench import Bench as Window
 from tests.app.support.results_bench import bench as window
 from tests.app.support.results_controller import SQUARE, Bench
 from tests.app.support.results_controller import bench as bench
-from tests.app.support.small_result import BLUE, NM
+from tests.app.support.small_result import BLUE, NM, RED
 
 __all__ = ["bench", "window"]
 ANGLE = Way(Measure.ANGLE)
@@ -87,6 +87,24 @@ def test_what_a_library_may_be_off_by_belongs_to_its_classes(
     for way in (Way(), Way(library_error=0.05)):
         bench.control.answers.from_library(_library(tmp_path), way)
     assert told == [0.0, 0.05]
+
+
+def test_samples_that_are_alike_are_undecided_and_one_class_by_their_name(
+    bench: Bench, tmp_path: Path, qtbot: QtBot
+) -> None:
+    """A library of many samples of one material: the window says what to do, and lets it be done."""
+    panel = MaterialsPanel(bench.state, bench.control.answers)
+    qtbot.addWidget(panel)
+    spectra = np.stack([NM, BLUE, BLUE * 1.001, RED, RED * 1.001], axis=1)
+    rows = [",".join(f"{value:.5f}" for value in row) for row in spectra]
+    path = tmp_path / "samples.csv"
+    path.write_text("\n".join(["nm,blue 1,blue 2,red 1,red 2", *rows]), encoding="utf-8")
+    panel.use_library(path)
+    assert "undecided: classes are alike" in panel.text.text()
+    panel.grouping.choose("name")
+    panel.grouping.activated.emit(panel.grouping.currentIndex())
+    assert _shown(bench).found.shown.names == ("blue", "red")
+    assert "undecided" not in panel.text.text()
 
 
 def test_points_have_the_colour_of_their_class() -> None:
