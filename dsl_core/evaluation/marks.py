@@ -14,6 +14,8 @@ from dsl_core.model.result import REASONS, Flag
 
 Mask = NDArray[np.bool_]
 Floats = NDArray[np.float32] | NDArray[np.float64]
+#: Of fifty bands one is so many deviations off by chance in one of three hundred pairs.
+SHOWN_FROM = 4.0
 
 
 def mask_of_outline(outline_px: Sequence[tuple[float, float]], shape: tuple[int, int]) -> Mask:
@@ -157,6 +159,33 @@ def distance_between(a_mm: Floats, b_mm: Floats, a_std_mm: float = 0.0, b_std_mm
     along = between / length
     shift_a, shift_b = a_std_mm * along @ (a / a[2]), b_std_mm * along @ (b / b[2])
     return Distance(length, float(np.hypot(shift_a, shift_b)))
+
+
+@dataclass(frozen=True)
+class Difference:
+    """Where two spectra differ most for their deviations: difference of reflectance, its deviation, nm."""
+
+    value: float
+    std: float
+    nm: float
+
+    @property
+    def is_shown(self) -> bool:
+        """Whether it is more than deviations of this many bands make by chance."""
+        return abs(self.value) > SHOWN_FROM * self.std
+
+
+def largest_difference(nm: Floats, a: Floats, b: Floats, a_std: Floats, b_std: Floats) -> Difference | None:
+    """The band (bands,) in which ``a - b`` is the most deviations from zero; None where none is known.
+
+    Errors of both are taken as independent: what two marks have in common makes them no less alike.
+    """
+    difference, std = np.asarray(a, np.float64) - b, np.hypot(a_std, b_std)
+    known = np.flatnonzero(np.isfinite(difference) & (std > 0))
+    if known.size == 0:
+        return None
+    most = known[np.argmax(np.abs(difference[known]) / std[known])]
+    return Difference(float(difference[most]), float(std[most]), float(nm[most]))
 
 
 def on_screen(points_mm: Floats, projection: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -86,3 +86,13 @@ def likeness(
     """Compare each pixel of (bands, rows, columns) with a spectrum (bands,); raises `DecodeError`."""
     angles = angle_map(cube, spectrum)
     return Likeness(colour_difference_map(cube, spectrum, wavelengths_nm, progress), angles)
+
+
+def angle_noise(cube: Floats, std: Floats) -> Map:
+    """The angle (rad) that the deviations of each pixel make alone; cubes of (bands, rows, columns)."""
+    noise, length = (
+        np.sqrt(np.sum([np.nan_to_num(band) ** 2 for band in each], axis=0, dtype=np.float64))
+        for each in (std, cube)
+    )
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.asarray(np.arctan2(noise, length), np.float32)

@@ -8,6 +8,7 @@ from hypothesis import strategies as st
 from dsl_core.evaluation.marks import (
     distance_between,
     explain_pixel,
+    largest_difference,
     mask_of_outline,
     mask_of_runs,
     nearest_on_screen,
@@ -91,3 +92,15 @@ def test_reasons_name_bands_and_deviations() -> None:
     assert any("430–440 nm" in line for line in text)
     assert any("±1.2 mm" in line for line in text)
     assert explain_pixel(0, NM) == []
+
+
+def test_two_spectra_differ_where_it_is_clearest_for_their_deviations() -> None:
+    nm, a, b = np.array([450.0, 500.0, 550.0]), np.array([0.2, 0.3, np.nan]), np.array([0.1, 0.319, 0.3])
+    found = largest_difference(nm, a, b, np.array([0.06, 0.003, 0.0]), np.array([0.08, 0.004, 0.0]))
+    assert found is not None
+    assert (found.value, found.std, found.nm) == (pytest.approx(-0.019), pytest.approx(0.005), 500.0)
+    assert not found.is_shown
+    found = largest_difference(nm, a, b, np.full(3, 0.003), np.full(3, 0.004))
+    assert found is not None
+    assert found.is_shown
+    assert largest_difference(nm, a, b, np.zeros(3), np.zeros(3)) is None

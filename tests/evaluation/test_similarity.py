@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from dsl_core.errors import DecodeError
-from dsl_core.evaluation.similarity import angle_map, likeness, spectrum_at
+from dsl_core.evaluation.similarity import angle_map, angle_noise, likeness, spectrum_at
 
 NM = np.arange(430.0, 661.0, 5.0)
 
@@ -42,3 +42,14 @@ def test_a_spectrum_is_not_continued_beyond_its_ends() -> None:
     for low, high in ((400.0, 550.0), (436.0, 700.0)):
         with pytest.raises(DecodeError, match=rf"{low:g} to {high:g} nm.*430 to 660 nm"):
             spectrum_at(bands, np.array([low, high]), np.array([0.1, 0.3]))
+
+
+def test_deviations_alone_make_an_angle() -> None:
+    cube, std = np.full((4, 1, 1), 0.5), np.full((4, 1, 1), 0.05)
+    rng = np.random.default_rng(2)
+    noisy = rng.normal(np.full((4, 1, 500), 0.5), 0.05)
+    # Three of four directions turn a spectrum, the fourth makes it longer.
+    assert float(angle_noise(cube, std)[0, 0]) == pytest.approx(0.0997, abs=1e-3)
+    assert np.sqrt(np.mean(angle_map(noisy, cube[:, 0, 0]) ** 2)) == pytest.approx(
+        0.0997 * np.sqrt(3 / 4), rel=0.1
+    )

@@ -118,13 +118,17 @@ class SearchMode(Enum):
 
 @dataclass(frozen=True)
 class Search:
-    """A search for the spectrum of a mark or pixel, with its limits."""
+    """A search for the spectrum of a mark or pixel, with its limits.
+
+    ``noise_rad`` (rows, columns) is the angle that deviations make alone; None where they are not known.
+    """
 
     name: str
     likeness: Likeness
     mode: SearchMode = SearchMode.SPECTRUM
     within_rad: float = 0.05
     within_delta_e: float = 2.0
+    noise_rad: Floats | None = None
 
     @property
     def found(self) -> NDArray[np.bool_]:
@@ -138,6 +142,14 @@ class Search:
         """Share found of the pixels that have a spectrum; None where no pixel has one."""
         known = int(np.isfinite(self.likeness.angle_rad).sum())
         return int(self.found.sum()) / known if known else None
+
+    @property
+    def noise_of_alike_rad(self) -> float:
+        """The angle that deviations make alone in most pixels of the same colour; 0 if it is not known."""
+        if self.noise_rad is None:
+            return 0.0
+        noise = self.noise_rad[self.likeness.delta_e <= self.within_delta_e]
+        return float(np.median(noise)) if noise.size else 0.0
 
 
 @dataclass(frozen=True, eq=False)

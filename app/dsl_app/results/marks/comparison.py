@@ -1,4 +1,4 @@
-"""The selected mark as rich text: compared with references, and its distances to other pins."""
+"""The selected mark as rich text: compared with other marks and references, and its distances to pins."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from dsl_app.results.state import Mark, ResultsState
 from dsl_app.shared.spectrum import Spectrum, number_text
 from dsl_app.shared.theme import Theme
 from dsl_core.errors import DslError
-from dsl_core.evaluation.marks import distance_between
+from dsl_core.evaluation.marks import distance_between, largest_difference
 from dsl_core.evaluation.spectral import compare
 from dsl_core.io.result.result_arrays import ResultArrays
 from dsl_core.model.figure import with_std
@@ -28,6 +28,7 @@ def comparison_html(state: ResultsState, theme: Theme) -> str:
     shown = [mark for mark in state.marks.value if mark.shown and not mark.trouble and mark.key != chosen.key]
     return (
         region_table(chosen, state.band.value, theme)
+        + difference_table(chosen, shown, theme)
         + comparison_table(chosen, shown, theme)
         + distance_table(chosen, shown, result, theme)
     )
@@ -58,6 +59,27 @@ def region_table(chosen: Mark, band: int, theme: Theme) -> str:
     return _table(head, rows, theme)
 
 
+def difference_table(chosen: Mark, others: list[Mark], theme: Theme) -> str:
+    """Whether marks of the scan differ, by the band that shows it best."""
+    rows = []
+    for mark in others:
+        a, b = chosen.spectrum, mark.spectrum
+        if chosen.curve is not None or mark.curve is not None or a.std is None or b.std is None:
+            continue
+        found = largest_difference(a.nm, a.mean, b.mean, a.std, b.std) if len(a.nm) == len(b.nm) else None
+        if found is None:
+            continue
+        figures = (
+            with_std(found.value, found.std, 4),
+            f"{found.nm:g} nm",
+            "yes" if found.is_shown else "not shown",
+        )
+        cells = "".join(f"<td align='right'>{figure.replace('-', '−')}</td>" for figure in figures)
+        rows.append(f"<tr><td>{escape(mark.name)}</td>{cells}</tr>")
+    head = [f"{escape(chosen.name)} minus", "reflectance", "clearest at", "differ?"]
+    return _table(head, rows, theme)
+
+
 def comparison_table(chosen: Mark, others: list[Mark], theme: Theme) -> str:
     """A spectrum compared with every reference, or a reference with every spectrum.
 
@@ -68,7 +90,7 @@ def comparison_table(chosen: Mark, others: list[Mark], theme: Theme) -> str:
         measured, reference = (mark, chosen) if chosen.curve is not None else (chosen, mark)
         if measured.curve is None and reference.curve is not None:
             rows += _compared(mark.name, measured.spectrum, reference.curve, theme)
-    return _table([f"{escape(chosen.name)} against", "RMSE", "angle, rad", "ΔE00", "×"], rows, theme)
+    return _table([f"{escape(chosen.name)} against", "RMSE", "angle, rad", "ΔE00", "scale"], rows, theme)
 
 
 def _compared(name: str, spectrum: Spectrum, curve: SpectralCurve, theme: Theme) -> list[str]:

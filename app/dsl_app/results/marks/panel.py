@@ -82,8 +82,8 @@ class MarksPanel(QWidget):
             header.setSectionResizeMode(column, QHeaderView.ResizeMode.ResizeToContents)
         self.hint = label(EMPTY, "muted", wraps=True)
         # A label would lay out a long table several times.
-        tip = "The selected mark compared with references, and its distance from other pins"
-        self.figures = named(QTextBrowser(), "Comparison with references", tip)
+        tip = "The selected mark compared with other marks and references, and its distance from other pins"
+        self.figures = named(QTextBrowser(), "Comparison of the selected mark", tip)
         FocusRing(self.figures)
         # In a narrow panel a figure is scrolled to, not broken in two.
         self.figures.setWordWrapMode(QTextOption.WrapMode.WordWrap)

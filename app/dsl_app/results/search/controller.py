@@ -27,13 +27,14 @@ class SearchController:
             return
 
         def work(progress: Progress) -> Search:
-            from dsl_core.evaluation.similarity import likeness, spectrum_at
+            from dsl_core.evaluation.similarity import angle_noise, likeness, spectrum_at
 
-            nm = result.wavelengths_nm
+            nm, std = result.wavelengths_nm, result.known("reflectance_std")
             return Search(
                 name,
                 likeness(result["reflectance"], spectrum_at(nm, target.nm, target.mean), nm, progress),
                 mode,
+                noise_rad=None if std is None else angle_noise(result["reflectance"], std),
             )
 
         def done(search: Search) -> None:

@@ -13,6 +13,9 @@ from dsl_core.words import capitalised
 
 HINT = "Select a pin, region or reference, or point at a pixel; then search the whole picture for it."
 
+#: A limit so many times the angle that deviations make alone is exceeded by few pixels by chance.
+CLEAR_OF_NOISE = 2.0
+
 
 class SearchPanel(QWidget):
     """Follows the search of a state and asks its controller."""
@@ -84,4 +87,11 @@ def search_text(search: Search | None) -> str:
             f" {search.within_rad:g} rad"
         ),
     }
-    return f"{100 * search.share:.2f} % of the pixels with a spectrum {criteria[search.mode]}."
+    found = f"{100 * search.share:.2f} % of the pixels with a spectrum {criteria[search.mode]}."
+    noise = search.noise_of_alike_rad
+    if noise <= search.within_rad / CLEAR_OF_NOISE:
+        return found
+    return (
+        f"{found} Deviations alone make angles of about {noise:.2g} rad here: choose {CLEAR_OF_NOISE:g} times"
+        " that, or more."
+    )

@@ -35,6 +35,18 @@ def test_a_pin_is_compared_with_references_and_measured_to_other_pins(bench: Ben
     assert "double" not in select(bench, 0)
 
 
+def test_pins_say_whether_they_differ_by_more_than_their_deviations(bench: Bench) -> None:
+    bench.control.marks.pin((3, 3))
+    bench.control.marks.pin((3, 13))
+    assert "not shown" in select(bench, 0)
+    bench.control.marks.pin((30, 5))
+    html = select(bench, 0)
+    assert "pin 1 minus" in html
+    assert html.count("not shown") == 1
+    assert html.count("yes") == 1
+    assert "±" in html
+
+
 def test_regions_have_no_distance(bench: Bench, tmp_path: Path) -> None:
     bench.control.marks.add_outline(SQUARE)
     bench.control.marks.pin((3, 3))

@@ -22,3 +22,18 @@ def test_the_search_is_shown_with_its_share(bench: Bench) -> None:
     assert search.within_rad == 0.2
     panel.clear.click()
     assert not bench.page.image.content.overlay.isVisible()
+
+
+def test_pixels_that_differ_by_their_noise_alone_are_told(bench: Bench) -> None:
+    """Half of one patch would otherwise be called another pigment of the same colour."""
+    bench.control.point_at((30, 5))
+    panel = bench.page.search.content
+    panel.start.click()
+    search = bench.state.search.value
+    assert search is not None
+    assert search.noise_of_alike_rad > 0
+    limit = 2 * search.noise_of_alike_rad
+    panel.angle.setValue(limit + 0.01)
+    assert "Deviations alone" not in panel.text.text()
+    panel.angle.setValue(limit / 2)
+    assert f"angles of about {limit / 2:.2g} rad here" in panel.text.text()
