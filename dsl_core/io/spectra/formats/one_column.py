@@ -62,10 +62,11 @@ def read_one_column(path: Path) -> list[Spectrum]:
     record = _RECORD.match(header)
     if record is None:
         return [Spectrum("", nm, values)]
-    *words, instrument, kind = ["", "", *record["said"].split()]
-    if kind not in _QUANTITIES:
-        return [Spectrum(" ".join(record["said"].split()), nm, values)]
-    return [Spectrum(" ".join(filter(None, words)) or instrument, nm, values, _QUANTITIES[kind], True)]
+    words = str(record["said"]).split()
+    if len(words) < 3 or words[-1] not in _QUANTITIES:
+        return [Spectrum(" ".join(words), nm, values)]
+    # Last come the instrument and the quantity.
+    return [Spectrum(" ".join(words[:-2]), nm, values, _QUANTITIES[words[-1]], True)]
 
 
 def _wavelengths_of(path: Path, header: str, count: int) -> Floats:
@@ -136,5 +137,5 @@ def _is_number(line: str) -> bool:
 
 
 FORMAT = Format(
-    "a column with its wavelengths in another file", (), is_one_column, read_one_column, is_library=True
+    "a column with its wavelengths in another file", (), is_one_column, read_one_column, is_named=True
 )
