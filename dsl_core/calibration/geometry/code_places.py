@@ -7,6 +7,7 @@ tells the coarser stripe that it sees, whose middle is its place with a larger d
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -60,7 +61,9 @@ def code_places(frames: PoseFrames, projector_size_px: tuple[int, int]) -> CodeP
     return CodePlaces(px, np.stack(steps) / np.sqrt(12), float((read & beyond).sum() / max(read.sum(), 1)))
 
 
-def _stripes(pairs: list[tuple[NDArray, NDArray]], light: NDArray[np.floating]) -> tuple[Floats, Floats]:
+def _stripes(
+    pairs: list[tuple[NDArray[Any], NDArray[Any]]], light: NDArray[np.floating]
+) -> tuple[Floats, Floats]:
     """First pixel and width (px) of the finest stripe that each pixel (rows, columns) tells; NaN for none."""
     index, digit = np.zeros(light.shape, np.int64), np.zeros(light.shape, bool)
     left, clear = np.full(light.shape, len(pairs)), np.ones(light.shape, bool)

@@ -14,6 +14,7 @@ from dsl_core.model.spectral import WavelengthGrid
 from dsl_core.optics.parallax import parallax_of
 from dsl_core.reconstruction.findings.band_findings import band_findings, line_width_nm
 from dsl_core.reconstruction.findings.flag_findings import SpectralCounts, share_findings
+from dsl_core.reconstruction.findings.line_edges import edge_findings
 from dsl_core.reconstruction.findings.model_findings import cause_findings
 from dsl_core.reconstruction.spectral.model_error import ModelError
 from dsl_core.reconstruction.spectral.self_correction import Followed
@@ -37,6 +38,7 @@ def fit_of(
     findings = [*earlier]
     blurred = any(finding.significant and finding.part == "focus" for finding in findings)
     findings += share_findings(flags, spectra, blurred)
+    findings += edge_findings(plan, flags)
     findings.append(_of_parallax(rig, depth_mm))
     width_nm = line_width_nm(rig, plan, grid, depth_mm)
     if spectra is not None and width_nm is not None:
