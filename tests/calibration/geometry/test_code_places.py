@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from dsl_core.calibration.geometry.code_places import CodePlaces, code_places
 from dsl_core.model.calibration.pose_frames import PoseFrames
@@ -13,9 +14,7 @@ from tests.cases.code_frames import code_images
 PROJECTOR_PX = (128, 96)
 
 
-def _places(
-    wide: int, first: int = 0
-) -> tuple[CodePlaces, np.ndarray[tuple[int, ...], np.dtype[np.float64]]]:
+def _places(wide: int, first: int = 0) -> tuple[CodePlaces, NDArray[np.float64]]:
     """What pixels tell that each see ``wide`` columns and rows, and the middles of those columns."""
     pictures = []
     for pattern in code_images(GrayCode(), PROJECTOR_PX):
@@ -23,7 +22,7 @@ def _places(
         rows, columns = seen.shape[0] // wide, seen.shape[1] // wide
         pictures.append(seen.reshape(rows, wide, columns, wide).mean((1, 3)) * 0.8 + 4)
     code = code_places(PoseFrames("pose_0", pictures[:-2], pictures[-2], pictures[-1]), PROJECTOR_PX)
-    return code, first + wide * np.arange(code.px.shape[2]) + (wide - 1) / 2
+    return code, np.asarray(first + wide * np.arange(code.px.shape[2]) + (wide - 1) / 2, np.float64)
 
 
 def test_every_bit_that_is_clear_counts() -> None:
