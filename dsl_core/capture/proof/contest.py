@@ -67,7 +67,7 @@ def ballots(seen: Floats, wanted: Floats, rival: Floats) -> Floats:
     votes = 2 * seen - wanted
     votes -= rival
     votes /= wanted - rival
-    return np.minimum(np.maximum(votes, -1, out=votes), 1, out=votes)
+    return np.asarray(np.minimum(np.maximum(votes, -1, out=votes), 1, out=votes))
 
 
 def counted(votes: Floats) -> Contest:
