@@ -20,6 +20,8 @@ from dsl_core.model.plan import CapturePlan, Shot
 
 #: How far the light of a colour may be from that of green, as a share, and in deviations.
 LEAST, SIGMAS = 0.03, 6.0
+#: Light of a colour says something where it is so many deviations bright: nearly all of white may saturate.
+BRIGHT_SIGMAS = 24.0
 
 
 @dataclass(frozen=True)
@@ -77,8 +79,10 @@ def _compared(
             for pair in (before, now)
         )
         variance = sum(float(noise.variance(each)[of].sum(dtype=np.float64)) for each in (*before, *now))
-        if first > 0:
+        if first > BRIGHT_SIGMAS * np.sqrt(variance):
             ratios[colour], stds[colour] = second / first, np.sqrt(variance) / first
+    if not np.isfinite(ratios[1]):
+        return None
     apart = np.abs(ratios / ratios[1] - 1)
     told = apart > np.maximum(LEAST, SIGMAS * np.hypot(stds, stds[1]))
     if not told.any():

@@ -62,3 +62,9 @@ def test_a_colour_that_saturates_only_later_says_nothing() -> None:
     seen = found(1.5, 1.0, 0.9, light=of_colours(3500.0, WHITE_DN, WHITE_DN))
     assert seen is not None
     assert "in red" not in seen.sentence
+
+
+def test_what_little_of_white_does_not_saturate_says_nothing() -> None:
+    light = np.full(SIZE[::-1], 5000.0)
+    light[:, :4] = 2.0
+    assert found(1.0, 0.0, 1.0, light=light) is None
