@@ -19,7 +19,7 @@ def line(at: int, leds: tuple[float, float, float] = (1, 1, 1)) -> Counts:
     """A line of so much light of each LED, from a column of the picture on, as a raster with noise."""
     column = np.arange(SIZE[0] * SIZE[1]) % SIZE[0]
     light = 1000 * (np.array(leds) @ LEDS)[CHANNELS] * ((column >= at) & (column < at + 6))
-    return np.random.default_rng(at).poisson(light + 4).astype(np.uint16) + np.uint16(60)
+    return np.asarray(np.random.default_rng(at).poisson(light + 4) + 60, np.uint16)
 
 
 def mixed(led: int) -> Counts:
