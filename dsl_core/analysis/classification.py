@@ -126,6 +126,8 @@ def classify_result(
 def within_nm(result: xr.Dataset, low_nm: float, high_nm: float) -> xr.Dataset:
     """The result with its bands between two wavelengths only; raises `DecodeError` where fewer than 3 are."""
     require_spectra(result)
+    if high_nm < low_nm:
+        raise DecodeError(f"The range goes from {low_nm:g} down to {high_nm:g} nm. Give its lower end first.")
     nm = result["wavelength_nm"].values
     kept = np.flatnonzero((nm >= low_nm) & (nm <= high_nm))
     if len(kept) < FEWEST_BANDS:

@@ -108,6 +108,7 @@ def test_the_face_of_python_tells_colours() -> None:
         ),
         ({}, "Give a library of spectra, pins, or both"),
         ({"pins": {"x": (5, 5)}, "range_nm": (100, 200)}, "Only 0 bands"),
+        ({"pins": {"x": (5, 5)}, "range_nm": (600, 500)}, "Give its lower end first"),
     ],
 )
 def test_wrong_places_are_told(options, words: str) -> None:  # type: ignore[no-untyped-def]
