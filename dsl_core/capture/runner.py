@@ -18,7 +18,7 @@ from dsl_core.capture.exposure import PatternImage, RetryPolicy, ShotTaker
 from dsl_core.capture.overexposure import ExposureWatch
 from dsl_core.capture.preflight import require_possible
 from dsl_core.capture.proof.verifier import FrameProof
-from dsl_core.capture.proven import ProvenShots
+from dsl_core.capture.proven.shots import ProvenShots
 from dsl_core.capture.put_back import ADVICE, PutBack
 from dsl_core.capture.sentinels import SentinelWatch
 from dsl_core.devices.base import DeviceRig

@@ -9,7 +9,7 @@ import pytest
 from dsl_core import pipeline
 from dsl_core.campaign.common.recipe import Bench, Step, naming
 from dsl_core.campaign.common.white_shot import FilterNote, note_of_filter
-from dsl_core.capture.proven import PictureError
+from dsl_core.capture.proven.wrong_pictures import PictureError
 from dsl_core.errors import CalibrationError, Cancelled, DecodeError, StoreError
 from dsl_core.model.placement import Placement
 from dsl_core.model.plan import CapturePlan, Columns, NoCode, Setting

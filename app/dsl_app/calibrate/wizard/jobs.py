@@ -140,6 +140,6 @@ class WizardJobs:
 
 def _is_of_a_lost_device(error: Exception) -> bool:
     """Whether a device no longer answers; one whose pictures are wrong does, and needs another remedy."""
-    from dsl_core.capture.proven import PictureError
+    from dsl_core.capture.proven.wrong_pictures import PictureError
 
     return isinstance(error, DeviceError) and not isinstance(error, (DriftError, PictureError))

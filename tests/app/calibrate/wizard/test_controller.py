@@ -14,7 +14,7 @@ from dsl_app.calibrate.wizard.state import Doing, WizardState
 from dsl_app.connection.state import Link
 
 from dsl_core import pipeline
-from dsl_core.capture.proven import PictureError
+from dsl_core.capture.proven.wrong_pictures import PictureError
 from dsl_core.devices.base import DeviceRig
 from dsl_core.errors import CalibrationError, DeviceError, StoreError
 from dsl_core.io.campaign_folder import CampaignFolder

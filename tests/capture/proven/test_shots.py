@@ -13,7 +13,8 @@ from dsl_core.capture.proof.finding import Finding, Verdict
 from dsl_core.capture.proof.lasting.levels import at_half_level
 from dsl_core.capture.proof.raster import Counts
 from dsl_core.capture.proof.verifier import FrameProof
-from dsl_core.capture.proven import JUST_BEFORE, SETTLE_MS
+from dsl_core.capture.proven.doubted import JUST_BEFORE
+from dsl_core.capture.proven.shots import SETTLE_MS
 from dsl_core.capture.runner import Runner, State
 from dsl_core.errors import DeviceError
 from dsl_core.model.plan import CapturePlan, GrayCode, LineComb, Setting, Shot

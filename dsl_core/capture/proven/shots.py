@@ -16,6 +16,8 @@ from dsl_core.capture.exposure import ShotTaker
 from dsl_core.capture.proof.finding import Finding, Light, Verdict
 from dsl_core.capture.proof.light_sums import light_sentence
 from dsl_core.capture.proof.verifier import FrameProof
+from dsl_core.capture.proven.doubted import MOST_UNTOLD, DoubtedShots
+from dsl_core.capture.proven.wrong_pictures import PictureError, what_to_do
 from dsl_core.capture.put_back import ADVICE
 from dsl_core.errors import Cancelled, DeviceError
 from dsl_core.model.frames import Frame, FrameSink, FrameSource, NotedSource
@@ -38,48 +40,10 @@ CURED_OFTEN, CURED_WITHIN = 8, 16
 IN_PART = (Verdict.TORN, Verdict.EXPOSURE)
 #: Of doubtful pictures that come out the same again, every so many are followed by a control.
 CONTROL_EVERY = 8
-#: A change may begin a little before it shows: so many pictures before one that stays wrong are withdrawn.
-JUST_BEFORE = 8
 #: Pictures that are wrong like this, though nothing has changed that anybody could name, may have become so
 #: slowly: nobody knows since when.
 CREEPING = (Verdict.EXPOSURE, Verdict.OTHER, Verdict.DISPLACED)
-#: Lines that are wrong like this while white, black and code look as at first have lost light of their own.
-DIM = (Verdict.DARK, Verdict.EXPOSURE)
-_DIMMED = (
-    "White, black and a frame of the code, captured once more, look as they did: the projector may give dark"
-    " pictures less light than bright ones. Switch its dynamic contrast, iris and eco mode off, check that"
-    " the exposure is long enough, and resume the scan."
-)
-#: The same of the first pictures at a drive level of their own.
-_TONE = (
-    "White, black and a frame of the code, captured once more, look as they did: the projector gives another"
-    " share of its light at this drive level than its calibration says, the camera's values are not"
-    " proportional to the light, or it exposes for longer or shorter than requested. Repeat the self-test,"
-    " which measures how light follows the level, or use one level in all settings; or switch gamma,"
-    " automatic exposure and gain of the camera off, and resume the scan."
-)
-#: The same of stripes of the code of which coarser ones show nothing wrong.
-_FINE = (
-    "Coarser stripes of the code are right and these are not: the projector's picture is scaled (a resolution"
-    " that is not its own, overscan, keystone) or sharpened, or something is out of focus or trembles. Send"
-    " the projector pictures of its own size, switch such corrections off, check the focus, and resume the"
-    " scan."
-)
-#: On resuming, so many shots before a missing one are captured again where nothing can be told of them.
-MOST_UNTOLD = 32
 _log = logging.getLogger(__name__)
-
-
-class PictureError(DeviceError):
-    """Pictures do not show their pattern, however often they are taken; ``wrong`` are their shots.
-
-    ``has_changed``: devices, light or scene are not as they were, and nobody knows since when.
-    """
-
-    def __init__(self, message: str, wrong: tuple[Shot, ...] = (), *, has_changed: bool = False) -> None:
-        """Keep the sentence and the shots."""
-        super().__init__(message)
-        self.wrong, self.has_changed = wrong, has_changed
 
 
 class ProvenShots:
@@ -103,17 +67,11 @@ class ProvenShots:
         self._failures = 0
         self._unlike_at = 0
         self._is_late = self._is_in_part = self._has_late_colour = False
-        self._untold: list[Shot] = []
-        self._recent: deque[Shot] = deque(maxlen=JUST_BEFORE)
-        #: What was saved since an old picture, taken again, last looked as it did at first.
-        self._since_sound: set[Shot] = set()
-        #: What was saved of the first code, until it is whole: its pictures are judged by each other.
-        self._of_code: set[Shot] = set()
+        self._doubted = DoubtedShots()
         self._doubts = 0
         self._has_seen_first = False
         #: What is wrong with light and places of the first code, as soon as that is known.
         self._light = ""
-        self._passed: deque[Shot] = deque(maxlen=MOST_UNTOLD)
         self._late_at: deque[int] = deque(maxlen=LATE_OFTEN)
         self._cured_at: deque[int] = deque(maxlen=CURED_OFTEN)
         #: Shots that were taken again because a picture did not show their pattern.
@@ -180,13 +138,13 @@ class ProvenShots:
 
         Raises `DeviceError` if they are not, after withdrawing those pictures.
         """
-        if self._proof is None or not self._untold:
+        if self._proof is None or not self._doubted.untold:
             return
         try:
             self._require_control(self._proof)
         except PictureError as error:
             self._withdraw(error)
-        self._untold.clear()
+        self._doubted.untold.clear()
 
     def _take(self, shot: Shot) -> None:
         if self._proof is not None and self._is_alone(shot):
@@ -208,16 +166,15 @@ class ProvenShots:
         elif found.verdict is Verdict.RIGHT:
             self._failures, self._is_in_part = 0, False
         if _is_sure(found):
-            self._passed.extend(self._untold)
-            self._untold.clear()
+            self._doubted.trust_untold()
         if found.verdict is Verdict.LATE or found.colour:
             self._count_late(found)
         self._correct(found, self._proof)
         if self._is_late:
             return
         if len(self._late_at) == LATE_OFTEN and shot.index - self._late_at[0] <= LATE_WITHIN:
-            # A right picture says nothing of those before it, where late ones come and go.
-            self._untold = [*self._passed, *self._untold]
+            # Late ones come and go.
+            self._doubted.doubt_passed()
             self._be_late(shot, self._proof)
         elif self._failures >= FAILURES:
             self._be_late(shot, self._proof)
@@ -233,22 +190,19 @@ class ProvenShots:
         """Save a picture that was not found wrong, and note if little is known of it."""
         self._sink.write(shot, frame)
         self._diagnosis.keep(shot, frame.pixels)
-        self._recent.append(shot)
         if self._proof is not None:
             self._date(shot, frame.pixels, self._proof)
-        if not _is_sure(found) and self._is_alone(shot) and shot not in self._untold:
-            self._untold.append(shot)
+        self._doubted.add(shot, is_untold=not _is_sure(found) and self._is_alone(shot))
 
     def _date(self, shot: Shot, pixels: NDArray[np.uint16], proof: FrameProof) -> None:
         """Note since when nobody has seen that devices, light and scene are as they were."""
         if shot.role == "sentinel":
             if proof.scene.is_unchanged(replace(shot, index=shot.pattern), pixels):
-                self._since_sound.clear()
+                self._doubted.settle_all()
         elif self._is_alone(shot):
-            self._since_sound.add(shot)
-            self._of_code.clear()
+            self._doubted.add_alone(shot)
         else:
-            self._of_code.add(shot)
+            self._doubted.add_code(shot)
 
     def _is_alone(self, shot: Shot) -> bool:
         """Whether a shot is judged by itself: those of the first code are by what they are together."""
@@ -321,7 +275,7 @@ class ProvenShots:
             change = self._explain()
             raise PictureError(
                 f"{found.names.capitalize()} does not show its pattern after {len(SETTLE_MS) + 1} exposures:"
-                f" {found.seen}. {_what_to_do(found, change, proof)} Frames before it are saved. If the"
+                f" {found.seen}. {what_to_do(found, change, proof)} Frames before it are saved. If the"
                 " pictures are right all the same, resume without checking that the scene has not moved.",
                 found.again,
                 has_changed=change.has_moved or (not change.sentence and found.verdict in CREEPING),
@@ -337,14 +291,14 @@ class ProvenShots:
             " kept.",
             describe_shot(shot),
         )
-        for each in tuple(self._untold):
+        for each in tuple(self._doubted.untold):
             frame = replace(self._again(each), corrected="it may be late")
             found = proof.judge(each, frame.pixels)
             if each not in found.again:
                 self._save(each, frame, found)
                 self.corrected += 1
             self._correct(found, proof)
-        self._untold.clear()
+        self._doubted.untold.clear()
         if self._is_in_part or self._has_late_colour:
             # A line says that it is right where it lights the scene itself. Its orders, too faint to tell,
             # may have been late elsewhere.
@@ -369,9 +323,9 @@ class ProvenShots:
                 f" pattern. {reason} Frames before are saved.",
                 has_changed=True,
             )
-        self._recent.clear()
+        self._doubted.settle_recent()
         if is_sound:
-            self._since_sound.clear()
+            self._doubted.settle_all()
 
     def _see_first(self, proof: FrameProof) -> None:
         """Once in a run, after the first code, see that its very first pictures are where they were.
@@ -383,7 +337,7 @@ class ProvenShots:
         if not pictures or self._has_seen_first:
             return
         self._has_seen_first = True
-        self._of_code.clear()
+        self._doubted.end_code()
         # Calibrations scan through filters.
         found = [light_sentence(proof.whole.code_sum(), None), *proof.whole.lasting(with_colours=False)]
         self._light = " ".join(each for each in found if each)
@@ -437,15 +391,8 @@ class ProvenShots:
         The ``latest`` is among them if it was saved, because others were wrong. What was wrong with the first
         code may be why, and is said as well.
         """
-        doubted = {*self._untold, *self._recent, *(shot for shot in error.wrong if shot != latest)}
-        if error.has_changed:
-            # A code of which some pictures are older than the change never fits its lines.
-            doubted |= self._since_sound | self._of_code
-        withdrawn = sorted(doubted, key=lambda shot: shot.index)
-        self._untold.clear()
-        self._recent.clear()
-        self._since_sound.clear()
-        self._of_code.clear()
+        wrong = [shot for shot in error.wrong if shot != latest]
+        withdrawn = self._doubted.withdraw(wrong, error.has_changed)
         known = "".join(f" {each}" for each in self._known_wrong)
         if not withdrawn:
             raise PictureError(f"{error}{known}", error.wrong) from error
@@ -459,21 +406,6 @@ class ProvenShots:
             f" captures {them} again.{known}",
             error.wrong,
         ) from error
-
-
-def _what_to_do(found: Finding, change: Explanation, proof: FrameProof) -> str:
-    """Why a picture stays wrong as far as that is known, and what to do about it."""
-    if found.verdict is Verdict.HIDDEN and not change.is_of_all:
-        # Who stands there is in the pictures that would say what has changed, too.
-        return f"{found.remedy} Resume the scan afterwards."
-    if change.is_as_at_first:
-        if found.verdict in DIM and found.shot.role == "spectral":
-            return _DIMMED
-        if found.verdict is Verdict.EXPOSURE and not proof.is_at_first_level(found.shot):
-            return _TONE
-    if not change.sentence and proof.are_finest(found.again):
-        return _FINE
-    return change.sentence or f"{found.remedy} Resume the scan afterwards."
 
 
 def _is_sure(found: Finding) -> bool:

@@ -12,15 +12,15 @@ import pytest
 from dsl_core.capture.diagnosis import Explanation
 from dsl_core.capture.proof.code.code_sum import CodeSum
 from dsl_core.capture.proof.finding import Finding, Light, Verdict
-from dsl_core.capture.proven import (
+from dsl_core.capture.proven.shots import (
     CURED_OFTEN,
     LATE_OFTEN,
     LATE_WITHIN,
     ON_END,
     SETTLE_MS,
-    PictureError,
     ProvenShots,
 )
+from dsl_core.capture.proven.wrong_pictures import PictureError
 from dsl_core.errors import Cancelled, DeviceError
 from dsl_core.model.frames import Frame
 from dsl_core.model.plan import CapturePlan, GrayCode, LineComb, Shot
@@ -421,10 +421,10 @@ def test_pictures_that_are_late_now_and_then_cast_doubt_on_untold_ones_before(
 
 def test_a_right_picture_ends_a_run_of_wrong_ones() -> None:
     bench = Bench(is_right)
-    bench.shots._failures, bench.shots._untold = 1, [SHOTS[12]]
+    bench.shots._failures, bench.shots._doubted.untold = 1, [SHOTS[12]]
     bench.shots.take(LINE)
     assert bench.shots._failures == 0
-    assert bench.shots._untold == []
+    assert bench.shots._doubted.untold == []
 
 
 def test_a_right_picture_of_unknown_light_may_still_be_too_dark() -> None:
@@ -433,7 +433,7 @@ def test_a_right_picture_of_unknown_light_may_still_be_too_dark() -> None:
     for shot in (CODE, SHOTS[12], LINE):
         bench.shots.take(shot)
     assert bench.shots._failures == 0
-    assert bench.shots._untold == [SHOTS[12], LINE]
+    assert bench.shots._doubted.untold == [SHOTS[12], LINE]
 
 
 def test_light_that_has_changed_is_believed_after_a_control_alone() -> None:
@@ -453,10 +453,10 @@ def test_only_pictures_that_are_judged_by_themselves_are_untold() -> None:
     bench = Bench(untold)
     for shot in (CODE, LINE, SHOTS[10]):
         bench.shots.take(shot)
-    assert bench.shots._untold == [LINE]
+    assert bench.shots._doubted.untold == [LINE]
     bench.first_setting = 1
     bench.shots.take(CODE)
-    assert bench.shots._untold == [LINE, CODE]
+    assert bench.shots._doubted.untold == [LINE, CODE]
 
 
 def test_a_doubtful_picture_is_taken_a_second_time_and_every_eighth_with_a_control() -> None:

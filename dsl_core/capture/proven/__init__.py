@@ -1,0 +1,1 @@
+"""Shots that show their pattern: what is taken again or doubted, and what to do where pictures stay wrong."""

@@ -1,0 +1,59 @@
+"""The error of pictures that stay wrong, and what to do about them."""
+
+from __future__ import annotations
+
+from dsl_core.capture.diagnosis import Explanation
+from dsl_core.capture.proof.finding import Finding, Verdict
+from dsl_core.capture.proof.verifier import FrameProof
+from dsl_core.errors import DeviceError
+from dsl_core.model.plan import Shot
+
+#: Lines that are wrong like this while white, black and code look as at first have lost light of their own.
+DIM = (Verdict.DARK, Verdict.EXPOSURE)
+_DIMMED = (
+    "White, black and a frame of the code, captured once more, look as they did: the projector may give dark"
+    " pictures less light than bright ones. Switch its dynamic contrast, iris and eco mode off, check that"
+    " the exposure is long enough, and resume the scan."
+)
+#: The same of the first pictures at a drive level of their own.
+_TONE = (
+    "White, black and a frame of the code, captured once more, look as they did: the projector gives another"
+    " share of its light at this drive level than its calibration says, the camera's values are not"
+    " proportional to the light, or it exposes for longer or shorter than requested. Repeat the self-test,"
+    " which measures how light follows the level, or use one level in all settings; or switch gamma,"
+    " automatic exposure and gain of the camera off, and resume the scan."
+)
+#: The same of stripes of the code of which coarser ones show nothing wrong.
+_FINE = (
+    "Coarser stripes of the code are right and these are not: the projector's picture is scaled (a resolution"
+    " that is not its own, overscan, keystone) or sharpened, or something is out of focus or trembles. Send"
+    " the projector pictures of its own size, switch such corrections off, check the focus, and resume the"
+    " scan."
+)
+
+
+class PictureError(DeviceError):
+    """Pictures do not show their pattern, however often they are taken; ``wrong`` are their shots.
+
+    ``has_changed``: devices, light or scene are not as they were, and nobody knows since when.
+    """
+
+    def __init__(self, message: str, wrong: tuple[Shot, ...] = (), *, has_changed: bool = False) -> None:
+        """Keep the sentence and the shots."""
+        super().__init__(message)
+        self.wrong, self.has_changed = wrong, has_changed
+
+
+def what_to_do(found: Finding, change: Explanation, proof: FrameProof) -> str:
+    """Why a picture stays wrong as far as that is known, and what to do about it."""
+    if found.verdict is Verdict.HIDDEN and not change.is_of_all:
+        # Who stands there is in the pictures that would say what has changed, too.
+        return f"{found.remedy} Resume the scan afterwards."
+    if change.is_as_at_first:
+        if found.verdict in DIM and found.shot.role == "spectral":
+            return _DIMMED
+        if found.verdict is Verdict.EXPOSURE and not proof.is_at_first_level(found.shot):
+            return _TONE
+    if not change.sentence and proof.are_finest(found.again):
+        return _FINE
+    return change.sentence or f"{found.remedy} Resume the scan afterwards."
