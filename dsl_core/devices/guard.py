@@ -123,7 +123,7 @@ def _two_digits(seconds: float) -> str:
 def _tell_hanging(name: str, verb: str, seconds: float) -> NoReturn:
     raise _HangsError(
         f"{name} was asked to {verb}, but has not returned for {_two_digits(seconds)} s. Switch it off and on"
-        " again or reconnect its cable, then go on. If it is only slow, ask whoever wrote its driver to"
+        " again or reconnect its cable, then continue. If it is only slow, ask whoever wrote its driver to"
         " allow it more time."
     ) from None
 
