@@ -211,7 +211,7 @@ def print_geometry(output: Output, found: GeometryCalibration) -> None:
     squares = found.squares
     output.say(
         f"Squares {squares.square_mm:.3f} ± {squares.square_std_mm:.3f} mm, printed"
-        f" {found.board.square_mm:g} mm; planes to {found.plane_rms_share:.1e} of their distance."
+        f" {found.board.square_mm:g} mm; planes to {found.shape_rms_share:.1e} of their distance."
     )
     for warning in found.warnings:
         output.say(f"Warning: {warning}")

@@ -41,7 +41,7 @@ def test_real_captures(give: Give, tmp_path: Path) -> None:
     assert found.rms_with_outliers_px <= 0.24
     assert found.squares.square_mm == pytest.approx(75.0, abs=0.03)
     assert found.squares.square_std_mm <= 0.1
-    assert found.plane_rms_share <= 1e-4
+    assert found.shape_rms_share <= 1e-4
     for pose in found.poses:
         assert pose.used
         assert pose.outliers <= 12

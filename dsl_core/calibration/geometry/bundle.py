@@ -35,6 +35,8 @@ CAUCHY_SIGMAS, ROBUST_ROUNDS = 2.0, 3
 #: Deviations stated over those that the scatter of corners explains: eight drawn rigs with noise, 145 rows of
 #: pixels, came out 1.18 times as far off.
 MARGIN = 1.2
+#: A board bends in waves no shorter than a polynomial of this degree has over it.
+BOW_DEGREE = 3
 #: Terms of the distortion that can be held at zero, and their places in a lens.
 TERMS = {"k1": (4,), "k2": (5,), "tangential": (6, 7), "k3": (8,)}
 CAMERA, PROJECTOR, STEREO = slice(0, LENS), slice(LENS, 2 * LENS), slice(2 * LENS, SHARED)
@@ -329,11 +331,34 @@ def triangulate(shared: Floats, seen: PoseObservation, start_mm: Floats) -> Floa
 
 
 def flatness(points_mm: Floats, ids: NDArray[np.int64], board: Board) -> Flatness:
-    """Sides of all squares whose corners were seen, and rms distance from the best plane."""
+    """Sides of all squares whose corners were seen, rms distance from the best plane, and rms of its bow."""
     sides = _sides(points_mm, ids, board)
     around = points_mm - points_mm.mean(0)
-    off_plane = float(np.linalg.svd(around, compute_uv=False)[2] / np.sqrt(len(points_mm)))
-    return Flatness(square_mm=float(sides.mean()), square_std_mm=float(sides.std()), plane_rms_mm=off_plane)
+    _, lengths, axes = np.linalg.svd(around, full_matrices=False)
+    return Flatness(
+        square_mm=float(sides.mean()),
+        square_std_mm=float(sides.std()),
+        plane_rms_mm=float(lengths[2] / np.sqrt(len(points_mm))),
+        bow_rms_mm=_bow_rms_mm(around @ axes.T),
+    )
+
+
+def _bow_rms_mm(around: Floats) -> float | None:
+    """Rms of the smooth part of what points (n, 3), third axis across their plane, are off it.
+
+    Corners that are off by noise alone would have a little of it; that is taken off.
+    """
+    scale = np.abs(around[:, :2]).max()
+    x, y = around[:, :2].T / max(scale, 1e-9)
+    terms = np.stack([x**i * y**j for i in range(BOW_DEGREE + 1) for j in range(BOW_DEGREE + 1 - i)], 1)
+    free = len(around) - terms.shape[1]
+    if free < terms.shape[1]:
+        return None
+    fitted = terms @ np.linalg.lstsq(terms, around[:, 2], rcond=None)[0]
+    noise = float(np.square(around[:, 2] - fitted).sum() / free)
+    # The plane itself has three of the terms.
+    by_noise = noise * (terms.shape[1] - 3) / len(around)
+    return float(np.sqrt(max(float(np.square(fitted).mean()) - by_noise, 0.0)))
 
 
 def _sides(points_mm: Floats, ids: NDArray[np.int64], board: Board) -> Floats:

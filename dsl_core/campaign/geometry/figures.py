@@ -108,8 +108,8 @@ def geometry_figures(record: GeometryCalibration) -> tuple[Figure, ...]:
             advice=more,
         ),
         Figure(
-            name="flatness of the board, rms of its corners",
-            value=100 * record.plane_rms_share,
+            name="flatness of the board, rms of its bow",
+            value=100 * record.shape_rms_share,
             unit="% of their distance",
             high=100 * PLANE_SHARE,
             advice="Use a flat, stiff board, and keep it still.",

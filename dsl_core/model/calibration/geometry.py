@@ -29,11 +29,21 @@ class PoseDeviation(Record):
 
 
 class Flatness(Record):
-    """The corners of one pose, triangulated: sides of the squares, and distance from their best plane."""
+    """The corners of one pose, triangulated: sides of the squares, and distance from their best plane.
+
+    ``bow_rms_mm`` is the smooth part of that distance, which is the board's shape; the rest is what corners
+    are off by. None in records of before it was kept, and for so few corners that nothing tells both apart.
+    """
 
     square_mm: float
     square_std_mm: float
     plane_rms_mm: float
+    bow_rms_mm: float | None = None
+
+    @property
+    def shape_rms_mm(self) -> float:
+        """What the board is not flat by, or at most so much."""
+        return self.plane_rms_mm if self.bow_rms_mm is None else self.bow_rms_mm
 
 
 class PoseQuality(Record):
@@ -108,6 +118,6 @@ class GeometryCalibration(Record):
         return float(((camera**2 + self.projector_rms_px**2) / 2) ** 0.5)
 
     @property
-    def plane_rms_share(self) -> float:
-        """Largest distance rms from a plane over the distance of its pose, of the used poses."""
-        return max(pose.measured.plane_rms_mm / pose.distance_mm for pose in self.poses if pose.used)
+    def shape_rms_share(self) -> float:
+        """Largest rms of what a board is not flat by, over the distance of its pose, of the used poses."""
+        return max(pose.measured.shape_rms_mm / pose.distance_mm for pose in self.poses if pose.used)

@@ -62,12 +62,28 @@ def test_no_point_near_by_is_better() -> None:
             assert (_squares(shared, seen, points + step_mm * axis) > best).all()
 
 
+@pytest.mark.parametrize("noise_mm", [0.0, 0.3])
+def test_a_bow_is_measured_whatever_corners_are_off_by(noise_mm: float) -> None:
+    board = corner_positions_mm(case.BOARD)
+    middle, half = board.mean(0), np.ptp(board[:, 0]) / 2
+    bow = np.square((board - middle)[:, 0] / half) * [[0], [0], [0.8]]
+    noise = np.random.default_rng(3).normal(0, noise_mm, len(board)) if noise_mm else np.zeros(len(board))
+    seen = board + [0, 0, 1000.0] + bow.T + noise[:, None] * [0, 0, 1]
+    found = flatness(seen, np.arange(63), case.BOARD)
+    assert found.shape_rms_mm == pytest.approx(bow[2].std(), rel=0.25 if noise_mm else 0.01)
+    flat = flatness(board + [0, 0, 1000.0] + noise[:, None] * [0, 0, 1], np.arange(63), case.BOARD)
+    assert flat.shape_rms_mm < 0.4 * noise_mm + 1e-6
+    few = flatness(seen[:15], np.arange(15), case.BOARD)
+    assert few.shape_rms_mm == few.plane_rms_mm
+
+
 def test_a_bent_board_is_measured() -> None:
     board = corner_positions_mm(case.BOARD)
     bent = board + np.array([0, 0, 1000.0]) + np.where(np.arange(63) % 2, 0.5, -0.5)[:, None] * [0, 0, 1]
     found = flatness(bent, np.arange(63), case.BOARD)
     assert found.plane_rms_mm == pytest.approx(0.5, rel=0.01)
     assert found.square_mm == pytest.approx(np.hypot(30, 1), rel=1e-6)
+    assert found.shape_rms_mm == pytest.approx(0, abs=0.05), "no shape of a board, but corners that are off"
     flat = flatness(board[:40], np.arange(40), case.BOARD)
     assert flat.square_mm == pytest.approx(30)
     assert flat.square_std_mm == pytest.approx(0, abs=1e-9)
