@@ -33,7 +33,7 @@ from dsl_core.cli.output import Output
 from dsl_core.errors import StoreError
 from dsl_core.io import MANIFEST_NAME
 from dsl_core.io.staging import check_targets
-from dsl_core.words import quoted
+from dsl_core.words import counted, quoted
 
 if TYPE_CHECKING:
     from dsl_core.capture.runner import Status
@@ -168,8 +168,13 @@ def _say_gaps(output: Output, target: Path) -> None:
     reader = ScanReader(target)
     missing = len(reader.missing())
     damaged = reader.plan.shot_count - len(reader.sound()) - missing
-    more = f"; damaged, and captured again: {damaged}" if damaged else ""
-    output.say(f"{target} lacks {missing} frames{more}.")
+    if missing:
+        more = f"; damaged, and captured again: {damaged}" if damaged else ""
+        output.say(f"{target} lacks {counted(missing, 'frame')}{more}.")
+    elif damaged:
+        output.say(f"{target} has {counted(damaged, 'damaged frame')}, captured again now.")
+    else:
+        output.say(f"{target} has all frames.")
     output.put(missing=missing, damaged=damaged)
 
 

@@ -17,7 +17,7 @@ from dsl_core.devices.base import (
     Stage,
 )
 from dsl_core.devices.registry import with_options
-from dsl_core.errors import DeviceError
+from dsl_core.errors import DeviceError, PlanError
 from dsl_core.extras import require_package
 from dsl_core.model.frames import Frame
 from dsl_core.model.rig import Rig
@@ -199,7 +199,10 @@ def open_twin(options: dict[str, str]) -> DeviceRig:
         world.position_mm = number("depth_mm", of_scene.pop("depth_mm", "700"))
         world.scene_at = lambda position_mm: make_scene("plane", depth_mm=position_mm, **of_scene)
     # Built once now, so that a wrong name or option is told before anything is captured.
-    world.scene_at(world.position_mm)
+    try:
+        world.scene_at(world.position_mm)
+    except PlanError as error:
+        raise PlanError(f"{error}{TwinOptions.meant(of_scene)}") from error
     devices = assemble(world)
     drawn = chosen.truth or 0
     devices.nominal, devices.filters = nominal, measured_transmissions(drawn)

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
+from difflib import get_close_matches
 from typing import Annotated
 
 from pydantic import BeforeValidator, Field, ValidationInfo
@@ -137,6 +139,17 @@ class TwinOptions(Record):
         made = cls.model_validate(own)
         _ = made.choice, made.limit, made.foreigners  # a wrong text is told now
         return made, {name: text for name, text in options.items() if name not in own}
+
+    @classmethod
+    def meant(cls, names: Iterable[str]) -> str:
+        """A question on names that are nearly those of options of the twin, with a space before it; or "".
+
+        >>> TwinOptions.meant(["sizze", "depth_mm"])
+        ' Did you mean size?'
+        """
+        near = [get_close_matches(name, cls.model_fields, n=1, cutoff=0.75) for name in names]
+        found = [each[0] for each in near if each]
+        return f" Did you mean {' and '.join(found)}?" if found else ""
 
     @property
     def choice(self) -> Choice:

@@ -58,6 +58,8 @@ def test_a_wrong_text_is_refused_with_its_name_and_what_is_needed(
 def test_an_option_that_nobody_has_is_refused_by_the_scene() -> None:
     with pytest.raises(PlanError, match=r"'plane' has no option colour; its options are depth_mm"):
         open_twin({"scene": "plane", "colour": "red"})
+    with pytest.raises(PlanError, match=r"'plane' has no option sizze; .* Did you mean size\?"):
+        open_twin({"scene": "plane", "sizze": "112x72"})
 
 
 def test_a_stage_stands_where_the_option_says() -> None:

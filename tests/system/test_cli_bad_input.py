@@ -97,11 +97,11 @@ def test_damaged_frames(give: Give, scan_copy: Path, damage: Damage, sentence: s
 @pytest.mark.parametrize(
     ("damage", "says"),
     [
-        (_missing, "lacks 1 frames."),
-        (_swapped, "lacks 0 frames; damaged, and captured again: 2."),
-        (_truncated, "lacks 0 frames; damaged, and captured again: 1."),
-        (_wrong_size, "lacks 0 frames; damaged, and captured again: 1."),
-        (_wrong_type, "lacks 0 frames; damaged, and captured again: 1."),
+        (_missing, "lacks 1 frame."),
+        (_swapped, "has 2 damaged frames, captured again now."),
+        (_truncated, "has 1 damaged frame, captured again now."),
+        (_wrong_size, "has 1 damaged frame, captured again now."),
+        (_wrong_type, "has 1 damaged frame, captured again now."),
     ],
 )
 def test_resume_mends_damaged_frames_to_the_bit(
