@@ -26,7 +26,7 @@ HINT = (
     " those."
 )
 #: As many rows of the legend are seen without scrolling.
-ROWS = 5
+ROWS = 4
 #: Lines of the hint, and of what a map rests on.
 TEXT_LINES = 2
 _MEASURES = (
@@ -35,11 +35,11 @@ _MEASURES = (
     ("Difference", Measure.RMSE),
 )
 _GROUPINGS = (
-    ("Classes: usual", "auto"),
-    ("Classes: names without numbers", "name"),
-    ("Classes: folders", "folder"),
-    ("Classes: files", "file"),
-    ("Classes: each spectrum", "none"),
+    ("Usual", "auto"),
+    ("Names without numbers", "name"),
+    ("Folders", "folder"),
+    ("Files", "file"),
+    ("Each spectrum", "none"),
 )
 #: With a larger share of undecided pixels, what to do about them matters more than any note.
 MOSTLY = 0.5
@@ -114,9 +114,12 @@ class MaterialsPanel(QWidget):
         # "By" is not written: the smallest window has no room for it next to its picture.
         ways = row_of((self.measure, 1), self.free)
         limits = row_of(label("Limit"), self.worst, label("Margin"), self.margin, STRETCH)
-        error = row_of(label("Library error"), self.error, (self.grouping, 1))
+        error = row_of(label("Library error"), self.error, STRETCH)
+        classes = row_of(label("Classes of a library"), (self.grouping, 1))
         map_row = row_of(self.write, self.clear, STRETCH)
-        column_of(sources, ways, error, limits, self.text, (self.table, 1), map_row, on=self, margins=0)
+        column_of(
+            sources, classes, ways, error, limits, self.text, (self.table, 1), map_row, on=self, margins=0
+        )
         self._keep_room()
         self.folder.clicked.connect(self.choose_folder)
         self.file.clicked.connect(self.choose_file)
