@@ -38,7 +38,7 @@ def fit_of(
     findings = [*earlier]
     blurred = any(finding.significant and finding.part == "focus" for finding in findings)
     findings += share_findings(flags, spectra, blurred)
-    findings += edge_findings(plan, flags)
+    findings += edge_findings(plan, flags, rig.projector_response.blur_px)
     findings.append(_of_parallax(rig, depth_mm))
     width_nm = line_width_nm(rig, plan, grid, depth_mm)
     if spectra is not None and width_nm is not None:

@@ -14,15 +14,21 @@ from dsl_core.reconstruction.findings.flag_findings import FEWEST, in_areas
 
 #: Share of the pixels, here and there, whose columns may be those of the binary code.
 MOST_BETWEEN = 0.15
+#: A line that is so many times as wide as its edges are blurred (rms) looks alike in its middle. Where lines
+#: are narrower, columns are not refined for other reasons, such as surfaces that reflect few wavelengths.
+SHARP = 11.0
 
 
-def edge_findings(plan: CapturePlan, flags: NDArray[np.integer]) -> Iterator[FitFinding]:
+def edge_findings(plan: CapturePlan, flags: NDArray[np.integer], blur_px: float) -> Iterator[FitFinding]:
     """What flags (rows, columns) say of lines that do not overlap; nothing of others.
 
-    Whole areas without refined columns have other reasons and are told elsewhere.
+    ``blur_px`` is that of the projector (rms). Whole areas without refined columns have other reasons and are
+    told elsewhere.
     """
     lines = plan.spectral
     if not isinstance(lines, ScanLines | LineComb) or lines.step_px < lines.width_px:
+        return
+    if lines.width_px < SHARP * blur_px:
         return
     measured = (flags & int(Flag.NO_LIGHT | DEPTH_INVALID)) == 0
     if np.count_nonzero(measured) < FEWEST:

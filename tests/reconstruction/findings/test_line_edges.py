@@ -20,12 +20,14 @@ def flags(every: int) -> np.ndarray[tuple[int, ...], np.dtype[np.uint16]]:
 
 
 def test_lines_that_meet_are_told_to_overlap_where_much_lies_between_their_edges() -> None:
-    told = Fit.of(edge_findings(EDGE_TO_EDGE, flags(3)))
+    told = Fit.of(edge_findings(EDGE_TO_EDGE, flags(3), 0.3))
     assert told.parts == ("profile",)
     assert "33%" in told.words
     assert "overlap" in told.words
-    assert Fit.of(edge_findings(EDGE_TO_EDGE, flags(10))).parts == ()
+    assert Fit.of(edge_findings(EDGE_TO_EDGE, flags(10), 0.3)).parts == ()
 
 
-def test_lines_that_overlap_are_told_nothing() -> None:
-    assert list(edge_findings(CapturePlan(), flags(3))) == []
+def test_lines_that_overlap_or_have_soft_edges_are_told_nothing() -> None:
+    assert list(edge_findings(CapturePlan(), flags(3), 0.3)) == []
+    # Narrow filters before a usual projector: few pixels have light enough to be refined.
+    assert list(edge_findings(EDGE_TO_EDGE, flags(3), 0.6)) == []
