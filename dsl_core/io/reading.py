@@ -12,11 +12,12 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from io import FileIO, RawIOBase
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import IO, TYPE_CHECKING, Any
 
 from dsl_core.io.sealed import unseal
 
 if TYPE_CHECKING:
+    import numpy as np
     from numpy.typing import NDArray
 
 #: More than any plan, rig or campaign file of this program holds.
@@ -80,23 +81,28 @@ def read_array(path: Path) -> NDArray[Any]:
 
     size = require_plain(path)
     with path.open("rb") as file:
-        try:
-            version = np.lib.format.read_magic(file)
-            read_header = (
-                np.lib.format.read_array_header_1_0
-                if version == (1, 0)
-                else np.lib.format.read_array_header_2_0
-            )
-            shape, _, dtype = read_header(file)
-            declared = math.prod(shape) * dtype.itemsize
-            if declared > size:
-                raise ValueError(f"it declares {declared} bytes of values, but has {size} bytes in all")
-            file.seek(0)
-            array: NDArray[Any] = np.lib.format.read_array(file, allow_pickle=False)
-        except (SyntaxError, TypeError, tokenize.TokenError, OverflowError) as error:
-            # NumPy parses the header as Python, and lets out what the parser says.
-            raise ValueError(f"its header is damaged ({type(error).__name__})") from error
+        shape, dtype = array_header(file)
+        declared = math.prod(shape) * dtype.itemsize
+        if declared > size:
+            raise ValueError(f"it declares {declared} bytes of values, but has {size} bytes in all")
+        file.seek(0)
+        array: NDArray[Any] = np.lib.format.read_array(file, allow_pickle=False)
     return array
+
+
+def array_header(file: IO[bytes]) -> tuple[tuple[int, ...], np.dtype[Any]]:
+    """Shape and type of the array that an open NumPy file begins with; raises ``ValueError``."""
+    import numpy as np
+
+    try:
+        version = np.lib.format.read_magic(file)
+        is_first = version == (1, 0)
+        read = np.lib.format.read_array_header_1_0 if is_first else np.lib.format.read_array_header_2_0
+        shape, _, dtype = read(file)
+    except (SyntaxError, TypeError, tokenize.TokenError, OverflowError) as error:
+        # NumPy parses the header as Python, and lets out what the parser says.
+        raise ValueError(f"its header is damaged ({type(error).__name__})") from error
+    return shape, dtype
 
 
 def require_plain(path: Path) -> int:

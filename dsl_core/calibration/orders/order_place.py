@@ -250,8 +250,8 @@ def _fit(
     value, offset, place = np.array(values), np.array(offsets), np.array(places).T
     near = np.abs(offset - np.median(offset)) < (3 * OUTLIER_PX if before is None else OUTLIER_PX)
     terms = _terms(place[:, near])
-    # Few cells carry a constant only; a little damping keeps a quadratic from bending where no cell is. It is
-    # fitted anew each time: a change to the rough one would keep what cells at the edge had bent it by.
+    # Few cells carry a constant only; a little damping keeps a quadratic from bending where no cell is. Each
+    # round fits the whole of it: a change to the rough one would keep what cells at the edge had bent.
     damping = np.diag([1e-9] + [(CELL_PX / TERM_PX) ** 2 if near.sum() > TERMS else 1e3] * (TERMS - 1))
     coefficients = np.linalg.solve(terms.T @ terms + damping, terms.T @ value[near])
     left = value[near] - terms @ coefficients

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dsl_core.errors import StoreError
-from dsl_core.io.reading import read_array, require_plain
+from dsl_core.io.reading import array_header, read_array, require_plain
 from dsl_core.words import natural
 
 SUFFIXES = {".npy", ".npz", ".mat"}
@@ -64,10 +64,7 @@ def _read_archive(path: Path) -> NDArray[Any]:
         shapes: dict[str, tuple[int, ...]] = {}
         for name, member in members.items():
             with archive.open(member) as file:
-                version = np.lib.format.read_magic(file)
-                read = np.lib.format.read_array_header_1_0
-                read = read if version == (1, 0) else np.lib.format.read_array_header_2_0
-                shape, _, dtype = read(file)
+                shape, dtype = array_header(file)
             if dtype.kind in "uifb" and math.prod(shape) * dtype.itemsize <= MOST_BYTES:
                 shapes[name] = shape
     with np.load(path, allow_pickle=False) as arrays:

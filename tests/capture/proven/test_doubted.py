@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dsl_core.capture.proven.doubted import JUST_BEFORE, MOST_UNTOLD, DoubtedShots
+from dsl_core.capture.proven.doubted import JUST_BEFORE, DoubtedShots
 from dsl_core.model.plan import CapturePlan, GrayCode, LineComb
 
 PLAN = CapturePlan(
@@ -32,7 +32,6 @@ def test_after_a_sure_picture_only_those_just_before_are_doubted() -> None:
     assert len(doubted.withdraw([], has_changed=False)) == JUST_BEFORE
     doubted.doubt_passed()
     assert doubted.untold == list(SHOTS[:20])
-    assert len(SHOTS[:20]) < MOST_UNTOLD
 
 
 def test_a_change_takes_back_what_was_saved_since_all_was_sound() -> None:
