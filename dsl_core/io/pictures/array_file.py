@@ -33,6 +33,10 @@ _COLOURS = (3, 4)
 _OTHER = re.compile(r"patt|proj|code|mask|truth|depth|calib|xyz|point", re.IGNORECASE)
 #: Pictures that a capture has besides those of its patterns, and that may have a name of their own.
 _ENDS = re.compile(r"white|black|dark|ambient|full|(?<![a-z])o(?:n|ff)(?![a-z])", re.IGNORECASE)
+#: Bytes of a number by MATLAB's name of its type.
+_MATLAB_BYTES = {"logical": 1, "int8": 1, "uint8": 1, "int16": 2, "uint16": 2, "int32": 4, "uint32": 4} | {
+    "single": 4, "double": 8,
+}  # fmt: skip
 #: What NumPy and SciPy raise for a damaged file; names are those of SciPy's own variables.
 _DAMAGED = (
     *(OSError, EOFError, ValueError, TypeError, LookupError, ArithmeticError, MemoryError),
@@ -45,11 +49,7 @@ Shapes = Mapping[str, tuple[int, ...]]
 def read_pictures(path: Path) -> NDArray[Any]:
     """The pictures of a file, (pictures, rows, columns) or (..., 3), or its only one; raises `StoreError`."""
     try:
-        size = require_plain(path)
-        if size > MOST_BYTES:
-            raise StoreError(
-                f"{path} is larger than {MOST_BYTES / 1e9:.0f} GB. Save its pictures one by one."
-            )
+        _require_bytes(path, require_plain(path))
         values = _READERS[path.suffix.lower()](path)
     except _DAMAGED as error:
         raise StoreError(f"{path} is not an array that can be read ({error}). Save it again.") from error
@@ -58,36 +58,42 @@ def read_pictures(path: Path) -> NDArray[Any]:
     return values
 
 
+def _require_bytes(path: Path, count: int) -> None:
+    """Raise `StoreError` for more than a capture has, in the file or in the arrays that it declares."""
+    if count > MOST_BYTES:
+        raise StoreError(f"{path} is larger than {MOST_BYTES / 1e9:.0f} GB. Save its pictures one by one.")
+
+
 def _read_archive(path: Path) -> NDArray[Any]:
     with zipfile.ZipFile(path) as archive:
         members = {name.removesuffix(".npy"): name for name in archive.namelist() if name.endswith(".npy")}
         shapes: dict[str, tuple[int, ...]] = {}
+        bytes_of: dict[str, int] = {}
         for name, member in members.items():
             with archive.open(member) as file:
                 shape, dtype = array_header(file)
-            if dtype.kind in "uifb" and math.prod(shape) * dtype.itemsize <= MOST_BYTES:
-                shapes[name] = shape
+            if dtype.kind in "uifb":
+                shapes[name], bytes_of[name] = shape, math.prod(shape) * dtype.itemsize
+    chosen = _chosen(path, shapes, pictures_last=False)
+    _require_bytes(path, sum(bytes_of[name] for name in chosen))
     with np.load(path, allow_pickle=False) as arrays:
-        return _joined([arrays[name] for name in _chosen(path, shapes, pictures_last=False)])
+        return _joined([arrays[name] for name in chosen])
 
 
 def _read_matlab(path: Path) -> NDArray[Any]:
     from scipy.io import loadmat, whosmat
     from scipy.io.matlab import MatReadError
 
-    numbers = re.compile(r"u?int(?:8|16|32)|single|double|logical")
     try:
         listed = whosmat(path)
-        shapes = {
-            name: tuple(shape)
-            for name, shape, kind in listed
-            if numbers.fullmatch(kind) and math.prod(shape) <= MOST_BYTES
-        }
+        shapes = {name: tuple(shape) for name, shape, kind in listed if kind in _MATLAB_BYTES}
+        bytes_of = {name: math.prod(shape) * _MATLAB_BYTES.get(kind, 0) for name, shape, kind in listed}
         if not shapes and any(kind == "cell" for *_, kind in listed):
             raise StoreError(
                 f"{path} holds cells. Save one array of pictures, cat(3, pictures{{:}}), instead."
             )
         chosen = _chosen(path, shapes, pictures_last=True)
+        _require_bytes(path, sum(bytes_of[name] for name in chosen))
         arrays = loadmat(path, variable_names=chosen)
     except NotImplementedError as error:
         raise StoreError(

@@ -11,6 +11,7 @@ import scipy.io
 from numpy.typing import NDArray
 
 from dsl_core.errors import StoreError
+from dsl_core.io.pictures import array_file
 from dsl_core.io.pictures.arrange import picture_files
 from dsl_core.io.pictures.array_file import read_pictures
 from dsl_core.io.pictures.picture_file import pictures_in
@@ -70,6 +71,23 @@ def test_what_is_not_one_capture_is_refused_with_what_is_there(
     np.savez(tmp_path / "a.npz", **arrays)  # type: ignore[arg-type]
     with pytest.raises(StoreError, match=told):
         read_pictures(tmp_path / "a.npz")
+
+
+@pytest.mark.parametrize("ending", ["npz", "mat"])
+def test_more_than_fits_is_refused_before_it_is_read(
+    tmp_path: Path, ending: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    # Zeros take little room in the file, and all of theirs in memory.
+    frames = np.zeros((7, 300, 400), np.uint16)
+    path = tmp_path / f"a.{ending}"
+    if ending == "npz":
+        np.savez_compressed(path, frames=frames)
+    else:
+        scipy.io.savemat(path, {"frames": np.moveaxis(frames, 0, -1)}, do_compression=True)
+    assert read_pictures(path).shape == frames.shape
+    monkeypatch.setattr(array_file, "MOST_BYTES", frames.nbytes - 1)
+    with pytest.raises(StoreError, match=r"is larger than .* GB\. Save its pictures one by one"):
+        read_pictures(path)
 
 
 def test_cells_and_damaged_files_are_refused_with_what_to_do(tmp_path: Path) -> None:
