@@ -148,6 +148,7 @@ def _read_curves(folder: Path) -> object:
 def _make_pictures(folder: Path) -> None:
     """Four bits of columns with their inverses, white and black, as files of each format."""
     import cv2
+    import OpenEXR
     import scipy.io
 
     height, width = 12, 32
@@ -159,12 +160,16 @@ def _make_pictures(folder: Path) -> None:
         (np.tile(10 + 200 * row, (height, 1)) + n).astype(np.uint8)
         for row, n in zip(rows, noise, strict=True)
     ]
-    for name, ending in (("png", ".png"), ("bmp", ".bmp"), ("pgm", ".pgm"), ("tif", ".tif"), ("jpg", ".jpg")):
+    for name, _ in _PICTURE_FILES:
         (folder / name).mkdir()
+    for name in ("png", "bmp", "pgm", "tif", "jpg", "webp"):
         for number, picture in enumerate(pictures):
-            (folder / name / f"{number:02d}{ending}").write_bytes(cv2.imencode(ending, picture)[1].tobytes())
-    for name in ("paged", "npy", "npz", "mat", "raw"):
-        (folder / name).mkdir()
+            content = cv2.imencode(f".{name}", picture)[1].tobytes()
+            (folder / name / f"{number:02d}.{name}").write_bytes(content)
+    for number, values in enumerate(np.array(pictures, np.float32)):
+        OpenEXR.File({}, {"Y": values}).write(str(folder / "exr" / f"{number:02d}.exr"))
+        head = f"Pf\n{width} {height}\n-1.0\n".encode()
+        (folder / "pfm" / f"{number:02d}.pfm").write_bytes(head + values[::-1].astype("<f4").tobytes())
     (folder / "paged" / "all.tif").write_bytes(cv2.imencodemulti(".tif", pictures)[1].tobytes())
     np.save(folder / "npy" / "all.npy", np.array(pictures))
     np.savez_compressed(folder / "npz" / "all.npz", frames=np.array(pictures))
@@ -176,7 +181,7 @@ def _make_pictures(folder: Path) -> None:
         "parts": [{"kind": "stripes", "bits": 4, "unit_px": 1}, {"kind": "white"}, {"kind": "black"}],
         "projector_size_px": [16, 8],
     }
-    for name in ("png", "bmp", "pgm", "tif", "jpg", "paged", "npy", "npz", "mat"):
+    for name, _ in _PICTURE_FILES:
         (folder / f"{name}.json").write_text(json.dumps(mapping))
     raw = {"width_px": width, "height_px": height, "bits": 8}
     (folder / "raw.json").write_text(json.dumps(mapping | {"raw": raw}))
@@ -332,6 +337,7 @@ def _read_session(folder: Path) -> object:
 
 _PICTURE_FILES = (
     *(("png", "03.png"), ("bmp", "03.bmp"), ("pgm", "03.pgm"), ("tif", "03.tif"), ("jpg", "03.jpg")),
+    *(("webp", "03.webp"), ("pfm", "03.pfm"), ("exr", "03.exr")),
     *(("paged", "all.tif"), ("npy", "all.npy"), ("npz", "all.npz"), ("mat", "all.mat"), ("raw", "03.raw")),
 )
 MORE = (

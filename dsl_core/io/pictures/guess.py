@@ -12,12 +12,12 @@ from numpy.typing import NDArray
 from dsl_core.errors import StoreError
 from dsl_core.io.pictures.arrange import arrange
 from dsl_core.io.pictures.camera_raw import BITS
-from dsl_core.io.pictures.camera_raw import SUFFIXES as CAMERA_RAWS
 from dsl_core.io.pictures.candidates import FEWEST, Candidate, candidates, jump_of
 from dsl_core.io.pictures.encoding import guessed_encoding
+from dsl_core.io.pictures.float_scale import FloatScale
 from dsl_core.io.pictures.guessed_parts import guessed_size, is_turned, part_of
 from dsl_core.io.pictures.mapping import Encoding, Mapping
-from dsl_core.io.pictures.picture_file import ARRAYS, bayer_of, load_values
+from dsl_core.io.pictures.picture_file import ARRAYS, LINEAR, bayer_of, load_values
 from dsl_core.model.rig import BayerPattern
 from dsl_core.optics.colour import srgb_decode
 from dsl_core.patterns.recognition.odd_pictures import lost_after, odd_pairs, same_in_a_row
@@ -246,7 +246,7 @@ def _alike_next(order: Sequence[Candidate], number: int, whole: Sequence[Candida
 
 
 def _look_at(candidate: Candidate) -> _Look:
-    taker, bits, most, floats = ProbeTaker(), 0, 0.0, False
+    taker, bits, most, fractions = ProbeTaker(), 0, 0.0, FloatScale()
     shape: tuple[int, ...] | None = None
     brightest: tuple[float, NDArray[np.float32]] | None = None
     colour = is_wide = False
@@ -260,8 +260,9 @@ def _look_at(candidate: Candidate) -> _Look:
                 f" {shape[0]} px. Keep pictures of one camera and size in a folder, or state a mapping."
             )
         shape, colour = values.shape, colour or values.ndim == 3
-        floats = floats or values.dtype.kind == "f"
         most = max(most, float(values.max()))
+        if values.dtype.kind == "f":
+            fractions.add(values)
         if values.dtype.kind in "ui":
             bits |= int(np.bitwise_or.reduce(values.ravel()))
             is_wide = is_wide or values.dtype.itemsize > 1
@@ -271,8 +272,9 @@ def _look_at(candidate: Candidate) -> _Look:
         taker.add(grey)
     assert brightest is not None
     stated = bayer_of(next(each for each in candidate.pictures if each is not None))
-    depth, aligned = _depth_of(bits, most, is_wide, floats) if stated is None else (BITS, False)
-    scale = most if floats else float((1 << (16 if aligned else depth or 8)) - 1)
+    white = fractions.white
+    depth, aligned = _depth_of(bits, most, is_wide, white is not None) if stated is None else (BITS, False)
+    scale = white or float((1 << (16 if aligned else depth or 8)) - 1)
     probes = taker.finish(max(scale, 1e-9))
     decoded = taker.finish(max(scale, 1e-9), srgb_decode)
     if probes.range_share < LEAST_LIGHT:
@@ -286,7 +288,7 @@ def _look_at(candidate: Candidate) -> _Look:
         notes.append(
             f"neighbouring pixels look like a colour mosaic; {bayer} is assumed (red and blue unsure)"
         )
-    return _Look(probes, decoded, depth, aligned, most if floats else None, bayer, tuple(notes))
+    return _Look(probes, decoded, depth, aligned, white, bayer, tuple(notes))
 
 
 def _depth_of(bits: int, most: float, is_wide: bool, floats: bool) -> tuple[int | None, bool]:
@@ -358,7 +360,7 @@ def _guess_of(
         left_aligned=look.left_aligned,
         full_scale=look.full_scale,
     )
-    if encoding is None and _has(candidate, CAMERA_RAWS):
+    if encoding is None and _has(candidate, LINEAR):
         encoding = "linear"
     if encoding is None:
         mapping, doubts_of_values = guessed_encoding(folder, mapping)

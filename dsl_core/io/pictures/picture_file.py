@@ -15,7 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dsl_core.errors import MissingPackageError, StoreError
-from dsl_core.io.pictures import array_file, camera_raw
+from dsl_core.io.pictures import array_file, camera_raw, open_exr
+from dsl_core.io.pictures.float_scale import SPARKS
 from dsl_core.io.pictures.mapping import MOST_PICTURES, Mapping, RawLayout
 from dsl_core.io.png_parts import declares_too_much
 from dsl_core.io.reading import read_bounded, require_plain
@@ -25,16 +26,19 @@ from dsl_core.optics.colour import srgb_decode
 
 T = TypeVar("T")
 
-PICTURES = {".png", ".tif", ".tiff", ".bmp", ".jpg", ".jpeg", ".pgm", ".ppm", *camera_raw.SUFFIXES}
+_BY_OPENCV = {".png", ".tif", ".tiff", ".bmp", ".jpg", ".jpeg", ".pgm", ".ppm", ".pfm", ".webp"}
+PICTURES = {*_BY_OPENCV, ".exr", *camera_raw.SUFFIXES}
 ARRAYS, RAWS = array_file.SUFFIXES, {".raw", ".bin"}
 #: Formats whose files may hold several pictures as pages.
 PAGED = {".tif", ".tiff"}
+#: Formats whose values are linear in light by their definition.
+LINEAR = {".exr", ".pfm", *camera_raw.SUFFIXES}
 #: What holds pictures and is not read, and what makes readable ones of it.
 _FRAMES = "Save its frames as pictures without loss, such as PNG"
 NOT_READ = {
     **dict.fromkeys((".avi", ".mp4", ".mov", ".mkv", ".wmv", ".mjpg", ".gif"), ("a video", _FRAMES)),
     **dict.fromkeys((".h5", ".hdf5"), ("a file of HDF5", "Save its pictures as PNG or as one file .npy")),
-    **dict.fromkeys((".webp", ".heic", ".jxl", ".exr", ".jp2"), ("a picture", "Save it as PNG or TIFF")),
+    **dict.fromkeys((".heic", ".jxl", ".jp2"), ("a picture", "Save it as PNG or TIFF")),
     **dict.fromkeys((".zip", ".7z", ".rar", ".gz"), ("an archive", "Unpack it")),
 }
 #: What a library raises for the head of a damaged picture.
@@ -44,6 +48,8 @@ _UNREADABLE = (
 #: Larger than any camera's picture, in bytes of its file and in pixels.
 MOST_BYTES, MOST_PIXELS = 1 << 30, 200_000_000
 _FULL = 65535
+#: Filters of renderers overshoot at edges by less than this share of white.
+FILTERED = 0.02
 #: Bits of frames decoded from sRGB: the steps of dark values are as fine as those of 12 bits.
 DECODED_BITS = 16
 
@@ -90,6 +96,8 @@ def load_values(picture: Picture, raw: RawLayout | None = None) -> NDArray[Any]:
         values = _raw(path, raw)
     elif suffix in camera_raw.SUFFIXES:
         values = _from_camera(path, camera_raw.read_mosaic)
+    elif suffix == ".exr":
+        values = _from_exr(path)
     else:
         values = _image(path, picture.index)
     if values.ndim == 3 and values.shape[2] == 1:
@@ -125,8 +133,16 @@ def load_mosaic(picture: Picture, mapping: Mapping, bit_depth: int) -> NDArray[n
     if values.ndim == 3:
         values = _one_channel(values, mapping)
     if is_float and mapping.full_scale is not None:
-        values = values / mapping.full_scale * (2**bit_depth - 1)
+        values = _share_of_white(values, mapping.full_scale) * (2**bit_depth - 1)
     return _whole(values, picture, mapping, bit_depth)
+
+
+def _share_of_white(values: NDArray[Any], white: float) -> NDArray[Any]:
+    """Values as shares of white; sparks become white, and what a filter of a renderer left below 0 black."""
+    share = values / white
+    if np.count_nonzero(share > 1) <= SPARKS * share.size and share.min() > -FILTERED:
+        share = share.clip(0, 1)
+    return np.asarray(share)
 
 
 def _one_channel(values: NDArray[Any], mapping: Mapping) -> NDArray[Any]:
@@ -141,7 +157,7 @@ def _decoded(values: NDArray[Any], picture: Picture, mapping: Mapping) -> NDArra
     """Values of sRGB as linear ones, of the same shape, by a table of all that their bits allow."""
     bits = mapping.bit_depth or (8 if values.dtype.itemsize == 1 else 16)
     if values.dtype.kind == "f":
-        values = values / (mapping.full_scale or 1.0) * (2**bits - 1)
+        values = _share_of_white(values, mapping.full_scale or 1.0) * (2**bits - 1)
     return np.asarray(_decoding_table(bits)[_whole(values, picture, mapping, bits)])
 
 
@@ -214,6 +230,15 @@ def _from_camera(path: Path, read: Callable[[bytes, int], T]) -> T:
         raise StoreError(
             f"{path} cannot be read as camera raw ({error}). {advice}, or leave it out."
         ) from error
+
+
+def _from_exr(path: Path) -> NDArray[Any]:
+    try:
+        return open_exr.read_exr(path, MOST_PIXELS)
+    except OSError as error:
+        raise _unread(path, error) from error
+    except ValueError as error:
+        raise StoreError(f"{path} cannot be read as OpenEXR ({error}). Save it again, or as TIFF.") from error
 
 
 def _too_many(path: Path, count: int) -> StoreError:

@@ -7,6 +7,7 @@ from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
+import OpenEXR
 import pytest
 from numpy.typing import NDArray
 
@@ -61,6 +62,23 @@ def test_lights_and_axes_may_be_in_folders_of_their_own(tmp_path: Path, gray: Pi
     guess = guess_mapping(write(tmp_path, pictures), PROJECTOR)
     assert guess.mapping.files == ("*", "*/*")
     assert [part.kind for part in guess.mapping.parts] == ["black", "white", "stripes"]
+
+
+def test_pictures_of_a_renderer_are_linear_and_their_sparks_are_not_white(
+    tmp_path: Path, gray: Pictures
+) -> None:
+    for index, each in enumerate(gray):
+        values = each.astype(np.float32) / 7
+        values[3 + index, 4] = 9000
+        OpenEXR.File({}, {"Combined.RGB": np.stack([values] * 3, -1)}).write(
+            str(tmp_path / f"{index:02}.exr")
+        )
+    mapping = guess_mapping(tmp_path, PROJECTOR).mapping
+    assert mapping.parts == (StripePictures(bits=7), WhitePicture(), BlackPicture())
+    assert mapping.encoding == "linear"
+    assert mapping.bit_depth == 16
+    assert mapping.full_scale is not None
+    assert max(each.max() for each in gray) / 7 < mapping.full_scale < 100
 
 
 def test_an_absent_number_is_seen(tmp_path: Path, gray: Pictures) -> None:
