@@ -219,8 +219,9 @@ class ProjectorResponse(Record):
 
 
 class CorrespondenceGrid(Record):
-    """The data-driven model of seed section 4: ``q = alpha * z**beta + gamma`` on a pixel grid.
+    """The published data-driven model ``q = alpha * z**beta + gamma`` on a pixel grid.
 
+    Eq. (2) of the supplement of "Dispersed Structured Light" (Shin et al., CVPR 2024).
     ``coefficients`` holds alpha, beta, gamma for every (order, wavelength, row, column) node, flattened in
     C order; ``z`` is depth in units of ``depth_unit_mm``.
     """

@@ -1,8 +1,9 @@
 """Which projector column lights a camera pixel, through which order, at which wavelength.
 
 Three models answer through the same call: the grating equation with the film's pose; the same with a small
-smooth correction; and the data-driven fit of seed section 4, ``q = alpha * z**beta + gamma``. The first two
-are smooth in wavelength, so they are evaluated at a few Chebyshev nodes and interpolated by a polynomial.
+smooth correction; and the published data-driven fit, ``q = alpha * z**beta + gamma``. The first two are
+smooth in wavelength, so they are evaluated at a few Chebyshev nodes and interpolated by a polynomial.
+Equations are those of the supplement of "Dispersed Structured Light" (Shin et al., CVPR 2024).
 """
 
 from __future__ import annotations
@@ -106,7 +107,7 @@ def projector_points(rig: Rig, pixels: Tensor, depth_mm: Tensor) -> Vectors:
 
 
 def zero_order(rig: Rig, pixels: Tensor, depth_mm: Tensor) -> tuple[Tensor, Tensor]:
-    """Projector column and row (px) of the zero order: conventional structured light, seed Eq. (11)."""
+    """Projector column and row (px) of the zero order: conventional structured light, Eqs. (9) to (11)."""
     column, row = project(rig.projector, *projector_points(rig, pixels, depth_mm))
     if rig.lateral_colour is None:
         return column, row
@@ -124,8 +125,8 @@ def _magnified(rig: Rig, column: Tensor, row: Tensor, by: Tensor) -> tuple[Tenso
 def triangulate(rig: Rig, pixels: Tensor, column_px: Tensor) -> tuple[Tensor, Tensor]:
     """Depth (mm) at flat pixel indices from projector columns (px), and its slope (mm per px).
 
-    The start is the closed form without projector distortion (seed Eqs. 9 to 11 solved for z); Newton
-    steps with the full model follow. NaN where ray and column do not meet in front of the camera.
+    The start is the closed form without projector distortion (Eqs. 9 to 11 solved for z); Newton steps
+    with the full model follow. NaN where ray and column do not meet in front of the camera.
     """
     z = _closed_form(rig, pixels, column_px)
     low, high = rig.depth_range_mm
@@ -157,7 +158,7 @@ def _closed_form(rig: Rig, pixels: Tensor, column_px: Tensor) -> Tensor:
 
 
 def chebyshev_nodes(start_nm: float, stop_nm: float, count: int = NODES) -> NDArray[np.float64]:
-    """Chebyshev nodes of the first kind over a wavelength range, nm, rising."""
+    """Chebyshev nodes of the first kind over a wavelength range, nm, rising, (count,)."""
     k = np.arange(count)[::-1]
     return np.asarray(
         0.5 * (start_nm + stop_nm) + 0.5 * (stop_nm - start_nm) * np.cos(np.pi * (k + 0.5) / count)
@@ -165,7 +166,7 @@ def chebyshev_nodes(start_nm: float, stop_nm: float, count: int = NODES) -> NDAr
 
 
 def interpolation_matrix(nodes: NDArray[np.float64], targets: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Matrix of polynomial interpolation from values at nodes to values at targets (Lagrange)."""
+    """Matrix (targets, nodes) of Lagrange's polynomial interpolation from values at nodes."""
 
     def scale(nm: NDArray[np.float64]) -> NDArray[np.float64]:
         # Near -0.5 to 0.5, which keeps the Vandermonde matrix well conditioned.
@@ -276,7 +277,7 @@ class HybridModel(GratingModel):
 
 
 class GridModel:
-    """The data-driven model of seed section 4: power law in depth, linear in wavelength, cubic in pixel."""
+    """The published data-driven model, Eq. (2): a power of depth, linear in wavelength, cubic in pixel."""
 
     def __init__(self, rig: Rig) -> None:
         if rig.correspondence is None:
@@ -290,7 +291,10 @@ class GridModel:
     def trace(
         self, pixels: Tensor, depth_mm: Tensor, order: int, wavelengths_nm: NDArray[np.float64]
     ) -> Footprint:
-        """Projector pixels; the rows, which the fit does not cover, are those of the analytic model."""
+        """Projector pixels; the rows, which the fit does not cover, are those of the analytic model.
+
+        Raises `CalibrationError` for an order that the fit does not cover.
+        """
         if order == 0:
             return _zero_footprint(self.rig, pixels, depth_mm, len(wavelengths_nm))
         if abs(order) > 1:
@@ -330,7 +334,7 @@ def _upsampled(grid: object, order: int, width: int, height: int) -> NDArray[np.
 
 
 def _linear_matrix(nodes: NDArray[np.float64], targets: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Matrix of linear interpolation, extrapolating with the outermost pair."""
+    """Matrix (targets, nodes) of linear interpolation, extrapolating with the outermost pair."""
     i = np.clip(np.searchsorted(nodes, targets) - 1, 0, len(nodes) - 2)
     t = (targets - nodes[i]) / (nodes[i + 1] - nodes[i])
     matrix = np.zeros((len(targets), len(nodes)))
@@ -342,7 +346,8 @@ def _linear_matrix(nodes: NDArray[np.float64], targets: NDArray[np.float64]) -> 
 def correspondence(rig: Rig, model: str = "auto") -> Correspondence:
     """The requested model: ``grating``, ``hybrid``, ``grid``, or ``auto``.
 
-    ``auto`` is hybrid where the rig holds a residual, else grid where it holds one, else grating.
+    ``auto`` is hybrid where the rig holds a residual, else grid where it holds one, else grating. Raises
+    `CalibrationError` for another name, and for a model that the rig lacks the data of.
     """
     if model == "auto":
         model = "grid" if rig.correspondence is not None else "grating"

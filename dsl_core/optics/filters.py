@@ -61,7 +61,10 @@ NO_SHIFT = FilterAngle()
 
 
 def nominal_filter(centre_nm: float, fwhm_nm: float = 10.0, peak: float = 0.8) -> SpectralCurve:
-    """Transmission that a data sheet promises: three coupled cavities, ``peak / (1 + (2 d / fwhm)^6)``."""
+    """Transmission that a data sheet promises at distance d from the centre: three coupled cavities.
+
+    ``peak / (1 + (2 d / fwhm)^6)``, the maximally flat response, half the peak at half the FWHM.
+    """
     nm = np.arange(centre_nm - 60.0, centre_nm + 60.5, 0.5)
     return SpectralCurve.of(nm, peak / (1 + (2 * np.abs(nm - centre_nm) / fwhm_nm) ** 6))
 

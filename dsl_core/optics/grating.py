@@ -5,7 +5,9 @@ cosines (a, b, c) leaves order m with::
 
     a' = a - m * wavelength / period,    b' = b,    c' = sqrt(1 - a'^2 - b'^2)
 
-The sign counts orders as the model package says: order +1 comes from columns right of the zero order.
+That is the grating equation for any incidence (J. E. Harvey and C. L. Vernold, "Description of diffraction
+grating behavior in direction cosine space", Appl. Opt. 37, 1998), with a sign that counts orders as the model
+package says: order +1 comes from columns right of the zero order.
 """
 
 from __future__ import annotations
@@ -54,7 +56,7 @@ class FilmFrame:
         return cls((ry @ rx @ rz).T, film.distance_mm, film.bend_per_mm, film.period_nm, film.shape)
 
     def surface(self, u: Tensor, v: Tensor) -> tuple[Tensor, Tensor, Tensor | None]:
-        """Height (mm) of the film at places across and along its lines (mm), and its slopes along both.
+        """Height (mm) of the film at places across and along its lines (mm), and its slopes, same shape.
 
         The second slope is None for a cylinder, which has none.
         """
@@ -86,7 +88,7 @@ def incoming_direction(frame: FilmFrame, point: Vectors, order: int, wavelength_
     projector coordinates. Solved by fixed-point iteration over the place where the ray meets the film.
     """
     target = frame.to_film(point)
-    # The film's surface point nearest the projector's axis, in film axes.
+    # Where the projector's axis meets the film, in film axes.
     origin = frame.axes @ np.array([0.0, 0.0, frame.distance_mm])
     shift = order * wavelength_nm / frame.period_nm
     scale = origin[2] / target.z

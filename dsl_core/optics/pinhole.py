@@ -1,5 +1,8 @@
 """Pinhole camera with the five-coefficient distortion of Brown and OpenCV.
 
+D. C. Brown, "Close-range camera calibration", Photogrammetric Engineering 37 (1971); order and signs of the
+coefficients are those of OpenCV.
+
 The arithmetic is written with operators only, so that NumPy arrays and torch tensors pass through
 the same lines.
 """
@@ -28,7 +31,8 @@ def distort(
 ) -> tuple[Any, Any]:
     """Distorted image-plane coordinates of undistorted ones (any shape, unit focal length).
 
-    OpenCV's model: radial ``1 + k1 r^2 + k2 r^4 + k3 r^6`` and tangential p1, p2. Beyond
+    ``coefficients`` are k1, k2, p1, p2, k3. With ``radial = 1 + k1 r^2 + k2 r^4 + k3 r^6`` the answer is
+    ``x radial + 2 p1 x y + p2 (r^2 + 2 x^2)`` and ``y radial + p1 (r^2 + 2 y^2) + 2 p2 x y``. Beyond
     ``max_radius_sq`` the radial factor fades smoothly into a constant, because the polynomial folds back on
     itself far outside the image and would put impossible points inside it.
     """
@@ -49,7 +53,7 @@ def distort(
 def undistort(
     x: NDArray[np.float64], y: NDArray[np.float64], coefficients: tuple[float, ...]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Undistorted coordinates of distorted ones: the inverse of `distort` by Newton's method.
+    """Undistorted coordinates of distorted ones, same shape: the inverse of `distort` by Newton's method.
 
     Raises `CalibrationError` when the distortion cannot be inverted there.
     """
@@ -120,7 +124,7 @@ def max_radius_sq(lens: Lens) -> float:
 def project(lens: Lens, x: Any, y: Any, z: Any) -> tuple[Any, Any]:
     """Column and row (px) of points in the lens's own coordinates (mm); any shape.
 
-    Seed Eqs. (9) to (11), with distortion.
+    ``homo^-1(K S)`` of the method's Eq. (11) (Shin et al., CVPR 2024, supplement), with distortion.
     """
     u, v = distort(x / z, y / z, lens.distortion, max_radius_sq(lens))
     return u * lens.fx_px + lens.cx_px, v * lens.fy_px + lens.cy_px

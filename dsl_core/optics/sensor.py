@@ -28,10 +28,10 @@ def bayer_channels(bayer: BayerPattern, rows: int, columns: int) -> NDArray[np.i
 
 
 def raw_variance(sensor: Sensor, signal_dn: NDArray[np.floating]) -> NDArray[np.floating]:
-    """Variance (DN^2) of a raw value whose expectation above black is ``signal_dn``.
+    """Variance (DN^2) of raw values whose expectation above black is ``signal_dn``, same shape.
 
-    Read noise, rounding to steps, and shot noise of the signal (EMVA 1288); the black level is an electronic
-    offset without shot noise.
+    The linear model of EMVA 1288: read noise, rounding to steps (``step^2 / 12``), and shot noise of the
+    signal, whose gain is one over ``electrons_per_dn``; the black level is an offset without shot noise.
     """
     floor = sensor.read_noise_dn**2 + sensor.step_dn**2 / 12
     return np.asarray(floor + np.maximum(signal_dn, 0) / sensor.electrons_per_dn)

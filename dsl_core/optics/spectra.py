@@ -32,7 +32,8 @@ BEYOND_NM = 40.0
 def chain_response(rig: Rig, order: int, wavelengths_nm: NDArray[np.float64]) -> NDArray[np.float64]:
     """DN per ms and nm of a perfect diffuser at unit shading, full drive of one LED.
 
-    Shape (camera channels 3, LEDs 3, wavelengths). Orders that the rig does not know give zero.
+    The product of response, efficiency and emission in the model equation of `dsl_core.model.rig.Rig`, shape
+    (camera channels 3, LEDs 3, wavelengths). Orders that the rig does not know give zero.
     """
     if order == 0:
         efficiency = np.ones(len(wavelengths_nm))

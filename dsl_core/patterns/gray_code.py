@@ -1,5 +1,6 @@
 """Binary reflected Gray code of projector columns and rows, encoded here and decoded next to it.
 
+Number n has the word ``n xor (n >> 1)`` (F. Gray, US patent 2,632,058, 1953).
 Bits run from the most significant to the least, columns before rows, each bit followed by its
 inverse: the order of OpenCV's ``GrayCodePattern``, with white and black appended.
 
@@ -23,7 +24,10 @@ from dsl_core.model.plan import BinaryCode
 
 
 def bit_counts(spec: BinaryCode, size_px: tuple[int, int]) -> tuple[int, int]:
-    """Column bits and row bits (0 when rows are not coded) for a projector of (width, height) px."""
+    """Column bits and row bits (0 when rows are not coded) for a projector of (width, height) px.
+
+    Raises `PlanError` for a projector that has nothing to tell apart.
+    """
     width, height = size_px
     if width < 2 or height < 1 or (spec.rows and height < 2):
         raise PlanError(

@@ -1,8 +1,8 @@
 """Numbered stripes of other programs: Gray, binary or XOR digits, with or without inverse.
 
 A digit with an inverse is the sign of a difference, as in `dsl_core.patterns.gray_code`. One without is
-compared with half of white above black, after Moreno and Taubin: "Simple, accurate, and robust
-projector-camera calibration", 3DIMPVT 2012, section 3.1; stripes blurred over each other then fail sooner.
+compared with half of white above black, the usual threshold; stripes blurred over each other then fail
+sooner.
 """
 
 from __future__ import annotations

@@ -18,7 +18,7 @@ from dsl_core.model.rig import Rgb, Rig
 from dsl_core.model.spectral import SpectralCurve
 from dsl_core.resources import resource_path
 
-#: Second order relative to the first (seed Fig. 5).
+#: Second order relative to the first (supplement, Fig. 5).
 SECOND_ORDER = 0.04
 #: First-order blue peak on white at the brighter setting, as a share of full scale (published graph).
 BLUE_PEAK = 0.74

@@ -1,9 +1,9 @@
 """Triangles between neighbouring pixels of a depth map, cut where the surface is not continuous.
 
-As organised point clouds are meshed elsewhere (D. Holz and S. Behnke, Fast Range Image Segmentation and
-Smoothing Using Approximate Surface Reconstruction, 2012): the squares of the pixel grid are split along the
-better diagonal. Two neighbours are joined unless the step along the ray between them is more than noise and
-than any surface that could have been seen.
+As organised point clouds are meshed elsewhere (D. Holz and S. Behnke, "Fast Range Image Segmentation and
+Smoothing Using Approximate Surface Reconstruction and Region Growing", IAS 2012): the squares of the pixel
+grid are split along the better diagonal. Two neighbours are joined unless the step along the ray between
+them is more than noise and than any surface that could have been seen.
 """
 
 from __future__ import annotations

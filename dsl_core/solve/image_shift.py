@@ -1,8 +1,8 @@
 """How far parts of a picture have moved since another one, in fractions of a pixel.
 
 Least squares on the gradient of the older picture, tile by tile, with the brightness of each tile left free
-(Lucas and Kanade, "An Iterative Image Registration Technique", IJCAI 1981); a shift common to all tiles is
-found first, so that it may be larger than a pixel.
+(B. D. Lucas and T. Kanade, "An Iterative Image Registration Technique with an Application to Stereo Vision",
+IJCAI 1981); a shift common to all tiles is found first, so that it may be larger than a pixel.
 """
 
 from __future__ import annotations

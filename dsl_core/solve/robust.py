@@ -1,4 +1,8 @@
-"""Deviations and weights that a few wrong values do not decide."""
+"""Deviations and weights that a few wrong values do not decide.
+
+Linear fits repeat weighted least squares with weights from their own residuals (P. J. Huber, "Robust
+Statistics", 1981).
+"""
 
 from __future__ import annotations
 
@@ -14,7 +18,10 @@ NORMAL = 1.4826
 
 
 def robust_std(residual: NDArray[np.floating], axis: int | None = None) -> Floats:
-    """Standard deviation of residuals about zero by their median size (scaled as normal ones need it)."""
+    """Standard deviation of residuals about zero by their median size (scaled as normal ones need it).
+
+    Along ``axis``, or of all.
+    """
     return np.asarray(NORMAL * np.median(np.abs(residual), axis=axis))
 
 
@@ -31,7 +38,7 @@ def rms(values: NDArray[np.floating]) -> float:
 
 
 def huber_weights(residual: Floats, sigma: Floats, limit_sigmas: float) -> tuple[Floats, float]:
-    """Inverse variances (n,) with Huber's weights, and how many times ``sigma`` the residuals scatter.
+    """Inverse variances (n,) with Huber's weights ``min(1, limit / |r|)``, and the scatter over ``sigma``.
 
     That factor is at least one; residuals beyond ``limit_sigmas`` of the deviation times it weigh less.
     """
@@ -43,8 +50,9 @@ def huber_weights(residual: Floats, sigma: Floats, limit_sigmas: float) -> tuple
 def robust_linear(design: Floats, values: Floats) -> tuple[Floats, Floats, float]:
     """Linear fit of values (n,) by a design (n, k) in which values far off count next to nothing.
 
-    Returns the coefficients (k,), the inverse (k, k) of the weighted normal matrix, and the scatter of the
-    residuals in the unit of the values: their covariance is the inverse times the scatter squared.
+    Weights are those of Geman and McClure, ``1 / (1 + (r / 3 s)^2)^2`` of residual r and scatter s.
+    Returns the coefficients (k,), the inverse (k, k) of the weighted normal matrix, and the scatter of
+    the residuals in the unit of the values: their covariance is the inverse times the scatter squared.
     """
     weight = np.ones_like(values)
     for _ in range(ROUNDS):

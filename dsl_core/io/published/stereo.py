@@ -151,7 +151,7 @@ def _nodes_of(stereo: Stereo) -> dict[str, Any]:
 
 
 def essential_matrix(pose: Pose) -> NDArray[np.float64]:
-    """``E = [t]x R`` with ``x_p' E x_c = 0`` (Hartley and Zisserman 2004, eq. 9.12), shape (3, 3)."""
+    """``E = [t]x R`` with ``x_p' E x_c = 0`` (Hartley and Zisserman 2004, section 9.6), shape (3, 3)."""
     return np.cross(pose.vector_mm, pose.matrix, axisb=0, axisc=0)
 
 

@@ -35,8 +35,9 @@ class PatchResult(Record):
 
 
 class ColorCheckerCalibration(Record):
-    """Response and emission refined on a chart by seed Eq. 1, film off.
+    """Response and emission refined on a chart, film off.
 
+    By Eq. 1 of the supplement of "Dispersed Structured Light" (Shin et al., CVPR 2024).
     ``corners_px`` are column and row of the outer corners of the patches: at dark skin, bluish green, black
     and white; ``quarter_turns`` says how far the chart was turned clockwise. ``weight`` of Eq. 1 and the
     relative ``reflectance_error`` of the patches are those the data chose; ``published_held_out`` is the

@@ -100,7 +100,7 @@ def step_edge(distance_px: Tensor, spread: Spread) -> Tensor:
 
 
 def halo_integral(distance_px: Tensor, response: ProjectorResponse) -> Tensor:
-    """Integral of the halo ``peak * exp(-|d| / decay)`` from minus infinity to a distance (px)."""
+    """Integral of the halo ``peak * exp(-|d| / decay)`` from minus infinity to distances (px), same shape."""
     tail = (
         response.halo_peak_per_px
         * response.halo_decay_px
