@@ -14,14 +14,8 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
-from dsl_core.model.rig import BayerPattern, colour_sites
-
-
-def bayer_colours(bayer: BayerPattern, rows: NDArray[np.intp], columns: NDArray[np.intp]) -> NDArray[np.intp]:
-    """Colour, 0 to 2 for red, green and blue, of pixels at rows and columns of the picture."""
-    sites = np.array(colour_sites(bayer)).reshape(2, 2)
-    return np.asarray(sites[rows % 2, columns % 2], np.intp)
-
+from dsl_core.model.rig import BayerPattern
+from dsl_core.optics.sensor import bayer_colours as bayer_colours
 
 #: Where samples of other colours are around a pixel (rows, columns from it): at its sides, and its corners.
 AROUND = ((0, -1), (0, 1), (-1, 0), (1, 0), (-1, -1), (-1, 1), (1, -1), (1, 1))

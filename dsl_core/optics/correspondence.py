@@ -19,10 +19,10 @@ from torch import Tensor
 from dsl_core.errors import CalibrationError
 from dsl_core.model.geometry import Lens, Pose
 from dsl_core.model.rig import BayerPattern, CorrespondenceGrid, Rig
-from dsl_core.optics.colour_neighbours import bayer_colours
 from dsl_core.optics.column_residual import residual_columns
 from dsl_core.optics.grating import FilmFrame, Vectors, incoming_direction
 from dsl_core.optics.pinhole import KEPT_PX, project, rays_at, rays_in
+from dsl_core.optics.sensor import bayer_channels
 
 #: Chebyshev nodes over the wavelength range; the interpolation error stays below 1e-3 px.
 NODES = 6
@@ -85,8 +85,7 @@ def _rays_of_rows(
 @lru_cache(maxsize=8)
 def _mosaic(bayer: BayerPattern, height: int, width: int) -> Tensor:
     """Colour, 0 to 2, of every pixel of a picture, flat."""
-    rows, columns = np.arange(height)[:, None], np.arange(width)[None]
-    return torch.as_tensor(bayer_colours(bayer, rows, columns).astype(np.uint8).ravel())
+    return torch.as_tensor(bayer_channels(bayer, height, width).astype(np.uint8).ravel())
 
 
 def _of_colour(values: tuple[float, float, float], rig: Rig, pixels: Tensor, other: Tensor) -> Tensor:

@@ -23,8 +23,15 @@ def bayer_channels(bayer: BayerPattern, rows: int, columns: int) -> NDArray[np.i
     >>> bayer_channels("RGGB", 2, 3).tolist()
     [[0, 1, 0], [1, 2, 1]]
     """
-    tile = np.array(colour_sites(bayer)).reshape(2, 2)
-    return np.tile(tile, (rows // 2 + 1, columns // 2 + 1))[:rows, :columns]
+    return np.asarray(bayer_colours(bayer, np.arange(rows)[:, None], np.arange(columns)), np.int64)
+
+
+def bayer_colours(
+    bayer: BayerPattern, rows: NDArray[np.integer], columns: NDArray[np.integer]
+) -> NDArray[np.intp]:
+    """Colour (0 R, 1 G, 2 B) of pixels at rows and columns of a mosaic, in the shape of both together."""
+    tile = np.array(colour_sites(bayer), np.intp).reshape(2, 2)
+    return np.asarray(tile[rows % 2, columns % 2])
 
 
 def raw_variance(sensor: Sensor, signal_dn: NDArray[np.floating]) -> NDArray[np.floating]:

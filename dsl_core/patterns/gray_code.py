@@ -1,6 +1,5 @@
 """Binary reflected Gray code of projector columns and rows, encoded here and decoded next to it.
 
-Number n has the word ``n xor (n >> 1)`` (F. Gray, US patent 2,632,058, 1953).
 Bits run from the most significant to the least, columns before rows, each bit followed by its
 inverse: the order of OpenCV's ``GrayCodePattern``, with white and black appended.
 
@@ -21,6 +20,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from dsl_core.errors import DecodeError, PlanError
 from dsl_core.model.plan import BinaryCode
+from dsl_core.patterns.digits import gray_word
 
 
 def bit_counts(spec: BinaryCode, size_px: tuple[int, int]) -> tuple[int, int]:
@@ -44,8 +44,7 @@ def frame_count(spec: BinaryCode, size_px: tuple[int, int]) -> int:
 
 def gray_bit(count: int, bit: int) -> NDArray[np.uint8]:
     """Bit ``bit`` (0 is the least significant) of the Gray code of 0 .. count-1, shape (count,), 0/1."""
-    index = np.arange(count)
-    return ((index ^ (index >> 1)) >> bit & 1).astype(np.uint8)
+    return (gray_word(np.arange(count, dtype=np.int32)) >> bit & 1).astype(np.uint8)
 
 
 def code_image(spec: BinaryCode, size_px: tuple[int, int], index: int) -> NDArray[np.uint8]:

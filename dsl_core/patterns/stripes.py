@@ -13,9 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dsl_core.model.captured_code import Stripes
+from dsl_core.patterns.digits import Numbers, gray_number, gray_word, with_base
 from dsl_core.patterns.reading import AxisReading, Floats, Measured
 
-Numbers = NDArray[np.int32]
 #: Share of the pixels that see bright and dark stripes of the finest digit at once, about, and the least.
 MIXED, LEAST_MIXED = 0.5, 0.01
 #: In these, light that is half of white may still be a bright or dark stripe's, give or take this share of
@@ -113,23 +113,13 @@ def _word(spec: Stripes, number: Numbers) -> Numbers:
     """The digits that show a number."""
     if spec.code == "binary":
         return number
-    word = number ^ (number >> 1)
-    return word if spec.code == "gray" else _with_base(spec, word)
+    word = gray_word(number)
+    return word if spec.code == "gray" else with_base(word, spec.bits, spec.base_bit)
 
 
 def number_of(spec: Stripes, word: Numbers) -> Numbers:
     """The numbers that words of digits mean, whole numbers of any shape."""
     if spec.code == "binary":
         return word
-    number = word if spec.code == "gray" else _with_base(spec, word)
-    shift = 1
-    while shift < spec.bits:
-        number = number ^ (number >> shift)
-        shift *= 2
-    return number
-
-
-def _with_base(spec: Stripes, word: Numbers) -> Numbers:
-    """All digits but the base combined with it; twice gives the same again."""
-    others = (1 << spec.bits) - 1 - (1 << spec.base_bit)
-    return np.asarray(word ^ ((word >> spec.base_bit & 1) * np.int32(others)), np.int32)
+    gray = word if spec.code == "gray" else with_base(word, spec.bits, spec.base_bit)
+    return gray_number(gray, spec.bits)

@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from dsl_core.errors import PlanError
 from dsl_core.model.plan import EnsembleCode, XorCode
+from dsl_core.patterns.digits import gray_number, gray_word, with_base
 from dsl_core.patterns.gray_code import DecodedCode, GrayDecoder, bit_counts, code_image
 
 #: Every bit of fine stripes stands this many deviations above its inverse where light comes straight.
@@ -82,11 +83,4 @@ def _base_bit(spec: Spec, size_px: tuple[int, int]) -> int:
 
 def _converted(code: NDArray[np.int32], bits: int, base_bit: int) -> NDArray[np.int32]:
     """Numbers decoded as if the XOR digits were Gray digits -> numbers that the XOR digits mean."""
-    digits = code ^ (code >> 1)
-    others = (1 << bits) - 1 - (1 << base_bit)
-    number = digits ^ ((digits >> base_bit & 1) * np.int32(others))
-    shift = 1
-    while shift < bits:
-        number ^= number >> shift
-        shift *= 2
-    return number
+    return gray_number(with_base(gray_word(code), bits, base_bit), bits)

@@ -11,7 +11,7 @@ from torch import Tensor
 
 from dsl_core.model.plan import CapturePlan
 from dsl_core.model.rig import Rig, Sensor
-from dsl_core.optics.sensor import bayer_channels, raw_variance
+from dsl_core.optics.sensor import bayer_channels, bayer_colours, raw_variance
 from dsl_core.reconstruction.hdr import setting_gains_ms
 
 #: As the merger of brackets: a raw value counts as saturated this close to full scale.
@@ -106,4 +106,4 @@ def _by_neighbours(
 def own_channel(rig: Rig, pixels: NDArray[np.int64]) -> NDArray[np.int64]:
     """Colour that each pixel of the mosaic measures, (pixels,)."""
     y, x = np.divmod(pixels, rig.camera.width_px)
-    return np.asarray(bayer_channels(rig.sensor.bayer, 2, 2)[y % 2, x % 2])
+    return np.asarray(bayer_colours(rig.sensor.bayer, y, x), np.int64)
