@@ -35,11 +35,12 @@ if TYPE_CHECKING:
     from dsl_core.api.scans import load_scan as load_scan
     from dsl_core.api.scans import open_rig as open_rig
     from dsl_core.api.scans import plan as plan
+    from dsl_core.api.scans import predict as predict
     from dsl_core.api.scans import reconstruct as reconstruct
     from dsl_core.api.scans import rigs as rigs
     from dsl_core.api.scans import scan as scan
 
-_SCANS = ("load_calibration", "load_scan", "open_rig", "plan", "reconstruct", "rigs", "scan")
+_SCANS = ("load_calibration", "load_scan", "open_rig", "plan", "predict", "reconstruct", "rigs", "scan")
 _RESULTS = ("evaluate", "export", "load_result", "save_result")
 _ANSWERS = ("classify", "colours")
 _ARRAYS = ("calibrate_geometry", "decode_stack", "depth_of_columns", "read_spectra")
@@ -65,6 +66,7 @@ __all__ = [
     "load_scan",
     "open_rig",
     "plan",
+    "predict",
     "read_spectra",
     "reconstruct",
     "rigs",

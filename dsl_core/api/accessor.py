@@ -4,15 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
 from dsl_core.api import FilePath
+from dsl_core.api.places import Place, extent_of, place_mask
 from dsl_core.errors import DecodeError
-from dsl_core.evaluation.marks import explain_pixel, region_spectrum
+from dsl_core.evaluation.marks import explain_pixel, largest_difference, region_spectrum
 from dsl_core.io.export import export_by_ending
 from dsl_core.io.result.result_file import save_result
 from dsl_core.model.fit import Fit
@@ -43,16 +43,19 @@ class ResultAccessor:
         found = self._pixel(x, y)[["reflectance", "reflectance_std", "data_share"]].load()
         return found.assign_attrs(name=f"x {x}, y {y}", reasons=self.reasons(x, y))
 
-    def region(self, where: NDArray[np.bool_] | Sequence[int]) -> xr.Dataset:
+    def region(self, where: Place) -> xr.Dataset:
         """Mean reflectance of a region and its standard deviation over ``wavelength_nm``.
 
-        ``where`` is a mask (rows, columns) or x, y, width, height in pixel coordinates. ``reflectance_std``
-        is the scatter of the region's pixels (that of their mean is smaller by the root of their number, as
-        far as errors are independent), ``pixel_std`` the mean deviation stated for a single pixel. The
-        attribute ``used`` counts the pixels with a spectrum. Raises `DecodeError` for a region without any.
+        ``where`` is a mask (rows, columns), or x, y, width and height in pixels of the whole picture.
+        ``reflectance_std`` is the scatter of the region's pixels (that of their mean is smaller by the
+        root of their number, as far as errors are independent), ``pixel_std`` the mean deviation stated
+        for a single pixel. The attribute ``used`` counts the pixels with a spectrum. Raises `DecodeError`
+        for a region without any.
         """
         self._require_spectra()
-        mask = self._mask(where)
+        if np.shape(where) == (2,):
+            raise DecodeError(f"A region has several pixels; for the one at {where!r} call spectrum(x, y).")
+        mask = place_mask(self._result, where)
         values, std, share = (
             self._result[name].values for name in ("reflectance", "reflectance_std", "data_share")
         )
@@ -62,14 +65,40 @@ class ResultAccessor:
         over = "wavelength_nm"
         return xr.Dataset(
             {
-                "reflectance": (over, found.mean),
-                "reflectance_std": (over, found.deviation),
-                "pixel_std": (over, found.pixel_std),
-                "data_share": (over, found.data_share),
+                name: (over, values, {"units": "1", "long_name": words})
+                for name, values, words in (
+                    ("reflectance", found.mean, "mean reflectance on the Spectralon scale"),
+                    ("reflectance_std", found.deviation, "standard deviation of the pixels"),
+                    ("pixel_std", found.pixel_std, "mean standard deviation stated for a pixel"),
+                    ("data_share", found.data_share, "mean share decided by data"),
+                )
             },
             coords={over: self._result[over]},
             attrs={"name": f"mean of {found.used} pixels", "used": found.used, "reasons": []},
         )
+
+    def difference(self, other: xr.Dataset) -> xr.Dataset:
+        """This spectrum less another one, both of `spectrum` or `region`, over the bands that both have.
+
+        ``reflectance_std`` is the deviation of the difference, errors of both taken as independent. The
+        attributes ``most_nm`` and ``most_sigmas`` say in which band it is the most deviations from zero, and
+        by how many; ``differ`` whether these are more than chance makes of so many bands. Raises
+        `DecodeError` for what is not one spectrum, and where no band has both.
+        """
+        a, b = xr.align(*(_one_spectrum(each) for each in (self._result, other)), join="inner")
+        nm, std = a["wavelength_nm"].values, np.hypot(a["reflectance_std"], b["reflectance_std"])
+        values = (each["reflectance"].values for each in (a, b))
+        most = largest_difference(nm, *values, a["reflectance_std"].values, b["reflectance_std"].values)
+        if most is None:
+            raise DecodeError("The spectra have no band in which both are known with their deviations.")
+        attrs = {
+            "name": f"{a.attrs.get('name', '')} less {b.attrs.get('name', '')}",
+            "most_nm": most.nm,
+            "most_sigmas": abs(most.value) / most.std,
+            "differ": most.is_shown,
+        }
+        both = {"reflectance": a["reflectance"] - b["reflectance"], "reflectance_std": std}
+        return xr.Dataset(both, attrs=attrs)
 
     def reasons(self, x: int, y: int) -> list[str]:
         """Why a pixel is limited, a sentence each; empty where nothing is.
@@ -116,7 +145,8 @@ class ResultAccessor:
     def plot(self, x: int | None = None, y: int | None = None, ax: Axes | None = None) -> Axes:
         """Draw a spectrum with its 95 % band, and return the axes.
 
-        Of a pixel of a result, or, without ``x`` and ``y``, of what `spectrum` or `region` returned.
+        Of a pixel of a result, or, without ``x`` and ``y``, of what `spectrum`, `region` or `difference`
+        returned; of a region the band is that of its pixels. Raises `DecodeError` where no pixel is said.
         """
         import matplotlib.pyplot as plt
 
@@ -137,33 +167,17 @@ class ResultAccessor:
         try:
             return self._result.sel(x=x, y=y)
         except KeyError as error:
-            raise DecodeError(f"Pixel x {x}, y {y} is not in the result ({self._extent()}).") from error
-
-    def _mask(self, where: Any) -> NDArray[np.bool_]:
-        rows, columns = self._result["y"].values, self._result["x"].values
-        given = np.asarray(where)
-        if given.dtype == bool:
-            if given.shape != (len(rows), len(columns)):
-                raise DecodeError(
-                    f"The mask has shape {given.shape}; the result has {len(rows)} rows and {len(columns)}"
-                    " columns."
-                )
-            return given
-        if given.shape != (4,):
-            raise DecodeError(f"A region is a mask, or x, y, width and height; given {where!r}.")
-        x, y, width, height = (int(value) for value in given)
-        inside_y, inside_x = (rows >= y) & (rows < y + height), (columns >= x) & (columns < x + width)
-        if not (inside_y.any() and inside_x.any()):
             raise DecodeError(
-                f"The region {tuple(int(v) for v in given)} (x, y, width, height) is outside the result"
-                f" ({self._extent()})."
-            )
-        return np.asarray(inside_y[:, None] & inside_x)
+                f"Pixel x {x}, y {y} is not in the result ({extent_of(self._result)})."
+            ) from error
 
     def _require_spectra(self) -> None:
         if "reflectance" not in self._result:
             raise DecodeError("The result contains depth only. Reconstruct the scan with spectra=True.")
 
-    def _extent(self) -> str:
-        rows, columns = self._result["y"].values, self._result["x"].values
-        return f"x {columns[0]} to {columns[-1]}, y {rows[0]} to {rows[-1]}"
+
+def _one_spectrum(given: xr.Dataset) -> xr.Dataset:
+    """Reflectance and its deviation (bands,) of one spectrum; raises `DecodeError` for anything else."""
+    if "reflectance_std" not in given or given["reflectance"].dims != ("wavelength_nm",):
+        raise DecodeError("A difference is that of two spectra, as spectrum(x, y) and region(...) return.")
+    return given[["reflectance", "reflectance_std"]].reset_coords(drop=True)

@@ -7,9 +7,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dsl_core.api import FilePath
+from dsl_core.api.places import Place, place_mask
 from dsl_core.errors import DecodeError
 from dsl_core.progress import Progress
 
@@ -17,9 +17,6 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from dsl_core.analysis.classes import SpectralClass
-
-#: Where a known material is: a mask (rows, columns), a pixel (x, y), or x, y, width and height.
-Place = NDArray[np.bool_] | Sequence[int]
 
 
 def classify(
@@ -74,7 +71,7 @@ def classify(
         classes += found
         notes += [*read.notes, *left_out]
     if pins:
-        classes += classes_of_masks(result, {name: place_mask(result, name, p) for name, p in pins.items()})
+        classes += classes_of_masks(result, {name: place_mask(result, p, name) for name, p in pins.items()})
     chosen = Measure(measure)
     limits = Limits.chosen(chosen, worst, margin)
     known, doubts = known_classes(classes, result.get("reflectance_std"))
@@ -123,7 +120,7 @@ def colours(
     from dsl_core.analysis.places import spectra_of_masks
 
     lights = [lights] if isinstance(lights, str) else lights
-    masks = {name: place_mask(result, name, place) for name, place in pins.items()}
+    masks = {name: place_mask(result, place, name) for name, place in pins.items()}
     spectra = spectra_of_masks(result, masks)
     found = colours_of(spectra, result["wavelength_nm"].values, lights, reference)
     shape = (len(lights), len(spectra))
@@ -138,23 +135,3 @@ def colours(
             variables[name] = (over, np.array(values).reshape(shape))
     coords = {"light": list(lights), "place": list(spectra), "component": ["L*", "a*", "b*"]}
     return xr.Dataset(variables, coords=coords).transpose("place", "light", ...)
-
-
-def place_mask(result: xr.Dataset, name: str, place: Place) -> NDArray[np.bool_]:
-    """The mask (rows, columns) of a place; raises `DecodeError` for anything that is none."""
-    given, rows, columns = np.asarray(place), result["y"].values, result["x"].values
-    if given.dtype == bool and given.shape == (len(rows), len(columns)):
-        return given
-    if given.dtype == bool or given.shape not in ((2,), (4,)):
-        raise DecodeError(
-            f"{name}: a place is a mask of {len(rows)} x {len(columns)}, a pixel x, y, or x, y, width,"
-            f" height; given {place!r}."
-        )
-    x, y, width, height = (*(int(v) for v in given), 1, 1)[:4]
-    inside_y, inside_x = (rows >= y) & (rows < y + height), (columns >= x) & (columns < x + width)
-    if not (inside_y.any() and inside_x.any()):
-        raise DecodeError(
-            f"{name}: the place {place!r} is outside the result, whose x runs from {columns.min()} to"
-            f" {columns.max()} and y from {rows.min()} to {rows.max()}. Choose one inside it."
-        )
-    return np.asarray(inside_y[:, None] & inside_x)

@@ -39,10 +39,10 @@ def export(
 ) -> list[Path]:
     """Write a result for another program and return the files written.
 
-    ``format`` is csv, envi, exr, glb, npy, obj, ply, png, stl or tiff; by default the ending of the path says
-    it. csv is a table of the spectra of ``pixels``, (x, y) each in the picture; what ``result.dsl.spectrum``
-    and ``result.dsl.region`` return is exported as csv too. Raises `StoreError` for an unknown format, an
-    existing file and a disk that fails.
+    ``format`` is csv, envi, exr, glb, npy, obj, ply, png, stl, tiff, or mesh for a surface as .ply; by
+    default the ending of the path says it. csv is a table of the spectra of ``pixels``, (x, y) each in
+    the picture; what ``result.dsl.spectrum`` and ``result.dsl.region`` return is exported as csv too.
+    Raises `StoreError` for an unknown format, an existing file and a disk that fails.
     """
     return export_by_ending(result, Path(path), format, pixels=pixels, overwrite=overwrite)
 

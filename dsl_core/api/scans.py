@@ -15,12 +15,12 @@ from dsl_core.api import FilePath
 from dsl_core.devices.base import DeviceRig
 from dsl_core.devices.registry import open_rig as open_by_texts
 from dsl_core.devices.registry import rig_names
-from dsl_core.errors import PlanError
+from dsl_core.errors import CalibrationError, PlanError
 from dsl_core.extras import names_missing_packages
 from dsl_core.io import calibration_library
 from dsl_core.io.scan.folder import ScanReader
 from dsl_core.io.scan.origin import rig_notes
-from dsl_core.model.base import problems_in_words
+from dsl_core.model.base import problems_in_words, what_is_wrong
 from dsl_core.model.options import Options
 from dsl_core.model.plan import CapturePlan
 from dsl_core.model.presets import PRESETS, preset_plan
@@ -30,6 +30,8 @@ from dsl_core.progress import Progress
 
 if TYPE_CHECKING:
     import xarray as xr
+
+    from dsl_core.planning.expected import Prediction
 
 
 def rigs() -> list[str]:
@@ -41,9 +43,9 @@ def rigs() -> list[str]:
 def open_rig(name: str = "twin", **options: object) -> DeviceRig:
     """Open the devices of a rig; use it in a ``with`` statement, so that they are closed.
 
-    ``options`` are those that ``dsl-scan rigs`` lists, as text, numbers, True and False, or a size as (width,
-    height). Raises
-    `DeviceError` for an unknown rig or option, and for devices that cannot be opened.
+    ``name`` is one of `rigs`, or the path of a rig profile. ``options`` are those that ``dsl-scan rigs``
+    lists, as text, numbers, True and False, or a size as (width, height). Raises `DeviceError` for an unknown
+    rig or option, and for devices that cannot be opened. A calibrated rig is read by `load_calibration`.
     """
     texts = {key: _as_text(value) for key, value in options.items()}
     rig = open_by_texts(name, texts)
@@ -62,8 +64,9 @@ def _as_text(value: object) -> str:
 def plan(rig: DeviceRig, preset: str = "reference", **changes: object) -> CapturePlan:
     """What a scan captures: the preset of that name for the picture sizes and exposures of a rig.
 
-    ``changes`` replace fields of `CapturePlan`, such as ``settings`` or ``code``. Raises `PlanError` for an
-    unknown preset or field, and for a plan that contradicts itself.
+    Presets are preview, comb, quick, coarse, balanced, columns and reference. ``changes`` replace fields
+    of `CapturePlan`, such as ``settings`` or ``code``. Raises `PlanError` for an unknown preset or field,
+    and for a plan that contradicts itself.
     """
     from dsl_core.capture.preflight import fit_plan
 
@@ -80,6 +83,25 @@ def plan(rig: DeviceRig, preset: str = "reference", **changes: object) -> Captur
                 f" {', '.join(CapturePlan.model_fields)}."
             ) from error
     return fit_plan(chosen, rig)
+
+
+@names_missing_packages
+def predict(rig: DeviceRig, plan: CapturePlan, calibration: Rig | FilePath | None = None) -> Prediction:
+    """What a plan is expected to reach on a rig, with its own calibration unless another is given.
+
+    ``seconds`` is the time of the capture, ``pixel_rmse`` the error of reflectance of a single pixel,
+    ``depth_std_mm`` that of depth. Nothing is captured. Raises `CalibrationError` where the rig has no
+    calibration, and `PlanError` for a plan without a binary code or spectral patterns.
+    """
+    from dsl_core.planning import prediction
+
+    known = _calibration(calibration) or rig.calibration
+    if known is None:
+        raise CalibrationError(
+            f"Nothing can be predicted for the rig {rig.name!r}, which has no calibration. Give one, such as"
+            ' calibration="rig.json".'
+        )
+    return prediction.predict(known, plan, latency_ms=rig.projector.info.latency_ms)
 
 
 @names_missing_packages
@@ -134,40 +156,62 @@ def reconstruct(
     ``bands_nm`` are the centre of the first and of the last band and their distance. ``region_px`` (x, y,
     width, height) solves spectra in that part of the picture alone and returns only that part; depth, normals
     and the check of the model still use the whole picture. Without ``spectra`` the result ends with depth.
-    ``solver``, ``correspondence`` and ``device`` are as in `Options`.
+    ``solver`` is best, published, nearest-line or colour-basis, ``correspondence`` auto, grating, hybrid or
+    grid, and ``device`` cpu, cuda, auto or another name of torch, all as in `Options`.
 
     The dataset holds the variables of `dsl_core.model.result.VARIABLES` over pixel coordinates ``x``, ``y``
     and ``wavelength_nm``, float32. Raises `StoreError` for an incomplete or damaged scan, `CalibrationError`
-    for a missing or unfitting calibration, `PlanError` for a solver that does not exist or does not fit, and
-    `DecodeError` where the frames show no usable light.
+    for a missing or unfitting calibration, `PlanError` for bands, a region, a device or a solver that does
+    not exist or does not fit, and `DecodeError` where the frames show no usable light.
     """
     import dsl_core.api.accessor  # noqa: F401  (registers ``.dsl``)
     from dsl_core.workflows.scans import reconstruct_scan
 
     folder = scan.folder if isinstance(scan, ScanReader) else Path(scan)
-    rig = calibration if isinstance(calibration, Rig | None) else load_calibration(calibration)
-    first, last, step = _bands(bands_nm)
     options = Options(
-        grid=WavelengthGrid(start_nm=first, stop_nm=last, step_nm=step),
+        grid=_grid(bands_nm),
         correspondence=correspondence,
         spectra=spectra,
-        device=device,
+        device=_device(device),
         solver=solver,
         region_px=None if region_px is None else _region(region_px, ScanReader(folder).plan.camera_size_px),
     )
-    return reconstruct_scan(folder, rig, options, progress)
+    return reconstruct_scan(folder, _calibration(calibration), options, progress)
 
 
-def _bands(given: Any) -> tuple[float, float, float]:
-    """First and last centre and their distance, nm."""
-    if isinstance(given, str) or len(given) != 3:
-        shown = repr(given) if isinstance(given, str) else f"{len(given)} values"
+def _calibration(given: Rig | FilePath | None) -> Rig | None:
+    return given if isinstance(given, Rig | None) else load_calibration(given)
+
+
+def _device(name: str) -> str:
+    """A device of torch by its name; raises `PlanError` for a name that is none."""
+    from dsl_core.reconstruction.torch_device import DEVICES, torch_device
+
+    if name in DEVICES:
+        return torch_device(name)
+    import torch
+
+    try:
+        torch.device(name)
+    except RuntimeError as error:
+        raise PlanError(f"There is no device {name!r}; choose {', '.join(DEVICES)}.") from error
+    return name
+
+
+def _grid(given: Any) -> WavelengthGrid:
+    """Bands by the centres of the first and the last and their distance, nm."""
+    if isinstance(given, str) or np.shape(given) != (3,):
+        shown = repr(given) if isinstance(given, str) or np.ndim(given) != 1 else f"{len(given)} values"
         raise PlanError(
             f"bands_nm are the centres of the first and of the last band and their distance in nm, such as"
             f" (430, 660, 5); given {shown}."
         )
     first, last, step = given
-    return first, last, step
+    try:
+        return WavelengthGrid(start_nm=first, stop_nm=last, step_nm=step)
+    except ValidationError as error:
+        words = "; ".join(what_is_wrong(fault) for fault in error.errors())
+        raise PlanError(f"bands_nm cannot be {first:g}, {last:g}, {step:g}: {words}.") from error
 
 
 def _region(given: Sequence[int], size_px: tuple[int, int]) -> tuple[int, int, int, int]:

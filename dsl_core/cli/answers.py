@@ -364,7 +364,7 @@ def _check_places(at: Sequence[str]) -> None:
 def _masks(path: Path, result: xr.Dataset, pins: bool, at: Sequence[str]) -> dict[str, NDArray[np.bool_]]:
     """The places that the options name."""
     from dsl_core.analysis.places import masks_of_marks
-    from dsl_core.api.answers import place_mask
+    from dsl_core.api.places import place_mask
     from dsl_core.io.result.annotations_file import load_annotations
 
     masks: dict[str, NDArray[np.bool_]] = {}
@@ -372,6 +372,6 @@ def _masks(path: Path, result: xr.Dataset, pins: bool, at: Sequence[str]) -> dic
         masks |= masks_of_marks(load_annotations(path), (result.sizes["y"], result.sizes["x"]))
     for text in at:
         name, place = parse_place("--at", text)
-        mask = place_mask(result, name, place)
+        mask = place_mask(result, place, name)
         masks[name] = masks[name] | mask if name in masks else mask
     return masks

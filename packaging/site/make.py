@@ -159,6 +159,7 @@ def python_page() -> str:
         "::: dsl_core.api.accessor.ResultAccessor",
         "::: dsl_core.errors",
         "::: dsl_core.model.options.Options",
+        "::: dsl_core.planning.expected.Prediction",
     ]
     return "\n\n".join(parts) + "\n"
 

@@ -104,7 +104,7 @@ def test_the_face_of_python_tells_colours() -> None:
         ({"pins": {"x": (1, 2, 3)}}, "a place is a mask"),
         (
             {"pins": {"a": (5, 5), "x": (200, 5)}},
-            r"x: the place .* is outside the result, whose x",
+            r"x: x 200, y 5, width 1, height 1 is outside the result",
         ),
         ({}, "Give a library of spectra, pins, or both"),
         ({"pins": {"x": (5, 5)}, "range_nm": (100, 200)}, "Only 0 bands"),

@@ -3,6 +3,7 @@
 import importlib.util
 import re
 from contextlib import chdir
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -14,8 +15,9 @@ import xarray as xr
 import dsl_core as dsl
 from dsl_core.cli.output import Output
 from dsl_core.cli.results import print_figures
-from dsl_core.errors import DecodeError, PlanError, StoreError
+from dsl_core.errors import CalibrationError, DecodeError, PlanError, StoreError
 from dsl_core.io.scan.folder import ScanReader
+from dsl_core.model.presets import PRESETS
 from dsl_core.resources import resource_path
 
 
@@ -100,6 +102,70 @@ def test_the_mean_of_a_region(result: xr.Dataset) -> None:
         result.dsl.region(np.zeros((72, 112), bool))
     with pytest.raises(DecodeError, match="mask has shape"):
         result.dsl.region(np.zeros((2, 2), bool))
+
+
+def test_a_region_says_its_units_and_takes_whole_pixels_alone(result: xr.Dataset) -> None:
+    patch = result.dsl.region((30, 20, 6, 4))
+    assert all(patch[name].attrs["units"] == "1" for name in patch)
+    with pytest.raises(DecodeError, match="in whole pixels"):
+        result.dsl.region((30.5, 20, 6, 4))
+    with pytest.raises(DecodeError, match="call spectrum"):
+        result.dsl.region((30, 20))
+    with pytest.raises(DecodeError, match=r"outside the result \(x 0 to 111, y 0 to 71\)"):
+        result.dsl.region((112, 20, 6, 4))
+
+
+def test_two_spectra_differ_where_their_deviations_do_not_explain_it(result: xr.Dataset) -> None:
+    one, other = result.dsl.region((48, 28, 6, 5)), result.dsl.region((60, 28, 6, 5))
+    less = one.dsl.difference(other)
+    np.testing.assert_allclose(less["reflectance"], one["reflectance"] - other["reflectance"])
+    np.testing.assert_allclose(less["reflectance_std"], np.hypot(one.reflectance_std, other.reflectance_std))
+    sigmas = np.abs(less["reflectance"] / less["reflectance_std"])
+    assert less.attrs["most_sigmas"] == pytest.approx(float(sigmas.max()))
+    assert less.attrs["most_nm"] == float(sigmas.idxmax())
+    assert less.attrs["differ"] == (less.attrs["most_sigmas"] > 4)
+    assert not one.dsl.difference(one).attrs["differ"]
+    few = one.dsl.difference(other.isel(wavelength_nm=slice(0, 5)))
+    assert few.sizes["wavelength_nm"] == 5
+    assert len(less.dsl.plot(ax=plt.figure().subplots()).lines) == 1
+    with pytest.raises(DecodeError, match="of two spectra"):
+        result.dsl.difference(one)
+    with pytest.raises(DecodeError, match="no band"):
+        one.dsl.difference(other.assign_coords(wavelength_nm=other["wavelength_nm"] + 1))
+
+
+def test_what_a_plan_will_reach_is_predicted_without_a_capture() -> None:
+    with dsl.open_rig("twin", size="112x72") as rig:
+        plan = dsl.plan(rig, "preview")
+        expected = dsl.predict(rig, plan)
+        assert dsl.predict(replace(rig, calibration=None), plan, rig.calibration) == expected
+        with pytest.raises(CalibrationError, match="has no calibration"):
+            dsl.predict(replace(rig, calibration=None), plan)
+    assert expected.seconds == pytest.approx(plan.duration_s(rig.projector.info.latency_ms), abs=1e-3)
+    assert 0 < expected.rmse < expected.pixel_rmse < 1
+
+
+def test_the_help_on_plans_names_every_preset() -> None:
+    assert all(re.search(rf"\b{each.key}\b", dsl.plan.__doc__ or "") for each in PRESETS)
+
+
+@pytest.mark.parametrize(
+    ("wrong", "words"),
+    [
+        ({"bands_nm": (650, 450, 10)}, "450 nm, must be above the first, 650 nm"),
+        ({"bands_nm": 5}, "given 5"),
+        ({"device": "abacus"}, "no device 'abacus'; choose cpu, cuda, auto"),
+    ],
+)
+def test_what_a_reconstruction_cannot_do_is_said_in_words(
+    scan: ScanReader, wrong: dict[str, Any], words: str
+) -> None:
+    with pytest.raises(PlanError, match=words):
+        dsl.reconstruct(scan, **wrong)
+
+
+def test_a_scan_shows_where_it_is_and_how_much_of_it(scan: ScanReader) -> None:
+    assert repr(scan) == f"ScanReader({str(scan.folder)!r}: 154 of 154 frames)"
 
 
 def test_points_are_the_pixels_with_depth(result: xr.Dataset) -> None:
@@ -209,7 +275,7 @@ def test_spectra_become_tables_that_are_read_again(
 def test_what_is_not_in_a_result_is_told(result: xr.Dataset, scan: ScanReader) -> None:
     with pytest.raises(DecodeError, match="x 999, y 1 is not in the result"):
         result.dsl.reasons(999, 1)
-    with pytest.raises(DecodeError, match=r"\(900, 900, 5, 5\) .* is outside the result \(x 0 to 111"):
+    with pytest.raises(DecodeError, match=r"x 900, y 900, .* is outside the result \(x 0 to 111"):
         result.dsl.region((900, 900, 5, 5))
     with pytest.raises(DecodeError, match="one spectrum, not a result"):
         result.dsl.spectrum(50, 30).dsl.spectrum(50, 30)

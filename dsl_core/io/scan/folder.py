@@ -59,6 +59,9 @@ class ScanReader:
         self.store.check()
         self.entries: dict[int, LogEntry] = {e.shot: e for e in read_log(self.folder / LOG_NAME)[0]}
 
+    def __repr__(self) -> str:
+        return f"ScanReader({str(self.folder)!r}: {len(self.entries)} of {self.plan.shot_count} frames)"
+
     @property
     def plan(self) -> CapturePlan:
         """The plan the frames belong to."""
