@@ -19,7 +19,11 @@ class SpectralChoice:
 #: How the place of each wavelength is computed.
 MODELS: tuple[SpectralChoice, ...] = (
     SpectralChoice("auto", "Best model in the calibration", "hybrid, else the grid, else the grating"),
-    SpectralChoice("grating", "Grating equation alone", "needs no depth stage; ignores a bend of the film"),
+    SpectralChoice(
+        "grating",
+        "Grating equation alone",
+        "the film's pose and form alone; leaves out what no formula describes",
+    ),
     SpectralChoice("hybrid", "Grating equation and measured residual", "needs a calibrated depth stage"),
     SpectralChoice("grid", "Measured grid", "as published; needs a grid measured on the depth stage"),
 )

@@ -38,6 +38,14 @@ def test_a_notebook_runs_as_written(
     assert capsys.readouterr().out
 
 
+@pytest.mark.parametrize("page", sorted(HELP.glob("*.md")), ids=lambda page: str(page.stem))
+def test_a_help_page_ends_with_where_to_go_from_there(page: Path) -> None:
+    heading = re.findall(r"^## (.*)$", page.read_text(encoding="utf-8"), re.MULTILINE)[-1]
+    end = page.read_text(encoding="utf-8").rpartition("## ")[2]
+    assert heading == "Next"
+    assert re.search(r"\]\([\w-]+\.md", end)
+
+
 def test_there_are_three_notebooks() -> None:
     assert len(EXAMPLES) == 3
 
