@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,12 +11,9 @@ from dsl_core.errors import CalibrationError
 from dsl_core.model.spectral import SpectralCurve
 
 Floats = NDArray[np.float64]
-#: A band of a result is the mean over a triangle as wide at half height as bands are apart.
-Shape = Literal["triangle", "gaussian", "box"]
-#: Samples of a kernel across its width at half height, and how far a kernel reaches, in such widths.
+#: Samples of a band's triangle across its width at half height.
 _PER_WIDTH = 32
-_REACH: dict[Shape, float] = {"triangle": 1.0, "gaussian": 1.5, "box": 0.5}
-#: At most this share of a band's kernel may lie beyond the ends of a spectrum.
+#: At most this share of a band's triangle may lie beyond the ends of a spectrum.
 MOST_BEYOND = 0.5
 
 
@@ -36,32 +32,27 @@ def band_widths_nm(bands_nm: Floats) -> Floats:
     return np.asarray(np.gradient(np.asarray(bands_nm, np.float64)))
 
 
-def band_weights(nm: Floats, bands_nm: Floats, widths_nm: Floats, shape: Shape = "triangle") -> Floats:
+def band_weights(nm: Floats, bands_nm: Floats, widths_nm: Floats) -> Floats:
     """Weights (bands, samples) that turn a spectrum, linear between its samples, into band means.
 
-    The kernel of a band is centred on it and ``widths_nm`` (bands,) wide at half height. Where it reaches
-    beyond the ends of the spectrum, the rest of it decides; a row is NaN where more than `MOST_BEYOND` does.
+    A band of a result is the mean over a triangle, centred on it and ``widths_nm`` (bands,) wide at half
+    height. Where it reaches beyond the ends of the spectrum, the rest of it decides; a row is NaN where more
+    than `MOST_BEYOND` does.
     """
     weights = np.full((len(bands_nm), len(nm)), np.nan)
-    at = np.linspace(-_REACH[shape], _REACH[shape], round(2 * _REACH[shape] * _PER_WIDTH) + 1)
-    kernel = _kernel(at, shape)
+    at = np.linspace(-1.0, 1.0, 2 * _PER_WIDTH + 1)
+    triangle = 1 - np.abs(at)
     for band, (centre, width) in enumerate(zip(bands_nm, widths_nm, strict=True)):
         # Samples of the spectrum itself are nodes too, so that the narrowest line of it counts in full.
-        inside = nm[np.abs(nm - centre) <= _REACH[shape] * width]
+        inside = nm[np.abs(nm - centre) <= width]
         fine = np.union1d(centre + at * width, inside)
-        mass = np.interp(fine, centre + at * width, kernel) * np.gradient(fine)
+        mass = np.interp(fine, centre + at * width, triangle) * np.gradient(fine)
         covered = (fine >= nm[0] - 1e-9) & (fine <= nm[-1] + 1e-9)
         total = mass[covered].sum()
         if total < (1 - MOST_BEYOND) * mass.sum() or total <= 0:
             continue
         weights[band] = _spread(fine[covered], mass[covered] / total, nm)
     return weights
-
-
-def _kernel(at: Floats, shape: Shape) -> Floats:
-    if shape == "gaussian":
-        return np.asarray(np.exp(-4 * np.log(2) * at**2))
-    return 1 - np.abs(at) if shape == "triangle" else np.ones_like(at)
 
 
 def _spread(fine: Floats, mass: Floats, nm: Floats) -> Floats:
@@ -74,19 +65,18 @@ def _spread(fine: Floats, mass: Floats, nm: Floats) -> Floats:
     return np.asarray(row)
 
 
-def at_bands(
-    curve: SpectralCurve, bands_nm: Floats, widths_nm: Floats | None = None, shape: Shape = "triangle"
-) -> BandValues:
-    """A spectrum at the bands of a result; raises `CalibrationError` where it does not cover them.
+def at_bands(curve: SpectralCurve, bands_nm: Floats) -> BandValues:
+    """A spectrum at the bands (nm) of a result, a mean over the triangle of each.
 
+    Raises `CalibrationError` where the spectrum does not cover them.
     The deviation holds that of the curve, if it states one, and what its sampling leaves open where it is
     coarser than the bands: half of the difference between straight lines and a smooth curve between samples.
     """
     from scipy.interpolate import PchipInterpolator
 
     nm, values = np.asarray(curve.wavelengths_nm), np.asarray(curve.values)
-    widths = band_widths_nm(bands_nm) if widths_nm is None else widths_nm
-    weights = band_weights(nm, bands_nm, widths, shape)
+    widths = band_widths_nm(bands_nm)
+    weights = band_weights(nm, bands_nm, widths)
     missing = ~np.isfinite(weights).all(1)
     if missing.any():
         raise CalibrationError(

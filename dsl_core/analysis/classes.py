@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from dsl_core.analysis.at_bands import Shape, at_bands
+from dsl_core.analysis.at_bands import at_bands
 from dsl_core.analysis.library import SpectralLibrary
 from dsl_core.errors import CalibrationError, DecodeError
 from dsl_core.model.result import SPECTRUM_INVALID, Flag
@@ -95,7 +95,7 @@ def components_of(covariance: Floats) -> tuple[Floats, Floats]:
 
 
 def classes_of_library(
-    library: SpectralLibrary, bands_nm: Floats, shape: Shape = "triangle", relative_error: float = 0.0
+    library: SpectralLibrary, bands_nm: Floats, relative_error: float = 0.0
 ) -> tuple[tuple[SpectralClass, ...], tuple[str, ...]]:
     """The groups of a library as classes at bands (nm), and notes on entries that are left out.
 
@@ -111,7 +111,7 @@ def classes_of_library(
     notes = []
     for entry in library.entries:
         try:
-            found = at_bands(entry.curve, bands_nm, shape=shape)
+            found = at_bands(entry.curve, bands_nm)
         except CalibrationError as error:
             notes.append(f"{entry.name} ({entry.file.name}) is left out. {error}")
         else:

@@ -26,8 +26,7 @@ class Block:
     """Pixels of which the same bands are known: reflectance and deviations (bands, pixels).
 
     ``whitening`` (bands, bands) makes errors in deviations independent, ``whitened`` is the reflectance in
-    such units; ``brightness`` (pixels,) is the
-    relative deviation of the level that all bands share.
+    such units; ``brightness`` (pixels,) is the relative deviation of the level that all bands share.
     """
 
     reflectance: NDArray[np.float32]

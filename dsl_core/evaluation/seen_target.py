@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from dsl_core.errors import DecodeError
 from dsl_core.evaluation.depth import PlaneFit, fit_plane
 from dsl_core.model.result import DEPTH_INVALID, Flag
+from dsl_core.solve.robust import robust_std
 
 Floats = NDArray[np.floating[Any]]
 Mask = NDArray[np.bool_]
@@ -29,8 +30,6 @@ _ROUNDING_MM = 1e-3
 _ROUNDS = 12
 #: The first search of the plane looks at about so many pixels along each side.
 _THIN_PX = 150
-#: The median of absolute values of a normal distribution is its deviation divided by this.
-_TO_DEVIATION = 1.4826
 
 
 @dataclass(frozen=True)
@@ -133,7 +132,7 @@ def _plane(points: Floats, chosen: Mask) -> tuple[PlaneFit, Mask]:
     kept = chosen
     for _ in range(_ROUNDS):
         off = np.abs(_behind(plane, points))
-        limit = _OUTLIER * max(_TO_DEVIATION * float(np.median(off[chosen])), _ROUNDING_MM)
+        limit = _OUTLIER * max(float(robust_std(off[chosen])), _ROUNDING_MM)
         now = chosen & (off <= limit)
         plane = fit_plane(points, now)
         if bool((now == kept).all()):

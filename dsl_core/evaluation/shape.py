@@ -7,6 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from dsl_core.solve.robust import robust_std
+
 Floats = NDArray[np.float32] | NDArray[np.float64]
 
 #: Residuals beyond this many robust deviations are weighted down (J. W. Tukey's biweight).
@@ -52,49 +54,68 @@ def fit_plane(points_mm: Floats, depth_std_mm: Floats | None = None) -> PlaneFit
     z = points[:, 2]
     rays, inverse = points / z[:, None], 1 / z
     spread = (np.ones(len(z)) if std is None else std[known]) * inverse**2
-    weights: NDArray[np.float64] = np.ones(len(z))
-    solution: NDArray[np.float64] = np.zeros(3)
-    inverted: NDArray[np.float64] = np.zeros((3, 3))
-    for _ in range(ROUNDS):
-        scaled = rays * (np.sqrt(weights) / spread)[:, None]
-        normal_matrix = scaled.T @ scaled
-        if np.linalg.cond(normal_matrix) > 1e14:
-            return None
-        inverted = np.asarray(np.linalg.inv(normal_matrix), np.float64)
-        last, solution = solution, inverted @ (scaled.T @ (inverse * np.sqrt(weights) / spread))
-        residual = (rays @ solution - inverse) / spread
-        robust = max(1.4826 * float(np.median(np.abs(residual))), 1e-12)
-        weights = np.maximum(1 - (residual / (TUKEY * robust)) ** 2, 0) ** 2
-        if np.allclose(last, solution, rtol=1e-10):
-            break
+    found = _inverse_plane(rays, inverse, spread)
+    if found is None:
+        return None
+    solution, covariance, residual, used = found
     length = float(np.linalg.norm(solution))
     # 1/z = solution . ray, so solution . point = 1; the normal shall point against the rays.
-    normal, used = -solution / length, weights > 0
+    normal = -solution / length
     off = (points @ normal + 1 / length)[used]
     expected = float("nan")
     if std is not None:
         expected = float(np.sqrt(np.mean((std[known][used] * (rays[used] @ normal)) ** 2)))
     # What is not flat within the deviations bounds how well a tilt is known, too.
     noise = max(float(np.mean(residual[used] ** 2)), 0.0 if std is None else 1.0)
-    tilt = float(np.degrees(np.arccos(np.clip(-normal[2], -1, 1))))
-    # Only the part of an error that is across the normal tilts it, towards or from the axis.
-    towards = np.array([0.0, 0.0, -1.0]) - normal * -normal[2]
-    size = float(np.linalg.norm(towards))
-    if size < 1e-9:
-        towards, size = np.array([1.0, 0.0, 0.0]), 1.0
-    towards /= size
-    tilt_std = float(np.degrees(np.sqrt(noise * towards @ inverted @ towards) / length))
+    tilt_deg, tilt_std_deg = _tilt(normal, noise * covariance / length**2)
     return PlaneFit(
         normal=normal,
         offset_mm=-1 / length,
         rms_mm=float(np.sqrt(np.mean(off**2))),
         range_mm=float(np.ptp(off)),
         expected_mm=expected,
-        tilt_deg=tilt,
-        tilt_std_deg=tilt_std,
+        tilt_deg=tilt_deg,
+        tilt_std_deg=tilt_std_deg,
         points=len(points),
         used=int(used.sum()),
     )
+
+
+def _inverse_plane(
+    rays: NDArray[np.float64], inverse: NDArray[np.float64], spread: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], NDArray[np.bool_]] | None:
+    """``p`` (3,) of ``p . ray = 1/z`` for rays (n, 3), inverse depths (n,) and their deviations (n,).
+
+    With its covariance (3, 3) for deviations as stated, the residuals (n,) in deviations, and which points
+    count (n,). None where the points do not tell a plane.
+    """
+    weights: NDArray[np.float64] = np.ones(len(inverse))
+    solution: NDArray[np.float64] = np.zeros(3)
+    for _ in range(ROUNDS):
+        scaled = rays * (np.sqrt(weights) / spread)[:, None]
+        normal_matrix = scaled.T @ scaled
+        if np.linalg.cond(normal_matrix) > 1e14:
+            return None
+        covariance = np.asarray(np.linalg.inv(normal_matrix), np.float64)
+        last, solution = solution, covariance @ (scaled.T @ (inverse * np.sqrt(weights) / spread))
+        residual = (rays @ solution - inverse) / spread
+        limit = TUKEY * max(float(robust_std(residual)), 1e-12)
+        weights = np.maximum(1 - (residual / limit) ** 2, 0) ** 2
+        if np.allclose(last, solution, rtol=1e-10):
+            break
+    return solution, covariance, residual, weights > 0
+
+
+def _tilt(normal: NDArray[np.float64], covariance: NDArray[np.float64]) -> tuple[float, float]:
+    """Angle of a unit normal (3,) with its covariance (3, 3) to the camera's axis, and its deviation, deg."""
+    tilt_deg = float(np.degrees(np.arccos(np.clip(-normal[2], -1, 1))))
+    # Only the part of an error that is across the normal tilts it, towards or from the axis.
+    towards = np.array([0.0, 0.0, -1.0]) - normal * -normal[2]
+    size = float(np.linalg.norm(towards))
+    if size < 1e-9:
+        towards, size = np.array([1.0, 0.0, 0.0]), 1.0
+    towards /= size
+    return tilt_deg, float(np.degrees(np.sqrt(towards @ covariance @ towards)))
 
 
 @dataclass(frozen=True)

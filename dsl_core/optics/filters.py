@@ -61,12 +61,14 @@ NO_SHIFT = FilterAngle()
 
 
 def nominal_filter(centre_nm: float, fwhm_nm: float = 10.0, peak: float = 0.8) -> SpectralCurve:
-    """Transmission that a data sheet promises at distance d from the centre: three coupled cavities.
-
-    ``peak / (1 + (2 d / fwhm)^6)``, the maximally flat response, half the peak at half the FWHM.
-    """
+    """Transmission that a data sheet promises, of three coupled cavities."""
     nm = np.arange(centre_nm - 60.0, centre_nm + 60.5, 0.5)
-    return SpectralCurve.of(nm, peak / (1 + (2 * np.abs(nm - centre_nm) / fwhm_nm) ** 6))
+    return SpectralCurve.of(nm, three_cavities(nm - centre_nm, fwhm_nm, peak))
+
+
+def three_cavities(distance_nm: Floats, fwhm_nm: float, peak: float = 0.8) -> Floats:
+    """``peak / (1 + (2 d / fwhm)^6)`` at distances from the centre, same shape: maximally flat."""
+    return np.asarray(peak / (1 + (2 * distance_nm / fwhm_nm) ** 6))
 
 
 def through_filter(

@@ -21,7 +21,7 @@ MOST_PIXELS = 500
 
 @dataclass(frozen=True)
 class Parallax:
-    """Depth (mm) that a column stands for, median of a picture, and ``most_mm``, from where it is said."""
+    """Depth (mm) that a column stands for, median of a picture, and the most that is still usual."""
 
     mm_per_column: float
     most_mm: float

@@ -2,13 +2,16 @@
 
 For reflectance H at internal bands, frame k and colour c of a pixel::
 
-    y_ck = shading * sum_m sum_j response_mcj G(q_m(j) - x_k) H_j
+    y_ck = shading * sum_m sum_j response_mcj G_k(q_m(j)) H_j
 
-with G the light of the pattern over a band. The solver, the prediction, the intensity graph and the check for
-drift all read this one model: which columns light a pixel through each order, which of them are inside the
-projector's frame, and how far blur, demosaicing and the width of a band spread their light. Both first orders
-add where both reach. Internal bands extend beyond the reported ones, because lines at the ends also collect
-light from outside.
+with G_k the light of frame k, averaged over a band, at the column q_m(j) that lights the pixel through order
+m; for one line at x_k, its profile at q_m(j) - x_k. That is Eq. (6) of the supplement of "Dispersed
+Structured Light" (Shin et al., CVPR 2024) with shading and blur.
+
+The solver, the prediction, the intensity graph and the check for drift all read this one model: which columns
+light a pixel through each order, which of them are inside the projector's frame, and how far blur,
+demosaicing and the width of a band spread their light. Both first orders add where both reach. Internal bands
+extend beyond the reported ones, because lines at the ends also collect light from outside.
 """
 
 from __future__ import annotations

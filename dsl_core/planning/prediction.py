@@ -38,7 +38,7 @@ FINE_STEP_NM, PEAK_SAMPLES = 1.0, 4
 #: Pieces pay the start of every tile, so that whole pictures take less.
 LINES_S, EXPOSURE_S = 41.0, 0.042
 DENSE_S, PATTERN_S = 229.0, 9.9
-BANDS = 47
+BANDS, CORES = 47, 2
 
 
 def predict(
@@ -145,10 +145,10 @@ def _width(rig: Rig, plan: CapturePlan, grid: WavelengthGrid, view: SamplePixels
     return float(np.mean(widths)) if widths else None
 
 
-def computing_seconds(plan: CapturePlan, grid: WavelengthGrid, cores: int = 2) -> float:
-    """Expected seconds of a reconstruction on a machine like the one that was measured."""
+def computing_seconds(plan: CapturePlan, grid: WavelengthGrid) -> float:
+    """Expected seconds of a reconstruction on a machine like the one that was measured, of two cores."""
     megapixels = plan.camera_size_px[0] * plan.camera_size_px[1] / 1e6
-    return megapixels * core_seconds_per_megapixel(plan, grid) / cores
+    return megapixels * core_seconds_per_megapixel(plan, grid) / CORES
 
 
 def core_seconds_per_megapixel(plan: CapturePlan, grid: WavelengthGrid) -> float:

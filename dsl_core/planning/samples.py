@@ -20,8 +20,8 @@ if TYPE_CHECKING:
     import xarray as xr
 
 Floats = NDArray[np.float64]
-#: Samples across and down by default.
-GRID = (8, 3)
+#: Samples across and down by default, and those of a quick look.
+GRID, LOOK_GRID = (8, 3), (12, 8)
 #: Distance of the samples from the rim of the picture, as a share of it.
 RIM = 0.04
 
@@ -80,8 +80,8 @@ def _of_plane(rig: Rig, depth_mm: float, pixels: NDArray[np.int64], lit_share: f
     return SamplePixels(pixels, depth.ravel()[pixels], shares, _incidence(rig, depth, pixels), lit_share)
 
 
-def scene_samples(rig: Rig, result: xr.Dataset, grid: tuple[int, int] = (12, 8)) -> SamplePixels:
-    """Pixels of a quick look at a scene, with the depth, shading and spectrum found there.
+def scene_samples(rig: Rig, result: xr.Dataset) -> SamplePixels:
+    """Some pixels of a quick look at a scene, with the depth, shading and spectrum found there.
 
     Raises `PlanError` when the look has no spectra, another size, or no valid pixel.
     """
@@ -98,7 +98,7 @@ def scene_samples(rig: Rig, result: xr.Dataset, grid: tuple[int, int] = (12, 8))
     valid &= np.isfinite(result["reflectance"].values).all(0) & np.isfinite(result["shading"].values)
     if not valid.any():
         raise PlanError("The quick look has no pixel with a spectrum. Scan again with more light.")
-    pixels = _spread(valid, grid)
+    pixels = _spread(valid, LOOK_GRID)
     depth = result["depth_mm"].values.astype(np.float64)
     return SamplePixels(
         pixels,

@@ -158,7 +158,10 @@ class TwinOptions(Record):
 
     @property
     def foreigners(self) -> Foreign | None:
-        """The foreign variants, drawn for the rig; None without any."""
+        """The foreign variants, drawn for the rig; None without any.
+
+        Raises `DeviceError` where they are not rendered with the effects that are chosen.
+        """
         found = Foreign.of(self.foreign, self.truth or 0)
         names = self.choice.names
         if found is not None and (names is None or DepthOfField.name in names):

@@ -24,7 +24,10 @@ def never() -> None:
 def work_through(
     work: Callable[[T, Check], object], things: Sequence[T], threads: int, stage: str, progress: Progress
 ) -> None:
-    """Do ``work`` on all things; its first error, or a cancel, stops it on the others."""
+    """Do ``work`` on all things; its first error, or a cancel, stops it on the others.
+
+    Raises that error, or `Cancelled`, which ``progress`` may raise.
+    """
     stopped = threading.Event()
 
     def check() -> None:

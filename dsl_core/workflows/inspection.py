@@ -1,8 +1,8 @@
 """The intensity graph of a pixel: what it saw while the lines went by, and what the model expects.
 
 Along the lines a pixel lights up three times: through the zero order, in its own colour, and through the
-two first orders, each wavelength at its own line (section 3 of the paper). Measured against model, the
-graph shows at a glance what is wrong with a pixel.
+two first orders, each wavelength at its own line (Figs. 2 and 3 of the supplement of Shin et al., CVPR 2024).
+Measured against model, the graph shows at a glance what is wrong with a pixel.
 """
 
 from __future__ import annotations

@@ -86,7 +86,10 @@ def read_targets(
     region: Region | None = None,
     progress: Progress | None = None,
 ) -> tuple[list[SeenTarget], list[float]]:
-    """Targets and positions of results; without ``positions_mm`` each result must know its own."""
+    """Targets and positions of results; without ``positions_mm`` each result must know its own.
+
+    Raises `DecodeError` for a result without a target or a position.
+    """
     if positions_mm is not None and len(positions_mm) != len(paths):
         raise DecodeError(
             f"{len(paths)} results and {len(positions_mm)} positions were given; give one for each."

@@ -14,7 +14,7 @@ from dsl_core.model.board import Board
 from dsl_core.model.calibration.geometry import GeometryCalibration
 from dsl_core.model.calibration.pose_frames import PoseFrames
 from dsl_core.model.plan import CapturePlan, CodeSet, NoSpectral, Setting, Shot
-from dsl_core.model.rig import BayerPattern, Rig, Sensor
+from dsl_core.model.rig import BayerPattern, Rig
 from dsl_core.workflows.captures import common_sensor, decode_columns_of
 
 if TYPE_CHECKING:
@@ -39,11 +39,10 @@ def decode_stack(
     projector_size_px: tuple[int, int],
     white: ArrayLike | None = None,
     black: ArrayLike | None = None,
-    sensor: Sensor | None = None,
 ) -> xr.Dataset:
-    """What `dsl_core.api.arrays.decode_stack` says, with the noise of a ``sensor``.
+    """What `dsl_core.api.arrays.decode_stack` says.
 
-    Without one, noise is that of a common sensor of 8 bits or, where values are larger, 16.
+    Noise is that of a common sensor of 8 bits or, where values are larger, 16. Raises `DecodeError`.
     """
     arrays = [np.asarray(each) for each in pictures]
     if not arrays or any(each.ndim != 2 or each.shape != arrays[0].shape for each in arrays):
@@ -73,7 +72,7 @@ def decode_stack(
     frames = np.stack([*stack, *lights])
     if frames.min() < 0 or frames.max() > 65535 or (frames != np.rint(frames)).any():
         raise DecodeError("Pictures must hold whole numbers from 0 to 65535, as the camera gave them.")
-    sensor = sensor or common_sensor(8 if frames.max() < 256 else 16)
+    sensor = common_sensor(8 if frames.max() < 256 else 16)
     return decode_columns_of(_Stack(plan, frames.astype(np.uint16)), sensor)
 
 
@@ -86,7 +85,10 @@ def calibrate_stacks(
     baseline_mm: float | None = None,
     hold: Collection[str] = (),
 ) -> GeometryCalibration:
-    """What `dsl_core.api.arrays.calibrate_geometry` says; errors name poses by numbers from 1."""
+    """What `dsl_core.api.arrays.calibrate_geometry` says; errors name poses by numbers from 1.
+
+    Raises `CalibrationError`.
+    """
     from dsl_core.workflows.pictures import calibrate_poses
 
     def frames() -> Iterator[PoseFrames]:
@@ -113,7 +115,7 @@ def _rig_for_depth(found: GeometryCalibration) -> Rig:
 
 
 def depth_of_columns(calibration: Rig | GeometryCalibration, column_px: ArrayLike) -> NDArray[np.float64]:
-    """What `dsl_core.api.arrays.depth_of_columns` says."""
+    """What `dsl_core.api.arrays.depth_of_columns` says; raises `DecodeError` for another size."""
     import torch
 
     from dsl_core.optics.correspondence import triangulate

@@ -108,7 +108,8 @@ def export_by_ending(
 ) -> list[Path]:
     """As `export`, in the format that the ending of the path says unless one is named.
 
-    A table (csv) is of ``pixels``, (x, y) each, or of the spectrum that the result is.
+    A table (csv) is of ``pixels``, (x, y) each, or of the spectrum that the result is. Raises `StoreError`
+    for what a format does not hold, and where the disk fails.
     """
     ending = path.suffix.lower()
     listed = [each for each in formats().values() if each.listed]

@@ -91,7 +91,10 @@ def export_png(
 
 
 def nearest_band(result: xr.Dataset, band_nm: float | None) -> tuple[int, float]:
-    """Index and centre (nm) of the band closest to a wavelength, of the middle band for None."""
+    """Index and centre (nm) of the band closest to a wavelength, of the middle band for None.
+
+    Raises `StoreError` for a wavelength that no band holds.
+    """
     centres = wavelengths_nm(result)
     if band_nm is None:
         return len(centres) // 2, centres[len(centres) // 2]

@@ -163,58 +163,27 @@ def _unit(reading: StripeReading, length: int) -> int:
 def _phases(
     axis: Axis, block: Block, reading: PhaseReading, blocks: Sequence[Block], size_px: Size, probes: Probes
 ) -> tuple[Part, list[str]]:
-    length = size_px[0] if axis == "columns" else size_px[1]
-    fringes, start, doubts = reading.fringes, reading.start_deg, []
+    fringes, start = reading.fringes, reading.start_deg
     stripes = next((b for b in blocks if b.axis == block.axis and isinstance(b.reading, StripeReading)), None)
     pictures = [p for p in block.slots if p is not None]
-    lines = probes.across if block.axis == "columns" else probes.down
-    if len(fringes) > 1 and reading.off_rad > BY_CHANCE * reading.chance_rad:
-        shown = ", ".join(f"{each:g}" for each in fringes)
-        figures = (
-            f"with {shown}, the best, they are off by {reading.off_rad:.2f} rad, and {reading.chance_rad:.2f}"
-            " would be chance"
-        )
-        if min(fringes) > 1 or reading.off_rad > NO_BETTER * reading.chance_rad:
-            raise StoreError(
-                f"The {len(pictures)} pictures of {axis} are sinusoids whose phases agree with no numbers of"
-                f" fringes: {figures}. The projector's gamma or noise may have changed them. State fringes"
-                " and start_deg in a mapping."
-            )
-        doubts.append(
-            f"phases of {axis} hardly agree with any numbers of fringes, as where a projector has a gamma:"
-            f" {figures}"
-        )
+    doubts = _disagreement(axis, reading, len(pictures))
     if stripes is not None and isinstance(stripes.reading, StripeReading):
+        lines = probes.across if block.axis == "columns" else probes.down
         number = numbers_of(lines, stripes.slots, stripes.reading)
         turns, start = turns_per_number(lines, pictures[: reading.steps], reading.direction, number)
+        length = size_px[0] if axis == "columns" else size_px[1]
         fringes = (length / _unit(stripes.reading, length) * turns,)
         if len(reading.fringes) > 1:
             fringes = tuple(fringes[0] * each / reading.fringes[0] for each in reading.fringes)
-    elif fringes == (0.0,):
-        raise StoreError(
-            f"The {reading.steps} pictures of {axis} are sinusoids of one period, which the picture"
-            " shows more than once, and nothing says which of them a pixel sees. Add pictures of a second"
-            " period or of stripes."
-        )
-    elif np.min(fringes) == 1.0:
-        doubts.append(f"the coarsest sinusoid of {axis} is taken to be one period over the projector")
     else:
-        shown = ", ".join(f"{each:g}" for each in fringes)
-        if (times := gcd(*map(int, fringes))) > 1:
-            raise StoreError(
-                f"Sinusoids of {shown} fringes over the {axis} of the projector look the same {times} times,"
-                " and nothing says which of them a pixel sees. Add pictures of a single fringe or of stripes,"
-                " or state other fringes in a mapping."
-            )
-        doubts.append(f"{axis}: {shown} fringes over the projector fit best, multiples fit as well")
-    if stripes is None:
         way = "to the right" if axis == "columns" else "downwards"
-        doubts.append(
+        doubts += [
+            _counted_alone(axis, reading),
             f"sinusoids do not say which way {axis} rise: {way} is assumed; where camera or projector is"
-            " mirrored, give direction of the mapping the other sign"
-        )
-    if stripes is None and reading.rival_rad < CLEARLY_WORSE * reading.off_rad:
-        doubts.append(f"{axis}: where the sinusoids start ({start:g} degrees) is unsure")
+            " mirrored, give direction of the mapping the other sign",
+        ]
+        if reading.rival_rad < CLEARLY_WORSE * reading.off_rad:
+            doubts.append(f"{axis}: where the sinusoids start ({start:g} degrees) is unsure")
     part = PhasePictures(
         axis=axis,
         fringes=fringes,
@@ -224,3 +193,48 @@ def _phases(
         direction=reading.direction,
     )
     return part, doubts
+
+
+def _disagreement(axis: Axis, reading: PhaseReading, count: int) -> list[str]:
+    """What is said where phases of several fringes do not agree; raises `StoreError` where they cannot."""
+    fringes = reading.fringes
+    if len(fringes) == 1 or reading.off_rad <= BY_CHANCE * reading.chance_rad:
+        return []
+    figures = (
+        f"with {_shown(fringes)}, the best, they are off by {reading.off_rad:.2f} rad, and"
+        f" {reading.chance_rad:.2f} would be chance"
+    )
+    if min(fringes) > 1 or reading.off_rad > NO_BETTER * reading.chance_rad:
+        raise StoreError(
+            f"The {count} pictures of {axis} are sinusoids whose phases agree with no numbers of"
+            f" fringes: {figures}. The projector's gamma or noise may have changed them. State fringes"
+            " and start_deg in a mapping."
+        )
+    return [
+        f"phases of {axis} hardly agree with any numbers of fringes, as where a projector has a gamma:"
+        f" {figures}"
+    ]
+
+
+def _counted_alone(axis: Axis, reading: PhaseReading) -> str:
+    """How sinusoids without stripes count their fringes; raises `StoreError` where they cannot."""
+    fringes = reading.fringes
+    if fringes == (0.0,):
+        raise StoreError(
+            f"The {reading.steps} pictures of {axis} are sinusoids of one period, which the picture"
+            " shows more than once, and nothing says which of them a pixel sees. Add pictures of a second"
+            " period or of stripes."
+        )
+    if np.min(fringes) == 1.0:
+        return f"the coarsest sinusoid of {axis} is taken to be one period over the projector"
+    if (times := gcd(*map(int, fringes))) > 1:
+        raise StoreError(
+            f"Sinusoids of {_shown(fringes)} fringes over the {axis} of the projector look the same {times}"
+            " times, and nothing says which of them a pixel sees. Add pictures of a single fringe or of"
+            " stripes, or state other fringes in a mapping."
+        )
+    return f"{axis}: {_shown(fringes)} fringes over the projector fit best, multiples fit as well"
+
+
+def _shown(fringes: Sequence[float]) -> str:
+    return ", ".join(f"{each:g}" for each in fringes)

@@ -197,7 +197,10 @@ def _shaped(nodes: dict[str, Node], node: str, part: str, path: Path) -> NDArray
 
 
 def five_coefficients(values: NDArray[np.float64], node: str, path: Path) -> NDArray[np.float64]:
-    """OpenCV's k1 k2 p1 p2 [k3 [...]]; the model ends at k3, so anything further must be zero."""
+    """OpenCV's k1 k2 p1 p2 [k3 [...]]; the model ends at k3, so anything further must be zero.
+
+    Padded with zeros to shape (5,). Raises `CalibrationError` that names the ``node`` of the file.
+    """
     if len(values) < 4 or np.any(values[5:]):
         raise CalibrationError(
             f"{path}: {node} has {len(values)} distortion coefficients; 4 or 5 are needed (k1 k2 p1 p2 k3),"

@@ -155,7 +155,10 @@ RESULT_FOLDER = FolderKind("a result", _is_result, _is_of_result)
 
 
 def read_attributes(path: Path) -> dict[str, Any]:
-    """The attributes of a folder, after checking that it is a result that can be read."""
+    """The attributes of a folder, after checking that it is a result that can be read.
+
+    Raises `StoreError`.
+    """
     if not (path / "zarr.json").is_file():
         raise StoreError(f"{path} is not a result: {what_is_at(path)}. Give the folder of one (NAME.zarr).")
     try:

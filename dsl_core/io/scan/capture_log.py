@@ -95,7 +95,10 @@ class CaptureLog:
             raise store_error(self.path, error) from error
 
     def append(self, entry: LogEntry) -> None:
-        """Add a line and wait until it is on disk; a line that does not fit is taken back."""
+        """Add a line and wait until it is on disk; a line that does not fit is taken back.
+
+        Raises `StoreError` where the log is closed or the disk fails.
+        """
         if self._descriptor is None:
             raise StoreError(f"{self.path} is closed; open the scan again before writing to it.")
         line = _line(entry)

@@ -187,7 +187,11 @@ def _normal(
     width: Tensor | None,
     fixed: Fixed | None = None,
 ) -> Normal:
-    """Normal equations of the shares: each pixel has an amplitude, and a column known to a deviation."""
+    """Normal equations of the shares: each pixel has an amplitude, and a column known to a deviation.
+
+    Both are eliminated: what they would change is taken from rows and target, all of it for the amplitude,
+    and for the column as much as its deviation leaves open.
+    """
     distance = column - peaks.centres
     half = peaks.width_px / 2
     table = LineTable(peaks.width_px, response, float(distance.abs().max()) + 1, column, width)
@@ -223,15 +227,14 @@ def _shapes(width_px: int, distance_px: Tensor, centres_px: Floats, width: Tenso
     at = np.arange(-math.ceil(reach * SAMPLES), math.ceil(reach * SAMPLES) + 1) / SAMPLES
     if width is None:
         one = ndtr((at + half) / STEP_PX) - ndtr((at - half) / STEP_PX)
-        return EvenTable(float(at[0]), 1 / SAMPLES, [one], distance_px).at(distance_px[..., None] - centres)[
-            0
-        ]
+        table = EvenTable(float(at[0]), 1 / SAMPLES, [one], distance_px)
+        return table.at(distance_px[..., None] - centres)[0]
     step = EvenTable(float(at[0]), 1 / SAMPLES, [ndtr(at / STEP_PX)], distance_px)
     near, far = (((distance_px + edge) / width)[..., None] - centres for edge in (half, -half))
     return step.at(near)[0] - step.at(far)[0]
 
 
 def unit(values: Tensor) -> Tensor:
-    """Columns of length one."""
+    """Values (rows, columns) with each column scaled to length one; one of zeros stays."""
     scaled: Tensor = values / values.norm(dim=0).clip(min=1e-30)
     return scaled

@@ -39,6 +39,8 @@ FEW, FEW_AS_GOOD, FEW_AS_GOOD_SHARE = 8, 1.6, 0.2
 #: A position that jumps within a surface is followed over this share of a line; so many pixels may.
 FOLLOWED_SHARE, MOST_JUMPS = 0.03, 0.01
 Complex = NDArray[np.complex64]
+#: Error as a share of chance's, sum of all fringes, place among the starts, the fringes, and the start, deg.
+_Tried = tuple[float, float, int, tuple[float, ...], float]
 
 
 @dataclass(frozen=True)
@@ -130,21 +132,7 @@ def read_phase_sets(
     if sets == 1:
         whole = 1.0 if abs(turns[0]) < ONE_FRINGE else 0.0
         return PhaseReading(steps, order, (whole,), 0.0, direction, 0.0, np.pi)
-    samples = _samples(waves, lines.lit)
-    guesses = list(dict.fromkeys(islice(_fringes(np.abs(turns)), MOST_GUESSES)))
-    # Many fringes fit anything: readings are compared with what they make of phases of unrelated pixels.
-    mixed = _by_chance(samples, int(np.argmax(np.abs(turns))))
-    chance = {fringes: max(_off(mixed, fringes, 0.0, steps, direction), 1e-3) for fringes in guesses}
-    tried = [
-        (sum(fringes), k, fringes, start) for fringes in guesses for k, start in enumerate(_starts(steps))
-    ]
-    # A few pixels tell what is far off.
-    few = [_off(samples[:, ::FEW], *each[2:], steps, direction) / chance[each[2]] for each in tried]
-    near = FEW_AS_GOOD * min(few, default=0.0) + FEW_AS_GOOD_SHARE
-    ranked = sorted(
-        (_off(samples, *each[2:], steps, direction) / chance[each[2]] if share <= near else share, *each)
-        for share, each in zip(few, tried, strict=True)
-    )
+    ranked, chance = _ranked(_samples(waves, lines.lit), np.abs(turns), steps, direction)
     if not ranked or ranked[0][0] * chance[ranked[0][3]] > MOST_OFF_RAD:
         return None
     best, _, _, fringes, _ = ranked[0]
@@ -163,6 +151,30 @@ def read_phase_sets(
     others = (each for each in ranked if each[4] != start or np.ptp(ratios[each[3]]) > 1e-9)
     rival = min((each[0] for each in others), default=np.pi / most)
     return PhaseReading(steps, order, fringes, start, direction, share * most, rival * most, most)
+
+
+def _ranked(
+    samples: Complex, turns: NDArray[np.float64], steps: int, direction: Literal[1, -1]
+) -> tuple[list[_Tried], dict[tuple[float, ...], float]]:
+    """Fringes and starts that may be those of samples (sets, pixels), the best first, and chance's errors.
+
+    Many fringes fit anything: an error (rad) is a share of what the same fringes make of unrelated pixels.
+    ``turns`` (sets,) are those seen along the lines.
+    """
+    guesses = list(dict.fromkeys(islice(_fringes(turns), MOST_GUESSES)))
+    mixed = _by_chance(samples, int(np.argmax(turns)))
+    chance = {fringes: max(_off(mixed, fringes, 0.0, steps, direction), 1e-3) for fringes in guesses}
+    tried = [
+        (sum(fringes), k, fringes, start) for fringes in guesses for k, start in enumerate(_starts(steps))
+    ]
+    # A few pixels tell what is far off.
+    few = [_off(samples[:, ::FEW], *each[2:], steps, direction) / chance[each[2]] for each in tried]
+    near = FEW_AS_GOOD * min(few, default=0.0) + FEW_AS_GOOD_SHARE
+    ranked = sorted(
+        (_off(samples, *each[2:], steps, direction) / chance[each[2]] if share <= near else share, *each)
+        for share, each in zip(few, tried, strict=True)
+    )
+    return ranked, chance
 
 
 def _by_chance(samples: Complex, kept: int) -> Complex:
