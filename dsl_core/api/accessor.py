@@ -86,9 +86,13 @@ class ResultAccessor:
         `DecodeError` for what is not one spectrum, and where no band has both.
         """
         a, b = xr.align(*(_one_spectrum(each) for each in (self._result, other)), join="inner")
-        nm, std = a["wavelength_nm"].values, np.hypot(a["reflectance_std"], b["reflectance_std"])
-        values = (each["reflectance"].values for each in (a, b))
-        most = largest_difference(nm, *values, a["reflectance_std"].values, b["reflectance_std"].values)
+        most = largest_difference(
+            a["wavelength_nm"].values,
+            a["reflectance"].values,
+            b["reflectance"].values,
+            a["reflectance_std"].values,
+            b["reflectance_std"].values,
+        )
         if most is None:
             raise DecodeError("The spectra have no band in which both are known with their deviations.")
         attrs = {
@@ -97,8 +101,9 @@ class ResultAccessor:
             "most_sigmas": abs(most.value) / most.std,
             "differ": most.is_shown,
         }
-        both = {"reflectance": a["reflectance"] - b["reflectance"], "reflectance_std": std}
-        return xr.Dataset(both, attrs=attrs)
+        std = np.hypot(a["reflectance_std"], b["reflectance_std"])
+        values = {"reflectance": a["reflectance"] - b["reflectance"], "reflectance_std": std}
+        return xr.Dataset(values, attrs=attrs)
 
     def reasons(self, x: int, y: int) -> list[str]:
         """Why a pixel is limited, a sentence each; empty where nothing is.
