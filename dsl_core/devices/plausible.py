@@ -135,6 +135,17 @@ def require_light(curve: SpectralCurve, others: Mapping[Any, SpectralCurve], wha
         )
 
 
+def require_grid(curve: SpectralCurve, first: SpectralCurve, name: str) -> None:
+    """Raise `DeviceError` unless a curve has the wavelengths of the first one that was measured."""
+    if curve.wavelengths_nm != first.wavelengths_nm:
+        said = (f"{len(c.wavelengths_nm)} from {c.wavelengths_nm[0]:g} nm" for c in (curve, first))
+        now, before = said
+        raise DeviceError(
+            f"{name} now measures at other wavelengths than before: {now}, not {before}. Its settings or its"
+            " calibration changed: restart it, and read all spectra again."
+        )
+
+
 def _fault_of(nm: NDArray[np.float64], value: NDArray[np.float64], unit: str) -> str:
     if unit != RADIANCE:
         return f"its unit is {unit!r} instead of {RADIANCE!r}"

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from dsl_core.calibration.light.emission_checks import require_repeats, white_of_parts
 from dsl_core.errors import CalibrationError
 from dsl_core.model.calibration.spectralon import (
     COLOURS,
@@ -45,6 +46,7 @@ def measured_emission(readings: EmissionReadings, reflectance: SpectralCurve) ->
             f"The spectrum under {' and '.join(missing)} is missing. Measure all of {', '.join(COLOURS)}."
         )
     nm = np.array(readings.readings["white"][0].wavelengths_nm)
+    require_repeats(readings)
     mean, variance = _means(readings, nm)
     leds = np.stack([mean[c] - mean["black"] for c in _LEDS]) / reflectance.at(nm)
     white = (mean["white"] - mean["black"]) / reflectance.at(nm)
@@ -57,9 +59,13 @@ def measured_emission(readings: EmissionReadings, reflectance: SpectralCurve) ->
     miss = noise["white"] + sum(noise[c] for c in _LEDS) + 4 * noise["black"]
     additivity_std = float(np.sqrt((miss * step**2).sum())) / total
     spread = np.stack([noise[c] + noise["black"] for c in _LEDS])
+    parts, apart = white_of_parts(white, leds, np.sqrt(miss))
     if abs(additivity - 1) < ADDITIVE:
         leds, spread = _with_white(leds, white, spread, noise)
-    return _smoothed(nm, leds, np.sqrt(spread), (additivity, additivity_std), len(readings.readings["white"]))
+    found = _smoothed(
+        nm, leds, np.sqrt(spread), (additivity, additivity_std), len(readings.readings["white"])
+    )
+    return found.model_copy(update={"white_parts": parts, "white_apart": apart})
 
 
 def _means(

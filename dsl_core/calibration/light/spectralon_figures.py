@@ -7,13 +7,16 @@ from numpy.typing import NDArray
 
 from dsl_core.calibration.common.plane import bulge_figure
 from dsl_core.calibration.common.room_light import light_change_figure
-from dsl_core.model.calibration.spectralon import SpectralonCalibration
+from dsl_core.model.calibration.spectralon import MeasuredEmission, SpectralonCalibration
 from dsl_core.model.figure import Figure
 from dsl_core.model.rig import Rig
 from dsl_core.optics.sensor import bayer_channels
 
 #: Limits: scatter of blocks in the middle (%), tilt (degrees).
 UNEVEN_PERCENT, MAX_TILT_DEG = 1.0, 15.0
+#: By how much white may contain more or less of an LED than the LED alone, %; and how far it may be from its
+#: parts at any wavelength, % of its peak (an LED that is half a nanometre away) or in deviations.
+PART_PERCENT, APART_PERCENT, APART_SIGMAS = 5.0, 4.0, 6.0
 LOOK_UNEVEN_PERCENT = 25.0
 #: A bulge over 300 mm: this one tilts the target's sides by half a degree, and corners of the flat field are
 #: off by .9 %.
@@ -58,6 +61,7 @@ def _emission_figures(record: SpectralonCalibration) -> list[Figure]:
             high=1.03,
             advice="Switch off the projector's colour enhancement; give all spectra in one unit.",
         ),
+        *_parts_of_white(emission),
         Figure(
             name="deviation of the emission, of its peak",
             value=max(noise),
@@ -71,6 +75,32 @@ def _emission_figures(record: SpectralonCalibration) -> list[Figure]:
             unit="%",
             high=2.0,
             advice="The instrument's range cuts off the LEDs; emission beyond it is assumed constant.",
+        ),
+    ]
+
+
+def _parts_of_white(emission: MeasuredEmission) -> list[Figure]:
+    """How white consists of red, green and blue; none in records of earlier versions."""
+    if emission.white_parts is None or emission.white_apart is None:
+        return []
+    value, std = (100 * each for each in emission.white_apart)
+    return [
+        Figure(
+            name="an LED in white and alone, largest difference",
+            value=100 * max(abs(part - 1) for part in emission.white_parts),
+            unit="%",
+            high=PART_PERCENT,
+            advice="Switch off the projector's colour enhancement, let it warm up, and see that each spectrum"
+            " is read while its own picture shows; then read them again.",
+        ),
+        Figure(
+            name="white over its parts, largest difference at a wavelength",
+            value=value,
+            unit="% of the peak",
+            std=std,
+            high=max(APART_PERCENT, APART_SIGMAS * std),
+            advice="The instrument's wavelengths changed between two spectra, or a spectrum is of another"
+            " picture. Restart the instrument, and read all spectra again.",
         ),
     ]
 

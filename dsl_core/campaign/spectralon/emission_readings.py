@@ -8,7 +8,7 @@ import numpy as np
 
 from dsl_core.campaign.common.recipe import Bench, Step
 from dsl_core.devices.base import DeviceRig
-from dsl_core.devices.plausible import require_light
+from dsl_core.devices.plausible import require_grid, require_light
 from dsl_core.errors import CalibrationError
 from dsl_core.io.spectra.catalogue import suffixes
 from dsl_core.io.spectra.spectrum_file import read_radiances
@@ -59,6 +59,9 @@ def read_emission(bench: Bench, step: Step, count: int, files: Path | None, prog
         progress.report("spectra", done, len(COLOURS))
         if colour not in readings:
             measured = _measure(devices, colour, count)
+            first = next((curves[0] for curves in readings.values()), measured[0])
+            for curve in measured:
+                require_grid(curve, first, "The spectroradiometer")
             if colour != "black":
                 before = {known: each for known, curves in readings.items() for each in curves}
                 for curve in measured:

@@ -32,7 +32,9 @@ class MeasuredEmission(Record):
     The instrument's scale is not used: ``curves`` are scaled so that the three integrals over wavelength sum
     to `EMISSION_SUM_NM`, which any rig can be compared by and no single noisy peak decides. ``additivity`` is
     white over the sum of red, green and blue, integrated. ``end_share`` is the emission that is left at the
-    ends of the range over its peak.
+    ends of the range over its peak. ``white_parts`` is how many times red, green and blue white consists of,
+    and ``white_apart`` (value, deviation) how far it is from them at any wavelength, as a share of its peak;
+    None in records of earlier versions.
     """
 
     curves: Rgb
@@ -41,6 +43,8 @@ class MeasuredEmission(Record):
     additivity_std: float
     readings: int
     end_share: float
+    white_parts: Row3 | None = None
+    white_apart: tuple[float, float] | None = None
 
 
 #: Integral of the three LEDs' emission together, nm (peak near one, as in the published curves).

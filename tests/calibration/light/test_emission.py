@@ -18,11 +18,19 @@ from dsl_core.calibration.light.emission import (
     smooth_curve,
 )
 from dsl_core.errors import CalibrationError
-from dsl_core.model.calibration.spectralon import COLOURS, EMISSION_SUM_NM, EmissionReadings, LightColour
+from dsl_core.model.calibration.spectralon import (
+    COLOURS,
+    EMISSION_SUM_NM,
+    EmissionReadings,
+    LightColour,
+    MeasuredEmission,
+)
 from dsl_core.model.spectral import SpectralCurve
 from dsl_core.simulation.published_rig import published_rig
 
 NM = np.arange(400.0, 701.0)
+#: Emission in place of which something else is looked at.
+NOTHING = MeasuredEmission.model_construct()
 WHITE = SpectralCurve.of([400, 700], [0.95, 0.99])
 LIGHT: dict[LightColour, tuple[int, int, int]] = {
     "red": (1, 0, 0), "green": (0, 1, 0), "blue": (0, 0, 1), "white": (1, 1, 1), "black": (0, 0, 0),
@@ -149,7 +157,12 @@ def test_the_deviation_of_white_over_its_parts_is_that_of_seven_readings(
     stated = {c: np.full(NM.size, variances[c]) for c in COLOURS}
     monkeypatch.setattr("dsl_core.calibration.light.emission._means", lambda *_: (means, stated))
     kept = list[Any]()
-    monkeypatch.setattr("dsl_core.calibration.light.emission._smoothed", lambda *parts: kept.append(parts))
+
+    def smoothed(*parts: Any) -> MeasuredEmission:
+        kept.append(parts)
+        return NOTHING
+
+    monkeypatch.setattr("dsl_core.calibration.light.emission._smoothed", smoothed)
     measured_emission(made, WHITE)
     white = WHITE.at(NM)
     step = np.gradient(NM)
@@ -173,7 +186,7 @@ def test_white_is_used_where_it_is_the_sum_to_a_percent(
     means["white"] = means["black"] + factor * parts
     stated = {c: np.ones(NM.size) for c in COLOURS}
     monkeypatch.setattr("dsl_core.calibration.light.emission._means", lambda *_: (means, stated))
-    monkeypatch.setattr("dsl_core.calibration.light.emission._smoothed", lambda *_: None)
+    monkeypatch.setattr("dsl_core.calibration.light.emission._smoothed", lambda *_: NOTHING)
 
     def noted(leds: Any, white: Any, spread: Any, noise: Any) -> Any:
         used.append(1)
