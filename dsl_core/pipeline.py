@@ -81,9 +81,11 @@ def open_scan(
         stored, watches = ScanReader(folder), ScanWatches.of(rig, plan, prove)
         watches.learn(writer, stored)
         sink = watches.over(WatchedSink(writer, watch) if watch else writer)
+        known = stored.calibration
         runner = Runner(
             rig, plan, sink, pattern_image, progress=progress, token=token, stored=stored, waits=waits,
             proof=watches.proof, sentinels=watches.sentinels, exposure=watches.exposure,
+            is_proven=known is not None and read_proof(stored, known) is not None,
         )  # fmt: skip
         yield runner
         if watches.seen is not None and runner.status.state is State.FINISHED:

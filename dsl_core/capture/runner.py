@@ -99,13 +99,15 @@ class Runner:
         sentinels: SentinelWatch | None = None,
         exposure: ExposureWatch | None = None,
         waits: bool = False,
+        is_proven: bool = False,
     ) -> None:
         """Keep the parts; ``clock`` gives seconds and only serves the estimate of the remaining time.
 
         With ``proof`` every picture is judged, and taken again if it does not show its pattern; ``stored``
         has the frames of earlier runs, from which it learns. When ``sentinels``, which see the frames of the
         sink, find that something moved, the scan pauses if it ``waits``, and ends otherwise. ``exposure``
-        sees them, too; what it finds is only told.
+        sees them, too; what it finds is only told. What is stored ``is_proven`` when a run before this one
+        has kept what all of its frames show.
         """
         self._rig = rig
         self._plan = plan
@@ -119,7 +121,7 @@ class Runner:
         self._stored = stored
         self._progress = progress or NoProgress()
         self._pace = _Pace(clock, rig.projector.info.latency_ms)
-        self._exposure, self._waits = exposure, waits
+        self._exposure, self._waits, self._is_proven = exposure, waits, is_proven
         self._place = PutBack(plan, sentinels, lambda shot: self._taker.take(shot).pixels, sink)
         self._status = Status(State.IDLE, total=plan.shot_count)
         self._listeners: list[Listener] = []
@@ -166,12 +168,13 @@ class Runner:
             require_possible(self._rig, self._plan)
             self._require_place(list(self._sink.missing()))
             missing = list(self._sink.missing())
+            is_proven = self._is_proven and not missing
             if self._stored is not None:
                 self._shots.learn(self._stored, {shot.index for shot in missing})
             self._take_all(missing)
             # Later pictures may have cast doubt on earlier ones.
             self._take_all(list(self._sink.missing()))
-            self._shots.conclude()
+            self._shots.conclude(is_proven)
             self._complete()
         except (Cancelled, KeyboardInterrupt) as error:
             self._end(

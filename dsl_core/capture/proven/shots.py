@@ -133,12 +133,19 @@ class ProvenShots:
         except PictureError as error:
             self._withdraw(error, shot)
 
-    def conclude(self) -> None:
+    def conclude(self, is_proven: bool = False) -> None:
         """Where the last pictures could not be judged, see that devices and scene are as they were.
 
-        Raises `DeviceError` if they are not, after withdrawing those pictures.
+        Drive levels are looked at as well, unless this run has done so or, with the scan, what it shows is
+        kept and nothing was taken since (``is_proven``): an earlier run that ended before that may have
+        doubted them. Raises `DeviceError` if devices or scene have changed, after withdrawing those pictures.
         """
-        if self._proof is None or not self._doubted.untold:
+        if self._proof is None:
+            return
+        has_asked = self._has_seen_first or is_proven or self._only_repeats
+        if not has_asked and self._proof.scene.first_pictures():
+            self._see_levels(self._proof)
+        if not self._doubted.untold:
             return
         try:
             self._require_control(self._proof)

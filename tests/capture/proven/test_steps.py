@@ -255,6 +255,19 @@ def test_white_at_half_its_level_is_compared_before_the_first_line_twice_if_it_i
     assert bench.whites_seen == []
 
 
+@pytest.mark.parametrize(
+    ("is_there", "is_proven", "asked"), [(True, False, [(10, 0)]), (True, True, []), (False, False, [])]
+)
+def test_levels_are_looked_at_where_an_earlier_run_took_all_lines(
+    is_there: bool, is_proven: bool, asked: list[tuple[int, int]]
+) -> None:
+    # What that run said of them ended with it.
+    bench = Bench(is_right)
+    bench.displaced, bench.whites_seen = [False] if is_there else [], [True]
+    bench.shots.conclude(is_proven)
+    assert [each[:2] for each in bench.taken] == asked
+
+
 def test_a_rig_that_only_repeats_is_not_asked_for_other_levels() -> None:
     bench = Bench(is_right)
     bench.displaced, bench.whites_seen = [False], [False]
