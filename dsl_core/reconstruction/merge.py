@@ -54,12 +54,14 @@ class Exposed:
     """In what light each shot of a plan was taken, all (shots,).
 
     ``levels`` are relative to the light that it should have had. Black is ``black_dn`` more than the black
-    frame of the shot's setting in every pixel, and this ``black_share`` of what that is above its level.
+    frame of the shot's setting in every pixel, and this ``black_share`` of what that is above its level; any
+    shot may be off from that by ``black_std_dn``.
     """
 
     levels: NDArray[np.float64]
     black_dn: NDArray[np.float64]
     black_share: NDArray[np.float64]
+    black_std_dn: float = 0.0
 
     @classmethod
     def as_planned(cls, count: int) -> Exposed:
@@ -98,7 +100,8 @@ class MergedScan:
         blacks = [black_frame([source.read(shot)], rig.sensor) for shot in self._shots["black", 0]]
         # The noise of a black frame is common to all frames of a pixel: it does not scatter between them.
         # What it shifts is measured later, on unlit frames, or stays unknown to `black_std`.
-        self.blacks = [BlackFrame(black.mean, np.zeros_like(black.variance)) for black in blacks]
+        wander = 0.0 if exposed is None else exposed.black_std_dn**2
+        self.blacks = [BlackFrame(black.mean, np.full_like(black.variance, wander)) for black in blacks]
         self.gains_ms = setting_gains_ms(self.plan.settings, rig.projector_response)
         self.black_std = _merged_std(blacks, self.gains_ms)
         self._mergers: dict[tuple[int, ...], HdrMerger] = {}

@@ -27,6 +27,7 @@ from dsl_core.reconstruction.light.course import (
 from dsl_core.reconstruction.light.line_levels import LineLevels, candidates, line_levels
 from dsl_core.reconstruction.light.room_flicker import room_flicker
 from dsl_core.reconstruction.light.setting_ratios import Ratio
+from dsl_core.reconstruction.light.slow_black import SlowBlack, slow_black
 from dsl_core.reconstruction.light.steady import SteadyLight
 from dsl_core.reconstruction.light.sudden import (
     Again,
@@ -108,6 +109,9 @@ def follow_light(
         frames, code.column, [Again(each.shot, each.log, each.std) for each in whites], blacks
     )
     exposed = None if sudden is None else sudden.exposed(frames)
+    slow = slow_black(frames, blacks, sudden)
+    if slow is not None:
+        exposed = slow.exposed(frames, exposed or Exposed.as_planned(frames.plan.shot_count))
     if exposed is not None:
         frames.expose(exposed)
         code, white = frames.decode(progress)
@@ -119,7 +123,7 @@ def follow_light(
         frames.expose(exposed)
         code, white = frames.decode(progress)
         pixels = look()
-    black = black_wander(blacks, sudden, 0.0 if room is None else room.rms_dn)
+    black = black_wander(blacks, sudden, 0.0 if room is None else room.rms_dn, slow)
     told = (
         *([] if black is None or not black.significant else [black]),
         *([] if room is None else [room.finding]),
@@ -167,7 +171,10 @@ def blacks_again(scan: Pictures) -> list[Again]:
 
 
 def black_wander(
-    blacks: Sequence[Again], sudden: SuddenChanges | None = None, flicker_dn: float = 0.0
+    blacks: Sequence[Again],
+    sudden: SuddenChanges | None = None,
+    flicker_dn: float = 0.0,
+    slow: SlowBlack | None = None,
 ) -> FitFinding | None:
     """What `blacks_again` says to a person, and since when; None without any.
 
@@ -180,6 +187,12 @@ def black_wander(
     if sudden is not None and sudden.black:
         often = "at once" if sudden.explains_black else "in part at once"
         what = f" It did so {often}, {_since(sudden.black)}; the frames are corrected for that."
+    if slow is not None:
+        what = what if sudden is not None and sudden.black else ""
+        what += (
+            " The frames are corrected for a change that is even from one of these pictures to the next, and"
+            f" taken to be off by {slow.std_dn:.1f} DN beyond that."
+        )
     return FitFinding.judged(
         "light",
         BLACK_AGAIN,
