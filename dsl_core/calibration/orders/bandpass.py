@@ -28,6 +28,7 @@ from dsl_core.calibration.orders.filter_shift import angle_of_view, cell_terms
 from dsl_core.calibration.orders.order_light import FilterLight
 from dsl_core.calibration.orders.order_place import PlanePixels, cell_means, of_colours
 from dsl_core.calibration.orders.response import BandSample, fit_response, shift_of_all
+from dsl_core.calibration.orders.steady_light import LightJump
 from dsl_core.errors import CalibrationError
 from dsl_core.model.calibration.bandpass import BandpassCalibration, FilterSample, OrderSample
 from dsl_core.model.rig import Rig
@@ -213,6 +214,8 @@ def _check(
         shift = each.light.shift_px[0]
         if abs(shift) > MOVED_PX:
             unusable, sentence = True, _moved(each.filter_nm, shift)
+        elif each.light.jump is not None and not unusable:
+            unusable, sentence = True, _jumped(each.filter_nm, each.light.jump)
         if sentence:
             (wrong if unusable else doubts).append(sentence)
     if wrong:
@@ -224,6 +227,14 @@ def _moved(filter_nm: float, shift_px: float) -> str:
     return (
         f"the filter of {filter_nm:g} nm: the zero order is {shift_px:+.2f} columns from where it was"
         " without a filter. The target, camera or projector moved; capture all steps again"
+    )
+
+
+def _jumped(filter_nm: float, jump: LightJump) -> str:
+    return (
+        f"the filter of {filter_nm:g} nm: light changed by {jump.share:+.0%} at once while lines were about"
+        f" at column {jump.column_px:.0f}. Switch automatic exposure and gain of the camera and eco mode of"
+        " the projector off, check that the filter stays in its place, and capture the step again"
     )
 
 

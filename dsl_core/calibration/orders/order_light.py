@@ -29,6 +29,7 @@ from dsl_core.calibration.orders.order_place import (
     line_graph,
     of_colours,
 )
+from dsl_core.calibration.orders.steady_light import LightJump, light_jump
 from dsl_core.model.plan import ScanLines
 from dsl_core.model.rig import ProjectorResponse
 
@@ -67,7 +68,8 @@ class FilterLight:
 
     ``shift_px`` is how far the zero order moved against the capture without filter, and its deviation;
     ``saturated`` the share of pixels whose zero order is saturated. ``cells`` (3, cells) is the zero order in
-    each cell of the image, NaN where it was not seen, with its deviation.
+    each cell of the image, NaN where it was not seen, with its deviation. ``jump`` is a change of the light
+    while lines passed over the target, None for none.
     """
 
     zero: Floats
@@ -77,6 +79,7 @@ class FilterLight:
     saturated: float
     cells: Floats = field(default_factory=_unseen)
     cells_std: Floats = field(default_factory=_unseen)
+    jump: LightJump | None = None
 
 
 def filter_light(
@@ -112,7 +115,9 @@ def filter_light(
         orders[sign] = _light(graph, sign, first, ORDER_HALF_PX)
         orders[2 * sign] = _light(graph, 2 * sign, find_second(graph, sign, first), SECOND_HALF_PX)
     share = float(saturated[inside].mean()) if inside.any() else 1.0
-    return FilterLight(zero, zero_std, orders, shift, share, *cell_means(chosen, relative))
+    bright = chosen.colour == int(np.nanargmax(np.where(np.isfinite(zero), zero, -np.inf)))
+    jump = light_jump(chosen.column_px[bright], relative[bright], frame_px)
+    return FilterLight(zero, zero_std, orders, shift, share, *cell_means(chosen, relative), jump)
 
 
 def _light(graph: LineGraph, order: int, place: OrderPlace | None, half_px: float) -> OrderLight:

@@ -25,6 +25,7 @@ from dsl_core.calibration.orders.bandpass import (
 from dsl_core.calibration.orders.filter_check import PlacedFilter
 from dsl_core.calibration.orders.filter_shift import cell_terms
 from dsl_core.calibration.orders.order_light import FilterLight, OrderLight
+from dsl_core.calibration.orders.steady_light import LightJump
 from dsl_core.errors import CalibrationError
 from dsl_core.model.calibration.bandpass import BandpassCalibration, apply_bandpass
 from dsl_core.model.plan import ScanLines
@@ -132,6 +133,14 @@ def test_wrong_filters_and_a_target_that_moved_are_named_together() -> None:
     assert "The filter of 500 nm: its first orders are where" in str(error.value)
     assert "the filter of 650 nm: the zero order is +0.40 columns" in str(error.value)
     assert "545 nm" not in str(error.value)
+
+
+def test_light_that_changed_at_once_is_named() -> None:
+    scan, profile = without_filter()
+    filters = [seen(nm) for nm in CENTRES]
+    filters[1] = replace(filters[1], light=replace(filters[1].light, jump=LightJump(-0.2, 400.0)))
+    with pytest.raises(CalibrationError, match=r"light changed by -20% at once while .* column 400"):
+        fit_bandpass(RIG, scan, profile, filters, REFLECTANCE)
 
 
 def test_a_broad_first_order_is_named() -> None:
