@@ -20,6 +20,7 @@ from dsl_core.calibration.orders.order_light import filter_light
 from dsl_core.campaign.common.depths import target_depth_mm
 from dsl_core.campaign.common.flat_target import diffuser_lines, line_frames, scan_lines_of
 from dsl_core.campaign.common.recipe import Bench, Recipe, Step, naming
+from dsl_core.campaign.common.same_white import keep_white, require_same_white
 from dsl_core.campaign.common.white_shot import (
     LONG_RATIO,
     FilterNote,
@@ -114,6 +115,7 @@ class BandpassRecipe(Recipe[BandpassCalibration]):
     def capture(self, bench: Bench, step: Step, progress: Progress) -> None:
         """Choose exposures by a test shot and scan; a scan that was begun keeps its own exposures."""
         bench.scan(step, lambda: self._begin(bench, step), progress)
+        require_same_white(bench, step)
 
     def fit(self, bench: Bench, progress: Progress) -> BandpassCalibration:
         """Calibrate from the captures of all steps."""
@@ -139,6 +141,7 @@ class BandpassRecipe(Recipe[BandpassCalibration]):
     def _begin(self, bench: Bench, step: Step) -> CapturePlan:
         """The plan of a step by a test shot; keeps what is known of its filter."""
         white = shoot_white(bench)
+        keep_white(bench, step, white)
         nm = step.placement.filter_nm
         if nm is None:
             return self._plan(bench.rig, step, white)

@@ -12,6 +12,7 @@ from dsl_core.calibration.colour.color_checker import LIGHTS
 from dsl_core.calibration.common.plane import TargetPlane, bulge_mm, fit_plane
 from dsl_core.calibration.light.chain import LineScan
 from dsl_core.campaign.common.recipe import Bench, Step
+from dsl_core.campaign.common.same_white import keep_white, require_same_white
 from dsl_core.campaign.common.white_shot import bracket, shoot_white
 from dsl_core.errors import CalibrationError
 from dsl_core.model.frames import FrameSource
@@ -76,19 +77,23 @@ def capture_uniform(bench: Bench, step: Step, ratio: float, progress: Progress) 
     """Code and uniform pictures of a step, black last; a scan that was begun continues as it was planned.
 
     Exposures follow a test shot; ``ratio`` above one adds an exposure that much longer, for dark patches.
+    Raises `CalibrationError` where white is not what that shot saw.
     """
     width = bench.devices.projector.info.width_px
 
     def plan() -> CapturePlan:
+        white = shoot_white(bench)
+        keep_white(bench, step, white)
         return CapturePlan(
             name=step.title,
             code=GrayCode(rows=False),
             spectral=Columns(levels=tuple((tuple(light),) * width for light in (*LIGHTS.tolist(), BLACK))),
-            settings=bracket(bench.rig, shoot_white(bench), step.title, ratio),
+            settings=bracket(bench.rig, white, step.title, ratio),
             code_settings=(0,),
         )
 
     bench.scan(step, plan, progress)
+    require_same_white(bench, step)
 
 
 def read_uniform(source: FrameSource, rig: Rig, progress: Progress) -> TargetPictures:

@@ -52,7 +52,7 @@ class WhiteLevel:
 
     ``ambient`` is what black shows above the sensor's black level, as a share of the brightest white;
     ``saturated`` says that even the darkest picture was. ``picture`` (rows, columns) is the mosaic itself, DN
-    per ms at full drive.
+    per ms at full drive, and ``level`` the drive level of its picture.
     """
 
     brightest: float
@@ -60,6 +60,7 @@ class WhiteLevel:
     ambient: float
     saturated: bool
     picture: NDArray[np.float64] = field(default_factory=lambda: np.zeros((0, 0)), repr=False)
+    level: float = 1.0
 
 
 def shoot_white(bench: Bench) -> WhiteLevel:
@@ -89,6 +90,7 @@ def shoot_white(bench: Bench) -> WhiteLevel:
         max(dark, 0.0) / max(peak, 1.0),
         peak > MOST_FILL * range_dn,
         rate,
+        level,
     )
 
 

@@ -21,6 +21,7 @@ from dsl_core.campaign.common.flat_target import (
     scanned_geometry,
 )
 from dsl_core.campaign.common.recipe import Bench, Recipe, Step, naming
+from dsl_core.campaign.common.same_white import keep_white, require_same_white
 from dsl_core.campaign.common.white_shot import (
     LONG_RATIO,
     LONGEST_MS,
@@ -151,6 +152,7 @@ class DepthStageRecipe(Recipe[DepthStageCalibration]):
         """
         note = self._move(bench, step)
         bench.scan(step, lambda: self._begin(bench, step, note), progress)
+        require_same_white(bench, step)
         if step.placement.filter_nm is None:
             self._check(bench, step, progress)
 
@@ -207,7 +209,9 @@ class DepthStageRecipe(Recipe[DepthStageCalibration]):
 
     def _begin(self, bench: Bench, step: Step, note: StageNote) -> CapturePlan:
         """The plan of a step by a test shot; keeps where the stage is and which filter this is."""
-        plan = self._plan(bench.rig, step, shoot_white(bench))
+        white = shoot_white(bench)
+        keep_white(bench, step, white)
+        plan = self._plan(bench.rig, step, white)
         bench.keep(step, STAGE_NOTE, note)
         return plan
 

@@ -1,0 +1,112 @@
+"""White of a scan is held against the test shot before it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from dsl_core.campaign.common.recipe import Bench, Step
+from dsl_core.campaign.common.same_white import (
+    NOTE_NAME,
+    OTHER_LEVEL,
+    SAME_LEVEL,
+    keep_white,
+    require_same_white,
+)
+from dsl_core.campaign.common.white_shot import WhiteLevel
+from dsl_core.errors import CalibrationError
+from dsl_core.model.placement import Placement
+from dsl_core.model.plan import CapturePlan, GrayCode, NoCode, ScanLines, Setting, Shot
+from tests.cases.small_rig import small_rig
+
+STEP = Step("it", "It", "Do it.", Placement(target="spectralon"))
+RATE = 0.6  # DN per ms at full drive
+RIG = small_rig()
+
+
+class Scanned(Bench):
+    """A bench whose scan shows white of a brightness, for ``factor`` times the exposure."""
+
+    factor = 1.0
+    level = 1.0
+    code: GrayCode | NoCode = GrayCode(rows=False)
+
+    def scan_of(self, step: Step) -> Any:
+        return self
+
+    @property
+    def plan(self) -> CapturePlan:
+        return CapturePlan(
+            code=self.code,
+            spectral=ScanLines(width_px=5, step_px=5),
+            settings=(Setting(exposure_ms=200.0, level=self.level),),
+            code_settings=(0,),
+        )
+
+    def read(self, shot: Shot) -> np.ndarray:
+        response = RIG.projector_response
+        light = float(response.radiance(self.level) - response.radiance(0.0))
+        # Lines that tile the frame are white together.
+        share = {"white": 1.0, "spectral": 1 / self.plan.spectral_count}.get(shot.role, 0.0)
+        more = RATE * 200.0 * light * self.factor * share
+        return _dithered(RIG.sensor.black_level_dn + more)
+
+
+def _dithered(mean: float) -> np.ndarray:
+    """Whole numbers with this mean, (60, 80)."""
+    steps = np.linspace(0, 1, 4800, endpoint=False).reshape(60, 80)
+    return np.floor(mean + steps).astype(np.uint16)
+
+
+@pytest.fixture
+def bench(tmp_path: Path) -> Scanned:
+    devices: Any = None
+    made = Scanned(devices, tmp_path, RIG)
+    made.step_folder(STEP).mkdir()
+    keep_white(made, STEP, shot())
+    return made
+
+
+def shot(level: float = 1.0, saturated: bool = False) -> WhiteLevel:
+    return WhiteLevel(RATE, np.full(3, RATE), 0.0, saturated, np.full((6, 8), RATE), level)
+
+
+def seen(bench: Scanned, factor: float, level: float = 1.0) -> Scanned:
+    """The bench with white of another brightness or level."""
+    Scanned.factor, Scanned.level = factor, level
+    return replace(bench)
+
+
+@pytest.fixture(autouse=True)
+def as_it_was(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(Scanned, "factor", 1.0)
+    monkeypatch.setattr(Scanned, "level", 1.0)
+
+
+def test_white_of_the_same_light_is_accepted(bench: Scanned) -> None:
+    for level in (1.0, 0.5):
+        require_same_white(seen(bench, 1.0, level), STEP)
+
+
+@pytest.mark.parametrize("code", [GrayCode(rows=False), NoCode()])
+@pytest.mark.parametrize("level", [1.0, 0.6])
+def test_another_exposure_than_the_one_requested_is_told(
+    bench: Scanned, level: float, code: GrayCode | NoCode, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(Scanned, "code", code)
+    allowed = SAME_LEVEL if level == 1.0 else OTHER_LEVEL
+    for factor in (1 - 0.8 * allowed, 1 + 0.8 * allowed):
+        require_same_white(seen(bench, factor, level), STEP)
+    for factor in (1 - 1.2 * allowed, 1 + 1.2 * allowed):
+        with pytest.raises(CalibrationError, match=rf"It: white of the scan has {factor:.2f} times"):
+            require_same_white(seen(bench, factor, level), STEP)
+
+
+def test_nothing_is_said_without_a_test_shot_that_was_not_saturated(bench: Scanned) -> None:
+    (bench.step_folder(STEP) / NOTE_NAME).unlink()
+    keep_white(bench, STEP, shot(saturated=True))
+    require_same_white(seen(bench, 0.1), STEP)
