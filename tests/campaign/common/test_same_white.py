@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -64,7 +65,7 @@ def _dithered(mean: float) -> np.ndarray:
 
 @pytest.fixture
 def bench(tmp_path: Path) -> Scanned:
-    devices: Any = None
+    devices: Any = SimpleNamespace(nominal=RIG, calibration=None)
     made = Scanned(devices, tmp_path, RIG)
     made.step_folder(STEP).mkdir()
     keep_white(made, STEP, shot())
@@ -104,6 +105,13 @@ def test_another_exposure_than_the_one_requested_is_told(
     for factor in (1 - 1.2 * allowed, 1 + 1.2 * allowed):
         with pytest.raises(CalibrationError, match=rf"It: white of the scan has {factor:.2f} times"):
             require_same_white(seen(bench, factor, level), STEP)
+
+
+def test_levels_are_known_after_the_self_test(bench: Scanned) -> None:
+    other = RIG.projector_response.model_copy(update={"gamma": RIG.projector_response.gamma + 0.1})
+    bench.devices.nominal = RIG.model_copy(update={"projector_response": other})
+    with pytest.raises(CalibrationError, match=r"has 0\.80 times"):
+        require_same_white(seen(bench, 0.8, 0.6), STEP)
 
 
 def test_nothing_is_said_without_a_test_shot_that_was_not_saturated(bench: Scanned) -> None:
