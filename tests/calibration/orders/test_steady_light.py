@@ -11,7 +11,9 @@ from dsl_core.calibration.orders.steady_light import FEWEST_PARTS, PARTS, light_
 FRAME_PX = 640
 
 
-def target(pixels: int = 400, noise: float = 0.02, seed: int = 0) -> tuple[NDArray[np.float64], ...]:
+def target(
+    pixels: int = 400, noise: float = 0.02, seed: int = 0
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Columns that pixels see, and the light of their zero orders through a filter at an angle."""
     rng = np.random.default_rng(seed)
     column = rng.uniform(20, 620, pixels)
