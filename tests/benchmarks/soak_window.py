@@ -1,7 +1,8 @@
 """Scans, reconstructions, clicks and keys at random on the whole application, for as long as you like.
 
 Run ``python -m tests.benchmarks.soak_window --minutes 60``. Every round takes a handful of random actions and
-one scan with its result, and then counts what should not grow: widgets, threads, open files, memory. An
+one scan with its result, and then counts what should not grow: widgets, threads, open files, memory. *stall*
+is the longest time (ms, as on a quiet machine) in which the window did not answer. An
 exception ends it with the seed and the last actions; growth beyond the limits is told at the end.
 """
 
@@ -47,47 +48,47 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--minutes", type=float, default=60.0)
     parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--trace", type=Path, metavar="FILE", help="what threads did in long gaps")
     parser.add_argument("--theme", choices=("light", "dark"), default="dark")
     wanted = parser.parse_args()
     if INSIDE not in os.environ:
         with virtual_display(1280, 800) as display:
             command = [sys.executable, "-m", "tests.benchmarks.soak_window", *sys.argv[1:]]
             raise SystemExit(subprocess.run(command, env={**as_on_screen(display), INSIDE: "1"}).returncode)
-    raise SystemExit(_soak(wanted.minutes, wanted.seed, wanted.theme))
+    raise SystemExit(_soak(wanted.minutes, wanted.seed, wanted.theme, wanted.trace))
 
 
-def _soak(minutes: float, seed: int, theme: str) -> int:
+def _soak(minutes: float, seed: int, theme: str, trace: Path | None) -> int:
     from dsl_app.shell.application import collect_garbage, make_application
 
     from tests.benchmarks.random_person import RandomPerson
+    from tests.benchmarks.stall_watch import StallWatch
 
     application = make_application([])
-    with tempfile.TemporaryDirectory(prefix="dsl-scan-") as home:
+    with tempfile.TemporaryDirectory(prefix="dsl-scan-") as home, open(trace or os.devnull, "w") as told:
         os.environ["HOME"] = os.environ["DSL_SCAN_HOME"] = home
         errors = _Errors()
         person = RandomPerson(Path(home), theme, random.Random(seed))
         collect_garbage(person.window)
+        watch = StallWatch(told if trace else None)
         rounds: list[tuple[float, ...]] = []
         kinds: list[Counter[str]] = []
         limit = time.monotonic() + 60 * minutes
-        head = ["round", "widgets", "objects", "threads", "files", "MB", "actions", "load"]
+        head = ["round", "widgets", "objects", "threads", "files", "MB", "actions", "stall", "load"]
         print("".join(f"{word:>10}" for word in head), flush=True)
         wrong = ""
         try:
             while time.monotonic() < limit and not wrong:
-                person.scan()
-                if not rounds:
-                    person.look_everywhere()
-                for _ in range(ACTIONS_A_ROUND):
-                    person.act()
-                    if errors.told:
-                        break
-                person.rest()
-                # Else what is weighed is which results happen to be open.
-                person.open_the_same()
+                with watch.during(f"round {len(rounds) + 1}") as stalls:
+                    _one_round(person, not rounds, errors)
                 rounds.append(_count(application))
                 kinds.append(Counter(type(widget).__name__ for widget in application.allWidgets()))
-                print("".join(f"{word:>10}" for word in _row(len(rounds), rounds[-1], person)), flush=True)
+                print(
+                    "".join(
+                        f"{word:>10}" for word in _row(len(rounds), rounds[-1], person, max(stalls.quiet))
+                    ),
+                    flush=True,
+                )
                 wrong = errors.told
         except Exception as error:
             wrong = f"{type(error).__name__}: {error}"
@@ -104,6 +105,19 @@ def _soak(minutes: float, seed: int, theme: str) -> int:
     judged = "nothing grew" if _is_long_enough(rounds) else "too few rounds to say whether anything grew"
     print(f"\nseed {seed}: {len(rounds)} rounds, {len(person.done)} actions, {person.scans} scans; {judged}")
     return 0
+
+
+def _one_round(person: RandomPerson, first: bool, errors: _Errors) -> None:
+    person.scan()
+    if first:
+        person.look_everywhere()
+    for _ in range(ACTIONS_A_ROUND):
+        person.act()
+        if errors.told:
+            break
+    person.rest()
+    # Else what is weighed is which results happen to be open.
+    person.open_the_same()
 
 
 class _Errors(logging.Handler):
@@ -150,9 +164,9 @@ def _count(application: QApplication) -> tuple[float, ...]:
     )
 
 
-def _row(number: int, counted: tuple[float, ...], person: RandomPerson) -> list[str]:
+def _row(number: int, counted: tuple[float, ...], person: RandomPerson, stall_ms: float) -> list[str]:
     figures = [f"{value:.0f}" for value in counted]
-    return [str(number), *figures, str(len(person.done)), f"{os.getloadavg()[0]:.1f}"]
+    return [str(number), *figures, str(len(person.done)), f"{stall_ms:.0f}", f"{os.getloadavg()[0]:.1f}"]
 
 
 def _is_long_enough(rounds: list[tuple[float, ...]]) -> bool:
