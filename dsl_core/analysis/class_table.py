@@ -29,6 +29,19 @@ class ClassRow:
     area_mm2: float | None
     pixels_std: float | None = None
     area_std_mm2: float | None = None
+    share_std: float | None = None
+
+    @property
+    def share_text(self) -> str:
+        """The share with its deviation; empty where pixels were not judged.
+
+        >>> ClassRow("red", 1, 1308, 0.5, 98.04, 41.7, 3.04, 0.016).share_text
+        '50.0 ± 1.6 %'
+        """
+        if self.share is None:
+            return ""
+        spread = None if self.share_std is None else 100 * self.share_std
+        return f"{100 * self.share:.1f}{_deviation(spread, 1)} %"
 
     @property
     def pixels_text(self) -> str:
@@ -80,6 +93,7 @@ def class_table(
             None if areas is None else float(areas[value]),
             _known(pixels_std, value),
             _known(areas_std, value),
+            None if pixels_std is None or not value else _known(pixels_std / judged, value),
         )
         for value in (*range(1, size), 0)
     )

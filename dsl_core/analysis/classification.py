@@ -162,9 +162,13 @@ def write_classification(
     shown = found.shown
     colours = shown.palette()
     if path.suffix.lower() == ".csv":
-        header = ("class", "colour", "pixels", "share_of_judged", "area_mm2", "pixels_std", "area_std_mm2")
+        figures = ("pixels", "share_of_judged", "area_mm2", "pixels_std", "area_std_mm2", "share_std")
+        header = ("class", "colour", *figures)
         rows = [
-            (r.label, colours[r.value], r.pixels, r.share, r.area_mm2, r.pixels_std, r.area_std_mm2)
+            (
+                *(r.label, colours[r.value], r.pixels, r.share, r.area_mm2),
+                *(r.pixels_std, r.area_std_mm2, r.share_std),
+            )
             for r in found.rows
         ]
         return export_table(result, header, rows, {"method": found.method}, path, overwrite=overwrite)

@@ -136,13 +136,9 @@ def classify(
     if len(notes) > _MOST_NOTES:
         output.say(f"... and {len(notes) - _MOST_NOTES} more notes on the library (see --json).")
     shown = [row for row in found.rows if row.pixels]
-    shares = ["-" if row.share is None else f"{row.share:.1%}" for row in shown]
     output.table(
         ("class", "pixels", "share", "area (mm2)"),
-        [
-            (row.label, row.pixels_text, share, row.area_text)
-            for row, share in zip(shown, shares, strict=True)
-        ],
+        [(row.label, row.pixels_text, row.share_text or "-", row.area_text) for row in shown],
     )
     output.say(f"By {found.method}.")
     if library and not library_error and _are_mostly_none(found):

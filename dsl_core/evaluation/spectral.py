@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import Generic, TypeVar
 
 import numpy as np
@@ -124,18 +124,28 @@ MIN_BANDS = 5
 
 @dataclass(frozen=True)
 class SpectrumComparison(SpectralErrors[float]):
-    """How a spectrum differs from a reference over the bands they share."""
+    """How a spectrum differs from a reference over the bands they share.
+
+    ``std`` has one standard deviation of each figure; None where no deviation of a band is known.
+    """
 
     bands: int
     range_nm: tuple[float, float]
+    std: SpectralErrors[float] | None = None
 
 
 def compare(
-    spectrum: NDArray[np.floating], wavelengths_nm: NDArray[np.floating], reference: SpectralCurve
+    spectrum: NDArray[np.floating],
+    wavelengths_nm: NDArray[np.floating],
+    reference: SpectralCurve,
+    std: NDArray[np.floating] | None = None,
+    correlation: Floats | None = None,
 ) -> SpectrumComparison:
     """Compare a spectrum (bands,) with a reference, interpolated linearly, where both have values.
 
-    Raises `DecodeError` when they share too few bands.
+    ``std`` (bands,) are the deviations of the spectrum and ``correlation`` (bands, bands) says how its bands
+    err together, not at all if it is not given; a reference has its own deviations, shared alike. Raises
+    `DecodeError` when they share too few bands.
     """
     nm = np.asarray(reference.wavelengths_nm)
     shared = (wavelengths_nm >= nm[0]) & (wavelengths_nm <= nm[-1]) & np.isfinite(spectrum)
@@ -146,6 +156,52 @@ def compare(
             f" {MIN_BANDS} are needed."
         )
     bands = np.asarray(wavelengths_nm[shared], np.float64)
-    wanted = np.interp(bands, nm, np.asarray(reference.values))
-    found = spectral_errors(np.asarray(spectrum[shared], np.float64)[:, None], wanted[:, None], bands)
-    return SpectrumComparison(**first_of(found), bands=count, range_nm=(float(bands[0]), float(bands[-1])))
+    wanted = np.interp(bands, nm, np.asarray(reference.values))[:, None]
+    measured = np.asarray(spectrum[shared], np.float64)[:, None]
+    found = spectral_errors(measured, wanted, bands)
+    together = np.eye(count) if correlation is None else correlation[np.ix_(shared, shared)]
+    stds = (
+        None if std is None else np.asarray(std[shared], np.float64),
+        None if reference.std is None else np.interp(bands, nm, np.asarray(reference.std)),
+    )
+    return SpectrumComparison(
+        **first_of(found),
+        bands=count,
+        range_nm=(float(bands[0]), float(bands[-1])),
+        std=_deviations(measured, wanted, bands, found, [_covariance(each, together) for each in stds]),
+    )
+
+
+def _covariance(std: Floats | None, correlation: Floats) -> Floats | None:
+    """Covariance (bands, bands) of deviations (bands,); None unless all are known."""
+    if std is None or not np.isfinite(std).all():
+        return None
+    return np.asarray(correlation * std * std[:, None])
+
+
+def _deviations(
+    measured: Floats,
+    truth: Floats,
+    bands_nm: Floats,
+    found: SpectralErrors[Floats],
+    covariances: list[Floats | None],
+) -> SpectralErrors[float] | None:
+    """Deviations of ``found``, from spectra one deviation away along the axes of either covariance.
+
+    Next to zero such figures have no slope, while these spectra still say how far each may reach.
+    """
+    squares = dict.fromkeys((field.name for field in fields(SpectralErrors)), 0.0)
+    for place, covariance in enumerate(covariances):
+        if covariance is None:
+            continue
+        sizes, axes = np.linalg.eigh(covariance)
+        steps = axes * np.sqrt(np.maximum(sizes, 0))
+        moves = np.concatenate([steps, -steps], axis=1)
+        moved = [measured, truth]
+        moved[place] = moved[place] + moves
+        errors = spectral_errors(*np.broadcast_arrays(*moved), bands_nm)
+        for name in squares:
+            squares[name] += float(((getattr(errors, name) - getattr(found, name)) ** 2).sum() / 2)
+    if all(covariance is None for covariance in covariances):
+        return None
+    return SpectralErrors(**{name: float(np.sqrt(square)) for name, square in squares.items()})

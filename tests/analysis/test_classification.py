@@ -56,6 +56,11 @@ def test_areas_are_those_of_the_surface(found) -> None:  # type: ignore[no-untyp
         assert row.area_mm2 == pytest.approx(row.pixels, rel=1e-3)
         assert row.area_std_mm2 is None or row.area_std_mm2 == pytest.approx(row.pixels_std, rel=1e-3)
     assert all((row.pixels_std is None) == (row.label not in NAMES) for row in made.rows)
+    judged = sum(row.pixels for row in made.rows if row.value)
+    for row in made.rows:
+        assert (row.share_std is None) == (row.pixels_std is None)
+        if row.share_std is not None and row.pixels_std is not None:
+            assert row.share_std == pytest.approx(row.pixels_std / judged)
     assert by_name["none of these"].pixels > 40 * 60
     assert by_name["not judged"].pixels == 61
     assert by_name["not judged"].share is None

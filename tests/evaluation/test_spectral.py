@@ -112,3 +112,33 @@ def test_only_shared_bands_are_compared() -> None:
     assert (found.bands, found.range_nm) == (21, (500.0, 600.0))
     with pytest.raises(DecodeError, match="5 are needed"):
         compare(np.full(GRID.size, 0.5), GRID, SpectralCurve.of([700.0, 800.0], [0.5, 0.5]))
+
+
+@pytest.mark.parametrize("offset", [0.0, 0.05])
+@pytest.mark.parametrize("of_reference", [False, True])
+def test_stated_deviations_are_those_of_figures_of_noisy_spectra(offset: float, of_reference: bool) -> None:
+    lags = np.abs(np.subtract.outer(np.arange(len(GRID)), np.arange(len(GRID))))
+    correlation, std = np.exp(-lags / 3.0), 0.01 + 0.005 * np.cos(GRID / 60)
+    measured = TRUTH[:, 0] + offset * np.cos(GRID / 25)
+    curve = SpectralCurve.of(GRID, TRUTH[:, 0])
+    stated = {"std": std}
+    if of_reference:
+        stated, curve = {}, curve.model_copy(update={"std": tuple(std)})
+    found = compare(measured, GRID, curve, correlation=correlation, **stated)
+    noise = np.random.default_rng(3).multivariate_normal(
+        np.zeros(len(GRID)), correlation * np.outer(std, std), 4000
+    )
+    first, second = measured[:, None], TRUTH
+    drawn = (first, second + noise.T) if of_reference else (first + noise.T, second)
+    errors = spectral_errors(*np.broadcast_arrays(*drawn), GRID)
+    assert found.std is not None
+    for name in ("rmse", "angle_rad", "delta_e", "scale", "rmse_scaled", "delta_e_scaled"):
+        off = np.sqrt(np.mean((getattr(errors, name) - getattr(found, name)) ** 2))
+        # A scale that is off by chance moves the rest to second order only.
+        assert getattr(found.std, name) == pytest.approx(off, rel=0.12), name
+
+
+def test_a_comparison_without_stated_deviations_has_none() -> None:
+    curve = SpectralCurve.of(GRID, TRUTH[:, 0])
+    assert compare(0.9 * TRUTH[:, 0], GRID, curve).std is None
+    assert compare(0.9 * TRUTH[:, 0], GRID, curve, np.full(len(GRID), np.nan)).std is None

@@ -100,6 +100,11 @@ class Mark:
     trouble: str = ""
     key: int = field(default_factory=lambda: next(_keys))
 
+    @property
+    def band_std(self) -> Floats | None:
+        """What is stated for its bands: of a region, for one of its pixels; None where nothing is."""
+        return self.spectrum.std if self.pixel_std is None else self.pixel_std
+
 
 @dataclass(frozen=True)
 class Library:

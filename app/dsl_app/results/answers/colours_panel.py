@@ -86,7 +86,7 @@ class ColoursPanel(QWidget):
         bands, spectra = result.wavelengths_nm, {}
         for name, mark in marks.items():
             spectrum = mark.spectrum
-            mean, std = spectrum.mean, mark.pixel_std if mark.pixel_std is not None else spectrum.std
+            mean, std = spectrum.mean, mark.band_std
             if mark.curve is not None:
                 try:
                     at = at_bands(mark.curve, bands)

@@ -217,8 +217,7 @@ class MaterialsPanel(QWidget):
                 continue
             first = cell(row.label)
             first.setIcon(swatch(colours[row.value] if row.value else "transparent"))
-            share = "" if row.share is None else f"{100 * row.share:.1f} %"
-            figures = (cell(text, "", RIGHT) for text in (row.pixels_text, share, row.area_text))
+            figures = (cell(text, "", RIGHT) for text in (row.pixels_text, row.share_text, row.area_text))
             rows.append((first, *figures))
         self.table.show_rows(rows)
 

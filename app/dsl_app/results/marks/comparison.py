@@ -7,11 +7,12 @@ from html import escape
 import numpy as np
 
 from dsl_app.results.state import Mark, ResultsState
-from dsl_app.shared.spectrum import Spectrum, number_text
+from dsl_app.shared.spectrum import number_text
 from dsl_app.shared.theme import Theme
+from dsl_core.analysis.band_noise import usual_correlation
 from dsl_core.errors import DslError
 from dsl_core.evaluation.marks import distance_between, largest_difference
-from dsl_core.evaluation.spectral import compare
+from dsl_core.evaluation.spectral import SpectrumComparison, compare
 from dsl_core.io.result.result_arrays import ResultArrays
 from dsl_core.model.figure import with_std
 from dsl_core.model.spectral import SpectralCurve
@@ -89,31 +90,50 @@ def comparison_table(chosen: Mark, others: list[Mark], theme: Theme) -> str:
     for mark in others:
         measured, reference = (mark, chosen) if chosen.curve is not None else (chosen, mark)
         if measured.curve is None and reference.curve is not None:
-            rows += _compared(mark.name, measured.spectrum, reference.curve, theme)
+            rows += _compared(mark.name, measured, reference.curve, theme)
+    if rows:
+        rows.append(f"<tr><td colspan='5'>{_ABOUT}</td></tr>")
     return _table([f"{escape(chosen.name)} against", "RMSE", "angle, rad", "ΔE00", "scale"], rows, theme)
 
 
-def _compared(name: str, spectrum: Spectrum, curve: SpectralCurve, theme: Theme) -> list[str]:
+#: What the deviations of a comparison are.
+_ABOUT = "±: one deviation, from those stated for the bands of one pixel."
+
+
+def _compared(name: str, measured: Mark, curve: SpectralCurve, theme: Theme) -> list[str]:
     """The rows of one comparison, which begin with the name of what is compared with."""
-    name = escape(name)
+    name, spectrum = escape(name), measured.spectrum
     try:
-        found = compare(spectrum.mean, spectrum.nm, curve)
+        together = usual_correlation(len(spectrum.nm))
+        found = compare(spectrum.mean, spectrum.nm, curve, measured.band_std, together)
     except DslError as error:
         return [f"<tr><td>{name}</td><td colspan='4'>{escape(str(error))}</td></tr>"]
     low, high = found.range_nm
     # Nothing is extrapolated beyond the ends of a reference.
     only = "" if found.bands == len(spectrum.nm) else "only "
     rows = []
+    as_it_is = (*(_figure(found, *each) for each in (("rmse", 4), ("angle_rad", 4), ("delta_e", 2))), "1")
+    scaled = (
+        *(_figure(found, "rmse_scaled", 4), ""),
+        *(_figure(found, *each) for each in (("delta_e_scaled", 2), ("scale", 3))),
+    )
     for title, figures in (
-        (name, (f"{found.rmse:.4f}", f"{found.angle_rad:.4f}", f"{found.delta_e:.2f}", "1")),
+        (name, as_it_is),
         (
             f"<span style='color:{theme.muted}'>{only}{low:g}–{high:g} nm, free scale</span>",
-            (f"{found.rmse_scaled:.4f}", "", f"{found.delta_e_scaled:.2f}", f"{found.scale:.3f}"),
+            scaled,
         ),
     ):
         cells = "".join(f"<td align='right'>{figure}</td>" for figure in figures)
         rows.append(f"<tr><td>{title}</td>{cells}</tr>")
     return rows
+
+
+def _figure(found: SpectrumComparison, name: str, decimals: int) -> str:
+    """A figure of a comparison with its deviation, where that is known."""
+    value = getattr(found, name)
+    std = None if found.std is None else getattr(found.std, name)
+    return with_std(value, std, decimals) if std else f"{value:.{decimals}f}"
 
 
 def distance_table(chosen: Mark, others: list[Mark], result: ResultArrays, theme: Theme) -> str:
