@@ -24,6 +24,7 @@ from PySide6.QtCore import QEvent, QPoint, Qt, QTimer
 from PySide6.QtGui import QDrag
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QAbstractButton, QApplication, QComboBox, QDialog, QMessageBox, QWidget
+from shiboken6 import isValid
 
 from dsl_core.progress import Progress
 
@@ -104,7 +105,9 @@ class RandomPerson:
         hit = top.childAt(at) or top
         kind, within = type(hit).__name__, hit.mapFrom(top, at)
         QTest.mouseMove(hit, within)
-        QTest.mouseClick(hit, Qt.MouseButton.LeftButton, pos=within)
+        # A dialog that is given up meanwhile takes its widgets with it.
+        if isValid(hit):
+            QTest.mouseClick(hit, Qt.MouseButton.LeftButton, pos=within)
         return f"{at.x()},{at.y()} {kind}"
 
     def _drag(self) -> str:
@@ -118,8 +121,10 @@ class RandomPerson:
         drop.start(DROP_MS)
         QTest.mousePress(hit, Qt.MouseButton.LeftButton, pos=pressed)
         for step in (0.3, 0.7, 1.0):
-            QTest.mouseMove(hit, pressed + (end - start) * step)
-        QTest.mouseRelease(hit, Qt.MouseButton.LeftButton, pos=pressed + end - start)
+            if isValid(hit):
+                QTest.mouseMove(hit, pressed + (end - start) * step)
+        if isValid(hit):
+            QTest.mouseRelease(hit, Qt.MouseButton.LeftButton, pos=pressed + end - start)
         drop.stop()
         return f"{start.x()},{start.y()} to {end.x()},{end.y()} {kind}"
 

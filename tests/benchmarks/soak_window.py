@@ -17,6 +17,7 @@ import subprocess
 import sys
 import tempfile
 import time
+import traceback
 from collections import Counter
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -92,7 +93,7 @@ def _soak(minutes: float, seed: int, theme: str, trace: Path | None) -> int:
                 wrong = errors.told
         except Exception as error:
             wrong = f"{type(error).__name__}: {error}"
-            logging.getLogger(__name__).exception("the soak stopped")
+            traceback.print_exc()
         finally:
             person.close()
         # At the end: what is used first at random comes late, and a step is no growth.
