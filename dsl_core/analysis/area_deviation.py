@@ -5,7 +5,9 @@ Three causes, by what the map itself shows:
 - **Edges.** A pixel is of one class, but edges run through pixels. Between two classes each pixel along a
   straight piece of the edge is wrong by the same part, spread evenly over one pixel: 1/12 px^2, and pixels of
   a straight piece err together. Beside pixels without a class the edge lies somewhere within these, all round
-  in the same sense: they may hold anything from nothing to all, 1/sqrt(3) px about what is counted.
+  in the same sense: they may hold anything from nothing to all. A count leaves them out, so that it is too
+  low by half of them on average; it is stated with 1/sqrt(3) px of each. An area counts half of each, with
+  1/sqrt(12) px.
 - **Classes.** A pixel is of its class with a probability, independently of others; pixels that are called
   undecided are missing by the probability of the class, all of them together.
 - **Depth.** An area goes with the square of the depth. Errors of depth are taken to be shared by all pixels,
@@ -36,11 +38,12 @@ _EVENLY, _FROM_END = 1 / 12, 1 / 3
 class ClassDeviations:
     """One standard deviation by the values of a map: pixels, and area in mm2 (None without points).
 
-    NaN for what is no class.
+    NaN for what is no class. ``beside_mm2`` is what an area has in pixels without a class, on average.
     """
 
     pixels: Map
-    areas_mm2: Map | None
+    areas_mm2: Map | None = None
+    beside_mm2: Map | None = None
 
 
 def class_deviations(
@@ -53,12 +56,13 @@ def class_deviations(
     """
     if scores.measure is not Measure.PROBABILITY:
         return None
-    pixels = np.sqrt(_variance(scores, shown, np.ones(shown.values.shape)))
+    variance, _ = _variance(scores, shown, np.ones(shown.values.shape), _FROM_END)
+    pixels = np.sqrt(variance)
     pixels[[0, shown.none, shown.unsure]] = np.nan
     if areas_mm2 is None:
-        return ClassDeviations(pixels, None)
+        return ClassDeviations(pixels)
     weights = _everywhere(areas_mm2)
-    variance = _variance(scores, shown, weights)
+    variance, beside = _variance(scores, shown, weights, _EVENLY)
     # Pixels of a class that have no point are missing from its area.
     pointless = np.where(np.isfinite(areas_mm2), 0.0, weights)
     variance += np.bincount(shown.values.ravel(), pointless.ravel(), len(variance)) ** 2
@@ -66,7 +70,7 @@ def class_deviations(
         by_depth = 2 * weights * np.nan_to_num(depth_relative_std)
         variance += np.bincount(shown.values.ravel(), by_depth.ravel(), len(variance)) ** 2
     variance[[0, shown.none, shown.unsure]] = np.nan
-    return ClassDeviations(pixels, np.sqrt(variance))
+    return ClassDeviations(pixels, np.sqrt(variance), beside / 2)
 
 
 def _everywhere(areas_mm2: Map) -> Map:
@@ -81,8 +85,11 @@ def _everywhere(areas_mm2: Map) -> Map:
     return np.asarray(areas_mm2[tuple(nearest)])
 
 
-def _variance(scores: Scores, shown: ClassMap, weights: Map) -> Map:
-    """Variance of the sum of weights (rows, columns) for each value of a map, without that of depth."""
+def _variance(scores: Scores, shown: ClassMap, weights: Map, of_beside: float) -> tuple[Map, Map]:
+    """Variance of the sum of weights (rows, columns) for each value of a map, without that of depth.
+
+    Also the weights of pixels without a class beside each; ``of_beside`` is the variance of what one holds.
+    """
     values, size = shown.values.astype(np.intp), len(shown.labels)
     variance, missing = np.zeros(size), np.zeros(size)
     beside = np.zeros(0, np.intp)
@@ -100,9 +107,10 @@ def _variance(scores: Scores, shown: ClassMap, weights: Map) -> Map:
         beside = np.concatenate([beside, at[alone] * size + ours[alone]])
     beside = np.unique(beside)
     pixel, value = np.divmod(beside, size)
-    missing += np.sqrt(_FROM_END) * np.bincount(value, weights.ravel()[pixel], size)
+    held = np.bincount(value, weights.ravel()[pixel], size)
+    missing += np.sqrt(of_beside) * held
     _add_classes(scores, shown, weights, beside, variance, missing)
-    return np.asarray(variance + missing**2)
+    return np.asarray(variance + missing**2), held
 
 
 def _sides(values: Values, weights: Map, index: Values) -> Iterator[tuple[Values, Values, Map, Values]]:

@@ -18,8 +18,9 @@ _LARGE_MM2, _LARGE_STD_MM2 = 100.0, 10.0
 class ClassRow:
     """One line of the table: a label, its value in the map, its pixels, their share of those judged, area.
 
-    ``share`` is None for pixels that were not judged. ``area_mm2`` is of the pixels with a point; None where
-    the result has none. Deviations are as `area_deviation` derives them, None where they are not known.
+    ``share`` is None for pixels that were not judged. ``area_mm2`` is of the pixels with a point, and of a
+    class also half of what is beside it without a class, where its edge runs; None where the result has no
+    points. Deviations are as `area_deviation` derives them, None where they are not known.
     """
 
     label: str
@@ -83,6 +84,8 @@ def class_table(
     areas: NDArray[np.float64] | None = None
     if areas_mm2 is not None:
         areas = np.bincount(shown.values.ravel(), np.nan_to_num(areas_mm2.ravel()), size).astype(np.float64)
+        if deviations is not None and deviations.beside_mm2 is not None:
+            areas += deviations.beside_mm2
     pixels_std, areas_std = (None, None) if deviations is None else (deviations.pixels, deviations.areas_mm2)
     return tuple(
         ClassRow(

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from dsl_core.analysis.area_deviation import class_deviations
+from dsl_core.analysis.class_table import class_table
 from dsl_core.analysis.classify import ClassMap, Limits, Measure, Scores
 
 SIZE, FINE = 40, 8
@@ -52,6 +53,26 @@ def test_nine_of_ten_shapes_on_the_grid_are_within_their_two_deviations(shape: s
     assert np.median(ratios) < (0.04 if mixed == "nearest" else 0.15)
 
 
+@pytest.mark.parametrize("shape", ["disc", "square"])
+def test_areas_are_not_too_small_where_edges_are_of_no_class(shape: str) -> None:
+    rng, off, counted_off, held = np.random.default_rng(8), [], [], []
+    for _ in range(40):
+        radius, centre = rng.uniform(8, 13), rng.uniform(18, 22, 2)
+        share = _covered(shape, radius, tuple(centre))
+        scores = _scores(np.where(share > 0.5, 0, 1))
+        scores.fit[(share > 0.02) & (share < 0.98)] = 0
+        shown, areas = ClassMap.of(scores), np.full(share.shape, 2.0)
+        row = class_table(shown, areas, class_deviations(scores, shown, areas))[0]
+        assert row.area_mm2 is not None
+        assert row.area_std_mm2 is not None
+        off.append(row.area_mm2 / (2 * share.sum()) - 1)
+        counted_off.append(row.pixels / share.sum() - 1)
+        held.append(abs(row.area_mm2 - 2 * share.sum()) <= 2 * row.area_std_mm2)
+    assert abs(np.mean(off)) < 0.02
+    assert np.mean(counted_off) < -0.08
+    assert np.mean(held) >= 0.9
+
+
 def test_probabilities_and_depth_add_to_edges() -> None:
     best = np.zeros((SIZE, SIZE), int)
     scores = _scores(best, MARGIN)
@@ -77,8 +98,11 @@ def test_pixels_without_a_point_may_hold_area_all_the_same(is_judged: bool) -> N
     found = class_deviations(scores, ClassMap.of(scores), np.where(lost, np.nan, 2.0))
     assert found is not None
     assert found.areas_mm2 is not None
-    expected_mm2 = 2 * lost.sum() if is_judged else 2 * found.pixels[1]
+    # Half of what has no class is counted as its area, and is as likely all of it as none.
+    expected_mm2 = 2 * lost.sum() if is_judged else found.pixels[1]
     assert found.areas_mm2[1] == pytest.approx(expected_mm2, rel=1e-3)
+    assert found.beside_mm2 is not None
+    assert found.beside_mm2[1] == pytest.approx(0 if is_judged else lost.sum())
 
 
 def test_what_is_undecided_may_be_of_either_class() -> None:

@@ -96,6 +96,8 @@ def comparison_table(chosen: Mark, others: list[Mark], theme: Theme) -> str:
     return _table([f"{escape(chosen.name)} against", "RMSE", "angle, rad", "ΔE00", "scale"], rows, theme)
 
 
+#: A narrow space at which no line is broken.
+_THIN = chr(0x202F)
 #: What the deviations of a comparison are.
 _ABOUT = "±: one deviation, from those stated for the bands of one pixel."
 
@@ -133,7 +135,8 @@ def _figure(found: SpectrumComparison, name: str, decimals: int) -> str:
     """A figure of a comparison with its deviation, where that is known."""
     value = getattr(found, name)
     std = None if found.std is None else getattr(found.std, name)
-    return with_std(value, std, decimals) if std else f"{value:.{decimals}f}"
+    # Four figures fit next to the picture with thin spaces, which also keep a line whole.
+    return with_std(value, std, decimals).replace(" ", _THIN) if std else f"{value:.{decimals}f}"
 
 
 def distance_table(chosen: Mark, others: list[Mark], result: ResultArrays, theme: Theme) -> str:
