@@ -23,7 +23,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import distance_transform_edt
 
 from dsl_core.analysis.classify import ClassMap, Measure, Scores
 
@@ -81,6 +80,9 @@ def _everywhere(areas_mm2: Map) -> Map:
     known = np.isfinite(areas_mm2)
     if known.all() or not known.any():
         return np.nan_to_num(areas_mm2)
+    # Opening a result, whose page knows class maps, does not wait for scipy.
+    from scipy.ndimage import distance_transform_edt
+
     nearest = distance_transform_edt(~known, return_distances=False, return_indices=True)
     return np.asarray(areas_mm2[tuple(nearest)])
 

@@ -86,3 +86,11 @@ def test_the_window_is_painted_before_heavy_libraries_are_imported() -> None:
     answer = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     heavy = {"numpy", "pyqtgraph", *HEAVY} - {"PySide6"}
     assert heavy.isdisjoint(json.loads(answer.stdout))
+
+
+def test_a_first_look_at_a_result_waits_for_nothing_that_it_does_not_need() -> None:
+    modules = "dsl_app.composition.demo, dsl_app.results.controller, dsl_app.results.page"
+    code = f"import json, sys, {modules}; print(json.dumps(sorted(sys.modules)))"
+    answer = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    later = {"scipy", "zarr", "pyvista", "torch", "dsl_core.capture.runner", "dsl_core.workflows.scans"}
+    assert later.isdisjoint(json.loads(answer.stdout))

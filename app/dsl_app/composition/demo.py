@@ -6,16 +6,17 @@ import shutil
 from collections.abc import Callable
 from datetime import datetime
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from dsl_app.connection.controller import RigController
 from dsl_app.connection.state import Link, RigChoice
-from dsl_app.scan.command_line import fresh_target
-from dsl_app.scan.controller import ScanController
-from dsl_app.scan.state import Phase
 from dsl_app.shared.jobs.base import Job, JobRunner
 from dsl_app.shared.notify import Notifier
 from dsl_app.start.examples import EXAMPLES
 from dsl_core.errors import StoreError
+
+if TYPE_CHECKING:
+    from dsl_app.scan.controller import ScanController
 
 #: The live scan: a Color Checker, for less than half a minute.
 LIVE_RIG = RigChoice("twin", (("scene", "color-checker"), ("size", "296x194")))
@@ -85,6 +86,9 @@ class DemoController:
                 " simulated rig, or start your own scan on the Scan page.",
             )
             return
+        from dsl_app.scan.command_line import fresh_target
+        from dsl_app.scan.state import Phase
+
         scans = self._scan_page()
         if scans.state.phase.value.is_busy:
             self._notifier.tell("info", "A scan is already running.")

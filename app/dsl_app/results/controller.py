@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,7 +29,9 @@ from dsl_core.model.result_sink import Maps
 from dsl_core.optics.levels import rgba_of_colours
 from dsl_core.progress import Progress
 from dsl_core.words import quoted
-from dsl_core.workflows.inspection import FrameBlock, IntensityGraph, intensity_graph, read_block
+
+if TYPE_CHECKING:
+    from dsl_core.workflows.inspection import FrameBlock, IntensityGraph
 
 
 class ResultsController:
@@ -319,6 +322,8 @@ class ResultsController:
             return
 
         def work(progress: Progress) -> tuple[FrameBlock, IntensityGraph]:
+            from dsl_core.workflows.inspection import intensity_graph, read_block
+
             near = block if block is not None and block.holds(pixel) else None
             near = near or read_block(result, pixel, progress)
             return near, intensity_graph(near, result, pixel)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 import pyqtgraph as pg
 from numpy.typing import NDArray
@@ -17,7 +19,9 @@ from dsl_app.shared.widgets.help_window import add_help_key
 from dsl_app.shared.widgets.layouts import column_of
 from dsl_app.shared.widgets.plots import RGB_COLOURS, CalmPlot, colour_legend
 from dsl_core.model.plan import spoken_number
-from dsl_core.workflows.inspection import IntensityGraph
+
+if TYPE_CHECKING:
+    from dsl_core.workflows.inspection import IntensityGraph
 
 CHANNELS = ("R", "G", "B")
 #: Wavelengths that are labelled along the first orders, nm.

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from PySide6.QtCore import Qt, QUrl, Signal
 from PySide6.QtGui import QDesktopServices
@@ -43,7 +44,9 @@ from dsl_app.shared.widgets.page import PageWidget
 from dsl_app.shared.widgets.save_dialog import ask_target
 from dsl_app.shared.widgets.ticker import Ticker
 from dsl_app.shared.wording import short_name
-from dsl_core.workflows.inspection import IntensityGraph
+
+if TYPE_CHECKING:
+    from dsl_core.workflows.inspection import IntensityGraph
 
 #: How often to ask for what a reconstruction has found, ms.
 FETCH_MS = 100

@@ -7,21 +7,24 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import Enum
 from pathlib import Path
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dsl_app.shared.evented import Event, Value
 from dsl_app.shared.spectrum import Floats, Pixel, Spectrum, spectrum_of_pixel
-from dsl_core.analysis.classification import Classification
 from dsl_core.analysis.transforms import Transform
 from dsl_core.evaluation.similarity import Likeness
 from dsl_core.io.result.result_arrays import ResultArrays
 from dsl_core.io.spectra.reference_file import ReferenceFile
 from dsl_core.model.spectral import SpectralCurve
 from dsl_core.optics.levels import Bands, Levels
-from dsl_core.workflows.inspection import IntensityGraph
+
+if TYPE_CHECKING:
+    # Not needed before the first picture of a result.
+    from dsl_core.analysis.classification import Classification
+    from dsl_core.workflows.inspection import IntensityGraph
 
 #: A nearest and a farthest depth, mm.
 Limits = tuple[float, float]
