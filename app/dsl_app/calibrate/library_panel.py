@@ -27,6 +27,7 @@ from dsl_app.shared.evented import follow_any
 from dsl_app.shared.plain_tip import plain_tip
 from dsl_app.shared.theme import Theme
 from dsl_app.shared.widget_state import LabelState
+from dsl_app.shared.widgets.ask_file import ask_file, start_folder
 from dsl_app.shared.widgets.dialogs import dialog_buttons, resize_within
 from dsl_app.shared.widgets.forms import allow, label, push_button, set_role, show_label
 from dsl_app.shared.widgets.help_window import add_help_key
@@ -213,16 +214,16 @@ class LibraryPanel(QGroupBox):
         if line is None:
             return
         name, chosen = QFileDialog.getSaveFileName(
-            self, "Export a calibration", f"{line.name}.json", ";;".join(FORMS)
+            self, "Export a calibration", str(Path(start_folder()) / f"{line.name}.json"), ";;".join(FORMS)
         )
         if name:
             # The dialog has asked whether to replace an existing file.
             self._commands.export(self.key, Path(name), FORMS.get(chosen, "entry"), overwrite=True)
 
     def _import(self) -> None:
-        name, _ = QFileDialog.getOpenFileName(self, "Import a calibration", "", "Calibrations (*.json)")
-        if name:
-            self._commands.import_file(Path(name))
+        path = ask_file(self, "Import a calibration", "Calibrations (*.json)")
+        if path is not None:
+            self._commands.import_file(path)
 
     def _show_drift(self, verdict: DriftVerdict | None) -> None:
         if verdict is not None:

@@ -19,6 +19,7 @@ from PySide6.QtWidgets import (
 from dsl_app.importing.state import PUBLISHED, FileRow, Found, ImportRequest, ImportState, import_view
 from dsl_app.shared.evented import follow_any
 from dsl_app.shared.known_files import breakable
+from dsl_app.shared.widgets.ask_file import ask_file
 from dsl_app.shared.widgets.dialogs import JobDialog, use_room
 from dsl_app.shared.widgets.forms import ChoiceBox, WholeBox, label, named, push_button, set_role
 from dsl_app.shared.widgets.help_window import add_help_key
@@ -184,9 +185,9 @@ class ImportDialog(JobDialog):
             self.other_chosen.emit(folder)
 
     def _choose_file(self) -> None:
-        name, _ = QFileDialog.getOpenFileName(self, "Choose a calibration", "", "Calibrations (*.json)")
-        if name:
-            self._commands.change(base=name)
+        path = ask_file(self, "Choose a calibration", "Calibrations (*.json)")
+        if path is not None:
+            self._commands.change(base=str(path))
 
     def _choose_home(self) -> None:
         name = QFileDialog.getExistingDirectory(self, "Save in", self.home.text())

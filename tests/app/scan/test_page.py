@@ -12,7 +12,7 @@ from dsl_app.scan import reconnect
 from dsl_app.scan.effects.controller import EffectsController
 from dsl_app.scan.effects.state import EffectsState
 from dsl_app.scan.forecast.controller import ForecastController
-from dsl_app.scan.forecast.panel import ForecastPanel
+from dsl_app.scan.forecast.panel import READY, ForecastPanel
 from dsl_app.scan.forecast.state import ForecastState
 from dsl_app.scan.frame_box import pattern_levels
 from dsl_app.scan.page import ScanPage
@@ -312,6 +312,10 @@ def test_nothing_is_shown_before_it_is_predicted(ready: Bench) -> None:
     page, _, _ = ready
     assert set(figures(page, 1).values()) == {"–"}
     assert "Nothing is predicted yet" in page.forecast._note.text()
+    assert "need a connected rig" in page.forecast._note.text()
+    page.forecast._state.is_ready.set(True)
+    # With a rig and a calibration nobody is told to connect one.
+    assert page.forecast._note.text() == READY
     assert not page.forecast.ask.isEnabled()
 
 

@@ -15,6 +15,7 @@ from dsl_app.importing.captures.state import NOMINAL, NONE, CapturesState, Said,
 from dsl_app.shared.evented import follow_any
 from dsl_app.shared.known_files import breakable
 from dsl_app.shared.plain_tip import plain_tip
+from dsl_app.shared.widgets.ask_file import ask_file
 from dsl_app.shared.widgets.dialogs import JobDialog, use_room
 from dsl_app.shared.widgets.forms import (
     ChoiceBox,
@@ -255,14 +256,14 @@ class CapturesDialog(JobDialog):
             self._commands.rename(self.name.text(), Path(name))
 
     def _choose_rig(self) -> None:
-        name, _ = QFileDialog.getOpenFileName(self, "Choose a calibration", "", RIGS)
-        if name:
-            self._commands.choose_calibration(name)
+        path = ask_file(self, "Choose a calibration", RIGS)
+        if path is not None:
+            self._commands.choose_calibration(str(path))
 
     def _choose_curves(self, device: str, _: bool = False) -> None:
-        name, _kind = QFileDialog.getOpenFileName(self, f"Choose the curves of the {device}", "", CURVES)
-        if name:
-            self._commands.set_curves(device, Path(name))
+        path = ask_file(self, f"Choose the curves of the {device}", CURVES)
+        if path is not None:
+            self._commands.set_curves(device, path)
 
     def _no_curves(self, device: str, _: bool = False) -> None:
         self._commands.set_curves(device, None)

@@ -5,13 +5,14 @@ from __future__ import annotations
 from pathlib import Path
 
 from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QFileDialog, QWidget
+from PySide6.QtWidgets import QWidget
 
 from dsl_app.results.answers.controller import AnswersController, Way
 from dsl_app.results.state import Materials, ResultsState
 from dsl_app.shared.plain_tip import plain_tip
 from dsl_app.shared.settings import folder_for
 from dsl_app.shared.theme import DARK, Theme
+from dsl_app.shared.widgets.ask_file import ask_file, ask_folder
 from dsl_app.shared.widgets.forms import ChoiceBox, NumberBox, allow, check_box, label, push_button, quiet
 from dsl_app.shared.widgets.icons import swatch
 from dsl_app.shared.widgets.layouts import STRETCH, column_of, row_of
@@ -147,17 +148,17 @@ class MaterialsPanel(QWidget):
 
     def choose_folder(self) -> None:
         """Ask for the folder of a library."""
-        name = QFileDialog.getExistingDirectory(self, "A folder of spectra; its subfolders are groups")
-        if name:
-            self.use_library(Path(name))
+        folder = ask_folder(self, "A folder of spectra; its subfolders are groups")
+        if folder is not None:
+            self.use_library(folder)
 
     def choose_file(self) -> None:
         """Ask for the file of a library."""
         kinds = " ".join(f"*{suffix}" for suffix in suffixes())
         kinds = f"Spectra ({kinds});;All files (*)"
-        name, _ = QFileDialog.getOpenFileName(self, "A file of spectra", "", kinds)
-        if name:
-            self.use_library(Path(name))
+        path = ask_file(self, "A file of spectra", kinds)
+        if path is not None:
+            self.use_library(path)
 
     def use_library(self, path: Path) -> None:
         """Look for the spectra of a file or folder."""

@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from pathlib import Path
 
 from PySide6.QtCore import QModelIndex, QSize, Qt, QTimer
 from PySide6.QtGui import QBrush, QColor, QGuiApplication, QKeySequence, QShortcut, QTextOption
 from PySide6.QtWidgets import (
     QAbstractItemView,
-    QFileDialog,
     QFrame,
     QHeaderView,
     QTextBrowser,
@@ -24,6 +22,7 @@ from dsl_app.results.state import Mark, ResultsState
 from dsl_app.shared.plain_tip import plain_tip
 from dsl_app.shared.settings import folder_for
 from dsl_app.shared.theme import DARK, Theme
+from dsl_app.shared.widgets.ask_file import ask_file
 from dsl_app.shared.widgets.forms import allow, label, named, push_button, quiet
 from dsl_app.shared.widgets.hints import FocusRing
 from dsl_app.shared.widgets.icons import SWATCH_PX, swatch
@@ -130,9 +129,9 @@ class MarksPanel(QWidget):
 
     def choose_reference(self) -> None:
         """Ask for a file with a spectrum."""
-        name, _ = QFileDialog.getOpenFileName(self, "Add a reference spectrum", "", _filters())
-        if name:
-            self._control.add_reference(Path(name))
+        path = ask_file(self, "Add a reference spectrum", _filters())
+        if path is not None:
+            self._control.add_reference(path)
 
     def remove_selected(self) -> None:
         """Remove the selected marks."""

@@ -5,13 +5,14 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from PySide6.QtCore import QSize
-from PySide6.QtWidgets import QDialog, QDialogButtonBox, QFileDialog, QFormLayout, QLineEdit, QWidget
+from PySide6.QtWidgets import QDialog, QDialogButtonBox, QFormLayout, QLineEdit, QWidget
 
 from dsl_app.rig.profiles.controller import ProfileController
 from dsl_app.rig.profiles.device_form import DeviceForm
 from dsl_app.rig.profiles.draft import Draft
 from dsl_app.rig.profiles.state import ProfileState, profile_view
 from dsl_app.shared.evented import follow_any
+from dsl_app.shared.widgets.ask_file import ask_file
 from dsl_app.shared.widgets.dialogs import command_window, confirm, dialog_buttons, resize_within
 from dsl_app.shared.widgets.forms import keep_height, label, named, push_button, set_role
 from dsl_app.shared.widgets.help_window import add_help_key
@@ -131,9 +132,9 @@ class ProfileDialog(QDialog):
     # Do --------------------------------------------------------------------------------------------
 
     def _choose_nominal(self) -> None:
-        name, _ = QFileDialog.getOpenFileName(self, "Choose the data sheets", "", "Rigs (*.json)")
-        if name:
-            self._commands.change(nominal=name)
+        path = ask_file(self, "Choose the data sheets", "Rigs (*.json)")
+        if path is not None:
+            self._commands.change(nominal=str(path))
 
     def _save(self) -> None:
         if self._commands.save():

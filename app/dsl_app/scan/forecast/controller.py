@@ -96,6 +96,7 @@ class ForecastController:
         """Discard predictions for another rig or calibration."""
         now, is_there = self._rigging(), self._rig.devices.value is not None
         self.state.trouble.set(NO_CALIBRATION if now is None and is_there else "")
+        self.state.is_ready.set(self._may_start and now is not None and is_there)
         if now == self._of:
             return
         self._stop()

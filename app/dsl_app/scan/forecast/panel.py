@@ -29,6 +29,7 @@ CURVE_PX = 180
 NOTHING_YET = (
     "Nothing is predicted yet. Predictions need a connected rig with a calibration, and no running scan."
 )
+READY = "Nothing is predicted yet. Predictions begin as soon as the rig is free."
 _HEADS = ("Figure", "This plan", "Published", "Last scan")
 
 
@@ -91,7 +92,7 @@ class ForecastPanel(QWidget):
         self.stops = [
             *follow_any(self._show_points, state.points, state.current),
             *follow_any(self._show_figures, state.measured),
-            *follow_any(self._show_note, state.progress, state.trouble, state.refusal),
+            *follow_any(self._show_note, state.progress, state.trouble, state.refusal, state.is_ready),
             *follow_any(self._show_rest, state.progress, state.left),
             *follow_any(self._show_scene, state.look, state.last_look),
             state.answer.follow(lambda text: show_label(self._answer, LabelState(text))),
@@ -182,7 +183,7 @@ class ForecastPanel(QWidget):
         elif state.refusal.value:
             text = state.refusal.value
         elif not state.points.value:
-            text = "Predicting…" if total else NOTHING_YET
+            text = "Predicting…" if total else READY if state.is_ready.value else NOTHING_YET
         else:
             chart = f"a Color Checker at {state.depth_mm.value:.0f} mm"
             scene = chart if state.look.value is None else f"the scene of {state.look.value.stem}"

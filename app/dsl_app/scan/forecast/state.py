@@ -71,7 +71,8 @@ class ForecastState:
     ``trouble`` or, for this plan alone, ``refusal`` says why). ``progress`` counts plans done and in total
     (0 of 0: nothing is computed), ``left`` those that are predicted on request only. ``answer`` answers a
     budget of time or error. ``look`` is the result whose scene is planned for (None: a Color Checker),
-    ``last_look`` the latest one; ``depth_mm`` is where the Color Checker would be.
+    ``last_look`` the latest one; ``depth_mm`` is where the Color Checker would be. ``is_ready``: predictions
+    need nothing but that the rig is free.
     """
 
     def __init__(self) -> None:
@@ -79,6 +80,7 @@ class ForecastState:
         self.current: Value[ForecastPoint | None] = Value(None)
         self.trouble = Value("")
         self.refusal = Value("")
+        self.is_ready = Value(False)
         self.progress = Value((0, 0))
         self.left = Value(0)
         self.answer = Value("")

@@ -10,6 +10,7 @@ from PySide6.QtGui import QAbstractFileIconProvider, QIcon
 from PySide6.QtWidgets import QFileDialog, QFileIconProvider, QFileSystemModel, QWidget
 
 from dsl_app.shared.known_files import Kind, kind_of, meant_by
+from dsl_app.shared.widgets.ask_file import chosen_in, start_folder
 
 #: Folders that are opened whole.
 THINGS = (Kind.SCAN, Kind.RESULT, Kind.CAMPAIGN)
@@ -78,9 +79,10 @@ class OpenDialog(QFileDialog):
         takes_folders: bool,
         filters: tuple[str, ...] = (ALL, RESULTS, SCANS),
     ) -> None:
+        folder = folder or start_folder()
         place = Path(folder)
         # One that does not exist yet would be taken for a name that was typed, and nothing could be chosen.
-        super().__init__(parent, title, folder if place.is_dir() or not folder else str(place.parent))
+        super().__init__(parent, title, folder if place.is_dir() else str(place.parent))
         self._takes_folders = takes_folders
         self.chosen: Path | None = None
         self.setOption(QFileDialog.Option.DontUseNativeDialog)
@@ -104,6 +106,7 @@ class OpenDialog(QFileDialog):
 
     def _choose(self, path: Path) -> None:
         self.chosen = meant_by(path)
+        chosen_in(path)
         self.done(QFileDialog.DialogCode.Accepted)
 
     def accept(self) -> None:
