@@ -70,11 +70,21 @@ def _require_whole(pixels: NDArray[np.uint16], name: str) -> None:
 
 def require_mosaic(pixels: NDArray[np.uint16], size_px: tuple[int, int], name: str) -> None:
     """Raise `DeviceError` unless pixels are a raw mosaic of this width and height."""
-    shape = (size_px[1], size_px[0])
-    if pixels.shape != shape or pixels.dtype != np.uint16:
+    if pixels.ndim != 2:
         raise DeviceError(
-            f"{name} delivered {pixels.dtype} of shape {pixels.shape} instead of uint16 of shape {shape}."
-            " Check its pixel format and region of interest."
+            f"{name} delivered a picture with colours ({' × '.join(map(str, pixels.shape))} numbers) instead"
+            " of the raw one, which has one number a pixel. Choose a raw pixel format, such as BayerRG12 or"
+            " Mono12."
+        )
+    if pixels.shape != (size_px[1], size_px[0]):
+        raise DeviceError(
+            f"{name} delivered a picture of {pixels.shape[1]} × {pixels.shape[0]} px instead of"
+            f" {size_px[0]} × {size_px[1]} px. Check its region of interest and binning."
+        )
+    if pixels.dtype != np.uint16:
+        raise DeviceError(
+            f"{name} delivered a picture in {pixels.dtype} instead of uint16, the raw counts. Check its pixel"
+            " format."
         )
 
 

@@ -29,6 +29,9 @@ from dsl_core.version import __version__
 GROUP = "dsl_scan.rigs"
 #: What keeps most devices from being opened.
 UNPLUGGED = "Check the cables and the power of its devices, and that no other program uses them."
+#: What a driver itself is mostly at fault for, and what its author does then.
+OF_CODE = (SyntaxError, NameError, AttributeError, TypeError, ImportError)
+WRITTEN_WRONG = "If it is your own, correct it and start dsl-scan again."
 #: Stands for the package of rigs that are profiles.
 PROFILE = "profile"
 #: Rigs of this package, so that they are there in a source tree or a frozen app without metadata too.
@@ -121,8 +124,9 @@ def open_rig(name: str, options: dict[str, str] | None = None) -> DeviceRig:
     except DslError:
         raise
     except Exception as error:
+        first = f"{UNPLUGGED} {WRITTEN_WRONG}" if isinstance(error, OF_CODE) else UNPLUGGED
         raise DeviceError(
-            _fault(points[0], f"failed to open: {type(error).__name__}: {error}", UNPLUGGED)
+            _fault(points[0], f"failed to open: {type(error).__name__}: {error}", first)
         ) from error
     if not isinstance(rig, DeviceRig):
         raise DeviceError(_fault(points[0], f"opened as {type(rig).__name__} instead of DeviceRig"))
@@ -179,7 +183,10 @@ def _load(point: EntryPoint) -> OpenRig:
         if missing is not None:
             raise missing from error
         reason = f"cannot be loaded from {point.value} ({type(error).__name__}: {error})"
-        raise DeviceError(_fault(point, reason)) from error
+        first = WRITTEN_WRONG if isinstance(error, OF_CODE) else ""
+        if isinstance(error, ModuleNotFoundError) and error.name:
+            first = f"Install {error.name.partition('.')[0]}, which it needs."
+        raise DeviceError(_fault(point, reason, first)) from error
     if not callable(function):
         raise DeviceError(_fault(point, f"is {point.value}, which is not a function"))
     return function  # type: ignore[no-any-return]

@@ -77,7 +77,7 @@ REASONS = {
     "driver ends the program": "SystemExit",
     "left-aligned": "is the largest",
     "cut off from": "rows empty",
-    "another size": "of shape",
+    "another size": "px instead of",
     "another type": "uint8",
     "exposure told": "instead of",
     "projector raises for good": "context lost",

@@ -218,8 +218,9 @@ def test_opening_passes_errors_on_and_is_bounded_too() -> None:
     ("frame", "sentence"),
     [
         (None, "delivered NoneType instead of a picture"),
-        (replace(FRAME, pixels=np.zeros((4, 5), np.uint16)), r"uint16 of shape \(4, 5\)"),
-        (replace(FRAME, pixels=np.zeros((4, 6), np.uint8)), "delivered uint8"),
+        (replace(FRAME, pixels=np.zeros((4, 5), np.uint16)), "picture of 5 × 4 px instead of 6 × 4 px"),
+        (replace(FRAME, pixels=np.zeros((4, 6, 3), np.uint16)), "with colours .4 × 6 × 3 numbers."),
+        (replace(FRAME, pixels=np.zeros((4, 6), np.uint8)), "picture in uint8 instead of uint16"),
         (replace(FRAME, pixels=np.full((4, 6), 4096, np.uint16)), "a value of 4096; with 12 bits, 4095"),
         (replace(FRAME, pixels=np.repeat([[9], [9], [9], [0]], 6, 1).astype(np.uint16)), "1 of 4 rows empty"),
         (replace(FRAME, exposure_ms=5.0), "exposes for 5 ms instead of 10 ms"),

@@ -176,6 +176,21 @@ def test_a_package_that_crashes_on_import_is_named(install: Install) -> None:
     assert "ZeroDivisionError" in entry.error
 
 
+@pytest.mark.parametrize(
+    ("source", "sentence"),
+    [
+        ("def open_rig(options: dict)", r"SyntaxError.*line 1.*correct it and start dsl-scan again"),
+        ("import fancycam.usb", "Install fancycam, which it needs"),
+    ],
+)
+def test_the_author_of_a_package_is_told_what_to_do_about_it(
+    source: str, sentence: str, install: Install
+) -> None:
+    install("faulty", source=source, bad="faulty:open_rig")
+    with pytest.raises(DeviceError, match=sentence):
+        open_rig("bad")
+
+
 def test_failures_while_opening_name_the_package_unless_they_speak_for_themselves(install: Install) -> None:
     install("mean_rig", mean="mean_rig:open_rig", nothing="mean_rig:open_nothing")
     with pytest.raises(PlanError, match="does not know the option wrong"):

@@ -265,7 +265,8 @@ class RigPage(PageWidget):
         self._commands.expose_automatically(self.live.content.region)
 
     def _show(self) -> None:
-        view = rig_view(self._state, self._live_state, self._is_other)
+        told = self._state.choice.value.name
+        view = rig_view(self._state, self._live_state, self._is_other, told != self._rig.currentData())
         show_parts(self, view)
         allow(self.auto, view.auto, CONNECT_FIRST)
 

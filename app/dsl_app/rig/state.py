@@ -78,12 +78,15 @@ class RigView:
     cycles: LabelState
 
 
-def rig_view(rig: RigState, live: LiveState, is_other: bool = False) -> RigView:
+def rig_view(
+    rig: RigState, live: LiveState, is_other: bool = False, is_of_other_rig: bool = False
+) -> RigView:
     """Texts and buttons of the Rig page for what is known now.
 
     While the form ``is_other`` than the rig that is connected, connecting that comes next: what the form
     shows is not what the camera sees. Once the picture is live, the next thing is a scan on a calibrated
-    rig, and the self-test on any other.
+    rig, and the self-test on any other. What went wrong is said while the form shows the rig it happened to,
+    and not where it ``is_of_other_rig``.
     """
     link, devices = rig.link.value, rig.devices.value
     has_devices = devices is not None
@@ -94,7 +97,7 @@ def rig_view(rig: RigState, live: LiveState, is_other: bool = False) -> RigView:
     is_live, is_calibrated = rig.live.value, devices is not None and devices.calibration is not None
     return RigView(
         link=LabelState(f"● {link.value}", _LINK_ROLES[link]),
-        trouble=LabelState(rig.trouble.value, "bad"),
+        trouble=LabelState("" if is_of_other_rig else rig.trouble.value, "bad"),
         camera_text=_describe(rig.camera),
         projector_text=_describe(rig.projector),
         connect_button=ButtonState(

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
 from enum import Enum
 from itertools import chain, count, islice
 from pathlib import Path
 
 from dsl_core.io import CAMPAIGN_NAME, MANIFEST_NAME, PUBLISHED_PLACES, PUBLISHED_STARTS
 from dsl_core.io.reading import read_json
+from dsl_core.words import counted
 
 RESULT_NAME = "zarr.json"
 _MARKS = ".marks.json"
@@ -73,15 +75,22 @@ def _is_published(folder: Path) -> bool:
 
 
 def _has_pictures(folder: Path) -> bool:
-    """Whether a folder has as many pictures as a capture needs."""
+    """Whether a folder has as many pictures as a capture needs, or an archive that may hold them all."""
+    from dsl_core.io.pictures.array_file import ARCHIVES
     from dsl_core.io.pictures.candidates import FEWEST
-    from dsl_core.io.pictures.picture_file import PICTURES
 
     try:
-        pictures = (each for each in folder.iterdir() if each.suffix.lower() in PICTURES)
-        return len(list(islice(pictures, FEWEST))) == FEWEST
+        if any(each.suffix.lower() in ARCHIVES for each in folder.iterdir()):
+            return True
+        return len(list(islice(_pictures(folder), FEWEST))) == FEWEST
     except OSError:
         return False
+
+
+def _pictures(folder: Path) -> Iterator[Path]:
+    from dsl_core.io.pictures.picture_file import PICTURES
+
+    return (each for each in folder.iterdir() if each.suffix.lower() in PICTURES)
 
 
 def has_pictures(folder: Path) -> bool:
@@ -156,10 +165,33 @@ def refusal(path: Path) -> str:
                 f"{path.name} is neither a plan, a pattern set nor a calibration of dsl-scan. Choose another"
                 " file."
             )
+        case Kind.UNKNOWN if told := _of_pictures(path):
+            return told
         case Kind.UNKNOWN:
             return f"{path.name} is not a known scan, result, reference spectrum or calibration. {_OPENS}"
         case kind:
             return f"{path.name} is a {kind.value}, but no page could open it. The log says why (Ctrl+L)."
+
+
+def _of_pictures(path: Path) -> str:
+    """What to do with something of a capture that is not the whole of it; empty if it is of none."""
+    from dsl_core.io.pictures.array_file import ARCHIVES
+    from dsl_core.io.pictures.candidates import FEWEST
+    from dsl_core.io.pictures.picture_file import PICTURES
+
+    if path.is_file() and path.suffix.lower() in PICTURES | ARCHIVES:
+        return (
+            f"{path.name} is opened only with all pictures of its capture. Drop their folder, or choose it"
+            " with File, Import."
+        )
+    if not path.is_dir():
+        return ""
+    if few := len(list(_pictures(path))):
+        return (
+            f"The folder {path.name} has {counted(few, 'picture')}; a capture has at least {FEWEST}: white,"
+            " black and its stripes. Choose the folder that has them all."
+        )
+    return ""
 
 
 def _is_empty(path: Path) -> bool:

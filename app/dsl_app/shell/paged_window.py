@@ -12,7 +12,7 @@ from PySide6.QtGui import QCloseEvent, QDragEnterEvent, QDropEvent, QKeyEvent, Q
 from PySide6.QtWidgets import QMainWindow, QStackedWidget
 
 from dsl_app.shared.jobs.qt_runner import QtRunner
-from dsl_app.shared.known_files import Kind, kind_of, meant_by, refusal
+from dsl_app.shared.known_files import Kind, has_pictures, kind_of, meant_by, refusal
 from dsl_app.shared.settings import RecentFiles, Settings, save_early, save_settings
 from dsl_app.shared.theme import DARK, Theme, style_sheet
 from dsl_app.shared.undo import UndoStack
@@ -143,6 +143,9 @@ class PagedWindow(QMainWindow):
         """Open a file or folder on the page that can, the open page first; a message tells why none does."""
         path = meant_by(path)
         kind = kind_of(path)
+        if kind is Kind.UNKNOWN and has_pictures(path):
+            # Each folder in it is a capture, of which the dialog offers the choice.
+            kind = Kind.PICTURES
         if kind in self._handlers:
             self._handlers[kind](path)
             return

@@ -71,7 +71,7 @@ def test_a_wrong_file_is_told_with_what_is_known(qtbot: QtBot, window: MainWindo
     (tmp_path / "cat.jpeg").write_bytes(b"\xff\xd8")
     drop(window, tmp_path / "cat.jpeg", write_reference(tmp_path / "tile.csv", RED))
     qtbot.waitUntil(lambda: len(window.toasts.shown) == 2)
-    assert "cat.jpeg is not a known scan" in window.toasts.shown[0].text
+    assert "cat.jpeg is opened only with all pictures of its capture" in window.toasts.shown[0].text
     assert "Open a result first" in window.toasts.shown[1].text
     assert window.parts.settings.recent == []
     window.close()

@@ -91,6 +91,8 @@ def test_a_lost_rig_can_be_connected_again_and_says_why_it_is_lost() -> None:
     rig.trouble.set("The camera sent no frame.")
     view = rig_view(rig, live)
     assert (view.trouble.text, view.link.role) == ("The camera sent no frame.", "bad")
+    # What was wrong with one rig is not said of another that is chosen next.
+    assert rig_view(rig, LiveState(), is_of_other_rig=True).trouble.text == ""
     assert view.connect_button.text == "Connect"
     buttons = (view.live_button, view.selftest, view.scan)
     assert [*(each.is_enabled or each.is_primary for each in buttons), view.auto] == 4 * [False]

@@ -55,7 +55,13 @@ def test_every_refusal_says_what_to_do(tmp_path: Path) -> None:
     (tmp_path / "spectrum.csv").write_text("nm,r\n")
     (tmp_path / "cat.jpeg").write_bytes(b"\xff\xd8")
     assert "Open a result first" in refusal(tmp_path / "spectrum.csv")
-    assert "dsl-scan opens scans" in refusal(tmp_path / "cat.jpeg")
+    assert "only with all pictures of its capture" in refusal(tmp_path / "cat.jpeg")
+    few = tmp_path / "few"
+    few.mkdir()
+    (few / "white.png").touch()
+    assert "has 1 picture; a capture has at least 4" in refusal(few)
+    (few / "frames.npz").touch()
+    assert kind_of(few) is Kind.PICTURES, "an archive may hold them all"
     assert "no longer exists" in refusal(tmp_path / "gone.zarr")
 
 

@@ -129,7 +129,7 @@ def test_pages_let_go_when_the_window_closes(window: MainWindow) -> None:
 def test_a_file_that_nobody_knows_is_told(window: MainWindow, tmp_path: Path) -> None:
     (tmp_path / "cat.jpeg").touch()
     window.open_path(tmp_path / "cat.jpeg")
-    assert "cat.jpeg is not a known scan" in window.toasts.shown[-1].text
+    assert "cat.jpeg is opened only with all pictures of its capture" in window.toasts.shown[-1].text
 
 
 def test_a_known_file_becomes_a_recent_one(window: MainWindow, tmp_path: Path) -> None:

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from PySide6.QtCore import QRect, QSize, Qt
-from PySide6.QtGui import QColor, QImage, QPainter, QPaintEvent, QPen, QPixmap
+from PySide6.QtCore import QRect, QSize, Qt, Signal
+from PySide6.QtGui import QColor, QImage, QPainter, QPaintEvent, QPen, QPixmap, QResizeEvent, QShowEvent
 from PySide6.QtWidgets import QFrame, QVBoxLayout, QWidget
 
 from dsl_app.compare.pair.state import Floats, PairState, Side, side_texts
@@ -29,6 +29,9 @@ class PairSides(QWidget):
         self.places = [SidePlace(), SidePlace()]
         row_of(*((place, 1) for place in self.places), on=self, margins=0)
         self.stops = follow_any(self._show, state.first, state.second)
+        recent.filled.connect(self._show_recent)
+        for place in self.places:
+            place.resized.connect(self._level)
 
     def _show(self) -> None:
         sides = self._state.first.value, self._state.second.value
@@ -37,11 +40,31 @@ class PairSides(QWidget):
         free = self.places[sides[0] is not None]
         if self._recent.parent() is not free:
             free.column.insertWidget(free.column.indexOf(free.picture), self._recent)
-            self._recent.show()
+        self._show_recent()
+
+        self._level()
+
+    def _level(self) -> None:
+        """Give both texts the room of the longer one, which takes more lines on a narrow page."""
+        texts = [place.text for place in self.places]
+        room = max(text.heightForWidth(text.width()) for text in texts)
+        for text in texts:
+            text.setMinimumHeight(room)
+
+    def _show_recent(self) -> None:
+        # Without entries it would still push down the picture of its side, and the two would not be level.
+        self._recent.setVisible(self._recent.files.count() > 0)
+
+    def showEvent(self, event: QShowEvent) -> None:
+        """List recent results, of which some may have come while the page was not seen."""
+        super().showEvent(event)
+        self._recent.fill()
 
 
 class SidePlace(QFrame):
     """The place of one result."""
+
+    resized = Signal()
 
     def __init__(self) -> None:
         super().__init__()
@@ -52,6 +75,11 @@ class SidePlace(QFrame):
             SmallDepth(),
         )
         self.column: QVBoxLayout = column_of(self.title, self.text, (self.picture, 1), on=self)
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        """Tell, once its text has its width."""
+        super().resizeEvent(event)
+        self.resized.emit()
 
     def show_side(self, side: Side | None, title: str, text: str) -> None:
         """Show a result, or with None that there is none yet."""

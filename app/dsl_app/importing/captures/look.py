@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from dsl_app.importing.captures.fields import first_mapping
 from dsl_app.importing.captures.state import (
     DOUBT,
+    NO_FILE,
     NOMINAL,
     NONE,
     CaptureRequest,
@@ -34,8 +35,6 @@ if TYPE_CHECKING:
 
 #: Small pictures: how many, and how wide, px.
 SMALL_COUNT, SMALL_PX = 24, 56
-#: Name in the table of a picture that there is none of.
-NO_FILE = "-"
 
 
 @dataclass(frozen=True)

@@ -8,8 +8,8 @@ from PySide6.QtCore import QSize
 from PySide6.QtGui import QIcon, QImage, QPixmap
 from PySide6.QtWidgets import QHeaderView, QStackedWidget
 
-from dsl_app.importing.captures.look import NO_FILE, SMALL_PX
-from dsl_app.importing.captures.state import Decoded
+from dsl_app.importing.captures.look import SMALL_PX
+from dsl_app.importing.captures.state import NO_FILE, Decoded
 from dsl_app.shared.known_files import breakable
 from dsl_app.shared.widgets.forms import label
 from dsl_app.shared.widgets.layouts import STRETCH, boxed, column_of

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import Enum
 from pathlib import Path
@@ -17,6 +18,8 @@ from dsl_core.words import counted, sentence
 #: Keys of calibrations that are neither in the library nor files.
 NONE, NOMINAL = "", ":nominal"
 SUFFIX = ".dsl"
+#: Name in the table of a picture that there is none of.
+NO_FILE = "-"
 #: Begins what is told of a calibration that may not be meant like that.
 DOUBT = "Check: "
 #: Files of other programs with lenses and pose; rig files of this program end in .json, too.
@@ -179,9 +182,15 @@ def captures_view(state: CapturesState) -> CapturesView:
     def said(place: Place, else_: Said) -> Said:
         return Said(troubles[place], "bad") if place in troubles else else_
 
-    importing = state.is_importing.value
+    if troubles.get(Place.MAPPING) == troubles.get(Place.FOLDER):
+        # Nothing is gained by reading it twice.
+        troubles.pop(Place.MAPPING, None)
+    importing, names = state.is_importing.value, [name for name, _ in state.listing.value.table]
     return CapturesView(
-        folder=said(Place.FOLDER, _about_folder(request, stated, busy, len(state.listing.value.table))),
+        folder=said(
+            Place.FOLDER,
+            _about_folder(request, stated, busy, names),
+        ),
         mapping=said(Place.MAPPING, _about_mapping(stated)),
         calibration=said(Place.CALIBRATION, _about_calibration(state.listing.value.calibration)),
         target=said(Place.TARGET, Said(f"Creates {request.target.name}{_also(request)}.")),
@@ -196,7 +205,7 @@ def captures_view(state: CapturesState) -> CapturesView:
     )
 
 
-def _about_folder(request: CaptureRequest, stated: Stated | None, busy: str, pictures: int) -> Said:
+def _about_folder(request: CaptureRequest, stated: Stated | None, busy: str, names: Sequence[str]) -> Said:
     if busy:
         return Said(f"{busy}…")
     if request.folder is None:
@@ -206,7 +215,9 @@ def _about_folder(request: CaptureRequest, stated: Stated | None, busy: str, pic
         origin = ", mapping guessed from the pictures"
     elif stated is not None and stated.file is not None:
         origin = f", mapping of {stated.file.name}"
-    return Said(f"{counted(pictures, 'picture')}{origin}.")
+    absent = sum(name == NO_FILE for name in names)
+    pictures = counted(len(names) - absent, "picture") + (f" and {absent} absent" if absent else "")
+    return Said(f"{pictures}{origin}.")
 
 
 def _about_mapping(stated: Stated | None) -> Said:

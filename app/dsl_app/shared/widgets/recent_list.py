@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
-from PySide6.QtCore import Qt
+from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QShowEvent
 from PySide6.QtWidgets import QListWidget, QListWidgetItem, QWidget
 
@@ -16,7 +16,9 @@ from dsl_app.shared.widgets.layouts import column_of
 
 
 class RecentList(QWidget):
-    """Lists recent files; ``open_path`` opens the one that is chosen."""
+    """Lists recent files; ``open_path`` opens the one that is chosen. ``filled``: it was listed anew."""
+
+    filled = Signal()
 
     def __init__(
         self,
@@ -50,6 +52,7 @@ class RecentList(QWidget):
         self.files.setFixedHeight(rows + 2 * self.files.frameWidth())
         for widget in (self._title, self.files):
             widget.setVisible(self.files.count() > 0)
+        self.filled.emit()
 
     def _open(self, item: QListWidgetItem) -> None:
         self._open_path(Path(item.data(Qt.ItemDataRole.UserRole)))

@@ -57,6 +57,7 @@ def test_an_empty_page_says_what_to_do(bench: Bench) -> None:
     assert "Open A" in first.text.text()
     assert first.picture.is_empty
     assert second.picture.is_empty
+    assert first.picture.y() == second.picture.y()
     # Both share the page, and the recent results lie where the first one is missing.
     assert abs(first.width() - second.width()) <= 1
     assert first.width() + second.width() > 0.9 * page.width()

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from dsl_app.importing.captures.fields import first_mapping
 from dsl_app.importing.captures.state import (
+    NO_FILE,
     NOMINAL,
     CaptureRequest,
     CapturesState,
@@ -43,6 +44,19 @@ def test_a_guess_can_be_imported(tmp_path: Path) -> None:
     assert view.folder.text == "1 picture, mapping guessed from the pictures."
     assert (view.mapping.text, view.calibration.text) == ("Nothing is unsure.", "No depth.")
     assert view.target.text == "Creates out.dsl."
+
+
+def test_pictures_that_are_absent_are_not_counted(tmp_path: Path) -> None:
+    state = state_of(tmp_path)
+    state.listing.set(Listing((("a.png", "white"), (NO_FILE, "bit 3: missing")), "No depth."))
+    assert captures_view(state).folder.text == "1 picture and 1 absent, mapping guessed from the pictures."
+
+
+def test_what_is_wrong_with_a_file_is_said_once(tmp_path: Path) -> None:
+    state = state_of(tmp_path)
+    state.trouble.set(tuple((place, "a.png cannot be decoded.") for place in (Place.FOLDER, Place.MAPPING)))
+    view = captures_view(state)
+    assert (view.folder.role, view.mapping.role) == ("bad", "muted")
 
 
 @pytest.mark.parametrize("place", list(Place))
