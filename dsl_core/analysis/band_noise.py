@@ -9,6 +9,8 @@ own deviation.
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -63,8 +65,9 @@ def _pairs(reflectance: Cube, std: Cube, good: NDArray[np.bool_], axis: int) -> 
     return np.asarray(pairs[:, np.isfinite(pairs).all(0)])
 
 
+@cache
 def usual_correlation(bands: int) -> Floats:
-    """The correlation (bands, bands) that results usually have, for where too few pixels tell it."""
+    """The correlation (bands, bands) that results usually have, where too few pixels tell it; read only."""
     found = np.zeros((bands, bands))
     for lag, value in enumerate(_USUAL[:bands]):
         found += np.diag(np.full(bands - lag, value), lag)
@@ -72,4 +75,6 @@ def usual_correlation(bands: int) -> Floats:
     values, vectors = np.linalg.eigh(found)
     found = (vectors * np.maximum(values, 1e-3)) @ vectors.T
     level = np.sqrt(np.diag(found))
-    return _with_own(found / level / level[:, None])
+    usual = _with_own(found / level / level[:, None])
+    usual.flags.writeable = False
+    return usual

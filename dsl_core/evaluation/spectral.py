@@ -159,7 +159,7 @@ def compare(
     wanted = np.interp(bands, nm, np.asarray(reference.values))[:, None]
     measured = np.asarray(spectrum[shared], np.float64)[:, None]
     found = spectral_errors(measured, wanted, bands)
-    together = np.eye(count) if correlation is None else correlation[np.ix_(shared, shared)]
+    together = np.eye(count) if correlation is None else _root(correlation[np.ix_(shared, shared)])
     stds = (
         None if std is None else np.asarray(std[shared], np.float64),
         None if reference.std is None else np.interp(bands, nm, np.asarray(reference.std)),
@@ -168,15 +168,21 @@ def compare(
         **first_of(found),
         bands=count,
         range_nm=(float(bands[0]), float(bands[-1])),
-        std=_deviations(measured, wanted, bands, found, [_covariance(each, together) for each in stds]),
+        std=_deviations(measured, wanted, bands, found, [_steps(each, together) for each in stds]),
     )
 
 
-def _covariance(std: Floats | None, correlation: Floats) -> Floats | None:
-    """Covariance (bands, bands) of deviations (bands,); None unless all are known."""
+def _root(correlation: Floats) -> Floats:
+    """Steps (bands, steps) whose squares add to a correlation (bands, bands)."""
+    sizes, axes = np.linalg.eigh(correlation)
+    return np.asarray(axes * np.sqrt(np.maximum(sizes, 0)))
+
+
+def _steps(std: Floats | None, root: Floats) -> Floats | None:
+    """The steps for deviations (bands,), whose squares add to their covariance; None unless all are known."""
     if std is None or not np.isfinite(std).all():
         return None
-    return np.asarray(correlation * std * std[:, None])
+    return np.asarray(root * std[:, None])
 
 
 def _deviations(
@@ -184,24 +190,22 @@ def _deviations(
     truth: Floats,
     bands_nm: Floats,
     found: SpectralErrors[Floats],
-    covariances: list[Floats | None],
+    steps: list[Floats | None],
 ) -> SpectralErrors[float] | None:
-    """Deviations of ``found``, from spectra one deviation away along the axes of either covariance.
+    """Deviations of ``found``, from spectra that are one of the ``steps`` of either away.
 
     Next to zero such figures have no slope, while these spectra still say how far each may reach.
     """
     squares = dict.fromkeys((field.name for field in fields(SpectralErrors)), 0.0)
-    for place, covariance in enumerate(covariances):
-        if covariance is None:
+    for place, each in enumerate(steps):
+        if each is None:
             continue
-        sizes, axes = np.linalg.eigh(covariance)
-        steps = axes * np.sqrt(np.maximum(sizes, 0))
-        moves = np.concatenate([steps, -steps], axis=1)
+        moves = np.concatenate([each, -each], axis=1)
         moved = [measured, truth]
         moved[place] = moved[place] + moves
         errors = spectral_errors(*np.broadcast_arrays(*moved), bands_nm)
         for name in squares:
             squares[name] += float(((getattr(errors, name) - getattr(found, name)) ** 2).sum() / 2)
-    if all(covariance is None for covariance in covariances):
+    if all(each is None for each in steps):
         return None
     return SpectralErrors(**{name: float(np.sqrt(square)) for name, square in squares.items()})

@@ -8,7 +8,7 @@ diffuser is white on every grid. The tables are files of the resources.
 
 from __future__ import annotations
 
-from functools import cache
+from functools import cache, lru_cache
 from typing import TypeVar
 
 import numpy as np
@@ -64,19 +64,28 @@ def _illuminant(name: str) -> Floats:
 def observer_weights(wavelengths_nm: Floats, illuminant: str = "D65") -> Floats:
     """Weights that turn reflectance at rising wavelengths (bands,) into XYZ, shape (3, bands).
 
-    Linear between bands, constant beyond them; the perfect diffuser has Y = 1. Raises ``ValueError``
-    for an unknown illuminant or wavelengths that do not rise.
+    Linear between bands, constant beyond them; the perfect diffuser has Y = 1. They are shared and read only.
+    Raises ``ValueError`` for an unknown illuminant or wavelengths that do not rise.
     """
+    bands = np.asarray(wavelengths_nm, np.float64)
+    return _observer_weights(bands.shape, bands.tobytes(), illuminant)
+
+
+@lru_cache(maxsize=64)
+def _observer_weights(shape: tuple[int, ...], content: bytes, illuminant: str) -> Floats:
+    """The weights of one grid, of which few occur: a comparison of colours would mostly compute them."""
     from scipy.interpolate import CubicSpline
 
-    bands = np.asarray(wavelengths_nm, np.float64)
+    bands = np.frombuffer(content, np.float64).reshape(shape)
     if bands.ndim != 1 or np.any(np.diff(bands) <= 0):
         raise ValueError("wavelengths must be one rising row of band centres")
     fine = np.arange(CIE_NM[0], CIE_NM[-1] + 1.0)
     power = np.interp(fine, CIE_NM, _illuminant(illuminant))
     matching = CubicSpline(CIE_NM, CIE_1931_XYZ, axis=1)(fine) * power
     spread = np.stack([np.interp(fine, bands, row) for row in np.eye(bands.size)])
-    return np.asarray(matching @ spread.T / matching[1].sum())
+    weights = np.asarray(matching @ spread.T / matching[1].sum())
+    weights.flags.writeable = False
+    return weights
 
 
 def reflectance_to_xyz(cube: AnyFloats, wavelengths_nm: Floats, illuminant: str = "D65") -> AnyFloats:

@@ -15,8 +15,9 @@ _last: list[Path] = []
 
 def start_folder() -> str:
     """Where the last choice was made, while that folder is there; else the documents, else the home."""
-    places = (*_last, QStandardPaths.writableLocation(QStandardPaths.StandardLocation.DocumentsLocation))
-    return next((str(place) for place in places if place and Path(place).is_dir()), str(Path.home()))
+    documents = QStandardPaths.writableLocation(QStandardPaths.StandardLocation.DocumentsLocation)
+    places = [*_last, *([Path(documents)] if documents else [])]
+    return str(next((place for place in places if place.is_dir()), Path.home()))
 
 
 def chosen_in(path: Path) -> None:
