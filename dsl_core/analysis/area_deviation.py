@@ -6,8 +6,8 @@ Three causes, by what the map itself shows:
   straight piece of the edge is wrong by the same part, spread evenly over one pixel: 1/12 px^2, and pixels of
   a straight piece err together. Beside pixels without a class the edge lies somewhere within these, all round
   in the same sense: they may hold anything from nothing to all. A count leaves them out, so that it is too
-  low by half of them on average; it is stated with 1/sqrt(3) px of each. An area counts half of each, with
-  1/sqrt(12) px.
+  low by half of them on average; it is stated with 1/sqrt(3) px of each. An area counts half of each
+  (of an undecided one, its probability), with 1/sqrt(12) px.
 - **Classes.** A pixel is of its class with a probability, independently of others; pixels that are called
   undecided are missing by the probability of the class, all of them together.
 - **Depth.** An area goes with the square of the depth. Errors of depth are taken to be shared by all pixels,
@@ -69,7 +69,7 @@ def class_deviations(
         by_depth = 2 * weights * np.nan_to_num(depth_relative_std)
         variance += np.bincount(shown.values.ravel(), by_depth.ravel(), len(variance)) ** 2
     variance[[0, shown.none, shown.unsure]] = np.nan
-    return ClassDeviations(pixels, np.sqrt(variance), beside / 2)
+    return ClassDeviations(pixels, np.sqrt(variance), beside)
 
 
 def _everywhere(areas_mm2: Map) -> Map:
@@ -90,7 +90,8 @@ def _everywhere(areas_mm2: Map) -> Map:
 def _variance(scores: Scores, shown: ClassMap, weights: Map, of_beside: float) -> tuple[Map, Map]:
     """Variance of the sum of weights (rows, columns) for each value of a map, without that of depth.
 
-    Also the weights of pixels without a class beside each; ``of_beside`` is the variance of what one holds.
+    Also what it has on average in pixels without a class beside it, of which one holds a share with the
+    variance ``of_beside``.
     """
     values, size = shown.values.astype(np.intp), len(shown.labels)
     variance, missing = np.zeros(size), np.zeros(size)
@@ -109,10 +110,22 @@ def _variance(scores: Scores, shown: ClassMap, weights: Map, of_beside: float) -
         beside = np.concatenate([beside, at[alone] * size + ours[alone]])
     beside = np.unique(beside)
     pixel, value = np.divmod(beside, size)
-    held = np.bincount(value, weights.ravel()[pixel], size)
-    missing += np.sqrt(of_beside) * held
+    missing += np.sqrt(of_beside) * np.bincount(value, weights.ravel()[pixel], size)
     _add_classes(scores, shown, weights, beside, variance, missing)
-    return np.asarray(variance + missing**2), held
+    expected = weights.ravel()[pixel] * _share_beside(scores, shown, pixel, value)
+    return np.asarray(variance + missing**2), np.bincount(value, expected, size)
+
+
+def _share_beside(scores: Scores, shown: ClassMap, pixel: Values, value: Values) -> Map:
+    """The share of pixels (flat indices) that the class of a value beside them has on average.
+
+    Half of one that nothing explains: an edge runs through it. An undecided one may as well be of two other
+    classes, and has its probability of this one.
+    """
+    best, second, margin = (a.ravel()[pixel] for a in (scores.best, scores.second, scores.margin))
+    sure = np.clip(margin.astype(np.float64), 0, 1)
+    named = np.where(best + 1 == value, sure, np.where(second + 1 == value, 1 - sure, 0.0))
+    return np.asarray(np.where(shown.values.ravel()[pixel] == shown.unsure, named, 0.5))
 
 
 def _sides(values: Values, weights: Map, index: Values) -> Iterator[tuple[Values, Values, Map, Values]]:

@@ -53,8 +53,13 @@ def test_areas_are_those_of_the_surface(found) -> None:  # type: ignore[no-untyp
     by_name = {row.label: row for row in made.rows}
     # Pixels of a plane at 700 mm are 1 mm apart.
     for row in made.rows[:-1]:
-        assert row.area_mm2 == pytest.approx(row.pixels, rel=1e-3)
-        assert row.area_std_mm2 is None or row.area_std_mm2 == pytest.approx(row.pixels_std, rel=1e-3)
+        if row.area_std_mm2 is None or row.pixels_std is None:
+            assert row.area_mm2 == pytest.approx(row.pixels, rel=1e-3)
+            continue
+        # Its edges add some, which is less than a count without them may be off by.
+        assert row.area_mm2 is not None
+        assert 0.999 * row.pixels <= row.area_mm2 < row.pixels + row.pixels_std
+        assert row.area_std_mm2 <= 1.001 * row.pixels_std
     assert all((row.pixels_std is None) == (row.label not in NAMES) for row in made.rows)
     judged = sum(row.pixels for row in made.rows if row.value)
     for row in made.rows:

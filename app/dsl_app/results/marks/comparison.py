@@ -96,8 +96,8 @@ def comparison_table(chosen: Mark, others: list[Mark], theme: Theme) -> str:
     return _table([f"{escape(chosen.name)} against", "RMSE", "angle, rad", "ΔE00", "scale"], rows, theme)
 
 
-#: A narrow space at which no line is broken.
-_THIN = chr(0x202F)
+#: A narrow space.
+_THIN = chr(0x200A)
 #: What the deviations of a comparison are.
 _ABOUT = "±: one deviation, from those stated for the bands of one pixel."
 
@@ -135,8 +135,10 @@ def _figure(found: SpectrumComparison, name: str, decimals: int) -> str:
     """A figure of a comparison with its deviation, where that is known."""
     value = getattr(found, name)
     std = None if found.std is None else getattr(found.std, name)
-    # Four figures fit next to the picture with thin spaces, which also keep a line whole.
-    return with_std(value, std, decimals).replace(" ", _THIN) if std else f"{value:.{decimals}f}"
+    if not std:
+        return f"{value:.{decimals}f}"
+    # Four figures have to fit next to the picture, each on one line.
+    return f"<nobr>{with_std(value, std, decimals).replace(' ', _THIN)}</nobr>"
 
 
 def distance_table(chosen: Mark, others: list[Mark], result: ResultArrays, theme: Theme) -> str:

@@ -23,7 +23,7 @@ def test_a_pin_is_compared_with_references_and_measured_to_other_pins(bench: Ben
     assert select(bench, 0) == ""
     bench.control.marks.pin((3, 13))
     bench.control.marks.add_reference(write_reference(tmp_path / "double.csv", 2 * BLUE))
-    html = select(bench, 0).replace(chr(0x202F), " ")
+    html = select(bench, 0).replace(chr(0x200A), " ")
     # Half as bright, but of the same shape: scaled by two, it has no error left.
     assert "double" in html
     assert f"{np.sqrt(np.mean(BLUE**2)):.4f} ± 0.0028" in html
