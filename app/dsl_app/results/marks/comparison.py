@@ -92,8 +92,8 @@ def comparison_table(chosen: Mark, others: list[Mark], theme: Theme) -> str:
         if measured.curve is None and reference.curve is not None:
             rows += _compared(mark.name, measured, reference.curve, theme)
     if rows:
-        rows.append(f"<tr><td colspan='5'>{_ABOUT}</td></tr>")
-    return _table([f"{escape(chosen.name)} against", "RMSE", "angle, rad", "ΔE00", "scale"], rows, theme)
+        rows.append(f"<tr><td colspan='4'>{_ABOUT}</td></tr>")
+    return _table([f"{escape(chosen.name)} against", "RMSE", "angle, rad", "ΔE00"], rows, theme)
 
 
 #: A narrow space.
@@ -109,21 +109,17 @@ def _compared(name: str, measured: Mark, curve: SpectralCurve, theme: Theme) -> 
         together = usual_correlation(len(spectrum.nm))
         found = compare(spectrum.mean, spectrum.nm, curve, measured.band_std, together)
     except DslError as error:
-        return [f"<tr><td>{name}</td><td colspan='4'>{escape(str(error))}</td></tr>"]
+        return [f"<tr><td>{name}</td><td colspan='3'>{escape(str(error))}</td></tr>"]
     low, high = found.range_nm
     # Nothing is extrapolated beyond the ends of a reference.
     only = "" if found.bands == len(spectrum.nm) else "only "
     rows = []
-    as_it_is = (*(_figure(found, *each) for each in (("rmse", 4), ("angle_rad", 4), ("delta_e", 2))), "1")
-    scaled = (
-        *(_figure(found, "rmse_scaled", 4), ""),
-        *(_figure(found, *each) for each in (("delta_e_scaled", 2), ("scale", 3))),
-    )
+    scaled = f"{only}{low:g}–{high:g} nm, scaled by {_figure(found, 'scale', 3)}"
     for title, figures in (
-        (name, as_it_is),
+        (name, [_figure(found, *each) for each in (("rmse", 4), ("angle_rad", 4), ("delta_e", 2))]),
         (
-            f"<span style='color:{theme.muted}'>{only}{low:g}–{high:g} nm, free scale</span>",
-            scaled,
+            f"<span style='color:{theme.muted}'>{scaled}</span>",
+            [_figure(found, "rmse_scaled", 4), "", _figure(found, "delta_e_scaled", 2)],
         ),
     ):
         cells = "".join(f"<td align='right'>{figure}</td>" for figure in figures)
@@ -137,7 +133,7 @@ def _figure(found: SpectrumComparison, name: str, decimals: int) -> str:
     std = None if found.std is None else getattr(found.std, name)
     if not std:
         return f"{value:.{decimals}f}"
-    # Four figures have to fit next to the picture, each on one line.
+    # Three figures have to fit next to the picture, each on one line.
     return f"<nobr>{with_std(value, std, decimals).replace(' ', _THIN)}</nobr>"
 
 
