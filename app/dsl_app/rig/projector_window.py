@@ -227,11 +227,23 @@ class ScreenProjector(Projector):
                 )
             self._behind.show(image)
             return
+        self._require_room(image.shape[1], image.shape[0])
         self._on_screen(image if image.ndim == 3 else np.repeat(image[..., None], 3, axis=2))
         if self._behind is not None:
             self._behind.show(image)
         else:
             time.sleep(self._latency_ms / 1000)
+
+    def _require_room(self, width: int, height: int) -> None:
+        """Raise `DeviceError` for a screen that would cut a pattern, of which no picture would tell."""
+        if self._window.factor(width, height) < 1:
+            screen = self._window.screen()
+            across, down = pixel_size(screen)
+            raise DeviceError(
+                f"The projector's screen {screen.name()} has {across} × {down} px, and patterns have"
+                f" {width} × {height} px. Set the screen to the full size of the projector, or choose another"
+                " one on the Rig page."
+            )
 
     def _on_screen(self, image: NDArray[np.uint8]) -> None:
         if QThread.isMainThread():
