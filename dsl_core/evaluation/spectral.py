@@ -203,7 +203,8 @@ def _deviations(
         moves = np.concatenate([each, -each], axis=1)
         moved = [measured, truth]
         moved[place] = moved[place] + moves
-        errors = spectral_errors(*np.broadcast_arrays(*moved), bands_nm)
+        first, second = np.broadcast_arrays(*moved)
+        errors = spectral_errors(first, second, bands_nm)
         for name in squares:
             squares[name] += float(((getattr(errors, name) - getattr(found, name)) ** 2).sum() / 2)
     if all(each is None for each in steps):

@@ -130,7 +130,8 @@ def test_stated_deviations_are_those_of_figures_of_noisy_spectra(offset: float, 
     )
     first, second = measured[:, None], TRUTH
     drawn = (first, second + noise.T) if of_reference else (first + noise.T, second)
-    errors = spectral_errors(*np.broadcast_arrays(*drawn), GRID)
+    drawn_measured, drawn_truth = np.broadcast_arrays(*drawn)
+    errors = spectral_errors(drawn_measured, drawn_truth, GRID)
     assert found.std is not None
     for name in ("rmse", "angle_rad", "delta_e", "scale", "rmse_scaled", "delta_e_scaled"):
         off = np.sqrt(np.mean((getattr(errors, name) - getattr(found, name)) ** 2))
