@@ -73,7 +73,7 @@ def require_mosaic(pixels: NDArray[np.uint16], size_px: tuple[int, int], name: s
     if pixels.ndim != 2:
         raise DeviceError(
             f"{name} delivered a picture with colours ({' × '.join(map(str, pixels.shape))} numbers) instead"
-            " of the raw one, which has one number a pixel. Choose a raw pixel format, such as BayerRG12 or"
+            " of the raw one, which has one number per pixel. Choose a raw pixel format, such as BayerRG12 or"
             " Mono12."
         )
     if pixels.shape != (size_px[1], size_px[0]):

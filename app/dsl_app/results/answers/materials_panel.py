@@ -104,7 +104,7 @@ class MaterialsPanel(QWidget):
         self.table = ReadTable(
             "Materials",
             "Classes with their pixels, shares and areas, ± one deviation; an area counts half of the pixels"
-            " beside it that are of no class, as edges run through them",
+            " next to it that are of no class, as edges run through them",
             ("Material", "Pixels", "Share", "Area, mm²"),
         )
         self.table.widen(0)
