@@ -5,6 +5,8 @@ spot, its light comes from there, and its column is that of a place next to the 
 ``s^2`` that place is ``s^2`` times the gradient of the logarithm of the picture away: exactly so for a
 Gaussian (Robbins, An Empirical Bayes Approach to Statistics, 1956), whatever the surface looks like. So
 columns across edges of brightness say how large the spot is, and then by how much each column is displaced.
+Where the lens is sharper than the pixels, edges are too sharp for gradients, and the spot is an even pixel
+(`light_pull`): what explains the columns better holds.
 
 Spectra are not concerned: all orders of a pixel come from the same place.
 """
@@ -22,18 +24,13 @@ from dsl_core.model.result import Flag
 from dsl_core.model.rig import Rig
 from dsl_core.optics.lines.line_set import LineSet
 from dsl_core.reconstruction.geometry import Geometry
+from dsl_core.reconstruction.light_pull import EVEN_PX2, even_pulls, light_slopes
 from dsl_core.solve.robust import NORMAL, weighted_median
 
 Map = NDArray[np.float64]
 
-#: Slope of a ramp from seven neighbours, of one colour each, in a mosaic: those of the own colour give the
-#: level, those of the other how it bends between them.
-MOSAIC_SLOPE = np.array([0.125, -0.25, -0.375, 0.0, 0.375, 0.25, -0.125])
-PLAIN_SLOPE = np.array([-0.5, 0.0, 0.5])
 #: Pixels on a side over which the steps of columns are averaged.
 SLOPE_WINDOW_PX = 9
-#: Light below so many of its deviations counts as that.
-DARK_SIGMAS = 2.0
 #: Light comes from within so many rms widths of the spot.
 FARTHEST = 2.0
 #: Pixels tell of a spot that one of so large a variance (px^2) would displace by more than their noise.
@@ -46,12 +43,16 @@ FEWEST = 200
 SHARED, MEDIAN_STD = 3.0, (np.pi / 2) ** 0.5
 #: Variance of a spot that matters for depth (px^2), and how many deviations it must have.
 LEAST_PX2, SIGMAS = 0.02, 4.0
+#: Variance of the spot of a pixel, rms over all between a point and a whole pixel, where it is not measured.
+UNMEASURED_PX2 = 3**-0.5 * EVEN_PX2
+#: A spot is small whose variance is below this share of a whole pixel's, by so many deviations.
+SMALL, SURE_SIGMAS = 0.5, 2.0
 #: Rms width of a spot beyond which a camera is out of focus, px: sharp edges of small spots are seen too
 #: coarsely, so that an even pixel alone (0.29 px) seems to have half of that.
 SHARP_PX = 0.35
 #: Window over which the largest displacement says how unsure all are, px.
 BESIDE_PX = 3
-#: Same-colour neighbours in a row, px away.
+#: Same-colour neighbours in a row or column, px away.
 NEXT_PX = 2
 
 
@@ -60,18 +61,24 @@ class CameraSpot:
     """The variance of the spot along rows or columns of the picture, with its deviation (px^2).
 
     ``doubt`` is how far a displacement may be off, as a share of it; ``columns_px`` the rms width of the
-    spot on the projector, in columns.
+    spot on the projector, in columns. An ``even`` spot is that of a pixel with a sharp lens.
     """
 
     variance_px2: float
     std_px2: float
     doubt: float
     columns_px: float
+    even: bool = False
 
     @property
     def present(self) -> bool:
         """Whether it matters and is not chance."""
         return self.variance_px2 > max(LEAST_PX2, SIGMAS * self.std_px2)
+
+    @property
+    def small(self) -> bool:
+        """Whether pixels surely see less than a whole one would."""
+        return self.variance_px2 + SURE_SIGMAS * self.std_px2 < SMALL * EVEN_PX2
 
     @property
     def rms_px(self) -> float:
@@ -96,32 +103,27 @@ def follow_spot(
 
     if lines is None or not lines.single:
         return geometry, None
-    slopes = light_slopes(geometry.amplitude, geometry.amplitude_std, rig.sensor.bayer == "MONO")
+    light = geometry.amplitude, geometry.amplitude_std, rig.sensor.bayer == "MONO"
     steps = column_slopes(geometry.column_px)
-    found = fit_spot(rig, geometry, (slopes * steps).sum(0), steps[0])
+    slopes, even = light_slopes(*light), (even_pulls(*light) * steps).sum(0)
+    found = fit_spot(rig, geometry, (slopes * steps).sum(0), steps, even)
     if found is None or not found.present:
-        return geometry, found
+        small = found is not None and found.small
+        return (geometry if small else _unsure(rig, geometry, even, window_px)), found
     farthest = FARTHEST / max(found.rms_px, 1e-6)
-    displaced = found.variance_px2 * (slopes.clip(-farthest, farthest) * steps).sum(0)
-    displaced = np.nan_to_num(displaced).astype(np.float32)
+    pull = even if found.even else (slopes.clip(-farthest, farthest) * steps).sum(0)
+    displaced = np.nan_to_num(found.variance_px2 * pull).astype(np.float32)
     # A slope that is zero at the middle of a thin line is no surer than those on either side.
     unsure = found.doubt * maximum_filter(np.abs(displaced), BESIDE_PX)
     return geometry.displaced(rig, displaced, unsure, window_px), found
 
 
-def light_slopes(amplitude: NDArray[np.floating], std: NDArray[np.floating], plain: bool = False) -> Map:
-    """Gradient of the logarithm of the light (rows, columns), across and down, (2, rows, columns), 1/px.
-
-    ``std`` is the deviation of the light. Each pixel has one colour of a mosaic, unless it is ``plain``.
-    """
-    from scipy.ndimage import correlate1d
-
-    floor = DARK_SIGMAS * np.where(np.isfinite(std), std, 0.0)
-    known = np.isfinite(amplitude)
-    least = np.maximum(floor, 1e-6 * np.max(amplitude, initial=0.0, where=known) + 1e-30)
-    log = np.log(np.where(known, np.maximum(amplitude, least), np.nan))
-    weights = PLAIN_SLOPE if plain else MOSAIC_SLOPE
-    return np.stack([correlate1d(log, weights, axis, mode="mirror") for axis in (1, 0)])
+def _unsure(rig: Rig, geometry: Geometry, even: Map, window_px: int | None) -> Geometry:
+    """Geometry that doubts the columns of pixels which may see an edge, with a spot that nobody measured."""
+    unsure = np.nan_to_num(UNMEASURED_PX2 * np.abs(even))
+    if not (unsure > geometry.column_std_px).any():
+        return geometry
+    return geometry.by(rig, unsure, window_px)
 
 
 def column_slopes(column_px: NDArray[np.floating]) -> Map:
@@ -152,22 +154,36 @@ def column_slopes(column_px: NDArray[np.floating]) -> Map:
     return np.stack(found)
 
 
-def fit_spot(rig: Rig, geometry: Geometry, pull: Map, across: Map) -> CameraSpot | None:
+def fit_spot(
+    rig: Rig, geometry: Geometry, soft: Map, steps: Map, even: Map | None = None
+) -> CameraSpot | None:
     """The spot by which columns are displaced; None where too few pixels tell.
 
-    ``pull`` (rows, columns) is what a spot of one square pixel would displace each column by (px), ``across``
-    the step of columns from pixel to pixel in a row.
+    ``soft`` and ``even`` (rows, columns) are what a spot of one square pixel would displace each column by
+    (px) if it is of that shape, ``steps`` (2, rows, columns) those of columns from pixel to pixel, across and
+    down.
     """
     doubtful = int(Flag.NOT_REFINED | Flag.UNUSUAL_PEAK)
     usable = np.isfinite(geometry.depth_mm) & ((geometry.flags & doubtful) == 0)
-    column = np.where(usable, geometry.column_px, np.nan).astype(np.float64)
-    away, pulled, noise = _bend(column), _bend(pull), geometry.column_std_px[:, NEXT_PX:-NEXT_PX]
+    seen = _Bends.of(np.where(usable, geometry.column_px, np.nan), geometry.column_std_px)
+    columns_px = float(np.nanmedian(np.hypot(*steps)[usable])) if usable.any() else 0.0
+    found = _fit(seen, soft, TELLING_PX2, columns_px)
+    if even is None:
+        return found
+    other = _fit(seen, even, EVEN_PX2, columns_px)
+    if other is None or (found is not None and seen.left(soft, found) <= seen.left(even, other)):
+        return found
+    return replace(other, even=True)
+
+
+def _fit(seen: _Bends, pull: Map, telling_px2: float, columns_px: float) -> CameraSpot | None:
+    pulled = _bends(pull)
     # Far from the neighbours is another surface.
     with np.errstate(invalid="ignore"):
-        telling = (np.abs(away) < LONGEST_PX) & (np.abs(pulled) * TELLING_PX2 > noise)
+        telling = seen.near & (np.abs(pulled) * telling_px2 > seen.noise_px)
     if np.count_nonzero(telling) < FEWEST:
         return None
-    away, pulled = away[telling], pulled[telling]
+    away, pulled = seen.away_px[telling], pulled[telling]
     ratio, weight = away / pulled, np.abs(pulled)
     variance = weighted_median(ratio, weight)
     scatter = weighted_median(np.abs(ratio - variance), weight)
@@ -176,16 +192,47 @@ def fit_spot(rig: Rig, geometry: Geometry, pull: Map, across: Map) -> CameraSpot
         variance,
         NORMAL * MEDIAN_STD * scatter / float(np.sqrt(many)),
         0.0,
-        max(variance, 0.0) ** 0.5 * float(np.nanmedian(np.abs(across[usable]))),
+        max(variance, 0.0) ** 0.5 * columns_px,
     )
     return replace(found, doubt=min(NORMAL * scatter / variance, 1.0)) if found.present else found
 
 
-def _bend(values: Map) -> Map:
-    """How far values (rows, columns) are from the middle of their neighbours of the same colour in a row."""
-    return np.asarray(
-        values[:, NEXT_PX:-NEXT_PX] - 0.5 * (values[:, : -2 * NEXT_PX] + values[:, 2 * NEXT_PX :])
-    )
+@dataclass(frozen=True)
+class _Bends:
+    """How far columns are from the middle of their neighbours, px, with their noise, flat over both axes."""
+
+    away_px: Map
+    noise_px: Map
+    near: NDArray[np.bool_]
+
+    @classmethod
+    def of(cls, column_px: NDArray[np.floating], noise_px: NDArray[np.floating]) -> _Bends:
+        """Those of columns (rows, columns), NaN where they are not known."""
+        away = _bends(column_px.astype(np.float64))
+        with np.errstate(invalid="ignore"):
+            near = np.abs(away) < LONGEST_PX
+        return cls(away, np.concatenate([each.ravel() for each in _inside(noise_px)]), near)
+
+    def left(self, pull: Map, spot: CameraSpot) -> float:
+        """Sum of what a spot leaves unexplained, px."""
+        pulled = np.nan_to_num(_bends(pull)[self.near])
+        return float(np.abs(self.away_px[self.near] - spot.variance_px2 * pulled).sum())
+
+
+def _inside(values: NDArray[np.floating]) -> tuple[NDArray[np.floating], NDArray[np.floating]]:
+    """Pixels of a map that have neighbours of their colour on both sides, in a row and in a column."""
+    return values[:, NEXT_PX:-NEXT_PX], values[NEXT_PX:-NEXT_PX]
+
+
+def _bends(values: Map) -> Map:
+    """How far values (rows, columns) are from the middle of their neighbours of the same colour.
+
+    Those in a row, and then those in a column, flat.
+    """
+    row, column = _inside(values)
+    across = row - 0.5 * (values[:, : -2 * NEXT_PX] + values[:, 2 * NEXT_PX :])
+    down = column - 0.5 * (values[: -2 * NEXT_PX] + values[2 * NEXT_PX :])
+    return np.concatenate([across.ravel(), down.ravel()])
 
 
 def spot_finding(found: CameraSpot) -> FitFinding:

@@ -36,6 +36,8 @@ from dsl_core.reconstruction.surface import Surface, reconstruct_surface
 LIT_SIGMAS = 8.0
 #: Deviation of a column between two that two codes name.
 EDGE_STD_PX = 0.15
+#: Two surfaces that leave so many deviations of a column open, and so many px, are a depth edge.
+MIXED_SIGMAS, MIXED_PX = 3.0, 1.5
 #: With fewer pixels than this share a scan is taken as failed.
 MIN_SHARE = 0.001
 #: The gravest reason first: too much light also confuses the code.
@@ -57,7 +59,8 @@ class Geometry:
 
     Where light comes from next to a pixel's centre, its column is ``displaced_px`` from that of the pixel,
     and depth is that of the pixel; ``seen_depth_mm`` is what the column alone leads to. ``highlight`` is the
-    reflectance that gloss may add, None where surfaces are matt.
+    reflectance that gloss may add, None where surfaces are matt. Pixels are ``mixed`` whose neighbours lead
+    to two surfaces.
     """
 
     column_px: NDArray[np.float32]
@@ -73,6 +76,7 @@ class Geometry:
     displaced_px: NDArray[np.float32] | None = None
     seen_depth_mm: NDArray[np.float64] | None = None
     highlight: NDArray[np.float32] | None = None
+    mixed: NDArray[np.bool_] | None = None
 
     def by(self, rig: Rig, column_error_px: NDArray[np.floating], window_px: int | None = None) -> Geometry:
         """Depth and surface from the same columns with another rig.
@@ -90,7 +94,7 @@ class Geometry:
                 column -= torch.as_tensor(self.displaced_px.ravel()[some])
             found, slope = (v.numpy() for v in triangulate(rig, torch.as_tensor(some), column))
             depth.ravel()[some], depth_std.ravel()[some] = found, slope * std_px.ravel()[some]
-        surface = reconstruct_surface(rig, depth, depth_std, window_px, _beyond(self.flags))
+        surface = reconstruct_surface(rig, depth, depth_std, window_px, _beyond(self.flags), self.mixed)
         edge = np.where(surface.edge, int(Flag.DEPTH_EDGE), 0).astype(np.uint16)
         return replace(
             self,
@@ -231,21 +235,27 @@ def geometry_of(
     colours = material_std_px(rig, maps.column_px)
     good = (flags & int(DEPTH_INVALID)) == 0
     seen_px = np.where(good, maps.column_px, np.float32(np.nan)).reshape(shape)
-    doubt = two_surfaces_std_px(seen_px, (maps.unusual & good).reshape(shape)).ravel()
+    # Without lines nobody could have seen a peak.
+    without_peak = (~maps.refined & good & (lines is not None)).reshape(shape)
+    unusual = (maps.unusual & good).reshape(shape)
+    doubt = two_surfaces_std_px(seen_px, noise_px, unusual, without_peak).ravel()
     dq = np.hypot(np.hypot(maps.column_std_px, common), np.hypot(waves, np.hypot(colours, doubt)))
     # In place, because maps of a large picture are large.
     depth_mm, depth_std = maps.depth_mm.reshape(shape), maps.slope_mm_per_px.reshape(shape)
     maps.slope_mm_per_px[:] *= dq
     for values in (maps.depth_mm, maps.slope_mm_per_px):
         values[~good] = np.nan
-    surface = reconstruct_surface(rig, depth_mm, depth_std, surface_window_px, _beyond(flags.reshape(shape)))
+    mixed = (doubt > np.maximum(MIXED_SIGMAS * maps.column_std_px, MIXED_PX)).reshape(shape)
+    beyond = _beyond(flags.reshape(shape))
+    surface = reconstruct_surface(rig, depth_mm, depth_std, surface_window_px, beyond, mixed)
     edge = np.where(surface.edge, int(Flag.DEPTH_EDGE), 0).astype(np.uint16)
     std = np.where(good, dq, np.nan).astype(np.float32).reshape(shape)
     light = (maps.amplitude, maps.amplitude_std, maps.offset, maps.offset_std)
     a, da, dark, dark_std = (m.reshape(shape) for m in light)
     return Geometry(
-        seen_px, std, depth_mm, depth_std, a, da, dark, dark_std, flags.reshape(shape) | edge, surface
-    )
+        seen_px, std, depth_mm, depth_std, a, da, dark, dark_std, flags.reshape(shape) | edge, surface,
+        mixed=mixed,
+    )  # fmt: skip
 
 
 def _beyond(flags: NDArray[np.uint16]) -> NDArray[np.bool_]:

@@ -81,11 +81,12 @@ def reconstruct_surface(
     depth_std_mm: Map,
     window_px: int | None = None,
     beyond: NDArray[np.bool_] | None = None,
+    mixed: NDArray[np.bool_] | None = None,
 ) -> Surface:
     """Fit planes around every pixel with a depth (NaN elsewhere) and derive normal and shading.
 
     ``beyond`` (rows, columns) are pixels that see something out of the calibrated depths: next to them is an
-    edge, too.
+    edge, too. So are ``mixed`` pixels, which see two surfaces.
     ``window_px`` is the size of the largest window. The deviation of a normal holds the noise of depth and
     what the misfit of the plane says about curvature; next to a jump that of shading holds mixed pixels.
     Large pictures are worked on block by block, with all pixels around that take part.
@@ -95,6 +96,8 @@ def reconstruct_surface(
     beside = 2 * window + 2
     blocks = list(_blocks(depth_mm.shape, beside))
     jump = _beside_what_is_beyond(rig, depth_mm, beyond)
+    if mixed is not None:
+        jump |= mixed
     if len(blocks) == 1:
         return _surface_of(rig, depth_mm, depth_std_mm, window, blocks[0][1], jump)
     found = Surface.empty(depth_mm.shape)

@@ -17,10 +17,10 @@ from dsl_core.reconstruction.camera_spot import (
     column_slopes,
     fit_spot,
     follow_spot,
-    light_slopes,
     spot_finding,
 )
 from dsl_core.reconstruction.geometry import Geometry
+from dsl_core.reconstruction.light_pull import light_slopes
 from dsl_core.reconstruction.scan_result import known_pixels
 from dsl_core.reconstruction.surface import reconstruct_surface
 from tests.cases.small_rig import small_rig
@@ -43,7 +43,8 @@ def rig() -> Rig:
 def seen(spot_px: float) -> tuple[np.ndarray, np.ndarray]:
     """Light (rows, columns) and place of the light (px, 2, rows, columns) of patches with dark borders.
 
-    The spot is Gaussian, and everything is summed over samples of the surface.
+    The spot is Gaussian, or that of an even pixel where it is NaN, and everything is summed over samples of
+    the surface.
     """
     margin = 8
     y, x = (np.arange((n + 2 * margin) * FINE) / FINE - margin for n in SHAPE)
@@ -55,6 +56,8 @@ def seen(spot_px: float) -> tuple[np.ndarray, np.ndarray]:
 
     def weights(places: np.ndarray, count: int) -> np.ndarray:
         away = places[None] - np.arange(count)[:, None]
+        if np.isnan(spot_px):
+            return np.asarray(((np.abs(away) < 0.5) + 0.5 * (np.abs(away) == 0.5)) / FINE)
         width = max(spot_px, 0.01)
         found = np.exp(-0.5 * (away / width) ** 2)
         return np.asarray(found / found.sum(1, keepdims=True))
@@ -141,7 +144,7 @@ def test_a_displacement_is_doubted_by_the_scatter_of_the_spot_but_never_wholly()
             rig(),
             replace(before, column_px=moved.astype(np.float32), column_std_px=exact),
             pull,
-            np.ones(SHAPE),
+            np.ones((2, *SHAPE)),
         )
         assert found is not None
         assert found.present
@@ -184,3 +187,27 @@ def test_a_spot_is_present_where_it_matters_and_is_no_chance() -> None:
     assert not CameraSpot(0.5, 0.2, 0.2, 0.8).present
     assert not CameraSpot(0.01, 0.001, 0.2, 0.8).present
     assert CameraSpot(0.25, 0.05, 0.2, 0.8).rms_std_px == pytest.approx(0.05)
+
+
+def test_edges_that_a_sharp_lens_leaves_in_a_pixel_displace_its_column_by_what_its_light_says() -> None:
+    before, depth = geometry(rig(), np.nan)
+    after, found = follow_spot(rig(), LINES, before)
+    assert found is not None
+    assert found.even
+    assert found.variance_px2 == pytest.approx(1 / 12, rel=0.1)
+    assert error_mm(after, depth) < 0.3 * error_mm(before, depth)
+    assert not spot_finding(found).significant, "this is how any camera is"
+
+
+def test_edges_are_doubted_where_nobody_could_measure_the_spot() -> None:
+    before, depth = geometry(rig(), np.nan)
+    few = np.zeros(SHAPE, bool)
+    few[8:22, 8:38] = True
+    some = replace(before, depth_mm=np.where(few, before.depth_mm, np.nan))
+    after, found = follow_spot(rig(), LINES, some)
+    assert found is None or not found.present
+    assert np.allclose(after.depth_mm, some.depth_mm, atol=0.01, equal_nan=True)
+    off, known = np.abs(some.depth_mm - depth), np.isfinite(some.depth_mm)
+    far = known & (off > 4 * some.depth_std_mm)
+    assert far.sum() > 10
+    assert np.mean((off < 1.96 * after.depth_std_mm)[far]) > 0.9

@@ -5,9 +5,15 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from dsl_core.reconstruction.columns.two_surfaces import two_surfaces_std_px
+from dsl_core.reconstruction.columns import two_surfaces
 
 ROWS, COLUMNS = 7, 9
+
+
+def two_surfaces_std_px(column_px: np.ndarray, unusual: np.ndarray) -> np.ndarray:
+    """Of unusual peaks alone, with little noise."""
+    std_px = np.full(column_px.shape, 0.01)
+    return two_surfaces.two_surfaces_std_px(column_px, std_px, unusual, np.zeros(column_px.shape, bool))
 
 
 def plane() -> np.ndarray:
@@ -51,3 +57,17 @@ def test_beside_shadow_and_at_the_edge_of_the_picture_a_whole_column_is_open() -
     assert (
         two_surfaces_std_px(seen, np.zeros((ROWS, COLUMNS), bool)).tolist() == np.zeros(seen.shape).tolist()
     )
+
+
+def test_without_a_peak_the_column_of_either_surface_is_open() -> None:
+    seen, none = plane(), np.zeros((ROWS, COLUMNS), bool)
+    seen[:, 5:] += 9.0
+    seen[:, 4] += 9.0
+    noise = np.full(seen.shape, 0.05)
+    found = two_surfaces.two_surfaces_std_px(seen, noise, none, only(3, 4))
+    assert found[3, 4] == pytest.approx((9.0 - 0.25) * 3**-0.5)
+    assert np.count_nonzero(found) == 1
+    # Noise may leave as much between neighbours, and beside shadow nothing is known.
+    assert not two_surfaces.two_surfaces_std_px(seen, 20 * noise, none, only(3, 4)).any()
+    seen[3, 6] = np.nan
+    assert not two_surfaces.two_surfaces_std_px(seen, noise, none, only(0, 3)).any()
