@@ -217,7 +217,7 @@ class PickedLines:
 
 
 def decode_columns(scan: MergedScan, progress: Progress | None = None) -> tuple[DecodedCode, MergedFrame]:
-    """Decode the binary code (seed Eqs. 4 to 8) and merge the white frame."""
+    """Decode the binary code (Shin et al., CVPR 2024, supplement, Eqs. 4 to 8) and merge the white frame."""
     plan = scan.plan
     if isinstance(plan.code, NoCode):
         raise DecodeError(

@@ -1,7 +1,7 @@
 """Time and error of the correspondence models: every pixel of 890 x 580, 47 bands, two orders.
 
 Run ``python -m tests.benchmarks.bench_correspondence``. The published code needs about 3 minutes for the
-analytic model and 2.5 s for the data-driven one (seed section 4).
+analytic model and 2.5 s for the data-driven one (section 4 of the method).
 """
 
 from __future__ import annotations

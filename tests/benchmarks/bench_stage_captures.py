@@ -137,7 +137,7 @@ def row(
 
 
 def _grid_error_px(fitted: Rig, samples: OrderSamples, truth: Rig) -> float:
-    """Error of the seed's model; not a number where positions or filters do not suffice for it."""
+    """Error of the published model; not a number where positions or filters do not suffice for it."""
     try:
         grid = fit_stage_grid(fitted, samples).grid
     except CalibrationError:

@@ -1,7 +1,8 @@
-"""The data-driven correspondence of seed section 4, fitted to samples of a flat target on a stage.
+"""The data-driven correspondence as published, fitted to samples of a flat target on a stage.
 
-At every node of a grid over the camera image, and for every order and filter wavelength, the projector
-column that lights the node is known at a few depths. Eq. (2) of the seed is fitted to them::
+At every node of a grid over the camera image, and for every order and filter wavelength, the projector column
+that lights the node is known at a few depths. Eq. (2) of the supplement of Shin et al. (CVPR 2024) is fitted
+to them::
 
     q = alpha * z**beta + gamma
 
@@ -69,7 +70,7 @@ class GridFit:
 
 
 def fit_grid(samples: GridSamples) -> GridFit:
-    """Fit Eq. (2) of the seed at every node, order and wavelength, leaving wrong samples out.
+    """Fit Eq. (2) at every node, order and wavelength, leaving wrong samples out.
 
     Alpha, beta and gamma of a node nearly compensate each other, so that noise moves all three; the exponents
     are therefore smoothed over the image and the other two fitted again, which keeps them fit to be
@@ -216,7 +217,7 @@ def _record(samples: GridSamples, maps: Floats) -> CorrespondenceGrid:
 
 
 def fit_stage_grid(rig: Rig, samples: OrderSamples) -> GridFit:
-    """Eq. (2) of the seed at the middles of all tiles, from samples of planes at three positions or more.
+    """Eq. (2) at the middles of all tiles, from samples of planes at three positions or more.
 
     The grid needs the same depths and wavelengths at every node; samples differ from these a little, which
     the fitted film of ``rig`` corrects. Raises `CalibrationError` as `fit_grid` does.

@@ -92,7 +92,7 @@ def calibrate_depth_stage(
 ) -> DepthStageCalibration:
     """Refine lenses and pose by planes, and fit the film and its residual to first orders on them.
 
-    With ``grid`` the data-driven model of the seed is fitted too. The rig's `geometry_covariance` is the
+    With ``grid`` the published data-driven model is fitted too. The rig's `geometry_covariance` is the
     prior of its geometry, which stays as it is without one; its `lateral_colour` is part of where first
     orders are, and its `projector_response` is that by which the planes' columns were found. Raises
     `CalibrationError` that names the position or the filter that does not fit.

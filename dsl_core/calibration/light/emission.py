@@ -1,8 +1,8 @@
 """Emission of the LEDs from a spectroradiometer that looks at a white standard.
 
-Red, green, blue and white pictures minus black give four spectra of three unknowns; where they agree on
-red + green + blue = white, all four count by their noise. Seed section 3.1: divided by the reflectance of
-the Spectralon.
+Red, green, blue and white pictures minus black give four spectra of three unknowns; where they agree on red +
+green + blue = white, all four count by their noise. Shin et al. (CVPR 2024, supplement), section 3.1: divided
+by the reflectance of the Spectralon.
 """
 
 from __future__ import annotations

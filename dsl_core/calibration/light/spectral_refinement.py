@@ -1,7 +1,7 @@
-"""Camera response and LED emission refined on surfaces of known reflectance (seed Eq. 1).
+"""Camera response and LED emission refined on surfaces of known reflectance (Eq. 1 of the method).
 
-The seed minimises the squared differences of measured and simulated intensities plus ``w`` times the squared
-gradients of response and emission over wavelength, w = 0.005. Here:
+The method (Shin et al., CVPR 2024, supplement) minimises the squared differences of measured and simulated
+intensities plus ``w`` times the squared gradients of response and emission over wavelength, w = 0.005. Here:
 
 - curves are ``start * exp(deviation)``, so that they stay positive, and the gradient is that of the deviation
   from the start: what was measured or stated before is not flattened;

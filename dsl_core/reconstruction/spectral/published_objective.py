@@ -1,12 +1,12 @@
 """The published reconstruction, kept as a second solver to compare with.
 
-Seed sections 4.3 and 7: each pixel's spectrum is the sigmoid of free parameters, fitted by Adam to the
-intensities of one valid first order (Eq. 3). A band is compared with the single frame whose line is
-nearest to its column; where the chosen order leaves bands unreached, the blurred mask of such pixels moves
-weight from the first order to the zero-order colour. Data terms are L1, and the gradient along wavelength
-is penalised. What the seed leaves open is chosen in the method's favour: the response of a band is
-that of the rig averaged over the line, as a calibration on known patches would make it, and the weight of
-smoothness is the one that does best on the twin's ColorChecker.
+Supplement of Shin et al. (CVPR 2024), sections 4.3 and 7: each pixel's spectrum is the sigmoid of free
+parameters, fitted by Adam to the intensities of one valid first order (Eq. 3). A band is compared with the
+single frame whose line is nearest to its column; where the chosen order leaves bands unreached, the blurred
+mask of such pixels moves weight from the first order to the zero-order colour. Data terms are L1, and the
+gradient along wavelength is penalised. What it leaves open is chosen in the method's favour: the response of
+a band is that of the rig averaged over the line, as a calibration on known patches would make it, and the
+weight of smoothness is the one that does best on the twin's ColorChecker.
 """
 
 from __future__ import annotations
@@ -135,7 +135,7 @@ class PublishedReconstruction:
         return fit(measured, self.options)
 
     def _valid_order(self, flat: NDArray[np.intp]) -> tuple[Tensor, Tensor, Tensor]:
-        """Seed Eq. (3): per pixel the first order that reaches more bands; which bands, and their columns."""
+        """Eq. (3): per pixel the first order that reaches more bands; which bands, and their columns."""
         index = torch.as_tensor(flat)
         depth = torch.as_tensor(self.pixels.depth_mm.ravel()[flat], dtype=torch.float32)
         width, height = self.plan.projector_size_px
@@ -151,7 +151,7 @@ class PublishedReconstruction:
         )
 
     def _first_order_weight(self, flat: NDArray[np.intp], reached: Tensor) -> Tensor:
-        """Kappa 1: the mask of completely reached pixels, Gaussian-blurred (seed section 7.1)."""
+        """Kappa 1: the mask of completely reached pixels, Gaussian-blurred (section 7.1)."""
         complete = np.ones(self.pixels.valid.shape, np.float32)
         complete.ravel()[flat] = reached.all(0).numpy()
         return torch.as_tensor(blurred_mask(complete).ravel()[flat])
