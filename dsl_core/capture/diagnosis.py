@@ -38,6 +38,8 @@ ALIKE = 0.1
 TELLING_DN = 2.0
 #: Share of saturated pixels from which on black is no longer black.
 SATURATED = 0.5
+#: Share of full scale from which on a pixel is saturated.
+FULL = 0.98
 #: Pixels needed to say anything.
 FEWEST = 12
 #: A frame of the code shows another pattern if its pixels differ by this share of white: noise makes less.
@@ -125,24 +127,45 @@ def _of_pair(one: Mosaic, other: Mosaic) -> References:
     return References(white=np.maximum(one, other), black=np.minimum(one, other), code=one)
 
 
+@dataclass(frozen=True)
+class _Lights:
+    """White less black, at first and now (rows, columns), in pixels that neither saturates (``used``).
+
+    ``lit`` are those with a good part of it, ``factor`` is how many times the light it is, ``darks`` how far
+    black is above its level, DN, at first and now.
+    """
+
+    old: NDArray[np.float64]
+    new: NDArray[np.float64]
+    used: NDArray[np.bool_]
+    lit: NDArray[np.bool_]
+    factor: float
+    darks: tuple[float, float]
+
+    @property
+    def is_other(self) -> bool:
+        """Whether all light has changed by a factor that matters."""
+        return abs(self.factor - 1) > LEAST_LIGHT
+
+    @property
+    def is_exposed_otherwise(self) -> bool:
+        """Whether black has changed by the same factor."""
+        before, now = self.darks
+        return self.is_other and before > TELLING_DN and abs(now / before / self.factor - 1) < ALIKE
+
+
 def what_changed(before: References, now: References, sensor: Sensor) -> Explanation:
     """What is different in later pictures."""
-    old, new = (each.white.astype(np.float64) - each.black for each in (before, now))
-    # All of the picture but what is saturated: of bright pixels alone, a motion would dim many.
-    full = 0.98 * sensor.full_scale_dn
-    was_bright, is_bright = (float((each.black >= full).mean()) for each in (before, now))
-    if was_bright < SATURATED <= is_bright:
+    if _is_black_bright(before, now, sensor):
         return Explanation(
             "Black saturates in most of the picture, and did not when the scan began: the projector or its"
             " computer inverts pictures, or another lamp shines on the scene. Set them as they were, and"
             " resume the scan."
         )
-    used = (before.white < full) & (now.white < full)
-    lit = used & (old > 0.25 * np.percentile(old, 95))
-    if lit.sum() < FEWEST:
+    light = _lights(before, now, sensor)
+    if light is None:
         return Explanation()
-    light = float(new[used].sum() / old[used].sum())
-    if light < NO_LIGHT:
+    if light.factor < NO_LIGHT:
         return Explanation(
             "White and black now look the same: the projector gives no light, something covers it or the"
             " lens, or the camera repeats a picture. Check projector and camera, and resume the scan."
@@ -150,36 +173,47 @@ def what_changed(before: References, now: References, sensor: Sensor) -> Explana
     altered = alteration(before.pictures, now.pictures, sensor)
     if altered:
         return Explanation(altered, is_of_all=True)
-    tiles = _light_of_tiles(old, new, used)
-    shaded = _shaded(tiles, used.shape)
+    tiles = _light_of_tiles(light.old, light.new, light.used)
+    shaded = _shaded(tiles, light.used.shape)
     if shaded:
         return Explanation(shaded)
-    dark_old, dark_new = (
-        float(each.black.mean(dtype=np.float64)) - sensor.black_level_dn for each in (before, now)
-    )
-    room = (dark_new - dark_old) / float(old[lit].mean())
+    return _of_light_or_motion(before, now, sensor, light, tiles)
+
+
+def _is_black_bright(before: References, now: References, sensor: Sensor) -> bool:
+    full = FULL * sensor.full_scale_dn
+    was_bright, is_bright = (float((each.black >= full).mean()) for each in (before, now))
+    return was_bright < SATURATED <= is_bright
+
+
+def _lights(before: References, now: References, sensor: Sensor) -> _Lights | None:
+    """What white and black say of the light; None where too few pixels have any."""
+    old, new = (each.white.astype(np.float64) - each.black for each in (before, now))
+    # All of the picture but what is saturated: of bright pixels alone, a motion would dim many.
+    full = FULL * sensor.full_scale_dn
+    used = (before.white < full) & (now.white < full)
+    lit = used & (old > 0.25 * np.percentile(old, 95))
+    if lit.sum() < FEWEST:
+        return None
+    was, is_ = (float(each.black.mean(dtype=np.float64)) - sensor.black_level_dn for each in (before, now))
+    return _Lights(old, new, used, lit, float(new[used].sum() / old[used].sum()), (was, is_))
+
+
+def _of_light_or_motion(
+    before: References, now: References, sensor: Sensor, light: _Lights, tiles: NDArray[np.float64]
+) -> Explanation:
+    """What lamps, exposure, room, focus and motion have changed, of pictures that show the same otherwise."""
     moved = moved_between((before.white, before.black), (now.white, now.black), sensor, is_pattern=False)
-    if moved is None and abs(light - 1) < LEAST_LIGHT:
+    if moved is None and not light.is_other:
         moved = moved_between((before.code, before.black), (now.code, now.black), sensor, is_pattern=True)
-    colours = _of_colours(old, new, used, sensor)
+    colours = _of_colours(light.old, light.new, light.used, sensor)
     is_uneven = max(colours) > (1 + UNEVEN) * min(colours)
-    is_other_light = not is_uneven and abs(light - 1) > LEAST_LIGHT
-    is_exposure = is_other_light and dark_old > TELLING_DN and abs(dark_new / dark_old / light - 1) < ALIKE
-    by_place = _said_of_places(tiles, light) if is_other_light and moved is None else ""
-    found = []
-    if is_uneven:
-        found.append(_said_of_colours(colours))
-    elif by_place:
-        found.append(by_place)
-    elif is_other_light:
-        found.append(_said_of_light(light, is_exposure))
-    if abs(room) > LEAST_ROOM and not is_exposure:
-        found.append(
-            f"The light of the room has changed: without the projector the picture is at {dark_new:.0f} DN"
-            f" above its black level, and was at {dark_old:.0f} DN when the scan began. Keep the room as it"
-            " was, and resume the scan."
-        )
-    is_soft = (moved is None or moved.is_pattern) and _has_softer_stripes(before, now, lit)
+    by_place = ""
+    if light.is_other and not is_uneven and moved is None:
+        by_place = _said_of_places(tiles, light.factor)
+    found = [_said_of_colours(colours) if is_uneven else by_place or _said_of_light(light)]
+    found.append("" if light.is_exposed_otherwise and not is_uneven else _said_of_room(light))
+    is_soft = (moved is None or moved.is_pattern) and _has_softer_stripes(before, now, light.lit)
     if is_soft:
         found.append(
             "Stripes of the code are softer than when the scan began: projector or camera is out of focus, or"
@@ -188,15 +222,16 @@ def what_changed(before: References, now: References, sensor: Sensor) -> Explana
     elif moved is not None and not is_uneven:
         # Other colours look like motion where surfaces have colours.
         found.append(f"{moved.sentence} {ADVICE}")
-    if not found and moved is None and _is_other_pattern(before, now, old, used):
+    sentence = " ".join(filter(None, found))
+    if not sentence and moved is None and _is_other_pattern(before, now, light.old, light.used):
         return Explanation(
             "White and black look as they did, and a frame of the code does not: the projector or its"
             " computer shows pictures elsewhere or in another size, or other pictures. Set mirroring,"
             " scaling, keystone and refresh rate as they were, and resume the scan.",
             has_moved=True,
         )
-    is_of_all = is_uneven or (moved is None and is_other_light and not by_place)
-    return Explanation(" ".join(found), moved is not None or is_soft, not found, is_of_all)
+    is_of_all = is_uneven or (moved is None and light.is_other and not by_place)
+    return Explanation(sentence, moved is not None or is_soft, not sentence, is_of_all)
 
 
 def _said_of_colours(colours: tuple[float, ...]) -> str:
@@ -220,12 +255,27 @@ def _said_of_colours(colours: tuple[float, ...]) -> str:
     )
 
 
-def _said_of_light(light: float, is_exposure: bool) -> str:
+def _said_of_light(light: _Lights) -> str:
     """That white has changed by a factor; that black has too says that it is the exposure."""
+    if not light.is_other:
+        return ""
+    is_exposure = light.is_exposed_otherwise
     what = "exposure or gain of the camera" if is_exposure else "light of the projector or the exposure"
     return (
-        f"The {what} is {light:.2f} times what it was when the scan began. Switch automatic exposure"
+        f"The {what} is {light.factor:.2f} times what it was when the scan began. Switch automatic exposure"
         " and gain of the camera off, check the lamp, and resume the scan."
+    )
+
+
+def _said_of_room(light: _Lights) -> str:
+    """That black has changed by a part of white that matters."""
+    before, now = light.darks
+    if abs(now - before) <= LEAST_ROOM * float(light.old[light.lit].mean()):
+        return ""
+    return (
+        f"The light of the room has changed: without the projector the picture is at {now:.0f} DN above its"
+        f" black level, and was at {before:.0f} DN when the scan began. Keep the room as it was, and resume"
+        " the scan."
     )
 
 
