@@ -170,7 +170,7 @@ class SpectralReconstruction:
                 yield slice(y, min(y + rows, of.stop)), slice(x, min(x + columns, width))
 
     def _colour_weight(self) -> NDArray[np.float32]:
-        """Weight of the zero-order colour: one minus the blurred mask of complete pixels (seed 7.1)."""
+        """Weight of the zero-order colour: one minus the blurred mask of complete pixels (method, 7.1)."""
         valid = np.flatnonzero(self.pixels.valid)
         complete = np.ones(self.pixels.valid.shape, np.float32)
         nm = self.bands.centres_nm[self.bands.reported][[0, -1]]
@@ -301,7 +301,7 @@ def _wanted(tile: tuple[slice, slice], part: tuple[slice, slice], shape: tuple[i
 
 
 def blurred_mask(mask: NDArray[np.float32]) -> NDArray[np.float32]:
-    """A mask (rows, columns) whose edges are as soft as a ninetieth of the picture's width (seed 7.1)."""
+    """A mask (rows, columns) whose edges are as soft as a ninetieth of the picture's width (method, 7.1)."""
     import cv2
 
     return np.asarray(cv2.GaussianBlur(mask, (0, 0), max(mask.shape[1] / 90, 1.0)), np.float32)

@@ -242,6 +242,10 @@ def _probe_some(scan: ProbedScan, targets: Indices) -> dict[str, NDArray[Any]]:
     heavy = (changes * weight[..., None]).mT
     normal = normal_of_all_curves(of_curves(heavy @ changes), others) - cross.mT @ bias
     score = of_all_curves(of_curves((heavy @ solved.residual[..., None])[..., 0]), others)
+    # What the level of the prior keeps spectra from taking up is not the model's: all pixels of a bright
+    # surface would ask for more light.
+    pull = (solved.nodes - scan.prior.level) * solved.free / scan.prior.level_std**2
+    score = score - (bias.mT @ pull[..., None])[..., 0]
     reported = scan.model.bands.reported
     y, x = np.divmod(targets, shape[1])
     return {

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -9,13 +10,19 @@ import numpy as np
 import pytest
 import torch
 
+from dsl_core.model.plan import CapturePlan, GrayCode, ScanLines
+from dsl_core.model.spectral import WavelengthGrid
+from dsl_core.optics.correspondence import correspondence
 from dsl_core.optics.spectra import ORDERS
 from dsl_core.reconstruction.spectral.probing import probe as probe_module
+from dsl_core.reconstruction.spectral.probing.cell_sums import CellSums
 from dsl_core.reconstruction.spectral.probing.curve_probe import KNOTS_NM, variety
 from dsl_core.reconstruction.spectral.probing.line_probe import LineProbe
-from dsl_core.reconstruction.spectral.probing.probe import ONE_COLOUR, Probe
+from dsl_core.reconstruction.spectral.probing.probe import ONE_COLOUR, PRIOR_STD, Probe
 from dsl_core.reconstruction.spectral.probing.probed_light import PARAMETERS
 from dsl_core.reconstruction.spectral.probing.probed_pixels import samples_of
+from dsl_core.reconstruction.spectral.spectra import SpectralReconstruction
+from tests.cases.twin_scan import solver_input, twin_scan
 
 RISING = np.linspace(0.2, 0.6, 24)
 NM = np.arange(430.0, 661.0, 5.0)
@@ -51,6 +58,24 @@ def test_neighbouring_residuals_that_go_together_count_until_they_first_do_not()
     wanted = 1 + 2 * sum(1 - lag / 30 for lag in range(1, 9))
     assert probe_module._correlation([long], lambda values: values).tolist() == pytest.approx([wanted])
     assert probe_module._correlation([0 * long], lambda values: values).tolist() == [1.0]
+
+
+def test_pixels_ask_for_the_same_however_bright_surfaces_are_thought_to_be() -> None:
+    plan = CapturePlan(code=GrayCode(rows=False), spectral=ScanLines(width_px=5, step_px=4))
+    devices, scan = twin_scan(plan, size="64x48", scene="plane")
+    assert devices.calibration is not None
+    stack, pixels = solver_input(devices.calibration, scan)
+    data = (devices.calibration, plan, WavelengthGrid(step_nm=10.0), correspondence(devices.calibration))
+    whole = SpectralReconstruction(*data, stack.radiance, stack.std, pixels).probed
+    asked = []
+    for level in (0.1, 1.0):
+        found = probe_module.probe(replace(whole, prior=replace(whole.prior, level=level)))
+        assert found is not None
+        sums = CellSums.of(found, np.tile(np.eye(len(PARAMETERS)), (len(found.score), 1, 1)))
+        fit = sums.fit(np.array(PRIOR_STD))
+        asked.append(fit.values / np.sqrt(np.diag(fit.covariance)))
+    # With the pull of the prior they differ by two deviations.
+    assert np.abs(asked[1] - asked[0]).max() < 0.3
 
 
 def probe_of(**more: Any) -> Probe:
