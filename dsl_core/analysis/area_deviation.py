@@ -113,7 +113,7 @@ def _variance(scores: Scores, shown: ClassMap, weights: Map, of_beside: float) -
     missing += np.sqrt(of_beside) * np.bincount(value, weights.ravel()[pixel], size)
     _add_classes(scores, shown, weights, beside, variance, missing)
     expected = weights.ravel()[pixel] * _share_beside(scores, shown, pixel, value)
-    return np.asarray(variance + missing**2), np.bincount(value, expected, size)
+    return np.asarray(variance + missing**2), np.asarray(np.bincount(value, expected, size), np.float64)
 
 
 def _share_beside(scores: Scores, shown: ClassMap, pixel: Values, value: Values) -> Map:
