@@ -41,7 +41,6 @@ class PairSides(QWidget):
         if self._recent.parent() is not free:
             free.column.insertWidget(free.column.indexOf(free.picture), self._recent)
         self._show_recent()
-
         self._level()
 
     def _level(self) -> None:
@@ -74,6 +73,7 @@ class SidePlace(QFrame):
             label("", "muted", wraps=True),
             SmallDepth(),
         )
+        self.text.setAlignment(Qt.AlignmentFlag.AlignTop)
         self.column: QVBoxLayout = column_of(self.title, self.text, (self.picture, 1), on=self)
 
     def resizeEvent(self, event: QResizeEvent) -> None:
