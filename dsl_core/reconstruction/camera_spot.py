@@ -166,7 +166,9 @@ def fit_spot(
     doubtful = int(Flag.NOT_REFINED | Flag.UNUSUAL_PEAK)
     usable = np.isfinite(geometry.depth_mm) & ((geometry.flags & doubtful) == 0)
     seen = _Bends.of(np.where(usable, geometry.column_px, np.nan), geometry.column_std_px)
-    columns_px = float(np.nanmedian(np.hypot(*steps)[usable])) if usable.any() else 0.0
+    # In a picture of two rows nobody knows how columns change across them.
+    known = usable & np.isfinite(steps).any(0)
+    columns_px = float(np.median(np.sqrt(np.nansum(steps**2, 0))[known])) if known.any() else 0.0
     found = _fit(seen, soft, TELLING_PX2, columns_px)
     if even is None:
         return found
