@@ -8,10 +8,10 @@ summed over spectral slices. Both use the same correspondence and response as th
 from __future__ import annotations
 
 import copy
+from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import nullcontext
 from dataclasses import replace
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 import torch
@@ -37,6 +37,8 @@ from dsl_core.simulation.rendering.spectral_tables import (
 )
 from dsl_core.simulation.scenes.truth import Parts, SceneTruth
 
+S = TypeVar("S")
+T = TypeVar("T")
 THREADS = 2
 #: Patterns with more runs of lit columns than this are summed over slices; behind a filter, slices would blur
 #: the narrow images of the lines.
@@ -88,10 +90,13 @@ class Renderer:
         self._reflectance = truth.materials.at(NM)
         self.slicing = BROAD
         self.zero_table = zero_table(rig, self._reflectance, self.device)
-        self.orders = [
-            OrderTables.make(rig, m, self.pixels, depth, self.shading > 0, self._reflectance, BROAD)
-            for m in (orders if film else ())
-        ]
+        lit = self.shading > 0
+
+        def tables(order: int) -> OrderTables:
+            return OrderTables.make(rig, order, self.pixels, depth, lit, self._reflectance, BROAD)
+
+        # The first picture of a live view waits for them.
+        self.orders = _of_orders(tables, orders if film else (), len(self.pixels))
         halo = (
             rig.projector_response
             if film
@@ -233,12 +238,16 @@ class Renderer:
         def light(tables: OrderTables) -> Tensor:
             return order_light(tables, table, self.material_channel, self.slicing)
 
-        # Orders are independent, so each core takes its share of them.
-        share = len(signal) > SHARED_FROM
-        with ThreadPoolExecutor(THREADS) if share else nullcontext() as pool:
-            parts = map(light, orders) if pool is None else pool.map(light, orders)
-            for tables, part in zip(orders, parts, strict=True):
-                signal[tables.active] += part
+        for tables, part in zip(orders, _of_orders(light, orders, len(signal)), strict=True):
+            signal[tables.active] += part
+
+
+def _of_orders(work: Callable[[T], S], orders: Sequence[T], paths: int) -> list[S]:
+    """What is worked out for each order, which are independent: in large pictures cores share them."""
+    if paths <= SHARED_FROM:
+        return list(map(work, orders))
+    with ThreadPoolExecutor(THREADS) as pool:
+        return list(pool.map(work, orders))
 
 
 def as_colour(image: NDArray[np.uint8]) -> NDArray[np.uint8]:
