@@ -49,6 +49,9 @@ def light_jump(column_px: Floats, relative: Floats, frame_px: int) -> LightJump 
         return None
     place = 2 * (np.array(at) + 0.5) / PARTS - 1
     level = float(np.median(mean))
+    if not level > 0:
+        # A filter that lets nothing through.
+        return None
     value, std = np.array(mean) / level, np.sqrt(np.array(variance) / level**2 + UNEVEN**2)
     found = [_step(place, value, std, k) for k in range(2, len(at) - 1)]
     gain, share, share_std, k = max(found)
@@ -63,9 +66,11 @@ def _step(place: Floats, value: Floats, std: Floats, k: int) -> tuple[float, flo
     wanted = value / std
     without, *_ = np.linalg.lstsq(smooth[:, :3], wanted, rcond=None)
     terms, *_ = np.linalg.lstsq(smooth, wanted, rcond=None)
-    left = [float(((wanted - design @ found) ** 2).sum()) for design, found in
-            ((smooth[:, :3], without), (smooth, terms))]  # fmt: skip
+    smooth_left, left = (
+        float(((wanted - design @ found) ** 2).sum())
+        for design, found in ((smooth[:, :3], without), (smooth, terms))
+    )
     # Where the course is not smooth either, a step is less sure.
-    worse = max(left[1] / max(len(place) - 4, 1), 1.0)
+    worse = max(left / max(len(place) - 4, 1), 1.0)
     height_std = float(np.sqrt(worse * np.linalg.pinv(smooth.T @ smooth)[3, 3]))
-    return left[0] - left[1], float(terms[3]), height_std, k
+    return smooth_left - left, float(terms[3]), height_std, k

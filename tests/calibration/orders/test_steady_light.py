@@ -36,6 +36,13 @@ def test_a_jump_is_found_with_its_size_and_place(share: float, from_px: float) -
     assert found.column_px == pytest.approx(from_px, abs=1.5 * FRAME_PX / PARTS)
 
 
+@pytest.mark.parametrize("factor", [0.0, -1.0])
+def test_a_filter_that_lets_nothing_through_says_nothing(factor: float) -> None:
+    column, light = target()
+    light[column > 320] *= 2
+    assert light_jump(column, factor * light, FRAME_PX) is None
+
+
 def test_dirt_on_the_target_is_no_jump() -> None:
     column, light = target()
     light[np.abs(column - 300) < 4] *= 0.3
