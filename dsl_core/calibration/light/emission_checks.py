@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from dsl_core.errors import CalibrationError
 from dsl_core.model.calibration.spectralon import COLOURS, EmissionReadings
+from dsl_core.solve.robust import robust_std
 
 Floats = NDArray[np.float64]
 
@@ -19,8 +20,6 @@ Floats = NDArray[np.float64]
 APART, SIGMAS = 0.05, 8.0
 #: Fewer readings than this have no middle one.
 FEWEST = 3
-#: A median of absolute deviations, in standard deviations of a normal distribution.
-MAD = 0.6745
 
 
 def require_repeats(readings: EmissionReadings) -> None:
@@ -33,7 +32,7 @@ def require_repeats(readings: EmissionReadings) -> None:
         stack = np.stack([curve.at(nm) for curve in curves])
         middle = np.median(stack, 0)
         away = np.abs(stack - middle)
-        noise = float(np.median(away.max(1))) / MAD
+        noise = float(robust_std(away.max(1)))
         limit = max(APART * float(middle.max()), SIGMAS * noise)
         odd = np.flatnonzero(away.max(1) > limit)
         if odd.size:
