@@ -17,8 +17,8 @@ from dsl_core.io.reading import require_plain
 
 #: Layers of a renderer that hold what its camera sees, in lower case; others are depth, normals and the like.
 _SEEN = ("", "combined", "beauty", "rgba", "rgb", "image", "color", "colour")
-#: Values of all channels of a file: a renderer's layers for a large sensor.
-_MOST_VALUES = 1 << 29
+#: Values of all channels of a file: a renderer's layers for a large sensor, 1 GB.
+_MOST_VALUES = 1 << 28
 
 
 def read_exr(path: Path, most_px: int) -> NDArray[np.float32]:

@@ -26,8 +26,10 @@ from dsl_core.optics.colour import srgb_decode
 
 T = TypeVar("T")
 
-_BY_OPENCV = {".png", ".tif", ".tiff", ".bmp", ".jpg", ".jpeg", ".pgm", ".ppm", ".pfm", ".webp"}
-PICTURES = {*_BY_OPENCV, ".exr", *camera_raw.SUFFIXES}
+PICTURES = {
+    *(".png", ".tif", ".tiff", ".bmp", ".jpg", ".jpeg", ".pgm", ".ppm", ".pfm", ".webp", ".exr"),
+    *camera_raw.SUFFIXES,
+}
 ARRAYS, RAWS = array_file.SUFFIXES, {".raw", ".bin"}
 #: Formats whose files may hold several pictures as pages.
 PAGED = {".tif", ".tiff"}
