@@ -16,7 +16,7 @@ from dsl_app.shared.widgets.layouts import column_of
 
 
 class RecentList(QWidget):
-    """Lists recent files; ``open_path`` opens the one that is chosen. ``filled``: it was listed anew."""
+    """Lists recent files; ``open_path`` opens the one that is chosen. ``filled``: it lists them again."""
 
     filled = Signal()
 
