@@ -17,12 +17,10 @@ from dsl_core.io.export import export_by_ending
 from dsl_core.io.result.result_file import save_result
 from dsl_core.model.fit import Fit
 from dsl_core.model.result import DEPTH_INVALID
+from dsl_core.solve.normal import BAND_95
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-
-#: Standard deviations on either side of a value that hold 95 % of a normal distribution.
-BAND_95 = 1.96
 
 
 @xr.register_dataset_accessor("dsl")  # type: ignore[no-untyped-call]

@@ -9,12 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dsl_core.errors import DecodeError
+from dsl_core.solve.normal import BAND_95
 
 Floats = NDArray[np.float64] | NDArray[np.float32]
 Mask = NDArray[np.bool_]
 
-#: Half width of the 95 % band of a normal distribution, in standard deviations.
-BAND_95 = NormalDist().inv_cdf(0.975)
 #: A value is decided by data, not by the prior, from this data share on.
 DECIDED_FROM = 0.5
 _LEVELS = (0.5, 0.68, 0.8, 0.9, 0.95, 0.99)

@@ -16,6 +16,9 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from dsl_core.solve.normal import MEDIAN_OVER_MEAN_STD
+from dsl_core.solve.robust import robust_std
+
 Floats = NDArray[np.float64]
 Counts = NDArray[np.uint16]
 #: Pixels count that white lights by at least this share of the range, and that stay below the upper one.
@@ -40,9 +43,6 @@ PARTS, FEWEST_PARTS = 4, 4
 ALMOST_SRGB = 2.2
 #: Exponents that are looked for, and how often their interval is halved.
 _BOUNDS, _HALVINGS = (0.2, 6.0), 16
-#: Standard deviation of a normal distribution for one of its median absolute deviation; the median's for
-#: one of the mean's.
-_MAD, _MEDIAN = 1.4826, 1.2533
 
 
 @dataclass(frozen=True)
@@ -125,8 +125,8 @@ class MixedLight:
     def noise(self) -> float:
         """Deviation of the median sum."""
         sums = _sums(self.mixed)
-        spread = _MAD * float(np.median(np.abs(sums - np.median(sums))))
-        return float(_MEDIAN * spread / np.sqrt(sums.size / NEIGHBOURS))
+        spread = float(robust_std(sums - np.median(sums)))
+        return float(MEDIAN_OVER_MEAN_STD * spread / np.sqrt(sums.size / NEIGHBOURS))
 
     @property
     def pixels(self) -> int:
@@ -246,7 +246,7 @@ def _noise_of(pure: Floats) -> float:
     if pure.shape[1] < FEWEST:
         return 0.0
     sums = pure[0] + pure[1] - pure[2] - pure[3]
-    return float(_MAD * np.median(np.abs(sums - np.median(sums))) / np.sqrt(2))
+    return float(robust_std(sums - np.median(sums)) / np.sqrt(2))
 
 
 def _some(values: Floats) -> Floats:

@@ -14,13 +14,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dsl_core.model.rig import Sensor
+from dsl_core.solve.robust import robust_std
 
 Counts = NDArray[np.uint16]
 Pair = tuple[Counts, Counts]
 #: A pixel counts if its pictures differ by so many standard deviations.
 LIT_SIGMAS = 6.0
-#: Median of the deviations of a normal distribution.
-NORMAL = 0.6745
 #: Parts of the picture that are compared, down and across, and the share of them that have less noise.
 PARTS, CALM = 4, 0.25
 #: Pixels that a part has to have.
@@ -48,7 +47,7 @@ def noise_excess(
     apart = np.where(sound, np.subtract(*sums), np.float32(np.nan))
     steps = np.abs(apart[:, 2:] - apart[:, :-2]) / np.sqrt(stated[:, 2:] + stated[:, :-2])
     parts = [
-        float(np.median(known)) / NORMAL
+        float(robust_std(known))
         for rows in np.array_split(steps, PARTS, axis=0)
         for part in np.array_split(rows, PARTS, axis=1)
         if (known := part[np.isfinite(part)]).size >= FEWEST

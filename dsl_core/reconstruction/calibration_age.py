@@ -9,6 +9,7 @@ import numpy as np
 
 from dsl_core.model.calibration.light_check import LightCheck
 from dsl_core.model.rig import Rig
+from dsl_core.solve.normal import BAND_95
 
 #: Within a week lamps hardly age, and people remember what they have touched.
 FRESH = timedelta(days=7)
@@ -115,7 +116,7 @@ def _of_light(rig: Rig, captured: str) -> str:
         return ""
     known = (
         f"no scan shows by itself whether its level has changed since. It is known to"
-        f" {1.96 * level.rel_std:.1%}, which deviations of reflectance contain."
+        f" {BAND_95 * level.rel_std:.1%}, which deviations of reflectance contain."
     )
     remedy = " Run the drift check with the Spectralon, or calibrate with it again."
     if level.check is not None:

@@ -25,7 +25,8 @@ from dsl_core.model.rig import Rig
 from dsl_core.optics.lines.line_set import LineSet
 from dsl_core.reconstruction.geometry import Geometry
 from dsl_core.reconstruction.light_pull import EVEN_PX2, even_pulls, light_slopes
-from dsl_core.solve.robust import NORMAL, weighted_median
+from dsl_core.solve.normal import MEDIAN_OVER_MEAN_STD, STD_OF_MEDIAN_SIZE
+from dsl_core.solve.robust import weighted_median
 
 Map = NDArray[np.float64]
 
@@ -40,7 +41,7 @@ LONGEST_PX = 4.0
 #: With fewer pixels nobody can tell.
 FEWEST = 200
 #: Each column is in three of the differences, and the deviation of a median is larger than that of a mean.
-SHARED, MEDIAN_STD = 3.0, (np.pi / 2) ** 0.5
+SHARED = 3.0
 #: Variance of a spot that matters for depth (px^2), and how many deviations it must have.
 LEAST_PX2, SIGMAS = 0.02, 4.0
 #: Variance of the spot of a pixel, rms over all between a point and a whole pixel, where it is not measured.
@@ -192,11 +193,11 @@ def _fit(seen: _Bends, pull: Map, telling_px2: float, columns_px: float) -> Came
     many = weight.sum() ** 2 / (weight**2).sum() / SHARED
     found = CameraSpot(
         variance,
-        NORMAL * MEDIAN_STD * scatter / float(np.sqrt(many)),
+        STD_OF_MEDIAN_SIZE * MEDIAN_OVER_MEAN_STD * scatter / float(np.sqrt(many)),
         0.0,
         max(variance, 0.0) ** 0.5 * columns_px,
     )
-    return replace(found, doubt=min(NORMAL * scatter / variance, 1.0)) if found.present else found
+    return replace(found, doubt=min(STD_OF_MEDIAN_SIZE * scatter / variance, 1.0)) if found.present else found
 
 
 @dataclass(frozen=True)

@@ -9,12 +9,12 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from dsl_core.solve.normal import STD_OF_MEDIAN_SIZE
+
 Floats = NDArray[np.float64]
 
 #: Rounds of a linear fit with weights from its own residuals.
 ROUNDS = 6
-#: Standard deviation of normal values over the median of their sizes.
-NORMAL = 1.4826
 
 
 def robust_std(residual: NDArray[np.floating], axis: int | None = None) -> Floats:
@@ -22,7 +22,7 @@ def robust_std(residual: NDArray[np.floating], axis: int | None = None) -> Float
 
     Along ``axis``, or of all.
     """
-    return np.asarray(NORMAL * np.median(np.abs(residual), axis=axis))
+    return np.asarray(STD_OF_MEDIAN_SIZE * np.median(np.abs(residual), axis=axis))
 
 
 def weighted_median(values: NDArray[np.floating], weight: NDArray[np.floating]) -> float:

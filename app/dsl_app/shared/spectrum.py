@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from dsl_core.evaluation.uncertainty import BAND_95
 from dsl_core.io.result.result_arrays import ResultArrays
+from dsl_core.solve.normal import BAND_95
 
 #: Column and row of a pixel.
 Pixel = tuple[int, int]

@@ -12,6 +12,7 @@ from dsl_core.model.figure import Figure
 from dsl_core.model.rig import Rig
 from dsl_core.optics.pinhole import pixel_rays
 from dsl_core.optics.shading import Plane
+from dsl_core.solve.normal import STD_OF_MEDIAN_SIZE
 from dsl_core.solve.robust import robust_std
 
 Floats = NDArray[np.float64]
@@ -133,7 +134,9 @@ def _near_first_plane(rays: Floats, inverse: Floats, on_plane: Mask) -> Mask:
     middle = np.median(np.abs(planes @ seen / value - 1), 1)
     best = int(middle.argmin())
     miss = np.tensordot(planes[best], rays, 1) / inverse - 1
-    return np.asarray(np.abs(miss) < max(OUTLIER_SIGMAS * 1.4826 * float(middle[best]), LEAST_RELATIVE))
+    return np.asarray(
+        np.abs(miss) < max(OUTLIER_SIGMAS * STD_OF_MEDIAN_SIZE * float(middle[best]), LEAST_RELATIVE)
+    )
 
 
 def _require_pixels(rays: Floats, on_plane: Mask) -> None:

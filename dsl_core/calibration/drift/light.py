@@ -21,6 +21,8 @@ from dsl_core.model.spectral import WavelengthGrid
 from dsl_core.optics.correspondence import correspondence
 from dsl_core.optics.pixel_model import PixelModel
 from dsl_core.optics.spectra import ORDERS, SECOND_ORDERS, Bands
+from dsl_core.solve.normal import MEDIAN_OVER_MEAN_STD
+from dsl_core.solve.robust import robust_std
 
 Floats = NDArray[np.float64]
 
@@ -68,12 +70,14 @@ def light_drift(rig: Rig, white: PlaneSignals, reflectance: float) -> list[Figur
                 " Fill the middle of the picture with the target."
             )
         ratio = white.radiance[0, mine] / expected[mine]
-        spread = 1.4826 * float(np.median(np.abs(ratio - np.median(ratio))))
+        spread = float(robust_std(ratio - np.median(ratio)))
         figures.append(
             Figure(
                 name=WHITE_SIGNAL.format(name),
                 value=float(np.median(ratio)),
-                std=float(np.hypot(1.2533 * spread / np.sqrt(mine.sum()), rig.white_scale_rel_std)),
+                std=float(
+                    np.hypot(MEDIAN_OVER_MEAN_STD * spread / np.sqrt(mine.sum()), rig.white_scale_rel_std)
+                ),
                 unit="1",
                 low=1 - LIGHT_LIMIT,
                 high=1 + LIGHT_LIMIT,
@@ -155,7 +159,7 @@ def _shift(data: Floats, model: Floats, slope: Floats, std: Floats) -> tuple[flo
         normal = design.T @ (weight[:, None] * design)
         answer = np.linalg.solve(normal, design.T @ (weight * data))
         off = data - design @ answer
-        spread = 1.4826 * np.median(np.abs(off) * np.sqrt(known))
+        spread = robust_std(off * np.sqrt(known))
         sigmas = np.abs(off) * np.sqrt(known) / max(spread, 1e-12)
         weight = known * np.minimum(1, _HUBER / np.maximum(sigmas, _HUBER))
     # A little more light changes the pull of a signal within the limit only (Huber 1981, section 7.6).

@@ -22,6 +22,7 @@ from dsl_core.model.calibration.spectralon import (
     MeasuredEmission,
 )
 from dsl_core.model.spectral import SpectralCurve
+from dsl_core.solve.robust import robust_std
 
 Floats = NDArray[np.float64]
 
@@ -86,7 +87,7 @@ def _variance(stack: Floats) -> Floats:
     if len(stack) > 1:
         return np.asarray(uniform_filter1d(stack.var(0, ddof=1), POOLED, mode="reflect"))
     # A single reading: second differences see its noise and little of a smooth spectrum.
-    rough = np.median(np.abs(np.diff(stack[0], 2))) / 0.6745
+    rough = robust_std(np.diff(stack[0], 2))
     return np.full(stack.shape[1], rough**2 / 6)
 
 

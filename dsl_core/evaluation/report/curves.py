@@ -9,9 +9,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from dsl_core.evaluation.uncertainty import BAND_95, HonestyCheck
+from dsl_core.evaluation.uncertainty import HonestyCheck
 from dsl_core.model.spectral import SpectralCurve
 from dsl_core.optics.colour import CIE_1931_XYZ, CIE_NM, reflectance_to_srgb, xyz_to_srgb
+from dsl_core.solve.normal import BAND_95
 
 Floats = NDArray[np.float64]
 #: Inner size of a drawing, in its own units.

@@ -14,7 +14,7 @@ from dsl_core.evaluation.report.pictures import ReportPicture, figure_uri, value
 from dsl_core.evaluation.seen_target import SeenTarget
 from dsl_core.evaluation.stage_test import StageTest, stage_table
 from dsl_core.evaluation.time_sweep import FIGURES, SweepFigure, SweepPoint, best_points
-from dsl_core.evaluation.uncertainty import BAND_95
+from dsl_core.solve.normal import BAND_95
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -17,13 +17,13 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from dsl_core.solve.robust import robust_std
+
 #: Differences of five neighbours that leave no plane and no even curve, how far apart these are, and the
 #: pixels of a tile.
 DIFFERENCES, APART_PX, TILE_PX = (1.0, -4.0, 6.0, -4.0, 1.0), (1, 2), 16
 #: Differences that a tile must have, and by how many times they exceed what deviations say if it matters.
 FEWEST, MATTERS = 40, 3.0
-#: Median of the absolute value of a normal deviate.
-MEDIAN = 0.6745
 
 
 @dataclass(frozen=True)
@@ -82,4 +82,4 @@ def _both(next_ones: float, second_ones: float) -> float:
 
 def _scale(differences: NDArray[np.float64]) -> float:
     known = differences[np.isfinite(differences)]
-    return float(np.median(np.abs(known))) / MEDIAN if known.size >= FEWEST else 1.0
+    return float(robust_std(known)) if known.size >= FEWEST else 1.0

@@ -18,6 +18,7 @@ from dsl_core.model.plan import ScanLines
 from dsl_core.model.rig import ProjectorResponse
 from dsl_core.optics.lines.profile import halo_of_line
 from dsl_core.reconstruction.light.line_levels import AROUND
+from dsl_core.solve.robust import robust_std
 
 Floats = NDArray[np.float64]
 
@@ -172,6 +173,6 @@ def _robust_fit(
         found = inverse @ right
         left = np.abs(values - found @ design) * np.sqrt(sure)
         if scaled:
-            usual = max(float(np.median(left)) / 0.6745, 1.0)
+            usual = max(float(robust_std(left)), 1.0)
         weight = sure * np.minimum(1, CLIP * usual / np.maximum(left, 1e-9))
     return found, np.sqrt(np.diag(inverse).clip(1e-30)), usual

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from dsl_core.model.plan import CapturePlan, NoSpectral, ScanLines
 from dsl_core.patterns.images import spectral_profiles
 from dsl_core.reconstruction.merge import PickedLines
+from dsl_core.solve.robust import robust_std
 from dsl_core.solve.thinned import thinned
 
 Floats = NDArray[np.float64]
@@ -118,9 +119,9 @@ def _solve(
         inverse = np.linalg.inv(matrix)
         needed = inverse @ (right + 1 / (spread**2 * mean))
         away = np.abs(frames @ needed - total) / np.sqrt(noise)
-        usual = max(float(np.median(away)) / 0.6745, 1e-9)
+        usual = max(float(robust_std(away)), 1e-9)
         weight = np.minimum(1, 2.5 * usual / np.maximum(away, 1e-9)) / noise
-    misfit = float(np.median(away * np.sqrt(noise) / total)) / 0.6745
+    misfit = float(robust_std(away * np.sqrt(noise) / total))
     deviation = np.sqrt(np.diag(inverse).clip(0)) * max(usual, 1.0) / mean
     return LineLevels(-np.log(needed.clip(1e-3)), deviation, misfit, quick)
 

@@ -13,6 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from dsl_core.solve.robust import robust_std
+
 Floats = NDArray[np.float64]
 
 #: How much likelier (chi-square) a step has to be than a steady change: at any shot, and at one of a few.
@@ -61,7 +63,7 @@ def date_of_step(change: Change, steps: Floats, stds: Floats, others: Collection
 def _covariance(more: Floats, stds: Floats) -> Floats:
     """That of differences whose neighbours share a frame, and its noise, and which scenes change as well."""
     noise = np.median(stds) ** 2
-    scene = max((float(np.median(np.abs(more))) / 0.6745) ** 2 - noise, LEAST_SCENE * noise)
+    scene = max(float(robust_std(more)) ** 2 - noise, LEAST_SCENE * noise)
     shared = -stds[1:] * stds[:-1] / 2
     return np.asarray(np.diag(stds**2 + scene) + np.diag(shared, 1) + np.diag(shared, -1))
 

@@ -137,7 +137,7 @@ def test_a_corner_is_judged_by_the_farthest_of_its_four_errors() -> None:
 
 def test_noise_is_robust_by_axis_and_never_nothing() -> None:
     residual = np.stack([np.linspace(-1, 1, 101), np.zeros(101)], 1)
-    assert _noise(residual) == pytest.approx([1.4826 * 0.5, 1e-4])
+    assert _noise(residual) == pytest.approx([1.482602 * 0.5, 1e-4])
 
 
 def test_parameters_scatter_by_what_their_covariance_says_with_its_margin() -> None:

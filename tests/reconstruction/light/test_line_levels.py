@@ -173,11 +173,11 @@ def test_levels_are_those_of_weighted_least_squares(strong: bool) -> None:
         whole += np.eye(count) / (spread * mean) ** 2
         levels = np.linalg.solve(whole, right + mean / (spread * mean) ** 2)
         away = np.abs(frames @ levels - total) / np.sqrt(noise)
-        usual = np.median(away) / 0.6745
+        usual = np.median(away) / 0.6744898
         weight = np.where(away > 2.5 * usual, 2.5 * usual / away, 1) / noise
     assert found.log == pytest.approx(-np.log(levels))
     assert found.std == pytest.approx(np.sqrt(np.diag(np.linalg.inv(whole))) * max(usual, 1) / mean)
-    assert found.misfit == pytest.approx(np.median(np.abs(frames @ levels / total - 1)) / 0.6745)
+    assert found.misfit == pytest.approx(np.median(np.abs(frames @ levels / total - 1)) / 0.6744898)
     assert found.quick == module._quick(smooth, smooth_std)
     assert (usual > 1) == strong
 

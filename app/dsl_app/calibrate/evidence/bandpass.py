@@ -6,7 +6,6 @@ import numpy as np
 
 from dsl_app.calibrate.evidence.base import Evidence, side_by_side, stacked
 from dsl_app.calibrate.evidence.charts import (
-    COVER,
     ChartBox,
     NamedCurve,
     channel_curves,
@@ -19,6 +18,7 @@ from dsl_app.shared.widgets.layouts import column_of
 from dsl_core.calibration.orders.efficiency import STANDS_OUT
 from dsl_core.model.calibration.bandpass import BandpassCalibration, FilterSample
 from dsl_core.model.spectral import SpectralCurve
+from dsl_core.solve.normal import BAND_95
 
 HEADS = (
     ("Requested, nm", "Nominal centre of the requested filter"),
@@ -111,15 +111,16 @@ def _row(each: FilterSample, warnings: tuple[str, ...]) -> list[Cell]:
 
 def _bound_of_seconds(record: BandpassCalibration) -> SpectralCurve:
     """What second orders stay below with a probability of 95 %."""
-    share = record.second_order_share + COVER * record.second_order_share_std
+    share = record.second_order_share + BAND_95 * record.second_order_share_std
     nm = np.array(record.efficiency[1].wavelengths_nm)
     return SpectralCurve.of(nm, share * np.maximum(*(record.efficiency[order].at(nm) for order in (1, -1))))
 
 
 def _second_orders(record: BandpassCalibration) -> str:
     share, std = 100 * record.second_order_share, 100 * record.second_order_share_std
+    most = share + BAND_95 * std
     return (
-        f"Second orders: {share:.2f} ± {std:.2f} % of the first, at most {share + COVER * std:.2f} % (95 %)."
+        f"Second orders: {share:.2f} ± {std:.2f} % of the first, at most {most:.2f} % (95 %)."
         f" Blur of the projector {with_spread(record.blur_px, record.blur_std_px)} px."
     )
 

@@ -24,6 +24,7 @@ from dsl_app.shared.widgets.layouts import column_of
 from dsl_app.shared.widgets.plots import RGB_COLOURS, CalmPlot
 from dsl_app.shared.widgets.spectrum_curve import SpectrumCurve
 from dsl_core.model.spectral import SpectralCurve
+from dsl_core.solve.normal import BAND_95
 
 Floats = NDArray[np.floating[Any]]
 #: A name of the legend with its colour (``#rrggbb``) and the sign that stands for it.
@@ -31,8 +32,6 @@ Key = tuple[str, str, str]
 LINE, DASHES, DOT, BAR = "━", "┅", "●", "■"
 #: Channels of the camera and LEDs of the projector, in order.
 CHANNELS = ("red", "green", "blue")
-#: Deviations on either side of a 95 % band.
-COVER = 1.96
 
 
 class ChartBox(QWidget):
@@ -203,7 +202,7 @@ def draw_points(
     known = np.isfinite(np.asarray(y))
     x, y, std = np.asarray(x)[known], np.asarray(y)[known], None if std is None else np.asarray(std)[known]
     if std is not None:
-        half = COVER * std
+        half = BAND_95 * std
         bars = pg.ErrorBarItem(x=x, y=y, height=2 * half, beam=0.0, pen=colour)
         box.item.addItem(bars)
     points = pg.ScatterPlotItem(x=x, y=y, size=size, symbol=symbol, brush=colour, pen=None)

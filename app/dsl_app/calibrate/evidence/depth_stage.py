@@ -11,7 +11,6 @@ from PySide6.QtWidgets import QWidget
 
 from dsl_app.calibrate.evidence.base import BackgroundReader, Evidence, side_by_side
 from dsl_app.calibrate.evidence.charts import (
-    COVER,
     DASHES,
     DOT,
     LINE,
@@ -31,6 +30,7 @@ from dsl_app.shared.widgets.layouts import boxed, column_of, tabs_of
 from dsl_core.campaign.depth_stage.figures import MAX_HELD_OUT_PX, MAX_STEP_MM
 from dsl_core.model.calibration.depth_stage import DepthStageCalibration
 from dsl_core.model.rig import Film
+from dsl_core.solve.normal import BAND_95
 
 if TYPE_CHECKING:
     from dsl_core.calibration.film.depth_stage import StageCurve
@@ -161,7 +161,7 @@ class DepthStageEvidence(Evidence[DepthStageCalibration]):
         std = np.array([position.step_std_mm for position in record.positions])
         draw_points(box, at, error, std, theme.pins[0])
         box.item.setXRange(at.min(), at.max(), padding=0.1)
-        range_about_zero(box, 1.2 * float((np.abs(error) + COVER * std).max()), MAX_STEP_MM, theme)
+        range_about_zero(box, 1.2 * float((np.abs(error) + BAND_95 * std).max()), MAX_STEP_MM, theme)
         pull = f"correction of the geometry by the planes {record.geometry_pull:.2f} standard deviations"
         box.name_curves((pull, theme.text, ""))
 

@@ -12,7 +12,6 @@ from dsl_app.calibrate.evidence.base import BackgroundReader, Evidence
 from dsl_app.calibrate.evidence.charts import (
     BAR,
     CHANNELS,
-    COVER,
     DASHES,
     DOT,
     LINE,
@@ -25,6 +24,7 @@ from dsl_app.calibrate.evidence.tables import with_spread
 from dsl_app.shared.widgets.plots import RGB_COLOURS
 from dsl_core.calibration.selftest.figures import BEAT_PERCENT, LINEARITY_PERCENT, RAMP_PERCENT
 from dsl_core.model.calibration.selftest import CycleCheck, SelfTest
+from dsl_core.solve.normal import BAND_95
 
 if TYPE_CHECKING:
     from dsl_core.calibration.selftest.record import SelfTestCurves
@@ -156,13 +156,13 @@ class SelfTestEvidence(Evidence[SelfTest]):
         box.item.addItem(
             pg.BarGraphItem(x=at, height=heights, width=0.55, brushes=brushes, pen=pg.mkPen(None))
         )
-        bars = pg.ErrorBarItem(x=at, y=heights, height=2 * COVER * std, beam=0.12, pen=theme.text)
+        bars = pg.ErrorBarItem(x=at, y=heights, height=2 * BAND_95 * std, beam=0.12, pen=theme.text)
         box.item.addItem(bars)
         level_line(box, BEAT_PERCENT, theme.bad, "limit")
         box.item.getAxis("bottom").setTicks(
             [[(i, f"{beat.exposure_ms:.1f}") for i, beat in enumerate(beats)]]
         )
-        top = max(float((heights + COVER * std).max()), 1.2 * BEAT_PERCENT)
+        top = max(float((heights + BAND_95 * std).max()), 1.2 * BEAT_PERCENT)
         box.item.setRange(xRange=(-0.6, len(beats) - 0.4), yRange=(0, 1.1 * top), padding=0)
         period = cycle.period_ms
         words = "steady light" if period is None else f"cycle of {with_spread(period.value, period.std)} ms"

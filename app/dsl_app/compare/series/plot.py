@@ -19,7 +19,7 @@ from dsl_app.shared.widgets.layouts import column_of
 from dsl_app.shared.widgets.plots import CalmPlot, ticks
 from dsl_core.evaluation.stage_test import StageLine, StageTest
 from dsl_core.evaluation.time_sweep import SweepPoint, best_points
-from dsl_core.evaluation.uncertainty import BAND_95
+from dsl_core.solve.normal import BAND_95
 
 #: Room around points, as a share of their range, and at least so many decades.
 ROOM, ROOM_DECADES = 0.12, 0.08

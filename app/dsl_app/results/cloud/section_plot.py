@@ -10,12 +10,11 @@ from PySide6.QtGui import QColor, QResizeEvent
 from dsl_app.shared.theme import DARK, Theme
 from dsl_app.shared.widgets.plots import CalmPlot
 from dsl_core.evaluation.shape import Section
+from dsl_core.solve.normal import BAND_95
 
 #: Height of the plot, in a low window, and from which on its axis has room for words, px.
 HEIGHT_PX, LEAST_PX, SPOKEN_PX = 150, 90, 130
 HEIGHT, UNIT = "Height (mm)", "mm"
-#: Deviations to either side of the band.
-BAND = 1.96
 
 
 class SectionPlot(CalmPlot):
@@ -57,7 +56,7 @@ class SectionPlot(CalmPlot):
     def show_section(self, cut: Section) -> None:
         """Show the curve of a section."""
         known = np.isfinite(cut.height_mm)
-        spread = BAND * np.where(np.isfinite(cut.std_mm), cut.std_mm, 0.0)
+        spread = BAND_95 * np.where(np.isfinite(cut.std_mm), cut.std_mm, 0.0)
         self.curve.setData(cut.along_mm, cut.height_mm)
         for side, limit in ((-1, self._low), (1, self._high)):
             limit.setData(cut.along_mm[known], (cut.height_mm + side * spread)[known])

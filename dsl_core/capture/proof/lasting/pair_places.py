@@ -15,6 +15,7 @@ from dsl_core.capture.proof.code.code_pairs import Pair
 from dsl_core.capture.proof.prediction import Lit
 from dsl_core.model.plan import BinaryCode
 from dsl_core.patterns.binary_code import binary_image
+from dsl_core.solve.robust import robust_std
 
 #: Columns by which an inverse may be off, and in deviations; clean scans of all scenes differ by a quarter.
 LEAST, SIGMAS = 0.3, 6.0
@@ -24,9 +25,8 @@ FEWEST = 2
 WIDTH = 2.0
 #: A pair says something where its place is known by so many columns.
 KNOWN = 0.1
-#: Light of a column rises by less than this away from edges, and so many such pixels say how noisy sums are;
-#: the median of what a normal distribution deviates by.
-FLAT, FEWEST_FLAT, NORMAL = 0.002, 60, 0.6745
+#: Light of a column rises by less than this away from edges; so many such pixels say how noisy sums are.
+FLAT, FEWEST_FLAT = 0.002, 60
 
 
 @dataclass(frozen=True)
@@ -70,7 +70,7 @@ def pair_places(
         flat = np.abs(slope) < FLAT
         if int(flat.sum()) >= FEWEST_FLAT:
             # Texture, and light that changed, count as noise does: as much as they do away from edges.
-            sigma = sigma * max(1.0, float(np.median(np.abs(apart[flat]) / sigma[flat])) / NORMAL)
+            sigma = sigma * max(1.0, float(robust_std(apart[flat] / sigma[flat])))
         weight = slope / sigma**2
         total = float(weight @ slope)
         if total <= 0:

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from dsl_core.capture.proof.noise import Noise
 from dsl_core.capture.proof.raster import Counts
-from dsl_core.optics.seen_noise import NORMAL
+from dsl_core.solve.normal import STD_OF_MEDIAN_SIZE
 from dsl_core.solve.ranks import median
 
 #: So many lines on end are asked, of the first ones after black.
@@ -45,7 +45,7 @@ class BrightBlack:
         lost -= max(median(lost), np.float32(0))
         lost /= np.sqrt(self._noise.variance(seen) + self._noise.variance(black))
         # Most pixels show noise alone: a camera that has more than it is said to have says so itself.
-        sigma = max(float(median(np.abs(lost - median(lost)))) / NORMAL, 1.0)
+        sigma = max(STD_OF_MEDIAN_SIZE * float(median(np.abs(lost - median(lost)))), 1.0)
         lines = self._lines.setdefault(setting, deque(maxlen=TOGETHER))
         lines.append(np.asarray(lost > SIGMAS * sigma))
         count = int(np.logical_and.reduce(lines).sum())

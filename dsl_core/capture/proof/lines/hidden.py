@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from dsl_core.capture.proof.noise import Noise
 from dsl_core.capture.proof.raster import Counts, Floats
 from dsl_core.capture.proof.recent import Recent
-from dsl_core.optics.seen_noise import NORMAL
+from dsl_core.solve.normal import STD_OF_MEDIAN_SIZE
 from dsl_core.solve.ranks import median
 
 #: A pixel is darker by so many deviations, and by this share of what the room gives it.
@@ -94,7 +94,7 @@ class HiddenParts:
         # A camera that has more noise than it is said to have says so itself, by pixels of one colour beside
         # each other: a shadow over half of the picture is no noise.
         step = np.abs(lost[2:] - lost[:-2]) / np.hypot(sigma[2:], sigma[:-2])
-        more = max(float(median(step)) / NORMAL, 1.0)
+        more = max(STD_OF_MEDIAN_SIZE * float(median(step)), 1.0)
         return self._darker(seen, black, max(median(lost), _NOTHING), more)
 
     def _sigma(self, seen: Counts, black: Counts) -> Floats:

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from dsl_core.capture.proof.noise import Noise
 from dsl_core.capture.proof.raster import Counts
-from dsl_core.optics.seen_noise import NORMAL
+from dsl_core.solve.robust import robust_std
 
 Bands = NDArray[np.float64]
 #: Parts of the height that are compared, coarse and fine, and lines that say what is usual. An eighth of a
@@ -85,7 +85,7 @@ class LineNeighbours:
         first, second = first - _of_most(first), second - _of_most(second)
         noise = np.sqrt(self._noise.variance(one) + self._noise.variance(other))
         step = first - second
-        sigma = max(float(np.median(np.abs(step / noise))) / NORMAL, 1.0)
+        sigma = max(float(robust_std(step / noise)), 1.0)
         lost = abs(float(step.sum()))
         is_dimmer = lost > FLICKER * max(abs(float(first.sum())), abs(float(second.sum())))
         is_dimmer &= lost > LIGHT_SIGMAS * sigma * float(np.sqrt((noise**2).sum()))
