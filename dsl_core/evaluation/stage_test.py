@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from dsl_core.errors import DecodeError
 from dsl_core.evaluation.depth import straightness_mm
+from dsl_core.evaluation.scatter import std_of_rms
 from dsl_core.evaluation.seen_target import SeenTarget
 from dsl_core.evaluation.verdict import Verdict, estimate_row
 
@@ -29,7 +30,9 @@ class StageLine:
     """Distances against positions as a straight line.
 
     ``offset_mm`` is distance minus position in the middle of the positions; ``deviations_mm`` are distances
-    minus the line, ``rms_mm`` and ``worst_mm`` their root mean square and largest size.
+    minus the line, ``rms_mm`` and ``worst_mm`` their root mean square and largest size. ``rms_std_mm`` is how
+    much the first would vary from one set of positions to another, ``worst_std_mm`` the deviation of the
+    distance that is worst.
     """
 
     scale: float
@@ -37,6 +40,8 @@ class StageLine:
     offset_mm: float
     offset_std_mm: float
     deviations_mm: tuple[float, ...]
+    rms_std_mm: float
+    worst_std_mm: float
 
     @property
     def rms_mm(self) -> float:
@@ -56,7 +61,8 @@ class StageTest:
     ``distances_mm`` are depths of the plane at one place next to the camera's axis, the same for all, with
     ``std_mm``. ``free`` is the line with its own slope, ``fixed`` the one with slope 1. ``pixel_rms_mm`` is
     the scatter of single pixels about their planes; ``patch_rms_mm`` the published figure: means of patches
-    about lines of their own, None where no patch is seen at all positions.
+    about lines of their own, None where no patch is seen at all positions. Both have a deviation by how
+    positions, or patches, differ in them.
     """
 
     positions_mm: tuple[float, ...]
@@ -67,6 +73,8 @@ class StageTest:
     pixel_rms_mm: float
     patch_rms_mm: float | None
     patches: int
+    pixel_rms_std_mm: float | None = None
+    patch_rms_std_mm: float | None = None
 
 
 def stage_test(positions_mm: Sequence[float], targets: Sequence[SeenTarget]) -> StageTest:
@@ -79,16 +87,19 @@ def stage_test(positions_mm: Sequence[float], targets: Sequence[SeenTarget]) -> 
     place = np.mean([target.middle_mm for target in targets], axis=0)
     found = [target.depth_at(float(place[0]), float(place[1])) for target in targets]
     at, distance, std = np.array(positions_mm), np.array([d for d, _ in found]), [s for _, s in found]
-    patch_rms, patches = _patch_straightness(positions_mm, targets)
+    of_patches = _patch_squares(positions_mm, targets)
+    of_pixels = [target.plane.rms_mm**2 for target in targets]
     return StageTest(
         tuple(map(float, positions_mm)),
         tuple(distance.tolist()),
         tuple(std),
         _line(at, distance, std, float(np.polyfit(at - at.mean(), distance, 1)[0]), known=2),
         _line(at, distance, std, 1.0, known=1),
-        float(np.sqrt(np.mean([target.plane.rms_mm**2 for target in targets]))),
-        patch_rms,
-        patches,
+        float(np.sqrt(np.mean(of_pixels))),
+        float(np.sqrt(np.mean(of_patches))) if of_patches else None,
+        len(of_patches),
+        std_of_rms(of_pixels),
+        std_of_rms(of_patches),
     )
 
 
@@ -127,33 +138,34 @@ def _line(at: Floats, distance: Floats, std: Sequence[float], scale: float, know
         offset_mm=float(distance.mean() - at.mean()),
         offset_std_mm=scatter / math.sqrt(len(at)),
         deviations_mm=tuple(off.tolist()),
+        # The sum of squares is distributed as chi squared, whose root is nearly normal.
+        rms_std_mm=scatter / math.sqrt(2 * len(at)),
+        worst_std_mm=float(std[int(np.abs(off).argmax())]),
     )
 
 
-def _patch_straightness(
-    positions_mm: Sequence[float], targets: Sequence[SeenTarget]
-) -> tuple[float | None, int]:
-    """Root mean square over patches that are seen at all positions, and how many those are."""
+def _patch_squares(positions_mm: Sequence[float], targets: Sequence[SeenTarget]) -> list[float]:
+    """Mean square off its own line of each patch that is seen at all positions, mm^2."""
     depths = np.stack([target.patches_mm.ravel() for target in targets])
     seen = depths[:, np.isfinite(depths).all(axis=0)].T
-    if not len(seen):
-        return None, 0
-    return float(np.sqrt(np.mean([straightness_mm(positions_mm, patch) ** 2 for patch in seen]))), len(seen)
+    return [straightness_mm(positions_mm, patch) ** 2 for patch in seen]
 
 
 def stage_table(found: StageTest) -> tuple[Verdict, ...]:
     """The figures as rows of a table."""
     free, fixed = found.free, found.fixed
     rows = [
-        Verdict("Straightness, slope free (RMS)", f"{free.rms_mm:.4f}", "mm"),
-        Verdict("Worst deviation, slope free", f"{free.worst_mm:.4f}", "mm"),
+        estimate_row("Straightness, slope free (RMS)", free.rms_mm, free.rms_std_mm, "mm", ".4f"),
+        estimate_row("Worst deviation, slope free", free.worst_mm, free.worst_std_mm, "mm", ".4f"),
         estimate_row("Slope of distance over position", free.scale, free.scale_std, "", ".5f"),
-        Verdict("Straightness, slope fixed to 1 (RMS)", f"{fixed.rms_mm:.4f}", "mm"),
-        Verdict("Worst deviation, slope fixed to 1", f"{fixed.worst_mm:.4f}", "mm"),
+        estimate_row("Straightness, slope fixed to 1 (RMS)", fixed.rms_mm, fixed.rms_std_mm, "mm", ".4f"),
+        estimate_row("Worst deviation, slope fixed to 1", fixed.worst_mm, fixed.worst_std_mm, "mm", ".4f"),
         estimate_row("Distance minus position", fixed.offset_mm, fixed.offset_std_mm, "mm", "+.4f"),
-        Verdict("Single pixels about their plane (RMS)", f"{found.pixel_rms_mm:.3f}", "mm"),
+        estimate_row(
+            "Single pixels about their plane (RMS)", found.pixel_rms_mm, found.pixel_rms_std_mm, "mm", ".3f"
+        ),
     ]
     if found.patch_rms_mm is not None:
         words = f"Means of {found.patches} patches (RMS, as published)"
-        rows.append(Verdict(words, f"{found.patch_rms_mm:.4f}", "mm"))
+        rows.append(estimate_row(words, found.patch_rms_mm, found.patch_rms_std_mm, "mm", ".4f"))
     return (*rows, Verdict("Positions", str(len(found.positions_mm))))

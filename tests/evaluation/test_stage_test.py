@@ -9,7 +9,7 @@ import pytest
 
 from dsl_core.errors import DecodeError
 from dsl_core.evaluation.seen_target import Region, SeenTarget, find_target
-from dsl_core.evaluation.stage_test import stage_table, stage_test
+from dsl_core.evaluation.stage_test import StageTest, stage_table, stage_test
 from tests.cases.stage_series import LEAN, SHAPE, flat_arrays
 
 POSITIONS = (695.2, 718.6, 742.1, 765.5, 788.9, 812.3, 835.8, 859.2)
@@ -68,9 +68,30 @@ def test_one_position_off_the_line_is_the_worst() -> None:
     assert int(np.argmax(np.abs(found.free.deviations_mm))) == 3
     assert found.free.worst_mm == pytest.approx(0.5, rel=0.25)
     rows = {row.figure: row for row in stage_table(found)}
-    assert rows["Worst deviation, slope free"].value == f"{found.free.worst_mm:.4f}"
+    worst = rows["Worst deviation, slope free"]
+    assert float(worst.value) == pytest.approx(found.free.worst_mm, abs=1e-4)
+    assert found.free.worst_std_mm == found.std_mm[3]
+    assert "±" in worst.words
     assert "±" in rows["Slope of distance over position"].words
     assert rows["Positions"].value == "8"
+
+
+def test_deviations_of_straightness_are_those_of_many_repeats() -> None:
+    def repeat(seed: int) -> StageTest:
+        rng = np.random.default_rng(seed)
+        off_mm = rng.normal(0.0, 0.3, len(POSITIONS))
+        targets = [
+            target(position + off, noise_mm=0.1, seed=100 * seed + i)
+            for i, (position, off) in enumerate(zip(POSITIONS, off_mm, strict=True))
+        ]
+        return stage_test(POSITIONS, targets)
+
+    found = [repeat(seed) for seed in range(30)]
+    for line in (lambda test: test.free, lambda test: test.fixed):
+        spread = np.std([line(test).rms_mm for test in found], ddof=1)
+        assert np.mean([line(test).rms_std_mm for test in found]) == pytest.approx(spread, rel=0.35)
+    pixels = np.std([test.pixel_rms_mm for test in found], ddof=1)
+    assert np.mean([test.pixel_rms_std_mm or 0.0 for test in found]) == pytest.approx(pixels, rel=0.5)
 
 
 def test_three_points_that_lie_straight_by_chance_are_no_surer_than_their_planes() -> None:

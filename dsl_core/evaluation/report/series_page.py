@@ -11,8 +11,9 @@ import numpy as np
 
 from dsl_core.evaluation.report.pages import render_page
 from dsl_core.evaluation.report.pictures import ReportPicture, figure_uri, value_picture
+from dsl_core.evaluation.scatter import with_std
 from dsl_core.evaluation.seen_target import SeenTarget
-from dsl_core.evaluation.stage_test import StageTest, stage_table
+from dsl_core.evaluation.stage_test import StageLine, StageTest, stage_table
 from dsl_core.evaluation.time_sweep import FIGURES, SweepFigure, SweepPoint, best_points
 from dsl_core.solve.normal import BAND_95
 
@@ -156,12 +157,16 @@ def _stage_plot(found: StageTest, axes: Axes) -> None:
     order = np.argsort(found.positions_mm)
     at, half = np.array(found.positions_mm)[order], BAND_95 * np.array(found.std_mm)[order]
     for line, key, words in (
-        (found.free, "free", f"slope free, RMS {found.free.rms_mm:.4f} mm"),
-        (found.fixed, "fixed", f"slope 1, RMS {found.fixed.rms_mm:.4f} mm"),
+        (found.free, "free", f"slope free, RMS {_rms(found.free)}"),
+        (found.fixed, "fixed", f"slope 1, RMS {_rms(found.fixed)}"),
     ):
         off = np.array(line.deviations_mm)[order]
         axes.errorbar(at, off, half, fmt="o-", ms=4, lw=0.8, capsize=2, color=_COLOURS[key], label=words)
     axes.axhline(0.0, color="gray", lw=0.8)
+
+
+def _rms(line: StageLine) -> str:
+    return f"{with_std(line.rms_mm, line.rms_std_mm, '.4f')} mm"
 
 
 def _sweep_plot(points: Sequence[SweepPoint], shown: SweepFigure, axes: Axes) -> None:

@@ -17,6 +17,7 @@ from dsl_app.shared.theme import DARK, Theme
 from dsl_app.shared.widgets.forms import label
 from dsl_app.shared.widgets.layouts import column_of
 from dsl_app.shared.widgets.plots import CalmPlot, ticks
+from dsl_core.evaluation.scatter import with_std
 from dsl_core.evaluation.stage_test import StageLine, StageTest
 from dsl_core.evaluation.time_sweep import SweepPoint, best_points
 from dsl_core.solve.normal import BAND_95
@@ -147,4 +148,8 @@ def _key(sign: str, colour: str) -> str:
 
 
 def _straight(line: StageLine) -> str:
-    return f"RMS {line.rms_mm:.4f} mm, worst {line.worst_mm:.4f} mm"
+    rms, worst = (
+        with_std(value, std, ".4f")
+        for value, std in ((line.rms_mm, line.rms_std_mm), (line.worst_mm, line.worst_std_mm))
+    )
+    return f"RMS {rms} mm, worst {worst} mm"
