@@ -11,6 +11,7 @@ from torch import Tensor
 
 from dsl_core.model.rig import Rig
 from dsl_core.optics.correspondence import CHUNK, GratingModel, chebyshev_nodes, interpolation_matrix, like
+from dsl_core.simulation.rendering.order_reach import may_reach
 from dsl_core.simulation.rendering.spectral_tables import NM, Slicing, SpectralTables
 
 #: Degree of the polynomial from column to wavelength; error below 0.01 nm over the film's range.
@@ -49,26 +50,28 @@ class OrderTables:
     ) -> OrderTables:
         """Tables of an order for pixels (P,), flat indices, at depths (P,), as far as they are ``lit``."""
         nodes = chebyshev_nodes(NM[0], NM[-1])
-        columns, rows = GratingModel(rig).exact(pixels, depth_mm, order, nodes)
+        near = may_reach(rig, order, pixels, depth_mm, lit, NM[[0, -1]])
+        columns, rows = GratingModel(rig).exact(pixels[near], depth_mm[near], order, nodes)
         w, h = rig.projector.width_px, rig.projector.height_px
         ends = like(interpolation_matrix(nodes, np.array([NM[0], NM.mean(), NM[-1]])), columns)
-        at_ends, rows_at_ends = ends @ columns, ends @ rows
+        at_ends = ends @ columns
         low, high = at_ends[[0, 2]].amin(0), at_ends[[0, 2]].amax(0)
-        active = torch.nonzero((high > -2) & (low < w + 1) & lit).ravel()
-        middle = at_ends[1, active]
-        spread = 1.02 * torch.maximum(high[active] - middle, middle - low[active])
-        dispersion = float((high - low)[active].median()) / (NM[-1] - NM[0]) if len(active) else 1.0
+        inside = torch.nonzero((high > -2) & (low < w + 1)).ravel()
+        columns, rows, low, high = columns[:, inside], rows[:, inside], low[inside], high[inside]
+        middle = at_ends[1, inside]
+        spread = 1.02 * torch.maximum(high - middle, middle - low)
+        dispersion = float((high - low).median()) / (NM[-1] - NM[0]) if len(inside) else 1.0
         sigma_nm = rig.projector_response.blur_px / dispersion
         return cls(
             order,
-            active,
-            columns[:, active],
-            rows[:, active],
+            near[inside],
+            columns,
+            rows,
             middle,
             spread,
-            _inverse(nodes, columns[:, active], middle, spread),
-            _row_limits(rows_at_ends[:, active], h),
-            (low[active], high[active]),
+            _inverse(nodes, columns, middle, spread),
+            _row_limits(ends @ rows, h),
+            (low, high),
             sigma_nm,
             SpectralTables.make(rig, order, reflectance, sigma_nm, slicing, pixels.device),
         )
