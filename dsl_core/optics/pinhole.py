@@ -24,6 +24,8 @@ FADE_RADIUS_SQ = 0.3
 GRID_POINTS = 17
 #: Pixels of a picture whose rays are all kept once they are known.
 KEPT_PX = 1 << 20
+#: Pixels whose rays are sought at once.
+BLOCK_PX = 1 << 14
 
 
 def distort(
@@ -81,10 +83,12 @@ def undistort(
 @lru_cache(maxsize=8)
 def pixel_rays(lens: Lens) -> NDArray[np.float64]:
     """Direction of every pixel's ray in camera coordinates with z = 1, shape (3, rows, columns)."""
-    columns, rows = np.meshgrid(
-        np.arange(lens.width_px, dtype=np.float64), np.arange(lens.height_px, dtype=np.float64)
-    )
-    rays = rays_at(lens, columns, rows)
+    rays = np.empty((3, lens.height_px, lens.width_px))
+    # In blocks that stay in the cache, a third of the time.
+    high = max(BLOCK_PX // lens.width_px, 1)
+    for top in range(0, lens.height_px, high):
+        rows = slice(top, min(top + high, lens.height_px))
+        rays[:, rows] = _rays_of(lens, rows)
     rays.setflags(write=False)
     return rays
 
@@ -93,6 +97,10 @@ def rays_in(lens: Lens, rows: slice, columns: slice = slice(None)) -> NDArray[np
     """The same of a part of the picture; only those of small pictures are computed once and kept."""
     if lens.width_px * lens.height_px <= KEPT_PX:
         return pixel_rays(lens)[:, rows, columns]
+    return _rays_of(lens, rows, columns)
+
+
+def _rays_of(lens: Lens, rows: slice, columns: slice = slice(None)) -> NDArray[np.float64]:
     across, down = np.meshgrid(
         np.arange(lens.width_px, dtype=np.float64)[columns], np.arange(lens.height_px, dtype=np.float64)[rows]
     )

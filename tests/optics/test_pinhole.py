@@ -7,7 +7,16 @@ import numpy as np
 import pytest
 
 from dsl_core.errors import CalibrationError
-from dsl_core.optics.pinhole import FADE_RADIUS_SQ, distort, max_radius_sq, pixel_rays, project, undistort
+from dsl_core.optics.pinhole import (
+    BLOCK_PX,
+    FADE_RADIUS_SQ,
+    distort,
+    max_radius_sq,
+    pixel_rays,
+    project,
+    rays_at,
+    undistort,
+)
 from dsl_core.simulation.published_rig import published_rig
 
 LENS = published_rig().camera
@@ -109,3 +118,11 @@ def test_any_corner_may_be_the_farthest(right: float, low: float) -> None:
     lens = LENS.model_copy(update={"distortion": (0.0,) * 5, **middle})
     x, y = 0.8 * (LENS.width_px - 1) / lens.fx_px, 0.7 * (LENS.height_px - 1) / lens.fy_px
     assert max_radius_sq(lens) == pytest.approx(1.21 * (x * x + y * y))
+
+
+def test_rays_of_a_picture_are_those_of_its_places_across_blocks() -> None:
+    lens = published_rig().camera.resized(200, 187)
+    assert 2 * BLOCK_PX < 200 * 187
+    assert 187 % (BLOCK_PX // 200) > 0
+    columns, rows = np.meshgrid(np.arange(200.0), np.arange(187.0))
+    np.testing.assert_allclose(pixel_rays(lens), rays_at(lens, columns, rows), rtol=0, atol=1e-11)
