@@ -2,7 +2,8 @@
 """Set up dsl-scan in a virtual environment and run it; needs only Python 3.11 to 3.14 and a network.
 
 python3 packaging/run.py demo [...]       a scan on the digital twin, from patterns to a report
-python3 packaging/run.py test [...]       all checks and tests; the rest goes to pytest (-n 0: one process)
+python3 packaging/run.py test [...]       all checks, and the tests but slow ones; what follows goes to pytest
+python3 packaging/run.py test all         the same with the slow tests, as before a release
 python3 packaging/run.py test quick       what breaks most often, in a minute and a half
 python3 packaging/run.py dsl-scan [...]   the command line of the project
 python3 packaging/run.py shell            a shell inside the environment
@@ -76,8 +77,10 @@ QUICK = (
     ),
     *("tests/io", "tests/model", "tests/optics", "tests/packaging_script", "tests/patterns", "tests/solve"),
 )
+#: One test in ten takes two thirds of the time: whole scans and calibrations, and hours at the window.
+NOT_SLOW = ("-m", "not slow")
 #: Seconds on two cores, said before a computer's own first run is known.
-USUAL_S = {"test": 700, "test quick": 90}
+USUAL_S = {"test": 600, "test all": 1500, "test quick": 90}
 TIMES = "dsl-scan-times.json"
 #: The longest that one check, or all tests, may take: what hangs must not keep a server for a day.
 LIMIT_S = 3600.0
@@ -336,14 +339,23 @@ def remember_s(venv: Path, what: str, seconds: float) -> None:
         (venv / TIMES).write_text(json.dumps(times))
 
 
+def chosen_tests(arguments: Sequence[str]) -> tuple[str, list[str]]:
+    """Which set of tests is asked for, empty for one of the person's own, and what pytest is told of it."""
+    sets = {"quick": (*NOT_SLOW, *QUICK), "all": ()}
+    if not arguments:
+        return "test", list(NOT_SLOW)
+    if arguments[0] in sets:
+        return f"test {arguments[0]}", [*sets[arguments[0]], *arguments[1:]]
+    return "", list(arguments)
+
+
 def test(venv: Path, arguments: Sequence[str]) -> int:
     """Run every check and the tests; the first exit code that is not zero is the answer."""
     # Tests start many processes. What they import is compiled once, and kept with the environment.
     variables = venv_variables(venv) | {"PYTHONPYCACHEPREFIX": str(venv / "bytecode")}
     variables.pop("PYTHONDONTWRITEBYTECODE", None)
-    what = "test quick" if arguments[:1] == ["quick"] else "test"
-    chosen = [*QUICK, *arguments[1:]] if what == "test quick" else list(arguments)
-    if not arguments or what == "test quick":
+    what, chosen = chosen_tests(arguments)
+    if what:
         say(f"{what} takes about {max(1, round(expected_s(venv, what) / 60))} min on this computer")
     results: list[tuple[str, int, float]] = []
 
@@ -362,7 +374,7 @@ def test(venv: Path, arguments: Sequence[str]) -> int:
     for name, code, seconds in results:
         say(f"{name:17s} {'passed' if code == 0 else f'FAILED ({code})':11s} {seconds:6.1f} s")
     worst = next((code for _, code, _ in results if code != 0), 0)
-    if worst == 0 and (not arguments or what == "test quick"):
+    if worst == 0 and what:
         remember_s(venv, what, sum(seconds for _, _, seconds in results))
     return worst
 

@@ -10,6 +10,7 @@ MEAN = 0.3 + 0.001 * (NM - 430) - 4e-6 * (NM - 545) ** 2 - 0.1 * np.exp(-0.5 * (
 STD = np.full(len(NM), 0.004)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("transform", list(Transform))
 def test_deviations_are_those_of_repeated_measurements(transform: Transform) -> None:
     rng = np.random.default_rng(1)

@@ -134,6 +134,7 @@ def test_two_spectra_differ_where_their_deviations_do_not_explain_it(result: xr.
         one.dsl.difference(other.assign_coords(wavelength_nm=other["wavelength_nm"] + 1))
 
 
+@pytest.mark.slow
 def test_what_a_plan_will_reach_is_predicted_without_a_capture() -> None:
     with dsl.open_rig("twin", size="112x72") as rig:
         plan = dsl.plan(rig, "preview")
@@ -188,6 +189,7 @@ def test_a_plot_shows_the_band(result: xr.Dataset) -> None:
         result.dsl.plot()
 
 
+@pytest.mark.slow
 def test_part_of_a_picture_is_solved_again_with_other_bands(scan: ScanReader, result: xr.Dataset) -> None:
     again = dsl.reconstruct(scan, region_px=(24, 18, 12, 8))
     part = result.sel(x=slice(24, 35), y=slice(18, 25))

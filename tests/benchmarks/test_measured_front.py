@@ -57,6 +57,7 @@ def test_a_plan_is_named_only_when_it_is_as_accurate_as_the_published_one() -> N
     assert found.named(64, "nearest-line") is None
 
 
+@pytest.mark.slow
 def test_the_page_names_the_baselines_and_what_failed(tmp_path: Path) -> None:
     found = Comparison.of("chart", POINTS, "published")
     page = write_measured_report([found], tmp_path / "front.html").read_text(encoding="utf-8")

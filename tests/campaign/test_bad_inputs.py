@@ -16,6 +16,7 @@ from .conftest import Calibrated
 pytestmark = pytest.mark.timeout(600)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("case", [case for case in CASES if case.quick], ids=lambda case: case.name)
 def test_it_is_told_and_leaves_the_rest(
     case: BadInput, calibrated: Calibrated, untouched: dict[str, bytes], tmp_path: Path

@@ -89,6 +89,7 @@ def test_saturated_white_gets_advice_for_a_shot_without_settings_to_lower(
     assert "plan's settings" not in str(found.value)
 
 
+@pytest.mark.slow
 def test_the_light_is_compared_with_a_spectralon(shot: tuple[Rig, MemoryScan]) -> None:
     """The plane of the twin is one."""
     rig, scan = shot

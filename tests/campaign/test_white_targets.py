@@ -101,6 +101,7 @@ def test_spectralon_is_applied_once_and_for_all(module_folder: Path) -> None:
     np.testing.assert_allclose(again.response[0].values, rig.response[0].values, rtol=1e-9)
 
 
+@pytest.mark.slow
 def test_color_checker_refines_what_the_spectralon_left(module_folder: Path) -> None:
     _, start, _ = spectralon(1, module_folder / "spectralon-1")
     # Upside down, as a person might place it.

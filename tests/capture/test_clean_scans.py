@@ -18,6 +18,7 @@ from dsl_core.pipeline import scan
 from dsl_core.simulation.sim_devices import open_twin
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("preset", ["preview", "comb", "coarse"])
 def test_every_picture_of_a_white_wall_shows_its_pattern(preset: str, tmp_path: Path) -> None:
     plan = preset_plan(preset)
@@ -49,6 +50,7 @@ def test_light_that_no_frame_shows_any_more_is_kept_with_the_scan(
     assert found.doubts == ("The light has settled.",)
 
 
+@pytest.mark.slow
 def test_a_small_object_before_nothing_shows_its_patterns(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -68,6 +70,7 @@ def test_a_small_object_before_nothing_shows_its_patterns(
     assert scan(rig, fit_plan(plan, rig), tmp_path / "scan.dsl").corrected == 0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("preset", ["preview", "coarse"])
 def test_a_camera_with_three_times_the_noise_stated_shows_its_patterns(
     preset: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch

@@ -26,6 +26,7 @@ def blocks(path: Path, language: str = "python") -> list[str]:
     return re.findall(rf"```{language}\n(.*?)```", path.read_text(encoding="utf-8"), re.DOTALL)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["many_scans", "read_spectra"])
 def test_a_notebook_runs_as_written(
     name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]

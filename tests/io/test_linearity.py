@@ -56,6 +56,7 @@ def test_verdicts_are_sentences_with_their_figures(
     assert found.sentence.endswith(ends)
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not CAPTURES.is_dir(), reason="the real captures of others are not here")
 @pytest.mark.parametrize(("power", "verdict"), [(1.0, "linear"), (1 / 2.2, "srgb")])
 def test_real_pictures_are_linear_until_they_are_encoded(tmp_path: Path, power: float, verdict: str) -> None:

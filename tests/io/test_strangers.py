@@ -32,6 +32,7 @@ from tests.cases.strangers import SAMPLES, Change, Sample, changed, changes
 SLOW = ("scan", "result", "dataset")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("sample", [*SAMPLES, *MORE], ids=lambda sample: sample.name)
 def test_a_changed_file_is_read_or_refused(sample: Sample, tmp_path: Path) -> None:
     sample.make(tmp_path)

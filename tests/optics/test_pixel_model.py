@@ -159,6 +159,7 @@ def test_the_pixel_has_bands_just_inside_and_just_outside_the_margin(readers: Re
     assert ((beyond > EDGE_PX) & (beyond < EDGE_PX + 2)).any(), beyond
 
 
+@pytest.mark.slow
 def test_solver_prediction_and_graph_expect_the_same_frames(readers: Readers) -> None:
     solver, virtual = readers.solver(), readers.virtual()
     nodes = torch.as_tensor(spectrum(solver.bands.centres_nm))

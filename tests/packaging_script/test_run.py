@@ -82,6 +82,14 @@ def test_tests_say_how_long_they_take_here(tmp_path: Path) -> None:
     assert run.expected_s(tmp_path, "test") == run.USUAL_S["test"]
 
 
+def test_slow_tests_are_left_out_unless_all_are_asked_for() -> None:
+    assert run.chosen_tests([]) == ("test", ["-m", "not slow"])
+    assert run.chosen_tests(["all", "-x"]) == ("test all", ["-x"])
+    assert run.chosen_tests(["quick"]) == ("test quick", ["-m", "not slow", *run.QUICK])
+    assert run.chosen_tests(["tests/optics", "-n", "0"]) == ("", ["tests/optics", "-n", "0"])
+    assert all(what in run.USUAL_S for what in ("test", "test all", "test quick"))
+
+
 def test_what_is_quick_is_there() -> None:
     assert all((run.ROOT / path).exists() for path in run.QUICK)
     assert (run.ROOT / run.FIRST_USE[1].replace(".", "/")).with_suffix(".py").exists()
@@ -154,6 +162,7 @@ def test_a_folder_that_is_no_environment_is_left_alone(tmp_path: Path) -> None:
     assert precious.read_text() == "years of work"
 
 
+@pytest.mark.slow
 def test_an_environment_whose_making_was_broken_off_gets_its_pip(tmp_path: Path) -> None:
     venv = tmp_path / "venv"
     subprocess.run([sys.executable, "-m", "venv", "--without-pip", str(venv)], check=True)

@@ -62,6 +62,7 @@ def test_a_budget_that_is_no_time_is_refused(text: str) -> None:
         parse_seconds(text)
 
 
+@pytest.mark.slow
 def test_real_plans_are_weighed_and_written(tmp_path: Path) -> None:
     rig = published_rig()
     quick = sorted(candidate_plans(rig), key=lambda plan: plan.duration_s(50))[:3]
@@ -137,6 +138,7 @@ def test_the_commands_write_no_plan_that_the_rig_refuses(
     assert not (tmp_path / "set.json").exists()
 
 
+@pytest.mark.slow
 def test_a_designed_plan_has_the_size_of_the_rig(tmp_path: Path) -> None:
     path = tmp_path / "plan.json"
     command = ["design", str(tmp_path / "set.json"), "--frames", "8", "--orders", "1", "-O", "size=112x72"]

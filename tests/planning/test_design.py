@@ -50,6 +50,7 @@ def test_lines_that_cannot_keep_apart_are_refused() -> None:
             design(published_rig(), PLAN, frames)
 
 
+@pytest.mark.slow
 def test_a_design_is_expected_to_beat_the_best_comb_and_is_the_same_again(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:

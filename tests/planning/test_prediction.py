@@ -29,6 +29,7 @@ def figures(spectral: ScanLines | LineComb, *settings: Setting) -> Prediction:
     return predict(rig, plan(spectral, *settings), plane_samples(rig, grid=(4, 2)), latency_ms=50)
 
 
+@pytest.mark.slow
 def test_less_light_and_fewer_lines_cost_accuracy() -> None:
     fine, coarse = figures(ScanLines(step_px=4)), figures(ScanLines(width_px=16, step_px=8))
     dim = figures(ScanLines(step_px=4), Setting(exposure_ms=1000 / 60, level=0.4))
@@ -40,6 +41,7 @@ def test_less_light_and_fewer_lines_cost_accuracy() -> None:
     assert fine.depth_std_mm < coarse.depth_std_mm
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("preset", PRESETS, ids=lambda preset: preset.key)
 def test_every_preset_has_an_error_that_is_a_number(preset: Preset) -> None:
     # A single long setting saturates, so that columns stay unrefined and their amplitudes unknown.
@@ -49,6 +51,7 @@ def test_every_preset_has_an_error_that_is_a_number(preset: Preset) -> None:
     assert 0 < found.depth_std_mm < 10
 
 
+@pytest.mark.slow
 def test_predictions_are_for_the_depths_that_the_rig_is_for() -> None:
     near = published_rig()
     assert near.usual_depth_mm == 700
@@ -73,6 +76,7 @@ def test_a_plan_without_patterns_or_code_is_refused() -> None:
             predict(rig, CapturePlan().model_copy(update=update))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("spectral", [ScanLines(step_px=4), LineComb(width_px=5, step_px=4, period_px=104)])
 def test_the_twin_agrees(spectral: ScanLines | LineComb) -> None:
     """The comb leaves columns unrefined, which puts the zero order where the model does not expect it."""

@@ -25,6 +25,7 @@ def twin() -> Rig:
         return devices.calibration
 
 
+@pytest.mark.slow
 def test_shipped_predictions_are_what_is_predicted_now(twin: Rig, tmp_path: Path) -> None:
     store = PredictionStore(tmp_path, twin, 50.0)
     plans = sorted(shipped_plans(twin), key=lambda plan: plan.shot_count)
@@ -64,6 +65,7 @@ def test_predictions_without_peaks_serve_where_none_are_asked_for(twin: Rig, tmp
     assert found.fwhm_nm is None
 
 
+@pytest.mark.slow
 def test_a_budget_on_the_twin_is_answered_without_torch(tmp_path: Path) -> None:
     code = (
         "import sys; from dsl_core.cli import main;"

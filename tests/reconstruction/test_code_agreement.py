@@ -75,6 +75,7 @@ def held(evaluation: Evaluation) -> float:
     return evaluation.depth_calibration.coverage_95
 
 
+@pytest.mark.slow
 def test_nothing_is_found_where_all_is_as_calibrated(scanned: tuple[DeviceRig, MemoryScan]) -> None:
     found, _ = findings(scanned, calibration_of(scanned[0]), scanned[1])
     assert found["rows"].value < 0.02
@@ -82,6 +83,7 @@ def test_nothing_is_found_where_all_is_as_calibrated(scanned: tuple[DeviceRig, M
     assert not any(each.significant for each in found.values())
 
 
+@pytest.mark.slow
 def test_a_projector_turned_since_calibration_is_told_and_depth_says_how_unsure_it_is(
     scanned: tuple[DeviceRig, MemoryScan],
 ) -> None:
@@ -93,6 +95,7 @@ def test_a_projector_turned_since_calibration_is_told_and_depth_says_how_unsure_
     assert held(evaluation) > 0.9
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("columns", [-2, 1])
 def test_a_picture_displaced_by_whole_columns_is_told_from_other_lenses(
     scanned: tuple[DeviceRig, MemoryScan], columns: int
@@ -114,6 +117,7 @@ def test_rows_are_displaced_by_whole_columns_if_these_explain_all_of_them() -> N
     assert whole_columns(2 * slope, std, 0 * slope) == 0
 
 
+@pytest.mark.slow
 def test_lines_that_lie_beside_the_code_everywhere_are_told(scanned: tuple[DeviceRig, MemoryScan]) -> None:
     devices, scan = scanned
     lines = [shot.index for shot in scan.plan.shots() if shot.role == "spectral"]

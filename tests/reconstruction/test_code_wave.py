@@ -169,6 +169,7 @@ def test_widths_that_differ_over_the_picture_are_doubted() -> None:
     assert unknown is before
 
 
+@pytest.mark.slow
 def test_a_scan_with_wider_lines_says_so_and_follows_them() -> None:
     devices = open_twin({"size": "64x44", "foreign": "blur", "scene": "plane"})
     plan = preset_plan("coarse")

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
 from dsl_core import pipeline
 from dsl_core.model.plan import CapturePlan, GrayCode, ScanLines
@@ -39,6 +40,7 @@ def relative_reflectance(rig: Rig, frames: MemoryScan, as_calibrated: bool = Fal
     return np.asarray(result["reflectance"].values[3:-3].mean(0) / REFLECTANCE)
 
 
+@pytest.mark.slow
 def test_the_true_calibration_leaves_no_vignetting() -> None:
     rig, frames = scan(vignetting=True)
     known = relative_reflectance(rig, frames)

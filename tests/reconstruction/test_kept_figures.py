@@ -8,6 +8,7 @@ from tests.cases.kept_figures import changes, read_kept
 from tests.reconstruction.kept_figures import SCANS, figures, kept_file, slack
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("scan", SCANS)
 def test_a_reconstruction_finds_what_it_found(scan: str) -> None:
     before = read_kept(kept_file(scan))

@@ -26,6 +26,7 @@ def monochrome_rig() -> Rig:
     return known.model_copy(update={"sensor": sensor, "response": (even, even, even)})
 
 
+@pytest.mark.slow
 def test_depth_and_spectra_come_from_brightness_alone(monkeypatch: pytest.MonkeyPatch) -> None:
     rig = monochrome_rig()
     monkeypatch.setattr(sim_devices, "published_rig", lambda: rig)

@@ -16,6 +16,7 @@ PLAN = CapturePlan(
 )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("lines_per_mm", "columns"), [(500, 640), (300, 640), (480, 320)])
 def test_a_chart_keeps_its_colours(lines_per_mm: float, columns: int) -> None:
     rig = published_rig()

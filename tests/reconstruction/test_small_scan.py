@@ -55,6 +55,7 @@ def evaluate(scanned: tuple[DeviceRig, MemoryScan], cube: NDArray[np.float32]) -
     return pipeline.evaluate(build_result({"reflectance": cube}, GRID.centres_nm, {}), truth)
 
 
+@pytest.mark.slow
 def test_light_outside_the_bands_asked_for_is_not_blamed_on_the_rig(
     scanned: tuple[DeviceRig, MemoryScan],
 ) -> None:
@@ -68,6 +69,7 @@ def test_light_outside_the_bands_asked_for_is_not_blamed_on_the_rig(
     assert pipeline.evaluate(result, truth).mean("rmse") < 0.012
 
 
+@pytest.mark.slow
 def test_both_correspondence_models_give_the_same_spectra(scanned: tuple[DeviceRig, MemoryScan]) -> None:
     devices, scan = scanned
     assert devices.calibration is not None
@@ -85,6 +87,7 @@ def test_both_correspondence_models_give_the_same_spectra(scanned: tuple[DeviceR
     assert all(fit is not None and 0 < fit.model_share < 0.2 for fit in fits)
 
 
+@pytest.mark.slow
 def test_a_cancel_while_columns_are_refined_leaves_the_other_chunks(
     scanned: tuple[DeviceRig, MemoryScan], monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -106,6 +109,7 @@ def test_a_cancel_while_columns_are_refined_leaves_the_other_chunks(
     assert 0 < len(begun) < 8064 // 100
 
 
+@pytest.mark.slow
 def test_published_objective_is_close_and_the_banded_solver_closer(
     scanned: tuple[DeviceRig, MemoryScan],
 ) -> None:
@@ -126,6 +130,7 @@ def test_published_objective_is_close_and_the_banded_solver_closer(
     assert ours.mean("rmse") < theirs.mean("rmse")
 
 
+@pytest.mark.slow
 def test_where_no_line_reaches_a_band_the_colour_of_the_zero_order_narrows_it_down() -> None:
     plan = CapturePlan(code=GrayCode(rows=False), spectral=ScanLines(width_px=5, step_px=4))
     devices, scan = twin_scan(plan, size="112x72", scene="plane")
@@ -156,6 +161,7 @@ def test_published_objective_refuses_several_lines_a_frame(scanned: tuple[Device
         PublishedReconstruction(rig, plan, GRID, correspondence(rig), stack.radiance, stack.std, pixels)
 
 
+@pytest.mark.slow
 def test_calibration_widens_the_deviation_and_nothing_else(scanned: tuple[DeviceRig, MemoryScan]) -> None:
     devices, scan = scanned
     rig = devices.calibration
@@ -171,6 +177,7 @@ def test_calibration_widens_the_deviation_and_nothing_else(scanned: tuple[Device
     assert np.nanmedian(wide["reflectance_std"].values - sure["reflectance_std"].values) > 0
 
 
+@pytest.mark.slow
 def test_pixels_at_the_edge_of_a_patch_have_the_spectrum_of_their_own_side(
     scanned: tuple[DeviceRig, MemoryScan],
 ) -> None:
@@ -194,6 +201,7 @@ def test_pixels_at_the_edge_of_a_patch_have_the_spectrum_of_their_own_side(
     assert (found.chi_square[1:-1, 1:-1][at_edge] > 2).mean() < 0.4
 
 
+@pytest.mark.slow
 def test_combs_fit_where_neighbouring_pixels_are_several_columns_apart() -> None:
     plan = CapturePlan(code=GrayCode(rows=False), spectral=LineComb(width_px=5, step_px=4, period_px=80))
     devices, scan = twin_scan(plan, size="112x72", scene="color-checker")

@@ -204,6 +204,7 @@ def test_a_chart_can_hang_upside_down() -> None:
     assert world.truth.materials.names[upright[14, 22]] == world.truth.materials.names[turned[43, 66]]
 
 
+@pytest.mark.slow
 def test_a_board_can_be_elsewhere_larger_or_missing() -> None:
     asked = Placement(target="board", film=False, options={"square_mm": 20.0, "x_mm": 6.0, "depth_mm": 700.0})
     worlds = {}

@@ -33,6 +33,7 @@ def draw(seed: int, noise: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return truth, design, design @ truth + noise * rng.standard_normal(60)
 
 
+@pytest.mark.slow
 def test_function_is_found_within_its_stated_deviation() -> None:
     sigmas = []
     for seed in range(8):

@@ -80,6 +80,7 @@ def test_the_reference_is_exact() -> None:
     assert found == pytest.approx(exact, rel=1e-15)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("dtype", [torch.float32, torch.float64])
 def test_the_solver_agrees_with_exact_arithmetic(dtype: torch.dtype) -> None:
     found = exactness(400, 11, dtype)

@@ -59,6 +59,7 @@ def make_fluorescent(rig: DeviceRig) -> None:
     world.rate = rate  # type: ignore[method-assign]
 
 
+@pytest.mark.slow
 def test_fluorescence_is_flagged_and_its_error_is_within_the_band(tmp_path: Path) -> None:
     plan = next(preset.plan for preset in PRESETS if preset.key == "coarse")
     with open_rig("twin", {"size": "112x72", "scene": "color-checker", "seed": "3"}) as rig:

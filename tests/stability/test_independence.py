@@ -40,6 +40,7 @@ def _off(one: xr.Dataset, other: xr.Dataset) -> float:
     return float((difference / one["reflectance_std"].values).max())
 
 
+@pytest.mark.slow
 def test_threads_change_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(spectra, "TILE", (4, 6))
     one, four = (_stage().finish(torch.float32, threads=count) for count in (1, 4))
@@ -47,6 +48,7 @@ def test_threads_change_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
         np.testing.assert_array_equal(one[name].values, four[name].values)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("tile", [(2, 2), (4, 6), (6, 20)])
 def test_tiles_of_any_size_agree(monkeypatch: pytest.MonkeyPatch, tile: tuple[int, int]) -> None:
     whole = _usual(torch.float64)

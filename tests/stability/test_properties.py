@@ -56,6 +56,7 @@ def planted(stage: Staged, place: str, value: float, share: float, seed: int) ->
     return replace(stage, stack=stack, white=white)
 
 
+@pytest.mark.slow
 @PROFILE
 @given(
     comb=st.booleans(),
@@ -115,6 +116,7 @@ def _usual() -> xr.Dataset:
     return _stage(False).finish(torch.float64)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("factor", [-20, -3, 8, 20])
 def test_powers_of_two_change_nothing(factor: int) -> None:
     """Signal and deviation in another unit: the same spectra and flags."""
@@ -133,6 +135,7 @@ def test_powers_of_two_change_nothing(factor: int) -> None:
     assert np.array_equal(other["flags"].values, same["flags"].values)
 
 
+@pytest.mark.slow
 def test_the_property_sees_what_is_silent() -> None:
     result = _stage(False).finish(torch.float32)
     assert silent_values(result) == []

@@ -11,7 +11,11 @@ from tests.stability.catalogue import PARTS
 from tests.stability.table import as_wanted
 
 CASES = [
-    pytest.param(case, precision, id=f"{part}: {case.name}, {precision}")
+    pytest.param(
+        *(case, precision),
+        id=f"{part}: {case.name}, {precision}",
+        marks=[pytest.mark.slow] if part == "whole scans" else [],
+    )
     for part, cases in PARTS.items()
     for case in cases
     for precision in PRECISIONS

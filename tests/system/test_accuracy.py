@@ -128,6 +128,7 @@ def test_noise_model_explains_what_the_spectra_leave(maps: SpectralMaps) -> None
     assert 0.8 <= float(np.median(maps.chi_square[solved])) <= 1.3
 
 
+@pytest.mark.slow
 def test_half_as_many_bands(chart: Scanned) -> None:
     grid = WavelengthGrid(step_nm=10.0)
     devices = cropped_twin("color-checker", CHART)
@@ -138,6 +139,7 @@ def test_half_as_many_bands(chart: Scanned) -> None:
     require_chart(pipeline.evaluate(result, truth), 0.01)
 
 
+@pytest.mark.slow
 def test_filter_keeps_its_width() -> None:
     scanned = scan("filters", FILTER, COLUMNS_ONLY)
     (patch,) = pipeline.evaluate(scanned.reconstruct(), scanned.truth).patches
@@ -146,6 +148,7 @@ def test_filter_keeps_its_width() -> None:
     assert abs(patch.peak.centre_nm - 475.0) < 1.0
 
 
+@pytest.mark.slow
 def test_comb_of_53_frames_through_the_dense_solver() -> None:
     plan = CapturePlan(spectral=LineComb(width_px=5, step_px=2, period_px=106))
     assert plan.spectral_count == 53
@@ -156,6 +159,7 @@ def test_comb_of_53_frames_through_the_dense_solver() -> None:
     require_depth(evaluation)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("step_px", [1, 4])
 def test_lines_of_another_step(step_px: int) -> None:
     plan = CapturePlan(code=GrayCode(rows=False), spectral=ScanLines(step_px=step_px))
@@ -163,6 +167,7 @@ def test_lines_of_another_step(step_px: int) -> None:
     require_chart(pipeline.evaluate(scanned.reconstruct(), scanned.truth), 0.01)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("step_px", [1, 4])
 def test_bright_frames_of_a_coarse_camera_are_solved(step_px: int) -> None:
     """The data weigh so much more than the prior that any indefinite part of their matrix would show."""
@@ -179,6 +184,7 @@ def test_bright_frames_of_a_coarse_camera_are_solved(step_px: int) -> None:
     assert np.isfinite(result["reflectance"].values).all(0).mean() > 0.4
 
 
+@pytest.mark.slow
 def test_pixels_of_the_order_gap_keep_a_spectrum() -> None:
     scanned = scan("leaves", GAP, COLUMNS_ONLY)
     result = scanned.reconstruct()
@@ -203,6 +209,7 @@ def test_pixels_of_the_order_gap_keep_a_spectrum() -> None:
     assert std.mean() > 0.1
 
 
+@pytest.mark.slow
 def test_threads_do_not_change_the_spectra(chart: Scanned, maps: SpectralMaps) -> None:
     again = solve(chart, threads=2)
     for name, one in vars(maps).items():
@@ -210,6 +217,7 @@ def test_threads_do_not_change_the_spectra(chart: Scanned, maps: SpectralMaps) -
             np.testing.assert_array_equal(one, getattr(again, name), err_msg=name)
 
 
+@pytest.mark.slow
 def test_tiles_do_not_change_the_spectra(
     chart: Scanned, maps: SpectralMaps, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -242,6 +250,7 @@ class Island:
         return next(s for s in self.plan.shots() if s.role == "black" and s.setting == setting)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("size_px", [2, 20])
 def test_nothing_is_missing_without_a_reason(chart: Scanned, size_px: int) -> None:
     square = slice(20, 20 + size_px), slice(4, 4 + size_px)

@@ -94,6 +94,7 @@ def test_damaged_frames(give: Give, scan_copy: Path, damage: Damage, sentence: s
     assert not scan_copy.with_suffix(".zarr").exists()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("damage", "says"),
     [
@@ -188,6 +189,7 @@ def test_frames_that_show_nothing(
     assert sentence in ending.sentence
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("command", "sentence"),
     [
@@ -312,6 +314,7 @@ def test_a_disk_that_is_too_small_is_told_before_the_scan(
     assert not (tmp_path / "a.dsl").exists()
 
 
+@pytest.mark.slow
 def test_a_disk_that_fills_up_loses_nothing(
     give: Give, tmp_path: Path, finished: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -336,6 +339,7 @@ def test_a_disk_that_fills_up_loses_nothing(
         np.testing.assert_array_equal(mended.read(shot), sound.read(shot))
 
 
+@pytest.mark.slow
 def test_a_full_disk_while_the_result_is_saved(
     give: Give, tmp_path: Path, finished: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -27,6 +27,7 @@ REAL = SHARED / "data" / "procam_checkerboard" / "half_res"
 SMALL = ["--pictures", "--board", "5x4", "--square-mm", 30, "--projector", "128x96"]
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not REAL.is_dir(), reason=f"the real captures are not in {REAL}")
 def test_real_captures(give: Give, tmp_path: Path) -> None:
     """Published tools reach 0.40 px and 0.43 mm with the pictures at full resolution."""
@@ -53,6 +54,7 @@ def test_real_captures(give: Give, tmp_path: Path) -> None:
     assert stereo.camera.fx_px == pytest.approx(found.camera.fx_px)
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not REAL.is_dir(), reason=f"the real captures are not in {REAL}")
 def test_a_real_pose_without_a_board_is_left_out_and_said(give: Give, tmp_path: Path) -> None:
     for pose in range(4):
@@ -112,6 +114,7 @@ def _covered(folder: Path) -> None:
     cv2.imwrite(str(folder / "capture_1" / "graycode_28.png"), np.full((180, 240), 90, np.uint8))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("damage", "sentence"),
     [
@@ -144,6 +147,7 @@ def test_an_impossible_board_and_mosaic_are_told(give: Give, pictures: Path) -> 
     ).sentence  # fmt: skip
 
 
+@pytest.mark.slow
 def test_pictures_of_a_board_in_any_order_are_guessed_and_give_the_camera_alone(
     give: Give, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -169,6 +173,7 @@ def test_pictures_of_a_board_in_any_order_are_guessed_and_give_the_camera_alone(
     assert "--camera-only prints a lens" in files.sentence
 
 
+@pytest.mark.slow
 def test_sinusoids_of_columns_alone_are_guessed_and_what_is_assumed_is_printed(
     give: Give, tmp_path: Path
 ) -> None:

@@ -57,6 +57,7 @@ def test_in_what_a_rig_is_unlike_the_usual_is_said(
     assert again["traits"] == ["a film is bent", "light is uneven"]
 
 
+@pytest.mark.slow
 def test_one_command_makes_a_rig_a_report_and_a_library_entry(give: Give, tmp_path: Path) -> None:
     folder, setting = tmp_path / "campaign", "geometry.scale=1.5"
     ending = give("calibrate", "all", folder, *TWIN, "--yes", "--name", "lab 3", "--set", setting, "--json")

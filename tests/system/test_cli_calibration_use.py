@@ -73,6 +73,7 @@ def test_a_scan_without_calibration_says_what_comes_before_its_reconstruction(
     assert f"then dsl-scan reconstruct {tmp_path / 'second.dsl'} --calibration CAMPAIGN" in second
 
 
+@pytest.mark.slow
 def test_a_scan_ends_with_what_was_found_of_its_pictures(
     give: Give, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -98,6 +99,7 @@ def test_other_settings_are_refused_unless_overridden(give: Give, tmp_path: Path
     assert reader.calibration.white_scale == 33.0
 
 
+@pytest.mark.slow
 def test_a_reconstruction_refuses_it_as_well(
     give: Give, tmp_path: Path, scan_copy: Path, calibrated: Rig
 ) -> None:
@@ -108,6 +110,7 @@ def test_a_reconstruction_refuses_it_as_well(
     assert give(*command, "lab", "--force").code == 0
 
 
+@pytest.mark.slow
 def test_what_a_calibration_missed_travels_with_the_rig(
     give: Give, tmp_path: Path, scan_copy: Path, calibrated: Rig
 ) -> None:

@@ -80,6 +80,7 @@ def test_a_calibration_travels(give: Give, tmp_path: Path, library: CalibrationL
     assert library.find("bare").rig == entry.rig
 
 
+@pytest.mark.slow
 def test_a_quick_shot_says_whether_the_rig_has_changed(give: Give, library: CalibrationLibrary) -> None:
     library.store("lab", calibrated())
     ending = give("calibrations", "check", "lab", "--yes", *PLANE, "--json")

@@ -64,6 +64,7 @@ def test_a_folder_of_no_capture_ends_in_one_sentence(
     assert "Add --guess for pictures of another program." in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_values_are_judged_before_and_after_an_import(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -37,6 +37,7 @@ def test_help_and_version_need_no_heavy_library() -> None:
     assert answer.splitlines()[-2:] == [f"dsl-scan {dsl_core.__version__}", "[]"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "arguments",
     ["design out.json --calibration missing.json", "calibrate all campaign --rig nothing"],
@@ -126,6 +127,7 @@ def test_other_codes_are_planned_by_name(
     assert "ensemble-04" in refused.sentence
 
 
+@pytest.mark.slow
 def test_a_scan_says_before_it_starts_what_it_takes(give: Give, tmp_path: Path) -> None:
     said = give("scan", tmp_path / "a.dsl", *SMALL_RIG, *SMALL_PLAN).out.splitlines()
     assert "154 frames, 1.0 min on the rig" in said[0]
@@ -156,6 +158,7 @@ def test_a_scan_exposes_for_the_scene_unless_exposures_were_chosen(
     assert ("metered" in ending.json) == metered
 
 
+@pytest.mark.slow
 def test_reconstruct_says_what_each_stage_costs(give: Give, finished: Path, tmp_path: Path) -> None:
     target = tmp_path / "depth.zarr"
     ending = give("reconstruct", finished / "scan.dsl", "-o", target, "--depth-only", "--no-refine", "--json")
@@ -238,6 +241,7 @@ def test_the_surface_of_a_result_as_a_mesh(give: Give, finished: Path, tmp_path:
     assert "does not end in" in give("mesh", finished / "scan.zarr", tmp_path / "x.doc").sentence
 
 
+@pytest.mark.slow
 def test_reconstruct_by_another_solver(give: Give, finished: Path, tmp_path: Path) -> None:
     target = tmp_path / "again.zarr"
     options = ("--solver", "colour-basis", "--bands", "450:650:50", "-o", target)
@@ -256,6 +260,7 @@ def test_what_the_calibration_lacks_is_said_before_a_frame_is_read(
     assert "has no data-driven correspondence" in ending.sentence
 
 
+@pytest.mark.slow
 def test_a_scan_goes_out_and_comes_back_in_the_published_layout(
     give: Give, finished: Path, tmp_path: Path
 ) -> None:
@@ -320,6 +325,7 @@ def test_a_plan_is_a_preset_by_name_or_a_file(tmp_path: Path, monkeypatch: pytes
     assert all(preset.key in option.help for preset in PRESETS)
 
 
+@pytest.mark.slow
 def test_the_demo_leaves_a_report_and_never_writes_over_another(
     give: Give, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

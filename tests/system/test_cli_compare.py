@@ -81,6 +81,7 @@ def test_what_is_missing_is_said(give: Give, stage: list[Path], tmp_path: Path) 
     assert "stage 725 mm.zarr: The region 99 x 9 px" in outside.sentence
 
 
+@pytest.mark.slow
 def test_a_sweep_against_the_longest_scan(give: Give, tmp_path: Path) -> None:
     reference, *scans = write_sweep(tmp_path)
     report = tmp_path / "sweep.html"
@@ -97,6 +98,7 @@ def test_a_sweep_against_the_longest_scan(give: Give, tmp_path: Path) -> None:
     assert "needs two scans" in give("sweep", scans[0], "--against", reference).sentence
 
 
+@pytest.mark.slow
 def test_a_sweep_against_the_truth_of_the_twin(give: Give, finished: Path, tmp_path: Path) -> None:
     assert give("scan", tmp_path / "quick.dsl", *SMALL_RIG, *SMALL_PLAN[:-1], "100@0.8").code == 0
     assert give("reconstruct", tmp_path / "quick.dsl", "--bands", "430:660:10").code == 0

@@ -41,6 +41,7 @@ def test_wrong_choices_are_told(arguments: list[str], told: str, capsys: pytest.
     assert told in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_a_scan_notes_its_effects(tmp_path: Path) -> None:
     target = tmp_path / "s.dsl"
     plan = ["--code", "columns", "--comb", "20x20x320", "--setting", "100@0.5"]

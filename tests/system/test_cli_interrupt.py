@@ -65,6 +65,7 @@ def unbroken(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("lines", [0, 40])
 def test_an_interrupted_scan_says_how_to_resume_and_does(
     give: Give, unbroken: Path, tmp_path: Path, lines: int

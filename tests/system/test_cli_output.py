@@ -51,6 +51,7 @@ def test_without_a_terminal_a_line_is_not_repeated(
     ]
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows has no pipe that breaks")
 @pytest.mark.parametrize(("arguments", "code"), [(["scenes"], 0), (["info", "/no/such/scan"], 2)])
 def test_a_reader_that_leaves_early_causes_no_traceback(arguments: list[str], code: int) -> None:

@@ -90,6 +90,7 @@ def test_the_sentence_names_the_command_and_the_choice(line: str, told: str, giv
     assert give(*line.split()).sentence.endswith(told)
 
 
+@pytest.mark.slow
 def test_each_is_answered_in_one_sentence_before_any_work(
     finished: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -86,6 +86,7 @@ def server(request: pytest.FixtureRequest) -> Iterator[Server]:
     server.close()
 
 
+@pytest.mark.slow
 @pytest.mark.timeout(300)
 def test_killed_scans_resume_to_the_unbroken_one(server: Server, tmp_path: Path) -> None:
     duration_s = server.duration_s(tmp_path / "unbroken.dsl")
@@ -106,6 +107,7 @@ def test_killed_scans_resume_to_the_unbroken_one(server: Server, tmp_path: Path)
     assert len({count for count in left if count > 0}) >= KILLS // 2, left
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("server", ["made"], indirect=True)
 def test_one_scan_killed_again_and_again_gets_there(server: Server, tmp_path: Path) -> None:
     duration_s = server.duration_s(tmp_path / "unbroken.dsl")

@@ -74,6 +74,7 @@ def _installed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delitem(sys.modules, "lab_rig", raising=False)
 
 
+@pytest.mark.slow
 def test_it_is_listed_scanned_resumed_and_reconstructed(give: Give, tmp_path: Path) -> None:
     listed = {rig["name"]: rig for rig in give("rigs", "--json").json["rigs"]}
     assert listed["lab"]["package"] == "lab-rig"

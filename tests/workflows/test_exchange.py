@@ -52,6 +52,7 @@ def _holds(session: Path, scene: int) -> bool:
     return all(np.array_equal(reader.read(shot), Even(scene).read(shot)) for shot in PLAN.shots())
 
 
+@pytest.mark.slow
 def test_another_dataset_never_passes_for_the_scan_that_is_there(tmp_path: Path) -> None:
     session = tmp_path / "scan.dsl"
     # Two folders of one name, as they lie in the folders of two days.
@@ -61,6 +62,7 @@ def test_another_dataset_never_passes_for_the_scan_that_is_there(tmp_path: Path)
     assert _holds(session, 1)
 
 
+@pytest.mark.slow
 def test_another_calibration_is_refused(tmp_path: Path) -> None:
     session, dataset = tmp_path / "scan.dsl", _dataset(tmp_path / "chart", 1)
     exchange.import_scan(dataset, session, RIG)
@@ -77,6 +79,7 @@ def test_a_scan_of_a_rig_is_not_gone_on_with(tmp_path: Path) -> None:
         exchange.import_scan(_dataset(tmp_path / "chart", 1), session, RIG)
 
 
+@pytest.mark.slow
 def test_an_interrupted_import_goes_on_also_from_a_folder_that_moved(tmp_path: Path) -> None:
     session, dataset = tmp_path / "scan.dsl", _dataset(tmp_path / "chart", 1)
     progress = CallbackProgress(lambda stage, done, total: progress.token.cancel() if done == 3 else None)

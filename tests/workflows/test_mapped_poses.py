@@ -86,6 +86,7 @@ def test_rows_alone_are_refused(folder: Path) -> None:
         read_mapped_pose(folder, mapping)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("axes", [("columns",), ("columns", "rows")])
 def test_sinusoids_are_decoded_along_each_axis(
     tmp_path: Path, axes: tuple[Literal["columns", "rows"], ...]

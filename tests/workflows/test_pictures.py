@@ -35,6 +35,7 @@ def test_boards_without_the_code_are_named(tmp_path: Path) -> None:
 HOLD = ("k1", "k2", "k3", "tangential")
 
 
+@pytest.mark.slow
 def test_pictures_of_columns_alone_are_recognised_and_give_depth(tmp_path: Path) -> None:
     for number, pose in enumerate(board_sets.columns_set()):
         write(tmp_path / f"capture_{number}", {f"g{i:02d}.png": each for i, each in enumerate(pose)})

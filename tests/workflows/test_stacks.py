@@ -69,6 +69,7 @@ def test_what_cannot_be_a_stack_is_refused() -> None:
         depth_of_columns(small_rig(), small)
 
 
+@pytest.mark.slow
 def test_the_example_of_the_help_page_runs() -> None:
     page = resource_path("help/importing.md").read_text(encoding="utf-8")
     (example,) = re.findall(r"```python\n(.*?)```", page, re.DOTALL)

@@ -72,6 +72,7 @@ def plane(tmp_path: Path) -> CalibrateBench:
     return made
 
 
+@pytest.mark.slow
 def test_a_drift_check_of_the_twin_says_that_nothing_has_moved(plane: CalibrateBench) -> None:
     _, calibration = plane.calibrated
     dated = calibration.model_copy(update={"provenance": Provenance(created="2026-03-01")})
@@ -85,6 +86,7 @@ def test_a_drift_check_of_the_twin_says_that_nothing_has_moved(plane: CalibrateB
     assert "The rig matches the calibration own." in plane.state.note.value
 
 
+@pytest.mark.slow
 def test_a_check_in_spite_of_other_settings_says_which(plane: CalibrateBench) -> None:
     devices, calibration = plane.calibrated
     conditions = current_conditions(devices)

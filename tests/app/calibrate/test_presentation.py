@@ -106,6 +106,7 @@ def test_what_can_be_done_with_the_whole_campaign(
 ALL_GOOD: dict[str, object] = {"rows": (replace(ROW, state=RowState.GOOD),)}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("values", "devices", "main"),
     [

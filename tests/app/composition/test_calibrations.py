@@ -54,6 +54,7 @@ def test_a_program_that_is_killed_remembers_its_campaign(
     window.close()
 
 
+@pytest.mark.slow
 def test_the_self_test_opens_from_the_rig_page_on_the_real_twin(
     qtbot: QtBot, window: MainWindow, tmp_path: Path
 ) -> None:

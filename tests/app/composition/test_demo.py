@@ -140,6 +140,7 @@ def test_a_failure_is_told(bench: Bench, tmp_path: Path) -> None:
     assert text.startswith("The example could not be opened: ")
 
 
+@pytest.mark.slow
 def test_the_live_demo_connects_the_twin_and_scans(bench: Bench, tmp_path: Path) -> None:
     bench.demo.scan_live()
     assert bench.scans.rig.state.link.value is Link.OPEN

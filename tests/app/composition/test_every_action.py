@@ -131,6 +131,7 @@ def prepare(window: MainWindow, action: Action) -> None:
         window.do("view_colour")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("action", [a for a in ACTIONS if a.key not in LEFT_OUT], ids=lambda a: a.key)
 def test_it_is_noticed(qtbot: QtBot, window: MainWindow, chosen: list[str], action: Action) -> None:
     prepare(window, action)

@@ -12,6 +12,7 @@ from tests.app.support.two_screens import missing_programs, two_screens
 ROOT = Path(__file__).resolve().parents[3]
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(bool(missing_programs()), reason=f"needs {', '.join(missing_programs())}")
 @pytest.mark.timeout(900)
 def test_a_day_at_the_rig_by_mouse_and_keys(tmp_path: Path) -> None:

@@ -108,6 +108,7 @@ def gate(monkeypatch: pytest.MonkeyPatch) -> Iterator[threading.Event]:
     free.set()
 
 
+@pytest.mark.slow
 def test_clicking_everything_while_a_scan_runs_loses_nothing(
     bench: Bench, gate: threading.Event, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
@@ -173,6 +174,7 @@ def test_closing_during_a_scan_asks_and_the_frames_stay(
     assert reader.plan.shot_count > len(reader.missing()) > 0
 
 
+@pytest.mark.slow
 def test_a_projector_that_is_pulled_out_interrupts_and_its_scan_goes_on(bench: Bench) -> None:
     page = bench.scan_page()
     state, rig = page._state, bench.composition.rig.state
@@ -189,6 +191,7 @@ def test_a_projector_that_is_pulled_out_interrupts_and_its_scan_goes_on(bench: B
     assert not page.banner.isVisible()
 
 
+@pytest.mark.slow
 def test_every_page_fits_the_smallest_window(bench: Bench, tmp_path: Path) -> None:
     bench.window.open_path(write_small_result(tmp_path))
     bench.wait(lambda: not bench.window.parts.runner.active)
@@ -212,6 +215,7 @@ def test_every_page_fits_the_smallest_window(bench: Bench, tmp_path: Path) -> No
                 assert button.width() > words, f"{page.key}: {button.text()}"
 
 
+@pytest.mark.slow
 def test_the_window_opens_at_one_and_a_half_times_the_size(tmp_path: Path) -> None:
     code = (
         "import sys; from pathlib import Path;"

@@ -32,6 +32,7 @@ def window(qtbot: QtBot, composition: Composition, tmp_path: Path) -> MainWindow
     return made
 
 
+@pytest.mark.slow
 def test_a_rig_is_watched_and_scans_from_the_results_page(
     qtbot: QtBot, window: MainWindow, composition: Composition
 ) -> None:
@@ -69,6 +70,7 @@ def test_a_rig_is_watched_and_scans_from_the_results_page(
     qtbot.waitUntil(lambda: state.link.value is Link.CLOSED, timeout=20000)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("key", "said"),
     [

@@ -142,6 +142,7 @@ def test_every_control_of_a_page_has_a_name_and_a_tooltip(window: MainWindow, ke
     assert given_twice(window, page) == []
 
 
+@pytest.mark.slow
 def test_a_button_that_cannot_be_pressed_says_why(window: MainWindow) -> None:
     silent = list[str]()
     for page in PAGES:
@@ -229,6 +230,7 @@ def test_every_control_of_a_rig_profile_has_a_name_and_a_tooltip(window: MainWin
     assert complaints(dialog) == []
 
 
+@pytest.mark.slow
 def test_every_control_of_a_wizard_and_of_imports_has_a_name_and_a_tooltip(
     qtbot: QtBot, window: MainWindow, tmp_path: Path
 ) -> None:

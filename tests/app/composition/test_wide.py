@@ -59,6 +59,7 @@ def results_of(window: MainWindow, qtbot: QtBot, folder: Path) -> ResultsPage:
     return page
 
 
+@pytest.mark.slow
 def test_views_are_side_by_side_in_a_large_window_alone(
     qtbot: QtBot, window: MainWindow, tmp_path: Path
 ) -> None:
@@ -121,6 +122,7 @@ def test_what_is_made_in_a_large_window_has_its_colours(qtbot: QtBot, tmp_path: 
     window.close()
 
 
+@pytest.mark.slow
 def test_what_comes_next_is_seen_on_a_magnified_screen(window: MainWindow, qtbot: QtBot) -> None:
     window.setMinimumSize(LEAST)
     scan = window.page_of("scan")
@@ -146,6 +148,7 @@ def test_what_comes_next_is_seen_on_a_magnified_screen(window: MainWindow, qtbot
         assert len(titles) == len(set(titles)) == 3 + (size == MAGNIFIED)
 
 
+@pytest.mark.slow
 def test_nothing_is_cut_or_covered_on_a_magnified_screen(
     window: MainWindow, qtbot: QtBot, tmp_path: Path
 ) -> None:
@@ -183,6 +186,7 @@ def test_no_word_on_a_view_is_cut_where_the_bar_is_narrow(
     assert abs(rows[LARGE]) < 5, "and beside them where there is"
 
 
+@pytest.mark.slow
 def test_spectra_are_read_with_any_tab_on_a_magnified_screen(
     window: MainWindow, qtbot: QtBot, tmp_path: Path
 ) -> None:

@@ -54,6 +54,7 @@ def test_a_program_that_is_killed_remembers_its_rig(
     assert settings.page == "start", "the page where unfinished scans are offered"
 
 
+@pytest.mark.slow
 def test_every_page_opens_in_both_themes(composed: tuple[Composition, MainWindow]) -> None:
     composition, window = composed
     for theme in ("light", "dark"):
@@ -128,6 +129,7 @@ def test_accuracy_is_predicted_in_the_background_and_closing_ends_it(
     assert list((tmp_path / "forecasts").glob("*.json"))
 
 
+@pytest.mark.slow
 def test_starting_loads_nothing_heavy() -> None:
     code = (
         "import sys, dsl_app.shell.application, dsl_app.composition.window;"

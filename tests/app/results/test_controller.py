@@ -81,6 +81,7 @@ def test_captures_of_others_are_reconstructed_without_spectra(
     assert "Leave out the spectra" in trouble_of(ReconstructionRequest("a"), source)
 
 
+@pytest.mark.slow
 def test_depth_only_results_show_depth_and_say_why_not_more(tmp_path: Path) -> None:
     bench = Bench(write_small_result(tmp_path, spectra=False))
     assert bench.state.view.value is ResultView.DEPTH

@@ -38,6 +38,7 @@ def test_a_pattern_is_painted_before_it_counts_as_shown(projector: ScreenProject
     assert before_s <= projector.shown_at_s <= time.monotonic() - 0.02
 
 
+@pytest.mark.slow
 def test_a_screen_that_is_not_there_is_named() -> None:
     with pytest.raises(DeviceError, match=r"no screen 'HDMI-9'; screens: .*change screen in the profile"):
         ScreenProjector(ALONE.model_copy(update={"screen": "HDMI-9"}))

@@ -20,6 +20,7 @@ from tests.app.support.two_screens import missing_programs, two_screens
 ROOT = Path(__file__).resolve().parents[3]
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(bool(missing_programs()), reason=f"needs {', '.join(missing_programs())}")
 @pytest.mark.parametrize("scale", ["1", "1.5"])
 def test_pixels_are_exact_and_the_window_survives_unplugging(scale: str) -> None:

@@ -150,6 +150,7 @@ def test_the_graph_of_a_pixel_shows_the_lines_that_are_there(bench: ScanBench) -
     assert (brightest.max(0) > brightest.min(0) + 20).all()
 
 
+@pytest.mark.slow
 def test_a_result_follows_and_is_told(
     bench: ScanBench, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -188,6 +189,7 @@ def test_a_result_follows_and_is_told(
     assert bench.state.reconstruction_s.value != expected_s
 
 
+@pytest.mark.slow
 def test_a_scan_without_calibration_is_not_reconstructed_but_says_what_to_do(bench: ScanBench) -> None:
     own, devices = bench.calibration, bench.rig.state.devices.value
     assert devices is not None
@@ -229,6 +231,7 @@ def test_a_reconstruction_that_does_not_end_well_is_not_announced_for_ever(
     assert f"The reconstruction {how}. Press Reconstruct… to begin again" in note
 
 
+@pytest.mark.slow
 def test_a_lost_camera_keeps_all_frames_and_the_scan_goes_on_later(
     bench: ScanBench, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
@@ -261,6 +264,7 @@ def test_frames_of_the_scan_before_are_not_shown_as_those_of_one_that_saved_none
     assert (bench.state.status.value.done, bench.state.picture.value) == (0, None)
 
 
+@pytest.mark.slow
 def test_a_scan_goes_on_over_a_damaged_frame(
     bench: ScanBench, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
@@ -301,6 +305,7 @@ def test_a_scene_that_moved_meanwhile_is_refused(
     assert bench.state.check_drift.value
 
 
+@pytest.mark.slow
 def test_an_interrupted_session_is_offered_and_a_complete_one_is_not(
     bench: ScanBench, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
@@ -343,6 +348,7 @@ def test_another_rig_that_is_connected_makes_way_for_that_of_the_scan(
     assert other.rig.state.choice.value == TWIN
 
 
+@pytest.mark.slow
 def test_a_click_while_another_rig_is_connected_is_not_forgotten(
     bench: ScanBench, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
@@ -404,6 +410,7 @@ def test_a_damaged_session_is_told(bench: ScanBench, tmp_path: Path) -> None:
     assert "damaged" in bench.notifier.told[-1][1]
 
 
+@pytest.mark.slow
 def test_a_typed_name_stays_until_a_scan_has_it(bench: ScanBench, tmp_path: Path) -> None:
     target = bench.state.target
     bench.scans.name_scan("leaf 1/2.dsl ")
@@ -734,6 +741,7 @@ def test_who_stops_a_lost_scan_does_not_find_it_gone_on(outage: Outage) -> None:
     assert "No scan is running." not in [text for _, text in bench.notifier.told]
 
 
+@pytest.mark.slow
 def test_a_pause_while_a_scan_is_prepared_holds_its_first_frame(
     bench: ScanBench, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -111,6 +111,7 @@ def test_a_name_counts_as_far_as_it_is_typed(ready: Bench, tmp_path: Path) -> No
     assert field.text() == "leaf 1-2"
 
 
+@pytest.mark.slow
 def test_pause_go_on_and_finish(qtbot: QtBot, ready: Bench, slow: None, tmp_path: Path) -> None:
     page, bench, _ = ready
     click(page.run.start)
@@ -138,6 +139,7 @@ def test_pause_go_on_and_finish(qtbot: QtBot, ready: Bench, slow: None, tmp_path
     assert page.run.start.property("role") == "primary"
 
 
+@pytest.mark.slow
 def test_cancel_keeps_frames_and_offers_to_resume(qtbot: QtBot, ready: Bench, slow: None) -> None:
     page, bench, _ = ready
     click(page.run.start)
@@ -166,6 +168,7 @@ def test_a_second_scan_is_refused_in_a_sentence(qtbot: QtBot, ready: Bench, slow
     assert bench.scans.open(Path("x.dsl")) is False
 
 
+@pytest.mark.slow
 def test_a_lost_camera_is_said_over_the_page(
     qtbot: QtBot, ready: Bench, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -274,6 +277,7 @@ def test_a_step_wider_than_the_line_is_said_and_not_started(ready: Bench) -> Non
     assert "leave columns between them dark" in page.run.remarks.text()
 
 
+@pytest.mark.slow
 def test_arrow_keys_follow_another_pixel(qtbot: QtBot, ready: Bench) -> None:
     page, bench, _ = ready
     click(page.run.start)
@@ -394,6 +398,7 @@ def test_every_figure_has_its_curve(qtbot: QtBot, ready: Bench, predicted: None)
         assert page.forecast.curve.content.marker.isVisible()
 
 
+@pytest.mark.slow
 def test_after_a_scan_its_figures_stand_beside(qtbot: QtBot, ready: Bench) -> None:
     page, bench, _ = ready
     click(page.run.start)
@@ -448,6 +453,7 @@ def test_a_scan_of_another_picture_size_fills_the_view(qtbot: QtBot) -> None:
         assert view.height() < 1.2 * height * cell_px
 
 
+@pytest.mark.slow
 def test_the_pattern_beside_a_frame_is_that_of_its_shot_as_bright_as_can_be() -> None:
     shots = list(SHORT.shots())
     picture = np.zeros((20, 30, 3), np.uint8)

@@ -18,6 +18,7 @@ def contrast(a: str, b: str) -> float:
     return (high + 0.05) / (low + 0.05)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("theme", [LIGHT, DARK], ids=lambda theme: theme.name)
 @pytest.mark.parametrize("role", ["text", "muted", "good", "warn", "bad"])
 def test_text_is_readable(theme: Theme, role: str) -> None:

@@ -13,6 +13,7 @@ from dsl_app.shell import warm_up as early
 from dsl_app.shell.warm_up import STEPS, WarmUp
 
 
+@pytest.mark.slow
 def test_everything_that_is_imported_early_exists() -> None:
     # A name that went away would be no warning to anybody.
     modules = [step.partition(":")[0] for step in STEPS]

@@ -44,6 +44,7 @@ def chart(tilt_y_deg: int = 0, roll_deg: int = 0, scene: str = "color-checker") 
     return np.asarray(devices.camera.snap().pixels[:144].astype(np.float32) - 260)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("quarter", range(4))
 @pytest.mark.parametrize("tilt_y_deg", [0, 20])
 def test_found_in_every_orientation(quarter: int, tilt_y_deg: int) -> None:
@@ -57,11 +58,13 @@ def test_found_in_every_orientation(quarter: int, tilt_y_deg: int) -> None:
     assert np.unravel_index(signals.mean.sum(1).argmax(), (24,))[0] == 18
 
 
+@pytest.mark.slow
 def test_a_chart_upside_down_on_the_table_is_told() -> None:
     pose = find_chart(chart(roll_deg=180), "RGGB", EXPECTED, "the picture")
     assert pose.quarter_turns == 2
 
 
+@pytest.mark.slow
 def test_patches_have_the_ratios_of_their_reflectances() -> None:
     mosaic = chart()
     pose = find_chart(mosaic, "RGGB", EXPECTED, "the picture")
@@ -75,6 +78,7 @@ def test_patches_have_the_ratios_of_their_reflectances() -> None:
     assert next(iter(chart_reflectance(np.array([550.0])))) == "dark skin"
 
 
+@pytest.mark.slow
 def test_corners_may_be_given_from_any() -> None:
     found = find_chart(chart(), "RGGB", EXPECTED, "the picture")
     for start in range(4):
@@ -83,6 +87,7 @@ def test_corners_may_be_given_from_any() -> None:
         assert np.abs(pose.corners_px - found.corners_px).max() < 4
 
 
+@pytest.mark.slow
 def test_a_mirrored_chart_is_told() -> None:
     with pytest.raises(CalibrationError, match="mirrored"):
         find_chart(np.ascontiguousarray(chart()[:, ::-1]), "GRBG", EXPECTED, "the picture")
@@ -106,6 +111,7 @@ def test_a_chart_cut_off_is_told() -> None:
         patch_samples(moved, (144, 222))
 
 
+@pytest.mark.slow
 def test_dust_does_not_count_and_saturation_is_counted() -> None:
     mosaic = chart().copy()
     pose = find_chart(mosaic, "RGGB", EXPECTED, "the picture")

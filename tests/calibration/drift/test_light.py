@@ -90,6 +90,7 @@ def by_name(figures: list[Figure]) -> dict[str, Figure]:
     return {figure.name.split(",")[0]: figure for figure in figures}
 
 
+@pytest.mark.slow
 def test_a_film_as_it_was_has_not_moved() -> None:
     figures = film_drift(RIG, signals(), REFLECTANCE)
     assert all(figure.passed for figure in figures)
@@ -99,6 +100,7 @@ def test_a_film_as_it_was_has_not_moved() -> None:
         assert found[f"brightness of order {order}"].value == pytest.approx(1.0, abs=0.01)
 
 
+@pytest.mark.slow
 def test_a_displaced_order_and_a_dim_one_are_each_told() -> None:
     found = by_name(film_drift(RIG, signals({-1: 0.9}, {1: 0.5}), REFLECTANCE))
     assert found["displacement of order +1"].value == pytest.approx(0.5, abs=0.06)
@@ -111,6 +113,7 @@ def test_a_displaced_order_and_a_dim_one_are_each_told() -> None:
     ]
 
 
+@pytest.mark.slow
 def test_brightness_of_all_orders_alike_is_not_the_films() -> None:
     dim = {0: 0.8, 1: 0.8, -1: 0.8}
     found = by_name(film_drift(RIG, signals(dim), REFLECTANCE))

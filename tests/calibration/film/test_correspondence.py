@@ -48,6 +48,7 @@ def with_grid(samples: GridSamples) -> Rig:
     return published_rig().model_copy(update={"correspondence": fit_grid(samples).grid})
 
 
+@pytest.mark.slow
 def test_spread_wavelengths_predict_held_out_columns(samples: GridSamples) -> None:
     rig = with_grid(samples)
     errors = held_out_errors(correspondence(rig, "grid"), rig)
@@ -55,6 +56,7 @@ def test_spread_wavelengths_predict_held_out_columns(samples: GridSamples) -> No
     assert np.percentile(np.abs(errors), 99) < 0.2
 
 
+@pytest.mark.slow
 def test_published_wavelengths_leave_the_gap_between_430_and_600_nm() -> None:
     rig = with_grid(sample_grating(published_rig(), DEPTHS_MM, np.array(PUBLISHED_NM)))
     errors = held_out_errors(GridModel(rig), rig)
@@ -62,6 +64,7 @@ def test_published_wavelengths_leave_the_gap_between_430_and_600_nm() -> None:
     assert 0.15 < np.sqrt(np.mean(errors**2)) < 0.4
 
 
+@pytest.mark.slow
 def test_noisy_samples_with_outliers_are_fitted_without_them(samples: GridSamples) -> None:
     rng = np.random.default_rng(1)
     noisy = samples.columns_px + 0.1 * rng.standard_normal(samples.columns_px.shape)
@@ -111,11 +114,13 @@ def test_samples_that_do_not_suffice_are_refused(
         fit_grid(replace(samples, **change))  # type: ignore[arg-type]
 
 
+@pytest.mark.slow
 def test_depths_a_twentieth_of_the_distance_apart_are_enough(samples: GridSamples) -> None:
     near = replace(samples, depths_mm=np.array([500.0, 507.0, 514.0, 521.0, 527.0]))
     assert fit_grid(near).grid is not None
 
 
+@pytest.mark.slow
 def test_models_have_one_interface(samples: GridSamples) -> None:
     rig = with_grid(samples)
     assert isinstance(correspondence(rig), GridModel)

@@ -68,6 +68,7 @@ def captured(position: int, number: int, really_nm: float) -> LineFrames:
     return line_frames(TRUTH, PLANES[position], FILTERS_NM[number], 10 * position + number, really_nm, skip=2)
 
 
+@pytest.mark.slow
 def test_the_film_is_found_from_its_data_sheet() -> None:
     fit, samples = fit_first_orders(rig_with(Film()), PLANES, stage_data(), NoProgress())
     assert set(zip(samples.position.tolist(), samples.filter.tolist(), strict=True)) == set(np.ndindex(2, 3))
@@ -79,12 +80,14 @@ def test_the_film_is_found_from_its_data_sheet() -> None:
     assert (samples.pixel < SIZE[0] * SIZE[1]).all()
 
 
+@pytest.mark.slow
 def test_a_film_that_fits_as_a_cylinder_is_one() -> None:
     rig = small_rig()
     samples = samples_of(rig, NOISE_PX)
     assert _fit(mounted(rig), samples, Film()).film == fit_film(mounted(rig), samples, Film()).film
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("index", [None, 1.9])
 def test_a_bent_film_and_filters_seen_at_an_angle_are_told_apart(index: float | None) -> None:
     rig = small_rig()
@@ -103,6 +106,7 @@ def test_a_bent_film_and_filters_seen_at_an_angle_are_told_apart(index: float | 
     assert np.sqrt(np.mean((off - grating_columns(rig, straight)) ** 2)) < 0.02
 
 
+@pytest.mark.slow
 def test_no_film_is_bent_more_than_one_can_be() -> None:
     rig = small_rig()
     shape = FilmShape(middle_mm=-6.0, factors=(0.05, 0.0, 0.0, 0.0, 0.0, 0.0))
@@ -114,6 +118,7 @@ def test_no_film_is_bent_more_than_one_can_be() -> None:
     assert _fit(mounted(rig), odd, Film()).film.shape is None
 
 
+@pytest.mark.slow
 def test_a_wrong_filter_is_named_with_its_wavelength() -> None:
     with pytest.raises(CalibrationError, match=r"850 mm, filter of 540 nm.*about \+1\d"):
         fit_first_orders(rig_with(Film()), PLANES, stage_data({(1, 1): 555.0}), NoProgress())

@@ -57,6 +57,7 @@ def test_stated_deviations_cover_the_film(seed: int) -> None:
     assert 0.3 < whitened < 20  # chi-square of six numbers
 
 
+@pytest.mark.slow
 def test_a_fifth_of_wrong_samples_does_no_harm() -> None:
     rig, samples = small_rig(), samples_of(small_rig(), NOISE_PX)
     samples.column_px[::5] += 15.0
@@ -65,6 +66,7 @@ def test_a_fifth_of_wrong_samples_does_no_harm() -> None:
     assert np.sqrt(np.mean(off**2)) < 0.02
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(2))
 def test_filters_seen_at_an_angle_do_not_bend_the_film(seed: int) -> None:
     # Index 1.9 and a tilt of 3 degrees: 4 nm at the side of the picture.
@@ -96,6 +98,7 @@ def twisted(rig: Rig) -> Rig:
     return rig.model_copy(update={"film": rig.film.model_copy(update={"shape": shape})})
 
 
+@pytest.mark.slow
 def test_a_film_of_another_shape_is_not_taken_for_one_that_is_tilted() -> None:
     rig = twisted(small_rig())
     samples = samples_of(rig, NOISE_PX)
@@ -113,6 +116,7 @@ def test_a_film_of_another_shape_is_not_taken_for_one_that_is_tilted() -> None:
     assert found.film.shape.factors[2] == pytest.approx(0.00015, abs=1e-5)
 
 
+@pytest.mark.slow
 def test_a_dent_that_no_shape_says_leaves_the_film_where_it_is() -> None:
     rig = twisted(small_rig())
     samples = samples_of(rig, NOISE_PX)
@@ -127,6 +131,7 @@ def test_a_dent_that_no_shape_says_leaves_the_film_where_it_is() -> None:
     assert abs(errors["tilt_x_deg"]) < 1.5
 
 
+@pytest.mark.slow
 def test_the_shape_of_a_film_does_not_explain_a_wrong_filter() -> None:
     rig = small_rig()
     samples = samples_of(rig, NOISE_PX)

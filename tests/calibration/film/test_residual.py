@@ -32,6 +32,7 @@ from tests.cases.film_samples import (
 )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("shape", [None, FilmShape(middle_mm=-6.0, factors=(0.004, 0, 1e-4, 0, 0, 0))])
 def test_no_correction_is_chosen_where_the_film_is_enough(shape: FilmShape | None) -> None:
     rig = small_rig()
@@ -42,6 +43,7 @@ def test_no_correction_is_chosen_where_the_film_is_enough(shape: FilmShape | Non
     assert all(each.hybrid_px < 1.2 * NOISE_PX for each in held_out)
 
 
+@pytest.mark.slow
 def test_an_uneven_film_is_corrected_where_nothing_was_seen() -> None:
     rig = small_rig()
     samples = samples_of(rig, NOISE_PX, saddle)

@@ -82,6 +82,7 @@ def test_markers_close_to_a_corner_do_not_draw_it() -> None:
     assert np.sqrt((error**2).mean()) < 0.1
 
 
+@pytest.mark.slow
 def test_refining_brings_corners_to_where_edges_cross(frames: PoseFrames) -> None:
     truth, _ = true_corners(TILTED, TILTED_SIZE_PX)
     rough = Corners(np.arange(77), truth + np.random.default_rng(0).uniform(-0.3, 0.3, truth.shape))

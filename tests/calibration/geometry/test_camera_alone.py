@@ -17,6 +17,7 @@ def whites() -> list[tuple[str, NDArray[np.float32]]]:
     return [(f"{k}.png", np.asarray(pose[-2], np.float32)) for k, pose in enumerate(board_set())]
 
 
+@pytest.mark.slow
 def test_the_lens_comes_with_deviations_that_hold() -> None:
     found = calibrate_camera([*whites(), ("empty.png", np.full((180, 240), 50, np.float32))], BOARD, PLAIN)
     off = found.lens.fx_px - CAMERA_FX_PX
@@ -29,6 +30,7 @@ def test_the_lens_comes_with_deviations_that_hold() -> None:
     assert any("empty.png is left out" in warning for warning in found.warnings)
 
 
+@pytest.mark.slow
 def test_pictures_that_say_too_little_are_refused() -> None:
     with pytest.raises(CalibrationError, match="The board was found in 2 of 2 pictures; 3 are needed"):
         calibrate_camera(whites()[:2], BOARD)

@@ -63,6 +63,7 @@ def test_exact_columns_give_the_exact_rig_but_for_what_they_do_not_tell() -> Non
     assert found.squares.square_mm == pytest.approx(30.0, abs=1e-3)
 
 
+@pytest.mark.slow
 def test_deviations_hold_of_what_is_told_and_of_what_is_assumed(found: GeometryCalibration) -> None:
     other = calibrated(columns_of(poses_seen(seed=1)))
     off = np.concatenate([pulls(each)[TOLD] for each in (found, other)])
@@ -91,6 +92,7 @@ def test_errors_and_coverage_are_those_of_columns(found: GeometryCalibration) ->
     assert all(pose.left_out is not None for pose in found.poses)
 
 
+@pytest.mark.slow
 def test_misread_columns_do_no_harm() -> None:
     poses = columns_of(poses_seen())
     for index, pose in enumerate(poses):
@@ -100,6 +102,7 @@ def test_misread_columns_do_no_harm() -> None:
     assert [pose.outliers for pose in found.poses] == [1] * len(poses)
 
 
+@pytest.mark.slow
 def test_terms_that_are_held_stay_zero() -> None:
     found = calibrated(columns_of(poses_seen()), hold=("k3", "tangential"))
     assert found.projector.distortion[2:] == found.camera.distortion[2:] == (0.0, 0.0, 0.0)
@@ -143,6 +146,7 @@ def test_a_pose_that_is_mirrored_unlike_the_others_is_named() -> None:
         calibrated(poses)
 
 
+@pytest.mark.slow
 def test_a_projector_that_is_mirrored_or_upside_down_is_doubted() -> None:
     found = calibrated([_mirrored(pose) for pose in columns_of(poses_seen())])
     assert any("rise from right to left" in each for each in found.warnings)
@@ -168,6 +172,7 @@ def test_poses_that_say_too_little_are_refused(poses: list[PoseObservation], wor
         calibrated(poses)
 
 
+@pytest.mark.slow
 def test_devices_that_stand_one_above_the_other_are_doubted(monkeypatch: pytest.MonkeyPatch) -> None:
     above = POSE.model_copy(update={"translation_mm": (0.5, -200.0, 0.0)})
     monkeypatch.setattr(board_poses, "POSE", above)

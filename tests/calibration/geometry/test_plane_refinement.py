@@ -118,6 +118,7 @@ def test_stated_deviations_cover_the_errors(several: list[tuple[Rig, Rig, PlaneR
     assert 0.4 < np.sqrt(np.mean(np.square(pulls))) < 1.7
 
 
+@pytest.mark.slow
 def test_lines_that_are_counted_from_elsewhere_take_the_geometry_with_them() -> None:
     off_px, errors = 0.06, []
     for seed in range(6, 9):
@@ -192,6 +193,7 @@ def test_a_bowed_plane_misses_its_limit_and_no_plane_at_all_is_refused() -> None
         refine_planes(truth, POSITIONS_MM, samples, None, STAGE_STD_MM)
 
 
+@pytest.mark.slow
 def test_a_target_that_bulges_everywhere_contradicts_the_board() -> None:
     truth, rng = random_rig(6, small_rig()), np.random.default_rng(0)
     board, covariance = board_said(6)
@@ -227,6 +229,7 @@ def test_a_stage_of_another_scale_is_noticed() -> None:
         refine_planes(small_rig(), tuple(p / 1.05 for p in POSITIONS_MM), samples, None, STAGE_STD_MM)
 
 
+@pytest.mark.slow
 def test_steps_a_little_too_long_are_told_by_their_ratio() -> None:
     truth, rng = random_rig(6, small_rig()), np.random.default_rng(6)
     board, covariance = board_said(6)

@@ -55,6 +55,7 @@ def test_undecided_pixels_are_done_without(frames: PoseFrames) -> None:
     assert np.abs(found - np.stack(on_projector(points), 1)).max() < 0.2
 
 
+@pytest.mark.slow
 def test_a_mosaic_is_read_like_mono(frames: PoseFrames) -> None:
     gains = np.ones((180, 240))
     gains[::2, ::2], gains[1::2, 1::2] = 0.5, 0.7
@@ -151,6 +152,7 @@ def test_the_grey_of_an_even_mosaic_is_even() -> None:
     np.testing.assert_allclose(grey_of(mosaic, "RGGB"), 0.25 * 100 + 0.5 * 200 + 0.25 * 40)
 
 
+@pytest.mark.slow
 def test_columns_alone_are_found_as_with_rows(frames: PoseFrames) -> None:
     known = observe_pose(frames, SMALL_BOARD, SMALL_PROJECTOR_PX)
     alone = observe_pose(replace(frames, pairs=frames.pairs[:14]), SMALL_BOARD, SMALL_PROJECTOR_PX)

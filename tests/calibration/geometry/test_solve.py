@@ -110,6 +110,7 @@ def test_errors_at_full_resolution_count_camera_pixels_twice(found: GeometryCali
     assert binned.full_resolution_rms_px == pytest.approx(expected)
 
 
+@pytest.mark.slow
 def test_misread_corners_do_no_harm() -> None:
     poses = poses_seen()
     for index, pose in enumerate(poses):

@@ -52,6 +52,7 @@ def lines(scanned: tuple[Rig, MemoryScan]) -> LineScan:
     return diffuser_lines(scanned[1], scanned[0], pixels=2500)[1]
 
 
+@pytest.mark.slow
 def test_filters_that_are_all_off_alike_are_measured_by_the_leds(
     scanned: tuple[Rig, MemoryScan], lines: LineScan
 ) -> None:
@@ -151,6 +152,7 @@ def test_too_few_pixels_are_refused(scanned: tuple[Rig, MemoryScan], lines: Line
         chain_correction(scanned[0], [lines.at(np.arange(20))])
 
 
+@pytest.mark.slow
 def test_saturated_values_do_not_count(scanned: tuple[Rig, MemoryScan], lines: LineScan) -> None:
     rng = np.random.default_rng(0)
     hit = rng.random(lines.radiance.shape) < 0.05

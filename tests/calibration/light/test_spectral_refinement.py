@@ -68,6 +68,7 @@ def response_error(rig_or: Rgb, true: Rig) -> np.ndarray:
     return np.asarray((error / truth.max(1, keepdims=True))[:, BANDS])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(1, 4))
 def test_refined_response_is_better_than_the_data_sheet(seed: int) -> None:
     true, nominal = random_rig(seed, published_rig()), published_rig()
@@ -153,6 +154,7 @@ def test_a_measured_emission_is_not_flattened_by_the_published_weight() -> None:
         assert np.abs(np.array(new.values) / ratio - old.at(FINE_NM)).max() < 0.02 * max(old.values)
 
 
+@pytest.mark.slow
 def test_an_unmeasured_emission_is_refined_too() -> None:
     true, nominal = random_rig(2, published_rig()), published_rig()
     data = surfaces(true, 3e-4)

@@ -267,6 +267,7 @@ def at_an_angle(centre: float, scan: LineScan, index: float) -> SeenFilter:
     return replace(straight, light=seen_light)
 
 
+@pytest.mark.slow
 def test_filters_seen_at_an_angle_are_taken_as_they_pass_light() -> None:
     scan, profile = without_filter()
     filters = [at_an_angle(nm, scan, 1.9) for nm in CENTRES]
@@ -284,6 +285,7 @@ def test_filters_seen_at_an_angle_are_taken_as_they_pass_light() -> None:
         assert found.efficiency[order].at(nm) == pytest.approx(RIG.efficiency[order].at(nm), rel=5e-3)
 
 
+@pytest.mark.slow
 def test_filters_that_are_all_off_alike_are_told(record: BandpassCalibration) -> None:
     scan, profile = without_filter()
     found = fit_bandpass(RIG, scan, profile, [seen(nm, nm - 6.0) for nm in CENTRES], REFLECTANCE)

@@ -64,6 +64,7 @@ def test_response_times_scale_comes_near_the_truth(measured: bool, factor: float
         assert np.sqrt(np.mean(after[bright] ** 2)) < 0.012
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("off_nm", [-6.0, 0.0, 2.0])
 @pytest.mark.parametrize("centres", [CENTRES, (450, 480, 540, 590, 640)])
 def test_filters_that_are_all_off_alike_disagree_with_the_leds(off_nm: float, centres: Any) -> None:
@@ -80,6 +81,7 @@ def test_filters_that_are_all_off_alike_disagree_with_the_leds(off_nm: float, ce
     assert 0.5 / np.sqrt(len(samples)) <= std < 0.4
 
 
+@pytest.mark.slow
 def test_nominal_curves_say_less_of_a_shift_than_measured_ones() -> None:
     known = published_rig()
     found = []

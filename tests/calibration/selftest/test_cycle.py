@@ -32,6 +32,7 @@ from dsl_core.model.calibration.selftest import Measured
 from tests.cases.cycle_readings import BLACK_DN, MIX, led_time_ms, short_exposures, table
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("hz", [24.3, 50.0, 60.0, 75.0, 120.0, 180.0, 240.1])
 def test_the_fundamental_is_found_and_no_harmonic(hz: float) -> None:
     scores = []
@@ -79,6 +80,7 @@ def test_light_that_varies_at_random_has_no_period() -> None:
     assert not found.is_steady
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("hz", [50.0, 60.0, 120.0])
 def test_the_spread_of_repeats_finds_the_cycle_without_time_stamps(hz: float) -> None:
     rng = np.random.default_rng(5)

@@ -28,6 +28,7 @@ from tests.cases.cycle_readings import short_exposures, table
 from tests.cases.light_rig import LightWorld, light_rig
 
 
+@pytest.mark.slow
 def test_points_agree_with_the_figures() -> None:
     capture = SelfTestRun(light_rig(LightWorld(late_ms=12.0)), NoProgress(), (100.0,)).capture()
     found, curves = analyse(capture), selftest_curves(capture)

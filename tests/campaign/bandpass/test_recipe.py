@@ -183,6 +183,7 @@ def test_missing_filter_is_refused(bench: Bench) -> None:
         recipe.capture(bench, step, NoProgress())
 
 
+@pytest.mark.slow
 def test_neighbouring_filter_is_found_by_the_places_of_its_orders(bench: Bench, tmp_path: Path) -> None:
     # So near that colours do not tell: 550 where 540 was asked for.
     step = next(step for step in RECIPE.steps(bench) if step.placement.filter_nm == 540.0)

@@ -155,6 +155,7 @@ def test_stage_notes_where_it_was(bench: Bench) -> None:
     assert ["850.0" in note for note in notes] == [False] * 4 + [True] * 4
 
 
+@pytest.mark.slow
 def test_a_capture_without_first_orders_is_named(bench: Bench, tmp_path: Path) -> None:
     step = RECIPE.steps(bench)[FILTERED]
     other = without(bench, tmp_path, step)

@@ -25,6 +25,7 @@ def seen_at(scale: float) -> Rig:
     return rig.model_copy(update={"pose": pose, "depth_range_mm": (scale * low, scale * high)})
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("scale", "square_mm"), [(0.5, 15.0), (1.0, 20.0), (2.0, 60.0)])
 def test_squares_follow_the_view_of_a_rig(scale: float, square_mm: float) -> None:
     found = fitting_board(USUAL_BOARD, seen_at(scale), 4)
@@ -39,6 +40,7 @@ def test_markers_keep_their_share_of_a_square() -> None:
     assert found.marker_mm / found.square_mm == pytest.approx(0.75)
 
 
+@pytest.mark.slow
 def test_a_board_that_no_squares_make_fit_stays_and_is_refused_by_name() -> None:
     rig = published_rig()
     aside = rig.pose.model_copy(update={"translation_mm": (900.0, 0.0, 0.0)})
@@ -50,6 +52,7 @@ def bench_of(scale: float, folder: Path) -> Bench:
     return Bench(open_twin({"size": "60x40"}), folder, seen_at(scale))
 
 
+@pytest.mark.slow
 def test_a_rig_that_places_boards_gets_squares_of_its_own_and_keeps_them(tmp_path: Path) -> None:
     recipe, bench = GeometryRecipe(), bench_of(0.5, tmp_path)
     step = recipe.steps(bench)[0]

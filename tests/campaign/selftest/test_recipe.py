@@ -90,6 +90,7 @@ def test_advised_exposures_remove_the_beat(found: SelfTest) -> None:
     assert at[333.3].ratio_percent.value < 0.1
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("hz", [50, 60, 120])
 def test_the_twins_cycle_is_found_and_its_beat_removed(hz: int) -> None:
     rig = open_twin({"scene": "plane", "film": "off", "size": "160x104", "led_cycle_hz": str(hz)})
@@ -108,6 +109,7 @@ def test_the_twins_cycle_is_found_and_its_beat_removed(hz: int) -> None:
     assert found.latency.blocking_ms.value == pytest.approx(50.0, abs=1.5)
 
 
+@pytest.mark.slow
 def test_without_time_stamps_the_spread_finds_the_cycle() -> None:
     found, figures = run_selftest(light_rig(LightWorld(cycle_hz=60.0, stamps=False)))
     assert found.cycle.method == "spread"
@@ -116,6 +118,7 @@ def test_without_time_stamps_the_spread_finds_the_cycle() -> None:
     assert failed(figures) == []
 
 
+@pytest.mark.slow
 def test_steady_light_has_no_cycle_and_keeps_the_exposures_wanted() -> None:
     recipe = SelfTestRecipe(wanted_ms=(100.0,))
     found, figures = run_selftest(light_rig(LightWorld()), recipe=recipe)
@@ -126,6 +129,7 @@ def test_steady_light_has_no_cycle_and_keeps_the_exposures_wanted() -> None:
     assert failed(figures) == []
 
 
+@pytest.mark.slow
 def test_a_projector_without_a_power_law_passes_and_is_kept_with_its_curve() -> None:
     found, figures = run_selftest(light_rig(LightWorld(srgb=True)))
     assert failed(figures) == []
@@ -141,6 +145,7 @@ def test_a_projector_without_a_power_law_passes_and_is_kept_with_its_curve() -> 
     assert RECIPE.apply(usual, published_rig()).projector_response.tone is None
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("world", "names"),
     [
@@ -162,6 +167,7 @@ def test_what_is_wrong_fails_its_own_figure(world: LightWorld, names: list[str])
     assert found.camera.electrons_per_dn.value == pytest.approx(10.0, rel=0.02)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("step_dn", "bits"), [(4, 0), (16, 8)])
 def test_values_of_fewer_bits_are_named_before_what_they_upset(
     tmp_path: Path, step_dn: int, bits: int
@@ -212,6 +218,7 @@ def test_lost_frames_are_taken_again_and_a_dead_camera_is_named() -> None:
         run_selftest(replace(with_faults(rig, FaultPlan(camera_gone_at=160)), place=None))
 
 
+@pytest.mark.slow
 def test_captures_survive_on_disk_and_fit_needs_no_devices(tmp_path: Path, found: SelfTest) -> None:
     here = bench(light_rig(LightWorld(cycle_hz=60.0, jitter_ms=0.5)), tmp_path)
     (step,) = RECIPE.steps(here)

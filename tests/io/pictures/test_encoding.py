@@ -51,6 +51,7 @@ def test_what_is_stated_is_compared_with_the_sums_of_the_code(
     assert bool(said) == bool(advice)
 
 
+@pytest.mark.slow
 def test_a_guess_decodes_pictures_for_screens_and_says_so(folders: dict[str, Path]) -> None:
     guessed = guess_mapping(folders["srgb"], PROJECTOR).mapping
     assert guessed.encoding == "srgb"

@@ -46,6 +46,7 @@ def test_the_mapping_finds_its_files_and_says_what_they_are(tmp_path: Path, gray
     assert any("7 bits of columns up to 12" in sentence for sentence in guess.mapping.unsure)
 
 
+@pytest.mark.slow
 def test_one_of_two_cameras_is_taken_and_the_other_named(tmp_path: Path, gray: Pictures) -> None:
     pictures = {f"cam{c}_{i:02d}.png": p for c in (1, 2) for i, p in enumerate(gray)}
     folder = write(tmp_path, pictures)
@@ -133,6 +134,7 @@ def test_stripes_count_the_periods_of_a_sinusoid(tmp_path: Path) -> None:
     assert (phases.fringes, phases.start_deg) == ((8.0,), -90.0)
 
 
+@pytest.mark.slow
 def test_stripes_count_the_periods_of_every_sinusoid(tmp_path: Path) -> None:
     sets: list[tuple[str, Stripes | Phases]] = [
         ("columns", Stripes(bits=4, inverse=False, unit_px=8)),
@@ -209,6 +211,7 @@ def test_inverses_may_be_in_a_folder_of_their_own(tmp_path: Path, gray: Pictures
     assert not guess.others
 
 
+@pytest.mark.slow
 def test_an_array_whose_last_axis_counts_pictures_is_told(tmp_path: Path, gray: Pictures) -> None:
     np.save(tmp_path / "all.npy", np.stack(gray, -1)[:32, :40].astype(np.uint8))
     with pytest.raises(StoreError, match=r"all\.npy is taken for 32 pictures of 16 x 40 px; .*moveaxis"):

@@ -133,6 +133,7 @@ def test_any_shape_is_found(true: ProjectorResponse) -> None:
     assert found.response.blur_px == pytest.approx(true.blur_px, rel=0.05)
 
 
+@pytest.mark.slow
 def test_a_skirt_is_found_where_lines_lie_side_by_side_and_pixels_far_apart() -> None:
     # Three lines a pixel, whose column and amplitude are its own: a free shape goes astray with columns.
     core, skirt = (np.exp(-0.5 * (PLACES / width) ** 2) / width for width in (0.6, 1.8))

@@ -57,6 +57,7 @@ def test_digits_are_told_by_how_steadily_their_numbers_run(
     assert reading.rises
 
 
+@pytest.mark.slow
 def test_rows_and_columns_are_told_apart_in_either_order_and_with_a_picture_absent() -> None:
     pictures, white, black = frames([("rows", Stripes(bits=7)), ("columns", Stripes(bits=7))])
     whole = [white, black, *pictures]
@@ -73,6 +74,7 @@ def test_rows_and_columns_are_told_apart_in_either_order_and_with_a_picture_abse
     assert _stripes(lacking, "rows").bits == _stripes(lacking, "columns").bits == 7
 
 
+@pytest.mark.slow
 def test_sinusoids_are_told_by_their_steps_and_their_fringes() -> None:
     sets = [("columns", Phases(periods_px=tuple(128 / n for n in (12, 11, 10)), steps=3, start_deg=-90))]
     found = _recognised(frames(sets)[0])
@@ -96,6 +98,7 @@ def test_pictures_of_no_code_make_no_sense() -> None:
     assert _recognised(list(noise)) is None
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("fringes", "steps", "start", "direction"),
     [((1, 4, 16), 3, -120.0, 1), ((1, 9), 3, 120.0, -1), ((8, 1), 5, 36.0, 1)],
@@ -113,6 +116,7 @@ def test_sinusoids_may_start_anywhere_and_end_with_the_projector(
     assert (block.reading.start_deg, block.reading.direction) == (start, direction)
 
 
+@pytest.mark.slow
 def test_one_fringe_is_not_taken_for_another_axis() -> None:
     dark = [
         np.asarray(np.rint(255 * (p / 255) ** (1 / 2.2)), np.uint16)
@@ -137,6 +141,7 @@ def test_white_and_black_are_no_coarse_digit_of_a_part_or_among_noise(share: flo
     assert [block.kind for block in found.blocks] == ["white", "black", "stripes"]
 
 
+@pytest.mark.slow
 def test_noisy_sinusoids_are_not_taken_for_finer_ones_that_fit_anything() -> None:
     seen, code = scene(), Phases(periods_px=(128, 8), steps=8)
     levels = [captured_levels(CapturedCode(column_sets=(code,)), PROJECTOR, k) for k in range(16)]

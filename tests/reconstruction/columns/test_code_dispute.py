@@ -103,6 +103,7 @@ class Wall:
             return np.asarray(np.abs(found.column_px.ravel() - self.column.numpy()) > 1)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("lines", "share"), [(False, 0.7), (True, 0.97)])
 def test_reflections_upset_the_gray_code_and_not_the_ensemble(lines: bool, share: float) -> None:
     wall = Wall.make("reflected")
@@ -120,6 +121,7 @@ def test_reflections_upset_the_gray_code_and_not_the_ensemble(lines: bool, share
     assert disagree[lit & ~wall.upset].mean() <= (0.0 if lines else 0.01)
 
 
+@pytest.mark.slow
 def test_light_that_comes_by_another_way_only_is_flagged_with_the_reason() -> None:
     wall = Wall.make("only reflected")
     found = wall.found(BOTH)
@@ -131,6 +133,7 @@ def test_light_that_comes_by_another_way_only_is_flagged_with_the_reason() -> No
     assert "another path" in REASONS[Flag.CODES_DISAGREE]
 
 
+@pytest.mark.slow
 def test_without_reflections_the_ensemble_finds_what_the_gray_code_finds() -> None:
     wall = Wall.make("straight")
     gray, both = (wall.found(code) for code in (GRAY, BOTH))

@@ -95,6 +95,7 @@ def test_columns_are_unsure_by_the_colours_of_materials(rig: Rig) -> None:
     assert material_std_px(coloured(rig, 8e-4), at) == pytest.approx([0, 0.015])
 
 
+@pytest.mark.slow
 def test_a_scan_through_such_lenses_is_corrected_and_says_so() -> None:
     plan = CapturePlan(code=GrayCode(rows=False), spectral=ScanLines(width_px=5, step_px=2))
     devices = open_twin({"size": "64x48", "scene": "color-checker", "foreign": "lateral-colour"})

@@ -59,6 +59,7 @@ def right(scanned: Scanned) -> float:
     return error
 
 
+@pytest.mark.slow
 def test_a_wrong_blur_of_the_calibration_does_no_harm_and_is_told(scanned: Scanned, right: float) -> None:
     wrong = blurred(scanned[0], 0.7)
     before, fit = depth_error_mm(scanned, wrong, as_calibrated=True)
@@ -72,6 +73,7 @@ def test_a_wrong_blur_of_the_calibration_does_no_harm_and_is_told(scanned: Scann
     assert "by the projector's calibration over 0.700 px" in told.sentence
 
 
+@pytest.mark.slow
 def test_a_field_that_the_calibration_has_wrong_does_no_harm(scanned: Scanned, right: float) -> None:
     """Columns follow the field that is stated, and the scan states its own."""
     field = SpreadField(

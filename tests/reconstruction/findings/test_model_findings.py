@@ -87,6 +87,7 @@ def less_blur(rig: Rig) -> Rig:
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("wrong", "part"),
     [

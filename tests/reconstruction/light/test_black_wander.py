@@ -21,6 +21,7 @@ PLAN = CapturePlan(
 )
 
 
+@pytest.mark.slow
 def test_black_that_wanders_is_named_and_the_light_is_not_blamed() -> None:
     devices, scan = twin_scan(PLAN, size="80x52", scene="color-checker")
     assert devices.calibration is not None

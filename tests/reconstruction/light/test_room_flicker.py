@@ -69,6 +69,7 @@ def test_steady_frames_and_a_flickering_projector_are_no_flicker_of_the_room(see
     assert seen.flicker(seen.with_(light * (gains[:, None, None] - 1))) is None
 
 
+@pytest.mark.slow
 def test_what_all_pixels_have_more_is_found_frame_by_frame(seen: Seen) -> None:
     more = np.random.default_rng(3).normal(0, 0.8, (len(seen.scan.frames), 1, 1))
     moved = seen.with_(more)
@@ -106,6 +107,7 @@ def test_a_room_that_flickers_is_a_share_of_what_it_lights(seen: Seen) -> None:
     assert found.rms_dn == pytest.approx(0.08 * np.median(room), rel=0.3)
 
 
+@pytest.mark.slow
 def test_lamps_that_flicker_and_light_for_every_pixel_are_told_apart(seen: Seen) -> None:
     room = np.median([seen.scan.frames[at] for at in seen.lines], axis=0) - seen.rig.sensor.black_level_dn
     rng = np.random.default_rng(3)
@@ -127,6 +129,7 @@ def test_patterns_other_than_single_lines_say_nothing(seen: Seen) -> None:
     assert room_flicker(frames, np.zeros((52, 80), int), nothing, None) is None
 
 
+@pytest.mark.slow
 def test_depth_and_sentences_are_those_of_a_steady_room(seen: Seen) -> None:
     more = np.random.default_rng(1).normal(0, 0.8, (len(seen.scan.frames), 1, 1))
     options = pipeline.Options(spectra=False)

@@ -66,6 +66,7 @@ def lines_of(scan: MemoryScan) -> tuple[NDArray[np.float32], tuple[FitFinding, .
     return frames.pick(PIXELS).radiance, told
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("of_white", [False, True])
 def test_a_slow_change_is_taken_off_the_lines_and_told(of_white: bool) -> None:
     right, nothing = lines_of(clean()[1])

@@ -60,6 +60,7 @@ def reconstructed(scan: MemoryScan) -> tuple[NDArray[np.float32], dict[str, str]
     return result["depth_mm"].values, {each.name: each.sentence for each in fit.significant}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("factor", "more_dn"), [(1.0, 16.0), (1.2, 0.0), (0.8, -5.0)])
 def test_a_change_at_once_leaves_depth_as_it_was(factor: float, more_dn: float) -> None:
     usual, said = reconstructed(clean()[1])

@@ -66,6 +66,7 @@ def whole(scanned: tuple[Rig, MemoryScan]) -> Iterator[xr.Dataset]:
         yield pipeline.reconstruct(scanned[1], scanned[0], pipeline.Options(grid=GRID))
 
 
+@pytest.mark.slow
 def test_rows_one_after_the_other_give_the_result_of_the_whole(
     scanned: tuple[Rig, MemoryScan], whole: xr.Dataset
 ) -> None:
@@ -80,6 +81,7 @@ def test_rows_one_after_the_other_give_the_result_of_the_whole(
     assert np.isfinite(whole["reflectance"].values[0]).mean() > 0.5
 
 
+@pytest.mark.slow
 def test_a_part_of_the_picture_is_that_part_of_the_whole(
     scanned: tuple[Rig, MemoryScan], whole: xr.Dataset
 ) -> None:
@@ -89,6 +91,7 @@ def test_a_part_of_the_picture_is_that_part_of_the_whole(
     xr.testing.assert_equal(found, whole.isel(y=slice(10, 25), x=slice(20, 50)))
 
 
+@pytest.mark.slow
 def test_a_reconstruction_that_was_killed_goes_on_and_ends_the_same(
     scanned: tuple[Rig, MemoryScan], whole: xr.Dataset, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

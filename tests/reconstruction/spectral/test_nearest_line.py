@@ -23,6 +23,7 @@ def trial(solver: str) -> Trial:
     return run_trial(published_rig(), PLAN, references.chart(), options=options, places=PLACES[:1])
 
 
+@pytest.mark.slow
 def test_each_baseline_is_sane_and_the_best_is_closer() -> None:
     best, nearest, basis = (trial(name).rmse for name in ("best", "nearest-line", "colour-basis"))
     assert best < 0.5 * min(nearest, basis)
@@ -36,6 +37,7 @@ def test_the_basis_gives_back_a_grey() -> None:
     assert np.abs(found - 0.5).max() < 0.1
 
 
+@pytest.mark.slow
 def test_an_unknown_solver_is_refused() -> None:
     with pytest.raises(PlanError, match="nearest-line"):
         trial("magic")

@@ -46,6 +46,7 @@ def smooth_spectra() -> torch.Tensor:
     return 0.45 + 0.3 * torch.sin(4 * x + torch.arange(3))
 
 
+@pytest.mark.slow
 def test_fit_finds_spectra_from_first_orders() -> None:
     truth = smooth_spectra()
     found = fit(measured(truth, 1.0), AdamOptions(steps=400, smoothness=0.0))

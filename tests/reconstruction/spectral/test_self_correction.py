@@ -56,6 +56,7 @@ def one_order_brighter(rig: Rig) -> Rig:
     return rig.model_copy(update={"efficiency": {**rig.efficiency, 1: brighter}})
 
 
+@pytest.mark.slow
 def test_most_of_the_error_of_a_darker_order_is_taken_back(
     scanned: tuple[Rig, MemoryScan], right: SpectralMaps
 ) -> None:
@@ -68,6 +69,7 @@ def test_most_of_the_error_of_a_darker_order_is_taken_back(
     assert error(taken, right) < 0.5 * error(left, right)
 
 
+@pytest.mark.slow
 def test_a_film_that_has_slipped_is_put_where_it_is(scanned: tuple[Rig, MemoryScan]) -> None:
     (rig, scan), fine = scanned, WavelengthGrid()
     right, left = (solved(each, scan, True, fine) for each in (rig, with_film(rig, -SLIPS)))
@@ -80,6 +82,7 @@ def test_a_film_that_has_slipped_is_put_where_it_is(scanned: tuple[Rig, MemorySc
     assert error(taken, right) < 0.5 * error(left, right)
 
 
+@pytest.mark.slow
 def test_by_wide_bands_its_motion_is_known_less_well(scanned: tuple[Rig, MemoryScan]) -> None:
     """What spectra curve along them displaces the orders, like a film that has come closer."""
     rig, scan = scanned
@@ -91,6 +94,7 @@ def test_by_wide_bands_its_motion_is_known_less_well(scanned: tuple[Rig, MemoryS
     assert motion.values[1] > 3 * motion.std[1]
 
 
+@pytest.mark.slow
 def test_a_film_as_calibrated_changes_nothing(scanned: tuple[Rig, MemoryScan], right: SpectralMaps) -> None:
     found = solved(*scanned, as_calibrated=False)
     assert found.followed is not None
@@ -120,6 +124,7 @@ def test_two_pixels_that_agree_say_whether_frames_fit_better(pixels: int, is_eno
     assert fits_better(before, after) == is_enough
 
 
+@pytest.mark.slow
 def test_what_both_orders_share_is_left_to_the_responses(
     scanned: tuple[Rig, MemoryScan], right: SpectralMaps
 ) -> None:
@@ -133,6 +138,7 @@ def test_what_both_orders_share_is_left_to_the_responses(
     assert not found.followed.balanced
 
 
+@pytest.mark.slow
 def test_light_of_orders_that_frames_fit_no_better_is_found_and_not_taken_over(
     scanned: tuple[Rig, MemoryScan], monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -48,6 +48,7 @@ def everything_of(scene: str, troubled: bool) -> tuple[LightPath, EffectPlan, ND
     return path, plan_effects(path), frames_dn(path, IMAGES, Limits(path).exposure_ms)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "scene"), [item for item in CALLS_FOR.items() if item[0] not in LATER], ids=lambda text: text
 )
@@ -61,6 +62,7 @@ def test_what_a_scene_calls_for_changes_it_by_more_than_the_tolerance_and_less_t
     assert plan.tolerance.value < change <= BY_NAME[name].bound(Limits(path)).dn + ROUNDING_DN
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("scene", ["plane tilt_y_deg=20", "leaves", "sphere gloss=1e-8", "face"])
 def test_auto_differs_from_all_by_less_than_the_tolerance(scene: str) -> None:
     tolerance = Tolerance(2.0)

@@ -57,6 +57,7 @@ def test_pixels_differ_by_a_percent_and_a_few_are_hot() -> None:
     assert seen == pytest.approx(2 * gain + hot)
 
 
+@pytest.mark.slow
 def test_frames_have_the_gain_and_the_dark_current() -> None:
     """The same shot without noise, with and without uneven pixels."""
 

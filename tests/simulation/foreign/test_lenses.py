@@ -61,6 +61,7 @@ def test_the_band_moves_by_some_nanometres_at_the_side() -> None:
     assert (centre_ratio(LENS, Foreign(frozenset({"plain"}))) == 1).all()
 
 
+@pytest.mark.slow
 def test_the_first_order_of_a_line_moves_to_columns_of_bluer_light() -> None:
     """Through a filter a white line has a narrow image in the first order; it moves with the band."""
     images = {}

@@ -87,6 +87,7 @@ def pattern(world: World, kind: str) -> NDArray[np.uint8]:
     return image
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["line", "stripes", "colours", "rows", "free", "black"])
 @pytest.mark.parametrize("scene", ["plane", "color-checker"])
 def test_with_nothing_foreign_the_light_is_that_of_the_usual_renderer(kind: str, scene: str) -> None:
@@ -158,6 +159,7 @@ def measured_spread(foreign: str, start: int = 330) -> tuple[float, float, float
     return float(mean), moments[0] - 1 / 12, moments[1] / moments[0] ** 1.5, beyond
 
 
+@pytest.mark.slow
 def test_spreads_have_the_moments_that_they_say() -> None:
     """Variance of the spread (the lit pixel's own taken off), skewness and tails, read off one frame."""
     std = published_rig().projector_response.blur_px
@@ -183,6 +185,7 @@ def test_spread_widens_towards_the_corners_only() -> None:
     assert side[1] > 1.1 * middle[1]
 
 
+@pytest.mark.slow
 def test_lateral_colour_magnifies_red_and_blue_differently() -> None:
     """An edge moves in opposite ways in red and blue, by less than both lenses can at the side."""
     world = twin("lateral-colour", "320x24", film="off")
@@ -205,6 +208,7 @@ def test_lateral_colour_magnifies_red_and_blue_differently() -> None:
     assert 0.004 < abs(shifts[0] - shifts[2]) < 0.4
 
 
+@pytest.mark.slow
 def test_noise_free_frames_do_not_depend_on_the_seed_of_the_noise_but_on_that_of_the_rig() -> None:
     def frame(**options: str) -> NDArray[np.uint16]:
         camera = open_twin({"foreign": "prnu,curves", "size": "32x24", "noise": "off", **options}).camera

@@ -30,6 +30,7 @@ def albedo(truth: SceneTruth) -> NDArray[np.float64]:
     return np.asarray(np.bincount(pixel, value, truth.depth_mm.size).reshape(truth.depth_mm.shape), float)
 
 
+@pytest.mark.slow
 def test_shares_of_a_pixel_sum_to_one() -> None:
     truth = see(roll_deg=7)
     pixel, _, share = truth.parts()
@@ -55,6 +56,7 @@ def test_a_mixed_pixel_holds_the_area_of_the_ink() -> None:
     assert window.sum() == pytest.approx(side.prod() * (1 + 1 / 16), rel=0.03)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("marker_mm", [0.0, 15.0])
 def test_corners_are_found_where_the_pose_puts_them(marker_mm: float) -> None:
     turned = {"x_mm": 20.0, "y_mm": -5.0, "tilt_x_deg": 12.0, "tilt_y_deg": -8.0, "roll_deg": 6.0}

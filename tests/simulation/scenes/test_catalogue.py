@@ -49,6 +49,7 @@ def test_truth_is_complete_and_consistent(name: str) -> None:
     assert spectra.max() <= 1
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", NAMES)
 def test_rendering_twice_gives_the_same(name: str) -> None:
     first, second = see(make_scene(name)), see(make_scene(name))
@@ -57,6 +58,7 @@ def test_rendering_twice_gives_the_same(name: str) -> None:
     np.testing.assert_array_equal(first.material, second.material)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", NAMES)
 def test_normals_agree_with_differences_of_depth(name: str) -> None:
     lens = FULL.resized(445, 290)

@@ -105,6 +105,7 @@ def test_a_failed_scan_does_not_stop_the_others_and_is_told(folder: Path) -> Non
     assert sorted(path.name for path in folder.iterdir() if path.suffix != ".dsl") == ["a.zarr", "c.zarr"]
 
 
+@pytest.mark.slow
 def test_complete_results_of_the_same_frames_and_options_are_kept(folder: Path) -> None:
     _batch(folder)
     before = (folder / "a.zarr" / "zarr.json").read_bytes()
@@ -127,6 +128,7 @@ def test_a_damaged_result_is_not_taken_for_complete(folder: Path) -> None:
     assert "is damaged" in _batch(folder)["a"].sentence
 
 
+@pytest.mark.slow
 def test_a_batch_that_was_killed_continues_and_ends_the_same(
     folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

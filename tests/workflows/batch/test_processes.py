@@ -23,6 +23,7 @@ def outcomes(runner: Processes, tasks: dict[int, ScanTask]) -> Sequence[Outcome]
     return [ended[i] for i in tasks]
 
 
+@pytest.mark.slow
 def test_every_task_is_done_once_and_tells_of_its_rows(tmp_path: Path) -> None:
     tasks = tasks_in(tmp_path, "abc")
     events = list(Processes(2, work=work.quick).run(tasks))
@@ -31,12 +32,14 @@ def test_every_task_is_done_once_and_tells_of_its_rows(tmp_path: Path) -> None:
     assert [work.begun(task) for task in tasks.values()] == [1, 1, 1]
 
 
+@pytest.mark.slow
 def test_only_the_task_whose_process_died_is_done_again(tmp_path: Path) -> None:
     tasks = tasks_in(tmp_path, "abc")
     assert [o.state for o in outcomes(Processes(1, work=work.dies_once), tasks)] == ["made"] * 3
     assert [work.begun(task) for task in tasks.values()] == [1, 2, 1]
 
 
+@pytest.mark.slow
 def test_a_task_that_kills_its_process_is_given_up_and_the_others_are_done(tmp_path: Path) -> None:
     tasks = tasks_in(tmp_path, "abc")
     found = outcomes(Processes(1, work=work.dies), tasks)
@@ -45,6 +48,7 @@ def test_a_task_that_kills_its_process_is_given_up_and_the_others_are_done(tmp_p
     assert "died 3 times, the last time with exit code 9" in found[1].sentence
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("memory", "most"), [(2.5, 2), (0.5, 1)])
 def test_tasks_wait_for_memory_but_one_always_runs(tmp_path: Path, memory: float, most: int) -> None:
     runner = Processes(3, memory, lambda task: 1.0, work.meets_others)

@@ -35,6 +35,7 @@ assert not heavy, heavy
 """
 
 
+@pytest.mark.slow
 def test_evidence_is_made_without_heavy_libraries() -> None:
     command = [sys.executable, "-c", MAKE_ALL, *recipe_names()]
     done = subprocess.run(command, capture_output=True, text=True, timeout=60)

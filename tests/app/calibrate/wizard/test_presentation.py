@@ -249,6 +249,7 @@ def test_back_leads_from_the_settings_to_the_work() -> None:
     assert page_before(wizard(SECOND)) == FIRST
 
 
+@pytest.mark.slow
 def test_the_activity_is_what_runs_else_the_note() -> None:
     idle = wizard(note="Captured.", progress=JobProgress("old", 3, 4))
     assert (activity(idle).text, activity(idle).is_busy) == ("Captured.", False)

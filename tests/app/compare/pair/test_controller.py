@@ -62,6 +62,7 @@ def test_cancelling_drops_what_waits(results: tuple[Path, Path, Path]) -> None:
     assert not compare.state.busy.value
 
 
+@pytest.mark.slow
 def test_a_result_is_compared_with_the_ground_truth_of_its_scene(
     results: tuple[Path, Path, Path], tmp_path: Path
 ) -> None:

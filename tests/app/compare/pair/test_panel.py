@@ -83,6 +83,7 @@ def test_a_result_alone_is_hatched_where_it_has_no_depth(qtbot: QtBot) -> None:
     assert len(valued) == 1
 
 
+@pytest.mark.slow
 def test_recent_results_are_compared_by_a_double_click(qtbot: QtBot, bench: Bench, chart: Path) -> None:
     page, state, _ = bench
     near = make_variant(chart, "near", 3.0)
@@ -119,6 +120,7 @@ def test_a_name_with_signs_of_markup_is_whole_above_its_picture(
     assert [" ".join(title.split()) for title in titles] == ["A chart", "B Mitte <2>", "A − B"]
 
 
+@pytest.mark.slow
 def test_figures_pictures_and_spectra_of_a_pair(qtbot: QtBot, bench: Bench, chart: Path) -> None:
     page, state, _ = bench
     with_truth(qtbot, bench, chart)
@@ -145,6 +147,7 @@ def test_figures_pictures_and_spectra_of_a_pair(qtbot: QtBot, bench: Bench, char
     apply_theme_to(page, DARK)
 
 
+@pytest.mark.slow
 def test_the_slider_steps_through_common_bands(qtbot: QtBot, bench: Bench, chart: Path) -> None:
     page, state, _ = bench
     with_truth(qtbot, bench, chart)

@@ -113,6 +113,7 @@ def test_a_region_is_read_again(series: SeriesController, undo: UndoStack, stage
     assert series.state.region.value is None
 
 
+@pytest.mark.slow
 def test_accuracy_over_time_against_one_result(series: SeriesController, tmp_path: Path) -> None:
     reference, *scans = write_sweep(tmp_path)
     series.ask(SeriesKind.SWEEP)

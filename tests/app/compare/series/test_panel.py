@@ -83,6 +83,7 @@ def test_a_position_is_typed_and_a_row_removed_by_keys(qtbot: QtBot, bench: Benc
     qtbot.waitUntil(lambda: panel.table.item(0, 1).text() == "700")  # type: ignore[union-attr]
 
 
+@pytest.mark.slow
 def test_the_rectangle_on_the_picture_is_all_that_counts(
     qtbot: QtBot, bench: Bench, stage: list[Path]
 ) -> None:
@@ -101,6 +102,7 @@ def test_the_rectangle_on_the_picture_is_all_that_counts(
     qtbot.waitUntil(lambda: not bench.state.busy.value, timeout=30_000)
 
 
+@pytest.mark.slow
 def test_accuracy_over_time_and_its_report(
     qtbot: QtBot, bench: Bench, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

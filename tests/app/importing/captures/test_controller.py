@@ -96,6 +96,7 @@ def test_parts_and_files_change_the_mapping(control: CapturesController) -> None
     assert stated.mapping.channel == "red"
 
 
+@pytest.mark.slow
 def test_another_projector_is_guessed_again_or_set(control: CapturesController) -> None:
     control.set_projector((32, 30))
     stated = control.state.stated.value
@@ -110,6 +111,7 @@ def test_another_projector_is_guessed_again_or_set(control: CapturesController) 
     assert (stated.mapping.projector_size_px, stated.mapping.channel) == (PROJECTOR, "red")
 
 
+@pytest.mark.slow
 def test_a_mapping_is_saved_and_used_for_another_folder(control: CapturesController, tmp_path: Path) -> None:
     file = tmp_path / "m.json"
     control.save_mapping(file)
@@ -128,6 +130,7 @@ def test_a_mapping_is_saved_and_used_for_another_folder(control: CapturesControl
     assert Place.MAPPING in troubles(control)
 
 
+@pytest.mark.slow
 def test_one_of_several_captures_is_chosen(tmp_path: Path) -> None:
     both = tmp_path / "both"
     for name in ("left", "right"):
@@ -143,6 +146,7 @@ def test_one_of_several_captures_is_chosen(tmp_path: Path) -> None:
     assert sorted(control.state.sets.value) == ["left", "right"]
 
 
+@pytest.mark.slow
 def test_an_outcome_that_no_longer_counts_is_dropped(folder: Path, tmp_path: Path) -> None:
     runner = ManualRunner()
     control = control_of(tmp_path, runner)

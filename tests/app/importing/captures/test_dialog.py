@@ -58,6 +58,7 @@ def settle(qtbot: QtBot, dialog: CapturesDialog) -> None:
     qtbot.waitUntil(lambda: not dialog._state.busy.value, timeout=PATIENCE_MS)
 
 
+@pytest.mark.slow
 def test_dropped_pictures_are_corrected_by_mouse_and_become_a_scan(
     qtbot: QtBot, window: MainWindow, folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -105,6 +106,7 @@ def test_dropped_pictures_are_corrected_by_mouse_and_become_a_scan(
     assert any("have a column" in toast.text for toast in window.toasts.shown)
 
 
+@pytest.mark.slow
 def test_a_wrong_folder_and_calibration_are_said_beside_them(
     qtbot: QtBot, window: MainWindow, folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -127,6 +129,7 @@ def test_a_wrong_folder_and_calibration_are_said_beside_them(
     assert not dialog.isVisible()
 
 
+@pytest.mark.slow
 def test_import_opens_the_dialog_that_fits_the_folder(
     qtbot: QtBot, window: MainWindow, folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

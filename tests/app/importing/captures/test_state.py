@@ -59,6 +59,7 @@ def test_what_is_wrong_with_a_file_is_said_once(tmp_path: Path) -> None:
     assert (view.folder.role, view.mapping.role) == ("bad", "muted")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("place", list(Place))
 def test_a_trouble_is_said_beside_what_it_is_about_and_prevents_the_import(
     tmp_path: Path, place: Place

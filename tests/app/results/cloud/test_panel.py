@@ -172,6 +172,7 @@ def test_a_3d_view_that_was_cancelled_comes_when_it_is_wanted_again(
     bench.window.close()
 
 
+@pytest.mark.slow
 def test_a_result_that_is_closed_leaves_no_copy_behind(bench: Bench, qtbot: QtBot) -> None:
     bench.control.show(ResultView.CLOUD)
     qtbot.waitUntil(lambda: bench.page.cloud.view is not None)

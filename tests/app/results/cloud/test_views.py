@@ -79,6 +79,7 @@ def test_a_marked_point_is_drawn_where_the_mouse_finds_it(bench: Bench, qtbot: Q
     assert spots.mean(0) == pytest.approx((place.y(), place.x()), abs=2)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("way", ["mouse", "arrow key", "wheel", "plus key"])
 def test_the_view_is_turned_and_looks_as_the_camera_again(bench: Bench, qtbot: QtBot, way: str) -> None:
     view = cloud_view(bench, qtbot)
@@ -137,6 +138,7 @@ def test_pictures_are_as_fine_as_the_screen(
     assert view.image.devicePixelRatio() == 1.5
 
 
+@pytest.mark.slow
 def test_a_large_cloud_grows_to_its_last_point(
     bench: Bench, qtbot: QtBot, monkeypatch: pytest.MonkeyPatch
 ) -> None:

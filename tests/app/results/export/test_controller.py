@@ -15,6 +15,7 @@ from tests.app.support.results_controller import bench as bench
 from tests.app.support.small_result import write_small_result
 
 
+@pytest.mark.slow
 def test_export_says_what_it_wrote_and_replaces_nothing_unasked(bench: Bench, tmp_path: Path) -> None:
     bench.control.marks.pin((3, 3))
     targets = {

@@ -70,6 +70,7 @@ def bench(finished: Path, tmp_path: Path) -> Bench:
     return made
 
 
+@pytest.mark.slow
 def test_the_result_comes_beside_the_old_one(bench: Bench) -> None:
     before = bench.folder / "small.zarr"
     kept = (before / "zarr.json").read_bytes()
@@ -90,6 +91,7 @@ def test_a_result_leads_to_its_scan_whatever_their_names(bench: Bench) -> None:
     assert bench.state.request.value.name == "small"
 
 
+@pytest.mark.slow
 def test_a_scan_without_result_has_nothing_to_compare_with(bench: Bench) -> None:
     shutil.rmtree(bench.folder / "small.zarr")
     bench.prepare()
@@ -100,6 +102,7 @@ def test_a_scan_without_result_has_nothing_to_compare_with(bench: Bench) -> None
     assert "reflectance" not in load_result(bench.folder / "small.zarr")
 
 
+@pytest.mark.slow
 def test_nothing_is_replaced_unasked(bench: Bench) -> None:
     bench.control.change(name="small", spectra=False)
     assert "small.zarr already exists" in bench.state.trouble.value
@@ -137,6 +140,7 @@ def test_bad_requests_are_refused_with_a_sentence(
     assert len(list(bench.folder.iterdir())) == 2
 
 
+@pytest.mark.slow
 def test_bands_do_not_matter_without_spectra(bench: Bench) -> None:
     bench.control.change(step_nm=7.0, spectra=False)
     assert bench.state.trouble.value == ""
@@ -153,6 +157,7 @@ def test_a_scan_without_calibration_asks_for_one(bench: Bench) -> None:
     assert bench.state.trouble.value == ""
 
 
+@pytest.mark.slow
 def test_calibrations_of_the_library_and_of_files_are_used(bench: Bench) -> None:
     bench.library.store("room 12", bench.rig)
     bench.prepare()

@@ -62,6 +62,7 @@ def results(window: MainWindow) -> ResultsPage:
     return page
 
 
+@pytest.mark.slow
 def test_a_second_result_is_made_opened_and_compared(
     qtbot: QtBot, window: MainWindow, tmp_path: Path
 ) -> None:
@@ -117,6 +118,7 @@ def test_the_dialog_shows_what_it_asks_for(
     assert not (tmp_path / "small-2.zarr").exists()
 
 
+@pytest.mark.slow
 def test_who_works_elsewhere_is_not_torn_away(qtbot: QtBot, window: MainWindow, tmp_path: Path) -> None:
     window.do("reconstruct_again")
     dialog = opened(qtbot, window)

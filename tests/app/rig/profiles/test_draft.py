@@ -18,6 +18,7 @@ SCREEN = DraftPart("screen", {"screen": "2", "latency_ms": "60"})
 DRAFT = Draft("lab", {"camera": WEBCAM, "projector": SCREEN}, note="a room")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("driver", "setting", "text", "value"),
     [

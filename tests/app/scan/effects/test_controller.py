@@ -89,6 +89,7 @@ def seen_as_it_is(world: World) -> NDArray[np.float32]:
     return np.asarray(world.image[:48, :64].mean(-1, dtype=np.float32))
 
 
+@pytest.mark.slow
 def test_a_choice_is_put_in_force_by_options_that_scans_note(
     control: EffectsController, bench: ScanBench, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

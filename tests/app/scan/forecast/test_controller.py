@@ -61,6 +61,7 @@ def counted(monkeypatch: pytest.MonkeyPatch) -> list[str]:
     return seen
 
 
+@pytest.mark.slow
 def test_the_planner_is_asked(bench: ScanBench, tmp_path: Path) -> None:
     work = ForecastJob(
         ForecastBasis(bench.calibration, 50.0, 1000 / 60), tmp_path, lambda rig: (), lambda: False
@@ -216,6 +217,7 @@ def test_other_work_goes_first(bench: ScanBench, tmp_path: Path, counted: list[s
     assert control._must_wait()
 
 
+@pytest.mark.slow
 def test_after_a_scan_what_it_was_stands_beside_what_was_expected(
     bench: ScanBench, tmp_path: Path, counted: list[str]
 ) -> None:

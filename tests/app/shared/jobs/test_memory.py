@@ -61,6 +61,7 @@ def test_little_garbage_may_wait_until_a_job_ends(day: Day) -> None:
     assert knot() is None
 
 
+@pytest.mark.slow
 def test_what_grew_old_is_found_in_time_but_not_while_a_job_runs(day: Day) -> None:
     held = Knot()
     knot = weakref.ref(held)

@@ -106,6 +106,7 @@ def test_tab_goes_through_a_form_and_then_to_its_buttons(qtbot: QtBot) -> None:
     assert go.isDefault()
 
 
+@pytest.mark.slow
 def test_no_button_of_a_dialog_has_an_icon_of_the_desktop(qtbot: QtBot, qapp: QApplication) -> None:
     before, leave = qapp.style().name(), QDialogButtonBox.StandardButton.Cancel
     qapp.setStyle(_WithIcons())

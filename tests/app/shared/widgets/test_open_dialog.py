@@ -25,6 +25,7 @@ def _dialog(qtbot: QtBot, home: Path, takes_folders: bool = False) -> OpenDialog
     return dialog
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["leaf.dsl", "leaf.zarr"])
 def test_a_thing_is_chosen_and_not_entered(qtbot: QtBot, home: Path, name: str) -> None:
     assert is_thing(home / name)

@@ -30,6 +30,7 @@ def steady() -> ProbedScan:
     return scanned(ScanLines(width_px=5, step_px=4))
 
 
+@pytest.mark.slow
 def test_frames_that_flicker_are_told_from_steady_ones(steady: ProbedScan) -> None:
     radiance = np.asarray(steady.radiance)
     true = 0.03 * np.random.default_rng(3).standard_normal(len(radiance))
@@ -55,6 +56,7 @@ def test_nothing_is_learned_of_a_frame_beyond_what_was_known(steady: ProbedScan)
     assert np.abs(known.log).max() < 0.02
 
 
+@pytest.mark.slow
 def test_several_lines_at_once_tell_nothing() -> None:
     comb = scanned(LineComb(width_px=5, step_px=4, period_px=160))
     assert frame_levels(comb, np.full(len(comb.radiance), 0.03)) is None

@@ -60,6 +60,7 @@ def test_neighbouring_residuals_that_go_together_count_until_they_first_do_not()
     assert probe_module._correlation([0 * long], lambda values: values).tolist() == [1.0]
 
 
+@pytest.mark.slow
 def test_pixels_ask_for_the_same_however_bright_surfaces_are_thought_to_be() -> None:
     plan = CapturePlan(code=GrayCode(rows=False), spectral=ScanLines(width_px=5, step_px=4))
     devices, scan = twin_scan(plan, size="64x48", scene="plane")

@@ -73,17 +73,20 @@ def assert_same(monkeypatch: pytest.MonkeyPatch, **changes: Any) -> SpectralMaps
     return found
 
 
+@pytest.mark.slow
 def test_compiled_spectra_are_those_of_tensors(monkeypatch: pytest.MonkeyPatch) -> None:
     found = assert_same(monkeypatch)
     assert np.isnan(found.reflectance[:, 3:5, 4:7]).all()
 
 
+@pytest.mark.slow
 def test_offsets_that_all_frames_share_count(monkeypatch: pytest.MonkeyPatch) -> None:
     _, pixels = stage()
     unsure = replace(pixels, offset_std=np.full_like(pixels.offset_std, 0.05))
     assert_same(monkeypatch, pixels=unsure)
 
 
+@pytest.mark.slow
 def test_what_is_no_number_weighs_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     made, _ = stage()
     rng = np.random.default_rng(0)
@@ -93,6 +96,7 @@ def test_what_is_no_number_weighs_nothing(monkeypatch: pytest.MonkeyPatch) -> No
     assert_same(monkeypatch, radiance=radiance, std=std)
 
 
+@pytest.mark.slow
 def test_monochrome_pixels_have_no_neighbours(monkeypatch: pytest.MonkeyPatch) -> None:
     made, _ = stage()
     sensor = made.rig.sensor.model_copy(update={"bayer": "MONO"})
