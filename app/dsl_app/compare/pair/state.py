@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from enum import Enum
 from pathlib import Path
@@ -51,6 +52,14 @@ class Side:
         origin = rig_of_notes(self.arrays.attributes)
         return origin is not None and origin[0] == "twin"
 
+    def std(self, shown: PairQuantity, band: int, pixel: Pixel) -> float:
+        """Standard deviation at a pixel, 0 where none is stated."""
+        name = "depth_std_mm" if shown is PairQuantity.DEPTH else "reflectance_std"
+        if self.truth is not None or name not in self.arrays.arrays:
+            return 0.0
+        values = self.arrays.at(name, pixel)
+        return float(values if shown is PairQuantity.DEPTH else values[band])
+
 
 @dataclass(frozen=True)
 class Pair:
@@ -72,6 +81,11 @@ class Pair:
             return None
         i, k = self.bands[band]
         return self.first.arrays["reflectance"][i], self.second.arrays["reflectance"][k]
+
+    def stds(self, shown: PairQuantity, band: int, pixel: Pixel) -> tuple[float, float]:
+        """Standard deviations of A and B at a pixel; 0 for the truth, and for a result that states none."""
+        i, k = (0, 0) if shown is PairQuantity.DEPTH else self.bands[band]
+        return self.first.std(shown, i, pixel), self.second.std(shown, k, pixel)
 
     def mean_reflectance(self) -> tuple[Floats, Floats] | None:
         """Reflectance of A and B over their common bands, images (h, w); None where they have none."""
@@ -197,17 +211,20 @@ def _at_hand(state: PairState) -> ButtonState:
 
 
 def cursor_text(state: PairState) -> str:
-    """The values of both sides under the cursor, and their difference."""
+    """The values of both sides under the cursor and their difference, with standard deviations."""
     pair, pixel = state.pair.value, state.cursor.value
     images = None if pair is None else pair.images(state.shown.value, state.band.value)
-    if images is None:
+    if pair is None or images is None:
         return ""
     if pixel is None:
         return "Point at a picture to compare values."
     a, b = (float(image[pixel[1], pixel[0]]) for image in images)
+    std_a, std_b = pair.stds(state.shown.value, state.band.value, pixel)
     decimals, unit = (2, " mm") if state.shown.value is PairQuantity.DEPTH else (3, "")
+    of_both = (("A", a, std_a), ("B", b, std_b), ("A − B", a - b, math.hypot(std_a, std_b)))
     values = "   ".join(
-        f"{name} {number_text(value, decimals)}{unit}"
-        for name, value in (("A", a), ("B", b), ("A − B", a - b))
+        f"{name} {number_text(value, decimals)}"
+        + (f" ± {number_text(std, decimals)}" if std > 0 and math.isfinite(value) else "")
+        for name, value, std in of_both
     )
-    return f"column {pixel[0]}, row {pixel[1]}:   {values}"
+    return f"column {pixel[0]}, row {pixel[1]}:   {values}{unit}"

@@ -131,8 +131,27 @@ def test_the_cursor_reads_both_sides_and_their_difference() -> None:
     state = state_of("ab")
     assert cursor_text(state) == "Point at a picture to compare values."
     state.cursor.set((2, 1))
-    assert cursor_text(state) == "column 2, row 1:   A 700.00 mm   B 702.50 mm   A − B −2.50 mm"
+    assert cursor_text(state) == "column 2, row 1:   A 700.00   B 702.50   A − B −2.50 mm"
     state.shown.set(PairQuantity.BAND)
     assert cursor_text(state) == "column 2, row 1:   A 0.500   B 0.750   A − B −0.250"
     state.band.set(1)
     assert cursor_text(state) == ""
+
+
+def test_values_under_the_cursor_have_their_deviations_but_for_the_truth() -> None:
+    state = state_of("at")
+    first, second = state.first.value, state.second.value
+    assert first is not None
+    assert second is not None
+    stds = {
+        "depth_std_mm": np.full((2, 3), 0.03, np.float32),
+        "reflectance_std": np.full((1, 2, 3), 0.012, np.float32),
+    }
+    first = replace(first, arrays=replace(first.arrays, arrays={**first.arrays.arrays, **stds}))
+    state.cursor.set((2, 1))
+    state.pair.set(Pair(first, second, ((0, 0),), ()))
+    assert cursor_text(state) == "column 2, row 1:   A 700.00 ± 0.03   B 700.00   A − B 0.00 ± 0.03 mm"
+    state.pair.set(Pair(first, replace(first, name="again"), ((0, 0),), ()))
+    assert cursor_text(state).endswith("B 700.00 ± 0.03   A − B 0.00 ± 0.04 mm")
+    state.shown.set(PairQuantity.BAND)
+    assert cursor_text(state).endswith("A 0.500 ± 0.012   B 0.500 ± 0.012   A − B 0.000 ± 0.017")
