@@ -87,9 +87,9 @@ def test_deviations_of_straightness_are_those_of_many_repeats() -> None:
         return stage_test(POSITIONS, targets)
 
     found = [repeat(seed) for seed in range(30)]
-    for line in (lambda test: test.free, lambda test: test.fixed):
-        spread = np.std([line(test).rms_mm for test in found], ddof=1)
-        assert np.mean([line(test).rms_std_mm for test in found]) == pytest.approx(spread, rel=0.35)
+    for lines in ([test.free for test in found], [test.fixed for test in found]):
+        spread = np.std([line.rms_mm for line in lines], ddof=1)
+        assert np.mean([line.rms_std_mm for line in lines]) == pytest.approx(spread, rel=0.35)
     pixels = np.std([test.pixel_rms_mm for test in found], ddof=1)
     assert np.mean([test.pixel_rms_std_mm or 0.0 for test in found]) == pytest.approx(pixels, rel=0.5)
 
