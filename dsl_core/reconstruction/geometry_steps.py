@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
 
 from dsl_core.model.fit import FitFinding
 from dsl_core.model.options import Options
-from dsl_core.model.rig import Rig
+from dsl_core.model.rig import ProjectorResponse, Rig
 from dsl_core.optics.lines.line_set import LineSet
+from dsl_core.optics.spread.fit import SpreadFit
 from dsl_core.patterns.gray_code import DecodedCode
 from dsl_core.progress import Progress
 from dsl_core.reconstruction.camera_spot import follow_spot, spot_finding
@@ -19,16 +21,36 @@ from dsl_core.reconstruction.columns.column import MODEL_ERROR
 from dsl_core.reconstruction.columns.line_peaks import smooth_peaks
 from dsl_core.reconstruction.columns.line_spread import own_spread, spread_pixels, with_own_spread
 from dsl_core.reconstruction.columns.peak_error import peak_error
-from dsl_core.reconstruction.columns.spread_doubt import spread_doubt
+from dsl_core.reconstruction.columns.spread_doubt import SpreadDoubt, spread_doubt
 from dsl_core.reconstruction.findings.spread_findings import spread_findings
 from dsl_core.reconstruction.fine_texture import follow_scatter
-from dsl_core.reconstruction.geometry import Geometry, geometry_of, require_light, require_pixels
+from dsl_core.reconstruction.geometry import (
+    FoundColumns,
+    Geometry,
+    geometry_of,
+    require_light,
+    require_pixels,
+)
 from dsl_core.reconstruction.hdr import MergedFrame
 from dsl_core.reconstruction.lenses import follow_lenses
 from dsl_core.reconstruction.light.followed import follow_light, unsure_level
 from dsl_core.reconstruction.rows.columns import columns_by_rows
 from dsl_core.reconstruction.rows.frames import ScanFrames
 from dsl_core.reconstruction.spectral.highlights import follow_highlights
+
+
+@dataclass(frozen=True)
+class _Spread:
+    """What is known of the spread of lines: what was found, what of it is in doubt, and errors that follow.
+
+    ``error`` is that of the modelled peak, relative to it; ``wave_px`` that of columns between edges of the
+    code.
+    """
+
+    found: SpreadFit | None = None
+    doubt: SpreadDoubt | None = None
+    error: float = MODEL_ERROR
+    wave_px: float = 0.0
 
 
 class GeometrySteps:
@@ -69,19 +91,46 @@ class GeometrySteps:
 
     def measure(self) -> Geometry:
         """Columns, depth and surface; raises `DslError` if no pixel has a depth."""
-        options, frames, lines = self._options, self._frames, self._lines
+        options, calibrated = self._options, self.rig.projector_response
+        follows = options.refine_columns and not options.as_calibrated
         code, white = self._taken()
-        refines_rig = options.refine_columns and not options.as_calibrated
-        error, calibrated, spread, doubt = MODEL_ERROR, self.rig.projector_response, None, None
-        if refines_rig:
-            spread = own_spread(self.rig, lines, code, white, frames)
-            self.rig = with_own_spread(self.rig, spread)
-            peaks = smooth_peaks(self.rig, lines, code, white, frames)
-            error, doubt = peak_error(peaks), spread_doubt(peaks, spread)
-            del peaks
-        columns = columns_by_rows(self.rig, options, frames, code, white, error, self._progress)
+        known = self._own_spread(code, white) if follows else _Spread()
+        columns = self._columns(code, white, known)
         named = NamedPlaces.of(code)
-        wave = code_wave(lines, named.column, columns.maps) if refines_rig else None
+        if follows:
+            columns, known = self._own_width(columns, known, code, white, named)
+        del code, white
+        geometry = geometry_of(
+            self.rig,
+            self._lines if options.refine_columns else None,
+            columns,
+            self._frames.shape,
+            options.surface_window_px,
+            None if known.doubt is None or known.doubt.is_sure else known.doubt,
+            code_wave_px=known.wave_px,
+        )
+        del columns
+        require_pixels(geometry.flags)
+        return self._followed(geometry, named, calibrated, known.found) if follows else geometry
+
+    def _own_spread(self, code: DecodedCode, white: MergedFrame) -> _Spread:
+        """What this scan's lines say of their spread, which ``rig`` then has."""
+        found = own_spread(self.rig, self._lines, code, white, self._frames)
+        self.rig = with_own_spread(self.rig, found)
+        peaks = smooth_peaks(self.rig, self._lines, code, white, self._frames)
+        return _Spread(found, spread_doubt(peaks, found), peak_error(peaks))
+
+    def _own_width(
+        self,
+        columns: FoundColumns,
+        known: _Spread,
+        code: DecodedCode,
+        white: MergedFrame,
+        named: NamedPlaces,
+    ) -> tuple[FoundColumns, _Spread]:
+        """The same columns, or others where the edges of the code say that lines are wider or narrower."""
+        lines, doubt, error = self._lines, known.doubt, known.error
+        wave = code_wave(lines, named.column, columns.maps)
         if wave is not None and doubt is not None:
             # One width may be well known, and yet be that of no part of a picture whose focus varies.
             own = wave.own_width(doubt)
@@ -89,42 +138,40 @@ class GeometrySteps:
             if own.changed:
                 self.findings.append(own.finding())
                 self.rig = own.of(self.rig)
-                error = peak_error(smooth_peaks(self.rig, lines, code, white, frames))
-                columns = columns_by_rows(self.rig, options, frames, code, white, error, self._progress)
+                error = peak_error(smooth_peaks(self.rig, lines, code, white, self._frames))
+                columns = self._columns(code, white, replace(known, error=error))
                 wave = code_wave(lines, named.column, columns.maps)
             doubt = with_varying_width(doubt, lines, named.column, columns.maps)
-        del code, white
         if wave is not None:
             self.findings.append(wave.finding())
-        geometry = geometry_of(
-            self.rig,
-            lines if options.refine_columns else None,
-            columns,
-            frames.shape,
-            options.surface_window_px,
-            None if doubt is None or doubt.is_sure else doubt,
-            code_wave_px=0.0 if wave is None else wave.error_px,
+        wave_px = 0.0 if wave is None else wave.error_px
+        return columns, replace(known, doubt=doubt, error=error, wave_px=wave_px)
+
+    def _columns(self, code: DecodedCode, white: MergedFrame, known: _Spread) -> FoundColumns:
+        return columns_by_rows(
+            self.rig, self._options, self._frames, code, white, known.error, self._progress
         )
-        del columns
-        require_pixels(geometry.flags)
-        if not refines_rig:
-            return geometry
-        window_px = options.surface_window_px
-        self.rig, geometry, found = follow_lenses(self.rig, lines, geometry, window_px)
-        self.findings += found
-        geometry, spot = follow_spot(self.rig, lines, geometry, window_px)
+
+    def _followed(
+        self, geometry: Geometry, named: NamedPlaces, calibrated: ProjectorResponse, found: SpreadFit | None
+    ) -> Geometry:
+        """The same with what depth, code and lines say together of lenses, pixels, scatter and highlights."""
+        window_px = self._options.surface_window_px
+        self.rig, geometry, more = follow_lenses(self.rig, self._lines, geometry, window_px)
+        self.findings += more
+        geometry, spot = follow_spot(self.rig, self._lines, geometry, window_px)
         if spot is not None:
             self.findings.append(spot_finding(spot))
-        geometry, found = follow_scatter(self.rig, geometry, window_px)
-        self.findings += found
-        if spread is not None:
-            self.findings += spread_findings(calibrated, spread, 0.0 if spot is None else spot.columns_px)
-        blur_px = calibrated.blur_px
-        geometry, found = code_agreement(self.rig, frames.plan, named, geometry, window_px, blur_px)
-        self.findings += found
-        if options.spectra:
-            geometry, found = follow_highlights(self.rig, geometry)
-            self.findings += found
+        geometry, more = follow_scatter(self.rig, geometry, window_px)
+        self.findings += more
+        if found is not None:
+            self.findings += spread_findings(calibrated, found, 0.0 if spot is None else spot.columns_px)
+        plan, blur_px = self._frames.plan, calibrated.blur_px
+        geometry, more = code_agreement(self.rig, plan, named, geometry, window_px, blur_px)
+        self.findings += more
+        if self._options.spectra:
+            geometry, more = follow_highlights(self.rig, geometry)
+            self.findings += more
         return geometry
 
     def _taken(self) -> tuple[DecodedCode, MergedFrame]:
