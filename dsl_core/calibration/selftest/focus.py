@@ -127,5 +127,6 @@ def _blur(edges: _Edges, chosen: NDArray[np.bool_]) -> Measured:
 
 _NO_EDGES = (
     "No clear edges of the projected bars are visible: the picture is far out of focus, or the target is"
-    " too rough or small. Focus projector and camera on the target and make it fill the view."
+    " too rough or small, or the projector showed an earlier picture. Focus projector and camera on the"
+    " target and make it fill the view; if it is sharp, raise the latency in the projector's driver."
 )

@@ -44,7 +44,8 @@ def check_latency(readings: Readings, claimed_ms: float, has_times: bool, show_s
     if len(failed) and failed.max() >= longest:
         raise DeviceError(
             f"A new picture is not always visible {longest:g} ms after it was shown. Raise the"
-            " latency in the projector's driver, and check that nothing else draws on its screen."
+            " latency in the projector's driver, and check that nothing else draws on its screen, and that"
+            " automatic exposure and gain of the camera are off."
         )
     worst = float(failed.max()) if len(failed) else 0.0
     wait = float(asked[asked > worst].min()) if len(failed) else 0.0

@@ -18,6 +18,8 @@ _AIM, _LONGEST_MS = 0.4, 200.0
 _BRIGHTER, _LONG_MS = 40.0, 2000.0
 #: Frames that catch every LED of a colour cycle at least once, and their random waits.
 _GLANCES, _MAP_FRAMES, _MAX_GAP_MS = 6, 16, 40.0
+#: A camera saturates if more than this share of all pixels has just the largest number.
+_SATURATED = 0.1
 #: A difference between white and black that is too small to be light.
 _NO_LIGHT_DN = 10.0
 #: The region: pixels brighter than this share of the brightest ones of their channel.
@@ -117,11 +119,24 @@ def _require_obedience(
     low, high = recorder.devices.camera.info.exposure_range_ms
     other_ms = white_ms / 4 if white_ms / 4 >= low else min(4 * white_ms, high)
     pairs = sorted((white_ms, other_ms))
-    faint, bright = (float(_mean(recorder, ms, rng).mean()) - black_dn for ms in pairs)
+    pictures = [_mean(recorder, ms, rng) for ms in pairs]
+    faint, bright = (float(each.mean()) - black_dn for each in pictures)
     if bright > _NO_LIGHT_DN and bright < 1.5 * faint:
+        _require_scale(recorder, *pictures)
         raise DeviceError(
             f"The camera gives {faint:.0f} DN at {pairs[0]:.3g} ms and {bright:.0f} DN at {pairs[1]:.3g} ms"
             " above black, so it ignores the requested exposure. Switch off its automatic exposure and gain."
+        )
+
+
+def _require_scale(recorder: Recorder, faint: NDArray[np.float64], bright: NDArray[np.float64]) -> None:
+    """Raise `DeviceError` when two pictures, (rows, columns), end at the same number below full scale."""
+    most = float(bright.max())
+    if (faint == most).mean() > _SATURATED:
+        raise DeviceError(
+            f"The camera saturates at {most:.0f} DN, and not at {recorder.full_scale_dn:.0f} DN as its"
+            f" {recorder.devices.camera.info.bit_depth} bits say. State its bits in the driver as they are,"
+            " or lower the gain's offset."
         )
 
 
