@@ -31,6 +31,8 @@ def table(
         beside_dn=np.zeros((n, 3)),
         clipped=np.zeros((n, 3)),
         pair_variance_dn2=np.zeros((n, 3)),
+        pair_covariance_dn2=np.zeros((n, 3)),
+        second_variance_dn2=np.zeros((n, 3)),
         is_pair=np.zeros(n, bool),
     )
 

@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import median_filter
 
 from dsl_core.devices.base import Camera, CameraInfo, DeviceRig, Projector, ProjectorInfo
 from dsl_core.model.frames import Frame
@@ -45,6 +46,13 @@ class LightWorld:
     clip_dn: float = 4095.0
     step_dn: int = 1
     hot: int = 0
+    drift_dn: float = 0.0
+    longer_ms: float = 0.0
+    filtered: bool = False
+    fades: float = 0.0
+    bands: float = 0.0
+    mosaic_off: int = 0
+    bits: int = 12
     jitter_ms: float = 0.0
     now_ms: float = 0.0
     shown: list[tuple[float, NDArray[np.float64]]] = field(default_factory=list)
@@ -89,10 +97,11 @@ class LightCamera(Camera):
         self.world, self.exposure_ms, self.number = world, 1.0, 0
         self.shot, self.attempt = 0, 0
         self.before: NDArray[np.uint16] | None = None
+        self.faded: NDArray[np.float64] | None = None
 
     @property
     def info(self) -> CameraInfo:
-        return CameraInfo("light", "L-C", WIDTH, HEIGHT, "RGGB", 12, (0.02, 10_000.0))
+        return CameraInfo("light", "L-C", WIDTH, HEIGHT, "RGGB", self.world.bits, (0.02, 10_000.0))
 
     def configure(self, exposure_ms: float) -> float:
         self.exposure_ms = 10.0 if self.world.ignores_exposure else exposure_ms
@@ -105,12 +114,21 @@ class LightCamera(Camera):
         world = self.world
         rng = np.random.default_rng((world.seed, self.shot, self.attempt))
         start = world.now_ms + world.jitter_ms * rng.random()
-        signal = world.drive(start, start + self.exposure_ms) * world.brightness
+        signal = world.drive(start, start + self.exposure_ms + world.longer_ms) * world.brightness
+        rows = np.arange(HEIGHT)[:, None] / HEIGHT
+        signal = signal * (1 + world.bands * np.sin(2 * np.pi * (3 * rows + rng.random())))
         signal = signal - world.bend * np.minimum(signal, 4095) ** 2 / 4095 + world.ambient * self.exposure_ms
         signal = signal + rng.standard_normal(signal.shape) * np.sqrt(
             np.maximum(signal, 0) / ELECTRONS_PER_DN + 1
         )
+        if world.filtered:
+            for row, column in np.ndindex(2, 2):
+                signal[row::2, column::2] = median_filter(signal[row::2, column::2], 3)
+        if world.fades and self.faded is not None and np.abs(self.faded - signal).mean() < 50:
+            signal = (1 - world.fades) * signal + world.fades * self.faded
+        self.faded = signal.copy()
         signal.flat[: world.hot * 7 : 7] += 300
+        signal = np.roll(signal, world.mosaic_off, 1) + world.drift_dn * self.number
         pixels = np.clip(np.rint(signal + BLACK_DN), 0, world.clip_dn).astype(np.uint16)
         pixels -= pixels % world.step_dn
         delivered = self.before if world.stale and self.before is not None else pixels

@@ -17,6 +17,8 @@ Floats = NDArray[np.float64]
 STEADINESS = 1e-4
 #: Exposures that a line needs.
 _MIN_EXPOSURES = 5
+#: Where dark frames have less noise than this, rounding makes most of it.
+_LEAST_NOISE_DN2 = 2 * ROUNDING_DN2
 
 
 @dataclass(frozen=True)
@@ -89,6 +91,39 @@ def fit_transfer(pairs: Readings, black_dn: float, sizes: RegionSizes) -> Transf
     return Transfer(gain, Measured(value=read, std=float(min(std / max(2 * read, 1e-9), np.sqrt(std)))))
 
 
+def noise_of_pixels(pairs: Readings, sizes: RegionSizes) -> Measured | None:
+    """Share of the noise that neighbouring pixels of a colour have in common; None where that is not known.
+
+    Filters of a camera spread it over neighbours, and light that flickers by rows adds some to whole rows.
+    """
+    used = pairs.is_pair[:, None] & pairs.unclipped
+    variance, shared = pairs.pair_variance_dn2[used], pairs.pair_covariance_dn2[used]
+    total = float(variance.sum())
+    if total <= 0 or not shared.any():
+        return None
+    pixels = np.broadcast_to(sizes.pixels, used.shape)[used]
+    return Measured(
+        value=float(shared.sum()) / total, std=float(np.sqrt((variance**2 / pixels).sum())) / total
+    )
+
+
+def noise_of_frames(dark: Readings, sizes: RegionSizes) -> Measured | None:
+    """Share of the noise that a dark frame has from the one before; None where rounding hides noise.
+
+    Of noise that fades from frame to frame, those next to each other differ by less than those further apart.
+    """
+    used = (dark.second_variance_dn2 > 0).all(1)
+    next_dn2, second_dn2 = (
+        float((variance[used] @ sizes.pixels).sum())
+        for variance in (dark.pair_variance_dn2, dark.second_variance_dn2)
+    )
+    count = int(used.sum()) * float(sizes.pixels.sum())
+    if count == 0 or next_dn2 < _LEAST_NOISE_DN2 * count:
+        return None
+    ratio = second_dn2 / next_dn2
+    return Measured(value=ratio - 1, std=float(ratio * np.sqrt(4 / count)))
+
+
 def check_camera(
     dark: Dark,
     transfer: Transfer,
@@ -97,7 +132,7 @@ def check_camera(
     hot: tuple[int, int],
     sizes: RegionSizes,
 ) -> CameraCheck:
-    """Line of signal against exposure for each channel, and all of the camera's figures together.
+    """Line of signal against exposure for each channel, and the figures that follow from it.
 
     ``hot`` are hot pixels and all pixels. Raises `CalibrationError` when a channel has too few unclipped
     exposures.
@@ -106,6 +141,11 @@ def check_camera(
     intercepts, stds = np.array([(line.intercept.value, line.intercept.std) for line in lines]).T
     red, green, blue = (line.largest_percent(sizes.full_scale_dn) for line in lines)
     weight = stds**-2 / (stds**-2).sum()
+    rates = np.array([line.rate_dn_per_ms for line in lines])
+    offsets, offset_stds = (
+        (intercepts - dark.level_dn.value) / rates,
+        np.hypot(stds, dark.level_dn.std) / rates,
+    )
     count, total = hot
     return CameraCheck(
         bit_depth=sizes.bit_depth,
@@ -118,7 +158,19 @@ def check_camera(
         electrons_per_dn=transfer.electrons_per_dn,
         read_noise_dn=transfer.read_noise_dn,
         hot_share=Measured(value=count / total, std=float(np.sqrt(max(count, 1)) / total)),
+        exposure_offset_ms=Measured(
+            value=float(np.average(offsets, weights=offset_stds**-2)),
+            std=float((offset_stds**-2).sum() ** -0.5),
+        ),
     )
+
+
+def black_change(dark: Dark, again: Readings, transfer: Transfer, sizes: RegionSizes) -> Measured:
+    """What black of the shortest exposure has gained since the level was measured, DN."""
+    weight = sizes.pixels / sizes.pixels.sum()
+    level = float((again.mean_dn - dark.rate * again.exposure_ms[:, None]).mean(0) @ weight)
+    noise = float(transfer.mean_std(np.zeros(1), np.array([sizes.pixels.sum() * len(again)]))[0])
+    return Measured(value=level - dark.level_dn.value, std=float(np.hypot(noise, dark.level_dn.std)))
 
 
 def count_hot_pixels(first: NDArray[np.uint16], second: NDArray[np.uint16], noise_dn: float) -> int:
@@ -152,6 +204,12 @@ class ExposureLine:
     residual_dn: Floats
     std_dn: Floats
     intercept: Measured
+
+    @property
+    def rate_dn_per_ms(self) -> float:
+        """The slope of the line."""
+        on_line = self.value_dn[-1] - self.residual_dn[-1]
+        return float((on_line - self.intercept.value) / self.exposure_ms[-1])
 
     def largest_percent(self, full_scale_dn: float) -> Measured:
         """The largest distance from the line in percent of full scale."""

@@ -25,6 +25,9 @@ from dsl_core.model.figure import Figure
 LINEARITY_PERCENT, BLACK_NOISES, SATURATION, HOT = 0.5, 5.0, 0.9, 1e-3
 #: Values of fewer bits than these, given as ones of more, round the light that black and ramps are read from.
 FEWEST_BITS = 10
+#: Largest change of the black level, as a share of full scale; exposures that are longer than stated, ms; and
+#: noise that neighbouring pixels, and frames one after the other, have in common.
+BLACK_CHANGE, EXPOSURE_MS, SHARED_BY_PIXELS, SHARED_BY_FRAMES = 1e-3, 0.1, 0.1, 0.25
 #: Largest difference of gamma between colours, rms residual of a ramp, both percent; largest black.
 GAMMA_SPREAD_PERCENT, RAMP_PERCENT, BLACK = 2.0, 100 * MOST_LEFT, 0.01
 #: The new picture must be visible when ``show`` returns, within this; beat at the advised exposures, percent.
@@ -92,6 +95,7 @@ def _camera(camera: CameraCheck) -> Iterator[Figure]:
         low=BLACK_NOISES * camera.read_noise_dn.value,
         advice="Noise is cut off at zero: raise the camera's black level.",
     )
+    yield from _steadiness(camera)
     yield _figure("electrons per DN", camera.electrons_per_dn, "e-/DN")
     yield _figure("read noise", camera.read_noise_dn, "DN")
     yield _figure(
@@ -109,6 +113,53 @@ def _camera(camera: CameraCheck) -> Iterator[Figure]:
         high=HOT,
         advice="Let the camera cool down, or switch on its correction of defective pixels.",
     )
+
+
+def _steadiness(camera: CameraCheck) -> Iterator[Figure]:
+    """Whether black, exposure and noise are what a camera of raw values has, where that was measured."""
+    full_scale_dn = 2**camera.bit_depth - 1
+    if camera.black_change_dn is not None:
+        most = BLACK_CHANGE * full_scale_dn
+        yield _figure(
+            "black level, change during the test",
+            camera.black_change_dn,
+            "DN",
+            low=-most,
+            high=most,
+            advice="The camera's black level drifts: let the camera warm up, and switch off automatic control"
+            " of its black level.",
+        )
+    is_line = max(each.value for each in camera.linearity_percent) <= LINEARITY_PERCENT
+    if camera.exposure_offset_ms is not None and is_line:
+        yield _figure(
+            "exposure, longer than stated by",
+            camera.exposure_offset_ms,
+            "ms",
+            low=-EXPOSURE_MS,
+            high=EXPOSURE_MS,
+            advice="State exposures in the camera's driver as they are: light without exposure is not black.",
+        )
+    for kind, shared, most in (
+        ("neighbouring pixels", camera.shared_by_pixels, SHARED_BY_PIXELS),
+        ("frames one after the other", camera.shared_by_frames, SHARED_BY_FRAMES),
+    ):
+        if shared is not None:
+            percent = Measured(value=100 * shared.value, std=100 * shared.std)
+            yield _figure(
+                f"noise that {kind} share",
+                percent,
+                "%",
+                low=-100 * most,
+                high=100 * most,
+                advice=_SHARED,
+            )
+
+
+_SHARED = (
+    "The camera filters its pictures, or light flickers while their rows are read, and electrons per DN are"
+    " wrong with it: switch off noise reduction, sharpening, scaling and compression of the camera, and lamps"
+    " that flicker."
+)
 
 
 def _projector(projector: ProjectorCheck) -> Iterator[Figure]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from itertools import pairwise
+from itertools import pairwise, permutations
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,9 +24,12 @@ RAMPS: dict[Colour, tuple[int, int, int]] = {
     "green": (0, 1, 0),
     "blue": (0, 0, 1),
 }
+LEDS: tuple[Colour, ...] = ("red", "green", "blue")
 #: Signals with less than this many standard deviations say little and bend the logarithm.
 _MIN_SNR = 30.0
 _MIN_LEVELS = 4
+#: Another order of a mosaic's colours is told if it gives more than this times as much light.
+_OTHER_ORDER = 2.0
 
 
 def check_projector(
@@ -48,6 +51,7 @@ def check_projector(
     values = np.array([check.gamma.value for check, _, _ in fits.values()])
     stds = np.array([check.gamma.std for check, _, _ in fits.values()])
     gamma, covariance = line_fit(np.ones((len(values), 1)), values, stds)
+    _require_colours(np.stack([fits[colour][1] for colour in LEDS]))
     _, white, white_std = fits["white"]
     black, has_ambient = _black_fraction(dark, white, white_std, sizes)
     projector = ProjectorCheck(
@@ -58,6 +62,24 @@ def check_projector(
         black_has_ambient=has_ambient,
     )
     return projector, _ambient(dark, white)
+
+
+def _require_colours(light: Floats) -> None:
+    """Raise `CalibrationError` where pixels see other LEDs than those of the colour they are said to have.
+
+    ``light`` is that of red, green and blue (rows) in the channels, (3, 3). Gains of channels and the power
+    of LEDs do not matter: each order of colours has a factor of all of them.
+    """
+    own = tuple(range(3))
+    by_order = {order: float(np.prod(light[own, order])) for order in permutations(own)}
+    best = max(by_order, key=lambda order: by_order[order])
+    if light.diagonal().all() and by_order[best] > _OTHER_ORDER * by_order[own]:
+        raise CalibrationError(
+            "The red, green and blue LED are seen by pixels that should have other colours in the camera's"
+            " mosaic. State the order of its colours in the driver as it is (such as GRBG), and switch off"
+            " mirroring, turning and a region of interest that begins at an odd pixel; or the projector swaps"
+            " its colours."
+        )
 
 
 def ramp_of(ramps: Readings, colour: Colour) -> Readings:

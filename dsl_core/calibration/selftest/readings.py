@@ -19,8 +19,11 @@ class Readings:
 
     The region holds the well lit pixels of each channel, ``beside`` those outside the projected picture.
     ``pair_variance_dn2`` is half the variance of the difference to the frame before over the region, 0 where
-    ``is_pair`` is not set. ``gap_ms`` is the wait requested before the frame, ``since_show`` how
-    many frames came before it since the picture changed. ``drive`` is the level (0..255) shown.
+    ``is_pair`` is not set; ``pair_covariance_dn2`` is half that difference's covariance with the one of the
+    next pixel of the colour. ``second_variance_dn2`` is half the variance of the difference to the frame two
+    before, 0 unless both are of one picture and exposure. ``gap_ms`` is the wait requested before the frame,
+    ``since_show`` how many frames came before it since the picture changed. ``drive`` is the level (0..255)
+    shown.
     """
 
     exposure_ms: Floats  # (n,)
@@ -32,6 +35,8 @@ class Readings:
     beside_dn: Floats  # (n, 3)
     clipped: Floats  # (n, 3): share of the region at or near the end of the scale
     pair_variance_dn2: Floats  # (n, 3)
+    pair_covariance_dn2: Floats  # (n, 3)
+    second_variance_dn2: Floats  # (n, 3)
     is_pair: NDArray[np.bool_]  # (n,)
 
     def __len__(self) -> int:

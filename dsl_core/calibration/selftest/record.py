@@ -10,11 +10,14 @@ from numpy.typing import NDArray
 
 from dsl_core.calibration.selftest.camera import (
     ExposureLine,
+    black_change,
     check_camera,
     count_hot_pixels,
     exposure_line,
     fit_dark,
     fit_transfer,
+    noise_of_frames,
+    noise_of_pixels,
 )
 from dsl_core.calibration.selftest.cycle import (
     Cycle,
@@ -37,6 +40,8 @@ PUBLISHED_MS = (160.0, 320.0)
 WANTED_MS = (500.0 / 3.0, 1000.0 / 3.0)
 Floats = NDArray[np.float64]
 
+#: Parts with pairs of frames at all sorts of light.
+_PAIRS = ("dark", "ramps", "series")
 #: Drive levels above which the power law is fitted.
 BRIGHT = 0.2
 
@@ -46,7 +51,8 @@ class SelfTestCapture:
     """All that is kept of the frames.
 
     ``parts`` are readings by name: ``dark``, ``cycle``, ``latency``, ``ramps``, ``series``, ``saturated``,
-    ``beat``, and ``spread`` where time stamps could not be used. ``dark_frames`` are two long ones.
+    ``beat``, ``black again``, and ``spread`` where time stamps could not be used. ``dark_frames`` are two
+    long ones.
     """
 
     parts: Mapping[str, Readings]
@@ -74,15 +80,16 @@ def analyse(capture: SelfTestCapture) -> SelfTest:
     cycle, method = cycle_of(parts["cycle"], parts.get("spread"), black_dn)
     period = cycle.period_ms
     whole = None if period is None else period.value
+    hot = count_hot_pixels(first, second, noise_dn), first.size
+    camera = check_camera(dark, transfer, parts["series"], parts["saturated"], hot, sizes)
+    again = parts.get("black again")
+    noise = {
+        "black_change_dn": None if again is None else black_change(dark, again, transfer, sizes),
+        "shared_by_pixels": noise_of_pixels(joined(*(parts[each] for each in _PAIRS)), sizes),
+        "shared_by_frames": noise_of_frames(parts["dark"], sizes),
+    }
     return SelfTest(
-        camera=check_camera(
-            dark,
-            transfer,
-            parts["series"],
-            parts["saturated"],
-            (count_hot_pixels(first, second, noise_dn), first.size),
-            sizes,
-        ),
+        camera=camera.model_copy(update=noise),
         projector=projector,
         latency=check_latency(
             parts["latency"], capture.claimed_latency_ms, has_trusted_times(parts["cycle"]), capture.show_s

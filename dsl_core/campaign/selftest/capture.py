@@ -27,6 +27,7 @@ from dsl_core.campaign.selftest.parts import (
     Frames,
     capture_bars,
     capture_beat,
+    capture_black,
     capture_cycle,
     capture_dark,
     capture_latency,
@@ -36,7 +37,7 @@ from dsl_core.campaign.selftest.parts import (
     find_level,
     white_rate,
 )
-from dsl_core.campaign.selftest.recorder import BLACK, Recorder
+from dsl_core.campaign.selftest.recorder import Recorder
 from dsl_core.campaign.selftest.survey import Survey, survey
 from dsl_core.devices.base import DeviceRig
 from dsl_core.errors import CalibrationError, DeviceError, StoreError
@@ -49,7 +50,12 @@ SEED = 20240617
 ARCHIVE_NAME = "selftest.npz"
 _VERSION = 1
 _NUMBERS = ("wanted_ms", "shortest_ms", "claimed_latency_ms", "show_s", "frames", "duration_s")
-_PARTS = ("light", "colour cycle", "latency", "dark frames", "ramps", "linearity", "colour beat", "focus")
+_PARTS = (
+    *("light", "colour cycle", "latency", "dark frames", "ramps", "linearity", "colour beat"),
+    *("focus", "black again"),
+)
+#: Columns of the readings that archives of before lack.
+_LATER = ("pair_covariance_dn2", "second_variance_dn2")
 #: Exposures are whole multiples of the shortest whole number of cycles that is at least this long.
 _UNIT_MS = 8.0
 #: Waited in addition to the latency found.
@@ -87,7 +93,7 @@ class SelfTestRun:
             lambda: capture_beat(recorder, self._exposures(cycle), seen.black_dn, rate, self._rng)
         )
         bars = self._part(lambda: capture_bars(recorder, unit_ms, seen.black_dn, rate))
-        recorder.show(BLACK)
+        parts["black again"] = self._part(lambda: capture_black(recorder))
         return self._packed(seen, bars, dark_frames)
 
     def _part(self, work: Callable[[], T]) -> T:
@@ -196,10 +202,11 @@ def load_capture(folder: Path) -> SelfTestCapture:
 
 
 def _unpacked(arrays: dict[str, Any], about: dict[str, Any]) -> SelfTestCapture:
-    parts = {
-        part: Readings(**{each.name: arrays[f"{part}/{each.name}"] for each in fields(Readings)})
-        for part in about["parts"]
-    }
+    parts = {}
+    for part in about["parts"]:
+        unknown = dict.fromkeys(_LATER, np.zeros_like(arrays[f"{part}/pair_variance_dn2"]))
+        known = {name.split("/")[1]: values for name, values in arrays.items() if name.startswith(f"{part}/")}
+        parts[part] = Readings(**{each.name: (unknown | known)[each.name] for each in fields(Readings)})
     bars, inverse, dark = arrays["bars"], arrays["inverse"], arrays["dark_frames"]
     return SelfTestCapture(
         parts=parts,

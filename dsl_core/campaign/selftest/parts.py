@@ -118,6 +118,7 @@ def find_level(
     """
     wanted = aim * (recorder.full_scale_dn - black_dn)
     level = min((wanted / (white_rate * exposure_ms)) ** (1 / _GUESSED_GAMMA), 1.0)
+    below, above = 0.0, np.inf
     for _ in range(_TRIES):
         drive = grey(max(level, 1 / 255))
         recorder.show(drive)
@@ -126,7 +127,11 @@ def find_level(
         ratio = 0.5 if clips else wanted / max(bright - black_dn, 1.0)
         if abs(ratio - 1) < _CLOSE or (ratio > 1 and level >= 1):
             return drive
+        below, above = (max(below, level), above) if ratio > 1 else (below, min(above, level))
         level = min(level * ratio ** (1 / _GUESSED_GAMMA), 1.0)
+        if below > 0 and not below < level < above:
+            # A guess that goes past what is known would go to and fro where light is steeper.
+            level = (below * above) ** 0.5
     if clips:
         raise CalibrationError(
             f"The picture clips at {exposure_ms:.3g} ms even when the projector is nearly black: ambient"
@@ -160,6 +165,14 @@ def capture_dark(recorder: Recorder, unit_ms: float) -> tuple[Readings, Frames]:
         units = units // 2
     frames = [_pair(recorder, units * unit_ms) for _ in range(_LONG_DARK_PAIRS)]
     return recorder.collect(), frames[0]
+
+
+def capture_black(recorder: Recorder) -> Readings:
+    """Black once more at the end of the test, and dark from then on."""
+    recorder.show(BLACK)
+    for _ in range(_DARK_PAIRS):
+        _pair(recorder, recorder.devices.camera.info.exposure_range_ms[0])
+    return recorder.collect()
 
 
 def _pair(recorder: Recorder, exposure_ms: float) -> Frames:

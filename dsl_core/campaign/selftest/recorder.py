@@ -28,6 +28,7 @@ _FIRST_SETTLE_MS = 500.0
 _COUNTED = 4000
 #: Pixels above this share of the largest number are clipped or about to be.
 CLIPPED_FROM = 0.985
+_NONE = [0.0, 0.0, 0.0]
 
 
 def grey(level: float) -> Drive:
@@ -68,6 +69,8 @@ class Recorder:
     _exposure_ms: float = 0.0
     _rows: list[Readings] = field(default_factory=list)
     _last: list[NDArray[np.uint16]] = field(default_factory=list)
+    #: The frame before the last, while picture and exposure stay.
+    _before_last: list[NDArray[np.uint16]] = field(default_factory=list)
 
     @property
     def full_scale_dn(self) -> float:
@@ -102,6 +105,7 @@ class Recorder:
         self.devices.projector.show(image)
         self.show_s.append(time.perf_counter() - start)
         self._drive, self._since_show = drive, 0
+        self._last, self._before_last = [], []
         self.wait(self.settle_ms if settle_ms is None else settle_ms)
 
     def snap(self, exposure_ms: float) -> Frame:
@@ -115,6 +119,7 @@ class Recorder:
                     " off its automatic exposure."
                 )
             self._exposure_ms = exposure_ms
+            self._last, self._before_last = [], []
         for attempt in range(_ATTEMPTS):
             camera.prepare(self.frames, self.attempt + attempt)
             try:
@@ -143,7 +148,9 @@ class Recorder:
         flat = frame.pixels.ravel()
         values = [flat[where] for where in self.region.lit]
         limit = CLIPPED_FROM * self.full_scale_dn
-        pairs = zip(self._last, values, strict=True) if pair else ()
+        pairs = [_half_spread(*two) for two in zip(self._last, values, strict=True)] if pair else []
+        older = self._before_last if pair else []
+        seconds = [_half_spread(*two)[0] for two in zip(older, values, strict=False)]
         self._rows.append(
             Readings(
                 exposure_ms=np.array([frame.exposure_ms]),
@@ -154,11 +161,13 @@ class Recorder:
                 mean_dn=np.array([[each.mean() for each in values]]),
                 beside_dn=np.array([[flat[w].mean() if len(w) else 0.0 for w in self.region.beside]]),
                 clipped=np.array([[(each > limit).mean() for each in values]]),
-                pair_variance_dn2=np.array([[_half_variance(*two) for two in pairs] or [0.0, 0.0, 0.0]]),
+                pair_variance_dn2=np.array([[each[0] for each in pairs] or _NONE]),
+                pair_covariance_dn2=np.array([[each[1] for each in pairs] or _NONE]),
+                second_variance_dn2=np.array([seconds or _NONE]),
                 is_pair=np.array([pair]),
             )
         )
-        self._last = values
+        self._before_last, self._last = self._last, values
         self._since_show += 1
         return frame
 
@@ -168,6 +177,12 @@ class Recorder:
         return joined(*rows)
 
 
-def _half_variance(first: NDArray[np.uint16], second: NDArray[np.uint16]) -> float:
-    """Half the variance of the difference of two frames of one region, DN^2."""
-    return float((second.astype(np.float32) - first.astype(np.float32)).var(ddof=1, dtype=np.float64) / 2)
+def _half_spread(first: NDArray[np.uint16], second: NDArray[np.uint16]) -> tuple[float, float]:
+    """Half the variance of the difference of two frames of one region, DN^2.
+
+    And half the covariance of what neighbouring pixels of it have.
+    """
+    off = second.astype(np.float64) - first
+    off -= off.mean()
+    spare = len(off) - 1
+    return float(off @ off) / spare / 2, float(off[1:] @ off[:-1]) / spare / 2

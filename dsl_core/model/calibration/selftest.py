@@ -35,6 +35,11 @@ class CameraCheck(Record):
     full scale, within the useful range: from ``black_level_dn`` to ``useful_dn``, the largest signal that no
     pixel of the region clipped. ``intercept_dn`` is where the line meets an exposure of zero. ``step_dn`` is
     the distance of neighbouring values: more than one where pictures were converted from fewer bits.
+
+    ``exposure_offset_ms`` is by how much exposures are longer than stated. ``black_change_dn`` is what the
+    black level gained during the test. Noise of raw values is each pixel's and each frame's own:
+    ``shared_by_pixels`` and ``shared_by_frames`` are the shares that neighbouring pixels, and frames one
+    after the other, have in common. Tests of before did not measure these.
     """
 
     bit_depth: int
@@ -47,6 +52,10 @@ class CameraCheck(Record):
     electrons_per_dn: Measured
     read_noise_dn: Measured
     hot_share: Measured
+    exposure_offset_ms: Measured | None = None
+    black_change_dn: Measured | None = None
+    shared_by_pixels: Measured | None = None
+    shared_by_frames: Measured | None = None
 
 
 class RampCheck(Record):

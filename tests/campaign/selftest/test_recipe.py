@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import replace
 from pathlib import Path
 
@@ -167,6 +168,58 @@ def test_what_is_wrong_fails_its_own_figure(world: LightWorld, names: list[str])
     assert found.camera.electrons_per_dn.value == pytest.approx(10.0, rel=0.02)
 
 
+@pytest.mark.parametrize(
+    ("world", "name"),
+    [
+        (LightWorld(drift_dn=0.05), "black level, change during the test"),
+        (LightWorld(longer_ms=0.5), "exposure, longer than stated by"),
+        (LightWorld(filtered=True), "noise that neighbouring pixels share"),
+        (LightWorld(bands=0.02), "noise that neighbouring pixels share"),
+        (LightWorld(fades=0.5), "noise that frames one after the other share"),
+    ],
+    ids=["black drifts", "exposure", "filter", "flicker by rows", "noise reduction in time"],
+)
+def test_a_camera_whose_values_are_not_raw_is_not_accepted(world: LightWorld, name: str) -> None:
+    _, figures = run_selftest(light_rig(world))
+    wrong = failures(figures)
+    assert name in [figure.name for figure in wrong]
+    assert all(figure.advice for figure in wrong)
+
+
+def test_raw_values_share_no_noise_and_keep_black_and_exposure(found: SelfTest) -> None:
+    camera = found.camera
+    measured = (
+        camera.black_change_dn,
+        camera.exposure_offset_ms,
+        camera.shared_by_pixels,
+        camera.shared_by_frames,
+    )
+    for each in measured:
+        assert each is not None
+        assert abs(each.value) < 4 * each.std
+
+
+def test_archives_of_before_say_nothing_of_noise_that_is_shared(tmp_path: Path) -> None:
+    save_capture(SelfTestRun(light_rig(LightWorld()), NoProgress(), (100.0,)).capture(), tmp_path)
+    with np.load(tmp_path / ARCHIVE_NAME) as stored:
+        kept = {name: stored[name] for name in stored.files}
+    about = json.loads(str(kept["about"]))
+    about["parts"].remove("black again")
+    later = ("pair_covariance_dn2", "second_variance_dn2")
+    kept = {name: values for name, values in kept.items() if name.split("/")[-1] not in later}
+    np.savez_compressed(tmp_path / ARCHIVE_NAME, **(kept | {"about": np.array(json.dumps(about))}))
+    found = analyse(load_capture(tmp_path))
+    camera = found.camera
+    assert (camera.black_change_dn, camera.shared_by_pixels, camera.shared_by_frames) == (None, None, None)
+    assert failed(RECIPE.figures(found)) == []
+
+
+def test_a_steep_gamma_within_limits_is_no_ambient_light() -> None:
+    found, figures = run_selftest(light_rig(LightWorld(gamma=(3.1, 3.1, 3.1))))
+    assert failed(figures) == []
+    assert found.projector.gamma.value == pytest.approx(3.1, abs=0.01)
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize(("step_dn", "bits"), [(4, 0), (16, 8)])
 def test_values_of_fewer_bits_are_named_before_what_they_upset(
@@ -200,14 +253,20 @@ def test_values_of_fewer_bits_are_named_before_what_they_upset(
         (LightWorld(ignores_exposure=True, brightness=0.1), DeviceError, "ignores the requested exposure"),
         (LightWorld(stale=True), DeviceError, "stale frames"),
         (LightWorld(late_ms=600.0), DeviceError, "A new picture is not always visible 400 ms"),
+        (LightWorld(bits=16), DeviceError, "saturates at 4095 DN, and not at 65535 DN as its 16 bits say"),
     ],
-    ids=["dark", "unplugged", "bright", "black saturated", "ambient", "exposure", "stale", "slow"],
+    ids=["dark", "unplugged", "bright", "black saturated", "ambient", "exposure", "stale", "slow", "bits"],
 )
 def test_hopeless_rigs_are_refused_with_what_to_do(
     world: LightWorld, kind: type[Exception], message: str
 ) -> None:
     with pytest.raises(kind, match=f"Self-test, .*{message}"):
         run_selftest(light_rig(world))
+
+
+def test_a_mosaic_that_begins_with_another_colour_is_refused() -> None:
+    with pytest.raises(CalibrationError, match="should have other colours in the camera's mosaic"):
+        run_selftest(light_rig(LightWorld(mosaic_off=1)))
 
 
 def test_lost_frames_are_taken_again_and_a_dead_camera_is_named() -> None:
