@@ -12,11 +12,14 @@ from dsl_core.calibration.selftest.camera import (
     ExposureLine,
     Transfer,
     _saturation,
+    black_change,
     check_camera,
     count_hot_pixels,
     exposure_line,
     fit_dark,
     fit_transfer,
+    noise_of_frames,
+    noise_of_pixels,
 )
 from dsl_core.calibration.selftest.readings import Readings, RegionSizes
 from dsl_core.errors import CalibrationError
@@ -234,3 +237,56 @@ def test_glow_is_taken_off_the_shortest_exposure() -> None:
     assert found.beside_rate == pytest.approx(np.full(3, 0.0625))
     assert found.rate_std == pytest.approx(2 * np.sqrt(0.25 / sizes.pixels) / 100)
     assert found.beside_std == pytest.approx(2 * np.sqrt(0.25 / np.array([100, 1, 100])) / 100)
+
+
+def pairs_of(variance_dn2: list[float], covariance_dn2: list[float], second_dn2: list[float]) -> Readings:
+    """Dark pairs whose three colours have the same noise."""
+    pairs = dark_readings((BLACK_DN,) * 3, 0.0, 0.0)[np.flatnonzero(np.arange(16) % 2)[: len(variance_dn2)]]
+    columns = (
+        np.repeat(np.array(each)[:, None], 3, 1) for each in (variance_dn2, covariance_dn2, second_dn2)
+    )
+    variance, covariance, second = columns
+    return replace(
+        pairs, pair_variance_dn2=variance, pair_covariance_dn2=covariance, second_variance_dn2=second
+    )
+
+
+def test_noise_that_pixels_share_is_weighed_by_how_much_there_is() -> None:
+    found = noise_of_pixels(pairs_of([4.0, 36.0], [1.0, 9.0], [0.0, 0.0]), SIZES)
+    assert found is not None
+    assert found.value == pytest.approx(0.25)
+    # Of 4000 pixels in three colours; the brighter pair says nearly all.
+    assert found.std == pytest.approx(np.sqrt((4**2 + 36**2) * (2 / 1000 + 1 / 2000)) / 120)
+    assert noise_of_pixels(pairs_of([4.0], [0.0], [0.0]), SIZES) is None
+
+
+def test_noise_that_frames_share_makes_those_further_apart_differ_by_more() -> None:
+    found = noise_of_frames(pairs_of([4.0, 2.0, 2.0], [0.0] * 3, [0.0, 3.0, 3.0]), SIZES)
+    assert found is not None
+    assert found.value == pytest.approx(0.5)
+    assert found.std == pytest.approx(1.5 * np.sqrt(4 / 8000))
+    # Of noise below the step of rounding nobody knows.
+    assert noise_of_frames(pairs_of([0.1, 0.1], [0.0] * 2, [0.1, 0.2]), SIZES) is None
+    assert noise_of_frames(pairs_of([4.0], [0.0], [0.0]), SIZES) is None
+
+
+def test_black_has_gained_what_its_light_does_not_explain() -> None:
+    dark = fit_dark(dark_readings((BLACK_DN,) * 3, 0.3, 0.1), SIZES)
+    transfer = Transfer(Measured(value=10.0, std=0.01), Measured(value=2.0, std=0.01))
+    again = table(np.full(4, 1.0), np.full((4, 3), BLACK_DN + 0.3 + 5.0))
+    found = black_change(dark, again, transfer, SIZES)
+    assert found.value == pytest.approx(5.0)
+    assert found.std == pytest.approx(np.hypot(dark.level_dn.std, np.sqrt((4 + 1 / 12) / 16000)))
+
+
+def test_exposures_that_are_longer_than_stated_are_measured() -> None:
+    exposure = np.arange(1.0, 13.0)
+    series = table(exposure, BLACK_DN + np.array([100.0, 300.0, 200.0]) * (exposure[:, None] + 0.4))
+    sizes = RegionSizes(np.full(3, 5000), np.zeros(3, np.int64), 12)
+    none = np.zeros(3)
+    dark = Dark(Measured(value=BLACK_DN, std=0.01), none, none, none, none)
+    transfer = Transfer(Measured(value=10.0, std=0.01), Measured(value=1.0, std=0.01))
+    found = check_camera(dark, transfer, series, series[-1:], (0, 100), sizes).exposure_offset_ms
+    assert found is not None
+    assert found.value == pytest.approx(0.4)
+    assert 0 < found.std < 0.01
