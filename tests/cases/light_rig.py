@@ -51,6 +51,7 @@ class LightWorld:
     filtered: bool = False
     fades: float = 0.0
     bands: float = 0.0
+    row_noise_dn: float = 0.0
     mosaic_off: int = 0
     bits: int = 12
     jitter_ms: float = 0.0
@@ -121,6 +122,8 @@ class LightCamera(Camera):
         signal = signal + rng.standard_normal(signal.shape) * np.sqrt(
             np.maximum(signal, 0) / ELECTRONS_PER_DN + 1
         )
+        if world.row_noise_dn:
+            signal = signal + world.row_noise_dn * rng.standard_normal((HEIGHT, 1))
         if world.filtered:
             for row, column in np.ndindex(2, 2):
                 signal[row::2, column::2] = median_filter(signal[row::2, column::2], 3)

@@ -91,19 +91,25 @@ def fit_transfer(pairs: Readings, black_dn: float, sizes: RegionSizes) -> Transf
     return Transfer(gain, Measured(value=read, std=float(min(std / max(2 * read, 1e-9), np.sqrt(std)))))
 
 
-def noise_of_pixels(pairs: Readings, sizes: RegionSizes) -> Measured | None:
-    """Share of the noise that neighbouring pixels of a colour have in common; None where that is not known.
+def noise_of_pixels(dark: Readings, lit: Readings, sizes: RegionSizes) -> Measured | None:
+    """Share of the noise of light that neighbouring pixels of a colour have in common; None if not known.
 
     Filters of a camera spread it over neighbours, and light that flickers by rows adds some to whole rows.
+    What dark frames have is left out: noise of whole rows is many a sensor's own, and does no harm.
     """
-    used = pairs.is_pair[:, None] & pairs.unclipped
-    variance, shared = pairs.pair_variance_dn2[used], pairs.pair_covariance_dn2[used]
-    total = float(variance.sum())
+    used = lit.is_pair[:, None] & lit.unclipped
+    own, own_shared = (
+        np.broadcast_to(each[dark.is_pair].mean(0), used.shape)[used]
+        for each in (dark.pair_variance_dn2, dark.pair_covariance_dn2)
+    )
+    variance, shared = lit.pair_variance_dn2[used], lit.pair_covariance_dn2[used]
+    total = float((variance - own).sum())
     if total <= 0 or not shared.any():
         return None
     pixels = np.broadcast_to(sizes.pixels, used.shape)[used]
     return Measured(
-        value=float(shared.sum()) / total, std=float(np.sqrt((variance**2 / pixels).sum())) / total
+        value=float((shared - own_shared).sum()) / total,
+        std=float(np.sqrt((variance**2 / pixels).sum())) / total,
     )
 
 

@@ -41,7 +41,7 @@ WANTED_MS = (500.0 / 3.0, 1000.0 / 3.0)
 Floats = NDArray[np.float64]
 
 #: Parts with pairs of frames at all sorts of light.
-_PAIRS = ("dark", "ramps", "series")
+_LIT = ("ramps", "series")
 #: Drive levels above which the power law is fitted.
 BRIGHT = 0.2
 
@@ -85,7 +85,7 @@ def analyse(capture: SelfTestCapture) -> SelfTest:
     again = parts.get("black again")
     noise = {
         "black_change_dn": None if again is None else black_change(dark, again, transfer, sizes),
-        "shared_by_pixels": noise_of_pixels(joined(*(parts[each] for each in _PAIRS)), sizes),
+        "shared_by_pixels": noise_of_pixels(parts["dark"], joined(*(parts[each] for each in _LIT)), sizes),
         "shared_by_frames": noise_of_frames(parts["dark"], sizes),
     }
     return SelfTest(

@@ -252,12 +252,20 @@ def pairs_of(variance_dn2: list[float], covariance_dn2: list[float], second_dn2:
 
 
 def test_noise_that_pixels_share_is_weighed_by_how_much_there_is() -> None:
-    found = noise_of_pixels(pairs_of([4.0, 36.0], [1.0, 9.0], [0.0, 0.0]), SIZES)
+    dark = pairs_of([2.0, 2.0], [0.0, 0.0], [0.0, 0.0])
+    found = noise_of_pixels(dark, pairs_of([6.0, 38.0], [1.0, 9.0], [0.0, 0.0]), SIZES)
     assert found is not None
     assert found.value == pytest.approx(0.25)
     # Of 4000 pixels in three colours; the brighter pair says nearly all.
-    assert found.std == pytest.approx(np.sqrt((4**2 + 36**2) * (2 / 1000 + 1 / 2000)) / 120)
-    assert noise_of_pixels(pairs_of([4.0], [0.0], [0.0]), SIZES) is None
+    assert found.std == pytest.approx(np.sqrt((6**2 + 38**2) * (2 / 1000 + 1 / 2000)) / 120)
+    assert noise_of_pixels(dark, pairs_of([4.0], [0.0], [0.0]), SIZES) is None
+
+
+def test_noise_of_rows_that_dark_frames_have_as_well_is_not_that_of_light() -> None:
+    dark, lit = pairs_of([12.0], [10.0], [0.0]), pairs_of([22.0], [10.0], [0.0])
+    found = noise_of_pixels(dark, lit, SIZES)
+    assert found is not None
+    assert found.value == pytest.approx(0.0)
 
 
 def test_noise_that_frames_share_makes_those_further_apart_differ_by_more() -> None:

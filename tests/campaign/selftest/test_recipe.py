@@ -199,6 +199,12 @@ def test_raw_values_share_no_noise_and_keep_black_and_exposure(found: SelfTest) 
         assert abs(each.value) < 4 * each.std
 
 
+def test_a_sensor_with_noise_of_its_rows_is_accepted() -> None:
+    found, figures = run_selftest(light_rig(LightWorld(row_noise_dn=4.0)))
+    assert "noise that neighbouring pixels share" not in [figure.name for figure in failures(figures)]
+    assert found.camera.electrons_per_dn.value == pytest.approx(10.0, rel=0.05)
+
+
 def test_archives_of_before_say_nothing_of_noise_that_is_shared(tmp_path: Path) -> None:
     save_capture(SelfTestRun(light_rig(LightWorld()), NoProgress(), (100.0,)).capture(), tmp_path)
     with np.load(tmp_path / ARCHIVE_NAME) as stored:
