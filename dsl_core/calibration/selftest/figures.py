@@ -32,7 +32,8 @@ BLACK_CHANGE, EXPOSURE_MS, SHARED_BY_PIXELS, SHARED_BY_FRAMES = 1e-3, 0.1, 0.1, 
 GAMMA_SPREAD_PERCENT, RAMP_PERCENT, BLACK = 2.0, 100 * MOST_LEFT, 0.01
 #: The new picture must be visible when ``show`` returns, within this; beat at the advised exposures, percent.
 WAIT_MS, BEAT_PERCENT = 1.0, 0.3
-#: A line of a scan is 5 px wide, and its edges are modelled by a blur of about 0.6 px.
+#: A line of a scan is 5 px wide, and its edges are modelled by a blur of about 0.6 px; the width of a pixel
+#: of the camera, which no focusing changes, comes on top.
 BLUR_PX, AMBIENT = 1.5, 0.01
 
 
@@ -271,7 +272,7 @@ def _focus(focus: FocusCheck) -> Iterator[Figure]:
         "blur of edges, worst third",
         focus.worst_px,
         "projector px",
-        high=BLUR_PX,
+        high=float(np.hypot(BLUR_PX, focus.pixel_px / 12**0.5)),
         advice="Focus the projector on the target first, then the camera; close the camera's aperture if only"
         " one side is soft.",
     )

@@ -155,6 +155,11 @@ class FocusCheck(Record):
     projector_px: Measured
     worst_px: Measured
 
+    @property
+    def pixel_px(self) -> float:
+        """Projector pixels that a pixel of the camera is wide; 0 where no blur was seen."""
+        return self.projector_px.value / self.camera_px.value if self.camera_px.value else 0.0
+
 
 class AmbientCheck(Record):
     """Light while the projector shows black, red, green, blue: DN per ms and as a share of white."""

@@ -152,8 +152,14 @@ def test_a_good_rig_passes_though_published_exposures_beat() -> None:
             "modulation of the light at 166.67 ms",
         ),
         (
-            with_("focus", worst_px=of(BLUR_PX)),
-            with_("focus", worst_px=of(BLUR_PX + 0.01)),
+            with_("focus", projector_px=of(0.0), worst_px=of(BLUR_PX)),
+            with_("focus", projector_px=of(0.0), worst_px=of(BLUR_PX + 0.01)),
+            "blur of edges, worst third",
+        ),
+        (
+            # Pixels of the camera 4.6 times as wide as the projector's add 1.33 px that is no blur.
+            with_("focus", camera_px=of(0.35), projector_px=of(1.61), worst_px=of(2.0)),
+            with_("focus", camera_px=of(0.35), projector_px=of(1.61), worst_px=of(2.02)),
             "blur of edges, worst third",
         ),
         (
