@@ -119,8 +119,16 @@ def _bent(gammas: NDArray[np.float64]) -> list[str]:
     known = gammas[np.isfinite(gammas)]
     if not len(known) or abs(np.median(known) - 1) <= GAMMA_TOLERANCE:
         return []
+    gamma = float(np.median(known))
+    if gamma > 1:
+        # Levels between black and white, that only a scaled picture has, give less than their share of light.
+        return [
+            f"Fine stripes give too little light, as if half of it had a gamma of {gamma:.2f}: the projector"
+            " scales or smooths its picture. Send its own resolution, and switch off keystone correction,"
+            " zoom, overscan and dynamic contrast; or the camera is not linear."
+        ]
     return [
-        f"The pictures are not linear: half the light corresponds to a gamma of {np.median(known):.2f}."
+        f"The pictures are not linear: half the light corresponds to a gamma of {gamma:.2f}."
         " Switch off the camera's gamma and the projector's dynamic contrast, which shift corners and bits."
     ]
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +19,9 @@ STEADINESS = 1e-4
 _MIN_EXPOSURES = 5
 #: Where dark frames have less noise than this, rounding makes most of it.
 _LEAST_NOISE_DN2 = 2 * ROUNDING_DN2
+#: Many sensors bend before they saturate: looked for above this share of the scale, where values lie below
+#: the line of the others by this share of it and by so many deviations.
+BENDS_ABOVE, BENT, BENT_SIGMAS = 0.85, 2e-3, 5.0
 
 
 @dataclass(frozen=True)
@@ -140,9 +143,12 @@ def check_camera(
 ) -> CameraCheck:
     """Line of signal against exposure for each channel, and the figures that follow from it.
 
-    ``hot`` are hot pixels and all pixels. Raises `CalibrationError` when a channel has too few unclipped
-    exposures.
+    ``series`` may bend at its end. ``hot`` are hot pixels and all pixels. Raises `CalibrationError` when a
+    channel has too few unclipped exposures.
     """
+    unclipped = series.unclipped
+    series = straight_part(series, dark, transfer, sizes)
+    useful_dn = float(series.mean_dn[series.unclipped].max())
     lines = [exposure_line(series, channel, dark, transfer, sizes) for channel in range(3)]
     intercepts, stds = np.array([(line.intercept.value, line.intercept.std) for line in lines]).T
     red, green, blue = (line.largest_percent(sizes.full_scale_dn) for line in lines)
@@ -159,7 +165,8 @@ def check_camera(
         black_level_dn=dark.level_dn,
         intercept_dn=Measured(value=float(weight @ intercepts), std=float((stds**-2).sum() ** -0.5)),
         linearity_percent=(red, green, blue),
-        useful_dn=float(series.mean_dn[series.unclipped].max()),
+        useful_dn=useful_dn,
+        bends=bool((unclipped & ~series.unclipped).any()),
         saturation_dn=_saturation(saturated),
         electrons_per_dn=transfer.electrons_per_dn,
         read_noise_dn=transfer.read_noise_dn,
@@ -224,6 +231,26 @@ class ExposureLine:
         return Measured(
             value=float(abs(self.residual_dn[worst]) * percent), std=float(self.std_dn[worst] * percent)
         )
+
+
+def straight_part(series: Readings, dark: Dark, transfer: Transfer, sizes: RegionSizes) -> Readings:
+    """The same readings, of which those count as clipped that lie where values bend before they end."""
+    from_dn = BENDS_ABOVE * sizes.full_scale_dn
+    low = replace(series, clipped=np.where(series.mean_dn > from_dn, 1.0, series.clipped))
+    ends_dn = np.inf
+    for channel in range(3):
+        high = series.unclipped[:, channel] & ~low.unclipped[:, channel]
+        if not high.any() or len(np.unique(series.exposure_ms[low.unclipped[:, channel]])) < _MIN_EXPOSURES:
+            continue
+        line = exposure_line(low, channel, dark, transfer, sizes)
+        value = series.mean_dn[high, channel]
+        found = np.polyfit(line.exposure_ms, line.value_dn - line.residual_dn, 1)
+        below = np.polyval(found, series.exposure_ms[high]) - value
+        signal = value - dark.level_dn.value
+        std = np.hypot(transfer.mean_std(signal, sizes.pixels[channel]), STEADINESS * signal)
+        bent = (below > BENT * sizes.full_scale_dn) & (below > BENT_SIGMAS * std)
+        ends_dn = min(ends_dn, value[bent].min(initial=np.inf))
+    return replace(series, clipped=np.where(series.mean_dn >= ends_dn, 1.0, series.clipped))
 
 
 def exposure_line(

@@ -97,6 +97,8 @@ def _camera(camera: CameraCheck) -> Iterator[Figure]:
         advice="Noise is cut off at zero: raise the camera's black level.",
     )
     yield from _steadiness(camera)
+    if camera.bends:
+        yield Figure(name="values bend before they end, above", value=camera.useful_dn, unit="DN")
     yield _figure("electrons per DN", camera.electrons_per_dn, "e-/DN")
     yield _figure("read noise", camera.read_noise_dn, "DN")
     yield _figure(

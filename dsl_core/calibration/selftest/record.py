@@ -18,6 +18,7 @@ from dsl_core.calibration.selftest.camera import (
     fit_transfer,
     noise_of_frames,
     noise_of_pixels,
+    straight_part,
 )
 from dsl_core.calibration.selftest.cycle import (
     Cycle,
@@ -155,7 +156,8 @@ def selftest_curves(capture: SelfTestCapture) -> SelfTestCurves:
     parts, sizes = capture.parts, capture.sizes
     dark = fit_dark(parts["dark"], sizes)
     transfer = fit_transfer(joined(parts["dark"], parts["series"]), dark.level_dn.value, sizes)
-    red, green, blue = (exposure_line(parts["series"], c, dark, transfer, sizes) for c in range(3))
+    series = straight_part(parts["series"], dark, transfer, sizes)
+    red, green, blue = (exposure_line(series, c, dark, transfer, sizes) for c in range(3))
     latency = parts["latency"]
     judged, asked, _ = trials(latency, is_right(latency))
     right = is_right(latency)[judged]

@@ -100,6 +100,7 @@ class SelfTestRecipe(Recipe[SelfTest]):
             "black_level_dn": camera.black_level_dn.value,
             "electrons_per_dn": camera.electrons_per_dn.value,
             "read_noise_dn": camera.read_noise_dn.value,
+            "saturation_dn": int(camera.useful_dn) if camera.bends else rig.sensor.saturation_dn,
         }
         response = {
             "gamma": projector.gamma.value,

@@ -33,13 +33,15 @@ class CameraCheck(Record):
 
     ``linearity_percent`` is the largest distance from a straight line for red, green and blue, in percent of
     full scale, within the useful range: from ``black_level_dn`` to ``useful_dn``, the largest signal that no
-    pixel of the region clipped. ``intercept_dn`` is where the line meets an exposure of zero. ``step_dn`` is
-    the distance of neighbouring values: more than one where pictures were converted from fewer bits.
+    pixel of the region clipped, and that lies on the line: where a sensor ``bends`` before it saturates,
+    larger values count for nothing. ``intercept_dn`` is where the line meets an exposure of zero. ``step_dn``
+    is the distance of neighbouring values: more than one where pictures were converted from fewer bits.
 
     ``exposure_offset_ms`` is by how much exposures are longer than stated. ``black_change_dn`` is what the
     black level gained during the test. Noise of raw values is each pixel's and each frame's own:
-    ``shared_by_pixels`` and ``shared_by_frames`` are the shares that neighbouring pixels, and frames one
-    after the other, have in common. Tests of before did not measure these.
+    ``shared_by_pixels`` is the share of the noise of light that neighbouring pixels have in common,
+    ``shared_by_frames`` that of all noise which dark frames have from the one before. Tests of before did not
+    measure these.
     """
 
     bit_depth: int
@@ -48,6 +50,7 @@ class CameraCheck(Record):
     intercept_dn: Measured
     linearity_percent: tuple[Measured, Measured, Measured]
     useful_dn: float
+    bends: bool = False
     saturation_dn: Measured
     electrons_per_dn: Measured
     read_noise_dn: Measured

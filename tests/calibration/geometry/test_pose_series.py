@@ -314,6 +314,14 @@ def test_poses_without_a_board_are_left_out_and_named_before_all_doubts(
     assert all(each.startswith(words) for each, words in zip(found.warnings, begin, strict=True))
 
 
+def test_stripes_that_lose_light_are_those_of_a_projector_that_scales_its_picture(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    (warning,) = series(monkeypatch, 1.0, 0.9, 1.0, gamma=1.4).warnings[1:]
+    assert warning.startswith("Fine stripes give too little light, as if half of it had a gamma of 1.40")
+    assert "keystone" in warning
+
+
 def test_fewer_than_three_poses_are_refused_with_the_reasons_where_there_are_any(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:

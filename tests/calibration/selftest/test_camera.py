@@ -59,6 +59,23 @@ def test_exposures_that_clip_bend_no_line() -> None:
         check_camera(dark, transfer, series[np.array([0, 1, 2, 3, 10, 11])], end, (0, 100), sizes)
 
 
+@pytest.mark.parametrize(("bend", "useful_share"), [(0.0, 0.98), (2.0, 0.92)])
+def test_a_sensor_that_bends_before_it_saturates_counts_as_saturated_there(
+    bend: float, useful_share: float
+) -> None:
+    share = np.array([0.05, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.85, 0.92, 0.95, 0.98])
+    full = 4095 - BLACK_DN
+    bent = share - bend * np.clip(share - 0.9, 0, None) ** 2
+    series = table(100 * share, BLACK_DN + full * bent[:, None] * np.ones(3))
+    none = np.zeros(3)
+    dark = Dark(Measured(value=BLACK_DN, std=0.01), none, none, none, none)
+    transfer = Transfer(Measured(value=10.0, std=0.01), Measured(value=1.0, std=0.01))
+    found = check_camera(dark, transfer, series, series[-1:], (0, 100), SIZES)
+    assert found.bends is (bend > 0)
+    assert found.useful_dn == pytest.approx(BLACK_DN + full * useful_share, abs=4)
+    assert max(each.value for each in found.linearity_percent) < 0.1
+
+
 def dark_readings(level_dn: tuple[float, float, float], rate: float, beside: float) -> Readings:
     """Eight pairs at 1 ms and 101 ms; read noise of 2 DN."""
     exposure = np.repeat([1.0, 101.0], 8)
