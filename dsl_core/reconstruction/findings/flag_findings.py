@@ -158,8 +158,10 @@ def _of_spectra(
         of_areas / measured,
         MOST_POOR_AREA,
         "No spectrum explains the line frames of whole areas, which hold {0} of the pixels: surfaces there"
-        " are fluorescent, translucent, glossy or finer than pixels, or receive light from other surfaces.",
-        "Look at a picture of the flags: reflectances there are not to be trusted beyond their deviations.",
+        " are fluorescent, translucent, glossy or finer than pixels, or receive light from other surfaces; or"
+        " dirt on the film dims an order there.",
+        "Look at a picture of the flags: reflectances there are not to be trusted beyond their deviations."
+        " Areas that stay where they are with another target are of the film: clean it.",
     )
     yield _share(
         "mixed pixels",

@@ -52,7 +52,7 @@ def test_a_flag_is_told_from_the_share_that_is_not_normal(flag: Flag, limit: flo
 
 @pytest.mark.parametrize(
     ("flag", "part", "words"),
-    [(Flag.POOR_FIT, "surfaces", "fluorescent"), (Flag.NOT_REFINED, "profile", "too dark, translucent")],
+    [(Flag.POOR_FIT, "surfaces", "dirt on the film"), (Flag.NOT_REFINED, "profile", "too dark, translucent")],
 )
 def test_whole_areas_are_told_though_they_are_a_small_part_of_the_picture(
     flag: Flag, part: Part, words: str
