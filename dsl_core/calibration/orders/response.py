@@ -86,9 +86,11 @@ def shift_of_all(
     ``through`` are the filters' transmissions at `FINE_NM`; the rest is as for `fit_response`. On one flank
     of an LED's spectrum such a shift makes light brighter, on the other one darker, in all colours of the
     camera; a response that does so is not smooth. An error of the spectroradiometer's wavelengths looks
-    alike.
+    alike. A response with edges of its own may look like a shift, too, but of another one at each LED: what
+    the LEDs disagree by is part of the deviation.
     """
-    in_white = chain_response(rig, 0, FINE_NM).sum(1) * reflectance
+    by_led = chain_response(rig, 0, FINE_NM) * reflectance
+    in_white = by_led.sum(1)
     change, shift_nm = np.zeros((3, len(NODES_NM))), 0.0
     for _ in range(SHIFT_ROUNDS):
         moved, further = (
@@ -97,12 +99,17 @@ def shift_of_all(
         )
         here, there = (_data(each, in_white, white, white_std, change) for each in (moved, further))
         slope = (here.target - there.target) / SHIFT_STEP_NM
-        design = np.concatenate([here.design, slope[:, None]], 1)
-        solution = _solve(samples, _Data(design, here.target + slope * shift_nm, here.std), [SHIFT_STD_NM])
+        target = here.target + slope * shift_nm
+        solution = _solve(samples, here.besides(slope[:, None], target), [SHIFT_STD_NM])
         change = solution.values[: 3 * len(NODES_NM)].reshape(3, -1)
         shift_nm = float(np.clip(solution.values[-1], shift_nm - MOST_NM, shift_nm + MOST_NM))
+    apart = here.besides(
+        slope[:, None] * _shares(by_led, samples, [_moved(t, shift_nm) for t in through]), target
+    )
+    excess = max(_disagreement(_solve(samples, apart, [SHIFT_STD_NM] * 3)), 1.0)
     centres = [MEASURED_NM if sample.measured_curve else NOMINAL_NM for sample in samples]
-    return shift_nm, float(np.hypot(solution.std[-1], np.linalg.norm(centres) / len(samples)))
+    own = solution.std[-1] * excess**0.5
+    return shift_nm, float(np.hypot(own, np.linalg.norm(centres) / len(samples)))
 
 
 @dataclass(frozen=True)
@@ -112,6 +119,24 @@ class _Data:
     design: Floats
     target: Floats
     std: Floats
+
+    def besides(self, more: Floats, target: Floats) -> _Data:
+        """The same with more unknowns (n, k) behind the others, and another target."""
+        return _Data(np.concatenate([self.design, more], 1), target, self.std)
+
+
+def _shares(by_led: Floats, samples: Sequence[BandSample], through: Sequence[Floats]) -> Floats:
+    """Share of each LED in the light of every equation, (n, LEDs); ``by_led`` (3, LEDs, `FINE_NM`)."""
+    light = [by_led[c] @ t for s, t in zip(samples, through, strict=True) for c in _usable(s)]
+    light += [by_led[c].sum(1) for c in range(3)]
+    return np.array([each / max(each.sum(), 1e-300) for each in light])
+
+
+def _disagreement(apart: SmoothSolution) -> float:
+    """Reduced chi-square of the LEDs' own shifts, the last three unknowns, about their mean."""
+    values, weight = apart.values[-3:], np.linalg.inv(apart.covariance[-3:, -3:])
+    off = values - weight.sum(0) @ values / weight.sum()
+    return float(off @ weight @ off / 2)
 
 
 def _data(

@@ -81,6 +81,24 @@ def test_filters_that_are_all_off_alike_disagree_with_the_leds(off_nm: float, ce
     assert 0.5 / np.sqrt(len(samples)) <= std < 0.4
 
 
+@pytest.mark.parametrize("off_nm", [0.0, 2.0])
+def test_edges_of_a_response_that_look_like_a_shift_are_in_its_deviation(off_nm: float) -> None:
+    """Red of the camera begins steeply; the rig so far knows a rounder one."""
+    known = published_rig()
+    nm = np.arange(396.0, 705.0, 2.0)
+    red = 0.03 + 0.97 / (1 + np.exp(-(nm - 598.0) / 3.5)) * (1 - 0.7 / (1 + np.exp(-(nm - 640.0) / 5.0)))
+    truth = known.model_copy(update={"response": (SpectralCurve.of(nm, red), *known.response[1:])})
+    seen = [passed(truth, nominal_filter(each + off_nm)).sum(1) for each in CENTRES]
+    samples = [
+        BandSample(each, 1e-3 * each, passed(known, nominal_filter(nm)), True)
+        for each, nm in zip(seen, CENTRES, strict=True)
+    ]
+    white = chain_response(truth, 0, FINE_NM).sum((1, 2))
+    through = [through_filter(nominal_filter(each)) for each in CENTRES]
+    found, std = shift_of_all(known, samples, through, white, 1e-3 * white, 1.0)
+    assert abs(found - off_nm) < 2 * std
+
+
 @pytest.mark.slow
 def test_nominal_curves_say_less_of_a_shift_than_measured_ones() -> None:
     known = published_rig()
