@@ -114,9 +114,9 @@ def _evenness(probe: Probe) -> Iterator[FitFinding]:
         (light.change, light.std),
         "1",
         MOST_UNEVEN,
-        f"The projector's light changes by {light.change:+.1%} from the middle of its frame to its left and"
-        f" right. Lines of one wavelength are brighter than those of another: reflectances are off by about"
-        f" {light.error:.1%}, as stated.",
+        "The projector's light, or the share of it that the film diffracts, changes by"
+        f" {light.change:+.1%} from the middle of its frame to its left and right. Lines of one wavelength"
+        f" are brighter than those of another: reflectances are off by about {light.error:.1%}, as stated.",
         "Scan with the object in the middle of the projector's frame, where its light is even; no flat field"
         " of the camera corrects this.",
     )

@@ -52,6 +52,8 @@ def test_light_that_changes_to_the_sides_is_found_told_and_part_of_deviations(ch
     (told,) = (each for each in cause_findings(probe) if each.name == NAME)
     assert told.significant
     assert f"{found.change:+.1%} from the middle" in told.sentence
+    # A film that diffracts less at its sides looks alike.
+    assert "the share of it that the film diffracts" in told.sentence
     even = common_error(replace(probe, sideways=None), fit_causes(probe))
     assert common_error(probe, fit_causes(probe)) == pytest.approx(np.hypot(even, found.error))
 
