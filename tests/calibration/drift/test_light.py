@@ -233,7 +233,7 @@ def test_the_deviation_of_white_is_that_of_a_median_beside_that_of_the_scale(
     for figure in light_drift(rig, even_signals(ratio * expected), 0.99):
         assert figure.value == pytest.approx(1.05)
         # Half of the deviations from the median are within 0.05, the others 0.15 and 0.25.
-        spread = 1.482602 * (0.05 + 0.15) / 2
+        spread = 1.4826022185 * (0.05 + 0.15) / 2
         assert figure.std == pytest.approx(np.hypot(1.253314 * spread / np.sqrt(168), 0.003))
         assert (figure.low, figure.high) == (0.97, 1.03)
 
@@ -286,7 +286,7 @@ def test_signals_far_off_pull_as_those_at_the_limit() -> None:
     slope = np.tile([1e-3, -1e-3], 150)
     _, gain, *_ = _shift(data, np.ones(300), slope, np.full(300, 1e-6))
     off = data - gain
-    scale = 1.482602 * float(np.median(np.abs(off)))
+    scale = 1.4826022185 * float(np.median(np.abs(off)))
     pulls = [abs(float(np.clip(off / scale, -limit, limit).mean())) for limit in (1.345, 2.0, 0.9)]
     assert pulls[0] < 5e-3
     assert min(pulls[1:]) > 0.02

@@ -281,7 +281,7 @@ def test_numbers_are_those_of_least_squares_with_their_prior() -> None:
         stage = LinearStage(design, seen, 0.01)
         start = np.array([0.0, 0.0, 0.1])
         numbers, covariance = _gauss_newton(stage, start, free, prior)  # type: ignore[arg-type]
-        scale = max(1.0, 1.482602 * float(np.median(np.abs(stage.residual_px(numbers)))) * weight**0.5)
+        scale = max(1.0, 1.4826022185 * float(np.median(np.abs(stage.residual_px(numbers)))) * weight**0.5)
         information = design[:, free].T @ design[:, free] * weight / scale**2 + pull
         right = design[:, free].T @ (seen - 0.1 * design[:, 2]) * weight / scale**2
         assert numbers[free] == pytest.approx(np.linalg.solve(information, right), rel=1e-4)
@@ -337,7 +337,7 @@ def test_residuals_beyond_two_and_a_half_deviations_pull_as_those_at_it() -> Non
     stage = LinearStage(design, seen, 0.01)
     numbers, _ = _gauss_newton(stage, np.zeros(3), np.array([0]), False)  # type: ignore[arg-type]
     off = stage.residual_px(numbers) / np.hypot(0.01, 0.002)
-    scale = max(1.0, 1.482602 * float(np.median(np.abs(off))))
+    scale = max(1.0, 1.4826022185 * float(np.median(np.abs(off))))
     pulls = [abs(float(np.clip(off / scale, -limit, limit).mean())) for limit in (2.5, 3.0, 2.0)]
     assert pulls[0] < 3e-3
     assert min(pulls[1:]) > 0.02
