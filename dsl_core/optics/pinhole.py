@@ -24,6 +24,8 @@ FADE_RADIUS_SQ = 0.3
 GRID_POINTS = 17
 #: Pixels of a picture whose rays are all kept once they are known.
 KEPT_PX = 1 << 20
+#: An error from which one more step of Newton's method leaves nothing.
+CLOSE = 1e-10
 #: Pixels whose rays are sought at once.
 BLOCK_PX = 1 << 14
 
@@ -64,14 +66,16 @@ def undistort(
     for _ in range(20):
         fx, fy = distort(u, v, coefficients)
         ex, ey = fx - x, fy - y
-        if max(np.abs(ex).max(initial=0), np.abs(ey).max(initial=0)) < 1e-12:
-            return u, v
+        close = max(np.abs(ex).max(initial=0), np.abs(ey).max(initial=0)) < CLOSE
         ax, ay = distort(u + h, v, coefficients)
         bx, by = distort(u, v + h, coefficients)
         jxx, jyx, jxy, jyy = (ax - fx) / h, (ay - fy) / h, (bx - fx) / h, (by - fy) / h
         det = jxx * jyy - jxy * jyx
         u = u - (jyy * ex - jxy * ey) / det
         v = v - (jxx * ey - jyx * ex) / det
+        if close:
+            # This step left less than rounding does: a place has one answer, whatever else was asked for.
+            return u, v
     if not max(np.abs(ex).max(), np.abs(ey).max()) < 1e-9:
         raise CalibrationError(
             f"The lens distortion {coefficients} cannot be inverted inside the image; the calibration is not"
