@@ -45,7 +45,7 @@ class LibraryController:
             progress.report("read the library", 0, 0)
             return self._library.lines()
 
-        self._runner.submit(Job("Read the library", work, self._state.library.set))
+        self._runner.submit(Job("Read the library", work, self._state.library.set, is_minor=True))
 
     def use(self, key: str) -> None:
         """Scan with a calibration from now on."""

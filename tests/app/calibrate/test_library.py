@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from typing import Any
 
 import pytest
 from dsl_app.connection.state import RigChoice
+from dsl_app.shared.jobs.base import Job
 
 from dsl_core.devices.conditions import current_conditions
 from dsl_core.io.calibration_library import CalibrationLibrary
@@ -16,6 +18,7 @@ from tests.app.calibrate.calibrate_bench import (
     calibrate,
     make_bench,
 )
+from tests.app.support.doubles import InlineRunner
 
 
 def test_the_library_restores_exports_imports_and_is_used(bench: CalibrateBench, tmp_path: Path) -> None:
@@ -44,6 +47,20 @@ def test_the_library_restores_exports_imports_and_is_used(bench: CalibrateBench,
     assert "<html" in opened[0].read_text()
     library.use("campaign")
     assert state.in_use.value == "campaign"
+
+
+def test_a_window_that_closes_while_the_library_is_read_asks_nothing(
+    bench: CalibrateBench, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    read, submit = list[bool](), InlineRunner.submit
+
+    def note(runner: InlineRunner, job: Job[Any]) -> Job[Any]:
+        read.append(job.is_minor)
+        return submit(runner, job)
+
+    monkeypatch.setattr(InlineRunner, "submit", note)
+    bench.control.library.load()
+    assert read == [True]
 
 
 def test_a_drift_check_needs_the_rig_that_was_calibrated(bench: CalibrateBench) -> None:
