@@ -22,6 +22,9 @@ from dsl_core.model.rig import ProjectorResponse, Rig
 from dsl_core.progress import NoProgress
 from tests.cases.film_bench import film_bench, place, take, take_all, truth_of, without
 
+#: Their fixtures calibrate a rig; `tests/campaign/test_kept_figures.py` calibrates one in any run.
+pytestmark = pytest.mark.slow
+
 RECIPE = BandpassRecipe(filters_nm=(450.0, 480.0, 540.0, 590.0, 610.0, 640.0), pixels=4000)
 INSIDE_NM = np.arange(450.0, 641.0, 10.0)
 
@@ -183,7 +186,6 @@ def test_missing_filter_is_refused(bench: Bench) -> None:
         recipe.capture(bench, step, NoProgress())
 
 
-@pytest.mark.slow
 def test_neighbouring_filter_is_found_by_the_places_of_its_orders(bench: Bench, tmp_path: Path) -> None:
     # So near that colours do not tell: 550 where 540 was asked for.
     step = next(step for step in RECIPE.steps(bench) if step.placement.filter_nm == 540.0)

@@ -14,6 +14,9 @@ from dsl_core.model.calibration.depth_stage import DepthStageCalibration
 from dsl_core.progress import NoProgress
 from tests.cases.film_bench import film_bench, take_all, truth_of
 
+#: Their fixtures calibrate a rig; `tests/campaign/test_kept_figures.py` calibrates one in any run.
+pytestmark = pytest.mark.slow
+
 RECIPE = DepthStageRecipe(
     positions_mm=(650.0, 850.0), filters_nm=(450.0, 640.0), code_step_px=5, filter_step_px=24, chain=False
 )

@@ -25,6 +25,9 @@ from dsl_core.progress import NoProgress, Progress
 from tests.cases.board_calibrated import board_calibrated
 from tests.cases.film_bench import film_bench, take, take_all, truth_of, without
 
+#: Their fixtures calibrate a rig; `tests/campaign/test_kept_figures.py` calibrates one in any run.
+pytestmark = pytest.mark.slow
+
 RECIPE = DepthStageRecipe(
     positions_mm=(620.0, 850.0), filters_nm=(450.0, 540.0, 640.0), code_step_px=5, chain=False
 )
@@ -155,7 +158,6 @@ def test_stage_notes_where_it_was(bench: Bench) -> None:
     assert ["850.0" in note for note in notes] == [False] * 4 + [True] * 4
 
 
-@pytest.mark.slow
 def test_a_capture_without_first_orders_is_named(bench: Bench, tmp_path: Path) -> None:
     step = RECIPE.steps(bench)[FILTERED]
     other = without(bench, tmp_path, step)

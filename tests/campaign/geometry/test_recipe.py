@@ -28,6 +28,9 @@ from dsl_core.progress import NoProgress
 from dsl_core.simulation.published_rig import published_rig
 from dsl_core.simulation.sim_devices import SimCamera, open_twin
 
+#: Their fixtures calibrate a rig; `tests/campaign/test_kept_figures.py` calibrates one in any run.
+pytestmark = pytest.mark.slow
+
 BOARD = Checkerboard(columns=9, rows=6, square_mm=22.0)
 RECIPE = GeometryRecipe(board=BOARD, poses=6)
 CHARUCO = Charuco(columns=9, rows=6, square_mm=28, marker_mm=21)
@@ -88,7 +91,6 @@ def test_columns_of_the_drawn_rig_come_back(bench: Bench, record: GeometryCalibr
     assert found.geometry_covariance is not None
 
 
-@pytest.mark.slow
 def test_a_pose_that_a_person_left_out_is_not_in_the_fit(bench: Bench, record: GeometryCalibration) -> None:
     found = replace(RECIPE, left_out=("pose-03",)).fit(bench, NoProgress())
     assert [pose.name for pose in found.poses] == ["Pose 1", "Pose 2", "Pose 4", "Pose 5", "Pose 6"]
@@ -116,7 +118,6 @@ def test_figures_pass_and_say_how_good_it_is(record: GeometryCalibration) -> Non
     assert record.warnings == ()
 
 
-@pytest.mark.slow
 def test_a_look_tells_how_the_board_stands(bench: Bench) -> None:
     step = RECIPE.steps(bench)[1]
     assert bench.devices.place is not None
@@ -135,7 +136,6 @@ def test_a_look_tells_how_the_board_stands(bench: Bench) -> None:
         RECIPE.look(bench, step)
 
 
-@pytest.mark.slow
 def test_a_board_half_out_of_view_is_refused_with_its_pose(tmp_path: Path) -> None:
     bench = bench_at(tmp_path)
     step = RECIPE.steps(bench)[2]
@@ -143,7 +143,6 @@ def test_a_board_half_out_of_view_is_refused_with_its_pose(tmp_path: Path) -> No
         take(RECIPE, bench, step, x_mm=160.0)
 
 
-@pytest.mark.slow
 def test_a_pose_without_board_is_left_out_and_named(poses: list[PoseFrames]) -> None:
     blank = replace(poses[1], white=np.full_like(poses[1].white, 40.0))
     series = observe_series([poses[0], blank, *poses[2:]], BOARD, (640, 360))
@@ -154,7 +153,6 @@ def test_a_pose_without_board_is_left_out_and_named(poses: list[PoseFrames]) -> 
         observe_series([poses[0], blank, poses[2]], BOARD, (640, 360))
 
 
-@pytest.mark.slow
 def test_a_blurred_pose_is_named(poses: list[PoseFrames]) -> None:
     import cv2
 
@@ -169,7 +167,6 @@ def test_a_blurred_pose_is_named(poses: list[PoseFrames]) -> None:
     assert [w.split(":")[0] for w in series.warnings] == ["Pose 3 is blurred"]
 
 
-@pytest.mark.slow
 def test_pictures_with_a_gamma_are_told(poses: list[PoseFrames]) -> None:
     def encoded(frames: PoseFrames) -> PoseFrames:
         top = float(frames.white.max())
@@ -181,7 +178,6 @@ def test_pictures_with_a_gamma_are_told(poses: list[PoseFrames]) -> None:
     assert any("not linear: half the light corresponds to a gamma of 0.4" in w for w in series.warnings)
 
 
-@pytest.mark.slow
 def test_a_wrong_printed_size_is_told_by_the_nominal_baseline(bench: Bench) -> None:
     wrong = replace(RECIPE, board=BOARD.model_copy(update={"square_mm": 27.5}))
     # The captures are those of the true board; only what the recipe believes of it differs.
@@ -199,7 +195,6 @@ def replace_steps(recipe: GeometryRecipe) -> GeometryRecipe:
     return Same(recipe.board, recipe.poses)
 
 
-@pytest.mark.slow
 def test_two_settings_are_merged(tmp_path: Path) -> None:
     bench = bench_at(tmp_path)
     recipe = replace(RECIPE, ratio=6.0)
