@@ -26,6 +26,9 @@ MOST_BLUR, MOST_TAIL = 0.03, 0.004
 #: Relative deviation of a blur beyond which lines, side by side in few frames, do not show it: what they seem
 #: to show then is light that translucent surfaces spread.
 UNSURE_BLUR = 0.1
+#: Gains of the camera's colours that are worth a finding. Green seems to differ from red and blue by up to
+#: .08 in clean scans of many materials, whose spectra are less smooth than the prior takes them for.
+MOST_COLOUR_GAIN, MOST_GREEN_GAIN = 0.03, 0.12
 #: Chi-square of most pixels above which no cause explains the frames.
 MOST_CHI_SQUARE = 1.5
 #: Share of one order's displacement that the other's must have if uneven lines may be the cause.
@@ -92,6 +95,7 @@ def cause_findings(
             "Calibrate the curves on this rig; those of data sheets are typically off by 5 %.",
         )
         yield _wide_bands(probe, probe.curves)
+    yield from _colour_gains(probe, told)
     usual = probe.usual_chi_square
     yield FitFinding.judged(
         "profile",
@@ -121,6 +125,26 @@ def _evenness(probe: Probe) -> Iterator[FitFinding]:
         " of the camera corrects this.",
     )
     yield found.model_copy(update={"significant": light.matters})
+
+
+def _colour_gains(probe: Probe, displaced: bool) -> Iterator[FitFinding]:
+    """Gains of colours; where orders are ``displaced``, the wavelengths of colours are as well."""
+    gains = probe.colour_gains
+    if gains is None:
+        return
+    green = matters(*gains.green, MOST_GREEN_GAIN)
+    found = FitFinding.judged(
+        "curves",
+        "gains of the camera's colours, " + ("green from red and blue" if green else "blue from red"),
+        gains.green if green else gains.apart,
+        "1",
+        MOST_GREEN_GAIN if green else MOST_COLOUR_GAIN,
+        f"Against green, the camera weighs red by {gains.red:+.1%} and blue by {gains.blue:+.1%} otherwise"
+        " than when it was calibrated: spectra are off by about as much.",
+        "Switch off automatic white balance, set the gains of the camera's colours as they were, and scan"
+        " again; or calibrate its response again.",
+    )
+    yield found.model_copy(update={"significant": found.significant and not displaced})
 
 
 def _wide_bands(probe: Probe, curves: CurveMisfit) -> FitFinding:

@@ -80,6 +80,16 @@ def wavy_curves(rig: Rig) -> Rig:
     return rig.model_copy(update={"response": (red, green, blue)})
 
 
+def white_balanced(rig: Rig) -> Rig:
+    """A calibration from before automatic white balance gave red 8 % and blue 15 % more."""
+    curves = [
+        curve.model_copy(update={"values": tuple(value / gain for value in curve.values)})
+        for curve, gain in zip(rig.response, (1.08, 1.0, 1.15), strict=True)
+    ]
+    red, green, blue = curves
+    return rig.model_copy(update={"response": (red, green, blue)})
+
+
 def less_blur(rig: Rig) -> Rig:
     response = rig.projector_response
     return rig.model_copy(
@@ -147,6 +157,23 @@ def test_colours_that_disagree_about_light_which_changes_fast_tell_of_wide_bands
     fit = Fit.of(cause_findings(replace(found, steepness=2 * found.steepness)))
     assert fit.parts[:1] == ("bands",)
     assert "Reconstruct with bands of at most 5 nm." in fit.words
+
+
+def test_white_balance_that_is_on_is_told_by_what_colours_say_of_each_other(
+    scanned: tuple[DeviceRig, MemoryScan],
+) -> None:
+    devices, scan = scanned
+    assert devices.calibration is not None
+    for rig, wanted in ((devices.calibration, 0.0), (white_balanced(devices.calibration), 0.07)):
+        seen = probed(rig, scan)
+        assert seen.colour_gains is not None
+        value, std = seen.colour_gains.apart
+        assert value == pytest.approx(wanted, abs=3 * std)
+        assert std < 0.02
+        found = next(f for f in cause_findings(seen) if "camera's colours" in f.name)
+        assert found.significant == (wanted > 0)
+    assert "weighs red by +" in found.sentence
+    assert "white balance" in found.advice
 
 
 def test_the_gain_of_an_order_is_found_by_its_size(scanned: tuple[DeviceRig, MemoryScan]) -> None:

@@ -22,6 +22,7 @@ from torch import Tensor
 from dsl_core.model.rig import BayerPattern
 from dsl_core.optics.spectra import ORDERS
 from dsl_core.optics.spread.field import widths_at
+from dsl_core.reconstruction.spectral.probing.colour_gains import ColourGains, colour_gains
 from dsl_core.reconstruction.spectral.probing.curve_probe import (
     USUAL_STEEPNESS,
     CurveMisfit,
@@ -130,6 +131,13 @@ class Probe:
         known = *self.with_curves, self.weight, np.array(PRIOR_STD), self.step_nm, self.steepness
         found = [curve_misfit(*known, bright=bright) for bright in (None, self.bright)]
         return min((each for each in found if each is not None), key=lambda each: each.rms, default=None)
+
+    @property
+    def colour_gains(self) -> ColourGains | None:
+        """How the camera weighs its colours, over the calibration; None where pixels do not tell."""
+        if self.with_curves is None:
+            return None
+        return colour_gains(*self.with_curves, self.weight, np.array(PRIOR_STD))
 
 
 def probe_targets(valid: NDArray[np.bool_]) -> Indices:
