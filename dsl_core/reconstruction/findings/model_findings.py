@@ -26,9 +26,8 @@ MOST_BLUR, MOST_TAIL = 0.03, 0.004
 #: Relative deviation of a blur beyond which lines, side by side in few frames, do not show it: what they seem
 #: to show then is light that translucent surfaces spread.
 UNSURE_BLUR = 0.1
-#: Gains of the camera's colours that are worth a finding. Green seems to differ from red and blue by up to
-#: .08 in clean scans of many materials, whose spectra are less smooth than the prior takes them for.
-MOST_COLOUR_GAIN, MOST_GREEN_GAIN = 0.03, 0.12
+#: Gains of the camera's colours that are worth a finding.
+MOST_COLOUR_GAIN = 0.03
 #: Chi-square of most pixels above which no cause explains the frames.
 MOST_CHI_SQUARE = 1.5
 #: Share of one order's displacement that the other's must have if uneven lines may be the cause.
@@ -132,15 +131,17 @@ def _colour_gains(probe: Probe, displaced: bool) -> Iterator[FitFinding]:
     gains = probe.colour_gains
     if gains is None:
         return
-    green = matters(*gains.green, MOST_GREEN_GAIN)
+    of_green = matters(*gains.green, MOST_COLOUR_GAIN)
+    colour, other = ("green", "red and blue") if of_green else ("blue", "red")
+    value, std = gains.green if of_green else gains.apart
     found = FitFinding.judged(
         "curves",
-        "gains of the camera's colours, " + ("green from red and blue" if green else "blue from red"),
-        gains.green if green else gains.apart,
+        f"gains of the camera's colours, {colour} from {other}",
+        (value, std),
         "1",
-        MOST_GREEN_GAIN if green else MOST_COLOUR_GAIN,
-        f"Against green, the camera weighs red by {gains.red:+.1%} and blue by {gains.blue:+.1%} otherwise"
-        " than when it was calibrated: spectra are off by about as much.",
+        MOST_COLOUR_GAIN,
+        f"Against {other}, the camera weighs {colour} by {value:+.1%} ± {std:.1%} otherwise than when it was"
+        " calibrated: spectra are off by about as much.",
         "Switch off automatic white balance, set the gains of the camera's colours as they were, and scan"
         " again; or calibrate its response again.",
     )

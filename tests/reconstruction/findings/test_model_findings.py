@@ -172,7 +172,7 @@ def test_white_balance_that_is_on_is_told_by_what_colours_say_of_each_other(
         assert std < 0.02
         found = next(f for f in cause_findings(seen) if "camera's colours" in f.name)
         assert found.significant == (wanted > 0)
-    assert "weighs red by +" in found.sentence
+    assert "Against red, the camera weighs blue by +" in found.sentence
     assert "white balance" in found.advice
 
 
