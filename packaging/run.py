@@ -80,7 +80,7 @@ QUICK = (
 #: One test in ten takes two thirds of the time: whole scans and calibrations, and hours at the window.
 NOT_SLOW = ("-m", "not slow")
 #: Seconds on two cores, said before a computer's own first run is known.
-USUAL_S = {"test": 600, "test all": 1500, "test quick": 90}
+USUAL_S = {"test": 720, "test all": 1600, "test quick": 90}
 TIMES = "dsl-scan-times.json"
 #: The longest that one check, or all tests, may take: what hangs must not keep a server for a day.
 LIMIT_S = 3600.0
