@@ -53,10 +53,12 @@ class Side:
         return origin is not None and origin[0] == "twin"
 
     def std(self, shown: PairQuantity, band: int, pixel: Pixel) -> float:
-        """Standard deviation at a pixel, 0 where none is stated."""
+        """Standard deviation at a pixel; that of the truth is 0, NaN where a result states none."""
         name = "depth_std_mm" if shown is PairQuantity.DEPTH else "reflectance_std"
-        if self.truth is not None or name not in self.arrays.arrays:
+        if self.truth is not None:
             return 0.0
+        if name not in self.arrays.arrays:
+            return math.nan
         values = self.arrays.at(name, pixel)
         return float(values if shown is PairQuantity.DEPTH else values[band])
 
@@ -83,7 +85,7 @@ class Pair:
         return self.first.arrays["reflectance"][i], self.second.arrays["reflectance"][k]
 
     def stds(self, shown: PairQuantity, band: int, pixel: Pixel) -> tuple[float, float]:
-        """Standard deviations of A and B at a pixel; 0 for the truth, and for a result that states none."""
+        """Standard deviations of A and B at a pixel, as `Side.std` gives them."""
         i, k = (0, 0) if shown is PairQuantity.DEPTH else self.bands[band]
         return self.first.std(shown, i, pixel), self.second.std(shown, k, pixel)
 
