@@ -12,6 +12,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from dsl_core.reconstruction.spectral.probing.curve_probe import of_all_pixels
+
 Floats = NDArray[np.float64]
 
 #: By how much each curve of a colour may be off at any wavelength (relative standard deviation).
@@ -52,8 +54,7 @@ def colour_gains(normal: Floats, score: Floats, weight: Floats, prior_std: Float
     First come p other parameters, with priors (p,), then the c knots of the curves, red before green before
     blue. None where the pixels do not tell.
     """
-    used = weight > 0
-    information, asked = np.tensordot(weight[used], normal[used], 1), weight[used] @ score[used]
+    information, asked = of_all_pixels(normal, score, weight)
     others = len(prior_std)
     knots = (len(asked) - others) // COLOURS
     of_gains = np.zeros((len(asked), 2))

@@ -123,6 +123,12 @@ class CurveMisfit:
     whole_rms: float
 
 
+def of_all_pixels(normal: Floats, score: Floats, weight: Floats) -> tuple[Floats, Floats]:
+    """Equations (k, k) and (k,) of all pixels (n, k, k) and (n, k) that have a weight (n,)."""
+    used = weight > 0
+    return np.tensordot(weight[used], normal[used], 1), weight[used] @ score[used]
+
+
 def curve_misfit(
     normal: Floats,
     score: Floats,
@@ -139,8 +145,7 @@ def curve_misfit(
     1 nm, ``bright`` (c,) where curves count (see `bright_knots`), None for everywhere. None where colours say
     too little.
     """
-    used = weight > 0
-    information, asked = np.tensordot(weight[used], normal[used], 1), weight[used] @ score[used]
+    information, asked = of_all_pixels(normal, score, weight)
     if bright is not None:
         # What is faint may take what it explains, too.
         first, faint = len(prior_std), np.flatnonzero(~bright)
