@@ -24,8 +24,9 @@ from dsl_core.io.reading import parts_of, read_bounded, read_json
 from dsl_core.io.scan.blosc_blocks import HEADER, Bytes, blocks_of
 from dsl_core.model.plan import spoken_number
 
-#: Blocks of 256 KiB decompress 1.7 times faster than Blosc's own choice for Zstandard, at the same size.
-_BLOSC = {"typesize": 2, "cname": "zstd", "clevel": 1, "shuffle": "bitshuffle", "blocksize": 1 << 18}
+#: Bands of rows are read by whole blocks. Frames in blocks of 64 KiB are 1.5 % larger than in ones of 256 KiB
+#: and decompress as fast, and a band of half a megapixel then needs half as much.
+_BLOSC = {"typesize": 2, "cname": "zstd", "clevel": 1, "shuffle": "bitshuffle", "blocksize": 1 << 16}
 _BITSHUFFLE = 2
 _PIXEL = np.dtype("<u2")
 
@@ -66,7 +67,7 @@ class FrameStore:
             ) from error
         wanted = self._metadata()
         for key in ("zarr_format", "shape", "data_type", "chunk_grid", "chunk_key_encoding", "codecs"):
-            if found.get(key) != wanted[key]:
+            if _comparable(found.get(key)) != _comparable(wanted[key]):
                 raise StoreError(
                     f"{self._metadata_path} gives {key} as {found.get(key)}, but the plan needs"
                     f" {wanted[key]}. The frames do not belong to this plan;"
@@ -190,3 +191,10 @@ class FrameStore:
             "attributes": {"unit": "DN"},
             "dimension_names": ["shot", "y", "x"],
         }
+
+
+def _comparable(value: Any) -> Any:
+    """A value of the metadata without the size of blocks, which each frame states itself."""
+    if isinstance(value, dict):
+        return {key: _comparable(each) for key, each in value.items() if key != "blocksize"}
+    return [_comparable(each) for each in value] if isinstance(value, list) else value

@@ -13,7 +13,7 @@ from dsl_core.io.scan.frame_store import ChunkError, FrameStore
 
 @pytest.fixture(scope="module")
 def mosaic() -> np.ndarray:
-    """Two and a half blocks."""
+    """Ten blocks and a shorter one."""
     return np.random.default_rng(0).integers(100, 140, (330, 1000)).astype(np.uint16)
 
 
@@ -49,8 +49,8 @@ def test_only_the_blocks_that_are_needed_are_in_a_part(store: FrameStore) -> Non
     chunk = store.path(0).read_bytes()
     part, begins = blocks_of(chunk, 0, 10)
     assert begins == 0
-    assert HEADER.unpack_from(part)[4] == 1 << 18
-    assert len(part) < 0.5 * len(chunk)
+    assert HEADER.unpack_from(part)[4] == 1 << 16
+    assert len(part) < 0.2 * len(chunk)
 
 
 @pytest.mark.parametrize("place", [4, 12, 16, 20])
@@ -82,9 +82,19 @@ def test_a_whole_of_one_block_is_that_block(tmp_path: Path) -> None:
 
 
 def test_the_last_block_comes_with_the_one_before_it(store: FrameStore) -> None:
-    # 2.5 blocks of 256 KiB: the last begins at twice as many bytes.
-    part, begins = blocks_of(store.path(0).read_bytes(), 600_000, 660_000)
-    assert begins == 1 << 18
-    assert HEADER.unpack_from(part)[4] == 660_000 - (1 << 18)
-    middle, begins = blocks_of(store.path(0).read_bytes(), 1 << 18, 1 << 19)
-    assert (begins, HEADER.unpack_from(middle)[4]) == (1 << 18, 1 << 18)
+    # Ten blocks of 64 KiB and a shorter one.
+    part, begins = blocks_of(store.path(0).read_bytes(), 656_000, 660_000)
+    assert begins == 9 << 16
+    assert HEADER.unpack_from(part)[4] == 660_000 - (9 << 16)
+    middle, begins = blocks_of(store.path(0).read_bytes(), 1 << 16, 1 << 17)
+    assert (begins, HEADER.unpack_from(middle)[4]) == (1 << 16, 1 << 16)
+
+
+def test_frames_in_blocks_of_another_size_are_read(store: FrameStore, mosaic: np.ndarray) -> None:
+    blosc = pytest.importorskip("numcodecs.blosc")
+    larger = blosc.Blosc(cname="zstd", clevel=1, shuffle=blosc.BITSHUFFLE, blocksize=1 << 18)
+    store.path(0).write_bytes(larger.encode(mosaic))
+    metadata = store.folder / "zarr.json"
+    metadata.write_text(metadata.read_text().replace("65536", "262144"))
+    store.check()
+    np.testing.assert_array_equal(store.read_rows(0, slice(150, 300)), mosaic[150:300])
