@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import TypeVar
@@ -175,17 +175,28 @@ def _scrolling(area: A, content: QWidget) -> A:
 
 
 def tab_in_place(place: QWidget) -> None:
-    """Let the Tab key come to what is inside a widget where that is: what is made later else comes last."""
-    chain, each = list[QWidget](), place.nextInFocusChain()
-    while each is not None and each is not place:
-        chain.append(each)
-        each = each.nextInFocusChain()
-    stops = [each for each in chain if each.focusPolicy() & Qt.FocusPolicy.TabFocus]
+    """Let the Tab key come to what is inside a widget where that is: what is made later else comes last.
+
+    The order is that in which parts were put into each other. Qt's own is not asked for: PySide takes what
+    `nextInFocusChain` returns for a child of the widget that it was asked of, and once that is gone declares
+    deleted what is still there.
+    """
+    stops = list(_stops(place.window()))
     inside = [each for each in stops if place.isAncestorOf(each)]
-    # It is a ring, so that the last of the others is the one before.
-    others = [each for each in stops if not place.isAncestorOf(each)]
-    for before, after in pairwise((*others[-1:], *inside)):
-        QWidget.setTabOrder(before, after)
+    if inside:
+        # It is a ring, so that before the first comes the last.
+        before = stops[stops.index(inside[0]) - 1]
+        for one, other in pairwise((before, *inside)):
+            QWidget.setTabOrder(one, other)
+
+
+def _stops(widget: QWidget) -> Iterator[QWidget]:
+    """What the Tab key comes to inside a widget, but for other windows."""
+    for part in widget.findChildren(QWidget, options=Qt.FindChildOption.FindDirectChildrenOnly):
+        if not part.isWindow():
+            if part.focusPolicy() & Qt.FocusPolicy.TabFocus:
+                yield part
+            yield from _stops(part)
 
 
 def tabs_of(name: str, *tabs: tuple[QWidget, str, str]) -> QTabWidget:

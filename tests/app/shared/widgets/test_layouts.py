@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import shiboken6
 from dsl_app.shared.widgets.layouts import (
     STRETCH,
     SideArea,
@@ -14,7 +15,7 @@ from dsl_app.shared.widgets.layouts import (
 )
 from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QLabel, QLineEdit, QWidget
+from PySide6.QtWidgets import QDialogButtonBox, QLabel, QLineEdit, QPushButton, QWidget
 from pytestqt.qtbot import QtBot
 
 
@@ -96,6 +97,17 @@ def test_the_tab_key_comes_to_what_was_made_later_where_it_is(qtbot: QtBot) -> N
     for field in (*later, last, first):
         QTest.keyClick(page.focusWidget(), Qt.Key.Key_Tab)
         assert page.focusWidget() is field
+
+
+def test_a_widget_that_goes_takes_no_button_of_others_along(qtbot: QtBot) -> None:
+    page, message, box = QWidget(), QPushButton("Close"), QDialogButtonBox()
+    qtbot.addWidget(page)
+    place = boxed(column_of(QLineEdit(), margins=0))
+    column_of(place, message, box, on=page)
+    save = box.addButton("Save", QDialogButtonBox.ButtonRole.AcceptRole)
+    tab_in_place(place)
+    shiboken6.delete(message)
+    assert shiboken6.isValid(save)
 
 
 def test_tabs_have_titles_and_tips(qtbot: QtBot) -> None:
