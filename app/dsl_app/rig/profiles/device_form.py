@@ -100,7 +100,7 @@ class DeviceForm(QWidget):
                 field.setPlaceholderText(text_of(rounded))
             field.textEdited.connect(lambda text, name=name: self._commands.set_text(self.kind, name, text))
             self.fields[name] = field
-            self._abouts[name] = setting.description or ""
+            self._abouts[name] = capitalised(setting.description or "")
             self.notes[name] = note = label(self._abouts[name], "muted", wraps=True)
             self.form.addRow(caption(name), column_of(field, note, 4, margins=0, spacing=2))
 

@@ -179,14 +179,17 @@ def text_of(value: object) -> str:
 
 #: Endings of names that are units.
 _UNITS = {"ms": "ms", "s": "s", "px": "px", "mm": "mm", "db": "dB", "nm": "nm"}
+#: Words of names that are initials.
+_INITIALS = {"id", "adc"}
 
 
 def caption(name: str) -> str:
     """The name of a setting as words, with its unit.
 
-    >>> caption("frame_wait_s"), caption("gain_db"), caption("id")
-    ('Frame wait (s)', 'Gain (dB)', 'Id')
+    >>> caption("frame_wait_s"), caption("gain_db"), caption("id"), caption("adc_bits")
+    ('Frame wait (s)', 'Gain (dB)', 'ID', 'ADC bits')
     """
     words, _, end = name.rpartition("_")
-    text = f"{words} ({_UNITS[end]})" if words and end in _UNITS else name
-    return capitalised(text.replace("_", " "))
+    text, unit = (words, f" ({_UNITS[end]})") if words and end in _UNITS else (name, "")
+    said = " ".join(word.upper() if word in _INITIALS else word for word in text.split("_"))
+    return capitalised(said) + unit

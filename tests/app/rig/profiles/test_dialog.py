@@ -156,7 +156,7 @@ def test_what_is_wrong_with_a_setting_stands_below_its_field_until_it_is_right(b
     assert (note.property("role"), camera.notes["index"].property("role")) == ("bad", "muted")
     camera.fields["size_px"].clear()
     QTest.keyClicks(camera.fields["size_px"], "640, 480")
-    assert (note.text(), note.property("role")) == ("width and height of its pictures", "muted")
+    assert (note.text(), note.property("role")) == ("Width and height of its pictures", "muted")
 
 
 def test_devices_are_tried_without_a_name_and_with_their_data_sheets(
