@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
@@ -17,6 +17,8 @@ from dsl_core.words import counted, natural
 FEWEST, MOST = 4, 512
 #: So many numbers may be absent from a row of names.
 MOST_ABSENT = 4
+#: With more files whose names stand alone than these, none is tried as the only one that does not belong.
+MOST_ALONE = 3
 #: Patterns of files that are tried, from the folder itself to folders in its folders.
 _EVERYTHING = (("*",), ("*", "*/*"), ("*", "*/*", "*/*/*"))
 _LAST_NUMBER = re.compile(r"\d+(?!.*\d)")
@@ -65,9 +67,8 @@ def candidates(folder: Path) -> tuple[list[Candidate], list[Candidate]]:
     parts = list(by_folder.values()) if len(by_folder) > 1 else []
     parts += [g for g in groups.values() if len(groups) > 1 and g not in parts]
     whole = [] if len(pictures) > MOST else list(_variants(folder, files, files, folder.absolute().name))
-    without_strays = [path for group in groups.values() if len(group) > 1 for path in group]
-    if 0 < len(without_strays) < len(files) and len(without_strays) <= MOST:
-        whole += _variants(folder, without_strays, files, folder.absolute().name)
+    for kept in _without_strays(files, groups.values()):
+        whole += _variants(folder, kept, files, folder.absolute().name)
     single = [
         candidate
         for group in sorted(parts, key=lambda g: natural(str(g[0])))
@@ -75,6 +76,17 @@ def candidates(folder: Path) -> tuple[list[Candidate], list[Candidate]]:
         for candidate in _variants(folder, group, files, _name(folder, group))
     ]
     return whole, single
+
+
+def _without_strays(files: Sequence[Path], groups: Collection[Sequence[Path]]) -> Iterator[list[Path]]:
+    """Files without one whose name stands alone, as white and black may, too, and without all of these."""
+    alone = [group[0] for group in groups if len(group) == 1]
+    if 1 < len(alone) <= MOST_ALONE and len(files) <= MOST:
+        # What lies beside a code mostly sorts after it.
+        yield from ([path for path in files if path != stray] for stray in reversed(alone))
+    rest = [path for path in files if path not in alone]
+    if alone and 0 < len(rest) <= MOST:
+        yield rest
 
 
 def _advice(folder: Path) -> str:

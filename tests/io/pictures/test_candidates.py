@@ -86,6 +86,14 @@ def test_strays_are_left_out_of_a_second_candidate(tmp_path: Path) -> None:
     assert [(each.name, len(each.pictures)) for each in single] == [("im", 4)]
 
 
+def test_each_file_that_stands_alone_may_be_the_only_stray(tmp_path: Path) -> None:
+    folder = folder_of(tmp_path / "scan", *numbered("im", 1, 2, 3, 4), "black.png", "white.png", "zoo.png")
+    whole, _ = candidates(folder)
+    alone = [{p.path.stem for p in each.pictures if p and "im" not in p.path.stem} for each in whole]
+    assert alone == [{"black", "white", "zoo"}, {"black", "white"}, {"black", "zoo"}, {"white", "zoo"}, set()]
+    assert [each.left_out for each in whole] == [0, 1, 1, 1, 3]
+
+
 def test_pictures_named_by_numbers_alone_are_called_by_the_first(tmp_path: Path) -> None:
     folder = folder_of(tmp_path / "scan", *numbered("", 1, 2, 3, 4), *numbered("white", 1, 2, 3, 4))
     assert [each.name for each in candidates(folder)[1]] == ["1", "white"]
