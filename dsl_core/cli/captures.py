@@ -45,12 +45,15 @@ def import_capture(
 ) -> None:
     """Say what every picture is; write the guessed mapping, and make a scan if there is a target."""
     from dsl_core.io.pictures.arrange import arrange
+    from dsl_core.io.scan.folder import require_name
     from dsl_core.io.staging import check_targets
     from dsl_core.workflows import captures
 
     encoding = encoding_named(options.encoding)
     if options.guess:
         check_targets([_mapping_path(source, options)], overwrite=options.force)
+    if target is not None:
+        require_name(target)
     if target is not None and not target.is_dir():
         check_targets([target], overwrite=False)
     if options.guess:

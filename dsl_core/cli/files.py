@@ -152,8 +152,11 @@ def _refuse(what: str, options: Mapping[str, object], instead: str) -> None:
 
 def _import_dataset(output: Output, source: Path, target: Path | None, rig: Rig) -> None:
     """The table comes first, so that it is printed even when the import is refused."""
+    from dsl_core.io.scan.folder import require_name
     from dsl_core.workflows import exchange
 
+    if target is not None:
+        require_name(target)
     try:
         records = exchange.import_scan(source, None, rig)
     except StoreError as error:

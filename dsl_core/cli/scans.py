@@ -107,8 +107,10 @@ def scan(
     """Capture a plan; every frame is saved to disk before the next is captured."""
     from dsl_core import pipeline
     from dsl_core.devices.registry import open_rig
+    from dsl_core.io.scan.folder import require_name
     from dsl_core.io.scan.origin import rig_notes
 
+    require_name(target)
     output, options = Output(json), with_effects(parse_options(option), effects, tolerance)
     choice = PlanChoice(plan, code, lines, comb, setting, sentinels)
     made = choice.build()

@@ -271,6 +271,17 @@ def test_a_traceback_only_when_asked(give: Give) -> None:
         assert "Traceback" in ending.err
 
 
+def test_a_scan_is_named_so_that_it_is_found_again(
+    give: Give, finished: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    for command in (("scan",), ("import", finished, "-o"), ("import", finished, "--guess", "-o")):
+        told = give(*command, "figure.json")
+        assert told.code == 2
+        assert "Name it figure.dsl" in told.sentence
+    assert not list(tmp_path.iterdir())
+
+
 def test_a_bug_is_called_one(give: Give, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("dsl_core.io.describe.describe", lambda *_: 1 / 0)
     ending = give("info", "absent")

@@ -42,6 +42,15 @@ LOG_NAME = "frames.jsonl"
 FRAMES_NAME = "frames"
 
 
+def require_name(folder: Path) -> None:
+    """Raise `StoreError` unless the name of a new scan is that of one, by which it is found again."""
+    if folder.suffix != SUFFIX:
+        raise StoreError(
+            f"{folder} is not the name of a scan: those end in {SUFFIX}."
+            f" Name it {folder.with_suffix(SUFFIX)}."
+        )
+
+
 def store_of(folder: Path, plan: CapturePlan) -> FrameStore:
     """The frames folder of a scan with this plan."""
     width, height = plan.camera_size_px
