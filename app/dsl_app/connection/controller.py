@@ -97,6 +97,8 @@ class RigController:
         def accepted() -> None:
             state.choice.set(choice)
             state.link.set(Link.OPENING)
+            # What hindered the connection before is no longer true of this one.
+            self._notifier.withdraw(state.trouble.value)
             state.trouble.set("")
             state.devices.set(None)
 

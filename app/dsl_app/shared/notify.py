@@ -25,6 +25,9 @@ class Notifier(Protocol):
         With ``stay_s`` it leaves by itself after that time.
         """
 
+    def withdraw(self, text: str) -> None:
+        """Take a sentence back, if it is still there: it has lost its sense."""
+
 
 def sentence_of(error: Exception) -> str:
     """What went wrong, for people."""

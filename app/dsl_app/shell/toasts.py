@@ -188,7 +188,7 @@ class Toasts(QObject):
     def withdraw(self, text: str) -> None:
         """Close the message of a text, if it is still there: it has lost its sense."""
         for toast in self.shown:
-            if toast.text == text:
+            if toast.text == in_window(text):
                 toast.dismiss()
 
     def _add(self, toast: Toast) -> None:

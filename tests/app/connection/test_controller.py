@@ -53,6 +53,13 @@ def test_a_rig_that_cannot_be_opened_says_why() -> None:
     assert notifier.told[0][0] == "error"
 
 
+def test_why_a_rig_was_not_opened_is_taken_back_with_the_next_connection() -> None:
+    rig, notifier = controller()
+    rig.connect(RigChoice("twin", (("scene", "moon"),)))
+    rig.connect(TWIN)
+    assert notifier.told[0][1] in notifier.withdrawn
+
+
 def test_the_cycle_is_the_calibrated_one() -> None:
     rig, _ = controller()
     rig.connect(TWIN)

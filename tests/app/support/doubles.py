@@ -86,6 +86,7 @@ class RecordingNotifier:
     def __init__(self) -> None:
         self.told: list[tuple[Level, str]] = []
         self.offers: dict[str, Callable[[], object]] = {}
+        self.withdrawn: list[str] = []
 
     def tell(self, level: Level, text: str, details: str = "") -> None:
         """Keep the sentence."""
@@ -95,3 +96,7 @@ class RecordingNotifier:
         """Keep the sentence and what it offers."""
         self.told.append(("info", text))
         self.offers.update(offers)
+
+    def withdraw(self, text: str) -> None:
+        """Keep what was taken back."""
+        self.withdrawn.append(text)
