@@ -129,10 +129,10 @@ def read_uniform(source: FrameSource, rig: Rig, progress: Progress) -> TargetPic
     )
 
 
-def middle(shape: tuple[int, ...], share: float = 0.5) -> NDArray[np.bool_]:
-    """The middle of an image, ``share`` of its width and height."""
+def middle(shape: tuple[int, ...]) -> NDArray[np.bool_]:
+    """The middle of an image, half as wide and high."""
     inside = np.zeros(shape, bool)
-    rows, columns = (slice(round(n * (1 - share) / 2), round(n * (1 + share) / 2)) for n in shape)
+    rows, columns = (slice(round(n / 4), round(3 * n / 4)) for n in shape)
     inside[rows, columns] = True
     return inside
 
