@@ -46,6 +46,8 @@ COARSER, FEWEST_VALUES = 0.3, 64
 #: Black is filtered with less than this share of its noise, where it was noise at first: so many times what
 #: the sensor explains. A picture that trembles by parts of a pixel has half of it.
 CALMER, MOSTLY_NOISE = 0.4, (0.6, 1.4)
+#: It has so many times its noise where gain was raised, if white has its light but for so much.
+NOISIER, SAME_LIGHT = 1.25, 0.1
 #: Share of the pixels that noise is measured by: others are at edges of what the room lights.
 CALM = 0.9
 #: A pixel is beyond black or white by so many deviations and this share of its contrast; where pictures are
@@ -70,6 +72,7 @@ def alteration(before: Pictures, now: Pictures, sensor: Sensor) -> str:
         or _banded(before, now)
         or _filtered(before, now, sensor)
         or _curved(before, now, sensor)
+        or _noisier(before, now, sensor)
     )
 
 
@@ -302,15 +305,40 @@ def _filtered(before: Pictures, now: Pictures, sensor: Sensor) -> str:
             "Edges of the pattern are darker than black or brighter than white: camera or projector sharpens"
             " its picture. Switch sharpening and edge enhancement off, and resume the scan."
         )
-    (usual, expected), (noise, now_expected) = (_noise(pictures[1], sensor) for pictures in (before, now))
-    # Less light has less noise as well, and so it is judged by what the sensor explains and as it is.
-    share = noise / max(usual, 1e-9) * max(1.0, expected / now_expected)
-    if MOSTLY_NOISE[0] < usual / expected < MOSTLY_NOISE[1] and share < CALMER:
+    shares = _noise_shares(before[1], now[1], sensor)
+    if max(shares) < CALMER:
         return (
-            f"Black has {share:.1f} times the noise that it had when the scan began: the camera filters"
+            f"Black has {max(shares):.1f} times the noise that it had when the scan began: the camera filters"
             " its pictures (noise reduction, median, compression). Switch that off, and resume the scan."
         )
     return ""
+
+
+def _noisier(before: Pictures, now: Pictures, sensor: Sensor) -> str:
+    """Whether pictures of the same light have more noise."""
+    old, new = (float((white.astype(np.float64) - black).sum()) for white, black, _ in (before, now))
+    shares = _noise_shares(before[1], now[1], sensor)
+    share, is_same_black = min(shares), max(shares) < (1 + SAME_LIGHT) * min(shares)
+    # Light of the room shows what it falls on.
+    if share < NOISIER or not is_same_black or abs(new - old) > SAME_LIGHT * abs(old):
+        return ""
+    return (
+        f"Black has {share:.1f} times the noise that it had when the scan began, and white has the same"
+        " light: gain of the camera was raised and its exposure shortened, or something disturbs its"
+        " electronics. Switch automatic exposure and gain off, and resume the scan."
+    )
+
+
+def _noise_shares(before: Mosaic, now: Mosaic, sensor: Sensor) -> tuple[float, float]:
+    """Noise of black over what it was: as it is, and but for what the sensor explains; 1 if it was no noise.
+
+    Less light has less noise as well.
+    """
+    (usual, expected), (noise, now_expected) = (_noise(black, sensor) for black in (before, now))
+    if not MOSTLY_NOISE[0] < usual / expected < MOSTLY_NOISE[1]:
+        return 1.0, 1.0
+    share = noise / max(usual, 1e-9)
+    return share, share * expected / now_expected
 
 
 def _noise(picture: Mosaic, sensor: Sensor) -> tuple[float, float]:

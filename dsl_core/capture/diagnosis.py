@@ -15,6 +15,9 @@ from numpy.typing import NDArray
 
 from dsl_core.capture.altered import alteration
 from dsl_core.capture.motion import TILES, moved_between
+from dsl_core.capture.proof.lasting.black_light import lit_black
+from dsl_core.capture.proof.noise import Noise
+from dsl_core.capture.proof.raster import Raster
 from dsl_core.capture.put_back import ADVICE
 from dsl_core.model.captured_code import CapturedCode
 from dsl_core.model.conditions import COLOUR_NAMES
@@ -170,6 +173,9 @@ def what_changed(before: References, now: References, sensor: Sensor) -> Explana
             "White and black now look the same: the projector gives no light, something covers it or the"
             " lens, or the camera repeats a picture. Check projector and camera, and resume the scan."
         )
+    appeared = _appeared(before, now, sensor)
+    if appeared:
+        return Explanation(appeared)
     altered = alteration(before.pictures, now.pictures, sensor)
     if altered:
         return Explanation(altered, is_of_all=True)
@@ -184,6 +190,24 @@ def _is_black_bright(before: References, now: References, sensor: Sensor) -> boo
     full = FULL * sensor.full_scale_dn
     was_bright, is_bright = (float((each.black >= full).mean()) for each in (before, now))
     return was_bright < SATURATED <= is_bright
+
+
+def _appeared(before: References, now: References, sensor: Sensor) -> str:
+    """Whether black has become as bright as white somewhere."""
+    size_px = now.black.shape[1], now.black.shape[0]
+    raster, noise = Raster(size_px), Noise(sensor)
+    channels = raster.channels(sensor.bayer)
+    was, is_ = (
+        lit_black(raster.take(each.white), raster.take(each.black), channels, noise, raster, size_px)
+        for each in (before, now)
+    )
+    if is_ is None or was is not None or is_.is_in_stripes:
+        return ""
+    return (
+        "Since the scan began, black has become as bright as white in columns {}-{}, rows {}-{} of the"
+        " picture: something came into the projected picture (a message, a window, the mouse pointer), or a"
+        " lamp into view. Take it away, close other programs, and resume the scan."
+    ).format(*is_.columns, *is_.rows)
 
 
 def _lights(before: References, now: References, sensor: Sensor) -> _Lights | None:

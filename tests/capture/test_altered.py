@@ -66,9 +66,16 @@ def in_bands(counts: Counts) -> Counts:
     return over_black(lambda light: light * (1 + 0.1 * np.sin(np.arange(64) / 5))[:, None])(counts)
 
 
+def noisier(counts: Counts) -> Counts:
+    light = counts - SENSOR.black_level_dn
+    sigma = np.sqrt((SENSOR.read_noise_dn**2 + light / SENSOR.electrons_per_dn).clip(0))
+    return counts + np.random.default_rng(8).normal(0, sigma)
+
+
 @pytest.mark.parametrize(
     ("change", "said"),
     [
+        (noisier, "Black has 1.4 times the noise that it had when the scan began, and white has the same"),
         (numbers, "The first row of black holds numbers"),
         (in_bands, "Whole rows of white have other light than when the scan began, by 7 % up and down"),
         (lambda c: c[:, ::-1], "picture is mirrored"),
@@ -107,6 +114,7 @@ def test_rows_that_only_the_projector_left_dark_are_not_taken_for_failed_ones() 
     [
         lambda c: c,
         over_black(lambda c: 0.5 * c),
+        over_black(lambda c: 2.0 * c),
         over_black(lambda c: c * np.tile([[0.6, 1.0], [1.0, 1.0]], (32, 48))),
         over_black(lambda c: c * np.where(np.arange(96) < 30, 0.3, 1.0)),
         over_black(lambda c: c * np.where(np.arange(64) < 30, 0.6, 1.0)[:, None]),
@@ -118,6 +126,7 @@ def test_rows_that_only_the_projector_left_dark_are_not_taken_for_failed_ones() 
     ids=[
         "noise",
         "half the light",
+        "twice the gain",
         "red",
         "somebody",
         "somebody above",

@@ -97,6 +97,16 @@ def test_colours_that_changed_unevenly_are_named_and_are_no_motion() -> None:
     assert what_changed(before, before, SENSOR).is_as_at_first
 
 
+def test_what_came_into_the_projected_picture_is_named() -> None:
+    before, later = pictures(), pictures()
+    for each in later.pictures:
+        each[40:52, 60:84] = 2400
+    found = what_changed(before, later, SENSOR)
+    assert "black has become as bright as white in columns 60-84, rows 40-52" in found.sentence
+    assert not found.is_of_all
+    assert what_changed(later, later, SENSOR).sentence == "", "it was there when the scan began"
+
+
 def test_a_plan_without_a_code_has_no_references() -> None:
     plan = CapturePlan(code=NoCode(), spectral=ScanLines())
     assert plan.references() == {}

@@ -9,6 +9,7 @@ from contextlib import suppress
 import numpy as np
 from numpy.typing import NDArray
 
+from dsl_core.capture.altered_since import alteration_of
 from dsl_core.capture.proof.finding import Finding, ProofReport, Verdict, together
 from dsl_core.capture.proof.light_sums import light_sentence
 from dsl_core.capture.proof.raster import Counts, Raster
@@ -137,10 +138,13 @@ def prove(
     `StoreError`.
     """
     found = seen.report(calibration, bit_depth, bayer, knows_light)
-    moved = movement_of(source, None if calibration is None else calibration.sensor, missing)
+    sensor = None if calibration is None else calibration.sensor
+    altered = alteration_of(source, sensor, missing)
+    # Pictures that are mixed or filtered look as if something had moved.
+    moved = None if altered else movement_of(source, sensor, missing)
     return ScanProof(
         judged=found.judged,
         untold=found.untold,
-        wrong=found.sentences,
+        wrong=(*found.sentences, *([altered] if altered else [])),
         moved=() if moved is None else (f"{moved.sentence} {moved.advice}",),
     )

@@ -34,6 +34,13 @@ class SceneCheck:
         known = self._known
         return is_same(known.raster.take(pixels), known.kept[control.index], known.code_pairs(), known.noise)
 
+    def shows_inverse(self, control: Shot, pixels: NDArray[np.uint16]) -> bool:
+        """Whether a raw mosaic of it shows what the inverse of its pattern showed at first."""
+        known = self._known
+        before = known.kept.get(known.places.get(("code", control.pattern ^ 1), -1))
+        seen = known.raster.take(pixels)
+        return before is not None and is_same(seen, before, known.code_pairs(), known.noise)
+
     def is_unchanged(self, control: Shot, pixels: NDArray[np.uint16]) -> bool:
         """Whether it does in the same light and contrast; False where its first picture is not known.
 

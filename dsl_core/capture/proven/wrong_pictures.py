@@ -57,3 +57,19 @@ def what_to_do(found: Finding, change: Explanation, proof: FrameProof) -> str:
     if not change.sentence and proof.are_finest(found.again):
         return _FINE
     return change.sentence or f"{found.remedy} Resume the scan afterwards."
+
+
+def why_control_differs(is_inverse: bool) -> str:
+    """What to say of a picture of the code that is not as it was, where white and black are.
+
+    The widest stripes, mirrored, are those of their inverse; others of a Gray code look as before.
+    """
+    if is_inverse:
+        return (
+            "It shows its inverse: the projector's picture is mirrored, turned or inverted, and was not when"
+            " the scan began. Set projector and computer as they were, and resume the scan."
+        )
+    return (
+        "Projector, camera, light or target have changed since. Check that the projector follows, that no"
+        " automatic mode is on, and that nothing has moved, and resume the scan."
+    )

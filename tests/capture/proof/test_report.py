@@ -13,7 +13,8 @@ from dsl_core.capture.proof.finding import ProofReport, Verdict
 from dsl_core.capture.proof.lines.line_sum import LineSum
 from dsl_core.capture.proof.report import SeenFrames, prove
 from dsl_core.capture.proof.whole_scan import WholeScan
-from dsl_core.model.plan import describe_shot
+from dsl_core.model.frames import Frame
+from dsl_core.model.plan import CapturePlan, GrayCode, Sentinels, describe_shot
 from tests.cases.memory_sink import MemorySink
 from tests.cases.rendered_rig import RenderedScene, token_image
 
@@ -134,3 +135,27 @@ def test_what_was_wrong_from_the_first_picture_on_is_told_of_the_darkest_setting
         dead.frames[shot.index] = frame
     told = [sentence for sentence in _judged(scene, dead).sentences if "no blue light" in sentence]
     assert len(told) == 1
+
+
+def test_sentinels_whose_pictures_were_altered_say_so_rather_than_that_something_moved() -> None:
+    plan = CapturePlan(
+        camera_size_px=(64, 48), projector_size_px=(64, 48), code=GrayCode(rows=False), sentinels=Sentinels()
+    )
+    rng, frames = np.random.default_rng(1), MemorySink(plan)
+    light = {"white": 900 * rng.uniform(0.3, 1, (48, 64)), "black": np.zeros((48, 64))}
+    again = {shot.index: plan.original(shot) for shot in plan.shots() if shot.role == "sentinel"}
+    for shot in plan.shots():
+        old = again.get(shot.index, shot)
+        seen = light.get(old.role, light["white"] * (np.arange(64) // 4 % 2))
+        # The camera of the sentinels blends a picture with that before it, which is a white one.
+        seen = 0.8 * seen + (0.2 * light["white"] if old.role == "black" else 0) if shot is not old else seen
+        pixels = np.rint(260 + seen + rng.normal(0, 2, seen.shape)).astype(np.uint16)
+        frames.write(shot, Frame(pixels, shot.exposure_ms))
+    said = prove(frames, SeenFrames(plan), missing=())
+    last = max(index for index, old in again.items() if old.role == "white")
+    assert [
+        each for each in said.wrong if f"By frame {last + 1}: Black, captured after white, holds 0." in each
+    ]
+    assert said.wrong[-1].endswith("in camera, projector and computer, and scan again.")
+    assert not said.moved
+    assert not prove(frames, SeenFrames(plan), missing=[last]).wrong

@@ -26,3 +26,16 @@ def test_the_first_pictures_are_named_once_the_code_is_whole(monkeypatch: pytest
     monkeypatch.setattr("dsl_core.capture.proof.scene_check.MANY_SHOTS", len(SHOTS))
     assert check.first_pictures() == (SHOTS[0], SHOTS[2])
     assert [shot.index for shot in check.code_after(SHOTS[2])] == list(range(3, 12))
+
+
+def test_a_control_shows_the_inverse_of_its_pattern(monkeypatch: pytest.MonkeyPatch) -> None:
+    scan: Any = known()
+    check = SceneCheck(scan)
+    assert not check.shows_inverse(SHOTS[2], counts(300).reshape(18, 32)), "its inverse is not there"
+    monkeypatch.setattr(type(scan), "code_pairs", lambda scan: {0: (counts(300), counts(900))})
+    scan.kept[3] = counts(900)
+    monkeypatch.setattr(
+        "dsl_core.capture.proof.scene_check.is_same", lambda seen, before, *_: bool((seen == before).all())
+    )
+    assert check.shows_inverse(SHOTS[2], counts(900).reshape(18, 32))
+    assert not check.shows_inverse(SHOTS[2], counts(300).reshape(18, 32))

@@ -48,7 +48,7 @@ class Bench:
         self._tell, self._same, self._differs = list(tell), is_as_before, differs
         self.believed: list[int] = []
         self.first_setting, self.token = 0, CancelToken()
-        self.cause, self.is_quite_the_same = "", True
+        self.cause, self.is_quite_the_same, self.is_inverse = "", True, False
         self.displaced: list[bool] = []
         self.first: tuple[Shot, ...] = (SHOTS[0],)
         self.alone = self.fine = False
@@ -86,6 +86,9 @@ class Bench:
 
     def is_as_before(self, control: Shot, pixels: object) -> bool:
         return self._same or control.index == 0
+
+    def shows_inverse(self, control: Shot, pixels: object) -> bool:
+        return self.is_inverse
 
     def is_unchanged(self, control: Shot, pixels: object) -> bool:
         return self.is_quite_the_same
@@ -530,6 +533,16 @@ def test_what_could_not_be_told_is_withdrawn_when_a_control_has_changed() -> Non
     assert calm.taken[1:] == CONTROLS
     calm.shots.conclude()
     assert len(calm.taken) == 3, "there is nothing left to doubt"
+
+
+@pytest.mark.parametrize("cause", ["", "The lamp fails."])
+def test_a_control_that_shows_its_inverse_names_a_mirrored_projector(cause: str) -> None:
+    """Unless white and black have changed as well."""
+    bench = Bench(untold, is_as_before=False)
+    bench.is_inverse, bench.cause = True, cause
+    bench.shots.take(LINE)
+    with pytest.raises(PictureError, match=cause or "projector's picture is mirrored, turned or inverted"):
+        bench.shots.conclude()
 
 
 def test_the_eight_pictures_before_a_wrong_one_are_withdrawn_back_to_the_last_control() -> None:

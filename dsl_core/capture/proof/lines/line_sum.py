@@ -18,9 +18,10 @@ from dsl_core.model.plan import CapturePlan, LineComb, ScanLines, Shot
 from dsl_core.patterns.multiplexed import profiles
 
 #: How far the sum may be from white: what clean scans of all scenes differ by is a fifth of this.
-LEAST, SIGMAS = 0.05, 5.0
-#: What black may have changed by unseen, DN, with and without pictures of it among the lines.
-UNSEEN_DN, UNKNOWN_DN = 0.3, 1.0
+LEAST, SIGMAS = 0.03, 4.0
+#: What black may have changed by unseen, DN, with and without pictures of it among the lines: a level that
+#: wanders shows in these, and what they show is allowed for besides.
+UNSEEN_DN, UNKNOWN_DN = 0.1, 1.0
 #: How uneven the lines may light the columns, as a share, but for those at the edges of the picture.
 EVEN, EDGE = 0.02, 16
 #: Pixels needed to say anything.
@@ -69,7 +70,7 @@ def line_sum(
     if usual <= 0:
         return None
     variance = noise.variance(kept[by_role["black"].index])[at].sum(dtype=np.float64)
-    std = len(lines) * float(np.sqrt(variance)) / usual
+    std = len(lines) * float(np.sqrt(variance / _pictures(places, black[0]))) / usual
     unseen = UNSEEN_DN if len(black[0]) > 1 else UNKNOWN_DN
     # Nobody knows when between two takes black and white changed.
     steps = [float(np.abs(np.diff(sums)).max(initial=0)) / 2 for _, sums in (black, white)]
@@ -85,6 +86,12 @@ def _course(
     shots = [first, *(each for each in again if plan.original(each).index == first.index)]
     sums = [float(kept[each.index][at].sum(dtype=np.float64)) for each in shots]
     return [each.index for each in shots], sums
+
+
+def _pictures(places: list[int], taken: list[int]) -> float:
+    """As many pictures as have the noise of what is interpolated, on average, from those ``taken``."""
+    weights = np.mean([np.interp(places, taken, each) for each in np.eye(len(taken))], axis=1)
+    return float(1 / np.sum(weights**2))
 
 
 def even_cover(plan: CapturePlan) -> float | None:

@@ -55,6 +55,14 @@ def test_lines_with_another_share_of_the_light_than_white_are_told(lines: float,
     assert found.is_off is is_told
 
 
+def test_lines_that_a_dynamic_iris_dims_by_a_twelfth_are_told() -> None:
+    dimmed, sound = total(plan(every=8), 0.92), total(plan(every=8))
+    assert dimmed is not None
+    assert sound is not None
+    assert dimmed.is_off
+    assert abs(sound.share - 1) < sound.allowed / 5
+
+
 def test_what_white_and_black_show_when_taken_once_more_is_taken_off() -> None:
     assert share(plan(), drift=0.3) < 0.9
     assert share(plan(every=8), drift=0.3) == pytest.approx(1, abs=0.01)
@@ -66,7 +74,7 @@ def test_without_black_taken_once_more_less_is_told() -> None:
     alone, watched = total(plan()), total(plan(every=8))
     assert alone is not None
     assert watched is not None
-    assert alone.allowed - watched.allowed == pytest.approx(0.7 * 32 / WHITE, abs=0.004)
+    assert alone.allowed - watched.allowed == pytest.approx(0.9 * 32 / WHITE, abs=0.004)
 
 
 def test_a_lamp_that_came_on_at_some_time_between_two_blacks_is_no_light_of_the_lines() -> None:
