@@ -50,6 +50,12 @@ OTHER_PATTERN = 0.08
 #: Something stands before tiles of the picture that have lost light to this share, so many, while others have
 #: kept it: a tenth of them within so much, and none has gained more than so much.
 SHADED, FEWEST_SHADED, ELSEWHERE, GAINED = 0.7, 2, 0.06, 0.15
+#: Something lights tiles of white that have so many times their light, while others have kept it.
+LIT_UP = 1.3
+_CAME_IN = (
+    "something came into the projected picture (a message, a window, the mouse pointer), or a lamp into view."
+    " Take it away, close other programs, and resume the scan."
+)
 #: Stripes of the code are out of focus with less than this share of the contrast (squared) they had, and the
 #: light they had but for so much of white's.
 SOFTER, SAME_SHARE = 0.85, 0.03
@@ -180,7 +186,7 @@ def what_changed(before: References, now: References, sensor: Sensor) -> Explana
     if altered:
         return Explanation(altered, is_of_all=True)
     tiles = _light_of_tiles(light.old, light.new, light.used)
-    shaded = _shaded(tiles, light.used.shape)
+    shaded = _shaded(tiles, light.used.shape) or _lit_up(tiles, light.used.shape)
     if shaded:
         return Explanation(shaded)
     return _of_light_or_motion(before, now, sensor, light, tiles)
@@ -203,11 +209,8 @@ def _appeared(before: References, now: References, sensor: Sensor) -> str:
     )
     if is_ is None or was is not None or is_.is_in_stripes:
         return ""
-    return (
-        "Since the scan began, black has become as bright as white in columns {}-{}, rows {}-{} of the"
-        " picture: something came into the projected picture (a message, a window, the mouse pointer), or a"
-        " lamp into view. Take it away, close other programs, and resume the scan."
-    ).format(*is_.columns, *is_.rows)
+    where = "columns {}-{}, rows {}-{} of the picture".format(*is_.columns, *is_.rows)
+    return f"Since the scan began, black has become as bright as white in {where}: {_CAME_IN}"
 
 
 def _lights(before: References, now: References, sensor: Sensor) -> _Lights | None:
@@ -354,16 +357,30 @@ def _shaded(tiles: NDArray[np.float64], shape: tuple[int, ...]) -> str:
     is_kept = abs(float(np.nanquantile(tiles, 0.9)) - 1) < ELSEWHERE and float(np.nanmax(tiles)) < 1 + GAINED
     if int(lost.sum()) < FEWEST_SHADED or not is_kept:
         return ""
-    rows, columns = np.divmod(np.flatnonzero(lost), TILES[1])
+    return (
+        f"White has lost light in {_place_of(lost, shape)}, and not elsewhere: something"
+        " stands in the way of projector, camera or lamps, or something came onto a lens. Take it away, and"
+        " resume the scan."
+    )
+
+
+def _lit_up(tiles: NDArray[np.float64], shape: tuple[int, ...]) -> str:
+    """Whether white, less black, has gained light in a part of the picture alone."""
+    gained = tiles > LIT_UP
+    usual, least = float(np.nanmedian(tiles)), float(np.nanmin(tiles))
+    if not gained.any() or abs(usual - 1) > ELSEWHERE or least < 1 - ELSEWHERE:
+        return ""
+    return f"White has gained light in {_place_of(gained, shape)}, and not elsewhere: {_CAME_IN}"
+
+
+def _place_of(tiles: NDArray[np.bool_], shape: tuple[int, ...]) -> str:
+    """Where tiles of a picture are, in words."""
+    rows, columns = np.divmod(np.flatnonzero(tiles), TILES[1])
     spans = [
         (int(at.min()) * size // count, (int(at.max()) + 1) * size // count)
         for at, size, count in zip((columns, rows), shape[::-1], TILES[::-1], strict=True)
     ]
-    return (
-        "White has lost light in columns {}-{}, rows {}-{} of the picture, and not elsewhere: something"
-        " stands in the way of projector, camera or lamps, or something came onto a lens. Take it away, and"
-        " resume the scan."
-    ).format(*spans[0], *spans[1])
+    return "columns {}-{}, rows {}-{} of the picture".format(*spans[0], *spans[1])
 
 
 def _of_colours(

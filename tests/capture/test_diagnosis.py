@@ -107,6 +107,14 @@ def test_what_came_into_the_projected_picture_is_named() -> None:
     assert what_changed(later, later, SENSOR).sentence == "", "it was there when the scan began"
 
 
+def test_a_part_of_white_that_gained_light_is_named_and_no_colour_of_it() -> None:
+    before, later = pictures(), pictures()
+    later.white[32:48:2, 64:80] += 1500
+    found = what_changed(before, later, SENSOR).sentence
+    assert found.startswith("White has gained light in columns 64-80, rows 32-48 of the picture")
+    assert "colours" not in found
+
+
 def test_a_plan_without_a_code_has_no_references() -> None:
     plan = CapturePlan(code=NoCode(), spectral=ScanLines())
     assert plan.references() == {}

@@ -2,16 +2,25 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 from numpy.typing import NDArray
 
+from dsl_core.capture.proof.contest import vote
 from dsl_core.capture.proof.control import choose_pairs, edges_moved, is_same, is_unchanged
 from dsl_core.capture.proof.judging.known import Known
 from dsl_core.capture.proof.lasting.levels import at_half_level, doubt_of_levels
 from dsl_core.model.plan import Shot
+from dsl_core.patterns.images import pattern_image
 
+#: Pixels say on average that a pattern is mirrored: 1 if all of them do.
+MIRRORED = 0.5
+#: What white may have of its first light, and of that shown for longer, as a share.
+UNSETTLED = 0.03
 #: Two more exposures cost little in plans of so many shots.
 MANY_SHOTS = 100
+Mosaic = NDArray[np.uint16]
 
 
 class SceneCheck:
@@ -22,6 +31,8 @@ class SceneCheck:
         self._known = known
         #: What white at half its level contradicts of the calibration, which no frame of the scan shows.
         self.levels = ""
+        #: How white differs when it is shown for longer, which no frame of the scan shows either.
+        self.unsettled = ""
 
     def controls(self) -> tuple[Shot, ...]:
         """Shots that show whether devices and scene are as they were; none before the first code."""
@@ -29,19 +40,26 @@ class SceneCheck:
         numbers = choose_pairs(known.code_pairs(), known.raster.shape)
         return tuple(known.shots[known.places["code", 2 * number]] for number in numbers)
 
-    def is_as_before(self, control: Shot, pixels: NDArray[np.uint16]) -> bool:
+    def is_as_before(self, control: Shot, pixels: Mosaic) -> bool:
         """Whether a raw mosaic of the shot that `controls` named shows what it showed at first."""
         known = self._known
         return is_same(known.raster.take(pixels), known.kept[control.index], known.code_pairs(), known.noise)
 
-    def shows_inverse(self, control: Shot, pixels: NDArray[np.uint16]) -> bool:
-        """Whether a raw mosaic of it shows what the inverse of its pattern showed at first."""
-        known = self._known
-        before = known.kept.get(known.places.get(("code", control.pattern ^ 1), -1))
-        seen = known.raster.take(pixels)
-        return before is not None and is_same(seen, before, known.code_pairs(), known.noise)
+    def shows_mirrored(self, control: Shot, pixels: Mosaic) -> bool:
+        """Whether a raw mosaic of it shows its pattern the other way round, by columns that pixels see."""
+        lit, image = self._known.lit, pattern_image(self._known.plan, control)
+        is_lit = image.reshape(*image.shape[:2], -1).max(2) > 0
+        if lit is None or not (is_lit == is_lit[0]).all():
+            return False
+        column = lit.key // 3
+        apart = is_lit[0][column] != is_lit[0][::-1][column]
+        seen = self._known.raster.take(pixels)[lit.index[apart]].astype(np.float32)
+        black, contrast = lit.black[apart], lit.contrast[apart]
+        is_mirrored = black + contrast * is_lit[0][::-1][column[apart]]
+        found = vote(seen, is_mirrored, black + contrast * is_lit[0][column[apart]])
+        return found.is_told and found.mean > MIRRORED
 
-    def is_unchanged(self, control: Shot, pixels: NDArray[np.uint16]) -> bool:
+    def is_unchanged(self, control: Shot, pixels: Mosaic) -> bool:
         """Whether it does in the same light and contrast; False where its first picture is not known.
 
         So it is for other pictures than those of the code: white does not show that something moved.
@@ -71,7 +89,7 @@ class SceneCheck:
         own = (each for each in known.shots if each.setting == known.first and each.role != "sentinel")
         return tuple(each for each in own if each.role != "spectral" and each.index > first.index)
 
-    def is_displaced(self, first: Shot, pixels: NDArray[np.uint16]) -> bool:
+    def is_displaced(self, first: Shot, pixels: Mosaic) -> bool:
         """Whether a raw mosaic of one of the `first_pictures` shows its pattern elsewhere than at first."""
         known = self._known
         seen, before = known.raster.take(pixels), known.kept[first.index]
@@ -108,3 +126,37 @@ class SceneCheck:
             known.noise,
         )
         return not self.levels
+
+    def see_settled(self, white: Shot, pixels: Mosaic, take: Callable[[Shot, bool], Mosaic]) -> None:
+        """Where ``white``, taken again as a sentinel, has other light than at first, see if it is a habit.
+
+        ``take`` captures a shot, shown for longer if it is told so. Light that comes back while white stays,
+        and is gone again after a dark picture, depends on the picture before; kept as ``unsettled``. Raises
+        what ``take`` raises.
+        """
+        known = self._known
+        first = known.plan.original(white)
+        old, black = known.kept.get(first.index), known.black(first)
+        if self.unsettled or first.role != "white" or old is None or black is None:
+            return
+
+        def light(mosaic: Mosaic) -> float:
+            seen = known.raster.take(mosaic)
+            sound = np.maximum(seen, old) < known.noise.sensor.full_scale_dn
+            now, before = (float((each.astype(np.float64) - black)[sound].sum()) for each in (seen, old))
+            return now / before if before > 0 else 1.0
+
+        once = light(pixels)
+        if abs(once - 1) < UNSETTLED:
+            return
+        longer = light(take(white, True))
+        take(known.shots[known.blacks[first.setting]], False)
+        again = light(take(white, False))
+        if abs(longer - once) < UNSETTLED or abs(again - once) > abs(longer - once) / 3:
+            return
+        self.unsettled = (
+            f"White, shown after a dark picture, has {once / longer:.2f} times the light that it has once it"
+            " is shown for longer: projector, computer or camera mix pictures with those before them (noise"
+            " reduction over time, blended frames, overdrive), or an iris follows them. Lines are off by"
+            " about as much. Switch that off, and scan again."
+        )

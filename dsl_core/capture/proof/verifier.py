@@ -127,7 +127,7 @@ class FrameProof:
     @property
     def past(self) -> tuple[str, ...]:
         """What pictures that are no part of the scan, or no longer, have shown to be wrong, in sentences."""
-        return tuple(each for each in (self._settled, self.scene.levels) if each)
+        return tuple(each for each in (self._settled, self.scene.levels, self.scene.unsettled) if each)
 
     @property
     def _settled(self) -> str:

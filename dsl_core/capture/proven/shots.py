@@ -179,6 +179,8 @@ class ProvenShots:
         self._correct(found, self._proof)
         if self._is_late:
             return
+        if shot.role == "sentinel" and not found.is_wrong:
+            self._proof.scene.see_settled(shot, frame.pixels, self._pixels)
         if len(self._late_at) == LATE_OFTEN and shot.index - self._late_at[0] <= LATE_WITHIN:
             # Late ones come and go.
             self._doubted.doubt_passed()
@@ -192,6 +194,9 @@ class ProvenShots:
     def _again(self, shot: Shot, earlier: int = 0) -> Frame:
         """Another picture of a shot, shown twice and for longer; ``earlier`` is how often that was done."""
         return self._taker.take(shot, earlier + 1, SETTLE_MS[earlier], twice=True)
+
+    def _pixels(self, shot: Shot, is_longer: bool) -> NDArray[np.uint16]:
+        return (self._again(shot) if is_longer else self._taker.take(shot)).pixels
 
     def _save(self, shot: Shot, frame: Frame, found: Finding) -> None:
         """Save a picture that was not found wrong, and note if little is known of it."""
@@ -325,7 +330,7 @@ class ProvenShots:
                 is_sound &= proof.scene.is_unchanged(control, frame.pixels)
                 continue
             reason = self._explain().sentence
-            reason = reason or why_control_differs(proof.scene.shows_inverse(control, frame.pixels))
+            reason = reason or why_control_differs(proof.scene.shows_mirrored(control, frame.pixels))
             raise PictureError(
                 f"{describe_shot(control).capitalize()}, captured once more as a control, no longer shows its"
                 f" pattern. {reason} Frames before are saved.",

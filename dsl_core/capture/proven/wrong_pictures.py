@@ -59,15 +59,15 @@ def what_to_do(found: Finding, change: Explanation, proof: FrameProof) -> str:
     return change.sentence or f"{found.remedy} Resume the scan afterwards."
 
 
-def why_control_differs(is_inverse: bool) -> str:
+def why_control_differs(is_mirrored: bool) -> str:
     """What to say of a picture of the code that is not as it was, where white and black are.
 
-    The widest stripes, mirrored, are those of their inverse; others of a Gray code look as before.
+    Most frames of a Gray code, mirrored, look as before; those with the widest stripes do not.
     """
-    if is_inverse:
+    if is_mirrored:
         return (
-            "It shows its inverse: the projector's picture is mirrored, turned or inverted, and was not when"
-            " the scan began. Set projector and computer as they were, and resume the scan."
+            "It is mirrored: the projector's picture is turned or mirrored, and was not when the scan began."
+            " Set projector and computer as they were, and resume the scan."
         )
     return (
         "Projector, camera, light or target have changed since. Check that the projector follows, that no"

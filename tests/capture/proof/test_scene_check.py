@@ -5,10 +5,14 @@ from __future__ import annotations
 from types import SimpleNamespace
 from typing import Any
 
+import numpy as np
 import pytest
 
+from dsl_core.capture.proof.prediction import Lit
 from dsl_core.capture.proof.scene_check import SceneCheck
-from tests.cases.proof_rules import SHOTS, counts, known
+from dsl_core.model.plan import Shot
+from dsl_core.patterns.images import pattern_image
+from tests.cases.proof_rules import PLAN, SHOTS, counts, known
 
 
 def test_there_are_no_controls_before_the_code() -> None:
@@ -28,14 +32,42 @@ def test_the_first_pictures_are_named_once_the_code_is_whole(monkeypatch: pytest
     assert [shot.index for shot in check.code_after(SHOTS[2])] == list(range(3, 12))
 
 
-def test_a_control_shows_the_inverse_of_its_pattern(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_control_is_mirrored_where_pixels_see_what_their_columns_show_on_the_other_side() -> None:
     scan: Any = known()
-    check = SceneCheck(scan)
-    assert not check.shows_inverse(SHOTS[2], counts(300).reshape(18, 32)), "its inverse is not there"
-    monkeypatch.setattr(type(scan), "code_pairs", lambda scan: {0: (counts(300), counts(900))})
-    scan.kept[3] = counts(900)
-    monkeypatch.setattr(
-        "dsl_core.capture.proof.scene_check.is_same", lambda seen, before, *_: bool((seen == before).all())
-    )
-    assert check.shows_inverse(SHOTS[2], counts(900).reshape(18, 32))
-    assert not check.shows_inverse(SHOTS[2], counts(300).reshape(18, 32))
+    check, column = SceneCheck(scan), np.tile(np.arange(32), 18)
+    assert not check.shows_mirrored(SHOTS[2], counts(300).reshape(18, 32)), "no column is known"
+    dark, contrast, sigma = (np.full(column.size, each, np.float32) for each in (260, 1000, 5))
+    scan.code = SimpleNamespace(lit=Lit(np.arange(column.size), 3 * column, dark, contrast, sigma))
+    # Of 32 columns, only the widest stripes are not their own mirror image.
+    shown = (260 + 1000 * (pattern_image(PLAN, SHOTS[0])[:, :, 0] > 0)).astype(np.uint16)
+    assert check.shows_mirrored(SHOTS[0], shown[:, ::-1])
+    assert not check.shows_mirrored(SHOTS[0], shown)
+    assert not check.shows_mirrored(SHOTS[2], shown), "this one is its own mirror image"
+
+
+@pytest.mark.parametrize(
+    ("once", "longer", "again", "said"),
+    [
+        (900, 1000, 900, "has 0.86 times the light that it has once it is shown for longer"),
+        (900, 900, 900, ""),
+        (900, 1000, 1000, ""),
+        (990, 1000, 990, ""),
+    ],
+    ids=["mixed", "drifted", "flickered", "steady"],
+)
+def test_white_that_depends_on_the_picture_before_is_told_from_a_lamp_that_drifts(
+    once: int, longer: int, again: int, said: str
+) -> None:
+    scan: Any = known()
+    scan.kept = {10: counts(1000), 11: counts(300)}
+    check, taken = SceneCheck(scan), list[tuple[str, bool]]()
+
+    def take(shot: Shot, is_longer: bool) -> np.ndarray:
+        taken.append((shot.role, is_longer))
+        light = longer if is_longer else again if shot.role != "black" else 300
+        return counts(light).reshape(18, 32)
+
+    check.see_settled(SHOTS[10], counts(once).reshape(18, 32), take)
+    assert said in check.unsettled
+    assert bool(check.unsettled) is bool(said)
+    assert taken == ([("white", True), ("black", False), ("white", False)] if once == 900 else [])

@@ -48,7 +48,7 @@ class Bench:
         self._tell, self._same, self._differs = list(tell), is_as_before, differs
         self.believed: list[int] = []
         self.first_setting, self.token = 0, CancelToken()
-        self.cause, self.is_quite_the_same, self.is_inverse = "", True, False
+        self.cause, self.is_quite_the_same, self.is_mirrored = "", True, False
         self.displaced: list[bool] = []
         self.first: tuple[Shot, ...] = (SHOTS[0],)
         self.alone = self.fine = False
@@ -58,6 +58,8 @@ class Bench:
         #: How often white at half its level is compared, and what that says.
         self.whites_seen, self.levels = list[bool](), ""
         self.recalled: dict[int, str] = {}
+        #: How white is taken again to see if it settles.
+        self.settling: tuple[bool, ...] = ()
         self.of_code: CodeSum | None = None
         self.of_ends: list[str] = []
         self.scene = self.whole = self
@@ -87,8 +89,8 @@ class Bench:
     def is_as_before(self, control: Shot, pixels: object) -> bool:
         return self._same or control.index == 0
 
-    def shows_inverse(self, control: Shot, pixels: object) -> bool:
-        return self.is_inverse
+    def shows_mirrored(self, control: Shot, pixels: object) -> bool:
+        return self.is_mirrored
 
     def is_unchanged(self, control: Shot, pixels: object) -> bool:
         return self.is_quite_the_same
@@ -131,6 +133,10 @@ class Bench:
 
     def is_displaced(self, first: Shot, pixels: object) -> bool:
         return self.displaced.pop(0)
+
+    def see_settled(self, white: Shot, pixels: object, take: Callable[[Shot, bool], object]) -> None:
+        for is_longer in self.settling:
+            take(white, is_longer)
 
     def whites(self) -> tuple[Shot, Shot] | None:
         return (SHOTS[10], replace(SHOTS[10], level=0.5)) if self.whites_seen else None
@@ -535,13 +541,23 @@ def test_what_could_not_be_told_is_withdrawn_when_a_control_has_changed() -> Non
     assert len(calm.taken) == 3, "there is nothing left to doubt"
 
 
+def test_only_a_sentinel_is_asked_whether_white_settles() -> None:
+    bench = Bench(is_right)
+    bench.settling = (True, False)
+    bench.shots.take(LINE)
+    assert len(bench.taken) == 1
+    again = replace(SHOTS[10], index=20, role="sentinel", pattern=10)
+    bench.shots.take(again)
+    assert bench.taken[1:] == [(20, 0, 0.0, False), (20, 1, 100.0, True), (20, 0, 0.0, False)]
+
+
 @pytest.mark.parametrize("cause", ["", "The lamp fails."])
-def test_a_control_that_shows_its_inverse_names_a_mirrored_projector(cause: str) -> None:
+def test_a_control_that_is_mirrored_names_the_projector(cause: str) -> None:
     """Unless white and black have changed as well."""
     bench = Bench(untold, is_as_before=False)
-    bench.is_inverse, bench.cause = True, cause
+    bench.is_mirrored, bench.cause = True, cause
     bench.shots.take(LINE)
-    with pytest.raises(PictureError, match=cause or "projector's picture is mirrored, turned or inverted"):
+    with pytest.raises(PictureError, match=cause or "projector's picture is turned or mirrored"):
         bench.shots.conclude()
 
 
