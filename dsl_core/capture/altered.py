@@ -317,8 +317,9 @@ def _filtered(before: Pictures, now: Pictures, sensor: Sensor) -> str:
 def _noisier(before: Pictures, now: Pictures, sensor: Sensor) -> str:
     """Whether pictures of the same light have more noise."""
     old, new = (float((white.astype(np.float64) - black).sum()) for white, black, _ in (before, now))
-    shares = _noise_shares(before[1], now[1], sensor)
-    share, is_same_black = min(shares), max(shares) < (1 + SAME_LIGHT) * min(shares)
+    shares, (noise, expected) = _noise_shares(before[1], now[1], sensor), _noise(now[1], sensor)
+    # Of a picture that was displaced by parts of a pixel, there may have been less noise before.
+    share, is_same_black = min(*shares, noise / expected), max(shares) < (1 + SAME_LIGHT) * min(shares)
     # Light of the room shows what it falls on.
     if share < NOISIER or not is_same_black or abs(new - old) > SAME_LIGHT * abs(old):
         return ""

@@ -158,6 +158,11 @@ def test_a_lamp_of_the_room_is_no_mixture(light: float) -> None:
     assert "mixed" not in alteration(pictures(1), now, SENSOR)  # type: ignore[arg-type]
 
 
+def test_noise_that_a_displaced_picture_had_less_of_before_is_no_gain() -> None:
+    displaced = pictures(1, of_colours(lambda c: 0.75 * c + 0.25 * np.roll(c, 1, 1)))
+    assert "noise" not in alteration(displaced, pictures(2), SENSOR)  # type: ignore[arg-type]
+
+
 def test_pictures_that_tell_nothing_are_not_altered() -> None:
     full = tuple(np.full((8, 8), int(SENSOR.full_scale_dn), np.uint16) for _ in range(3))
     assert alteration(full, full, SENSOR) == ""  # type: ignore[arg-type]

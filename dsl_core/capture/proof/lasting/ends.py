@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dsl_core.capture.proof.lasting.black_light import black_light, lit_black
+from dsl_core.capture.proof.lasting.black_values import filled_rows, low_black
 from dsl_core.capture.proof.lasting.missing_light import missing_light
 from dsl_core.capture.proof.lasting.sensor_parts import sensor_parts
 from dsl_core.capture.proof.lasting.written_row import written_row
@@ -35,7 +36,8 @@ def sentences_of_ends(
     level = plan.settings[setting].level
     glow = black_light(white, black, level, rig.projector_response, channels, noise, raster)
     parts = sensor_parts(white, black, channels, noise, raster, plan.camera_size_px[0])
-    found = [each.sentence for each in (glow, parts) if each is not None]
+    found = [low_black(black, noise), filled_rows(black, noise, raster)]
+    found += [each.sentence for each in (glow, parts) if each is not None]
     if with_colours:
         found.append(missing_light(white, black, rig, channels, noise, raster))
     return [each for each in found if each]

@@ -9,10 +9,12 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from dsl_core.capture.proof.lasting.black_values import filled_rows, low_black
 from dsl_core.capture.proof.lasting.ends import sentences_of_ends
 from dsl_core.capture.proof.noise import Noise
 from dsl_core.capture.proof.raster import Raster
 from dsl_core.model.plan import Shot
+from dsl_core.model.rig import Sensor
 from tests.cases.rendered_rig import RenderedScene, token_image
 
 Mosaic = NDArray[np.float64]
@@ -115,6 +117,35 @@ def test_a_pointer_is_told_with_its_place_whether_it_saturates_or_not(
     assert sentence.startswith(
         "Black is as bright as white at 9 pixels in columns 30-33, rows 20-23: something is in the projected"
     )
+
+
+def test_black_below_the_level_of_the_sensor_is_told(scene: RenderedScene) -> None:
+    level_dn = scene.calibration.sensor.black_level_dn
+
+    def quarter(*counts: Mosaic) -> tuple[Mosaic, Mosaic]:
+        white, black = ((each + level_dn) / 4 - level_dn for each in counts)
+        return white, black
+
+    assert said(scene, quarter)[0].startswith("Black is at 6")
+    assert said(scene, lambda white, black: (white - 10.0, black - 10.0)) == [], "a level drifts"
+
+
+@pytest.mark.parametrize(("rows", "which"), [(np.s_[-2:], "last"), (np.s_[:2], "first")])
+def test_rows_that_a_driver_fills_up_are_told(scene: RenderedScene, rows: slice, which: str) -> None:
+    def filled(*counts: Mosaic) -> tuple[Mosaic, Mosaic]:
+        white, black = (each.copy() for each in counts)
+        white[rows] = black[rows] = 0.0
+        return white, black
+
+    assert said(scene, filled)[0].startswith(f"The {which} rows of black all have the value 260 DN")
+
+
+def test_rows_without_any_counts_are_those_of_a_camera_without_an_offset() -> None:
+    raster, black = Raster((32, 32)), np.random.default_rng(1).integers(0, 3, (32, 32)).astype(np.uint16)
+    black[-4:] = 0
+    noise = Noise(Sensor(black_level_dn=0.0))
+    assert filled_rows(raster.take(black), noise, raster) == ""
+    assert low_black(raster.take(black), noise) == ""
 
 
 def test_hot_pixels_are_no_pointer(scene: RenderedScene) -> None:
