@@ -48,8 +48,9 @@ COARSER, FEWEST_VALUES = 0.3, 64
 CALMER, MOSTLY_NOISE = 0.4, (0.6, 1.4)
 #: It has so many times its noise where gain was raised, if white has its light but for so much.
 NOISIER, SAME_LIGHT = 1.25, 0.1
-#: Share of the pixels that noise is measured by: others are at edges of what the room lights.
-CALM = 0.9
+#: Share of the pixels that noise is measured by: others are at edges of what the room lights; and what these
+#: have of the noise of all.
+CALM, CALM_NOISE = 0.9, 0.82
 #: A pixel is beyond black or white by so many deviations and this share of its contrast; where pictures are
 #: sharpened, this share of the lit ones is beyond either, and so many.
 BEYOND_SIGMAS, BEYOND, SHARPENED, FEWEST_SHARPENED = 6.0, 0.1, 0.01, 8
@@ -319,7 +320,10 @@ def _noisier(before: Pictures, now: Pictures, sensor: Sensor) -> str:
     old, new = (float((white.astype(np.float64) - black).sum()) for white, black, _ in (before, now))
     shares, (noise, expected) = _noise_shares(before[1], now[1], sensor), _noise(now[1], sensor)
     # Of a picture that was displaced by parts of a pixel, there may have been less noise before.
-    share, is_same_black = min(*shares, noise / expected), max(shares) < (1 + SAME_LIGHT) * min(shares)
+    share, is_same_black = (
+        min(*shares, noise / (CALM_NOISE * expected)),
+        max(shares) < (1 + SAME_LIGHT) * min(shares),
+    )
     # Light of the room shows what it falls on.
     if share < NOISIER or not is_same_black or abs(new - old) > SAME_LIGHT * abs(old):
         return ""
