@@ -11,13 +11,12 @@ from dsl_core.capture.proof.contest import vote
 from dsl_core.capture.proof.control import choose_pairs, edges_moved, is_same, is_unchanged
 from dsl_core.capture.proof.judging.known import Known
 from dsl_core.capture.proof.lasting.levels import at_half_level, doubt_of_levels
+from dsl_core.capture.proof.settled_light import LEAST_CHANGE, change_of_light, unsettled_sentence
 from dsl_core.model.plan import Shot
 from dsl_core.patterns.images import pattern_image
 
 #: Pixels say on average that a pattern is mirrored: 1 if all of them do.
 MIRRORED = 0.5
-#: What white may have of its first light, and of that shown for longer, as a share.
-UNSETTLED = 0.03
 #: Two more exposures cost little in plans of so many shots.
 MANY_SHOTS = 100
 Mosaic = NDArray[np.uint16]
@@ -127,36 +126,23 @@ class SceneCheck:
         )
         return not self.levels
 
-    def see_settled(self, white: Shot, pixels: Mosaic, take: Callable[[Shot, bool], Mosaic]) -> None:
-        """Where ``white``, taken again as a sentinel, has other light than at first, see if it is a habit.
+    def see_settled(self, again: Shot, pixels: Mosaic, take: Callable[[Shot, bool], Mosaic]) -> None:
+        """Where white or black, taken ``again`` as a sentinel, has changed, see if that is a habit.
 
-        ``take`` captures a shot, shown for longer if it is told so. Light that comes back while white stays,
-        and is gone again after a dark picture, depends on the picture before; kept as ``unsettled``. Raises
-        what ``take`` raises.
+        ``take`` captures a shot, shown for longer if it is told so. What that shows is kept as ``unsettled``.
+        Raises what ``take`` raises.
         """
         known = self._known
-        first = known.plan.original(white)
-        old, black = known.kept.get(first.index), known.black(first)
-        if self.unsettled or first.role != "white" or old is None or black is None:
+        ends, role = known.ends(known.first), known.plan.original(again).role
+        if self.unsettled or ends is None or role not in LEAST_CHANGE:
             return
 
-        def light(mosaic: Mosaic) -> float:
-            seen = known.raster.take(mosaic)
-            sound = np.maximum(seen, old) < known.noise.sensor.full_scale_dn
-            now, before = (float((each.astype(np.float64) - black)[sound].sum()) for each in (seen, old))
-            return now / before if before > 0 else 1.0
+        def change(mosaic: Mosaic) -> float:
+            return change_of_light(known.raster.take(mosaic), ends, role, known.noise.sensor.full_scale_dn)
 
-        once = light(pixels)
-        if abs(once - 1) < UNSETTLED:
+        once = change(pixels)
+        if abs(once) < LEAST_CHANGE[role]:
             return
-        longer = light(take(white, True))
-        take(known.shots[known.blacks[first.setting]], False)
-        again = light(take(white, False))
-        if abs(longer - once) < UNSETTLED or abs(again - once) > abs(longer - once) / 3:
-            return
-        self.unsettled = (
-            f"White, shown after a dark picture, has {once / longer:.2f} times the light that it has once it"
-            " is shown for longer: projector, computer or camera mix pictures with those before them (noise"
-            " reduction over time, blended frames, overdrive), or an iris follows them. Lines are off by"
-            " about as much. Switch that off, and scan again."
-        )
+        longer = change(take(again, True))
+        take(known.shots[known.places["black" if role == "white" else "white", 0]], False)
+        self.unsettled = unsettled_sentence(role, once, longer, change(take(again, False)))

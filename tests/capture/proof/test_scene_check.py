@@ -46,28 +46,47 @@ def test_a_control_is_mirrored_where_pixels_see_what_their_columns_show_on_the_o
 
 
 @pytest.mark.parametrize(
-    ("once", "longer", "again", "said"),
+    ("role", "once", "longer", "again", "said"),
     [
-        (900, 1000, 900, "has 0.86 times the light that it has once it is shown for longer"),
-        (900, 900, 900, ""),
-        (900, 1000, 1000, ""),
-        (990, 1000, 990, ""),
+        ("white", 900, 1000, 900, "has 0.86 times the light that it has once it is shown for longer"),
+        ("white", 900, 900, 900, ""),
+        ("white", 900, 1000, 1000, ""),
+        ("white", 990, 1000, 990, ""),
+        (
+            "black",
+            307,
+            300,
+            307,
+            "Black, captured after white, holds 1.0% of the light of white, and",
+        ),
+        ("black", 307, 307, 307, ""),
+        ("black", 302, 300, 302, ""),
     ],
-    ids=["mixed", "drifted", "flickered", "steady"],
+    ids=["mixed", "drifted", "flickered", "steady", "lag", "room", "calm"],
 )
-def test_white_that_depends_on_the_picture_before_is_told_from_a_lamp_that_drifts(
-    once: int, longer: int, again: int, said: str
+def test_light_that_depends_on_the_picture_before_is_told_from_a_lamp_that_drifts(
+    role: str, once: int, longer: int, again: int, said: str
 ) -> None:
     scan: Any = known()
     scan.kept = {10: counts(1000), 11: counts(300)}
     check, taken = SceneCheck(scan), list[tuple[str, bool]]()
+    own = SHOTS[10 if role == "white" else 11]
 
     def take(shot: Shot, is_longer: bool) -> np.ndarray:
         taken.append((shot.role, is_longer))
-        light = longer if is_longer else again if shot.role != "black" else 300
-        return counts(light).reshape(18, 32)
+        return counts(longer if is_longer else again).reshape(18, 32)
 
-    check.see_settled(SHOTS[10], counts(once).reshape(18, 32), take)
+    check.see_settled(own, counts(once).reshape(18, 32), take)
     assert said in check.unsettled
     assert bool(check.unsettled) is bool(said)
-    assert taken == ([("white", True), ("black", False), ("white", False)] if once == 900 else [])
+    other = "black" if role == "white" else "white"
+    asked = [(role, True), (other, False), (role, False)]
+    assert taken == (asked if once in (900, 307) else [])
+
+
+def test_no_other_sentinel_is_asked_whether_it_settles() -> None:
+    scan: Any = known()
+    scan.kept = {10: counts(1000), 11: counts(300)}
+    check = SceneCheck(scan)
+    check.see_settled(SHOTS[13], counts(900).reshape(18, 32), lambda shot, is_longer: 1 / 0)
+    assert check.unsettled == ""
