@@ -11,19 +11,26 @@ from dsl_core.capture.proof.raster import Counts
 
 #: What of white's light each may differ by from what it was, and from what it is when shown for longer.
 LEAST_CHANGE = {"white": 0.03, "black": 0.004}
+#: Share of the pixels of white that do not saturate, and their mean light, DN, that say something.
+LEAST_SOUND, LEAST_DN = 0.25, 100.0
 #: It is the same again if it differs by no more than this share of the change.
 SAME = 0.33
 
 
 def change_of_light(seen: Counts, ends: tuple[Counts, Counts], role: str, full_dn: float) -> float:
-    """What white has gained, or black of the light of white, as a share; ``ends`` are both at first."""
+    """What white has gained, or black of the light of white, as a share; ``ends`` are both at first.
+
+    Zero where white has little light, or saturates.
+    """
     white, black = ends
     sound = np.maximum(seen, white) < full_dn
     light = white[sound].astype(np.float64) - black[sound]
+    if light.size < LEAST_SOUND * white.size or light.mean() < LEAST_DN:
+        return 0.0
     gained = seen[sound].astype(np.float64) - (white if role == "white" else black)[sound]
     if role == "white":
-        return float(gained.sum() / max(light.sum(), 1.0))
-    return float(gained @ light / max(light @ light, 1.0))
+        return float(gained.sum() / light.sum())
+    return float(gained @ light / (light @ light))
 
 
 def unsettled_sentence(role: str, once: float, longer: float, again: float) -> str:
