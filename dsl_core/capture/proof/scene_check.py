@@ -11,7 +11,7 @@ from dsl_core.capture.proof.contest import vote
 from dsl_core.capture.proof.control import choose_pairs, edges_moved, is_same, is_unchanged
 from dsl_core.capture.proof.judging.known import Known
 from dsl_core.capture.proof.lasting.levels import at_half_level, doubt_of_levels
-from dsl_core.capture.proof.settled_light import LEAST_CHANGE, change_of_light, unsettled_sentence
+from dsl_core.capture.proof.lasting.settled_light import LEAST_CHANGE, change_of_light, unsettled_sentence
 from dsl_core.model.plan import Shot
 from dsl_core.patterns.images import pattern_image
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from dsl_core.capture.proof.settled_light import change_of_light, unsettled_sentence
+from dsl_core.capture.proof.lasting.settled_light import change_of_light, unsettled_sentence
 
 
 def counts(value: int) -> np.ndarray:
