@@ -69,7 +69,7 @@ def in_bands(counts: Counts) -> Counts:
 def noisier(counts: Counts) -> Counts:
     light = counts - SENSOR.black_level_dn
     sigma = np.sqrt((SENSOR.read_noise_dn**2 + light / SENSOR.electrons_per_dn).clip(0))
-    return counts + np.random.default_rng(8).normal(0, sigma)
+    return np.asarray(counts + np.random.default_rng(8).normal(0, sigma))
 
 
 @pytest.mark.parametrize(

@@ -87,6 +87,11 @@ def test_light_that_depends_on_the_picture_before_is_told_from_a_lamp_that_drift
 def test_no_other_sentinel_is_asked_whether_it_settles() -> None:
     scan: Any = known()
     scan.kept = {10: counts(1000), 11: counts(300)}
-    check = SceneCheck(scan)
-    check.see_settled(SHOTS[13], counts(900).reshape(18, 32), lambda shot, is_longer: 1 / 0)
-    assert check.unsettled == ""
+    check, taken = SceneCheck(scan), list[Shot]()
+
+    def take(shot: Shot, is_longer: bool) -> np.ndarray:
+        taken.append(shot)
+        return counts(300).reshape(18, 32)
+
+    check.see_settled(SHOTS[13], counts(900).reshape(18, 32), take)
+    assert (check.unsettled, taken) == ("", [])
