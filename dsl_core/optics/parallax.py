@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from dsl_core.model.geometry import Lens, Pose
 from dsl_core.model.rig import Rig
 from dsl_core.optics.pinhole import project, rays_at
 
@@ -43,7 +44,10 @@ class Parallax:
     @property
     def advice(self) -> str:
         """What to do about it."""
-        return "Move the camera to the side, across the stripes, and calibrate again."
+        return (
+            "Move the camera to the side, across the stripes, or turn the projector and its film by 90°, so"
+            " that stripes lie across the line from it to the camera; then calibrate again."
+        )
 
 
 def parallax_of(rig: Rig, depth_mm: NDArray[np.floating] | None = None) -> Parallax:
@@ -51,23 +55,34 @@ def parallax_of(rig: Rig, depth_mm: NDArray[np.floating] | None = None) -> Paral
 
     In the middle of the rig's depths where none are given.
     """
-    width, height = rig.camera.width_px, rig.camera.height_px
     known = None if depth_mm is None else np.flatnonzero(np.isfinite(depth_mm))
     if depth_mm is None or known is None or not known.size:
-        # The window asks at every change of a plan: no array of the picture's size is made for it.
-        some = np.arange(0, width * height, max(1, width * height // MOST_PIXELS))
-        depth = np.full(some.size, np.mean(rig.depth_range_mm))
-    else:
-        some = known[:: max(1, known.size // MOST_PIXELS)]
-        depth = depth_mm.ravel()[some].astype(np.float64)
-    rays = rays_at(rig.camera, (some % width).astype(float), (some // width).astype(float))
-    near, far = (_columns(rig, rays * depth * by) for by in (0.995, 1.005))
-    one_percent_mm = 0.01 * float(np.median(depth))
+        return parallax_at(rig.camera, rig.projector, rig.pose, float(np.mean(rig.depth_range_mm)))
+    some = known[:: max(1, known.size // MOST_PIXELS)]
+    depth = depth_mm.ravel()[some].astype(np.float64)
+    return _parallax(rig.camera, rig.projector, rig.pose, some, depth)
+
+
+def parallax_at(camera: Lens, projector: Lens, pose: Pose, depth_mm: float) -> Parallax:
+    """The parallax of lenses, all over the camera's picture, at a depth.
+
+    The window asks at every change of a plan: no array of the picture's size is made for it.
+    """
+    size = camera.width_px * camera.height_px
+    some = np.arange(0, size, max(1, size // MOST_PIXELS))
+    return _parallax(camera, projector, pose, some, np.full(some.size, depth_mm))
+
+
+def _parallax(
+    camera: Lens, projector: Lens, pose: Pose, pixels: NDArray[np.intp], depth_mm: NDArray[np.float64]
+) -> Parallax:
+    """The parallax at the depths (n,) of pixels (flat indices, (n,))."""
+    rows, columns = np.divmod(pixels, camera.width_px)
+    points = rays_at(camera, columns.astype(float), rows.astype(float)) * depth_mm
+    near, far = (
+        project(projector, *(pose.matrix @ (points * by) + pose.vector_mm[:, None]))[0]
+        for by in (0.995, 1.005)
+    )
+    one_percent_mm = 0.01 * float(np.median(depth_mm))
     moved_px = max(float(np.median(np.abs(far - near))), 1e-6)
     return Parallax(one_percent_mm / moved_px, one_percent_mm / LEAST_PX)
-
-
-def _columns(rig: Rig, points_mm: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Columns of the projector that light points (3, n) of the camera's frame."""
-    column, _ = project(rig.projector, *(rig.pose.matrix @ points_mm + rig.pose.vector_mm[:, None]))
-    return np.asarray(column)

@@ -11,7 +11,7 @@ from dsl_core.model.plan import CapturePlan
 from dsl_core.model.rig import Rig
 from dsl_core.model.spectral import WavelengthGrid
 from dsl_core.optics.correspondence import triangulate, zero_order
-from dsl_core.optics.parallax import parallax_of
+from dsl_core.optics.parallax import parallax_at, parallax_of
 from dsl_core.reconstruction.findings.fit import fit_of
 from dsl_core.simulation.published_rig import published_rig
 
@@ -53,3 +53,11 @@ def test_a_camera_above_the_projector_is_told_before_the_scan_and_with_its_resul
     assert not verdicts[0].parts
     assert verdicts[1].parts == ("geometry",)
     assert f"{parallax_of(ABOVE, depth).mm_per_column:.0f} mm of depth" in verdicts[1].words
+
+
+def test_a_calibration_knows_the_parallax_of_its_lenses_before_there_is_a_rig() -> None:
+    for rig in (SIDE, ABOVE):
+        wanted = parallax_of(rig, np.full((58, 89), 600.0))
+        found = parallax_at(rig.camera, rig.projector, rig.pose, 600.0)
+        assert found.mm_per_column == pytest.approx(wanted.mm_per_column, rel=0.01)
+        assert found.most_mm == pytest.approx(wanted.most_mm)

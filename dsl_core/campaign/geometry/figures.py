@@ -14,6 +14,7 @@ from dsl_core.model.calibration.geometry import GeometryCalibration
 from dsl_core.model.calibration.pose_frames import PoseFrames
 from dsl_core.model.figure import Figure, doubts
 from dsl_core.model.rig import Rig
+from dsl_core.optics.parallax import parallax_at
 
 #: A board of fewer corners than this share in view says too little.
 LEAST_CORNERS = 0.6
@@ -23,6 +24,9 @@ MOST_BLUR_PX = 1.5
 LEAST_VIEW = 8.0
 #: Limits of a good calibration; that of the reprojection is the calibration's own.
 PLANE_SHARE, SQUARE_SHARE, COVERAGE = 5e-4, 0.005, 0.35
+
+#: A column may stand for so many times the usual most of depth: with more, no later calibration succeeds.
+NO_DEPTH = 4.0
 
 
 def look_at_board(white: WhiteLevel, board: Board, rig: Rig, title: str, found: Found) -> tuple[Figure, ...]:
@@ -122,5 +126,19 @@ def geometry_figures(record: GeometryCalibration) -> tuple[Figure, ...]:
             advice=more,
         ),
         Figure(name="picture covered, projector", value=100 * record.projector_coverage, unit="%"),
+        _depth_of_columns(record),
         doubts("doubts about poses and print", record.warnings, " "),
+    )
+
+
+def _depth_of_columns(record: GeometryCalibration) -> Figure:
+    """Whether columns tell depth; without it the Spectralon seems to bulge, and its place is lost."""
+    distance_mm = float(np.median([pose.distance_mm for pose in record.poses]))
+    found = parallax_at(record.camera, record.projector, record.pose, distance_mm)
+    return Figure(
+        name="depth that a column stands for",
+        value=found.mm_per_column,
+        unit="mm",
+        high=NO_DEPTH * found.most_mm,
+        advice=f"{found.sentence} {found.advice}" if found.is_small else "",
     )

@@ -118,6 +118,15 @@ def test_figures_pass_and_say_how_good_it_is(record: GeometryCalibration) -> Non
     assert record.warnings == ()
 
 
+def test_columns_that_tell_no_depth_are_named_at_once(record: GeometryCalibration) -> None:
+    above = record.pose.model_copy(update={"translation_mm": (2.0, -120.0, 0.0)})
+    made = record.model_copy(update={"pose": above})
+    (missed,) = [figure for figure in RECIPE.figures(made) if not figure.passed]
+    assert missed.name == "depth that a column stands for"
+    assert "one above the other" in missed.advice
+    assert "turn the projector and its film by 90°" in missed.advice
+
+
 def test_a_look_tells_how_the_board_stands(bench: Bench) -> None:
     step = RECIPE.steps(bench)[1]
     assert bench.devices.place is not None
