@@ -36,8 +36,9 @@ MIN_TILT_DEG, GOOD_TILT_DEG = 5.0, 20.0
 MAX_SATURATED = 0.01
 MIN_COVERAGE, CELLS = 0.3, 8
 GOOD_RMS_PX, GOOD_FOCAL_SHARE = 0.5, 0.01
-#: What the distortion may leave open in the corners of a picture, px.
-MAX_CORNER_PX = 1.0
+#: What the distortion may leave open in the corners of a picture, px; of the projector's, at least this share
+#: of what a pixel of the camera sees of it, as coarse pictures tell its columns as much less well.
+MAX_CORNER_PX, CORNER_SHARE = 1.0, 0.5
 
 
 @dataclass
@@ -290,7 +291,7 @@ def doubts(found: GeometryCalibration, tilt_deg: float, baseline_mm: float | Non
                 " Add poses with more tilt."
             )
         corner_px = _corner_px(found, lens, 0 if what == "camera" else LENS)
-        if corner_px > MAX_CORNER_PX:
+        if corner_px > _most_corner_px(found, lens):
             sentences.append(
                 f"The distortion of the {what} is poorly known beyond the board{_k3(lens, deviation)}:"
                 f" {corner_px:.1f} px in a corner of its picture."
@@ -317,6 +318,12 @@ def _k3(lens: Lens, deviation: LensDeviation) -> str:
     """The term that is known least, in words; empty where it is held at zero."""
     std = deviation.distortion[4]
     return f" (k3 {lens.distortion[4]:.2f} ± {std:.2f})" if std else ""
+
+
+def _most_corner_px(found: GeometryCalibration, lens: Lens) -> float:
+    """What the distortion of one of the lenses may leave open in a corner, px of its picture."""
+    seen_px = lens.fx_px / found.camera.fx_px
+    return MAX_CORNER_PX if lens is found.camera else max(MAX_CORNER_PX, CORNER_SHARE * seen_px)
 
 
 def _corner_px(found: GeometryCalibration, lens: Lens, first: int) -> float:

@@ -111,6 +111,24 @@ def test_distortion_that_the_board_leaves_open_counts_in_the_corner(found: Geome
         assert not told or ": 2.0 px in a corner" in sentences[0]
 
 
+@pytest.mark.parametrize(("coarse", "px", "told"), [(1.0, 1.8, True), (8.0, 1.8, False), (8.0, 3.0, True)])
+def test_coarse_pictures_may_leave_more_open_in_the_projectors_corner(
+    found: GeometryCalibration, coarse: float, px: float, told: bool
+) -> None:
+    lens = found.projector
+    size_px = found.camera.width_px / coarse, found.camera.height_px / coarse
+    camera = found.camera.resized(round(size_px[0]), round(size_px[1]))
+    corner = np.hypot(
+        max(lens.cx_px, lens.width_px - 1 - lens.cx_px) / lens.fx_px,
+        max(lens.cy_px, lens.height_px - 1 - lens.cy_px) / lens.fy_px,
+    )
+    covariance = np.diag(np.full(24, 1e-12))
+    covariance[17, 17] = (px / (lens.fx_px * corner**7)) ** 2
+    changes = {"covariance": tuple(covariance.ravel().tolist()), "camera": camera}
+    sentences = doubts(found.model_copy(update=changes), 40.0, None)
+    assert any("distortion of the projector" in each for each in sentences) == told
+
+
 def test_another_known_length_tells_a_wrong_printed_size(found: GeometryCalibration) -> None:
     baseline = float(np.linalg.norm(found.pose.translation_mm))
     assert not any("printed squares" in each for each in doubts(found, 40.0, 1.05 * baseline))
