@@ -19,6 +19,9 @@ STEADY = timedelta(days=1)
 #: much for one. LED projectors lose little by age, and change by dust, heat and how they are set: after three
 #: weeks 95 % of the levels are thought to be within 6.6 %. This is a default, not a measurement.
 PER_ROOT_DAY = 0.0075
+#: The same of a rig that a scan shows to be not as calibrated, whatever dates say: what moves a film a little
+#: may change its light as well, which no scan shows. It counts as one that is three weeks old.
+CHANGED_REL_STD = PER_ROOT_DAY * 20**0.5
 #: What a rig's own drift checks say counts against the default as much as this many of them would.
 DEFAULT_CHECKS = 3.0
 #: Changes of the light between two checks on one day tell of the checks, not of age.
@@ -98,6 +101,11 @@ def aged(rig: Rig, captured: str) -> Rig:
         return rig
     unsure = float(np.hypot(rig.reference_rel_std, level.rel_std))
     return rig.model_copy(update={"reference_rel_std": unsure})
+
+
+def doubt_of_changed(rig: Rig) -> float:
+    """What is to be added to ``reference_rel_std`` of a rig that a scan shows to be not as calibrated."""
+    return float(max(CHANGED_REL_STD**2 - rig.reference_rel_std**2, 0.0) ** 0.5)
 
 
 def unseen_since(rig: Rig, captured: str) -> str:

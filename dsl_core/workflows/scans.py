@@ -179,7 +179,10 @@ def _dated(result: xr.Dataset, rig: Rig, reader: ScanReader) -> dict[str, str]:
     if fit is None or is_import(reader):
         return {}
     level, unseen = light_level(rig, reader.manifest.created), unseen_since(rig, reader.manifest.created)
-    found = {"unseen": unseen, "level_rel_std": 0.0 if level is None else level.rel_std}
+    found = {
+        "unseen": " ".join(part for part in (fit.unseen, unseen) if part),
+        "level_rel_std": max(fit.level_rel_std, 0.0 if level is None else level.rel_std),
+    }
     return {FIT_ATTRIBUTE: fit.model_copy(update=found).model_dump_json()}
 
 

@@ -125,6 +125,14 @@ def test_a_result_says_that_its_calibration_is_old_unless_its_pictures_have_no_d
     assert found is None or ("days older than this scan" in found.words and found.level_rel_std > 0.1)
 
 
+def test_dates_do_not_hide_what_a_scan_itself_leaves_open(folder: Path) -> None:
+    reader = ScanReader(folder)
+    rig = small_rig().model_copy(update={"provenance": Provenance(created=reader.manifest.created)})
+    made = Fit(level_rel_std=0.03, unseen="The film may have moved.")
+    found = Fit.read({**scans._dated(small_result().assign_attrs(fit=made.model_dump_json()), rig, reader)})
+    assert found == made
+
+
 @pytest.mark.parametrize(("notes", "told"), [({}, True), ({"imported_sensor": "{}"}, False)])
 def test_a_scan_long_after_its_calibration_is_reconstructed_with_a_light_that_is_less_known(
     folder: Path, monkeypatch: pytest.MonkeyPatch, notes: dict[str, str], told: bool

@@ -12,10 +12,11 @@ from dsl_core.model.plan import CapturePlan
 from dsl_core.model.rig import Rig
 from dsl_core.model.spectral import WavelengthGrid
 from dsl_core.optics.parallax import parallax_of
+from dsl_core.reconstruction.calibration_age import CHANGED_REL_STD
 from dsl_core.reconstruction.findings.band_findings import band_findings, line_width_nm
 from dsl_core.reconstruction.findings.flag_findings import SpectralCounts, share_findings
 from dsl_core.reconstruction.findings.line_edges import edge_findings
-from dsl_core.reconstruction.findings.model_findings import cause_findings
+from dsl_core.reconstruction.findings.model_findings import MOVED, cause_findings
 from dsl_core.reconstruction.spectral.model_error import ModelError
 from dsl_core.reconstruction.spectral.self_correction import Followed
 
@@ -45,7 +46,11 @@ def fit_of(
         findings += band_findings(grid.step_nm, width_nm, spectra)
     if followed is not None:
         findings += cause_findings(followed.probe, followed.balanced, followed.motion)
-    return Fit.of(findings, () if error is None else np.round(error.relative, 4).tolist())
+    fit = Fit.of(findings, () if error is None else np.round(error.relative, 4).tolist())
+    if followed is None or not followed.has_changed:
+        return fit
+    doubts = [found.sentence for found in findings if found.name == MOVED and not found.significant]
+    return fit.model_copy(update={"level_rel_std": CHANGED_REL_STD, "unseen": " ".join(doubts)})
 
 
 def _of_parallax(rig: Rig, depth_mm: NDArray[np.floating]) -> FitFinding:

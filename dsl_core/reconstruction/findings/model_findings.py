@@ -7,6 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from dsl_core.model.fit import SIGMAS, FitFinding, matters
+from dsl_core.reconstruction.calibration_age import CHANGED_REL_STD
 from dsl_core.reconstruction.spectral.causes import (
     MOST_CURVES,
     MOST_DRIFT,
@@ -20,6 +21,7 @@ from dsl_core.reconstruction.spectral.film_motion import LEAST_MOTION_PX, FilmMo
 from dsl_core.reconstruction.spectral.probing.curve_probe import USUAL_STEEPNESS, CurveMisfit
 from dsl_core.reconstruction.spectral.probing.line_probe import PROFILE
 from dsl_core.reconstruction.spectral.probing.probe import Probe
+from dsl_core.solve.normal import BAND_95
 
 #: Blur and tail of the lines below which neither is worth a finding.
 MOST_BLUR, MOST_TAIL = 0.03, 0.004
@@ -32,6 +34,8 @@ MOST_COLOUR_GAIN = 0.03
 MOST_CHI_SQUARE = 1.5
 #: Share of one order's displacement that the other's must have if uneven lines may be the cause.
 ALIKE = 0.4
+#: Name of what is found of the film as a whole.
+MOVED = "movement of the film"
 #: Added to findings whose effect the spectra of the result already allow for.
 CORRECTED = " The spectra of this result are corrected for it."
 #: Words, decimals and unit of the numbers of a film, as in `FIELDS`.
@@ -176,19 +180,23 @@ def _motion(motion: FilmMotion, probe: Probe) -> FitFinding:
         )
         if sure
     ]
+    by_nm = f"This displaces wavelengths by {motion.shift_px * probe.nm_per_px:.2f} nm."
     return FitFinding(
         part="film",
-        name="movement of the film",
+        name=MOVED,
         value=motion.shift_px,
         std=motion.shift_std_px,
         unit="px",
         limit=LEAST_MOTION_PX,
-        significant=True,
-        sentence=f"The film has moved since the calibration: {', '.join(clauses)}. This displaces wavelengths"
-        f" by {motion.shift_px * probe.nm_per_px:.2f} nm." + CORRECTED,
+        significant=motion.sure,
+        sentence=f"The film has moved since the calibration: {', '.join(clauses)}. {by_nm}{CORRECTED}"
+        if motion.sure
+        else f"The film may have moved since the calibration: {', '.join(clauses)}. {by_nm} It may be chance,"
+        " so that the spectra are not corrected for it.",
         advice="Fix the film so that it cannot slip; if it moves further, repeat the depth-stage calibration."
-        " The level of the light may have changed, too, which no scan can tell: the drift check with the"
-        " Spectralon does." + _OR_TURNED,
+        " The level and the colour of the light may have changed, too, which no scan can tell: reflectance"
+        f" holds to {BAND_95 * CHANGED_REL_STD:.0%}, as stated, and the drift check with the Spectralon tells"
+        " more." + _OR_TURNED,
     )
 
 

@@ -4,8 +4,10 @@ A film that slips in its frame tilts, turns, bends or changes its distance: five
 the whole picture, each in its own way over place and wavelength. They are fitted to all probed pixels with
 the calibration as prior, together with gains and profile, which could look alike. A line spread that is not
 symmetric displaces both orders alike and is granted a little of that. Numbers that are not surely off zero
-stay as calibrated, and a motion is one only if it explains pixels that the fit has not seen. The density of
-the film's lines stays: no motion changes it. Of a film bent as no record says, the nearest motion is found.
+stay as calibrated. Where none is, the least sure ones are left out one by one: many a slip is of one kind,
+which five numbers share out among themselves. A motion is one only if it explains pixels that the fit has
+not seen. The density of the film's lines stays: no motion changes it. Of a film bent as no record says, the
+nearest motion is found.
 """
 
 from __future__ import annotations
@@ -22,7 +24,7 @@ from dsl_core.optics.correspondence import GratingModel
 from dsl_core.optics.pixel_model import PixelModel
 from dsl_core.optics.spectra import ORDERS
 from dsl_core.reconstruction.spectral.causes import beside_curves
-from dsl_core.reconstruction.spectral.probing.held_out import explains_others
+from dsl_core.reconstruction.spectral.probing.held_out import Hypothesis, explains_others
 from dsl_core.reconstruction.spectral.probing.probe import LEADING, Probe
 from dsl_core.reconstruction.spectral.probing.probe import PRIOR_STD as PARAMETER_STD
 from dsl_core.reconstruction.spectral.probing.probed_light import PARAMETERS, ProbedScan
@@ -43,20 +45,23 @@ LEAST_MOTION_PX, FINE_NM = 0.02, 5.0
 
 @dataclass(frozen=True)
 class FilmMotion:
-    """Changes (5,) of `FIELDS` with deviations ``std`` (5,), in their units; 0 where none is sure.
+    """Changes (5,) of `FIELDS` with deviations ``std`` (5,), in their units; 0 where none is sure, or asked.
 
     ``shift_px`` is by how much they displace the first orders at the probed pixels, root mean square, and
-    ``shift_std_px`` its deviation.
+    ``shift_std_px`` its deviation. A motion that is not ``sure`` does not make the frames of
+    a scan fit better.
     """
 
     values: Floats
     std: Floats
     shift_px: float
     shift_std_px: float
+    sure: bool = True
 
     def then(self, more: FilmMotion) -> FilmMotion:
-        """Both motions, the second of which is small and tells how sure all is."""
-        return FilmMotion(self.values + more.values, more.std, self.shift_px, more.shift_std_px)
+        """Both motions, the second of which is small and tells how sure all is that it asked for."""
+        std = np.where(more.std > 0, more.std, self.std)
+        return FilmMotion(self.values + more.values, std, self.shift_px, more.shift_std_px)
 
 
 def moved(model: PixelModel, motion: FilmMotion) -> PixelModel:
@@ -75,21 +80,35 @@ def fit_motion(scan: ProbedScan, probe: Probe) -> FilmMotion | None:
     if not probe.places or not isinstance(scan.model.correspondence, GratingModel):
         return None
     effect = _effect(scan, scan.model.correspondence, probe)
-    count = len(FIELDS)
-    moves = beside_curves(probe, *_design(effect, probe.step_nm))
-    fit = moves.sums.fit(moves.prior_std)
-    covariance = fit.covariance[:count, :count]
-    std = np.sqrt(np.diag(covariance))
-    # What could be chance helps no pixel, and harms those at the edge of the frame.
-    values = np.where(np.abs(fit.values[:count]) > SIGMAS * std, fit.values[:count], 0.0)
-    shift = effect[probe.sound][:, _SHIFT]
-    spread = np.einsum("nok,kl,nol->no", shift, covariance, shift)
-    shift_px, shift_std_px = (float(np.sqrt(np.mean(square))) for square in ((shift @ values) ** 2, spread))
+    kept = list(range(len(FIELDS)))
+    while kept:
+        count = len(kept)
+        moves = beside_curves(probe, *_design(effect[..., kept], PRIOR_STD[kept], probe.step_nm))
+        fit = moves.sums.fit(moves.prior_std)
+        found, covariance = fit.values[:count], fit.covariance[:count, :count]
+        sigmas = np.abs(found) / np.sqrt(np.diag(covariance))
+        # What could be chance helps no pixel, and harms those at the edge of the frame.
+        sure = sigmas > SIGMAS
+        if sure.all() or (sure.any() and count == len(FIELDS)):
+            return _motion_of(effect, probe, kept, np.where(sure, found, 0.0), covariance, moves)
+        del kept[int(sigmas.argmin())]
+    return None
+
+
+def _motion_of(
+    effect: Floats, probe: Probe, kept: list[int], found: Floats, covariance: Floats, moves: Hypothesis
+) -> FilmMotion | None:
+    """The motion of the ``kept`` fields, found to be (k,); None where it is too small, or could be chance."""
+    shift = effect[probe.sound][:, _SHIFT][..., kept]
+    squares = (shift @ found) ** 2, np.einsum("nok,kl,nol->no", shift, covariance, shift)
+    shift_px, shift_std_px = (float(np.sqrt(np.mean(square))) for square in squares)
     if shift_px < LEAST_MOTION_PX * coarseness(probe.step_nm):
         return None
     # Without the film, gains and profile explain a part already.
-    if not explains_others(moves, count):
+    if not explains_others(moves, len(kept)):
         return None
+    values, std = np.zeros((2, len(FIELDS)))
+    values[kept], std[kept] = found, np.sqrt(np.diag(covariance))
     return FilmMotion(values, std, shift_px, shift_std_px)
 
 
@@ -122,8 +141,8 @@ def _effect(scan: ProbedScan, correspondence: GratingModel, probe: Probe) -> Flo
     return np.nan_to_num(effect)
 
 
-def _design(effect: Floats, step_nm: float) -> tuple[Floats, Floats]:
-    """Design (n, p, k) and prior (k,) of a film's numbers, and of what could look like them.
+def _design(effect: Floats, prior_std: Floats, step_nm: float) -> tuple[Floats, Floats]:
+    """Design (n, p, k) and prior (k,) of some of a film's numbers, and of what could look like them.
 
     Lines that are not symmetric displace both orders alike; bands wider than `FINE_NM`, along which spectra
     curve, to opposite sides.
@@ -136,7 +155,7 @@ def _design(effect: Floats, step_nm: float) -> tuple[Floats, Floats]:
         design[:, _SHIFT, column] = shifts
     design[:, 2:LEADING, count + len(sides) :] = np.eye(LEADING - 2)
     displaced = (LOPSIDED_PX, wide_px)[: len(sides)]
-    return design, np.r_[PRIOR_STD[:count], displaced, PARAMETER_STD[2:LEADING]]
+    return design, np.r_[prior_std, displaced, PARAMETER_STD[2:LEADING]]
 
 
 def with_film(rig: Rig, changes: Floats) -> Rig:

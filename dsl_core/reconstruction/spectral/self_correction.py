@@ -18,7 +18,7 @@ import numpy as np
 from dsl_core.optics.pixel_model import PixelModel
 from dsl_core.optics.spectra import ORDERS
 from dsl_core.reconstruction.spectral.causes import EXPLAINS, MOST_EXCESS, Causes, fit_causes
-from dsl_core.reconstruction.spectral.film_motion import FilmMotion, fit_motion, moved
+from dsl_core.reconstruction.spectral.film_motion import FilmMotion, coarseness, fit_motion, moved
 from dsl_core.reconstruction.spectral.probing.probe import Probe, probe
 from dsl_core.reconstruction.spectral.probing.probed_light import ProbedScan
 
@@ -33,9 +33,9 @@ STEPS, FAR_PX = 2, 0.3
 class Followed:
     """A model that follows a scan, and what the scan says.
 
-    ``motion`` is that of the film, None where none was found; ``balanced`` whether the light of the orders
-    was taken over (None: nothing asked for it). ``probe`` is what the scan says of the model with the film
-    moved, ``left`` what it says of ``model``.
+    ``motion`` is that of the film, None where none was found; where it is not sure, it is not followed.
+    ``balanced`` is whether the light of the orders was taken over (None: nothing asked for it). ``probe`` is
+    what the scan says of the model with the film moved, ``left`` what it says of ``model``.
     """
 
     model: PixelModel
@@ -43,6 +43,11 @@ class Followed:
     left: Probe
     motion: FilmMotion | None = None
     balanced: bool | None = None
+
+    @property
+    def has_changed(self) -> bool:
+        """Whether the film seems to have moved, or one order to have become brighter, since calibrated."""
+        return self.motion is not None or bool(self.balanced)
 
 
 def follow(scan: ProbedScan, as_calibrated: bool = False) -> Followed | None:
@@ -60,6 +65,9 @@ def follow(scan: ProbedScan, as_calibrated: bool = False) -> Followed | None:
             break
         better = _tried(replace(scan, model=moved(model, more)), found)
         if better is None:
+            # Spectra that curve along wide bands displace the orders as well.
+            if motion is None and coarseness(found.step_nm) <= 1:
+                motion = replace(more, sure=False)
             break
         model, found = moved(model, more), better
         motion = more if motion is None else motion.then(more)

@@ -19,6 +19,7 @@ from dsl_core.optics.lines.line_set import LineSet
 from dsl_core.optics.pixel_model import COLOUR_ERROR, DIRECT_ERROR, PixelModel, Traced
 from dsl_core.optics.spectra import ORDERS, Bands
 from dsl_core.progress import NoProgress, Progress
+from dsl_core.reconstruction.calibration_age import doubt_of_changed
 from dsl_core.reconstruction.columns.pattern_column import radiance_profiles, rounding_error
 from dsl_core.reconstruction.spectral.causes import common_error, fit_causes
 from dsl_core.reconstruction.spectral.model_error import ModelError, model_error, neighbour_contrast
@@ -94,6 +95,8 @@ class SpectralReconstruction:
         self.contrast = neighbour_contrast(pixels.amplitude)
         self.followed: Followed | None = None
         self.error: ModelError | None = None
+        #: Relative deviation of the light's level where the scan shows that the rig has changed.
+        self._unsure_level = 0.0
         usual = self.device.type == "cpu" and dtype == torch.float32
         #: Tensors are for a GPU, and for other precisions.
         self._compiled = CompiledTiles(self.prior) if usual and self.model.single else None
@@ -123,6 +126,7 @@ class SpectralReconstruction:
             if found is not None:
                 self.model, self.bands = found.model, found.model.bands
                 self.error = model_error(found.left, common_error(found.left, fit_causes(found.left)))
+                self._unsure_level = doubt_of_changed(self.rig) if found.has_changed else 0.0
 
     def take(
         self,
@@ -259,7 +263,7 @@ class SpectralReconstruction:
         if self.error is not None:
             excess = excess + (misfit - SURE_MISFIT).clip(min=0) * (self.error.correlation - 1)
             share = self.error.at(*frames.place(), self.pixels.valid.shape)
-            error = torch.hypot(relative, like(share, mean))
+            error = torch.hypot(relative, like(np.hypot(share, self._unsure_level), mean))
         # A pixel that no spectrum explains may have that of a neighbour, one at the upper bound any level.
         high = (spectra.at_bound & (spectra.nodes > self.prior.bounds[1] / 2)).any(0)
         error = torch.hypot(error, torch.where(high, BOUND_SHARE, 0.0))

@@ -164,3 +164,11 @@ def test_what_curves_do_that_are_off_is_no_motion(scan: ProbedScan, moved_mm: fl
     assert (motion is not None) == found
     if motion is not None:
         assert abs(motion.values[4] - moved_mm) < 3 * motion.std[4]
+
+
+def test_a_small_slip_of_one_kind_is_not_shared_out_among_all_kinds(scan: ProbedScan) -> None:
+    slip = np.array([0.0, 0.0, 0.0, 0.0, 0.1])
+    found = fit_motion(scan, displaced(scan.model.rig, slip))
+    assert found is not None
+    assert np.flatnonzero(found.values).tolist() == [4]
+    assert abs(found.values[4] - 0.1) < 3 * found.std[4] < 0.1

@@ -14,8 +14,10 @@ from dsl_core.model.plan import CapturePlan, GrayCode, ScanLines
 from dsl_core.model.rig import Rig
 from dsl_core.model.spectral import WavelengthGrid
 from dsl_core.optics.correspondence import correspondence
-from dsl_core.reconstruction.spectral import self_correction
-from dsl_core.reconstruction.spectral.film_motion import with_film
+from dsl_core.reconstruction.calibration_age import CHANGED_REL_STD
+from dsl_core.reconstruction.findings.fit import fit_of
+from dsl_core.reconstruction.spectral import self_correction, spectra
+from dsl_core.reconstruction.spectral.film_motion import FilmMotion, with_film
 from dsl_core.reconstruction.spectral.self_correction import fits_better
 from dsl_core.reconstruction.spectral.spectra import SpectralReconstruction
 from dsl_core.reconstruction.spectral.spectral_maps import SpectralMaps
@@ -147,3 +149,22 @@ def test_light_of_orders_that_frames_fit_no_better_is_found_and_not_taken_over(
     assert found is not None
     assert (found.balanced, found.motion) == (False, None)
     assert found.left is found.probe
+
+
+def test_what_has_changed_may_have_changed_the_level_of_its_light_as_well(
+    scanned: tuple[Rig, MemoryScan], right: SpectralMaps, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert right.followed is not None
+    perhaps = FilmMotion(np.array([0.0, 0.0, 0.0, 0.0, 0.1]), np.full(5, 0.02), 0.03, 0.01, sure=False)
+    said = replace(right.followed, motion=perhaps)
+    monkeypatch.setattr(spectra, "follow", lambda *_: said)
+    found = solved(*scanned, as_calibrated=False)
+    bright = right.reflectance > 0.5
+    more = np.sqrt(found.std[bright] ** 2 - right.std[bright] ** 2) / right.reflectance[bright]
+    assert np.allclose(more, CHANGED_REL_STD, rtol=0.05)
+    depth, flags = np.full((72, 112), 700.0), np.zeros((72, 112), np.uint16)
+    given = scanned[0], scanned[1].plan, GRID, depth, flags, None
+    fits = [fit_of(*given, each) for each in (right.followed, said)]
+    assert [fit.level_rel_std for fit in fits] == [0.0, CHANGED_REL_STD]
+    assert "may have moved" in fits[1].unseen
+    assert fits[1].parts == fits[0].parts

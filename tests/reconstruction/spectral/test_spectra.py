@@ -82,7 +82,7 @@ def stored(misfit: list[float], error: Any = None, **more: Any) -> SpectralMaps:
     relative = torch.tensor([0.0, 0.1, float("nan"), 0.0], dtype=torch.float64)
     owner: Any = SimpleNamespace(
         bands=SimpleNamespace(reported=slice(1, 3)), error=error, prior=Prior(), contrast=contrast,
-        pixels=SimpleNamespace(valid=np.ones((3, 5), bool)),
+        pixels=SimpleNamespace(valid=np.ones((3, 5), bool)), _unsure_level=0.0,
         model=SimpleNamespace(inside=lambda footprint, margin_px: footprint.columns > 0),
         _map=lambda values, flat: torch.as_tensor(values.ravel()[flat]).double(),
     )  # fmt: skip
