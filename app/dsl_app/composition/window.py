@@ -17,6 +17,7 @@ from dsl_app.composition.dialogs import ImportAction, ReconstructAgainAction
 from dsl_app.composition.first_connection import FirstConnection
 from dsl_app.composition.rig_profiles import ProfileAction
 from dsl_app.connection.state import Link, RigChoice, RigState
+from dsl_app.shared.evented import Value
 from dsl_app.shared.known_files import Kind
 from dsl_app.shared.settings import data_folder, demo_folder
 from dsl_app.shared.widgets.page import PageWidget
@@ -67,6 +68,8 @@ class Composition(QObject):
         self._options = options
         #: The controller of the Scan page, once that has been opened.
         self.scans: ScanController | None = None
+        #: Whether the result of a scan is being computed.
+        self._awaited = Value(False)
 
     def open_window(
         self, folder: Path | None = None, theme: str | None = None, in_background: bool = False
@@ -349,6 +352,7 @@ class Composition(QObject):
             lambda phase: self.session.scan_began() if phase is Phase.RUNNING else None
         )
         state.finished.changed.connect(self._remember_scan)
+        state.is_reconstructing.changed.connect(self._awaited.set)
         self.scans = controller = ScanController(
             state, rig, parts.runner, window.toasts, parts.undo, hidden=demo_folder(), pace=self._pace
         )
@@ -418,7 +422,7 @@ class Composition(QObject):
         window, parts, state = self.window, self.window.parts, ResultsState()
         controller = ResultsController(state, parts.runner, window.toasts, parts.undo)
         controller.opened.connect(lambda result: self._end_demo(result.path))
-        welcome = Welcome(parts.recent, window.open_path, lambda: self.demo.show())
+        welcome = Welcome(parts.recent, window.open_path, lambda: self.demo.show(), self._awaited)
         self.session.results = controller
         page = ResultsPage(state, controller, parts.runner, welcome)
         page.open_chosen.connect(window.open_path)

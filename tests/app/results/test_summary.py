@@ -10,6 +10,7 @@ from dsl_app.results.page import ResultsPage
 from dsl_app.results.state import ResultsState
 from dsl_app.results.summary import Content, effects_text, summarise
 from dsl_app.results.welcome import Welcome
+from dsl_app.shared.evented import Value
 from dsl_app.shared.settings import RecentFiles, Settings
 from dsl_app.shared.undo import UndoStack
 from dsl_app.shared.widgets.help_window import help_of
@@ -51,7 +52,7 @@ def test_nothing_is_said_where_nothing_is_known(attributes: dict[str, object]) -
 def make_page(qtbot: QtBot) -> ResultsPage:
     state, runner = ResultsState(), InlineRunner()
     control = ResultsController(state, runner, RecordingNotifier(), UndoStack())
-    welcome = Welcome(RecentFiles(Settings()), lambda _: None, lambda: None)
+    welcome = Welcome(RecentFiles(Settings()), lambda _: None, lambda: None, Value(False))
     page = ResultsPage(state, control, runner, welcome)
     qtbot.addWidget(page)
     return page
@@ -66,6 +67,17 @@ def test_the_results_page_says_which_effects_a_scan_had(qtbot: QtBot, tmp_path: 
     assert "left out specular" in page.about.toolTip()
     assert help_of(page.pixel_info) == "hard-cases"
     page.release()
+
+
+def test_a_person_who_waits_for_a_result_is_told_so(qtbot: QtBot) -> None:
+    awaited = Value(True)
+    welcome = Welcome(RecentFiles(Settings()), lambda _: None, lambda: None, awaited)
+    qtbot.addWidget(welcome)
+    assert welcome.title.text() == "A result is being computed"
+    assert welcome.choose.property("role") == ""
+    awaited.set(False)
+    assert welcome.title.text() == "No result is open"
+    assert welcome.choose.property("role") == "primary"
 
 
 def result(**attributes: object) -> ResultArrays:

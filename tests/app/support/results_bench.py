@@ -10,6 +10,7 @@ from dsl_app.results.controller import ResultsController
 from dsl_app.results.page import ResultsPage
 from dsl_app.results.state import Mark, ResultsState
 from dsl_app.results.welcome import Welcome
+from dsl_app.shared.evented import Value
 from dsl_app.shared.spectrum import Pixel
 from dsl_app.shared.widgets.deferred import Deferred
 from dsl_app.shared.widgets.page import PageWidget
@@ -51,7 +52,9 @@ class Bench:
     def _make(self) -> PageWidget:
         window, runner = self.window, InlineRunner(self.window.toasts)
         self.control = ResultsController(self.state, runner, window.toasts, window.parts.undo)
-        welcome = Welcome(window.parts.recent, window.open_path, lambda: self.asked.append("demo"))
+        welcome = Welcome(
+            window.parts.recent, window.open_path, lambda: self.asked.append("demo"), Value(False)
+        )
         self.page = ResultsPage(self.state, self.control, runner, welcome)
         self.page.apply_theme(window.theme)
         return self.page
