@@ -15,7 +15,8 @@ from dsl_core.model.plan import Shot, describe_shot
 #: Where several rivals won, the picture before is blamed if its votes are nearly as many (their mean), and
 #: another place of the same line only if its are more.
 NEARLY = 0.3
-#: Where a line lights so few pixels, most may see an edge, and vote for nothing.
+#: Where a line lights so few pixels, most may see an edge, and vote for nothing; or those of a coarse picture
+#: see some columns each, and so its line and the next. Another picture then tells whether it was late.
 FEW_VOTES = 60
 
 
@@ -38,7 +39,8 @@ def decide(
         return Finding(shot, Verdict.EXPOSURE, (shot,), f"{ratio:.2g} times what was expected")
     if lost:
         shown = name()
-        if shown == shot and all(each.count < FEW_VOTES and each.mean > -NEARLY for each in lost.values()):
+        is_even = all(each.count < FEW_VOTES and each.mean > -NEARLY for each in lost.values())
+        if is_even and shown is not None and abs(shown.index - shot.index) <= 1:
             return Finding(shot, Verdict.UNTOLD, is_doubtful=True)
         return named(shot, lost, shown)
     if any(contest.is_torn for contest in told.values()):

@@ -104,7 +104,9 @@ def test_without_it_the_rival_that_won_most_does_and_late_before_all_that_are_ne
     ("lost", "shown", "verdict"),
     [
         (Contest(16, 0.1), LINE, Verdict.UNTOLD),
-        (Contest(16, 0.1), SHOTS[14], Verdict.SWAPPED),
+        (Contest(16, -0.25), SHOTS[LINE.index + 1], Verdict.UNTOLD),
+        (Contest(16, -0.5), SHOTS[LINE.index + 1], Verdict.SWAPPED),
+        (Contest(16, 0.1), SHOTS[LINE.index + 2], Verdict.OTHER),
         (Contest(16, 0.1), None, Verdict.SWAPPED),
         (Contest(16, -0.5), LINE, Verdict.SWAPPED),
         (Contest(100, 0.1), LINE, Verdict.SWAPPED),
