@@ -173,7 +173,11 @@ def test_pictures_reach_the_projector(qtbot: QtBot, bench: Bench) -> None:
     devices = state.devices.value
     assert devices is not None
     world = devices.projector.world  # type: ignore[attr-defined]
-    qtbot.waitUntil(lambda: world.image[0, 99:106, 0].tolist() == [0, 204, 204, 204, 204, 204, 0])
+
+    def shown() -> list[int]:
+        return [] if world.image is None else world.image[0, 99:106, 0].tolist()
+
+    qtbot.waitUntil(lambda: shown() == [0, 204, 204, 204, 204, 204, 0])
 
 
 def test_the_line_wanders_and_stops(qtbot: QtBot, bench: Bench) -> None:
