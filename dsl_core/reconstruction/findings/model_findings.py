@@ -135,16 +135,14 @@ def _colour_gains(probe: Probe, displaced: bool) -> Iterator[FitFinding]:
     gains = probe.colour_gains
     if gains is None:
         return
-    of_green = matters(*gains.green, MOST_COLOUR_GAIN)
-    colour, other = ("green", "red and blue") if of_green else ("blue", "red")
-    value, std = gains.green if of_green else gains.apart
+    value, std = gains.apart
     found = FitFinding.judged(
         "curves",
-        f"gains of the camera's colours, {colour} from {other}",
+        "gains of the camera's colours, blue from red",
         (value, std),
         "1",
         MOST_COLOUR_GAIN,
-        f"Against {other}, the camera weighs {colour} by {value:+.1%} ± {std:.1%} otherwise than when it was"
+        f"Against red, the camera weighs blue by {value:+.1%} ± {std:.1%} otherwise than when it was"
         " calibrated: spectra are off by about as much.",
         "Switch off automatic white balance, set the gains of the camera's colours as they were, and scan"
         " again; or calibrate its response again.",
