@@ -18,6 +18,11 @@ Floats = NDArray[np.float64]
 STEPS, FURTHEST_PX = 4, 2.5
 #: After a step as short as this, the next one would change nothing that matters, px.
 SHORT_PX = 0.02
+#: Pixels with less than this share of the greatest weight are clipped; tiles whose gradients are all noise
+#: keep this share of their energy.
+CLIPPED, NO_STRUCTURE = 1e-6, 1e-6
+#: What the noise of a pixel seems to tell of a shift: a quarter, and a fifth more, as sums of many scatter.
+OF_NOISE = 0.3
 
 
 @dataclass(frozen=True)
@@ -94,7 +99,8 @@ def _one_tile(
         shift = shift + step
         if np.hypot(*(shift - common)) > FURTHEST_PX or np.hypot(*step) < SHORT_PX:
             break
-    std = np.sqrt(np.diag(covariance)[:2]) / gain
+    std = np.sqrt(np.diag(covariance)[:2])
+    std = std / gain / _share_of_structure(1 / std**2, weight)
     left = seen - design @ values
     size = float(np.mean(np.abs(moved * gain))) + 1e-12
     change = np.sqrt(max(float(np.mean(left**2)) - float(np.mean(variance[part])), 0.0)) / size
@@ -106,6 +112,16 @@ def _one_tile(
         unmoved, moved_by = (_chi_square(old, seen, weight, part, by) for by in (np.zeros(2), shift))
         better = max(unmoved - moved_by, 0.0)
     return shift[0], shift[1], std[0], std[1], change, gain, better
+
+
+def _share_of_structure(information: Floats, weight: Floats) -> Floats:
+    """Root of the share of what gradients tell of a shift (2,) that is not noise, hardly any if all may be.
+
+    Half of the variance that pixels are weighted with is that of the old picture, whose noise has a gradient
+    of half of that: a quarter for each pixel, which tells nothing of a shift.
+    """
+    noise = OF_NOISE * np.count_nonzero(weight > CLIPPED * weight.max())
+    return np.asarray(np.sqrt(np.maximum(1 - noise / information, NO_STRUCTURE)))
 
 
 def _chi_square(old: Floats, seen: Floats, weight: Floats, part: tuple[slice, slice], shift: Floats) -> float:

@@ -44,6 +44,14 @@ def test_a_part_that_moves_is_found_there(scene: np.ndarray) -> None:
     assert np.delete(got.length.ravel(), 0).max() < 0.15
 
 
+def test_the_gradients_of_noise_tell_nothing() -> None:
+    fading = np.tile(np.linspace(150.0, 300.0, 300), (200, 1))
+    for seed in range(5):
+        got = found(fading, fading, seed)
+        assert got.y_std.min() > 0.1, "nothing but noise changes down the picture"
+        assert got.sigmas.max() < 6
+
+
 def test_an_empty_picture_tells_nothing() -> None:
     flat = np.full((48, 72), 100.0)
     got = tile_shifts(flat, flat, np.ones_like(flat), (2, 3))
