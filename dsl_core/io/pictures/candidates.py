@@ -82,7 +82,7 @@ def _without_strays(files: Sequence[Path], groups: Collection[Sequence[Path]]) -
     """Files without one whose name stands alone, as white and black may, too, and without all of these."""
     alone = [group[0] for group in groups if len(group) == 1]
     if 1 < len(alone) <= MOST_ALONE and len(files) <= MOST:
-        # What lies beside a code mostly sorts after it.
+        # A photograph of the set-up mostly has a name that comes after those of a code.
         yield from ([path for path in files if path != stray] for stray in reversed(alone))
     rest = [path for path in files if path not in alone]
     if alone and 0 < len(rest) <= MOST:
