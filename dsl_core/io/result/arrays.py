@@ -33,6 +33,11 @@ PACKINGS = {
 INTEGERS: dict[str, type[np.unsignedinteger[Any]]] = {"flags": np.uint16, "reach": np.uint8}
 
 
+#: Chunks that hold only the fill value are written as well: a result that lacks a chunk is damaged, and looking
+#: for them costs more. It is no property of an array, but of whoever opens one to write.
+EMPTY_TOO = {"array.write_empty_chunks": True}
+
+
 def write_variable(group: zarr.Group, name: str, variable: xr.Variable) -> None:
     """Store a whole variable as an array of a group."""
     values: NDArray[Any] = np.asarray(variable.values)
@@ -67,7 +72,6 @@ def new_array(
         compressors=[BloscCodec(cname="zstd", clevel=1, shuffle="bitshuffle"), Crc32cCodec()],
         dimension_names=[str(d) for d in like.dims],
         attributes={**{str(k): plain(v) for k, v in like.attrs.items()}, **encoding},
-        # Looking for chunks that hold only the fill value costs more than writing them.
         config={"write_empty_chunks": True},
     )
 

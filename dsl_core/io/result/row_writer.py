@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from dsl_core.io.atomic import PARTIAL_SUFFIX, make_folder, make_safe, store_error, write_atomic
 from dsl_core.io.reading import read_bounded
-from dsl_core.io.result.arrays import PACKINGS, encoded, fits, new_array, stored_as, write_variable
+from dsl_core.io.result.arrays import EMPTY_TOO, PACKINGS, encoded, fits, new_array, stored_as, write_variable
 from dsl_core.io.result.result_file import RESULT_FOLDER, labels_of, opened, seal_folder
 from dsl_core.io.scan.lock import FolderLock
 from dsl_core.io.staging import check_targets, staged
@@ -98,7 +98,7 @@ class RowWriter:
     def put(self, rows: slice, maps: Maps, note: str) -> None:
         """Write the maps (..., rows, columns) of a band of rows; raises `StoreError`."""
         part = build_result(dict(maps), self._nm, {})
-        with self._writing():
+        with self._writing(), zarr.config.set(EMPTY_TOO):
             group = self._group()
             for name in maps:
                 self._write(group, name, part[name].variable, rows)

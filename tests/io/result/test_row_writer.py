@@ -60,6 +60,16 @@ def write(
     return load_result(target, lazy=False)
 
 
+def test_rows_may_hold_nothing_but_zeros(tmp_path: Path) -> None:
+    """As flags of a clean surface do; a store of chunks may leave out those that hold its fill value."""
+    given = maps()
+    for name in ("flags", "reach", "depth_mm", "reflectance"):
+        given[name][..., BANDS[1], :] = 0
+    found = write(tmp_path / "rows.zarr", given)
+    np.testing.assert_array_equal(found["flags"], given["flags"])
+    np.testing.assert_allclose(found["reflectance"], given["reflectance"], atol=3e-5)
+
+
 @pytest.mark.parametrize("highest", [1.2, 4.0])
 def test_rows_make_the_result_that_is_saved_at_once(tmp_path: Path, highest: float) -> None:
     given = maps(highest)
