@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from dsl_core.capture import metering
+from dsl_core.capture.again import Again
 from dsl_core.capture.preflight import fit_plan, require_possible
 from dsl_core.capture.proof.report import SeenFrames
 from dsl_core.capture.proof.report import prove as prove_frames
@@ -69,12 +70,14 @@ def open_scan(
     watch: Watch | None = None,
     prove: bool = True,
     waits: bool = False,
+    again: Again = Again.SCAN,
 ) -> Iterator[Runner]:
     """A runner over a scan's folder, for callers that pause, cancel or listen; ``watch`` sees every frame.
 
     An interrupted scan resumes at its next missing frame. Pictures that do not show their pattern are
     captured again, unless ``prove`` is off, as for cameras that can only repeat what they gave before. When
     sentinels show that something moved, the scan pauses if it ``waits`` for a person, and ends otherwise.
+    What to do after that is advised in the words of what it is captured for (``again``).
     """
     require_possible(rig, plan)
     with ScanWriter.open(folder, plan, rig, notes) as writer:
@@ -85,7 +88,7 @@ def open_scan(
         runner = Runner(
             rig, plan, sink, pattern_image, progress=progress, token=token, stored=stored, waits=waits,
             proof=watches.proof, sentinels=watches.sentinels, exposure=watches.exposure,
-            is_proven=known is not None and read_proof(stored, known) is not None,
+            is_proven=known is not None and read_proof(stored, known) is not None, again=again,
         )  # fmt: skip
         yield runner
         if watches.seen is not None and runner.status.state is State.FINISHED:
@@ -118,9 +121,10 @@ def scan(
     progress: Progress | None = None,
     notes: dict[str, str] | None = None,
     prove: bool = True,
+    again: Again = Again.SCAN,
 ) -> Status:
     """Capture a plan into a folder; an interrupted scan resumes at its next missing frame."""
-    with open_scan(rig, plan, folder, progress, notes, prove=prove) as runner:
+    with open_scan(rig, plan, folder, progress, notes, prove=prove, again=again) as runner:
         return runner.run()
 
 

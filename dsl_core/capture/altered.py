@@ -95,7 +95,7 @@ def _turned(before: Mosaic, now: Mosaic, sensor: Sensor) -> str:
         if apart < SAME_SIGMAS and apart < NEARER * usual:
             return (
                 f"The camera's picture is {how}, and was not when the scan began. Switch mirroring and"
-                " turning off in the settings of the camera, and resume the scan."
+                " turning off in the settings of the camera."
             )
     return ""
 
@@ -131,7 +131,7 @@ def _begun_elsewhere(before: Pictures, now: Pictures) -> str:
     return (
         "The camera's pixels see other colours than when the scan began, as where its picture begins one"
         f" {what} later: its region of interest or its format (order of the colours) was changed. Set both as"
-        " they were, and resume the scan."
+        " they were."
     )
 
 
@@ -148,13 +148,12 @@ def _dark_rows(before: Pictures, now: Pictures, sensor: Sensor) -> str:
         return (
             f"{count} rows of the picture no longer have any light of the projector, the first of them is row"
             f" {first}, and their pixels work: the projector leaves a part of its picture dark (another"
-            " window or size, a failed part), or something stands in its way. Set its picture as it was,"
-            " clear the way, and resume the scan."
+            " window or size, a failed part), or something stands in its way. Set its picture as it was"
+            " and clear the way."
         )
     return (
         f"{count} rows of the picture no longer have any light, the first of them is row {first}: rows of"
-        " the sensor failed, or their packets are lost. Check cable and driver of the camera, and resume the"
-        " scan."
+        " the sensor failed, or their packets are lost. Check cable and driver of the camera."
     )
 
 
@@ -185,8 +184,7 @@ def _limit_of(before: Mosaic, now: Mosaic, sensor: Sensor) -> tuple[int, float] 
 def _said_of_limit(where: str, most: int, share: float) -> str:
     return (
         f"No pixel of white{where} has more than {most} DN, and {share:.0%} have just that: the camera"
-        " saturates below its full scale. Set gain, bit depth and limits of its driver as they were, and"
-        " resume the scan."
+        " saturates below its full scale. Set gain, bit depth and limits of its driver as they were."
     )
 
 
@@ -212,7 +210,7 @@ def _curved(before: Pictures, now: Pictures, sensor: Sensor) -> str:
     return (
         f"White follows the light of when the scan began by a power of {float(np.mean(powers)):.2f}: gamma,"
         " tone mapping or high dynamic range of the camera was switched on, or its black level changed. Set"
-        " it to values that are proportional to light, and resume the scan."
+        " it to values that are proportional to light."
     )
 
 
@@ -247,7 +245,7 @@ def _mixed(before: Pictures, now: Pictures, sensor: Sensor) -> str:
     return (
         f"Black, captured after white, holds {share:.2f} times the light of white: pictures are mixed with"
         " those before them (noise reduction over time, frames that are blended, afterglow). Switch that off"
-        " in camera, projector and computer, and resume the scan."
+        " in camera, projector and computer."
     )
 
 
@@ -274,8 +272,7 @@ def _banded(before: Pictures, now: Pictures) -> str:
     return (
         f"Whole rows of white have other light than when the scan began, by {100 * spread:.0f} % up and down:"
         " the light flickers, as that of the mains or of pulsed LEDs does, while the camera exposes one row"
-        " after the other. Expose for whole periods of the light, keep lamps of the room off, and resume the"
-        " scan."
+        " after the other. Expose for whole periods of the light and keep lamps of the room off."
     )
 
 
@@ -288,8 +285,7 @@ def _coarser(before: Pictures, now: Pictures) -> str:
     step = max(round(span[1] / max(new.size - 1, 1)), 1)
     return (
         f"Values of the camera come in steps of about {step} DN, and did not when the scan began: it delivers"
-        " less bits, or compresses its pictures. Set its pixel format to raw values of all bits, and resume"
-        " the scan."
+        " less bits, or compresses its pictures. Set its pixel format to raw values of all bits."
     )
 
 
@@ -304,13 +300,13 @@ def _filtered(before: Pictures, now: Pictures, sensor: Sensor) -> str:
     if all(int((lit & beyond).sum()) > fewest for beyond in (code > white + limit, code < black - limit)):
         return (
             "Edges of the pattern are darker than black or brighter than white: camera or projector sharpens"
-            " its picture. Switch sharpening and edge enhancement off, and resume the scan."
+            " its picture. Switch sharpening and edge enhancement off."
         )
     shares = _noise_shares(before[1], now[1], sensor)
     if max(shares) < CALMER:
         return (
             f"Black has {max(shares):.1f} times the noise that it had when the scan began: the camera filters"
-            " its pictures (noise reduction, median, compression). Switch that off, and resume the scan."
+            " its pictures (noise reduction, median, compression). Switch that off."
         )
     return ""
 
@@ -330,7 +326,7 @@ def _noisier(before: Pictures, now: Pictures, sensor: Sensor) -> str:
     return (
         f"Black has {share:.1f} times the noise that it had when the scan began, and white has the same"
         " light: gain of the camera was raised and its exposure shortened, or something disturbs its"
-        " electronics. Switch automatic exposure and gain off, and resume the scan."
+        " electronics. Switch automatic exposure and gain off."
     )
 
 

@@ -24,7 +24,7 @@ def alteration_of(source: FrameSource, sensor: Sensor | None = None, missing: It
     found = alteration(before, (now[0], now[1], now[2]), sensor or Sensor())
     if not found:
         return ""
-    return f"By frame {last['white'].number}: {found.replace('resume the scan', 'scan again')}"
+    return f"By frame {last['white'].number}: {found} Then scan again."
 
 
 _ROLES: tuple[Role, ...] = ("white", "black", "code")

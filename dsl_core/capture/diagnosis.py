@@ -54,7 +54,7 @@ SHADED, FEWEST_SHADED, ELSEWHERE, GAINED = 0.7, 2, 0.06, 0.15
 LIT_UP = 1.3
 _CAME_IN = (
     "something came into the projected picture (a message, a window, the mouse pointer), or a lamp into view."
-    " Take it away, close other programs, and resume the scan."
+    " Take it away and close other programs."
 )
 #: Stripes of the code are out of focus with less than this share of the contrast (squared) they had, and the
 #: light they had but for so much of white's.
@@ -168,8 +168,7 @@ def what_changed(before: References, now: References, sensor: Sensor) -> Explana
     if _is_black_bright(before, now, sensor):
         return Explanation(
             "Black saturates in most of the picture, and did not when the scan began: the projector or its"
-            " computer inverts pictures, or another lamp shines on the scene. Set them as they were, and"
-            " resume the scan."
+            " computer inverts pictures, or another lamp shines on the scene. Set them as they were."
         )
     light = _lights(before, now, sensor)
     if light is None:
@@ -177,7 +176,7 @@ def what_changed(before: References, now: References, sensor: Sensor) -> Explana
     if light.factor < NO_LIGHT:
         return Explanation(
             "White and black now look the same: the projector gives no light, something covers it or the"
-            " lens, or the camera repeats a picture. Check projector and camera, and resume the scan."
+            " lens, or the camera repeats a picture. Check projector and camera."
         )
     appeared = _appeared(before, now, sensor)
     if appeared:
@@ -244,7 +243,7 @@ def _of_light_or_motion(
     if is_soft:
         found.append(
             "Stripes of the code are softer than when the scan began: projector or camera is out of focus, or"
-            " something came onto a lens. Set the focus as it was, and resume the scan."
+            " something came onto a lens. Set the focus as it was."
         )
     elif moved is not None and not is_uneven:
         # Other colours look like motion where surfaces have colours.
@@ -254,7 +253,7 @@ def _of_light_or_motion(
         return Explanation(
             "White and black look as they did, and a frame of the code does not: the projector or its"
             " computer shows pictures elsewhere or in another size, or other pictures. Set mirroring,"
-            " scaling, keystone and refresh rate as they were, and resume the scan.",
+            " scaling, keystone and refresh rate as they were.",
             has_moved=True,
         )
     is_of_all = is_uneven or (moved is None and light.is_other and not by_place)
@@ -269,12 +268,12 @@ def _said_of_colours(colours: tuple[float, ...]) -> str:
     if lost and others and max(abs(share - 1) for share in others) < LEAST_LIGHT:
         advice = (
             f"Look whether the projector still shines in {' and '.join(lost)}, and whether camera and"
-            " cables pass it on, and resume the scan."
+            " cables pass it on."
         )
     else:
         advice = (
             "Switch white balance of the camera and night mode of the projector and of its computer off,"
-            " check the projector's colours and that the film is where it was, and resume the scan."
+            " and check the projector's colours and that the film is where it was."
         )
     return (
         f"The light of white is {red:.2f} times what it was when the scan began in red, {green:.2f} times"
@@ -290,7 +289,7 @@ def _said_of_light(light: _Lights) -> str:
     what = "exposure or gain of the camera" if is_exposure else "light of the projector or the exposure"
     return (
         f"The {what} is {light.factor:.2f} times what it was when the scan began. Switch automatic exposure"
-        " and gain of the camera off, check the lamp, and resume the scan."
+        " and gain of the camera off, and check the lamp."
     )
 
 
@@ -301,8 +300,7 @@ def _said_of_room(light: _Lights) -> str:
         return ""
     return (
         f"The light of the room has changed: without the projector the picture is at {now:.0f} DN above its"
-        f" black level, and was at {before:.0f} DN when the scan began. Keep the room as it was, and resume"
-        " the scan."
+        f" black level, and was at {before:.0f} DN when the scan began. Keep the room as it was."
     )
 
 
@@ -322,7 +320,7 @@ def _said_of_places(tiles: NDArray[np.float64], light: float) -> str:
     return (
         f"The light of white is {low:.2f} times what it was when the scan began in some parts of the picture"
         f" and {high:.2f} times in others: moisture, haze or dust came before a lens, the film or the target,"
-        " or a lamp of the room or the projector moved. Clear the way of the light, and resume the scan."
+        " or a lamp of the room or the projector moved. Clear the way of the light."
     )
 
 
@@ -359,8 +357,7 @@ def _shaded(tiles: NDArray[np.float64], shape: tuple[int, ...]) -> str:
         return ""
     return (
         f"White has lost light in {_place_of(lost, shape)}, and not elsewhere: something"
-        " stands in the way of projector, camera or lamps, or something came onto a lens. Take it away, and"
-        " resume the scan."
+        " stands in the way of projector, camera or lamps, or something came onto a lens. Take it away."
     )
 
 

@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from dsl_core.capture.again import Again
 from dsl_core.capture.frame_order import FrameOrder, StaleFrameError
 from dsl_core.devices.base import DeviceRig
 from dsl_core.devices.plausible import require_exposure, require_mosaic
@@ -48,17 +49,18 @@ class ShotTaker:
         policy: RetryPolicy,
         token: CancelToken | None = None,
         now: Callable[[], float] = time.time,
+        again: Again = Again.SCAN,
     ) -> None:
         """Keep the parts; nothing is sent to the devices yet. A cancelled ``token`` ends further attempts.
 
-        ``now`` gives the time of day, s, that is noted when a pattern was shown.
+        ``now`` gives the time of day, s, that is noted when a pattern was shown; errors advise ``again``.
         """
         self._rig = rig
         self._plan = plan
         self._pattern_image = pattern_image
         self._policy = policy
         self._token = token or CancelToken()
-        self._sleep, self._now = rig.sleep or time.sleep, now
+        self._sleep, self._now, self._again = rig.sleep or time.sleep, now, again
         self._order = FrameOrder(time.monotonic if rig.sleep is None else None)
         self._shown_s = 0.0
         self._shown: tuple[object, ...] | None = None
@@ -95,7 +97,7 @@ class ShotTaker:
         if len(twins) < 2:
             raise DeviceError(
                 f"For {describe_shot(shot)}, the camera delivered the picture of the previous shot."
-                " Check that the projector responds and restart the camera, then resume the scan."
+                f" Check that the projector responds and restart the camera. {self._again.then}"
             )
         if not self._noiseless:
             _log.warning("the camera gives one picture for different patterns; assumed to be free of noise")
@@ -147,7 +149,7 @@ class ShotTaker:
         if attempt + 1 >= self._policy.attempts:
             raise DeviceError(
                 f"{describe_shot(shot).capitalize()} failed {attempt + 1} times: {ended(str(error))}"
-                " Resume the scan when the device works again."
+                f" {self._again.capitalize()} when the device works again."
             ) from error
         _log.warning("%s, attempt %d: %s", describe_shot(shot), attempt + 1, error)
         self._order.interrupted()

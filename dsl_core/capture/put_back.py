@@ -17,11 +17,8 @@ from dsl_core.capture.sentinels import SentinelWatch
 from dsl_core.model.frames import FrameSink
 from dsl_core.model.plan import CapturePlan, Shot
 
-#: What a person can do about a motion while the scan can still be completed.
-ADVICE = (
-    "Put back what moved and resume the scan: what was captured since then is captured again. If it cannot be"
-    " put back, start a new scan."
-)
+#: What a person can do about a motion while the capture can still be completed.
+ADVICE = "Put back what moved, or start from the beginning if that is impossible."
 
 
 class PutBack:

@@ -13,6 +13,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from enum import StrEnum
 
+from dsl_core.capture.again import Again
 from dsl_core.capture.diagnosis import Diagnosis
 from dsl_core.capture.exposure import PatternImage, RetryPolicy, ShotTaker
 from dsl_core.capture.overexposure import ExposureWatch
@@ -74,7 +75,6 @@ _log = logging.getLogger(__name__)
 _COMPLETIONS = 2
 #: So often in a run, what moved may be put back; a rig that never keeps still does not scan for ever.
 _PUT_BACKS = 5
-_ALL_THE_SAME = "To continue all the same, resume the scan without checking that the scene has not moved."
 
 
 class Runner:
@@ -100,6 +100,7 @@ class Runner:
         exposure: ExposureWatch | None = None,
         waits: bool = False,
         is_proven: bool = False,
+        again: Again = Again.SCAN,
     ) -> None:
         """Keep the parts; ``clock`` gives seconds and only serves the estimate of the remaining time.
 
@@ -107,16 +108,16 @@ class Runner:
         has the frames of earlier runs, from which it learns. When ``sentinels``, which see the frames of the
         sink, find that something moved, the scan pauses if it ``waits``, and ends otherwise. ``exposure``
         sees them, too; what it finds is only told. What is stored ``is_proven`` when a run before this one
-        has kept what all of its frames show.
+        has kept what all of its frames show. Errors advise ``again``.
         """
         self._rig = rig
         self._plan = plan
         self._sink = sink
         self._token = token or CancelToken()
-        self._taker = ShotTaker(rig, plan, pattern_image, policy or RetryPolicy(), self._token)
+        self._taker = ShotTaker(rig, plan, pattern_image, policy or RetryPolicy(), self._token, again=again)
         sensor = rig.calibration.sensor if rig.calibration else Sensor()
         self._shots = ProvenShots(
-            self._taker, proof, Diagnosis(plan, sensor), sink, self._token, rig.only_repeats
+            self._taker, proof, Diagnosis(plan, sensor), sink, self._token, rig.only_repeats, again
         )
         self._stored = stored
         self._progress = progress or NoProgress()
@@ -128,6 +129,7 @@ class Runner:
         self._condition = threading.Condition()
         self._pause_requested = False
         self._put_backs = 0
+        self._again = again
 
     @property
     def status(self) -> Status:
@@ -179,7 +181,7 @@ class Runner:
         except (Cancelled, KeyboardInterrupt) as error:
             self._end(
                 State.CANCELLED,
-                str(error) or "Interrupted; saved frames are kept. Resume the scan.",
+                str(error) or f"Interrupted; saved frames are kept. {self._again.sentence}",
             )
             raise
         except DslError as error:
@@ -224,8 +226,8 @@ class Runner:
             self._set(State.RUNNING, warning=f"{moved.sentence} {moved.advice}")
             return
         if not self._waits:
-            raise DriftError(f"{moved.sentence} {ADVICE} {_ALL_THE_SAME}")
-        self._set(State.RUNNING, warning=f"{moved.sentence} {ADVICE}")
+            raise DriftError(f"{moved.sentence} {self._put_it_back}")
+        self._set(State.RUNNING, warning=f"{moved.sentence} {ADVICE} {self._again.then}")
         self.pause()
 
     def _require_place(self, missing: list[Shot]) -> None:
@@ -239,10 +241,16 @@ class Runner:
             )
         elif missing:
             raise DriftError(
-                f"{moved.sentence} Not all is back in its place: {away.sentence} {ADVICE} {_ALL_THE_SAME}"
+                f"{moved.sentence} Not all is back in its place: {away.sentence} {self._put_it_back}"
             )
         else:
             self._set(State.CHECKING, warning=f"{moved.sentence} {moved.advice}")
+
+    @property
+    def _put_it_back(self) -> str:
+        """What to do about a motion that ended a run."""
+        again = f"{self._again.then} What was captured since then is captured again."
+        return f"{ADVICE} {again} {self._again.unchecked}".rstrip()
 
     def _is_back(self) -> bool:
         """Whether what moved was put back during a pause, so that all since then is captured again."""
@@ -272,7 +280,7 @@ class Runner:
             raise StoreError(
                 f"{len(lost)} of {self._plan.shot_count} frames are lost or damaged whenever they are read"
                 f" back, the first is {describe_shot(lost[0])}. Check the drive, and that no other program"
-                " changes the folder; then resume the scan."
+                f" changes the folder. {self._again.then}"
             )
 
     def _between_shots(self, shot: Shot, done: int) -> bool:
@@ -289,7 +297,8 @@ class Runner:
         if self._token.is_cancelled:
             self._set(State.CANCELLING, shot=shot, done=done)
             raise Cancelled(
-                f"Cancelled after {done} of {self._plan.shot_count} frames; they are saved. Resume the scan."
+                f"Cancelled after {done} of {self._plan.shot_count} frames; they are saved."
+                f" {self._again.sentence}"
             )
         return was_paused
 

@@ -151,7 +151,7 @@ class GrayDecoder:
         if self.missing_pairs:
             raise DecodeError(
                 f"The binary code is incomplete: {self._pairs} of {sum(self._bits)} pattern pairs were given."
-                " Capture the missing frames (resume the scan)."
+                " Capture the missing frames."
             )
         decided = (self._margin >= min_margin) & (self._margin > 0)
         if self._margin_sigmas is not None:

@@ -16,7 +16,7 @@ from typing import Any, Generic, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from dsl_core.campaign.common.step_words import step_words
+from dsl_core.capture.again import Again
 from dsl_core.devices.base import DeviceRig
 from dsl_core.errors import CalibrationError, Cancelled, DslError, StoreError
 from dsl_core.io import MANIFEST_NAME
@@ -91,8 +91,7 @@ class Bench:
         else:
             plan = pipeline.fit_plan(make_plan(), self.devices)
             make_folder(folder)
-        with step_words():
-            pipeline.scan(self.devices, plan, folder / SCAN_NAME, progress)
+        pipeline.scan(self.devices, plan, folder / SCAN_NAME, progress, again=Again.STEP)
         return plan
 
     def keep(self, step: Step, name: str, record: Record) -> None:

@@ -11,6 +11,7 @@ from typing import NoReturn
 import numpy as np
 from numpy.typing import NDArray
 
+from dsl_core.capture.again import Again
 from dsl_core.capture.diagnosis import Diagnosis, Explanation
 from dsl_core.capture.exposure import ShotTaker
 from dsl_core.capture.proof.finding import Finding, Light, Verdict
@@ -57,13 +58,14 @@ class ProvenShots:
         sink: FrameSink,
         token: CancelToken,
         only_repeats: bool = False,
+        again: Again = Again.SCAN,
     ) -> None:
         """Keep the parts; the ``diagnosis`` says why pictures are wrong that stay so.
 
-        Rigs that ``only_repeats`` cannot show what the plan has not.
+        Rigs that ``only_repeats`` cannot show what the plan has not. Errors advise ``again``.
         """
         self._taker, self._proof, self._sink, self._token = taker, proof, sink, token
-        self._diagnosis, self._only_repeats = diagnosis, only_repeats
+        self._diagnosis, self._only_repeats, self._next_step = diagnosis, only_repeats, again
         self._failures = 0
         self._unlike_at = 0
         self._is_late = self._is_in_part = self._has_late_colour = False
@@ -268,7 +270,9 @@ class ProvenShots:
             if not found.is_wrong:
                 return
             if self._token.is_cancelled:
-                raise Cancelled(f"Cancelled: {found.sentence} Frames that do are saved. Resume the scan.")
+                raise Cancelled(
+                    f"Cancelled: {found.sentence} Frames that do are saved. {self._next_step.sentence}"
+                )
             _log.warning("%s It is captured again.", found.sentence)
             reason, wrong = found.seen, found.again
             taken: list[tuple[Shot, Frame, Finding]] = []
@@ -287,8 +291,8 @@ class ProvenShots:
             change = self._explain()
             raise PictureError(
                 f"{found.names.capitalize()} does not show its pattern after {len(SETTLE_MS) + 1} exposures:"
-                f" {found.seen}. {what_to_do(found, change, proof)} Frames before it are saved. If the"
-                " pictures are right all the same, resume without checking that the scene has not moved.",
+                f" {found.seen}. {what_to_do(found, change, proof)} {self._next_step.then} Frames before it"
+                f" are saved. {self._next_step.unchecked}".rstrip(),
                 found.again,
                 has_changed=change.has_moved or (not change.sentence and found.verdict in CREEPING),
             )
@@ -333,7 +337,7 @@ class ProvenShots:
             reason = reason or why_control_differs(proof.scene.shows_mirrored(control, frame.pixels))
             raise PictureError(
                 f"{describe_shot(control).capitalize()}, captured once more as a control, no longer shows its"
-                f" pattern. {reason} Frames before are saved.",
+                f" pattern. {reason} {self._next_step.then} Frames before are saved.",
                 has_changed=True,
             )
         self._doubted.settle_recent()
@@ -385,7 +389,8 @@ class ProvenShots:
         raise PictureError(
             f"{describe_shot(first).capitalize()}, captured once more, is displaced from where it was:"
             " projector, camera or target moved while the code was captured, or the projector corrects or"
-            f" scales its picture. {self._explain().sentence or ADVICE} Frame {first.number} is kept.",
+            f" scales its picture. {self._explain().sentence or ADVICE} {self._next_step.then} Frame"
+            f" {first.number} is kept.",
             tuple(proof.scene.code_after(first)),
             has_changed=True,
         )
@@ -411,12 +416,12 @@ class ProvenShots:
             raise PictureError(f"{error}{known}", error.wrong) from error
         self._sink.withdraw(withdrawn)
         first, last = withdrawn[0].number, withdrawn[-1].number
-        which, them = f"{len(withdrawn)} frames between {first} and {last}", "them"
+        which, they = f"{len(withdrawn)} frames between {first} and {last}", "they"
         if len(withdrawn) == 1:
-            which, them = f"Frame {first}", "it"
+            which, they = f"Frame {first}", "it"
         raise PictureError(
-            f"{error} {which}, captured just before or not judged in full, may be wrong too; the resumed scan"
-            f" captures {them} again.{known}",
+            f"{error} {which}, captured just before or not judged in full, may be wrong too: {they} will be"
+            f" captured again.{known}",
             error.wrong,
         ) from error
 

@@ -12,8 +12,8 @@ from dsl_core.model.plan import Shot
 DIM = (Verdict.DARK, Verdict.EXPOSURE)
 _DIMMED = (
     "White, black and a frame of the code, captured once more, look as they did: the projector may give dark"
-    " pictures less light than bright ones. Switch its dynamic contrast, iris and eco mode off, check that"
-    " the exposure is long enough, and resume the scan."
+    " pictures less light than bright ones. Switch its dynamic contrast, iris and eco mode off, and check"
+    " that the exposure is long enough."
 )
 #: The same of the first pictures at a drive level of their own.
 _TONE = (
@@ -21,14 +21,13 @@ _TONE = (
     " share of its light at this drive level than its calibration says, the camera's values are not"
     " proportional to the light, or it exposes for longer or shorter than requested. Repeat the self-test,"
     " which measures how light follows the level, or use one level in all settings; or switch gamma,"
-    " automatic exposure and gain of the camera off, and resume the scan."
+    " automatic exposure and gain of the camera off."
 )
 #: The same of stripes of the code of which coarser ones show nothing wrong.
 _FINE = (
     "Coarser stripes of the code are right and these are not: the projector's picture is scaled (a resolution"
     " that is not its own, overscan, keystone) or sharpened, or something is out of focus or trembles. Send"
-    " the projector pictures of its own size, switch such corrections off, check the focus, and resume the"
-    " scan."
+    " the projector pictures of its own size, switch such corrections off, and check the focus."
 )
 
 
@@ -48,7 +47,7 @@ def what_to_do(found: Finding, change: Explanation, proof: FrameProof) -> str:
     """Why a picture stays wrong as far as that is known, and what to do about it."""
     if found.verdict is Verdict.HIDDEN and not change.is_of_all:
         # Who stands there is in the pictures that would say what has changed, too.
-        return f"{found.remedy} Resume the scan afterwards."
+        return found.remedy
     if change.is_as_at_first:
         if found.verdict in DIM and found.shot.role == "spectral":
             return _DIMMED
@@ -56,7 +55,7 @@ def what_to_do(found: Finding, change: Explanation, proof: FrameProof) -> str:
             return _TONE
     if not change.sentence and proof.are_finest(found.again):
         return _FINE
-    return change.sentence or f"{found.remedy} Resume the scan afterwards."
+    return change.sentence or found.remedy
 
 
 def why_control_differs(is_mirrored: bool) -> str:
@@ -67,9 +66,9 @@ def why_control_differs(is_mirrored: bool) -> str:
     if is_mirrored:
         return (
             "It is mirrored: the projector's picture is turned or mirrored, and was not when the scan began."
-            " Set projector and computer as they were, and resume the scan."
+            " Set projector and computer as they were."
         )
     return (
         "Projector, camera, light or target have changed since. Check that the projector follows, that no"
-        " automatic mode is on, and that nothing has moved, and resume the scan."
+        " automatic mode is on, and that nothing has moved."
     )

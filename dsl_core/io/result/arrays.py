@@ -33,8 +33,8 @@ PACKINGS = {
 INTEGERS: dict[str, type[np.unsignedinteger[Any]]] = {"flags": np.uint16, "reach": np.uint8}
 
 
-#: Chunks that hold only the fill value are written as well: a result that lacks a chunk is damaged, and looking
-#: for them costs more. It is no property of an array, but of whoever opens one to write.
+#: Chunks that hold only the fill value are written as well: a result that lacks a chunk is damaged, and a
+#: search for them costs more. This is not a property of an array but of whoever opens it to write.
 EMPTY_TOO = {"array.write_empty_chunks": True}
 
 

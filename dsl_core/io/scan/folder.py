@@ -288,7 +288,8 @@ class ScanWriter:
         """
         if not self.folder.is_dir():
             raise StoreError(
-                f"{self.folder} was moved or deleted while it was written. Put it back and resume the scan."
+                f"{self.folder} was moved or deleted while it was written. Put it back: what is missing is"
+                " then captured again."
             )
         restored = [
             name

@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
-from dsl_core import pipeline
 from dsl_core.campaign.common.recipe import Bench, Step, naming
 from dsl_core.campaign.common.white_shot import FilterNote, note_of_filter
-from dsl_core.capture.proven.wrong_pictures import PictureError
-from dsl_core.errors import CalibrationError, Cancelled, DecodeError, StoreError
+from dsl_core.errors import CalibrationError, Cancelled, DecodeError, DeviceError, StoreError
 from dsl_core.model.placement import Placement
 from dsl_core.model.plan import CapturePlan, Columns, NoCode, Setting
 from dsl_core.progress import NoProgress
+from tests.cases.faults import FaultPlan, with_faults
 from tests.cases.film_bench import film_bench
 
 STEP = Step("one", "Step one", "Place it.", Placement(target="spectralon"))
@@ -44,24 +44,17 @@ def test_a_scan_is_planned_once_and_complete_afterwards(bench: Bench) -> None:
     assert len(planned) == 1
 
 
-def test_a_step_that_fails_does_not_speak_of_a_scan(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_step_that_fails_does_not_speak_of_a_scan(bench: Bench) -> None:
     """Who calibrates has no scan to resume."""
-
-    def fails(*_: object) -> None:
-        raise PictureError("White is dim. Check the lamp, and resume the scan.", has_changed=True)
-
-    monkeypatch.setattr(pipeline, "scan", fails)
+    failing = replace(bench, devices=with_faults(bench.devices, FaultPlan(camera_gone_at=0)))
     levels = (((1.0,) * 3,) * bench.devices.projector.info.width_px,)
+    settings = (Setting(exposure_ms=5.0, level=1.0),)
     plan = CapturePlan(
-        name="one",
-        code=NoCode(),
-        spectral=Columns(levels=levels),
-        settings=(Setting(exposure_ms=5.0, level=1.0),),
-        code_settings=(0,),
+        name="one", code=NoCode(), spectral=Columns(levels=levels), settings=settings, code_settings=(0,)
     )
-    with pytest.raises(PictureError, match=r"lamp, and capture this step again\.$") as caught:
-        bench.scan(STEP, lambda: plan, NoProgress())
-    assert caught.value.has_changed
+    with pytest.raises(DeviceError, match="Capture this step again when the device works again") as caught:
+        failing.scan(STEP, lambda: plan, NoProgress())
+    assert "scan" not in str(caught.value).replace("scan line", "")
 
 
 def test_a_record_is_kept_next_to_the_scan(bench: Bench) -> None:

@@ -156,6 +156,6 @@ def test_sentinels_whose_pictures_were_altered_say_so_rather_than_that_something
     assert [
         each for each in said.wrong if f"By frame {last + 1}: Black, captured after white, holds 0." in each
     ]
-    assert said.wrong[-1].endswith("in camera, projector and computer, and scan again.")
+    assert said.wrong[-1].endswith("in camera, projector and computer. Then scan again.")
     assert not said.moved
     assert not prove(frames, SeenFrames(plan), missing=[last]).wrong

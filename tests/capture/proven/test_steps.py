@@ -352,7 +352,7 @@ def test_only_the_finest_stripes_are_wrong_where_pictures_are_scaled(cause: str,
 def test_nobody_hides_a_part_of_a_picture_of_which_all_has_changed() -> None:
     bench = Bench(lambda shot: Finding(shot, Verdict.HIDDEN, (shot,)))
     bench.cause = "Turned."
-    with pytest.raises(PictureError, match=r"darker than the black picture.*\. Turned\. Frames before"):
+    with pytest.raises(PictureError, match=r"darker than the black picture.*\. Turned\. Then resume the scan\. Frames before"):
         bench.shots.take(LINE)
 
 
@@ -536,7 +536,7 @@ def test_what_could_not_be_told_is_withdrawn_when_a_control_has_changed() -> Non
     assert bench.withdrawn == [12, 13]
     one = Bench(untold, is_as_before=False)
     one.shots.take(LINE)
-    with pytest.raises(PictureError, match=r"Frame 14, captured just before.* captures it again"):
+    with pytest.raises(PictureError, match=r"Frame 14, captured just before.* it will be captured again"):
         one.shots.conclude()
     calm = Bench(untold)
     calm.shots.take(LINE)

@@ -160,14 +160,14 @@ class GenicamCamera(Camera):
                 if self._clock() >= until_s:
                     raise DeviceError(
                         f"The camera {known.model} was lost ({lost}) and did not come back within"
-                        f" {self._settings.reconnect_s:g} s ({error}). Check cable and power, then resume."
+                        f" {self._settings.reconnect_s:g} s ({error}). Check cable and power."
                     ) from error
             self._sleep(_SEARCH_S)
         if found != known:
             self._let_go()
             raise DeviceError(
                 f"After the camera was lost, another one answered: {found} instead of {known}."
-                " Connect the same camera again, then resume."
+                " Connect the same camera again."
             )
         self._numbers.restart()
         self.counts = replace(self.counts, reopened=self.counts.reopened + 1)
