@@ -352,7 +352,9 @@ def test_only_the_finest_stripes_are_wrong_where_pictures_are_scaled(cause: str,
 def test_nobody_hides_a_part_of_a_picture_of_which_all_has_changed() -> None:
     bench = Bench(lambda shot: Finding(shot, Verdict.HIDDEN, (shot,)))
     bench.cause = "Turned."
-    with pytest.raises(PictureError, match=r"darker than the black picture.*\. Turned\. Then resume the scan\. Frames before"):
+    with pytest.raises(
+        PictureError, match=r"darker than the black picture.*\. Turned\. Then resume the scan\. Frames before"
+    ):
         bench.shots.take(LINE)
 
 
