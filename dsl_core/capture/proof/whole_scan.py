@@ -7,6 +7,7 @@ from dsl_core.capture.proof.colour_again import ColourAgain, colour_again
 from dsl_core.capture.proof.judging.known import Known
 from dsl_core.capture.proof.lasting.ends import sentences_of_ends
 from dsl_core.capture.proof.lasting.pair_places import pair_places
+from dsl_core.capture.proof.lasting.soft_stripes import soft_stripes
 from dsl_core.capture.proof.lines.line_sum import LineSum, line_sum
 from dsl_core.capture.proof.lines.local_sum import LocalSum, local_sum
 from dsl_core.capture.proof.white_again import WhiteAgain, white_again
@@ -76,11 +77,19 @@ class WholeScan:
                 known.raster,
                 with_colours,
             )
-        return [each for each in (*said, self._pair_places()) if each]
+        return [each for each in (*said, self._pair_places(), self._soft_stripes()) if each]
 
     def _pair_places(self) -> str:
         known, code = self._known, self._known.plan.code
         if known.lit is None or isinstance(code, NoCode | CapturedCode):
             return ""
         found = pair_places(code, known.plan.projector_size_px, known.code_pairs(), known.lit)
+        return "" if found is None else found.sentence
+
+    def _soft_stripes(self) -> str:
+        known, code = self._known, self._known.plan.code
+        ends = known.ends(known.first)
+        if known.calibration is None or ends is None or isinstance(code, NoCode | CapturedCode):
+            return ""
+        found = soft_stripes(code, known.code_pairs(), ends, known.calibration, known.noise, known.raster)
         return "" if found is None else found.sentence

@@ -289,10 +289,12 @@ class ProvenShots:
                     self.corrected += 1
         if found.is_wrong:
             change = self._explain()
+            advice = f"{what_to_do(found, change, proof)} {self._next_step.then}"
+            if self._known_wrong and not change.sentence:
+                advice = " ".join(self._known_wrong)
             raise PictureError(
                 f"{found.names.capitalize()} does not show its pattern after {len(SETTLE_MS) + 1} exposures:"
-                f" {found.seen}. {what_to_do(found, change, proof)} {self._next_step.then} Frames before it"
-                f" are saved. {self._next_step.unchecked}".rstrip(),
+                f" {found.seen}. {advice} Frames before it are saved. {self._next_step.unchecked}".rstrip(),
                 found.again,
                 has_changed=change.has_moved or (not change.sentence and found.verdict in CREEPING),
             )
@@ -411,7 +413,7 @@ class ProvenShots:
         """
         wrong = [shot for shot in error.wrong if shot != latest]
         withdrawn = self._doubted.withdraw(wrong, error.has_changed)
-        known = "".join(f" {each}" for each in self._known_wrong)
+        known = "".join(f" {each}" for each in self._known_wrong if each not in str(error))
         if not withdrawn:
             raise PictureError(f"{error}{known}", error.wrong) from error
         self._sink.withdraw(withdrawn)
