@@ -33,6 +33,13 @@ def _number(value: object, info: ValidationInfo) -> float:
     return number(str(info.field_name), value)
 
 
+def _positive(value: object, info: ValidationInfo) -> float:
+    found = number(str(info.field_name), value)
+    if found == 0:
+        raise DeviceError(f"The twin's option {info.field_name} must be above 0, not {value!r}.")
+    return found
+
+
 def _whole(value: object, info: ValidationInfo) -> int:
     return int(number(str(info.field_name), value))
 
@@ -58,6 +65,7 @@ def _size(value: object) -> tuple[int, int] | None:
 
 
 Number = Annotated[float, BeforeValidator(_number)]
+Positive = Annotated[float, BeforeValidator(_positive)]
 Whole = Annotated[int, BeforeValidator(_whole)]
 Switch = Annotated[bool, BeforeValidator(_switch)]
 
@@ -101,7 +109,7 @@ class TwinOptions(Record):
     )
     ambient_dn_per_ms: Number = Field(default=AMBIENT_DN_PER_MS, description="light of the room")
     defocus_px: Number = Field(default=0.0, description="blur of a camera that is out of focus")
-    brightness: Number = Field(
+    brightness: Positive = Field(
         default=1.0, description="light of the projector, relative to the published rig"
     )
 
@@ -114,7 +122,7 @@ class TwinOptions(Record):
         default=0.0, description="how much longer wavelengths than measured all filters pass"
     )
     bow_mm: Number = Field(default=0.0, description="how far diffusers bulge over 300 mm")
-    stage_scale: Number = Field(
+    stage_scale: Positive = Field(
         default=1.0, description="how far the stage moves from 700 mm, relative to what it reports"
     )
     chart_roll_deg: Number = Field(
@@ -123,7 +131,7 @@ class TwinOptions(Record):
     board_shift_mm: Number = Field(
         default=0.0, description="how far a board stands to the right of its place"
     )
-    print_scale: Number = Field(
+    print_scale: Positive = Field(
         default=1.0, description="size of a printed board, relative to what it should be"
     )
     target_missing: Switch = Field(default=False, description="on: a wall instead of a board or a chart")

@@ -40,6 +40,8 @@ def test_texts_are_read_and_those_of_the_scene_are_left() -> None:
         ("seed", "-1", "option seed must be a number of at least 0, not '-1'"),
         ("sigma", "much", "option sigma must be a number of at least 0, not 'much'"),
         ("brightness", "inf", "option brightness must be a number of at least 0, not 'inf'"),
+        ("brightness", "0", "option brightness must be above 0, not '0'"),
+        ("print_scale", "0", "option print_scale must be above 0, not '0'"),
         ("wrong_filter_nm", "blue", "option wrong_filter_nm must be a number of at least 0, not 'blue'"),
         ("noise", "yes", "option noise must be 'on' or 'off', not 'yes'"),
         ("target_missing", "", "option target_missing must be 'on' or 'off', not ''"),
