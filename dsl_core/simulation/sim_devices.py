@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import time
 
 import numpy as np
@@ -25,6 +26,7 @@ from dsl_core.model.spectral import SpectralCurve
 from dsl_core.simulation.bandpass_filters import measured_transmissions
 from dsl_core.simulation.effects.catalogue import USUAL_CHOICE
 from dsl_core.simulation.effects.planner import describe
+from dsl_core.simulation.effects.specular import Specular, glossy_materials
 from dsl_core.simulation.placing import TwinHand
 from dsl_core.simulation.published_rig import published_rig
 from dsl_core.simulation.random_rig import random_rig
@@ -32,6 +34,8 @@ from dsl_core.simulation.rendered_scene import EffectRequest, Setup
 from dsl_core.simulation.scenes.catalogue import make_scene
 from dsl_core.simulation.twin_options import TwinOptions, number
 from dsl_core.simulation.world import Clock, World
+
+_log = logging.getLogger(__name__)
 
 LATENCY_MS = 50.0
 #: What the projector says of its frames, whatever its LEDs do.
@@ -200,9 +204,16 @@ def open_twin(options: dict[str, str]) -> DeviceRig:
         world.scene_at = lambda position_mm: make_scene("plane", depth_mm=position_mm, **of_scene)
     # Built once now, so that a wrong name or option is told before anything is captured.
     try:
-        world.scene_at(world.position_mm)
+        scene = world.scene_at(world.position_mm)
     except PlanError as error:
         raise PlanError(f"{error}{TwinOptions.meant(of_scene)}") from error
+    names = chosen.choice.names
+    if "gloss" in of_scene and glossy_materials(scene.materials) and names and Specular.name not in names:
+        _log.warning(
+            "Surfaces look matt: effects are '%s', which leave out highlights of glossy ones. To have them,"
+            " add the option effects=auto, which renders what the scene calls for.",
+            chosen.effects,
+        )
     devices = assemble(world)
     drawn = chosen.truth or 0
     devices.nominal, devices.filters = nominal, measured_transmissions(drawn)

@@ -112,3 +112,11 @@ class TestTwin(
         instrument = self.open_rig().spectroradiometer
         assert instrument is not None
         return instrument
+
+
+@pytest.mark.parametrize(("effects", "is_told"), [("usual", True), ("auto", False)])
+def test_an_option_that_shows_in_no_picture_is_told(
+    effects: str, is_told: bool, caplog: pytest.LogCaptureFixture
+) -> None:
+    open_twin({"scene": "sphere", "gloss": "0.5", "size": "32x24", "effects": effects})
+    assert ("effects=auto" in caplog.text) == is_told
