@@ -13,6 +13,9 @@ from dsl_core.model.calibration.selftest import LatencyCheck, Measured
 TOLERANCE = 0.03
 #: ``since_show`` from which a frame certainly shows the new picture.
 REFERENCE = 2
+#: Light that creeps changes from each picture of one pattern to the next by at least this share of it, and
+#: by this share of its largest step; what is late changes once.
+LEAST_CREEP, STEADILY = 0.005, 0.5
 
 
 def is_right(readings: Readings) -> NDArray[np.bool_]:
@@ -35,13 +38,20 @@ def check_latency(readings: Readings, claimed_ms: float, has_times: bool, show_s
 
     Rows are trials of two frames each: ``since_show`` 0 after the wait ``gap_ms``, then 1 at once. ``show_s``
     is what the clock of the computer says of ``show``, for cameras without time stamps. Raises `DeviceError`
-    when even the longest wait was too short.
+    when even the longest wait was too short, or where light that creeps looks like it.
     """
     right = is_right(readings)
     judged, asked, stale = trials(readings, right)
     failed = asked[~right[judged]]
     longest = asked.max()
     if len(failed) and failed.max() >= longest:
+        creep = _creep(readings)
+        if creep:
+            raise DeviceError(
+                f"The light changes by {creep:+.1%} from picture to picture of one pattern, so"
+                " that nobody can tell when a new one is visible. Switch off automatic exposure, gain and"
+                " white balance of the camera, and let the projector warm up."
+            )
         raise DeviceError(
             f"A new picture is not always visible {longest:g} ms after it was shown. Raise the"
             " latency in the projector's driver, and check that nothing else draws on its screen, and that"
@@ -57,6 +67,18 @@ def check_latency(readings: Readings, claimed_ms: float, has_times: bool, show_s
         stale_frames=stale,
         checked=int((readings.since_show == 0).sum()),
     )
+
+
+def _creep(readings: Readings) -> float:
+    """Change of light from one picture of the reference to the next, as a share; 0 if it is not steady."""
+    lit = readings.drive.max(1) > 0
+    sure = int(np.flatnonzero((readings.since_show >= REFERENCE) & lit).max())
+    light = readings.mean_dn.sum(1)
+    black = light[(readings.since_show >= REFERENCE) & ~lit].mean()
+    steps = np.diff(light[sure - REFERENCE : sure + 1]) / (light[sure] - black)
+    least, most = np.abs(steps).min(), np.abs(steps).max()
+    is_steady = least > max(LEAST_CREEP, STEADILY * most) and (steps[0] > 0) == (steps[-1] > 0)
+    return float(steps.mean()) if is_steady else 0.0
 
 
 def first_failing(readings: Readings, right: NDArray[np.bool_]) -> float | None:

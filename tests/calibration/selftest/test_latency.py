@@ -66,6 +66,17 @@ def test_a_picture_is_right_within_three_percent_of_its_light() -> None:
     assert np.flatnonzero(~is_right(replace(readings, mean_dn=mean))).tolist() == [9]
 
 
+@pytest.mark.parametrize(
+    ("later", "said"), [((0.96, 0.98, 1.0), "changes by \\+2.0%"), ((0.5, 1.0, 1.0), "400 ms")]
+)
+def test_light_that_creeps_is_not_called_a_late_picture(later: tuple[float, ...], said: str) -> None:
+    readings = latency_readings(420.0, [400])
+    mean = readings.mean_dn.copy()
+    mean[3:6] = 260 + 1000 * np.array(later)[:, None]
+    with pytest.raises(DeviceError, match=said):
+        check_latency(replace(readings, mean_dn=mean), 25.0, True, 0.0)
+
+
 @pytest.mark.parametrize(("step_dn", "responds"), [(1.6, False), (1.7, True)])
 def test_a_projector_responds_when_three_channels_change_by_five_counts(
     step_dn: float, responds: bool
