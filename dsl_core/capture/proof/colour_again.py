@@ -19,7 +19,7 @@ from dsl_core.model.conditions import COLOUR_NAMES
 from dsl_core.model.plan import CapturePlan, Shot
 
 #: How far the light of a colour may be from that of green, as a share, and in deviations.
-LEAST, SIGMAS = 0.03, 6.0
+LEAST, SIGMAS = 0.015, 6.0
 #: Light of a colour says something where it is so many deviations bright: nearly all of white may saturate.
 BRIGHT_SIGMAS = 24.0
 
