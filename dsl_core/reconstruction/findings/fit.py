@@ -15,6 +15,7 @@ from dsl_core.optics.parallax import parallax_of
 from dsl_core.reconstruction.calibration_age import CHANGED_REL_STD
 from dsl_core.reconstruction.findings.band_findings import band_findings, line_width_nm
 from dsl_core.reconstruction.findings.flag_findings import SpectralCounts, share_findings
+from dsl_core.reconstruction.findings.known_causes import without_drift_that_is_none
 from dsl_core.reconstruction.findings.line_edges import edge_findings
 from dsl_core.reconstruction.findings.model_findings import MOVED, cause_findings
 from dsl_core.reconstruction.spectral.model_error import ModelError
@@ -45,7 +46,8 @@ def fit_of(
     if spectra is not None and width_nm is not None:
         findings += band_findings(grid.step_nm, width_nm, spectra)
     if followed is not None:
-        findings += cause_findings(followed.probe, followed.balanced, followed.motion)
+        of_model = cause_findings(followed.probe, followed.balanced, followed.motion)
+        findings += without_drift_that_is_none(of_model, [*findings])
     fit = Fit.of(findings, () if error is None else np.round(error.relative, 4).tolist())
     if followed is None or not followed.has_changed:
         return fit

@@ -5,8 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from dsl_core.model.fit import FitFinding
-from dsl_core.reconstruction.light.followed import BLACK_AGAIN
+from dsl_core.reconstruction.findings.model_findings import DRIFT_LEFT
+from dsl_core.reconstruction.light.followed import BLACK_AGAIN, DRIFT
 from dsl_core.reconstruction.spectral.order_balance import BALANCE
+
+#: What may be left of a drift in frames that follow the light: so much, and so many deviations of it.
+MOST_LEFT, SIGMAS = 0.05, 4.5
 
 
 def with_known_causes(findings: Iterable[FitFinding]) -> list[FitFinding]:
@@ -30,3 +34,23 @@ def _by_black(finding: FitFinding) -> FitFinding:
             " film was turned over.",
         }
     )
+
+
+def without_drift_that_is_none(
+    findings: Iterable[FitFinding], earlier: Iterable[FitFinding]
+) -> list[FitFinding]:
+    """The same findings on the model, where white and sums of lines, ``earlier``, say how the light drifted.
+
+    Frames follow it. Surfaces of few colours, seen by one order early and by the other late, may seem to ask
+    for more.
+    """
+    course = next((each for each in earlier if each.name == DRIFT and each.std is not None), None)
+    if course is None or course.std is None:
+        return list(findings)
+    most = max(MOST_LEFT, SIGMAS * course.std)
+    return [
+        each.model_copy(update={"significant": False})
+        if each.name == DRIFT_LEFT and abs(each.value) > most
+        else each
+        for each in findings
+    ]

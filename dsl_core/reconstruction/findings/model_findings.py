@@ -27,7 +27,7 @@ from dsl_core.solve.normal import BAND_95
 MOST_BLUR, MOST_TAIL = 0.03, 0.004
 #: Relative deviation of a blur beyond which lines, side by side in few frames, do not show it: what they seem
 #: to show then is light that translucent surfaces spread.
-UNSURE_BLUR = 0.1
+UNSURE_BLUR = 0.06
 #: Gains of the camera's colours that are worth a finding.
 MOST_COLOUR_GAIN = 0.03
 #: Chi-square of most pixels above which no cause explains the frames.
@@ -36,6 +36,8 @@ MOST_CHI_SQUARE = 1.5
 ALIKE = 0.4
 #: Name of what is found of the film as a whole.
 MOVED = "movement of the film"
+#: Name of what is left of a drift of the light.
+DRIFT_LEFT = "change of the light over the scan"
 #: Added to findings whose effect the spectra of the result already allow for.
 CORRECTED = " The spectra of this result are corrected for it."
 #: Words, decimals and unit of the numbers of a film, as in `FIELDS`.
@@ -77,7 +79,7 @@ def cause_findings(
         yield _profile(PROFILE[index], float(value), float(std))
     drift = FitFinding.judged(
         "light",
-        "change of the light over the scan",
+        DRIFT_LEFT,
         (causes.drift, causes.drift_std),
         "1",
         MOST_DRIFT,
@@ -200,9 +202,14 @@ def _motion(motion: FilmMotion, probe: Probe) -> FitFinding:
 
 def _film(causes: Causes, probe: Probe) -> FitFinding:
     plus, minus = causes.mean_px
-    # Light that is brighter on one side of a line displaces both orders to that side.
-    alike = plus * minus > 0 and min(abs(plus), abs(minus)) > ALIKE * max(abs(plus), abs(minus))
-    lines = ", or the light of lines is less even than calibrated" if alike else ""
+    alike = min(abs(plus), abs(minus)) > ALIKE * max(abs(plus), abs(minus))
+    too = ""
+    if alike and plus * minus > 0:
+        # Light that is brighter on one side of a line displaces both orders to that side.
+        too = ", or the light of lines is less even than calibrated"
+    elif alike:
+        # Both orders seem to have other wavelengths, and so has light whose colours have changed.
+        too = ", or the projector's colours are not as calibrated (night mode, picture mode, warmer LEDs)"
     return FitFinding.judged(
         "film",
         "place of the first orders",
@@ -211,7 +218,7 @@ def _film(causes: Causes, probe: Probe) -> FitFinding:
         MOST_SHIFT_PX * coarseness(probe.step_nm),
         f"Wavelengths are off by {causes.rms_px * probe.nm_per_px:.2f} nm: order +1 lies {plus:+.3f} columns"
         f" from its place, order -1 {minus:+.3f}, on average; the film has moved or is bent"
-        f" otherwise{lines}.",
+        f" otherwise{too}.",
         "Run the drift check, and calibrate the depth stage again." + _OR_TURNED,
     )
 

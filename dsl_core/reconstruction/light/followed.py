@@ -51,6 +51,8 @@ FAINT = 0.1
 LEAST_BRACKET = 0.5
 #: Changes of black that matter: first orders of dark surfaces are a few numbers bright.
 MOST_BLACK_DN = 0.5
+#: What a change of the light over a scan is called that frames are corrected for.
+DRIFT = "drift of the light"
 #: Rms of a flicker's changes of black that two pictures of it hardly exceed.
 USUAL_FLICKERS = 3.0
 _CORRECTED = " The frames are corrected for it."
@@ -241,7 +243,7 @@ def light_findings(course: LightCourse, with_lines: bool) -> Iterator[FitFinding
     std = (1 + change) * course.drift_std
     drift = FitFinding.judged(
         "light",
-        "drift of the light",
+        DRIFT,
         (change, std),
         "1",
         LEAST_DRIFT,

@@ -5,8 +5,9 @@ from __future__ import annotations
 import pytest
 
 from dsl_core.model.fit import FitFinding
-from dsl_core.reconstruction.findings.known_causes import with_known_causes
-from dsl_core.reconstruction.light.followed import BLACK_AGAIN
+from dsl_core.reconstruction.findings.known_causes import with_known_causes, without_drift_that_is_none
+from dsl_core.reconstruction.findings.model_findings import DRIFT_LEFT
+from dsl_core.reconstruction.light.followed import BLACK_AGAIN, DRIFT
 from dsl_core.reconstruction.spectral.order_balance import BALANCE
 
 
@@ -22,3 +23,20 @@ def test_a_changed_black_explains_faint_orders(black_dn: float, is_film: bool) -
     assert found[0] == black
     assert (found[1] == orders) == is_film
     assert ("0.74 times as bright against order -1" in found[1].sentence) == (not is_film)
+
+
+@pytest.mark.parametrize(
+    ("left", "course_std", "is_told"),
+    [(-0.286, 0.003, False), (0.04, 0.003, True), (-0.2, 0.05, True), (-0.286, None, True)],
+)
+def test_light_whose_course_is_known_has_not_drifted_much_beyond_it(
+    left: float, course_std: float | None, is_told: bool
+) -> None:
+    seen = FitFinding.judged("light", DRIFT_LEFT, (left, 0.002), "1", 0.014, "It drifted.", "Wait.")
+    known = (
+        []
+        if course_std is None
+        else [FitFinding.judged("light", DRIFT, (0.01, course_std), "1", 0.006, "It drifted.", "Wait.")]
+    )
+    found = without_drift_that_is_none([seen], known)
+    assert [each.significant for each in found] == [is_told]
