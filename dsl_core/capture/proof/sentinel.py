@@ -17,6 +17,8 @@ from dsl_core.capture.proof.prediction import Expected, contest_of_pictures
 from dsl_core.capture.proof.raster import Counts, Raster
 from dsl_core.model.plan import Shot
 
+#: Mean vote below which a picture may be mixed with another one. Light may have changed by a seventh.
+MIXED = 0.5
 #: So many takes of one sentinel may be refused.
 REFUSALS = 2
 
@@ -49,6 +51,9 @@ class SentinelProof:
             if colour:
                 detail = of_another_pattern(colour)
                 return self._refuse(Finding(shot, Verdict.TORN, (shot,), detail, colour=colour))
+            if found.is_told and found.mean < MIXED:
+                detail = "it is mixed with another pattern, or its light has changed"
+                return self._refuse(Finding(shot, Verdict.TORN, (shot,), detail))
         return Finding(shot, Verdict.RIGHT if told else Verdict.UNTOLD)
 
     def _refuse(self, found: Finding) -> Finding:

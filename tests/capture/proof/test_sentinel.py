@@ -49,6 +49,18 @@ def test_another_picture_is_named_and_refused_a_few_times_only(pictures: dict[st
     assert found.again == (other,)
 
 
+@pytest.mark.parametrize("role", ["white", "black"])
+def test_a_picture_that_is_blended_with_the_one_before_is_refused(
+    pictures: dict[str, np.ndarray], role: str
+) -> None:
+    other = pictures["black" if role == "white" else "again"]
+    for share, verdict in ((0.4, Verdict.TORN), (0.1, Verdict.RIGHT)):
+        mixed = ((1 - share) * pictures[role] + share * other).astype(np.uint16)
+        proof = SentinelProof(Noise.of(None, 12), RASTER, CHANNELS)
+        found = proof.judge(SHOT, mixed, pictures[role], pictures["black"], [other])
+        assert found.verdict is verdict
+
+
 def test_stale_rows_in_the_middle_are_refused(pictures: dict[str, np.ndarray]) -> None:
     again, line = pictures["again"], pictures["line"]
     stale = np.concatenate([again[:960], line[960:1200], again[1200:]])

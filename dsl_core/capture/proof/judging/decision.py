@@ -52,13 +52,25 @@ def decide(
     # That a picture is neither white nor black does not say that it is the one wanted.
     is_told = Verdict.LATE in told
     is_frayed = is_told and any(contest.is_doubtful for contest in told.values())
+    detail = "a few rows of it showed another pattern" if is_frayed else ""
+    detail = _unclear(shot, told, learned) or detail
     return Finding(
         shot,
         Verdict.RIGHT if is_told else Verdict.UNTOLD,
-        detail="a few rows of it showed another pattern" if is_frayed else "",
-        is_doubtful=is_frayed or light is Light.STEP,
+        detail=detail,
+        is_doubtful=bool(detail) or light is Light.STEP,
         light=light,
     )
+
+
+def _unclear(shot: Shot, told: Mapping[Verdict, Contest], learned: Learned) -> str:
+    """That a line is mixed with the one before or after it; empty if it is not."""
+    if shot.role != "spectral":
+        return ""
+    near = [each for each in (Verdict.LATE, Verdict.SWAPPED) if each in told]
+    # Each of them is asked, as each remembers.
+    unclear = [learned.votes.is_unclear(shot, each, told[each]) for each in near]
+    return "it was mixed with another pattern" if any(unclear) else ""
 
 
 def named(shot: Shot, lost: Mapping[Verdict, Contest], shown: Shot | None) -> Finding:

@@ -12,6 +12,7 @@ from dsl_core.capture.proof.noise import Noise
 from dsl_core.capture.proof.prediction import Lit, line_profile
 from dsl_core.capture.proof.raster import Counts, Floats, Raster
 from dsl_core.capture.proof.usual_light import UsualLight
+from dsl_core.capture.proof.usual_votes import UsualVotes
 from dsl_core.model.captured_code import CapturedCode
 from dsl_core.model.plan import CapturePlan, NoCode, Role, Shot
 from dsl_core.model.rig import Rig
@@ -24,12 +25,19 @@ class Learned:
     usual: UsualLight
     steps: LightSteps
     places: LinePlaces
+    votes: UsualVotes
     #: Shots of later settings that were found wrong before.
     contested: set[int]
 
     def copy(self) -> Learned:
         """Another one, which further pictures change alone."""
-        return Learned(self.usual.copy(), self.steps.copy(), self.places.copy(), self.contested.copy())
+        return Learned(
+            self.usual.copy(),
+            self.steps.copy(),
+            self.places.copy(),
+            self.votes.copy(),
+            self.contested.copy(),
+        )
 
 
 class Known:
@@ -63,6 +71,7 @@ class Known:
             UsualLight(self.first, knows_light and calibration is not None),
             LightSteps(),
             LinePlaces(),
+            UsualVotes(),
             set(),
         )
         self.code = self._first_code()

@@ -78,6 +78,32 @@ def test_a_picture_of_other_light_than_those_before_is_doubtful(
 
 
 @pytest.mark.parametrize(
+    ("votes", "is_mixed"),
+    [
+        (Contest(150, 0.24), True),
+        (Contest(150, 0.62), True),
+        (Contest(150, 0.72), False),
+        # Of few pixels, most may be at edges.
+        (Contest(35, 0.58), False),
+        (Contest(35, 0.4), True),
+    ],
+)
+@pytest.mark.parametrize("rival", [Verdict.LATE, Verdict.SWAPPED])
+def test_a_line_that_is_less_itself_than_those_before_is_doubtful(
+    rival: Verdict, votes: Contest, is_mixed: bool
+) -> None:
+    learned = known().learned
+    usual = {Verdict.LATE: Contest(150, 0.95), Verdict.SWAPPED: Contest(150, 0.95)}
+    for _ in range(3):
+        assert not decide(LINE, usual | {rival: votes}, 0.8, known().learned).is_doubtful, "nothing before"
+        assert not decide(LINE, usual, 0.8, learned).is_doubtful
+    found = decide(LINE, usual | {rival: votes}, 0.8, learned)
+    assert (found.verdict, found.is_doubtful) == (Verdict.RIGHT, is_mixed)
+    assert found.detail == ("it was mixed with another pattern" if is_mixed else "")
+    assert not decide(SHOTS[3], usual | {rival: votes}, 0.8, learned).is_doubtful, "not of the code"
+
+
+@pytest.mark.parametrize(
     ("shown", "verdict"),
     [(12, Verdict.LATE), (14, Verdict.SWAPPED), (15, Verdict.OTHER), (11, Verdict.OTHER)],
 )
