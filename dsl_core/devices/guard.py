@@ -12,6 +12,7 @@ from typing import Any, NoReturn, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import ValidationError
 
 from dsl_core.devices.base import (
     Camera,
@@ -27,6 +28,7 @@ from dsl_core.devices.base import (
 from dsl_core.devices.device_thread import DeviceThread, DriverError, HangingError
 from dsl_core.devices.plausible import require_frame, require_position, require_spectrum
 from dsl_core.errors import DeviceError, DslError
+from dsl_core.model.base import problems_in_words
 from dsl_core.model.frames import Frame
 from dsl_core.model.placement import Placement
 from dsl_core.model.spectral import SpectralCurve
@@ -129,7 +131,7 @@ def _tell_hanging(name: str, verb: str, seconds: float) -> NoReturn:
 
 
 def _tell_failed(name: str, verb: str, error: BaseException | None) -> NoReturn:
-    text = " ".join(str(error).split())
+    text = " ".join((problems_in_words(error) if isinstance(error, ValidationError) else str(error)).split())
     text = text if len(text) <= _QUOTED else text[: _QUOTED - 3] + "..."
     kind = type(error).__name__
     reason = f"{kind}: {text}" if text else kind

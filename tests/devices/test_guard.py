@@ -187,6 +187,15 @@ def test_whatever_a_driver_raises_names_the_device(lab: _Lab, beam: _Lab, thread
         rig.camera.snap()
 
 
+def test_a_record_that_a_driver_cannot_make_is_told_in_words(lab: _Lab, rig: DeviceRig) -> None:
+    lab.act["measure"] = lambda: SpectralCurve.of(NM, np.full(61, np.nan), unit=LIGHT.unit)
+    assert rig.spectroradiometer is not None
+    with pytest.raises(DeviceError) as raised:
+        rig.spectroradiometer.measure()
+    assert "values.0 must be a finite number (given nan)" in str(raised.value)
+    assert "pydantic.dev" not in str(raised.value)
+
+
 def test_sentences_of_our_own_are_passed_on(lab: _Lab, rig: DeviceRig) -> None:
     def fail() -> None:
         raise StoreError("The replayed frame is damaged.")
