@@ -46,6 +46,7 @@ class ExposureWatch:
         if not self._waits_for and share >= MOST_OVEREXPOSED:
             self.found = (
                 f"White is overexposed in {share:.0%} of the picture in every setting of the plan: codes are"
-                " unsure there, and depth is lost where lines are overexposed too. Expose for a shorter time,"
-                " or with a lower level, or choose a plan that has a darker setting as well, like coarse."
+                " unsure there, depth is lost where lines are overexposed too, and wrong pictures hardly"
+                " show. Expose for a shorter time or with a lower level, or choose a plan that has a darker"
+                " setting as well, like coarse."
             )

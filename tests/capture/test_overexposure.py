@@ -68,6 +68,7 @@ def test_a_scan_tells_it_once_and_ends_as_usual(tmp_path, caplog) -> None:  # ty
         runner.listen(seen.append)
         status = runner.run()
     assert status.overexposed.startswith("White is overexposed in 9")
+    assert "wrong pictures hardly show" in status.overexposed
     assert "a darker setting" in status.overexposed
     assert [record.getMessage() for record in caplog.records].count(status.overexposed) == 1
     before = [each.shot for each in seen if not each.overexposed and each.shot is not None]
