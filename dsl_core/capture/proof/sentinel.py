@@ -6,6 +6,7 @@ What has moved since is not for this module: a sentinel that looks the same wron
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +15,7 @@ from dsl_core.capture.proof.finding import Finding, Verdict, of_another_pattern
 from dsl_core.capture.proof.late_colour import late_colour
 from dsl_core.capture.proof.noise import Noise
 from dsl_core.capture.proof.prediction import Expected, contest_of_pictures
-from dsl_core.capture.proof.raster import Counts, Raster
+from dsl_core.capture.proof.raster import Counts, Floats, Raster
 from dsl_core.model.plan import Shot
 
 #: Mean vote below which a picture may be mixed with another one. Light may have changed by a seventh.
@@ -51,10 +52,19 @@ class SentinelProof:
             if colour:
                 detail = of_another_pattern(colour)
                 return self._refuse(Finding(shot, Verdict.TORN, (shot,), detail, colour=colour))
-            if found.is_told and found.mean < MIXED:
+            if self._is_mixed(seen, old, rival, dark):
                 detail = "it is mixed with another pattern, or its light has changed"
                 return self._refuse(Finding(shot, Verdict.TORN, (shot,), detail))
         return Finding(shot, Verdict.RIGHT if told else Verdict.UNTOLD)
+
+    def _is_mixed(self, seen: Counts, old: Counts, rival: Counts, dark: Floats) -> bool:
+        """Whether pixels that did not saturate hold another picture too; others would be bright anyway."""
+        expected, saturated = self._expected(old), old >= self._noise.sensor.full_scale_dn
+        wanted = replace(expected, variance=np.where(saturated, np.float32(np.inf), expected.variance))
+        found = contest_of_pictures(
+            seen, wanted, self._expected(rival), dark, np.zeros_like(dark), self._noise, self._raster
+        )
+        return found.is_told and found.mean < MIXED
 
     def _refuse(self, found: Finding) -> Finding:
         """A finding on a sentinel that is wrong, but for one that stays so."""

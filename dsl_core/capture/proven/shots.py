@@ -163,7 +163,7 @@ class ProvenShots:
             self._sink.write(shot, frame)
             return
         found = self._proof.judge(shot, frame.pixels)
-        if found.is_doubtful and not self._is_late:
+        if found.is_doubtful:
             frame, found = self._ask_again(found, frame, self._proof)
         elif self._proof.is_alone(found) and not self._is_late:
             frame, found = self._compare(found, frame, self._proof)

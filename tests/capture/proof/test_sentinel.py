@@ -24,7 +24,10 @@ def pictures() -> dict[str, np.ndarray]:
     line = np.where(np.arange(light.size) % SIZE[0] // 8 == 2, light, 0.0)
     noisy = {name: rng.poisson(at) + 60 for name, at in (("white", light), ("again", light), ("line", line))}
     noisy["black"] = rng.poisson(np.full(light.size, 4.0)) + 60
-    return {name: picture.astype(np.uint16) for name, picture in noisy.items()}
+    found = {name: picture.astype(np.uint16) for name, picture in noisy.items()}
+    for picture in found.values():
+        picture.flags.writeable = False  # as those of a scan
+    return found
 
 
 def judge(pictures: dict[str, np.ndarray], seen: np.ndarray, proof: SentinelProof) -> Verdict:
@@ -47,6 +50,19 @@ def test_another_picture_is_named_and_refused_a_few_times_only(pictures: dict[st
     other = replace(SHOT, index=91)
     found = proof.judge(other, torn, pictures["white"], pictures["black"], [pictures["black"]])
     assert found.again == (other,)
+
+
+def test_saturated_pixels_do_not_hide_that_a_picture_is_blended(pictures: dict[str, np.ndarray]) -> None:
+    full = Noise.of(None, 12).sensor.full_scale_dn
+    bright = np.arange(SIZE[0] * SIZE[1]) < 1600
+    white = np.where(bright, full, pictures["white"]).astype(np.uint16)
+    # Of twice full scale, six tenths saturate as well.
+    mixed = np.where(bright, full, 0.6 * pictures["white"] + 0.4 * pictures["black"]).astype(np.uint16)
+    proof = SentinelProof(Noise.of(None, 12), RASTER, CHANNELS)
+    found = proof.judge(SHOT, mixed, white, pictures["black"], [pictures["black"]])
+    assert found.verdict is Verdict.TORN
+    found = proof.judge(SHOT, white, white, pictures["black"], [pictures["black"]])
+    assert found.verdict is Verdict.RIGHT
 
 
 @pytest.mark.parametrize("role", ["white", "black"])

@@ -522,11 +522,13 @@ def test_the_second_picture_says_whether_the_first_was_wrong(
     assert bench.shots.corrected == bool(reason)
 
 
-def test_who_is_late_anyway_asks_for_no_second_picture() -> None:
-    bench = Bench(doubtful)
+def test_who_is_late_anyway_asks_for_another_picture_of_what_is_doubtful() -> None:
+    bench = Bench(doubtful, is_right)
     bench.shots._is_late = True
     bench.shots.take(LINE)
-    assert bench.taken == [(13, 0, 0.0, True)]
+    assert bench.taken == [(13, 0, 0.0, True), (13, 1, 100.0, True), *CONTROLS]
+    bench.shots.take(LINE)
+    assert bench.taken[4:] == [(13, 0, 0.0, True)]
 
 
 def test_what_could_not_be_told_is_withdrawn_when_a_control_has_changed() -> None:
