@@ -19,7 +19,7 @@ from dsl_core.capture.proof.raster import Counts
 
 #: How far the sums may be from white, and from each other: what clean scans of all scenes differ by is a
 #: fifth of this.
-LEAST, LEAST_CURVE, SIGMAS = 0.03, 0.06, 5.0
+LEAST, LEAST_CURVE, SIGMAS = 0.02, 0.06, 5.0
 #: What black may have changed by unseen, DN.
 UNSEEN_DN = 0.5
 #: The last pair, just before white, has to differ by this share of what most pairs do: light that changes

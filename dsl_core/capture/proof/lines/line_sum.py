@@ -17,8 +17,8 @@ from dsl_core.capture.proof.raster import Counts
 from dsl_core.model.plan import CapturePlan, LineComb, ScanLines, Shot
 from dsl_core.patterns.multiplexed import profiles
 
-#: How far the sum may be from white: what clean scans of all scenes differ by is a fifth of this.
-LEAST, SIGMAS = 0.03, 4.0
+#: How far the sum may be from white: what 43 clean scans of all scenes differ by, beyond noise, is a fifth.
+LEAST, SIGMAS = 0.02, 4.0
 #: What black may have changed by unseen, DN, with and without pictures of it among the lines: a level that
 #: wanders shows in these, and what they show is allowed for besides.
 UNSEEN_DN, UNKNOWN_DN = 0.1, 1.0
