@@ -6,13 +6,13 @@ from dataclasses import dataclass
 
 from dsl_core.capture.proof.code.first_code import FirstCode
 from dsl_core.capture.proof.finding import Verdict
+from dsl_core.capture.proof.judging.usual_votes import UsualVotes
 from dsl_core.capture.proof.light_steps import LightSteps
 from dsl_core.capture.proof.lines.line_place import LinePlaces
 from dsl_core.capture.proof.noise import Noise
 from dsl_core.capture.proof.prediction import Lit, line_profile
 from dsl_core.capture.proof.raster import Counts, Floats, Raster
 from dsl_core.capture.proof.usual_light import UsualLight
-from dsl_core.capture.proof.usual_votes import UsualVotes
 from dsl_core.model.captured_code import CapturedCode
 from dsl_core.model.plan import CapturePlan, NoCode, Role, Shot
 from dsl_core.model.rig import Rig

@@ -8,7 +8,7 @@ import pytest
 
 from dsl_core.capture.proof.contest import Contest
 from dsl_core.capture.proof.finding import Verdict
-from dsl_core.capture.proof.usual_votes import UsualVotes
+from dsl_core.capture.proof.judging.usual_votes import UsualVotes
 from tests.cases.proof_rules import LATER_LINE, LINE
 
 
