@@ -17,6 +17,8 @@ from dsl_core.model.figure import Figure, failures
 MISSED_ATTRIBUTE = "calibration_missed"
 #: Names are those of files.
 LONGEST = 100
+#: Name of the figure that says how far held-out first orders lie from where the film's record puts them, px.
+HELD_OUT_ORDERS = "held-out error of first orders"
 
 
 class CalibrationNote(Record):

@@ -7,6 +7,7 @@ from collections.abc import Iterable
 import numpy as np
 from numpy.typing import NDArray
 
+from dsl_core.model.calibration.accepted import HELD_OUT_ORDERS
 from dsl_core.model.fit import Fit, FitFinding
 from dsl_core.model.plan import CapturePlan
 from dsl_core.model.rig import Rig
@@ -46,13 +47,22 @@ def fit_of(
     if spectra is not None and width_nm is not None:
         findings += band_findings(grid.step_nm, width_nm, spectra)
     if followed is not None:
-        of_model = cause_findings(followed.probe, followed.balanced, followed.motion)
+        off_px = _orders_off_px(rig)
+        of_model = cause_findings(followed.probe, followed.balanced, followed.motion, off_px)
         findings += without_drift_that_is_none(of_model, [*findings])
     fit = Fit.of(findings, () if error is None else np.round(error.relative, 4).tolist())
     if followed is None or not followed.has_changed:
         return fit
     doubts = [found.sentence for found in findings if found.name == MOVED and not found.significant]
     return fit.model_copy(update={"level_rel_std": CHANGED_REL_STD, "unseen": " ".join(doubts)})
+
+
+def _orders_off_px(rig: Rig) -> float:
+    """How far first orders lay from their places (rms, px) when the film was calibrated; 0 if not noted."""
+    values = [
+        figure.value for note in rig.calibrations for figure in note.figures if figure.name == HELD_OUT_ORDERS
+    ]
+    return values[-1] if values else 0.0
 
 
 def _of_parallax(rig: Rig, depth_mm: NDArray[np.floating]) -> FitFinding:

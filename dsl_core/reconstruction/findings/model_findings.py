@@ -57,17 +57,21 @@ _OR_TURNED = (
 
 
 def cause_findings(
-    probe: Probe, corrected: bool | None = None, motion: FilmMotion | None = None
+    probe: Probe,
+    corrected: bool | None = None,
+    motion: FilmMotion | None = None,
+    calibrated_px: float = 0.0,
 ) -> Iterator[FitFinding]:
     """What the probed pixels of a scan say about each part of the model.
 
     ``corrected`` results follow what was found of the orders' light; where that was tried and did not make
     the frames fit better (False), it is not a finding. ``motion`` is that of the film, which the model of
-    the probe follows already.
+    the probe follows already, and ``calibrated_px`` how far (rms) first orders lay from their places when
+    these were calibrated, 0 where nobody noted it.
     """
     causes = fit_causes(probe)
     if motion is not None:
-        yield _motion(motion, probe)
+        yield _motion(motion, probe, calibrated_px)
     place = _film(causes, probe)
     told = place.significant and probe.places and causes.displaced
     yield place.model_copy(update={"significant": told})
@@ -171,7 +175,7 @@ def _wide_bands(probe: Probe, curves: CurveMisfit) -> FitFinding:
     return found.model_copy(update={"significant": found.significant and not by_curves})
 
 
-def _motion(motion: FilmMotion, probe: Probe) -> FitFinding:
+def _motion(motion: FilmMotion, probe: Probe, calibrated_px: float) -> FitFinding:
     surely = np.abs(motion.values) > SIGMAS * motion.std
     clauses = [
         f"{words} by {value:+.{digits}f} ± {std:.{digits}f}{unit}"
@@ -181,6 +185,14 @@ def _motion(motion: FilmMotion, probe: Probe) -> FitFinding:
         if sure
     ]
     by_nm = f"This displaces wavelengths by {motion.shift_px * probe.nm_per_px:.2f} nm."
+    # A dent that no record can say is there in every scan, and looks like a motion.
+    or_dented = (
+        f", or its shape is none that a calibration can record, which left first orders"
+        f" {calibrated_px:.2f} px (rms) from their places"
+        if motion.shift_px < SIGMAS * calibrated_px
+        else ""
+    )
+    moved = f"moved since the calibration{or_dented}: {', '.join(clauses)}. {by_nm}"
     return FitFinding(
         part="film",
         name=MOVED,
@@ -189,10 +201,9 @@ def _motion(motion: FilmMotion, probe: Probe) -> FitFinding:
         unit="px",
         limit=LEAST_MOTION_PX,
         significant=motion.sure,
-        sentence=f"The film has moved since the calibration: {', '.join(clauses)}. {by_nm}{CORRECTED}"
+        sentence=f"The film has {moved}{CORRECTED}"
         if motion.sure
-        else f"The film may have moved since the calibration: {', '.join(clauses)}. {by_nm} It may be chance,"
-        " so that the spectra are not corrected for it.",
+        else f"The film may have {moved} It may be chance, so that the spectra are not corrected for it.",
         advice="Fix the film so that it cannot slip; if it moves further, repeat the depth-stage calibration."
         " The level and the colour of the light may have changed, too, which no scan can tell: reflectance"
         f" holds to {BAND_95 * CHANGED_REL_STD:.0%}, as stated, and the drift check with the Spectralon tells"

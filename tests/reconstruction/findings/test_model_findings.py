@@ -215,3 +215,16 @@ def test_a_film_that_was_followed_is_said_to_have_moved_and_by_how_much(
     perhaps = Fit.of(cause_findings(probed(devices.calibration, scan), motion=replace(motion, sure=False)))
     assert perhaps.parts == ()
     assert any("may have moved" in found.sentence for found in perhaps.findings)
+
+
+def test_a_film_calibrated_no_better_than_it_moved_may_have_another_shape(
+    scanned: tuple[DeviceRig, MemoryScan],
+) -> None:
+    devices, scan = scanned
+    assert devices.calibration is not None
+    seen, numbers = probed(devices.calibration, scan), np.array([0.0, 0.0, 0.0, 0.0, 0.1])
+    motion = FilmMotion(numbers, np.full(5, 0.02), 0.45, 0.06)
+    told = {px: Fit.of(cause_findings(seen, motion=motion, calibrated_px=px)) for px in (0.0, 0.1, 0.2)}
+    assert {px: fit.parts for px, fit in told.items()} == dict.fromkeys(told, ("film",))
+    assert "which left first orders 0.20 px (rms) from their places" in told[0.2].words
+    assert all("shape is none that a calibration can record" not in told[px].words for px in (0.0, 0.1))
