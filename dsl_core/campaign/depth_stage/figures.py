@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from dsl_core.calibration.film.form import FilmForm
+from dsl_core.model.calibration.accepted import HELD_OUT_ORDERS
 from dsl_core.model.calibration.chain import ChainCorrection
 from dsl_core.model.calibration.depth_stage import DepthStageCalibration, StagePosition
 from dsl_core.model.figure import Figure, doubts
@@ -77,7 +78,7 @@ def depth_stage_figures(record: DepthStageCalibration) -> tuple[Figure, ...]:
         *_bow(record),
         Figure(name="standard deviation of depth from the geometry", value=record.depth_std_mm, unit="mm"),
         Figure(
-            name="held-out error of first orders",
+            name=HELD_OUT_ORDERS,
             value=record.held_out_px,
             unit="px",
             high=MAX_HELD_OUT_PX,

@@ -11,11 +11,14 @@ import numpy as np
 import pytest
 
 from dsl_core.devices.base import DeviceRig
+from dsl_core.model.calibration.accepted import HELD_OUT_ORDERS, CalibrationNote
+from dsl_core.model.figure import Figure
 from dsl_core.model.fit import Fit, Part
 from dsl_core.model.plan import CapturePlan, GrayCode, ScanLines
 from dsl_core.model.rig import Rig
 from dsl_core.model.spectral import WavelengthGrid
 from dsl_core.optics.correspondence import correspondence
+from dsl_core.reconstruction.findings.fit import _orders_off_px
 from dsl_core.reconstruction.findings.model_findings import _film, _profile, cause_findings
 from dsl_core.reconstruction.spectral.causes import MOST_SHIFT_PX, Causes
 from dsl_core.reconstruction.spectral.film_motion import FilmMotion
@@ -228,3 +231,21 @@ def test_a_film_calibrated_no_better_than_it_moved_may_have_another_shape(
     assert {px: fit.parts for px, fit in told.items()} == dict.fromkeys(told, ("film",))
     assert "which left first orders 0.20 px (rms) from their places" in told[0.2].words
     assert all("shape is none that a calibration can record" not in told[px].words for px in (0.0, 0.1))
+
+
+def test_what_the_last_film_calibration_left_of_first_orders_is_taken_from_the_rig(
+    scanned: tuple[DeviceRig, MemoryScan],
+) -> None:
+    rig = scanned[0].calibration
+    assert rig is not None
+    assert _orders_off_px(rig.model_copy(update={"calibrations": ()})) == 0.0
+    notes = tuple(
+        CalibrationNote(
+            name="depth-stage",
+            title="Depth stage",
+            accepted="",
+            figures=(Figure(name=HELD_OUT_ORDERS, value=px, unit="px"),),
+        )
+        for px in (0.3, 0.2)
+    )
+    assert _orders_off_px(rig.model_copy(update={"calibrations": notes})) == 0.2
