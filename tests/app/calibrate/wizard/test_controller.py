@@ -275,7 +275,7 @@ def test_a_camera_whose_pictures_are_wrong_is_not_lost(
     state, control = bench.wizard("selftest")
     control.go_to(1)
 
-    def wrong(*_: object) -> None:
+    def wrong(*_: object, **__: object) -> None:
         raise PictureError("White does not show its pattern. Switch automatic exposure off.")
 
     monkeypatch.setattr(pipeline, "scan", wrong)
