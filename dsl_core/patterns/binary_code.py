@@ -37,6 +37,15 @@ def binary_image(code: BinaryCode, size_px: tuple[int, int], index: int) -> NDAr
     return _KINDS[code.kind][0](code, size_px, index)
 
 
+def stripes_across(code: BinaryCode, size_px: tuple[int, int], index: int) -> NDArray[np.bool_] | None:
+    """Which columns of the projector a pattern lights; None for one that codes rows.
+
+    Raises `PlanError`.
+    """
+    image = binary_image(code, size_px, index)
+    return None if (image != image[:1]).any() else image[0] > 0
+
+
 def decoder_of(code: BinaryCode, size_px: tuple[int, int]) -> CodeDecoder:
     """A fresh decoder for a code on a projector of ``size_px`` = (width, height); raises `PlanError`."""
     return _KINDS[code.kind][1](code, size_px)

@@ -14,7 +14,7 @@ import numpy as np
 from dsl_core.capture.proof.code.code_pairs import Pair
 from dsl_core.capture.proof.prediction import Lit
 from dsl_core.model.plan import BinaryCode
-from dsl_core.patterns.binary_code import binary_image
+from dsl_core.patterns.binary_code import stripes_across
 from dsl_core.solve.robust import robust_std
 
 #: Columns by which an inverse may be off, and in deviations; clean scans of all scenes differ by a quarter.
@@ -59,10 +59,10 @@ def pair_places(
     column = lit.key // 3
     found = []
     for number, (one, other) in pairs.items():
-        image = binary_image(code, size_px, 2 * number)
-        if (image != image[:1]).any():
-            continue  # this one codes rows
-        slope = _slope(np.asarray(image[0] > 0, np.float32))[column]
+        stripes = stripes_across(code, size_px, 2 * number)
+        if stripes is None:
+            continue
+        slope = _slope(np.asarray(stripes, np.float32))[column]
         apart = one[lit.index].astype(np.float32) + other[lit.index] - 2 * lit.black
         apart = apart / lit.contrast - 1
         apart -= np.median(apart)

@@ -18,7 +18,7 @@ from dsl_core.capture.proof.noise import Noise
 from dsl_core.capture.proof.raster import Counts, Raster
 from dsl_core.model.plan import BinaryCode
 from dsl_core.model.rig import Rig
-from dsl_core.patterns.binary_code import binary_image
+from dsl_core.patterns.binary_code import stripes_across
 
 #: A blur is told that is so many times the usual one, and so many columns wider. Clean scans of all scenes,
 #: those of rigs unlike ours among them, are within a quarter of the usual one.
@@ -67,13 +67,14 @@ def soft_stripes(
     ``pairs`` are rasters of a pattern and its inverse by their number, ``ends`` those of white and black.
     Raises `PlanError`.
     """
+    size_px = rig.projector.width_px, rig.projector.height_px
     left, profiles = [], []
     for number, pair in pairs.items():
-        image = binary_image(code, (rig.projector.width_px, rig.projector.height_px), 2 * number)
-        share = None if (image != image[:1]).any() else _share_left(pair, ends, noise, raster)
-        if share is not None:
+        stripes = stripes_across(code, size_px, 2 * number)
+        share = None if stripes is None else _share_left(pair, ends, noise, raster)
+        if stripes is not None and share is not None:
             left.append(share)
-            profiles.append(np.where(image[0] > 0, 1.0, -1.0))
+            profiles.append(np.where(stripes, 1.0, -1.0))
     if len(left) < FEWEST_PAIRS:
         return None
     blur = _width(np.array(left), profiles)
