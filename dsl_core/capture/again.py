@@ -27,7 +27,7 @@ class Again(StrEnum):
 
     @property
     def unchecked(self) -> str:
-        """What else is left to someone who knows better, as a sentence; steps are always checked."""
+        """A sentence on how to continue without the check; empty for a step, which is always checked."""
         if self is Again.STEP:
             return ""
         return "To continue all the same, resume the scan without checking that the scene has not moved."
