@@ -131,9 +131,9 @@ def _reconstruct(
 ) -> str:
     """Depth and spectra; what was found, in a sentence."""
     from dsl_core.io.result.result_file import load_result
-    from dsl_core.model.attributes import sentences_of
+    from dsl_core.model.attributes import DOUBTS, sentences_of
     from dsl_core.workflows.batch.task import doubts_of
-    from dsl_core.workflows.scans import DOUBTS, NOT_JUDGED, reconstruct_to
+    from dsl_core.workflows.scans import NOT_JUDGED, reconstruct_to
 
     timer = StageTimer()
     with output.progress() as progress:

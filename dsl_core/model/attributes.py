@@ -12,6 +12,8 @@ from dsl_core.model.plan import CapturePlan
 
 #: Name of the attribute that holds the plan by which a result's frames were captured.
 PLAN_ATTRIBUTE = "capture_plan"
+#: Name of that which lists sentences about pictures that do not show their pattern.
+DOUBTS = "frames_in_doubt"
 
 
 def sentences_of(attributes: Mapping[Any, Any], name: str) -> tuple[str, ...]:

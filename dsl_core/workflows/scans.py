@@ -26,7 +26,7 @@ from dsl_core.io.scan.folder import ScanReader
 from dsl_core.io.scan.manifest import Manifest, read_manifest
 from dsl_core.io.scan.origin import is_of_this_computer, model_notes, rig_of_notes
 from dsl_core.io.scan.proof_file import read_proof
-from dsl_core.model.attributes import PLAN_ATTRIBUTE
+from dsl_core.model.attributes import DOUBTS, PLAN_ATTRIBUTE
 from dsl_core.model.conditions import differences
 from dsl_core.model.fit import ATTRIBUTE as FIT_ATTRIBUTE
 from dsl_core.model.fit import Fit
@@ -46,8 +46,6 @@ from dsl_core.workflows.captures import is_import, sensor_of_scan, with_imported
 if TYPE_CHECKING:
     import xarray as xr
 
-#: Attribute of a result: sentences about pictures that do not show their pattern, as a list in JSON.
-DOUBTS = "frames_in_doubt"
 #: Attribute of a result: how many frames show too little to be judged by their pattern, as "26 of 150".
 NOT_JUDGED = "frames_not_judged"
 #: Attribute of a result: a digest of all that it depends on.

@@ -41,12 +41,13 @@ from dsl_core.devices.base import DeviceRig
 from dsl_core.devices.registry import open_rig
 from dsl_core.errors import DslError
 from dsl_core.io.scan.folder import ScanReader
+from dsl_core.model.attributes import DOUBTS
 from dsl_core.model.fit import Fit
 from dsl_core.model.placement import Placement
 from dsl_core.model.plan import CapturePlan, GrayCode, ScanLines, Sentinels, Setting, Shot
 from dsl_core.progress import NoProgress
 from dsl_core.simulation.scenes.catalogue import scene_catalogue
-from dsl_core.workflows.scans import DOUBTS, reconstruct_scan
+from dsl_core.workflows.scans import reconstruct_scan
 from tests.benchmarks.common import options, print_table, write_json
 from tests.cases.faulty_lab import CAMERA, OTHER, PROJECTOR, SHIFTS, SPECTRUM, STAGE, installed
 from tests.cases.lab_everyday import CAMERA_EVERYDAY, PROJECTOR_EVERYDAY

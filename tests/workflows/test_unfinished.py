@@ -23,6 +23,7 @@ from dsl_core.io.scan.folder import ScanReader
 from dsl_core.io.scan.lock import FolderLock
 from dsl_core.io.scan.manifest import read_manifest
 from dsl_core.io.scan.proof_file import PROOF_NAME, read_proof, save_proof
+from dsl_core.model.attributes import DOUBTS
 from dsl_core.model.presets import PRESETS
 from dsl_core.model.result_sink import Maps
 from dsl_core.model.scan_proof import ScanProof
@@ -126,10 +127,10 @@ def test_a_finished_scan_knows_what_its_pictures_show(scan: Path, tmp_path: Path
     kept = ScanProof(judged=9, untold=2, wrong=("Frame 7 is late.",))
     save_proof(reader, reader.calibration, kept)
     result = scans.reconstruct_scan(copy, None, OPTIONS)
-    assert json.loads(result.attrs[scans.DOUBTS]) == ["Frame 7 is late."]
+    assert json.loads(result.attrs[DOUBTS]) == ["Frame 7 is late."]
     assert result.attrs[scans.NOT_JUDGED] == "2 of 9"
     (copy / PROOF_NAME).unlink()
-    assert scans.DOUBTS not in scans.reconstruct_scan(copy, None, OPTIONS).attrs
+    assert DOUBTS not in scans.reconstruct_scan(copy, None, OPTIONS).attrs
     assert scans.known_doubts(copy) == []
 
 
@@ -154,7 +155,7 @@ def test_what_white_contradicted_before_a_scan_is_repeated_by_its_result(scan: P
     kept = ScanProof(judged=9, untold=0, wrong=("Frame 7 is late.",))
     save_proof(reader, reader.calibration, kept)
     doubts = ["White is blue: 3 times.", "Frame 7 is late."]
-    assert json.loads(scans.reconstruct_scan(copy, None, OPTIONS).attrs[scans.DOUBTS]) == doubts
+    assert json.loads(scans.reconstruct_scan(copy, None, OPTIONS).attrs[DOUBTS]) == doubts
     assert scans.known_doubts(copy) == doubts
     (copy / PROOF_NAME).unlink()
     again = ScanProof(judged=9, untold=0, wrong=("White is blue: 2 times.",))

@@ -9,6 +9,7 @@ from pathlib import Path
 
 from dsl_core.io.result.completed import missing_text
 from dsl_core.io.result.result_arrays import ResultArrays
+from dsl_core.model.attributes import DOUBTS, sentences_of
 from dsl_core.model.calibration.accepted import read_missed
 from dsl_core.model.fit import Fit
 from dsl_core.model.rendered_effects import RenderedEffects
@@ -28,8 +29,8 @@ class Summary:
     """What the page shows: texts of its head, and which buttons can be used.
 
     ``message`` stands in place of a result; ``can_reconstruct`` means that a scan is offered. ``warning``
-    says which limits the rig's calibrations missed and what of the model does not fit, ``advice`` what to do;
-    both are empty where all is well.
+    says which pictures are in doubt, which limits the rig's calibrations missed and what of the model does
+    not fit, ``advice`` what to do; both are empty where all is well.
     """
 
     content: Content
@@ -70,21 +71,21 @@ def summarise(result: ResultArrays | None, offer: Path | None, busy: str, is_beg
     effects, details = effects_text(result.attributes)
     fit = Fit.read(result.attributes)
     missed = read_missed(result.attributes)
+    in_doubt = sentences_of(result.attributes, DOUBTS)
     doubted = fit if fit is not None and fit.significant else None
     lacks = [text] if (text := missing_text(result)) else []
     unseen = [fit.unseen] if fit is not None and fit.unseen else []
     parts = (f"{width} × {height} px{bands}", captured, effects, str(result.path))
+    texts = (str(result.path), "\n".join((*in_doubt, *missed)), fit.words if fit else "", details)
     return Summary(
         content,
         title=result.path.stem,
         about=" · ".join(part for part in parts if part),
-        details="\n\n".join(
-            part for part in (str(result.path), "\n".join(missed), fit.words if fit else "", details) if part
-        ),
+        details="\n\n".join(part for part in texts if part),
         message=message,
         has_result=True,
-        warning=" ".join([*missed, *([doubted.headline] if doubted else []), *lacks, *unseen]),
-        advice="\n".join([*missed, *([doubted.words] if doubted else unseen), *lacks]),
+        warning=" ".join([*in_doubt[:1], *missed, *([doubted.headline] if doubted else []), *lacks, *unseen]),
+        advice="\n".join([*in_doubt, *missed, *([doubted.words] if doubted else unseen), *lacks]),
     )
 
 

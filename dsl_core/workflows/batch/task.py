@@ -22,12 +22,12 @@ from dsl_core.io.objects.copies import published_as
 from dsl_core.io.objects.rooms import brought, published
 from dsl_core.io.objects.store import ObjectFolder
 from dsl_core.io.scan.folder import ScanReader
-from dsl_core.model.attributes import sentences_of
+from dsl_core.model.attributes import DOUBTS, sentences_of
 from dsl_core.model.fit import Fit
 from dsl_core.model.options import Options
 from dsl_core.model.rig import Rig
 from dsl_core.workflows.captures import is_import
-from dsl_core.workflows.scans import DOUBTS, MADE_OF, is_made_of, key_of_result, reconstruct_to
+from dsl_core.workflows.scans import MADE_OF, is_made_of, key_of_result, reconstruct_to
 
 if TYPE_CHECKING:
     import xarray as xr

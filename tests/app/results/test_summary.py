@@ -130,6 +130,16 @@ def test_what_the_calibration_missed_stands_before_what_does_not_fit() -> None:
     assert "the place of the film" in both.warning
 
 
+def test_pictures_in_doubt_come_before_all_else() -> None:
+    doubts, missed = ("Stripes are blurred.", "Frame 7 is late."), ("A limit was missed.",)
+    found = summarise(
+        result(frames_in_doubt=json.dumps(doubts), calibration_missed=json.dumps(missed)), None, ""
+    )
+    assert found.warning == "Stripes are blurred. A limit was missed."
+    assert found.advice == "Stripes are blurred.\nFrame 7 is late.\nA limit was missed."
+    assert "Frame 7 is late." in found.details
+
+
 def test_what_no_scan_shows_is_told_once_whether_the_model_fits_or_not() -> None:
     old = "The calibration is 21 days older than this scan."
     lost = FitFinding(
