@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import importlib.util
 import json
 import os
@@ -10,10 +11,13 @@ import subprocess
 import sys
 import threading
 import time
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from types import ModuleType
 
 import pytest
+
+from dsl_core.reconstruction.spectral.solving import lane_solver
 
 SCRIPT = Path(__file__).resolve().parents[2] / "packaging" / "run.py"
 
@@ -107,6 +111,28 @@ def test_what_runs_beside_the_checks_ends_when_they_are_broken_off() -> None:
     with pytest.raises(OSError, match="broken off"), run.beside(endless, dict(os.environ)):
         raise OSError("broken off")
     assert time.monotonic() - started < 50
+
+
+def test_a_first_demo_compiles_the_solver_meanwhile_and_does_not_wait_for_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    asked: list[object] = []
+
+    @contextlib.contextmanager
+    def noted(command: Sequence[str], variables: dict[str, str], limit_s: float) -> Iterator[None]:
+        asked.append((command[1:], limit_s, variables["VIRTUAL_ENV"]))
+        yield
+        asked.append("ended")
+
+    monkeypatch.setattr(run, "beside", noted)
+    monkeypatch.setattr(run, "dispatch", lambda command, *_: asked.append(command) or 0)
+    for is_new, command in ((True, "demo"), (False, "demo"), (True, "dsl-scan")):
+        monkeypatch.setattr(run, "prepare", lambda *_, new=is_new, **__: new)
+        assert run.main(["--venv", str(tmp_path), command]) == 0
+    assert asked == [(list(run.SOLVER), 0.0, str(tmp_path)), "demo", "ended", "demo", "dsl-scan"]
+    monkeypatch.setattr(lane_solver, "compile_early", lambda: asked.append("compiled"))
+    exec(run.SOLVER[1], {})
+    assert asked[-1] == "compiled"
 
 
 def test_what_ldconfig_does_not_list_is_missing() -> None:
