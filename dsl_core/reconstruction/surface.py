@@ -29,10 +29,16 @@ LEAST_PX, RATIO = 3, 1.7
 #: Error of a slope that a misfit causes, relative to that of as much noise in a single sample: a curved
 #: surface tilts the plane of a window next to the pixel far more than one around it.
 CENTRED, BESIDE = 1.0, 4.0
+#: Share of a window's pixels that must have a depth if it is to tell how depth scatters.
+BULK = 0.9
 #: A further window must promise this share of the variance: noise alone should not choose it.
 CLEARLY_BETTER = 0.7
 #: A misfit this many deviations of its own noise counts by itself; others are averaged with those around.
 CLEAR_MISFIT = 10.0
+#: Deviations hold what neighbours have in common, too, which scatters about no plane and hides no curvature.
+#: The scatter that they have is asked for in so many patches across and down, of at most so many pixels a
+#: side; one that is no smaller than this share of the variance is as stated.
+PATCHES, PATCH_PX, AS_STATED = 4, 96, 0.8
 #: A jump is this many deviations of the step to a neighbour, and this share of the inverse depth.
 JUMP_SIGMAS, JUMP_SHARE = 5.0, 0.004
 #: A surface that is nearer than this share to an end of the calibrated depths may go on beyond it.
@@ -98,11 +104,12 @@ def reconstruct_surface(
     jump = _beside_what_is_beyond(rig, depth_mm, beyond)
     if mixed is not None:
         jump |= mixed
+    share = _scatter_share(rig, depth_mm, depth_std_mm, window)
     if len(blocks) == 1:
-        return _surface_of(rig, depth_mm, depth_std_mm, window, blocks[0][1], jump)
+        return _surface_of(rig, depth_mm, depth_std_mm, window, blocks[0][1], jump, share)
     found = Surface.empty(depth_mm.shape)
     for own, near in blocks:
-        part = _surface_of(rig, depth_mm[near], depth_std_mm[near], window, near, jump[near])
+        part = _surface_of(rig, depth_mm[near], depth_std_mm[near], window, near, jump[near], share)
         inside = tuple(slice(o.start - n.start, o.stop - n.start) for o, n in zip(own, near, strict=True))
         for field in fields(Surface):
             getattr(found, field.name)[..., *own] = getattr(part, field.name)[..., *inside]
@@ -134,17 +141,53 @@ def _beside_what_is_beyond(rig: Rig, depth_mm: Map, beyond: NDArray[np.bool_] | 
     return np.asarray(near & (depth_mm > low * (1 + GOES_ON)) & (depth_mm < high * (1 - GOES_ON)))
 
 
-def _surface_of(
-    rig: Rig, depth_mm: Map, depth_std_mm: Map, window: int, place: Block, jump: NDArray[np.bool_]
-) -> Surface:
-    """The surface of a block at a place of the picture; at a ``jump`` is an edge whatever is seen."""
-    rays = rays_in(rig.camera, *place)
+def _scatter_share(rig: Rig, depth_mm: Map, depth_std_mm: Map, window: int) -> float:
+    """Which share of the stated variance of depth scatters about planes, in the middle of all parts.
+
+    Asked of windows that are large enough to see an error that repeats with the lines of a scan.
+    """
+    size = windows_px(window)[:2][-1]
+    sides = [min(PATCH_PX, -(-whole // PATCHES)) for whole in depth_mm.shape]
+    starts = (
+        np.linspace(0, whole - side, PATCHES).astype(int).tolist()
+        for whole, side in zip(depth_mm.shape, sides, strict=True)
+    )
+    seen = []
+    for top, left in product(*starts):
+        place = slice(top, top + sides[0]), slice(left, left + sides[1])
+        inverse, std, valid = _inverse(depth_mm[place], depth_std_mm[place])
+        fits = _plane_fits(rays_in(rig.camera, *place), inverse, std, valid, size)
+        seen.append(fits.scatter[fits.count > BULK * size**2])
+    scatter = np.concatenate(seen)
+    share = float(np.median(scatter)) if scatter.size else 1.0
+    return share if share < AS_STATED else 1.0
+
+
+def _inverse(depth_mm: Map, depth_std_mm: Map) -> tuple[Map, Map, NDArray[np.bool_]]:
+    """Inverse depth, zero where there is none, its deviation, and where there is one."""
     valid = np.isfinite(depth_mm)
     inverse = np.where(valid, 1 / np.where(valid, depth_mm, 1), 0.0)
-    std = np.where(valid, depth_std_mm, 1.0) * np.where(valid, inverse, 1.0) ** 2
+    return inverse, np.where(valid, depth_std_mm, 1.0) * np.where(valid, inverse, 1.0) ** 2, valid
+
+
+def _surface_of(
+    rig: Rig,
+    depth_mm: Map,
+    depth_std_mm: Map,
+    window: int,
+    place: Block,
+    jump: NDArray[np.bool_],
+    share: float,
+) -> Surface:
+    """The surface of a block at a place of the picture; at a ``jump`` is an edge whatever is seen.
+
+    ``share`` of the variance of depth scatters about planes.
+    """
+    rays = rays_in(rig.camera, *place)
+    inverse, std, valid = _inverse(depth_mm, depth_std_mm)
     best = _Best(rays, inverse, std)
     for size in windows_px(window):
-        best.offer(_plane_fits(rays, inverse, std, valid, size), size)
+        best.offer(_plane_fits(rays, inverse, std, valid, size, share), size)
     bad = ~valid | ~np.isfinite(best.variance)
     length = np.maximum(np.linalg.norm(best.fit, axis=0), 1e-12)
     normal = -best.fit / length
@@ -172,7 +215,8 @@ class _Fits:
 
     ``fit`` (3, rows, columns) are the coefficients of the rays, ``variance`` that of a slope by the noise
     of depth, ``misfit`` the square of a slope's error by what the plane leaves, relative to `CENTRED`;
-    ``unit`` the variance of a slope for noise of one; ``count`` the pixels, zero where they are too few.
+    ``unit`` the variance of a slope for noise of one; ``count`` the pixels, zero where they are too few;
+    ``scatter`` the mean square about the plane over the stated variance.
     """
 
     fit: Map
@@ -180,10 +224,16 @@ class _Fits:
     misfit: Map
     unit: Map
     count: Map
+    scatter: Map
 
 
-def _plane_fits(rays: Map, inverse: Map, std: Map, valid: NDArray[np.bool_], window: int) -> _Fits:
-    """Weighted least squares in every window; the noise is ``std`` of the inverse depth."""
+def _plane_fits(
+    rays: Map, inverse: Map, std: Map, valid: NDArray[np.bool_], window: int, share: float = 1.0
+) -> _Fits:
+    """Weighted least squares in every window; the noise is ``std`` of the inverse depth.
+
+    What exceeds a ``share`` of its variance is misfit.
+    """
     x, y = rays[0], rays[1]
     weight = np.where(valid, 1 / np.maximum(std, 1e-15) ** 2, 0.0)
     weight = weight / (weight.max(initial=0) or 1.0)
@@ -203,9 +253,16 @@ def _plane_fits(rays: Map, inverse: Map, std: Map, valid: NDArray[np.bool_], win
     count = np.where(count >= max(6, 0.15 * window**2), count, 0.0)
     unit = np.maximum(a, c) / (determinant * np.maximum(count, 1))
     noise = np.maximum(mean(std**2), 0)
-    misfit = _beyond_noise(residual, noise, count, window)
+    misfit = _beyond_noise(residual, share * noise, count, window)
     fit = np.stack([alpha, beta, level - alpha * mx - beta * my])
-    return _Fits(fit, noise * unit, misfit * unit * count, unit, count)
+    scatter = _for_each_degree(residual, count) / np.maximum(noise, 1e-30)
+    return _Fits(fit, noise * unit, misfit * unit * count, unit, count, scatter)
+
+
+def _for_each_degree(residual: Map, count: Map) -> Map:
+    """The mean square about planes for each degree of freedom that they leave."""
+    many = np.maximum(count, 4)
+    return np.asarray(residual * many / (many - 3))
 
 
 def _beyond_noise(residual: Map, noise: Map, count: Map, window: int) -> Map:
@@ -214,8 +271,8 @@ def _beyond_noise(residual: Map, noise: Map, count: Map, window: int) -> Map:
     A window alone would not see a curvature that tilts its plane by several deviations; surfaces curve alike
     in the neighbourhood, so that its mean does.
     """
+    excess = _for_each_degree(residual, count) - noise
     many = np.maximum(count, 4)
-    excess = residual * many / (many - 3) - noise
     clear = excess > CLEAR_MISFIT * noise * np.sqrt(2 / many)
     counted = ((count > 0) & ~clear).astype(float)
     wide = 2 * window + 1
