@@ -77,11 +77,10 @@ class SeenFrames:
         whole = light_sentence(proof.whole.code_sum(), proof.whole.line_sum())
         light = [whole] if whole else []
         light += proof.whole.lasting()
-        light += [
-            each.sentence
-            for each in (proof.whole.white_again(), proof.whole.colour_again())
-            if each is not None
-        ]
+        lit = proof.whole.lit_again()
+        # A window covers white, and changes its colour, where it came into the picture.
+        whites = (proof.whole.white_again(), proof.whole.colour_again()) if lit is None else (lit,)
+        light += [each.sentence for each in whites if each is not None]
         light += [each.sentence for each in proof.whole.local_sums()]
         return ProofReport(judged, together(wrong), sum(not proof.is_told(s) for s in untold), tuple(light))
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dsl_core.capture.proof.again.lit_again import LitAgain, lit_again
+from dsl_core.capture.proof.code.code_colours import code_colours
 from dsl_core.capture.proof.code.code_sum import CodeSum, code_sum
 from dsl_core.capture.proof.colour_again import ColourAgain, colour_again
 from dsl_core.capture.proof.judging.known import Known
@@ -46,6 +48,12 @@ class WholeScan:
         found = (local_sum(known.plan, n, known.kept, lit, known.noise, known.raster) for n in settings)
         return [each for each in found if each is not None]
 
+    def lit_again(self) -> LitAgain | None:
+        """The first black, captured again, that is as bright as white somewhere, and was not at first."""
+        known = self._known
+        channels = known.raster.channels(known.bayer)
+        return lit_again(known.plan, known.kept, channels, known.noise, known.raster)
+
     def white_again(self) -> WhiteAgain | None:
         """The white, captured again, that differs most from the first in a part of the picture."""
         return white_again(self._known.plan, self._known.kept, self._known.noise, self._known.raster)
@@ -77,7 +85,18 @@ class WholeScan:
                 known.raster,
                 with_colours,
             )
-        return [each for each in (*said, self._pair_places(), self._soft_stripes()) if each]
+        return [
+            each for each in (*said, self._code_colours(), self._pair_places(), self._soft_stripes()) if each
+        ]
+
+    def _code_colours(self) -> str:
+        known = self._known
+        ends = known.ends(known.first)
+        if known.lit is None or ends is None:
+            return ""
+        channels = known.raster.channels(known.bayer)
+        found = code_colours(known.code_pairs(), ends, known.noise, channels)
+        return "" if found is None else found.sentence
 
     def _pair_places(self) -> str:
         known, code = self._known, self._known.plan.code

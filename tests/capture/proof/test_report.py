@@ -8,8 +8,10 @@ from itertools import islice
 import numpy as np
 import pytest
 
+from dsl_core.capture.proof.again.lit_again import LitAgain
 from dsl_core.capture.proof.colour_again import ColourAgain
 from dsl_core.capture.proof.finding import ProofReport, Verdict
+from dsl_core.capture.proof.lasting.black_light import LitBlack
 from dsl_core.capture.proof.lines.line_sum import LineSum
 from dsl_core.capture.proof.report import SeenFrames, prove
 from dsl_core.capture.proof.whole_scan import WholeScan
@@ -98,6 +100,16 @@ def test_white_of_another_colour_is_told(
 ) -> None:
     seen = ColourAgain(next(iter(scene.plan.shots())), (1.1, 1.0, 0.9), 0.1)
     monkeypatch.setattr(WholeScan, "colour_again", lambda scan: seen)
+    assert _judged(scene, frames).sentences == (seen.sentence,)
+
+
+def test_a_window_that_came_in_is_told_instead_of_what_it_does_to_white(
+    scene: RenderedScene, frames: MemorySink, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    first = next(iter(scene.plan.shots()))
+    seen = LitAgain(first, LitBlack(9, (3, 7), (2, 5), False))
+    monkeypatch.setattr(WholeScan, "lit_again", lambda scan: seen)
+    monkeypatch.setattr(WholeScan, "colour_again", lambda scan: ColourAgain(first, (1.1, 1.0, 0.9), 0.1))
     assert _judged(scene, frames).sentences == (seen.sentence,)
 
 
