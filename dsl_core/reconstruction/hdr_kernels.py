@@ -88,16 +88,21 @@ def merge_settings(
 def light_sums(
     faint: Array, bright: Array, black_faint: Array, black_bright: Array,
     low: float, high: float, scale: float, floor: float, electrons: float,
-) -> tuple[int, float, float]:  # fmt: skip
+) -> tuple[int, float, float, float]:  # fmt: skip
     """Pixels of two settings that can be compared, and what a fit of one as a multiple of the other needs.
 
     Mosaics and blacks are (rows, columns). Returns how many pixels have light above ``low`` in the bright
-    one and counts below ``high`` in both; the sums of their squared bright light less its noise, and of the
-    products of both lights, weighted by the noise that the faint one has for light ``scale`` times the
-    bright one. ``floor`` is the variance of counts without light.
+    one and counts below ``high`` in both; the sums of their squared bright light less its noise, of the
+    products of both lights, and of their squared faint light, weighted by the noise that the faint one has
+    for light ``scale`` times the bright one. ``floor`` is the variance of counts without light.
     """
     rows, columns = faint.shape
-    count, power, product = np.zeros(columns), np.zeros(columns), np.zeros(columns)
+    count, power, product, square = (
+        np.zeros(columns),
+        np.zeros(columns),
+        np.zeros(columns),
+        np.zeros(columns),
+    )
     for y in range(rows):
         for x in range(columns):
             light = np.float64(np.float32(bright[y, x]) - black_bright[y, x])
@@ -109,4 +114,5 @@ def light_sums(
             count[x] += 1.0 if used else 0.0
             power[x] += weight * (light * light - floor - shot)
             product[x] += weight * light * other
-    return int(count.sum()), power.sum(), product.sum()
+            square[x] += weight * other * other
+    return int(count.sum()), power.sum(), product.sum(), square.sum()

@@ -26,7 +26,7 @@ from dsl_core.reconstruction.light.course import (
 )
 from dsl_core.reconstruction.light.line_levels import LineLevels, candidates, line_levels
 from dsl_core.reconstruction.light.room_flicker import room_flicker
-from dsl_core.reconstruction.light.setting_ratios import Ratio
+from dsl_core.reconstruction.light.setting_ratios import Ratio, without_strange
 from dsl_core.reconstruction.light.slow_black import SlowBlack, slow_black
 from dsl_core.reconstruction.light.steady import SteadyLight
 from dsl_core.reconstruction.light.sudden import (
@@ -103,6 +103,7 @@ def follow_light(
     def look() -> NDArray[np.intp]:
         pixels = candidates(code.column, (white.radiance, white.variance))
         frames.look(np.union1d(pixels, also(code, white)), progress)
+        frames.ratios = without_strange(frames.ratios)
         return pixels
 
     pixels = look()

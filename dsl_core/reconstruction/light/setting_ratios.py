@@ -1,14 +1,20 @@
-"""How much light one setting had, compared with another: the same pattern was shown to both."""
+"""How much light one setting had, compared with another: the same pattern was shown to both.
+
+Where the brighter setting saturates nearly everywhere, as white often does, few pixels are compared. What
+came before these between both settings, or was taken off saturated counts, then looks like light of the whole
+picture, which other pixels or other patterns contradict.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
+from dsl_core.model.plan import Role
 from dsl_core.model.rig import Sensor
 from dsl_core.optics.sensor import raw_variance
 from dsl_core.reconstruction.hdr import BlackFrame
@@ -17,6 +23,14 @@ from dsl_core.reconstruction.hdr import BlackFrame
 USED = (0.01, 0.9)
 #: Rows of a picture that are looked at, and pixels that a comparison needs.
 ROWS, FEWEST = 145, 12
+
+#: Pixels contradict each other where what no factor explains is so many times their noise (variance).
+CONTRADICT = 4.0
+#: A pattern whose settings are further apart than those of most patterns, by so much (logarithm) and so many
+#: deviations from pattern to pattern, says nothing of the light: its picture would be of wrong brightness.
+STRANGE, STRANGE_SIGMAS = 0.35, 8.0
+#: Patterns needed to know what most of them say.
+FEWEST_PATTERNS = 8
 
 
 @dataclass(frozen=True)
@@ -53,7 +67,7 @@ def compare_settings(
         # The fainter setting is fitted as a multiple of the brighter one, whose noise hardly matters.
         faint, bright = (i, -1) if gains_ms[i] <= gains_ms[-1] else (-1, i)
         scale = gains_ms[faint] / gains_ms[bright]
-        count, power, product = light_sums(
+        count, power, product, square = light_sums(
             pictures[faint], pictures[bright], darks[faint], darks[bright],
             low, high, scale, floor, sensor.electrons_per_dn,
         )  # fmt: skip
@@ -63,5 +77,25 @@ def compare_settings(
             continue
         log = np.log(factor / scale)
         std = 1 / np.sqrt(power) / factor
+        misfit = (square - factor * product) / count
+        std *= np.sqrt(misfit) if misfit > CONTRADICT else 1.0
         found.append(Ratio(float(log if faint == i else -log), float(std)))
     return (*found, Ratio(0.0, 0.0))
+
+
+def without_strange(
+    ratios: Mapping[tuple[Role, int], tuple[Ratio | None, ...]],
+) -> dict[tuple[Role, int], tuple[Ratio | None, ...]]:
+    """The ``ratios`` of patterns by role and number, None where they contradict those of most others."""
+    found = {key: list(of_settings) for key, of_settings in ratios.items()}
+    for place in range(max(map(len, found.values()), default=0)):
+        keys = [key for key, each in found.items() if place < len(each) and each[place] is not None]
+        logs = np.array([ratio.log for key in keys if (ratio := found[key][place]) is not None])
+        if logs.size < FEWEST_PATTERNS:
+            continue
+        apart = np.abs(logs - np.median(logs))
+        limit = max(STRANGE, STRANGE_SIGMAS * 1.4826 * float(np.median(apart)))
+        for key, is_strange in zip(keys, apart > limit, strict=True):
+            if is_strange:
+                found[key][place] = None
+    return {key: tuple(of_settings) for key, of_settings in found.items()}

@@ -3,10 +3,16 @@
 import numpy as np
 import pytest
 
+from dsl_core.model.plan import Role
 from dsl_core.model.rig import Sensor
 from dsl_core.optics.sensor import digitise
 from dsl_core.reconstruction.hdr import BlackFrame
-from dsl_core.reconstruction.light.setting_ratios import compare_settings, compared_rows
+from dsl_core.reconstruction.light.setting_ratios import (
+    Ratio,
+    compare_settings,
+    compared_rows,
+    without_strange,
+)
 
 SENSOR, GAINS_MS = Sensor(), (4.0, 100.0)
 
@@ -62,7 +68,10 @@ def test_a_ratio_is_the_factor_of_the_brighter_setting_that_fits_the_fainter_one
     weight = 1 / (2 * (0.25 + 1 / 12) + scale * x / 10)
     power = weight @ (x**2 - x / 10 - 0.25 - 1 / 12)
     factor = weight @ (x * y) / power
-    assert found.std == pytest.approx(1 / np.sqrt(power) / factor)
+    # The pixel of 302 DN contradicts all others.
+    misfit = weight @ (y**2 - factor * x * y) / used.sum()
+    assert misfit > 4
+    assert found.std == pytest.approx(np.sqrt(misfit / power) / factor)
     assert found.log == pytest.approx(np.log(factor / scale) * (1 if gains[0] < gains[1] else -1))
     assert found.log == pytest.approx(np.log(1.03), abs=0.01)
 
@@ -84,3 +93,40 @@ def test_rows_are_spread_over_the_picture() -> None:
     rows = compared_rows(1000)
     assert (len(rows), rows[0], rows[-1]) == (145, 0, 999)
     assert set(np.diff(rows)) == {6, 7}
+
+
+def test_pixels_that_contradict_each_other_make_a_ratio_uncertain() -> None:
+    """A few bright pixels that something came before, among many faint ones that nothing did."""
+    gains, black = (4.0, 10.0), black_of((6, 80), 260)
+    light = np.full((6, 80), 20.0)
+    light[0, :20] = 300.0
+    rng = np.random.default_rng(3)
+    sound, covered = (
+        [
+            np.rint(260 + gain * light * share + rng.normal(0, 2, light.shape)).astype(np.uint16)
+            for gain, share in zip(gains, shares, strict=True)
+        ]
+        for shares in ((1.0, 1.0), (np.where(light > 100, 2.5, 1.0), 1.0))
+    )
+    usual, wrong = (compare_settings(raws, [black, black], gains, SENSOR)[0] for raws in (sound, covered))
+    assert usual is not None
+    assert wrong is not None
+    assert abs(usual.log) < 4 * usual.std
+    assert wrong.std > 10 * usual.std
+
+
+def ratios_of(logs: list[float]) -> dict[tuple[Role, int], tuple[Ratio | None, ...]]:
+    return {("spectral", i): (Ratio(log, 0.001), Ratio(0.0, 0.0)) for i, log in enumerate(logs)}
+
+
+def test_a_pattern_that_contradicts_all_others_says_nothing_of_the_light() -> None:
+    """White that saturates but where something dark came before it: three pixels, fifty times the light."""
+    ratios = ratios_of([0.01 * i for i in range(20)]) | {("white", 0): (Ratio(3.9, 0.0002), None)}
+    found = without_strange(ratios)
+    assert found.pop(("white", 0)) == (None, None)
+    assert found == ratios_of([0.01 * i for i in range(20)])
+
+
+@pytest.mark.parametrize("logs", [[0.0, 0.5] * 8, [0.0] * 15 + [0.3], [0.0] * 6 + [3.9]])
+def test_light_that_flickers_and_few_patterns_are_left_as_they_are(logs: list[float]) -> None:
+    assert without_strange(ratios_of(logs)) == ratios_of(logs)
