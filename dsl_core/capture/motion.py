@@ -21,6 +21,9 @@ TILES = (4, 6)
 LEAST_PX, SIGMAS, CHANGED = 0.2, 6.0, 0.25
 #: Tiles that tell a shift to this many pixels count; so many of them must have moved, or all but few.
 TELLING_PX, FEWEST = 0.1, 2
+#: Something moved for sure if a shift explains at least this share of what changed in one of the tiles:
+#: filters that sharpen, mixed pictures and other colours move the edges of stripes, but change more than that.
+EXPLAINED = 0.6
 #: From this share of the telling tiles on, all of the picture moved.
 MOST = 0.6
 
@@ -31,7 +34,8 @@ class Movement:
 
     None: the picture changed, but by no shift; as shots: at some time since the scan began.
     ``is_pattern``: the picture stayed, but the pattern on it moved. ``columns`` and ``rows`` bound what
-    moved, camera pixels; None for all of the picture.
+    moved, camera pixels; None for all of the picture. Unless it ``is_sure``, more has changed everywhere than
+    a shift explains.
     """
 
     after: int | None
@@ -41,6 +45,7 @@ class Movement:
     is_pattern: bool
     columns: tuple[int, int] | None = None
     rows: tuple[int, int] | None = None
+    is_sure: bool = True
 
     @property
     def sentence(self) -> str:
@@ -53,6 +58,12 @@ class Movement:
             part = " in columns {}-{}, rows {}-{} of the picture".format(*self.columns, *self.rows)
         if self.shift_px is None:
             return f"The scene changed{part}, {when}, by more than a small motion."
+        if not self.is_sure:
+            return (
+                f"The picture changed{part}, {when}, and a motion explains only a part of it: camera or"
+                " projector sharpen, filter or mix pictures, light or colours of the projector are others,"
+                " or something moved."
+            )
         size = f"{self.shift_px:.1f} ± {max(self.std_px, 0.1):.1f} px"
         if self.is_pattern:
             return (
@@ -65,7 +76,10 @@ class Movement:
     @property
     def advice(self) -> str:
         """What to do about it."""
-        return "Fix camera, projector and scene, and scan again; frames after that do not fit those before."
+        first = "Fix camera, projector and scene"
+        if not self.is_sure:
+            first = "Switch what improves pictures off in camera, projector and computer, fix all of them"
+        return f"{first}, and scan again; frames after that do not fit those before."
 
 
 def moved_between(
@@ -116,6 +130,7 @@ def _movement(found: TileShifts, shape: tuple[int, ...], is_pattern: bool) -> Mo
         is_pattern=is_pattern,
         columns=None if whole else columns,
         rows=None if whole else rows,
+        is_sure=bool((found.explained[sure] >= EXPLAINED).any()) or not sure.any(),
     )
 
 

@@ -31,7 +31,8 @@ class TileShifts:
 
     ``change`` is the rms of what no shift and no brightness explains, as a share of the tile's light, less
     noise; ``gain`` the brightness. ``better`` is by how much chi-square is lower than without any shift,
-    brightness left free. Tiles without structure have infinite deviations.
+    brightness left free, and ``explained`` is that as a share of all that noise does not explain. Tiles
+    without structure have infinite deviations.
     """
 
     x: Floats
@@ -41,6 +42,7 @@ class TileShifts:
     change: Floats
     gain: Floats
     better: Floats
+    explained: Floats
 
     @property
     def length(self) -> Floats:
@@ -66,7 +68,7 @@ def tile_shifts(old: Floats, new: Floats, variance: Floats, tiles: tuple[int, in
     down, across = (
         np.linspace(0, size, count + 1).astype(int) for size, count in zip(old.shape, tiles, strict=True)
     )
-    found = np.full((7, *tiles), np.inf)
+    found = np.full((8, *tiles), np.inf)
     for i in range(tiles[0]):
         for j in range(tiles[1]):
             part = slice(down[i], down[i + 1]), slice(across[j], across[j + 1])
@@ -77,7 +79,7 @@ def tile_shifts(old: Floats, new: Floats, variance: Floats, tiles: tuple[int, in
 def _one_tile(
     old: Floats, new: Floats, variance: Floats, part: tuple[slice, slice], common: tuple[float, float]
 ) -> tuple[float, ...]:
-    lost = (0.0, 0.0, np.inf, np.inf, 0.0, 1.0, 0.0)
+    lost = (0.0, 0.0, np.inf, np.inf, 0.0, 1.0, 0.0, 0.0)
     shift = np.array(common)
     weight = 1 / variance[part].ravel()
     seen = new[part].ravel()
@@ -107,11 +109,12 @@ def _one_tile(
     if np.hypot(*(shift - common)) > FURTHEST_PX:
         shift = np.array(common)
         std = np.full(2, np.inf)
-    better = 0.0
+    better = explained = 0.0
     if np.hypot(*shift) > SHORT_PX:
         unmoved, moved_by = (_chi_square(old, seen, weight, part, by) for by in (np.zeros(2), shift))
         better = max(unmoved - moved_by, 0.0)
-    return shift[0], shift[1], std[0], std[1], change, gain, better
+        explained = min(better / max(unmoved - np.count_nonzero(weight > CLIPPED * weight.max()), 1.0), 1.0)
+    return shift[0], shift[1], std[0], std[1], change, gain, better, explained
 
 
 def _share_of_structure(information: Floats, weight: Floats) -> Floats:

@@ -9,12 +9,14 @@ from dsl_core.simulation.published_rig import published_rig
 from dsl_core.solve.image_shift import TileShifts
 
 
-def tiles(x: float = 0.0, std: float = 0.01, change: float = 0.0, moved: int = 24) -> TileShifts:
+def tiles(
+    x: float = 0.0, std: float = 0.01, change: float = 0.0, moved: int = 24, explained: float = 1.0
+) -> TileShifts:
     """Shifts of 4 x 6 tiles, of which the first ones moved; the others tell that they did not."""
     is_moved = (np.arange(24) < moved).reshape(4, 6)
     nothing, one = np.zeros((4, 6)), np.ones((4, 6))
     shift, changed = (np.asarray(size * is_moved, np.float64) for size in (x, change))
-    return TileShifts(shift, nothing, std * one, std / 2 * one, changed, one, 1e9 * one)
+    return TileShifts(shift, nothing, std * one, std / 2 * one, changed, one, 1e9 * one, explained * one)
 
 
 @pytest.mark.parametrize(
@@ -64,6 +66,21 @@ def test_a_scene_that_changed_has_no_shift() -> None:
     assert (seen.shift_px, seen.std_px) == (None, 0.0)
     assert seen.columns is None, "of two tiles that tell, at least, both changed"
     assert "The scene changed, since the scan began, by more than a small motion." in seen.sentence
+
+
+@pytest.mark.parametrize(("explained", "is_motion"), [(0.59, False), (0.61, True)])
+def test_a_shift_that_explains_only_a_part_of_what_changed_is_no_sure_motion(
+    explained: float, is_motion: bool
+) -> None:
+    found = tiles(0.5, moved=3, explained=0.3)
+    found.explained[0, 1] = explained
+    seen = _movement(found, (32, 48), True)
+    assert seen is not None
+    assert ("The pattern moved by 1.0" in seen.sentence) == is_motion
+    assert ("a motion explains only a part of it: camera or projector sharpen" in seen.sentence) == (
+        not is_motion
+    )
+    assert ("Fix camera, projector and scene" in seen.advice) == is_motion
 
 
 def test_light_is_what_is_above_black_with_the_noise_of_both() -> None:

@@ -44,6 +44,13 @@ def test_a_part_that_moves_is_found_there(scene: np.ndarray) -> None:
     assert np.delete(got.length.ravel(), 0).max() < 0.15
 
 
+def test_a_shift_explains_what_moved_and_little_of_what_was_sharpened(scene: np.ndarray) -> None:
+    moved = found(shift(scene, (0.2, 0.5), order=3, mode="nearest"), scene)
+    sharpened = found(scene + 0.5 * (scene - gaussian_filter(scene, 1.0)), scene)
+    assert moved.explained.min() > 0.9
+    assert sharpened.explained.max() < 0.4
+
+
 def test_the_gradients_of_noise_tell_nothing() -> None:
     fading = np.tile(np.linspace(150.0, 300.0, 300), (200, 1))
     for seed in range(5):
@@ -61,7 +68,7 @@ def test_an_empty_picture_tells_nothing() -> None:
 
 def test_sigmas_and_lengths_are_those_of_both_directions() -> None:
     one = np.ones((1, 1))
-    found = TileShifts(3 * one, -4 * one, 0.5 * one, 2 * one, 0 * one, one, 100 * one)
+    found = TileShifts(3 * one, -4 * one, 0.5 * one, 2 * one, 0 * one, one, 100 * one, one)
     assert found.length.item() == 5.0
     assert found.sigmas.item() == pytest.approx(np.hypot(6, 2))
     assert replace(found, better=9 * one).sigmas.item() == pytest.approx(3)
