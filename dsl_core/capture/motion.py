@@ -22,7 +22,7 @@ LEAST_PX, SIGMAS, CHANGED = 0.2, 6.0, 0.25
 #: Tiles that tell a shift to this many pixels count; so many of them must have moved, or all but few.
 TELLING_PX, FEWEST = 0.1, 2
 #: Something moved for sure if a shift explains at least this share of what changed in one of the tiles:
-#: filters that sharpen, mixed pictures and other colours move the edges of stripes, but change more than that.
+#: filters that sharpen, mixed pictures and other colours move edges of stripes, but change more than that.
 EXPLAINED = 0.6
 #: From this share of the telling tiles on, all of the picture moved.
 MOST = 0.6
