@@ -39,8 +39,8 @@ class CodeColours:
         return (
             f"{self.pairs} pairs of the code have another colour than white, which each of them adds up to:"
             f" their light is {each}. Colours changed before white was captured, and no picture tells which"
-            " are as calibrated: reflectances may be off by as much. Switch automatic white balance of the camera"
-            " and night mode of projector and computer off, let the projector warm up, and scan again."
+            " are as calibrated: reflectances may be off by as much. Switch automatic white balance of the"
+            " camera and night mode of projector and computer off, let the projector warm up, and scan again."
         )
 
 
