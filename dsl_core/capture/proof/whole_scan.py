@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dsl_core.capture.proof.again.lit_again import LitAgain, lit_again
+from dsl_core.capture.proof.again.single_pixels import SinglePixels, single_pixels
 from dsl_core.capture.proof.code.code_colours import code_colours
 from dsl_core.capture.proof.code.code_sum import CodeSum, code_sum
 from dsl_core.capture.proof.colour_again import ColourAgain, colour_again
@@ -53,6 +54,11 @@ class WholeScan:
         known = self._known
         channels = known.raster.channels(known.bayer)
         return lit_again(known.plan, known.kept, channels, known.noise, known.raster)
+
+    def single_pixels(self) -> SinglePixels | None:
+        """The black, captured again, in which most pixels are far off alone."""
+        known = self._known
+        return single_pixels(known.plan, known.kept, known.noise, known.raster)
 
     def white_again(self) -> WhiteAgain | None:
         """The white, captured again, that differs most from the first in a part of the picture."""

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from dsl_core.capture.proof.again.lit_again import LitAgain
+from dsl_core.capture.proof.again.single_pixels import SinglePixels
 from dsl_core.capture.proof.colour_again import ColourAgain
 from dsl_core.capture.proof.finding import ProofReport, Verdict
 from dsl_core.capture.proof.lasting.black_light import LitBlack
@@ -110,6 +111,14 @@ def test_a_window_that_came_in_is_told_instead_of_what_it_does_to_white(
     seen = LitAgain(first, LitBlack(9, (3, 7), (2, 5), False))
     monkeypatch.setattr(WholeScan, "lit_again", lambda scan: seen)
     monkeypatch.setattr(WholeScan, "colour_again", lambda scan: ColourAgain(first, (1.1, 1.0, 0.9), 0.1))
+    assert _judged(scene, frames).sentences == (seen.sentence,)
+
+
+def test_single_pixels_of_black_are_told(
+    scene: RenderedScene, frames: MemorySink, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    seen = SinglePixels(next(iter(scene.plan.shots())), 0.003, 256.0)
+    monkeypatch.setattr(WholeScan, "single_pixels", lambda scan: seen)
     assert _judged(scene, frames).sentences == (seen.sentence,)
 
 
