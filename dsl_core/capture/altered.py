@@ -32,6 +32,8 @@ NO_LIGHT, FEWEST_ROWS, MOST_ROWS = 0.05, 2, 0.7
 ALIVE, SAME_BLACK_DN = 0.6, 2.0
 #: Pictures are clipped where this share of the pixels has the largest value, below this share of full scale.
 CLIPPED, BELOW_FULL = 0.01, 0.9
+#: A picture alone says so with more than this share of full scale.
+BRIGHT_SHARE = 0.2
 #: White follows that of before by another power than one by so much, alike in every colour, and as closely as
 #: this correlation; blocks of so many pixels of a colour a side are asked that are so many deviations bright,
 #: and so many are needed, whose light (logarithm) deviates by so much.
@@ -170,6 +172,19 @@ def _clipped(before: Mosaic, now: Mosaic, sensor: Sensor) -> str:
         if found is not None:
             return _said_of_limit(f" in {name}", *found)
     return ""
+
+
+def ends_early(picture: Mosaic, sensor: Sensor) -> str:
+    """Whether the counts of a bright picture end below full scale; empty if they do not."""
+    most = int(picture.max())
+    share = float((picture == most).mean())
+    is_bright = most - sensor.black_level_dn > BRIGHT_SHARE * (sensor.full_scale_dn - sensor.black_level_dn)
+    if not is_bright or most >= BELOW_FULL * sensor.full_scale_dn or share < CLIPPED:
+        return ""
+    return (
+        f"No pixel of it has more than {most} DN, and {share:.0%} have just that: the camera saturates below"
+        " its full scale. Set gain, bit depth and limits of its driver as they were."
+    )
 
 
 def _limit_of(before: Mosaic, now: Mosaic, sensor: Sensor) -> tuple[int, float] | None:

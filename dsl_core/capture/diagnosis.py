@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from dsl_core.capture.altered import alteration
+from dsl_core.capture.altered import alteration, ends_early
 from dsl_core.capture.motion import TILES, moved_between
 from dsl_core.capture.proof.lasting.black_light import lit_black
 from dsl_core.capture.proof.noise import Noise
@@ -129,6 +129,10 @@ class Diagnosis:
         else:
             return Explanation()
         return what_changed(before, now, self._sensor)
+
+    def explain_picture(self, pixels: Mosaic) -> Explanation:
+        """What a wrong picture, raw mosaic (rows, columns), shows by itself where references do not."""
+        return Explanation(ends_early(pixels, self._sensor), is_of_all=True)
 
 
 def _of_pair(one: Mosaic, other: Mosaic) -> References:

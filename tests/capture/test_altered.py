@@ -9,7 +9,7 @@ import pytest
 from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter, median_filter
 
-from dsl_core.capture.altered import alteration
+from dsl_core.capture.altered import alteration, ends_early
 from dsl_core.model.rig import Sensor
 
 SENSOR = Sensor()
@@ -166,3 +166,16 @@ def test_noise_that_a_displaced_picture_had_less_of_before_is_no_gain() -> None:
 def test_pictures_that_tell_nothing_are_not_altered() -> None:
     full = tuple(np.full((8, 8), int(SENSOR.full_scale_dn), np.uint16) for _ in range(3))
     assert alteration(full, full, SENSOR) == ""  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(("most_dn", "is_told"), [(1500, True), (4095, False), (290, False)])
+def test_a_bright_picture_whose_counts_end_below_full_scale_says_so_alone(
+    most_dn: int, is_told: bool
+) -> None:
+    white = np.minimum(4 * pictures(1)[0].astype(np.uint32), most_dn).astype(np.uint16)
+    assert (f"has more than {most_dn} DN" in ends_early(white, SENSOR)) == is_told
+
+
+def test_neither_black_nor_a_sound_white_ends_early() -> None:
+    white, black, code = pictures(1)
+    assert [ends_early(each, SENSOR) for each in (white, black, code)] == ["", "", ""]

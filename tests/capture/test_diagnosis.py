@@ -282,3 +282,14 @@ def test_black_that_saturates_is_told(share: float, is_told: bool) -> None:
     full = np.where(np.arange(96) < 96 * share, int(SENSOR.full_scale_dn), before.black).astype(np.uint16)
     found = what_changed(before, References(np.maximum(before.white, full), full, full), SENSOR).sentence
     assert ("Black saturates in most" in found) == is_told
+
+
+def test_a_picture_that_ends_below_full_scale_says_so_where_white_does_not(
+    scene: RenderedScene, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As white of a dimmer setting, which is below the limit."""
+    monkeypatch.setattr(Diagnosis, "explain", lambda diagnosis, take: Explanation())
+    rig = changing([scene], Change(most_dn=from_shot(9, 65535, 1200)), 1)
+    proof = FrameProof(scene.plan, scene.calibration)
+    with pytest.raises(DeviceError, match=r"No pixel of it has more than 1200 DN, and .* have just that"):
+        Runner(rig, scene.plan, MemorySink(scene.plan), token_image, proof=proof).run()

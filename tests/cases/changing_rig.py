@@ -35,13 +35,14 @@ def from_shot(at: int, before: float, after: float) -> Callable[[int], float]:
 class Change:
     """What happens at each shot: factors of the projector's light, the room's and the exposure.
 
-    ``scene`` says which of the scenes of `changing` is there.
+    ``scene`` says which of the scenes of `changing` is there, ``most_dn`` what counts end at.
     """
 
     light: Callable[[int], float] = steady
     room: Callable[[int], float] = steady
     exposure: Callable[[int], float] = steady
     scene: Callable[[int], int] = lambda shot: 0
+    most_dn: Callable[[int], float] = lambda shot: 65535
 
 
 @dataclass
@@ -96,6 +97,7 @@ class _Camera(Camera):
         )
         exposure_ms = state.exposure_ms * state.change.exposure(state.shot)
         pixels = digitise(scene.calibration.sensor, rate * np.float32(exposure_ms), state.rng)
+        pixels = np.minimum(pixels, np.uint16(state.change.most_dn(state.shot)))
         return Frame(pixels, state.exposure_ms, float(state.count), state.count)
 
 

@@ -289,6 +289,9 @@ class ProvenShots:
                     self.corrected += 1
         if found.is_wrong:
             change = self._explain()
+            if not change.sentence:
+                of_picture = self._diagnosis.explain_picture(frame.pixels)
+                change = of_picture if of_picture.sentence else change
             advice = f"{what_to_do(found, change, proof)} {self._next_step.then}"
             if self._known_wrong and not change.sentence:
                 advice = " ".join(self._known_wrong)

@@ -103,10 +103,10 @@ def test_pixels_that_contradict_each_other_make_a_ratio_uncertain() -> None:
     rng = np.random.default_rng(3)
     sound, covered = (
         [
-            np.rint(260 + gain * light * share + rng.normal(0, 2, light.shape)).astype(np.uint16)
+            np.rint(260 + gain * light * np.asarray(share) + rng.normal(0, 2, light.shape)).astype(np.uint16)
             for gain, share in zip(gains, shares, strict=True)
         ]
-        for shares in ((1.0, 1.0), (np.where(light > 100, 2.5, 1.0), 1.0))
+        for shares in ((np.ones_like(light), 1.0), (np.where(light > 100, 2.5, 1.0), 1.0))
     )
     usual, wrong = (compare_settings(raws, [black, black], gains, SENSOR)[0] for raws in (sound, covered))
     assert usual is not None
