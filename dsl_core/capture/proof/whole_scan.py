@@ -97,8 +97,9 @@ class WholeScan:
 
     def _code_colours(self) -> str:
         known = self._known
-        ends = known.ends(known.first)
-        if known.lit is None or ends is None:
+        ends, whole = known.ends(known.first), self.code_sum()
+        # Values that are not proportional to the light give edges of stripes other colours.
+        if known.lit is None or ends is None or (whole is not None and whole.is_curved):
             return ""
         channels = known.raster.channels(known.bayer)
         found = code_colours(known.code_pairs(), ends, known.noise, channels)

@@ -159,6 +159,9 @@ class Bench:
             raise DeviceError("no camera")
         return Explanation(self.cause, self.cause == "It moved.", self.cause == "", self.cause == "Turned.")
 
+    def explain_picture(self, pixels: object) -> Explanation:
+        return Explanation()
+
 
 def is_right(shot: Shot) -> Finding:
     return Finding(shot, Verdict.RIGHT, light=Light.USUAL)

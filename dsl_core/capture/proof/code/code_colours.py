@@ -67,7 +67,9 @@ def code_colours(
                 ratios[colour] = float(total[of].sum(dtype=np.float64)) / white
                 stds[colour] = (noise_dn + 2 * UNSEEN_DN * int(of.sum())) / white
         apart = np.abs(ratios / ratios[1] - 1)
-        if (apart > np.maximum(LEAST + stds + stds[1], SIGMAS * np.hypot(stds, stds[1]))).any():
+        # Values that are not proportional to the light make edges of stripes brighter in every colour.
+        least = max(LEAST, abs(ratios[1] - 1)) + stds + stds[1]
+        if (apart > np.maximum(least, SIGMAS * np.hypot(stds, stds[1]))).any():
             found.append(ratios)
     if len(found) < FEWEST_PAIRS:
         return None
