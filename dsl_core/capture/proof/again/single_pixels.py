@@ -35,7 +35,7 @@ class SinglePixels:
         """What is wrong, and what to do."""
         return (
             f"In black, captured again as frame {self.shot.number}, {self.share:.2%} of the pixels are off by"
-            f" up to {self.most_dn:.0f} DN, and those beside them are not: bits change on the way from the"
+            f" up to {self.most_dn:.0f} DN, and their neighbours are not: bits change on the way from the"
             " camera, or pixels of its sensor have become hot. Other frames may hold as many. Check cable,"
             " connectors and hub, let the camera cool down, and scan again."
         )
