@@ -10,13 +10,14 @@ but many pixels together tell a displacement to some hundredths.
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from dsl_core.model.fit import FitFinding, Part
+from dsl_core.model.fit import FitFinding, Part, matters
 from dsl_core.model.plan import BinaryCode, CapturePlan, EnsembleCode, GrayCode, XorCode
 from dsl_core.model.result import Flag
 from dsl_core.model.rig import Rig
@@ -60,6 +61,8 @@ ROWS_TELL = 0.5
 NEARLY_WHOLE, LEFT_OVER = 0.15, 0.3
 #: Name of what is found of lines.
 LINES_AGAINST_CODE = "lines against the binary code"
+#: Name of what is found of rows.
+ROWS_AGAINST_DEPTH = "rows of the binary code"
 #: Pixels that say nothing: their column is not that of one surface, or is not refined.
 _DOUBTFUL = Flag.NOT_REFINED | Flag.UNUSUAL_PEAK | Flag.DEPTH_EDGE
 
@@ -104,6 +107,21 @@ class Disagreement:
         """Deviation of the root mean square."""
         return rms_beyond_chance(self.shift_px, self.std_px)[1]
 
+    @property
+    def beyond_chance_px(self) -> float:
+        """What deviations have to hold of it, also where it is too small for words; 0 where it is chance.
+
+        The mean of all groups is known better than the shift of any.
+        """
+        mean, std = self.mean_px, float(np.sum(self.std_px**-2.0) ** -0.5)
+        told = (self.rms_px, self.rms_std_px), (abs(mean), std)
+        return max(value if matters(value, deviation, 0.0) else 0.0 for value, deviation in told)
+
+    @property
+    def mean_px(self) -> float:
+        """Mean shift, by what each group knows."""
+        return float(np.average(self.shift_px, weights=self.std_px**-2.0))
+
     def smooth(self) -> Floats:
         """Shifts averaged over neighbouring groups, px: what moves does so along the columns, or at once."""
         size = min(SMOOTH_GROUPS, len(self.shift_px))
@@ -139,12 +157,19 @@ def code_agreement(
         _of_rows(rig, plan.code, code, geometry, usable),
     ):
         if found is not None:
-            findings.append(found)
-            share = 1.0 if found.name == LINES_AGAINST_CODE else ROWS_TELL
-            error_px = math.hypot(error_px, found.value / share if found.significant else 0.0)
+            finding, beyond_px = found
+            findings.append(finding)
+            share = 1.0 if finding.name == LINES_AGAINST_CODE else ROWS_TELL
+            off_px = max(finding.value * finding.significant, beyond_px)
+            error_px = math.hypot(error_px, off_px / share)
     if error_px > 0:
         geometry = geometry.by(rig, np.full(geometry.depth_mm.shape, np.float32(error_px)), window_px)
     return geometry, findings
+
+
+def rows_apart_px(findings: Iterable[FitFinding]) -> float | None:
+    """By how much rows lie from where depth places them (px, rms), by what was found; None if not told."""
+    return next((each.value for each in findings if each.name == ROWS_AGAINST_DEPTH), None)
 
 
 def rms_beyond_chance(shift_px: Floats, std_px: Floats) -> tuple[float, float]:
@@ -202,7 +227,8 @@ def _correlated(seen: Floats, log_likelihood: Floats, tried: int) -> Floats:
 
 def _of_columns(
     code: NamedPlaces, geometry: Geometry, usable: NDArray[np.bool_], blur_px: float
-) -> FitFinding | None:
+) -> tuple[FitFinding, float] | None:
+    """What is found of columns, and what deviations hold of it besides (px)."""
     usable = usable & (code.column >= 0)
     column = geometry.column_px[usable].astype(np.float64)
     group = (column.clip(0) / COLUMNS_PX).astype(int)
@@ -211,7 +237,7 @@ def _of_columns(
     if found is None:
         return None
     part, cause, advice = _cause_of(found, blur_px)
-    return FitFinding.judged(
+    told = FitFinding.judged(
         part,
         LINES_AGAINST_CODE,
         (found.rms_px, found.rms_std_px),
@@ -221,6 +247,8 @@ def _of_columns(
         f" code saw the same points: {cause} Deviations of depth contain it.",
         advice,
     )
+    # Stripes that are blurred disagree by themselves, and do so in every scan.
+    return told, found.beyond_chance_px if blur_px <= BLURRED_PX else 0.0
 
 
 def _cause_of(found: Disagreement, blur_px: float) -> tuple[Part, str, str]:
@@ -229,7 +257,7 @@ def _cause_of(found: Disagreement, blur_px: float) -> tuple[Part, str, str]:
     What moves displaces neighbouring columns alike. Where all are displaced alike, by less than light that is
     brighter on one side of a line can be, nobody can tell whether that or a motion is the cause.
     """
-    smooth, mean = found.smooth(), float(np.average(found.shift_px, weights=found.std_px**-2.0))
+    smooth, mean = found.smooth(), found.mean_px
     if float(np.mean(smooth**2)) < MOST_SMOOTH * float(np.mean(found.shift_px**2)):
         unknown = "the model of the lines does not fit, and nothing that moved explains it."
         return (
@@ -253,7 +281,8 @@ def _cause_of(found: Disagreement, blur_px: float) -> tuple[Part, str, str]:
 
 def _of_rows(
     rig: Rig, kind: BinaryCode, code: NamedPlaces, geometry: Geometry, usable: NDArray[np.bool_]
-) -> FitFinding | None:
+) -> tuple[FitFinding, float] | None:
+    """What is found of rows, and what deviations hold of it besides (px)."""
     if code.row is None:
         return None
     pixels = np.flatnonzero(usable & (code.row >= 0))
@@ -273,9 +302,9 @@ def _of_rows(
     film = ", or the film," if found.rms_px < MOST_BY_FILM_PX else ""
     by = counted(abs(columns), "column")
     moved = f", or the projector's pattern moved by {by} before the code or within it" if columns else ""
-    return FitFinding.judged(
+    told = FitFinding.judged(
         "geometry",
-        "rows of the binary code",
+        ROWS_AGAINST_DEPTH,
         (found.rms_px, found.rms_std_px),
         "px",
         MOST_ROWS_PX,
@@ -285,6 +314,7 @@ def _of_rows(
         "Check focus, zoom and mounts of camera and projector, and that the projector does not move its"
         " picture. Scan again; if that does not help, calibrate the geometry again.",
     )
+    return told, found.beyond_chance_px
 
 
 def whole_columns(shift_px: Floats, std_px: Floats, rows_per_column: Floats) -> int:

@@ -212,4 +212,18 @@ def test_columns_of_a_code_whose_finest_stripes_are_blurred_tell_of_no_motion(
     geometry = cast(Geometry, SimpleNamespace(column_px=exact))
     found = _of_columns(named, geometry, np.ones(exact.shape, bool), blur_px)
     assert found is not None
-    assert found.significant == told
+    assert found[0].significant == told
+    assert (found[1] > 0) == told
+
+
+@pytest.mark.parametrize(("moved_px", "held_px"), [(0.0, 0.0), (0.06, 0.06)])
+def test_depth_is_as_unsure_as_the_code_says_where_that_is_too_little_for_words(
+    moved_px: float, held_px: float
+) -> None:
+    exact = np.random.default_rng(5).uniform(100, 500, (120, 160))
+    named = NamedPlaces(np.rint(exact + moved_px).astype(np.int32), None)
+    geometry = cast(Geometry, SimpleNamespace(column_px=exact))
+    found = _of_columns(named, geometry, np.ones(exact.shape, bool), 0.6)
+    assert found is not None
+    assert not found[0].significant
+    assert found[1] == pytest.approx(held_px, abs=0.01)
