@@ -145,6 +145,7 @@ def reconstruct(
     and normals as soon as they are known: spectra take much longer. Threads have whole pictures or tiles to
     work on, never parts of one tensor: see `one_kernel_thread`.
     """
+    from dsl_core.reconstruction.code_agreement import rows_apart_px
     from dsl_core.reconstruction.geometry_steps import GeometrySteps
     from dsl_core.reconstruction.light.own_sensor import own_sensor
     from dsl_core.reconstruction.rows.assembly import Assembly
@@ -176,7 +177,10 @@ def reconstruct(
     solver = None
     if options.spectra:
         with timer.stage("spectra"):
-            solver = row_solver(rig, plan, options, frames, known_pixels(geometry), progress)
+            pixels, rows_px = known_pixels(geometry), rows_apart_px(findings)
+            solver = row_solver(rig, plan, options, frames, pixels, progress, rows_px)
+        if solver.followed is not None and solver.followed.turn is not None:
+            geometry = solver.followed.turn.doubted(geometry, options.surface_window_px)
     result = Assembly(rig, plan, options, geometry, frames.bands, sink or MemorySink())
     # The frames of the last band may still be in memory.
     for band in result.missing(reversed(frames.bands)):

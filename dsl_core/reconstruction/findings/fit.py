@@ -48,7 +48,7 @@ def fit_of(
         findings += band_findings(grid.step_nm, width_nm, spectra)
     if followed is not None:
         off_px = _orders_off_px(rig)
-        of_model = cause_findings(followed.probe, followed.balanced, followed.motion, off_px)
+        of_model = cause_findings(followed.probe, followed.balanced, followed.motion, off_px, followed.turn)
         findings += without_drift_that_is_none(of_model, [*findings])
     fit = Fit.of(findings, () if error is None else np.round(error.relative, 4).tolist())
     if followed is None or not followed.has_changed:

@@ -21,6 +21,7 @@ from dsl_core.reconstruction.spectral.film_motion import LEAST_MOTION_PX, FilmMo
 from dsl_core.reconstruction.spectral.probing.curve_probe import USUAL_STEEPNESS, CurveMisfit
 from dsl_core.reconstruction.spectral.probing.line_probe import PROFILE
 from dsl_core.reconstruction.spectral.probing.probe import Probe
+from dsl_core.reconstruction.spectral.turned import Turn
 from dsl_core.solve.normal import BAND_95
 
 #: Blur and tail of the lines below which neither is worth a finding.
@@ -36,6 +37,8 @@ MOST_CHI_SQUARE = 1.5
 ALIKE = 0.4
 #: Name of what is found of the film as a whole.
 MOVED = "movement of the film"
+#: Name of what is found of the pose in its place.
+TURNED = "turn of camera or projector"
 #: Name of what is left of a drift of the light.
 DRIFT_LEFT = "change of the light over the scan"
 #: Added to findings whose effect the spectra of the result already allow for.
@@ -61,17 +64,20 @@ def cause_findings(
     corrected: bool | None = None,
     motion: FilmMotion | None = None,
     calibrated_px: float = 0.0,
+    turn: Turn | None = None,
 ) -> Iterator[FitFinding]:
     """What the probed pixels of a scan say about each part of the model.
 
     ``corrected`` results follow what was found of the orders' light; where that was tried and did not make
     the frames fit better (False), it is not a finding. ``motion`` is that of the film, which the model of
     the probe follows already, and ``calibrated_px`` how far (rms) first orders lay from their places when
-    these were calibrated, 0 where nobody noted it.
+    these were calibrated, 0 where nobody noted it. ``turn`` is what of that may be a changed pose.
     """
     causes = fit_causes(probe)
     if motion is not None:
-        yield _motion(motion, probe, calibrated_px)
+        if turn is not None:
+            yield _turn(turn, motion)
+        yield _motion(motion, probe, calibrated_px, turn)
     place = _film(causes, probe)
     told = place.significant and probe.places and causes.displaced
     yield place.model_copy(update={"significant": told})
@@ -175,7 +181,26 @@ def _wide_bands(probe: Probe, curves: CurveMisfit) -> FitFinding:
     return found.model_copy(update={"significant": found.significant and not by_curves})
 
 
-def _motion(motion: FilmMotion, probe: Probe, calibrated_px: float) -> FitFinding:
+def _turn(turn: Turn, motion: FilmMotion) -> FitFinding:
+    """What a motion of the film may be besides: it is told first where that is so."""
+    return FitFinding(
+        part="geometry",
+        name=TURNED,
+        value=motion.shift_px,
+        std=motion.shift_std_px,
+        unit="px",
+        limit=LEAST_MOTION_PX,
+        significant=turn.instead,
+        sentence=f"First orders lie {motion.shift_px:.2f} px (rms) from their places as if camera and"
+        f" projector had moved against each other, which puts depth off by {turn.depth_share:.1%}: the"
+        " calibration is of another rig, or of another pose or zoom. Deviations of depth and of reflectance"
+        " contain it.",
+        advice="See that the calibration is this rig's, and measure a surface at a known distance; then"
+        " calibrate the geometry again.",
+    )
+
+
+def _motion(motion: FilmMotion, probe: Probe, calibrated_px: float, turn: Turn | None) -> FitFinding:
     surely = np.abs(motion.values) > SIGMAS * motion.std
     clauses = [
         f"{words} by {value:+.{digits}f} ± {std:.{digits}f}{unit}"
@@ -207,8 +232,14 @@ def _motion(motion: FilmMotion, probe: Probe, calibrated_px: float) -> FitFindin
         advice="Fix the film so that it cannot slip; if it moves further, repeat the depth-stage calibration."
         " The level and the colour of the light may have changed, too, which no scan can tell: reflectance"
         f" holds to {BAND_95 * CHANGED_REL_STD:.0%}, as stated, and the drift check with the Spectralon tells"
-        " more." + _OR_TURNED,
+        " more." + _OR_TURNED + _unsure_depth(turn),
     )
+
+
+def _unsure_depth(turn: Turn | None) -> str:
+    if turn is None or turn.instead or not turn.believed:
+        return ""
+    return f" Deviations of depth contain {turn.believed * turn.depth_share:.1%} of it for that."
 
 
 def _film(causes: Causes, probe: Probe) -> FitFinding:

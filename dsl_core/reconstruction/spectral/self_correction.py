@@ -21,6 +21,7 @@ from dsl_core.reconstruction.spectral.causes import EXPLAINS, MOST_EXCESS, Cause
 from dsl_core.reconstruction.spectral.film_motion import FilmMotion, coarseness, fit_motion, moved
 from dsl_core.reconstruction.spectral.probing.probe import Probe, probe
 from dsl_core.reconstruction.spectral.probing.probed_light import ProbedScan
+from dsl_core.reconstruction.spectral.turned import Turn, find_turn
 
 #: How many deviations the chi-square of pixels has to fall by.
 SURELY = 3.0
@@ -35,7 +36,8 @@ class Followed:
 
     ``motion`` is that of the film, None where none was found; where it is not sure, it is not followed.
     ``balanced`` is whether the light of the orders was taken over (None: nothing asked for it). ``probe`` is
-    what the scan says of the model with the film moved, ``left`` what it says of ``model``.
+    what the scan says of the model with the film moved, ``left`` what it says of ``model``. ``turn`` is what
+    of the motion may be one of camera and projector, None where there is none, or it is not sure.
     """
 
     model: PixelModel
@@ -43,6 +45,7 @@ class Followed:
     left: Probe
     motion: FilmMotion | None = None
     balanced: bool | None = None
+    turn: Turn | None = None
 
     @property
     def has_changed(self) -> bool:
@@ -50,10 +53,10 @@ class Followed:
         return self.motion is not None or bool(self.balanced)
 
 
-def follow(scan: ProbedScan, as_calibrated: bool = False) -> Followed | None:
+def follow(scan: ProbedScan, as_calibrated: bool = False, rows_px: float | None = None) -> Followed | None:
     """The model of a scan with what the scan shows of the film taken over; None where it shows nothing.
 
-    With ``as_calibrated`` the model stays as it is.
+    With ``as_calibrated`` the model stays as it is. ``rows_px`` is as for `find_turn`.
     """
     found = probe(scan)
     if found is None or as_calibrated:
@@ -73,13 +76,16 @@ def follow(scan: ProbedScan, as_calibrated: bool = False) -> Followed | None:
         motion = more if motion is None else motion.then(more)
         if more.shift_px < FAR_PX:
             break
+    turn = None
+    if motion is not None and motion.sure:
+        turn = find_turn(scan, motion, found, model, probe, rows_px)
     balanced = corrected(model, fit_causes(found))
     if balanced is None:
-        return Followed(model, found, found, motion)
+        return Followed(model, found, found, motion, turn=turn)
     left = _tried(replace(scan, model=balanced), found)
     if left is None:
-        return Followed(model, found, found, motion, balanced=False)
-    return Followed(balanced, found, left, motion, balanced=True)
+        return Followed(model, found, found, motion, balanced=False, turn=turn)
+    return Followed(balanced, found, left, motion, balanced=True, turn=turn)
 
 
 def _tried(scan: ProbedScan, before: Probe) -> Probe | None:

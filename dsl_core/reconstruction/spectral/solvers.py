@@ -72,9 +72,11 @@ def row_solver(
     frames: ScanFrames,
     pixels: Pixels,
     progress: Progress | None = None,
+    rows_px: float | None = None,
 ) -> RowSolver:
     """Spectra of known pixels, with the solver and the model of correspondence that ``options`` name.
 
+    ``rows_px`` is by how much (rms) the rows of a code disagree with depth, None where it has none.
     Raises `PlanError` for an unknown solver or patterns that it cannot read, `CalibrationError` for a model
     that the calibration does not hold.
     """
@@ -104,7 +106,7 @@ def row_solver(
 
     best = SpectralReconstruction(
         rig, plan, options.grid, model, *cubes(picked), pixels,
-        device=options.device, as_calibrated=options.as_calibrated,
+        device=options.device, as_calibrated=options.as_calibrated, rows_px=rows_px,
     )  # fmt: skip
     if frames.light is not None and frames.light.flickers:
         found = frame_levels(best.probed, frames.light.std)

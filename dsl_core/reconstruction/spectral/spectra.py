@@ -80,9 +80,11 @@ class SpectralReconstruction:
         device: str = "cpu",
         dtype: torch.dtype = torch.float32,
         as_calibrated: bool = False,
+        rows_px: float | None = None,
     ) -> None:
         """With ``as_calibrated`` the model stays as it is, whatever the scan itself says.
 
+        ``rows_px`` is by how much (rms) the rows of a code disagree with depth, None where it has none.
         Where frames come by rows, ``radiance`` and ``std`` are those of the pixels that `learn` asks.
         """
         self.rig, self.pixels = rig, pixels
@@ -101,7 +103,7 @@ class SpectralReconstruction:
         #: Tensors are for a GPU, and for other precisions.
         self._compiled = CompiledTiles(self.prior) if usual and self.model.single else None
         self._tensors = TensorTiles(self.prior, zero_order_error(rig, plan))
-        self._as_calibrated = as_calibrated
+        self._as_calibrated, self._rows_px = as_calibrated, rows_px
         #: The row of the picture that the stacks begin with.
         self._first_row = 0
 
@@ -122,11 +124,13 @@ class SpectralReconstruction:
     def learn(self) -> None:
         """Have the model follow what the scan says of it, and know how wrong it still is."""
         with one_kernel_thread():
-            self.followed = found = follow(self.probed, self._as_calibrated)
+            self.followed = found = follow(self.probed, self._as_calibrated, self._rows_px)
             if found is not None:
                 self.model, self.bands = found.model, found.model.bands
                 self.error = model_error(found.left, common_error(found.left, fit_causes(found.left)))
-                self._unsure_level = doubt_of_changed(self.rig) if found.has_changed else 0.0
+                by_pose = 0.0 if found.turn is None else found.turn.level_rel_std
+                by_light = doubt_of_changed(self.rig) if found.has_changed else 0.0
+                self._unsure_level = float(np.hypot(by_light, by_pose))
 
     def take(
         self,
