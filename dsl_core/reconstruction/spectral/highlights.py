@@ -4,6 +4,10 @@ A highlight sends on the light of all orders alike, so that no pixel tells it fr
 is white, and grows as the surface turns towards the direction that mirrors the projector into the camera:
 where brightness does that from place to place by the same amount in all colours, surfaces are glossy. Each
 surface between depth edges is judged by itself: a matt wall behind a glossy object says nothing of it.
+
+Normals are noisy, and from one pair of neighbours to the next that is most of how they turn on a flat
+surface: a highlight fitted to it would be too faint. So directions are smoothed as well, and what then
+surely explains most is told.
 """
 
 from __future__ import annotations
@@ -33,6 +37,9 @@ LEAST, SIGMAS, WHITE_SHARE = 0.01, 6.0, 0.3
 #: Cells of 2 x 2 pixels, one of each colour, are compared with those so many cells away; with at most so
 #: many pairs. Neighbouring pairs err alike: deviations are those between blocks of so many cells a side.
 LAG, MOST_PAIRS, BLOCK = 2, 40_000, 8
+#: Widths (px) by which directions are smoothed, and what a highlight must then have of reflectance: smoothed
+#: ones are off where surfaces curve, and brightness with them by 0.01.
+SMOOTHED_PX, LEAST_SMOOTHED = (0.0, 6.0, 12.0), 0.03
 #: Rows of a picture that are looked at together.
 SLAB = 128
 #: What differs from cell to cell without any highlight: a share of reflectance, and reflectance.
@@ -51,13 +58,26 @@ _NM = np.arange(400.0, 701.0)
 class Highlight:
     """A highlight of reflectance ``peak`` in the mirror direction, with deviation, and its ``roughness``.
 
-    ``colours`` are what red, green and blue say of the peak by themselves.
+    ``colours`` are what red, green and blue say of the peak by themselves, ``left`` is what it leaves over,
+    and ``brightest`` its reflectance where it is brightest of the pairs.
     """
 
     roughness: float
     peak: float
     peak_std: float
     colours: tuple[float, float, float]
+    left: float = 0.0
+    brightest: float = np.inf
+
+    @property
+    def is_white(self) -> bool:
+        """Whether all colours show it."""
+        return min(self.colours) > WHITE_SHARE * self.peak
+
+    @property
+    def is_sure(self) -> bool:
+        """Whether it is white, matters, and is none by chance."""
+        return self.is_white and self.brightest > LEAST and self.peak > SIGMAS * self.peak_std
 
     def at(self, towards: NDArray[np.floating]) -> NDArray[np.floating]:
         """Its reflectance where the cosine between normal and mirror direction is ``towards``."""
@@ -68,16 +88,16 @@ def follow_highlights(rig: Rig, geometry: Geometry) -> tuple[Geometry, list[FitF
     """Geometry that says what highlights add to reflectance, and what is told of them."""
     towards = towards_mirror(rig, geometry)
     surfaces = surfaces_between_edges(geometry, towards)
-    found = find_highlights(rig, geometry, towards, surfaces)
+    found = _surest(rig, geometry, towards, surfaces)
     if not found:
         return geometry, []
     added = np.zeros(towards.shape, np.float32)
     own = _everywhere(surfaces, towards.shape)
-    for surface, light in found.items():
+    for surface, (light, facing) in found.items():
         here = own == surface
-        added[here] = np.nan_to_num(light.at(towards[here]))
+        added[here] = np.nan_to_num(light.at(facing[here]))
     brightest = float(added.max(initial=0.0))
-    surest = min(light.peak_std / light.peak for light in found.values())
+    surest = min(light.peak_std / light.peak for light, _ in found.values())
     concerned = float((added > LEAST).sum() / max(np.isfinite(geometry.depth_mm).sum(), 1))
     told = FitFinding.judged(
         "surfaces",
@@ -94,6 +114,29 @@ def follow_highlights(rig: Rig, geometry: Geometry) -> tuple[Geometry, list[FitF
     return replace(geometry, highlight=added), [told]
 
 
+def _surest(
+    rig: Rig, geometry: Geometry, towards: NDArray[np.float32], surfaces: NDArray[np.int32]
+) -> dict[int, tuple[Highlight, NDArray[np.float32]]]:
+    """By the number of a surface, its highlight and the directions, smoothed or not, that explain it."""
+    fits: dict[int, list[tuple[Highlight, NDArray[np.float32]]]] = {}
+    for by_px in SMOOTHED_PX:
+        facing = smoothed(towards, by_px)
+        for surface, light in fit_highlights(rig, geometry, facing, surfaces).items():
+            fits.setdefault(surface, []).append((light, facing))
+    found = {}
+    for surface, each in fits.items():
+        each.sort(key=lambda one: one[0].left)
+        sure = [
+            (light, facing)
+            for light, facing in each
+            if light.is_sure and (facing is towards or light.brightest > LEAST_SMOOTHED)
+        ]
+        # What has a colour by the directions that explain it best is no highlight by others either.
+        if sure and each[0][0].is_white:
+            found[surface] = sure[0]
+    return found
+
+
 def towards_mirror(rig: Rig, geometry: Geometry) -> NDArray[np.float32]:
     """Cosine between the normal and the direction that mirrors the projector into the camera, NaN unknown."""
     towards = np.empty(geometry.depth_mm.shape, np.float32)
@@ -104,6 +147,17 @@ def towards_mirror(rig: Rig, geometry: Geometry) -> NDArray[np.float32]:
         half /= np.linalg.norm(half, axis=0)
         towards[rows] = (geometry.surface.normals[:, rows] * half).sum(0).clip(0, 1)
     return towards
+
+
+def smoothed(towards: NDArray[np.float32], by_px: float) -> NDArray[np.float32]:
+    """`towards_mirror` (rows, columns) smoothed by a width (rms, px); NaN stays where it is."""
+    from scipy.ndimage import gaussian_filter
+
+    known = np.isfinite(towards)
+    if by_px == 0 or not known.any():
+        return towards
+    total, weight = (gaussian_filter(np.where(known, each, 0.0), by_px) for each in (towards, 1.0))
+    return np.where(known, total / np.maximum(weight, 1e-12), np.nan).astype(np.float32)
 
 
 def surfaces_between_edges(geometry: Geometry, towards: NDArray[np.floating]) -> NDArray[np.int32]:
@@ -132,7 +186,15 @@ def _everywhere(surfaces: NDArray[np.int32], shape: tuple[int, ...]) -> NDArray[
 def find_highlights(
     rig: Rig, geometry: Geometry, towards: NDArray[np.floating], surfaces: NDArray[np.int32]
 ) -> dict[int, Highlight]:
-    """By the number of a surface, the highlight that explains best how its brightness changes."""
+    """By the number of a surface, the highlight that surely explains how its brightness changes."""
+    fits = fit_highlights(rig, geometry, towards, surfaces)
+    return {surface: found for surface, found in fits.items() if found.is_sure}
+
+
+def fit_highlights(
+    rig: Rig, geometry: Geometry, towards: NDArray[np.floating], surfaces: NDArray[np.int32]
+) -> dict[int, Highlight]:
+    """By the number of a surface, the highlight that explains best how brightness changes, sure or not."""
     pairs = _pairs(rig, geometry, towards, surfaces)
     if pairs is None:
         return {}
@@ -142,13 +204,11 @@ def find_highlights(
 
 
 def _highlight_of(pairs: _Pairs) -> Highlight | None:
-    """The highlight of one surface; None where none explains its pairs."""
+    """The highlight of one surface; None where too few pairs say anything."""
     if len(np.unique(pairs.block)) < FEWEST_BLOCKS:
         return None
-    found = min((_fitted(pairs, roughness) for roughness in ROUGHNESS), key=lambda each: each[1])[0]
-    brightest = float(found.at(np.append(pairs.here, pairs.there)).max())
-    sure = found.peak > SIGMAS * found.peak_std and min(found.colours) > WHITE_SHARE * found.peak
-    return found if sure and brightest > LEAST else None
+    found = min((_fitted(pairs, roughness) for roughness in ROUGHNESS), key=lambda each: each.left)
+    return replace(found, brightest=float(found.at(np.append(pairs.here, pairs.there)).max()))
 
 
 @dataclass(frozen=True)
@@ -257,8 +317,8 @@ def _cells(values: NDArray[np.generic]) -> Floats:
     return np.asarray(cells.transpose(0, 2, 1, 3).reshape(rows, columns, 4))
 
 
-def _fitted(pairs: _Pairs, roughness: float) -> tuple[Highlight, float]:
-    """The highlight of a roughness that fits best, robustly, and what it leaves over."""
+def _fitted(pairs: _Pairs, roughness: float) -> Highlight:
+    """The highlight of a roughness that fits best, robustly."""
     rise = _lobe(pairs.here, roughness) - _lobe(pairs.there, roughness)
     peak = 0.0
     for _ in range(ROUNDS):
@@ -276,4 +336,4 @@ def _fitted(pairs: _Pairs, roughness: float) -> tuple[Highlight, float]:
     red, green, blue = ((weight * rise * pairs.differs).sum(1) / np.maximum(of_colour, 1e-12)).tolist()
     off = np.abs(pairs.differs - peak * rise) / pairs.std
     left = float(np.where(off < HUBER, off**2, HUBER * (2 * off - HUBER)).sum())
-    return Highlight(roughness, peak, std, (red, green, blue)), left
+    return Highlight(roughness, peak, std, (red, green, blue), left)

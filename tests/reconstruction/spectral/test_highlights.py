@@ -114,6 +114,27 @@ def test_deviations_contain_what_is_added_and_it_is_told(ball: tuple[Rig, Geomet
     assert with_highlight(geometry, std) is std
 
 
+def test_a_highlight_on_a_flat_surface_is_found_although_normals_are_noisy(
+    ball: tuple[Rig, Geometry],
+) -> None:
+    """From pixel to pixel, noise turns them by more than the surface does."""
+    rig, geometry = ball
+    shape, random = geometry.flags.shape, np.random.default_rng(4)
+    normals = np.array([0.1, -0.1, -1.0])[:, None, None] + 0.03 * random.standard_normal((3, *shape))
+    normals /= np.linalg.norm(normals, axis=0)
+    flat, none = np.full(shape, 720.0), np.zeros(shape, bool)
+    surface = replace(geometry.surface, normals=normals.astype(np.float32), edge=none)
+    wall = replace(geometry, depth_mm=flat, surface=surface, flags=np.zeros(shape, np.uint16))
+    true = np.broadcast_to([[[0.1]], [[-0.1]], [[-1.0]]], normals.shape) / np.sqrt(1.02)
+    exact = towards_mirror(rig, replace(wall, surface=replace(surface, normals=true.astype(np.float32))))
+    added = Highlight(0.5, 0.4, 0.0, (0.4, 0.4, 0.4)).at(exact)
+    seen = lit(rig, wall, np.broadcast_to(YELLOW[:, None, None], (3, *shape)) + added)
+    found, (told,) = follow_highlights(rig, seen)
+    assert told.significant
+    assert found.highlight is not None
+    assert float(np.median(found.highlight / added)) == pytest.approx(1.0, abs=0.3)
+
+
 def test_too_few_pixels_say_nothing(ball: tuple[Rig, Geometry]) -> None:
     rig, geometry = ball
     towards = towards_mirror(rig, geometry)
@@ -217,7 +238,7 @@ def test_pulls_that_cancel_within_blocks_make_no_peak_surer_than_its_pairs() -> 
     pairs = highlights._Pairs(
         here, np.full(count, 0.9), far * one, 0.01 * one, np.arange(count) // 24, np.ones(count, np.int32)
     )
-    found = highlights._fitted(pairs, 0.4)[0]
+    found = highlights._fitted(pairs, 0.4)
     # Three quarters of the pairs tell the peak; the others pull with two deviations each.
     rise = highlights._lobe(pairs.here, 0.4) - highlights._lobe(pairs.there, 0.4)
     assert abs(found.peak) < found.peak_std
