@@ -124,7 +124,7 @@ def with_pose(rig: Rig, changes: Floats) -> Rig:
     turn = Rotation.from_rotvec(changes[:3], degrees=True).as_matrix()
     rotation = rig.pose.matrix @ turn
     translation = rig.pose.vector_mm + rotation @ [changes[3], 0.0, 0.0]
-    pose = Pose(rotation=tuple(map(tuple, rotation.tolist())), translation_mm=tuple(translation.tolist()))
+    pose = Pose.model_validate({"rotation": rotation.tolist(), "translation_mm": translation.tolist()})
     return rig.model_copy(update={"pose": pose})
 
 
@@ -135,13 +135,15 @@ def _fit(scan: ProbedScan, moved: GratingModel, of_film: Probe) -> Floats:
     depth = torch.as_tensor(scan.pixels.depth_mm.ravel()[pixels.numpy()], dtype=torch.float64)
     nm = scan.model.bands.centres_nm[scan.model.bands.reported][[0, -1]]
     kind = type(scan.model.correspondence)
+    assert issubclass(kind, GratingModel)
     wanted = _columns(moved, pixels, depth, nm)
     width = scan.model.rig.projector.width_px
     shown = (wanted > 0) & (wanted < width - 1)
 
     def left(changes: Floats) -> Floats:
         rig = with_pose(scan.model.rig, changes)
-        return wanted - _columns(kind(rig), pixels, triangulate(rig, pixels, column)[0], nm)
+        here = _columns(kind(rig), pixels, triangulate(rig, pixels, column)[0], nm)
+        return np.asarray(wanted - here)
 
     changes = np.zeros(len(STEPS))
     for _ in range(ROUNDS):

@@ -46,6 +46,7 @@ def _judged(scanned: Scanned, rig: Rig) -> tuple[Fit, float, float]:
     result = pipeline.reconstruct(scanned[1], rig, Options(WavelengthGrid(step_nm=5.0)))
     truth, fit = scans.twin_truth(scanned[0], WavelengthGrid()), Fit.read(result.attrs)
     assert truth is not None
+    assert truth.depth_mm is not None
     assert fit is not None
     depth, std = result["depth_mm"].values, result["depth_std_mm"].values
     return fit, check_honesty(depth, truth.depth_mm, std).coverage_95, float(np.nanmedian(std))
