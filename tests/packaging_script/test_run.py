@@ -125,7 +125,12 @@ def test_a_first_demo_compiles_the_solver_meanwhile_and_does_not_wait_for_it(
         asked.append("ended")
 
     monkeypatch.setattr(run, "beside", noted)
-    monkeypatch.setattr(run, "dispatch", lambda command, *_: asked.append(command) or 0)
+
+    def dispatched(command: str, *_: object) -> int:
+        asked.append(command)
+        return 0
+
+    monkeypatch.setattr(run, "dispatch", dispatched)
     for is_new, command in ((True, "demo"), (False, "demo"), (True, "dsl-scan")):
         monkeypatch.setattr(run, "prepare", lambda *_, new=is_new, **__: new)
         assert run.main(["--venv", str(tmp_path), command]) == 0
