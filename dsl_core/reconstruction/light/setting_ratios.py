@@ -18,6 +18,7 @@ from dsl_core.model.plan import Role
 from dsl_core.model.rig import Sensor
 from dsl_core.optics.sensor import raw_variance
 from dsl_core.reconstruction.hdr import BlackFrame
+from dsl_core.solve.normal import STD_OF_MEDIAN_SIZE
 
 #: Counts of the brighter setting that are compared, as shares of full scale.
 USED = (0.01, 0.9)
@@ -94,7 +95,7 @@ def without_strange(
         if logs.size < FEWEST_PATTERNS:
             continue
         apart = np.abs(logs - np.median(logs))
-        limit = max(STRANGE, STRANGE_SIGMAS * 1.4826 * float(np.median(apart)))
+        limit = max(STRANGE, STRANGE_SIGMAS * STD_OF_MEDIAN_SIZE * float(np.median(apart)))
         for key, is_strange in zip(keys, apart > limit, strict=True):
             if is_strange:
                 found[key][place] = None
