@@ -35,9 +35,9 @@ BULK = 0.9
 CLEARLY_BETTER = 0.7
 #: A misfit this many deviations of its own noise counts by itself; others are averaged with those around.
 CLEAR_MISFIT = 10.0
-#: Deviations hold what neighbours have in common, too, which scatters about no plane and hides no curvature.
-#: The scatter that they have is asked for in so many patches across and down, of at most so many pixels a
-#: side; one that is no smaller than this share of the variance is as stated.
+#: Deviations also hold what neighbours have in common, which does not scatter about a plane and must not hide
+#: curvature. How much does scatter is measured in this many patches across and down, each of at most this
+#: many pixels a side; a share of the variance that is no smaller than this counts as stated.
 PATCHES, PATCH_PX, AS_STATED = 4, 96, 0.8
 #: A jump is this many deviations of the step to a neighbour, and this share of the inverse depth.
 JUMP_SIGMAS, JUMP_SHARE = 5.0, 0.004
@@ -142,9 +142,9 @@ def _beside_what_is_beyond(rig: Rig, depth_mm: Map, beyond: NDArray[np.bool_] | 
 
 
 def _scatter_share(rig: Rig, depth_mm: Map, depth_std_mm: Map, window: int) -> float:
-    """Which share of the stated variance of depth scatters about planes, in the middle of all parts.
+    """Share of the stated variance of depth that scatters about planes: the median over patches.
 
-    Asked of windows that are large enough to see an error that repeats with the lines of a scan.
+    Measured in windows large enough to contain an error that repeats with the lines of a scan.
     """
     size = windows_px(window)[:2][-1]
     sides = [min(PATCH_PX, -(-whole // PATCHES)) for whole in depth_mm.shape]

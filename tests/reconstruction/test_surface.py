@@ -117,6 +117,19 @@ def test_what_deviations_have_in_common_hides_no_curvature(scene: str) -> None:
     assert np.mean(error < 3 * std) > 0.99
 
 
+@pytest.mark.parametrize(("share", "found"), [(0.3, 0.3), (0.95, 1.0), (1.5, 1.0)])
+def test_the_share_of_the_variance_that_scatters_is_measured_unless_as_stated(
+    share: float, found: float
+) -> None:
+    rig = small_rig()
+    noise = NOISE_MM * np.random.default_rng(6).normal(size=(80, 120))
+    std = np.full(noise.shape, NOISE_MM / share**0.5)
+    measured = surface_module._scatter_share(rig, 700.0 + noise, std, 9)
+    assert measured == pytest.approx(found, rel=0.1)
+    nothing = np.full(noise.shape, np.nan)
+    assert surface_module._scatter_share(rig, nothing, nothing, 9) == 1.0
+
+
 def beside_steps(depth_mm: NDArray[np.float64], step_mm: float) -> NDArray[np.bool_]:
     """Pixels with a neighbour above, below or at a side whose depth differs by more."""
     found = np.zeros(depth_mm.shape, bool)
