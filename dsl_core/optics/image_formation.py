@@ -11,7 +11,7 @@ width of a band. The operator comes as products with H, and as matrices.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -84,17 +84,20 @@ class ImageFormation:
         profiles: NDArray[np.float64],
         paths: list[OrderPath],
         shading: Tensor,
+        light: Callable[[float], BlurredProfiles] | None = None,
     ) -> None:
-        """``profiles`` (frames, width, LEDs): radiance relative to full drive; ``shading`` is (pixels,)."""
+        """``profiles`` (frames, width, LEDs): radiance relative to full drive; ``shading`` is (pixels,).
+
+        ``light`` gives the blurred profiles of a band's half width where they are known already.
+        """
         profiles = one_if_grey(profiles)
         if profiles.shape[2] == 1:
             # Grey patterns light all LEDs alike: one stands for their sum.
             paths = [replace(path, moments=path.moments.sum(1, keepdims=True)) for path in paths]
         self.paths, self.shading, self.frames = paths, shading, len(profiles)
         self.bands = max(path.moments.shape[2] for path in paths)
-        self._light = {
-            path.band_px: BlurredProfiles(response, profiles, path.band_px, shading) for path in paths
-        }
+        light = light or (lambda band_px: BlurredProfiles(response, profiles, band_px, shading))
+        self._light = {path.band_px: light(path.band_px) for path in paths}
 
     def forward(self, reflectance: Tensor) -> Tensor:
         """Signals (3, frames, pixels) of reflectance (bands, pixels)."""

@@ -100,6 +100,7 @@ class PixelModel:
         self.profiles = one_if_grey(profiles)
         #: Whether every frame shows one line, so that it lights a pixel by one order only.
         self.single = lines is not None and lines.single
+        self._lights: dict[tuple[float, float, torch.dtype, torch.device], BlurredProfiles] = {}
 
     @property
     def orders(self) -> tuple[int, ...]:
@@ -161,7 +162,8 @@ class PixelModel:
                 footprint = traced.orders[order]
                 half = self.bands.half_width_px(footprint.columns)
                 paths.append(OrderPath(footprint.columns, self.inside(footprint), moments, half))
-        return ImageFormation(self.response(blur_px), self.profiles, paths, shading)
+        response, profiles = self.response(blur_px), self.profiles
+        return ImageFormation(response, profiles, paths, shading, lambda px: self.light(px, shading, blur_px))
 
     def equations(
         self, traced: Traced, colour: Tensor, radiance: Tensor, weight: Tensor, offset_variance: Tensor
@@ -216,9 +218,19 @@ class PixelModel:
         margin = self.lines.width_px / 2 + EDGE_PX
         return self.lines.near(low - margin, high + margin)
 
+    def light(self, band_px: float, other: Tensor, blur_px: float = 0.0) -> BlurredProfiles:
+        """The light of all frames, blurred by a band's half width, in the precision of another tensor.
+
+        Half widths are few, and each takes long to blur by, so that the light is kept.
+        """
+        key = blur_px, band_px, other.dtype, other.device
+        if key not in self._lights:
+            self._lights[key] = BlurredProfiles(self.response(blur_px), self.profiles, band_px, other)
+        return self._lights[key]
+
     def zero_light(self, other: Tensor, blur_px: float = 0.0) -> BlurredProfiles:
         """The zero order's light of all frames, in the precision of another tensor."""
-        return BlurredProfiles(self.response(blur_px), self.profiles, 0.0, other)
+        return self.light(0.0, other, blur_px)
 
     def zero_moments(self, other: Tensor) -> Tensor:
         """Response to the zero order, (3, LEDs, bands); grey patterns light all LEDs as one."""

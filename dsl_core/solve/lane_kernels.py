@@ -342,64 +342,21 @@ def gradient(
                     out[at] += prior[o, j - o] * weight[i] * x[at - o * LANES]
 
 
-@within
-def gather(
-    equations: Array, neighbours: bool, shares: Array, shading: Array, y: int, matrix: int, right: int,
-    gathered: Array,
-) -> None:  # fmt: skip
-    """Equations of the pixels of a row, (columns, channels), from those of their samples.
-
-    The first channels are those of the ``matrix``, the next of the ``right`` side: both for unit reflectance.
-    """
-    for x in range(gathered.shape[0]):
-        if neighbours:
-            left, beside, above, below = shares[y, 0, x], shares[y, 1, x], shares[y, 2, x], shares[y, 3, x]
-            for c in range(gathered.shape[1]):
-                total = equations[y + 1, x + 1, c] + left * equations[y + 1, x, c]
-                total += beside * equations[y + 1, x + 2, c]
-                gathered[x, c] = total + above * equations[y, x + 1, c] + below * equations[y + 2, x + 1, c]
-            corners = shares[y, 4, x], shares[y, 5, x], shares[y, 6, x], shares[y, 7, x]
-            if corners[0] + corners[1] + corners[2] + corners[3] > 0.0:
-                add_corners(equations, x, y, corners, gathered)
-        else:
-            for c in range(gathered.shape[1]):
-                gathered[x, c] = equations[y, x, c]
-        for c in range(matrix + right):
-            gathered[x, c] *= shading[y, x]
-        for c in range(matrix):
-            gathered[x, c] *= shading[y, x]
-
-
-@within
-def add_corners(
-    equations: Array, x: int, y: int, shares: tuple[float, float, float, float], gathered: Array
-) -> None:
-    """Add the samples at a pixel's corners to its equations."""
-    # A loop of its own: with more arrays it could not be found out before whether they overlap.
-    a, b, c, d = shares
-    for k in range(gathered.shape[1]):
-        total = a * equations[y, x, k] + b * equations[y, x + 2, k]
-        gathered[x, k] += total + c * equations[y + 2, x, k] + d * equations[y + 2, x + 2, k]
-
-
 @compiled
 def solve_blocks(
-    equations: Array, neighbours: bool, shares: Array, index: Array, shading: Array, offsets: bool,
-    rows: Array, levels: Array, prior: Array, volumes: Array, taus: Array, bounds: Array, level: float,
-    uneven: float, local: float, parameters: float, diagonals: tuple[int, ...],
-    gathered: Array, work: tuple[Array, ...], solutions: tuple[Array, ...], candidates: Array,
+    equations: Array, index: Array, shading: Array, offsets: bool, rows: Array, levels: Array, prior: Array,
+    volumes: Array, taus: Array, bounds: Array, level: float, uneven: float, local: float, parameters: float,
+    diagonals: tuple[int, ...], work: tuple[Array, ...], solutions: tuple[Array, ...], candidates: Array,
     marks: tuple[Array, ...], nodes: Array, mean: Array, std: Array, share: Array, at_bound: Array,
     tau: Array, misfit: Array,
 ) -> bool:  # fmt: skip
     """Solve pixels from the sums of their samples' equations; False where a system is not positive definite.
 
-    ``equations`` are (rows, columns, channels), see `dsl_core.optics.lines.sums`. With ``neighbours`` they
-    have one more sample on every side, of which pixels take ``shares`` (rows, 8, columns), in the order of
-    `dsl_core.optics.colour_neighbours.AROUND`. ``index`` is the pixel's place in the results, negative where
-    none is wanted. ``rows`` (rows, bands, 3, columns) are broad-band equations of values ``levels`` (rows, 3,
-    columns), both empty where there are none. ``prior`` (4, bands) are the diagonals of squared second
-    differences and of the level. ``gathered`` (columns, channels) is room for the equations of a row. Results
-    are (bands, pixels), ``tau`` and ``misfit`` (pixels,).
+    ``equations`` are (rows, columns, channels), see `dsl_core.optics.lines.sums`, of pixels with ``shading``.
+    ``index`` is the pixel's place in the results, negative where none is wanted. ``rows`` (rows, bands, 3,
+    columns) are broad-band equations of values ``levels`` (rows, 3, columns), both empty where there are
+    none. ``prior`` (4, bands) are the diagonals of squared second differences and of the level. Results are
+    (bands, pixels), ``tau`` and ``misfit`` (pixels,).
     """
     band, count = len(diagonals), prior.shape[1]
     size = band + 1
@@ -412,7 +369,6 @@ def solve_blocks(
     at_sums = (size * size + size + size * ROWS) * LANES
     bad, evident = at_sums + BAD * LANES, at_sums + EVIDENCE * LANES
     for y in range(index.shape[0]):
-        gather(equations, neighbours, shares, shading, y, size * count, count, gathered)
         for block in range(index.shape[1] // LANES):
             x0 = (block & MOST) * LANES
             any_used = False
@@ -423,7 +379,7 @@ def solve_blocks(
                 continue
             for c in range(channels):
                 for i in range(LANES):
-                    sums[c * LANES + i] = gathered[x0 + i, c]
+                    sums[c * LANES + i] = equations[y, x0 + i, c]
             broad = x0 < 0  # no literal: parts would be compiled once for it and once for any other
             for j in range(count):
                 for i in range(LANES):

@@ -17,6 +17,7 @@ from tests.solve.plain import plain
 Floats = NDArray[np.float64]
 
 kernels = plain("dsl_core.solve.lane_kernels")
+neighbour_sums = plain("dsl_core.solve.neighbour_sums")
 LANES, ROWS, SUMS = int(kernels.LANES), int(kernels.ROWS), int(kernels.SUMS)
 BANDS, LEVEL, RIDGE, UNEVEN, LOCAL = 11, 0.4, 2.5, 1 / 36, 100.0
 TAUS = np.array([0.005, 0.03, 0.18, 1.1])
@@ -146,11 +147,15 @@ class Scene:
         out: dict[str, Any] = {name: np.full((BANDS, self.pixels), np.nan) for name in names[:4]}
         out |= {"at_bound": np.zeros((BANDS, self.pixels), bool)}
         out |= {name: np.full(self.pixels, np.nan) for name in names[5:]}
+        gathered = np.full((*self.index.shape, self.channels), np.nan)
+        size = BANDS * (band + 1)
+        neighbour_sums.gather(
+            self.equations, self.neighbours, self.shares, self.shading, size, BANDS, gathered
+        )
         sound = kernels.solve_blocks(
-            self.equations, self.neighbours, self.shares, self.index, self.shading, self.offsets,
+            gathered, self.index, self.shading, self.offsets,
             self.broad if self.has_broad else np.zeros((0, 0, 0, 0)),
             self.levels, PRIOR, VOLUMES, TAUS, BOUNDS, LEVEL, UNEVEN, LOCAL, self.parameters, (0,) * band,
-            np.full((self.columns, self.channels), np.nan),
             (*nan(*sizes), np.zeros(ROWS * margin * LANES)), tuple(solutions),
             np.full((len(TAUS) + 1, LANES), np.nan), marks, *(out[name] for name in names),
         )  # fmt: skip

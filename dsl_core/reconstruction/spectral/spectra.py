@@ -27,6 +27,7 @@ from dsl_core.reconstruction.spectral.probing.picked_cube import PickedCube
 from dsl_core.reconstruction.spectral.probing.probed_light import ProbedScan
 from dsl_core.reconstruction.spectral.self_correction import Followed, follow
 from dsl_core.reconstruction.spectral.solving.compiled_tiles import CompiledTiles
+from dsl_core.reconstruction.spectral.solving.dense_tiles import DenseTiles
 from dsl_core.reconstruction.spectral.solving.prior import Prior
 from dsl_core.reconstruction.spectral.solving.solution import Spectra
 from dsl_core.reconstruction.spectral.solving.tensor_tiles import TensorTiles
@@ -37,7 +38,7 @@ from dsl_core.solve.threads import one_kernel_thread
 
 #: Pixels of a tile of up to `TILE_BANDS` bands, and of the smallest; even numbers keep the Bayer phase.
 TILE, TILE_BANDS, LEAST_TILE = (64, 96), 60, (16, 24)
-#: Rows of a tile whose full matrices are in memory at once.
+#: Rows of a tile whose full matrices are in memory at once, as tensors.
 DENSE_ROWS = 16
 #: Pixels whose light is traced at a time, where all are.
 CHUNK = 1 << 18
@@ -101,8 +102,10 @@ class SpectralReconstruction:
         self._unsure_level = 0.0
         usual = self.device.type == "cpu" and dtype == torch.float32
         #: Tensors are for a GPU, and for other precisions.
-        self._compiled = CompiledTiles(self.prior) if usual and self.model.single else None
-        self._tensors = TensorTiles(self.prior, zero_order_error(rig, plan))
+        self._lines = CompiledTiles(self.prior) if usual and self.model.single else None
+        direct_error = zero_order_error(rig, plan)
+        self._dense = DenseTiles(self.prior, direct_error) if usual and not self.model.single else None
+        self._tensors = TensorTiles(self.prior, direct_error)
         self._as_calibrated, self._rows_px = as_calibrated, rows_px
         #: The row of the picture that the stacks begin with.
         self._first_row = 0
@@ -172,7 +175,7 @@ class SpectralReconstruction:
     def _tiles(self, of: slice) -> Iterator[tuple[slice, slice]]:
         width = self.pixels.valid.shape[1]
         rows, columns = tile_shape(self.bands.count)
-        rows = rows if self.model.single else min(rows, DENSE_ROWS)
+        rows = rows if self.model.single or self._dense is not None else min(rows, DENSE_ROWS)
         for y in range(of.start, of.stop, rows):
             for x in range(0, width, columns):
                 yield slice(y, min(y + rows, of.stop)), slice(x, min(x + columns, width))
@@ -228,10 +231,12 @@ class SpectralReconstruction:
         traced = self.trace(near)
         check()
         colour = self._colour_roots(frames) if self.model.single else None
-        if self._compiled is None:
-            found = self._tensors.solve(self.model, frames, near, traced, colour, check)
+        if self._lines is not None:
+            found = self._lines.solve(self.model, self._stacks(), frames, near, traced, colour, check)
+        elif self._dense is not None:
+            found = self._dense.solve(self.model, frames, near, traced, check)
         else:
-            found = self._compiled.solve(self.model, self._stacks(), frames, near, traced, colour, check)
+            found = self._tensors.solve(self.model, frames, near, traced, colour, check)
         own = torch.as_tensor(np.searchsorted(near.flat, frames.flat), device=self.device)
         self._store(*found, frames, (traced, own), out, first_row)
 

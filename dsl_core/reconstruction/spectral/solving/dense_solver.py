@@ -6,7 +6,7 @@ import torch
 from torch import Tensor
 
 from dsl_core.reconstruction.spectral.solving.prior import Prior, parabola_peak, roughness, too_faint
-from dsl_core.reconstruction.spectral.solving.solution import LOCAL_STD, Spectra, band_mean, within_band
+from dsl_core.reconstruction.spectral.solving.solution import Spectra, band_mean, share_of, within_band
 from dsl_core.reconstruction.spectral.solving.solver import ACTIVE_SET_ROUNDS, PENALTY, TOLERANCE
 from dsl_core.solve import banded
 
@@ -19,26 +19,26 @@ def solve_dense(data: Tensor, right: Tensor, prior: Prior) -> Spectra:
     try:
         found = _solve(data, right, prior)
     except torch.linalg.LinAlgError:  # type: ignore[attr-defined]
-        data = _semidefinite(data, prior)
-        found = _solve(data.double(), right.double(), prior).to(right.dtype)
+        data = data.double()
+        ridge = torch.eye(data.shape[1]).to(data) * prior.level_std**-2
+        broken = torch.linalg.cholesky_ex(data + ridge).info > 0
+        data[broken] = semidefinite(data[broken])
+        found = _solve(data, right.double(), prior).to(right.dtype)
     faint = too_faint(torch.diagonal(data, dim1=1, dim2=2).T, prior)
     if bool(faint.any()):
         found.put(faint, _solve(data[faint].double(), right[faint].double(), prior))
     return found
 
 
-def _semidefinite(data: Tensor, prior: Prior) -> Tensor:
-    """Equations, in double precision, without what rounding left below zero.
+def semidefinite(data: Tensor) -> Tensor:
+    """Equations (pixels, bands, bands) in double precision, without what rounding left below zero.
 
     Bright data that leave a combination of bands open have there the rounding of the others as information,
     which may be negative and more than the prior's. It is zero; anything else would claim knowledge.
     """
-    data = data.double()
-    ridge = torch.eye(data.shape[1]).to(data) * prior.level_std**-2
-    broken = torch.linalg.cholesky_ex(data + ridge).info > 0
-    values, vectors = torch.linalg.eigh(data[broken])
-    data[broken] = (vectors * values.clip(min=0)[:, None]) @ vectors.mT
-    return data
+    values, vectors = torch.linalg.eigh(data.double())
+    clipped: Tensor = (vectors * values.clip(min=0)[:, None]) @ vectors.mT
+    return clipped
 
 
 def _solve(data: Tensor, right: Tensor, prior: Prior) -> Spectra:
@@ -85,8 +85,7 @@ def _log_diagonal(factor: Tensor) -> Tensor:
 def _share(data: Tensor) -> Tensor:
     """As `solution.data_share`, from full matrices, (pixels, bands)."""
     near = torch.ones_like(data[0]).triu(-2).tril(2)
-    local = (data * near).sum(2)
-    return local.clip(min=0) / (local.clip(min=0) + LOCAL_STD**-2)
+    return share_of((data * near).sum(2))
 
 
 def _bounded(

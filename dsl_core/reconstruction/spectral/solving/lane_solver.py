@@ -21,6 +21,7 @@ from dsl_core.reconstruction.spectral.solving.solver import (
 from dsl_core.solve import banded
 from dsl_core.solve.lane_kernels import LANES, ROWS, SUMS, solve_blocks
 from dsl_core.solve.many import Check, never
+from dsl_core.solve.neighbour_sums import gather
 
 Floats = NDArray[np.float64]
 #: Fewest diagonals beside the main one that a kernel is compiled for; more are a power of two.
@@ -159,11 +160,14 @@ class LaneSolver:
         those of the pixels themselves. Raises `ValueError` where a system is not positive definite.
         """
         rows, levels = broad or (np.zeros((0, 0, 0, 0)), np.zeros((0, 0, 0)))
+        gathered = np.empty((*index.shape, equations.shape[2]))
+        own = np.zeros((0, 0, 0)) if shares is None else shares
+        matrix = self.bands * self.size
+        gather(equations, shares is not None, own, shading, matrix, self.bands, gathered)
         sound = solve_blocks(
-            equations, shares is not None, np.zeros((0, 0, 0)) if shares is None else shares, index, shading,
-            equations.shape[2] == self.channels(True), rows, levels, self._prior, self._volumes, self._taus,
-            self._bounds, self._level, WITHIN_BAND, LOCAL_STD**-2, self._parameters, self._diagonals,
-            np.empty((index.shape[1], equations.shape[2])), *self._work,
+            gathered, index, shading, equations.shape[2] == self.channels(True), rows, levels, self._prior,
+            self._volumes, self._taus, self._bounds, self._level, WITHIN_BAND, LOCAL_STD**-2,
+            self._parameters, self._diagonals, *self._work,
             found.nodes, found.mean, found.std, found.data_share, found.at_bound, found.tau,
             found.misfit,
         )  # fmt: skip

@@ -91,4 +91,10 @@ def data_share(data: Tensor) -> Tensor:
     for o in range(1, min(3, data.shape[0])):
         local[: bands - o] += data[o, : bands - o]
         local[o:] += data[o, : bands - o]
+    return share_of(local)
+
+
+def share_of(local: Tensor) -> Tensor:
+    """Share of an answer that the information of data decides; rounding below zero is none."""
+    local = local.clip(min=0)
     return local / (local + LOCAL_STD**-2)

@@ -1,4 +1,4 @@
-"""Spectra of tiles by tensors: on a GPU, in other precisions, and where patterns couple distant bands."""
+"""Spectra of tiles by tensors: on a GPU, and in other precisions."""
 
 from __future__ import annotations
 
@@ -85,7 +85,7 @@ class TensorTiles:
         from dsl_core.reconstruction.spectral.solving.dense_solver import solve_dense
 
         parts: list[tuple[Tensor, ...]] = []
-        samples = self._dense_samples(model, near, traced)
+        samples = dense_samples(model, near, traced, self.direct_error)
         # Full matrices take long: a part of the pixels at a time, so that a cancel need not wait.
         for start in range(0, len(near.flat), DENSE_PIXELS):
             check()
@@ -108,17 +108,21 @@ class TensorTiles:
             misfit.append((square[part] - explained) / left[part])
         return _joined(found), torch.cat(misfit)
 
-    def _dense_samples(
-        self, model: PixelModel, near: TileFrames, traced: Traced
-    ) -> tuple[Tensor, Tensor, Tensor, Tensor]:
-        """Own colours (samples,), radiance and weight (frames, samples), variance of offsets (samples,)."""
-        colour = torch.as_tensor(bayer_colours(near.bayer, *near.place()), device=near.like.device)
-        radiance, weight = near.own()
-        light = model.zero_light(near.known("shading"))
-        direct = model.direct_light(light, traced.column_px, near.zero_order_colour()[0])
-        direct = direct.gather(0, colour.expand(1, len(radiance), -1))[0]
-        weight = 1 / (1 / weight + (self.direct_error * direct) ** 2)
-        return colour, radiance, weight, near.known("offset_std") ** 2
+
+def dense_samples(
+    model: PixelModel, near: TileFrames, traced: Traced, direct_error: float
+) -> tuple[Tensor, Tensor, Tensor, Tensor]:
+    """Own colours (samples,), radiance and weight (frames, samples), variance of offsets (samples,).
+
+    ``direct_error`` is that of the zero order, relative to it, in frames that mix orders.
+    """
+    colour = torch.as_tensor(bayer_colours(near.bayer, *near.place()), device=near.like.device)
+    radiance, weight = near.own()
+    light = model.zero_light(near.known("shading"))
+    direct = model.direct_light(light, traced.column_px, near.zero_order_colour()[0])
+    direct = direct.gather(0, colour.expand(1, len(radiance), -1))[0]
+    weight = 1 / (1 / weight + (direct_error * direct) ** 2)
+    return colour, radiance, weight, near.known("offset_std") ** 2
 
 
 def _gather(frames: TileFrames, near: TileFrames) -> ColourNeighbours:

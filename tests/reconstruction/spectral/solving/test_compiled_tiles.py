@@ -50,7 +50,7 @@ def solved(monkeypatch: pytest.MonkeyPatch, compiled: bool, **changes: Any) -> S
         arrays["rig"], made.plan, GRID, correspondence(made.rig), arrays["radiance"], arrays["std"],
         arrays["pixels"], dtype=torch.float32 if compiled else torch.float64,
     )  # fmt: skip
-    assert (solver._compiled is not None) == compiled
+    assert (solver._lines is not None) == compiled
     with monkeypatch.context() as patch:
         if not compiled:
             patch.setattr(tensor_tiles, "solve_spectra", solve_tensors)

@@ -42,7 +42,7 @@ def test_spectra_of_dense_patterns_can_be_stopped_at_every_part_of_a_tile(
         return matrix, torch.ones((BANDS, many)), torch.ones(many)
 
     samples = (values[0], values, values + 1, values[0])
-    monkeypatch.setattr(TensorTiles, "_dense_samples", lambda *given: samples)
+    monkeypatch.setattr(tensor_tiles, "dense_samples", lambda *given: samples)
     monkeypatch.setattr(tensor_tiles, "_gather", lambda *tiles: SimpleNamespace(sum=lambda each: each))
     model: Any = SimpleNamespace(equations=equations, single=False)
     asked: list[int] = []
