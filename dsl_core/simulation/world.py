@@ -14,6 +14,7 @@ from dsl_core.model.spectral import SpectralCurve
 from dsl_core.optics.sensor import digitise
 from dsl_core.simulation.effects.base import LightPath, PatternView
 from dsl_core.simulation.effects.planner import EffectPlan
+from dsl_core.simulation.effects.sensor import out_of_focus
 from dsl_core.simulation.foreign.exposure import exposed
 from dsl_core.simulation.foreign.lenses import truth_of_colours
 from dsl_core.simulation.led_cycle import led_weights
@@ -191,13 +192,13 @@ class World:
             image = (
                 np.zeros(shape, np.uint8) if self.image is None else np.broadcast_to(self._colour(), shape)
             )
+            shown, blur_px = choose(image), self.path.defocus_px
             with one_kernel_thread():
-                rate = renderer.expected(choose(image)) + np.float32(self.path.ambient_dn_per_ms)
-            if self.path.defocus_px:
-                from scipy.ndimage import gaussian_filter
-
-                rate = gaussian_filter(rate, self.path.defocus_px, mode="nearest")
-            rates[key] = rate
+                if blur_px:
+                    rate = out_of_focus(renderer, shown, blur_px, self.rig.sensor.bayer)
+                else:
+                    rate = renderer.expected(shown)
+            rates[key] = rate + np.float32(self.path.ambient_dn_per_ms)
         return rates[key]
 
     def _colour(self) -> NDArray[np.uint8]:

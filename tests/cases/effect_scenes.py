@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from dsl_core.model.rig import FlatField, Rig
 from dsl_core.simulation.effects.base import LightPath, Limits, PatternView, make_view
+from dsl_core.simulation.effects.sensor import out_of_focus
 from dsl_core.simulation.published_rig import published_rig
 from dsl_core.simulation.rendered_scene import EffectRequest, Setup
 from dsl_core.simulation.scenes.catalogue import make_scene
@@ -94,12 +95,12 @@ def frame_dn(
     path: LightPath, view: PatternView, image: NDArray[np.uint8], exposure_ms: float
 ) -> NDArray[np.float32]:
     """What a frame shows without noise and rounding: expected counts, ended at full scale."""
-    from scipy.ndimage import gaussian_filter
-
-    signal = view.expected(image) + np.float32(path.ambient_dn_per_ms)
-    if path.defocus_px:
-        signal = gaussian_filter(signal, path.defocus_px, mode="nearest")
     sensor = path.rig.sensor
+    if path.defocus_px:
+        signal = out_of_focus(view, image, path.defocus_px, sensor.bayer)
+    else:
+        signal = view.expected(image)
+    signal = signal + np.float32(path.ambient_dn_per_ms)
     value = signal * np.float32(exposure_ms) + np.float32(sensor.black_level_dn)
     return np.asarray(np.minimum(value, sensor.full_scale_dn))
 

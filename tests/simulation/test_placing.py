@@ -236,6 +236,19 @@ def test_defocus_softens_what_is_seen() -> None:
     assert rows["3"] < 0.5 * rows["0"]
 
 
+def test_a_lens_out_of_focus_mixes_no_colours() -> None:
+    """White fades slowly over a plane: blurred, each colour of the mosaic has what it had."""
+    seen = {}
+    for defocus in ("0", "3"):
+        rig, world = twin(defocus_px=defocus, scene="plane")
+        rig.projector.show(trial_picture("white", (640, 360)))
+        seen[defocus] = world.rate()[16:-16, 16:-16]
+    colours = [seen["0"][y::2, x::2].mean() for y, x in ((0, 0), (0, 1), (1, 1))]
+    assert min(colours) < 0.7 * max(colours)
+    for y, x in np.ndindex(2, 2):
+        assert seen["3"][y::2, x::2] == pytest.approx(seen["0"][y::2, x::2], rel=0.03)
+
+
 def test_a_drawn_camera_sees_its_corners_darker() -> None:
     _, world = twin(truth="4", scene="plane")
     assert world.rig.flat_field is not None

@@ -6,7 +6,9 @@ from types import MappingProxyType
 
 import numpy as np
 
-from dsl_core.simulation.effects.base import Effect, Limits
+from dsl_core.model.rig import BayerPattern
+from dsl_core.optics.sensor import bayer_channels
+from dsl_core.simulation.effects.base import Effect, Image, Limits, PatternView, Signal
 from dsl_core.simulation.effects.tolerance import EffectBound
 
 #: Normal noise beyond so many standard deviations comes about once in 10^15 pixels, a million scans.
@@ -41,6 +43,15 @@ class Defocus(Effect):
         if limits.path.defocus_px == 0:
             return limits.of_dn(0.0, "the camera is focused")
         return limits.of_share(1.0, "edges in the image turn from soft to hard")
+
+
+def out_of_focus(view: PatternView, image: Image, sigma_px: float, bayer: BayerPattern) -> Signal:
+    """Signal (rows, columns) of a pattern through a lens that blurs each colour before the mosaic."""
+    from scipy.ndimage import gaussian_filter
+
+    planes = gaussian_filter(view.planes(image), (0, sigma_px, sigma_px), mode="nearest")
+    mosaic = bayer_channels(bayer, *planes.shape[1:])
+    return np.asarray(np.take_along_axis(planes, mosaic[None], 0)[0])
 
 
 class ShotNoise(Effect):
