@@ -36,7 +36,7 @@ _MEASURES = (
     ("Difference", Measure.RMSE),
 )
 _GROUPINGS = (
-    ("Usual", "auto"),
+    ("Subfolders, or names", "auto"),
     ("Names without numbers", "name"),
     ("Folders", "folder"),
     ("Files", "file"),
@@ -86,8 +86,8 @@ class MaterialsPanel(QWidget):
         )
         self.grouping = ChoiceBox(
             "Classes of a library",
-            "What of a folder or file becomes a class: usually each subfolder or each name; 'leaf 1' and"
-            " 'leaf 2' are one class by names without numbers",
+            "What of a folder or file becomes a class: each subfolder and, of spectra in none, each name;"
+            " 'leaf 1' and 'leaf 2' are one class by names without numbers",
             _GROUPINGS,
             lambda _: self._regroup(),
         )
