@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from datetime import datetime
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -19,7 +18,7 @@ from dsl_app.composition.rig_profiles import ProfileAction
 from dsl_app.connection.state import Link, RigChoice, RigState
 from dsl_app.shared.evented import Value
 from dsl_app.shared.known_files import Kind
-from dsl_app.shared.settings import data_folder, demo_folder
+from dsl_app.shared.settings import demo_folder
 from dsl_app.shared.widgets.page import PageWidget
 from dsl_app.shell.application import make_window, open_first_page
 from dsl_app.shell.main_window import MainWindow
@@ -33,8 +32,6 @@ if TYPE_CHECKING:
     from dsl_app.rig.controller import LiveController
     from dsl_app.rig.projector_screens import ProjectorScreens
     from dsl_app.scan.controller import ScanController
-    from dsl_app.scan.reconstruction_time import Pace
-    from dsl_app.scan.state import ScanState
     from dsl_app.session.restore import SessionRestore
     from dsl_core.devices.base import Projector
 
@@ -331,87 +328,17 @@ class Composition(QObject):
         CalibrationWizard(state, control, self.window.theme, self.window).open()
 
     def _scan_page(self) -> PageWidget:
-        from dsl_app.scan.command_line import fresh_target
-        from dsl_app.scan.controller import ScanController
-        from dsl_app.scan.effects.controller import EffectsController
-        from dsl_app.scan.effects.state import EffectsState
-        from dsl_app.scan.forecast.controller import ForecastController
-        from dsl_app.scan.forecast.panel import ForecastPanel
-        from dsl_app.scan.forecast.state import ForecastState
-        from dsl_app.scan.page import ScanPage
-        from dsl_app.scan.state import Phase, ScanState
-        from dsl_core.model.plan import CapturePlan, Sentinels
+        from dsl_app.composition.scan_page import ScanPageMaker
 
-        window, parts, rig = self.window, self.window.parts, self.rig
-        folder = Path(parts.settings.output_folder or Path.home() / "dsl-scans")
-        state = ScanState(CapturePlan(sentinels=Sentinels()), fresh_target(folder, datetime.now()))
-        state.phase.changed.connect(
-            lambda phase: self._remember_folder(state) if phase is Phase.DONE else None
-        )
-        state.phase.changed.connect(
-            lambda phase: self.session.scan_began() if phase is Phase.RUNNING else None
-        )
-        state.finished.changed.connect(self._remember_scan)
-        state.is_reconstructing.changed.connect(self._awaited.set)
-        self.scans = controller = ScanController(
-            state, rig, parts.runner, window.toasts, parts.undo, hidden=demo_folder(), pace=self._pace
-        )
-        state.wanted.connect(lambda _: window.open_page("scan"))
-        self.calibration_in_use.serve_scans(controller)
-        self.session.scans = controller
-        foreseen = ForecastState()
-        forecast = ForecastController(
-            foreseen,
-            state,
-            rig.state,
-            controller.plans,
-            parts.runner,
-            window.toasts,
-            data_folder() / "forecasts",
+        page, self.scans = ScanPageMaker(
+            self.window,
+            self.rig,
+            self.session,
+            self.calibration_in_use,
+            self._awaited,
             self._options.predicts,
-        )
-        rendered = EffectsState()
-        effects = EffectsController(rendered, state, rig, parts.runner, window.toasts)
-        page = ScanPage(
-            state,
-            controller,
-            ForecastPanel(foreseen, forecast),
-            rendered,
-            effects,
-            window.open_path,
-            self._awaits_result,
-        )
-        page.reconstruct_requested.connect(lambda: window.do("reconstruct_again"))
+        ).make()
         return page
-
-    @property
-    def _pace(self) -> Pace:
-        """How fast this computer reconstructs, kept between sessions."""
-        from dsl_app.scan.reconstruction_time import Pace
-
-        settings = self.window.parts.settings
-
-        def keep(us_per_px: float) -> None:
-            settings.reconstruct_us_per_px = us_per_px
-
-        return Pace(settings.reconstruct_us_per_px, keep)
-
-    def _awaits_result(self) -> bool:
-        """Whether the Results page is open and has nothing to show."""
-        if self.window.page != "results":
-            return False
-        page = self.window.page_of("results")
-        return page.subject() is None and not page.is_reading
-
-    def _remember_folder(self, state: ScanState) -> None:
-        folder = state.target.value.parent
-        if folder != demo_folder():
-            self.window.parts.settings.output_folder = str(folder)
-
-    def _remember_scan(self, finished: Path | None) -> None:
-        """List a scan as recent once its frames are complete: its result may fail, or not be wanted yet."""
-        if finished is not None and finished.parent != demo_folder():
-            self.window.parts.recent.add(finished)
 
     def _results_page(self) -> PageWidget:
         from dsl_app.results.controller import ResultsController
