@@ -63,9 +63,13 @@ class BlurredProfiles:
             light = zero_order_profile(torch.as_tensor(distance), -0.5, 0.5, response)
         else:
             light = torch.as_tensor(band_profile(distance, 1.0, response.line_spread, band_px))
-        # From the last column to the first, a column's light begins one column of samples later.
-        spread = light.to(other).unfold(0, OVERSAMPLE * (width - 1) + 1, 1)[:, ::OVERSAMPLE]
-        self.table = torch.einsum("sx,fxl->slf", spread, like(profiles, other).flip(1))
+        shown = torch.as_tensor(profiles, dtype=torch.float64, device=other.device).permute(2, 0, 1)
+        apart = shown.new_zeros((*shown.shape[:2], OVERSAMPLE * (width - 1) + 1))
+        apart[..., ::OVERSAMPLE] = shown
+        # Each column's light, added up: a convolution, of which what wraps around is not looked at.
+        spread = torch.fft.rfft(light.to(shown)) * torch.fft.rfft(apart, n=len(light))
+        table = torch.fft.irfft(spread, n=len(light))[..., -samples:]
+        self.table = table.permute(2, 0, 1).to(other).contiguous()
 
     def at(self, columns_px: Tensor) -> Tensor:
         """Light at columns of shape (pixels,): (pixels, LEDs, frames); almost none far outside the frame."""

@@ -100,7 +100,7 @@ class PixelModel:
         self.profiles = one_if_grey(profiles)
         #: Whether every frame shows one line, so that it lights a pixel by one order only.
         self.single = lines is not None and lines.single
-        self._lights: dict[tuple[float, float, torch.dtype, torch.device], BlurredProfiles] = {}
+        self._lights: dict[tuple[float, float, float, torch.dtype, torch.device], BlurredProfiles] = {}
 
     @property
     def orders(self) -> tuple[int, ...]:
@@ -218,14 +218,19 @@ class PixelModel:
         margin = self.lines.width_px / 2 + EDGE_PX
         return self.lines.near(low - margin, high + margin)
 
-    def light(self, band_px: float, other: Tensor, blur_px: float = 0.0) -> BlurredProfiles:
+    def light(
+        self, band_px: float, other: Tensor, blur_px: float = 0.0, width: float = 1.0
+    ) -> BlurredProfiles:
         """The light of all frames, blurred by a band's half width, in the precision of another tensor.
 
-        Half widths are few, and each takes long to blur by, so that the light is kept.
+        Lines are spread ``width`` times as wide as usual. Half widths are few, and each takes long to blur
+        by, so that the light is kept.
         """
-        key = blur_px, band_px, other.dtype, other.device
+        key = blur_px, band_px, width, other.dtype, other.device
         if key not in self._lights:
-            self._lights[key] = BlurredProfiles(self.response(blur_px), self.profiles, band_px, other)
+            response = self.response(blur_px)
+            response = response if width == 1.0 else response.of_width(width * response.blur_px)
+            self._lights[key] = BlurredProfiles(response, self.profiles, band_px, other)
         return self._lights[key]
 
     def zero_light(self, other: Tensor, blur_px: float = 0.0) -> BlurredProfiles:

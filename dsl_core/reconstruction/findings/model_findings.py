@@ -85,8 +85,9 @@ def cause_findings(
         unequal = corrected is not False and causes.unequal
         refuted = not (unequal if finding.part == "orders" else causes.brighter)
         yield finding.model_copy(update={"significant": finding.significant and not refuted})
-    for index, (value, std) in enumerate(zip(probe.lines.values, probe.lines.std, strict=True)):
-        yield _profile(PROFILE[index], float(value), float(std))
+    if probe.lines is not None:
+        for name, value, std in zip(PROFILE, probe.lines.values, probe.lines.std, strict=True):
+            yield _profile(name, float(value), float(std))
     drift = FitFinding.judged(
         "light",
         DRIFT_LEFT,
@@ -228,7 +229,8 @@ def _motion(motion: FilmMotion, probe: Probe, calibrated_px: float, turn: Turn |
         significant=motion.sure,
         sentence=f"The film has {moved}{CORRECTED}"
         if motion.sure
-        else f"The film may have {moved} It may be chance, so that the spectra are not corrected for it.",
+        else f"The film may have {moved} It may be chance, so that the spectra are not corrected for it."
+        + _unsure_depth(turn),
         advice="Fix the film so that it cannot slip; if it moves further, repeat the depth-stage calibration."
         " The level and the colour of the light may have changed, too, which no scan can tell: reflectance"
         f" holds to {BAND_95 * CHANGED_REL_STD:.0%}, as stated, and the drift check with the Spectralon tells"

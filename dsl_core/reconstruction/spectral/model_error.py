@@ -73,7 +73,8 @@ def model_error(probe: Probe, common: float = 0.0) -> ModelError:
         by_noise = covariance @ information @ covariance
         bias = probe.bias[here][:, :, :LEADING]
         square = (bias @ asked) ** 2 - SURE * np.einsum("nbp,pq,nbq->nb", bias, by_noise, bias)
-        square += (bias[:, :, _PROFILE] @ probe.lines.values) ** 2
+        if probe.lines is not None:
+            square += (bias[:, :, _PROFILE] @ probe.lines.values) ** 2
         squares[cell], level[cell] = square.sum(0), (probe.reflectance[here] ** 2).sum(0)
     error, light = (
         gaussian_filter(values.reshape(*CELLS, bands), (0.7, 0.7, 1.0), mode="nearest")

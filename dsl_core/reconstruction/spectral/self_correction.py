@@ -61,24 +61,26 @@ def follow(scan: ProbedScan, as_calibrated: bool = False, rows_px: float | None 
     found = probe(scan)
     if found is None or as_calibrated:
         return None if found is None else Followed(scan.model, found, found)
-    model, motion = scan.model, None
+    model, motion, doubt = scan.model, None, None
     for _ in range(STEPS):
         more = fit_motion(replace(scan, model=model), found)
         if more is None:
             break
-        better = _tried(replace(scan, model=moved(model, more)), found)
-        if better is None:
+        there = moved(model, more)
+        after = probe(replace(scan, model=there))
+        if after is None or not fits_better(found, after):
             # Spectra that curve along wide bands displace the orders as well.
             if motion is None and coarseness(found.step_nm) <= 1:
-                motion = replace(more, sure=False)
+                motion, doubt = replace(more, sure=False), (there, after)
             break
-        model, found = moved(model, more), better
+        model, found = there, after
         motion = more if motion is None else motion.then(more)
         if more.shift_px < FAR_PX:
             break
     turn = None
-    if motion is not None and motion.sure:
-        turn = find_turn(scan, motion, found, model, probe, rows_px)
+    if motion is not None:
+        film, of_film = doubt or (model, found)
+        turn = None if of_film is None else find_turn(scan, motion, of_film, film, probe, rows_px)
     balanced = corrected(model, fit_causes(found))
     if balanced is None:
         return Followed(model, found, found, motion, turn=turn)

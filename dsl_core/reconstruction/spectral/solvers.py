@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
-import numpy as np
-
 from dsl_core.errors import PlanError
 from dsl_core.model.fit import FitFinding
 from dsl_core.model.options import SOLVERS, Options, names
@@ -33,7 +31,6 @@ from dsl_core.reconstruction.spectral.solving.tile_frames import Pixels
 from dsl_core.reconstruction.spectral.spectra import SpectralReconstruction, tile_shape
 from dsl_core.reconstruction.spectral.spectral_maps import SpectralMaps
 
-_NONE = np.empty(0, np.intp)
 _KINDS = {"published": PublishedReconstruction, "nearest-line": NearestLine}
 
 
@@ -90,12 +87,10 @@ def row_solver(
             rig, plan, options.grid, model, stack.radiance, stack.std, pixels, device=options.device
         )
         return RowSolver(lambda _, progress: kind.run(progress))
-    lines = LineSet.of(plan)
-    asked = probed_pixels(pixels.valid, rig.sensor.bayer) if lines is not None and lines.single else _NONE
-
+    lines, asked = LineSet.of(plan), probed_pixels(pixels.valid, rig.sensor.bayer)
     picked = frames.pick(asked, progress)
     findings: list[FitFinding] = []
-    if lines is not None and asked.size:
+    if lines is not None and lines.single and asked.size:
         seen = FirstOrderLight.of(lines, model, picked, pixels)
         told = colour_sites_finding(rig, seen), order_balance_finding(rig, seen)
         findings = [each for each in told if each is not None]

@@ -170,7 +170,9 @@ class SpectralReconstruction:
     @property
     def probed(self) -> ProbedScan:
         """What a probe needs of the scan, with the model as it is now."""
-        return ProbedScan(self.model, self.pixels, self.radiance, self.std, self.prior)
+        return ProbedScan(
+            self.model, self.pixels, self.radiance, self.std, self.prior, self._tensors.direct_error
+        )
 
     def _tiles(self, of: slice) -> Iterator[tuple[slice, slice]]:
         width = self.pixels.valid.shape[1]

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from dsl_core.devices.base import DeviceRig
-from dsl_core.model.plan import CapturePlan, GrayCode, ScanLines
+from dsl_core.model.plan import CapturePlan, GrayCode, LineComb, ScanLines
 from dsl_core.model.rig import Rig
 from dsl_core.model.spectral import WavelengthGrid
 from dsl_core.optics.correspondence import correspondence
@@ -69,6 +69,22 @@ def test_most_of_the_error_of_a_darker_order_is_taken_back(
     assert taken.followed is not None
     assert taken.followed.balanced
     assert error(taken, right) < 0.5 * error(left, right)
+
+
+@pytest.mark.slow
+def test_combs_tell_of_a_film_that_has_slipped() -> None:
+    plan = CapturePlan(code=GrayCode(rows=False), spectral=LineComb(width_px=6, step_px=4, period_px=96))
+    devices, scan = twin_scan(plan, size="112x72", scene="color-checker")
+    rig, fine = devices.calibration, WavelengthGrid()
+    assert rig is not None
+    right, taken = (solved(each, scan, False, fine) for each in (rig, with_film(rig, -SLIPS)))
+    assert right.followed is not None
+    assert right.followed.motion is None
+    assert taken.followed is not None
+    motion = taken.followed.motion
+    assert motion is not None
+    assert motion.sure
+    assert np.abs(motion.values - SLIPS)[[1, 4]].max() < 0.05
 
 
 @pytest.mark.slow

@@ -17,7 +17,8 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from dsl_core.reconstruction.spectral.probing.probe import CHUNK, FEWEST, probe_targets
-from dsl_core.reconstruction.spectral.probing.probed_light import ProbedScan, SolvedPixels, solve_pixels
+from dsl_core.reconstruction.spectral.probing.probed_light import ProbedLight, ProbedScan
+from dsl_core.reconstruction.spectral.probing.solved_pixels import SolvedPixels, solve_pixels
 from dsl_core.solve.threads import one_kernel_thread
 
 Floats = NDArray[np.float64]
@@ -60,6 +61,7 @@ def _add(solved: SolvedPixels, part: slice, normal: Tensor, score: Tensor) -> No
     """Add the equations of some pixels, each with the weight that its frames' fit deserves."""
     pixels, bands = solved.nodes[part].shape
     here = (solved.owner >= part.start) & (solved.owner < part.start + pixels)
+    assert isinstance(solved.light, ProbedLight)
     weight, residual = solved.light.weight[here], solved.residual[here]
     # A change of level by one is all of the light of a frame: what the model says of it.
     light = (solved.nodes[solved.owner[here]][:, None] @ solved.rows[here])[:, 0]

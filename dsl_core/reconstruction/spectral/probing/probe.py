@@ -36,8 +36,9 @@ from dsl_core.reconstruction.spectral.probing.curve_probe import (
     variety,
 )
 from dsl_core.reconstruction.spectral.probing.line_probe import LineProbe, probe_lines, sound_pixels
-from dsl_core.reconstruction.spectral.probing.probed_light import PARAMETERS, ProbedScan, solve_pixels
+from dsl_core.reconstruction.spectral.probing.probed_light import PARAMETERS, ProbedScan
 from dsl_core.reconstruction.spectral.probing.probed_pixels import Indices, cell_of, sample_pixels, samples_of
+from dsl_core.reconstruction.spectral.probing.solved_pixels import solve_pixels
 from dsl_core.reconstruction.spectral.solving.solution import band_mean
 
 Floats = NDArray[np.float64]
@@ -71,13 +72,13 @@ class Probe:
     ``place`` (n, 2) is row and column from -1 to 1, ``cell`` (n,) the cell of `CELLS`, ``pixel`` (n,) the
     flat index. ``with_curves`` are ``normal`` and ``score`` of these parameters and of the curves after
     them, None where nobody asked, ``bright`` (knots of all colours,) where these have light. ``lines`` says
-    what the zero order of the same pixels does, ``nm_per_px`` how far apart columns of the first orders are,
-    ``step_nm`` bands; ``steepness`` is by how much the logarithm of the light changes along 1 nm. ``places``
-    is whether pixels can tell where the orders are: on a small piece of one colour an error of its spectrum
-    looks like a shift. ``sideways`` (n, 2) is by how much lines of each order are farther to the sides of the
-    projector's frame than the pixel's own column: the difference of squares, one at the side, mean over
-    bands; None where nobody traced them. ``uneven`` (n,) is how much darker the darkest of neighbours of a
-    pixel's colour is than the brightest, a share.
+    what the zero order of the same pixels does, None where no frame shows it alone, ``nm_per_px`` how far
+    apart columns of the first orders are, ``step_nm`` bands; ``steepness`` is by how much the logarithm of
+    the light changes along 1 nm. ``places`` is whether pixels can tell where the orders are: on a small
+    piece of one colour an error of its spectrum looks like a shift. ``sideways`` (n, 2) is by how much
+    lines of each order are farther to the sides of the projector's frame than the pixel's own column: the
+    difference of squares, one at the side, mean over bands; None where nobody traced them. ``uneven``
+    (n,) is how much darker the darkest of neighbours of a pixel's colour is than the brightest, a share.
     """
 
     normal: Floats
@@ -89,7 +90,7 @@ class Probe:
     place: Floats
     cell: Indices
     pixel: Indices
-    lines: LineProbe
+    lines: LineProbe | None
     nm_per_px: float
     places: bool = True
     step_nm: float = 5.0
@@ -152,18 +153,14 @@ def probed_pixels(valid: NDArray[np.bool_], bayer: BayerPattern) -> Indices:
 
 
 def probe(scan: ProbedScan) -> Probe | None:
-    """Probe pixels of a scan of single lines; None for other patterns, and where there are too few pixels."""
+    """Probe pixels of a scan; None where there are too few of them."""
     targets = probe_targets(scan.pixels.valid)
-    if not scan.model.single or len(targets) < FEWEST:
+    if len(targets) < FEWEST:
         return None
     with torch.inference_mode():
         parts = [_probe_some(scan, targets[i : i + CHUNK]) for i in range(0, len(targets), CHUNK)]
     together = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
-    lines = scan.model.lines
-    assert lines is not None
-    response = scan.model.response(0.0)
     column = torch.as_tensor(scan.pixels.column_px.ravel()[targets], dtype=torch.float64)
-    widths = widths_at(scan.model.rig, torch.as_tensor(targets), column)
     traced = _columns(scan, targets)
     camera = scan.model.rig.camera
     wide = camera.width_px / camera.fx_px > ONE_VIEW
@@ -179,11 +176,19 @@ def probe(scan: ProbedScan) -> Probe | None:
         bright=bright_knots(white, scan.model.bands.centres_nm[scan.model.bands.reported]),
         # A monochrome camera has no colours that could disagree.
         with_curves=None if scan.model.rig.sensor.bayer == "MONO" else whole,
-        lines=probe_lines(lines, response, scan.pixels, scan.radiance, scan.std, targets, widths),
+        lines=_lines(scan, targets, column) if scan.model.single else None,
         nm_per_px=_nm_per_px(scan, traced[ORDERS[0]][0]),
         sideways=_sideways(scan, column, traced),
         uneven=unevenness(scan.pixels.amplitude, targets),
     )
+
+
+def _lines(scan: ProbedScan, targets: Indices, column_px: Tensor) -> LineProbe:
+    """What single lines say near the columns (n,) of pixels."""
+    lines, response = scan.model.lines, scan.model.response(0.0)
+    assert lines is not None
+    widths = widths_at(scan.model.rig, torch.as_tensor(targets), column_px)
+    return probe_lines(lines, response, scan.pixels, scan.radiance, scan.std, targets, widths)
 
 
 def unevenness(amplitude: NDArray[np.float32], targets: Indices) -> Floats:

@@ -1,6 +1,7 @@
 """The light that probed pixels receive line by line, as measured and as the model says, and its changes.
 
-It is worked out for single lines, for the samples of the mosaic that belong to some pixels.
+It is worked out for the samples of the mosaic that belong to some pixels; for single lines, of which only
+those near an order light a pixel by it. `pattern_light` does the same for all other patterns.
 """
 
 from __future__ import annotations
@@ -19,15 +20,12 @@ from dsl_core.model.projector.line_spread import Spread, stretched
 from dsl_core.optics.colour_neighbours import bayer_colours
 from dsl_core.optics.correspondence import Footprint, like
 from dsl_core.optics.lines.profile import SAMPLES, ProfileTable, halo_of_line
-from dsl_core.optics.pixel_model import PixelModel
+from dsl_core.optics.pixel_model import DIRECT_ERROR, PixelModel
 from dsl_core.optics.spectra import ORDERS
 from dsl_core.reconstruction.spectral.probing.picked_cube import PickedCube
-from dsl_core.reconstruction.spectral.probing.probed_pixels import Indices, samples_of
-from dsl_core.reconstruction.spectral.solving.dense_solver import solve_dense
-from dsl_core.reconstruction.spectral.solving.prior import Prior, roughness
-from dsl_core.reconstruction.spectral.solving.solution import freedom
+from dsl_core.reconstruction.spectral.probing.probed_pixels import Indices
+from dsl_core.reconstruction.spectral.solving.prior import Prior
 from dsl_core.reconstruction.spectral.solving.tile_frames import Pixels, weighted
-from dsl_core.solve import banded
 
 Floats = NDArray[np.float64]
 
@@ -56,7 +54,8 @@ ZERO_ERROR = 0.01
 class ProbedScan:
     """A scan and its model: ``radiance`` and ``std`` are (frames, rows, columns), in DN per ms.
 
-    Of the picture only `probed_pixels` are looked at.
+    Of the picture only `probed_pixels` are looked at. ``direct_error`` is that of the zero order, relative to
+    it, in frames that light a pixel by several orders at once.
     """
 
     model: PixelModel
@@ -64,6 +63,7 @@ class ProbedScan:
     radiance: NDArray[np.float32] | PickedCube
     std: NDArray[np.floating] | PickedCube
     prior: Prior
+    direct_error: float = DIRECT_ERROR
 
 
 def along_bands(model: PixelModel) -> Floats:
@@ -240,73 +240,3 @@ class ProbedLight:
         time = lines.position(self._known["column_px"]) / lines.lines - 0.5
         zero[:, 0, 6] = (self.rows[..., -1] * nodes).sum(1) * time
         return torch.cat([*parts, zero], 1)
-
-
-@dataclass(frozen=True)
-class SolvedPixels:
-    """Probed pixels (n,) and their spectra, found by the samples (m,) of each, whose values are (m, k).
-
-    ``owner`` (m,) is the pixel of a sample, ``shading`` (m,) its shading, ``rows`` (m, bands, k) the model
-    for that and ``heavy`` the same, weighted; ``residual`` (m, k) is what spectra leave. ``nodes`` (n, bands)
-    and ``mean`` (bands, n) are the spectra, ``information`` (n, bands, bands) what is known of them, with the
-    prior; ``free`` (n, bands) are bands that are not held at a bound.
-    """
-
-    light: ProbedLight
-    owner: Tensor
-    shading: Tensor
-    rows: Tensor
-    heavy: Tensor
-    residual: Tensor
-    nodes: Tensor
-    mean: Tensor
-    information: Tensor
-    free: Tensor
-
-    def gather(self, values: Tensor) -> Tensor:
-        """Sums over the samples of each pixel: (m, ...) -> (n, ...)."""
-        into = values.new_zeros((len(self.nodes), *values.shape[1:]))
-        return into.index_add_(0, self.owner, values)
-
-    def give_way(self, asked: Tensor, part: slice = slice(None)) -> Tensor:
-        """By how much nodes of some pixels change that are asked to (pixels, bands, q) by the data.
-
-        Those that are held at a bound do not: with them, spectra of dark surfaces would take up more than
-        they can, and what is left would ask for changes of the model.
-        """
-        free = self.free[part].to(asked)
-        information = self.information[part] * free[:, None] * free[..., None] + torch.diag_embed(1 - free)
-        given: Tensor = torch.linalg.solve(information, asked * free[..., None])
-        return given
-
-    @property
-    def freedom(self) -> Tensor:
-        """Degrees of freedom (n,) of the frames of each pixel."""
-        return freedom(self.gather((self.light.weight > 0).double().sum(1)))
-
-    @property
-    def chi_square(self) -> Tensor:
-        """Reduced chi-square (n,) of the frames of each pixel."""
-        return self.gather((self.light.weight * self.residual**2).sum(1)) / self.freedom
-
-
-def solve_pixels(scan: ProbedScan, targets: Indices) -> SolvedPixels:
-    """Spectra of some pixels (flat indices) by all that their samples receive, in double precision."""
-    shape = scan.pixels.valid.shape
-    samples, owner = samples_of(targets, shape, scan.model.rig.sensor.bayer)
-    light, owners = ProbedLight(scan, samples), torch.as_tensor(owner)
-    lit = torch.as_tensor(scan.pixels.shading.ravel()[targets], dtype=torch.float64)[owners]
-    rows = light.rows * lit[:, None, None]
-    heavy = rows * light.weight[:, None]
-
-    def gather(values: Tensor) -> Tensor:
-        return values.new_zeros((len(targets), *values.shape[1:])).index_add_(0, owners, values)
-
-    matrix, right = gather(heavy @ rows.mT), gather((heavy @ light.values[..., None])[..., 0])
-    found = solve_dense(matrix, right, scan.prior)
-    nodes = found.nodes.T.contiguous()
-    prior = banded.to_dense(roughness(nodes.shape[1], matrix)[..., None])[0] * found.tau[:, None, None] ** -2
-    prior = prior + torch.eye(nodes.shape[1]).to(matrix) * scan.prior.level_std**-2
-    residual = light.values - (nodes[owners][:, None] @ rows)[:, 0]
-    free = ~found.at_bound.T
-    return SolvedPixels(light, owners, lit, rows, heavy, residual, nodes, found.mean, matrix + prior, free)

@@ -147,7 +147,7 @@ def probed(monkeypatch: pytest.MonkeyPatch, share: float, varied: bool, **model:
     monkeypatch.setattr(probe_module, "_probe_some", some)
     monkeypatch.setattr(probe_module, "probe_targets", lambda valid: np.arange(int(valid.sum())))
     monkeypatch.setattr(probe_module, "widths_at", lambda *_: None)
-    monkeypatch.setattr(probe_module, "probe_lines", lambda *_: None)
+    monkeypatch.setattr(probe_module, "_lines", lambda *_: "of lines")
     monkeypatch.setattr(probe_module, "_columns", lambda *_: dict.fromkeys(ORDERS, (None, None)))
     monkeypatch.setattr(probe_module, "_nm_per_px", lambda *_: 2.0)
     monkeypatch.setattr(probe_module, "_sideways", lambda *_: None)
@@ -198,11 +198,15 @@ def test_the_parameters_come_first_and_curves_after_them(monkeypatch: pytest.Mon
     assert found.bright.tolist() == (KNOTS_NM > 660 - 30).tolist()
 
 
-@pytest.mark.parametrize("model", [{"single": False}, {"pixels": 39}])
-def test_other_patterns_and_fewer_than_forty_pixels_say_nothing(
-    model: dict[str, Any], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    assert probed(monkeypatch, 1.0, True, **model) is None
+def test_fewer_than_forty_pixels_say_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    assert probed(monkeypatch, 1.0, True, pixels=39) is None
+
+
+@pytest.mark.parametrize("single", [True, False])
+def test_only_single_lines_show_the_zero_order_alone(single: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    found = probed(monkeypatch, 1.0, True, single=single)
+    assert found is not None
+    assert found.lines == ("of lines" if single else None)
 
 
 def test_wavelengths_are_those_between_columns_whichever_way_they_run() -> None:

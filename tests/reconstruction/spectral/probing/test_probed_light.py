@@ -16,9 +16,9 @@ from dsl_core.reconstruction.spectral.probing.probed_light import (
     PARAMETERS,
     OrderLight,
     ProbedLight,
-    SolvedPixels,
     along_bands,
 )
+from dsl_core.reconstruction.spectral.probing.solved_pixels import SolvedPixels
 
 
 def test_a_stretch_rises_from_the_first_reported_band_to_the_last() -> None:

@@ -70,6 +70,8 @@ def assert_same(monkeypatch: pytest.MonkeyPatch, **changes: Any) -> SpectralMaps
 def test_compiled_spectra_are_those_of_tensors(monkeypatch: pytest.MonkeyPatch) -> None:
     found = assert_same(monkeypatch)
     assert np.isnan(found.reflectance[:, 3:5, 4:7]).all()
+    assert found.followed is not None
+    assert found.followed.motion is None
 
 
 def test_offsets_that_all_frames_share_count(monkeypatch: pytest.MonkeyPatch) -> None:
