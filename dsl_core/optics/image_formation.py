@@ -69,7 +69,7 @@ class BlurredProfiles:
         # Each column's light, added up: a convolution, of which what wraps around is not looked at.
         spread = torch.fft.rfft(light.to(shown)) * torch.fft.rfft(apart, n=len(light))
         table = torch.fft.irfft(spread, n=len(light))[..., -samples:]
-        self.table = table.permute(2, 0, 1).to(other).contiguous()
+        self.table: Tensor = table.permute(2, 0, 1).to(other).contiguous()
 
     def at(self, columns_px: Tensor) -> Tensor:
         """Light at columns of shape (pixels,): (pixels, LEDs, frames); almost none far outside the frame."""

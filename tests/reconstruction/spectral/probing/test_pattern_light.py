@@ -34,8 +34,8 @@ def scan_of(model: PixelModel, at: Tensor, depth: Tensor, **known: float) -> Pro
     pixels = Pixels(**maps, valid=np.isfinite(maps["depth_mm"]))
     radiance, std = np.zeros((2, len(model.profiles), len(at)), np.float32)
     std[:] = STD
-    cubes = (PickedCube(each, at.numpy(), SHAPE[1]) for each in (radiance, std))
-    return ProbedScan(model, pixels, *cubes, Prior(), direct_error=0.0)
+    lit, unsure = (PickedCube(each, at.numpy(), SHAPE[1]) for each in (radiance, std))
+    return ProbedScan(model, pixels, lit, unsure, Prior(), direct_error=0.0)
 
 
 def seen(model: PixelModel, traced: Traced, nodes: Tensor, colour: Tensor) -> Tensor:
