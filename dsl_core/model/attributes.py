@@ -12,6 +12,8 @@ from dsl_core.model.plan import CapturePlan
 
 #: Name of the attribute that holds the plan by which a result's frames were captured.
 PLAN_ATTRIBUTE = "capture_plan"
+#: Name of that which is the relative deviation of all reflectances together, which no pixel shows.
+SCALE_ATTRIBUTE = "reflectance_scale_rel_std"
 #: Name of that which lists sentences about pictures that do not show their pattern.
 DOUBTS = "frames_in_doubt"
 

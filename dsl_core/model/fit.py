@@ -121,6 +121,9 @@ class Fit(Record):
     as a share of reflectance, in cells of the picture; empty where nothing is known. ``level_rel_std`` is the
     part, as a share of all reflectance, that the light may have changed by since its level was measured. The
     rest is noise, and what the calibration itself left open.
+    ``scale`` says what the scale of reflectance rests on and to what share it is known, and ``scale_rel_std``
+    is its relative deviation, which is common to all pixels and only partly in the stated ones; None where
+    there is no reflectance or nobody asked.
     ``measured`` says in what the calibration found the rig to be unlike the usual, which the result follows.
     ``unseen`` is what no finding can tell, in a sentence, such as the age of the calibration.
     """
@@ -128,6 +131,8 @@ class Fit(Record):
     findings: tuple[FitFinding, ...] = ()
     model_error: tuple[tuple[tuple[float, ...], ...], ...] = ()
     level_rel_std: float = 0.0
+    scale_rel_std: float | None = None
+    scale: str = ""
     measured: str = ""
     unseen: str = ""
 
@@ -185,8 +190,7 @@ class Fit(Record):
                 f"Deviations of reflectance contain {self.level_rel_std:.1%} of it for what the light may"
                 " have changed by since its level was measured."
             )
-        if self.unseen:
-            lines.append(self.unseen)
+        lines += [text for text in (self.scale, self.unseen) if text]
         return "\n".join(lines)
 
     @property

@@ -26,7 +26,7 @@ from dsl_core.io.scan.folder import ScanReader
 from dsl_core.io.scan.manifest import Manifest, read_manifest
 from dsl_core.io.scan.origin import is_of_this_computer, model_notes, rig_of_notes
 from dsl_core.io.scan.proof_file import read_proof
-from dsl_core.model.attributes import DOUBTS, PLAN_ATTRIBUTE
+from dsl_core.model.attributes import DOUBTS, PLAN_ATTRIBUTE, SCALE_ATTRIBUTE
 from dsl_core.model.conditions import differences
 from dsl_core.model.fit import ATTRIBUTE as FIT_ATTRIBUTE
 from dsl_core.model.fit import Fit
@@ -39,7 +39,13 @@ from dsl_core.model.spectral import WavelengthGrid
 from dsl_core.patterns.images import pattern_image
 from dsl_core.pipeline import Options, reconstruct, scan
 from dsl_core.progress import NoProgress, Progress
-from dsl_core.reconstruction.calibration_age import aged, light_level, unseen_since
+from dsl_core.reconstruction.calibration_age import (
+    aged,
+    light_level,
+    scale_in_words,
+    scale_rel_std,
+    unseen_since,
+)
 from dsl_core.version import __version__
 from dsl_core.workflows.captures import is_import, sensor_of_scan, with_imported_sensor
 
@@ -146,7 +152,7 @@ def reconstruct_scan(
             **({DOUBTS: json.dumps(doubts)} if doubts else {}),
             **({NOT_JUDGED: proof.not_judged} if proof.untold else {}),
             **model_notes(rig, options.correspondence),
-            **_dated(result, rig, reader),
+            **_dated(result, rig, reader, has_spectra=options.spectra),
             "captured": reader.manifest.created,
             "captured_with": reader.manifest.rig_name,
             PLAN_ATTRIBUTE: reader.plan.model_dump_json(),
@@ -171,17 +177,27 @@ def known_doubts(folder: Path) -> list[str]:
     return _doubts(reader, None if reader.calibration is None else read_proof(reader, reader.calibration))
 
 
-def _dated(result: xr.Dataset, rig: Rig, reader: ScanReader) -> dict[str, str]:
-    """The verdict of a result, with what its scan cannot tell of a calibration that is old."""
+def _dated(
+    result: xr.Dataset, rig: Rig, reader: ScanReader, *, has_spectra: bool = True
+) -> dict[str, str | float]:
+    """The verdict of a result, with what its scan cannot tell of an old calibration, or of its light."""
     fit = Fit.read({str(name): value for name, value in result.attrs.items()})
-    if fit is None or is_import(reader):
+    if fit is None:
         return {}
-    level, unseen = light_level(rig, reader.manifest.created), unseen_since(rig, reader.manifest.created)
-    found = {
-        "unseen": " ".join(part for part in (fit.unseen, unseen) if part),
-        "level_rel_std": max(fit.level_rel_std, 0.0 if level is None else level.rel_std),
-    }
-    return {FIT_ATTRIBUTE: fit.model_copy(update=found).model_dump_json()}
+    # Nobody knows when the pictures of an import were taken, so that no check is one of their light.
+    captured = "" if is_import(reader) else reader.manifest.created
+    level = light_level(rig, captured)
+    fit = fit.model_copy(
+        update={
+            "unseen": " ".join(part for part in (fit.unseen, unseen_since(rig, captured)) if part),
+            "level_rel_std": max(fit.level_rel_std, 0.0 if level is None else level.rel_std),
+        }
+    )
+    if not has_spectra:
+        return {FIT_ATTRIBUTE: fit.model_dump_json()}
+    scale = max(scale_rel_std(rig, captured), fit.level_rel_std)
+    said = {"scale_rel_std": scale, "scale": scale_in_words(rig, captured, scale)}
+    return {FIT_ATTRIBUTE: fit.model_copy(update=said).model_dump_json(), SCALE_ATTRIBUTE: round(scale, 5)}
 
 
 def reconstruct_to(

@@ -48,6 +48,7 @@ def test_what_no_finding_can_tell_comes_last() -> None:
     assert "contain 3.4% of it for what the light may" in Fit(level_rel_std=0.034).words
     assert Fit(level_rel_std=0.004).words == Fit().words
     assert Fit(measured="Own.", unseen="Old.").words.splitlines()[1:] == ["Own.", "Old."]
+    assert Fit(scale="Scale.", unseen="Old.").words.splitlines()[1:] == ["Scale.", "Old."]
     assert Fit(unseen="Old.").words == "The model fits this rig and scene.\nOld."
     assert Fit(unseen="Old.", findings=(finding("light", 2.0, True),)).words.endswith("\nOld.")
 

@@ -8,10 +8,14 @@ from dsl_core.model.calibration.accepted import AcceptedCalibration, Calibration
 from dsl_core.model.calibration.light_check import LightCheck
 from dsl_core.model.rig import Provenance, Rig
 from dsl_core.reconstruction.calibration_age import (
+    CHECKED_REL_STD,
     DEFAULT_CHECKS,
     PER_ROOT_DAY,
+    UNCHECKED_REL_STD,
     aged,
     light_level,
+    scale_in_words,
+    scale_rel_std,
     unseen_since,
     wander_per_root_day,
 )
@@ -139,3 +143,32 @@ def test_what_checks_get_wrong_themselves_is_not_taken_for_light() -> None:
     assert wander_per_root_day(unsure) == pytest.approx(PER_ROOT_DAY * (3 / 4) ** 0.5)
     same_day = (checked("2026-03-01T12:00:00+00:00", 1.02),)
     assert wander_per_root_day(same_day) == pytest.approx(PER_ROOT_DAY)
+
+
+@pytest.mark.parametrize("created", ["2026-03-22T09:00:00+00:00", "", "spring"])
+def test_light_that_nobody_checked_may_be_some_per_cent_off_on_any_day(created: str) -> None:
+    """Light 5 % darker within an hour of its calibration is a darker surface to every scan."""
+    rig = rig_of(created)
+    assert scale_rel_std(rig, SCANNED) == UNCHECKED_REL_STD
+    said = scale_in_words(rig, SCANNED, UNCHECKED_REL_STD)
+    assert "known to 4.9%" in said
+    assert "not checked since the calibration" in said
+    assert "run the drift check with the Spectralon" in said
+    # What age adds is contained in the deviations; the rest is not, so that these are no wider within a day.
+    assert aged(rig, SCANNED).reference_rel_std == rig.reference_rel_std
+
+
+def test_a_drift_check_of_the_day_makes_the_scale_known() -> None:
+    rig = with_checks(checked("2026-03-22T09:00:00+00:00", 1.0, 0.002))
+    assert scale_rel_std(rig, SCANNED) == CHECKED_REL_STD
+    said = scale_in_words(rig, SCANNED, CHECKED_REL_STD)
+    assert "known to 1.0%" in said
+    assert said.endswith("(light checked on 2026-03-22).")
+    darker = with_checks(checked("2026-03-22T09:00:00+00:00", 0.95, 0.002))
+    assert scale_rel_std(darker, SCANNED) == pytest.approx(0.05, abs=0.001)
+    # A lamp that was switched off since is not known by a check of days ago.
+    assert scale_rel_std(with_checks(checked("2026-03-20T09:00:00+00:00", 1.0)), SCANNED) == UNCHECKED_REL_STD
+
+
+def test_the_scale_of_an_old_calibration_is_known_no_better_than_its_light() -> None:
+    assert scale_rel_std(rig_of(THREE_WEEKS), SCANNED) == pytest.approx(PER_ROOT_DAY * 20**0.5)

@@ -10,6 +10,7 @@ import pytest
 from dsl_core.capture.movement import pick_reference_shots
 from dsl_core.devices.replay import replay_rig
 from dsl_core.errors import DecodeError, DeviceError, StoreError
+from dsl_core.io.export.common import provenance_of
 from dsl_core.io.scan.folder import ScanReader, ScanWriter
 from dsl_core.io.scan.origin import rig_notes
 from dsl_core.model.fit import Fit
@@ -121,8 +122,8 @@ def test_a_result_says_that_its_calibration_is_old_unless_its_pictures_have_no_d
     reader.manifest.notes.update(notes)
     rig = small_rig().model_copy(update={"provenance": Provenance(created="2020-01-01")})
     found = Fit.read({**scans._dated(small_result().assign_attrs(fit=Fit().model_dump_json()), rig, reader)})
-    assert (found is not None) == told
-    assert found is None or ("days older than this scan" in found.words and found.level_rel_std > 0.1)
+    assert found is not None
+    assert ("days older than this scan" in found.words) == (found.level_rel_std > 0.1) == told
 
 
 def test_dates_do_not_hide_what_a_scan_itself_leaves_open(folder: Path) -> None:
@@ -130,7 +131,30 @@ def test_dates_do_not_hide_what_a_scan_itself_leaves_open(folder: Path) -> None:
     rig = small_rig().model_copy(update={"provenance": Provenance(created=reader.manifest.created)})
     made = Fit(level_rel_std=0.03, unseen="The film may have moved.")
     found = Fit.read({**scans._dated(small_result().assign_attrs(fit=made.model_dump_json()), rig, reader)})
-    assert found == made
+    assert found is not None
+    assert found.model_copy(update={"scale_rel_std": None, "scale": ""}) == made
+    assert found.scale_rel_std == made.level_rel_std
+
+
+@pytest.mark.parametrize("notes", [{}, {"imported_sensor": "{}"}])
+def test_a_result_states_the_scale_of_its_reflectance_which_no_pixel_shows(
+    folder: Path, notes: dict[str, str]
+) -> None:
+    """In its verdict, and as a figure that all exports carry; a result of depth alone has no such scale."""
+    reader = ScanReader(folder)
+    reader.manifest.notes.update(notes)
+    rig = small_rig().model_copy(update={"provenance": Provenance(created=reader.manifest.created)})
+    judged = small_result().assign_attrs(fit=Fit().model_dump_json())
+    noted = scans._dated(judged, rig, reader)
+    found = Fit.read(noted)
+    assert found is not None
+    assert found.scale_rel_std == noted["reflectance_scale_rel_std"] == 0.025
+    assert "known to 4.9%" in found.words
+    assert not found.significant
+    origin = provenance_of(noted)
+    assert origin["reflectance_scale_rel_std"] == "0.025"
+    assert "Scale of reflectance: known to 4.9%" in origin["verdict"]
+    assert "reflectance_scale_rel_std" not in scans._dated(judged, rig, reader, has_spectra=False)
 
 
 @pytest.mark.parametrize(("notes", "told"), [({}, True), ({"imported_sensor": "{}"}, False)])

@@ -13,6 +13,7 @@ from dsl_core.model.attributes import DOUBTS, sentences_of
 from dsl_core.model.calibration.accepted import read_missed
 from dsl_core.model.fit import Fit
 from dsl_core.model.rendered_effects import RenderedEffects
+from dsl_core.solve.normal import BAND_95
 from dsl_core.words import counted
 
 
@@ -75,7 +76,7 @@ def summarise(result: ResultArrays | None, offer: Path | None, busy: str, is_beg
     doubted = fit if fit is not None and fit.significant else None
     lacks = [text] if (text := missing_text(result)) else []
     unseen = [fit.unseen] if fit is not None and fit.unseen else []
-    parts = (f"{width} × {height} px{bands}", captured, effects, str(result.path))
+    parts = (f"{width} × {height} px{bands}", scale_text(fit), captured, effects, str(result.path))
     texts = (str(result.path), "\n".join((*in_doubt, *missed)), fit.words if fit else "", details)
     return Summary(
         content,
@@ -87,6 +88,17 @@ def summarise(result: ResultArrays | None, offer: Path | None, busy: str, is_beg
         warning=" ".join([*in_doubt[:1], *missed, *([doubted.headline] if doubted else []), *lacks, *unseen]),
         advice="\n".join([*in_doubt, *missed, *([doubted.words] if doubted else unseen), *lacks]),
     )
+
+
+def scale_text(fit: Fit | None) -> str:
+    """To what share the scale of reflectance is known at 95 %; empty where nobody says.
+
+    >>> scale_text(Fit(scale_rel_std=0.025))
+    'scale of reflectance known to 4.9 %'
+    """
+    if fit is None or fit.scale_rel_std is None:
+        return ""
+    return f"scale of reflectance known to {100 * BAND_95 * fit.scale_rel_std:.1f} %"
 
 
 def effects_text(attributes: Mapping[str, object]) -> tuple[str, str]:

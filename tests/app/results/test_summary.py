@@ -114,6 +114,15 @@ def test_the_head_tells_size_bands_time_and_path() -> None:
     assert summarise(depth, None, "").about == "64 × 48 px · depth only · a.zarr"
 
 
+def test_the_head_tells_to_what_share_the_scale_of_reflectance_is_known() -> None:
+    fit = Fit(scale_rel_std=0.025, scale="Scale of reflectance: known to 4.9%.")
+    found = summarise(result(fit=fit.model_dump_json()), None, "")
+    assert found.about == "64 × 48 px · 2 bands · scale of reflectance known to 4.9 % · /scans/leaf.zarr"
+    assert fit.scale in found.details
+    # It is so of every scan, and no reason for a warning.
+    assert found.warning == found.advice == ""
+
+
 def test_what_the_calibration_missed_stands_before_what_does_not_fit() -> None:
     missed = (
         "This rig's calibration 'Geometry' missed its limit: camera error 0.60 px (limit: at most 0.5 px).",
