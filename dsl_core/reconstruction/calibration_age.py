@@ -24,8 +24,8 @@ PER_ROOT_DAY = 0.0075
 CHANGED_REL_STD = PER_ROOT_DAY * 20**0.5
 #: The level of a lamp that nobody has measured since its calibration, on whatever day: how well it comes back
 #: when it is switched on, and stays as its settings are. 95 % of the levels, of each colour by itself, are
-#: thought to be within 5 % of the calibrated one. This is a default, not a measurement.
-UNCHECKED_REL_STD = 0.025
+#: thought to be within 6 % of the calibrated one. This is a default, not a measurement.
+UNCHECKED_REL_STD = 0.03
 #: How well a level is known on a day on which a drift check measured it, at best.
 CHECKED_REL_STD = 0.005
 #: What a rig's own drift checks say counts against the default as much as this many of them would.

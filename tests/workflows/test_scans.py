@@ -148,12 +148,12 @@ def test_a_result_states_the_scale_of_its_reflectance_which_no_pixel_shows(
     noted = scans._dated(judged, rig, reader)
     found = Fit.read(noted)
     assert found is not None
-    assert found.scale_rel_std == noted["reflectance_scale_rel_std"] == 0.025
-    assert "known to 4.9%" in found.words
+    assert found.scale_rel_std == noted["reflectance_scale_rel_std"] == 0.03
+    assert "known to 5.9%" in found.words
     assert not found.significant
     origin = provenance_of(noted)
-    assert origin["reflectance_scale_rel_std"] == "0.025"
-    assert "Scale of reflectance: known to 4.9%" in origin["verdict"]
+    assert origin["reflectance_scale_rel_std"] == "0.03"
+    assert "Scale of reflectance: known to 5.9%" in origin["verdict"]
     assert "reflectance_scale_rel_std" not in scans._dated(judged, rig, reader, has_spectra=False)
 
 
