@@ -7,7 +7,8 @@ surface between depth edges is judged by itself: a matt wall behind a glossy obj
 
 Normals are noisy, and from one pair of neighbours to the next that is most of how they turn on a flat
 surface: a highlight fitted to it would be too faint. So directions are smoothed as well, and what then
-surely explains most is told.
+surely explains most is told. On a curved surface smoothing hides how it turns; there places far apart tell
+more, as directions then differ by more than their noise.
 """
 
 from __future__ import annotations
@@ -37,9 +38,13 @@ LEAST, SIGMAS, WHITE_SHARE = 0.01, 6.0, 0.3
 #: Cells of 2 x 2 pixels, one of each colour, are compared with those so many cells away; with at most so
 #: many pairs. Neighbouring pairs err alike: deviations are those between blocks of so many cells a side.
 LAG, MOST_PAIRS, BLOCK = 2, 40_000, 8
+#: Cells farther apart are this share of the picture's width from each other: two windows of the normals.
+FAR = 1 / 37
 #: Widths (px) by which directions are smoothed, and what a highlight must then have of reflectance: smoothed
 #: ones are off where surfaces curve, and brightness with them by 0.01.
 SMOOTHED_PX, LEAST_SMOOTHED = (0.0, 6.0, 12.0), 0.03
+#: A pixel is at most so many deviations brighter than it was seen.
+SEEN_SIGMAS = 2.0
 #: Rows of a picture that are looked at together.
 SLAB = 128
 #: What differs from cell to cell without any highlight: a share of reflectance, and reflectance.
@@ -84,6 +89,10 @@ class Highlight:
         return np.asarray(self.peak * _lobe(towards, self.roughness))
 
 
+#: The number of a surface, its highlight, and the cosines to the mirror direction that it was found by.
+_Found = tuple[int, Highlight, NDArray[np.float32]]
+
+
 def follow_highlights(rig: Rig, geometry: Geometry) -> tuple[Geometry, list[FitFinding]]:
     """Geometry that says what highlights add to reflectance, and what is told of them."""
     towards = towards_mirror(rig, geometry)
@@ -93,11 +102,14 @@ def follow_highlights(rig: Rig, geometry: Geometry) -> tuple[Geometry, list[FitF
         return geometry, []
     added = np.zeros(towards.shape, np.float32)
     own = _everywhere(surfaces, towards.shape)
-    for surface, (light, facing) in found.items():
+    for surface, light, facing in found:
         here = own == surface
-        added[here] = np.nan_to_num(light.at(facing[here]))
+        # Noise of directions makes a highlight too faint: of two that are sure, the brighter one counts.
+        added[here] = np.maximum(added[here], np.nan_to_num(light.at(facing[here])))
+    # What a surface sends on of its own is not less than nothing.
+    added = np.fmin(added, _seen(rig, geometry))
     brightest = float(added.max(initial=0.0))
-    surest = min(light.peak_std / light.peak for light, _ in found.values())
+    surest = min(light.peak_std / light.peak for _, light, _ in found)
     concerned = float((added > LEAST).sum() / max(np.isfinite(geometry.depth_mm).sum(), 1))
     told = FitFinding.judged(
         "surfaces",
@@ -114,26 +126,52 @@ def follow_highlights(rig: Rig, geometry: Geometry) -> tuple[Geometry, list[FitF
     return replace(geometry, highlight=added), [told]
 
 
+def _seen(rig: Rig, geometry: Geometry) -> NDArray[np.float32]:
+    """The most reflectance (rows, columns) that the light of each pixel allows in its colour; NaN unknown."""
+    white = chain_response(rig, 0, _NM).sum((1, 2))
+    shape = geometry.depth_mm.shape
+    channel, gain = bayer_channels(rig.sensor.bayer, *shape), np.broadcast_to(relative_gain(rig), shape)
+    shading = np.maximum(geometry.surface.shading, LEAST_SHADING)
+    most = np.maximum(geometry.amplitude, 0) + SEEN_SIGMAS * geometry.amplitude_std
+    return np.asarray(most / (shading * white[channel] * gain), np.float32)
+
+
 def _surest(
     rig: Rig, geometry: Geometry, towards: NDArray[np.float32], surfaces: NDArray[np.int32]
-) -> dict[int, tuple[Highlight, NDArray[np.float32]]]:
-    """By the number of a surface, its highlight and the directions, smoothed or not, that explain it."""
-    fits: dict[int, list[tuple[Highlight, NDArray[np.float32]]]] = {}
-    for by_px in SMOOTHED_PX:
-        facing = smoothed(towards, by_px)
-        for surface, light in fit_highlights(rig, geometry, facing, surfaces).items():
-            fits.setdefault(surface, []).append((light, facing))
-    found = {}
+) -> list[_Found]:
+    """Highlights by places near each other and by such as are far apart."""
+    far = max(round(FAR * towards.shape[1]), LAG)
+    directions = [(by_px, smoothed(towards, by_px)) for by_px in SMOOTHED_PX]
+    # Smoothing serves neighbours, which hardly differ.
+    return [
+        *_sure_of(rig, geometry, directions, surfaces, LAG),
+        *_sure_of(rig, geometry, directions[:1], surfaces, far),
+    ]
+
+
+def _sure_of(
+    rig: Rig,
+    geometry: Geometry,
+    directions: list[tuple[float, NDArray[np.float32]]],
+    surfaces: NDArray[np.int32],
+    lag: int,
+) -> list[_Found]:
+    """Of pairs so many cells apart, what surely explains most by directions smoothed by some widths (px)."""
+    fits: dict[int, list[tuple[Highlight, NDArray[np.float32], float]]] = {}
+    for by_px, facing in directions:
+        for surface, light in fit_highlights(rig, geometry, facing, surfaces, lag).items():
+            fits.setdefault(surface, []).append((light, facing, by_px))
+    found = []
     for surface, each in fits.items():
         each.sort(key=lambda one: one[0].left)
         sure = [
-            (light, facing)
-            for light, facing in each
-            if light.is_sure and (facing is towards or light.brightest > LEAST_SMOOTHED)
+            (surface, light, facing)
+            for light, facing, by_px in each
+            if light.is_sure and (by_px == 0 or light.brightest > LEAST_SMOOTHED)
         ]
         # What has a colour by the directions that explain it best is no highlight by others either.
         if sure and each[0][0].is_white:
-            found[surface] = sure[0]
+            found.append(sure[0])
     return found
 
 
@@ -183,19 +221,18 @@ def _everywhere(surfaces: NDArray[np.int32], shape: tuple[int, ...]) -> NDArray[
     return np.asarray(near[y[:, None], x])
 
 
-def find_highlights(
-    rig: Rig, geometry: Geometry, towards: NDArray[np.floating], surfaces: NDArray[np.int32]
-) -> dict[int, Highlight]:
-    """By the number of a surface, the highlight that surely explains how its brightness changes."""
-    fits = fit_highlights(rig, geometry, towards, surfaces)
-    return {surface: found for surface, found in fits.items() if found.is_sure}
-
-
 def fit_highlights(
-    rig: Rig, geometry: Geometry, towards: NDArray[np.floating], surfaces: NDArray[np.int32]
+    rig: Rig,
+    geometry: Geometry,
+    towards: NDArray[np.floating],
+    surfaces: NDArray[np.int32],
+    lag: int = LAG,
 ) -> dict[int, Highlight]:
-    """By the number of a surface, the highlight that explains best how brightness changes, sure or not."""
-    pairs = _pairs(rig, geometry, towards, surfaces)
+    """By the number of a surface, the highlight that explains best how brightness changes, sure or not.
+
+    ``lag`` is how many cells apart the places are that are compared.
+    """
+    pairs = _pairs(rig, geometry, towards, surfaces, lag)
     if pairs is None:
         return {}
     counts = np.bincount(pairs.surface)
@@ -238,9 +275,13 @@ def _lobe(towards: NDArray[np.floating], roughness: float) -> NDArray[np.floatin
 
 
 def _pairs(
-    rig: Rig, geometry: Geometry, towards: NDArray[np.floating], surfaces: NDArray[np.int32]
+    rig: Rig,
+    geometry: Geometry,
+    towards: NDArray[np.floating],
+    surfaces: NDArray[np.int32],
+    lag: int = LAG,
 ) -> _Pairs | None:
-    """Pairs of cells of a surface of which all is known; None if too few, or if a camera has no colours."""
+    """Pairs of cells so many apart of which all is known; None if too few, or if a camera has no colours."""
     if len(set(colour_sites(rig.sensor.bayer))) < 3:
         return None
     gain = np.broadcast_to(relative_gain(rig), towards.shape)
@@ -257,6 +298,7 @@ def _pairs(
             surfaces[rows.start // 2 : rows.stop // 2],
             rows.start,
             every,
+            lag,
         )
         for rows in _slabs(len(towards))
     ]
@@ -278,6 +320,7 @@ def _pairs_of(
     surfaces: NDArray[np.int32],
     top: int,
     every: int,
+    lag: int,
 ) -> tuple[NDArray[Any], ...]:
     """What `_Pairs` holds, of the rows of a picture from ``top`` on: one of so many pairs."""
     channel, shading = bayer_channels(rig.sensor.bayer, *towards.shape), geometry.surface.shading
@@ -295,7 +338,7 @@ def _pairs_of(
     unsure = _cells(np.where(usable, geometry.surface.shading_rel_std, 0.0)).mean(-1)
     rows, columns = known.shape
     parts = []
-    for down, across in ((LAG, 0), (0, LAG)):
+    for down, across in ((lag, 0), (0, lag)):
         first = slice(down, None), slice(across, None)
         second = slice(None, max(rows - down, 0)), slice(None, max(columns - across, 0))
         alike = known[first] & known[second] & (surfaces[first] == surfaces[second])
@@ -304,7 +347,9 @@ def _pairs_of(
         da, db = (noise[:, *part][:, row, column] for part in (first, second))
         by_normals = (unsure[first][row, column] * a) ** 2 + (unsure[second][row, column] * b) ** 2
         own = np.sqrt(da**2 + db**2 + by_normals + (TEXTURE * (a + b) / 2) ** 2 + FLOOR**2)
-        block = (top // 2 + row) // BLOCK * columns + column // BLOCK
+        # Pairs that share a cell, or an edge between theirs, err alike.
+        side = max(BLOCK, 2 * lag)
+        block = (top // 2 + row) // side * columns + column // side
         on = surfaces[first][row, column]
         parts.append((facing[first][row, column], facing[second][row, column], a - b, own, block, on))
     return tuple(np.concatenate(part, -1) for part in zip(*parts, strict=True))
