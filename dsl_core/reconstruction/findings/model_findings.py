@@ -39,6 +39,8 @@ ALIKE = 0.4
 MOVED = "movement of the film"
 #: Name of what is found of the pose in its place.
 TURNED = "turn of camera or projector"
+#: Share of depth that a turn must put in doubt to be told beside a motion of the film.
+LEAST_DEPTH_SHARE = 0.001
 #: Name of what is left of a drift of the light.
 DRIFT_LEFT = "change of the light over the scan"
 #: Added to findings whose effect the spectra of the result already allow for.
@@ -75,9 +77,13 @@ def cause_findings(
     """
     causes = fit_causes(probe)
     if motion is not None:
-        if turn is not None:
-            yield _turn(turn, motion)
-        yield _motion(motion, probe, calibrated_px, turn)
+        of_film = _motion(motion, probe, calibrated_px, turn)
+        if turn is None:
+            yield of_film
+        elif turn.instead:
+            yield from (_turn(turn, motion), of_film)
+        else:
+            yield from (of_film, _perhaps_turned(turn, motion))
     place = _film(causes, probe)
     told = place.significant and probe.places and causes.displaced
     yield place.model_copy(update={"significant": told})
@@ -183,7 +189,7 @@ def _wide_bands(probe: Probe, curves: CurveMisfit) -> FitFinding:
 
 
 def _turn(turn: Turn, motion: FilmMotion) -> FitFinding:
-    """What a motion of the film may be besides: it is told first where that is so."""
+    """What is told in the place of a motion of the film."""
     return FitFinding(
         part="geometry",
         name=TURNED,
@@ -191,13 +197,31 @@ def _turn(turn: Turn, motion: FilmMotion) -> FitFinding:
         std=motion.shift_std_px,
         unit="px",
         limit=LEAST_MOTION_PX,
-        significant=turn.instead,
+        significant=True,
         sentence=f"First orders lie {motion.shift_px:.2f} px (rms) from their places as if camera and"
         f" projector had moved against each other, which puts depth off by {turn.depth_share:.1%}: the"
         " calibration is of another rig, or of another pose or zoom. Deviations of depth and of reflectance"
         " contain it.",
         advice="See that the calibration is this rig's, and measure a surface at a known distance; then"
         " calibrate the geometry again.",
+    )
+
+
+def _perhaps_turned(turn: Turn, motion: FilmMotion) -> FitFinding:
+    """What a motion of the film may be as well, where nothing says which."""
+    return FitFinding(
+        part="geometry",
+        name=TURNED,
+        value=motion.shift_px,
+        std=motion.shift_std_px,
+        unit="px",
+        limit=LEAST_MOTION_PX,
+        significant=motion.sure and turn.believed * turn.depth_share > LEAST_DEPTH_SHARE,
+        sentence="Instead of the film, camera or projector may have turned a little: that displaces first"
+        f" orders alike, and then depth is off by {turn.depth_share:.1%}. Nothing in the scan says which."
+        f" Deviations of depth contain {turn.believed * turn.depth_share:.1%} of it for that.",
+        advice="Measure a surface at a known distance; if depth is off, calibrate the geometry again. A plan"
+        " whose code has rows tells both apart.",
     )
 
 
@@ -234,14 +258,8 @@ def _motion(motion: FilmMotion, probe: Probe, calibrated_px: float, turn: Turn |
         advice="Fix the film so that it cannot slip; if it moves further, repeat the depth-stage calibration."
         " The level and the colour of the light may have changed, too, which no scan can tell: reflectance"
         f" holds to {BAND_95 * CHANGED_REL_STD:.0%}, as stated, and the drift check with the Spectralon tells"
-        " more." + _OR_TURNED + _unsure_depth(turn),
+        " more." + ("" if turn is not None and turn.believed else _OR_TURNED),
     )
-
-
-def _unsure_depth(turn: Turn | None) -> str:
-    if turn is None or turn.instead or not turn.believed:
-        return ""
-    return f" Deviations of depth contain {turn.believed * turn.depth_share:.1%} of it for that."
 
 
 def _film(causes: Causes, probe: Probe) -> FitFinding:

@@ -24,6 +24,7 @@ from dsl_core.reconstruction.spectral.causes import MOST_SHIFT_PX, Causes
 from dsl_core.reconstruction.spectral.film_motion import FilmMotion
 from dsl_core.reconstruction.spectral.probing.probe import Probe, probe
 from dsl_core.reconstruction.spectral.spectra import SpectralReconstruction
+from dsl_core.reconstruction.spectral.turned import Turn
 from tests.cases.twin_scan import MemoryScan, solver_input, twin_scan
 
 GRID = WavelengthGrid(step_nm=10.0)
@@ -218,6 +219,36 @@ def test_a_film_that_was_followed_is_said_to_have_moved_and_by_how_much(
     perhaps = Fit.of(cause_findings(probed(devices.calibration, scan), motion=replace(motion, sure=False)))
     assert perhaps.parts == ()
     assert any("may have moved" in found.sentence for found in perhaps.findings)
+
+
+@pytest.mark.parametrize(
+    ("believed", "instead", "depth_share", "told"),
+    [
+        (0.7, False, 0.009, ("film", "geometry")),
+        (1.0, True, 0.009, ("geometry", "film")),
+        (0.0, False, 0.009, ("film",)),
+        (0.7, False, 0.001, ("film",)),
+    ],
+)
+def test_where_nothing_says_whether_the_film_has_moved_or_the_camera_turned_both_are_named(
+    scanned: tuple[DeviceRig, MemoryScan],
+    believed: float,
+    instead: bool,
+    depth_share: float,
+    told: tuple[str, ...],
+) -> None:
+    devices, scan = scanned
+    assert devices.calibration is not None
+    seen, numbers = probed(devices.calibration, scan), np.array([0.0, 0.0, 0.0, 0.0, 0.3])
+    motion = FilmMotion(numbers, np.full(5, 0.02), 0.1, 0.02)
+    turn = Turn(devices.calibration, believed, instead, depth_share)
+    fit = Fit.of(cause_findings(seen, motion=motion, turn=turn))
+    assert fit.parts == told
+    may_be_either = "Nothing in the scan says which" in fit.words
+    assert may_be_either == (told == ("film", "geometry"))
+    unsure = replace(motion, sure=False)
+    slight = Fit.of(cause_findings(seen, motion=unsure, turn=replace(turn, instead=False)))
+    assert slight.parts == ()
 
 
 def test_a_film_calibrated_no_better_than_it_moved_may_have_another_shape(
