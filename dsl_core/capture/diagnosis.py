@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from dsl_core.capture.altered import alteration, ends_early
 from dsl_core.capture.motion import TILES, moved_between
+from dsl_core.capture.proof.again.room_again import said_of_room, said_of_slight_change
 from dsl_core.capture.proof.lasting.black_light import lit_black
 from dsl_core.capture.proof.noise import Noise
 from dsl_core.capture.proof.raster import Raster
@@ -26,8 +27,8 @@ from dsl_core.model.rig import Sensor, colour_sites
 
 Mosaic = NDArray[np.uint16]
 
-#: Changes of light that matter: a factor of white, and a part of white by which black differs.
-LEAST_LIGHT, LEAST_ROOM = 0.05, 0.03
+#: A factor of white that matters.
+LEAST_LIGHT = 0.05
 #: Factors of the colours of white that differ by this share of each other are no change of all light, where
 #: each colour has had so much of it.
 UNEVEN, LEAST_COLOUR = 0.1, 0.05
@@ -83,13 +84,15 @@ class Explanation:
     """What has changed, and what to do, as sentences (empty if nothing has); whether something moved.
 
     ``is_as_at_first``: white, black and code were compared, and nothing has changed. ``is_of_all``: all of
-    the picture has, alike, so that nothing stands before a part of it.
+    the picture has, alike, so that nothing stands before a part of it. ``is_slight``: a picture may be wrong
+    for another reason.
     """
 
     sentence: str = ""
     has_moved: bool = False
     is_as_at_first: bool = False
     is_of_all: bool = False
+    is_slight: bool = False
 
 
 class Diagnosis:
@@ -154,6 +157,11 @@ class _Lights:
     lit: NDArray[np.bool_]
     factor: float
     darks: tuple[float, float]
+
+    @property
+    def white_dn(self) -> float:
+        """What lit pixels had at first, DN."""
+        return float(self.old[self.lit].mean())
 
     @property
     def is_other(self) -> bool:
@@ -242,7 +250,9 @@ def _of_light_or_motion(
     if light.is_other and not is_uneven and moved is None:
         by_place = _said_of_places(tiles, light.factor)
     found = [_said_of_colours(colours) if is_uneven else by_place or _said_of_light(light)]
-    found.append("" if light.is_exposed_otherwise and not is_uneven else _said_of_room(light))
+    found.append(
+        "" if light.is_exposed_otherwise and not is_uneven else said_of_room(light.darks, light.white_dn)
+    )
     is_soft = (moved is None or moved.is_pattern) and _has_softer_stripes(before, now, light.lit)
     if is_soft:
         found.append(
@@ -260,6 +270,9 @@ def _of_light_or_motion(
             " scaling, keystone and refresh rate as they were.",
             has_moved=True,
         )
+    if not sentence and moved is None:
+        slight = said_of_slight_change(before.black, now.black, light.white_dn)
+        return Explanation(slight, is_as_at_first=not slight, is_slight=bool(slight))
     is_of_all = is_uneven or (moved is None and light.is_other and not by_place)
     return Explanation(sentence, moved is not None or is_soft, not sentence, is_of_all)
 
@@ -294,17 +307,6 @@ def _said_of_light(light: _Lights) -> str:
     return (
         f"The {what} is {light.factor:.2f} times what it was when the scan began. Switch automatic exposure"
         " and gain of the camera off, and check the lamp."
-    )
-
-
-def _said_of_room(light: _Lights) -> str:
-    """That black has changed by a part of white that matters."""
-    before, now = light.darks
-    if abs(now - before) <= LEAST_ROOM * float(light.old[light.lit].mean()):
-        return ""
-    return (
-        f"The light of the room has changed: without the projector the picture is at {now:.0f} DN above its"
-        f" black level, and was at {before:.0f} DN when the scan began. Keep the room as it was."
     )
 
 

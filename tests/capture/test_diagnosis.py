@@ -167,7 +167,8 @@ def even(white: np.ndarray | float, room_dn: float) -> References:
     [
         (1.04, 20, ""), (1.06, 20, "is 1.06 times what it was"),
         (0.96, 20, ""), (0.94, 20, "is 0.94 times what it was"),
-        (1.0, 49, ""), (1.0, 51, "at 51 DN above its black level, and was at 20 DN"),
+        (1.0, 23.9, ""), (1.0, 24.1, "or the black level of the camera, has changed: without the projector"),
+        (1.0, 49, "or the black level"), (1.0, 51, "at 51 DN above its black level, and was at 20 DN"),
         (0.5, 10.8, "exposure or gain of the camera is 0.50"),
         (0.5, 11.2, "light of the projector or the exposure is 0.50"),
         (0.5, 9.2, "exposure or gain of the camera is 0.50"),
@@ -189,8 +190,19 @@ def test_black_tells_the_exposure_from_two_counts_on(room_dn: float, is_told: bo
 def test_the_rooms_light_counts_against_the_lit_part_of_the_picture(added: int, is_told: bool) -> None:
     white = np.full((48, 72), 1000.0)
     white[:, 36:58], white[:, 58:] = 300.0, 100.0
-    found = what_changed(even(white, 20.0), even(white, 20.0 + added), SENSOR).sentence
-    assert ("light of the room" in found) == is_told
+    found = what_changed(even(white, 20.0), even(white, 20.0 + added), SENSOR)
+    assert ("at 44 DN above its black level" in found.sentence) == is_told
+    assert found.is_slight != is_told
+
+
+def test_a_lamp_of_the_room_is_told_from_a_black_level_by_what_surfaces_reflect() -> None:
+    surfaces = np.full((48, 72), 1000.0)
+    surfaces[:, 36:] = 300.0
+    lamp = even(surfaces, 20.0 + 0.01 * surfaces)
+    found = what_changed(even(surfaces, 20.0), lamp, SENSOR)
+    assert found.sentence.startswith("The light of the room has changed: without the projector")
+    assert found.is_slight
+    assert not found.is_as_at_first
 
 
 def test_saturated_pixels_tell_nothing() -> None:

@@ -18,7 +18,12 @@ from dsl_core.capture.proof.finding import Finding, Light, Verdict
 from dsl_core.capture.proof.light_sums import light_sentence
 from dsl_core.capture.proof.verifier import FrameProof
 from dsl_core.capture.proven.doubted import MOST_UNTOLD, DoubtedShots
-from dsl_core.capture.proven.wrong_pictures import PictureError, what_to_do, why_control_differs
+from dsl_core.capture.proven.wrong_pictures import (
+    PictureError,
+    has_begun_before,
+    what_to_do,
+    why_control_differs,
+)
 from dsl_core.capture.put_back import ADVICE
 from dsl_core.errors import Cancelled, DeviceError
 from dsl_core.model.frames import Frame, FrameSink, FrameSource, NotedSource
@@ -41,9 +46,6 @@ CURED_OFTEN, CURED_WITHIN = 8, 16
 IN_PART = (Verdict.TORN, Verdict.EXPOSURE)
 #: Of doubtful pictures that come out the same again, every so many are followed by a control.
 CONTROL_EVERY = 8
-#: Pictures that are wrong like this, though nothing has changed that anybody could name, may have become so
-#: slowly: nobody knows since when.
-CREEPING = (Verdict.EXPOSURE, Verdict.OTHER, Verdict.DISPLACED)
 _log = logging.getLogger(__name__)
 
 
@@ -292,14 +294,15 @@ class ProvenShots:
             if not change.sentence:
                 of_picture = self._diagnosis.explain_picture(frame.pixels)
                 change = of_picture if of_picture.sentence else change
+            seen = "it differs from what it should show" if change.is_slight else found.seen
             advice = f"{what_to_do(found, change, proof)} {self._next_step.then}"
             if self._known_wrong and not change.sentence:
                 advice = " ".join(self._known_wrong)
             raise PictureError(
                 f"{found.names.capitalize()} does not show its pattern after {len(SETTLE_MS) + 1} exposures:"
-                f" {found.seen}. {advice} Frames before it are saved. {self._next_step.unchecked}".rstrip(),
+                f" {seen}. {advice} Frames before it are saved. {self._next_step.unchecked}".rstrip(),
                 found.again,
-                has_changed=change.has_moved or (not change.sentence and found.verdict in CREEPING),
+                has_changed=has_begun_before(found, change),
             )
 
     def _be_late(self, shot: Shot, proof: FrameProof) -> None:

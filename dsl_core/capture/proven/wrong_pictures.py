@@ -10,6 +10,9 @@ from dsl_core.model.plan import Shot
 
 #: Lines that are wrong like this while white, black and code look as at first have lost light of their own.
 DIM = (Verdict.DARK, Verdict.EXPOSURE)
+#: Pictures that are wrong like this, though nothing has changed that anybody could name, may have become so
+#: slowly: nobody knows since when.
+CREEPING = (Verdict.EXPOSURE, Verdict.OTHER, Verdict.DISPLACED)
 _DIMMED = (
     "White, black and a frame of the code, captured once more, look as they did: the projector may give dark"
     " pictures less light than bright ones. Switch its dynamic contrast, iris and eco mode off, and check"
@@ -55,7 +58,20 @@ def what_to_do(found: Finding, change: Explanation, proof: FrameProof) -> str:
             return _TONE
     if not change.sentence and proof.are_finest(found.again):
         return _FINE
+    if change.is_slight:
+        return f"{change.sentence} If that is not why: {found.remedy}"
     return change.sentence or found.remedy
+
+
+def has_begun_before(found: Finding, change: Explanation) -> bool:
+    """Whether pictures before one that stays wrong may be spoiled as well, and nobody knows since when.
+
+    What has changed in white, black and code since the scan began is in some of them. Who stands in the light
+    is seen at once.
+    """
+    if change.has_moved:
+        return True
+    return found.verdict is not Verdict.HIDDEN if change.sentence else found.verdict in CREEPING
 
 
 def why_control_differs(is_mirrored: bool) -> str:

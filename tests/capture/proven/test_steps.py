@@ -738,12 +738,21 @@ def test_all_since_the_last_control_is_withdrawn_where_something_moved() -> None
         take_all(bench, lines[12:24])
 
 
-@pytest.mark.parametrize(("cause", "first"), [("", 12), ("The lamp fails.", 14)])
-def test_all_since_the_last_control_is_withdrawn_where_nobody_knows_what_has_changed(
-    cause: str, first: int
+@pytest.mark.parametrize(
+    ("verdict", "cause", "first"),
+    [
+        (Verdict.EXPOSURE, "", 12),
+        (Verdict.EXPOSURE, "The lamp fails.", 12),
+        (Verdict.LATE, "The room is brighter.", 12),
+        (Verdict.HIDDEN, "The lamp fails.", 14),
+        (Verdict.LATE, "", 14),
+    ],
+)
+def test_all_since_the_last_control_is_withdrawn_where_nobody_knows_since_when_it_has_changed(
+    verdict: Verdict, cause: str, first: int
 ) -> None:
     lines = tuple(PLAN.model_copy(update={"spectral": LineComb(width_px=1, step_px=1, period_px=40)}).shots())
-    bench = Bench(*[is_right] * 10, lambda shot: Finding(shot, Verdict.EXPOSURE, (shot,)))
+    bench = Bench(*[is_right] * 10, lambda shot: Finding(shot, verdict, (shot,)))
     bench.cause = cause
     with pytest.raises(PictureError):
         take_all(bench, lines[12:24])
@@ -761,8 +770,8 @@ def test_a_line_that_nothing_tells_is_compared_with_another_picture_of_it(differ
     assert bench.shots.corrected == differs
 
 
-@pytest.mark.parametrize(("cause", "first"), [("It moved.", 0), ("The exposure.", 2)])
-def test_a_code_in_which_something_moved_is_captured_again_from_its_first_picture(
+@pytest.mark.parametrize(("cause", "first"), [("It moved.", 0), ("The exposure.", 0), ("", 2)])
+def test_a_code_in_which_something_changed_is_captured_again_from_its_first_picture(
     cause: str, first: int
 ) -> None:
     bench = Bench(*10 * [is_right], lambda shot: Finding(shot, Verdict.TORN, (shot,)))
