@@ -147,6 +147,7 @@ def reconstruct(
     """
     from dsl_core.reconstruction.code_agreement import rows_apart_px
     from dsl_core.reconstruction.geometry_steps import GeometrySteps
+    from dsl_core.reconstruction.light.early_ends import EarlyEnds
     from dsl_core.reconstruction.light.own_sensor import own_sensor
     from dsl_core.reconstruction.rows.assembly import Assembly
     from dsl_core.reconstruction.rows.bands import bands_of
@@ -159,11 +160,13 @@ def reconstruct(
     if options.spectra:
         check_solver(options.solver, rig, plan, options.correspondence)
     findings: list[FitFinding] = []
+    ends = None
     if not options.as_calibrated:
         sensor, found = own_sensor(source, rig.sensor)
         rig = rig.model_copy(update={"sensor": sensor})
         findings += found
-    frames = ScanFrames(source, rig, bands_of(plan, options.band_rows, rows_together(rig, options)))
+        ends = EarlyEnds(source, sensor)
+    frames = ScanFrames(ends or source, rig, bands_of(plan, options.band_rows, rows_together(rig, options)))
     steps = GeometrySteps(rig, options, frames, progress)
     with timer.stage("read, merge, decode the binary code"):
         steps.decode()
@@ -192,7 +195,7 @@ def reconstruct(
             result.put(band, spectra)
     with timer.stage("colour and result", in_parts=True):
         progress.report("colour and result", 0, 0)
-        return result.finish(solver, findings)
+        return result.finish(solver, findings + list(ends.findings if ends is not None else ()))
 
 
 def evaluate(result: xr.Dataset, truth: Truth) -> Evaluation:

@@ -85,7 +85,7 @@ class Explanation:
 
     ``is_as_at_first``: white, black and code were compared, and nothing has changed. ``is_of_all``: all of
     the picture has, alike, so that nothing stands before a part of it. ``is_slight``: a picture may be wrong
-    for another reason.
+    for another reason. ``seen`` is what a wrong picture then is, as a clause, rather than what it looks like.
     """
 
     sentence: str = ""
@@ -93,6 +93,7 @@ class Explanation:
     is_as_at_first: bool = False
     is_of_all: bool = False
     is_slight: bool = False
+    seen: str = ""
 
 
 class Diagnosis:
@@ -135,7 +136,8 @@ class Diagnosis:
 
     def explain_picture(self, pixels: Mosaic) -> Explanation:
         """What a wrong picture, raw mosaic (rows, columns), shows by itself where references do not."""
-        return Explanation(ends_early(pixels, self._sensor), is_of_all=True)
+        ends = ends_early(pixels, self._sensor)
+        return Explanation(ends, is_of_all=True, seen="its brightest pixels are cut off" if ends else "")
 
 
 def _of_pair(one: Mosaic, other: Mosaic) -> References:
@@ -157,11 +159,6 @@ class _Lights:
     lit: NDArray[np.bool_]
     factor: float
     darks: tuple[float, float]
-
-    @property
-    def white_dn(self) -> float:
-        """What lit pixels had at first, DN."""
-        return float(self.old[self.lit].mean())
 
     @property
     def is_other(self) -> bool:
@@ -250,9 +247,8 @@ def _of_light_or_motion(
     if light.is_other and not is_uneven and moved is None:
         by_place = _said_of_places(tiles, light.factor)
     found = [_said_of_colours(colours) if is_uneven else by_place or _said_of_light(light)]
-    found.append(
-        "" if light.is_exposed_otherwise and not is_uneven else said_of_room(light.darks, light.white_dn)
-    )
+    white_dn, tells_room = float(light.old[light.lit].mean()), is_uneven or not light.is_exposed_otherwise
+    found.append(said_of_room(light.darks, white_dn) if tells_room else "")
     is_soft = (moved is None or moved.is_pattern) and _has_softer_stripes(before, now, light.lit)
     if is_soft:
         found.append(
@@ -271,8 +267,9 @@ def _of_light_or_motion(
             has_moved=True,
         )
     if not sentence and moved is None:
-        slight = said_of_slight_change(before.black, now.black, light.white_dn)
-        return Explanation(slight, is_as_at_first=not slight, is_slight=bool(slight))
+        slight = said_of_slight_change(before.black, now.black, white_dn)
+        seen = "it differs from what it should show" if slight else ""
+        return Explanation(slight, is_as_at_first=not slight, is_slight=bool(slight), seen=seen)
     is_of_all = is_uneven or (moved is None and light.is_other and not by_place)
     return Explanation(sentence, moved is not None or is_soft, not sentence, is_of_all)
 

@@ -294,13 +294,13 @@ class ProvenShots:
             if not change.sentence:
                 of_picture = self._diagnosis.explain_picture(frame.pixels)
                 change = of_picture if of_picture.sentence else change
-            seen = "it differs from what it should show" if change.is_slight else found.seen
             advice = f"{what_to_do(found, change, proof)} {self._next_step.then}"
             if self._known_wrong and not change.sentence:
                 advice = " ".join(self._known_wrong)
             raise PictureError(
                 f"{found.names.capitalize()} does not show its pattern after {len(SETTLE_MS) + 1} exposures:"
-                f" {seen}. {advice} Frames before it are saved. {self._next_step.unchecked}".rstrip(),
+                f" {change.seen or found.seen}. {advice} Frames before it are saved."
+                f" {self._next_step.unchecked}".rstrip(),
                 found.again,
                 has_changed=has_begun_before(found, change),
             )
