@@ -5,7 +5,8 @@ white taken again. The drift is a smooth curve that starts at zero with the firs
 taken to have been as calibrated when the scan began. Flicker is what is left, frame by frame.
 
 Settings of a camera that is not linear differ as if the light had drifted between them. They are told apart
-by what witnesses say of the time within one setting.
+by what witnesses say of the time within one setting. Light that changes at once is no smooth curve: such a
+step is fitted at every shot, and shots at which it may have come are off by as much as that leaves open.
 """
 
 from __future__ import annotations
@@ -21,6 +22,8 @@ Floats = NDArray[np.float64]
 #: What the terms of the drift may be before a scan is seen: linear and quadratic over the scan.
 DRIFT_STD = (0.5, 0.3)
 NO_DRIFT = 1e-6
+#: The same of a change at once.
+STEP_STD = 0.5
 #: Witnesses needed to say anything; so many are enough of pictures taken again, which see the light itself.
 FEWEST, FEWEST_AGAIN = 4, 2
 #: What a single one may be wrong by, as nothing says how much the light flickers.
@@ -62,6 +65,7 @@ class LightCourse:
 
     ``white`` is the logarithm of the level of white as it was merged, ``slope`` that unknown of the
     witnesses, ``flicker`` the rms from shot to shot; both kinds of change are zero where they do not matter.
+    ``step_at`` is the likeliest first shot after a change at once, None where the light drifts smoothly.
     ``settings`` are logarithms of the signals of each but the last setting over what its exposure and level
     say, relative to the last one, in steady light; empty unless they explain what is seen as well as a drift
     does, or better: then there is no drift.
@@ -76,11 +80,12 @@ class LightCourse:
     flicker: float
     flicker_std: float
     settings: tuple[float, ...] = ()
+    step_at: int | None = None
 
     @property
     def drifts(self) -> bool:
-        """Whether the light drifts, more than by chance and more than nobody minds."""
-        return abs(self.drift) > max(LEAST_DRIFT, SIGMAS * self.drift_std)
+        """Whether the light drifts, more than by chance and more than nobody minds; a step was likelier."""
+        return self.step_at is not None or abs(self.drift) > max(LEAST_DRIFT, SIGMAS * self.drift_std)
 
     @property
     def flickers(self) -> bool:
@@ -106,7 +111,12 @@ def light_course(witnesses: Sequence[Witness], shots: int) -> LightCourse | None
     found, apart = _course(witnesses, shots, DRIFT_STD), _course(witnesses, shots, nothing, APART_STD)
     flicker = min(found.flicker, apart.flicker)
     drift_misfit = _misfit(witnesses, shots, flicker, DRIFT_STD, SETTING_STD)
-    if _misfit(witnesses, shots, flicker, nothing, APART_STD) < drift_misfit - LIKELIER:
+    apart_misfit = _misfit(witnesses, shots, flicker, nothing, APART_STD)
+    if not found.is_steady or found.settings or apart_misfit < drift_misfit - LIKELIER:
+        stepped = _stepped(witnesses, shots, flicker)
+        if stepped is not None and abs(stepped.drift) > LEAST_DRIFT:
+            return stepped
+    if apart_misfit < drift_misfit - LIKELIER:
         return apart
     if not found.drifts:
         level = _course(witnesses, shots, nothing)
@@ -139,17 +149,85 @@ def _alone(again: Witness, shots: int) -> LightCourse | None:
     return found if found.drifts else None
 
 
+def _stepped(witnesses: Sequence[Witness], shots: int, flicker: float) -> LightCourse | None:
+    """The course of light that changed once, at once; None unless that fits much better than smooth courses.
+
+    It is the mean over all shots at which the step may have come, by how likely each of them is. A smooth
+    course takes a part of a step for ``flicker``.
+    """
+    nothing = (NO_DRIFT, NO_DRIFT)
+    told = sorted({each for one in witnesses for each in (one.shot, one.against) if each is not None})
+    places = np.array([at for at in told if at > told[0]])
+    if places.size == 0:
+        return None
+
+    def misfits_of(flicker: float) -> Floats:
+        each = (_misfit(witnesses, shots, flicker, nothing, SETTING_STD, int(at)) for at in places)
+        return np.array(list(each))
+
+    first = int(places[misfits_of(flicker).argmin()])
+    flicker = min(flicker, _course(witnesses, shots, nothing, step_at=first).flicker)
+    smooth = min(
+        _misfit(witnesses, shots, flicker, DRIFT_STD, SETTING_STD),
+        _misfit(witnesses, shots, flicker, nothing, APART_STD),
+    )
+    misfits = misfits_of(flicker)
+    if float(misfits.min()) > smooth - LIKELIER:
+        return None
+    likely = np.flatnonzero(misfits < misfits.min() + LIKELIER)
+    weight = np.exp(-0.5 * (misfits[likely] - misfits.min()))
+    # A step between two shots that witnesses know of is as likely at each shot between them.
+    found = [_course(witnesses, shots, nothing, step_at=int(at)) for at in places[likely]]
+    weight /= weight.sum()
+    ramps = np.array([_reached(shots, told[told.index(int(at)) - 1], int(at)) for at in places[likely]])
+    heights = np.array([each.drift for each in found])
+    log = (weight[:, None] * heights[:, None] * ramps).sum(0)
+    square = heights[:, None] ** 2 * ramps + np.array([each.std**2 for each in found])
+    std = np.sqrt(np.maximum((weight[:, None] * square).sum(0) - log**2, 0.0))
+    best = found[int(weight.argmax())]
+    return _as_seen_again(replace(best, log=log, std=std), witnesses)
+
+
+def _as_seen_again(found: LightCourse, witnesses: Sequence[Witness]) -> LightCourse:
+    """A step as high as all witnesses and bright pictures taken again after it say on average, if any were.
+
+    Settings tell its date, and its height less surely: a change of black, which comes with one of the
+    camera's gain, is much of what faint ones show. The course may be off by half of what both are apart.
+    """
+    at = found.step_at or 0
+    again = [each for each in witnesses if each.setting is None and each.against is not None]
+    heights = [each.log for each in again if each.against is not None and each.against < at <= each.shot]
+    if not heights or found.drift == 0:
+        return found
+    height = (float(np.mean(heights)) + found.drift) / 2
+    reached = found.log / found.drift
+    apart = abs(height - found.drift)
+    return replace(
+        found,
+        log=height * reached,
+        std=np.hypot(found.std, apart * reached),
+        drift=height,
+        drift_std=float(np.hypot(found.drift_std, apart)),
+    )
+
+
+def _reached(shots: int, before: int, at: int) -> Floats:
+    """How likely a step after the shot ``before``, at the latest with ``at``, has come by each shot."""
+    return np.clip((np.arange(shots) - before) / (at - before), 0.0, 1.0)
+
+
 def _misfit(
     witnesses: Sequence[Witness],
     shots: int,
     flicker: float,
     drift_std: tuple[float, float],
     setting_std: float,
+    step_at: int | None = None,
 ) -> float:
     """How badly the likeliest course fits all witnesses and what is believed before (robust chi-square)."""
-    values, _, left = _fit(witnesses, shots, flicker, drift_std, setting_std)
+    values, _, left = _fit(witnesses, shots, flicker, drift_std, setting_std, step_at)
     away = np.abs(left) / np.sqrt(_noise(witnesses, flicker))
-    believed = values / _believed(len(values), drift_std, setting_std)
+    believed = values / _believed(len(values), drift_std, setting_std, step_at is not None)
     of_witnesses = np.where(away < HUBER, away**2, HUBER * (2 * away - HUBER)).sum()
     return float(of_witnesses + believed @ believed)
 
@@ -159,16 +237,20 @@ def _course(
     shots: int,
     drift_std: tuple[float, float],
     setting_std: float = SETTING_STD,
+    step_at: int | None = None,
 ) -> LightCourse:
-    """The likeliest course under what is believed before."""
+    """The likeliest course under what is believed before, with a step at a shot or without one."""
     flicker = 0.0
     for _ in range(6):
-        values, covariance, left = _fit(witnesses, shots, flicker, drift_std, setting_std)
+        values, covariance, left = _fit(witnesses, shots, flicker, drift_std, setting_std, step_at)
         flicker, flicker_std = _flicker(witnesses, left)
     time = np.linspace(0, 1, shots)
     terms = np.stack([time, time**2], 1)
-    log = terms @ values[:2]
-    std = np.sqrt(np.einsum("sp,pq,sq->s", terms, covariance[:2, :2], terms))
+    drift = [0, 1]
+    if step_at is not None:
+        terms, drift = np.column_stack([terms, np.arange(shots) >= step_at]), [0, 1, len(values) - 1]
+    log = terms @ values[drift]
+    std = np.sqrt(np.einsum("sp,pq,sq->s", terms, covariance[np.ix_(drift, drift)], terms))
     furthest = int(np.abs(log).argmax())
     return LightCourse(
         log=log,
@@ -179,7 +261,8 @@ def _course(
         drift_std=float(std[furthest]),
         flicker=flicker,
         flicker_std=flicker_std,
-        settings=tuple(values[4:].tolist()),
+        settings=tuple(values[4:].tolist()) if step_at is None else (),
+        step_at=step_at,
     )
 
 
@@ -189,11 +272,16 @@ def _fit(
     flicker: float,
     drift_std: tuple[float, float],
     setting_std: float,
+    step_at: int | None = None,
 ) -> tuple[Floats, Floats, Floats]:
-    """Terms of the drift, level of white, slope, settings; their covariance; what is left of each witness."""
+    """Terms of the drift, level of white, slope, settings; their covariance; what is left of each witness.
+
+    The last of the terms is the step at ``step_at``, if there is one.
+    """
     last = max(shots - 1, 1)
     settings = 1 + max((each.setting for each in witnesses if each.setting is not None), default=-1)
-    design = np.zeros((len(witnesses), 4 + settings))
+    count = 4 + settings + (step_at is not None)
+    design = np.zeros((len(witnesses), count))
     for row, each in zip(design, witnesses, strict=True):
         time, other = each.shot / last, None if each.against is None else each.against / last
         row[:2] = time - (other or 0.0), time**2 - (other or 0.0) ** 2
@@ -201,9 +289,13 @@ def _fit(
         row[3] = each.slope
         if each.setting is not None:
             row[4 + each.setting] = 1.0
+        if step_at is not None:
+            row[-1] = float(each.shot >= step_at) - float(
+                each.against is not None and each.against >= step_at
+            )
     log = np.array([each.log for each in witnesses])
     noise = _noise(witnesses, flicker)
-    prior = np.diag(_believed(4 + settings, drift_std, setting_std) ** -2)
+    prior = np.diag(_believed(count, drift_std, setting_std, step_at is not None) ** -2)
     weight = 1 / noise
     for _ in range(4):
         covariance = np.linalg.inv((design.T * weight) @ design + prior)
@@ -220,9 +312,10 @@ def _noise(witnesses: Sequence[Witness], flicker: float) -> Floats:
     return own + np.array([1.0 if each.against is None else 2.0 for each in witnesses]) * flicker**2
 
 
-def _believed(count: int, drift_std: tuple[float, float], setting_std: float) -> Floats:
+def _believed(count: int, drift_std: tuple[float, float], setting_std: float, with_step: bool) -> Floats:
     """Deviations of what is fitted before anything is seen."""
-    return np.array([*drift_std, 1.0, SLOPE_STD, *[setting_std] * (count - 4)])
+    settings = [setting_std] * (count - 4 - with_step)
+    return np.array([*drift_std, 1.0, SLOPE_STD, *settings, *[STEP_STD] * with_step])
 
 
 def _flicker(witnesses: Sequence[Witness], left: Floats) -> tuple[float, float]:

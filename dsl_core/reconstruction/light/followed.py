@@ -248,8 +248,18 @@ def light_findings(course: LightCourse, with_lines: bool) -> Iterator[FitFinding
         (change, std),
         "1",
         LEAST_DRIFT,
-        f"The light drifted by {change:+.1%} (±{std:.1%}) during the scan.{_CORRECTED}",
-        "Let the projector warm up for longer.",
+        (
+            f"The light drifted by {change:+.1%} (±{std:.1%}) during the scan.{_CORRECTED}"
+            if course.step_at is None
+            else f"The light has changed by {change:+.1%} (±{std:.1%}) at once, from about frame"
+            f" {spoken_number(course.step_at)} on.{_CORRECTED} Which of both was as calibrated, no scan can"
+            " tell: the first is taken to be."
+        ),
+        (
+            "Let the projector warm up for longer."
+            if course.step_at is None
+            else "Switch automatic exposure and gain of the camera off, and check the lamp and its supply."
+        ),
     )
     yield drift.model_copy(update={"significant": course.drifts})
     if course.settings:

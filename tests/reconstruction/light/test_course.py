@@ -200,3 +200,44 @@ def test_a_witness_far_off_counts_by_its_distance_and_not_by_its_square() -> Non
     steady = [Witness(0, 0, away * sigma, std) for away in (1.0, -2.0, 10.0)]  # nothing is fitted to them
     misfit = course_module._misfit(steady, SHOTS, 0.0, course_module.DRIFT_STD, course_module.SETTING_STD)
     assert misfit == pytest.approx(1 + 4 + 2.5 * (2 * 10 - 2.5))
+
+
+def stepped(height: float, at: int, seed: int = 1) -> list[Witness]:
+    """Steady witnesses but for light that changes at once at a shot."""
+    found = []
+    for each in witnesses(0.0, 0.0, seed):
+        before = 0.0 if each.against is None else height * (each.against >= at)
+        found.append(replace(each, log=each.log + height * (each.shot >= at) - before))
+    return found
+
+
+@pytest.mark.parametrize("at", [60, 130])
+@pytest.mark.parametrize("height", [-0.08, -0.03, 0.05])
+def test_light_that_changes_at_once_is_no_smooth_drift(at: int, height: float) -> None:
+    course = light_course(stepped(height, at), SHOTS)
+    assert course is not None
+    assert course.step_at is not None
+    assert abs(course.step_at - at) <= 1
+    assert course.drift == pytest.approx(height, abs=0.004)
+    truth = height * (np.arange(SHOTS) >= at)
+    away = np.abs(course.log - truth)
+    assert away[np.abs(np.arange(SHOTS) - at) > 1].max() < 0.004
+    assert (away <= 3 * course.std + 0.003).all()
+
+
+def test_a_drift_and_a_flicker_are_no_step() -> None:
+    for seed in range(2):
+        for heard in (witnesses(-0.1, 0.0, seed), witnesses(0.0, 0.03, seed), witnesses(0.05, 0.03, seed)):
+            course = light_course(heard, SHOTS)
+            assert course is not None
+            assert course.step_at is None
+
+
+def test_a_step_may_be_off_by_half_of_what_bright_and_faint_pictures_are_apart() -> None:
+    heard = [replace(each, log=-0.05) if each.shot == 199 else each for each in stepped(-0.08, 60)]
+    course = light_course(heard, SHOTS)
+    assert course is not None
+    assert course.drift == pytest.approx(-0.065, abs=0.004)
+    assert course.drift_std == pytest.approx(0.015, abs=0.004)
+    assert course.std[150] == pytest.approx(0.015, abs=0.004)
+    assert course.std[:50].max() < 0.003

@@ -215,6 +215,14 @@ def test_white_is_compared_with_white_less_the_black_next_to_each(monkeypatch: p
         assert now == shot.index - near[0].index
 
 
+def test_light_that_changed_at_once_is_told_with_the_frame_from_which_on() -> None:
+    told, _ = followed.light_findings(replace(course_of(-0.1), step_at=90), True)
+    assert told.significant
+    assert told.name == followed.DRIFT
+    assert told.sentence.startswith("The light has changed by -9.5% (±0.1%) at once, from about frame 91 on.")
+    assert "Which of both was as calibrated, no scan can tell" in told.sentence
+
+
 def test_findings_say_what_was_corrected() -> None:
     drift, flicker = followed.light_findings(course_of(-0.1, 0.0), True)
     assert (drift.part, drift.limit, drift.significant) == ("light", 0.006, True)
