@@ -78,8 +78,10 @@ def undistort(
             return u, v
     if not max(np.abs(ex).max(), np.abs(ey).max()) < 1e-9:
         raise CalibrationError(
-            f"The lens distortion {coefficients} cannot be inverted inside the image; the calibration is not"
-            " that of a real lens. Calibrate the geometry again."
+            f"The lens distortion ({', '.join(f'{each:.3g}' for each in coefficients)}) cannot be inverted"
+            " inside the image; the calibration is not that of a real lens. Calibrate the geometry again:"
+            " hold the board near all edges of the picture, and let camera, projector and their lenses be as"
+            " they are between poses."
         )
     return u, v
 

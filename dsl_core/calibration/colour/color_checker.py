@@ -288,8 +288,8 @@ def color_checker_figures(record: ColorCheckerCalibration) -> tuple[Figure, ...]
             unit="% of white",
             high=RESIDUAL_PERCENT,
             advice="Clean the chart, avoid reflections, and check that its reflectances are those of this"
-            " edition. If dark patches alone are too bright, light of bright ones veils the picture: clean"
-            " the camera's lens.",
+            " edition, that the film is off, and that nothing covers a patch. If dark patches alone"
+            " are too bright, light of bright ones veils the picture: clean the camera's lens.",
         ),
         Figure(
             name="residual of patches held out, regularised as published",

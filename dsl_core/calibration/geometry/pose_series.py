@@ -194,7 +194,10 @@ def _check_axes(poses: Sequence[PoseObservation]) -> None:
         )
     else:
         axis = "left to right" if slopes[mirrored][:, 0, 0].mean() < 0 else "top to bottom"
-        cause = f"the projector's picture is mirrored {axis}. Switch off its mirroring (rear or ceiling mode)"
+        cause = (
+            f"that of the projector, or else of the camera, is mirrored {axis}. Switch off the mirroring"
+            " of both (rear or ceiling mode of the projector)"
+        )
     raise CalibrationError(f"In {names} the images of camera and projector mirror each other: {cause}.")
 
 

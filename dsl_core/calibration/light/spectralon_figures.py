@@ -138,7 +138,7 @@ def _picture_figures(record: SpectralonCalibration) -> list[Figure]:
             value=100 * record.unevenness,
             unit="%",
             high=UNEVEN_PERCENT,
-            advice="Clean the Spectralon and avoid shadows and reflections.",
+            advice="Take the film off, clean the Spectralon and the lens, and avoid shadows and reflections.",
         ),
         Figure(
             name="white over red + green + blue in the pictures, largest difference",

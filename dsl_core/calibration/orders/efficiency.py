@@ -59,7 +59,8 @@ def fit_efficiency(order: int, samples: Sequence[RatioSample]) -> EfficiencyFit:
     if len({round(_centre(s)) for s in used}) < MIN_SAMPLES:
         raise CalibrationError(
             f"Order {order:+d} was found through {len(used)} filters; {MIN_SAMPLES} of different wavelengths"
-            " are needed. Place the target where the order's light reaches it, and use more filters."
+            " are needed. Check that the film is mounted, place the target where the order's light reaches"
+            " it, and use more filters."
         )
     hats = hat_functions(FINE_NM, NODES_NM)
     light = np.stack([s.light / s.light.sum() for s in used])

@@ -278,9 +278,10 @@ def _of_filters(record: BandpassCalibration) -> list[Figure]:
                 std=record.filters_off_std_nm,
                 low=-limit,
                 high=limit,
-                advice="All filters pass other wavelengths than stated, or the spectroradiometer's are off."
-                " Check that the transmissions are those of these filters, seen straight on, and that the"
-                " filters are flat in front of the lens; check the spectroradiometer by a lamp with known"
+                advice="The filters pass other wavelengths than stated, one of them less light, or the"
+                " spectroradiometer's wavelengths are off. Check that each filter is clean, alone in the beam"
+                " and flat in front of the lens, and that the transmissions are those of these filters, seen"
+                " straight on; check the spectroradiometer by a lamp with known"
                 " lines.",
             )
         )

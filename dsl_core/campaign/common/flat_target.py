@@ -102,11 +102,12 @@ def read_uniform(source: FrameSource, rig: Rig, progress: Progress) -> TargetPic
 
     from dsl_core.optics.correspondence import triangulate
     from dsl_core.reconstruction.geometry import LIT_SIGMAS
+    from dsl_core.reconstruction.light.early_ends import EarlyEnds
     from dsl_core.reconstruction.merge import MergedScan, check_source, decode_columns
     from dsl_core.solve.threads import one_kernel_thread
 
     check_source(source, rig)
-    merged = MergedScan(source, rig)
+    merged = MergedScan(EarlyEnds(source, rig.sensor), rig)
     code, white = decode_columns(merged, progress)
     shape = white.radiance.shape
     with one_kernel_thread():
@@ -148,10 +149,11 @@ def scanned_geometry(
     from dsl_core.optics.lines.line_set import LineSet
     from dsl_core.reconstruction.columns.line_spread import own_spread, with_own_spread
     from dsl_core.reconstruction.geometry import reconstruct_geometry, require_light, require_pixels
+    from dsl_core.reconstruction.light.early_ends import EarlyEnds
     from dsl_core.reconstruction.merge import MergedScan, check_source, decode_columns, stack_lines
 
     plan = check_source(source, rig)
-    merged = MergedScan(source, rig)
+    merged = MergedScan(EarlyEnds(source, rig.sensor), rig)
     code, white = decode_columns(merged, progress)
     require_light(white.radiance, white.saturated)
     stack = stack_lines(merged, progress)
@@ -206,10 +208,11 @@ def line_frames(
     source: FrameSource, rig: Rig, pixels: NDArray[np.int64]
 ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
     """The line frames of a scan at some pixels: radiance and its deviation, each (frames, pixels)."""
+    from dsl_core.reconstruction.light.early_ends import EarlyEnds
     from dsl_core.reconstruction.merge import MergedScan, check_source
 
     plan = check_source(source, rig)
-    merged = MergedScan(source, rig)
+    merged = MergedScan(EarlyEnds(source, rig.sensor), rig)
     radiance = np.empty((plan.spectral_count, len(pixels)), np.float32)
     std = np.empty_like(radiance)
     for frame in range(plan.spectral_count):

@@ -61,8 +61,9 @@ def require_same_white(bench: Bench, step: Step) -> None:
         raise CalibrationError(
             f"{step.title}: white of the scan has {share:.2f} times the light for its exposure that it had in"
             " the test shot before. The camera exposed for another time than requested, or light or gain"
-            " changed: switch its automatic exposure and gain and the projector's eco mode off, let the"
-            " projector warm up, and capture the step again."
+            " changed, or light of the room came on, or the camera's values are not proportional to the"
+            " light: switch its automatic exposure, gain and gamma and the projector's eco mode off,"
+            " keep the room dark, let the projector warm up, and capture the step again."
         )
 
 

@@ -72,7 +72,8 @@ _REMEDY = {
     " room has changed its colour.",
     Verdict.ROWS_TWICE: "Packets of the camera's link are lost or sent again: check its cable, its network"
     " and the size of packets.",
-    Verdict.OTHER: "Check that camera, target and light have not moved since the scan began.",
+    Verdict.OTHER: "Check that camera, target and light have not moved since the scan began, and that the"
+    " lamp has warmed up and keeps its light.",
 }
 
 
