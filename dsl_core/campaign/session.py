@@ -35,7 +35,7 @@ from dsl_core.campaign.recipes import campaign_recipes
 from dsl_core.devices.base import DeviceRig
 from dsl_core.devices.conditions import current_conditions
 from dsl_core.errors import CalibrationError, StoreError
-from dsl_core.io.campaign_folder import CampaignFolder, now
+from dsl_core.io.campaign_folder import CampaignFolder, later_than, now
 from dsl_core.io.records import replace_record
 from dsl_core.model.base import Record
 from dsl_core.model.calibration.accepted import AcceptedCalibration
@@ -154,6 +154,7 @@ class CalibrationSession:
         note = read_note(folder) or CaptureNote(conditions=current_conditions(self.devices), started=now())
         note = note.model_copy(update={"steps": len(self.steps)})
         replace_record(folder / NOTE_NAME, note)
+        before = max(self._captured(), self._captured_before())
         self.campaign.discard(self.recipe.name)
         self._place_again(step)
         try:
@@ -165,7 +166,8 @@ class CalibrationSession:
             raise CalibrationError(
                 f"The step {step.title!r} is not complete yet. Capture it again to continue."
             )
-        replace_record(folder / NOTE_NAME, note.model_copy(update={"finished": now(), "refused": ""}))
+        finished = later_than(before)
+        replace_record(folder / NOTE_NAME, note.model_copy(update={"finished": finished, "refused": ""}))
 
     def fit(self, progress: Progress | None = None) -> AcceptedCalibration:
         """Calibrate from the captures of all steps; the outcome waits on disk to be accepted.
@@ -226,6 +228,14 @@ class CalibrationSession:
         except StoreError:
             return ""
         return max((note.finished for note in notes if note is not None), default="")
+
+    def _captured_before(self) -> str:
+        """The same of what the accepted calibration was fitted to: a step that is redone is moved aside."""
+        try:
+            known = self.campaign.accepted(self.recipe.name)
+        except StoreError:
+            return ""
+        return "" if known is None else known.captured
 
     def _require_captures(self) -> None:
         lacking = [each for each in self.statuses() if each.state != "captured"]

@@ -16,7 +16,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from datetime import UTC, datetime
+from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from typing import Literal, Self
 
@@ -195,6 +195,20 @@ def _as_name(time: str) -> str:
 def now() -> str:
     """The time as it is written into files: UTC, to the microsecond, so that two never agree."""
     return datetime.now(UTC).isoformat(timespec="microseconds")
+
+
+def later_than(before: str) -> str:
+    """The time, or that of ``before`` and a little, if a clock was set back since: new is never older.
+
+    ``before`` is what `now` wrote, or any other text, which then counts for nothing.
+    """
+    time = now()
+    if time > before:
+        return time
+    try:
+        return (datetime.fromisoformat(before) + timedelta(microseconds=1)).isoformat(timespec="microseconds")
+    except (ValueError, OverflowError):
+        return time
 
 
 def _refuse_other_rig(path: Path, info: CampaignInfo, rig: str | None, options: Mapping[str, str]) -> None:

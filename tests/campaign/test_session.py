@@ -6,10 +6,12 @@ import json
 import shutil
 from collections.abc import Iterator, Sequence
 from contextlib import nullcontext
+from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
 import pytest
 
+from dsl_core.campaign import session as session_module
 from dsl_core.campaign.assembly import accepted_calibrations, assemble, nominal_rig
 from dsl_core.campaign.common.recipe import AnyRecipe, Step
 from dsl_core.campaign.guide import calibrate_all, run_calibration
@@ -17,7 +19,8 @@ from dsl_core.campaign.session import CalibrationSession
 from dsl_core.devices.base import CameraInfo, DeviceRig
 from dsl_core.devices.registry import open_rig
 from dsl_core.errors import CalibrationError, Cancelled, StoreError
-from dsl_core.io.campaign_folder import CampaignFolder
+from dsl_core.io import campaign_folder
+from dsl_core.io.campaign_folder import CampaignFolder, later_than
 from dsl_core.io.rig_file import load_rig, save_rig
 from dsl_core.io.sealed import unseal
 from dsl_core.model.calibration.accepted import AcceptedCalibration
@@ -116,11 +119,16 @@ def test_the_accepted_one_before_is_history(devices: DeviceRig, campaign: Campai
         run_calibration(one, guide, NoProgress(), redo=["night"])
 
 
+@pytest.mark.parametrize("clock", ["runs", "is set back"])
 def test_new_captures_whose_fit_nobody_accepted_are_not_passed_over(
-    devices: DeviceRig, campaign: CampaignFolder
+    devices: DeviceRig, campaign: CampaignFolder, clock: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     one = session(devices, campaign, FakeRecipe())
     old = run_calibration(one, Willing(), NoProgress())
+    if clock == "is set back":
+        an_hour_ago = (datetime.now(UTC) - timedelta(hours=1)).isoformat(timespec="microseconds")
+        for module in (campaign_folder, session_module):
+            monkeypatch.setattr(module, "now", lambda: an_hour_ago)
     with pytest.raises(CalibrationError, match="accept with --accept-failed"):
         run_calibration(one, Willing(accepts=False), NoProgress(), redo=["dim"])
     again = session(devices, CampaignFolder.open(campaign.path), FakeRecipe())
@@ -411,3 +419,11 @@ def test_a_target_is_placed_again_before_it_is_captured(devices: DeviceRig, camp
     hand.put_back()  # as a scan does that comes between
     one.capture(one.steps[0])
     assert hand.done == ["place", "put back", "place"]
+
+
+def test_a_time_is_later_than_one_before_whatever_the_clock_says() -> None:
+    before = "2999-03-01T10:20:30.999999+00:00"
+    assert later_than(before) == "2999-03-01T10:20:31.000000+00:00"
+    assert later_than("") > "2026"
+    assert later_than("no time") > "2026"
+    assert later_than("2026-03-01T10:20:30.000400+00:00") > "2026-03-01T10:20:30.000400+00:00"

@@ -49,6 +49,11 @@ PLANE = "plane"
 CURVE_NAME = "filter.json"
 #: Filters may all be off by this much (nm), or by this many deviations, the larger.
 MAX_OFF_NM, OFF_SIGMAS = 1.0, 3.0
+#: A clear film passes at least this share of the light in all its orders; one that seems to pass less stands
+#: before a target that reflects less than stated.
+LEAST_PASSED = 0.7
+#: Where the share of the orders is judged, nm.
+MIDDLE_NM = 550.0
 #: A bulge over 300 mm at which the efficiency is off by .3 %, which is as well as it is known.
 MAX_BULGE_MM = 3.0
 FILTERS_NM = tuple(float(nm) for nm in range(430, 661, 10))
@@ -86,9 +91,9 @@ class BandpassRecipe(Recipe[BandpassCalibration]):
         first = Step(
             PLANE,
             "White target without filter",
-            "Mount the film in front of the projector. Place the Spectralon or another even white target"
-            f" about {depth_mm / 10:g} cm from the camera, facing it; it must not move until the last"
-            " filter is done. No filter in front of the camera.",
+            "Mount the film in front of the projector. Place the Spectralon, or a white target whose"
+            f" reflectance is set, about {depth_mm / 10:g} cm from the camera, facing it; it must not move"
+            " until the last filter is done. No filter in front of the camera.",
             Placement(target="spectralon", film=True, options=where),
         )
         filtered = [
@@ -128,7 +133,8 @@ class BandpassRecipe(Recipe[BandpassCalibration]):
             seen.append(self._filter(bench, rig, step, scan))
         progress.report("filters", len(filtered), len(filtered))
         record = fit_bandpass(rig, scan, profile, seen, self.reflectance)
-        return record.model_copy(update={"bulge_mm": scan.bulge_mm})
+        passed = record.white_scale / rig.white_scale * (1 + _in_orders(record))
+        return record.model_copy(update={"bulge_mm": scan.bulge_mm, "passed": passed})
 
     def figures(self, record: BandpassCalibration, done: Collection[str] = ()) -> tuple[Figure, ...]:
         """Deviations of efficiency and response, blur and halo, and filters in doubt."""
@@ -259,6 +265,7 @@ def bandpass_figures(record: BandpassCalibration, done: Collection[str] = ()) ->
             advice="Focus the projector on the target.",
         ),
         *_of_filters(record),
+        *_passed(record),
         *bulge_figure("bulge of the target over 300 mm", record.bulge_mm, MAX_BULGE_MM),
         doubts("filters in doubt", record.warnings),
     ]
@@ -289,6 +296,28 @@ def _of_filters(record: BandpassCalibration) -> list[Figure]:
         value, std = record.filter_index
         figures.append(_plain("refractive index of the filters, by angle of view", "", value, std))
     return figures
+
+
+def _in_orders(record: BandpassCalibration) -> float:
+    """Light of all other orders relative to the zero order, in the middle of the spectrum."""
+    return float(sum(curve.at(MIDDLE_NM) for curve in record.efficiency.values()))
+
+
+def _passed(record: BandpassCalibration) -> list[Figure]:
+    """How much of white the film passes, as far as the target reflects what is stated."""
+    if record.passed is None:
+        return []
+    return [
+        Figure(
+            name="white through the film in all orders, of that of the Spectralon without it",
+            value=100 * record.passed,
+            unit="%",
+            low=100 * LEAST_PASSED,
+            advice="The target is darker than the Spectralon, or the film takes light. Put the Spectralon"
+            " there, or state the reflectance of the target (reflectance), as that of everything is relative"
+            " to it; check that nothing shades camera or projector. If the film is a dark one, accept it.",
+        )
+    ]
 
 
 def _response_advice(record: BandpassCalibration, done: Collection[str]) -> str:

@@ -47,7 +47,8 @@ class BandpassCalibration(Record):
     wavelengths than stated all filters pass, judged by the LEDs' spectra, with its deviation, None where it
     was not judged; ``filter_index`` is the effective index of the filters' layers by their shift with the
     angle of view, with its deviation, None where none is seen. ``bulge_mm`` is by how much the target bulges
-    towards the camera over 300 mm, with its deviation (None in older records).
+    towards the camera over 300 mm, with its deviation (None in older records). ``passed`` is the light of
+    white in all orders through the film, over that of the Spectralon without it (None in older records).
     """
 
     filters: tuple[FilterSample, ...]
@@ -70,6 +71,7 @@ class BandpassCalibration(Record):
     filters_off_std_nm: float = Field(default=0.0, ge=0)
     filter_index: tuple[float, float] | None = None
     bulge_mm: tuple[float, float] | None = None
+    passed: float | None = Field(default=None, gt=0)
     warnings: tuple[str, ...] = ()
 
 

@@ -140,6 +140,18 @@ def test_figures_pass_and_record_goes_through_json(record: BandpassCalibration) 
     assert BandpassCalibration.model_validate_json(record.model_dump_json()) == record
 
 
+def test_a_target_darker_than_stated_is_refused_as_no_clear_film_takes_so_much(
+    bench: Bench, record: BandpassCalibration
+) -> None:
+    assert record.passed is not None
+    in_orders = sum(float(curve.at(550.0)) for curve in record.efficiency.values())
+    assert record.passed == pytest.approx(record.white_scale / bench.rig.white_scale * (1 + in_orders))
+    (told,) = failures(RECIPE.figures(record.model_copy(update={"passed": 0.69})))
+    assert told.advice.startswith("The target is darker than the Spectralon")
+    for sound in (0.71, 1.3, None):
+        assert failures(RECIPE.figures(record.model_copy(update={"passed": sound}))) == ()
+
+
 @pytest.mark.parametrize(
     ("measured", "done", "advised", "not_advised"),
     [
