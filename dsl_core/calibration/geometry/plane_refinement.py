@@ -27,6 +27,7 @@ from dsl_core.calibration.geometry.stage_planes import (
     rays_through,
     require_agreement,
     require_enough,
+    require_one_angle,
     require_plane,
     require_steps,
     require_tiles,
@@ -110,12 +111,13 @@ def refine_planes(
     `CalibrationError` that names the position that shows no plane, or whose step is not what was asked.
     """
     require_tiles(positions_mm, samples)
-    start, rise = _start(rig, positions_mm, samples, stage_std_mm)
+    slopes, start, rise = _start(rig, positions_mm, samples, stage_std_mm)
     problem = StageProblem(rig, positions_mm, samples, covariance, stage_std_mm)
     free = np.arange(SHARED if covariance is None else 0, len(start))
     numbers, posterior = _gauss_newton(problem, start, free)
     limits = np.array([column_limit_px(part) for part in samples])
     found = _summary(rig, problem, numbers, posterior, limits)
+    require_one_angle(positions_mm, slopes, found.residual_rms_px)
     require_plane(positions_mm, found.residual_rms_px)
     require_agreement(found.pull, found.bow_mm, found.bow_std_mm, rise)
     return found
@@ -163,15 +165,15 @@ def _bow(problem: StageProblem, numbers: Floats, posterior: Floats) -> tuple[flo
 
 def _start(
     rig: Rig, positions_mm: Sequence[float], samples: Sequence[ColumnSamples], stage_std_mm: float
-) -> tuple[Floats, float]:
-    """Plane of each position for itself under the geometry given, and how long steps are by it."""
+) -> tuple[Floats, Floats, float]:
+    """Slopes (positions, 2) of each plane for itself, the start of a joint fit, and how long steps are."""
     slopes, distances, _ = _alone(rig, positions_mm, samples, stage_std_mm)
     rise = require_steps(positions_mm, distances)
     start = np.zeros(STEPS + len(samples))
     start[SLOPES] = slopes.mean(0)
     steps = np.asarray(positions_mm) - positions_mm[0]
     start[DISTANCE] = np.median(distances - steps)
-    return start, rise
+    return slopes, start, rise
 
 
 def lone_plane(rig: Rig, position_mm: float, samples: ColumnSamples) -> tuple[float, float]:

@@ -29,6 +29,8 @@ Floats = NDArray[np.float64]
 SLOPES, DISTANCE, GAIN, STEPS = slice(SHARED, SHARED + 2), SHARED + 2, SHARED + 3, SHARED + 4
 #: Place of the column of the projector's principal point.
 ZERO = PROJECTOR.start + 2
+#: Planes of the stage that fit no parallel ones are at another angle from so many degrees on.
+TURNED_DEG = 1.0
 #: A stage askew to the camera axis by 0.8 degrees moves a plane by this share too little.
 GAIN_STD = 1e-4
 #: Half of the width over which a bulge is stated.
@@ -224,6 +226,25 @@ def column_limit_px(samples: ColumnSamples) -> float:
     sampling_px = SAMPLING_SHARE * float(np.hypot(*slope))
     noise_px = NOISE_SIGMAS * float(np.sqrt(np.mean(samples.std_px**2)))
     return float(np.sqrt(MODEL_PX**2 + sampling_px**2 + noise_px**2))
+
+
+def require_one_angle(positions_mm: Sequence[float], slopes: Floats, rms_px: Floats) -> None:
+    """Raise `CalibrationError` naming the position whose target stands at another angle than the others.
+
+    ``slopes`` (positions, 2) are those of each plane for itself, and ``rms_px`` (positions,) how far columns
+    are off planes that are parallel: only where these do not fit is anything said.
+    """
+    if rms_px.max() <= NO_PLANE_PX:
+        return
+    turned_deg = np.degrees(np.hypot(*(np.arctan(slopes) - np.median(np.arctan(slopes), axis=0)).T))
+    worst = int(turned_deg.argmax())
+    if turned_deg[worst] > TURNED_DEG:
+        raise CalibrationError(
+            f"The target at the stage's position {positions_mm[worst]:g} mm stands at an angle of"
+            f" {turned_deg[worst]:.1f} degrees to those at others; a stage carries it without turning it."
+            " Fasten the target, see that nobody moved it, camera or projector meanwhile, and capture this"
+            " position again, or all of them if they are two."
+        )
 
 
 def require_plane(positions_mm: Sequence[float], rms_px: Floats) -> None:

@@ -193,6 +193,13 @@ def test_a_bowed_plane_misses_its_limit_and_no_plane_at_all_is_refused() -> None
         refine_planes(truth, POSITIONS_MM, samples, None, STAGE_STD_MM)
 
 
+def test_a_target_that_turned_between_positions_is_named() -> None:
+    truth, samples = small_rig(), _samples(small_rig())
+    samples[1] = seen(truth, 750.0, np.random.default_rng(0), tilt=0.02 + np.tan(np.radians(8.0)))
+    with pytest.raises(CalibrationError, match=r"position 750 mm stands at an angle of [678]\.\d degrees"):
+        refine_planes(truth, POSITIONS_MM, samples, None, STAGE_STD_MM)
+
+
 @pytest.mark.slow
 def test_a_target_that_bulges_everywhere_contradicts_the_board() -> None:
     truth, rng = random_rig(6, small_rig()), np.random.default_rng(0)

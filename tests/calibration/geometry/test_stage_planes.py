@@ -19,6 +19,7 @@ from dsl_core.calibration.geometry.stage_planes import (
     covariance_root,
     plane_of,
     require_agreement,
+    require_one_angle,
     require_plane,
     require_steps,
     require_tiles,
@@ -124,6 +125,11 @@ def test_steps_flatness_and_agreement_have_limits() -> None:
     require_plane(at, np.array([0.1, 0.49, 0.1]))
     with pytest.raises(CalibrationError, match=r"position 100 mm are 0\.51 px RMS off those of a plane"):
         require_plane(at, np.array([0.1, 0.51, 0.1]))
+    slopes = np.array([[0.0, 0.02], [0.0, 0.02], [0.0, 0.02 + np.tan(np.radians(1.1))]])
+    require_one_angle(at, slopes, np.array([0.1, 0.1, 0.49]))
+    require_one_angle(at, slopes * 0.8, np.array([0.1, 0.1, 0.51]))
+    with pytest.raises(CalibrationError, match=r"position 200 mm stands at an angle of 1\.1 degrees"):
+        require_one_angle(at, slopes, np.array([0.1, 0.1, 0.51]))
     require_agreement(3.9, 1.0, 0.1, 1.0)
     with pytest.raises(CalibrationError, match=r"move by 4\.1 of"):
         require_agreement(4.1, 1.0, 0.1, 1.0)
