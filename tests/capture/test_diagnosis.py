@@ -153,7 +153,7 @@ def test_a_scan_that_stops_says_why(scene: RenderedScene, change: Change, said: 
         Runner(rig, scene.plan, MemorySink(scene.plan), token_image, proof=proof).run()
 
 
-def even(white: np.ndarray | float, room_dn: float) -> References:
+def even(white: np.ndarray | float, room_dn: np.ndarray | float) -> References:
     """Pictures without noise or detail of a scene, ``white`` DN above the light of the room."""
     black = np.full((48, 72), SENSOR.black_level_dn + room_dn)
     # Fractions of counts as their share of the pixels.
