@@ -278,13 +278,21 @@ def light_findings(course: LightCourse, with_lines: bool) -> Iterator[FitFinding
 
 
 def unsure_level(plan: CapturePlan, response: ProjectorResponse, findings: Iterable[FitFinding]) -> float:
-    """Relative deviation of the level of all light, where settings disagree about it.
+    """Relative deviation of the level of all light, where settings disagree about it or it has changed.
 
     Which of them is right no scan can tell, nor whose fault it is. A projector whose gamma is off by as much
     as makes settings of two drive levels disagree has, at the last of them, another share of its full light
     as well. A camera whose values follow a power of the light makes less of first orders, which are faint,
-    than of white. The larger of both counts.
+    than of white. The larger of both counts. What a change of the light is off by is common to all frames
+    after it, and no average over frames makes it less.
     """
+    findings = tuple(findings)
+    change = next((f for f in findings if f.significant and f.name == DRIFT), None)
+    return float(np.hypot(_unsure_settings(plan, response, findings), (change.std or 0.0) if change else 0.0))
+
+
+def _unsure_settings(plan: CapturePlan, response: ProjectorResponse, findings: Sequence[FitFinding]) -> float:
+    """The part of it of settings that disagree."""
     apart = next((f for f in findings if f.significant and f.name == APART), None)
     if apart is None:
         return 0.0

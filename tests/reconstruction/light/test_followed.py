@@ -308,3 +308,11 @@ def test_too_few_witnesses_find_nothing(monkeypatch: pytest.MonkeyPatch) -> None
     made = Followed(monkeypatch, None, None, None)
     assert made.run()[1:] == (made.white, ())
     assert not made.light
+
+
+def test_what_a_change_of_the_light_is_off_by_is_common_to_all_frames() -> None:
+    course = replace(course_of(-0.1), drift_std=0.02, step_at=90)
+    unsure = followed.unsure_level(PLAN, ProjectorResponse(), followed.light_findings(course, True))
+    assert unsure == pytest.approx(0.02 * np.exp(-0.1))
+    steady = followed.light_findings(course_of(0.001), True)
+    assert followed.unsure_level(PLAN, ProjectorResponse(), steady) == 0.0
