@@ -262,6 +262,14 @@ def _motion(motion: FilmMotion, probe: Probe, calibrated_px: float, turn: Turn |
     )
 
 
+def _unsure_depth(turn: Turn | None) -> str:
+    """What depth is unsure of by a motion that may be chance."""
+    share = 0.0 if turn is None else turn.believed * turn.depth_share
+    if share < LEAST_DEPTH_SHARE:
+        return ""
+    return f" Camera or projector may have turned instead: deviations of depth contain {share:.1%} for that."
+
+
 def _film(causes: Causes, probe: Probe) -> FitFinding:
     plus, minus = causes.mean_px
     alike = min(abs(plus), abs(minus)) > ALIKE * max(abs(plus), abs(minus))

@@ -249,6 +249,8 @@ def test_where_nothing_says_whether_the_film_has_moved_or_the_camera_turned_both
     unsure = replace(motion, sure=False)
     slight = Fit.of(cause_findings(seen, motion=unsure, turn=replace(turn, instead=False)))
     assert slight.parts == ()
+    or_turned = any("turned instead" in found.sentence for found in slight.findings)
+    assert or_turned == (believed * depth_share > 0.001)
 
 
 def test_a_film_calibrated_no_better_than_it_moved_may_have_another_shape(
