@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import lru_cache
+from typing import cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,6 +33,18 @@ def bayer_colours(
     """Colour (0 R, 1 G, 2 B) of pixels at rows and columns of a mosaic, in the shape of both together."""
     tile = np.array(colour_sites(bayer), np.intp).reshape(2, 2)
     return np.asarray(tile[rows % 2, columns % 2])
+
+
+def mosaic_from(bayer: BayerPattern, row: int, column: int) -> BayerPattern:
+    """The pattern of the part of a mosaic that begins at a row and a column.
+
+    >>> mosaic_from("RGGB", 3, 2)
+    'GBRG'
+    """
+    if bayer == "MONO":
+        return bayer
+    tile = np.roll(np.array(list(bayer)).reshape(2, 2), (-row, -column), (0, 1))
+    return cast(BayerPattern, "".join(tile.ravel().tolist()))
 
 
 def raw_variance(sensor: Sensor, signal_dn: NDArray[np.floating]) -> NDArray[np.floating]:

@@ -15,6 +15,7 @@ from dsl_core.optics.demosaic import demosaic, demosaic_variance
 from dsl_core.optics.lines.line_set import LineSet
 from dsl_core.optics.lines.profile import halo_of_line
 from dsl_core.optics.pixel_model import MODEL_ERROR
+from dsl_core.optics.sensor import mosaic_from
 
 
 @dataclass(frozen=True)
@@ -66,6 +67,7 @@ class TileFrames:
         near = np.s_[max(rows.start - 2, 0) : rows.stop + 2, max(columns.start - 2, 0) : columns.stop + 2]
         there = slice(near[0].start - first_row, near[0].stop - first_row), near[1]
         self._corner = near[0].start, near[1].start
+        self._mosaic = mosaic_from(self.bayer, *self._corner)
         self._radiance, self._std = radiance[:, *there], std[:, *there]
         self._near = Pixels(**{name: values[near] for name, values in vars(pixels).items()})
         at = (y - near[0].start) * self._near.valid.shape[1] + x - near[1].start
@@ -120,7 +122,7 @@ class TileFrames:
 
     def zero_order_colour(self) -> tuple[Tensor, Tensor]:
         """Zero-order amplitude in three colours and its variance, each (3, pixels)."""
-        colour = demosaic(self._tensor(self._near.amplitude), self.bayer).reshape(3, -1)[:, self.at]
+        colour = demosaic(self._tensor(self._near.amplitude), self._mosaic).reshape(3, -1)[:, self.at]
         return colour, self._variance(self._near.amplitude_std)
 
     def place(self) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
@@ -130,7 +132,7 @@ class TileFrames:
 
     def _variance(self, std: NDArray[np.float32]) -> Tensor:
         """Variance in three colours of independent deviations (rows, columns), (3, pixels)."""
-        return demosaic_variance(self._tensor(std) ** 2, self.bayer).reshape(3, -1)[:, self.at]
+        return demosaic_variance(self._tensor(std) ** 2, self._mosaic).reshape(3, -1)[:, self.at]
 
 
 def weighted(values: Tensor, variance: Tensor) -> tuple[Tensor, Tensor]:

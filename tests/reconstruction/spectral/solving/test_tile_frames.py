@@ -19,7 +19,9 @@ RGB = np.array([30.0, 50.0, 20.0])
 LEVEL = RGB[bayer_channels(RIG.sensor.bayer, *SHAPE)].astype(np.float32)
 
 
-def tile(amplitude: NDArray[np.float32], std: float, offset: float = 0.0) -> TileFrames:
+def tile(
+    amplitude: NDArray[np.float32], std: float, offset: float = 0.0, first: tuple[int, int] = (4, 6)
+) -> TileFrames:
     """Four rows and six columns of a picture of one colour, of which one pixel is not valid."""
 
     def full(value: float) -> NDArray[np.float32]:
@@ -34,7 +36,9 @@ def tile(amplitude: NDArray[np.float32], std: float, offset: float = 0.0) -> Til
     deviation = np.full(radiance.shape, std, np.float32)
     deviation[1, 4, 8] = np.inf
     like = torch.empty(0, dtype=torch.float64)
-    return TileFrames(RIG, radiance, deviation, known, slice(4, 8), slice(6, 12), like)
+    return TileFrames(
+        RIG, radiance, deviation, known, *(slice(a, a + n) for a, n in zip(first, (4, 6), strict=True)), like
+    )
 
 
 def test_the_tile_has_its_valid_pixels_where_they_are_in_the_picture() -> None:
@@ -47,6 +51,12 @@ def test_the_tile_has_its_valid_pixels_where_they_are_in_the_picture() -> None:
 def test_of_frames_that_begin_at_a_later_row_the_rows_near_the_tile_are_used() -> None:
     whole = tile(LEVEL, 1.0)
     assert whole._radiance.shape == (FRAMES, 8, 10)
+
+
+@pytest.mark.parametrize("first", [(4, 6), (3, 6), (4, 5), (5, 7), (0, 1)])
+def test_colours_are_the_same_wherever_a_tile_begins(first: tuple[int, int]) -> None:
+    colour, _ = tile(LEVEL, 1.0, first=first).zero_order_colour()
+    assert (colour - torch.as_tensor(RGB)[:, None]).abs().max() < 1e-5
 
 
 @pytest.mark.parametrize("std", [0.5, 3.0])
