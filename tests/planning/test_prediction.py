@@ -77,9 +77,16 @@ def test_a_plan_without_patterns_or_code_is_refused() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("spectral", [ScanLines(step_px=4), LineComb(width_px=5, step_px=4, period_px=104)])
+@pytest.mark.parametrize(
+    "spectral",
+    [
+        ScanLines(step_px=4),
+        LineComb(width_px=6, step_px=4, period_px=64),
+        LineComb(width_px=5, step_px=2, period_px=80),
+    ],
+)
 def test_the_twin_agrees(spectral: ScanLines | LineComb) -> None:
-    """The comb leaves columns unrefined, which puts the zero order where the model does not expect it."""
+    """Combs leave columns unrefined, which puts the zero order where the model does not expect it."""
     rig, chart = published_rig(), references.chart()
     found = predict(rig, plan(spectral), trial_samples(rig, chart), peaks=False)
     measured = run_trial(rig, plan(spectral), chart)

@@ -98,11 +98,14 @@ class LightCourse:
         return not (self.drifts or self.flickers or self.settings)
 
 
-def light_course(witnesses: Sequence[Witness], shots: int) -> LightCourse | None:
+def light_course(
+    witnesses: Sequence[Witness], shots: int, first_lines: Sequence[int] = ()
+) -> LightCourse | None:
     """The course that fits all witnesses best; None with too few.
 
     A single picture taken again says how far the light has come, and not on which way. A drift that may be
-    chance is left out: the curve is then zero, and other figures are those without it.
+    chance is left out: the curve is then zero, and other figures are those without it. ``first_lines`` are
+    the first shots of a setting that show patterns for spectra.
     """
     again = [each for each in witnesses if each.against is not None and each.setting is None]
     if len(witnesses) < FEWEST and len(again) < FEWEST_AGAIN:
@@ -113,7 +116,7 @@ def light_course(witnesses: Sequence[Witness], shots: int) -> LightCourse | None
     drift_misfit = _misfit(witnesses, shots, flicker, DRIFT_STD, SETTING_STD)
     apart_misfit = _misfit(witnesses, shots, flicker, nothing, APART_STD)
     if not found.is_steady or found.settings or apart_misfit < drift_misfit - LIKELIER:
-        stepped = _stepped(witnesses, shots, flicker)
+        stepped = _stepped(witnesses, shots, flicker, first_lines)
         if stepped is not None and abs(stepped.drift) > LEAST_DRIFT:
             return stepped
     if apart_misfit < drift_misfit - LIKELIER:
@@ -149,11 +152,14 @@ def _alone(again: Witness, shots: int) -> LightCourse | None:
     return found if found.drifts else None
 
 
-def _stepped(witnesses: Sequence[Witness], shots: int, flicker: float) -> LightCourse | None:
+def _stepped(
+    witnesses: Sequence[Witness], shots: int, flicker: float, first_lines: Sequence[int]
+) -> LightCourse | None:
     """The course of light that changed once, at once; None unless that fits much better than smooth courses.
 
     It is the mean over all shots at which the step may have come, by how likely each of them is. A smooth
-    course takes a part of a step for ``flicker``.
+    course takes a part of a step for ``flicker``. A camera that is not linear shows bright codes in another
+    ratio of the settings than faint lines: a step where lines begin has to be seen by a picture taken again.
     """
     nothing = (NO_DRIFT, NO_DRIFT)
     told = sorted({each for one in witnesses for each in (one.shot, one.against) if each is not None})
@@ -173,6 +179,10 @@ def _stepped(witnesses: Sequence[Witness], shots: int, flicker: float) -> LightC
     )
     misfits = misfits_of(flicker)
     if float(misfits.min()) > smooth - LIKELIER:
+        return None
+    by_lines = [_misfit(witnesses, shots, flicker, nothing, SETTING_STD, at) for at in first_lines]
+    is_seen = any(each.setting is None and each.against is not None for each in witnesses)
+    if not is_seen and min(by_lines, default=np.inf) < misfits.min() + LIKELIER:
         return None
     likely = np.flatnonzero(misfits < misfits.min() + LIKELIER)
     weight = np.exp(-0.5 * (misfits[likely] - misfits.min()))

@@ -136,7 +136,8 @@ def follow_light(
         # Dim settings show the change of black rather than that of the light.
         frames.ratios = {}
     settings = [_without(each, exposed) for each in _of_settings(frames)]
-    before = light_course([*settings, *whites], frames.plan.shot_count)
+    shots, first_lines = frames.plan.shot_count, _first_lines(frames.plan)
+    before = light_course([*settings, *whites], shots, first_lines)
     if before is not None and not before.is_steady:
         frames.expose(_between_settings(frames, before, exposed))
         code, white = frames.decode(progress)
@@ -147,7 +148,7 @@ def follow_light(
     )
     if lines is not None and lines.misfit > MOST_MISFIT:
         lines = None
-    course = light_course([*settings, *whites, *_of_lines(frames, lines)], frames.plan.shot_count)
+    course = light_course([*settings, *whites, *_of_lines(frames, lines)], shots, first_lines)
     if course is None:
         return code, white, told
     if not course.is_steady:
@@ -155,6 +156,15 @@ def follow_light(
         frames.follow(light)
         white = light.steady_white(white)
     return code, white, (*told, *light_findings(course, lines is not None))
+
+
+def _first_lines(plan: CapturePlan) -> list[int]:
+    """The first shot of each setting that shows a pattern for spectra."""
+    first: dict[int, int] = {}
+    for shot in plan.shots():
+        if shot.role == "spectral":
+            first.setdefault(shot.setting, shot.index)
+    return list(first.values())
 
 
 def blacks_again(scan: Pictures) -> list[Again]:

@@ -241,3 +241,16 @@ def test_a_step_may_be_off_by_half_of_what_bright_and_faint_pictures_are_apart()
     assert course.drift_std == pytest.approx(0.015, abs=0.004)
     assert course.std[150] == pytest.approx(0.015, abs=0.004)
     assert course.std[:50].max() < 0.003
+
+
+def test_codes_in_another_ratio_than_lines_are_no_step_unless_white_is_seen_to_change() -> None:
+    """A camera that is not linear shows that: bright codes first, then faint lines from shot 20 on."""
+    rng = np.random.default_rng(3)
+    codes = [Witness(k, 100 + k, 0.02 + 0.001 * rng.normal(), 0.001, setting=0) for k in range(18)]
+    lines = [Witness(k, 100 + k, 0.001 * rng.normal(), 0.005, setting=0) for k in range(20, 99)]
+    course = light_course([*codes, *lines], SHOTS, first_lines=(20, 120))
+    assert course is None or course.step_at is None
+    seen = light_course([*codes, *lines, Witness(199, 15, -0.02, 0.001)], SHOTS, first_lines=(20, 120))
+    assert seen is not None
+    assert seen.step_at is not None
+    assert abs(seen.step_at - 20) <= 2

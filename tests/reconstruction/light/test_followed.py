@@ -245,7 +245,7 @@ class Followed:
         self.code: Any = SimpleNamespace(column=np.full(shape, 7))
         ones = np.ones(shape, np.float32)
         self.white = MergedFrame(ones, 0.01 * ones, np.zeros(shape, bool))
-        monkeypatch.setattr(followed, "light_course", lambda witnesses, shots: next(courses))
+        monkeypatch.setattr(followed, "light_course", lambda *_: next(courses))
         monkeypatch.setattr(followed, "line_levels", lambda *given: lines)
         monkeypatch.setattr(followed, "room_flicker", lambda *given: self.room)
         self.room: RoomFlicker | None = None

@@ -36,9 +36,8 @@ def tile(
     deviation = np.full(radiance.shape, std, np.float32)
     deviation[1, 4, 8] = np.inf
     like = torch.empty(0, dtype=torch.float64)
-    return TileFrames(
-        RIG, radiance, deviation, known, *(slice(a, a + n) for a, n in zip(first, (4, 6), strict=True)), like
-    )
+    rows, columns = slice(first[0], first[0] + 4), slice(first[1], first[1] + 6)
+    return TileFrames(RIG, radiance, deviation, known, rows, columns, like)
 
 
 def test_the_tile_has_its_valid_pixels_where_they_are_in_the_picture() -> None:
