@@ -83,7 +83,7 @@ def cause_findings(
         elif turn.instead:
             yield from (_turn(turn, motion), of_film)
         else:
-            yield from (of_film, _perhaps_turned(turn, motion))
+            yield from (of_film, _turn(turn, motion))
     place = _film(causes, probe)
     told = place.significant and probe.places and causes.displaced
     yield place.model_copy(update={"significant": told})
@@ -189,7 +189,26 @@ def _wide_bands(probe: Probe, curves: CurveMisfit) -> FitFinding:
 
 
 def _turn(turn: Turn, motion: FilmMotion) -> FitFinding:
-    """What is told in the place of a motion of the film."""
+    """A turn of camera or projector, in the place of a motion of the film or as what that may be as well."""
+    off, held = f"depth off by {turn.depth_share:.1%}", turn.believed * turn.depth_share
+    if turn.instead:
+        told, sentence, advice = (
+            True,
+            f"First orders lie {motion.shift_px:.2f} px (rms) from their places as if camera and projector"
+            f" had moved against each other, which puts {off}: the calibration is of another rig, or of"
+            " another pose or zoom. Deviations of depth and of reflectance contain it.",
+            "See that the calibration is this rig's, and measure a surface at a known distance; then"
+            " calibrate the geometry again.",
+        )
+    else:
+        told, sentence, advice = (
+            motion.sure and held > LEAST_DEPTH_SHARE,
+            "Instead of the film, camera or projector may have turned a little: that displaces first orders"
+            f" alike, and then puts {off}. Nothing in the scan says which. Deviations of depth contain"
+            f" {held:.1%} of it for that.",
+            "Measure a surface at a known distance; if depth is off, calibrate the geometry again. A plan"
+            " whose code has rows tells both apart.",
+        )
     return FitFinding(
         part="geometry",
         name=TURNED,
@@ -197,31 +216,9 @@ def _turn(turn: Turn, motion: FilmMotion) -> FitFinding:
         std=motion.shift_std_px,
         unit="px",
         limit=LEAST_MOTION_PX,
-        significant=True,
-        sentence=f"First orders lie {motion.shift_px:.2f} px (rms) from their places as if camera and"
-        f" projector had moved against each other, which puts depth off by {turn.depth_share:.1%}: the"
-        " calibration is of another rig, or of another pose or zoom. Deviations of depth and of reflectance"
-        " contain it.",
-        advice="See that the calibration is this rig's, and measure a surface at a known distance; then"
-        " calibrate the geometry again.",
-    )
-
-
-def _perhaps_turned(turn: Turn, motion: FilmMotion) -> FitFinding:
-    """What a motion of the film may be as well, where nothing says which."""
-    return FitFinding(
-        part="geometry",
-        name=TURNED,
-        value=motion.shift_px,
-        std=motion.shift_std_px,
-        unit="px",
-        limit=LEAST_MOTION_PX,
-        significant=motion.sure and turn.believed * turn.depth_share > LEAST_DEPTH_SHARE,
-        sentence="Instead of the film, camera or projector may have turned a little: that displaces first"
-        f" orders alike, and then depth is off by {turn.depth_share:.1%}. Nothing in the scan says which."
-        f" Deviations of depth contain {turn.believed * turn.depth_share:.1%} of it for that.",
-        advice="Measure a surface at a known distance; if depth is off, calibrate the geometry again. A plan"
-        " whose code has rows tells both apart.",
+        significant=told,
+        sentence=sentence,
+        advice=advice,
     )
 
 
