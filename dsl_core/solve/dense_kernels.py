@@ -289,7 +289,10 @@ def near_diagonal(own: Array, bands: int, local: Array) -> None:
 
 @within
 def most_evident(candidates: Array, taus: Array) -> float:
-    """Logarithm of the smoothness at the peak of a parabola through the best candidate and its neighbours."""
+    """Logarithm of the smoothness at the peak of a parabola through the best candidate and its neighbours.
+
+    As in `lane_kernels`, for one pixel: compiled functions that call each other are in one module.
+    """
     best = 0
     for t in range(len(taus)):
         if candidates[t] > candidates[best]:
