@@ -33,7 +33,8 @@ from dsl_core.reconstruction.geometry import (
 )
 from dsl_core.reconstruction.hdr import MergedFrame
 from dsl_core.reconstruction.lenses import follow_lenses
-from dsl_core.reconstruction.light.followed import follow_light, unsure_level
+from dsl_core.reconstruction.light.followed import follow_light
+from dsl_core.reconstruction.light.told import unsure_level
 from dsl_core.reconstruction.rows.columns import columns_by_rows
 from dsl_core.reconstruction.rows.frames import ScanFrames
 from dsl_core.reconstruction.spectral.highlights import follow_highlights

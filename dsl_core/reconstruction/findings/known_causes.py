@@ -6,7 +6,7 @@ from collections.abc import Iterable
 
 from dsl_core.model.fit import FitFinding
 from dsl_core.reconstruction.findings.model_findings import DRIFT_LEFT
-from dsl_core.reconstruction.light.followed import BLACK_AGAIN, DRIFT
+from dsl_core.reconstruction.light.told import BLACK_AGAIN, DRIFT
 from dsl_core.reconstruction.spectral.order_balance import BALANCE
 
 #: What may be left of a drift in frames that follow the light: so much, and so many deviations of it.

@@ -7,7 +7,7 @@ import pytest
 from dsl_core.model.fit import FitFinding
 from dsl_core.reconstruction.findings.known_causes import with_known_causes, without_drift_that_is_none
 from dsl_core.reconstruction.findings.model_findings import DRIFT_LEFT
-from dsl_core.reconstruction.light.followed import BLACK_AGAIN, DRIFT
+from dsl_core.reconstruction.light.told import BLACK_AGAIN, DRIFT
 from dsl_core.reconstruction.spectral.order_balance import BALANCE
 
 

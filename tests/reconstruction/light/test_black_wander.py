@@ -8,7 +8,8 @@ import pytest
 from dsl_core import pipeline
 from dsl_core.model.fit import Fit
 from dsl_core.model.plan import CapturePlan, ScanLines, Sentinels, Setting
-from dsl_core.reconstruction.light.followed import black_wander, blacks_again
+from dsl_core.reconstruction.light.told import black_wander
+from dsl_core.reconstruction.light.witnesses import blacks_again
 from dsl_core.reconstruction.rows.frames import ScanFrames
 from tests.cases.small_rig import small_rig
 from tests.cases.twin_scan import MemoryScan, twin_scan

@@ -14,8 +14,9 @@ from dsl_core.model.plan import CapturePlan, GrayCode, ScanLines, Sentinels, Set
 from dsl_core.model.rig import Rig
 from dsl_core.patterns.gray_code import DecodedCode
 from dsl_core.reconstruction.hdr import MergedFrame
-from dsl_core.reconstruction.light.followed import blacks_again, follow_light
+from dsl_core.reconstruction.light.followed import follow_light
 from dsl_core.reconstruction.light.slow_black import UNEVEN, slow_black
+from dsl_core.reconstruction.light.witnesses import blacks_again
 from dsl_core.reconstruction.merge import Exposed
 from dsl_core.reconstruction.rows.bands import bands_of
 from dsl_core.reconstruction.rows.frames import ScanFrames
