@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
 
@@ -102,6 +102,11 @@ class Finding:
         return bool(self.again)
 
     @property
+    def is_sure(self) -> bool:
+        """Whether a picture shows its pattern in its usual light: all is well then, and was before it."""
+        return self.verdict is Verdict.RIGHT and self.light is Light.USUAL
+
+    @property
     def names(self) -> str:
         """The shots that are wrong, or of which at least one is."""
         if len(self.again) == 1:
@@ -125,6 +130,15 @@ class Finding:
     def remedy(self) -> str:
         """What a person can do."""
         return _REMEDY.get(self.verdict, "")
+
+
+def last_wrong(findings: Sequence[Finding]) -> Finding:
+    """What pictures taken one after the other show: the last wrong one, with all shots that are wrong."""
+    wrong = [found for found in findings if found.is_wrong]
+    if not wrong:
+        return findings[-1]
+    again = sorted({shot for found in wrong for shot in found.again}, key=lambda shot: shot.index)
+    return replace(wrong[-1], again=tuple(again))
 
 
 def of_another_pattern(colour: str) -> str:

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import logging
-from collections import deque
-from collections.abc import Collection, Sequence
+from collections.abc import Collection
 from dataclasses import replace
 from typing import NoReturn
 
@@ -14,10 +13,11 @@ from numpy.typing import NDArray
 from dsl_core.capture.again import Again
 from dsl_core.capture.diagnosis import Diagnosis, Explanation
 from dsl_core.capture.exposure import ShotTaker
-from dsl_core.capture.proof.finding import Finding, Light, Verdict
+from dsl_core.capture.proof.finding import Finding, Light, Verdict, last_wrong
 from dsl_core.capture.proof.light_sums import light_sentence
 from dsl_core.capture.proof.verifier import FrameProof
 from dsl_core.capture.proven.doubted import MOST_UNTOLD, DoubtedShots
+from dsl_core.capture.proven.lateness import Lateness
 from dsl_core.capture.proven.wrong_pictures import (
     PictureError,
     has_begun_before,
@@ -32,18 +32,6 @@ from dsl_core.progress import CancelToken
 
 #: How often a shot is taken again before the scan stops, and how long the pattern may settle before that, ms.
 SETTLE_MS = (100.0, 300.0, 900.0)
-#: After so many wrong pictures on end, projector or camera count as late.
-FAILURES = 2
-#: Pictures of which nothing can be told are unlike those before them on end within so many shots. None of
-#: them is ever right, so that a lamp that flickers now and then would else add up over a scan.
-ON_END = 3
-#: So many pictures that are late, or a colour of them, within so many shots, with right ones between: a
-#: display that drops every so many. Those of which nothing could be told may have been late as well.
-LATE_OFTEN, LATE_WITHIN = 3, 64
-#: So many pictures that a second one cured within so many shots: most are late in a part.
-CURED_OFTEN, CURED_WITHIN = 8, 16
-#: Pictures on end that are wrong like this may be late in a part of the picture alone.
-IN_PART = (Verdict.TORN, Verdict.EXPOSURE)
 #: Of doubtful pictures that come out the same again, every so many are followed by a control.
 CONTROL_EVERY = 8
 _log = logging.getLogger(__name__)
@@ -68,16 +56,12 @@ class ProvenShots:
         """
         self._taker, self._proof, self._sink, self._token = taker, proof, sink, token
         self._diagnosis, self._only_repeats, self._next_step = diagnosis, only_repeats, again
-        self._failures = 0
-        self._unlike_at = 0
-        self._is_late = self._is_in_part = self._has_late_colour = False
+        self._is_late, self._lateness = False, Lateness()
         self._doubted = DoubtedShots()
         self._doubts = 0
         self._has_seen_first = False
         #: What is wrong with light and places of the first code, as soon as that is known.
         self._light = ""
-        self._late_at: deque[int] = deque(maxlen=LATE_OFTEN)
-        self._cured_at: deque[int] = deque(maxlen=CURED_OFTEN)
         #: Shots that were taken again because a picture did not show their pattern.
         self.corrected = 0
 
@@ -171,28 +155,19 @@ class ProvenShots:
             frame, found = self._compare(found, frame, self._proof)
         if shot not in found.again:
             self._save(shot, frame, found)
-        if found.is_wrong:
-            self._failures += 1
-            self._is_in_part |= found.verdict in IN_PART
-        elif found.verdict is Verdict.RIGHT:
-            self._failures, self._is_in_part = 0, False
-        if _is_sure(found):
+        self._lateness.count(found)
+        if found.is_sure:
             self._doubted.trust_untold()
         if found.verdict is Verdict.LATE or found.colour:
-            self._count_late(found)
+            self._lateness.count_late(found)
         self._correct(found, self._proof)
         if self._is_late:
             return
         if shot.role == "sentinel" and not found.is_wrong:
             self._proof.scene.see_settled(shot, frame.pixels, self._pixels)
-        if len(self._late_at) == LATE_OFTEN and shot.index - self._late_at[0] <= LATE_WITHIN:
-            # Late ones come and go.
-            self._doubted.doubt_passed()
-            self._be_late(shot, self._proof)
-        elif self._failures >= FAILURES:
-            self._be_late(shot, self._proof)
-        elif len(self._cured_at) == CURED_OFTEN and shot.index - self._cured_at[0] < CURED_WITHIN:
-            self._is_in_part = True
+        if self._lateness.is_told(shot):
+            if self._lateness.comes_and_goes(shot):
+                self._doubted.doubt_passed()
             self._be_late(shot, self._proof)
 
     def _again(self, shot: Shot, earlier: int = 0) -> Frame:
@@ -208,7 +183,7 @@ class ProvenShots:
         self._diagnosis.keep(shot, frame.pixels)
         if self._proof is not None:
             self._date(shot, frame.pixels, self._proof)
-        self._doubted.add(shot, is_untold=not _is_sure(found) and self._is_alone(shot))
+        self._doubted.add(shot, is_untold=not found.is_sure and self._is_alone(shot))
 
     def _date(self, shot: Shot, pixels: NDArray[np.uint16], proof: FrameProof) -> None:
         """Note since when nobody has seen that devices, light and scene are as they were."""
@@ -233,11 +208,10 @@ class ProvenShots:
         found = proof.judge(doubt.shot, second.pixels)
         has_mark = doubt.verdict is Verdict.RIGHT or bool(doubt.detail)
         if differs or (has_mark and not found.is_doubtful):
-            self._count_unlike(found)
             colour = doubt.colour or proof.late_colour(doubt.shot, frame.pixels, second.pixels)
             if colour:
-                self._count_late(replace(doubt, colour=colour))
-            self._cured_at.append(doubt.shot.index)
+                self._lateness.count_late(replace(doubt, colour=colour))
+            self._lateness.count_cured(found)
             self.corrected += 1
             return replace(second, corrected=doubt.detail or "it was unlike those before it"), found
         if found.light is Light.STEP or self._doubts % CONTROL_EVERY == 0:
@@ -245,18 +219,6 @@ class ProvenShots:
             proof.believe_light(doubt.shot)
         self._doubts += 1
         return second, found
-
-    def _count_late(self, found: Finding) -> None:
-        """Count a picture that is late, or a colour of one."""
-        self._late_at.append(found.shot.index)
-        self._has_late_colour |= bool(found.colour)
-
-    def _count_unlike(self, found: Finding) -> None:
-        """Count a picture that another one of its shot was unlike as one of a run, or as the first of one."""
-        shot = found.shot.index
-        if found.verdict is Verdict.UNTOLD and shot - self._unlike_at > ON_END:
-            self._failures = 0
-        self._failures, self._unlike_at = self._failures + 1, shot
 
     def _compare(self, alone: Finding, frame: Frame, proof: FrameProof) -> tuple[Frame, Finding]:
         """A picture that nothing tells, if another one of its shot is the same; else a third."""
@@ -281,7 +243,7 @@ class ProvenShots:
             for shot in wrong:
                 frame = replace(self._again(shot, earlier), corrected=reason)
                 taken.append((shot, frame, proof.judge(shot, frame.pixels)))
-            found = _together([each for *_, each in taken])
+            found = last_wrong([each for *_, each in taken])
             if len(wrong) > 1 and wrong[-1].role == "spectral" and not found.is_wrong:
                 # They agree now; but so do two wrong ones, and the earlier one may have been right.
                 self._require_control(proof)
@@ -323,7 +285,7 @@ class ProvenShots:
                 self.corrected += 1
             self._correct(found, proof)
         self._doubted.untold.clear()
-        if self._is_in_part or self._has_late_colour:
+        if self._lateness.is_in_part or self._lateness.has_late_colour:
             # A line says that it is right where it lights the scene itself. Its orders, too faint to tell,
             # may have been late elsewhere.
             lines = proof.lines_before(shot)
@@ -432,17 +394,3 @@ class ProvenShots:
             f" captured again.{known}",
             error.wrong,
         ) from error
-
-
-def _is_sure(found: Finding) -> bool:
-    """Whether a picture shows its pattern in its usual light: all is well then, and was before it."""
-    return found.verdict is Verdict.RIGHT and found.light is Light.USUAL
-
-
-def _together(findings: Sequence[Finding]) -> Finding:
-    """What pictures taken one after the other show: the last wrong one, with all shots that are wrong."""
-    wrong = [found for found in findings if found.is_wrong]
-    if not wrong:
-        return findings[-1]
-    again = sorted({shot for found in wrong for shot in found.again}, key=lambda shot: shot.index)
-    return replace(wrong[-1], again=tuple(again))

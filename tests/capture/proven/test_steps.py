@@ -12,14 +12,8 @@ import pytest
 from dsl_core.capture.diagnosis import Explanation
 from dsl_core.capture.proof.code.code_sum import CodeSum
 from dsl_core.capture.proof.finding import Finding, Light, Verdict
-from dsl_core.capture.proven.shots import (
-    CURED_OFTEN,
-    LATE_OFTEN,
-    LATE_WITHIN,
-    ON_END,
-    SETTLE_MS,
-    ProvenShots,
-)
+from dsl_core.capture.proven.lateness import CURED_OFTEN, LATE_OFTEN, LATE_WITHIN, ON_END
+from dsl_core.capture.proven.shots import SETTLE_MS, ProvenShots
 from dsl_core.capture.proven.wrong_pictures import PictureError
 from dsl_core.errors import Cancelled, DeviceError
 from dsl_core.model.frames import Frame
@@ -392,7 +386,7 @@ def test_pictures_that_nothing_tells_are_late_only_if_they_differ_on_end(apart: 
 
 def test_what_could_not_be_told_before_devices_were_late_is_taken_again_after_a_control() -> None:
     bench = Bench(untold, late, is_right, is_right)
-    bench.shots._failures = 1
+    bench.shots._lateness.failures = 1
     bench.shots.take(SHOTS[12])
     bench.shots.take(LINE)
     # The control, and then the untold one.
@@ -447,7 +441,7 @@ def test_pictures_that_are_late_now_and_then_cast_doubt_on_untold_ones_before(
 ) -> None:
     # A display that drops some pictures shows right ones between, which say nothing of those before.
     bench = Bench(untold, is_right, late, is_right)
-    bench.shots._late_at.extend([14 - before, 13])
+    bench.shots._lateness._late_at.extend([14 - before, 13])
     take_all(bench, SHOTS[12:15])
     assert ("captured twice" in bench.shots.note) == is_late
     assert bench.written[12] == ("it may be late" if is_late else "")
@@ -455,18 +449,18 @@ def test_pictures_that_are_late_now_and_then_cast_doubt_on_untold_ones_before(
 
 def test_a_right_picture_ends_a_run_of_wrong_ones() -> None:
     bench = Bench(is_right)
-    bench.shots._failures, bench.shots._doubted.untold = 1, [SHOTS[12]]
+    bench.shots._lateness.failures, bench.shots._doubted.untold = 1, [SHOTS[12]]
     bench.shots.take(LINE)
-    assert bench.shots._failures == 0
+    assert bench.shots._lateness.failures == 0
     assert bench.shots._doubted.untold == []
 
 
 def test_a_right_picture_of_unknown_light_may_still_be_too_dark() -> None:
     bench = Bench(of_unknown_light)
-    bench.shots._failures = 1
+    bench.shots._lateness.failures = 1
     for shot in (CODE, SHOTS[12], LINE):
         bench.shots.take(shot)
-    assert bench.shots._failures == 0
+    assert bench.shots._lateness.failures == 0
     assert bench.shots._doubted.untold == [SHOTS[12], LINE]
 
 
