@@ -2,13 +2,9 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable
 from datetime import datetime
 from pathlib import Path
-
-import numpy as np
-from numpy.typing import NDArray
 
 from dsl_app.connection.controller import RIG, RigController
 from dsl_app.connection.state import Link
@@ -16,6 +12,7 @@ from dsl_app.scan.command_line import fresh_target, named_target, rig_of_scan, s
 from dsl_app.scan.job import ScanJob, ScanRequest
 from dsl_app.scan.plan import ScanPlanController
 from dsl_app.scan.reconnect import Reconnector
+from dsl_app.scan.reconstruction import Reconstructor
 from dsl_app.scan.reconstruction_time import Pace
 from dsl_app.scan.state import InterruptedScan, Phase, Reconnection, ScanState
 from dsl_app.shared.jobs.base import Job, JobRunner, JobState
@@ -28,8 +25,6 @@ from dsl_core.errors import DeviceError, DriftError, DslError
 from dsl_core.io import MANIFEST_NAME
 from dsl_core.io.calibration_library import CalibrationLibrary
 from dsl_core.io.scan.origin import rig_notes
-from dsl_core.model.result_sink import Maps
-from dsl_core.progress import Progress
 from dsl_core.words import quoted
 
 _PHASES = {State.RUNNING: Phase.RUNNING, State.PAUSED: Phase.PAUSED, State.CANCELLING: Phase.STOPPING}
@@ -55,12 +50,8 @@ class ScanController:
         pace: Pace | None = None,
     ) -> None:
         self.state, self._rig, self._runner, self._notifier = state, rig, runner, notifier
-        self._clock, self._hidden, self._pace = clock, hidden, pace or Pace()
-        #: The depth of the reconstruction that runs, from its thread; news until it is in the state.
-        self._seen_depth: NDArray[np.float32] | None = None
-        self._stop_expecting = state.plan.follow(
-            lambda plan: state.reconstruction_s.set(self._pace.expected_s(plan.camera_size_px))
-        )
+        self._clock, self._hidden = clock, hidden
+        self._reconstructor = Reconstructor(state, runner, notifier, pace or Pace())
         #: The name that a person typed for a scan to come.
         self._name = ""
         #: Where the person saves scans.
@@ -165,9 +156,7 @@ class ScanController:
     def take_news(self) -> None:
         """Copy what the job reported since the last call to the state; called by a timer."""
         self._reconnector.take_news()
-        seen, self._seen_depth = self._seen_depth, None
-        if seen is not None:
-            self.state.depth.set(seen)
+        self._reconstructor.take_news()
         scan = self._scan
         if scan is None:
             return
@@ -295,47 +284,7 @@ class ScanController:
 
     def reconstruct(self, session: Path) -> None:
         """Reconstruct a complete scan, save the result next to it and report it."""
-        target, before = session.with_suffix(".zarr"), self.state.note.value
-        # How long it takes was said before; from now on the job's own clock tells what is left.
-        waiting = f"{before} Reconstructing; the depth is shown first.".strip()
-        size_px, since_s = self.state.plan.value.camera_size_px, time.monotonic()
-
-        def see(maps: Maps) -> None:
-            self._seen_depth = np.asarray(maps["depth_mm"], np.float32)
-
-        def work(progress: Progress) -> Path:
-            from dsl_core.workflows.scans import reconstruct_to
-
-            return reconstruct_to(target, session, progress=progress, seen_geometry=see)
-
-        def finish() -> None:
-            self._seen_depth = None
-            self.state.is_reconstructing.set(False)
-            self.state.depth.set(None)
-
-        def done(path: Path) -> None:
-            finish()
-            self._pace.learn(size_px, time.monotonic() - since_s)
-            self.state.reconstruction_s.set(self._pace.expected_s(self.state.plan.value.camera_size_px))
-            self.state.note.set(f"The result is saved in {path}.")
-            self.state.result.emit(path)
-
-        def ended(how: str) -> None:
-            finish()
-            # Another scan may have set a note of its own meanwhile.
-            if self.state.note.value == waiting:
-                retry = "Press Reconstruct… to begin again; the frames are kept."
-                self.state.note.set(f"{before} The reconstruction {how}. {retry}".strip())
-
-        def failed(error: Exception) -> None:
-            ended("failed")
-            self._notifier.tell("error", sentence_of(error))
-
-        self.state.note.set(waiting)
-        self.state.is_reconstructing.set(True)
-        self._runner.submit(
-            Job(f"Reconstruct {session.stem}", work, done, failed, lambda: ended("was cancelled"))
-        )
+        self._reconstructor.start(session)
 
     def offer_result(self, path: Path, open_result: Callable[[Path], object]) -> None:
         """Tell a person who works on another page that a result is saved."""
@@ -416,6 +365,6 @@ class ScanController:
     def close(self) -> None:
         """Disconnect from the rig's state."""
         self._stop_following()
-        self._stop_expecting()
+        self._reconstructor.close()
         self._reconnector.close()
         self.plans.close()

@@ -1,0 +1,88 @@
+"""The reconstruction that follows a scan: its time beforehand, its depth as soon as known, its end. No Qt."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dsl_app.scan.reconstruction_time import Pace
+from dsl_app.scan.state import ScanState
+from dsl_app.shared.jobs.base import Job, JobRunner
+from dsl_app.shared.notify import Notifier, sentence_of
+from dsl_core.model.result_sink import Maps
+from dsl_core.progress import Progress
+
+
+class Reconstructor:
+    """Reconstructs scans as jobs; `take_news` copies the depth that is known first to the state."""
+
+    def __init__(self, state: ScanState, runner: JobRunner, notifier: Notifier, pace: Pace) -> None:
+        """Keep the parts; the ``pace`` learns from each reconstruction."""
+        self._state, self._runner, self._notifier, self._pace = state, runner, notifier, pace
+        #: The depth of the reconstruction that runs, from its thread; news until it is in the state.
+        self._seen_depth: NDArray[np.float32] | None = None
+        self._stop_expecting = state.plan.follow(lambda plan: self._expect(plan.camera_size_px))
+
+    def take_news(self) -> None:
+        """Copy what the job reported since the last call to the state."""
+        seen, self._seen_depth = self._seen_depth, None
+        if seen is not None:
+            self._state.depth.set(seen)
+
+    def start(self, session: Path) -> None:
+        """Reconstruct a complete scan, save the result next to it and report it."""
+        state, before = self._state, self._state.note.value
+        # How long it takes was said before; from now on the job's own clock tells what is left.
+        waiting = f"{before} Reconstructing; the depth is shown first.".strip()
+        size_px, since_s = state.plan.value.camera_size_px, time.monotonic()
+
+        def done(path: Path) -> None:
+            self._finish()
+            self._pace.learn(size_px, time.monotonic() - since_s)
+            self._expect(state.plan.value.camera_size_px)
+            state.note.set(f"The result is saved in {path}.")
+            state.result.emit(path)
+
+        def ended(how: str) -> None:
+            self._finish()
+            # Another scan may have set a note of its own meanwhile.
+            if state.note.value == waiting:
+                retry = "Press Reconstruct… to begin again; the frames are kept."
+                state.note.set(f"{before} The reconstruction {how}. {retry}".strip())
+
+        def failed(error: Exception) -> None:
+            ended("failed")
+            self._notifier.tell("error", sentence_of(error))
+
+        def cancelled() -> None:
+            ended("was cancelled")
+
+        def work(progress: Progress) -> Path:
+            return self._reconstruct(session, progress)
+
+        state.note.set(waiting)
+        state.is_reconstructing.set(True)
+        self._runner.submit(Job(f"Reconstruct {session.stem}", work, done, failed, cancelled))
+
+    def _reconstruct(self, session: Path, progress: Progress) -> Path:
+        from dsl_core.workflows.scans import reconstruct_to
+
+        def see(maps: Maps) -> None:
+            self._seen_depth = np.asarray(maps["depth_mm"], np.float32)
+
+        return reconstruct_to(session.with_suffix(".zarr"), session, progress=progress, seen_geometry=see)
+
+    def _finish(self) -> None:
+        self._seen_depth = None
+        self._state.is_reconstructing.set(False)
+        self._state.depth.set(None)
+
+    def _expect(self, size_px: tuple[int, int]) -> None:
+        self._state.reconstruction_s.set(self._pace.expected_s(size_px))
+
+    def close(self) -> None:
+        """Disconnect from the state."""
+        self._stop_expecting()
