@@ -18,9 +18,9 @@ from dsl_core.evaluation.spectral import peak_width, spectral_errors
 from dsl_core.model.plan import CapturePlan, NoSpectral
 from dsl_core.model.rig import Rig
 from dsl_core.model.spectral import WavelengthGrid
-from dsl_core.optics.lines.line_set import LineSet
 from dsl_core.optics.spectra import Bands
 from dsl_core.planning import references
+from dsl_core.planning.computing_time import computing_seconds
 from dsl_core.planning.expected import Prediction
 from dsl_core.planning.samples import SamplePixels, plane_samples
 from dsl_core.planning.virtual import Outcome, VirtualPixels
@@ -33,12 +33,6 @@ Floats = NDArray[np.float64]
 MODEL_FLOOR = 0.003
 #: Spectral step of the truth behind the width of narrow peaks, nm, and samples that state it.
 FINE_STEP_NM, PEAK_SAMPLES = 1.0, 4
-#: Core seconds a million pixels at `BANDS` bands, least squares over 68 reconstructions of small pieces of
-#: the twin: single lines, fixed and an exposure (scatter 24 %); all other sets, fixed and a pattern (11 %).
-#: Pieces pay the start of every tile, so that whole pictures take less.
-LINES_S, EXPOSURE_S = 41.0, 0.042
-DENSE_S, PATTERN_S = 229.0, 9.9
-BANDS, CORES = 47, 2
 
 
 def predict(
@@ -82,7 +76,7 @@ def _predict(
         spectral_frames=plan.spectral_count,
         seconds=round(plan.duration_s(latency_ms), 3),
         raw_bytes=plan.raw_bytes,
-        computing_s=round(computing_seconds(plan, grid), 2),
+        computing_s=round(computing_seconds(plan, grid.count), 2),
         rmse=float(np.hypot(calm.by_spectrum, MODEL_FLOOR * level)),
         pixel_rmse=float(np.hypot(rough.over_all, MODEL_FLOOR * level)),
         angle_rad=calm.angle_rad,
@@ -143,22 +137,3 @@ def _width(rig: Rig, plan: CapturePlan, grid: WavelengthGrid, view: SamplePixels
         except DecodeError:  # too faint or too wide to have a half maximum
             continue
     return float(np.mean(widths)) if widths else None
-
-
-def computing_seconds(plan: CapturePlan, grid: WavelengthGrid) -> float:
-    """Expected seconds of a reconstruction on a machine like the one that was measured, of two cores."""
-    megapixels = plan.camera_size_px[0] * plan.camera_size_px[1] / 1e6
-    return megapixels * core_seconds_per_megapixel(plan, grid) / CORES
-
-
-def core_seconds_per_megapixel(plan: CapturePlan, grid: WavelengthGrid) -> float:
-    """Core seconds a million pixels.
-
-    The number of bands was not varied: time is taken as proportional to it for lines, whose matrices are
-    banded, and to its square elsewhere, where building full matrices takes most of the time.
-    """
-    share = grid.count / BANDS
-    lines = LineSet.of(plan)
-    if lines is not None and lines.single:
-        return LINES_S * share + EXPOSURE_S * plan.shot_count
-    return (DENSE_S + PATTERN_S * plan.spectral_count) * share**2

@@ -82,10 +82,10 @@ class ScanPageMaker:
         """How fast this computer reconstructs, kept between sessions."""
         settings = self.window.parts.settings
 
-        def keep(us_per_px: float) -> None:
-            settings.reconstruct_us_per_px = us_per_px
+        def keep(pace: float) -> None:
+            settings.reconstruction_pace = pace
 
-        return Pace(settings.reconstruct_us_per_px, keep)
+        return Pace(settings.reconstruction_pace, keep)
 
     def _awaits_result(self) -> bool:
         """Whether the Results page is open and has nothing to show."""

@@ -12,6 +12,7 @@ from dsl_app.scan.reconstruction_time import Pace
 from dsl_app.scan.state import ScanState
 from dsl_app.shared.jobs.base import Job, JobRunner
 from dsl_app.shared.notify import Notifier, sentence_of
+from dsl_core.model.plan import CapturePlan
 from dsl_core.model.result_sink import Maps
 from dsl_core.progress import Progress
 
@@ -24,7 +25,7 @@ class Reconstructor:
         self._state, self._runner, self._notifier, self._pace = state, runner, notifier, pace
         #: The depth of the reconstruction that runs, from its thread; news until it is in the state.
         self._seen_depth: NDArray[np.float32] | None = None
-        self._stop_expecting = state.plan.follow(lambda plan: self._expect(plan.camera_size_px))
+        self._stop_expecting = state.plan.follow(self._expect)
 
     def take_news(self) -> None:
         """Copy what the job reported since the last call to the state."""
@@ -37,12 +38,12 @@ class Reconstructor:
         state, before = self._state, self._state.note.value
         # How long it takes was said before; from now on the job's own clock tells what is left.
         waiting = f"{before} Reconstructing; the depth is shown first.".strip()
-        size_px, since_s = state.plan.value.camera_size_px, time.monotonic()
+        plan, since_s = state.plan.value, time.monotonic()
 
         def done(path: Path) -> None:
             self._finish()
-            self._pace.learn(size_px, time.monotonic() - since_s)
-            self._expect(state.plan.value.camera_size_px)
+            self._pace.learn(plan, time.monotonic() - since_s)
+            self._expect(state.plan.value)
             state.note.set(f"The result is saved in {path}.")
             state.result.emit(path)
 
@@ -80,8 +81,8 @@ class Reconstructor:
         self._state.is_reconstructing.set(False)
         self._state.depth.set(None)
 
-    def _expect(self, size_px: tuple[int, int]) -> None:
-        self._state.reconstruction_s.set(self._pace.expected_s(size_px))
+    def _expect(self, plan: CapturePlan) -> None:
+        self._state.reconstruction_s.set(self._pace.expected_s(plan))
 
     def close(self) -> None:
         """Disconnect from the state."""

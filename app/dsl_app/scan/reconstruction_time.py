@@ -1,41 +1,33 @@
-"""How long the reconstruction of a scan will take, by what the last one took on this computer. No Qt."""
+"""How long the reconstruction of a scan will take, by its plan and what the last one took here. No Qt."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 
 from dsl_app.shared.notify import describe_seconds
+from dsl_core.model.plan import CapturePlan
+from dsl_core.planning.computing_time import computing_seconds
 
-#: Time that a pixel takes on two cores of a laptop, before one was computed here, µs.
-USUAL_US_PER_PX = 80.0
-#: What a picture of any size takes: a small one says little of the pace.
-START_S = 3.0
-#: A pace beyond these was disturbed, or is that of a scan without spectra, µs.
-LEAST_US_PER_PX, MOST_US_PER_PX = 5.0, 20_000.0
+#: Paces beyond these are those of a computer that did something else, or slept.
+LEAST, MOST = 0.05, 20.0
 
 
 class Pace:
-    """Microseconds that a pixel takes; ``keep`` is told each pace that was measured, for later sessions."""
+    """Times as long as expected that this computer takes; ``keep`` is told each, for later sessions."""
 
-    def __init__(
-        self, us_per_px: float = USUAL_US_PER_PX, keep: Callable[[float], object] = lambda _: None
-    ) -> None:
-        self._us_per_px, self._keep = us_per_px or USUAL_US_PER_PX, keep
+    def __init__(self, pace: float = 1.0, keep: Callable[[float], object] = lambda _: None) -> None:
+        self._pace, self._keep = pace, keep
 
-    def expected_s(self, size_px: tuple[int, int]) -> float:
-        """Seconds for a picture of a width and height.
+    def expected_s(self, plan: CapturePlan) -> float:
+        """Seconds that the reconstruction of a plan's scan takes."""
+        return self._pace * computing_seconds(plan)
 
-        >>> round(Pace().expected_s((890, 580)))
-        44
-        """
-        return START_S + 1e-6 * self._us_per_px * size_px[0] * size_px[1]
-
-    def learn(self, size_px: tuple[int, int], seconds: float) -> None:
+    def learn(self, plan: CapturePlan, seconds: float) -> None:
         """Take what a reconstruction took."""
-        us_per_px = 1e6 * (seconds - START_S) / (size_px[0] * size_px[1])
-        if LEAST_US_PER_PX <= us_per_px <= MOST_US_PER_PX:
-            self._us_per_px = us_per_px
-            self._keep(us_per_px)
+        pace = seconds / computing_seconds(plan)
+        if LEAST <= pace <= MOST:
+            self._pace = pace
+            self._keep(pace)
 
 
 def about(seconds: float) -> str:

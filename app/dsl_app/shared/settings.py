@@ -43,8 +43,8 @@ class Settings(BaseModel):
     window_geometry: str = ""
     window_state: str = ""
     tour_seen: bool = False
-    #: What a pixel of the last reconstruction took, µs; 0 before there was one.
-    reconstruct_us_per_px: float = Field(default=0.0, ge=0.0)
+    #: How many times as long as expected the last reconstruction took on this computer.
+    reconstruction_pace: float = Field(default=1.0, gt=0.0)
 
     def remember(self, path: Path) -> None:
         """Put a file first among the recent ones."""
