@@ -56,23 +56,7 @@ class RigPage(PageWidget):
         set_help(self.live, "rig#live-picture")
         self.projector = ProjectorPanel()
         set_help(self.projector, "rig#projector")
-        self._rig = ChoiceBox("Rig", "The rig to connect", [(name, name) for name in rigs])
-        self.options = OptionsForm()
-        self._rig.currentIndexChanged.connect(lambda _: self.options.set_rig(str(self._rig.currentData())))
-        self.options.set_rig(str(self._rig.currentData()))
-        self.options.chosen.connect(self._change_options)
-        self.new_profile = push_button(
-            "&New…",
-            "Put a rig together from devices that are found, and save it as a profile",
-            lambda: self.profile_requested.emit(""),
-        )
-        self.edit_profile = push_button(
-            "E&dit…",
-            "Change the drivers, addresses and settings of this rig's profile",
-            lambda: self.profile_requested.emit(str(self._rig.currentData())),
-        )
-        self._rig.currentIndexChanged.connect(lambda _: self._show_profile())
-        self.connect_button = push_button("Connect", CONNECT, self._toggle_link, "primary")
+        self._make_choice(rigs)
         self.link = label("")
         self.trouble = label("", wraps=True)
         self.camera_text, self.projector_text = label("–"), label("–")
@@ -107,6 +91,26 @@ class RigPage(PageWidget):
         self._show_profile()
         self._lay_out()
         self._connect()
+
+    def _make_choice(self, rigs: Sequence[str]) -> None:
+        """What chooses a rig, its options and its profile, and connects it."""
+        self._rig = ChoiceBox("Rig", "The rig to connect", [(name, name) for name in rigs])
+        self.options = OptionsForm()
+        self._rig.currentIndexChanged.connect(lambda _: self.options.set_rig(str(self._rig.currentData())))
+        self.options.set_rig(str(self._rig.currentData()))
+        self.options.chosen.connect(self._change_options)
+        self.new_profile = push_button(
+            "&New…",
+            "Put a rig together from devices that are found, and save it as a profile",
+            lambda: self.profile_requested.emit(""),
+        )
+        self.edit_profile = push_button(
+            "E&dit…",
+            "Change the drivers, addresses and settings of this rig's profile",
+            lambda: self.profile_requested.emit(str(self._rig.currentData())),
+        )
+        self._rig.currentIndexChanged.connect(lambda _: self._show_profile())
+        self.connect_button = push_button("Connect", CONNECT, self._toggle_link, "primary")
 
     def _make_live(self) -> LiveView:
         state, made = self._live_state, LiveView()

@@ -112,6 +112,13 @@ class MaterialsPanel(QWidget):
         self.text = label(HINT, "muted", wraps=True)
         self.text.setAlignment(Qt.AlignmentFlag.AlignTop)
         self.error.setPrefix("± ")
+        self._lay_out()
+        self._keep_room()
+        self._connect()
+        self._new_measure()
+        state.materials.follow(self._show)
+
+    def _lay_out(self) -> None:
         sources = row_of(self.marks, self.folder, self.file, STRETCH)
         # "By" is not written: the smallest window has no room for it next to its picture.
         ways = row_of((self.measure, 1), self.free)
@@ -122,7 +129,9 @@ class MaterialsPanel(QWidget):
         column_of(
             sources, classes, ways, error, limits, self.text, (self.table, 1), map_row, on=self, margins=0
         )
-        self._keep_room()
+
+    def _connect(self) -> None:
+        control = self._control
         self.folder.clicked.connect(self.choose_folder)
         self.file.clicked.connect(self.choose_file)
         self.marks.clicked.connect(lambda: control.from_marks(self.way))
@@ -130,8 +139,6 @@ class MaterialsPanel(QWidget):
         for box in (self.worst, self.margin):
             box.setKeyboardTracking(True)
             box.valueChanged.connect(lambda _: control.set_limits(self.worst.value(), self.margin.value()))
-        self._new_measure()
-        state.materials.follow(self._show)
 
     def _keep_room(self) -> None:
         """Keep the room of the legend and of its notes: nothing moves under a click when they come."""
