@@ -178,6 +178,7 @@ def _tell(output: Output, front: list[Weighed], chosen: Weighed) -> None:
             each.plan.name,
             each.expected.frames,
             f"{each.expected.seconds:.0f}",
+            f"{each.expected.computing_s:.0f}",
             f"{each.expected.pixel_rmse:.4f}",
             f"{each.expected.pixel_angle_rad:.3f}",
             f"{each.expected.depth_std_mm:.2f}",
@@ -185,7 +186,9 @@ def _tell(output: Output, front: list[Weighed], chosen: Weighed) -> None:
         for each in front
     ]
     output.say("Plans that no other beats in both time and expected error:")
-    output.table(("", "plan", "frames", "s", "error of a pixel", "angle rad", "depth mm"), rows)
+    output.table(
+        ("", "plan", "frames", "s", "computing s", "error of a pixel", "angle rad", "depth mm"), rows
+    )
     e = chosen.expected
     output.say(
         f"Chosen: {chosen.plan.name}: {e.frames} frames in {e.seconds:.0f} s, expected reflectance error"

@@ -279,12 +279,14 @@ class ForecastController:
 
 
 def measure(scan: MeasuredScan, result: Path) -> MeasuredScan:
-    """The scan with its errors where the truth is known."""
+    """The scan with what its reconstruction took, and with its errors where the truth is known."""
+    from dsl_core.evaluation.cost import costs_of
     from dsl_core.evaluation.summary import evaluate
     from dsl_core.io.result.result_file import load_result
     from dsl_core.workflows.scans import truth_of
 
     found = load_result(result)
+    scan = replace(scan, computing_s=sum(stage.seconds for stage in costs_of(found.attrs)) or None)
     try:
         truth = truth_of(found)
     except DslError:  # a real rig, whose scene is unknown

@@ -113,6 +113,12 @@ FIGURES: tuple[ForecastFigure, ...] = (
         "Exposures and the projector's latency. Not measured on a simulated rig, which does not wait",
         minutes,
     ),
+    ForecastFigure(
+        "computing_s",
+        "Reconstruction",
+        "Expected: on a computer of two cores. Measured: on this one",
+        minutes,
+    ),
 )
 
 #: Figures that the curve can show; that of single pixels is shown first.

@@ -46,9 +46,10 @@ class ForecastPoint:
 
 @dataclass(frozen=True)
 class MeasuredScan:
-    """Measured figures of a scan; errors are None without a known truth, times on a rig that does not wait.
+    """Measured figures of a scan.
 
-    ``rmse`` and ``delta_e`` are means over patches, ``pixel_*`` those of single pixels.
+    Errors are None without a known truth, ``seconds`` on a rig that does not wait, and ``computing_s`` before
+    the scan has a result. ``rmse`` and ``delta_e`` are means over patches, ``pixel_*`` of single pixels.
     """
 
     name: str
@@ -62,6 +63,7 @@ class MeasuredScan:
     fwhm_nm: float | None = None
     depth_rmse_mm: float | None = None
     coverage: float | None = None
+    computing_s: float | None = None
 
 
 class ForecastState:
