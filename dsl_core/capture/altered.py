@@ -81,7 +81,7 @@ def alteration(before: Pictures, now: Pictures, sensor: Sensor) -> str:
 
 def _numbered(black: Mosaic, sensor: Sensor) -> str:
     raster = Raster((black.shape[1], black.shape[0]))
-    found = written_row(raster.take(black), Noise(sensor), raster, black.shape[1])
+    found = written_row(raster.take(black), Noise(sensor), raster)
     return "" if found is None else found.sentence
 
 

@@ -27,7 +27,7 @@ def doubts_of_white(taker: ShotTaker, white: Shot, seen: NDArray[np.uint16], rig
     noise, channels = Noise.of(rig.sensor, rig.sensor.bit_depth), raster.channels(rig.sensor.bayer)
     shots = replace(white, role="black"), at_half_level(white)
     black, dim = (raster.take(taker.take(each).pixels) for each in shots)
-    written = written_row(black, noise, raster, seen.shape[1])
+    written = written_row(black, noise, raster)
     if written is not None:
         return written.sentence
     bright = raster.take(seen)

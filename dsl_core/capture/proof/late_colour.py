@@ -35,6 +35,8 @@ def late_colour(
     """
     for colour, name in enumerate(COLOUR_NAMES):
         own = np.flatnonzero(channels == colour)
+        if not own.size:  # a monochrome camera
+            continue
         one, two = (
             Expected(each[own].astype(np.float32), noise.variance(each)[own]) for each in (wanted, before)
         )

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dsl_core.model.rig import colour_sites
+from dsl_core.optics.spread_rows import spread_rows
 
 Floats = NDArray[np.float32]
 Counts = NDArray[np.uint16]
@@ -29,15 +30,16 @@ class Raster:
         width, height = size_px
         count = min(height, max(_ROWS, _PIXELS // width))
         #: Rows of the picture, in their order.
-        self.rows = np.unique(np.linspace(0, height - 1, count).round().astype(int))
-        self._step = -(-width // _WIDTH)
+        self.rows = spread_rows(height, count)
+        #: Columns of the picture from one of the raster to the next: an even number would miss a colour.
+        self.step_px = -(-width // _WIDTH) | 1
         #: Rows and columns of the raster.
-        self.shape = (self.rows.size, -(-width // self._step))
-        self._mosaic = (self.rows[:, None] % 2) * 2 + np.arange(0, width, self._step)[None, :] % 2
+        self.shape = (self.rows.size, -(-width // self.step_px))
+        self._mosaic = (self.rows[:, None] % 2) * 2 + np.arange(0, width, self.step_px)[None, :] % 2
 
     def take(self, pixels: NDArray[np.uint16]) -> Counts:
         """The compared pixels of a raw mosaic (rows, columns), flat and not to be changed."""
-        taken = np.ascontiguousarray(pixels[self.rows, :: self._step]).ravel()
+        taken = np.ascontiguousarray(pixels[self.rows, :: self.step_px]).ravel()
         taken.flags.writeable = False
         return taken
 

@@ -45,3 +45,8 @@ def test_a_colour_that_is_late_is_named(led: int, name: str) -> None:
 def test_neither_a_right_picture_nor_a_dim_colour_is_late() -> None:
     assert told(line(20)) == ""
     assert told(line(20, (1, 1, 0.5))) == ""
+
+
+def test_a_camera_without_colours_is_asked_for_none() -> None:
+    grey = Raster(SIZE).channels("MONO")
+    assert late_colour(line(20), line(20), line(10), line(SIZE[0]), grey, Noise.of(None, 12)) == ""

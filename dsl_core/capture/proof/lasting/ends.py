@@ -25,7 +25,7 @@ def sentences_of_ends(
     ``channels`` are the colours of their pixels. Without a calibration, nobody knows what is usual; without
     ``with_colours``, missing ones are left out, which a filter before the camera takes away.
     """
-    written = written_row(black, noise, raster, plan.camera_size_px[0])
+    written = written_row(black, noise, raster)
     if written is not None:
         return [written.sentence]  # its numbers look like light
     lit = lit_black(white, black, channels, noise, raster, plan.camera_size_px)

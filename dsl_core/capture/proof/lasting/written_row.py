@@ -35,20 +35,15 @@ class WrittenRow:
         )
 
 
-def written_row(black: Counts, noise: Noise, raster: Raster, width_px: int) -> WrittenRow | None:
-    """Numbers in the first row of ``black``, a raster; None where there are none.
-
-    ``width_px`` are the columns of the camera.
-    """
+def written_row(black: Counts, noise: Noise, raster: Raster) -> WrittenRow | None:
+    """Numbers in the first row of ``black``, a raster; None where there are none."""
     if raster.shape[0] < 2:
         return None
-    step_px = -(-width_px // raster.shape[1])
-    longest = min(LONGEST_PX // step_px, raster.shape[1])
+    longest = min(LONGEST_PX // raster.step_px, raster.shape[1])
     rows = black.reshape(raster.shape)[:2, :longest].astype(np.float32)
     # Colours of a mosaic alternate from pixel to pixel.
-    beside = 2 if step_px % 2 else 1
-    around = (rows[:, 2 * beside :] + rows[:, : -2 * beside]) / 2
-    first, below = np.abs(rows[:, beside:-beside] - around) > APART * noise.sensor.full_scale_dn
+    around = (rows[:, 4:] + rows[:, :-4]) / 2
+    first, below = np.abs(rows[:, 2:-2] - around) > APART * noise.sensor.full_scale_dn
     if int(first.sum()) < FEWEST or int(below.sum()) > MOST_BELOW * int(first.sum()):
         return None
-    return WrittenRow((int(np.flatnonzero(first)[-1]) + beside) * step_px)
+    return WrittenRow((int(np.flatnonzero(first)[-1]) + 2) * raster.step_px)

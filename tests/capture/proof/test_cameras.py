@@ -1,0 +1,67 @@
+"""Cameras of any width, and without colours, are judged as all others are."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from dsl_core.capture.proof.finding import Verdict
+from dsl_core.capture.proof.verifier import FrameProof
+from dsl_core.model.plan import CapturePlan, GrayCode, ScanLines, Sentinels, Setting, Shot
+from dsl_core.optics.sensor import bayer_channels
+from dsl_core.patterns.images import pattern_image
+
+COLUMNS = 64
+
+
+def plan_of(width: int, height: int) -> CapturePlan:
+    return CapturePlan(
+        camera_size_px=(width, height),
+        projector_size_px=(COLUMNS, 8),
+        code=GrayCode(rows=False),
+        spectral=ScanLines(width_px=4, step_px=2),
+        settings=(Setting(exposure_ms=100, level=0.5),),
+        code_settings=(0,),
+        sentinels=Sentinels(every=20),
+    )
+
+
+class FlatScene:
+    """A flat surface whose columns are the projector's, seen by a camera with noise."""
+
+    def __init__(self, plan: CapturePlan, bayer: str, led: tuple[float, float, float] = (1, 1, 1)) -> None:
+        width, height = plan.camera_size_px
+        self._plan, self._rng = plan, np.random.default_rng(width)
+        self._column = np.arange(width) * COLUMNS // width
+        self._gain = (np.array([0.8, 1.0, 0.6]) * led)[bayer_channels(bayer, height, width)]
+
+    def take(self, shot: Shot) -> NDArray[np.uint16]:
+        image = pattern_image(self._plan, self._plan.original(shot)).astype(float)
+        share = image.reshape(8, COLUMNS, -1).mean((0, 2)) / max(image.max(), 1)
+        light = 100 + 2000 * share[self._column][None] * self._gain
+        return self._rng.normal(light, np.sqrt(4 + 0.1 * light)).round().clip(0, 4095).astype(np.uint16)
+
+
+@pytest.mark.parametrize(
+    ("width", "height", "bayer"),
+    [(640, 71, "RGGB"), (1000, 36, "MONO"), (1280, 36, "RGGB"), (2048, 36, "GRBG"), (4096, 36, "MONO")],
+)
+def test_right_pictures_of_any_camera_pass(width: int, height: int, bayer: str) -> None:
+    plan = plan_of(width, height)
+    proof, scene = FrameProof(plan, None, 12, bayer), FlatScene(plan, bayer)
+    found = [proof.judge(shot, scene.take(shot)).verdict for shot in plan.shots()]
+    assert set(found) <= {Verdict.RIGHT, Verdict.UNTOLD}
+    assert found.count(Verdict.RIGHT) > len(found) / 2
+
+
+@pytest.mark.parametrize("width", [640, 1280])
+def test_a_blue_that_fails_is_seen_by_a_camera_of_any_width(width: int) -> None:
+    plan = plan_of(width, 36)
+    proof, scene, dim = FrameProof(plan, None, 12, "RGGB"), FlatScene(plan, "RGGB"), None
+    told = []
+    for shot in plan.shots():
+        if shot.role == "spectral" and dim is None:
+            dim = FlatScene(plan, "RGGB", (1.0, 1.0, 0.2))
+        told.append(proof.judge(shot, (dim or scene).take(shot)))
+    assert any(each.is_wrong or each.is_doubtful for each in told if each.shot.role != "code")
