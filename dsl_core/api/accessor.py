@@ -15,12 +15,17 @@ from dsl_core.errors import DecodeError
 from dsl_core.evaluation.marks import explain_pixel, largest_difference, region_spectrum
 from dsl_core.io.export import export_by_ending
 from dsl_core.io.result.result_file import save_result
+from dsl_core.model.attributes import SCALE_ATTRIBUTE
 from dsl_core.model.fit import Fit
 from dsl_core.model.result import DEPTH_INVALID
 from dsl_core.solve.normal import BAND_95
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+
+#: The attribute of a result that says when its scan was captured, and what a region keeps of its scan.
+CAPTURED = "captured"
+OF_SCAN = (CAPTURED, SCALE_ATTRIBUTE)
 
 
 @xr.register_dataset_accessor("dsl")  # type: ignore[no-untyped-call]
@@ -72,24 +77,38 @@ class ResultAccessor:
                 )
             },
             coords={over: self._result[over]},
-            attrs={"name": f"mean of {found.used} pixels", "used": found.used, "reasons": []},
+            attrs={
+                "name": f"mean of {found.used} pixels",
+                "used": found.used,
+                "reasons": [],
+                **{name: self._result.attrs[name] for name in OF_SCAN if name in self._result.attrs},
+            },
         )
 
     def difference(self, other: xr.Dataset) -> xr.Dataset:
         """This spectrum less another one, both of `spectrum` or `region`, over the bands that both have.
 
-        ``reflectance_std`` is the deviation of the difference, errors of both taken as independent. The
+        ``reflectance_std`` is the deviation of the difference, errors of both taken as independent; spectra
+        of two scans may differ by the scale of each as well, as far as results state it. The
         attributes ``most_nm`` and ``most_sigmas`` say in which band it is the most deviations from zero, and
         by how many; ``differ`` whether these are more than chance makes of so many bands. Raises
         `DecodeError` for what is not one spectrum, and where no band has both.
         """
         a, b = xr.align(*(_one_spectrum(each) for each in (self._result, other)), join="inner")
+        is_one_scan = a.attrs.get(CAPTURED) == b.attrs.get(CAPTURED)
+        a_std, b_std = (
+            np.hypot(
+                each["reflectance_std"],
+                each["reflectance"] * (0.0 if is_one_scan else each.attrs.get(SCALE_ATTRIBUTE, 0.0)),
+            )
+            for each in (a, b)
+        )
         most = largest_difference(
             a["wavelength_nm"].values,
             a["reflectance"].values,
             b["reflectance"].values,
-            a["reflectance_std"].values,
-            b["reflectance_std"].values,
+            a_std.values,
+            b_std.values,
         )
         if most is None:
             raise DecodeError("The spectra have no band in which both are known with their deviations.")
@@ -99,8 +118,10 @@ class ResultAccessor:
             "most_sigmas": abs(most.value) / most.std,
             "differ": most.is_shown,
         }
-        std = np.hypot(a["reflectance_std"], b["reflectance_std"])
-        values = {"reflectance": a["reflectance"] - b["reflectance"], "reflectance_std": std}
+        values = {
+            "reflectance": a["reflectance"] - b["reflectance"],
+            "reflectance_std": np.hypot(a_std, b_std),
+        }
         return xr.Dataset(values, attrs=attrs)
 
     def reasons(self, x: int, y: int) -> list[str]:

@@ -121,6 +121,8 @@ class Fit(Record):
     as a share of reflectance, in cells of the picture; empty where nothing is known. ``level_rel_std`` is the
     part, as a share of all reflectance, that the light may have changed by since its level was measured. The
     rest is noise, and what the calibration itself left open.
+    ``common_rel_std`` is the part that all pixels have in common: what the calibration leaves open of white,
+    and the scan of its light and of the pose.
     ``scale`` says what the scale of reflectance rests on and to what share it is known, and ``scale_rel_std``
     is its relative deviation, which is common to all pixels and only partly in the stated ones; None where
     there is no reflectance or nobody asked.
@@ -131,6 +133,7 @@ class Fit(Record):
     findings: tuple[FitFinding, ...] = ()
     model_error: tuple[tuple[tuple[float, ...], ...], ...] = ()
     level_rel_std: float = 0.0
+    common_rel_std: float = 0.0
     scale_rel_std: float | None = None
     scale: str = ""
     measured: str = ""

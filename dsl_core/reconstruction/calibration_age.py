@@ -8,6 +8,7 @@ from datetime import UTC, datetime, timedelta
 import numpy as np
 
 from dsl_core.model.calibration.light_check import LightCheck
+from dsl_core.model.fit import Fit
 from dsl_core.model.rig import Rig
 from dsl_core.solve.normal import BAND_95
 
@@ -83,6 +84,18 @@ def scale_rel_std(rig: Rig, captured: str) -> float:
     return max(level.rel_std, CHECKED_REL_STD if is_checked else UNCHECKED_REL_STD)
 
 
+def whole_scale_rel_std(rig: Rig, captured: str, fit: Fit) -> float:
+    """Relative deviation of the scale of a result's reflectance, with all that its pixels have in common.
+
+    ``rig`` is as calibrated, and not yet `aged`. Light counts by what is known of it after all, which is less
+    than deviations contain.
+    """
+    level = light_level(rig, captured)
+    contained = 0.0 if level is None else level.rel_std
+    others = max(fit.common_rel_std**2 - contained**2, 0.0) ** 0.5
+    return float(np.hypot(others, max(scale_rel_std(rig, captured), fit.level_rel_std)))
+
+
 def scale_in_words(rig: Rig, captured: str, rel_std: float) -> str:
     """What the scale of a scan's reflectance rests on, and to what share it is known."""
     level, calibrated = light_level(rig, captured), light_calibrated(rig)[:10]
@@ -155,8 +168,8 @@ def _of_light(rig: Rig, captured: str) -> str:
     if level is None:
         return ""
     known = (
-        f"no scan shows by itself whether its level has changed since. It is known to"
-        f" {BAND_95 * level.rel_std:.1%}, which deviations of reflectance contain."
+        f"no scan shows by itself whether its level has changed since. Deviations of reflectance contain"
+        f" {BAND_95 * level.rel_std:.1%} for its age."
     )
     remedy = " Run the drift check with the Spectralon, or calibrate with it again."
     if level.check is not None:

@@ -43,8 +43,8 @@ from dsl_core.reconstruction.calibration_age import (
     aged,
     light_level,
     scale_in_words,
-    scale_rel_std,
     unseen_since,
+    whole_scale_rel_std,
 )
 from dsl_core.version import __version__
 from dsl_core.workflows.captures import is_import, sensor_of_scan, with_imported_sensor
@@ -195,7 +195,7 @@ def _dated(
     )
     if not has_spectra:
         return {FIT_ATTRIBUTE: fit.model_dump_json()}
-    scale = max(scale_rel_std(rig, captured), fit.level_rel_std)
+    scale = whole_scale_rel_std(rig, captured, fit)
     said = {"scale_rel_std": scale, "scale": scale_in_words(rig, captured, scale)}
     return {FIT_ATTRIBUTE: fit.model_copy(update=said).model_dump_json(), SCALE_ATTRIBUTE: round(scale, 5)}
 

@@ -115,6 +115,24 @@ def test_a_region_says_its_units_and_takes_whole_pixels_alone(result: xr.Dataset
         result.dsl.region((112, 20, 6, 4))
 
 
+def test_spectra_of_two_scans_may_differ_by_their_scales(result: xr.Dataset) -> None:
+    again = result.assign_attrs(captured="2026-01-02T10:00:00+00:00", reflectance_scale_rel_std=0.03)
+    for one, other in (
+        (result.dsl.region((48, 28, 6, 5)), again.dsl.region((48, 28, 6, 5))),
+        (result.dsl.spectrum(50, 30), again.dsl.spectrum(50, 30)),
+    ):
+        brighter = other.assign(reflectance=1.03 * other["reflectance"])
+        less = one.dsl.difference(brighter)
+        wanted = np.sqrt(
+            one["reflectance_std"] ** 2
+            + other["reflectance_std"] ** 2
+            + (one.attrs["reflectance_scale_rel_std"] * one["reflectance"]) ** 2
+            + (0.03 * brighter["reflectance"]) ** 2
+        )
+        np.testing.assert_allclose(less["reflectance_std"], wanted)
+        assert not less.attrs["differ"]
+
+
 def test_two_spectra_differ_where_their_deviations_do_not_explain_it(result: xr.Dataset) -> None:
     one, other = result.dsl.region((48, 28, 6, 5)), result.dsl.region((60, 28, 6, 5))
     less = one.dsl.difference(other)

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 
 from dsl_core.model.calibration.accepted import AcceptedCalibration, CalibrationNote
 from dsl_core.model.calibration.light_check import LightCheck
+from dsl_core.model.fit import Fit
 from dsl_core.model.rig import Provenance, Rig
 from dsl_core.reconstruction.calibration_age import (
     CHECKED_REL_STD,
@@ -18,6 +20,7 @@ from dsl_core.reconstruction.calibration_age import (
     scale_rel_std,
     unseen_since,
     wander_per_root_day,
+    whole_scale_rel_std,
 )
 from dsl_core.simulation.published_rig import published_rig
 
@@ -73,7 +76,7 @@ def test_the_light_is_the_less_known_the_longer_ago_it_was_calibrated() -> None:
         assert aged(undated, SCANNED) == undated
     said = unseen_since(rig_of(THREE_WEEKS), SCANNED)
     assert "The light was calibrated 21 days before this scan" in said
-    assert "It is known to 6.6%" in said
+    assert "Deviations of reflectance contain 6.6% for its age." in said
 
 
 def test_the_calibration_of_the_light_counts_not_another_part() -> None:
@@ -168,6 +171,20 @@ def test_a_drift_check_of_the_day_makes_the_scale_known() -> None:
     assert scale_rel_std(darker, SCANNED) == pytest.approx(0.05, abs=0.001)
     # A lamp that was switched off since is not known by a check of days ago.
     assert scale_rel_std(with_checks(checked("2026-03-20T09:00:00+00:00", 1.0)), SCANNED) == UNCHECKED_REL_STD
+
+
+def test_the_scale_holds_what_all_pixels_have_in_common_and_light_once() -> None:
+    """Settings that disagree, a turned camera or a poor white leave it no better known than each of them."""
+    fresh, old = rig_of("2026-03-22T09:00:00+00:00"), rig_of(THREE_WEEKS)
+    for rig in (fresh, old):
+        light, stated = scale_rel_std(rig, SCANNED), aged(rig, SCANNED).reference_rel_std
+        alone = Fit(common_rel_std=float(np.hypot(stated, rig.white_scale_rel_std)))
+        own = np.hypot(rig.reference_rel_std, rig.white_scale_rel_std)
+        assert whole_scale_rel_std(rig, SCANNED, alone) == pytest.approx(np.hypot(light, own))
+        apart = Fit(common_rel_std=float(np.hypot(alone.common_rel_std, 0.05)))
+        assert whole_scale_rel_std(rig, SCANNED, apart) == pytest.approx(np.linalg.norm([light, own, 0.05]))
+    changed = Fit(level_rel_std=0.0335, common_rel_std=0.0)
+    assert whole_scale_rel_std(fresh, SCANNED, changed) == 0.0335
 
 
 def test_the_scale_of_an_old_calibration_is_known_no_better_than_its_light() -> None:

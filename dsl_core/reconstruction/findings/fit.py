@@ -50,7 +50,10 @@ def fit_of(
         off_px = _orders_off_px(rig)
         of_model = cause_findings(followed.probe, followed.balanced, followed.motion, off_px, followed.turn)
         findings += without_drift_that_is_none(of_model, [*findings])
+    turn = None if followed is None else followed.turn
+    common = [rig.white_scale_rel_std, rig.reference_rel_std, 0.0 if turn is None else turn.level_rel_std]
     fit = Fit.of(findings, () if error is None else np.round(error.relative, 4).tolist())
+    fit = fit.model_copy(update={"common_rel_std": float(np.linalg.norm(common))})
     if followed is None or not followed.has_changed:
         return fit
     doubts = [found.sentence for found in findings if found.name == MOVED and not found.significant]

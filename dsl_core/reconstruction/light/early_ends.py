@@ -108,7 +108,7 @@ def end_of_values(pixels: Mosaic, sensor: Sensor, first_row: int = 0) -> int | N
 
 
 def _is_end(pixels: Mosaic, end: int, sensor: Sensor, first_row: int) -> bool:
-    """Whether many pixels of several colours have this value, few those next to it, and hardly any more."""
+    """Whether many pixels have this value, of several colours if any, few those next to it, and none more."""
     at_end = pixels == end
     pile = int(at_end.sum())
     if pile < PILE or int((pixels > end).sum()) > ABOVE * pile:
@@ -120,4 +120,4 @@ def _is_end(pixels: Mosaic, end: int, sensor: Sensor, first_row: int) -> bool:
         return False
     channels = bayer_channels(sensor.bayer, pixels.shape[0] + first_row % 2, pixels.shape[1])[first_row % 2 :]
     colours = np.sort(np.bincount(channels[at_end], minlength=3))
-    return bool(colours[1] >= OTHER_COLOUR * pile)
+    return bool(colours[1] >= OTHER_COLOUR * pile or sensor.bayer == "MONO")

@@ -48,7 +48,8 @@ def doubt_of_levels(
         found[COLOUR_NAMES[colour]] = float(less.sum() / more.sum()) / wanted
     if max((abs(share - 1) for share in found.values()), default=0.0) < ALLOWED:
         return ""
-    shares = ", ".join(f"{share:.2f} in {name}" for name, share in found.items())
+    has_colours = np.unique(channels).size > 1
+    shares = ", ".join(f"{share:.2f}{f' in {name}' if has_colours else ''}" for name, share in found.items())
     return (
         "At half the drive level, white has another share of its light than the calibration says:"
         f" {shares} times that. Something changes levels on their way: a picture mode of the projector"

@@ -194,15 +194,20 @@ def _lines(scan: ProbedScan, targets: Indices, column_px: Tensor) -> LineProbe:
 def unevenness(amplitude: NDArray[np.float32], targets: Indices) -> Floats:
     """Differences of the light (rows, columns) around pixels (flat indices, (n,)), relative to the brightest.
 
-    Every other row and column has the same colour.
+    Every other row and column has the same colour; beyond the picture, a pixel stands for its neighbour.
     """
     rows, columns = amplitude.shape
     y, x = np.divmod(targets, columns)
-    beside = np.array([-2, 0, 2])
-    down, across = ((at[:, None] + beside).clip(0, size - 1) for at, size in ((y, rows), (x, columns)))
-    light = np.nan_to_num(amplitude[down[:, :, None], across[:, None]]).reshape(-1, beside.size**2).clip(0)
+    down, across = (_beside(at, size) for at, size in ((y, rows), (x, columns)))
+    light = np.nan_to_num(amplitude[down[:, :, None], across[:, None]]).reshape(len(targets), -1).clip(0)
     high = light.max(1)
     return np.asarray((high - light.min(1)) / np.maximum(high, 1e-12), np.float64)
+
+
+def _beside(at: Indices, size: int) -> Indices:
+    """Places (n, 3) two before, at and two behind each one, and the place itself where that is outside."""
+    places = at[:, None] + np.array([-2, 0, 2])
+    return np.where((places < 0) | (places >= size), at[:, None], places)
 
 
 def _white(scan: ProbedScan) -> Floats:

@@ -156,13 +156,19 @@ class DenseSolver:
         return gathered
 
     def solve(self, equations: Floats, index: NDArray[np.int64], found: Solved) -> None:
-        """Solve pixels (rows, columns) into ``found``, at the places that ``index`` says, where it is one."""
+        """Solve pixels (rows, columns) into ``found``, at the places that ``index`` says, where it is one.
+
+        Raises `ValueError` where a system is not positive definite, even without what rounding may have done.
+        """
         wanted = index >= 0
         at, own = index[wanted], equations[wanted]
         some = self._solved(own)
         broken = ~some.sound
         if broken.any():
-            again = self._solved(self._semidefinite(own[broken]))
+            is_finite = np.isfinite(own[broken]).all()
+            again = self._solved(self._semidefinite(own[broken])) if is_finite else None
+            if again is None or not again.sound.all():
+                raise ValueError(banded.NOT_DEFINITE)
             for name, values in vars(some).items():
                 values[broken] = getattr(again, name)
         for name, values in vars(some).items():

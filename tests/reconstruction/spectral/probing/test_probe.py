@@ -255,9 +255,7 @@ def test_light_is_uneven_by_neighbours_of_the_same_colour() -> None:
     light = np.tile(np.array([[1.0, 3.0], [3.0, 2.0]], np.float32), (5, 6))
     light[:, 6:] *= np.float32(0.25)
     light[9, 0] = np.nan
-    even, beside, corner, dark = (
-        np.ravel_multi_index(at, light.shape) for at in ((4, 2), (4, 5), (0, 11), (9, 2))
-    )
-    targets = np.array([even, beside, corner, dark])
-    assert probe_module.unevenness(light, targets).tolist() == [0.0, 0.75, 0.0, 1.0]
-    assert probe_module.unevenness(np.zeros_like(light), targets).tolist() == [0.0] * 4
+    places = ((4, 2), (4, 5), (0, 11), (1, 1), (8, 10), (9, 2))
+    targets = np.array([np.ravel_multi_index(at, light.shape) for at in places])
+    assert probe_module.unevenness(light, targets).tolist() == [0.0, 0.75, 0.0, 0.0, 0.0, 1.0]
+    assert probe_module.unevenness(np.zeros_like(light), targets).tolist() == [0.0] * 6

@@ -123,3 +123,6 @@ def test_what_rounding_made_negative_is_no_information() -> None:
     for name in ("nodes", "std", "data_share"):
         exact = getattr(wanted, name).numpy()[:, ::-1]
         assert getattr(spectra_found, name).numpy() == pytest.approx(exact, rel=1e-4, abs=1e-5), name
+    equations[0, 1, 3] = np.nan
+    with pytest.raises(ValueError, match="positive definite"):
+        DenseSolver(prior, bands).solve(equations, np.array([[1, 0]]), found)
