@@ -98,8 +98,8 @@ class ResultAccessor:
         is_one_scan = a.attrs.get(CAPTURED) == b.attrs.get(CAPTURED)
         a_std, b_std = (
             np.hypot(
-                each["reflectance_std"],
-                each["reflectance"] * (0.0 if is_one_scan else each.attrs.get(SCALE_ATTRIBUTE, 0.0)),
+                each["reflectance_std"].values,
+                each["reflectance"].values * (0.0 if is_one_scan else each.attrs.get(SCALE_ATTRIBUTE, 0.0)),
             )
             for each in (a, b)
         )
@@ -107,8 +107,8 @@ class ResultAccessor:
             a["wavelength_nm"].values,
             a["reflectance"].values,
             b["reflectance"].values,
-            a_std.values,
-            b_std.values,
+            a_std,
+            b_std,
         )
         if most is None:
             raise DecodeError("The spectra have no band in which both are known with their deviations.")
@@ -120,7 +120,7 @@ class ResultAccessor:
         }
         values = {
             "reflectance": a["reflectance"] - b["reflectance"],
-            "reflectance_std": np.hypot(a_std, b_std),
+            "reflectance_std": a["reflectance_std"].copy(data=np.hypot(a_std, b_std)),
         }
         return xr.Dataset(values, attrs=attrs)
 

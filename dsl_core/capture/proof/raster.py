@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dsl_core.model.rig import colour_sites
-from dsl_core.optics.spread_rows import spread_rows
+from dsl_core.solve.thinned import spread_rows
 
 Floats = NDArray[np.float32]
 Counts = NDArray[np.uint16]

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from dsl_core.capture.proof.finding import Verdict
 from dsl_core.capture.proof.verifier import FrameProof
 from dsl_core.model.plan import CapturePlan, GrayCode, ScanLines, Sentinels, Setting, Shot
+from dsl_core.model.rig import BayerPattern
 from dsl_core.optics.sensor import bayer_channels
 from dsl_core.patterns.images import pattern_image
 
@@ -30,7 +31,9 @@ def plan_of(width: int, height: int) -> CapturePlan:
 class FlatScene:
     """A flat surface whose columns are the projector's, seen by a camera with noise."""
 
-    def __init__(self, plan: CapturePlan, bayer: str, led: tuple[float, float, float] = (1, 1, 1)) -> None:
+    def __init__(
+        self, plan: CapturePlan, bayer: BayerPattern, led: tuple[float, float, float] = (1, 1, 1)
+    ) -> None:
         width, height = plan.camera_size_px
         self._plan, self._rng = plan, np.random.default_rng(width)
         self._column = np.arange(width) * COLUMNS // width
@@ -40,14 +43,15 @@ class FlatScene:
         image = pattern_image(self._plan, self._plan.original(shot)).astype(float)
         share = image.reshape(8, COLUMNS, -1).mean((0, 2)) / max(image.max(), 1)
         light = 100 + 2000 * share[self._column][None] * self._gain
-        return self._rng.normal(light, np.sqrt(4 + 0.1 * light)).round().clip(0, 4095).astype(np.uint16)
+        values = self._rng.normal(light, np.sqrt(4 + 0.1 * light))
+        return np.asarray(values.round().clip(0, 4095), np.uint16)
 
 
 @pytest.mark.parametrize(
     ("width", "height", "bayer"),
     [(640, 71, "RGGB"), (1000, 36, "MONO"), (1280, 36, "RGGB"), (2048, 36, "GRBG"), (4096, 36, "MONO")],
 )
-def test_right_pictures_of_any_camera_pass(width: int, height: int, bayer: str) -> None:
+def test_right_pictures_of_any_camera_pass(width: int, height: int, bayer: BayerPattern) -> None:
     plan = plan_of(width, height)
     proof, scene = FrameProof(plan, None, 12, bayer), FlatScene(plan, bayer)
     found = [proof.judge(shot, scene.take(shot)).verdict for shot in plan.shots()]
