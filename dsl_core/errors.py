@@ -33,6 +33,10 @@ class StoreError(DslError):
     """A scan, result or export on disk cannot be read or written."""
 
 
+class DriveError(StoreError):
+    """A whole drive does not answer; nothing is known to be wrong with what is on it."""
+
+
 class TakenError(StoreError):
     """What is to be written exists already; it may be replaced where that was allowed."""
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Iterable
-from contextlib import suppress
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +14,7 @@ from dsl_core.capture.proof.light_sums import light_sentence
 from dsl_core.capture.proof.raster import Counts, Raster
 from dsl_core.capture.proof.verifier import FrameProof
 from dsl_core.capture.sentinels import movement_of
-from dsl_core.errors import StoreError
+from dsl_core.errors import DriveError, StoreError
 from dsl_core.model.frames import FrameSource, read_rows
 from dsl_core.model.plan import CapturePlan, Shot
 from dsl_core.model.rig import Rig
@@ -39,11 +38,15 @@ class SeenFrames:
             self._seen[shot.index] = seen
 
     def read_missing(self, source: FrameSource) -> None:
-        """Read every frame of which nothing is kept yet; damaged ones are left out."""
+        """Read every frame of which nothing is kept yet; damaged ones are left out. Raises `DriveError`."""
         for shot in self.plan.shots():
             if shot.index not in self._seen:
-                with suppress(StoreError):
+                try:
                     self.keep(shot, source.read(shot))
+                except DriveError:
+                    raise
+                except StoreError:
+                    continue
 
     @property
     def unseen(self) -> frozenset[int]:

@@ -14,6 +14,7 @@ from pydantic import Field
 
 from dsl_core.errors import StoreError
 from dsl_core.io.atomic import store_error, sync_folder, write_all, write_atomic
+from dsl_core.io.patience import drive_error, is_away, patiently
 from dsl_core.io.reading import read_bounded
 from dsl_core.io.sealed import seal, unseal
 from dsl_core.model.base import Record
@@ -50,6 +51,8 @@ def read_log(path: Path) -> tuple[list[LogEntry], int]:
     except FileNotFoundError:
         return [], 0
     except OSError as error:
+        if is_away(error):
+            raise drive_error(path, error) from error
         raise StoreError(
             f"{path} cannot be read ({error.strerror or error}). Restore it from a copy of the scan."
         ) from error
@@ -102,16 +105,34 @@ class CaptureLog:
         if self._descriptor is None:
             raise StoreError(f"{self.path} is closed; open the scan again before writing to it.")
         line = _line(entry)
-        try:
-            os.lseek(self._descriptor, self._size, os.SEEK_SET)
-            write_all(self._descriptor, line)
-            os.fsync(self._descriptor)
-        except OSError as error:
-            with contextlib.suppress(OSError):  # a torn line is dropped by the next reader anyway
-                os.ftruncate(self._descriptor, self._size)
-            raise store_error(self.path, error) from error
+        patiently(lambda: self._append(line), self.path)
         self._size += len(line)
         self.entries.append(entry)
+
+    def _append(self, line: bytes) -> None:
+        descriptor = self._descriptor
+        if descriptor is None:  # `append` has found it open
+            return
+        try:
+            os.lseek(descriptor, self._size, os.SEEK_SET)
+            write_all(descriptor, line)
+            os.fsync(descriptor)
+        except OSError as error:
+            with contextlib.suppress(OSError):  # a torn line is dropped by the next reader anyway
+                os.ftruncate(descriptor, self._size)
+            if is_away(error):
+                self._open_again(descriptor)
+            raise store_error(self.path, error) from error
+
+    def _open_again(self, old: int) -> None:
+        """Take the file of that name, if it is the same one: a share that was away forgets what was open."""
+        with contextlib.suppress(OSError):
+            new = os.open(self.path, os.O_WRONLY | getattr(os, "O_BINARY", 0))
+            if os.fstat(new).st_size < self._size:
+                os.close(new)
+                return
+            self._descriptor = new
+            os.close(old)
 
     def restore(self) -> bool:
         """Write all lines again unless the disk has them; says whether that was necessary."""

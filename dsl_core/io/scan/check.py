@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from dsl_core.errors import StoreError
+from dsl_core.errors import DriveError, StoreError
 from dsl_core.io.scan.capture_log import LogEntry
 from dsl_core.io.scan.folder import ScanReader
 from dsl_core.model.plan import Shot, describe_shot, spoken_number
@@ -92,6 +92,8 @@ def _unreadable(reader: ScanReader) -> Iterator[str]:
         if shot.index in present:
             try:
                 reader.read(shot)
+            except DriveError:
+                raise
             except StoreError as error:
                 yield str(error)
 

@@ -22,10 +22,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dsl_core.devices.base import DeviceRig
-from dsl_core.errors import StoreError
+from dsl_core.errors import DriveError, StoreError
 from dsl_core.io import MANIFEST_NAME
-from dsl_core.io.atomic import make_folder, remove_partials
+from dsl_core.io.atomic import make_folder, remove_partials, store_error
 from dsl_core.io.kinds import whose_inside
+from dsl_core.io.patience import drive_error, is_away, patiently
 from dsl_core.io.records import replace_record
 from dsl_core.io.scan.capture_log import CaptureLog, LogEntry, read_log
 from dsl_core.io.scan.estimate import check_space
@@ -87,11 +88,16 @@ class ScanReader:
         return [s for s in self.plan.shots() if s.index not in self.entries or s.index not in stored]
 
     def sound(self) -> set[int]:
-        """Indices of the frames that are there to the bit: every pixel is read and compared."""
+        """Indices of the frames that are there to the bit: every pixel is read and compared.
+
+        Raises `DriveError` where nobody can tell.
+        """
 
         def is_sound(shot: Shot) -> bool:
             try:
                 self.read(shot)
+            except DriveError:
+                raise
             except StoreError:
                 return False
             return True
@@ -286,7 +292,11 @@ class ScanWriter:
 
         Every pixel is read and compared. Raises `StoreError` when the folder itself is gone or fails.
         """
-        if not self.folder.is_dir():
+        try:
+            is_there = patiently(self.folder.is_dir, self.folder)
+        except OSError as error:
+            raise (drive_error if is_away(error) else store_error)(self.folder, error) from error
+        if not is_there:
             raise StoreError(
                 f"{self.folder} was moved or deleted while it was written. Put it back: what is missing is"
                 " then captured again."

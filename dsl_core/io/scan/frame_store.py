@@ -10,16 +10,17 @@ from __future__ import annotations
 
 import json
 import zlib
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dsl_core.errors import StoreError
 from dsl_core.io.atomic import make_folder, store_error, sync_folder, write_atomic
+from dsl_core.io.patience import drive_error, is_away, patiently
 from dsl_core.io.reading import parts_of, read_bounded, read_json
 from dsl_core.io.scan.blosc_blocks import HEADER, Bytes, blocks_of
 from dsl_core.model.plan import spoken_number
@@ -29,6 +30,7 @@ from dsl_core.model.plan import spoken_number
 _BLOSC = {"typesize": 2, "cname": "zstd", "clevel": 1, "shuffle": "bitshuffle", "blocksize": 1 << 16}
 _BITSHUFFLE = 2
 _PIXEL = np.dtype("<u2")
+T = TypeVar("T")
 
 
 def checksum(pixels: NDArray[np.uint16]) -> int:
@@ -61,6 +63,8 @@ class FrameStore:
             if not isinstance(found, dict):
                 raise ValueError("not an object")
         except (OSError, ValueError) as error:
+            if isinstance(error, OSError) and is_away(error):
+                raise drive_error(self._metadata_path, error) from error
             raise StoreError(
                 f"{self._metadata_path} is missing or damaged, so the frames cannot be read."
                 " Restore it from a copy of the scan."
@@ -79,8 +83,14 @@ class FrameStore:
         return self.folder / f"c.{index}.0.0"
 
     def stored(self) -> set[int]:
-        """Indices of all frame files in the folder, also of those that the plan does not know."""
-        names = (path.name.split(".") for path in self.folder.glob("c.*.0.0"))
+        """Indices of all frame files in the folder, also of those that the plan does not know.
+
+        Raises `StoreError` where the folder cannot be listed.
+        """
+        try:
+            names = [path.name.split(".") for path in self.folder.glob("c.*.0.0")]
+        except OSError as error:
+            raise (drive_error if is_away(error) else store_error)(self.folder, error) from error
         return {int(name[1]) for name in names if name[1].isdigit()}
 
     def write(self, index: int, pixels: NDArray[np.uint16]) -> None:
@@ -95,7 +105,8 @@ class FrameStore:
         codec = blosc.Blosc(
             cname=_BLOSC["cname"], clevel=_BLOSC["clevel"], shuffle=_BITSHUFFLE, blocksize=_BLOSC["blocksize"]
         )
-        write_atomic(self.path(index), codec.encode(np.ascontiguousarray(pixels, _PIXEL)))
+        chunk = codec.encode(np.ascontiguousarray(pixels, _PIXEL))
+        patiently(lambda: write_atomic(self.path(index), chunk), self.path(index))
 
     def remove(self, indices: Iterable[int]) -> None:
         """Delete mosaics, also for a power cut that follows; raises `StoreError`."""
@@ -107,11 +118,8 @@ class FrameStore:
             raise store_error(self.folder, error) from error
 
     def read(self, index: int, out: NDArray[np.uint16] | None = None) -> NDArray[np.uint16]:
-        """Load a mosaic, shape (height, width), into ``out`` if given; raises `ChunkError`."""
-        try:
-            chunk = read_bounded(self.path(index), self._most_bytes)
-        except OSError as error:
-            raise self._unreadable(index, error) from error
+        """Load a mosaic, shape (height, width), into ``out`` if given; raises `ChunkError`, `DriveError`."""
+        chunk = self._patiently(index, lambda: read_bounded(self.path(index), self._most_bytes))
         self._check_header(index, chunk)
         if out is None:
             out = np.empty((self.height_px, self.width_px), np.uint16)
@@ -126,26 +134,42 @@ class FrameStore:
     def read_rows(self, index: int, rows: slice) -> NDArray[np.uint16]:
         """Some rows of a mosaic, shape (rows, width); only the blocks that hold them are decompressed.
 
-        Raises `ChunkError`.
+        Raises `ChunkError`, `DriveError`.
         """
         first, last, _ = rows.indices(self.height_px)
         row_bytes = self.width_px * _PIXEL.itemsize
         from numcodecs import blosc
 
-        try:
+        def blocks() -> tuple[bytes, int]:
             with parts_of(self.path(index), self._most_bytes) as chunk:
                 self._check_header(index, chunk)
-                part, begins = blocks_of(chunk, first * row_bytes, last * row_bytes)
+                return blocks_of(chunk, first * row_bytes, last * row_bytes)
+
+        try:
+            part, begins = self._patiently(index, blocks)
             raw = np.frombuffer(blosc.decompress(part), np.uint8)
-        except OSError as error:
-            raise self._unreadable(index, error) from error
         except (RuntimeError, ValueError) as error:
             raise ChunkError(f"its file {self.path(index)} does not decompress ({error})") from error
         wanted = raw[first * row_bytes - begins : last * row_bytes - begins]
         return wanted.view(_PIXEL).reshape(last - first, self.width_px)
 
-    def _unreadable(self, index: int, error: OSError) -> ChunkError:
-        return ChunkError(f"its file {self.path(index)} cannot be read ({error.strerror or error})")
+    def _patiently(self, index: int, read: Callable[[], T]) -> T:
+        """What ``read`` finds in the file of a frame, asked again while its drive does not answer."""
+        try:
+            return patiently(read, self.path(index), self._is_gone)
+        except OSError as error:
+            if is_away(error) and self._is_gone():
+                raise drive_error(self.folder, error) from error
+            reason = error.strerror or error
+            raise ChunkError(f"its file {self.path(index)} cannot be read ({reason})") from error
+
+    def _is_gone(self) -> bool:
+        """Whether the drive does not answer: where one frame alone cannot be read, that file is damaged."""
+        try:
+            read_bounded(self._metadata_path)
+        except OSError as error:
+            return is_away(error)
+        return False
 
     def _check_header(self, index: int, chunk: Bytes) -> None:
         """Refuse a chunk that is cut off or holds another size or type, before the decoder touches it."""

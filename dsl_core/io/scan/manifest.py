@@ -15,6 +15,7 @@ from dsl_core.devices.conditions import conditions_of
 from dsl_core.errors import StoreError
 from dsl_core.io import MANIFEST_NAME
 from dsl_core.io.kinds import what_is_at
+from dsl_core.io.patience import drive_error, is_away
 from dsl_core.io.records import read_record
 from dsl_core.model.base import Record
 from dsl_core.model.conditions import differences as setting_differences
@@ -59,7 +60,13 @@ def describe_scan(plan: CapturePlan, rig: DeviceRig | None, notes: dict[str, str
 
 def read_manifest(folder: Path) -> Manifest:
     """Load the manifest of a scan folder; raises `StoreError`."""
-    if not (folder / MANIFEST_NAME).exists():
+    try:
+        is_scan = (folder / MANIFEST_NAME).exists()
+    except OSError as error:
+        if is_away(error):
+            raise drive_error(folder, error) from error
+        raise
+    if not is_scan:
         raise StoreError(
             f"{folder} is not a scan: {what_is_at(folder)}. Give the folder of a scan (NAME.dsl)."
         )
