@@ -19,6 +19,7 @@ from dsl_core.model.rig import Sensor
 from dsl_core.optics.sensor import raw_variance
 from dsl_core.reconstruction.hdr import BlackFrame
 from dsl_core.solve.normal import STD_OF_MEDIAN_SIZE
+from dsl_core.solve.thinned import thinned
 
 #: Counts of the brighter setting that are compared, as shares of full scale.
 USED = (0.01, 0.9)
@@ -27,6 +28,11 @@ ROWS, FEWEST = 145, 12
 
 #: Pixels contradict each other where what no factor explains is so many times their noise (variance).
 CONTRADICT = 4.0
+#: Pixels that agree with most others are off by so many deviations and by this share of their light at most;
+#: so many of all have to. A fly, a shadow or a reflection is in few pixels, and may be in the brightest ones.
+AGREE_SIGMAS, AGREE_SHARE, FEWEST_AGREE = 4.0, 0.02, 0.6
+#: Pixels asked whether they agree.
+ASKED = 20_000
 #: A pattern whose settings are further apart than those of most patterns, by so much (logarithm) and so many
 #: deviations from pattern to pattern, says nothing of the light: its picture would be of wrong brightness.
 STRANGE, STRANGE_SIGMAS = 0.35, 8.0
@@ -76,12 +82,42 @@ def compare_settings(
         if count < FEWEST or factor <= 0:
             found.append(None)
             continue
-        log = np.log(factor / scale)
-        std = 1 / np.sqrt(power) / factor
         misfit = (square - factor * product) / count
-        std *= np.sqrt(misfit) if misfit > CONTRADICT else 1.0
-        found.append(Ratio(float(log if faint == i else -log), float(std)))
+        ratio: Ratio | None = Ratio(float(np.log(factor / scale)), float(1 / np.sqrt(power) / factor))
+        if misfit > CONTRADICT:
+            pair = [(pictures[n], darks[n]) for n in (faint, bright)]
+            ratio = _of_most(*pair, scale, (low, high), floor, sensor.electrons_per_dn)
+        found.append(ratio if ratio is None or faint == i else Ratio(-ratio.log, ratio.std))
     return (*found, Ratio(0.0, 0.0))
+
+
+def _of_most(
+    faint: tuple[NDArray[np.unsignedinteger], NDArray[np.floating]],
+    bright: tuple[NDArray[np.unsignedinteger], NDArray[np.floating]],
+    scale: float,
+    limits: tuple[float, float],
+    floor: float,
+    electrons: float,
+) -> Ratio | None:
+    """What most pixels say, where some contradict them; None where they do not agree either.
+
+    Each setting is a mosaic and its black; the other arguments are those of `light_sums`.
+    """
+    other, light = (np.subtract(raw, black, dtype=np.float32) for raw, black in (faint, bright))
+    used = (light > limits[0]) & (bright[0] < limits[1]) & (faint[0] < limits[1])
+    some = thinned(np.flatnonzero(used), ASKED)
+    x, y = (each.ravel()[some].astype(np.float64) for each in (light, other))
+    shot = x / electrons
+    variance = 2.0 * floor + scale * shot
+    middle = float(np.median(y / x))
+    agree = np.abs(y - middle * x) < AGREE_SIGMAS * np.sqrt(variance) + AGREE_SHARE * middle * x
+    if middle <= 0 or int(agree.sum()) < max(FEWEST, FEWEST_AGREE * some.size):
+        return None
+    x, y, weight = x[agree], y[agree], 1 / variance[agree]
+    power = float(weight @ (x**2 - floor - shot[agree]))
+    factor = float(weight @ (x * y)) / power
+    misfit = max(float(weight @ (y - factor * x) ** 2) / x.size, 1.0)
+    return Ratio(float(np.log(factor / scale)), float(np.sqrt(misfit / power)) / factor)
 
 
 def without_strange(
