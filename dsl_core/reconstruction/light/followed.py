@@ -21,10 +21,11 @@ from dsl_core.reconstruction.light.setting_ratios import without_strange
 from dsl_core.reconstruction.light.slow_black import slow_black
 from dsl_core.reconstruction.light.steady import SteadyLight
 from dsl_core.reconstruction.light.sudden import Again, sudden_changes
-from dsl_core.reconstruction.light.told import black_wander, light_findings, sudden_findings
+from dsl_core.reconstruction.light.told import black_wander, colour_findings, light_findings, sudden_findings
 from dsl_core.reconstruction.light.witnesses import (
     LEVEL_ERROR,
     blacks_again,
+    colours_of_whites,
     of_lines,
     of_settings,
     of_whites,
@@ -99,6 +100,7 @@ def follow_light(
         settings = [without_steps(each, exposed) for each in of_settings(frames)]
     lines = scan.levels()
     course = light_course([*settings, *whites, *of_lines(frames, lines)], shots, first_lines)
+    told = (*told, *colour_findings(list(colours_of_whites(frames))))
     if course is None:
         return scan.code, scan.white, told
     white = scan.white

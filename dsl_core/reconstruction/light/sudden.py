@@ -31,6 +31,8 @@ Floats = NDArray[np.float64]
 LEAST_LOG, LEAST_DN, SIGMAS = 0.02, 0.5, 6.0
 #: Light that both neighbours hold in common has to be so many deviations to say by how much it changed.
 TELLING = 10.0
+#: Deviations from which on a step is not as large in its own frames as in white taken again.
+UNLIKE = 4.0
 #: What a change of black as lines show it may be wrong by, relative to it, and of that DN at least.
 ROUGH_SHARE, ROUGH_DN = 0.1, 0.5
 
@@ -60,12 +62,14 @@ class Gained:
 class SuddenChanges:
     """Steps of black and of the logarithm of light by the first shot after each.
 
-    ``explains_black`` is whether black did not change otherwise.
+    ``explains_black`` is whether black did not change otherwise. ``apart`` is by how much a step of light
+    in its own frames differs from that in white taken again, where that is more than chance.
     """
 
     black: Mapping[int, Gained]
     log: Mapping[int, float]
     explains_black: bool = True
+    apart: float = 0.0
 
     def exposed(self, scan: Scan) -> Exposed:
         """In what light each shot was taken: as calibrated at first, with black as in its black frame."""
@@ -112,7 +116,18 @@ def sudden_changes(
         and at != white.shot
     }
     gained = {at: _gained(scan, steps, at, *each, light.get(at, 0.0)) for at, each in dated.items()}
-    return SuddenChanges(gained, light, len(dated) == len(darks)) if light or dated else None
+    if not light and not dated:
+        return None
+    # Neighbouring lines differ by what the scene sends back as well; pictures of a code are all light.
+    in_code = {shot.index for shot in scan.plan.shots() if shot.role == "code"} & light.keys()
+    apart = max((_apart(log[at], log_std[at], light[at]) for at in in_code), default=0.0)
+    return SuddenChanges(gained, light, len(dated) == len(darks), apart)
+
+
+def _apart(seen: float, std: float, total: float) -> float:
+    """By how much a step differs from that of white taken again: settings may gain and lose unlike light."""
+    off = abs(seen - total)
+    return float(off) if off > UNLIKE * std else 0.0
 
 
 def share_of_black(

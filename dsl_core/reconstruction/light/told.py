@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Iterator, Sequence
 
 import numpy as np
 
+from dsl_core.model.conditions import COLOUR_NAMES
 from dsl_core.model.fit import FitFinding
 from dsl_core.model.plan import CapturePlan, spoken_number
 from dsl_core.model.rig import ProjectorResponse
@@ -13,6 +15,7 @@ from dsl_core.reconstruction.hdr import setting_gains_ms
 from dsl_core.reconstruction.light.course import LEAST_DRIFT, LEAST_FLICKER, LightCourse
 from dsl_core.reconstruction.light.slow_black import SlowBlack
 from dsl_core.reconstruction.light.sudden import Again, SuddenChanges
+from dsl_core.reconstruction.light.witnesses import ColoursAgain
 
 #: Settings that differ by more are told, and what that is called.
 LEAST_APART, APART = 0.01, "settings against each other"
@@ -25,10 +28,15 @@ LEAST_BRACKET = 0.5
 #: Changes of black that matter: first orders of dark surfaces are a few numbers bright.
 MOST_BLACK_DN = 0.5
 #: What a change of the light over a scan is called that frames are corrected for.
-DRIFT = "drift of the light"
+DRIFT, STEP = "drift of the light", "step of the light"
+#: The calibrated light may be any from the first to the last of a scan: deviation of that, of the change.
+ANY_BETWEEN = 1 / math.sqrt(3)
+#: How far the light of a colour may be from that of all, as a share, in deviations, and what that is called.
+LEAST_COLOUR, COLOUR_SIGMAS, COLOUR = 0.015, 6.0, "colour of the light"
 #: Rms of a flicker's changes of black that two pictures of it hardly exceed.
 USUAL_FLICKERS = 3.0
 _CORRECTED = " The frames are corrected for it."
+_FIRST = " Which light was as calibrated, no scan can tell: the first is taken to be."
 
 
 def black_wander(
@@ -71,21 +79,45 @@ def sudden_findings(sudden: SuddenChanges | None) -> Iterator[FitFinding]:
     if sudden is None or not sudden.log:
         return
     worst = max(sudden.log.values(), key=abs)
-    yield FitFinding.judged(
+    unlike = f" (±{sudden.apart:.1%})" if sudden.apart else ""
+    step = FitFinding.judged(
         "light",
-        "step of the light",
-        float(np.expm1(worst)),
+        STEP,
+        (float(np.expm1(worst)), sudden.apart),
         "1",
         LEAST_DRIFT,
-        f"The light has changed by {np.expm1(worst):+.1%} at once, {_since(sudden.log)}.{_CORRECTED} Which of"
-        " both was as calibrated, no scan can tell: the first is taken to be.",
+        f"The light has changed by {np.expm1(worst):+.1%}{unlike} at once, {_since(sudden.log)}."
+        f"{_CORRECTED}{_FIRST}",
         "Switch automatic exposure and gain of the camera off, and check the lamp and its supply.",
     )
+    # That it came is sure; how high it is may not be.
+    yield step.model_copy(update={"significant": True})
 
 
 def _since(steps: Iterable[int]) -> str:
     names = " and ".join(f"frame {spoken_number(at)}" for at in sorted(steps))
     return f"from {names} on"
+
+
+def colour_findings(colours: Sequence[ColoursAgain]) -> Iterator[FitFinding]:
+    """What white taken again, the one whose colour differs most, says to a person."""
+    told = [each for each in colours if each.apart > max(LEAST_COLOUR, COLOUR_SIGMAS * each.std)]
+    if not told:
+        return
+    worst = max(told, key=lambda each: each.apart)
+    more = ", ".join(
+        f"{np.expm1(log):+.1%} in {name}" for name, log in zip(COLOUR_NAMES, worst.log, strict=True)
+    )
+    yield FitFinding.judged(
+        "light",
+        COLOUR,
+        (worst.apart, worst.std),
+        "1",
+        LEAST_COLOUR,
+        f"The light has changed its colour during the scan: white has {more}. Frames are corrected as if all"
+        " colours had changed alike; deviations of reflectance hold what they differ by.",
+        "Switch night mode, colour temperature and automatic white balance off, and check the lamps.",
+    )
 
 
 def light_findings(course: LightCourse, with_lines: bool) -> Iterator[FitFinding]:
@@ -99,11 +131,10 @@ def light_findings(course: LightCourse, with_lines: bool) -> Iterator[FitFinding
         "1",
         LEAST_DRIFT,
         (
-            f"The light drifted by {change:+.1%} (±{std:.1%}) during the scan.{_CORRECTED}"
+            f"The light drifted by {change:+.1%} (±{std:.1%}) during the scan.{_CORRECTED}{_FIRST}"
             if course.step_at is None
             else f"The light has changed by {change:+.1%} (±{std:.1%}) at once, from about frame"
-            f" {spoken_number(course.step_at)} on.{_CORRECTED} Which of both was as calibrated, no scan can"
-            " tell: the first is taken to be."
+            f" {spoken_number(course.step_at)} on.{_CORRECTED}{_FIRST}"
         ),
         (
             "Let the projector warm up for longer."
@@ -134,11 +165,14 @@ def unsure_level(plan: CapturePlan, response: ProjectorResponse, findings: Itera
     as makes settings of two drive levels disagree has, at the last of them, another share of its full light
     as well. A camera whose values follow a power of the light makes less of first orders, which are faint,
     than of white. The larger of both counts. What a change of the light is off by is common to all frames
-    after it, and no average over frames makes it less.
+    after it, and no average over frames makes it less; nor does any frame say which light was calibrated, the
+    first or the last. Light that changes its colour is followed as if all colours had changed alike.
     """
     findings = tuple(findings)
-    change = next((f for f in findings if f.significant and f.name == DRIFT), None)
-    return float(np.hypot(_unsure_settings(plan, response, findings), (change.std or 0.0) if change else 0.0))
+    changes = [each for each in findings if each.significant and each.name in (DRIFT, STEP)]
+    off = [part for each in changes for part in (each.std or 0.0, ANY_BETWEEN * each.value)]
+    colours = [each.value for each in findings if each.significant and each.name == COLOUR]
+    return float(np.linalg.norm([_unsure_settings(plan, response, findings), *off, *colours]))
 
 
 def _unsure_settings(plan: CapturePlan, response: ProjectorResponse, findings: Sequence[FitFinding]) -> float:

@@ -3,21 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dsl_core.model.plan import Shot
-from dsl_core.optics.sensor import raw_variance
+from dsl_core.optics.sensor import bayer_channels, raw_variance
 from dsl_core.reconstruction.light.course import Witness
 from dsl_core.reconstruction.light.line_levels import LineLevels
 from dsl_core.reconstruction.light.pictures import Pictures
 from dsl_core.reconstruction.light.sudden import Again, share_of_black
 from dsl_core.reconstruction.merge import Exposed
+from dsl_core.solve.robust import robust_std
 
 #: What levels of frames may be wrong by beyond their own deviations: the sum of light is not exact.
 LEVEL_ERROR = 0.004
+#: Pixels of a colour that tell how much light of it there is; deviation of a median over that of a mean.
+FEWEST, STD_OF_MEDIAN = 60, 1.2533
 
 
 def blacks_again(scan: Pictures) -> list[Again]:
@@ -56,8 +59,52 @@ def of_settings(scan: Pictures) -> Iterator[Witness]:
                 yield Witness(shot.index, shots[-1].index, ratio.log, ratio.std, setting=place)
 
 
+@dataclass(frozen=True)
+class ColoursAgain:
+    """Logarithms of the light of white, taken again, in red, green and blue, over that of the first.
+
+    ``apart`` is how far the farthest of them is from that of all light together, and ``std`` its deviation.
+    """
+
+    log: tuple[float, float, float]
+    apart: float
+    std: float
+
+
 def of_whites(scan: Pictures) -> Iterator[Witness]:
     """White taken again, over white as it was taken first, each less the black next to it."""
+    for shot, old, first, now in _whites_again(scan):
+        yield _compared(scan, shot, old, first, now)
+
+
+def colours_of_whites(scan: Pictures) -> Iterator[ColoursAgain]:
+    """The same in each colour, of a camera that sees colours; none where one is nowhere bright enough."""
+    bayer, limit = scan.rig.sensor.bayer, 0.9 * scan.rig.sensor.full_scale_dn
+    if bayer == "MONO":
+        return
+    for _, _, first, now in _whites_again(scan):
+        channels = bayer_channels(bayer, *first.shape)
+        bright = np.zeros(first.shape, bool)
+        for colour in range(3):
+            own = channels == colour
+            bright |= own & (first > 0.25 * np.percentile(first[own], 95))
+        used = bright & (first < limit) & (now < limit) & (now > 0)
+        each = [used & (channels == colour) for colour in range(3)]
+        if min(int(own.sum()) for own in each) < FEWEST:
+            continue
+        more = np.log(np.where(used, now, 1.0) / np.where(used, first, 1.0))
+        # Something before a part of the picture changes the light of that part alone.
+        middle, logs = float(np.median(more[used])), [float(np.median(more[own])) for own in each]
+        worst = int(np.abs(np.array(logs) - middle).argmax())
+        own = more[each[worst]]
+        std = STD_OF_MEDIAN * float(robust_std(own - logs[worst])) / np.sqrt(own.size)
+        yield ColoursAgain((logs[0], logs[1], logs[2]), abs(logs[worst] - middle), std)
+
+
+def _whites_again(
+    scan: Pictures,
+) -> Iterator[tuple[Shot, Shot, NDArray[np.floating], NDArray[np.floating]]]:
+    """Each white taken again, what it repeats, and the light of both: that of the first one first."""
     plan = scan.plan
     again = {shot: plan.original(shot) for shot in plan.shots() if shot.role == "sentinel"}
     blacks = [shot for shot, old in again.items() if old.role == "black"]
@@ -67,8 +114,7 @@ def of_whites(scan: Pictures) -> Iterator[Witness]:
             continue
         black = scan.shots_of("black", 0)[old.setting]
         first = scan.source.read(old).astype(np.float32) - scan.source.read(black)
-        now = scan.source.read(shot).astype(np.float32) - scan.source.read(near[0])
-        yield _compared(scan, shot, old, first, now)
+        yield shot, old, first, scan.source.read(shot).astype(np.float32) - scan.source.read(near[0])
 
 
 def _compared(

@@ -9,7 +9,15 @@ import pytest
 
 from dsl_core.model.plan import CapturePlan, Setting
 from dsl_core.model.rig import ProjectorResponse
-from dsl_core.reconstruction.light.told import DRIFT, light_findings, unsure_level
+from dsl_core.reconstruction.light.sudden import SuddenChanges
+from dsl_core.reconstruction.light.told import (
+    DRIFT,
+    colour_findings,
+    light_findings,
+    sudden_findings,
+    unsure_level,
+)
+from dsl_core.reconstruction.light.witnesses import ColoursAgain
 from tests.cases.scan_light import PLAN, course_of
 
 
@@ -66,7 +74,7 @@ def test_light_that_changed_at_once_is_told_with_the_frame_from_which_on() -> No
     assert told.significant
     assert told.name == DRIFT
     assert told.sentence.startswith("The light has changed by -9.5% (±0.1%) at once, from about frame 91 on.")
-    assert "Which of both was as calibrated, no scan can tell" in told.sentence
+    assert "Which light was as calibrated, no scan can tell" in told.sentence
 
 
 def test_findings_say_what_was_corrected() -> None:
@@ -82,8 +90,32 @@ def test_findings_say_what_was_corrected() -> None:
 
 
 def test_what_a_change_of_the_light_is_off_by_is_common_to_all_frames() -> None:
+    """It may be off, and any light from the first to the last may be that of the calibration."""
     course = replace(course_of(-0.1), drift_std=0.02, step_at=90)
     unsure = unsure_level(PLAN, ProjectorResponse(), light_findings(course, True))
-    assert unsure == pytest.approx(0.02 * np.exp(-0.1))
+    assert unsure == pytest.approx(np.hypot(0.02 * np.exp(-0.1), np.expm1(-0.1) / np.sqrt(3)))
+    assert unsure > np.std(np.linspace(np.expm1(-0.1), 0.0, 1001))
     steady = light_findings(course_of(0.001), True)
     assert unsure_level(PLAN, ProjectorResponse(), steady) == 0.0
+
+
+def test_a_step_that_is_another_in_its_own_frames_is_as_unsure() -> None:
+    sudden = SuddenChanges({}, {40: -0.08}, apart=0.02)
+    (told,) = sudden_findings(sudden)
+    assert told.sentence.startswith("The light has changed by -7.7% (±2.0%) at once, from frame 41 on.")
+    assert "Which light was as calibrated, no scan can tell" in told.sentence
+    alike = unsure_level(PLAN, ProjectorResponse(), sudden_findings(replace(sudden, apart=0.0)))
+    assert alike == pytest.approx(-np.expm1(-0.08) / np.sqrt(3))
+    assert unsure_level(PLAN, ProjectorResponse(), [told]) == pytest.approx(np.hypot(alike, 0.02))
+
+
+def test_colours_that_change_unlike_are_told_and_make_the_level_unsure() -> None:
+    alike, unlike = (
+        ColoursAgain((-0.05, -0.051, -0.049), 0.001, 0.0005),
+        ColoursAgain((0.0, -0.1, -0.03), 0.06, 0.001),
+    )
+    assert list(colour_findings([])) == list(colour_findings([alike])) == []
+    assert list(colour_findings([replace(unlike, std=0.02)])) == []
+    (told,) = colour_findings([alike, unlike])
+    assert "white has +0.0% in red, -9.5% in green, -3.0% in blue" in told.sentence
+    assert unsure_level(PLAN, ProjectorResponse(), [told]) == pytest.approx(0.06)

@@ -10,9 +10,16 @@ import pytest
 from numpy.typing import NDArray
 
 from dsl_core.model.plan import Shot
+from dsl_core.optics.sensor import bayer_channels
 from dsl_core.reconstruction.light import witnesses
 from dsl_core.reconstruction.light.setting_ratios import Ratio
-from dsl_core.reconstruction.light.witnesses import of_lines, of_settings, of_whites
+from dsl_core.reconstruction.light.witnesses import (
+    ColoursAgain,
+    colours_of_whites,
+    of_lines,
+    of_settings,
+    of_whites,
+)
 from tests.cases.scan_light import COUNT, PLAN, levels_of, scan_of, shots_of
 
 
@@ -85,3 +92,28 @@ def test_white_is_compared_with_white_less_the_black_next_to_each(monkeypatch: p
         near = [b for b in again if PLAN.original(b).role == "black" and abs(b.index - shot.index) < 4]
         assert first == old.index - black.index
         assert now == shot.index - near[0].index
+
+
+def test_white_is_compared_colour_by_colour_and_something_before_a_part_of_it_is_no_colour() -> None:
+    """Blue loses a tenth everywhere; then a shadow falls on a red wall at the side."""
+    rng = np.random.default_rng(2)
+    channels = bayer_channels("RGGB", 40, 60)
+    white = rng.uniform(900, 1100, channels.shape)
+    white[:, :20] *= np.array([1.0, 0.4, 0.4])[channels[:, :20]]
+    shade = np.where(np.arange(60) < 15, 0.5, 1.0)
+
+    def found(now: NDArray[np.float64]) -> ColoursAgain:
+        def read(shot: Shot) -> NDArray[np.uint16]:
+            role = PLAN.original(shot).role if shot.role == "sentinel" else shot.role
+            light = now if shot.role == "sentinel" else white
+            counts = 200 + (0 if role == "black" else light)
+            return np.rint(rng.normal(counts, 3, channels.shape)).astype(np.uint16)
+
+        return next(colours_of_whites(scan_of(source=SimpleNamespace(read=read))))
+
+    bluish = found(white * np.array([1.0, 1.0, 0.9])[channels])
+    assert bluish.log == pytest.approx((0.0, 0.0, np.log(0.9)), abs=0.004)
+    assert bluish.apart == pytest.approx(-np.log(0.9), abs=0.004)
+    assert bluish.std < 0.002
+    shaded = found(white * shade)
+    assert shaded.apart < max(0.004, 4 * shaded.std)
