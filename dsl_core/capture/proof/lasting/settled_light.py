@@ -13,6 +13,8 @@ from dsl_core.capture.proof.raster import Counts
 LEAST_CHANGE = {"white": 0.03, "black": 0.004}
 #: Share of the pixels of white that do not saturate, and their mean light, DN, that say something.
 LEAST_SOUND, LEAST_DN = 0.25, 100.0
+#: Spread of white's light, relative to its mean, that tells a share of it from what all pixels gain alike.
+CONTRAST = 0.2
 #: It is the same again if it differs by no more than this share of the change.
 SAME = 0.33
 
@@ -30,7 +32,11 @@ def change_of_light(seen: Counts, ends: tuple[Counts, Counts], role: str, full_d
     gained = seen[sound].astype(np.float64) - (white if role == "white" else black)[sound]
     if role == "white":
         return float(gained.sum() / light.sum())
-    return float(gained @ light / (light @ light))
+    away = light - light.mean()
+    if away.std() < CONTRAST * light.mean():
+        return float(gained @ light / (light @ light))
+    # What all pixels gain alike is the camera's black level or the light of the room.
+    return float(gained @ away / (away @ away))
 
 
 def unsettled_sentence(role: str, once: float, longer: float, again: float) -> str:
@@ -41,6 +47,9 @@ def unsettled_sentence(role: str, once: float, longer: float, again: float) -> s
     """
     gone = once - longer
     if abs(gone) < LEAST_CHANGE[role] or abs(again - once) > SAME * abs(gone):
+        return ""
+    if role == "black" and gone < 0:
+        # Nothing takes light from black: its level was another one for a while.
         return ""
     if role == "white":
         return (

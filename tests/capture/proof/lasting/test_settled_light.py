@@ -32,3 +32,14 @@ def test_light_that_went_out_once_and_did_not_come_back_is_no_habit() -> None:
     assert unsettled_sentence("white", -0.9, -0.9, -0.9) == ""
     assert unsettled_sentence("white", -0.9, 0.0, 0.0) == ""
     assert "has 0.10 times" in unsettled_sentence("white", -0.9, 0.0, -0.9)
+
+
+def test_a_black_level_that_jitters_is_no_afterglow() -> None:
+    """Brighter pixels keep more of white; a level is one for all pixels."""
+    white = np.linspace(400, 3000, 64).astype(np.uint16)
+    ends = white, counts(300)
+    glow = np.rint(300 + 0.02 * (white.astype(float) - 300)).astype(np.uint16)
+    assert change_of_light(glow, ends, "black", 4095) == pytest.approx(0.02, rel=0.02)
+    assert change_of_light(counts(320), ends, "black", 4095) == pytest.approx(0.0, abs=1e-9)
+    assert unsettled_sentence("black", -0.02, 0.0, -0.02) == ""
+    assert "holds 2.0% of the light of white" in unsettled_sentence("black", 0.02, 0.0, 0.02)
