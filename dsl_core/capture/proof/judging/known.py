@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 from dsl_core.capture.proof.code.first_code import FirstCode
 from dsl_core.capture.proof.finding import Verdict
+from dsl_core.capture.proof.judging.common_light import CommonLight
 from dsl_core.capture.proof.judging.usual_votes import UsualVotes
 from dsl_core.capture.proof.light_steps import LightSteps
 from dsl_core.capture.proof.lines.line_place import LinePlaces
@@ -26,6 +27,7 @@ class Learned:
     steps: LightSteps
     places: LinePlaces
     votes: UsualVotes
+    common: CommonLight
     #: Shots of later settings that were found wrong before.
     contested: set[int]
 
@@ -36,6 +38,7 @@ class Learned:
             self.steps.copy(),
             self.places.copy(),
             self.votes.copy(),
+            self.common.copy(),
             self.contested.copy(),
         )
 
@@ -72,6 +75,7 @@ class Known:
             LightSteps(),
             LinePlaces(),
             UsualVotes(),
+            CommonLight(),
             set(),
         )
         self.code = self._first_code()

@@ -8,6 +8,7 @@ import numpy as np
 
 from dsl_core.capture.proof.contest import Contest
 from dsl_core.capture.proof.finding import Finding, Verdict
+from dsl_core.capture.proof.judging.common_light import common_light
 from dsl_core.capture.proof.judging.decision import decide, in_place
 from dsl_core.capture.proof.judging.known import Known
 from dsl_core.capture.proof.later_settings import LaterSettings
@@ -78,6 +79,8 @@ class LaterPictures:
             return found
         if found.is_wrong:
             return self._with_doubtful(found)
+        if shot.role == "spectral" and has_black and (more := self._common_light(shot, seen, wanted)):
+            return self._lit_by_room(shot, more)
         if share is not None and first_of_role and not later.is_measured(shot):
             later.measure(shot, share)
             known.learned.usual.begin(shot)
@@ -96,6 +99,20 @@ class LaterPictures:
                 seen, wanted, lit, dark, (profile, moved(profile, side)), known.noise
             )
         )
+
+    def _common_light(self, shot: Shot, seen: Counts, wanted: Expected) -> float:
+        """What all pixels of a picture of several lines have more than before, DN; 0 if they have not."""
+        known, profile = self._known, self._known.profile(shot)
+        if known.lit is None or profile is None or isinstance(known.plan.spectral, ScanLines):
+            return 0.0
+        more = common_light(seen, wanted, known.lit, profile, known.noise.sensor.full_scale_dn)
+        return 0.0 if more is None else known.learned.common.step(shot, more)
+
+    def _lit_by_room(self, shot: Shot, more_dn: float) -> Finding:
+        """That all of a picture has gained light; one with less may be right, and its first setting not."""
+        old = self._known.shots[self._known.places[shot.role, shot.pattern]]
+        again = (shot,) if more_dn > 0 else (old, shot)
+        return Finding(shot, Verdict.OTHER, again, f"all of it has {more_dn:+.0f} DN against those before")
 
     def _level_of_code(self, shot: Shot) -> float:
         """Light of a picture of the first code over that of white; 1 for other shots."""
