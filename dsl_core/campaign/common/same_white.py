@@ -7,6 +7,7 @@ its own, contradicts it.
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from dsl_core.campaign.common.recipe import Bench, Step
 from dsl_core.campaign.common.white_shot import WhiteLevel
@@ -24,6 +25,11 @@ SAME_LEVEL, OTHER_LEVEL = 0.12, 0.35
 SAME = 0.01
 #: Share of saturated pixels from which on white says nothing.
 MOST_SATURATED = 0.01
+#: Upright strips of a picture, of which a line and its orders light fewer than half.
+STRIPS = 16
+#: What one picture of black is off by, times the lines it is taken off, as a share of their light: beyond it
+#: lamps that flicker would decide whether white is the same.
+MOST_OF_BLACK = 0.02
 
 
 class WhiteNote(Record):
@@ -80,10 +86,32 @@ def _white_of(scan: FrameSource, full_scale_dn: float) -> tuple[Shot | None, flo
         whites = [shot for shot in shots if shot.role == "spectral"]
     if black is None or not whites:
         return None, 0.0
-    dark, seen_dn = float(scan.read(black).mean(dtype=np.float64)), 0.0
+    dark, above = scan.read(black), []
     for shot in whites:
         pixels = scan.read(shot)
         if float((pixels >= full_scale_dn).mean()) > MOST_SATURATED:
             return None, 0.0
-        seen_dn += float(pixels.mean(dtype=np.float64)) - dark
-    return whites[0], seen_dn
+        above.append(_above(pixels, dark))
+    return whites[0], _light_of(np.array(above))
+
+
+def _above(pixels: NDArray[np.uint16], dark: NDArray[np.uint16]) -> tuple[float, float]:
+    """What a picture shows above black, DN: mean of all pixels, and that of strips which no line lights."""
+    columns = pixels.mean(0, dtype=np.float64) - dark.mean(0, dtype=np.float64)
+    strips = [strip.mean() for strip in np.array_split(columns, STRIPS)]
+    return float(columns.mean()), float(np.median(strips))
+
+
+def _light_of(above: NDArray[np.float64]) -> float:
+    """Light of pictures that are white together, DN, from `_above` of each (pictures, 2).
+
+    One picture of black is taken off all of them. Where lamps flicker, each has its own black, which its
+    unlit strips show, with a little halo.
+    """
+    total, unlit = float(above[:, 0].sum()), above[:, 1]
+    if len(above) < 3:
+        return total
+    unsteady = float(np.std(np.diff(unlit))) / np.sqrt(2)
+    if unsteady * len(above) <= MOST_OF_BLACK * abs(total):
+        return total
+    return total - float(unlit.sum())

@@ -35,6 +35,8 @@ class Scanned(Bench):
     factor = 1.0
     level = 1.0
     code: GrayCode | NoCode = GrayCode(rows=False)
+    #: Light of the room's lamps beside that in black, DN, which beats from picture to picture.
+    lamps_dn = 0.0
 
     def scan_of(self, step: Step) -> Any:
         return self
@@ -54,10 +56,12 @@ class Scanned(Bench):
         # Lines that tile the frame are white together.
         share = {"white": 1.0, "spectral": 1 / self.plan.spectral_count}.get(shot.role, 0.0)
         more = RATE * 200.0 * light * self.factor * share
-        return _dithered(RIG.sensor.black_level_dn + more)
+        beat = np.sin(1.1 * shot.index + 1.5) if shot.role == "spectral" else 1.0
+        lit = np.where(np.arange(80) // 5 == shot.index % 16, 16.0, 0.0) if shot.role == "spectral" else 1.0
+        return _dithered(RIG.sensor.black_level_dn + more * lit + 1 + beat * self.lamps_dn)
 
 
-def _dithered(mean: float) -> np.ndarray:
+def _dithered(mean: float | np.ndarray) -> np.ndarray:
     """Whole numbers with this mean, (60, 80)."""
     steps = np.linspace(0, 1, 4800, endpoint=False).reshape(60, 80)
     return np.floor(mean + steps).astype(np.uint16)
@@ -86,6 +90,8 @@ def seen(bench: Scanned, factor: float, level: float = 1.0) -> Scanned:
 def as_it_was(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(Scanned, "factor", 1.0)
     monkeypatch.setattr(Scanned, "level", 1.0)
+    monkeypatch.setattr(Scanned, "code", GrayCode(rows=False))
+    monkeypatch.setattr(Scanned, "lamps_dn", 0.0)
 
 
 def test_white_of_the_same_light_is_accepted(bench: Scanned) -> None:
@@ -105,6 +111,32 @@ def test_another_exposure_than_the_one_requested_is_told(
     for factor in (1 - 1.2 * allowed, 1 + 1.2 * allowed):
         with pytest.raises(CalibrationError, match=rf"It: white of the scan has {factor:.2f} times"):
             require_same_white(seen(bench, factor, level), STEP)
+
+
+@pytest.mark.parametrize("factor", [1.0, 0.83, 1.17])
+def test_lamps_that_flicker_do_not_decide(bench: Scanned, factor: float) -> None:
+    # One black picture of lamps at their brightest is taken off all lines: a fifth of their light.
+    Scanned.code, Scanned.lamps_dn = NoCode(), 0.2 * RATE * 200.0 / bench.plan.spectral_count
+    here = seen(bench, factor)
+    if factor == 1.0:
+        require_same_white(here, STEP)
+    else:
+        with pytest.raises(CalibrationError, match=rf"has {factor - 0.01:.2f}|has {factor:.2f}"):
+            require_same_white(here, STEP)
+
+
+def test_a_room_lit_for_good_after_black_is_told(bench: Scanned, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(Scanned, "code", NoCode())
+    read = Scanned.read
+
+    def lit(self: Scanned, shot: Shot) -> np.ndarray:
+        return read(self, shot) + np.uint16(shot.role == "spectral")
+
+    monkeypatch.setattr(Scanned, "read", lit)
+    more = bench.plan.spectral_count / (RATE * 200.0)
+    assert more > SAME_LEVEL
+    with pytest.raises(CalibrationError, match=rf"has {1 + more:.2f} times"):
+        require_same_white(seen(bench, 1.0), STEP)
 
 
 def test_levels_are_known_after_the_self_test(bench: Scanned) -> None:
