@@ -7,6 +7,7 @@ next the zero order of an even target changes little, whatever the angle does to
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +18,12 @@ Floats = NDArray[np.float64]
 PARTS, FEWEST, FEWEST_PARTS = 24, 6, 10
 #: A change at once that is one, as a share and in deviations.
 JUMP, SIGMAS = 0.05, 6.0
+#: Share of the usual light that counts as none.
+GONE = 0.02
+#: Orders of the polynomial that is a smooth course of the light's logarithm, the next where what one leaves
+#: with a step is this many times what parts are off by (variances). A filter at the edge of an LED's light is
+#: seen at its own angle by every pixel, and passes several times as much on one side as on the other.
+COURSES, WELL = (2, 4), 2.0
 #: What an even target, seen through a filter, may leave from part to part beside a smooth course, as a share.
 UNEVEN = 0.005
 
@@ -52,25 +59,37 @@ def light_jump(column_px: Floats, relative: Floats, frame_px: int) -> LightJump 
     if not level > 0:
         # A filter that lets nothing through.
         return None
-    value, std = np.array(mean) / level, np.sqrt(np.array(variance) / level**2 + UNEVEN**2)
-    found = [_step(place, value, std, k) for k in range(2, len(at) - 1)]
-    gain, share, share_std, k = max(found)
-    if gain <= 0 or abs(share) < max(JUMP, SIGMAS * share_std):
+    seen = np.maximum(mean, GONE * level)
+    value, std = np.log(seen), np.sqrt(np.array(variance) / seen**2 + UNEVEN**2)
+    for order in COURSES:
+        found = max(_step(place, value, std, k, order) for k in range(2, len(at) - 1))
+        if found.left < WELL:
+            break
+    share = float(np.expm1(found.height))
+    if found.gain <= 0 or abs(share) < JUMP or abs(found.height) < SIGMAS * found.height_std:
         return None
-    return LightJump(share, at[k] * frame_px / PARTS)
+    return LightJump(share, at[found.part] * frame_px / PARTS)
 
 
-def _step(place: Floats, value: Floats, std: Floats, k: int) -> tuple[float, float, float, int]:
-    """What a step before part ``k`` explains (chi-square), its height, the deviation of that, and ``k``."""
-    smooth = np.stack([np.ones_like(place), place, place**2, place >= place[k]], 1) / std[:, None]
-    wanted = value / std
-    without, *_ = np.linalg.lstsq(smooth[:, :3], wanted, rcond=None)
-    terms, *_ = np.linalg.lstsq(smooth, wanted, rcond=None)
-    smooth_left, left = (
-        float(((wanted - design @ found) ** 2).sum())
-        for design, found in ((smooth[:, :3], without), (smooth, terms))
-    )
+class _Step(NamedTuple):
+    """What a step explains (chi-square), its height and deviation, its part, and chi-square left per part."""
+
+    gain: float
+    height: float
+    height_std: float
+    part: int
+    left: float
+
+
+def _step(place: Floats, value: Floats, std: Floats, k: int, order: int) -> _Step:
+    """A step before part ``k`` of a course that is a polynomial of an ``order`` otherwise."""
+    course = np.vander(place, order + 1, increasing=True)
+    design, wanted = np.column_stack([course, place >= place[k]]) / std[:, None], value / std
+    without, *_ = np.linalg.lstsq(design[:, :-1], wanted, rcond=None)
+    terms, *_ = np.linalg.lstsq(design, wanted, rcond=None)
+    smooth_left = float(((wanted - design[:, :-1] @ without) ** 2).sum())
+    left = float(((wanted - design @ terms) ** 2).sum())
     # Where the course is not smooth either, a step is less sure.
-    worse = max(left / max(len(place) - 4, 1), 1.0)
-    height_std = float(np.sqrt(worse * np.linalg.pinv(smooth.T @ smooth)[3, 3]))
-    return smooth_left - left, float(terms[3]), height_std, k
+    each = left / max(len(place) - design.shape[1], 1)
+    height_std = float(np.sqrt(max(each, 1.0) * np.linalg.pinv(design.T @ design)[-1, -1]))
+    return _Step(smooth_left - left, float(terms[-1]), height_std, k, each)
