@@ -12,6 +12,7 @@ from dsl_core.reconstruction.spectral.causes import (
     MOST_CURVES,
     MOST_DRIFT,
     MOST_GAIN,
+    MOST_SECOND,
     MOST_SHIFT_PX,
     Causes,
     fit_causes,
@@ -31,6 +32,8 @@ MOST_BLUR, MOST_TAIL = 0.03, 0.004
 UNSURE_BLUR = 0.06
 #: Gains of the camera's colours that are worth a finding.
 MOST_COLOUR_GAIN = 0.03
+#: Second orders that are known no better, relative to the light of the first, are not told.
+KNOWN_SECOND = 0.05
 #: Chi-square of most pixels above which no cause explains the frames.
 MOST_CHI_SQUARE = 1.5
 #: Share of one order's displacement that the other's must have if uneven lines may be the cause.
@@ -43,6 +46,8 @@ TURNED = "turn of camera or projector"
 LEAST_DEPTH_SHARE = 0.001
 #: Name of what is left of a drift of the light.
 DRIFT_LEFT = "change of the light over the scan"
+#: Name of what is found of the second orders.
+SECONDS = "light of the second orders"
 #: Added to findings whose effect the spectra of the result already allow for.
 CORRECTED = " The spectra of this result are corrected for it."
 #: Words, decimals and unit of the numbers of a film, as in `FIELDS`.
@@ -91,6 +96,7 @@ def cause_findings(
         unequal = corrected is not False and causes.unequal
         refuted = not (unequal if finding.part == "orders" else causes.brighter)
         yield finding.model_copy(update={"significant": finding.significant and not refuted})
+    yield from _seconds(causes, corrected)
     if probe.lines is not None:
         for name, value, std in zip(PROFILE, probe.lines.values, probe.lines.std, strict=True):
             yield _profile(name, float(value), float(std))
@@ -313,6 +319,24 @@ def _gains(causes: Causes, corrected: bool) -> Iterator[FitFinding]:
         " response to level or exposure is not as calibrated. Deviations of reflectance contain it.",
         "Repeat the self-test.",
     )
+
+
+def _seconds(causes: Causes, corrected: bool | None) -> Iterator[FitFinding]:
+    """The light of second orders, where frames tell of it."""
+    more, std = causes.second
+    if std > KNOWN_SECOND:
+        return
+    found = FitFinding.judged(
+        "orders",
+        SECONDS,
+        causes.second,
+        "1",
+        MOST_SECOND,
+        f"Second orders are brighter than the calibration says by {more:+.1%} ± {std:.1%} of the light of the"
+        " first." + CORRECTED * bool(corrected),
+        "Calibrate the efficiency of the orders again with the bandpass filters.",
+    )
+    yield found.model_copy(update={"significant": causes.seconds_differ and corrected is not False})
 
 
 def _profile(name: str, value: float, std: float) -> FitFinding:

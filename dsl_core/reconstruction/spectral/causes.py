@@ -13,12 +13,14 @@ from dsl_core.reconstruction.spectral.probing.cell_sums import CellSums
 from dsl_core.reconstruction.spectral.probing.curve_probe import BETWEEN
 from dsl_core.reconstruction.spectral.probing.held_out import Hypothesis, explains_others
 from dsl_core.reconstruction.spectral.probing.probe import LEADING, PRIOR_STD, Probe
-from dsl_core.reconstruction.spectral.probing.probed_light import PARAMETERS
+from dsl_core.reconstruction.spectral.probing.probed_light import PARAMETERS, SECOND
 
 Floats = NDArray[np.float64]
 
 #: What matters of the place of the orders (px) and of their gains.
 MOST_SHIFT_PX, MOST_GAIN = 0.035, 0.015
+#: What matters of the light of second orders, relative to that of the first.
+MOST_SECOND = 0.015
 #: What matters of the light over the scan, and of curves by which colours disagree.
 MOST_DRIFT, MOST_CURVES = 0.014, 0.015
 #: A larger drift is not one: white taken again would show it, and effects are taken to be linear.
@@ -46,8 +48,10 @@ class Causes:
     ``gain`` (2,) of both orders, with the deviations of their mean and difference; ``drift`` of the light
     from the first line to the last. A line lights a pixel by one order long before or after another does by
     the other, so that drift looks much as a difference of the gains: ``drift_alone`` and ``difference_alone``
-    are each, with its deviation, where the other is none. ``explained`` are the shares of what frames lack
-    that the shifts, the mean and the difference of the gains, and drift explain; 1 where frames lack nothing.
+    are each, with its deviation, where the other is none. ``second`` is light of second orders that the model
+    lacks, relative to that of the first, with its deviation. ``explained`` are the shares of what frames lack
+    that the shifts, the mean and the difference of the gains, drift and second orders explain; 1 where frames
+    lack nothing.
     """
 
     shift_px: Floats
@@ -62,7 +66,8 @@ class Causes:
     drift_std: float
     drift_alone: tuple[float, float]
     difference_alone: tuple[float, float]
-    explained: tuple[float, float, float, float] = (1.0, 1.0, 1.0, 1.0)
+    second: tuple[float, float] = (0.0, 0.0)
+    explained: tuple[float, float, float, float, float] = (1.0, 1.0, 1.0, 1.0, 1.0)
 
     @property
     def brighter(self) -> bool:
@@ -84,6 +89,11 @@ class Causes:
         plus, minus = self.gain
         both = matters(plus - minus, self.difference_std, MOST_GAIN)
         return both and matters(*self.difference_alone, MOST_GAIN) and self.explained[2] > EXPLAINS
+
+    @property
+    def seconds_differ(self) -> bool:
+        """Whether second orders have other light than calibrated."""
+        return matters(*self.second, MOST_SECOND) and self.explained[4] > EXPLAINS
 
     @property
     def common_gain(self) -> float:
@@ -170,8 +180,8 @@ def fit_causes(probe: Probe) -> Causes:
         one = sums.fit(held_std)
         return float(one.values[kept]), float(np.sqrt(one.covariance[kept, kept]))
 
-    drift = len(found) - 1
-    groups = slice(0, first), slice(first, first + 1), slice(first + 1, first + 2), slice(drift, drift + 1)
+    drift, second = len(found) - 1, first + SECOND - 2
+    groups = slice(0, first), *(slice(at, at + 1) for at in (first, first + 1, drift, second))
     shares = [_explained(probe, sums, prior_std, found, group) for group in groups]
     return Causes(
         shift_px=shift,
@@ -186,7 +196,8 @@ def fit_causes(probe: Probe) -> Causes:
         drift_std=float(deviations[drift]),
         drift_alone=alone(drift, first + 1),
         difference_alone=alone(first + 1, drift),
-        explained=(shares[0], shares[1], shares[2], shares[3]),
+        second=(float(found[second]), float(deviations[second])),
+        explained=(shares[0], shares[1], shares[2], shares[3], shares[4]),
     )
 
 

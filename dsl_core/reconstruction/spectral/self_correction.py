@@ -2,8 +2,9 @@
 
 A film that has slipped since the calibration displaces both first orders as a motion does
 (`dsl_core.reconstruction.spectral.film_motion`). One that has aged or become dirty sends less light into one
-order than into the other. Pixels that both orders reach, and the zero order, tell by how much. What is too
-small to matter, or could be chance, is left as calibrated; so is what does not make the frames fit better.
+order than into the other. Pixels that both orders reach, and the zero order, tell by how much; patterns
+that light a pixel by several orders at once also tell how bright second orders are. What is too small to
+matter, or could be chance, is left as calibrated; so is what does not make the frames fit better.
 Displaced orders that no motion explains stay where they are, and deviations hold them: a scan cannot tell a
 film that is bent otherwise from a line spread that is not symmetric, and the wrong correction makes spectra
 worse.
@@ -16,11 +17,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from dsl_core.optics.pixel_model import PixelModel
-from dsl_core.optics.spectra import ORDERS
+from dsl_core.optics.spectra import ORDERS, SECOND_ORDERS
 from dsl_core.reconstruction.spectral.causes import EXPLAINS, MOST_EXCESS, Causes, fit_causes
 from dsl_core.reconstruction.spectral.film_motion import FilmMotion, coarseness, fit_motion, moved
 from dsl_core.reconstruction.spectral.probing.probe import Probe, probe
-from dsl_core.reconstruction.spectral.probing.probed_light import ProbedScan
+from dsl_core.reconstruction.spectral.probing.probed_light import ProbedScan, second_share
 from dsl_core.reconstruction.spectral.turned import Turn, find_turn
 
 #: How many deviations the chi-square of pixels has to fall by.
@@ -37,7 +38,8 @@ class Followed:
     ``motion`` is that of the film, None where none was found; where it is not sure, it is not followed.
     ``balanced`` is whether the light of the orders was taken over (None: nothing asked for it). ``probe`` is
     what the scan says of the model with the film moved, ``left`` what it says of ``model``. ``turn`` is what
-    of the motion may be one of camera and projector, None where there is none, or it is not sure.
+    of the motion may be one of camera and projector, None where there is none, or it is not sure. ``aged`` is
+    whether one first order has become brighter than the other.
     """
 
     model: PixelModel
@@ -46,11 +48,12 @@ class Followed:
     motion: FilmMotion | None = None
     balanced: bool | None = None
     turn: Turn | None = None
+    aged: bool = False
 
     @property
     def has_changed(self) -> bool:
         """Whether the film seems to have moved, or one order to have become brighter, since calibrated."""
-        return self.motion is not None or bool(self.balanced)
+        return self.motion is not None or (bool(self.balanced) and self.aged)
 
 
 def follow(scan: ProbedScan, as_calibrated: bool = False, rows_px: float | None = None) -> Followed | None:
@@ -81,13 +84,14 @@ def follow(scan: ProbedScan, as_calibrated: bool = False, rows_px: float | None 
     if motion is not None:
         film, of_film = doubt or (model, found)
         turn = None if of_film is None else find_turn(scan, motion, of_film, film, probe, rows_px)
-    balanced = corrected(model, fit_causes(found))
+    causes = fit_causes(found)
+    balanced = corrected(model, causes)
     if balanced is None:
         return Followed(model, found, found, motion, turn=turn)
     left = _tried(replace(scan, model=balanced), found)
     if left is None:
         return Followed(model, found, found, motion, balanced=False, turn=turn)
-    return Followed(balanced, found, left, motion, balanced=True, turn=turn)
+    return Followed(balanced, found, left, motion, balanced=True, turn=turn, aged=causes.unequal)
 
 
 def _tried(scan: ProbedScan, before: Probe) -> Probe | None:
@@ -98,10 +102,15 @@ def _tried(scan: ProbedScan, before: Probe) -> Probe | None:
 
 def corrected(model: PixelModel, causes: Causes) -> PixelModel | None:
     """The model with orders as bright as the scan says, where that matters; None where it does not."""
-    if not causes.unequal:
+    gains = dict[int, float]()
+    if causes.unequal:
+        own = causes.gain - causes.common_gain
+        gains |= {order: 1 + float(gain) for order, gain in zip(ORDERS, own, strict=True)}
+    if causes.seconds_differ:
+        more = max(causes.second[0] / second_share(model), -1.0)
+        gains |= dict.fromkeys(SECOND_ORDERS, 1 + more)
+    if not gains:
         return None
-    own = causes.gain - causes.common_gain
-    gains = {order: 1 + float(gain) for order, gain in zip(ORDERS, own, strict=True)}
     moments = {order: values * gains.get(order, 1.0) for order, values in model.bands.moments.items()}
     bands = replace(model.bands, moments=moments)
     return PixelModel(model.rig, bands, model.profiles, model.correspondence, model.lines)

@@ -91,7 +91,7 @@ def test_a_motion_is_found_within_its_deviations(scan: ProbedScan, changes: list
 
 
 def test_the_coarser_the_bands_the_more_a_film_must_have_moved(scan: ProbedScan) -> None:
-    moved = displaced(scan.model.rig, np.array([0.0, 0.05, 0.0, 0.0, 0.0]))
+    moved = displaced(scan.model.rig, np.array([0.0, 0.06, 0.0, 0.0, 0.0]))
     found = {nm: fit_motion(scan, replace(moved, step_nm=nm)) for nm in (5.0, 8.0, 10.0)}
     assert found[5.0] is not None
     assert 0.02 * (8 / 5) ** 2 < found[5.0].shift_px < 0.02 * (10 / 5) ** 2

@@ -11,7 +11,7 @@ from scipy.ndimage import gaussian_filter
 from dsl_core.reconstruction.spectral.causes import common_error, fit_causes
 from dsl_core.reconstruction.spectral.model_error import MARGIN, ModelError, model_error, neighbour_contrast
 from dsl_core.reconstruction.spectral.probing.line_probe import LineProbe
-from dsl_core.reconstruction.spectral.probing.probe import PRIOR_STD, Probe
+from dsl_core.reconstruction.spectral.probing.probe import LEADING, PRIOR_STD, Probe
 from dsl_core.reconstruction.spectral.probing.probed_light import PARAMETERS
 from dsl_core.reconstruction.spectral.probing.probed_pixels import CELLS
 
@@ -85,17 +85,17 @@ def test_cells_ask_beyond_twice_their_noise_and_neighbours_share_the_answer() ->
     assert probe.lines is not None
     probe.lines.values[:] = 0.01, -0.02
     squares, level = np.zeros((*CELLS, BANDS)), np.zeros((*CELLS, BANDS))
-    prior = np.diag(np.array(PRIOR_STD[:7]) ** -2.0)
+    prior = np.diag(np.array(PRIOR_STD[:LEADING]) ** -2.0)
     for cell in range(CELLS[0] * CELLS[1]):
         here, place = probe.cell == cell, np.unravel_index(cell, CELLS)
         weight = 1 / np.where(probe.chi_square[here] > 1, probe.chi_square[here], 1)
-        known = np.einsum("n,npq->pq", weight, probe.normal[here])[:7, :7]
-        asked = np.linalg.solve(known + prior, (weight @ probe.score[here])[:7])
+        known = np.einsum("n,npq->pq", weight, probe.normal[here])[:LEADING, :LEADING]
+        asked = np.linalg.solve(known + prior, (weight @ probe.score[here])[:LEADING])
         inverse = np.linalg.inv(known + prior)
         for bias, own in zip(probe.bias[here], probe.reflectance[here], strict=True):
-            noise = np.diag(bias[:, :7] @ inverse @ known @ inverse @ bias[:, :7].T)
+            noise = np.diag(bias[:, :LEADING] @ inverse @ known @ inverse @ bias[:, :LEADING].T)
             profile = bias[:, [4, 5]] @ np.array([0.01, -0.02])
-            squares[place] += (bias[:, :7] @ asked) ** 2 - 2 * noise + profile**2
+            squares[place] += (bias[:, :LEADING] @ asked) ** 2 - 2 * noise + profile**2
             level[place] += own**2
     error, light = (gaussian_filter(each, (0.7, 0.7, 1.0), mode="nearest") for each in (squares, level))
     wanted = np.hypot(1.25 * np.sqrt(error.clip(0) / light), 0.02).transpose(2, 0, 1)

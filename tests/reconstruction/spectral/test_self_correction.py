@@ -10,12 +10,14 @@ import numpy as np
 import pytest
 
 from dsl_core.devices.base import DeviceRig
+from dsl_core.model.fit import FitFinding
 from dsl_core.model.plan import CapturePlan, GrayCode, LineComb, ScanLines
 from dsl_core.model.rig import Rig
 from dsl_core.model.spectral import WavelengthGrid
 from dsl_core.optics.correspondence import correspondence
 from dsl_core.reconstruction.calibration_age import CHANGED_REL_STD
 from dsl_core.reconstruction.findings.fit import fit_of
+from dsl_core.reconstruction.findings.model_findings import SECONDS, cause_findings
 from dsl_core.reconstruction.spectral import self_correction, spectra
 from dsl_core.reconstruction.spectral.film_motion import FilmMotion, with_film
 from dsl_core.reconstruction.spectral.self_correction import fits_better
@@ -71,12 +73,55 @@ def test_most_of_the_error_of_a_darker_order_is_taken_back(
     assert error(taken, right) < 0.5 * error(left, right)
 
 
-@pytest.mark.slow
-def test_combs_tell_of_a_film_that_has_slipped() -> None:
+@pytest.fixture(scope="module")
+def combs() -> tuple[Rig, MemoryScan]:
     plan = CapturePlan(code=GrayCode(rows=False), spectral=LineComb(width_px=6, step_px=4, period_px=96))
     devices, scan = twin_scan(plan, size="112x72", scene="color-checker")
-    rig, fine = devices.calibration, WavelengthGrid()
-    assert rig is not None
+    assert devices.calibration is not None
+    return devices.calibration, scan
+
+
+def said_of_seconds(found: SpectralMaps) -> FitFinding | None:
+    assert found.followed is not None
+    of_model = cause_findings(found.followed.probe, found.followed.balanced)
+    return next((each for each in of_model if each.name == SECONDS), None)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("factor", [0.3, 2.0])
+def test_combs_tell_how_bright_second_orders_are(combs: tuple[Rig, MemoryScan], factor: float) -> None:
+    rig, scan = combs
+    curves = {
+        order: curve.model_copy(update={"values": tuple(factor * value for value in curve.values)})
+        if abs(order) == 2
+        else curve
+        for order, curve in rig.efficiency.items()
+    }
+    share = rig.efficiency[2].at(545.0) / rig.efficiency[1].at(545.0)
+    right, taken = (
+        solved(each, scan, False, WavelengthGrid())
+        for each in (rig, rig.model_copy(update={"efficiency": curves}))
+    )
+    usual, told = said_of_seconds(right), said_of_seconds(taken)
+    assert usual is not None
+    assert not usual.significant
+    assert told is not None
+    assert told.significant
+    assert told.value == pytest.approx((1 - factor) * share, rel=0.25)
+    assert "corrected for it" in told.sentence
+    assert taken.followed is not None
+    assert not taken.followed.has_changed
+    assert error(taken, right) < 0.003
+
+
+@pytest.mark.slow
+def test_single_lines_say_nothing_of_second_orders(scanned: tuple[Rig, MemoryScan]) -> None:
+    assert said_of_seconds(solved(*scanned, as_calibrated=False)) is None
+
+
+@pytest.mark.slow
+def test_combs_tell_of_a_film_that_has_slipped(combs: tuple[Rig, MemoryScan]) -> None:
+    (rig, scan), fine = combs, WavelengthGrid()
     right, taken = (solved(each, scan, False, fine) for each in (rig, with_film(rig, -SLIPS)))
     assert right.followed is not None
     assert right.followed.motion is None

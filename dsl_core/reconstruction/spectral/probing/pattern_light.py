@@ -15,10 +15,12 @@ from dsl_core.optics.pixel_model import Traced, without_offset
 from dsl_core.reconstruction.spectral.probing.probed_light import (
     BLUR_STEP,
     PARAMETERS,
+    SECOND,
     SHIFT_PX,
     TAIL_BLUR,
     ProbedScan,
     along_bands,
+    second_share,
 )
 from dsl_core.reconstruction.spectral.probing.probed_pixels import Indices
 from dsl_core.reconstruction.spectral.solving.tile_frames import weighted
@@ -26,7 +28,7 @@ from dsl_core.reconstruction.spectral.solving.tile_frames import weighted
 #: Widths of lines relative to the usual one: as they are, blurred, and those of a tail.
 WIDTHS = (1.0, 1 + BLUR_STEP, TAIL_BLUR)
 #: What changes of the light of each band and frame are worked out for: the first of `PARAMETERS`.
-_OF_BANDS = PARAMETERS[:6]
+_OF_BANDS = PARAMETERS[: SECOND + 1]
 
 
 class PatternLight:
@@ -85,6 +87,7 @@ class PatternLight:
             self._light(0, 0.0, traced.column_px[None], traced.direct[None], width) for width in WIDTHS
         )
         changes = total.new_zeros((*total.shape, len(_OF_BANDS)))
+        seconds = second_share(model)
         for order, footprint in traced.orders.items():
             columns, inside = footprint.columns, model.inside(footprint)
             half = model.bands.half_width_px(columns)
@@ -94,6 +97,8 @@ class PatternLight:
             changes[..., side] += abs(order) * (high - low) / (2 * SHIFT_PX)
             if abs(order) == 1:
                 changes[..., 2 + side] = own
+            else:
+                changes[..., SECOND] += own / seconds
             total += own
             blurred += wider
             tail += far

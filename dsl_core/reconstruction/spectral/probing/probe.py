@@ -44,10 +44,10 @@ from dsl_core.reconstruction.spectral.solving.solution import band_mean
 Floats = NDArray[np.float64]
 
 #: The first of them that no other one makes up for, in a cell of the picture or over all of it.
-LEADING = 7
+LEADING = 8
 #: What each may be off before any scan is seen, so that fits stay finite. Blur and tails hardly show in the
 #: first orders, where an error of the spectrum's prior looks like them; the zero order tells them far better.
-PRIOR_STD = (0.5, 0.5, 0.2, 0.2, 0.1, 0.02, 0.1, 0.5, 0.5)
+PRIOR_STD = (0.5, 0.5, 0.2, 0.2, 0.1, 0.02, 0.1, 0.1, 0.5, 0.5)
 #: Pixels probed in each cell: one of so many of the whole picture, and their range.
 ONE_OF, PIXELS_PER_CELL = 6000, (8, 12)
 #: With fewer pixels nothing is said; so many are worked out at a time.

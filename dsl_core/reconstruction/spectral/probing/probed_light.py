@@ -21,7 +21,7 @@ from dsl_core.optics.colour_neighbours import bayer_colours
 from dsl_core.optics.correspondence import Footprint, like
 from dsl_core.optics.lines.profile import SAMPLES, ProfileTable, halo_of_line
 from dsl_core.optics.pixel_model import DIRECT_ERROR, PixelModel
-from dsl_core.optics.spectra import ORDERS
+from dsl_core.optics.spectra import ORDERS, SECOND_ORDERS
 from dsl_core.reconstruction.spectral.probing.picked_cube import PickedCube
 from dsl_core.reconstruction.spectral.probing.probed_pixels import Indices
 from dsl_core.reconstruction.spectral.solving.prior import Prior
@@ -30,7 +30,9 @@ from dsl_core.reconstruction.spectral.solving.tile_frames import Pixels, weighte
 Floats = NDArray[np.float64]
 
 #: The parameters, in their order: shifts in projector columns, stretches (a shift that rises by this many
-#: columns from the middle wavelength to the last), all others relative.
+#: columns from the middle wavelength to the last), all others relative. The light of second orders is
+#: relative to that of the first; single lines, of which only those near first orders are looked at, say
+#: nothing of it.
 PARAMETERS = (
     "shift +1",
     "shift -1",
@@ -38,10 +40,13 @@ PARAMETERS = (
     "gain -1",
     "blur",
     "tail",
+    "gain 2",
     "drift",
     "stretch +1",
     "stretch -1",
 )
+#: Where the light of second orders is among them.
+SECOND = PARAMETERS.index("gain 2")
 #: Steps of the numerical derivatives: columns (px) and blur (share).
 SHIFT_PX, BLUR_STEP = 0.05, 0.05
 #: Blur of the tail of a line, relative to its own.
@@ -71,6 +76,16 @@ def along_bands(model: PixelModel) -> Floats:
     nm = model.bands.centres_nm
     first, last = nm[model.bands.reported][[0, -1]]
     return np.asarray((2 * nm - first - last) / (last - first))
+
+
+def second_share(model: PixelModel) -> float:
+    """Light of the second orders over that of the first, as the model has it."""
+    moments = model.bands.moments
+    first, second = (
+        sum(float(moments[order].sum()) for order in orders if order in moments)
+        for orders in (ORDERS, SECOND_ORDERS)
+    )
+    return second / first
 
 
 @dataclass(frozen=True)
@@ -230,13 +245,13 @@ class ProbedLight:
             line = light.near.flatten(1)[..., None].expand_as(gained)
             of_lines = own.new_zeros((*own.shape, gained.shape[-1])).scatter_add_(1, line, gained)
             part = torch.zeros((*own.shape, len(PARAMETERS)), dtype=own.dtype)
-            shifted, part[..., 4], part[..., 5], part[..., 7 + number] = of_lines.unbind(-1)
+            shifted, part[..., 4], part[..., 5], part[..., 8 + number] = of_lines.unbind(-1)
             part[..., number], part[..., 2 + number] = shifted, own
-            part[..., 6] = own * light.time
+            part[..., 7] = own * light.time
             parts.append(part)
         zero = torch.zeros_like(parts[0][:, :1])
         lines = self._scan.model.lines
         assert lines is not None
         time = lines.position(self._known["column_px"]) / lines.lines - 0.5
-        zero[:, 0, 6] = (self.rows[..., -1] * nodes).sum(1) * time
+        zero[:, 0, 7] = (self.rows[..., -1] * nodes).sum(1) * time
         return torch.cat([*parts, zero], 1)

@@ -12,9 +12,16 @@ from torch import Tensor
 from dsl_core.optics.colour_neighbours import bayer_colours
 from dsl_core.optics.correspondence import Footprint
 from dsl_core.optics.pixel_model import PixelModel, Traced
+from dsl_core.optics.spectra import ORDERS
 from dsl_core.reconstruction.spectral.probing.pattern_light import PatternLight
 from dsl_core.reconstruction.spectral.probing.picked_cube import PickedCube
-from dsl_core.reconstruction.spectral.probing.probed_light import PARAMETERS, ProbedScan, along_bands
+from dsl_core.reconstruction.spectral.probing.probed_light import (
+    PARAMETERS,
+    SECOND,
+    ProbedScan,
+    along_bands,
+    second_share,
+)
 from dsl_core.reconstruction.spectral.solving.prior import Prior
 from dsl_core.reconstruction.spectral.solving.tile_frames import Pixels
 from tests.optics.test_pixel_model import COLOURS, COMB, random, some_model
@@ -70,13 +77,16 @@ def test_changes_are_those_of_the_forward_model(spectral: object) -> None:
     assert found.shape == (5, len(model.profiles), len(PARAMETERS))
     along = torch.as_tensor(along_bands(model))[:, None]
     for side, order in enumerate((1, -1)):
-        for shape, index in ((torch.ones_like(along), side), (along, 7 + side)):
+        for shape, index in ((torch.ones_like(along), side), (along, PARAMETERS.index("stretch +1") + side)):
             low, high = (
                 seen(model, displaced(traced, order, step * shape), nodes, colour) for step in (-0.05, 0.05)
             )
             assert torch.allclose(found[..., index], (high - low) / 0.1, atol=2e-3 * float(own.max()))
         without = replace(traced, orders={m: f for m, f in traced.orders.items() if m != order})
         assert torch.allclose(found[..., 2 + side], own - seen(model, without, nodes, colour), atol=1e-9)
+    without = replace(traced, orders={m: f for m, f in traced.orders.items() if m in ORDERS})
+    seconds = own - seen(model, without, nodes, colour)
+    assert torch.allclose(second_share(model) * found[..., SECOND], seconds, atol=1e-9)
     wider = model.rig.projector_response.of_width(1.05 * model.rig.projector_response.blur_px)
     rig = model.rig.model_copy(update={"projector_response": wider})
     blurred = PixelModel(rig, model.bands, model.profiles, model.correspondence, model.lines)
@@ -84,7 +94,7 @@ def test_changes_are_those_of_the_forward_model(spectral: object) -> None:
     assert torch.allclose(found[..., 4], gained, atol=1e-9)
     frames = len(model.profiles)
     time = (torch.arange(frames) + 0.5) / frames - 0.5
-    assert torch.allclose(found[..., 6], own * time)
+    assert torch.allclose(found[..., PARAMETERS.index("drift")], own * time)
 
 
 def test_an_offset_that_frames_share_is_taken_out_of_all() -> None:

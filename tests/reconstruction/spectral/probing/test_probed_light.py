@@ -20,6 +20,8 @@ from dsl_core.reconstruction.spectral.probing.probed_light import (
 )
 from dsl_core.reconstruction.spectral.probing.solved_pixels import SolvedPixels
 
+DRIFT, STRETCH = PARAMETERS.index("drift"), PARAMETERS.index("stretch +1")
+
 
 def test_a_stretch_rises_from_the_first_reported_band_to_the_last() -> None:
     nm = np.arange(420.0, 481.0, 10.0)
@@ -90,14 +92,14 @@ def test_what_the_parameters_change_is_the_sum_over_bands_of_what_each_line_gain
             own = light.rows[s].numpy().T @ nodes[s].numpy()
             lines_of = wanted[s, 4 * number : 4 * number + 4]
             lines_of[:, 2 + number] = own
-            lines_of[:, 6] = own * light.time[s].numpy()
+            lines_of[:, DRIFT] = own * light.time[s].numpy()
             for band in range(3):
                 for k, line in enumerate(light.near[s, band].tolist()):
                     gain = light.changes[s, band, k].numpy() * float(light.white[s, band] * nodes[s, band])
                     lines_of[line, number] += gain[0]
                     lines_of[line, [4, 5]] += gain[1:]
-                    lines_of[line, 7 + number] += gain[0] * along[band]
-        wanted[s, 8, 6] = float(nodes[s].sum()) * ([50, 120][s] / 200 - 0.5)
+                    lines_of[line, STRETCH + number] += gain[0] * along[band]
+        wanted[s, 8, DRIFT] = float(nodes[s].sum()) * ([50, 120][s] / 200 - 0.5)
     assert found == pytest.approx(wanted)
 
 
