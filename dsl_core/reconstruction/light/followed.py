@@ -17,7 +17,7 @@ from dsl_core.reconstruction.light.course import LightCourse, Witness, light_cou
 from dsl_core.reconstruction.light.line_levels import LineLevels, candidates, line_levels
 from dsl_core.reconstruction.light.pictures import Pictures
 from dsl_core.reconstruction.light.room_flicker import room_flicker
-from dsl_core.reconstruction.light.setting_ratios import without_strange
+from dsl_core.reconstruction.light.setting_ratios import without_any, without_strange
 from dsl_core.reconstruction.light.slow_black import slow_black
 from dsl_core.reconstruction.light.steady import SteadyLight
 from dsl_core.reconstruction.light.sudden import Again, sudden_changes
@@ -49,13 +49,23 @@ class _Scan:
         progress: Progress | None,
     ) -> None:
         self.frames, self.code, self.white, self._also, self._progress = frames, code, white, also, progress
+        self._believes_settings = True
         self._pixels = self._look()
 
     def _look(self) -> NDArray[np.intp]:
         pixels = candidates(self.code.column, (self.white.radiance, self.white.variance))
         self.frames.look(np.union1d(pixels, self._also(self.code, self.white)), self._progress)
-        self.frames.ratios = without_strange(self.frames.ratios)
+        self._weigh_settings()
         return pixels
+
+    def _weigh_settings(self) -> None:
+        weigh = without_strange if self._believes_settings else without_any
+        self.frames.ratios = weigh(self.frames.ratios)
+
+    def disbelieve_settings(self) -> None:
+        """From now on settings say nothing of the light against each other."""
+        self._believes_settings = False
+        self._weigh_settings()
 
     def expose(self, exposed: Exposed) -> None:
         """Read and decode all frames again, as exposed to other light."""
@@ -133,7 +143,7 @@ def _follow_changes(scan: _Scan, whites: Sequence[Witness]) -> tuple[Exposed | N
     is_told = black is not None and black.significant
     if is_told and (sudden is None or not sudden.explains_black):
         # Dim settings show the change of black rather than that of the light.
-        frames.ratios = {}
+        scan.disbelieve_settings()
     told = (black if is_told else None, None if room is None else room.finding)
     return exposed, (*(each for each in told if each is not None), *sudden_findings(sudden))
 

@@ -19,7 +19,7 @@ from dsl_core.model.rig import Sensor
 from dsl_core.optics.sensor import raw_variance
 from dsl_core.reconstruction.hdr import BlackFrame
 from dsl_core.solve.normal import STD_OF_MEDIAN_SIZE
-from dsl_core.solve.thinned import thinned
+from dsl_core.solve.thinned import spread_rows, thinned
 
 #: Counts of the brighter setting that are compared, as shares of full scale.
 USED = (0.01, 0.9)
@@ -51,7 +51,7 @@ class Ratio:
 @lru_cache(maxsize=8)
 def compared_rows(height: int) -> NDArray[np.intp]:
     """Rows of a picture of a height that are looked at."""
-    return np.unique(np.linspace(0, height - 1, min(height, ROWS)).astype(np.intp))
+    return spread_rows(height, ROWS)
 
 
 def compare_settings(
@@ -85,8 +85,8 @@ def compare_settings(
         misfit = (square - factor * product) / count
         ratio: Ratio | None = Ratio(float(np.log(factor / scale)), float(1 / np.sqrt(power) / factor))
         if misfit > CONTRADICT:
-            pair = [(pictures[n], darks[n]) for n in (faint, bright)]
-            ratio = _of_most(*pair, scale, (low, high), floor, sensor.electrons_per_dn)
+            one, two = ((pictures[n], darks[n]) for n in (faint, bright))
+            ratio = _of_most(one, two, scale, (low, high), floor, sensor.electrons_per_dn)
         found.append(ratio if ratio is None or faint == i else Ratio(-ratio.log, ratio.std))
     return (*found, Ratio(0.0, 0.0))
 
@@ -118,6 +118,13 @@ def _of_most(
     factor = float(weight @ (x * y)) / power
     misfit = max(float(weight @ (y - factor * x) ** 2) / x.size, 1.0)
     return Ratio(float(np.log(factor / scale)), float(np.sqrt(misfit / power)) / factor)
+
+
+def without_any(
+    ratios: Mapping[tuple[Role, int], tuple[Ratio | None, ...]],
+) -> dict[tuple[Role, int], tuple[Ratio | None, ...]]:
+    """The patterns of settings that say nothing of the light."""
+    return {pattern: (None,) * len(known) for pattern, known in ratios.items()}
 
 
 def without_strange(

@@ -15,12 +15,13 @@ from dsl_core.reconstruction.light.line_levels import LineLevels
 from dsl_core.reconstruction.light.pictures import Pictures
 from dsl_core.reconstruction.light.sudden import Again, share_of_black
 from dsl_core.reconstruction.merge import Exposed
+from dsl_core.solve.normal import MEDIAN_OVER_MEAN_STD
 from dsl_core.solve.robust import robust_std
 
 #: What levels of frames may be wrong by beyond their own deviations: the sum of light is not exact.
 LEVEL_ERROR = 0.004
-#: Pixels of a colour that tell how much light of it there is; deviation of a median over that of a mean.
-FEWEST, STD_OF_MEDIAN = 60, 1.2533
+#: Pixels of a colour that tell how much light of it there is.
+FEWEST = 60
 
 
 def blacks_again(scan: Pictures) -> list[Again]:
@@ -97,7 +98,7 @@ def colours_of_whites(scan: Pictures) -> Iterator[ColoursAgain]:
         middle, logs = float(np.median(more[used])), [float(np.median(more[own])) for own in each]
         worst = int(np.abs(np.array(logs) - middle).argmax())
         own = more[each[worst]]
-        std = STD_OF_MEDIAN * float(robust_std(own - logs[worst])) / np.sqrt(own.size)
+        std = MEDIAN_OVER_MEAN_STD * float(robust_std(own - logs[worst])) / np.sqrt(own.size)
         yield ColoursAgain((logs[0], logs[1], logs[2]), abs(logs[worst] - middle), std)
 
 

@@ -78,6 +78,7 @@ class Followed:
         monkeypatch.setattr(followed, "room_flicker", lambda *given: self.room)
         self.room: RoomFlicker | None = None
         self.looked: list[int] = []
+        self.ratios: dict[Any, Any] = {}
 
     def expose(self, exposed: Exposed) -> None:
         self.asked.append("expose")
@@ -88,12 +89,16 @@ class Followed:
         return self.code, self.white
 
     def run(self) -> tuple[Any, ...]:
+        def look(pixels: Any, progress: Any) -> None:
+            self.looked.append(len(pixels))
+            scan.ratios = dict(self.ratios)
+
         scan = scan_of(
             source=SimpleNamespace(read=lambda shot: np.full((3, 4), 400, np.uint16)),
             expose=self.expose,
             follow=self.light.append,
             decode=self.decode,
-            look=lambda pixels, progress: self.looked.append(len(pixels)),
+            look=look,
             pick=lambda pixels, progress: None,
         )
         return followed.follow_light(scan, self.code, self.white, lambda code, white: np.array([3, 50]))
@@ -136,3 +141,26 @@ def test_too_few_witnesses_find_nothing(monkeypatch: pytest.MonkeyPatch) -> None
     made = Followed(monkeypatch, None, None, None)
     assert made.run()[1:] == (made.white, ())
     assert not made.light
+
+
+def test_settings_that_a_black_has_made_doubtful_stay_so_when_frames_are_read_again(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """What white says of the light between settings is taken off all the same."""
+    asked: list[list[Any]] = []
+
+    def course(witnesses: list[Any], *_: Any) -> Any:
+        asked.append(list(witnesses))
+        return course_of(0.1)
+
+    made = Followed(monkeypatch, None, None, levels_of())
+    monkeypatch.setattr(followed, "light_course", course)
+    monkeypatch.setattr(followed, "of_whites", lambda _: iter(()))
+    monkeypatch.setattr(followed, "colours_of_whites", lambda _: iter(()))
+    monkeypatch.setattr(followed, "black_wander", lambda *_: SimpleNamespace(significant=True))
+    made.ratios = {("spectral", k): (Ratio(0.5, 0.01), Ratio(0.0, 0.0)) for k in range(COUNT)}
+    made.run()
+    assert not any(each.setting is not None for witnesses in asked for each in witnesses)
+    first, last = shots_of("spectral", 1)
+    drift = course_of(0.1).log
+    assert np.log(made.exposed.levels[first.index]) == pytest.approx(drift[first.index] - drift[last.index])

@@ -86,7 +86,7 @@ def test_something_that_sits_down_between_settings_is_no_change_of_the_light(row
     black = BlackFrame(np.full((60, 80), SENSOR.black_level_dn, np.float32), np.zeros((60, 80), np.float32))
     faint, bright = mosaics(1.0)
     light = (faint[-rows:] - SENSOR.black_level_dn) * (GAINS_MS[1] / GAINS_MS[0])
-    bright[-rows:] = digitise(SENSOR, light / 3, np.random.default_rng(4))
+    bright[-rows:] = digitise(SENSOR, (light / 3).astype(np.float32), np.random.default_rng(4))
     found = compare_settings([faint, bright], [black, black], GAINS_MS, SENSOR)[0]
     assert (found is not None) == told
     if found is not None:
