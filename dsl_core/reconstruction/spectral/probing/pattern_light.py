@@ -58,7 +58,7 @@ class PatternLight:
         own, changes = self._rows(traced)
         self.values = self._without_offset(values[..., None])[..., 0]
         self.rows = self._without_offset(own.mT).mT
-        self._changes = changes
+        self._light_of_bands, self._changes = own, changes
         #: How many values belong to each order: all orders share them.
         self.sizes = [frames]
 
@@ -132,6 +132,5 @@ class PatternLight:
         stretched = torch.einsum("sbfk,sb->sfk", self._changes[..., :2], nodes * along)
         frames = self.values.shape[1]
         time = (torch.arange(frames, dtype=nodes.dtype) + 0.5) / frames - 0.5
-        drift = (nodes[:, None] @ self.rows)[:, 0] * time
-        changes = torch.cat([self._without_offset(of_bands), drift[..., None]], 2)
-        return torch.cat([changes, self._without_offset(stretched)], 2)
+        drift = (nodes[:, None] @ self._light_of_bands)[:, 0] * time
+        return self._without_offset(torch.cat([of_bands, drift[..., None], stretched], 2))
