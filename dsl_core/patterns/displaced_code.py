@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from dsl_core.model.plan import BinaryCode
 from dsl_core.patterns.binary_code import binary_image, decoder_of
 from dsl_core.patterns.gray_code import bit_counts
+from dsl_core.solve.normal import STD_OF_MEDIAN_SIZE
 
 #: Columns by which pictures may be displaced, to either side; wider ones leave traces elsewhere as well.
 MOST_COLUMNS = 4
@@ -89,7 +90,7 @@ def _deviations(
     one, other = (columns @ moved / columns.sum(1, keepdims=True).clip(1) for columns in (never, twice))
     apart = (other - one) / np.maximum(one + other, 1e-9)
     # The median, as edges of the next stripes may be among those elsewhere.
-    usual = 1.48 * np.median(np.abs(apart[:, 1:]), 1)
+    usual = STD_OF_MEDIAN_SIZE * np.median(np.abs(apart[:, 1:]), 1)
     return np.asarray(apart[:, 0] / usual.clip(1e-9))
 
 

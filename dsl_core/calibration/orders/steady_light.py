@@ -12,6 +12,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from dsl_core.solve.normal import MEDIAN_OVER_MEAN_STD, STD_OF_MEDIAN_SIZE
+
 Floats = NDArray[np.float64]
 
 #: Parts that the columns are split into, pixels that each of them needs, and parts that a fit needs.
@@ -51,7 +53,8 @@ def light_jump(column_px: Floats, relative: Floats, frame_px: int) -> LightJump 
             low, middle, high = np.percentile(own, (25, 50, 75))
             at.append(k)
             mean.append(middle)
-            variance.append((1.25 * (high - low) / 1.35) ** 2 / own.size)
+            std = STD_OF_MEDIAN_SIZE * (high - low) / 2
+            variance.append((MEDIAN_OVER_MEAN_STD * std) ** 2 / own.size)
     if len(at) < FEWEST_PARTS:
         return None
     place = 2 * (np.array(at) + 0.5) / PARTS - 1

@@ -13,6 +13,7 @@ from dsl_core.capture.proof.noise import Noise
 from dsl_core.capture.proof.raster import Counts, Floats, Raster
 from dsl_core.model.plan import CapturePlan, Shot
 from dsl_core.patterns.multiplexed import profile
+from dsl_core.solve.normal import STD_OF_MEDIAN_SIZE
 from dsl_core.solve.ranks import median, quantile
 from dsl_core.solve.thinned import thinned
 
@@ -214,7 +215,7 @@ def black_gained(seen: Counts, lit: Lit, wanted: Floats, noise: Noise) -> np.flo
     black = lit.black[unlit]
     sigma = np.float32(np.sqrt(2 * median(noise.variance(black))))
     # What a normal distribution has its lowest quarter below.
-    gained = quantile(seen[lit.index[unlit]] - black, NO_ORDERS) + np.float32(0.674) * sigma
+    gained = quantile(seen[lit.index[unlit]] - black, NO_ORDERS) + sigma / np.float32(STD_OF_MEDIAN_SIZE)
     return gained if abs(gained) > LEAST_GAINED * sigma else _NOTHING
 
 

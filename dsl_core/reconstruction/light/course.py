@@ -17,6 +17,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from dsl_core.solve.normal import STD_OF_MEDIAN_SIZE
+
 Floats = NDArray[np.float64]
 
 #: What the terms of the drift may be before a scan is seen: linear and quadratic over the scan.
@@ -332,7 +334,7 @@ def _flicker(witnesses: Sequence[Witness], left: Floats) -> tuple[float, float]:
     """The rms of single shots, from the scatter of witnesses beyond their own deviations."""
     many = np.array([1.0 if each.against is None else 2.0 for each in witnesses])
     own = np.array([each.std**2 + QUIET**2 for each in witnesses])
-    square = (left**2 / 0.455 - own) / many
+    square = (left**2 * STD_OF_MEDIAN_SIZE**2 - own) / many
     # The median of squares stands for their mean, so that a few outliers do not make flicker.
     found = float(np.median(square))
     scatter = float(np.median((left**2 + own) / many)) * np.sqrt(2 / len(left)) * 2

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from dsl_core.model.plan import CapturePlan, NoSpectral, ScanLines
 from dsl_core.patterns.images import spectral_profiles
 from dsl_core.reconstruction.merge import PickedLines
+from dsl_core.solve.normal import STD_OF_MEDIAN_SIZE
 from dsl_core.solve.robust import robust_std
 from dsl_core.solve.thinned import thinned
 
@@ -150,7 +151,8 @@ def _quick(smooth: Floats, smooth_std: Floats) -> float:
         return 0.0
     off = smooth.sum(1)
     norm = np.sqrt((smooth**2).sum(1))
-    return float(np.sqrt(max(np.median((off / norm) ** 2) / 0.455 - np.median(smooth_std / norm) ** 2, 0.0)))
+    variance = STD_OF_MEDIAN_SIZE**2 * np.median((off / norm) ** 2) - np.median(smooth_std / norm) ** 2
+    return float(np.sqrt(max(variance, 0.0)))
 
 
 def _coverage(plan: CapturePlan) -> Floats | None:

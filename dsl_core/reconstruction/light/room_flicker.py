@@ -24,6 +24,7 @@ from dsl_core.reconstruction.light.line_levels import AROUND, PIXELS, pitch_of
 from dsl_core.reconstruction.light.line_levels import zone_px as zone_px_of
 from dsl_core.reconstruction.light.neighbour_steps import Scan
 from dsl_core.reconstruction.merge import Exposed, PickedLines
+from dsl_core.solve.normal import STD_OF_MEDIAN_SIZE
 from dsl_core.solve.thinned import thinned
 
 Floats = NDArray[np.float64]
@@ -208,7 +209,7 @@ def _frames_from_steps(
     kept: NDArray[np.intp], own: Floats, std: Floats, unlit: Floats, unlit_std: Floats, noise: float
 ) -> _Found | None:
     """What each frame has more, from what ``kept`` ones have more than their neighbours, and unlit pixels."""
-    count, of_steps = len(unlit), float(np.median(own**2)) / 0.455
+    count, of_steps = len(unlit), float(np.median(own**2)) * STD_OF_MEDIAN_SIZE**2
     rms = np.sqrt(max(of_steps - float(np.median(std**2)), 0.0) / (1 + _SQUARES))
     if rms < max(SIGMAS * float(np.median(std)), OF_NOISE * noise):
         return None

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.stats import chi2
 
 from dsl_core.reconstruction.light import course as course_module
 from dsl_core.reconstruction.light.course import LightCourse, Witness, light_course
@@ -147,7 +148,7 @@ def test_flicker_is_what_the_middle_of_the_squares_leaves_beyond_their_own_noise
     left = np.array([0.0, 0.01, 0.02, 0.03, -0.04, 0.05, 0.9])
     found, std = course_module._flicker(heard, left)
     many, own = np.array([2, 1, 2, 1, 2, 1, 2]), 0.003**2 + 0.002**2
-    assert found == pytest.approx(np.sqrt(np.median((left**2 / 0.455 - own) / many)))
+    assert found == pytest.approx(np.sqrt(np.median((left**2 / chi2.median(1) - own) / many)))
     assert std == pytest.approx(np.median((left**2 + own) / many) * np.sqrt(2 / 7) / found)
     none, chance = course_module._flicker(heard, 0 * left)
     assert none == 0.0
