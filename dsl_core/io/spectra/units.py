@@ -5,6 +5,8 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
+import numpy as np
+
 from dsl_core.errors import CalibrationError
 from dsl_core.io.spectra.records import Floats, Quantity
 
@@ -26,17 +28,34 @@ _WORDS: tuple[tuple[Quantity, re.Pattern[str]], ...] = (
     ("counts", re.compile(r"\bcounts?\b|\bDN\b|\bscope\b|digital number", re.IGNORECASE)),
     ("radiance", re.compile(r"radiance|strahldichte|\brad\b", re.IGNORECASE)),
 )
-#: Columns that hold no spectrum of their own.
+#: Words for columns that hold no spectrum of their own, wherever they stand in a title.
 _BESIDE = re.compile(
-    r"std|st\. ?dev|deviation|uncertain|unsicherheit|\berror|\bsd\b|\bsem\b|variance|pixel|chan|flag|wave"
-    r"|\bindex\b|lambda|λ|^\W*n[or]\b",
+    r"deviation|abweichung|uncertain|unsicherheit|variance|λ|wave ?(?:len|num)|wvl|wellenl"
+    r"|\b(?:std ?(?:dev)?|st\. ?dev|errors?|sd|sem|flags?|wave|lambda)\b",
     re.IGNORECASE,
 )
+#: Words that say so where they are all of the title: "pixel 3" and "No. 2 blue" are spectra.
+_COUNTER = re.compile(
+    r"\W*(?:pixels?|chan(?:nels?)?|index|n[or]|id|row|zeile|#)?(?: ?(?:n[or]|number|index))?\W*",
+    re.IGNORECASE,
+)
+#: Where words of a title meet that are written together: "refl_std", "leafStd".
+_MEETING = re.compile(r"_|(?<=[a-z])(?=[A-Z])")
 
 
 def is_beside(title: str) -> bool:
-    """Whether a column's title says that it is no spectrum: a deviation, a pixel number, wavelengths."""
-    return bool(_BESIDE.search(title))
+    """Whether a column's title says that it is no spectrum: a deviation, a pixel number, wavelengths.
+
+    >>> is_beside("leaf_std"), is_beside("Channel"), is_beside("camouflage"), is_beside("No. 1 red")
+    (True, True, False, False)
+    """
+    words = _MEETING.sub(" ", title)
+    return bool(_BESIDE.search(words) or (words.strip() and _COUNTER.fullmatch(words)))
+
+
+def counts_rows(title: str, values: Floats) -> bool:
+    """Whether a column without a title only counts its rows, as tables of data frames do."""
+    return not title.strip() and values.size > 1 and bool(np.all(np.diff(values) == 1))
 
 
 def quantity_of(title: str, around: str = "") -> tuple[Quantity, float, bool]:

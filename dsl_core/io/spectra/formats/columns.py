@@ -11,7 +11,7 @@ import numpy as np
 from dsl_core.errors import CalibrationError
 from dsl_core.io.spectra.records import WAVELENGTHS_NM, Format, Quantity, Spectrum, content_of, rising
 from dsl_core.io.spectra.text import MIN_ROWS, Table, cells_of, decoded, is_text, number_of, tables_of
-from dsl_core.io.spectra.units import is_beside, quantity_of, to_nanometres
+from dsl_core.io.spectra.units import counts_rows, is_beside, quantity_of, to_nanometres
 
 #: Corrects what a format knows better than its titles say: column's title to quantity.
 Known = Callable[[str], Quantity | None]
@@ -36,13 +36,16 @@ def read_columns(path: Path) -> list[Spectrum]:
 def spectra_of(path: Path, table: Table, known: Known | None = None) -> list[Spectrum]:
     """The spectra of a table with wavelengths in one of its columns; raises `CalibrationError`."""
     titles, names = table.titles, table.names
-    first = next((i for i, title in enumerate(titles) if _WAVELENGTH.search(title)), 0)
+    columns = list(range(table.cells.shape[1]))
+    if len(columns) > 2:
+        columns = [i for i in columns if not counts_rows(titles[i], table.cells[:, i])] or columns
+    first = next((i for i in columns if _WAVELENGTH.search(titles[i])), columns[0])
     given = table.cells[:, first]
     kept = np.isfinite(given)
     if np.count_nonzero(kept) < MIN_ROWS:
         return []
     nm = to_nanometres(path, given[kept], titles[first], table.header)
-    values_of = [i for i in range(table.cells.shape[1]) if i != first and not is_beside(titles[i])]
+    values_of = [i for i in columns if i != first and not is_beside(titles[i])]
     spectra = []
     for i in values_of:
         values = table.cells[kept, i]
