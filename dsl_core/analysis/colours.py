@@ -36,6 +36,10 @@ ILLUMINANTS: dict[str, str] = {
 USUAL = ("A", "D50", "D65", "FL11", "LED-B3")
 
 
+#: Least shares of X, Y and Z of the perfect diffuser that bands must hold. Missing ends are continued as they
+#: are at the last band, which is right for short ones alone.
+LEAST_SEEN = (0.7, 0.7, 0.55)
+
 #: What `Colour.cells` are.
 HEADER = ("place", "light", "L*", "±L*", "a*", "±a*", "b*", "±b*", "ΔE00", "±ΔE00")
 
@@ -82,6 +86,33 @@ def xyz_weights(bands_nm: Floats, light: str) -> Floats:
     return np.asarray(matching @ spread / matching[1].sum())
 
 
+def require_bands(bands_nm: Floats, light: str) -> None:
+    """Raise `DecodeError` where bands leave out too much of what makes a colour under a light."""
+    nm, matching = _table(light)
+    half = abs(bands_nm[-1] - bands_nm[0]) / max(len(bands_nm) - 1, 1) / 2
+    inside = (nm >= bands_nm.min() - half) & (nm <= bands_nm.max() + half)
+    seen = matching[:, inside].sum(1) / matching.sum(1)
+    if np.any(seen < LEAST_SEEN):
+        least = int((seen - LEAST_SEEN).argmin())
+        raise DecodeError(
+            f"The bands, {bands_nm.min():g} to {bands_nm.max():g} nm, hold {seen[least]:.0%} of"
+            f" {'XYZ'[least]} under {light}: too little for a colour. Reconstruct bands from about 430 to 660"
+            " nm, or choose another light."
+        )
+
+
+def lights_for(bands_nm: Floats) -> tuple[str, ...]:
+    """The `ILLUMINANTS` under which bands hold enough of a colour."""
+    found = []
+    for light in ILLUMINANTS:
+        try:
+            require_bands(bands_nm, light)
+        except DecodeError:
+            continue
+        found.append(light)
+    return tuple(found)
+
+
 def lab_of(reflectance: Floats, weights: Floats) -> Floats:
     """L*a*b* (3, ...) of reflectance (bands, ...) with the perfect diffuser as white."""
     return xyz_to_lab(np.tensordot(weights, reflectance, axes=1), weights.sum(axis=1))
@@ -98,13 +129,15 @@ def colours_of(
 
     Deviations that are all NaN are not known: no colour has one then, and differences have that of the other.
     ``correlation`` (bands, bands) says how bands err together; the usual one of a result otherwise.
-    Differences are to the spectrum named ``reference``. Raises `DecodeError` for unknown lights or names.
+    Differences are to the spectrum named ``reference``. Raises `DecodeError` for unknown lights or names, and
+    for bands that hold too little of a colour.
     """
     if reference is not None and reference not in spectra:
         raise DecodeError(f"There is no spectrum {reference!r} to compare with: {', '.join(spectra)}.")
     shared = usual_correlation(len(bands_nm)) if correlation is None else correlation
     found = []
     for light in lights:
+        require_bands(bands_nm, light)
         weights = xyz_weights(bands_nm, light)
         labs = {
             name: _lab_with_covariance(values, std, weights, shared)

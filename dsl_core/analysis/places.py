@@ -58,12 +58,13 @@ def spectra_of_masks(result: xr.Dataset, masks: Mapping[str, Mask]) -> dict[str,
     """Mean reflectance (bands,) of each place and its deviation, by name.
 
     That of a single pixel is as the result states it, that of more the mean of theirs: what a pixel of the
-    place is uncertain by, whatever the place itself varies. Raises `DecodeError` where no pixel has a
-    spectrum.
+    place is uncertain by, whatever the place itself varies; NaN where the result states none. Raises
+    `DecodeError` where no pixel has a spectrum.
     """
     require_spectra(result)
     reflectance = result["reflectance"].values
-    std = result["reflectance_std"].values if "reflectance_std" in result else np.zeros_like(reflectance)
+    is_known = "reflectance_std" in result
+    std = result["reflectance_std"].values if is_known else reflectance
     found = {}
     for name, mask in masks.items():
         region = region_spectrum(reflectance, std, std, mask)
@@ -71,5 +72,5 @@ def spectra_of_masks(result: xr.Dataset, masks: Mapping[str, Mask]) -> dict[str,
             raise DecodeError(
                 f"{name}: none of its {region.pixels} pixels has a spectrum. Mark another place."
             )
-        found[name] = (region.mean, region.pixel_std)
+        found[name] = (region.mean, region.pixel_std if is_known else np.full_like(region.mean, np.nan))
     return found

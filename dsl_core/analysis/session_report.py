@@ -51,7 +51,11 @@ def session_content(
             for name, (mean, std) in spectra.items()
             if np.isfinite(mean).all()
         ]
-        tables = [colour_table(colours_of(spectra, bands))] if spectra else []
+        tables = []
+        try:
+            tables += [colour_table(colours_of(spectra, bands))] if spectra else []
+        except DecodeError as error:
+            missing.append(str(error))
         centres = (np.argwhere(masks[name]).mean(0).round() for name in spectra)
         places = [(int(y), int(x)) for y, x in centres]
         content = replace(

@@ -264,7 +264,9 @@ def _stds(spectrum: NamedSpectrum) -> list[float]:
 
 def _cells(spectrum: NamedSpectrum) -> list[str]:
     pairs = zip(spectrum.mean, _stds(spectrum), strict=True)
-    return ["-" if mean != mean else f"{mean:.4f} ± {std:.4f}" for mean, std in pairs]
+    return [
+        "-" if mean != mean else f"{mean:.4f}{'' if std != std else f' ± {std:.4f}'}" for mean, std in pairs
+    ]
 
 
 def colours(

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from dsl_core.analysis.colours import ILLUMINANTS, colours_of, lab_of, xyz_weights
+from dsl_core.analysis.colours import ILLUMINANTS, colours_of, lab_of, lights_for, xyz_weights
 from dsl_core.errors import DecodeError
 from dsl_core.optics.charts import chart_reflectance
 from dsl_core.optics.colour import delta_e_2000
@@ -62,3 +62,23 @@ def test_unknown_lights_and_names_are_told() -> None:
         colours_of(spectra, NM, ("candle",))
     with pytest.raises(DecodeError, match="no spectrum 'y'"):
         colours_of(spectra, NM, reference="y")
+
+
+@pytest.mark.parametrize(
+    ("start_nm", "stop_nm", "light", "held"),
+    [(430, 660, "FL11", True), (440, 650, "FL11", True), (450, 650, "FL11", False), (430, 600, "A", False),
+     (500, 560, "D65", False), (480, 480, "D65", False)],
+)  # fmt: skip
+def test_bands_that_hold_too_little_of_a_colour_have_none(
+    start_nm: float, stop_nm: float, light: str, held: bool
+) -> None:
+    bands = np.arange(start_nm, stop_nm + 1.0, 5.0)
+    spectra = {"x": (np.full(len(bands), 0.4), np.full(len(bands), 0.01))}
+    assert (light in lights_for(bands)) == held
+    if held:
+        assert len(colours_of(spectra, bands, (light,))) == 1
+    else:
+        with pytest.raises(
+            DecodeError, match=f"{start_nm} to {stop_nm} nm, hold .* under {light}: too little"
+        ):
+            colours_of(spectra, bands, (light,))

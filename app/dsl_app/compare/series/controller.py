@@ -216,9 +216,13 @@ class SeriesController:
         if against == row.path:
             return _without(row, SeriesKind.SWEEP, "This is the reference.")
         try:
-            if self._reference is None:
-                self._reference = TruthReference() if against is None else ResultReference(against, progress)
-            return replace(row, point=self._reference.judge(row.path, progress))
+            reference = self._reference
+            if reference is None:
+                reference = TruthReference() if against is None else ResultReference(against, progress)
+                # Another one may have been chosen while this one was read.
+                if self.state.against.value == against:
+                    self._reference = reference
+            return replace(row, point=reference.judge(row.path, progress))
         except Cancelled:
             raise
         except DslError as error:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
+from itertools import chain, count
 
 import numpy as np
 from PySide6.QtCore import Qt
@@ -17,8 +19,8 @@ from dsl_app.shared.widgets.icons import swatch
 from dsl_app.shared.widgets.layouts import column_of, row_of
 from dsl_app.shared.widgets.read_table import RIGHT, ReadTable, cell
 from dsl_core.analysis.at_bands import at_bands
-from dsl_core.analysis.colours import HEADER, ILLUMINANTS, Colour, colours_of
-from dsl_core.errors import CalibrationError
+from dsl_core.analysis.colours import HEADER, ILLUMINANTS, Colour, colours_of, lights_for
+from dsl_core.errors import CalibrationError, DecodeError
 
 EMPTY = "Pin pixels, mark regions or add references; their colours under a light are listed here."
 THIN = chr(0x200A)
@@ -58,14 +60,18 @@ class ColoursPanel(QWidget):
     def _show(self) -> None:
         if not self.isVisible():
             return
-        marks = {mark.name: mark for mark in self._state.marks.value if not mark.trouble}
+        marks = _labelled(self._state.marks.value)
         selected = self._state.selected_mark
-        reference = selected.name if selected is not None and selected.name in marks else None
-        found = self._colours(marks, (str(self.light.currentData()),), reference)
+        reference = next((label for label, mark in marks.items() if mark is selected), None)
+        why = EMPTY
+        try:
+            found = self._colours(marks, (str(self.light.currentData()),), reference)
+        except DecodeError as error:
+            found, why = [], str(error)
         self.copy.setEnabled(bool(found))
         self.table.setVisible(bool(found))
         if not found:
-            self.text.setText(EMPTY)
+            self.text.setText(why)
             return
         self.text.setText(_NONE if reference is None else _CHOSEN.format(reference))
         rows = []
@@ -100,9 +106,12 @@ class ColoursPanel(QWidget):
 
     def copy_all(self) -> None:
         """Copy the colours under all lights."""
-        marks = {mark.name: mark for mark in self._state.marks.value if not mark.trouble}
+        marks = _labelled(self._state.marks.value)
         selected = self._state.selected_mark
-        found = self._colours(marks, tuple(ILLUMINANTS), None if selected is None else selected.name)
+        reference = next((label for label, mark in marks.items() if mark is selected), None)
+        result = self._state.result.value
+        lights = () if result is None else lights_for(np.asarray(result.wavelengths_nm, np.float64))
+        found = self._colours(marks, lights, reference)
         lines = ["\t".join(HEADER)]
         for each in found:
             cells = (f"{v:.4f}" if isinstance(v, float) else v or "" for v in each.cells)
@@ -114,6 +123,16 @@ class ColoursPanel(QWidget):
         self._theme = theme
         self.table.apply_theme(theme)
         self._show()
+
+
+def _labelled(marks: Iterable[Mark]) -> dict[str, Mark]:
+    """Marks that have a spectrum by what they are called in the table: those of one name are numbered."""
+    found: dict[str, Mark] = {}
+    for mark in marks:
+        if not mark.trouble:
+            labels = chain([mark.name], (f"{mark.name} ({number})" for number in count(2)))
+            found[next(label for label in labels if label not in found)] = mark
+    return found
 
 
 def _value(value: float, std: float) -> str:

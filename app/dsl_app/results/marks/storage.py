@@ -48,6 +48,8 @@ class MarkStorage:
         self._reading = _Reading.DONE
         self._reason = ""
         self._waiting: list[Callable[[], None]] = []
+        #: When the file was changed last, and its size, as far as this window knows.
+        self._stamp: tuple[int, int] | None = None
 
     # Read ------------------------------------------------------------------------------------------
 
@@ -81,6 +83,7 @@ class MarkStorage:
             return
         try:
             saved = load_annotations(result.path)
+            self._stamp = _stamp_of(annotations_path(result.path))
         except DslError as error:
             self._damaged(result, str(error))
             return
@@ -173,17 +176,33 @@ class MarkStorage:
     # Save ------------------------------------------------------------------------------------------
 
     def save(self) -> None:
-        """Save all marks; says why if that fails."""
+        """Save all marks; says why if that fails, and keeps what another window has saved meanwhile."""
         result = self.state.result.value
         if result is None:
             return
+        path = annotations_path(result.path)
+        if _stamp_of(path) not in (None, self._stamp):
+            self._notifier.tell(
+                "warning",
+                f"Another window has changed the marks in {path}.{set_aside(path)} Those of this window are"
+                " saved now. Close one of the windows.",
+            )
         try:
             save_annotations(annotations_of(self.state.marks.value), result.path)
+            self._stamp = _stamp_of(path)
         except DslError as error:
             self._notifier.tell("warning", f"The marks could not be saved: {error}")
 
 
 # Records on disk -----------------------------------------------------------------------------------
+
+
+def _stamp_of(path: Path) -> tuple[int, int] | None:
+    try:
+        status = path.stat()
+    except OSError:
+        return None
+    return status.st_mtime_ns, status.st_size
 
 
 def marks_of(saved: Annotations, result: ResultArrays, progress: Progress) -> tuple[Mark, ...]:

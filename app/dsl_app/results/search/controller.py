@@ -16,6 +16,8 @@ class SearchController:
 
     def __init__(self, state: ResultsState, runner: JobRunner, notifier: Notifier) -> None:
         self.state, self._runner, self._notifier = state, runner, notifier
+        #: The number of the latest search: an earlier one that takes longer is no longer wanted.
+        self._latest = 0
 
     def start(self, mode: SearchMode) -> None:
         """Search for the spectrum of the selected mark, or of the cursor if no mark is selected."""
@@ -25,6 +27,8 @@ class SearchController:
                 "info", "Select a pin, region or reference, or point at a pixel, to search for its spectrum."
             )
             return
+
+        self._latest = number = self._latest + 1
 
         def work(progress: Progress) -> Search:
             from dsl_core.evaluation.similarity import angle_noise, likeness, spectrum_at
@@ -38,7 +42,7 @@ class SearchController:
             )
 
         def done(search: Search) -> None:
-            if self.state.result.value is result:
+            if self.state.result.value is result and number == self._latest:
                 self.state.search.set(search)
 
         self._runner.submit(Job(f"Search for {name}", work, done, is_minor=True))
@@ -57,6 +61,7 @@ class SearchController:
 
     def clear(self) -> None:
         """Show the picture without the search."""
+        self._latest += 1
         self.state.search.set(None)
 
     def _target(self) -> tuple[str, Spectrum | None]:

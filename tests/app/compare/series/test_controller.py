@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 from dsl_app.compare.series.controller import SeriesController
-from dsl_app.compare.series.state import SeriesKind, SeriesState
+from dsl_app.compare.series.state import SeriesKind, SeriesRow, SeriesState
 from dsl_app.shared.undo import UndoStack
 
 from dsl_core.io.result.result_file import save_result
 from dsl_core.model.result import build_result
+from dsl_core.progress import NoProgress
 from tests.app.support.doubles import InlineRunner, ManualRunner, RecordingNotifier
 from tests.cases.stage_series import NM, flat_arrays, write_stage, write_sweep
 
@@ -156,3 +158,29 @@ def test_results_that_come_while_one_is_read_wait_and_a_cancel_says_so(stage: li
     runner.run_all()
     assert series.state.busy.value == ""
     assert [row.trouble(SeriesKind.STAGE)[:8] for row in series.state.rows.value] == ["", *["Not read"] * 3]
+
+
+def test_a_reference_chosen_while_another_is_read_is_the_one_compared_with(
+    series: SeriesController, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from dsl_core.workflows import series as workflow
+
+    first, second = Path("a.zarr"), Path("b.zarr")
+
+    class Read:
+        def __init__(self, path: Path, progress: Any) -> None:
+            self.name = path.stem
+            if path == first:
+                series.state.against.set(second)
+
+        def judge(self, path: Path, progress: Any) -> Any:
+            return None
+
+    monkeypatch.setattr(workflow, "ResultReference", Read)
+    series.state.against.set(first)
+    row = SeriesRow(Path("scan.zarr"))
+    names = []
+    for _ in range(2):
+        series._compare(row, NoProgress())
+        names.append(getattr(series._reference, "name", None))
+    assert names == [None, "b"]

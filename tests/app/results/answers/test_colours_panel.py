@@ -83,3 +83,18 @@ def test_figures_of_many_marks_are_whole_in_a_window_of_1280_px(qtbot: QtBot, be
     panel.table.show_rows([(cell("pin 1"), *(cell(text, "", RIGHT) for text in texts)) for _ in range(40)])
     wide = sum(panel.table.columnWidth(column) for column in range(5))
     assert wide <= panel.table.viewport().width()
+
+
+def test_marks_of_one_name_have_a_row_each(qtbot: QtBot, bench: Bench) -> None:
+    panel = ColoursPanel(bench.state)
+    qtbot.addWidget(panel)
+    panel.show()
+    for pixel in ((30, 5), (3, 3)):
+        bench.control.marks.pin(pixel)
+        bench.control.marks.rename(bench.state.marks.value[-1].key, "leaf")
+    bench.state.selected.set(bench.state.marks.value[0].key)
+    panel.apply_theme(LIGHT)
+    cells = [[panel.table.item(row, column).text() for column in (0, 1, 4)] for row in range(2)]  # type: ignore[union-attr]
+    assert [row[0] for row in cells] == ["leaf", "leaf (2)"]
+    assert cells[0][1] != cells[1][1]
+    assert [row[2] == "" for row in cells] == [True, False]

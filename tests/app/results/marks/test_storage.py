@@ -217,3 +217,17 @@ def test_marks_of_one_name_are_told_apart_without_their_arrays() -> None:
     state.marks.set((other,))
     state.marks.set((other,))
     assert len(told) == 2
+
+
+def test_what_another_window_saved_meanwhile_is_kept_aside(path: Path) -> None:
+    one, other = (Bench(path, InlineRunner()) for _ in range(2))
+    one.control.marks.pin((5, 5))
+    other.control.marks.pin((2, 2))
+    assert "Another window has changed the marks" in other.told
+    before = len(other.notifier.told)
+    other.control.marks.pin((4, 4))
+    assert len(other.notifier.told) == before
+    assert [pin.pixel for pin in other.kept.pins][-2:] == [(2, 2), (4, 4)]
+    (aside,) = path.parent.glob("small.marks.damaged*")
+    aside.replace(path.with_suffix(".marks.json"))
+    assert [pin.pixel for pin in one.kept.pins][-1] == (5, 5)

@@ -91,3 +91,20 @@ def test_a_search_that_ends_after_another_result_was_opened_is_dropped(bench: Be
     bench.control.open(tmp_path / "small.zarr")
     runner.run_all()
     assert bench.state.search.value is None
+
+
+def test_the_search_that_was_asked_for_last_is_shown(bench: Bench) -> None:
+    """Jobs end in any order, and none comes back once the search is cleared."""
+    runner = ManualRunner()
+    search = SearchController(bench.state, runner, RecordingNotifier())
+    for pixel in ((10, 10), (30, 5)):
+        bench.control.point_at(pixel)
+        search.start(SearchMode.SPECTRUM)
+    runner.waiting.reverse()
+    runner.run_all()
+    assert bench.state.search.value is not None
+    assert bench.state.search.value.name == "pixel 30, 5"
+    search.start(SearchMode.SPECTRUM)
+    search.clear()
+    runner.run_all()
+    assert bench.state.search.value is None
