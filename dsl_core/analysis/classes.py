@@ -13,10 +13,13 @@ from dsl_core.analysis.at_bands import at_bands
 from dsl_core.analysis.library import SpectralLibrary
 from dsl_core.errors import CalibrationError, DecodeError
 from dsl_core.model.result import SPECTRUM_INVALID, Flag
+from dsl_core.words import counted
 
 Floats = NDArray[np.float64]
 Cube = NDArray[np.float32] | NDArray[np.float64]
 
+#: Fewer bands than this decide nothing.
+FEWEST_BANDS = 3
 #: A class of more spectra than this is summed up: a mean, and components of how its spectra vary.
 MOST_MEMBERS = 8
 MOST_COMPONENTS = 3
@@ -146,6 +149,11 @@ def class_of_pixels(
     known = np.isfinite(values).all(0) & np.isfinite(spread).all(0)
     values, spread = values[:, known], spread[:, known]
     count = values.shape[1]
+    if len(values) < FEWEST_BANDS:
+        raise DecodeError(
+            f"The result has {counted(len(values), 'band')}; {FEWEST_BANDS} at least tell materials apart."
+            " Reconstruct more bands."
+        )
     if count == 0:
         raise DecodeError(f"{name}: none of its {len(y)} pixels has a spectrum. Mark another place.")
     noise = np.mean(spread**2, axis=1)

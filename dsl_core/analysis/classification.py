@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from dsl_core.analysis.area_deviation import class_deviations
 from dsl_core.analysis.areas import Cube, depth_relative_std, pixel_areas_mm2
 from dsl_core.analysis.class_table import ClassRow, class_table
-from dsl_core.analysis.classes import SpectralClass, class_of_pixels
-from dsl_core.analysis.classify import FEWEST_BANDS, Brightness, ClassMap, Limits, Measure, Scores, score
+from dsl_core.analysis.classes import FEWEST_BANDS, SpectralClass, class_of_pixels
+from dsl_core.analysis.classify import Brightness, ClassMap, Limits, Measure, Scores, score
 from dsl_core.analysis.places import Mask, require_spectra
 from dsl_core.errors import DecodeError
 from dsl_core.io.export.class_map import (

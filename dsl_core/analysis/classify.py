@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dsl_core.analysis.band_noise import band_correlation, usual_correlation
-from dsl_core.analysis.classes import NOT_JUDGED, SpectralClass, marked_by, shared_names
+from dsl_core.analysis.classes import FEWEST_BANDS, NOT_JUDGED, SpectralClass, marked_by, shared_names
 from dsl_core.analysis.likelihood import Block, class_fit
 from dsl_core.analysis.mark_colours import Ground, mark_colour
 from dsl_core.errors import DecodeError
@@ -36,8 +36,6 @@ _AT_ONCE = 8192
 #: Classes of a map that ENVI, and a colour table, can hold.
 MOST_CLASSES = 250
 NOT_JUDGED_COLOUR, NONE_COLOUR, UNSURE_COLOUR = "#000000", "#777777", "#c8c8c8"
-#: Fewer bands than this decide nothing.
-FEWEST_BANDS = 3
 
 
 class Measure(Enum):

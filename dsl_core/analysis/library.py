@@ -154,7 +154,10 @@ def read_groups(table: Path) -> dict[str, str]:
     import csv
 
     try:
-        rows = list(csv.DictReader(read_bounded(table).decode("utf-8-sig").splitlines()))
+        lines = read_bounded(table).decode("utf-8-sig").splitlines()
+        # Where a comma is the decimal point, tables have semicolons.
+        separator = next((each for each in ";\t" if lines and each in lines[0]), ",")
+        rows = list(csv.DictReader(lines, delimiter=separator))
     except (OSError, UnicodeDecodeError, csv.Error) as error:
         raise CalibrationError(f"The table of groups {table} cannot be read ({error}).") from error
     if not rows or not {"name", "group"} <= set(rows[0]):

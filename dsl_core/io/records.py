@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from codecs import BOM_UTF8
 from pathlib import Path
 from typing import TypeVar
 
@@ -53,7 +54,7 @@ def read_record(
     """
     name = f"{called} {path}".strip()
     try:
-        return kind.model_validate_json(unseal(read_bounded(path)).decode())
+        return kind.model_validate_json(unseal(read_bounded(path).removeprefix(BOM_UTF8)).decode())
     except UnicodeDecodeError as failure:
         raise error(f"{name} cannot be read (it is not a text file). {remedy}") from failure
     except OSError as failure:

@@ -191,3 +191,10 @@ def test_shares_and_probabilities_are_at_most_one() -> None:
     assert Limits.chosen(Measure.ANGLE, 1.5, None) == Limits(1.5, 0.1)
     with pytest.raises(DecodeError, match=r"from 0 to 1; given 7 and 0\.95"):
         Limits.chosen(Measure.PROBABILITY, 7, None)
+
+
+@pytest.mark.parametrize("bands", [1, 2])
+def test_one_or_two_bands_tell_no_materials_apart(bands: int) -> None:
+    values = np.full((bands, 4, 5), 0.3)
+    with pytest.raises(DecodeError, match=f"has {bands} band.*3 at least"):
+        class_of_pixels("x", values, 0.01 * values, np.ones((4, 5), bool))

@@ -5,7 +5,7 @@ import pytest
 
 from dsl_core.analysis.classes import classes_of_library
 from dsl_core.analysis.classify import ClassMap, score
-from dsl_core.analysis.library import read_library
+from dsl_core.analysis.library import read_groups, read_library
 from dsl_core.errors import CalibrationError
 from tests.cases.spectra_files import NM, SHARE, asd
 
@@ -124,3 +124,11 @@ def test_an_error_in_percent_is_refused(tmp_path: Path) -> None:
     library = read_library([_csv(tmp_path / "l.csv", SHARE, titles=("one",))])
     with pytest.raises(CalibrationError, match=r"share from 0 to 1, not 2\. Give 0\.02 for 2 %"):
         classes_of_library(library, BANDS_NM, relative_error=2.0)
+
+
+@pytest.mark.parametrize("separator", [",", ";", "\t"])
+def test_groups_are_read_whatever_separates_them(separator: str, tmp_path: Path) -> None:
+    table = tmp_path / "groups.csv"
+    lines = (("name", "group"), ("oak 1", "oak"), ("elm", "elm"))
+    table.write_text("\n".join(separator.join(line) for line in lines), encoding="utf-8-sig")
+    assert read_groups(table) == {"oak 1": "oak", "elm": "elm"}

@@ -68,3 +68,9 @@ def test_of_many_wrong_fields_one_is_named_unless_more_are_asked_for(tmp_path: P
     (tmp_path / "plan.json").write_text('{"name": 3, "a": 1, "b": 2}')
     with pytest.raises(StoreError, match=r"name must be a text \(given 3\); and 2 more\."):
         read_record(tmp_path / "plan.json", CapturePlan)
+
+
+def test_a_file_with_the_mark_that_windows_puts_first_is_read(tmp_path: Path) -> None:
+    path = write_record(tmp_path / "plan.json", PLAN)
+    path.write_bytes(b"\xef\xbb\xbf" + path.read_bytes())
+    assert read_record(path, CapturePlan) == PLAN

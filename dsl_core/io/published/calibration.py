@@ -18,6 +18,7 @@ from dsl_core.io.published.curve_tables import (
 )
 from dsl_core.io.published.layout import FileRecord
 from dsl_core.io.published.stereo import Size, Stereo, load_stereo, save_stereo
+from dsl_core.io.staging import check_targets
 from dsl_core.model.rig import Provenance, Rgb, Rig
 from dsl_core.model.spectral import SpectralCurve
 
@@ -83,7 +84,13 @@ def load_calibration(
 
 
 def export_calibration(rig: Rig, root: Path, *, overwrite: bool = False) -> list[Path]:
-    """Write a rig's lenses, pose and curves in the published layout below ``root``; raises `StoreError`."""
+    """Write a rig's lenses, pose and curves in the published layout below ``root``; raises `StoreError`.
+
+    Where one of the files is there and may not be replaced, none is written: old lenses and new tables would
+    pass for one rig.
+    """
+    tables = [root / TABLE_FOLDER / name for name, _ in TABLE_NAMES.values()]
+    check_targets([*tables, root / STEREO_NAME], overwrite=overwrite)
     stereo = Stereo(camera=rig.camera, projector=rig.projector, pose=rig.pose)
     return [
         *save_tables(rig, root / TABLE_FOLDER, overwrite=overwrite),

@@ -67,7 +67,7 @@ def find_scans(source: Path) -> list[Path]:
     if not source.exists():
         raise StoreError(f"{source} does not exist. Give a folder with scans, or a list of them.")
     try:
-        lines = [line.strip() for line in read_bounded(source).decode().splitlines()]
+        lines = [line.strip() for line in read_bounded(source).decode("utf-8-sig").splitlines()]
     except (OSError, UnicodeDecodeError) as error:
         raise StoreError(
             f"{source} is not a list of scans ({error}). Give a text file with a path on each line."

@@ -154,3 +154,16 @@ def test_the_table_says_what_to_do(tmp_path: Path) -> None:
     assert table["DG.npy"].status == "missing"
     assert table["first_order_correspondence_model.npy"].status == "optional"
     assert [r.status for r in check_calibration(tmp_path / "nowhere")] == ["missing"] * 4 + ["optional"]
+
+
+def test_a_calibration_is_written_whole_or_not_at_all(tmp_path: Path) -> None:
+    """New tables beside old lenses would be taken for one rig."""
+    rig = small_rig()
+    *tables, lenses = export_calibration(rig, tmp_path)
+    for path in tables:
+        path.unlink()
+    with pytest.raises(StoreError, match="already exists"):
+        export_calibration(rig, tmp_path)
+    assert not any(path.exists() for path in tables)
+    assert len(export_calibration(rig, tmp_path, overwrite=True)) == 4
+    assert lenses.exists()

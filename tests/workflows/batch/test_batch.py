@@ -70,6 +70,8 @@ def _batch(folder: Path, runner: Here | None = None, **how: object) -> dict[str,
 
 def test_scans_are_found_in_folders_and_lists(folder: Path, tmp_path: Path) -> None:
     listed = tmp_path / "some.txt"
+    listed.write_text("\ufeffscans/b.dsl\n", encoding="utf-8")
+    assert find_scans(listed) == [tmp_path / "scans/b.dsl"]
     listed.write_text("# the good ones\nscans/c.dsl\n\nscans/a.dsl\nscans/c.dsl\n")
     assert [path.name for path in find_scans(folder)] == ["a.dsl", "b.dsl", "c.dsl"]
     assert find_scans(listed) == [tmp_path / "scans/c.dsl", tmp_path / "scans/a.dsl"]
