@@ -30,6 +30,7 @@ from dsl_core.calibration.geometry.columns_only import (
     start_from_columns,
     with_assumed_rows,
 )
+from dsl_core.calibration.geometry.knocked import knocked
 from dsl_core.calibration.geometry.pose_series import (
     GOOD_RMS_PX,
     check_poses,
@@ -109,6 +110,9 @@ def calibrate_geometry(
     normals = [rotation_of(motion[:3])[:, 2] for motion in final.parameters[SHARED:].reshape(-1, 6)]
     tilt = largest_angle_deg(np.array(normals))
     unseen = columns_only_doubts(found, poses) if columns_only else []
+    fitting = [pose for pose, keep in zip(poses, kept, strict=True) if keep]
+    knock = knocked(fitting, final.parameters)
+    unseen += [] if knock is None else [knock.sentence]
     return found.model_copy(update={"warnings": (*unseen, *warnings, *doubts(found, tilt, baseline_mm))})
 
 
