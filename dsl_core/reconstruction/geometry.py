@@ -20,7 +20,6 @@ from dsl_core.optics.pinhole import rays_in
 from dsl_core.patterns.gray_code import DecodedCode
 from dsl_core.progress import Progress
 from dsl_core.reconstruction.columns.code_dispute import Settled, has_peak, is_dark, settle
-from dsl_core.reconstruction.columns.column import MODEL_ERROR
 from dsl_core.reconstruction.columns.lateral_colour import material_std_px
 from dsl_core.reconstruction.columns.line_spread import wave_std_px
 from dsl_core.reconstruction.columns.maps import CHUNK, WHOLE_PX_STD, ColumnFinder, ColumnMaps
@@ -182,7 +181,7 @@ class ColumnSearch:
         plan: CapturePlan,
         refine_columns: bool = True,
         device: str = "cpu",
-        peak_error: float = MODEL_ERROR,
+        peak_error: float | None = None,
     ) -> None:
         self.rig, self._device, self._peak_error = rig, device, peak_error
         self.lines = LineSet.of(plan) if refine_columns else None

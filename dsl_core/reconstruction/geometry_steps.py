@@ -17,8 +17,7 @@ from dsl_core.progress import Progress
 from dsl_core.reconstruction.camera_spot import follow_spot, spot_finding
 from dsl_core.reconstruction.code_agreement import NamedPlaces, code_agreement
 from dsl_core.reconstruction.code_wave import code_wave, with_varying_width
-from dsl_core.reconstruction.columns.column import MODEL_ERROR
-from dsl_core.reconstruction.columns.line_peaks import smooth_peaks
+from dsl_core.reconstruction.columns.line_peaks import LinePeaks, comb_peaks, smooth_peaks
 from dsl_core.reconstruction.columns.line_spread import own_spread, spread_pixels, with_own_spread
 from dsl_core.reconstruction.columns.peak_error import peak_error
 from dsl_core.reconstruction.columns.spread_doubt import SpreadDoubt, spread_doubt
@@ -44,14 +43,19 @@ from dsl_core.reconstruction.spectral.highlights import follow_highlights
 class _Spread:
     """What is known of the spread of lines: what was found, what of it is in doubt, and errors that follow.
 
-    ``error`` is that of the modelled peak, relative to it; ``wave_px`` that of columns between edges of the
-    code.
+    ``error`` is that of the modelled peak, relative to it, None for the usual one; ``wave_px`` that of
+    columns between edges of the code.
     """
 
     found: SpreadFit | None = None
     doubt: SpreadDoubt | None = None
-    error: float = MODEL_ERROR
+    error: float | None = None
     wave_px: float = 0.0
+
+
+def _error_of(peaks: LinePeaks | None) -> float | None:
+    """The error that peaks ask for; None, the usual one, where there are none to ask."""
+    return None if peaks is None else peak_error(peaks)
 
 
 class GeometrySteps:
@@ -119,7 +123,8 @@ class GeometrySteps:
         found = own_spread(self.rig, self._lines, code, white, self._frames)
         self.rig = with_own_spread(self.rig, found)
         peaks = smooth_peaks(self.rig, self._lines, code, white, self._frames)
-        return _Spread(found, spread_doubt(peaks, found), peak_error(peaks))
+        asked = comb_peaks(self.rig, self._lines, code, white, self._frames) if peaks is None else peaks
+        return _Spread(found, spread_doubt(peaks, found), _error_of(asked))
 
     def _own_width(
         self,
@@ -139,7 +144,7 @@ class GeometrySteps:
             if own.changed:
                 self.findings.append(own.finding())
                 self.rig = own.of(self.rig)
-                error = peak_error(smooth_peaks(self.rig, lines, code, white, self._frames))
+                error = _error_of(smooth_peaks(self.rig, lines, code, white, self._frames))
                 columns = self._columns(code, white, replace(known, error=error))
                 wave = code_wave(lines, named.column, columns.maps)
             doubt = with_varying_width(doubt, lines, named.column, columns.maps)

@@ -27,7 +27,8 @@ ENDS_PX = (-0.45, 0.45)
 #: Relative error of the modelled peak (blur, halo, neighbouring pixels), added to each variance, where a scan
 #: was not asked for its own (`peak_error`).
 MODEL_ERROR = 0.0015
-#: The same for combs, where the first orders of other lines are under the peak.
+#: The same for combs, where the first orders of other lines are under the peak. So much the brightness of a
+#: peak is off by in any case: they are nearly alike in its frames, which moves no column.
 COMB_ERROR = 0.05
 #: A column is loose, whatever its fit says, unless the line next to its own lights it by so many deviations:
 #: without, the fit has stopped where the slope of that line would begin.
@@ -64,15 +65,17 @@ class Column:
     unusual: Tensor
 
 
-def refine(peaks: LinePeaks, model_error: float = MODEL_ERROR) -> Column:
+def refine(peaks: LinePeaks, model_error: float | None = None) -> Column:
     """Refine decoded columns.
 
-    ``model_error`` is that of the peak of single lines, relative to it. Where the fit fails, the decoded
-    column stays, with the deviation of a whole pixel, ``1/sqrt(12)``. Its amplitude is that of the brightest
-    frame near it, or of the fit to what is left where frames are saturated, with an infinite deviation: less
-    would make light of the zero order next to them.
+    ``model_error`` is that of the peak, relative to it, None for the usual one. Where the fit fails, the
+    decoded column stays, with the deviation of a whole pixel, ``1/sqrt(12)``. Its amplitude is that of the
+    brightest frame near it, or of the fit to what is left where frames are saturated, with an infinite
+    deviation: less would make light of the zero order next to them.
     """
     coarse_px, single = peaks.coarse_px, peaks.lines.single
+    if model_error is None:
+        model_error = MODEL_ERROR if single else COMB_ERROR
     fit = fit_peaks(peaks, model_error)
     unusual = _is_unusual(fit)
     poor = torch.nonzero(unusual).ravel()
@@ -154,13 +157,12 @@ def fit_peaks(peaks: LinePeaks, model_error: float, aside_px: float | None = Non
     usual_px = 0.0 if peaks.response.spread is None else ASIDE_PX
     q = peaks.coarse_px + (usual_px if aside_px is None else aside_px)
     brightest = amplitude = y.amax(0)
-    error = model_error if peaks.lines.single else COMB_ERROR
     # No distance grows by more than the steps of all iterations.
     reach_px = float((q - centres).abs().max()) + ITERATIONS * STEP_PX
     table = peaks.table(q, reach_px)
     for _ in range(ITERATIONS):
         g, slope = table.at(q - centres)
-        weight = 1 / (variance + (error * amplitude) ** 2)
+        weight = 1 / (variance + (model_error * amplitude) ** 2)
         wg = weight * g
         gg = (wg * g).sum(0).clip(min=1e-30)
         amplitude = (wg * y).sum(0) / gg
@@ -172,6 +174,8 @@ def fit_peaks(peaks: LinePeaks, model_error: float, aside_px: float | None = Non
     beside = (amplitude * g * torch.sqrt(weight)).topk(2, 0).values[1]
     chi_square = (weight * residual**2).sum(0) / (used - 2).clip(min=1)
     measured = torch.isfinite(variance).all(0)
+    if not peaks.lines.single:
+        gg = (g**2 / (variance + (COMB_ERROR * amplitude) ** 2)).sum(0).clip(min=1e-30)
     return PeakFit(
         q, amplitude, 1 / torch.sqrt(gg), information, chi_square, used, brightest, measured, beside
     )

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import torch
+from numpy.typing import NDArray
 from torch import Tensor
 
 from dsl_core.model.rig import ProjectorResponse, Rig
@@ -16,12 +17,14 @@ from dsl_core.optics.spread.field import widths_at
 from dsl_core.optics.unlit import unlit_px
 from dsl_core.patterns.gray_code import DecodedCode
 from dsl_core.reconstruction.columns.dark_offset import dark_offset
-from dsl_core.reconstruction.columns.line_spread import Pickable, spread_pixels
+from dsl_core.reconstruction.columns.line_spread import Pickable, bright_runs, spread_pixels
 from dsl_core.reconstruction.hdr import MergedFrame
 from dsl_core.solve.threads import one_kernel_thread
 
 #: Frames on either side of a peak that are looked at where lines leave nothing out.
 FEWEST_BESIDE = 2
+#: Fewer pixels of combs do not say how far off their peaks are.
+FEWEST_PIXELS = 300
 
 
 @dataclass(frozen=True)
@@ -101,8 +104,24 @@ def smooth_peaks(
 ) -> LinePeaks | None:
     """The peaks of bright pixels on smooth surfaces; None where single lines do not cover the picture."""
     pixels = spread_pixels(lines, code, white)
-    if lines is None or pixels.size == 0:
+    return None if lines is None or pixels.size == 0 else _peaks_of(rig, lines, pixels, code, stack)
+
+
+@one_kernel_thread()
+def comb_peaks(
+    rig: Rig, lines: LineSet | None, code: DecodedCode, white: MergedFrame, stack: Pickable
+) -> LinePeaks | None:
+    """The same for combs; None for other patterns, and where too few pixels are bright."""
+    if lines is None or lines.single:
         return None
+    pixels = bright_runs(code, white)
+    return _peaks_of(rig, lines, pixels, code, stack) if pixels.size >= FEWEST_PIXELS else None
+
+
+def _peaks_of(
+    rig: Rig, lines: LineSet, pixels: NDArray[np.intp], code: DecodedCode, stack: Pickable
+) -> LinePeaks:
+    """The peaks of some pixels (flat indices), without their dark offset."""
     seen = stack.pick(pixels)
     column = torch.as_tensor(code.likely_column.ravel()[pixels].astype(np.float64))
     y, std = (torch.as_tensor(values.astype(np.float64)) for values in (seen.radiance, seen.std))

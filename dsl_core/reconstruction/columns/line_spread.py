@@ -115,6 +115,11 @@ def spread_pixels(lines: LineSet | None, code: DecodedCode, white: MergedFrame) 
     """
     if lines is None or not lines.single or lines.step_px > lines.width_px:
         return np.empty(0, np.intp)
+    return bright_runs(code, white)
+
+
+def bright_runs(code: DecodedCode, white: MergedFrame) -> NDArray[np.intp]:
+    """Flat indices of bright pixels, in runs of neighbours on smooth surfaces, evenly thinned."""
     light = white.radiance
     good = ~code.undecided & ~white.saturated & np.isfinite(light) & (light > 0)
     if not good.any():

@@ -16,7 +16,7 @@ from dsl_core.optics.lines.line_set import LineSet
 from dsl_core.optics.spread.field import widths_at
 from dsl_core.optics.unlit import unlit_px
 from dsl_core.progress import NoProgress, Progress
-from dsl_core.reconstruction.columns.column import MODEL_ERROR, Column, refine
+from dsl_core.reconstruction.columns.column import Column, refine
 from dsl_core.reconstruction.columns.dark_offset import dark_offset
 from dsl_core.reconstruction.columns.line_peaks import LinePeaks
 from dsl_core.reconstruction.columns.pattern_column import first_order_share, refine_by_profiles
@@ -83,8 +83,8 @@ class ColumnFinder:
     device: str = "cpu"
     #: Where the first pixel of ``white`` and ``stack`` is in the whole picture, a flat index.
     first: int = 0
-    #: Relative error of the modelled peak of single lines.
-    peak_error: float = MODEL_ERROR
+    #: Relative error of the modelled peak of lines, None for the usual one.
+    peak_error: float | None = None
 
     def find(
         self,
@@ -166,7 +166,7 @@ def _on_lines(
     lines: LineSet,
     rig: Rig,
     widths: Tensor | None,
-    peak_error: float,
+    peak_error: float | None,
 ) -> tuple[Column, Tensor, Tensor]:
     response = rig.projector_response
     unlit = unlit_px(rig, lines.width_px)

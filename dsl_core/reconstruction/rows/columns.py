@@ -22,12 +22,12 @@ def columns_by_rows(
     frames: ScanFrames,
     code: DecodedCode,
     white: MergedFrame,
-    peak_error: float,
+    peak_error: float | None,
     progress: Progress | None = None,
 ) -> FoundColumns:
     """Refine and triangulate decoded columns band by band.
 
-    ``peak_error`` is that of the modelled peak of single lines, relative to it.
+    ``peak_error`` is that of the modelled peak of lines, relative to it, None for the usual one.
     """
     height, width = code.column.shape
     search = ColumnSearch(rig, frames.plan, options.refine_columns, options.device, peak_error)

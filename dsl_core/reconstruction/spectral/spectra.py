@@ -38,6 +38,9 @@ from dsl_core.solve.threads import one_kernel_thread
 
 #: Pixels of a tile of up to `TILE_BANDS` bands, and of the smallest; even numbers keep the Bayer phase.
 TILE, TILE_BANDS, LEAST_TILE = (64, 96), 60, (16, 24)
+#: Relative error of the light of bands in combs, whose frames do not tell a change of a LED's light, or of
+#: the film's place, that is too small to be named.
+COMB_LIGHT = 0.03
 #: Rows of a tile whose full matrices are in memory at once, as tensors.
 DENSE_ROWS = 16
 #: Pixels whose light is traced at a time, where all are.
@@ -130,7 +133,9 @@ class SpectralReconstruction:
             self.followed = found = follow(self.probed, self._as_calibrated, self._rows_px)
             if found is not None:
                 self.model, self.bands = found.model, found.model.bands
-                self.error = model_error(found.left, common_error(found.left, fit_causes(found.left)))
+                common = common_error(found.left, fit_causes(found.left))
+                combs = self.model.lines is not None and not self.model.single
+                self.error = model_error(found.left, float(np.hypot(common, COMB_LIGHT if combs else 0.0)))
                 by_pose = 0.0 if found.turn is None else found.turn.level_rel_std
                 by_light = doubt_of_changed(self.rig) if found.has_changed else 0.0
                 self._unsure_level = float(np.hypot(by_light, by_pose))

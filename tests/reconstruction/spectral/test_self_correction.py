@@ -21,7 +21,7 @@ from dsl_core.reconstruction.findings.model_findings import SECONDS, cause_findi
 from dsl_core.reconstruction.spectral import self_correction, spectra
 from dsl_core.reconstruction.spectral.film_motion import FilmMotion, with_film
 from dsl_core.reconstruction.spectral.self_correction import fits_better
-from dsl_core.reconstruction.spectral.spectra import SpectralReconstruction
+from dsl_core.reconstruction.spectral.spectra import COMB_LIGHT, SpectralReconstruction
 from dsl_core.reconstruction.spectral.spectral_maps import SpectralMaps
 from tests.cases.twin_scan import MemoryScan, solver_input, twin_scan
 
@@ -105,6 +105,8 @@ def test_combs_tell_how_bright_second_orders_are(combs: tuple[Rig, MemoryScan], 
     usual, told = said_of_seconds(right), said_of_seconds(taken)
     assert usual is not None
     assert not usual.significant
+    assert right.error is not None
+    assert right.error.relative.min() >= COMB_LIGHT
     assert told is not None
     assert told.significant
     assert told.value == pytest.approx((1 - factor) * share, rel=0.25)
