@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -46,7 +47,9 @@ STRAIGHT_PIECES = 0.5 / np.sqrt(180.0)
 TRUSTED = 0.02
 #: Curvature against which a level counts: small, so that only the shape is kept smooth.
 LEVEL_WEIGHT = 1e-4
-ITERATIONS = 30
+ITERATIONS = 100
+#: Share of what is missed that a step has to gain, and the least part of one that is tried.
+NEARER, LEAST_PART = 0.1, 1e-3
 
 
 @dataclass(frozen=True)
@@ -294,14 +297,34 @@ def _matched(response: Floats, lights: Floats, wanted: Floats, rel_std: Floats) 
     used = (wanted > 0) & (rel_std < TRUSTED) & (lights @ response > 0)
     gradient = np.diff(np.eye(len(NODES_NM)), axis=0)
     stiff = np.linalg.inv(gradient.T @ gradient + LEVEL_WEIGHT * np.eye(len(NODES_NM)))
-    factor = np.zeros(len(NODES_NM))
-    for _ in range(ITERATIONS):
+
+    def at(factor: Floats) -> tuple[Floats, Floats]:
         density = lights[used] * (response * np.exp(factor @ hats))
         signal = density.sum(1)
-        miss = np.log(wanted[used] / signal)
+        return np.log(wanted[used] / signal), density @ hats.T / signal[:, None]
+
+    factor = np.zeros(len(NODES_NM))
+    miss, share = at(factor)
+    for _ in range(ITERATIONS):
         if np.abs(miss).max(initial=0.0) < 1e-12:
             break
-        share = density @ hats.T / signal[:, None]
         # The smoothest factor that meets all signals to first order, seen from the start.
-        factor = stiff @ share.T @ np.linalg.solve(share @ stiff @ share.T, miss + share @ factor)
+        met = stiff @ share.T @ np.linalg.solve(share @ stiff @ share.T, miss + share @ factor)
+        factor, miss, share = _towards(factor, met, miss, at)
     return np.asarray(response * np.exp(factor @ hats))
+
+
+def _towards(
+    factor: Floats, met: Floats, miss: Floats, at: Callable[[Floats], tuple[Floats, Floats]]
+) -> tuple[Floats, Floats, Floats]:
+    """A step from one factor to another that brings signals nearer, with what is missed ``at`` it.
+
+    All the way, unless signals are so far off, as leaks that a data sheet rounds off, that it misses more.
+    """
+    part, largest = 1.0, np.abs(miss).max()
+    while True:
+        there = factor + part * (met - factor)
+        after, share = at(there)
+        if np.abs(after).max() < (1 - NEARER * part) * largest or part < LEAST_PART:
+            return there, after, share
+        part /= 2

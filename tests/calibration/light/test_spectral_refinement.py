@@ -191,6 +191,21 @@ def test_whites_are_matched_exactly_and_once() -> None:
     assert errors[1] < 0.7 * errors[0]
 
 
+def test_a_leak_far_fainter_than_its_data_sheet_says_is_matched() -> None:
+    rig, reflectance = published_rig(), SpectralCurve.of([400, 700], [0.97, 0.97])
+    emission = np.stack([curve.at(FINE_NM) for curve in rig.emission]) * 0.97
+    response = np.stack([curve.at(FINE_NM) for curve in rig.response])
+    signal = rig.white_scale * response @ emission.T
+    # A red filter with an edge: its data sheet has 23 times the light of the blue LED.
+    signal[0] /= [0.95, 1.43, 22.8]
+    measured = WhiteSignals.model_validate(
+        {"signal": signal.tolist(), "rel_std": [[1e-4] * 3] * 3, "white_over_sum": [1.0] * 3}
+    )
+    found = match_whites(rig, measured, reflectance)
+    matched = np.stack([curve.at(FINE_NM) for curve in found.response]) @ emission.T * found.white_scale
+    np.testing.assert_allclose(matched, signal, rtol=1e-6)
+
+
 def test_a_refinement_that_is_cancelled_ends_at_its_next_trial() -> None:
     rig, told = published_rig(), list[int]()
     token = CancelToken()
