@@ -7,7 +7,6 @@ from collections.abc import Iterable
 import numpy as np
 from numpy.typing import NDArray
 
-from dsl_core.model.calibration.accepted import HELD_OUT_ORDERS
 from dsl_core.model.fit import Fit, FitFinding
 from dsl_core.model.plan import CapturePlan
 from dsl_core.model.rig import Rig
@@ -19,6 +18,7 @@ from dsl_core.reconstruction.findings.flag_findings import SpectralCounts, share
 from dsl_core.reconstruction.findings.known_causes import without_drift_that_is_none
 from dsl_core.reconstruction.findings.line_edges import edge_findings
 from dsl_core.reconstruction.findings.model_findings import MOVED, cause_findings
+from dsl_core.reconstruction.spectral.film_motion import orders_off_px
 from dsl_core.reconstruction.spectral.model_error import ModelError
 from dsl_core.reconstruction.spectral.self_correction import Followed
 
@@ -47,7 +47,7 @@ def fit_of(
     if spectra is not None and width_nm is not None:
         findings += band_findings(grid.step_nm, width_nm, spectra)
     if followed is not None:
-        off_px = _orders_off_px(rig)
+        off_px = orders_off_px(rig)
         of_model = cause_findings(followed.probe, followed.balanced, followed.motion, off_px, followed.turn)
         findings += without_drift_that_is_none(of_model, [*findings])
     turn = None if followed is None else followed.turn
@@ -58,14 +58,6 @@ def fit_of(
         return fit
     doubts = [found.sentence for found in findings if found.name == MOVED and not found.significant]
     return fit.model_copy(update={"level_rel_std": CHANGED_REL_STD, "unseen": " ".join(doubts)})
-
-
-def _orders_off_px(rig: Rig) -> float:
-    """How far first orders lay from their places (rms, px) when the film was calibrated; 0 if not noted."""
-    values = [
-        figure.value for note in rig.calibrations for figure in note.figures if figure.name == HELD_OUT_ORDERS
-    ]
-    return values[-1] if values else 0.0
 
 
 def _of_parallax(rig: Rig, depth_mm: NDArray[np.floating]) -> FitFinding:

@@ -242,7 +242,7 @@ def _motion(motion: FilmMotion, probe: Probe, calibrated_px: float, turn: Turn |
     or_dented = (
         f", or its shape is none that a calibration can record, which left first orders"
         f" {calibrated_px:.2f} px (rms) from their places"
-        if motion.shift_px < SIGMAS * calibrated_px
+        if motion.may_be_dent(calibrated_px)
         else ""
     )
     moved = f"moved since the calibration{or_dented}: {', '.join(clauses)}. {by_nm}"

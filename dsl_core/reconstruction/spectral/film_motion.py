@@ -18,6 +18,7 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
+from dsl_core.model.calibration.accepted import HELD_OUT_ORDERS
 from dsl_core.model.fit import SIGMAS
 from dsl_core.model.rig import Rig
 from dsl_core.optics.correspondence import GratingModel
@@ -58,10 +59,22 @@ class FilmMotion:
     shift_std_px: float
     sure: bool = True
 
+    def may_be_dent(self, calibrated_px: float) -> bool:
+        """Whether a film whose orders lay so far (rms, px) from their places when calibrated looks so."""
+        return self.shift_px < SIGMAS * calibrated_px
+
     def then(self, more: FilmMotion) -> FilmMotion:
         """Both motions, the second of which is small and tells how sure all is that it asked for."""
         std = np.where(more.std > 0, more.std, self.std)
         return FilmMotion(self.values + more.values, std, self.shift_px, more.shift_std_px)
+
+
+def orders_off_px(rig: Rig) -> float:
+    """How far first orders lay from their places (rms, px) when the film was calibrated; 0 if not noted."""
+    values = [
+        figure.value for note in rig.calibrations for figure in note.figures if figure.name == HELD_OUT_ORDERS
+    ]
+    return values[-1] if values else 0.0
 
 
 def moved(model: PixelModel, motion: FilmMotion) -> PixelModel:

@@ -23,7 +23,7 @@ from dsl_core.optics.pixel_model import PixelModel
 from dsl_core.optics.spectra import ORDERS
 from dsl_core.reconstruction.geometry import Geometry
 from dsl_core.reconstruction.spectral.film_motion import PRIOR_STD as FILM_STD
-from dsl_core.reconstruction.spectral.film_motion import FilmMotion
+from dsl_core.reconstruction.spectral.film_motion import FilmMotion, orders_off_px
 from dsl_core.reconstruction.spectral.probing.probe import Probe, probed_pixels
 from dsl_core.reconstruction.spectral.probing.probed_light import ProbedScan
 
@@ -37,7 +37,8 @@ STEPS = np.array([1e-2, 1e-2, 1e-2, 1e-1])
 ROUNDS, COLUMN_STD_PX = 8, 0.01
 #: By how many deviations frames must fit one better than the other.
 SURELY = 3.0
-#: A film that would have moved by more deviations than this of `film_motion.PRIOR_STD` is another rig's.
+#: A film that would have moved by more deviations than this of `film_motion.PRIOR_STD` is another rig's,
+#: unless its calibration left first orders displaced nearly as far: a dent looks like any motion.
 IMPLAUSIBLE = 4.0
 #: Rows that the pose would displace by more than this (px, rms) tell of it: those of a changed pose are seen
 #: displaced by at least this share.
@@ -102,17 +103,20 @@ def find_turn(
     asked = np.flatnonzero(np.isfinite(there.pixels.depth_mm))
     share = there.pixels.depth_mm.ravel()[asked] / scan.pixels.depth_mm.ravel()[asked] - 1
     depth_share = float(np.sqrt(np.mean(share**2))) if asked.size else 0.0
-    return Turn(rig, *_belief(motion, _surer(of_film, probe(there))), depth_share)
+    belief = _belief(motion, _surer(of_film, probe(there)), motion.may_be_dent(orders_off_px(rig)))
+    return Turn(rig, *belief, depth_share)
 
 
-def _belief(motion: FilmMotion, surer: float) -> tuple[float, bool]:
+def _belief(motion: FilmMotion, surer: float, dented: bool = False) -> tuple[float, bool]:
     """Share of the pose's error that deviations hold, and whether it is told instead of the film's motion.
 
-    ``surer`` is by how many deviations frames fit the pose better than the ``motion``.
+    ``surer`` is by how many deviations frames fit the pose better than the ``motion``; ``dented`` is whether
+    what the calibration could not record of the film's shape may look like that.
     """
+    far = bool((np.abs(motion.values) > IMPLAUSIBLE * FILM_STD).any())
     # How far orders are displaced, and with them depth, is not known exactly either.
     unsure = min(motion.shift_std_px / max(motion.shift_px, 1e-12), 1.0)
-    if surer > SURELY or bool((np.abs(motion.values) > IMPLAUSIBLE * FILM_STD).any()):
+    if surer > SURELY or (far and not dented):
         return float(np.hypot(1.0, unsure)), True
     return 0.0 if surer < -SURELY else float(np.hypot(EITHER, unsure)), False
 

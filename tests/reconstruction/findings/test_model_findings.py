@@ -18,10 +18,9 @@ from dsl_core.model.plan import CapturePlan, GrayCode, ScanLines
 from dsl_core.model.rig import Rig
 from dsl_core.model.spectral import WavelengthGrid
 from dsl_core.optics.correspondence import correspondence
-from dsl_core.reconstruction.findings.fit import _orders_off_px
 from dsl_core.reconstruction.findings.model_findings import _film, _profile, cause_findings
 from dsl_core.reconstruction.spectral.causes import MOST_SHIFT_PX, Causes
-from dsl_core.reconstruction.spectral.film_motion import FilmMotion
+from dsl_core.reconstruction.spectral.film_motion import FilmMotion, orders_off_px
 from dsl_core.reconstruction.spectral.probing.probe import Probe, probe
 from dsl_core.reconstruction.spectral.spectra import SpectralReconstruction
 from dsl_core.reconstruction.spectral.turned import Turn
@@ -271,7 +270,7 @@ def test_what_the_last_film_calibration_left_of_first_orders_is_taken_from_the_r
 ) -> None:
     rig = scanned[0].calibration
     assert rig is not None
-    assert _orders_off_px(rig.model_copy(update={"calibrations": ()})) == 0.0
+    assert orders_off_px(rig.model_copy(update={"calibrations": ()})) == 0.0
     notes = tuple(
         CalibrationNote(
             name="depth-stage",
@@ -281,4 +280,4 @@ def test_what_the_last_film_calibration_left_of_first_orders_is_taken_from_the_r
         )
         for px in (0.3, 0.2)
     )
-    assert _orders_off_px(rig.model_copy(update={"calibrations": notes})) == 0.2
+    assert orders_off_px(rig.model_copy(update={"calibrations": notes})) == 0.2

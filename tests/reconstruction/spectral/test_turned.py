@@ -95,4 +95,10 @@ def test_what_frames_fit_better_is_believed_unless_no_film_can_have_moved_so_far
     assert _belief(slip, SURELY + 1) == (1.0, True)
     far = replace(slip, values=1.01 * IMPLAUSIBLE * PRIOR_STD)
     assert _belief(far, -SURELY - 1) == (1.0, True)
+    # A dent that the calibration could not record looks like any motion.
+    assert _belief(far, -SURELY - 1, dented=True) == (0.0, False)
+    assert _belief(far, 0.0, dented=True) == (EITHER, False)
+    assert _belief(far, SURELY + 1, dented=True) == (1.0, True)
+    assert far.may_be_dent(far.shift_px / 2)
+    assert not far.may_be_dent(far.shift_px / 4)
     assert _belief(replace(slip, shift_std_px=0.05), 0.0)[0] == pytest.approx(np.hypot(EITHER, 0.5))
