@@ -13,6 +13,7 @@ import pytest
 from dsl_core.capture.proof.report import SeenFrames
 from dsl_core.errors import DriveError, StoreError
 from dsl_core.io import patience
+from dsl_core.io.reading import read_bounded
 from dsl_core.io.records import read_record
 from dsl_core.io.scan import frame_store
 from dsl_core.io.scan.check import find_problems
@@ -110,12 +111,12 @@ def test_a_bad_place_on_a_disk_costs_its_own_frame_only(
     session: Path, plan: CapturePlan, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     share, reader = _Share(monkeypatch), ScanReader(session)
-    bad, read = reader.store.path(4), frame_store.read_bounded
+    bad = reader.store.path(4)
 
     def refusing(path: Path, *most: int) -> bytes:
         if path == bad:
             raise OSError(errno.EIO, os.strerror(errno.EIO))
-        return read(path, *most)
+        return read_bounded(path, *most)
 
     monkeypatch.setattr(frame_store, "read_bounded", refusing)
     assert {shot.index for shot in plan.shots()} - reader.sound() == {4}
