@@ -156,7 +156,8 @@ def incidence_deg(rig: Rig, truth: Any) -> Floats:
 def calibrated(variant: str, seed: int, size: str, folder: Path) -> Rig:
     """The rig that the commands find, left in a folder; raises `DslError` with the sentence of a refusal."""
     home = folder / f"{variant}-{seed}"
-    if not (home / "rig.json").exists():
+    # A rig is there from the first step on; with this record the calibration is whole.
+    if not (home / "depth-stage.json").exists():
         chosen = {"size": size, "seed": str(seed), **rig_options(variant, seed)}
         words = ["--rig", "twin", "--yes", "--no-library"]
         words += [part for key, value in chosen.items() for part in ("--option", f"{key}={value}")]
