@@ -115,7 +115,9 @@ def alike(drift: float, difference: float) -> Probe:
     plus, minus, over = (PARAMETERS.index(name) for name in ("gain +1", "gain -1", "drift"))
     seen = np.zeros((2, len(PARAMETERS)))
     seen[0, [plus, minus, over]], seen[1, over] = (1.0, -1.0, 1.0), 0.1
-    normal = INFORMATION * (seen.T @ seen + np.diag(np.r_[[1.0, 1.0, 1e-4, 1e-4, 1.0, 1.0, 1e-4, 1.0, 1.0]]))
+    own = np.ones(len(PARAMETERS))
+    own[[plus, minus, over]] = 1e-4
+    normal = INFORMATION * (seen.T @ seen + np.diag(own))
     asked = np.zeros(len(PARAMETERS))
     asked[[plus, minus, over]] = 0.5 * difference, -0.5 * difference, drift
     return replace(
@@ -158,12 +160,12 @@ def test_changes_count_from_what_matters_on() -> None:
 
 
 def test_each_cause_must_explain_by_itself_what_frames_lack() -> None:
-    """The shares are those of the shifts, the mean and the difference of the gains, and drift."""
+    """The shares are those of the shifts, mean and difference of the gains, drift, and second orders."""
     believed = []
-    for a, b, c, d in np.eye(4).tolist():
-        only = replace(CAUSES, explained=(a, b, c, d))
-        believed.append((only.brighter, only.unequal, only.drifts))
-    assert believed == [(False,) * 3, (True, False, False), (False, True, False), (False, False, True)]
+    for a, b, c, d, e in np.eye(5).tolist():
+        only = replace(CAUSES, second=(0.04, 0.002), explained=(a, b, c, d, e))
+        believed.append((only.brighter, only.unequal, only.drifts, only.seconds_differ))
+    assert np.array_equal(believed, np.eye(5, dtype=bool)[:, 1:])
 
 
 @pytest.mark.parametrize(
@@ -196,4 +198,4 @@ def test_a_response_that_is_off_is_more_so_far_from_where_it_was_measured() -> N
     assert common_error(probe, replace(quiet, gain=np.array([0.05, -0.04]))) == 0
     assert common_error(probe, replace(quiet, common_std=0.02)) == 0
     assert common_error(probe, replace(quiet, gain=np.array([0.014, 0.014]))) == 0
-    assert common_error(probe, replace(quiet, explained=(1.0, 0.1, 1.0, 1.0))) == 0
+    assert common_error(probe, replace(quiet, explained=(1.0, 0.1, 1.0, 1.0, 1.0))) == 0
