@@ -8,7 +8,7 @@ from dsl_core.devices.base import DeviceRig
 from dsl_core.devices.conditions import check_conditions
 from dsl_core.errors import PlanError
 from dsl_core.model.plan import CapturePlan
-from dsl_core.model.presets import on_cycles
+from dsl_core.model.presets import has_usual_exposures, on_cycles
 from dsl_core.model.rig import Rig
 from dsl_core.optics.parallax import parallax_of
 
@@ -16,11 +16,11 @@ from dsl_core.optics.parallax import parallax_of
 def fit_plan(plan: CapturePlan, rig: DeviceRig) -> CapturePlan:
     """The plan for the image sizes of a rig's camera and projector.
 
-    Exposures that nobody chose become whole colour cycles, as the calibration measured them or else as the
-    projector claims; others are left as they are.
+    Exposures that nobody chose, those of a preset, become whole colour cycles, as the calibration measured
+    them or else as the projector claims; others are left as they are.
     """
     camera, projector = rig.camera.info, rig.projector.info
-    if plan.settings == CapturePlan().settings:
+    if has_usual_exposures(plan):
         known = rig.calibration or projector
         plan = on_cycles(plan, known.frame_period_ms)
     return plan.sized(camera, projector)

@@ -128,6 +128,22 @@ def on_cycles(plan: CapturePlan, period_ms: float) -> CapturePlan:
     return plan.model_copy(update={"settings": settings})
 
 
+def has_usual_exposures(plan: CapturePlan) -> bool:
+    """Whether exposures and levels are those of a preset, or of a plan in which nobody set them.
+
+    They are of the published projector, and fit no other one's cycles.
+    """
+    usual = (CapturePlan().settings, *(preset.plan.settings for preset in PRESETS))
+    return any(
+        len(settings) == len(plan.settings)
+        and all(
+            math.isclose(one.exposure_ms, other.exposure_ms) and math.isclose(one.level, other.level)
+            for one, other in zip(settings, plan.settings, strict=True)
+        )
+        for settings in usual
+    )
+
+
 def _on_cycles(setting: Setting, period_ms: float) -> Setting:
     exposure_ms = whole_cycles(setting.exposure_ms, period_ms) * period_ms
     if math.isclose(exposure_ms, setting.exposure_ms):

@@ -10,6 +10,7 @@ from dsl_core.capture.preflight import find_obstacles, fit_plan
 from dsl_core.devices.base import DeviceRig
 from dsl_core.devices.registry import open_rig
 from dsl_core.model.plan import CapturePlan, Setting
+from dsl_core.model.presets import PRESETS
 from dsl_core.simulation.published_rig import published_rig
 
 TWIN = {"size": "160x104", "scene": "plane"}
@@ -24,6 +25,15 @@ def test_default_exposures_are_whole_colour_cycles(rate_hz: float, cycles: list[
         assert fit_plan(chosen, rig).settings == chosen.settings
     if rate_hz == 60:
         assert fitted.settings == CapturePlan().settings
+
+
+@pytest.mark.parametrize("rate_hz", [50.0, 59.94, 120.0])
+def test_exposures_of_every_preset_are_whole_cycles_of_any_projector(rate_hz: float) -> None:
+    with open_rig("twin", {**TWIN, "led_cycle_hz": str(rate_hz)}) as rig:
+        for preset in PRESETS:
+            for setting in fit_plan(preset.plan, rig).settings:
+                cycles = setting.exposure_ms * rate_hz / 1000
+                assert cycles == pytest.approx(round(cycles)), preset.key
 
 
 def test_sizes_and_exposures_that_do_not_fit_are_obstacles(rig: DeviceRig, plan: CapturePlan) -> None:
