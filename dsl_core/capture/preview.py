@@ -78,7 +78,7 @@ def quick_picture(
 def statistics(mosaic: NDArray[np.uint16], bayer: BayerPattern, full_scale_dn: int) -> Statistics:
     """Histogram, saturation, means and focus of a raw mosaic; raises `DecodeError` for images below 2 x 2."""
     sites = _cells(mosaic, bayer)
-    shift = max((full_scale_dn + 1).bit_length() - 1 - 8, 0)
+    shift = max(full_scale_dn.bit_length() - 8, 0)
     histogram = np.zeros((3, BINS), np.int64)
     saturated, total, count = np.zeros(3), np.zeros(3), np.zeros(3)
     for channel, site in zip(_CHANNELS, sites, strict=True):

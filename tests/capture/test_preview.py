@@ -207,9 +207,9 @@ def test_any_saturated_pixel_of_a_cell_shows_it(site: tuple[int, int]) -> None:
 
 
 def test_counts_beyond_the_last_bin_are_in_it() -> None:
-    # Bins of 8 counts, as a full scale of 4000 is nearest to 2048: 3000 would be bin 375.
-    histogram = statistics(mosaic_of((3000, 800, 8), "RGGB", (6, 8)), "RGGB", 4000).histogram
-    assert (histogram[0, 255], histogram[1, 100], histogram[2, 1]) == (12, 24, 12)
+    # Bins of 16 counts, as a full scale of 4000 takes 12 bits: 5000 would be bin 312.
+    histogram = statistics(mosaic_of((5000, 800, 16), "RGGB", (6, 8)), "RGGB", 4000).histogram
+    assert (histogram[0, 255], histogram[1, 50], histogram[2, 1]) == (12, 24, 12)
     assert histogram.sum() == 48
 
 

@@ -12,6 +12,7 @@ from dsl_app.connection.state import Link, RigState
 from dsl_app.rig.state import LEVEL, Drawn, FrameCounts, LiveState, exposure_text
 from dsl_app.shared.notify import Notifier, sentence_of
 from dsl_core.capture.auto_exposure import ExposureSearch
+from dsl_core.capture.overexposure import full_scale_dn
 from dsl_core.devices.base import DeviceRig
 from dsl_core.errors import DeviceError
 from dsl_core.model.frames import Frame
@@ -261,7 +262,7 @@ class AutoExposer:
         shortest_ms, longest_ms = info.exposure_range_ms
         self._search = search = ExposureSearch(
             (shortest_ms, max(min(longest_ms, LONGEST_MS), shortest_ms)),
-            2**info.bit_depth - 1,
+            full_scale_dn(devices),
             self._rig.cycle_ms,
             0.0 if known is None else known.sensor.black_level_dn,
         )

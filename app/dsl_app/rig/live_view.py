@@ -46,6 +46,7 @@ class LiveView(QWidget):
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
+        self._full_scale_dn = 4095
         self._camera: CameraInfo | None = None
         self.draw: Value[Draw | None] = Value(None)
         self._is_live = False
@@ -115,9 +116,14 @@ class LiveView(QWidget):
         layout.addWidget(self.controls)
         self.controls.show()
 
-    def set_camera(self, camera: CameraInfo | None) -> None:
-        """Show frames of this camera from now on."""
+    def set_camera(self, camera: CameraInfo | None, full_scale_dn: int | None = None) -> None:
+        """Show frames of this camera from now on, whose pixels are saturated at ``full_scale_dn``.
+
+        Without that, saturated is the largest number of the camera's bits.
+        """
         self._camera, self._frame, self._times = camera, None, []
+        largest_dn = 4095 if camera is None else 2**camera.bit_depth - 1
+        self._full_scale_dn = largest_dn if full_scale_dn is None else full_scale_dn
         self._choose_draw()
         self._item.clear()
         self._read = None
@@ -186,7 +192,7 @@ class LiveView(QWidget):
         draw = partial(
             quick_picture,
             bayer=camera.bayer,
-            full_scale_dn=2**camera.bit_depth - 1,
+            full_scale_dn=self._full_scale_dn,
             show_saturation=self.saturation.isChecked(),
             display=self.display.display,
         )
@@ -204,7 +210,7 @@ class LiveView(QWidget):
         assert self._camera is not None
         assert self._frame is not None
         pixels = cut(self._frame.pixels, self.region)
-        found = statistics(pixels, self._camera.bayer, 2**self._camera.bit_depth - 1)
+        found = statistics(pixels, self._camera.bayer, self._full_scale_dn)
         self._pixels = found.histogram
         self._show_histogram()
         worst = max(found.saturated)
@@ -224,7 +230,7 @@ class LiveView(QWidget):
 
     def _show_histogram(self) -> None:
         if self.histogram.made is not None:
-            levels = 4096 if self._camera is None else 2**self._camera.bit_depth
+            levels = 1 << self._full_scale_dn.bit_length()
             self.histogram.made.show_counts(self._pixels, levels, self.logarithmic.isChecked())
 
     def _hover(self, position: QPointF) -> None:

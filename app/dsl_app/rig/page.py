@@ -22,6 +22,7 @@ from dsl_app.shared.widgets.help_window import set_help
 from dsl_app.shared.widgets.layouts import STRETCH, boxed, column_of, row_of, scrolled
 from dsl_app.shared.widgets.page import PageWidget
 from dsl_app.shared.widgets.ticker import Ticker
+from dsl_core.capture.overexposure import full_scale_dn
 from dsl_core.devices.base import DeviceRig
 from dsl_core.io.rig_profile import profile_path
 
@@ -114,7 +115,7 @@ class RigPage(PageWidget):
 
     def _make_live(self) -> LiveView:
         state, made = self._live_state, LiveView()
-        made.set_camera(self._state.camera)
+        made.set_camera(self._state.camera, self._full_scale_dn)
         if self.is_wide:
             made.place_controls(self.beside)
         self.stops += [
@@ -281,10 +282,15 @@ class RigPage(PageWidget):
         self._told = self._choice
         self._show()
 
+    @property
+    def _full_scale_dn(self) -> int | None:
+        devices = self._state.devices.value
+        return None if devices is None else full_scale_dn(devices)
+
     def _show_devices(self, devices: DeviceRig | None) -> None:
         camera = self._state.camera
         if self.live.made is not None:
-            self.live.made.set_camera(camera)
+            self.live.made.set_camera(camera, self._full_scale_dn)
         self.projector.set_projector(self._state.projector)
         self._show_exposure(self._live_state.exposure_ms.value)
         if camera is not None:

@@ -9,9 +9,11 @@ from pathlib import Path
 import numpy as np
 
 from dsl_app.scan.state import LivePicture
+from dsl_core.capture.overexposure import full_scale_dn
 from dsl_core.capture.preview import BlockGraph, BlockGraphs, quick_picture
 from dsl_core.capture.runner import Runner, Status
-from dsl_core.devices.base import CameraInfo, DeviceRig
+from dsl_core.devices.base import DeviceRig
+from dsl_core.model.conditions import BayerPattern
 from dsl_core.model.frames import Frame
 from dsl_core.model.plan import CapturePlan, Shot
 from dsl_core.model.rig import Rig
@@ -85,10 +87,10 @@ class ScanJob:
         if request.is_resumed:
             self._read_before(graphs, progress)
         self._graphs = graphs
-        info = devices.camera.info
+        bayer, full_dn = devices.camera.info.bayer, full_scale_dn(devices)
         with pipeline.open_scan(
             devices, plan, request.folder, progress, notes, self.token,
-            lambda shot, frame: self._watch(shot, frame, info),
+            lambda shot, frame: self._watch(shot, frame, bayer, full_dn),
             prove=not request.is_resumed or request.check_drift, waits=True,
         ) as runner:  # fmt: skip
             runner.listen(self._listen)
@@ -131,16 +133,16 @@ class ScanJob:
             progress.report("read saved frames", done, len(there))
             graphs.add(shot, reader.read(shot))
 
-    def _watch(self, shot: Shot, frame: Frame, camera: CameraInfo) -> None:
+    def _watch(self, shot: Shot, frame: Frame, bayer: BayerPattern, full_scale_dn: int) -> None:
         assert self._graphs is not None
         self._graphs.add(shot, frame.pixels)
         if self._picture is not None:
             return
-        picture = quick_picture(frame.pixels, camera.bayer, 2**camera.bit_depth - 1)
+        picture = quick_picture(frame.pixels, bayer, full_scale_dn)
         thin = -(-picture.shape[1] // PICTURE_CELLS)
         with self._lock:
             self._picture = LivePicture(
-                shot, picture[::thin, ::thin], 2 * thin, *_exposed(frame, 2**camera.bit_depth - 1)
+                shot, picture[::thin, ::thin], 2 * thin, *_exposed(frame, full_scale_dn)
             )
 
     def _listen(self, status: Status) -> None:

@@ -42,3 +42,17 @@ def test_a_picture_that_was_made_is_shown_unless_settings_have_changed(qtbot: Qt
     assert all(curve.getData()[1].any() for curve in curves)
     view.set_camera(None)
     assert [curve.getData()[1] for curve in curves] == [None] * 3, "no counts of a camera that is gone"
+
+
+def test_a_camera_that_ends_below_its_bits_is_saturated_there(qtbot: QtBot) -> None:
+    view = LiveView()
+    qtbot.addWidget(view)
+    camera = CameraInfo("test", "1", 16, 12, "RGGB", 12, (0.01, 1000.0))
+    frame = Frame(np.full((12, 16), 3900, np.uint16), 10.0, 0.0)
+    for full_scale_dn, share in ((None, "0.00"), (3900, "100.00")):
+        view.set_camera(camera, full_scale_dn)
+        draw = view.draw.value
+        assert draw is not None
+        view._figures_at = 0.0  # figures follow frames a few times a second only
+        view.show_frame(frame, (draw, draw(frame.pixels)))
+        assert f"R {share} %" in view._saturated.text()
