@@ -39,7 +39,7 @@ HALF_PX = 24
 
 @dataclass(frozen=True)
 class IntensityGraph:
-    """One pixel over the frames of its pattern set.
+    """One pixel, (x, y) in the camera's picture, over the frames of its pattern set.
 
     ``measured``, ``std`` and ``model`` have shape (3, frames), DN per ms; the model is None where the pixel
     has no spectrum. ``zero`` is the frame of the zero order, ``orders`` the frame of each wavelength through
@@ -103,7 +103,7 @@ class FrameBlock:
     plan: CapturePlan
 
     def holds(self, pixel: tuple[int, int]) -> bool:
-        """Whether a pixel (x, y) is in the block with the neighbours that demosaicing needs."""
+        """Whether a pixel (x, y) of the picture is in the block with the neighbours demosaicing needs."""
         count = self.radiance.shape[:0:-1]
         for at, first, many, size in zip(pixel, self.origin, count, self.plan.camera_size_px, strict=True):
             low = first + (2 if first > 0 else 0)
@@ -114,15 +114,16 @@ class FrameBlock:
 
 
 def read_block(result: ResultArrays, pixel: tuple[int, int], progress: Progress | None = None) -> FrameBlock:
-    """Read the frames around a pixel (x, y) of a result's scan; raises `StoreError`, `CalibrationError`."""
+    """Read the frames of a result's scan around its pixel (x, y); raises `StoreError`, `CalibrationError`."""
     progress, reader = progress or NoProgress(), ScanReader(find_scan(result))
     require_complete(reader)
     rig, plan = _calibration(reader, result), reader.plan
     width, height = plan.camera_size_px
     # Even corners keep the phase of the Bayer mosaic.
-    left, top = (max(at - HALF_PX, 0) // 2 * 2 for at in pixel)
-    rows = slice(top, min(pixel[1] + HALF_PX, height))
-    columns = slice(left, min(pixel[0] + HALF_PX, width))
+    at_x, at_y = result.in_picture(pixel)
+    left, top = (max(at - HALF_PX, 0) // 2 * 2 for at in (at_x, at_y))
+    rows = slice(top, min(at_y + HALF_PX, height))
+    columns = slice(left, min(at_x + HALF_PX, width))
     scan = MergedScan(_Cropped(reader, rows, columns), rig)
     shape = (plan.spectral_count, rows.stop - rows.start, columns.stop - columns.start)
     radiance, variance = np.empty(shape, np.float32), np.empty(shape, np.float32)
@@ -151,10 +152,11 @@ def _calibration(reader: ScanReader, result: ResultArrays) -> Rig:
 
 
 def intensity_graph(block: FrameBlock, result: ResultArrays, pixel: tuple[int, int]) -> IntensityGraph:
-    """What a pixel (x, y) of a block saw; raises `DecodeError` when it is outside."""
-    if not block.holds(pixel):
-        raise DecodeError(f"Pixel {pixel[0]}, {pixel[1]} is outside the frames that were read. Read its own.")
-    x, y = pixel[0] - block.origin[0], pixel[1] - block.origin[1]
+    """What a pixel (x, y) of a result saw; raises `DecodeError` when it is outside the block."""
+    at = result.in_picture(pixel)
+    if not block.holds(at):
+        raise DecodeError(f"Pixel {at[0]}, {at[1]} is outside the frames that were read. Read its own.")
+    x, y = at[0] - block.origin[0], at[1] - block.origin[1]
     # A neighbourhood with an even corner, large enough for bilinear demosaicing.
     left, top = max(x - 2, 0) // 2 * 2, max(y - 2, 0) // 2 * 2
     part = np.s_[:, top : y + 3, left : x + 3]
@@ -163,7 +165,7 @@ def intensity_graph(block: FrameBlock, result: ResultArrays, pixel: tuple[int, i
     variance = demosaic_variance(block.variance[part], bayer)[:, :, y - top, x - left].T
     model, zero, orders = _expected(block, result, pixel)
     return IntensityGraph(
-        pixel,
+        at,
         np.asarray(measured, np.float64),
         np.sqrt(np.asarray(variance, np.float64)),
         model,
@@ -190,7 +192,8 @@ def _expected(
     step = float(nm[1] - nm[0]) if len(nm) > 1 else 5.0
     grid = WavelengthGrid(start_nm=nm[0], stop_nm=nm[-1], step_nm=step) if len(nm) > 1 else WavelengthGrid()
     model = model_of_plan(rig, block.plan, grid, correspondence(rig, model_of_notes(result.attributes)[1]))
-    flat = pixel[1] * result.shape[1] + pixel[0]
+    at = result.in_picture(pixel)
+    flat = at[1] * block.plan.camera_size_px[0] + at[0]
     place = torch.tensor([flat]), torch.tensor([depth], dtype=torch.float64)
     traced = model.trace(*place, torch.tensor([column], dtype=torch.float64))
     zero, orders = None, {}

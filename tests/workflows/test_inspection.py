@@ -10,7 +10,7 @@ from dsl_core.devices.registry import open_rig
 from dsl_core.errors import CalibrationError, DecodeError, StoreError
 from dsl_core.io.calibration_library import HOME_VARIABLE, CalibrationLibrary
 from dsl_core.io.result.result_arrays import ResultArrays, load_arrays
-from dsl_core.io.result.result_file import save_result
+from dsl_core.io.result.result_file import load_result, save_result
 from dsl_core.io.scan.folder import ScanReader
 from dsl_core.io.scan.origin import model_notes, rig_notes
 from dsl_core.model.plan import CapturePlan, GrayCode, Setting
@@ -95,3 +95,18 @@ def test_the_model_is_that_of_the_correspondence_of_the_result(result: ResultArr
     by_grid = ResultArrays(result.path, result.wavelengths_nm, result.arrays, attributes)
     with pytest.raises(CalibrationError, match="data-driven"):
         intensity_graph(block, by_grid, (x, y))
+
+
+def test_a_part_of_the_picture_reads_the_frames_of_its_own_pixels(result: ResultArrays) -> None:
+    solid = np.argwhere(np.isfinite(result["reflectance"][0]) & np.isfinite(result["shading"]))
+    y, x = next((y, x) for y, x in solid.tolist() if y > 40 and x > 70)
+    whole = intensity_graph(read_block(result, (x, y)), result, (x, y))
+    left, top = x - 11, y - 7
+    cut = load_result(result.path).isel(x=slice(left, left + 30), y=slice(top, top + 20))
+    part = load_arrays(save_result(cut, result.path.parent / "part.zarr"))
+    own = intensity_graph(read_block(part, (11, 7)), part, (11, 7))
+    assert own.pixel == whole.pixel == (x, y)
+    np.testing.assert_array_equal(own.measured, whole.measured)
+    assert own.model is not None
+    assert whole.model is not None
+    np.testing.assert_allclose(own.model, whole.model, rtol=1e-6)

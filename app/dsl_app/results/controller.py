@@ -324,7 +324,7 @@ class ResultsController:
         def work(progress: Progress) -> tuple[FrameBlock, IntensityGraph]:
             from dsl_core.workflows.inspection import intensity_graph, read_block
 
-            near = block if block is not None and block.holds(pixel) else None
+            near = block if block is not None and block.holds(result.in_picture(pixel)) else None
             near = near or read_block(result, pixel, progress)
             return near, intensity_graph(near, result, pixel)
 

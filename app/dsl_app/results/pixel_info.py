@@ -25,7 +25,8 @@ LONGEST = "pixel 0000, 0000   ·   x −000.0  y −000.0  z 0000.00 ± 0.00 mm 
 
 def pixel_text(result: ResultArrays, pixel: Pixel, band: int) -> str:
     """Pixel, position, depth and reflectance in the current band, with deviations."""
-    parts = [f"pixel {pixel[0]}, {pixel[1]}"]
+    x_px, y_px = result.in_picture(pixel)
+    parts = [f"pixel {x_px}, {y_px}"]
     if "points_mm" in result.arrays:
         x, y, z = (float(v) for v in result.at("points_mm", pixel))
         spread = float(result.at("depth_std_mm", pixel)) if "depth_std_mm" in result.arrays else math.nan

@@ -27,6 +27,7 @@ from dsl_core.model.calibration.accepted import MISSED_ATTRIBUTE, read_missed
 from dsl_core.model.fit import ATTRIBUTE, Fit
 from dsl_core.model.plan import CapturePlan
 from dsl_core.model.rendered_effects import RenderedEffects
+from dsl_core.model.result_order import columns_and_rows_px
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -175,6 +176,7 @@ def _spectra(content: ReportContent, pixels: Sequence[tuple[int, int]]) -> list[
     if "reflectance" not in content.result:
         return []
     bands = _bands(content)
+    columns_px, rows_px = columns_and_rows_px(content.result)
     patches = () if content.evaluation is None else content.evaluation.patches
     drawn = [spectrum_curve(p.name, _patch_note(p), bands, p.mean, p.posterior_std, p.truth) for p in patches]
     for number, (row, column) in enumerate(pixels, start=1):
@@ -184,7 +186,7 @@ def _spectra(content: ReportContent, pixels: Sequence[tuple[int, int]]) -> list[
         std = None
         if "reflectance_std" in content.result:
             std = content.result["reflectance_std"].values[:, row, column].astype(np.float64)
-        note = f"row {row}, column {column}"
+        note = f"row {rows_px[row]}, column {columns_px[column]}"
         drawn.append(
             spectrum_curve(
                 f"Pixel {number}", note, bands, spectrum, std, _true_spectrum(content, row, column)

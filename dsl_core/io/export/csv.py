@@ -16,6 +16,7 @@ from dsl_core.io.export.common import provenance, require, require_suffix, wavel
 from dsl_core.io.export.wording import deviation_text, figure_text, header_lines
 from dsl_core.io.staging import staged
 from dsl_core.model.result import Reach, reasons
+from dsl_core.model.result_order import columns_and_rows_px
 from dsl_core.solve.many import Check, never
 
 if TYPE_CHECKING:
@@ -84,11 +85,8 @@ def _check_pixels(result: xr.Dataset, pixels: Sequence[Pixel]) -> None:
 
 def _coordinates(result: xr.Dataset) -> tuple[list[int], list[int]]:
     """The x and y of a result's pixels in the whole picture, of which it may be a part."""
-    found = [
-        result[axis].values.tolist() if axis in result.coords else list(range(result.sizes[axis]))
-        for axis in ("x", "y")
-    ]
-    return found[0], found[1]
+    xs, ys = columns_and_rows_px(result)
+    return xs.tolist(), ys.tolist()
 
 
 def _rows(result: xr.Dataset, pixel: Pixel) -> Iterator[tuple[object, ...]]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from dsl_core.errors import StoreError
 from dsl_core.io.result.result_file import checked_attributes, damage_of, own_attributes
 from dsl_core.model.result import VARIABLES
+from dsl_core.model.result_order import places_px
 from dsl_core.progress import NoProgress, Progress
 
 if TYPE_CHECKING:
@@ -30,7 +31,8 @@ AT_ONCE_BYTES = 16e6
 class ResultArrays:
     """The arrays of a result by the names of `VARIABLES`; what the result does not hold is not there.
 
-    ``missing`` names what `completed` put in its place as unknown.
+    ``missing`` names what `completed` put in its place as unknown. ``columns_px`` and ``rows_px`` are where
+    the pixels are in the camera's picture; None where the result does not say.
     """
 
     path: Path
@@ -38,6 +40,8 @@ class ResultArrays:
     arrays: Mapping[str, NDArray[Any]]
     attributes: Mapping[str, Any] = field(default_factory=dict)
     missing: tuple[str, ...] = ()
+    columns_px: NDArray[np.int64] | None = None
+    rows_px: NDArray[np.int64] | None = None
 
     @property
     def shape(self) -> tuple[int, int]:
@@ -61,6 +65,21 @@ class ResultArrays:
     def at(self, name: str, pixel: tuple[int, int]) -> NDArray[Any]:
         """Everything that a variable holds for a pixel ``(x, y)``: one value, or one per band or axis."""
         return self.arrays[name][..., pixel[1], pixel[0]]
+
+    @property
+    def origin_px(self) -> tuple[int, int]:
+        """Column and row of the camera's picture where the result begins."""
+        return tuple(0 if at is None else int(at[0]) for at in (self.columns_px, self.rows_px))  # type: ignore[return-value]
+
+    def in_picture(self, pixel: tuple[int, int]) -> tuple[int, int]:
+        """Where a pixel ``(x, y)`` of the arrays is in the camera's picture."""
+        if not self.holds(pixel):
+            return pixel[0] + self.origin_px[0], pixel[1] + self.origin_px[1]
+        x, y = (
+            at if places is None else int(places[at])
+            for at, places in zip(pixel, (self.columns_px, self.rows_px), strict=True)
+        )
+        return x, y
 
     @property
     def picture(self) -> tuple[Path, tuple[int, int]]:
@@ -136,6 +155,13 @@ def _ordered(found: Mapping[str, StoredArray], path: Path) -> tuple[NDArray[np.f
     return nm[order], there
 
 
+def _places(found: Mapping[str, StoredArray]) -> Iterator[NDArray[np.int64] | None]:
+    """Columns, then rows, of the camera's picture that a result says its pixels are in."""
+    for axis in ("x", "y"):
+        said = axis in found and found[axis].dims == (axis,)
+        yield places_px(found[axis].values((slice(None),))) if said else None
+
+
 def load_arrays(path: Path, progress: Progress | None = None) -> ResultArrays:
     """Read a whole result, with its bands rising; never holds much more than it.
 
@@ -167,4 +193,4 @@ def load_arrays(path: Path, progress: Progress | None = None) -> ResultArrays:
         # Where pixels are is unknown; their spectra can be looked at all the same.
         arrays["depth_mm"] = np.full(arrays["reflectance"].shape[1:], np.nan, np.float32)
         missing = ("depth_mm",)
-    return ResultArrays(path, nm, arrays, own_attributes(attributes), missing)
+    return ResultArrays(path, nm, arrays, own_attributes(attributes), missing, *_places(found))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import re
+from dataclasses import replace
 from html.parser import HTMLParser
 from io import BytesIO
 from typing import Any
@@ -200,3 +201,13 @@ def test_flag_picture_shows_the_gravest_and_counts_all() -> None:
 
 def test_large_pictures_are_thinned() -> None:
     assert pixels_of(value_picture(np.zeros((30, 2500)), "", "", "").uri).shape == (10, 834, 4)
+
+
+def test_pixels_of_a_part_are_named_as_in_the_whole_picture(full: ReportContent) -> None:
+    shifted = full.result.assign_coords(x=full.result["x"] + 100, y=full.result["y"] + 50)
+    said, whole = (
+        set(re.findall(r"row (\d+), column (\d+)", Page(render_report(replace(full, result=each))).text))
+        for each in (shifted, full.result)
+    )
+    assert whole
+    assert said == {(str(int(row) + 50), str(int(column) + 100)) for row, column in whole}

@@ -99,3 +99,19 @@ def test_an_axis_of_two_lengths_is_damage(stored: Path) -> None:
     group.attrs.put(attributes)
     with pytest.raises(StoreError, match="along wavelength_nm"):
         load_arrays(stored)
+
+
+def test_pixels_of_a_part_are_known_in_the_whole_picture(stored: Path, tmp_path: Path) -> None:
+    whole = load_result(stored)
+    assert load_arrays(stored).in_picture((3, 4)) == (3, 4)
+    part = whole.isel(x=slice(100, 160, 2), y=slice(50, 90))
+    arrays = load_arrays(save_result(part, tmp_path / "part.zarr"))
+    assert arrays.origin_px == (100, 50)
+    assert arrays.in_picture((3, 4)) == (106, 54)
+    np.testing.assert_array_equal(arrays.at("reflectance", (3, 4)), whole["reflectance"].sel(x=106, y=54))
+
+
+def test_coordinates_that_name_no_pixels_are_left_aside(stored: Path, tmp_path: Path) -> None:
+    centres = load_result(stored).assign_coords(x=np.arange(200) + 0.5, y=np.zeros(120))
+    arrays = load_arrays(save_result(centres, tmp_path / "centres.zarr"))
+    assert arrays.in_picture((3, 4)) == (3, 4)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import TypeVar
 
@@ -246,7 +247,7 @@ def truth_arrays(result: ResultArrays, truth: Truth) -> ResultArrays:
         # One extra row for pixels without a material, whose index is -1.
         spectra = np.vstack([truth.spectra, np.full((1, truth.spectra.shape[1]), np.nan)]).astype(np.float32)
         arrays["reflectance"] = np.ascontiguousarray(spectra.T)[:, truth.material]
-    return ResultArrays(result.path, result.wavelengths_nm, arrays)
+    return replace(result, arrays=arrays, attributes={}, missing=())
 
 
 def _write_pair(pair: Pair, target: Path, progress: Progress) -> Path:

@@ -229,4 +229,5 @@ def cursor_text(state: PairState) -> str:
         + (f" ± {number_text(std, decimals)}" if std > 0 and math.isfinite(value) else "")
         for name, value, std in of_both
     )
-    return f"column {pixel[0]}, row {pixel[1]}:   {values}{unit}"
+    x_px, y_px = pair.first.arrays.in_picture(pixel)
+    return f"column {x_px}, row {y_px}:   {values}{unit}"

@@ -61,7 +61,8 @@ class ExportController:
         state, result = self.state, self.state.result.value
         if result is None or not targets:
             return
-        pixels = [mark.pixel for mark in state.marks.value if mark.pixel and not mark.trouble]
+        pins = [mark.pixel for mark in state.marks.value if mark.pixel and not mark.trouble]
+        pixels = [result.in_picture(pin) for pin in pins]
         band_nm = float(result.wavelengths_nm[state.band.value]) if result.has_spectra else None
         light, adapted = state.picture_light.value
         look = picture_look(state)

@@ -44,7 +44,9 @@ class MarksController:
     def _pin(self, pixel: Pixel) -> None:
         spectrum = self.state.spectrum_at(pixel)
         if spectrum is None:
-            self._notifier.tell("info", f"Pixel {pixel[0]}, {pixel[1]} has no spectrum to pin.")
+            result = self.state.result.value
+            x_px, y_px = pixel if result is None else result.in_picture(pixel)
+            self._notifier.tell("info", f"Pixel {x_px}, {y_px} has no spectrum to pin.")
             return
         self._add(Mark("pin", self._name("pin"), self._colour(), spectrum, pixel=pixel))
 
@@ -199,7 +201,7 @@ class MarksController:
 
     def can_export(self) -> bool:
         """Whether a spectrum is shown that can be copied or exported; if not, says what to do."""
-        found = bool(shown_spectra(self.state.marks.value))
+        found = bool(shown_spectra(self.state.marks.value, self.state.result.value))
         if not found:
             self._notifier.tell("info", "No spectrum is ticked. Pin a pixel, draw a region, or tick one.")
         return found
@@ -209,7 +211,7 @@ class MarksController:
         from dsl_core.io.export.spectra import spectra_as_text
 
         if self.can_export():
-            spectra = shown_spectra(self.state.marks.value)
+            spectra = shown_spectra(self.state.marks.value, self.state.result.value)
             put(spectra_as_text(spectra))
             self._notifier.tell(
                 "info",
@@ -221,7 +223,7 @@ class MarksController:
         result = self.state.result.value
         if result is None or not self.can_export():
             return
-        spectra = shown_spectra(self.state.marks.value)
+        spectra = shown_spectra(self.state.marks.value, self.state.result.value)
 
         def work(progress: Progress) -> Path:
             from dsl_core.io.export.spectra import export_spectra

@@ -28,6 +28,7 @@ from dsl_app.shared.widgets.hints import FocusRing
 from dsl_app.shared.widgets.icons import SWATCH_PX, swatch
 from dsl_app.shared.widgets.layouts import STRETCH, column_of, row_of
 from dsl_app.shared.widgets.save_dialog import ask_target
+from dsl_core.io.result.result_arrays import ResultArrays
 from dsl_core.io.spectra.catalogue import formats, suffixes
 
 KEY = Qt.ItemDataRole.UserRole
@@ -192,7 +193,8 @@ class MarksPanel(QWidget):
             self._show_row(item, mark)
 
     def _show_row(self, item: QTreeWidgetItem, mark: Mark) -> None:
-        for column, text in enumerate((mark.name, where(mark), count(mark))):
+        cells = mark.name, where(mark, self._state.result.value), count(mark)
+        for column, text in enumerate(cells):
             item.setText(column, text)
             item.setToolTip(column, plain_tip(mark.trouble))
         item.setIcon(0, swatch(self._theme.pin(mark.colour)))
@@ -251,12 +253,13 @@ class MarksPanel(QWidget):
         self._show_selection()
 
 
-def where(mark: Mark) -> str:
+def where(mark: Mark, result: ResultArrays | None) -> str:
     """Where a mark is, in a few words, or that it has no spectrum now."""
     if mark.trouble:
         return "no spectrum"
     if mark.pixel is not None:
-        return f"{mark.pixel[0]}, {mark.pixel[1]}"
+        x_px, y_px = mark.pixel if result is None else result.in_picture(mark.pixel)
+        return f"{x_px}, {y_px}"
     if mark.file is not None:
         return mark.file.name if len(mark.file.name) <= 18 else mark.file.name[:17] + "…"
     return "lasso in 3D" if mark.runs else "outline"

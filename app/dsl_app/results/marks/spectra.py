@@ -40,18 +40,19 @@ def fill_region(draft: Mark, result: ResultArrays, progress: Progress) -> Mark:
     return replace(draft, spectrum=spectrum, pixels=found.pixels, used=found.used, pixel_std=found.pixel_std)
 
 
-def shown_spectra(marks: Iterable[Mark]) -> list[NamedSpectrum]:
-    """The spectra of the marks that are shown and have one."""
-    return [_named_spectrum(mark) for mark in marks if mark.shown and not mark.trouble]
+def shown_spectra(marks: Iterable[Mark], result: ResultArrays | None) -> list[NamedSpectrum]:
+    """The spectra of the marks of a result that are shown and have one."""
+    return [_named_spectrum(mark, result) for mark in marks if mark.shown and not mark.trouble]
 
 
-def _named_spectrum(mark: Mark) -> NamedSpectrum:
+def _named_spectrum(mark: Mark, result: ResultArrays | None) -> NamedSpectrum:
     from dsl_core.io.export.spectra import NamedSpectrum
 
     nm, mean, std = mark.spectrum.nm, mark.spectrum.mean, mark.spectrum.std
     match mark.kind:
         case "pin":
             at = mark.pixel
+            at = at if at is None or result is None else result.in_picture(at)
             where = "" if at is None else f"pixel at column {at[0]}, row {at[1]}, counted from 0"
             return NamedSpectrum(mark.name, nm, mean, uncertainty=std, pixels=1, where=where)
         case "region":

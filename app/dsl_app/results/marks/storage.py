@@ -217,7 +217,8 @@ def marks_of(saved: Annotations, result: ResultArrays, progress: Progress) -> tu
 
 def _saved_pin(pin: PinRecord, result: ResultArrays) -> Mark:
     spectrum = spectrum_of_pixel(result, pin.pixel)
-    trouble = "" if spectrum is not None else f"Pixel {pin.pixel[0]}, {pin.pixel[1]} has no spectrum here."
+    x_px, y_px = result.in_picture(pin.pixel)
+    trouble = "" if spectrum is not None else f"Pixel {x_px}, {y_px} has no spectrum here."
     spectrum = spectrum or NO_SPECTRUM
     return Mark("pin", pin.name, pin.colour, spectrum, pin.shown, pixel=pin.pixel, trouble=trouble)
 

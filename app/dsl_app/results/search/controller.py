@@ -69,5 +69,7 @@ class SearchController:
         if mark is not None:
             return mark.name, None if mark.trouble else mark.spectrum
         if cursor is not None:
-            return f"pixel {cursor[0]}, {cursor[1]}", self.state.spectrum_at(cursor)
+            result = self.state.result.value
+            x_px, y_px = cursor if result is None else result.in_picture(cursor)
+            return f"pixel {x_px}, {y_px}", self.state.spectrum_at(cursor)
         return "", None
