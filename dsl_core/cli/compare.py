@@ -27,12 +27,19 @@ def compare(
     json: Json = False,
 ) -> None:
     """Compare two results: FIRST minus SECOND over the pixels and bands that both have."""
-    from dsl_core.evaluation.difference import compare_results, difference_table, figures, shared_bands
+    from dsl_core.evaluation.difference import (
+        compare_results,
+        difference_table,
+        figures,
+        require_same_places,
+        shared_bands,
+    )
     from dsl_core.io.result.result_arrays import load_arrays
 
     output = Output(json)
     with output.progress() as progress:
         a, b = (load_arrays(path, progress) for path in (first, second))
+        require_same_places(a.places_px, b.places_px)
         both = a.has_spectra and b.has_spectra
         bands = shared_bands(b.wavelengths_nm, a.wavelengths_nm) if both else []
         cubes = [side["reflectance"] if both else None for side in (b, a)]

@@ -16,6 +16,8 @@ from dsl_core.progress import NoProgress, Progress
 Floats = NDArray[np.floating[Any]]
 #: A figure in words, its value, standard deviation (None: counted, not estimated), unit and format.
 Row = tuple[str, float, float | None, str, str]
+#: Columns and rows of the camera's picture that a result is of, None where it does not say.
+Places = tuple[NDArray[np.int64] | None, NDArray[np.int64] | None]
 #: Bands of two results this close are the same, nm.
 SAME_BAND_NM = 0.01
 #: Field, that of its deviation, words, unit and format of every row, in the order of the table.
@@ -103,6 +105,24 @@ def require_same_size(first: Floats, second: Floats) -> None:
         raise DecodeError(
             f"The results have {sizes[0]} and {sizes[1]} pixels. Choose two of the same camera and region."
         )
+
+
+def require_same_places(first: Places, second: Places) -> None:
+    """Raise `DecodeError` when two results of one size are of different parts of the camera's picture."""
+    for a, b in zip(first, second, strict=True):
+        if a is not None and b is not None and not np.array_equal(a, b):
+            extents = f"{_extent(first)}, and {_extent(second)}"
+            raise DecodeError(
+                f"The results are of different parts of the picture ({extents})."
+                " Choose two of the same region, or reconstruct both of it."
+            )
+
+
+def _extent(places: Places) -> str:
+    """From where to where a part goes, in words."""
+    return ", ".join(
+        f"{axis} {at[0]} to {at[-1]}" for axis, at in zip("xy", places, strict=True) if at is not None
+    )
 
 
 def _with_spectra(

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from dsl_core.errors import DecodeError
-from dsl_core.evaluation.difference import compare_results, shared_bands
+from dsl_core.evaluation.difference import compare_results, require_same_places, shared_bands
 from dsl_core.evaluation.seen_target import Region, SeenTarget, find_target
 from dsl_core.evaluation.summary import Truth, evaluate
 from dsl_core.evaluation.time_sweep import (
@@ -152,6 +152,7 @@ class ResultReference:
         if path.resolve() == self.path.resolve():
             raise DecodeError(f"{path.name} is what the others are compared with. Name other results.")
         mine, other = self._arrays, load_arrays(path, progress)
+        require_same_places(mine.places_px, other.places_px)
         both = mine.has_spectra and other.has_spectra
         bands = shared_bands(mine.wavelengths_nm, other.wavelengths_nm) if both else []
         cubes = [side["reflectance"] if both else None for side in (mine, other)]

@@ -4,7 +4,12 @@ import numpy as np
 import pytest
 
 from dsl_core.errors import DecodeError
-from dsl_core.evaluation.difference import compare_results, difference_table, shared_bands
+from dsl_core.evaluation.difference import (
+    compare_results,
+    difference_table,
+    require_same_places,
+    shared_bands,
+)
 
 NM = np.array([430.0, 440.0, 450.0])
 
@@ -38,6 +43,14 @@ def test_results_that_do_not_fit_say_why() -> None:
     with pytest.raises(DecodeError, match="No pixel"):
         compare_results(np.full((4, 5), np.nan), np.zeros((4, 5)))
     assert shared_bands(NM, np.empty(0)) == []
+
+
+def test_only_results_that_say_where_they_are_can_be_of_different_parts() -> None:
+    here, there = np.arange(5), np.arange(5) + 100
+    require_same_places((here, here), (here.copy(), None))
+    require_same_places((None, None), (there, here))
+    with pytest.raises(DecodeError, match=r"\(x 0 to 4, y 0 to 4, and x 100 to 104\)"):
+        require_same_places((here, here), (there, None))
 
 
 def test_figures_say_how_sure_they_are() -> None:

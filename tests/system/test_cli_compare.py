@@ -31,6 +31,20 @@ def test_two_results_are_compared_first_minus_second(give: Give, tmp_path: Path)
     assert "Depth, mean difference" in give("compare", first, second).out
 
 
+@pytest.mark.parametrize("command", [("compare",), ("sweep", "--against")])
+def test_different_parts_of_the_picture_are_not_compared(
+    give: Give, tmp_path: Path, command: tuple[str, ...]
+) -> None:
+    whole = small_result()
+    first = save_result(whole.isel(x=slice(0, 4)), tmp_path / "first.zarr")
+    second = save_result(whole.isel(x=slice(5, 9)), tmp_path / "second.zarr")
+    ending = give(*command, first, second)
+    assert ending.code == 2
+    assert "x 0 to 3, y 0 to 5" in ending.sentence
+    assert "x 5 to 8, y 0 to 5" in ending.sentence
+    assert "Choose two of the same region" in ending.sentence
+
+
 def test_a_result_that_is_not_there_is_named(give: Give, tmp_path: Path) -> None:
     ending = give("compare", tmp_path / "a.zarr", tmp_path / "b.zarr")
     assert ending.code == 2

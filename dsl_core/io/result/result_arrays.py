@@ -67,9 +67,14 @@ class ResultArrays:
         return self.arrays[name][..., pixel[1], pixel[0]]
 
     @property
+    def places_px(self) -> tuple[NDArray[np.int64] | None, NDArray[np.int64] | None]:
+        """Columns and rows of the camera's picture that the result is of; None where it does not say."""
+        return self.columns_px, self.rows_px
+
+    @property
     def origin_px(self) -> tuple[int, int]:
         """Column and row of the camera's picture where the result begins."""
-        return tuple(0 if at is None else int(at[0]) for at in (self.columns_px, self.rows_px))  # type: ignore[return-value]
+        return tuple(0 if at is None else int(at[0]) for at in self.places_px)  # type: ignore[return-value]
 
     def in_picture(self, pixel: tuple[int, int]) -> tuple[int, int]:
         """Where a pixel ``(x, y)`` of the arrays is in the camera's picture."""
@@ -77,7 +82,7 @@ class ResultArrays:
             return pixel[0] + self.origin_px[0], pixel[1] + self.origin_px[1]
         x, y = (
             at if places is None else int(places[at])
-            for at, places in zip(pixel, (self.columns_px, self.rows_px), strict=True)
+            for at, places in zip(pixel, self.places_px, strict=True)
         )
         return x, y
 

@@ -212,12 +212,14 @@ def make_pair(first: Side, second: Side, progress: Progress) -> Pair:
     from dsl_core.evaluation.difference import (
         compare_results,
         difference_table,
+        require_same_places,
         require_same_size,
         shared_bands,
     )
 
     a, b = first.arrays, second.arrays
     require_same_size(a["depth_mm"], b["depth_mm"])
+    require_same_places(a.places_px, b.places_px)
     both = a.has_spectra and b.has_spectra
     bands = shared_bands(a.wavelengths_nm, b.wavelengths_nm) if both else []
     if second.truth is not None:

@@ -7,6 +7,7 @@ import pytest
 from dsl_app.compare.pair.controller import PairController
 from dsl_app.compare.pair.state import PairQuantity, PairState
 
+from dsl_core.io.result.result_file import load_result, save_result
 from tests.app.support.compare_bench import make_result, make_variant
 from tests.app.support.doubles import InlineRunner, ManualRunner, RecordingNotifier
 from tests.app.support.small_result import write_small_result
@@ -101,6 +102,18 @@ def test_results_of_other_sizes_are_refused_in_a_sentence(results: tuple[Path, P
     compare.open(results[2])
     assert compare.state.pair.value is None
     assert "64 × 48 and 36 × 24 pixels" in compare.state.trouble.value
+
+
+def test_results_of_other_parts_of_the_picture_are_refused(
+    results: tuple[Path, Path, Path], tmp_path: Path
+) -> None:
+    compare, _ = controller()
+    whole = load_result(results[0])
+    for name, left in (("left", 0), ("right", 20)):
+        assert compare.open(save_result(whole.isel(x=slice(left, left + 20)), tmp_path / f"{name}.zarr"))
+    assert compare.state.pair.value is None
+    assert "x 0 to 19" in compare.state.trouble.value
+    assert "x 20 to 39" in compare.state.trouble.value
 
 
 def test_sides_change_places(results: tuple[Path, Path, Path]) -> None:
