@@ -18,6 +18,7 @@ from dsl_core.io.result.result_file import save_result
 from dsl_core.model.attributes import SCALE_ATTRIBUTE
 from dsl_core.model.fit import Fit
 from dsl_core.model.result import DEPTH_INVALID
+from dsl_core.model.result_order import with_axes
 from dsl_core.solve.normal import BAND_95
 
 if TYPE_CHECKING:
@@ -58,9 +59,10 @@ class ResultAccessor:
         self._require_spectra()
         if np.shape(where) == (2,):
             raise DecodeError(f"A region has several pixels; for the one at {where!r} call spectrum(x, y).")
-        mask = place_mask(self._result, where)
+        result = with_axes(self._result)
+        mask = place_mask(result, where)
         values, std, share = (
-            self._result[name].values for name in ("reflectance", "reflectance_std", "data_share")
+            result[name].values for name in ("reflectance", "reflectance_std", "data_share")
         )
         found = region_spectrum(values, std, share, mask)
         if found.used == 0:
@@ -76,12 +78,12 @@ class ResultAccessor:
                     ("data_share", found.data_share, "mean share decided by data"),
                 )
             },
-            coords={over: self._result[over]},
+            coords={over: result[over]},
             attrs={
                 "name": f"mean of {found.used} pixels",
                 "used": found.used,
                 "reasons": [],
-                **{name: self._result.attrs[name] for name in OF_SCAN if name in self._result.attrs},
+                **{name: result.attrs[name] for name in OF_SCAN if name in result.attrs},
             },
         )
 
@@ -147,8 +149,9 @@ class ResultAccessor:
 
     def points(self) -> xr.Dataset:
         """The pixels that have depth: all variables over the dimension ``point``, with ``x`` and ``y``."""
-        known = (self._result["flags"] & int(DEPTH_INVALID)) == 0
-        stacked = self._result.stack(point=("y", "x"))
+        result = with_axes(self._result)
+        known = (result["flags"] & int(DEPTH_INVALID)) == 0
+        stacked = result.stack(point=("y", "x"))
         return stacked.isel(point=np.flatnonzero(known.values.ravel())).reset_index("point")
 
     def export(

@@ -11,6 +11,7 @@ import numpy as np
 from dsl_core.api import FilePath
 from dsl_core.api.places import Place, place_mask
 from dsl_core.errors import DecodeError
+from dsl_core.model.result_order import with_axes
 from dsl_core.progress import Progress
 
 if TYPE_CHECKING:
@@ -56,6 +57,7 @@ def classify(
     from dsl_core.analysis.places import require_spectra
 
     require_spectra(result)
+    result = with_axes(result)
     if library is None and not pins:
         raise DecodeError("There is nothing to compare with. Give a library of spectra, pins, or both.")
     if range_nm is not None:
@@ -119,7 +121,7 @@ def colours(
     from dsl_core.analysis.colours import colours_of
     from dsl_core.analysis.places import spectra_of_masks
 
-    lights = [lights] if isinstance(lights, str) else lights
+    result, lights = with_axes(result), [lights] if isinstance(lights, str) else lights
     masks = {name: place_mask(result, place, name) for name, place in pins.items()}
     spectra = spectra_of_masks(result, masks)
     found = colours_of(spectra, result["wavelength_nm"].values, lights, reference)

@@ -11,6 +11,7 @@ from dsl_core.api import FilePath
 from dsl_core.extras import names_missing_packages
 from dsl_core.io.export import export_by_ending
 from dsl_core.io.result import result_file
+from dsl_core.model.result_order import canonical
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -56,4 +57,5 @@ def evaluate(result: xr.Dataset) -> Evaluation:
     from dsl_core import pipeline
     from dsl_core.workflows.scans import truth_of
 
+    result = canonical(result)
     return pipeline.evaluate(result, truth_of(result))

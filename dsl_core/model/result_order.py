@@ -1,4 +1,8 @@
-"""Where the pixels of a result are in the camera's picture, of which a result may be a part."""
+"""The order that a result is relied on to have, and where its pixels are in the camera's picture.
+
+xarray goes by names and does not mind an order; arrays do. Other programs, and slices of a person, may store
+axes otherwise, bands that fall, or a picture upside down.
+"""
 
 from __future__ import annotations
 
@@ -7,8 +11,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from dsl_core.model.result import VARIABLES
+
 if TYPE_CHECKING:
     import xarray as xr
+
+#: The axis of bands.
+BANDS = "wavelength_nm"
 
 
 def places_px(coordinate: ArrayLike) -> NDArray[np.int64] | None:
@@ -35,3 +44,48 @@ def columns_and_rows_px(result: xr.Dataset) -> tuple[NDArray[np.int64], NDArray[
         np.arange(result.sizes["x"]) if columns is None else columns,
         np.arange(result.sizes["y"]) if rows is None else rows,
     )
+
+
+def rising_order(values: ArrayLike) -> NDArray[np.intp] | None:
+    """The order (n,) in which values rise; None where they do already, or are no finite numbers.
+
+    >>> rising_order([660.0, 430.0]), rising_order([430.0, 660.0])
+    (array([1, 0]), None)
+    """
+    given = np.asarray(values)
+    if given.ndim != 1 or given.dtype.kind not in "iuf" or not np.isfinite(given).all():
+        return None
+    order = np.argsort(given, kind="stable")
+    return None if bool((order == np.arange(given.size)).all()) else order
+
+
+def with_axes(result: xr.Dataset) -> xr.Dataset:
+    """A result with its axes as `VARIABLES` has them and its bands rising; rows and columns stay as they are.
+
+    It is the very dataset where that is so already. What has other axes, such as one spectrum, keeps them.
+    """
+    result = _rising(result, (BANDS,))
+    turned = {
+        name: variable.transpose(*VARIABLES[str(name)][0])
+        for name, variable in result.data_vars.items()
+        if name in VARIABLES
+        and variable.dims != VARIABLES[str(name)][0]
+        and set(variable.dims) == set(VARIABLES[str(name)][0])
+    }
+    return result.assign(turned) if turned else result
+
+
+def canonical(result: xr.Dataset) -> xr.Dataset:
+    """As `with_axes`, with columns from left to right and rows from top to bottom by ``x`` and ``y``."""
+    return _rising(with_axes(result), ("x", "y"))
+
+
+def _rising(result: xr.Dataset, axes: tuple[str, ...]) -> xr.Dataset:
+    orders = {
+        axis: order
+        for axis in axes
+        if axis in result.coords and result[axis].dims == (axis,)
+        for order in (rising_order(result[axis].values),)
+        if order is not None
+    }
+    return result.isel(orders) if orders else result

@@ -26,6 +26,7 @@ from dsl_core.io.export.ply import export_ply
 from dsl_core.io.export.png import export_png
 from dsl_core.io.export.spectra import export_spectra, named_spectrum
 from dsl_core.io.plugins import load_plugins
+from dsl_core.model.result_order import canonical
 from dsl_core.solve.many import Check, never
 
 if TYPE_CHECKING:
@@ -95,7 +96,7 @@ def export(
     """Write a result in the named format; raises `StoreError` for a name that is not one of `formats`."""
     if name not in formats():
         raise StoreError(f"There is no export format {name!r}. Choose one of {_names()}.")
-    return formats()[name].write(result, path, overwrite=overwrite, check=check)
+    return formats()[name].write(canonical(result), path, overwrite=overwrite, check=check)
 
 
 def export_by_ending(
@@ -111,7 +112,7 @@ def export_by_ending(
     A table (csv) is of ``pixels``, (x, y) each, or of the spectrum that the result is. Raises `StoreError`
     for what a format does not hold, and where the disk fails.
     """
-    ending = path.suffix.lower()
+    result, ending = canonical(result), path.suffix.lower()
     listed = [each for each in formats().values() if each.listed]
     meant = next((each.key for each in listed if ending in (each.suffix, *each.endings)), ending[1:])
     chosen = (name or meant).lower()

@@ -57,7 +57,7 @@ def export_npy(
     require_suffix(path, ".npy")
 
     def write(draft: Path, title: str, values: NDArray[Any]) -> None:
-        np.save(draft, values)
+        np.save(draft, np.ascontiguousarray(values))  # in the order of rows: some readers know no other
 
     return _write_planes(_depth_planes(result, "An array of depth", path), write, overwrite, check)
 

@@ -15,14 +15,12 @@ from numpy.typing import NDArray
 from dsl_core.errors import StoreError
 from dsl_core.io.result.result_file import checked_attributes, damage_of, own_attributes
 from dsl_core.model.result import VARIABLES
-from dsl_core.model.result_order import places_px
+from dsl_core.model.result_order import BANDS, places_px, rising_order
 from dsl_core.progress import NoProgress, Progress
 
 if TYPE_CHECKING:
     from dsl_core.io.result.stored_arrays import StoredArray
 
-#: The axis of bands.
-BANDS = "wavelength_nm"
 #: What is read of a variable between two looks at whether the person has cancelled.
 AT_ONCE_BYTES = 16e6
 
@@ -105,11 +103,11 @@ def _parts(shape: tuple[int, ...]) -> list[slice]:
 
 @dataclass(frozen=True)
 class _Ordered:
-    """An array read with its axes as `VARIABLES` has them, and its bands in an ``order``, if it has bands."""
+    """An array read with its axes as `VARIABLES` has them, each in its order of ``orders``, if it has one."""
 
     stored: StoredArray
     axes: tuple[str, ...]
-    order: NDArray[np.intp]
+    orders: Mapping[str, NDArray[np.intp]]
 
     @property
     def shape(self) -> tuple[int, ...]:
@@ -117,9 +115,9 @@ class _Ordered:
 
     def read(self, part: slice) -> NDArray[Any]:
         """The values of a part of the first axis; raises `StoreError`."""
-        rises = bool((np.diff(self.order) == 1).all())
-        first: Any = part if self.axes[0] != BANDS or rises else self.order[part]
-        keys = {axis: slice(None) for axis in self.axes} | {self.axes[0]: first}
+        keys: dict[str, Any] = {axis: self.orders.get(axis, slice(None)) for axis in self.axes}
+        first = self.axes[0]
+        keys[first] = self.orders[first][part] if first in self.orders else part
         values = self.stored.values(tuple(keys[axis] for axis in self.stored.dims))
         return values.transpose([self.stored.dims.index(axis) for axis in self.axes])
 
@@ -136,7 +134,7 @@ def _require_one_size(found: Mapping[str, StoredArray], labels: Mapping[str, lis
 
 
 def _ordered(found: Mapping[str, StoredArray], path: Path) -> tuple[NDArray[np.float64], dict[str, _Ordered]]:
-    """Wavelengths that rise, and the arrays of a result with axes and bands in the order relied on."""
+    """Wavelengths that rise, and the arrays of a result in the order of `canonical`."""
     for name, (axes, *_) in VARIABLES.items():
         if name in found and set(found[name].dims) != set(axes):
             has = ", ".join(found[name].dims)
@@ -144,27 +142,36 @@ def _ordered(found: Mapping[str, StoredArray], path: Path) -> tuple[NDArray[np.f
                 f"{path} has {name} along the axes ({has}); ({', '.join(axes)}) are needed. Rename them where"
                 " the result was made."
             )
-    is_axis = BANDS in found and found[BANDS].dims == (BANDS,)
-    nm = np.asarray(found[BANDS].values((slice(None),)) if is_axis else (), np.float64)
-    order = np.arange(nm.size)
-    if "reflectance" in found:
-        if not nm.size or not np.isfinite(nm).all() or len(np.unique(nm)) < nm.size:
-            raise StoreError(
-                f"{path} has a reflectance, but not one wavelength for each of its bands. Add the coordinate"
-                " wavelength_nm, in nm."
-            )
-        order = np.argsort(nm)
-    there = {
-        name: _Ordered(found[name], axes, order) for name, (axes, *_) in VARIABLES.items() if name in found
+    nm = np.asarray(_coordinate(found, BANDS), np.float64)
+    is_named = nm.size and np.isfinite(nm).all() and len(np.unique(nm)) == nm.size
+    if "reflectance" in found and not is_named:
+        raise StoreError(
+            f"{path} has a reflectance, but not one wavelength for each of its bands. Add the coordinate"
+            " wavelength_nm, in nm."
+        )
+    orders = {
+        axis: order
+        for axis in (BANDS, "x", "y")
+        if (order := rising_order(_coordinate(found, axis))) is not None
     }
-    return nm[order], there
+    there = {
+        name: _Ordered(found[name], axes, orders) for name, (axes, *_) in VARIABLES.items() if name in found
+    }
+    return nm[orders.get(BANDS, slice(None))], there
+
+
+def _coordinate(found: Mapping[str, StoredArray], axis: str) -> NDArray[Any]:
+    """The values that a result gives an axis; nothing where it gives none."""
+    said = axis in found and found[axis].dims == (axis,)
+    return found[axis].values((slice(None),)) if said else np.empty(0)
 
 
 def _places(found: Mapping[str, StoredArray]) -> Iterator[NDArray[np.int64] | None]:
     """Columns, then rows, of the camera's picture that a result says its pixels are in."""
     for axis in ("x", "y"):
-        said = axis in found and found[axis].dims == (axis,)
-        yield places_px(found[axis].values((slice(None),))) if said else None
+        values = _coordinate(found, axis)
+        order = rising_order(values)
+        yield places_px(values if order is None else values[order])
 
 
 def load_arrays(path: Path, progress: Progress | None = None) -> ResultArrays:

@@ -27,6 +27,7 @@ from dsl_core.io.result.arrays import plain, write_variable
 from dsl_core.io.result.inventory import CHECKSUM, INVENTORY, check_inventory, with_inventory
 from dsl_core.io.staging import FolderKind, staged
 from dsl_core.model.result import SCHEMA_VERSION
+from dsl_core.model.result_order import canonical
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -77,7 +78,7 @@ def seal_folder(folder: Path, attributes: Mapping[Any, Any]) -> None:
 
 
 def load_result(path: Path, *, lazy: bool = True) -> xr.Dataset:
-    """Open a saved result; bands are read when they are first used unless ``lazy`` is false.
+    """Open a saved result in the `canonical` order; bands are read when first used unless ``lazy`` is false.
 
     Raises `StoreError` when the folder is missing, damaged, not a result, or of another schema version.
     """
@@ -121,6 +122,7 @@ def opened(path: Path, stored: Mapping[str, Any], *, lazy: bool = True) -> xr.Da
                 variable.attrs["scale_factor"] = np.float32(variable.attrs["scale_factor"])
         raw = xr.Dataset(variables, attrs=own_attributes(stored))
         result = xr.decode_cf(raw).assign_coords({n: (n, np.array(v)) for n, v in labels.items()})
+        result = canonical(result)
         return result if lazy else result.load()
     except FAILURES as error:
         raise damage_of(path, error) from error

@@ -1,0 +1,87 @@
+"""Results whose axes, bands, rows or columns are stored in another order say the same."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+
+import dsl_core as dsl
+from dsl_core.io.result.result_arrays import load_arrays
+from dsl_core.model.result_order import canonical, with_axes
+from tests.cases.small_result import small_result
+
+Change = Callable[[xr.Dataset], xr.Dataset]
+CHANGES: dict[str, Change] = {
+    "bands fall": lambda result: result.isel(wavelength_nm=slice(None, None, -1)),
+    "bands are shuffled": lambda result: result.isel(wavelength_nm=[2, 0, 4, 1, 3]),
+    "other axes": lambda result: result.transpose("x", "y", ...),
+    "upside down": lambda result: result.isel(y=slice(None, None, -1)),
+    "mirrored": lambda result: result.isel(x=slice(None, None, -1)),
+    "all": lambda result: result[dict.fromkeys(("wavelength_nm", "y", "x"), slice(None, None, -1))].transpose(
+        "y", "x", ...
+    ),
+}
+PLACES = {"a": (1, 1, 3, 2), "b": (6, 3)}
+
+
+@pytest.fixture(params=CHANGES)
+def changed(request: pytest.FixtureRequest) -> xr.Dataset:
+    return CHANGES[request.param](small_result())
+
+
+def test_a_loaded_result_has_the_order_relied_on(changed: xr.Dataset, tmp_path: Path) -> None:
+    path, usual = dsl.save_result(changed, tmp_path / "a.zarr"), small_result()
+    saved = dsl.load_result(dsl.save_result(usual, tmp_path / "usual.zarr"))
+    found, arrays = dsl.load_result(path), load_arrays(path)
+    xr.testing.assert_equal(found, saved)
+    for name, values in arrays.arrays.items():
+        assert found[name].dims == usual[name].dims
+        np.testing.assert_array_equal(values, saved[name].values, err_msg=name)
+    np.testing.assert_array_equal(arrays.wavelengths_nm, usual["wavelength_nm"].values)
+    assert arrays.in_picture((2, 1)) == (2, 1)
+
+
+@pytest.mark.parametrize("ending", [".ply", ".stl", ".hdr", ".csv", ".npy"])
+def test_exports_are_the_same(changed: xr.Dataset, tmp_path: Path, ending: str) -> None:
+    pixels = [(4, 2)] if ending == ".csv" else []
+    for name, result in (("changed", changed), ("usual", small_result())):
+        folder = tmp_path / name
+        folder.mkdir()
+        dsl.export(result, folder / f"a{ending}", pixels=pixels)
+    files = sorted((tmp_path / "usual").iterdir())
+    assert files
+    for file in files:
+        assert file.read_bytes() == (tmp_path / "changed" / file.name).read_bytes(), file.name
+
+
+def test_answers_are_the_same(changed: xr.Dataset) -> None:
+    usual = small_result()
+    xr.testing.assert_allclose(
+        dsl.colours(changed, PLACES, "D65", "a"), dsl.colours(usual, PLACES, "D65", "a"), rtol=1e-6
+    )
+    found, known = (dsl.classify(each, pins=PLACES, measure="angle") for each in (changed, usual))
+    xr.testing.assert_allclose(found.sortby(["y", "x"]), known, rtol=1e-5)
+    xr.testing.assert_allclose(changed.dsl.region(PLACES["a"]), usual.dsl.region(PLACES["a"]), rtol=1e-6)
+    points, all_points = (each.dsl.points().sortby(["y", "x"]) for each in (changed, usual))
+    xr.testing.assert_equal(points["depth_mm"].drop_vars("point", errors="ignore"), all_points["depth_mm"])
+
+
+def test_a_mask_marks_rows_as_they_are_given(changed: xr.Dataset) -> None:
+    mask = np.zeros((changed.sizes["y"], changed.sizes["x"]), bool)
+    mask[1, 2] = True
+    x, y = int(changed["x"][2]), int(changed["y"][1])
+    found = changed.dsl.region(mask)["reflectance"].sortby("wavelength_nm")
+    np.testing.assert_allclose(found, small_result()["reflectance"].sel(x=x, y=y), rtol=1e-6)
+
+
+def test_what_is_in_order_is_left_as_it_is() -> None:
+    usual = small_result()
+    assert canonical(usual) is usual
+    bare = usual.drop_vars(["x", "y"])
+    assert canonical(bare) is bare
+    spectrum = usual.dsl.spectrum(4, 2)
+    assert with_axes(spectrum) is spectrum
