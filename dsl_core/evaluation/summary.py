@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -41,6 +41,22 @@ class Truth:
     names: tuple[str, ...] = ()
     spectra: Floats | None = None
     targets: tuple[int, ...] | None = None
+
+    @property
+    def size_px(self) -> tuple[int, int] | None:
+        """Columns and rows of the picture; None where nothing is known of its pixels."""
+        known = [each for each in (self.depth_mm, self.material, self.lit) if each is not None]
+        return (known[0].shape[1], known[0].shape[0]) if known else None
+
+    def part(self, columns_px: NDArray[np.int64], rows_px: NDArray[np.int64]) -> Truth:
+        """What is known of these columns and rows of the picture; raises ``IndexError`` for others."""
+        at = np.ix_(rows_px, columns_px)
+        return replace(
+            self,
+            depth_mm=None if self.depth_mm is None else self.depth_mm[at],
+            lit=None if self.lit is None else self.lit[at],
+            material=None if self.material is None else self.material[at],
+        )
 
 
 @dataclass(frozen=True)

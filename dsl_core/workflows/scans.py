@@ -9,6 +9,9 @@ from dataclasses import asdict, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import numpy as np
+from numpy.typing import NDArray
+
 from dsl_core.capture.metering import WHITE_IN_DOUBT
 from dsl_core.capture.movement import check_movement, pick_reference_shots
 from dsl_core.capture.proof.report import SeenFrames, WatchedSource, prove
@@ -26,12 +29,13 @@ from dsl_core.io.scan.folder import ScanReader
 from dsl_core.io.scan.manifest import Manifest, read_manifest
 from dsl_core.io.scan.origin import is_of_this_computer, model_notes, rig_of_notes
 from dsl_core.io.scan.proof_file import read_proof
-from dsl_core.model.attributes import DOUBTS, PLAN_ATTRIBUTE, SCALE_ATTRIBUTE
+from dsl_core.model.attributes import DOUBTS, PLAN_ATTRIBUTE, SCALE_ATTRIBUTE, plan_of
 from dsl_core.model.conditions import differences
 from dsl_core.model.fit import ATTRIBUTE as FIT_ATTRIBUTE
 from dsl_core.model.fit import Fit
 from dsl_core.model.frames import FrameSource
 from dsl_core.model.plan import CapturePlan
+from dsl_core.model.result_order import places_px
 from dsl_core.model.result_sink import ResultSink, SeenGeometry
 from dsl_core.model.rig import Rig
 from dsl_core.model.scan_proof import ScanProof
@@ -326,6 +330,10 @@ def _require_conditions(folder: Path, manifest: Manifest, rig: Rig) -> None:
 
 def twin_truth(rig: DeviceRig, grid: WavelengthGrid) -> Truth | None:
     """The ground truth of the twin's scene; None for a real rig."""
+    return _twin_truth(rig, grid.centres_nm)
+
+
+def _twin_truth(rig: DeviceRig, wavelengths_nm: NDArray[np.float64]) -> Truth | None:
     from dsl_core.simulation.sim_devices import SimCamera
 
     if not isinstance(rig.camera, SimCamera):
@@ -337,7 +345,7 @@ def twin_truth(rig: DeviceRig, grid: WavelengthGrid) -> Truth | None:
         truth.lit,
         truth.material,
         materials.names,
-        materials.at(grid.centres_nm),
+        materials.at(wavelengths_nm),
         materials.targets,
     )
 
@@ -345,7 +353,10 @@ def twin_truth(rig: DeviceRig, grid: WavelengthGrid) -> Truth | None:
 def truth_of(
     result: xr.Dataset, rig_name: str | None = None, options: Mapping[str, str] | None = None
 ) -> Truth:
-    """Truth from the rig that took the scan, or the one named; raises `DecodeError` if there is none."""
+    """Truth from the rig that took the scan, or the one named, of the part of the picture that a result is.
+
+    Raises `DecodeError` if there is none.
+    """
     origin = (rig_name, dict(options or {})) if rig_name else rig_of_notes(result.attrs)
     if origin is None:
         raise DecodeError(
@@ -356,10 +367,10 @@ def truth_of(
     if rig_name is None and not is_built_in(origin[0]):
         raise DecodeError(_no_truth(origin[0]))
     with open_rig(*origin) as rig:
-        truth = twin_truth(rig, _grid_of(result))
+        truth = _twin_truth(rig, _bands_of(result))
     if truth is None:
         raise DecodeError(_no_truth(origin[0]))
-    return truth
+    return _truth_of_part(truth, result)
 
 
 def _no_truth(rig_name: str) -> str:
@@ -369,8 +380,20 @@ def _no_truth(rig_name: str) -> str:
     )
 
 
-def _grid_of(result: xr.Dataset) -> WavelengthGrid:
+def _bands_of(result: xr.Dataset) -> NDArray[np.float64]:
     if "wavelength_nm" not in result.coords:
-        return WavelengthGrid()
-    nm = result["wavelength_nm"].values
-    return WavelengthGrid(start_nm=nm[0], stop_nm=nm[-1], step_nm=nm[1] - nm[0])
+        return WavelengthGrid().centres_nm
+    return np.asarray(result["wavelength_nm"].values, np.float64)
+
+
+def _truth_of_part(truth: Truth, result: xr.Dataset) -> Truth:
+    """The truth where a result is in the picture; all of it where that is not known, so that sizes decide."""
+    plan = plan_of(result.attrs)
+    if plan is None or plan.camera_size_px != truth.size_px:
+        return truth
+    columns, rows = (places_px(result[axis].values) if axis in result.coords else None for axis in ("x", "y"))
+    if columns is None or rows is None:
+        return truth
+    width, height = plan.camera_size_px
+    is_inside = 0 <= columns.min() <= columns.max() < width and 0 <= rows.min() <= rows.max() < height
+    return truth.part(columns, rows) if is_inside else truth

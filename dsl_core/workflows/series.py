@@ -131,7 +131,8 @@ class TruthReference:
 
     def _truth(self, path: Path, result: Any) -> Truth:
         bands = result["wavelength_nm"].values if "wavelength_nm" in result.coords else ()
-        key = repr((rig_of_notes(result.attrs), tuple(bands)))
+        places = [result[axis].values.tolist() for axis in ("x", "y") if axis in result.coords]
+        key = repr((rig_of_notes(result.attrs), tuple(bands), places))
         if key not in self._known:
             truth = truth_of(result)
             if self._known:
@@ -191,6 +192,6 @@ def _require_same_scene(path: Path, known: Truth, truth: Truth) -> None:
     ):
         return
     raise DecodeError(
-        f"{path.name} shows another scene, or was captured with another camera, than the results before it."
-        " A sweep compares scans of one scene."
+        f"{path.name} shows another scene or part of it, or another camera captured it, than the results"
+        " before it. A sweep compares scans of one scene, all of the same part."
     )

@@ -1,0 +1,64 @@
+"""Part results of the twin are compared with the truth of their own part and bands."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+
+import dsl_core as dsl
+from dsl_core import pipeline
+from dsl_core.errors import DecodeError
+from dsl_core.io.result.result_file import load_result, save_result
+from dsl_core.workflows.scans import truth_of
+from dsl_core.workflows.series import read_sweep
+from tests.app.support.compare_bench import make_result
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory: pytest.TempPathFactory) -> xr.Dataset:
+    return load_result(make_result(tmp_path_factory.mktemp("parts"), "chart"), lazy=False)
+
+
+def test_a_part_has_the_truth_of_its_place(whole: xr.Dataset) -> None:
+    every, part = truth_of(whole), whole.isel(x=slice(20, 50, 2), y=slice(30, 10, -1))
+    here = truth_of(part)
+    assert every.depth_mm is not None
+    assert here.depth_mm is not None
+    np.testing.assert_array_equal(here.depth_mm, every.depth_mm[30:10:-1, 20:50:2])
+    found, known = dsl.evaluate(part), dsl.evaluate(whole)
+    assert found.depth is not None
+    assert known.depth is not None
+    assert found.depth.rmse_mm < 2 * known.depth.rmse_mm
+
+
+@pytest.mark.parametrize("bands", [[20], [3, 30], [0, 1, 5, 40]])
+def test_bands_are_those_of_the_result(whole: xr.Dataset, bands: list[int]) -> None:
+    some, every = whole.isel(wavelength_nm=bands), truth_of(whole)
+    here = truth_of(some)
+    assert here.spectra is not None
+    assert every.spectra is not None
+    np.testing.assert_allclose(here.spectra, every.spectra[:, bands], atol=1e-12)
+    assert dsl.evaluate(some).mean("rmse") < 2 * dsl.evaluate(whole).mean("rmse")
+
+
+def test_a_part_that_does_not_say_where_it_is_is_refused(whole: xr.Dataset) -> None:
+    nowhere = whole.isel(x=slice(20, 50)).drop_vars("x")
+    with pytest.raises(DecodeError, match="render the truth for the camera"):
+        dsl.evaluate(nowhere)
+    other = {"size": "128x96", "scene": "color-checker"}
+    with pytest.raises(DecodeError, match="render the truth for the camera"):
+        pipeline.evaluate(whole, truth_of(whole, "twin", other))
+
+
+def test_a_sweep_compares_one_part_with_the_truth(whole: xr.Dataset, tmp_path: Path) -> None:
+    def saved(name: str, left: int) -> Path:
+        return save_result(whole.isel(x=slice(left, left + 30)), tmp_path / f"{name}.zarr")
+
+    first, second, other = saved("first", 10), saved("second", 10), saved("other", 30)
+    points, _ = read_sweep([first, second])
+    assert points[0].depth_mm == points[1].depth_mm
+    with pytest.raises(DecodeError, match="all of the same part"):
+        read_sweep([first, other])
