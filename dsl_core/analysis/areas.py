@@ -15,6 +15,8 @@ LEAST_COSINE = 0.1
 def pixel_areas_mm2(points_mm: Cube, normals: Cube | None = None) -> Map:
     """Area of the surface that each pixel sees, mm2, (rows, columns); NaN without a point.
 
+    NaN everywhere where all points lie on one line of pixels, which does not say how far apart rays are.
+
     ``points_mm`` and ``normals`` are (3, rows, columns) in camera coordinates. The pixel's cone of rays cuts
     ``z^2 J / |n . r|`` out of a plane with normal n: r is the ray with unit depth, J the area between
     neighbouring rays, from a smooth fit to all rays. Triangles between the points themselves would grow with
@@ -24,9 +26,10 @@ def pixel_areas_mm2(points_mm: Cube, normals: Cube | None = None) -> Map:
     with np.errstate(divide="ignore", invalid="ignore"):
         ray_x, ray_y = points_mm[0] / depth, points_mm[1] / depth
     known = np.isfinite(ray_x) & np.isfinite(ray_y)
-    if known.sum() < 3:
+    gradients = _gradients(np.stack([ray_x, ray_y]), known)
+    if gradients is None:
         return np.full(depth.shape, np.nan)
-    (xx, xy), (yx, yy) = (_gradient(ray, known) for ray in (ray_x, ray_y))
+    (xx, xy), (yx, yy) = gradients
     area = depth**2 * np.abs(xx * yy - xy * yx)
     if normals is None:
         return np.asarray(area)
@@ -43,22 +46,43 @@ def depth_relative_std(points_mm: Cube, depth_std_mm: Cube | None) -> Map | None
         return np.asarray(depth_std_mm.astype(np.float64) / points_mm[2])
 
 
-def _gradient(ray: Map, known: NDArray[np.bool_]) -> tuple[Map, Map]:
-    """Change of a ray's slope from column to column and from row to row, of a cubic fit to all pixels."""
-    rows, columns = known.shape
+def _gradients(rays: Map, known: NDArray[np.bool_]) -> tuple[tuple[Map, Map], ...] | None:
+    """Change of rays' slopes (2, rows, columns) per column and per row, of fits to known pixels.
+
+    A cubic where pixels are spread widely enough, in few columns or rows the polynomial that they determine;
+    None where that is none.
+    """
     v, u = np.nonzero(known)
+    if not v.size:
+        return None
     thin = slice(None, None, max(len(v) // 20_000, 1))
-    scale = max(rows, columns) / 2
-    powers = [(i, j) for i in range(4) for j in range(4 - i)]
-    x, y = (u[thin] - columns / 2) / scale, (v[thin] - rows / 2) / scale
-    design = np.stack([x**i * y**j for i, j in powers], axis=1)
-    factors = np.linalg.lstsq(design, ray[v[thin], u[thin]].astype(np.float64), rcond=None)[0]
-    y, x = np.mgrid[0:rows, 0:columns].astype(np.float64)
-    x, y = (x - columns / 2) / scale, (y - rows / 2) / scale
-    along_x, along_y = np.zeros(known.shape), np.zeros(known.shape)
+    # By the pixels that are known: in a narrow strip of a large picture, powers would all but coincide.
+    middles = [(at.min() + at.max()) / 2 for at in (u, v)]
+    scales = [max((at.max() - at.min()) / 2, 0.5) for at in (u, v)]
+    x, y = ((at[thin] - middle) / scale for at, middle, scale in zip((u, v), middles, scales, strict=True))
+    slopes = rays[:, v[thin], u[thin]].T.astype(np.float64)
+    for degree in (3, 2, 1):
+        powers = [(i, j) for i in range(degree + 1) for j in range(degree + 1 - i)]
+        design = np.stack([x**i * y**j for i, j in powers], axis=1)
+        factors, _, rank, _ = np.linalg.lstsq(design, slopes, rcond=None)
+        if rank == len(powers):
+            break
+    else:
+        return None
+    row, column = np.indices(known.shape, np.float64)
+    places = (column - middles[0]) / scales[0], (row - middles[1]) / scales[1]
+    return tuple(_derivatives(each, powers, places, scales) for each in factors.T)
+
+
+def _derivatives(
+    factors: Map, powers: list[tuple[int, int]], places: tuple[Map, Map], scales: list[float]
+) -> tuple[Map, Map]:
+    """Of a polynomial with factors of ``x**i * y**j``, per column and per row, at scaled places."""
+    x, y = places
+    along_x, along_y = np.zeros(x.shape), np.zeros(x.shape)
     for factor, (i, j) in zip(factors, powers, strict=True):
         if i:
-            along_x += factor * i * x ** (i - 1) * y**j / scale
+            along_x += factor * i * x ** (i - 1) * y**j / scales[0]
         if j:
-            along_y += factor * j * x**i * y ** (j - 1) / scale
+            along_y += factor * j * x**i * y ** (j - 1) / scales[1]
     return along_x, along_y

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -20,7 +21,8 @@ class ClassRow:
 
     ``share`` is None for pixels that were not judged. ``area_mm2`` is of the pixels with a point, and of a
     class also half of what is beside it without a class, where its edge runs; None where the result has no
-    points. Deviations are as `area_deviation` derives them, None where they are not known.
+    points, NaN where no pixel of the class has a known area. Deviations are as `area_deviation` derives them,
+    None where they are not known.
     """
 
     label: str
@@ -60,7 +62,7 @@ class ClassRow:
         >>> ClassRow("red", 1, 1308, 0.5, 98.04, 41.7, 3.04).area_text
         '98.0 ± 3.0'
         """
-        if self.area_mm2 is None:
+        if self.area_mm2 is None or math.isnan(self.area_mm2):
             return "–"
         spread = self.area_std_mm2
         # Without a deviation, edges of a large area are known to no tenth.
@@ -86,6 +88,8 @@ def class_table(
         areas = np.bincount(shown.values.ravel(), np.nan_to_num(areas_mm2.ravel()), size).astype(np.float64)
         if deviations is not None and deviations.beside_mm2 is not None:
             areas += deviations.beside_mm2
+        measured = np.bincount(shown.values.ravel(), np.isfinite(areas_mm2).ravel(), size)
+        areas[(pixels > 0) & (measured == 0)] = np.nan
     pixels_std, areas_std = (None, None) if deviations is None else (deviations.pixels, deviations.areas_mm2)
     return tuple(
         ClassRow(
@@ -95,7 +99,7 @@ def class_table(
             float(pixels[value] / judged) if value else None,
             None if areas is None else float(areas[value]),
             _known(pixels_std, value),
-            _known(areas_std, value),
+            None if areas is None or np.isnan(areas[value]) else _known(areas_std, value),
             None if pixels_std is None or not value else _known(pixels_std / judged, value),
         )
         for value in (*range(1, size), 0)

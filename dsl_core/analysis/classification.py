@@ -29,6 +29,11 @@ from dsl_core.progress import Progress
 if TYPE_CHECKING:
     import xarray as xr
 
+#: Why no pixel has an area.
+NO_AREAS = (
+    "Areas are not known: the pixels that have a point are none, or lie on one line, which does not say how"
+    " far apart lines of sight are. Classify a part that is at least two pixels wide and high."
+)
 #: The endings that a class map is written with, and what is written.
 ENDINGS = {".hdr": "ENVI classification", ".ply": "points with their class", ".csv": "table of areas"}
 
@@ -84,6 +89,11 @@ class Classification:
     def method(self) -> str:
         """How the map came about, in a sentence."""
         return method_in_words(self.scores.measure, self.limits, self.brightness)
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What is not known of the areas, and why; empty where all is, and for results without points."""
+        return () if self.areas is None or np.isfinite(self.areas.mm2).any() else (NO_AREAS,)
 
 
 def method_in_words(measure: Measure, limits: Limits, brightness: Brightness) -> str:

@@ -98,7 +98,7 @@ def _materials(found: Classification) -> tuple[ReportPicture, ReportTable]:
         )
         for row in found.rows
     )
-    note = f"By {found.method}; ± one deviation."
+    note = " ".join((f"By {found.method}; ± one deviation.", *found.notes))
     return picture, ReportTable("Materials", ("Material", "Pixels", "Share", "Area, mm²"), rows, note)
 
 

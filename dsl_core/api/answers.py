@@ -45,8 +45,8 @@ def classify(
 
     The dataset holds ``class`` (y, x), an index into the coordinate ``label``, ``fit`` and ``margin`` (y, x),
     and for each label ``pixels`` and ``area_mm2``, with ``pixels_std`` and ``area_std_mm2``; the attribute
-    ``notes`` lists what was converted or left out of the library. Raises `CalibrationError` for a library
-    without usable spectra and `DecodeError` for places without spectra or a result that has none.
+    ``notes`` lists what was converted or left out of the library, and why areas are NaN.
+    Raises `CalibrationError` for a library without usable spectra and `DecodeError` for places without spectra or a result that has none.
     """
     import xarray as xr
 
@@ -96,7 +96,7 @@ def classify(
         stds = [_or_nan(rows[label].area_std_mm2) for label in labels]
         variables["area_std_mm2"] = ("label", stds, {"units": "mm2"})
     coords = {"label": labels, "y": result["y"], "x": result["x"]}
-    return xr.Dataset(variables, coords=coords, attrs={"method": made.method, "notes": notes})
+    return xr.Dataset(variables, coords=coords, attrs={"method": made.method, "notes": [*made.notes, *notes]})
 
 
 def _or_nan(value: float | None) -> float:

@@ -131,6 +131,7 @@ def classify(
         files = [
             file for each in outputs for file in write_classification(result, found, each, overwrite=force)
         ]
+    notes = [*found.notes, *notes]
     for note in notes[:_MOST_NOTES]:
         output.say(note)
     if len(notes) > _MOST_NOTES:

@@ -25,3 +25,35 @@ def test_a_tilted_plane_has_its_area_whatever_the_noise_of_depth() -> None:
 def test_pixels_without_a_point_have_no_area() -> None:
     points = np.full((3, 4, 4), np.nan)
     assert np.isnan(pixel_areas_mm2(points)).all()
+
+
+def seen_plane(shown: np.ndarray) -> tuple[np.ndarray, float]:
+    """Points of a level plane where pixels are shown, and the area of each pixel, mm2."""
+    v, u = np.indices(shown.shape).astype(float)
+    points = 700 * np.stack([(u - 39.5) / 200, (v - 29.5) / 200, np.ones_like(u)])
+    points[:, ~shown] = np.nan
+    return points.astype(np.float32), (700 / 200) ** 2
+
+
+@pytest.mark.parametrize(
+    "part",
+    [np.s_[:, 20:22], np.s_[:, 20:23], np.s_[10:12], np.s_[10:13], np.s_[10:12, 20:22], np.s_[10:13, 20:23]],
+)
+@pytest.mark.parametrize("is_cut", [False, True])
+def test_narrow_strips_have_the_area_that_they_have_in_a_picture(part: object, is_cut: bool) -> None:
+    shown = np.zeros((60, 80), bool)
+    shown[part] = True  # type: ignore[call-overload]
+    points, each_mm2 = seen_plane(shown)
+    areas = pixel_areas_mm2(points[(slice(None), *np.atleast_1d(part))] if is_cut else points)
+    known = areas[np.isfinite(areas)]
+    assert known.size == shown.sum()
+    np.testing.assert_allclose(known, each_mm2, rtol=0.01)
+
+
+@pytest.mark.parametrize("line", ["column", "row", "diagonal", "pixel"])
+def test_pixels_on_one_line_have_no_known_area(line: str) -> None:
+    shown = np.zeros((60, 80), bool)
+    where = {"column": np.s_[:, 30], "row": np.s_[30], "pixel": np.s_[30, 30]}
+    shown[where.get(line, (np.arange(60), np.arange(60) + 7))] = True
+    points, _ = seen_plane(shown)
+    assert np.isnan(pixel_areas_mm2(points)).all()

@@ -159,3 +159,17 @@ def test_the_command_names_pins_and_writes_files(tmp_path: Path, capsys: pytest.
 def test_nothing_marked_is_told() -> None:
     with pytest.raises(DecodeError, match="Nothing is marked"):
         masks_of_marks(Annotations(), (4, 4))
+
+
+def test_areas_that_nothing_tells_are_not_zero(found) -> None:  # type: ignore[no-untyped-def]
+    result, made = found
+    assert made.notes == ()
+    cube = chart_cube()
+    classes = [SpectralClass(n, (Member.of(s),)) for n, s in zip(NAMES, cube.spectra[:3], strict=True)]
+    alone = classify_result(result.isel(x=slice(30, 31)), classes)
+    (note,) = alone.notes
+    assert "on one line" in note
+    for row in alone.rows:
+        assert row.area_std_mm2 is None or not row.pixels
+        assert np.isnan(row.area_mm2) if row.pixels else row.area_mm2 == 0
+        assert row.area_text == "–" or not row.pixels

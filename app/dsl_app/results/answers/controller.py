@@ -100,7 +100,7 @@ class AnswersController:
             )
             areas = PixelAreas.of(*(result.known(name) for name in ("points_mm", "normals", "depth_std_mm")))
             made = Classification.of(scores, brightness=way.brightness, areas=areas)
-            return Materials(name, made, (*doubts, *notes))
+            return Materials(name, made, (*made.notes, *doubts, *notes))
 
         def done(materials: Materials) -> None:
             if self.state.result.value is result and request == self._request:
