@@ -45,8 +45,9 @@ def classify(
 
     The dataset holds ``class`` (y, x), an index into the coordinate ``label``, ``fit`` and ``margin`` (y, x),
     and for each label ``pixels`` and ``area_mm2``, with ``pixels_std`` and ``area_std_mm2``; the attribute
-    ``notes`` lists what was converted or left out of the library, and why areas are NaN.
-    Raises `CalibrationError` for a library without usable spectra and `DecodeError` for places without spectra or a result that has none.
+    ``notes`` lists what was converted or left out of the library, and why areas are NaN. Raises
+    `CalibrationError` for a library without usable spectra and `DecodeError` for places without spectra or a
+    result that has none.
     """
     import xarray as xr
 

@@ -34,6 +34,7 @@ from dsl_core.planning.samples import SamplePixels
 from dsl_core.reconstruction.columns.column import Column, refine
 from dsl_core.reconstruction.columns.line_peaks import LinePeaks
 from dsl_core.reconstruction.columns.pattern_column import first_order_share, refine_by_profiles
+from dsl_core.reconstruction.columns.peak_error import peak_error
 from dsl_core.reconstruction.geometry import LIT_SIGMAS
 from dsl_core.reconstruction.spectral.solving.dense_solver import solve_dense
 from dsl_core.reconstruction.spectral.solving.prior import Prior
@@ -255,7 +256,9 @@ class VirtualPixels:
         radiance, std = (v.reshape(-1, frames).T.contiguous() for v in (y, std))
         response, profiles = self.rig.projector_response, self.model.profiles
         if self.model.lines is not None:
-            column = refine(LinePeaks(true.round(), radiance, std, self.model.lines, response), 0.0)
+            peaks = LinePeaks(true.round(), radiance, std, self.model.lines, response)
+            # What first orders of other lines add under a comb's peaks is in these data, and not in its fit.
+            column = refine(peaks, 0.0 if peaks.lines.single else peak_error(peaks))
         else:
             share = first_order_share(self.rig, profiles, self.pixels, self.column.to(self.shading).round())
             share = share.repeat_interleave(count, 0)
