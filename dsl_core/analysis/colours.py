@@ -127,7 +127,8 @@ def colours_of(
 ) -> list[Colour]:
     """The colour of each spectrum (values and deviations, bands each) under each light.
 
-    Deviations that are all NaN are not known: no colour has one then, and differences have that of the other.
+    A band that is missing (NaN) is taken to lie between its neighbours. Deviations that are all NaN are not
+    known: no colour has one then, and differences have that of the other.
     ``correlation`` (bands, bands) says how bands err together; the usual one of a result otherwise.
     Differences are to the spectrum named ``reference``. Raises `DecodeError` for unknown lights or names, and
     for bands that hold too little of a colour.
@@ -139,10 +140,14 @@ def colours_of(
     for light in lights:
         require_bands(bands_nm, light)
         weights = xyz_weights(bands_nm, light)
-        labs = {
-            name: _lab_with_covariance(values, std, weights, shared)
-            for name, (values, std) in spectra.items()
-        }
+        labs = {}
+        for name, (values, std) in spectra.items():
+            known = np.isfinite(values)
+            if known.all() or not known.any():
+                labs[name] = _lab_with_covariance(values, std, weights, shared)
+                continue
+            own = xyz_weights(bands_nm[known], light), shared[np.ix_(known, known)]
+            labs[name] = _lab_with_covariance(values[known], std[known], *own)
         for name, (lab, covariance) in labs.items():
             difference: tuple[float | None, float | None] = (None, None)
             if reference is not None and name != reference:

@@ -47,9 +47,10 @@ def session_content(
                 missing.append(str(error))
         bands = np.asarray(result["wavelength_nm"].values, np.float64)
         curves = [
-            spectrum_curve(name, f"{int(masks[name].sum())} px", bands, mean, std)
+            spectrum_curve(name, f"{int(masks[name].sum())} px", bands[known], mean[known], std[known])
             for name, (mean, std) in spectra.items()
-            if np.isfinite(mean).all()
+            for known in (np.isfinite(mean),)
+            if known.all() or known.sum() > 1
         ]
         tables = []
         try:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -73,8 +73,9 @@ def mask_of_runs(runs: Iterable[tuple[int, int, int]], shape: tuple[int, int]) -
 class RegionSpectrum:
     """Mean reflectance of a region and the deviation of its pixels, of shape (bands,); NaN without pixels.
 
-    ``pixels`` are in the outline, ``used`` of them have a spectrum. ``pixel_std`` is the mean uncertainty
-    stated for a single pixel; a deviation far above it means that the region is not of one material.
+    ``pixels`` are in the outline, ``used`` of them have a spectrum, of which bands may be missing (NaN).
+    ``pixel_std`` is the mean uncertainty stated for a single pixel; a deviation far above it means that the
+    region is not of one material.
     """
 
     mean: NDArray[np.float64]
@@ -89,7 +90,10 @@ def region_spectrum(reflectance: Floats, std: Floats, data_share: Floats, mask: 
     """The spectrum of the pixels of a mask (rows, columns) in band-first cubes (bands, rows, columns)."""
     at = np.flatnonzero(mask)
     # Band by band, so that no copy of a cube is made.
-    solid = at[np.isfinite(reflectance.reshape(len(reflectance), -1)[len(reflectance) // 2][at])]
+    is_known = np.zeros(at.size, bool)
+    for band in reflectance.reshape(len(reflectance), -1):
+        is_known |= np.isfinite(band[at])
+    solid = at[is_known]
     if solid.size == 0:
         nothing = np.full(len(reflectance), np.nan)
         return RegionSpectrum(nothing, nothing, nothing, nothing, int(at.size), 0)
@@ -97,13 +101,28 @@ def region_spectrum(reflectance: Floats, std: Floats, data_share: Floats, mask: 
         cube.reshape(len(cube), -1)[:, solid].astype(np.float64) for cube in (reflectance, std, data_share)
     )
     return RegionSpectrum(
-        mean=np.nanmean(picked, axis=1),
-        deviation=np.nanstd(picked, axis=1, ddof=1) if solid.size > 1 else np.zeros(len(picked)),
-        pixel_std=np.nanmean(spread, axis=1),
-        data_share=np.nanmean(share, axis=1),
+        mean=_over_pixels(np.nanmean, picked),
+        deviation=_over_pixels(_spread, picked, least=min(2, solid.size)),
+        pixel_std=_over_pixels(np.nanmean, spread),
+        data_share=_over_pixels(np.nanmean, share),
         pixels=int(at.size),
         used=int(solid.size),
     )
+
+
+def _over_pixels(
+    figure: Callable[..., Any], values: NDArray[np.float64], least: int = 1
+) -> NDArray[np.float64]:
+    """A figure (bands,) of values (bands, pixels); NaN for bands that fewer pixels than ``least`` have."""
+    enough = np.isfinite(values).sum(axis=1) >= least
+    found = np.full(len(values), np.nan)
+    found[enough] = figure(values[enough], axis=1)
+    return found
+
+
+def _spread(values: NDArray[np.float64], axis: int) -> NDArray[np.float64]:
+    """The standard deviation of pixels; that of a single one is none."""
+    return np.asarray(np.nanstd(values, axis=axis, ddof=min(1, values.shape[axis] - 1)))
 
 
 def explain_pixel(

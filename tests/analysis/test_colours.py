@@ -82,3 +82,17 @@ def test_bands_that_hold_too_little_of_a_colour_have_none(
             DecodeError, match=f"{start_nm} to {stop_nm} nm, hold .* under {light}: too little"
         ):
             colours_of(spectra, bands, (light,))
+
+
+def test_a_missing_band_leaves_a_colour() -> None:
+    values = chart_reflectance(NM)["foliage"]
+    missing, std = values.copy(), np.full(NM.size, 0.01)
+    missing[23] = np.nan
+    whole, part, alone = colours_of(
+        {"a": (values, std), "b": (missing, std), "c": (values, std)}, NM, ("D65",), "a"
+    )
+    assert np.abs(np.subtract(whole.lab, part.lab)).max() < 0.1
+    assert part.delta_e is not None
+    assert part.delta_e < 0.1
+    assert part.lab_std == pytest.approx(whole.lab_std, rel=0.1)
+    assert alone.lab == whole.lab

@@ -127,3 +127,15 @@ def test_a_result_of_depth_alone_has_a_report(tmp_path: Path) -> None:
     content = session_content("depth", depth, Annotations())
     assert "Depth" in write_report(content, tmp_path / "d.html").read_text(encoding="utf-8")
     write_report(content, tmp_path / "d.pdf")
+
+
+def test_a_missing_band_takes_no_mark_out_of_a_report() -> None:
+    result = chart_result()
+    whole = session_content("whole", result, MARKS)
+    missing = result.copy(deep=True)
+    missing["reflectance"][23] = missing["reflectance_std"][23] = np.nan
+    part = session_content("part", missing, MARKS)
+    assert [curve.title for curve in part.curves] == [curve.title for curve in whole.curves]
+    assert part.summary == whole.summary
+    assert "nan" not in str(part.tables)
+    assert all("nan" not in curve.line + curve.band for curve in part.curves)

@@ -65,6 +65,24 @@ def test_a_region_leaves_pixels_without_spectrum_out() -> None:
     assert np.isnan(none.mean).all()
 
 
+@pytest.mark.parametrize("band", [0, 1, 2])
+def test_a_band_that_is_missing_takes_no_spectrum_away(band: int) -> None:
+    cube = np.full((3, 2, 2), 0.4, np.float32)
+    cube[:, 0, 1] = 0.6
+    cube[:, 1, 0] = np.nan
+    cube[band] = np.nan
+    found = region_spectrum(cube, 0.1 * cube, np.ones_like(cube), np.ones((2, 2), bool))
+    assert (found.pixels, found.used) == (4, 3)
+    others = np.arange(3) != band
+    np.testing.assert_allclose(found.mean[others], np.mean([0.4, 0.4, 0.6]), rtol=1e-6)
+    np.testing.assert_allclose(found.deviation[others], np.std([0.4, 0.4, 0.6], ddof=1), rtol=1e-5)
+    assert np.isnan([found.mean[band], found.deviation[band], found.pixel_std[band]]).all()
+    one = region_spectrum(cube, cube, cube, np.array([[True, False], [False, False]]))
+    assert one.used == 1
+    assert np.flatnonzero(np.isnan(one.mean)).tolist() == [band]
+    assert one.deviation[others].tolist() == [0.0, 0.0]
+
+
 def test_distance_counts_errors_along_the_connection_only() -> None:
     a, b = np.array([0.0, 0.0, 500.0]), np.array([30.0, 40.0, 500.0])
     found = distance_between(a, b, 1.0, 0.0)
