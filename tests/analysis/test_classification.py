@@ -171,5 +171,6 @@ def test_areas_that_nothing_tells_are_not_zero(found) -> None:  # type: ignore[n
     assert "on one line" in note
     for row in alone.rows:
         assert row.area_std_mm2 is None or not row.pixels
+        assert row.area_mm2 is not None
         assert np.isnan(row.area_mm2) if row.pixels else row.area_mm2 == 0
         assert row.area_text == "–" or not row.pixels

@@ -72,7 +72,8 @@ class ResultArrays:
     @property
     def origin_px(self) -> tuple[int, int]:
         """Column and row of the camera's picture where the result begins."""
-        return tuple(0 if at is None else int(at[0]) for at in self.places_px)  # type: ignore[return-value]
+        x, y = (0 if at is None else int(at[0]) for at in self.places_px)
+        return x, y
 
     def in_picture(self, pixel: tuple[int, int]) -> tuple[int, int]:
         """Where a pixel ``(x, y)`` of the arrays is in the camera's picture."""
