@@ -30,6 +30,8 @@ FEWEST_BITS = 10
 BLACK_CHANGE, EXPOSURE_MS, SHARED_BY_PIXELS, SHARED_BY_FRAMES = 1e-3, 0.1, 0.1, 0.25
 #: Largest difference of gamma between colours, rms residual of a ramp, both percent; largest black.
 GAMMA_SPREAD_PERCENT, RAMP_PERCENT, BLACK = 2.0, 100 * MOST_LEFT, 0.01
+#: Linear projectors have a gamma of one, which noise puts on either side of it.
+LEAST_GAMMA = 0.8
 #: The new picture must be visible when ``show`` returns, within this; beat at the advised exposures, percent.
 WAIT_MS, BEAT_PERCENT = 1.0, 0.3
 #: A line of a scan is 5 px wide, and its edges are modelled by a blur of about 0.6 px; the width of a pixel
@@ -170,7 +172,7 @@ def _projector(projector: ProjectorCheck) -> Iterator[Figure]:
         "gamma",
         projector.gamma,
         "1",
-        low=1.0,
+        low=LEAST_GAMMA,
         high=3.5,
         advice="Set the projector's picture mode to one without dynamic contrast or film mode.",
     )

@@ -13,6 +13,7 @@ from dsl_core.calibration.selftest.figures import (
     BLUR_PX,
     GAMMA_SPREAD_PERCENT,
     HOT,
+    LEAST_GAMMA,
     LINEARITY_PERCENT,
     RAMP_PERCENT,
     WAIT_MS,
@@ -184,10 +185,16 @@ def test_bounds_follow_from_the_camera_and_the_projector() -> None:
     found = named(GOOD)
     assert found["saturation"].low == pytest.approx(0.9 * 4095)
     assert found["black level"].low == pytest.approx(5 * 2.0)
-    assert (found["gamma"].low, found["gamma"].high) == (1.0, 3.5)
+    assert (found["gamma"].low, found["gamma"].high) == (LEAST_GAMMA, 3.5)
     assert found["modulation of the light at 166.67 ms"].high == pytest.approx(0.3 + 3 * 0.01)
     assert (LINEARITY_PERCENT, GAMMA_SPREAD_PERCENT, RAMP_PERCENT) == (0.5, 2.0, 1.0)
     assert (HOT, BLACK, AMBIENT, WAIT_MS, BLUR_PX) == (1e-3, 0.01, 0.01, 1.0, 1.5)
+
+
+def test_a_linear_projector_passes_on_either_side_of_one() -> None:
+    for gamma in (0.999996, 1.000004):
+        assert failures(selftest_figures(with_("projector", gamma=of(gamma)))) == ()
+    assert not named(with_("projector", gamma=of(0.7)))["gamma"].passed
 
 
 def test_the_difference_between_colours_is_a_share_of_gamma_with_its_deviation() -> None:
