@@ -162,6 +162,7 @@ def check_camera(
     return CameraCheck(
         bit_depth=sizes.bit_depth,
         step_dn=sizes.step_dn,
+        ends_dn=sizes.ends_dn,
         black_level_dn=dark.level_dn,
         intercept_dn=Measured(value=float(weight @ intercepts), std=float((stds**-2).sum() ** -0.5)),
         linearity_percent=(red, green, blue),

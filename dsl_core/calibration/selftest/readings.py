@@ -60,13 +60,15 @@ CLIPPED_SHARE = 2e-4
 class RegionSizes:
     """Pixels inside and outside the projected picture by colour, and the number format of the camera.
 
-    ``step_dn`` is the distance of neighbouring values.
+    ``step_dn`` is the distance of neighbouring values, ``ends_dn`` the number that nearly all pixels of a
+    picture that clips reach, None where no picture did.
     """
 
     pixels: NDArray[np.int64]
     beside: NDArray[np.int64]
     bit_depth: int
     step_dn: int = 1
+    ends_dn: int | None = None
 
     @property
     def full_scale_dn(self) -> float:

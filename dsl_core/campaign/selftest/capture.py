@@ -89,12 +89,14 @@ class SelfTestRun:
         parts["series"], parts["saturated"] = self._part(
             lambda: capture_series(recorder, unit_ms, seen.black_dn, rate)
         )
+        # Before the next picture: the last reading is one that should clip.
+        ends_dn = recorder.ends_dn
         parts["beat"] = self._part(
             lambda: capture_beat(recorder, self._exposures(cycle), seen.black_dn, rate, self._rng)
         )
         bars = self._part(lambda: capture_bars(recorder, unit_ms, seen.black_dn, rate))
         parts["black again"] = self._part(lambda: capture_black(recorder))
-        return self._packed(seen, bars, dark_frames)
+        return self._packed(replace(seen.sizes, ends_dn=ends_dn), bars, dark_frames)
 
     def _part(self, work: Callable[[], T]) -> T:
         self._progress.report("self-test", self._done, len(_PARTS))
@@ -126,11 +128,11 @@ class SelfTestRun:
         advised = self._wanted_ms if period is None else advised_exposures(period.value, self._wanted_ms)
         return tuple(dict.fromkeys((*PUBLISHED_MS, *advised)))
 
-    def _packed(self, seen: Survey, bars: BarFrames, dark_frames: Frames) -> SelfTestCapture:
+    def _packed(self, sizes: RegionSizes, bars: BarFrames, dark_frames: Frames) -> SelfTestCapture:
         recorder = self._recorder
         return SelfTestCapture(
             parts=self._parts,
-            sizes=replace(seen.sizes, step_dn=step_of(recorder.counts)),
+            sizes=replace(sizes, step_dn=step_of(recorder.counts)),
             bars=bars,
             dark_frames=dark_frames,
             wanted_ms=self._wanted_ms,
@@ -173,6 +175,7 @@ def save_capture(capture: SelfTestCapture, folder: Path) -> Path:
         "version": _VERSION,
         "bit_depth": capture.sizes.bit_depth,
         "step_dn": capture.sizes.step_dn,
+        "ends_dn": capture.sizes.ends_dn,
         "parts": list(capture.parts),
     }
     buffer = io.BytesIO()
@@ -210,7 +213,13 @@ def _unpacked(arrays: dict[str, Any], about: dict[str, Any]) -> SelfTestCapture:
     bars, inverse, dark = arrays["bars"], arrays["inverse"], arrays["dark_frames"]
     return SelfTestCapture(
         parts=parts,
-        sizes=RegionSizes(arrays["pixels"], arrays["beside"], about["bit_depth"], about.get("step_dn", 1)),
+        sizes=RegionSizes(
+            arrays["pixels"],
+            arrays["beside"],
+            about["bit_depth"],
+            step_dn=about.get("step_dn", 1),
+            ends_dn=about.get("ends_dn"),
+        ),
         bars=BarFrames((bars[0], bars[1]), (inverse[0], inverse[1])),
         dark_frames=(dark[0], dark[1]),
         **{name: about[name] for name in _NUMBERS if name != "wanted_ms"},

@@ -8,16 +8,17 @@ from dataclasses import dataclass
 import numpy as np
 
 from dsl_core.calibration.selftest.figures import AMBIENT, selftest_figures
+from dsl_core.calibration.selftest.readings import ROUNDING_DN2
 from dsl_core.calibration.selftest.record import WANTED_MS, analyse
 from dsl_core.campaign.common.recipe import Bench, Recipe, Step, naming
 from dsl_core.campaign.selftest.capture import ARCHIVE_NAME, SEED, SelfTestRun, load_capture, save_capture
 from dsl_core.campaign.selftest.recorder import Recorder
 from dsl_core.campaign.selftest.survey import survey
 from dsl_core.errors import CalibrationError, DeviceError
-from dsl_core.model.calibration.selftest import SelfTest
+from dsl_core.model.calibration.selftest import CameraCheck, SelfTest
 from dsl_core.model.figure import Figure
 from dsl_core.model.placement import Placement
-from dsl_core.model.rig import Rig
+from dsl_core.model.rig import Rig, Sensor
 from dsl_core.progress import Progress
 
 #: Share of the camera's pixels that the picture should light well.
@@ -99,8 +100,9 @@ class SelfTestRecipe(Recipe[SelfTest]):
             "bit_depth": camera.bit_depth,
             "black_level_dn": camera.black_level_dn.value,
             "electrons_per_dn": camera.electrons_per_dn.value,
-            "read_noise_dn": camera.read_noise_dn.value,
-            "saturation_dn": int(camera.useful_dn) if camera.bends else rig.sensor.saturation_dn,
+            "read_noise_dn": _read_noise_dn(camera),
+            "saturation_dn": _saturation_dn(camera, rig.sensor),
+            "step_dn": camera.step_dn,
         }
         response = {
             "gamma": projector.gamma.value,
@@ -114,3 +116,18 @@ class SelfTestRecipe(Recipe[SelfTest]):
         if record.cycle.period_ms is not None:
             changes["frame_period_ms"] = record.cycle.period_ms.value
         return rig.model_copy(update=changes)
+
+
+def _saturation_dn(camera: CameraCheck, known: Sensor) -> int | None:
+    """Where values end or bend, None at the largest number of the bits; as known where nothing clipped."""
+    if camera.bends:
+        return int(camera.useful_dn)
+    if camera.ends_dn is None:
+        return known.saturation_dn
+    return camera.ends_dn if camera.ends_dn < 2**camera.bit_depth - 1 else None
+
+
+def _read_noise_dn(camera: CameraCheck) -> float:
+    """Read noise without what coarse steps add: a sensor's step counts beside its noise."""
+    coarse_dn2 = (camera.step_dn**2 - 1) * ROUNDING_DN2
+    return float(max(camera.read_noise_dn.value**2 - coarse_dn2, 0.0) ** 0.5)

@@ -28,6 +28,9 @@ _FIRST_SETTLE_MS = 500.0
 _COUNTED = 4000
 #: Pixels above this share of the largest number are clipped or about to be.
 CLIPPED_FROM = 0.985
+#: A channel has clipped if more than this share of its pixels has; and so many may read less than its end,
+#: as dead ones do.
+_ALL_CLIPPED, _MAY_READ_LESS = 0.98, 0.02
 _NONE = [0.0, 0.0, 0.0]
 
 
@@ -81,6 +84,13 @@ class Recorder:
     def last_mean_dn(self) -> float:
         """Mean of the strongest channel of the last reading."""
         return float(self._rows[-1].mean_dn.max())
+
+    @property
+    def ends_dn(self) -> int | None:
+        """The number that nearly all pixels of the last reading reach, None where no channel clipped."""
+        limit = CLIPPED_FROM * self.full_scale_dn
+        ends = [each for each in self._last if (each > limit).mean() > _ALL_CLIPPED]
+        return min((int(np.quantile(each, _MAY_READ_LESS)) for each in ends), default=None)
 
     @property
     def duration_s(self) -> float:

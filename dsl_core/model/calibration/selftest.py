@@ -36,6 +36,8 @@ class CameraCheck(Record):
     pixel of the region clipped, and that lies on the line: where a sensor ``bends`` before it saturates,
     larger values count for nothing. ``intercept_dn`` is where the line meets an exposure of zero. ``step_dn``
     is the distance of neighbouring values: more than one where pictures were converted from fewer bits.
+    ``ends_dn`` is the number that nearly all pixels of a picture that clips reach: what a pixel that is at its
+    end reads. None where nothing clipped, and in tests of before.
 
     ``exposure_offset_ms`` is by how much exposures are longer than stated. ``black_change_dn`` is what the
     black level gained during the test. Noise of raw values is each pixel's and each frame's own:
@@ -46,6 +48,7 @@ class CameraCheck(Record):
 
     bit_depth: int
     step_dn: int = 1
+    ends_dn: int | None = None
     black_level_dn: Measured
     intercept_dn: Measured
     linearity_percent: tuple[Measured, Measured, Measured]
