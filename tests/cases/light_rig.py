@@ -21,6 +21,8 @@ MIX = np.array([[165.0, 44.0, 6.0], [40.0, 307.0, 73.0], [8.0, 32.0, 206.0]])
 #: The same in the colour of each pixel, (LEDs, rows, columns); the last rows see beside the picture.
 SEEN = MIX[:, np.array([[0, 1], [1, 2]])[np.arange(HEIGHT)[:, None] % 2, np.arange(WIDTH) % 2]]
 SEEN[:, -16:] = 0
+#: What pixels without a filter see of each LED.
+PLAIN = np.where(SEEN > 0, np.array([90.0, 140.0, 96.0])[:, None, None], 0.0)
 ELECTRONS_PER_DN, BLACK_DN = published_rig().sensor.electrons_per_dn, published_rig().sensor.black_level_dn
 
 
@@ -53,6 +55,7 @@ class LightWorld:
     bands: float = 0.0
     row_noise_dn: float = 0.0
     mosaic_off: int = 0
+    monochrome: bool = False
     bits: int = 12
     jitter_ms: float = 0.0
     now_ms: float = 0.0
@@ -68,7 +71,8 @@ class LightWorld:
                 np.where(level <= 0.04045, level / 12.92, ((level + 0.055) / 1.055) ** 2.4), (3, 1)
             )
         light = self.black + (1 - self.black) * light
-        return np.asarray(np.stack([light[led][picture[..., led]] for led in range(3)]) * SEEN)
+        seen = PLAIN if self.monochrome else SEEN
+        return np.asarray(np.stack([light[led][picture[..., led]] for led in range(3)]) * seen)
 
     def drive(self, start_ms: float, stop_ms: float) -> NDArray[np.float64]:
         """Light over an exposure, (rows, columns), DN."""
@@ -102,7 +106,8 @@ class LightCamera(Camera):
 
     @property
     def info(self) -> CameraInfo:
-        return CameraInfo("light", "L-C", WIDTH, HEIGHT, "RGGB", self.world.bits, (0.02, 10_000.0))
+        mosaic = "MONO" if self.world.monochrome else "RGGB"
+        return CameraInfo("light", "L-C", WIDTH, HEIGHT, mosaic, self.world.bits, (0.02, 10_000.0))
 
     def configure(self, exposure_ms: float) -> float:
         self.exposure_ms = 10.0 if self.world.ignores_exposure else exposure_ms

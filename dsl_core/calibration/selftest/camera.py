@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from dsl_core.calibration.selftest.readings import ROUNDING_DN2, Readings, RegionSizes, line_fit
 from dsl_core.errors import CalibrationError
 from dsl_core.model.calibration.selftest import CameraCheck, Measured
+from dsl_core.model.conditions import COLOUR_NAMES
 
 Floats = NDArray[np.float64]
 
@@ -163,6 +164,7 @@ def check_camera(
         bit_depth=sizes.bit_depth,
         step_dn=sizes.step_dn,
         ends_dn=sizes.ends_dn,
+        is_monochrome=sizes.is_monochrome,
         black_level_dn=dark.level_dn,
         intercept_dn=Measured(value=float(weight @ intercepts), std=float((stds**-2).sum() ** -0.5)),
         linearity_percent=(red, green, blue),
@@ -261,8 +263,9 @@ def exposure_line(
     used = series.unclipped[:, channel]
     exposure, value = series.exposure_ms[used], series.mean_dn[used, channel]
     if len(np.unique(exposure)) < _MIN_EXPOSURES:
+        name = "picture" if sizes.is_monochrome else f"{COLOUR_NAMES[channel]} channel"
         raise CalibrationError(
-            f"The {('red', 'green', 'blue')[channel]} channel clips at all but {len(np.unique(exposure))}"
+            f"The {name} clips at all but {len(np.unique(exposure))}"
             " exposures, too few to fit a line. Close the aperture of the camera or dim the light."
         )
     signal = value - dark.level_dn.value

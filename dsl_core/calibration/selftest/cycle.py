@@ -264,7 +264,8 @@ def _beat(
     mean = signal.mean(0)
     ratios = signal[:, [0, 2]] / signal[:, [1]]
     channels = 100 * signal.std(0, ddof=1) / mean
-    ratio = float((100 * ratios.std(0, ddof=1) / ratios.mean(0)).max())
+    spread = channels if sizes.is_monochrome else 100 * ratios.std(0, ddof=1) / ratios.mean(0)
+    ratio = float(spread.max())
     # Relative standard deviation of a standard deviation of normal numbers.
     share = 1 / np.sqrt(2 * (len(repeats) - 1))
     measured = [Measured(value=float(value), std=float(share * value)) for value in channels]

@@ -17,6 +17,7 @@ ROUNDING_DN2 = 1 / 12
 class Readings:
     """Columns of n frames, for red, green, blue where there are three.
 
+    A monochrome camera has three channels as well, of every third row each, which see the same.
     The region holds the well lit pixels of each channel, ``beside`` those outside the projected picture.
     ``pair_variance_dn2`` is half the variance of the difference to the frame before over the region, 0 where
     ``is_pair`` is not set; ``pair_covariance_dn2`` is half that difference's covariance with the one of the
@@ -61,7 +62,7 @@ class RegionSizes:
     """Pixels inside and outside the projected picture by colour, and the number format of the camera.
 
     ``step_dn`` is the distance of neighbouring values, ``ends_dn`` the number that nearly all pixels of a
-    picture that clips reach, None where no picture did.
+    picture that clips reach, None where no picture did. Channels that are no colours are ``is_monochrome``.
     """
 
     pixels: NDArray[np.int64]
@@ -69,6 +70,7 @@ class RegionSizes:
     bit_depth: int
     step_dn: int = 1
     ends_dn: int | None = None
+    is_monochrome: bool = False
 
     @property
     def full_scale_dn(self) -> float:

@@ -176,6 +176,7 @@ def save_capture(capture: SelfTestCapture, folder: Path) -> Path:
         "bit_depth": capture.sizes.bit_depth,
         "step_dn": capture.sizes.step_dn,
         "ends_dn": capture.sizes.ends_dn,
+        "is_monochrome": capture.sizes.is_monochrome,
         "parts": list(capture.parts),
     }
     buffer = io.BytesIO()
@@ -219,6 +220,7 @@ def _unpacked(arrays: dict[str, Any], about: dict[str, Any]) -> SelfTestCapture:
             about["bit_depth"],
             step_dn=about.get("step_dn", 1),
             ends_dn=about.get("ends_dn"),
+            is_monochrome=about.get("is_monochrome", False),
         ),
         bars=BarFrames((bars[0], bars[1]), (inverse[0], inverse[1])),
         dark_frames=(dark[0], dark[1]),

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from dsl_core.calibration.selftest.readings import RegionSizes
 from dsl_core.campaign.selftest.recorder import BLACK, Recorder, Region, grey
 from dsl_core.errors import CalibrationError, DeviceError
+from dsl_core.model.rig import BayerPattern
 from dsl_core.optics.sensor import bayer_channels
 
 #: White is exposed until it reaches this share of the scale, or this long.
@@ -75,11 +76,14 @@ def survey(recorder: Recorder, rng: np.random.Generator) -> Survey:
     # Means over neighbours, so that the noise of bright ambient light is not taken for the projector's light.
     if float(np.percentile(uniform_filter(white - dark, 9), 99)) < _NO_LIGHT_DN:
         raise _no_light(float(np.percentile(dark, 99)) - black_dn, white_ms)
-    region, lit_share = _find_region(white, dark, bayer_channels(info.bayer, *white.shape))
+    region, lit_share = _find_region(white, dark, _channels(info.bayer, white.shape))
+    if min(len(each) for each in region.lit) < _FEWEST_PIXELS:
+        raise _too_few_pixels(info.bayer)
     sizes = RegionSizes(
         np.array([len(each) for each in region.lit]),
         np.array([len(each) for each in region.beside]),
         info.bit_depth,
+        is_monochrome=info.bayer == "MONO",
     )
     lit = np.concatenate(region.lit)
     light = float((white - dark).ravel()[lit].mean())
@@ -194,6 +198,24 @@ def _no_light(ambient_dn: float, exposure_ms: float) -> CalibrationError | Devic
     )
 
 
+def _channels(bayer: BayerPattern, shape: tuple[int, ...]) -> NDArray[np.int64]:
+    """Channel (0 to 2) of every pixel: its colour, or of a monochrome camera that of its row, every third.
+
+    Whole rows, so that the next pixel of a channel is a neighbour on the sensor.
+    """
+    if bayer == "MONO":
+        return np.broadcast_to(np.arange(shape[0])[:, None] % 3, shape)
+    return bayer_channels(bayer, *shape)
+
+
+def _too_few_pixels(bayer: BayerPattern) -> CalibrationError:
+    colours = "" if bayer == "MONO" else " in red, green and blue"
+    return CalibrationError(
+        f"The projected picture is bright enough{colours} on too few pixels. Put a white target in view that"
+        " fills the picture, and check that all three LEDs of the projector light."
+    )
+
+
 def _find_region(
     bright: NDArray[np.float64], black: NDArray[np.float64], channels: NDArray[np.int64]
 ) -> tuple[Region, float]:
@@ -213,11 +235,6 @@ def _find_region(
         own = (channels == c) & sound
         lit.append(np.flatnonzero(own & (share > _LIT)))
         beside.append(np.flatnonzero(own & dark))
-    if min(len(each) for each in lit) < _FEWEST_PIXELS:
-        raise CalibrationError(
-            "The projected picture is bright enough in red, green and blue on too few pixels. Put a white"
-            " target in view that fills the picture, and check that all three LEDs of the projector light."
-        )
     if min(len(each) for each in beside) < _FEWEST_BESIDE:
         beside = [np.empty(0, np.int64)] * 3
     total = sum(len(each) for each in lit) / white.size

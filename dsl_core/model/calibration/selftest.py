@@ -36,8 +36,9 @@ class CameraCheck(Record):
     pixel of the region clipped, and that lies on the line: where a sensor ``bends`` before it saturates,
     larger values count for nothing. ``intercept_dn`` is where the line meets an exposure of zero. ``step_dn``
     is the distance of neighbouring values: more than one where pictures were converted from fewer bits.
-    ``ends_dn`` is the number that nearly all pixels of a picture that clips reach: what a pixel that is at its
-    end reads. None where nothing clipped, and in tests of before.
+    ``ends_dn`` is the number that nearly all pixels of a picture that clips reach, None where nothing clipped
+    and in tests of before. Where the camera ``is_monochrome``, a third of its rows each stand for red, green
+    and blue, here and in all other parts.
 
     ``exposure_offset_ms`` is by how much exposures are longer than stated. ``black_change_dn`` is what the
     black level gained during the test. Noise of raw values is each pixel's and each frame's own:
@@ -49,6 +50,7 @@ class CameraCheck(Record):
     bit_depth: int
     step_dn: int = 1
     ends_dn: int | None = None
+    is_monochrome: bool = False
     black_level_dn: Measured
     intercept_dn: Measured
     linearity_percent: tuple[Measured, Measured, Measured]
@@ -120,7 +122,7 @@ class Beat(Record):
     """Spread over repeats at one exposure, percent of the mean: red, green, blue, and the colour ratios.
 
     ``ratio_percent`` is the larger spread of red to green and of blue to green; ``floor_percent`` is what the
-    noise of the sensor alone gives.
+    noise of the sensor alone gives. Monochrome cameras see no ratios, but a spread of their light.
     """
 
     exposure_ms: float

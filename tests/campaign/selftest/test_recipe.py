@@ -82,43 +82,6 @@ def test_a_good_rig_passes_and_its_rig_is_updated(found: SelfTest) -> None:
     assert SelfTest.model_validate_json(found.model_dump_json()) == found
 
 
-@pytest.mark.parametrize(
-    ("ends_dn", "known_dn", "expected"),
-    [(4095, None, None), (4050, None, 4050), (3800, 3900, 3800), (4095, 3900, None), (None, 3900, 3900)],
-    ids=["end of the scale", "early", "earlier than known", "later than known", "nothing clipped"],
-)
-def test_the_end_that_was_measured_is_the_rigs(
-    found: SelfTest, ends_dn: int | None, known_dn: int | None, expected: int | None
-) -> None:
-    known = published_rig()
-    known = known.model_copy(update={"sensor": known.sensor.model_copy(update={"saturation_dn": known_dn})})
-    camera = found.camera.model_copy(update={"ends_dn": ends_dn})
-    rig = RECIPE.apply(found.model_copy(update={"camera": camera}), known)
-    assert found.camera.ends_dn == 4095
-    assert rig.sensor.saturation_dn == expected
-
-
-def test_the_steps_that_were_measured_are_the_rigs_and_no_part_of_its_noise(found: SelfTest) -> None:
-    noise_dn = float(np.hypot(8.0, 15.97 / 12**0.5))
-    update = {"step_dn": 16, "read_noise_dn": Measured(value=noise_dn, std=0.1)}
-    camera = found.camera.model_copy(update=update)
-    sensor = RECIPE.apply(found.model_copy(update={"camera": camera}), published_rig()).sensor
-    assert sensor.step_dn == 16
-    assert sensor.read_noise_dn == pytest.approx(8.0, abs=0.01)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(("bits", "clip_dn", "step_dn"), [(12, 4050, 1), (12, 3800, 1), (16, 65520, 16)])
-def test_a_camera_whose_values_end_early_is_described_as_it_is(
-    tmp_path: Path, bits: int, clip_dn: int, step_dn: int
-) -> None:
-    world = LightWorld(cycle_hz=60.0, jitter_ms=0.5, bits=bits, clip_dn=clip_dn, step_dn=step_dn)
-    run = SelfTestRun(light_rig(world), NoProgress(), RECIPE.wanted_ms)
-    save_capture(run.capture(), tmp_path)
-    sensor = RECIPE.apply(analyse(load_capture(tmp_path)), published_rig()).sensor
-    assert (sensor.bit_depth, sensor.saturation_dn, sensor.step_dn) == (bits, clip_dn, step_dn)
-
-
 def test_advised_exposures_remove_the_beat(found: SelfTest) -> None:
     at = {round(beat.exposure_ms, 1): beat for beat in found.cycle.beats}
     assert sorted(at) == [160.0, 166.7, 320.0, 333.3]
