@@ -32,6 +32,8 @@ if TYPE_CHECKING:
 
 #: Drive level below which the light is mostly noise.
 DIM = 0.15
+#: What a monochrome camera has in the place of colours.
+THIRDS = ("rows 1, 4, 7…", "rows 2, 5, 8…", "rows 3, 6, 9…")
 READING = "Reading the means of the frames…"
 
 
@@ -114,7 +116,8 @@ class SelfTestEvidence(Evidence[SelfTest]):
         reach = max(float(np.abs(percent * line.residual_dn).max()) for line in curves.lines)
         box.item.setXRange(0, max(float(line.value_dn.max()) for line in curves.lines), padding=0.03)
         range_about_zero(box, max(1.3 * reach, 0.02), LINEARITY_PERCENT, self._theme)
-        checks = zip(CHANNELS, record.camera.linearity_percent, RGB_COLOURS, strict=True)
+        names = THIRDS if record.camera.is_monochrome else CHANNELS
+        checks = zip(names, record.camera.linearity_percent, RGB_COLOURS, strict=True)
         box.name_curves(
             *((f"{name}, at most {each.value:.3f} %", colour, DOT) for name, each, colour in checks)
         )

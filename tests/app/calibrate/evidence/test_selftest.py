@@ -63,6 +63,16 @@ def test_points_of_the_captures_are_drawn(
     assert f"of {record.latency.checked}" in words(widget.latency)
 
 
+def test_the_rows_of_a_monochrome_camera_are_not_named_as_colours(
+    qtbot: QtBot, session: CalibrationSession, record: SelfTest
+) -> None:
+    camera = record.camera.model_copy(update={"is_monochrome": True})
+    widget = shown(qtbot, "selftest", record.model_copy(update={"camera": camera}), session)
+    qtbot.waitUntil(lambda: len(points(widget.linearity)) == 3, timeout=10_000)
+    assert "rows 1, 4, 7…, at most" in words(widget.linearity)
+    assert "green" not in words(widget.linearity)
+
+
 def test_beats_are_bars_in_the_order_of_exposures(
     qtbot: QtBot, session: CalibrationSession, record: SelfTest
 ) -> None:
