@@ -26,6 +26,15 @@ def colour_sites(bayer: str) -> tuple[int, int, int, int]:
     return first, second, third, fourth
 
 
+def mosaic_colours(bayer: str) -> tuple[int, ...]:
+    """The colours that pixels of a mosaic have, in ascending order: of a monochrome camera one.
+
+    >>> mosaic_colours("GRBG"), mosaic_colours("MONO")
+    ((0, 1, 2), (1,))
+    """
+    return tuple(sorted(set(colour_sites(bayer))))
+
+
 #: Frame periods of one mode are measured; a mode of another rate differs by far more than this share.
 _SAME_PERIOD = 0.01
 

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from dsl_core.model.conditions import mosaic_colours
 from dsl_core.model.rig import BayerPattern
 from dsl_core.optics.sensor import bayer_channels
 
@@ -43,6 +44,8 @@ def even_mosaic(mosaic: NDArray[Any], bayer: BayerPattern, reach_px: float) -> N
     import cv2
 
     values = np.asarray(mosaic, np.float32)
+    if len(mosaic_colours(bayer)) == 1:
+        return values
     colours = bayer_channels(bayer, *values.shape)
     means = []
     for colour in range(3):

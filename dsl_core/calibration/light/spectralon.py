@@ -19,6 +19,7 @@ from dsl_core.model.calibration.spectralon import (
     Square3,
     WhiteSignals,
 )
+from dsl_core.model.conditions import mosaic_colours
 from dsl_core.model.geometry import Row3
 from dsl_core.model.rig import FlatField, Rgb, Rig, Sensor
 from dsl_core.model.spectral import SpectralCurve
@@ -88,7 +89,7 @@ def measure_white(pictures: UniformPictures) -> WhiteMeasurement:
             " middle of the picture at the distance of the scans and shorten the exposure."
         )
     relative = np.full(channel.shape, np.nan)
-    for c in range(3):
+    for c in mosaic_colours(pictures.sensor.bayer):
         of_colour = used & (channel == c)
         relative[of_colour] = flat[3][of_colour] / flat[3][of_colour].mean()
     evenness = fit_evenness(relative, used)
@@ -144,16 +145,18 @@ def _near_course(white: Floats, channel: NDArray[np.int64], good: Mask) -> Mask:
 
 
 def _signals(flat: Floats, channel: NDArray[np.int64], used: Mask) -> WhiteSignals:
-    """Means over pixels and, from the scatter of blocks, their deviations."""
+    """Means over pixels and, from the scatter of blocks, their deviations; zeros of missing colours."""
     block = _block_of(used.shape)
-    signal, std = np.empty((3, 4)), np.empty((3, 4))
-    for c in range(3):
+    signal, std = np.zeros((3, 4)), np.zeros((3, 4))
+    seen = np.unique(channel)
+    for c in seen:
         of_colour = used & (channel == c)
         for picture in range(4):
             signal[c, picture], std[c, picture] = _mean(flat[picture][of_colour], block[of_colour])
-    if not (signal[:, 3] > 0).all():
+    if not (signal[seen, 3] > 0).all():
         raise CalibrationError("The Spectralon is not brighter under white than under black.")
-    over_sum = signal[:, 3] / signal[:, :3].sum(1)
+    over_sum = np.ones(3)
+    over_sum[seen] = signal[seen, 3] / signal[seen, :3].sum(1)
     relative = std[:, :3] / np.maximum(np.abs(signal[:, :3]), 1e-12)
     return WhiteSignals(
         signal=_square(np.maximum(signal[:, :3], 0)), rel_std=_square(relative), white_over_sum=_row(over_sum)
@@ -286,9 +289,10 @@ def match_whites(rig: Rig, white: WhiteSignals, reflectance: SpectralCurve) -> R
 
 
 def _white_std(white: WhiteSignals) -> Floats:
-    """Relative deviation of each channel's signal under all LEDs, shape (3,)."""
+    """Relative deviation of each channel's signal under all LEDs, (3,), or (1,) of a monochrome camera."""
+    seen = white.array.sum(1) > 0
     spread = white.array * np.array(white.rel_std)
-    return np.asarray(np.linalg.norm(spread, axis=1) / white.array.sum(1))
+    return np.asarray(np.linalg.norm(spread[seen], axis=1) / white.array[seen].sum(1))
 
 
 def _matched(response: Floats, lights: Floats, wanted: Floats, rel_std: Floats) -> Floats:

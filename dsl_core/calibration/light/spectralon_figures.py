@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from dsl_core.calibration.common.plane import bulge_figure
 from dsl_core.calibration.common.room_light import light_change_figure
 from dsl_core.model.calibration.spectralon import MeasuredEmission, SpectralonCalibration
+from dsl_core.model.conditions import mosaic_colours
 from dsl_core.model.figure import Figure
 from dsl_core.model.rig import Rig
 from dsl_core.optics.sensor import bayer_channels
@@ -29,7 +30,7 @@ def unevenness_of_middle(picture: NDArray[np.float64], rig: Rig) -> Figure:
     colour = bayer_channels(rig.sensor.bayer, *picture.shape)[rows, columns]
     inner = picture[rows, columns]
     spread = 0.0
-    for c in range(3):
+    for c in mosaic_colours(rig.sensor.bayer):
         low, middle, high = np.quantile(inner[colour == c], (0.05, 0.5, 0.95))
         spread = max(spread, float((high - low) / max(middle, 1e-9)))
     return Figure(
@@ -108,8 +109,9 @@ def _parts_of_white(emission: MeasuredEmission) -> list[Figure]:
 def _picture_figures(record: SpectralonCalibration) -> list[Figure]:
     white = record.white
     worst = max(abs(share - 1) for share in white.white_over_sum)
-    total = np.array(white.signal).sum(1)
-    spread = np.linalg.norm(np.array(white.signal) * np.array(white.rel_std), axis=1) / total
+    total = white.array.sum(1)
+    # A monochrome camera has no signals of red and blue pixels.
+    spread = np.linalg.norm(white.array * np.array(white.rel_std), axis=1)[total > 0] / total[total > 0]
     gain = np.array(record.flat_field.gain)
     return [
         Figure(

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from dsl_core.model.conditions import mosaic_colours
 from dsl_core.model.rig import Rig
 from dsl_core.model.spectral import SpectralCurve
 from dsl_core.optics.filters import FINE_NM
@@ -151,8 +152,11 @@ def verdict(
 def colour_shift(rig: Rig, seen: Floats, transmission: SpectralCurve) -> tuple[float, float]:
     """How far (nm) the pass band must move to explain the colours seen (3,), and what that gains.
 
-    The gain is in chi-square against no shift; beyond about ten the filter is another one.
+    The gain is in chi-square against no shift; beyond about ten the filter is another one. Monochrome cameras
+    see no colours, so that no shift gains anything.
     """
+    if len(mosaic_colours(rig.sensor.bayer)) == 1:
+        return 0.0, 0.0
     chi = []
     white = chain_response(rig, 0, FINE_NM).sum(1)
     known_nm, passes = np.array(transmission.wavelengths_nm), np.array(transmission.values)

@@ -16,6 +16,7 @@ from dsl_core.campaign.common.recipe import Bench
 from dsl_core.devices.base import DeviceRig
 from dsl_core.errors import CalibrationError
 from dsl_core.model.base import Record
+from dsl_core.model.conditions import mosaic_colours
 from dsl_core.model.figure import Figure
 from dsl_core.model.plan import Setting
 from dsl_core.model.rig import Rig
@@ -48,7 +49,7 @@ _ATTEMPTS = 14
 
 @dataclass(frozen=True)
 class WhiteLevel:
-    """White above black at full drive, DN per ms: brightest pixel, and means of R, G, B.
+    """White above black at full drive, DN per ms: brightest pixel, and means of R, G, B (0 without any).
 
     ``ambient`` is what black shows above the sensor's black level, as a share of the brightest white;
     ``saturated`` says that even the darkest picture was. ``picture`` (rows, columns) is the mosaic itself, DN
@@ -83,10 +84,13 @@ def shoot_white(bench: Bench) -> WhiteLevel:
     light = rig.projector_response.radiance(level) - rig.projector_response.radiance(0.0)
     rate = above / (exposure_ms * float(light))
     colours = bayer_channels(rig.sensor.bayer, *rate.shape)
+    mean = np.zeros(3)
+    for colour in mosaic_colours(rig.sensor.bayer):
+        mean[colour] = rate[colours == colour].mean()
     dark = float(np.median(black)) - rig.sensor.black_level_dn
     return WhiteLevel(
         float(np.quantile(rate, 1 - BRIGHTEST_SHARE)),
-        np.array([rate[colours == colour].mean() for colour in range(3)]),
+        mean,
         max(dark, 0.0) / max(peak, 1.0),
         peak > MOST_FILL * range_dn,
         rate,

@@ -45,6 +45,11 @@ def test_colours_of_a_mosaic_are_made_even() -> None:
     np.testing.assert_allclose(even[8:-8, 8:-8], light[8:-8, 8:-8], rtol=2e-3)
 
 
+def test_a_monochrome_picture_is_even_as_it_is() -> None:
+    light = np.random.default_rng(0).uniform(50, 150, (40, 60))
+    np.testing.assert_array_equal(even_mosaic(light, "MONO", 6.0), light.astype(np.float32))
+
+
 def test_a_corner_out_of_sight_is_no_corner() -> None:
     flat = np.full((60, 60), 50.0) + np.random.default_rng(0).normal(0, 1, (60, 60))
     along = np.array([[[15.0, 0.0], [0.0, 15.0]]])

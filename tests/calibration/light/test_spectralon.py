@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from dsl_core.calibration.light.spectral_refinement import FINE_NM
 from dsl_core.calibration.light.spectralon import (
     UniformPictures,
     _between_nodes,
@@ -14,12 +15,15 @@ from dsl_core.calibration.light.spectralon import (
     _roughness,
     _white_std,
     fit_evenness,
+    match_whites,
     measure_white,
 )
 from dsl_core.errors import CalibrationError
 from dsl_core.model.calibration.spectralon import WhiteSignals
-from dsl_core.model.rig import Sensor
+from dsl_core.model.rig import BayerPattern, Sensor
+from dsl_core.model.spectral import SpectralCurve
 from dsl_core.optics.sensor import bayer_channels, gain_at_pixels
+from dsl_core.simulation.published_rig import published_rig
 
 SHAPE = (96, 144)
 Y, X = (axis / max(axis.max(), 1) * 2 - 1 for axis in np.mgrid[: SHAPE[0], : SHAPE[1]].astype(float))
@@ -29,14 +33,16 @@ SIGNAL = np.array([[4.0, 1.0, 0.2], [1.0, 6.0, 1.5], [0.3, 1.0, 5.0]])
 EVERY = np.ones(SHAPE, bool)
 
 
-def pictures(gain: np.ndarray, noise: float = 2e-3, white: float = 1.0) -> UniformPictures:
+def pictures(
+    gain: np.ndarray, noise: float = 2e-3, white: float = 1.0, bayer: BayerPattern = "RGGB"
+) -> UniformPictures:
     """Red, green, blue and white on a target whose shading falls to one side."""
     rng = np.random.default_rng(0)
-    channel = bayer_channels("RGGB", *SHAPE)
+    channel = bayer_channels(bayer, *SHAPE)
     shading = 0.8 + 0.1 * X
     of_light = np.concatenate([SIGNAL.T, white * SIGNAL.sum(1)[None]])[:, channel]
     radiance = of_light * shading * gain * (1 + noise * rng.standard_normal((4, *SHAPE)))
-    return UniformPictures(radiance, np.zeros(SHAPE, bool), shading, EVERY, Sensor(bayer="RGGB"))
+    return UniformPictures(radiance, np.zeros(SHAPE, bool), shading, EVERY, Sensor(bayer=bayer))
 
 
 def test_vignetting_is_found() -> None:
@@ -84,6 +90,21 @@ def test_white_signals_are_those_at_unit_shading_without_vignetting() -> None:
     assert found.white.white_over_sum == pytest.approx((1.0, 1.0, 1.0), abs=1e-3)
     assert np.max(found.white.rel_std) < 1e-3
     assert found.used.mean() > 0.99
+
+
+def test_a_monochrome_camera_has_the_signals_of_its_one_colour() -> None:
+    found = measure_white(pictures(VIGNETTE, bayer="MONO")).white
+    assert found.array[[0, 2]].tolist() == [[0.0] * 3] * 2
+    assert found.array[1] / SIGNAL[1] == pytest.approx(np.full(3, VIGNETTE.mean()), rel=2e-3)
+    assert found.white_over_sum == pytest.approx((1.0, 1.0, 1.0), abs=1e-3)
+    rig = published_rig()
+    rig = rig.model_copy(update={"sensor": rig.sensor.model_copy(update={"bayer": "MONO"})})
+    even = SpectralCurve.of([400.0, 700.0], [0.99, 0.99])
+    matched = match_whites(rig, found, even)
+    light = np.stack([curve.at(FINE_NM) for curve in matched.emission]) * even.at(FINE_NM)
+    signal = matched.white_scale * light @ matched.response[1].at(FINE_NM)
+    assert signal == pytest.approx(found.array[1], rel=1e-6)
+    assert 0 < matched.white_scale_rel_std < 0.01
 
 
 def test_deviations_of_white_are_those_of_means_over_pixels() -> None:

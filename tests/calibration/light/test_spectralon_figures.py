@@ -34,6 +34,12 @@ def test_only_the_middle_counts() -> None:
     assert found.passed
 
 
+def test_a_monochrome_camera_is_judged_by_its_one_colour() -> None:
+    rig = RIG.model_copy(update={"sensor": RIG.sensor.model_copy(update={"bayer": "MONO"})})
+    assert unevenness_of_middle(np.ones((80, 120)), rig).passed
+    assert not unevenness_of_middle(MOSAIC, rig).passed
+
+
 def test_a_shadow_over_a_part_of_the_middle_fails() -> None:
     picture = MOSAIC.copy()
     picture[:, 30:40] *= 0.6
@@ -93,3 +99,15 @@ def test_a_calibration_is_judged_by_its_figures_and_their_limits() -> None:
     assert figures["white over red + green + blue"].std == 0.002
     unmet = {name for name, each in figures.items() if not each.passed}
     assert unmet == {"deviation of the emission, of its peak", *list(wanted)[7:8]}
+
+
+def test_the_deviation_of_white_is_that_of_the_colours_a_camera_has() -> None:
+    nothing = (0.0, 0.0, 0.0)
+    white = WhiteSignals(
+        signal=(nothing, (1.0, 1.0, 2.0), nothing),
+        rel_std=(nothing, (0.0, 0.0, 0.005), nothing),
+        white_over_sum=(1.0, 1.0, 1.0),
+    )
+    figures = spectralon_figures(record().model_copy(update={"white": white}))
+    found = next(each for each in figures if each.name == "deviation of white")
+    assert found.value == pytest.approx(0.25)

@@ -113,6 +113,12 @@ def test_colours_tell_another_filter(asked: float, there: float) -> None:
     assert gain > 12.0
 
 
+def test_a_monochrome_camera_tells_no_filter_by_colours() -> None:
+    rig = published_rig()
+    rig = rig.model_copy(update={"sensor": rig.sensor.model_copy(update={"bayer": "MONO"})})
+    assert colour_shift(rig, np.array([0.0, 1.0, 0.0]), nominal_filter(600.0)) == (0.0, 0.0)
+
+
 def test_colours_of_the_right_filter_are_accepted_though_the_response_is_off() -> None:
     rig = published_rig()
     for nm in CENTRES:

@@ -57,6 +57,13 @@ def test_the_projector_alone_waits_for_its_latency(bench: Bench) -> None:
     assert not failures(film_light(shot, bench.rig))
 
 
+def test_a_monochrome_camera_has_the_mean_of_its_one_colour(bench: Bench) -> None:
+    place(bench, Placement(target="spectralon", film=True))
+    sensor = bench.rig.sensor.model_copy(update={"bayer": "MONO"})
+    shot = shoot_white(replace(bench, rig=bench.rig.model_copy(update={"sensor": sensor})))
+    assert shot.mean == pytest.approx([0.0, shot.picture.mean(), 0.0])
+
+
 def test_another_filter_and_none_are_refused(bench: Bench) -> None:
     place(bench, Placement(target="spectralon", film=True))
     open_white = shoot_white(bench)
