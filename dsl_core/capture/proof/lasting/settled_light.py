@@ -11,8 +11,9 @@ from dsl_core.capture.proof.raster import Counts
 
 #: What of white's light each may differ by from what it was, and from what it is when shown for longer.
 LEAST_CHANGE = {"white": 0.03, "black": 0.004}
-#: Share of the pixels of white that do not saturate, and their mean light, DN, that say something.
-LEAST_SOUND, LEAST_DN = 0.25, 100.0
+#: Share of the pixels of white that do not saturate, and their mean light, as a share of full scale, that say
+#: something: cameras of 8 bits have no more than 255.
+LEAST_SOUND, LEAST_LIGHT = 0.25, 100 / 4095
 #: Spread of white's light, relative to its mean, that tells a share of it from what all pixels gain alike.
 CONTRAST = 0.2
 #: It is the same again if it differs by no more than this share of the change.
@@ -27,7 +28,7 @@ def change_of_light(seen: Counts, ends: tuple[Counts, Counts], role: str, full_d
     white, black = ends
     sound = np.maximum(seen, white) < full_dn
     light = white[sound].astype(np.float64) - black[sound]
-    if light.size < LEAST_SOUND * white.size or light.mean() < LEAST_DN:
+    if light.size < LEAST_SOUND * white.size or light.mean() < LEAST_LIGHT * full_dn:
         return 0.0
     gained = seen[sound].astype(np.float64) - (white if role == "white" else black)[sound]
     if role == "white":

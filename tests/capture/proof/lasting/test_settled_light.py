@@ -43,3 +43,9 @@ def test_a_black_level_that_jitters_is_no_afterglow() -> None:
     assert change_of_light(counts(320), ends, "black", 4095) == pytest.approx(0.0, abs=1e-9)
     assert unsettled_sentence("black", -0.02, 0.0, -0.02) == ""
     assert "holds 2.0% of the light of white" in unsettled_sentence("black", 0.02, 0.0, 0.02)
+
+
+def test_a_camera_of_eight_bits_is_asked_as_well() -> None:
+    ends = counts(90), counts(10)
+    assert change_of_light(counts(98), ends, "white", 255) == pytest.approx(0.1)
+    assert change_of_light(counts(13), (counts(14), counts(10)), "white", 255) == 0.0
