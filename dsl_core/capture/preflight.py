@@ -10,6 +10,7 @@ from dsl_core.errors import PlanError
 from dsl_core.model.plan import CapturePlan
 from dsl_core.model.presets import has_usual_exposures, on_cycles
 from dsl_core.model.rig import Rig
+from dsl_core.optics.lines.reach import MOST_UNREACHED, unreached_share, unreached_words
 from dsl_core.optics.parallax import parallax_of
 
 
@@ -35,8 +36,9 @@ def find_remarks(calibration: Rig | None) -> list[str]:
     """What a scan with a calibration will suffer from although it can start, in sentences."""
     if calibration is None:
         return []
-    found = parallax_of(calibration)
-    return [f"{found.sentence} {found.advice}"] if found.is_small else []
+    found, unreached = parallax_of(calibration), unreached_share(calibration)
+    remarks = [f"{found.sentence} {found.advice}"] if found.is_small else []
+    return [*remarks, " ".join(unreached_words(unreached))] if unreached > MOST_UNREACHED else remarks
 
 
 def require_possible(rig: DeviceRig, plan: CapturePlan) -> None:

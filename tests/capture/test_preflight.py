@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import pytest
 
-from dsl_core.capture.preflight import find_obstacles, fit_plan
+from dsl_core.capture.preflight import find_obstacles, find_remarks, fit_plan
 from dsl_core.devices.base import DeviceRig
 from dsl_core.devices.registry import open_rig
 from dsl_core.model.plan import CapturePlan, Setting
@@ -68,3 +68,13 @@ def test_a_calibration_of_other_devices_is_an_obstacle(rig: DeviceRig, plan: Cap
     assert mosaic.startswith(
         "the calibration is for a RGGB mosaic of 10 bits, the camera delivers RGGB of 12"
     )
+
+
+@pytest.mark.parametrize(
+    ("lines_per_mm", "told"), [(300.0, False), (480.0, False), (600.0, False), (1000.0, True)]
+)
+def test_a_film_whose_orders_miss_the_frame_is_told_before_the_scan(lines_per_mm: float, told: bool) -> None:
+    rig = published_rig()
+    film = rig.film.model_copy(update={"lines_per_mm": lines_per_mm})
+    remarks = find_remarks(rig.model_copy(update={"film": film}))
+    assert ["No first order reaches 84% of the bands" in each for each in remarks] == [True] * told

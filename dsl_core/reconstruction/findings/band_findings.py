@@ -13,6 +13,7 @@ from dsl_core.model.rig import Rig
 from dsl_core.model.spectral import WavelengthGrid
 from dsl_core.optics.correspondence import GratingModel
 from dsl_core.optics.lines.line_set import LineSet
+from dsl_core.optics.lines.reach import MOST_UNREACHED, unreached_words
 from dsl_core.optics.spectra import ORDERS
 from dsl_core.reconstruction.findings.flag_findings import FEWEST, SpectralCounts
 
@@ -59,6 +60,17 @@ def band_findings(step_nm: float, line_nm: float, spectra: SpectralCounts) -> It
         f"Bands of {step_nm:g} nm are coarse for lines that are {line_nm:.0f} nm wide.",
         f"Reconstruct with bands of at most {line_nm:.0f} nm.",
     )
+    bands = spectra.reached + spectra.unreached
+    if bands >= FEWEST:
+        unreached = spectra.unreached / bands
+        yield FitFinding.judged(
+            "bands",
+            "bands that no first order reaches",
+            unreached,
+            "share",
+            MOST_UNREACHED,
+            *unreached_words(unreached),
+        )
     if spectra.reached < FEWEST:
         return
     undecided = spectra.undecided / spectra.reached

@@ -30,13 +30,14 @@ class SpectralCounts:
 
     Spectra that fit poorly touch bounds as well, as along edges: these count as ``poor`` alone. Those of dark
     surfaces touch 0 by their noise: only the upper bound counts. ``reached`` are bands of pixels that lines
-    reach, ``undecided`` those of them that the prior decides.
+    reach, ``undecided`` those of them that the prior decides, and ``unreached`` those of no first order.
     """
 
     poor: int = 0
     at_bound: int = 0
     reached: int = 0
     undecided: int = 0
+    unreached: int = 0
 
     def __add__(self, other: SpectralCounts) -> SpectralCounts:
         return SpectralCounts(*(a + b for a, b in zip(astuple(self), astuple(other), strict=True)))
@@ -63,6 +64,7 @@ def count_spectra(
         at_bound=int(np.count_nonzero(measured & at_bound & ~poor)),
         reached=int(np.count_nonzero(reached)),
         undecided=int(np.count_nonzero(reached & (data_share < 0.5))),
+        unreached=int(np.count_nonzero(np.isfinite(data_share) & ~reached)),
     )
 
 

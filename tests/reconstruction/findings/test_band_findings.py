@@ -34,7 +34,22 @@ def test_bands_are_judged_by_the_lines_and_by_the_data(step_nm: float, share: fl
 def test_bands_that_no_line_reaches_are_not_blamed_on_their_width() -> None:
     cube = (3, *SHAPE)
     zero_only = np.full(cube, int(Reach.ZERO_ONLY))
-    assert Fit.of(band_findings(5, 11.0, counted(np.full(cube, 0.1), zero_only))).parts == ()
+    found = Fit.of(band_findings(5, 11.0, counted(np.full(cube, 0.1), zero_only)))
+    assert "wider bands" not in found.words
+    assert "No first order reaches 100% of the bands" in found.words
+    assert "fewer lines per mm" in found.words
+
+
+@pytest.mark.parametrize(("missed", "told"), [(0, False), (2, False), (4, True)])
+def test_a_film_whose_orders_miss_the_frame_is_told(missed: int, told: bool) -> None:
+    reach = np.full((10, *SHAPE), int(Reach.PLUS_ONE))
+    reach[:missed] = int(Reach.ZERO_ONLY)
+    found = Fit.of(band_findings(5, 11.0, counted(np.full(reach.shape, 0.9), reach)))
+    assert (found.parts == ("bands",)) == told
+    assert ("No first order reaches 40%" in found.words) == told
+    # Pixels without a spectrum have no bands that could be missed.
+    none = counted(np.full(reach.shape, np.nan), np.zeros(reach.shape, int))
+    assert none.unreached == 0
 
 
 def test_a_line_of_the_published_rig_is_about_ten_nanometres_wide() -> None:
