@@ -29,10 +29,11 @@ from dsl_core.optics.shading import Plane
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-#: Columns of plain background on either side of the profile, and the farthest search for a first guess (px).
-FLANK_PX, SEARCH_PX = 4.0, 40.0
-#: Line frames this near to the zero order are not searched.
-ZERO_ORDER_PX = 60.0
+#: Columns of plain background on either side of the profile.
+FLANK_PX = 4.0
+#: The farthest search for a first guess, and how near to the zero order line frames are not searched, in
+#: columns at a focal length of `FOCAL_PX`: a film unlike its data sheet turns orders by angles.
+SEARCH_PX, ZERO_ORDER_PX, FOCAL_PX = 40.0, 60.0, 983.0
 #: Rounds of the fit; the first finds the brightness that the shift needs.
 ROUNDS = 5
 #: A tile's light counts when it stands this many deviations above nothing.
@@ -125,15 +126,25 @@ def _fit_tiles(
     return _TileFit(values, np.sqrt(np.diagonal(inverse, axis1=1, axis2=2).clip(0)) / size, chi)
 
 
+def search_px(rig: Rig) -> tuple[float, float]:
+    """How far `search_columns` searches, and how near to the zero order it does not, whole columns (px).
+
+    In proportion to the focal length, yet no less than what lines and their blur take anywhere.
+    """
+    times = max(1.0, rig.projector.fx_px / FOCAL_PX)
+    return float(round(SEARCH_PX * times)), float(round(ZERO_ORDER_PX * times))
+
+
 def search_columns(
     rig: Rig, plane: Plane, frames: LineFrames, passband: Passband, model: Correspondence
 ) -> TileColumns:
-    """The same from as far off as `SEARCH_PX`, to a few columns: the brightest place along the columns."""
+    """The same from as far off as `search_px`, to a few columns: the brightest place along the columns."""
     paths = trace_paths(rig, plane, frames.pixels, passband, model)
-    near = values_near(frames, paths, SEARCH_PX)
-    near = near.only(np.abs(near.line_px - paths.zero_px[near.sample]) > ZERO_ORDER_PX)
-    count, bins = count_tiles(rig), int(2 * SEARCH_PX) + 1
-    off = np.rint(near.line_px - paths.column_px[near.sample] + SEARCH_PX).astype(np.int64)
+    farthest_px, unused_px = search_px(rig)
+    near = values_near(frames, paths, farthest_px)
+    near = near.only(np.abs(near.line_px - paths.zero_px[near.sample]) > unused_px)
+    count, bins = count_tiles(rig), int(2 * farthest_px) + 1
+    off = np.rint(near.line_px - paths.column_px[near.sample] + farthest_px).astype(np.int64)
     cell = paths.tiles[near.sample] * bins + off.clip(0, bins - 1)
     light = (passband.signal / passband.signal.max())[paths.colour[near.sample]] * paths.shading[near.sample]
     kernel = np.ones(2 * round(reach_px(frames.lines, paths, passband) / 2) + 1)
@@ -154,9 +165,9 @@ def search_columns(
     sigmas = (level[rows, best] - np.median(level, 1)) * np.sqrt(power[rows, best])
     chosen, at = paths.middle
     # A peak at the end of the search is the flank of something else.
-    good = (sigmas[chosen] > LIT_SIGMAS) & (np.abs(best[chosen] - SEARCH_PX) < SEARCH_PX - 3)
+    good = (sigmas[chosen] > LIT_SIGMAS) & (np.abs(best[chosen] - farthest_px) < farthest_px - 3)
     width = np.full(int(good.sum()), 1 + frames.lines.step_px / 8)
-    return _shifts(paths, passband, chosen[good], at[good], middle - SEARCH_PX, width)
+    return _shifts(paths, passband, chosen[good], at[good], middle - farthest_px, width)
 
 
 def _shifts(

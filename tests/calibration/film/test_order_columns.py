@@ -9,7 +9,13 @@ import numpy as np
 import pytest
 
 from dsl_core.calibration.film import order_columns
-from dsl_core.calibration.film.order_columns import TileColumns, _fit_tiles, fit_columns, search_columns
+from dsl_core.calibration.film.order_columns import (
+    TileColumns,
+    _fit_tiles,
+    fit_columns,
+    search_columns,
+    search_px,
+)
 from dsl_core.calibration.film.order_paths import LineFrames, trace_paths
 from dsl_core.optics.correspondence import GratingModel
 from tests.cases.order_lines import TRUE_FILM, line_frames, passband, plane_at, rig_with
@@ -153,3 +159,12 @@ def fit_chi(fit: Any, frames: LineFrames, band: Any, tile: int) -> float:
         fit_columns(TRUTH, PLANE, frames, band, GratingModel(TRUTH))
     assert len(seen) == 5
     return float(np.sqrt(max(seen[-1], 1.0)))
+
+
+def test_a_search_reaches_as_far_on_a_projector_of_many_columns() -> None:
+    """A film unlike its data sheet moves orders by an angle, which is three times the columns there."""
+    lens = TRUTH.projector
+    many = TRUTH.model_copy(update={"projector": lens.resized(3 * lens.width_px, 3 * lens.height_px)})
+    assert many.projector.fx_px == pytest.approx(3 * lens.fx_px)
+    assert search_px(TRUTH) == (40.0, 60.0)
+    assert search_px(many) == (120.0, 180.0)
