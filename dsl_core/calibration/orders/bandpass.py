@@ -118,7 +118,7 @@ def fit_bandpass(
     middle = relative_shift(shift_terms(rig, _middle(rig)), np.array(angle.values))
     placed = [_placed(each, passed(rig, each.transmission, middle)) for each in filters]
     found = found_wavelengths(rig, placed)
-    warnings = _check(filters, placed, found)
+    warnings = _check(rig, filters, placed, found)
     fits = {
         order: fit_efficiency(
             order,
@@ -196,6 +196,7 @@ def _placed(each: SeenFilter, light: Floats) -> PlacedFilter:
 
 
 def _check(
+    rig: Rig,
     filters: Sequence[SeenFilter],
     placed: Sequence[PlacedFilter],
     found: Sequence[tuple[float, float] | None],
@@ -210,7 +211,7 @@ def _check(
         width = max((light.width_px for light in first), default=0.0)
         # Noise between the orders looks like light that is spread out.
         share = min((light.share + NOISE_SIGMAS * light.share_std for light in first), default=1.0)
-        unusable, sentence = verdict(place, where, width, share)
+        unusable, sentence = verdict(rig, place, where, width, share)
         shift = each.light.shift_px[0]
         if abs(shift) > MOVED_PX:
             unusable, sentence = True, _moved(each.filter_nm, shift)

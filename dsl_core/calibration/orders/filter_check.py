@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from dsl_core.calibration.orders.dispersion import widening
 from dsl_core.model.conditions import mosaic_colours
 from dsl_core.model.rig import Rig
 from dsl_core.model.spectral import SpectralCurve
@@ -28,7 +29,8 @@ DENSITY_STD = 0.04
 ENOUGH, FEW = 5, 3
 #: Where film or target are not square to the light, density seems to change with wavelength by so much.
 ASKEW = 0.01
-#: Peaks wider than this (rms px) or with less than this share of the light are not those of a narrow filter.
+#: Peaks wider than this (rms columns of `dispersion`'s projector, 16 nm) or with less than this share of the
+#: light are not those of a narrow filter.
 BROAD_PX, BROAD_SHARE = 9.0, 0.7
 #: Candidates of the search by colour, nm; relative error of the response known so far, and stray light.
 SHIFTS_NM = np.arange(-140.0, 141.0, 2.0)
@@ -119,11 +121,11 @@ def _by_film(rig: Rig, each: PlacedFilter) -> list[tuple[float, float]]:
 
 
 def verdict(
-    each: PlacedFilter, found: tuple[float, float] | None, width_px: float, share: float
+    rig: Rig, each: PlacedFilter, found: tuple[float, float] | None, width_px: float, share: float
 ) -> tuple[bool, str]:
     """Whether a filter is unusable, and a sentence on what is wrong with it (empty: nothing)."""
     name = f"the filter of {each.filter_nm:g} nm"
-    if width_px > BROAD_PX or share < BROAD_SHARE:
+    if width_px > BROAD_PX * widening(rig, each.effective_nm) or share < BROAD_SHARE:
         return True, (
             f"{name}: the light of the first orders is spread over {2 * width_px:.0f} columns, as without a"
             " narrow filter. Put the filter in front of the camera, shade ambient light, and capture the step"

@@ -91,12 +91,13 @@ def filter_light(
     reach_px: tuple[float, float],
     unlit_px: tuple[float, float],
     frame_px: int,
+    widening: float = 1.0,
 ) -> FilterLight:
     """Measure one filter from ``radiance`` and ``std`` (frames, P), DN per ms; infinite where saturated.
 
     ``reach_px`` are the smallest and largest distance from the zero order at which a first order may be,
     whatever the filter, and ``unlit_px`` those between which none does; ``frame_px`` is the projector's
-    width.
+    width, and ``widening`` how many times more columns orders take than windows are stated for.
     """
     centres = (lines.width_px - 1) / 2 + lines.step_px * np.arange(len(radiance))
     saturated = ~np.isfinite(std).all(0)
@@ -105,15 +106,23 @@ def filter_light(
     chosen = pixels.at(use)
     signal, error = radiance[:, use].astype(float), std[:, use].astype(float)
     graph, shift = line_graph(
-        lines, chosen, signal, error, centres[:, None] - chosen.column_px, response, unlit_px, frame_px
+        lines,
+        chosen,
+        signal,
+        error,
+        centres[:, None] - chosen.column_px,
+        response,
+        unlit_px,
+        frame_px,
+        widening,
     )
     relative, everywhere = graph.amplitude / chosen.shading, np.ones(len(graph.amplitude), bool)
     zero, zero_std = of_colours(chosen, relative, everywhere, np.mean)
     orders: dict[int, OrderLight] = {}
     for sign in (1, -1):
         first = find_order(graph, sign, reach_px)
-        orders[sign] = _light(graph, sign, first, ORDER_HALF_PX)
-        orders[2 * sign] = _light(graph, 2 * sign, find_second(graph, sign, first), SECOND_HALF_PX)
+        orders[sign] = _light(graph, sign, first, ORDER_HALF_PX * widening)
+        orders[2 * sign] = _light(graph, 2 * sign, find_second(graph, sign, first), SECOND_HALF_PX * widening)
     share = float(saturated[inside].mean()) if inside.any() else 1.0
     bright = chosen.colour == int(np.nanargmax(np.where(np.isfinite(zero), zero, -np.inf)))
     jump = light_jump(chosen.column_px[bright], relative[bright], frame_px)

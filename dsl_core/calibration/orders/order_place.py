@@ -27,7 +27,7 @@ ZERO_HALF_PX = 9.0
 #: Cells of the image, down and across, and pixels that one needs.
 CELLS = (4, 6)
 MIN_PIXELS = 12
-#: Half windows (px) around first and second orders.
+#: Half windows (px) around first and second orders, of a projector and film as `dispersion` states them.
 ORDER_HALF_PX, SECOND_HALF_PX = 20.0, 27.0
 #: Distance of second from first orders, as multiples of the first's.
 SECOND_PLACE = (1.9, 2.35)
@@ -86,6 +86,7 @@ class LineGraph:
     """What some pixels see of the lines, arrays (frames, P), and their zero-order amplitude (P,).
 
     Signal is without dark signal, zero order and halo; distance is that of the line from the zero order.
+    ``widening`` is how many times more columns orders take than windows are stated for.
     """
 
     signal: Floats
@@ -94,6 +95,7 @@ class LineGraph:
     amplitude: Floats
     pixels: PlanePixels
     frame_px: int
+    widening: float = 1.0
 
     def holds(self, centre: Floats, half_px: float) -> NDArray[np.bool_]:
         """Pixels (P,) whose light at ``centre`` (P,) px from the zero order comes from inside the frame."""
@@ -110,6 +112,7 @@ def line_graph(
     response: ProjectorResponse,
     unlit_px: tuple[float, float],
     frame_px: int,
+    widening: float = 1.0,
 ) -> tuple[LineGraph, tuple[float, float]]:
     """Take dark signal, zero order and halo out; and how far the zero order moved, with deviation (px).
 
@@ -135,7 +138,7 @@ def line_graph(
     )
     total = max(float(sums[0]), 1e-30)
     moved = float(sums[1]) / total, float(np.sqrt(sums[2])) / total
-    return LineGraph(signal, variance, distance, amplitude, pixels, frame_px), moved
+    return LineGraph(signal, variance, distance, amplitude, pixels, frame_px, widening), moved
 
 
 def by_cell(pixels: PlanePixels, which: NDArray[np.bool_]) -> list[NDArray[np.bool_]]:
@@ -195,11 +198,14 @@ class OrderPlace:
 
 def find_order(graph: LineGraph, sign: int, reach_px: tuple[float, float]) -> OrderPlace | None:
     """The first order on one side of the zero order, or None where no peak stands out."""
-    rough = _fit(graph, sign, np.zeros(len(graph.amplitude)), reach_px)
+    rough, half_px = (
+        _fit(graph, sign, np.zeros(len(graph.amplitude)), reach_px),
+        ORDER_HALF_PX * graph.widening,
+    )
     for _ in range(REFINEMENTS):
         if rough is None:
             return None
-        rough = _fit(graph, sign, rough.at(graph.pixels.place), (-ORDER_HALF_PX, ORDER_HALF_PX), rough)
+        rough = _fit(graph, sign, rough.at(graph.pixels.place), (-half_px, half_px), rough)
     return rough
 
 
@@ -212,7 +218,8 @@ def find_second(graph: LineGraph, sign: int, first: OrderPlace | None) -> OrderP
     scale = middle / np.maximum(np.abs(lined), 1e-6)
     reach = (SECOND_PLACE[0] * middle, SECOND_PLACE[1] * middle)
     whole = np.zeros(len(lined), np.int64)
-    (peak,) = _peaks(graph, whole, 1, sign * graph.distance * scale, reach, SECOND_HALF_PX)
+    half_px = SECOND_HALF_PX * graph.widening
+    (peak,) = _peaks(graph, whole, 1, sign * graph.distance * scale, reach, half_px)
     times = float(np.mean(SECOND_PLACE)) if peak is None else peak.centre_px / middle
     coefficients, std_px = first.coefficients * times, first.std_px * times
     if peak is None:
@@ -234,10 +241,10 @@ def _fit(
 ) -> OrderPlace | None:
     """Peaks of all cells around a centre (P,), and the quadratic through them."""
     distance = sign * (graph.distance - centre)
-    use = np.ones(len(centre), bool) if before is None else graph.holds(centre, INSIDE_PX)
+    use = np.ones(len(centre), bool) if before is None else graph.holds(centre, INSIDE_PX * graph.widening)
     peaks, offsets, values, places = [], [], [], []
     cells = np.where(use, graph.pixels.cell, -1)
-    found = _peaks(graph, cells, CELLS[0] * CELLS[1], distance, reach_px, ORDER_HALF_PX)
+    found = _peaks(graph, cells, CELLS[0] * CELLS[1], distance, reach_px, ORDER_HALF_PX * graph.widening)
     for cell, peak in enumerate(found):
         if peak is not None:
             which = cells == cell
@@ -248,7 +255,8 @@ def _fit(
     if not peaks:
         return None
     value, offset, place = np.array(values), np.array(offsets), np.array(places).T
-    near = np.abs(offset - np.median(offset)) < (3 * OUTLIER_PX if before is None else OUTLIER_PX)
+    farthest_px = OUTLIER_PX * graph.widening * (3 if before is None else 1)
+    near = np.abs(offset - np.median(offset)) < farthest_px
     terms = _terms(place[:, near])
     # Few cells carry a constant only; a little damping keeps a quadratic from bending where no cell is. Each
     # round fits the whole of it: a change to the rough one would keep what cells at the edge had bent.

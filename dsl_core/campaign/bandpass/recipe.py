@@ -16,6 +16,7 @@ from dsl_core.calibration.common.plane import bulge_figure
 from dsl_core.calibration.light.chain import LineScan
 from dsl_core.calibration.light.zero_order import ZeroOrderFit
 from dsl_core.calibration.orders.bandpass import SeenFilter, fit_bandpass, plane_pixels, plane_profile
+from dsl_core.calibration.orders.dispersion import widening
 from dsl_core.calibration.orders.order_light import filter_light
 from dsl_core.campaign.common.depths import target_depth_mm
 from dsl_core.campaign.common.flat_target import diffuser_lines, line_frames, scan_lines_of
@@ -215,6 +216,7 @@ class BandpassRecipe(Recipe[BandpassCalibration]):
             first_order_reach_px(rig),
             unlit_px(rig, lines.width_px),
             rig.projector.width_px,
+            widening(rig, note.filter_nm),
         )
         if light.saturated > 0.5:
             raise CalibrationError(

@@ -227,9 +227,9 @@ def test_a_target_has_moved_from_a_seventh_of_a_column_on(shift_px: float, moved
     place = PlacedFilter(540.0, 540.0, True, {})
     if moved:
         with pytest.raises(CalibrationError, match=re.escape(f"zero order is {shift_px:+.2f} columns")):
-            _check([each], [place], [(540.0, 0.1)])
+            _check(RIG, [each], [place], [(540.0, 0.1)])
     else:
-        _check([each], [place], [(540.0, 0.1)])
+        _check(RIG, [each], [place], [(540.0, 0.1)])
 
 
 def test_second_orders_are_compared_with_the_first_at_the_same_light() -> None:

@@ -32,13 +32,15 @@ def test_right_filters_raise_no_doubt() -> None:
     filters = placed()
     for each, found in zip(filters, found_wavelengths(published_rig(), filters), strict=True):
         assert found is not None
-        assert verdict(each, found, 3.0, 1.0) == (False, "")
+        assert verdict(published_rig(), each, found, 3.0, 1.0) == (False, "")
 
 
 def test_wrong_filter_is_named_and_the_others_are_not() -> None:
     filters = placed({520.0: 550.0})
     found = found_wavelengths(published_rig(), filters)
-    verdicts = {f.filter_nm: verdict(f, w, 3.0, 1.0) for f, w in zip(filters, found, strict=True)}
+    verdicts = {
+        f.filter_nm: verdict(published_rig(), f, w, 3.0, 1.0) for f, w in zip(filters, found, strict=True)
+    }
     unusable, sentence = verdicts.pop(520.0)
     assert unusable
     assert "the filter of 520 nm: its first orders are where those of 55" in sentence
@@ -50,7 +52,7 @@ def test_tilted_filter_is_a_doubt() -> None:
     filters = placed({550.0: 546.0})
     index = CENTRES.index(550.0)
     found = found_wavelengths(published_rig(), filters)[index]
-    unusable, sentence = verdict(filters[index], found, 3.0, 1.0)
+    unusable, sentence = verdict(published_rig(), filters[index], found, 3.0, 1.0)
     assert not unusable
     assert "nm shorter than it should; it may be tilted" in sentence
     assert "wavelengths 4.0 ± 0." in sentence
@@ -66,7 +68,7 @@ def test_a_dim_filter_is_not_judged_to_a_nanometre(noise_px: float, doubted: boo
     )
     filters[index] = dim
     found = found_wavelengths(published_rig(), filters)[index]
-    unusable, sentence = verdict(dim, found, 3.0, 1.0)
+    unusable, sentence = verdict(published_rig(), dim, found, 3.0, 1.0)
     assert not unusable
     assert bool(sentence) == doubted
     assert ("it passes wavelengths 5.1 ± 0." in sentence) == doubted
@@ -74,7 +76,7 @@ def test_a_dim_filter_is_not_judged_to_a_nanometre(noise_px: float, doubted: boo
 
 def test_broad_light_is_no_filter() -> None:
     each = placed()[0]
-    unusable, sentence = verdict(each, (430.0, 1.0), 30.0, 0.4)
+    unusable, sentence = verdict(published_rig(), each, (430.0, 1.0), 30.0, 0.4)
     assert unusable
     assert "as without a narrow filter" in sentence
 
@@ -84,14 +86,16 @@ def test_few_filters_are_compared_with_the_film() -> None:
     right, wrong = found_wavelengths(published_rig(), filters)
     assert right is not None
     assert wrong is not None
-    assert not verdict(filters[0], right, 3.0, 1.0)[0]
-    assert verdict(filters[1], wrong, 3.0, 1.0)[0]
+    assert not verdict(published_rig(), filters[0], right, 3.0, 1.0)[0]
+    assert verdict(published_rig(), filters[1], wrong, 3.0, 1.0)[0]
 
 
 def test_two_swapped_filters_of_four_are_named_and_the_others_are_not() -> None:
     filters = [each for each in placed({580.0: 610.0, 610.0: 580.0}) if each.filter_nm >= 550]
     found = found_wavelengths(published_rig(), filters)
-    verdicts = [verdict(each, where, 3.0, 1.0) for each, where in zip(filters, found, strict=True)]
+    verdicts = [
+        verdict(published_rig(), each, where, 3.0, 1.0) for each, where in zip(filters, found, strict=True)
+    ]
     assert [unusable for unusable, _ in verdicts] == [False, True, True, False]
     assert "where those of 610 ± 6 nm should be" in verdicts[1][1]
 
@@ -101,7 +105,7 @@ def test_four_filters_show_a_film_unlike_its_data_sheet_and_raise_no_doubt(densi
     filters = placed({nm: density * nm for nm in CENTRES})[2:6]
     for each, found in zip(filters, found_wavelengths(published_rig(), filters), strict=True):
         assert found == pytest.approx((each.filter_nm, 0.01 * each.filter_nm), rel=0.06)
-        assert verdict(each, found, 3.0, 1.0) == (False, "")
+        assert verdict(published_rig(), each, found, 3.0, 1.0) == (False, "")
 
 
 @pytest.mark.parametrize(("asked", "there"), [(450.0, 600.0), (540.0, 470.0), (600.0, 540.0)])
@@ -125,3 +129,26 @@ def test_colours_of_the_right_filter_are_accepted_though_the_response_is_off() -
         seen = passed(rig, nominal_filter(nm)).sum(1) * np.array([0.85, 1.0, 1.15])
         shift, gain = colour_shift(rig, seen, nominal_filter(nm))
         assert gain < 12.0 or abs(shift) < 14.0
+
+
+@pytest.mark.parametrize(
+    ("width_px", "lines_per_mm", "rms_px", "unusable"),
+    [
+        (640, 480.0, 8.9, False),
+        (640, 480.0, 9.1, True),
+        (1920, 480.0, 13.5, False),
+        (1920, 1000.0, 40.0, False),
+        (1920, 480.0, 30.0, True),
+        (320, 480.0, 8.9, False),
+    ],
+)
+def test_a_filter_is_broad_by_its_nanometres(
+    width_px: int, lines_per_mm: float, rms_px: float, unusable: bool
+) -> None:
+    """A filter of 20 nm is 13.5 columns wide on a projector of 1920: rms, with the lines."""
+    rig = published_rig()
+    lens = rig.projector.resized(width_px, width_px * 9 // 16)
+    film = rig.film.model_copy(update={"lines_per_mm": lines_per_mm})
+    rig = rig.model_copy(update={"projector": lens, "film": film})
+    each = placed()[CENTRES.index(550.0)]
+    assert verdict(rig, each, (550.0, 1.0), rms_px, 1.0)[0] == unusable

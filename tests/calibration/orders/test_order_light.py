@@ -20,22 +20,25 @@ AT_PX = {1: 180.0, -1: -180.0, 2: 372.0, -2: -372.0}
 DARK, NOISE = 0.05, 0.01
 
 
-def seen(moved_px: float = 0.0, saturated: int = 0, uneven: float = 0.0) -> FilterLight:
+def seen(
+    moved_px: float = 0.0, saturated: int = 0, uneven: float = 0.0, times: int = 1, widening: float = 1.0
+) -> FilterLight:
     """White pixels all over the image, a Gaussian of 3 px for each order; amplitudes differ by colour.
 
-    ``uneven`` is by which share orders are brighter or darker in every other cell of the image.
+    ``uneven`` is by which share orders are brighter or darker in every other cell of the image; ``times`` how
+    many times more columns the projector has, and ``widening`` what is known of that.
     """
     rng = np.random.default_rng(0)
     down, across = np.meshgrid(np.linspace(0.01, 0.99, 40), np.linspace(0.01, 0.99, 100), indexing="ij")
     place = np.stack([down.ravel(), across.ravel()])
-    column = 10 + 620 * place[1]
+    column = times * (10 + 620 * place[1])
     colour = np.arange(len(column)) % 3
     amplitude = np.array([8.0, 10.0, 6.0])[colour]
-    centres = 2.0 + 5.0 * np.arange(128)[:, None]
+    centres = 2.0 + 5.0 * np.arange(128 * times)[:, None]
     distance = centres - column
     light = zero_order_profile(torch.as_tensor(moved_px - distance), -2.5, 2.5, RESPONSE).numpy()
     for order, ratio in RATIO.items():
-        bell = np.exp(-0.5 * ((distance - AT_PX[order] - 6 * (place[1] - 0.5)) / 3.0) ** 2)
+        bell = np.exp(-0.5 * ((distance / times - AT_PX[order] - 6 * (place[1] - 0.5)) / 3.0) ** 2) / times
         cell = (4 * place[0]).astype(int) + (6 * place[1]).astype(int)
         light = light + ratio * (1 + uneven * (-1) ** cell) * LINES.step_px * bell / (
             3.0 * np.sqrt(2 * np.pi)
@@ -45,7 +48,9 @@ def seen(moved_px: float = 0.0, saturated: int = 0, uneven: float = 0.0) -> Filt
     std[60, :saturated] = np.inf
     whole = {order: np.ones(len(column), bool) for order in RATIO}
     pixels = PlanePixels(column, np.full(len(column), 2.0), colour, place, whole)
-    return filter_light(LINES, pixels, radiance, std, RESPONSE, (120.0, 320.0), (60.0, 110.0), FRAME_PX)
+    reach_px, unlit_px = (120.0 * times, 320.0 * times), (60.0 * times, 110.0 * times)
+    frame_px = FRAME_PX * times
+    return filter_light(LINES, pixels, radiance, std, RESPONSE, reach_px, unlit_px, frame_px, widening)
 
 
 @pytest.fixture(scope="module")
@@ -98,3 +103,12 @@ def test_cells_say_where_the_zero_order_and_each_order_were_seen(found: FilterLi
     assert by_column[1][5] == 0.0
     assert by_column[-1][0] == 0.0
     assert by_column[1][0] > 0.9 * by_column[1][1] > 0
+
+
+@pytest.mark.parametrize(("widening", "whole"), [(3.0, True), (1.0, False)])
+def test_all_light_of_an_order_is_summed_on_a_projector_of_many_columns(widening: float, whole: bool) -> None:
+    """Three times the columns spread an order over three times as many; windows of few lose a part of it."""
+    wide = seen(times=3, widening=widening).orders
+    for order in (1, -1):
+        assert (wide[order].ratio == pytest.approx(RATIO[order], rel=0.01)) == whole
+        assert wide[order].width_px == pytest.approx(9.0, rel=0.03) or not whole
