@@ -9,6 +9,7 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
+from dsl_core.model.conditions import colour_sites
 from dsl_core.model.plan import CapturePlan
 from dsl_core.model.rig import Rig, Sensor
 from dsl_core.optics.sensor import bayer_channels, bayer_colours, raw_variance
@@ -70,14 +71,24 @@ class Bracket:
 def demosaic_factors(rig: Rig, pixels: NDArray[np.int64]) -> NDArray[np.float64]:
     """Variance of each colour at pixels relative to that of a sample of the mosaic, (pixels, 3).
 
-    A sample measured there counts once; bilinear means of two or four samples have a half or a quarter.
+    A sample measured there counts once; bilinear means of two or four samples have a half or a quarter. Where
+    there is no mosaic, every colour is the pixel's own sample.
     """
+    if rig.sensor.bayer == "MONO":
+        return np.ones((len(pixels), 3))
     return _by_neighbours(rig, pixels, own=1.0, cross=0.25, sideways=0.5, below=0.5, diagonal=0.25)
 
 
 def sideways_shares(rig: Rig, pixels: NDArray[np.int64]) -> NDArray[np.float64]:
     """Share of each colour at pixels that bilinear means take from neighbouring columns, (pixels, 3)."""
+    if rig.sensor.bayer == "MONO":
+        return np.zeros((len(pixels), 3))
     return _by_neighbours(rig, pixels, own=0.0, cross=0.5, sideways=1.0, below=0.0, diagonal=1.0)
+
+
+def measured_colours(rig: Rig) -> NDArray[np.bool_]:
+    """Which of R, G and B are measurements of their own, (3,): without a mosaic there is one, as green."""
+    return np.isin(np.arange(3), colour_sites(rig.sensor.bayer))
 
 
 def _by_neighbours(

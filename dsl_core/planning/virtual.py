@@ -29,7 +29,13 @@ from dsl_core.optics.pixel_model import (
 )
 from dsl_core.optics.spectra import ORDERS, Bands
 from dsl_core.optics.unlit import unlit_px
-from dsl_core.planning.noise import Bracket, demosaic_factors, own_channel, sideways_shares
+from dsl_core.planning.noise import (
+    Bracket,
+    demosaic_factors,
+    measured_colours,
+    own_channel,
+    sideways_shares,
+)
 from dsl_core.planning.samples import SamplePixels
 from dsl_core.reconstruction.columns.column import Column, refine
 from dsl_core.reconstruction.columns.line_peaks import LinePeaks
@@ -136,6 +142,7 @@ class VirtualPixels:
         self.own = torch.as_tensor(own_channel(rig, view.pixels))
         factors = like(demosaic_factors(rig, view.pixels), self.shading)
         self.factors = factors[:, None, :, None]
+        self.measured = torch.as_tensor(measured_colours(rig))
         self.depth = torch.as_tensor(view.depth_mm, dtype=torch.float64)
         self.column, _ = zero_order(rig, self.pixels, self.depth)
         _, self.slope_mm = triangulate(rig, self.pixels, self.column)
@@ -273,7 +280,7 @@ class VirtualPixels:
             colour = self._white(draw.nodes, (0,)).flatten(0, 1).T
             direct = self.model.direct_light(self.modelled, found, colour)
             spread = spread + (self.direct_error * direct.permute(2, 0, 1).reshape(spread.shape)) ** 2
-        return torch.where(draw.saturated, 0.0, 1 / spread)
+        return torch.where(draw.saturated | ~self.measured[:, None], 0.0, 1 / spread)
 
     def _solve(
         self, draw: Draw, noisy: Tensor, clean: Tensor, error_px: Tensor, spread: Tensor
@@ -328,7 +335,9 @@ class VirtualPixels:
             return matrix, right, quiet
         colour = self._white(draw.nodes, (0,))
         variance = spread[..., None] ** 2 * self.factors[..., 0]
-        root = (~reached).float()[:, None, None] / (variance + (COLOUR_ERROR * colour) ** 2).sqrt()
+        root = ((~reached)[:, None, None] & self.measured).float() / (
+            variance + (COLOUR_ERROR * colour) ** 2
+        ).sqrt()
         moments = like(self.bands.moments[0].sum(1), matrix)
         rows = (moments * (root * self.shading[:, None, None])[..., None]).flatten(0, 1)
         # Where the amplitude is unknown its equation weighs nothing, and neither does its noise.

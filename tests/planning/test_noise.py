@@ -6,9 +6,18 @@ import numpy as np
 import pytest
 import torch
 
-from dsl_core.model.plan import CapturePlan, Setting
+from dsl_core.model.plan import CapturePlan, ScanLines, Setting
+from dsl_core.model.rig import Rig
+from dsl_core.model.spectral import SpectralCurve
 from dsl_core.optics.demosaic import demosaic_variance
-from dsl_core.planning.noise import Bracket, demosaic_factors, own_channel
+from dsl_core.planning.noise import (
+    Bracket,
+    demosaic_factors,
+    measured_colours,
+    own_channel,
+    sideways_shares,
+)
+from dsl_core.planning.prediction import predict
 from dsl_core.reconstruction.hdr import BlackFrame, HdrMerger, setting_gains_ms
 from tests.cases.small_rig import small_rig
 
@@ -45,3 +54,33 @@ def test_factors_are_those_of_demosaicing() -> None:
     variance = demosaic_variance(np.ones((height, width), np.float32), rig.sensor.bayer).reshape(3, -1)
     assert np.allclose(demosaic_factors(rig, pixels), variance[:, pixels].T)
     assert own_channel(rig, pixels).tolist() == [0, 1, 1, 2]
+
+
+def without_mosaic(rig: Rig, red: float) -> Rig:
+    """The rig with a monochrome sensor, whose curve stands in the place of red as well, times ``red``."""
+    curve = rig.response[1]
+    other = SpectralCurve(
+        wavelengths_nm=curve.wavelengths_nm, values=tuple(red * each for each in curve.values)
+    )
+    sensor = rig.sensor.model_copy(update={"bayer": "MONO"})
+    return rig.model_copy(update={"sensor": sensor, "response": (other, curve, other)})
+
+
+def test_a_pixel_without_a_mosaic_is_measured_once() -> None:
+    rig = small_rig()
+    mono = without_mosaic(rig, 1.0)
+    pixels = np.array([500, 501], np.int64)
+    raw = np.ones((rig.camera.height_px, rig.camera.width_px), np.float32)
+    variance = demosaic_variance(raw, "MONO").reshape(3, -1)
+    assert np.allclose(demosaic_factors(mono, pixels), variance[:, pixels].T)
+    assert not sideways_shares(mono, pixels).any()
+    assert measured_colours(mono).tolist() == [False, True, False]
+    assert measured_colours(rig).all()
+
+
+def test_a_prediction_without_a_mosaic_takes_no_copies_for_measurements() -> None:
+    plan = CapturePlan(spectral=ScanLines(width_px=8, step_px=8))
+    copied, blind = (
+        predict(without_mosaic(small_rig(), red), plan, peaks=False).pixel_rmse for red in (1.0, 0.0)
+    )
+    assert copied == pytest.approx(blind, rel=1e-3)
