@@ -13,8 +13,9 @@ from dsl_core.errors import PlanError
 from dsl_core.model.result import SPECTRUM_INVALID
 from dsl_core.model.rig import Rig
 from dsl_core.optics.correspondence import zero_order
-from dsl_core.optics.pinhole import pixel_rays
-from dsl_core.optics.shading import Plane, plane_shading
+from dsl_core.optics.pinhole import rays_at
+from dsl_core.optics.shading import shading
+from dsl_core.solve.thinned import thinned
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -24,6 +25,8 @@ Floats = NDArray[np.float64]
 GRID, LOOK_GRID = (8, 3), (12, 8)
 #: Distance of the samples from the rim of the picture, as a share of it.
 RIM = 0.04
+#: Of pictures of more pixels about so many are asked whether the projector lights them, spread over all.
+ASKED = 300_000
 
 
 @dataclass(frozen=True)
@@ -60,24 +63,19 @@ def plane_samples(rig: Rig, depth_mm: float | None = None, grid: tuple[int, int]
     Without ``depth_mm`` it is at the rig's usual depth.
     """
     depth_mm = rig.usual_depth_mm if depth_mm is None else depth_mm
-    depth = _plane(depth_mm).depth_mm(rig)
-    lit = _inside(rig, depth)
+    lit, lit_share = _inside(rig, depth_mm)
     if not lit.any():
         raise PlanError(
             f"The projector of rig {rig.name!r} lights nothing of a plane at {depth_mm:g} mm."
             " Choose a depth inside the rig's range."
         )
-    return _of_plane(rig, depth_mm, _spread(lit, grid), float(lit.mean()))
-
-
-def _plane(depth_mm: float) -> Plane:
-    return Plane(np.array([0.0, 0.0, 1.0 / depth_mm]))
+    return _of_plane(rig, depth_mm, _spread(lit, grid), lit_share)
 
 
 def _of_plane(rig: Rig, depth_mm: float, pixels: NDArray[np.int64], lit_share: float) -> SamplePixels:
-    plane = _plane(depth_mm)
-    depth, shares = plane.depth_mm(rig), plane_shading(rig, plane).ravel()[pixels]
-    return SamplePixels(pixels, depth.ravel()[pixels], shares, _incidence(rig, depth, pixels), lit_share)
+    depth, facing = np.full(pixels.shape, float(depth_mm)), np.array([[0.0], [0.0], [-1.0]])
+    points = _points(rig, pixels, depth)
+    return SamplePixels(pixels, depth, shading(rig, points, facing), _incidence(rig, points), lit_share)
 
 
 def scene_samples(rig: Rig, result: xr.Dataset) -> SamplePixels:
@@ -99,25 +97,28 @@ def scene_samples(rig: Rig, result: xr.Dataset) -> SamplePixels:
     if not valid.any():
         raise PlanError("The quick look has no pixel with a spectrum. Scan again with more light.")
     pixels = _spread(valid, LOOK_GRID)
-    depth = result["depth_mm"].values.astype(np.float64)
+    depth = result["depth_mm"].values.ravel()[pixels].astype(np.float64)
     return SamplePixels(
         pixels,
-        depth.ravel()[pixels],
+        depth,
         result["shading"].values.ravel()[pixels].astype(np.float64),
-        _incidence(rig, depth, pixels),
+        _incidence(rig, _points(rig, pixels, depth)),
         float(valid.mean()),
         result["reflectance"].values.reshape(-1, valid.size)[:, pixels].T.astype(np.float64),
         result["wavelength_nm"].values.astype(np.float64),
     )
 
 
-def _inside(rig: Rig, depth_mm: Floats) -> NDArray[np.bool_]:
-    """Pixels whose point the projector's frame lights directly, (rows, columns)."""
-    index = torch.arange(depth_mm.size)
-    column, row = zero_order(rig, index, torch.as_tensor(depth_mm.ravel()))
+def _inside(rig: Rig, depth_mm: float) -> tuple[NDArray[np.bool_], float]:
+    """Asked pixels whose point the projector's frame lights directly, (rows, columns), and their share."""
+    lit = np.zeros((rig.camera.height_px, rig.camera.width_px), bool)
+    asked = thinned(np.arange(lit.size), ASKED)
+    depth = torch.full(asked.shape, float(depth_mm), dtype=torch.float64)
+    column, row = zero_order(rig, torch.as_tensor(asked), depth)
     lens = rig.projector
-    lit = (column > -0.5) & (column < lens.width_px - 0.5) & (row > -0.5) & (row < lens.height_px - 0.5)
-    return np.asarray(lit.numpy()).reshape(depth_mm.shape)
+    inside = (column > -0.5) & (column < lens.width_px - 0.5) & (row > -0.5) & (row < lens.height_px - 0.5)
+    lit.ravel()[asked] = inside.numpy()
+    return lit, float(inside.double().mean())
 
 
 def _spread(usable: NDArray[np.bool_], grid: tuple[int, int]) -> NDArray[np.int64]:
@@ -137,8 +138,13 @@ def _spread(usable: NDArray[np.bool_], grid: tuple[int, int]) -> NDArray[np.int6
     return np.unique(np.asarray(chosen, np.int64))
 
 
-def _incidence(rig: Rig, depth_mm: Floats, pixels: NDArray[np.int64]) -> Floats:
+def _points(rig: Rig, pixels: NDArray[np.int64], depth_mm: Floats) -> Floats:
+    """Points (3, samples) that pixels see at their depth (samples,), mm."""
+    rows, columns = np.divmod(pixels, rig.camera.width_px)
+    return rays_at(rig.camera, columns.astype(np.float64), rows.astype(np.float64)) * depth_mm
+
+
+def _incidence(rig: Rig, points_mm: Floats) -> Floats:
     """Tangent of the angle between the way to the projector and the way to the camera's plane, (samples,)."""
-    points = (pixel_rays(rig.camera) * depth_mm).reshape(3, -1)[:, pixels]
-    to_light = rig.pose.projector_centre_mm[:, None] - points
+    to_light = rig.pose.projector_centre_mm[:, None] - points_mm
     return np.asarray(np.hypot(to_light[0], to_light[1]) / np.abs(to_light[2]))

@@ -1,0 +1,47 @@
+"""Samples of a plane are the same few pixels however they are asked, and cost little for large pictures."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from dsl_core.optics.shading import Plane, plane_shading
+from dsl_core.planning import samples
+from dsl_core.planning.samples import plane_samples
+from dsl_core.simulation.published_rig import published_rig
+
+DEPTH_MM = 700.0
+
+
+def test_large_pictures_are_asked_at_some_pixels(monkeypatch: pytest.MonkeyPatch) -> None:
+    rig = published_rig()
+    large = rig.model_copy(update={"camera": rig.camera.resized(4096, 3000)})
+    traced = list[int]()
+    trace = samples.zero_order
+
+    def counted(rig, pixels, depth):  # type: ignore[no-untyped-def]
+        traced.append(len(pixels))
+        return trace(rig, pixels, depth)
+
+    monkeypatch.setattr(samples, "zero_order", counted)
+    few, many = (plane_samples(each, DEPTH_MM) for each in (rig, large))
+    assert traced[0] == 890 * 580, "every pixel of the twin"
+    assert traced[1] < 4e5
+    assert len(many.pixels) == len(few.pixels)
+    assert many.lit_share == pytest.approx(few.lit_share, abs=0.02)
+    rows, columns = np.divmod(many.pixels, 4096)
+    assert set(zip(rows % 2, columns % 2, strict=True)) == {(0, 0), (0, 1), (1, 0), (1, 1)}
+    # The same places, to within the few pixels that are not asked.
+    for at, wanted, size, known in zip(
+        (rows, columns), np.divmod(few.pixels, 890), (3000, 4096), (580, 890), strict=True
+    ):
+        assert np.abs(np.sort(at / size) - np.sort(wanted / known)).max() < 0.02
+
+
+def test_samples_have_depth_and_shading_of_their_plane() -> None:
+    rig = published_rig()
+    rig = rig.model_copy(update={"camera": rig.camera.resized(160, 104)})
+    found = plane_samples(rig, DEPTH_MM)
+    plane = Plane(np.array([0.0, 0.0, 1 / DEPTH_MM]))
+    assert found.depth_mm == pytest.approx(DEPTH_MM)
+    assert found.shading == pytest.approx(plane_shading(rig, plane).ravel()[found.pixels], rel=1e-9)
