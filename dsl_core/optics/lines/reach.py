@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
-import torch
+import numpy as np
+from numpy.typing import NDArray
 
+from dsl_core.model.geometry import Lens
 from dsl_core.model.rig import Rig
 from dsl_core.model.spectral import WavelengthGrid
-from dsl_core.optics.correspondence import correspondence, zero_order
-from dsl_core.optics.spectra import ORDERS
+from dsl_core.optics.pinhole import project, rays_at
 
+Floats = NDArray[np.float64]
 #: More of the bands of lit pixels without a first order than this is not what a film is chosen for.
 MOST_UNREACHED = 0.3
-#: About so many pixels are asked.
-MOST_PIXELS = 500
+#: About so many pixels are asked, at so many wavelengths.
+MOST_PIXELS, BANDS = 200, 12
+#: First orders, and steps towards the place on the film where their light passes.
+ORDERS, ITERATIONS = (1, -1), 5
 
 
 def unreached_words(share: float) -> tuple[str, str]:
@@ -25,18 +29,41 @@ def unreached_words(share: float) -> tuple[str, str]:
     )
 
 
-def unreached_share(rig: Rig, grid: WavelengthGrid | None = None) -> float:
+def unreached_share(rig: Rig) -> float:
     """Share of the bands that no first order reaches, over pixels that the projector lights; NaN for none.
 
-    At a surface that faces the camera at the rig's usual depth.
+    At a surface that faces the camera at the rig's usual depth, through a flat film square to the projector,
+    which is good to a few columns. The window asks at every change of a plan: without torch, at few pixels.
     """
-    lens, size = rig.projector, rig.camera.width_px * rig.camera.height_px
-    pixels = torch.arange(0, size, size // MOST_PIXELS | 1)
-    depth = torch.full(pixels.shape, rig.usual_depth_mm, dtype=torch.float64)
-    column, row = zero_order(rig, pixels, depth)
-    lit = (column > -0.5) & (column < lens.width_px - 0.5) & (row > -0.5) & (row < lens.height_px - 0.5)
-    if not bool(lit.any()):
+    size = rig.camera.width_px * rig.camera.height_px
+    rows, columns = np.divmod(np.arange(0, size, size // MOST_PIXELS | 1), rig.camera.width_px)
+    rays = rays_at(rig.camera, columns.astype(float), rows.astype(float))
+    points = rig.pose.matrix @ (rays * rig.usual_depth_mm) + rig.pose.vector_mm[:, None]
+    points = points[:, _inside(rig.projector, points)]
+    if not points.size:
         return float("nan")
-    nm, trace = (grid or WavelengthGrid()).centres_nm, correspondence(rig).trace
-    some = [trace(pixels[lit], depth[lit], m, nm).inside(lens.width_px, lens.height_px) for m in ORDERS]
-    return float(1 - torch.stack(some).any(0).double().mean())
+    ends = WavelengthGrid()
+    nm = np.linspace(ends.start_nm, ends.stop_nm, BANDS)
+    reached = [_inside(rig.projector, _sent(rig, points, m * nm / rig.film.period_nm)) for m in ORDERS]
+    return float(1 - (reached[0] | reached[1]).mean())
+
+
+def _sent(rig: Rig, points_mm: Floats, turned: Floats) -> Floats:
+    """Directions (3, bands, n) in which light leaves for points (3, n), turned by sines (bands,)."""
+    distance_mm, (x, y, z) = rig.film.distance_mm, points_mm[:, None]
+    sent = points_mm[:, None] / z + np.zeros((1, len(turned), 1))
+    for _ in range(ITERATIONS):
+        at = distance_mm * sent[:2] / sent[2]
+        left = np.stack([x - at[0], y - at[1], (z - distance_mm) + 0 * at[0]])
+        across, along = left[:2] / np.linalg.norm(left, axis=0)
+        across = across + turned[:, None]
+        with np.errstate(invalid="ignore"):
+            sent = np.stack([across, along, np.sqrt(1 - across**2 - along**2)])
+    return sent
+
+
+def _inside(lens: Lens, directions: Floats) -> NDArray[np.bool_]:
+    """Whether directions (3, ...) of light are inside a projector's frame."""
+    column, row = project(lens, *directions)
+    inside = (column > -0.5) & (column < lens.width_px - 0.5) & (row > -0.5) & (row < lens.height_px - 0.5)
+    return np.asarray(inside)
