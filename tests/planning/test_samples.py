@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from torch import Tensor
 
+from dsl_core.model.rig import Rig
+from dsl_core.optics.correspondence import zero_order
 from dsl_core.optics.shading import Plane, plane_shading
-from dsl_core.planning import samples
 from dsl_core.planning.samples import plane_samples
 from dsl_core.simulation.published_rig import published_rig
 
@@ -17,13 +19,12 @@ def test_large_pictures_are_asked_at_some_pixels(monkeypatch: pytest.MonkeyPatch
     rig = published_rig()
     large = rig.model_copy(update={"camera": rig.camera.resized(4096, 3000)})
     traced = list[int]()
-    trace = samples.zero_order
 
-    def counted(rig, pixels, depth):  # type: ignore[no-untyped-def]
+    def counted(rig: Rig, pixels: Tensor, depth: Tensor) -> tuple[Tensor, Tensor]:
         traced.append(len(pixels))
-        return trace(rig, pixels, depth)
+        return zero_order(rig, pixels, depth)
 
-    monkeypatch.setattr(samples, "zero_order", counted)
+    monkeypatch.setattr("dsl_core.planning.samples.zero_order", counted)
     few, many = (plane_samples(each, DEPTH_MM) for each in (rig, large))
     assert traced[0] == 890 * 580, "every pixel of the twin"
     assert traced[1] < 4e5

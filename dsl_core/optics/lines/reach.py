@@ -59,7 +59,7 @@ def _sent(rig: Rig, points_mm: Floats, turned: Floats) -> Floats:
         across = across + turned[:, None]
         with np.errstate(invalid="ignore"):
             sent = np.stack([across, along, np.sqrt(1 - across**2 - along**2)])
-    return sent
+    return np.asarray(sent)
 
 
 def _inside(lens: Lens, directions: Floats) -> NDArray[np.bool_]:
