@@ -7,13 +7,16 @@ import pytest
 from numpy.typing import NDArray
 
 from dsl_core.capture.proof.finding import Verdict
+from dsl_core.capture.proof.judging.known import Known
 from dsl_core.capture.proof.verifier import FrameProof
-from dsl_core.model.plan import CapturePlan, GrayCode, ScanLines, Sentinels, Setting, Shot
+from dsl_core.model.plan import CapturePlan, Columns, GrayCode, ScanLines, Sentinels, Setting, Shot
 from dsl_core.model.rig import BayerPattern
 from dsl_core.optics.sensor import bayer_channels
 from dsl_core.patterns.images import pattern_image
+from dsl_core.simulation.published_rig import published_rig
 
 COLUMNS = 64
+NM = np.arange(400.0, 701.0)
 
 
 def plan_of(width: int, height: int) -> CapturePlan:
@@ -57,6 +60,35 @@ def test_right_pictures_of_any_camera_pass(width: int, height: int, bayer: Bayer
     found = [proof.judge(shot, scene.take(shot)).verdict for shot in plan.shots()]
     assert set(found) <= {Verdict.RIGHT, Verdict.UNTOLD}
     assert found.count(Verdict.RIGHT) > len(found) / 2
+
+
+def coloured(width: int, height: int) -> CapturePlan:
+    """A plan whose pictures after the code are all red, all green, all blue, white and black."""
+    lights = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0), (1.0, 1.0, 1.0), (0.0, 0.0, 0.0))
+    spectral = Columns(levels=tuple((light,) * COLUMNS for light in lights))
+    return plan_of(width, height).model_copy(update={"spectral": spectral})
+
+
+def test_a_camera_without_colours_sees_a_third_of_white_in_each_colour() -> None:
+    plan = coloured(1000, 36)
+    proof, scene = FrameProof(plan, None, 12, "MONO"), FlatScene(plan, "MONO")
+    found = {shot.index: proof.judge(shot, scene.take(shot)) for shot in plan.shots()}
+    assert [each for each in found.values() if each.is_wrong] == []
+
+
+def test_a_calibration_says_how_much_of_white_each_colour_is() -> None:
+    plan, rig = coloured(1000, 36), published_rig()
+    mono = rig.model_copy(update={"sensor": rig.sensor.model_copy(update={"bayer": "MONO"})})
+    pictures = [shot for shot in plan.shots() if shot.role == "spectral"]
+    seen = []
+    for each in (mono, rig):
+        known = Known(plan, each, 12, "RGGB", at_the_end=False, knows_light=False)
+        seen.append([known.profile(shot) for shot in pictures])
+    light = np.array([profile[0] for profile in seen[0] if profile is not None])
+    parts = [np.trapezoid(c.at(NM) * rig.response[1].at(NM), NM) for c in rig.emission]
+    assert light == pytest.approx([*(np.array(parts) / sum(parts)), 1.0, 0.0], abs=1e-3)
+    assert seen[1][2] is not None
+    assert seen[1][2][:3].tolist() == [0.0, 0.0, 1.0]
 
 
 @pytest.mark.parametrize("width", [640, 1280])

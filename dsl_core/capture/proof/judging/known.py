@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
+
 from dsl_core.capture.proof.code.first_code import FirstCode
 from dsl_core.capture.proof.finding import Verdict
 from dsl_core.capture.proof.judging.common_light import CommonLight
@@ -15,8 +17,13 @@ from dsl_core.capture.proof.prediction import Lit, line_profile
 from dsl_core.capture.proof.raster import Counts, Floats, Raster
 from dsl_core.capture.proof.usual_light import UsualLight
 from dsl_core.model.captured_code import CapturedCode
+from dsl_core.model.conditions import colour_sites
 from dsl_core.model.plan import CapturePlan, NoCode, Role, Shot
 from dsl_core.model.rig import Rig
+from dsl_core.optics.spectra import chain_response
+
+#: Wavelengths that LEDs are compared at, nm.
+_NM = np.arange(400.0, 701.0, 2.0)
 
 
 @dataclass
@@ -100,8 +107,14 @@ class Known:
         shot = self.plan.original(shot)
         key = shot.role, shot.pattern
         if key not in self._profiles:
-            self._profiles[key] = line_profile(self.plan, shot)
+            self._profiles[key] = self._seen(line_profile(self.plan, shot))
         return self._profiles[key]
+
+    def _seen(self, profile: Floats | None) -> Floats | None:
+        """A `line_profile` as pixels see it: those of a monochrome camera see all LEDs together."""
+        if profile is None or self.bayer != "MONO":
+            return profile
+        return np.repeat(profile.reshape(-1, 3) @ _light_of_leds(self.calibration), 3)
 
     def rivals(self, shot: Shot) -> list[tuple[Verdict, Shot]]:
         """The shots whose pattern a picture most likely shows instead, and what that would be called."""
@@ -136,3 +149,11 @@ class Known:
         if shot not in again:
             self.kept[shot.index] = seen
             (self.untold.discard if is_told else self.untold.add)(shot.index)
+
+
+def _light_of_leds(rig: Rig | None) -> Floats:
+    """What share of white each LED gives a monochrome camera, (3,); a third of it where nobody knows."""
+    if rig is None:
+        return np.full(3, 1 / 3, np.float32)
+    light = chain_response(rig, 0, _NM)[colour_sites("MONO")[0]].sum(1)
+    return np.asarray(light / light.sum(), np.float32)
