@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import median_filter
 
 from dsl_core.devices.base import Camera, CameraInfo, DeviceRig, Projector, ProjectorInfo
+from dsl_core.model.conditions import BayerPattern
 from dsl_core.model.frames import Frame
 from dsl_core.simulation.published_rig import published_rig
 
@@ -106,7 +107,7 @@ class LightCamera(Camera):
 
     @property
     def info(self) -> CameraInfo:
-        mosaic = "MONO" if self.world.monochrome else "RGGB"
+        mosaic: BayerPattern = "MONO" if self.world.monochrome else "RGGB"
         return CameraInfo("light", "L-C", WIDTH, HEIGHT, mosaic, self.world.bits, (0.02, 10_000.0))
 
     def configure(self, exposure_ms: float) -> float:
