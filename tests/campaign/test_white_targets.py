@@ -246,3 +246,17 @@ def test_what_is_not_known_of_the_spectralon_is_part_of_every_reflectance(module
         SpectralonRecipe(reflectance_rel_std=2.0).fit(
             Bench(twin(1), module_folder / "spectralon-1", start), NONE
         )
+
+
+def test_a_color_checker_is_refused_for_a_monochrome_camera_before_anything_is_captured(
+    tmp_path: Path,
+) -> None:
+    rig = published_rig()
+    mono = rig.model_copy(update={"sensor": rig.sensor.model_copy(update={"bayer": "MONO"})})
+    bench, recipe = Bench(twin(), tmp_path, mono), ColorCheckerRecipe()
+    (step,) = recipe.steps(bench)
+    with pytest.raises(CalibrationError, match=r"camera is monochrome.*Leave this calibration out"):
+        recipe.look(bench, step)
+    with pytest.raises(CalibrationError, match=r"camera is monochrome.*Leave this calibration out"):
+        recipe.capture(bench, step, NONE)
+    assert not recipe.is_captured(bench, step)

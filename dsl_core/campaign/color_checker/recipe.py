@@ -30,6 +30,7 @@ from dsl_core.campaign.common.recipe import Bench, Recipe, Step, naming
 from dsl_core.campaign.common.white_shot import other_light, shoot_white
 from dsl_core.errors import CalibrationError
 from dsl_core.model.calibration.color_checker import ORIENTATIONS, ColorCheckerCalibration
+from dsl_core.model.conditions import mosaic_colours
 from dsl_core.model.figure import Figure
 from dsl_core.model.placement import Placement
 from dsl_core.model.rig import Rig
@@ -83,7 +84,8 @@ class ColorCheckerRecipe(Recipe[ColorCheckerCalibration]):
         )
 
     def look(self, bench: Bench, step: Step) -> tuple[Figure, ...]:
-        """Whether the chart is found, and how it is turned."""
+        """Whether the chart is found, and how it is turned; raises `CalibrationError`."""
+        _require_colours(bench.rig)
         white = shoot_white(bench)
         pose = self._pose(white.picture.astype(np.float32), bench.rig, f"the test shot of {step.title}")
         patch_samples(pose.corners_px, (white.picture.shape[0], white.picture.shape[1]))
@@ -99,7 +101,8 @@ class ColorCheckerRecipe(Recipe[ColorCheckerCalibration]):
         )
 
     def capture(self, bench: Bench, step: Step, progress: Progress) -> None:
-        """Choose exposures by a test shot and capture."""
+        """Choose exposures by a test shot and capture; raises `CalibrationError` for monochrome cameras."""
+        _require_colours(bench.rig)
         capture_uniform(bench, step, RATIO, progress)
 
     def fit(self, bench: Bench, progress: Progress) -> ColorCheckerCalibration:
@@ -168,3 +171,12 @@ def white_picture(bench: Bench, step: Step) -> NDArray[np.uint8]:
     scan = MergedScan(bench.scan_of(step), bench.rig)
     picture = chart_picture(scan.merge("spectral", WHITE).radiance, bench.rig.sensor.bayer)
     return np.ascontiguousarray(picture[..., ::-1])
+
+
+def _require_colours(rig: Rig) -> None:
+    """Raise `CalibrationError` for a camera whose patches have no colours to compare."""
+    if len(mosaic_colours(rig.sensor.bayer)) == 1:
+        raise CalibrationError(
+            "The rig's camera is monochrome, and the Color Checker compares red, green and blue. Leave this"
+            " calibration out, and state the camera's response curve in the rig."
+        )
