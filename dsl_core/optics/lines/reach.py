@@ -11,8 +11,9 @@ from dsl_core.model.spectral import WavelengthGrid
 from dsl_core.optics.pinhole import project, rays_at
 
 Floats = NDArray[np.float64]
-#: More of the bands of lit pixels without a first order than this is not what a film is chosen for.
-MOST_UNREACHED = 0.3
+#: More of the bands of lit pixels without a first order than this is not what a film is chosen for: at the
+#: side of a sound rig's picture a third may be.
+MOST_UNREACHED = 0.5
 #: About so many pixels are asked, at so many wavelengths.
 MOST_PIXELS, BANDS = 200, 12
 #: First orders, and steps towards the place on the film where their light passes.
