@@ -164,6 +164,7 @@ def _peaks(seen: PickedLines, lines: LineSet, column: torch.Tensor, rig: Rig) ->
     )
 
 
+@one_kernel_thread()
 def wave_std_px(
     column_px: NDArray[np.floating],
     column_std_px: NDArray[np.floating],

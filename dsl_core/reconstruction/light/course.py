@@ -17,6 +17,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from dsl_core.reconstruction.light.heard import Heard, Witness
 from dsl_core.solve.normal import STD_OF_MEDIAN_SIZE
 
 Floats = NDArray[np.float64]
@@ -36,29 +37,10 @@ SETTING_STD, SLOPE_STD = 0.01, 0.02
 APART_STD, LIKELIER = 0.5, 25.0
 #: Witnesses farther off than so many deviations weigh less.
 HUBER = 2.5
-#: Scatter that remains where nothing flickers.
-QUIET = 0.002
 #: Changes of light below these are left as they are.
 LEAST_DRIFT, LEAST_FLICKER = 0.006, 0.008
 #: Deviations that a change has to be from none: its place on the curve is chosen after the fact.
 SIGMAS = 4.5
-
-
-@dataclass(frozen=True)
-class Witness:
-    """The logarithm of the light of one shot over that of another one, and its deviation.
-
-    Shots are named by their index; ``against`` None is white as it was merged, of unknown level. ``slope``
-    is what a witness may be wrong by in common with others, as a multiple of one unknown. ``setting`` is the
-    place of the shot's setting if it is compared with the same pattern at the last one.
-    """
-
-    shot: int
-    against: int | None
-    log: float
-    std: float
-    slope: float = 0.0
-    setting: int | None = None
 
 
 @dataclass(frozen=True)
@@ -112,21 +94,21 @@ def light_course(
     again = [each for each in witnesses if each.against is not None and each.setting is None]
     if len(witnesses) < FEWEST and len(again) < FEWEST_AGAIN:
         return _alone(again[0], shots) if again else None
-    nothing = (NO_DRIFT, NO_DRIFT)
-    found, apart = _course(witnesses, shots, DRIFT_STD), _course(witnesses, shots, nothing, APART_STD)
+    heard, nothing = Heard.of(witnesses), (NO_DRIFT, NO_DRIFT)
+    found, apart = _course(heard, shots, DRIFT_STD), _course(heard, shots, nothing, APART_STD)
     flicker = min(found.flicker, apart.flicker)
-    drift_misfit = _misfit(witnesses, shots, flicker, DRIFT_STD, SETTING_STD)
-    apart_misfit = _misfit(witnesses, shots, flicker, nothing, APART_STD)
+    drift_misfit = _misfit(heard, shots, flicker, DRIFT_STD, SETTING_STD)
+    apart_misfit = _misfit(heard, shots, flicker, nothing, APART_STD)
     if not found.is_steady or found.settings or apart_misfit < drift_misfit - LIKELIER:
-        stepped = _stepped(witnesses, shots, flicker, first_lines)
+        stepped = _stepped(heard, shots, flicker, first_lines)
         if stepped is not None and abs(stepped.drift) > LEAST_DRIFT:
             return stepped
     if apart_misfit < drift_misfit - LIKELIER:
         return apart
     if not found.drifts:
-        level = _course(witnesses, shots, nothing)
+        level = _course(heard, shots, nothing)
         return replace(level, settings=(), drift=found.drift, drift_std=found.drift_std)
-    others = [each for each in witnesses if each.setting is None]
+    others = heard.some(heard.setting < 0)
     rests_on_settings = len(others) < FEWEST or not _course(others, shots, DRIFT_STD).drifts
     return replace(found, settings=apart.settings if rests_on_settings else ())
 
@@ -154,9 +136,7 @@ def _alone(again: Witness, shots: int) -> LightCourse | None:
     return found if found.drifts else None
 
 
-def _stepped(
-    witnesses: Sequence[Witness], shots: int, flicker: float, first_lines: Sequence[int]
-) -> LightCourse | None:
+def _stepped(heard: Heard, shots: int, flicker: float, first_lines: Sequence[int]) -> LightCourse | None:
     """The course of light that changed once, at once; None unless that fits much better than smooth courses.
 
     It is the mean over all shots at which the step may have come, by how likely each of them is. A smooth
@@ -164,54 +144,54 @@ def _stepped(
     ratio of the settings than faint lines: a step where lines begin has to be seen by a picture taken again.
     """
     nothing = (NO_DRIFT, NO_DRIFT)
-    told = sorted({each for one in witnesses for each in (one.shot, one.against) if each is not None})
-    places = np.array([at for at in told if at > told[0]])
+    told = np.union1d(heard.shot, heard.against[heard.against >= 0])
+    places = told[1:]
     if places.size == 0:
         return None
 
     def misfits_of(flicker: float) -> Floats:
-        each = (_misfit(witnesses, shots, flicker, nothing, SETTING_STD, int(at)) for at in places)
+        each = (_misfit(heard, shots, flicker, nothing, SETTING_STD, int(at)) for at in places)
         return np.array(list(each))
 
     first = int(places[misfits_of(flicker).argmin()])
-    flicker = min(flicker, _course(witnesses, shots, nothing, step_at=first).flicker)
+    flicker = min(flicker, _course(heard, shots, nothing, step_at=first).flicker)
     smooth = min(
-        _misfit(witnesses, shots, flicker, DRIFT_STD, SETTING_STD),
-        _misfit(witnesses, shots, flicker, nothing, APART_STD),
+        _misfit(heard, shots, flicker, DRIFT_STD, SETTING_STD),
+        _misfit(heard, shots, flicker, nothing, APART_STD),
     )
     misfits = misfits_of(flicker)
     if float(misfits.min()) > smooth - LIKELIER:
         return None
-    by_lines = [_misfit(witnesses, shots, flicker, nothing, SETTING_STD, at) for at in first_lines]
-    is_seen = any(each.setting is None and each.against is not None for each in witnesses)
-    if not is_seen and min(by_lines, default=np.inf) < misfits.min() + LIKELIER:
+    by_lines = [_misfit(heard, shots, flicker, nothing, SETTING_STD, at) for at in first_lines]
+    if not heard.of_lamp.any() and min(by_lines, default=np.inf) < misfits.min() + LIKELIER:
         return None
     likely = np.flatnonzero(misfits < misfits.min() + LIKELIER)
     weight = np.exp(-0.5 * (misfits[likely] - misfits.min()))
     # A step between two shots that witnesses know of is as likely at each shot between them.
-    found = [_course(witnesses, shots, nothing, step_at=int(at)) for at in places[likely]]
+    found = [_course(heard, shots, nothing, step_at=int(at)) for at in places[likely]]
     weight /= weight.sum()
-    ramps = np.array([_reached(shots, told[told.index(int(at)) - 1], int(at)) for at in places[likely]])
+    ramps = np.array(
+        [_reached(shots, before, at) for before, at in zip(told[likely], places[likely], strict=True)]
+    )
     heights = np.array([each.drift for each in found])
     log = (weight[:, None] * heights[:, None] * ramps).sum(0)
     square = heights[:, None] ** 2 * ramps + np.array([each.std**2 for each in found])
     std = np.sqrt(np.maximum((weight[:, None] * square).sum(0) - log**2, 0.0))
     best = found[int(weight.argmax())]
-    return _as_seen_again(replace(best, log=log, std=std), witnesses)
+    return _as_seen_again(replace(best, log=log, std=std), heard)
 
 
-def _as_seen_again(found: LightCourse, witnesses: Sequence[Witness]) -> LightCourse:
+def _as_seen_again(found: LightCourse, heard: Heard) -> LightCourse:
     """A step as high as all witnesses and bright pictures taken again after it say on average, if any were.
 
     Settings tell its date, and its height less surely: a change of black, which comes with one of the
     camera's gain, is much of what faint ones show. The course may be off by half of what both are apart.
     """
     at = found.step_at or 0
-    again = [each for each in witnesses if each.setting is None and each.against is not None]
-    heights = [each.log for each in again if each.against is not None and each.against < at <= each.shot]
-    if not heights or found.drift == 0:
+    heights = heard.log[heard.of_lamp & (heard.against < at) & (at <= heard.shot)]
+    if heights.size == 0 or found.drift == 0:
         return found
-    height = (float(np.mean(heights)) + found.drift) / 2
+    height = (float(heights.mean()) + found.drift) / 2
     reached = found.log / found.drift
     apart = abs(height - found.drift)
     return replace(
@@ -229,7 +209,7 @@ def _reached(shots: int, before: int, at: int) -> Floats:
 
 
 def _misfit(
-    witnesses: Sequence[Witness],
+    heard: Heard,
     shots: int,
     flicker: float,
     drift_std: tuple[float, float],
@@ -237,15 +217,15 @@ def _misfit(
     step_at: int | None = None,
 ) -> float:
     """How badly the likeliest course fits all witnesses and what is believed before (robust chi-square)."""
-    values, _, left = _fit(witnesses, shots, flicker, drift_std, setting_std, step_at)
-    away = np.abs(left) / np.sqrt(_noise(witnesses, flicker))
+    values, _, left = _fit(heard, shots, flicker, drift_std, setting_std, step_at)
+    away = np.abs(left) / np.sqrt(_noise(heard, flicker))
     believed = values / _believed(len(values), drift_std, setting_std, step_at is not None)
     of_witnesses = np.where(away < HUBER, away**2, HUBER * (2 * away - HUBER)).sum()
     return float(of_witnesses + believed @ believed)
 
 
 def _course(
-    witnesses: Sequence[Witness],
+    heard: Heard,
     shots: int,
     drift_std: tuple[float, float],
     setting_std: float = SETTING_STD,
@@ -254,8 +234,8 @@ def _course(
     """The likeliest course under what is believed before, with a step at a shot or without one."""
     flicker = 0.0
     for _ in range(6):
-        values, covariance, left = _fit(witnesses, shots, flicker, drift_std, setting_std, step_at)
-        flicker, flicker_std = _flicker(witnesses, left)
+        values, covariance, left = _fit(heard, shots, flicker, drift_std, setting_std, step_at)
+        flicker, flicker_std = _flicker(heard, left)
     time = np.linspace(0, 1, shots)
     terms = np.stack([time, time**2], 1)
     drift = [0, 1]
@@ -279,7 +259,7 @@ def _course(
 
 
 def _fit(
-    witnesses: Sequence[Witness],
+    heard: Heard,
     shots: int,
     flicker: float,
     drift_std: tuple[float, float],
@@ -290,24 +270,9 @@ def _fit(
 
     The last of the terms is the step at ``step_at``, if there is one.
     """
-    last = max(shots - 1, 1)
-    settings = 1 + max((each.setting for each in witnesses if each.setting is not None), default=-1)
-    count = 4 + settings + (step_at is not None)
-    design = np.zeros((len(witnesses), count))
-    for row, each in zip(design, witnesses, strict=True):
-        time, other = each.shot / last, None if each.against is None else each.against / last
-        row[:2] = time - (other or 0.0), time**2 - (other or 0.0) ** 2
-        row[2] = -1.0 if other is None else 0.0
-        row[3] = each.slope
-        if each.setting is not None:
-            row[4 + each.setting] = 1.0
-        if step_at is not None:
-            row[-1] = float(each.shot >= step_at) - float(
-                each.against is not None and each.against >= step_at
-            )
-    log = np.array([each.log for each in witnesses])
-    noise = _noise(witnesses, flicker)
-    prior = np.diag(_believed(count, drift_std, setting_std, step_at is not None) ** -2)
+    design, log = heard.design(shots, step_at), heard.log
+    noise = _noise(heard, flicker)
+    prior = np.diag(_believed(design.shape[1], drift_std, setting_std, step_at is not None) ** -2)
     weight = 1 / noise
     for _ in range(4):
         covariance = np.linalg.inv((design.T * weight) @ design + prior)
@@ -318,10 +283,9 @@ def _fit(
     return np.asarray(values), np.asarray(covariance), np.asarray(left)
 
 
-def _noise(witnesses: Sequence[Witness], flicker: float) -> Floats:
+def _noise(heard: Heard, flicker: float) -> Floats:
     """Variance of what each witness says, of which those of two shots flicker twice."""
-    own = np.array([each.std**2 + QUIET**2 for each in witnesses])
-    return own + np.array([1.0 if each.against is None else 2.0 for each in witnesses]) * flicker**2
+    return heard.own_variance + heard.flickering * flicker**2
 
 
 def _believed(count: int, drift_std: tuple[float, float], setting_std: float, with_step: bool) -> Floats:
@@ -330,10 +294,9 @@ def _believed(count: int, drift_std: tuple[float, float], setting_std: float, wi
     return np.array([*drift_std, 1.0, SLOPE_STD, *settings, *[STEP_STD] * with_step])
 
 
-def _flicker(witnesses: Sequence[Witness], left: Floats) -> tuple[float, float]:
+def _flicker(heard: Heard, left: Floats) -> tuple[float, float]:
     """The rms of single shots, from the scatter of witnesses beyond their own deviations."""
-    many = np.array([1.0 if each.against is None else 2.0 for each in witnesses])
-    own = np.array([each.std**2 + QUIET**2 for each in witnesses])
+    many, own = heard.flickering, heard.own_variance
     square = (left**2 * STD_OF_MEDIAN_SIZE**2 - own) / many
     # The median of squares stands for their mean, so that a few outliers do not make flicker.
     found = float(np.median(square))

@@ -13,7 +13,8 @@ from dsl_core.model.plan import CapturePlan
 from dsl_core.patterns.gray_code import DecodedCode
 from dsl_core.progress import Progress
 from dsl_core.reconstruction.hdr import MergedFrame
-from dsl_core.reconstruction.light.course import LightCourse, Witness, light_course
+from dsl_core.reconstruction.light.course import LightCourse, light_course
+from dsl_core.reconstruction.light.heard import Witness
 from dsl_core.reconstruction.light.line_levels import LineLevels, candidates, line_levels
 from dsl_core.reconstruction.light.pictures import Pictures
 from dsl_core.reconstruction.light.room_flicker import room_flicker

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from dsl_core.model.plan import Shot
 from dsl_core.optics.sensor import bayer_channels, raw_variance
-from dsl_core.reconstruction.light.course import Witness
+from dsl_core.reconstruction.light.heard import Witness
 from dsl_core.reconstruction.light.line_levels import LineLevels
 from dsl_core.reconstruction.light.pictures import Pictures
 from dsl_core.reconstruction.light.sudden import Again, share_of_black

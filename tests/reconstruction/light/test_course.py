@@ -7,7 +7,8 @@ import pytest
 from scipy.stats import chi2
 
 from dsl_core.reconstruction.light import course as course_module
-from dsl_core.reconstruction.light.course import LightCourse, Witness, light_course
+from dsl_core.reconstruction.light.course import LightCourse, light_course
+from dsl_core.reconstruction.light.heard import QUIET, Heard, Witness
 
 SHOTS = 200
 
@@ -121,7 +122,7 @@ def test_terms_are_those_of_weighted_least_squares_with_what_is_believed_before(
     heard = [each for each in witnesses(0.08, 0.02, 4) if each.shot % 3]
     heard[5] = replace(heard[5], log=heard[5].log + 0.3)
     flicker = 0.01
-    values, covariance, left = course_module._fit(heard, SHOTS, flicker, (0.5, 0.3), 0.01)
+    values, covariance, left = course_module._fit(Heard.of(heard), SHOTS, flicker, (0.5, 0.3), 0.01)
     rows, noise = [], []
     for each in heard:
         t, u = each.shot / 199, 0.0 if each.against is None else each.against / 199
@@ -146,11 +147,11 @@ def test_terms_are_those_of_weighted_least_squares_with_what_is_believed_before(
 def test_flicker_is_what_the_middle_of_the_squares_leaves_beyond_their_own_noise() -> None:
     heard = [Witness(k, None if k % 2 else 0, 0.0, 0.003) for k in range(7)]
     left = np.array([0.0, 0.01, 0.02, 0.03, -0.04, 0.05, 0.9])
-    found, std = course_module._flicker(heard, left)
+    found, std = course_module._flicker(Heard.of(heard), left)
     many, own = np.array([2, 1, 2, 1, 2, 1, 2]), 0.003**2 + 0.002**2
     assert found == pytest.approx(np.sqrt(np.median((left**2 / chi2.median(1) - own) / many)))
     assert std == pytest.approx(np.median((left**2 + own) / many) * np.sqrt(2 / 7) / found)
-    none, chance = course_module._flicker(heard, 0 * left)
+    none, chance = course_module._flicker(Heard.of(heard), 0 * left)
     assert none == 0.0
     assert chance == pytest.approx(np.sqrt(np.median(own / many) * np.sqrt(2 / 7) * 2))
 
@@ -171,8 +172,8 @@ def test_changes_count_beyond_chance_and_beyond_what_nobody_minds(
 
 def test_the_curve_begins_at_zero_and_its_deviation_is_that_of_its_terms() -> None:
     heard = witnesses(-0.1, 0.0)
-    course = course_module._course(heard, SHOTS, (0.5, 0.3))
-    values, covariance, _ = course_module._fit(heard, SHOTS, course.flicker, (0.5, 0.3), 0.01)
+    course = course_module._course(Heard.of(heard), SHOTS, (0.5, 0.3))
+    values, covariance, _ = course_module._fit(Heard.of(heard), SHOTS, course.flicker, (0.5, 0.3), 0.01)
     time = np.arange(SHOTS) / (SHOTS - 1)
     terms = np.stack([time, time**2])
     assert course.log == pytest.approx(values[:2] @ terms, abs=1e-4)
@@ -187,7 +188,7 @@ def test_four_witnesses_are_enough_and_a_drift_by_chance_is_told_but_not_followe
     course = light_course(heard, SHOTS)
     assert course is not None
     assert np.abs(course.log).max() < 1e-5
-    assert course.drift == course_module._course(heard, SHOTS, (0.5, 0.3)).drift
+    assert course.drift == course_module._course(Heard.of(heard), SHOTS, (0.5, 0.3)).drift
     assert abs(course.drift) > 0.001
     # A scan of one shot has no course, and is divided by nothing.
     alone = light_course([Witness(0, None, 0.01, 0.01)] * 4, 1)
@@ -197,9 +198,11 @@ def test_four_witnesses_are_enough_and_a_drift_by_chance_is_told_but_not_followe
 
 def test_a_witness_far_off_counts_by_its_distance_and_not_by_its_square() -> None:
     std = 0.003
-    sigma = float(np.hypot(std, course_module.QUIET))
+    sigma = float(np.hypot(std, QUIET))
     steady = [Witness(0, 0, away * sigma, std) for away in (1.0, -2.0, 10.0)]  # nothing is fitted to them
-    misfit = course_module._misfit(steady, SHOTS, 0.0, course_module.DRIFT_STD, course_module.SETTING_STD)
+    misfit = course_module._misfit(
+        Heard.of(steady), SHOTS, 0.0, course_module.DRIFT_STD, course_module.SETTING_STD
+    )
     assert misfit == pytest.approx(1 + 4 + 2.5 * (2 * 10 - 2.5))
 
 
