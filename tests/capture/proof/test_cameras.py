@@ -35,16 +35,21 @@ class FlatScene:
     """A flat surface whose columns are the projector's, seen by a camera with noise."""
 
     def __init__(
-        self, plan: CapturePlan, bayer: BayerPattern, led: tuple[float, float, float] = (1, 1, 1)
+        self,
+        plan: CapturePlan,
+        bayer: BayerPattern,
+        led: tuple[float, float, float] = (1, 1, 1),
+        shares: tuple[float, float, float] = (1, 1, 1),
     ) -> None:
         width, height = plan.camera_size_px
         self._plan, self._rng = plan, np.random.default_rng(width)
         self._column = np.arange(width) * COLUMNS // width
         self._gain = (np.array([0.8, 1.0, 0.6]) * led)[bayer_channels(bayer, height, width)]
+        self._shares = np.array(shares) / sum(shares)
 
     def take(self, shot: Shot) -> NDArray[np.uint16]:
         image = pattern_image(self._plan, self._plan.original(shot)).astype(float)
-        share = image.reshape(8, COLUMNS, -1).mean((0, 2)) / max(image.max(), 1)
+        share = (image.reshape(8, COLUMNS, -1).mean(0) / max(image.max(), 1)) @ self._shares
         light = 100 + 2000 * share[self._column][None] * self._gain
         values = self._rng.normal(light, np.sqrt(4 + 0.1 * light))
         return np.asarray(values.round().clip(0, 4095), np.uint16)
@@ -69,9 +74,12 @@ def coloured(width: int, height: int) -> CapturePlan:
     return plan_of(width, height).model_copy(update={"spectral": spectral})
 
 
-def test_a_camera_without_colours_sees_a_third_of_white_in_each_colour() -> None:
+@pytest.mark.parametrize("shares", [(1.0, 1.0, 1.0), (0.11, 0.8, 0.09), (0.6, 0.3, 0.1)])
+def test_a_camera_without_colours_and_calibration_may_see_any_light_of_each_led(
+    shares: tuple[float, float, float],
+) -> None:
     plan = coloured(1000, 36)
-    proof, scene = FrameProof(plan, None, 12, "MONO"), FlatScene(plan, "MONO")
+    proof, scene = FrameProof(plan, None, 12, "MONO"), FlatScene(plan, "MONO", shares=shares)
     found = {shot.index: proof.judge(shot, scene.take(shot)) for shot in plan.shots()}
     assert [each for each in found.values() if each.is_wrong] == []
 

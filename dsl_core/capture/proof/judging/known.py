@@ -111,10 +111,17 @@ class Known:
         return self._profiles[key]
 
     def _seen(self, profile: Floats | None) -> Floats | None:
-        """A `line_profile` as pixels see it: those of a monochrome camera see all LEDs together."""
+        """A `line_profile` as pixels see it: those of a monochrome camera see all LEDs together.
+
+        None for a coloured picture to a monochrome camera that is not calibrated.
+        """
         if profile is None or self.bayer != "MONO":
             return profile
-        return np.repeat(profile.reshape(-1, 3) @ _light_of_leds(self.calibration), 3)
+        leds = profile.reshape(-1, 3)
+        if self.calibration is None:
+            # How bright each LED is to such a camera is not known yet; pictures of all alike need no share.
+            return profile if (leds == leds[:, :1]).all() else None
+        return np.repeat(leds @ _light_of_leds(self.calibration), 3)
 
     def rivals(self, shot: Shot) -> list[tuple[Verdict, Shot]]:
         """The shots whose pattern a picture most likely shows instead, and what that would be called."""
@@ -151,9 +158,7 @@ class Known:
             (self.untold.discard if is_told else self.untold.add)(shot.index)
 
 
-def _light_of_leds(rig: Rig | None) -> Floats:
-    """What share of white each LED gives a monochrome camera, (3,); a third of it where nobody knows."""
-    if rig is None:
-        return np.full(3, 1 / 3, np.float32)
+def _light_of_leds(rig: Rig) -> Floats:
+    """What share of white each LED gives a monochrome camera, (3,)."""
     light = chain_response(rig, 0, _NM)[colour_sites("MONO")[0]].sum(1)
     return np.asarray(light / light.sum(), np.float32)
