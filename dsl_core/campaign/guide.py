@@ -87,17 +87,29 @@ def calibrate_all(
     """Run every calibration in order and assemble the rig; resumes where it was interrupted.
 
     ``recipes`` are all calibrations, those of this installation if not given; ``stage`` surrounds each one
-    under its title, to measure it. However it ends, a rig that places targets puts back what was there.
+    under its title, to measure it. What is `omitted` of this rig is not run. However it ends, a rig that
+    places targets puts back what was there.
     """
     recipes = campaign_recipes(campaign) if recipes is None else recipes
+    without = omitted(recipes, devices)
     try:
-        for recipe in recipes:
+        for recipe in (each for each in recipes if each.name not in without):
             with stage(recipe.title) if stage else nullcontext():
                 run_calibration(CalibrationSession(recipe, devices, campaign, recipes), guide, progress)
     finally:
         if devices.put_back is not None:
             devices.put_back()
     return calibrated_rig(campaign, devices, name, recipes)
+
+
+def omitted(recipes: Sequence[AnyRecipe], devices: DeviceRig) -> dict[str, str]:
+    """The calibrations, by name, that all of a rig go without, and a sentence with the reason of each.
+
+    Raises `CalibrationError` when nothing is known of the rig.
+    """
+    rig = nominal_rig(devices)
+    reasons = {recipe.name: recipe.reason_to_omit(rig) for recipe in recipes}
+    return {name: reason for name, reason in reasons.items() if reason}
 
 
 def calibrated_rig(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from dsl_core.calibration.drift.light import WHITE_SIGNAL
+from dsl_core.calibration.drift.light import white_signal
 from dsl_core.io.calibration_library import CalibrationLibrary
 from dsl_core.model.calibration.light_check import LightCheck
 from dsl_core.model.conditions import COLOUR_NAMES
@@ -19,7 +19,8 @@ def light_check(rig: Rig, figures: Iterable[Figure], checked: str) -> LightCheck
     That is so without the Spectralon, and where nobody noted when the light was calibrated.
     """
     by_name = {figure.name: figure for figure in figures}
-    whites = [by_name.get(WHITE_SIGNAL.format(name)) for name in COLOUR_NAMES]
+    # A monochrome camera has one figure for the light of all LEDs together.
+    whites = [by_name.get(white_signal(name), by_name.get(white_signal(""))) for name in COLOUR_NAMES]
     calibrated = light_calibrated(rig)
     red, green, blue = whites
     if red is None or green is None or blue is None or not calibrated:

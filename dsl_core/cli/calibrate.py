@@ -185,9 +185,9 @@ def all_(
     json: Json = False,
 ) -> None:
     """Run every calibration in order: from an unknown rig to a calibrated one, with a report."""
-    from dsl_core.campaign.guide import calibrate_all
+    from dsl_core.campaign.guide import calibrate_all, omitted
     from dsl_core.campaign.products import write_products
-    from dsl_core.campaign.recipes import load_recipe
+    from dsl_core.campaign.recipes import campaign_recipes, load_recipe
     from dsl_core.io.calibration_library import check_name
 
     output, timer, settings = Output(json), StageTimer(), _settings_by_name(set_)
@@ -202,6 +202,8 @@ def all_(
         opened_campaign(campaign, rig, parse_options(option), settings) as (folder, devices),
         resumed_by(f"dsl-scan calibrate all {campaign}"),
     ):
+        for each, reason in omitted(campaign_recipes(folder), devices).items():
+            output.say(f"{each} is left out: {reason}")
         with output.progress() as progress:
             try:
                 calibrated = calibrate_all(

@@ -35,6 +35,16 @@ def mosaic_colours(bayer: str) -> tuple[int, ...]:
     return tuple(sorted(set(colour_sites(bayer))))
 
 
+def colours_named(bayer: str) -> dict[int, str]:
+    """The colours that pixels of a mosaic have, by number, and their names: none of a monochrome camera's.
+
+    >>> colours_named("GRBG"), colours_named("MONO")
+    ({0: 'red', 1: 'green', 2: 'blue'}, {1: ''})
+    """
+    colours = mosaic_colours(bayer)
+    return {colour: COLOUR_NAMES[colour] if len(colours) > 1 else "" for colour in colours}
+
+
 #: Frame periods of one mode are measured; a mode of another rate differs by far more than this share.
 _SAME_PERIOD = 0.01
 

@@ -15,7 +15,7 @@ from dsl_app.shared.jobs.base import Job
 from dsl_app.shared.notify import describe_seconds
 from dsl_core.campaign.assembly import nominal_rig
 from dsl_core.campaign.common.recipe import AnyRecipe, Bench, Step
-from dsl_core.campaign.guide import calibrate_all
+from dsl_core.campaign.guide import calibrate_all, omitted
 from dsl_core.campaign.products import Products, write_products
 from dsl_core.campaign.session import CalibrationSession
 from dsl_core.devices.base import DeviceRig
@@ -52,6 +52,7 @@ class CalibrateAll:
         self._camera: WatchedCamera | None = None
         self._overall = Overall({})
         self._shown = ""
+        self._omitted: dict[str, str] = {}
 
     @property
     def is_running(self) -> bool:
@@ -63,11 +64,11 @@ class CalibrateAll:
         self._camera = WatchedCamera(devices.camera)
         # Scans of a calibration must not change the rig of the window.
         own = replace(devices, camera=self._camera)
-        self._overall, self._shown = Overall({}), ""
+        self._overall, self._shown, self._omitted = Overall({}), "", {}
         job = Job(
             "Calibrate everything",
             lambda progress: self._all(path, own, name, progress),
-            lambda made: self._ended(f"Everything is calibrated. {products_text(made)}"),
+            lambda made: self._ended(self._outcome(made)),
             lambda error: self._ended("", error),
             lambda: self._ended("Stopped. Everything captured is kept; start again to continue."),
             exclusive=RIG,
@@ -82,12 +83,17 @@ class CalibrateAll:
         campaign = CampaignFolder.open(path)
         recipes = self._kinds.recipes(campaign)
         progress.report("prepare", 0, 0)
-        self._overall = Overall({recipe.name: _parts(recipe, devices, campaign) for recipe in recipes})
+        self._omitted = omitted(recipes, devices)
+        run = [recipe for recipe in recipes if recipe.name not in self._omitted]
+        self._overall = Overall({recipe.name: _parts(recipe, devices, campaign) for recipe in run})
         guide = UnattendedGuide(progress, overall=self._overall)
         rig = calibrate_all(campaign, devices, guide, guide, name, recipes)
         guide.title = "Report"
         guide.report("write", 0, 0)
         return write_products(campaign, rig, name, recipes=recipes, library=self._store)
+
+    def _outcome(self, made: Products) -> str:
+        return " ".join(["Everything is calibrated.", products_text(made), *self._omitted.values()])
 
     def cancel(self) -> None:
         """Stop at the next safe point; everything captured is kept."""

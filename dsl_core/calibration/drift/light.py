@@ -14,7 +14,7 @@ import torch
 from numpy.typing import NDArray
 
 from dsl_core.errors import CalibrationError
-from dsl_core.model.conditions import COLOUR_NAMES
+from dsl_core.model.conditions import colours_named
 from dsl_core.model.figure import Figure
 from dsl_core.model.rig import Rig
 from dsl_core.model.spectral import WavelengthGrid
@@ -26,8 +26,6 @@ from dsl_core.solve.robust import robust_std
 
 Floats = NDArray[np.float64]
 
-#: Name of the figure of a colour.
-WHITE_SIGNAL = "white signal, {0}, over calibration"
 LIGHT_LIMIT, FILM_LIMIT_PX, EFFICIENCY_LIMIT = 0.03, 0.2, 0.05
 #: Bands of the prediction, without those that the model adds beyond both ends.
 GRID = WavelengthGrid(start_nm=430.0, stop_nm=675.0, step_nm=5.0)
@@ -37,6 +35,15 @@ _MIN_SIGNALS = 200
 #: Deviations from which a signal pulls no harder.
 _HUBER = 1.345
 _EVERY = (0, *ORDERS, *SECOND_ORDERS)
+
+
+def white_signal(colour: str) -> str:
+    """Name of the figure of a colour, or of a monochrome camera's light, which has no name.
+
+    >>> white_signal("red"), white_signal("")
+    ('white signal, red, over calibration', 'white signal, over calibration')
+    """
+    return ", ".join(part for part in ("white signal", colour, "over calibration") if part)
 
 
 @dataclass(frozen=True)
@@ -58,22 +65,22 @@ class PlaneSignals:
 
 
 def light_drift(rig: Rig, white: PlaneSignals, reflectance: float) -> list[Figure]:
-    """Measured over predicted white signal of each colour, for a target of known reflectance."""
+    """Measured over predicted white signal of each colour that is seen, for a target of known reflectance."""
     expected = _Plane(rig, white, reflectance).signals()[0]
     usable = np.isfinite(white.std[0]) & (expected > 0.2 * np.median(expected))
     figures = []
-    for colour, name in enumerate(COLOUR_NAMES):
+    for colour, name in colours_named(rig.sensor.bayer).items():
         mine = usable & (white.colours == colour)
         if mine.sum() < _MIN_SIGNALS // 4:
             raise CalibrationError(
-                f"Only {int(mine.sum())} {name} pixels of the target are lit and not saturated."
+                f"Only {f'{mine.sum()} {name}'.strip()} pixels of the target are lit and not saturated."
                 " Fill the middle of the picture with the target."
             )
         ratio = white.radiance[0, mine] / expected[mine]
         spread = float(robust_std(ratio - np.median(ratio)))
         figures.append(
             Figure(
-                name=WHITE_SIGNAL.format(name),
+                name=white_signal(name),
                 value=float(np.median(ratio)),
                 std=float(
                     np.hypot(MEDIAN_OVER_MEAN_STD * spread / np.sqrt(mine.sum()), rig.white_scale_rel_std)

@@ -40,6 +40,7 @@ from dsl_core.calibration.light.chain_equations import (
 )
 from dsl_core.errors import CalibrationError
 from dsl_core.model.calibration.chain import ChainCorrection, apply_chain
+from dsl_core.model.conditions import mosaic_colours
 from dsl_core.model.rig import Rig
 from dsl_core.model.spectral import SpectralCurve
 from dsl_core.optics.correspondence import Correspondence, correspondence
@@ -113,9 +114,9 @@ def largest_correction(before: Rig, after: Rig) -> float:
     Of response, efficiency and white scale only the product counts, and where a colour is dark its factor
     absorbs stray light and can grow without limit.
     """
-    largest = 0.0
+    largest, seen = 0.0, list(mosaic_colours(before.sensor.bayer))
     for order in ORDERS:
-        old, new = (chain_response(rig, order, UNKNOWNS.nodes_nm).sum(1) for rig in (before, after))
+        old, new = (chain_response(rig, order, UNKNOWNS.nodes_nm).sum(1)[seen] for rig in (before, after))
         light = old.sum(0)
         bright = light > BRIGHT_SHARE * light.max()
         weight = old**2
@@ -148,6 +149,7 @@ def _solve(rig: Rig, scans: list[LineScan], model: Correspondence, target: Spect
         **SMOOTHNESS,
     )
     used = [part for part in parts if part.count]
+    seen = list(mosaic_colours(rig.sensor.bayer))
     left_out = LeftOut(
         solution,
         total,
@@ -160,7 +162,7 @@ def _solve(rig: Rig, scans: list[LineScan], model: Correspondence, target: Spect
         solution,
         float(misfit / max(first.count, 1)),
         chain_std,
-        float(np.sqrt((ratio_std**2).mean() / 3)),
+        float(np.linalg.norm(ratio_std[seen]) / len(seen)),
         pixels,
         _scale(solution, with_scale, used),
     )
@@ -239,6 +241,8 @@ def _chain_std(rig: Rig, order: int, solution: SmoothSolution, left_out: LeftOut
 def _product(rig: Rig, order: int) -> Floats:
     """Relative change of the chain at the nodes by the unknowns, colours weighted by squared signal."""
     weight = chain_response(rig, order, UNKNOWNS.nodes_nm).sum(1) ** 2
+    # Curves of colours that a monochrome camera does not have weigh nothing.
+    weight[[colour for colour in range(3) if colour not in mosaic_colours(rig.sensor.bayer)]] = 0.0
     weight = weight / weight.sum(0).clip(min=1e-30)
     n = len(UNKNOWNS.nodes_nm)
     product = np.zeros((n, UNKNOWNS.count))

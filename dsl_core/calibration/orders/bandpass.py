@@ -31,6 +31,7 @@ from dsl_core.calibration.orders.response import BandSample, fit_response, shift
 from dsl_core.calibration.orders.steady_light import LightJump
 from dsl_core.errors import CalibrationError
 from dsl_core.model.calibration.bandpass import BandpassCalibration, FilterSample, OrderSample
+from dsl_core.model.conditions import mosaic_colours
 from dsl_core.model.rig import Rig
 from dsl_core.model.spectral import SpectralCurve
 from dsl_core.optics.filters import (
@@ -270,12 +271,13 @@ def _second(
 def _white(rig: Rig, scan: LineScan, profile: ZeroOrderFit) -> tuple[Floats, Floats]:
     """Zero order of white at unit shading in each colour (DN per ms), and its deviation by cells.
 
-    The amplitudes are those of the fit that knows blur and halo.
+    The amplitudes are those of the fit that knows blur and halo. NaN, infinite for colours that the camera's
+    mosaic does not have.
     """
     pixels = plane_pixels(rig, scan, 550.0)
     relative = profile.amplitude / scan.shading
     value, std = of_colours(pixels, relative, profile.good, np.median)
-    if np.isnan(value).any():
+    if np.isnan(value[list(mosaic_colours(rig.sensor.bayer))]).any():
         raise CalibrationError(
             "The scan without a filter shows too little of the target. Fill the picture with a flat white"
             " target and capture the step again."

@@ -63,7 +63,8 @@ def fit_response(
 ) -> Rig:
     """The rig with its response and white scale refined, and their deviations.
 
-    ``white`` (3,) is the zero order of white at unit shading, DN per ms.
+    ``white`` (3,) is the zero order of white at unit shading, DN per ms, NaN for colours that the camera does
+    not have: their curves stay as they are.
     """
     in_white = chain_response(rig, 0, FINE_NM).sum(1) * reflectance
     change = np.zeros((3, len(NODES_NM)))
@@ -103,9 +104,8 @@ def shift_of_all(
         solution = _solve(samples, here.besides(slope[:, None], target), [SHIFT_STD_NM])
         change = solution.values[: 3 * len(NODES_NM)].reshape(3, -1)
         shift_nm = float(np.clip(solution.values[-1], shift_nm - MOST_NM, shift_nm + MOST_NM))
-    apart = here.besides(
-        slope[:, None] * _shares(by_led, samples, [_moved(t, shift_nm) for t in through]), target
-    )
+    shares = _shares(by_led, samples, [_moved(t, shift_nm) for t in through], white)
+    apart = here.besides(slope[:, None] * shares, target)
     excess = max(_disagreement(_solve(samples, apart, [SHIFT_STD_NM] * 3)), 1.0)
     centres = [MEASURED_NM if sample.measured_curve else NOMINAL_NM for sample in samples]
     own = solution.std[-1] * excess**0.5
@@ -125,10 +125,12 @@ class _Data:
         return _Data(np.concatenate([self.design, more], 1), target, self.std)
 
 
-def _shares(by_led: Floats, samples: Sequence[BandSample], through: Sequence[Floats]) -> Floats:
+def _shares(
+    by_led: Floats, samples: Sequence[BandSample], through: Sequence[Floats], white: Floats
+) -> Floats:
     """Share of each LED in the light of every equation, (n, LEDs); ``by_led`` (3, LEDs, `FINE_NM`)."""
     light = [by_led[c] @ t for s, t in zip(samples, through, strict=True) for c in _usable(s)]
-    light += [by_led[c].sum(1) for c in range(3)]
+    light += [by_led[c].sum(1) for c in _seen_colours(white)]
     return np.array([each / max(each.sum(), 1e-300) for each in light])
 
 
@@ -149,7 +151,7 @@ def _data(
             design.append(_place(row, colour, len(samples), i))
             target.append(value)
             std.append(np.hypot(sample.std[colour] / sample.seen[colour], LEAST_STD))
-    for colour in range(3):
+    for colour in _seen_colours(white):
         row, value = _equation(in_white[colour], white[colour], change[colour])
         design.append(_place(row, colour, len(samples), None))
         target.append(value)
@@ -171,6 +173,11 @@ def _solve(samples: Sequence[BandSample], data: _Data, more_std: Sequence[float]
 def _moved(through: Floats, shift_nm: float) -> Floats:
     """A transmission at `FINE_NM` whose band is so many nm further to the red."""
     return np.interp(FINE_NM - shift_nm, FINE_NM, through)
+
+
+def _seen_colours(white: Floats) -> list[int]:
+    """The colours that the camera has, of the zero order of white (3,)."""
+    return np.flatnonzero(np.isfinite(white)).tolist()
 
 
 def _usable(sample: BandSample) -> list[int]:

@@ -241,13 +241,13 @@ def bandpass_figures(record: BandpassCalibration, done: Collection[str] = ()) ->
     ]
     figures += [
         Figure(
-            name=f"response of {colour}, deviation",
+            name=f"{colour}, deviation",
             value=100 * float(np.median(_relative_std(curve, centres[_bright(curve, centres)]))),
             unit="%",
             high=5.0,
             advice=_response_advice(record, done),
         )
-        for colour, curve in zip(COLOUR_NAMES, record.response, strict=True)
+        for colour, curve in _responses(record).items()
     ]
     halo = 200 * record.halo_decay_px
     figures += [
@@ -272,6 +272,14 @@ def bandpass_figures(record: BandpassCalibration, done: Collection[str] = ()) ->
         doubts("filters in doubt", record.warnings),
     ]
     return tuple(figures)
+
+
+def _responses(record: BandpassCalibration) -> dict[str, SpectralCurve]:
+    """The curves that were measured, by name: a monochrome camera has one, and no red or blue pixels."""
+    seen = [any(each.zero_dn_per_ms[colour] for each in record.filters) for colour in range(3)]
+    if sum(seen) == 1:
+        return {"response": record.response[seen.index(True)]}
+    return {f"response of {name}": record.response[i] for i, name in enumerate(COLOUR_NAMES) if seen[i]}
 
 
 def _of_filters(record: BandpassCalibration) -> list[Figure]:
@@ -327,7 +335,7 @@ def _response_advice(record: BandpassCalibration, done: Collection[str]) -> str:
     ways = []
     if not all(each.curve_measured for each in record.filters):
         ways.append("measure the filters' transmissions")
-    if "color-checker" not in done:
+    if "color-checker" not in done and len(_responses(record)) > 1:
         ways.append("calibrate with a Color Checker first")
     ways = ways or [
         "use more filters where this colour is bright",

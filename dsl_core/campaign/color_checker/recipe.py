@@ -46,6 +46,12 @@ PATCHES_MM = (312.0, 208.0)
 _Corners = tuple[tuple[float, float], tuple[float, float], tuple[float, float], tuple[float, float]]
 
 
+_NO_COLOURS = (
+    "The rig's camera is monochrome, and the Color Checker compares red, green and blue. Leave this"
+    " calibration out, and state the camera's response curve in the rig."
+)
+
+
 @dataclass(frozen=True)
 class ColorCheckerRecipe(Recipe[ColorCheckerCalibration]):
     """The calibration with a classic Color Checker of 24 patches.
@@ -83,9 +89,13 @@ class ColorCheckerRecipe(Recipe[ColorCheckerCalibration]):
             ),
         )
 
+    def reason_to_omit(self, rig: Rig) -> str:
+        """That a monochrome camera has no colours to compare."""
+        return _NO_COLOURS if len(mosaic_colours(rig.sensor.bayer)) == 1 else ""
+
     def look(self, bench: Bench, step: Step) -> tuple[Figure, ...]:
         """Whether the chart is found, and how it is turned; raises `CalibrationError`."""
-        _require_colours(bench.rig)
+        self._require_colours(bench.rig)
         white = shoot_white(bench)
         pose = self._pose(white.picture.astype(np.float32), bench.rig, f"the test shot of {step.title}")
         patch_samples(pose.corners_px, (white.picture.shape[0], white.picture.shape[1]))
@@ -102,7 +112,7 @@ class ColorCheckerRecipe(Recipe[ColorCheckerCalibration]):
 
     def capture(self, bench: Bench, step: Step, progress: Progress) -> None:
         """Choose exposures by a test shot and capture; raises `CalibrationError` for monochrome cameras."""
-        _require_colours(bench.rig)
+        self._require_colours(bench.rig)
         capture_uniform(bench, step, RATIO, progress)
 
     def fit(self, bench: Bench, progress: Progress) -> ColorCheckerCalibration:
@@ -126,6 +136,11 @@ class ColorCheckerRecipe(Recipe[ColorCheckerCalibration]):
                 "reference_rel_std": unsure,
             }
         )
+
+    def _require_colours(self, rig: Rig) -> None:
+        """Raise `CalibrationError` for a camera whose patches have no colours to compare."""
+        if reason := self.reason_to_omit(rig):
+            raise CalibrationError(reason)
 
     def _fit(self, bench: Bench, step: Step, progress: Progress) -> ColorCheckerCalibration:
         rig = bench.rig
@@ -171,12 +186,3 @@ def white_picture(bench: Bench, step: Step) -> NDArray[np.uint8]:
     scan = MergedScan(bench.scan_of(step), bench.rig)
     picture = chart_picture(scan.merge("spectral", WHITE).radiance, bench.rig.sensor.bayer)
     return np.ascontiguousarray(picture[..., ::-1])
-
-
-def _require_colours(rig: Rig) -> None:
-    """Raise `CalibrationError` for a camera whose patches have no colours to compare."""
-    if len(mosaic_colours(rig.sensor.bayer)) == 1:
-        raise CalibrationError(
-            "The rig's camera is monochrome, and the Color Checker compares red, green and blue. Leave this"
-            " calibration out, and state the camera's response curve in the rig."
-        )

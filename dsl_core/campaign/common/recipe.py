@@ -126,6 +126,10 @@ class Recipe(ABC, Generic[RecordT]):
     def steps(self, bench: Bench) -> tuple[Step, ...]:
         """The steps in their order."""
 
+    def reason_to_omit(self, rig: Rig) -> str:
+        """Why all calibrations of a rig go without this one: a sentence, empty where they do not."""
+        return ""
+
     @abstractmethod
     def look(self, bench: Bench, step: Step) -> tuple[Figure, ...]:
         """Check with a few frames, which are not kept, that the target is right: found, even, unsaturated.
