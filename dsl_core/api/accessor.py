@@ -18,7 +18,7 @@ from dsl_core.io.result.result_file import save_result
 from dsl_core.model.attributes import SCALE_ATTRIBUTE
 from dsl_core.model.fit import Fit
 from dsl_core.model.result import DEPTH_INVALID
-from dsl_core.model.result_order import with_axes
+from dsl_core.model.result_order import with_axes, with_bits
 from dsl_core.solve.normal import BAND_95
 
 if TYPE_CHECKING:
@@ -192,7 +192,7 @@ class ResultAccessor:
         if "x" not in self._result.dims:
             raise DecodeError("This is one spectrum, not a result: it has no pixels to choose from.")
         try:
-            return self._result.sel(x=x, y=y)
+            return with_bits(self._result.sel(x=x, y=y))
         except KeyError as error:
             raise DecodeError(
                 f"Pixel x {x}, y {y} is not in the result ({extent_of(self._result)})."

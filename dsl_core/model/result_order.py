@@ -1,23 +1,29 @@
 """The order that a result is relied on to have, and where its pixels are in the camera's picture.
 
 xarray goes by names and does not mind an order; arrays do. Other programs, and slices of a person, may store
-axes otherwise, bands that fall, or a picture upside down.
+axes otherwise, bands that fall, or a picture upside down. Masking with `xarray.Dataset.where` makes floats
+of whole numbers, and NaN of those that it takes away.
 """
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from dsl_core.model.result import VARIABLES
+from dsl_core.model.result import VARIABLES, Flag
 
 if TYPE_CHECKING:
     import xarray as xr
 
 #: The axis of bands.
 BANDS = "wavelength_nm"
+#: Variables of bits, with their types, and what says of a pixel that it has been taken away.
+BITS: dict[str, tuple[type[np.unsignedinteger[Any]], int]] = {
+    "flags": (np.uint16, int(Flag.NON_FINITE)),
+    "reach": (np.uint8, 0),
+}
 
 
 def places_px(coordinate: ArrayLike) -> NDArray[np.int64] | None:
@@ -59,12 +65,37 @@ def rising_order(values: ArrayLike) -> NDArray[np.intp] | None:
     return None if bool((order == np.arange(given.size)).all()) else order
 
 
+def as_bits(name: str, values: NDArray[Any]) -> NDArray[Any]:
+    """Values of a variable named ``name``: bits that masking made floats as whole numbers again.
+
+    NaN in flags becomes `Flag.NON_FINITE`, since nothing is left of such a pixel. Other variables, and
+    fractions (a mean of flags is no flag), stay as they are.
+
+    >>> as_bits("flags", np.array([4.0, np.nan])).tolist()
+    [4, 512]
+    """
+    if name not in BITS or values.dtype.kind != "f":
+        return values
+    kind, taken_away = BITS[name]
+    filled = np.where(np.isnan(values), taken_away, values)
+    is_whole = bool(((filled >= 0) & (filled <= np.iinfo(kind).max) & (filled == np.rint(filled))).all())
+    return filled.astype(kind) if is_whole else values
+
+
+def with_bits(result: xr.Dataset) -> xr.Dataset:
+    """A result whose flags and reach are whole numbers, as by `as_bits`; the very dataset if they are."""
+    floats = [name for name in BITS if name in result and result[name].dtype.kind == "f"]
+    whole = {name: result[name].copy(data=as_bits(name, result[name].values)) for name in floats}
+    return result.assign(whole) if whole else result
+
+
 def with_axes(result: xr.Dataset) -> xr.Dataset:
     """A result with its axes as `VARIABLES` has them and its bands rising; rows and columns stay as they are.
 
-    It is the very dataset where that is so already. What has other axes, such as one spectrum, keeps them.
+    Flags are whole numbers, as `with_bits` makes them. It is the very dataset where all that is so already.
+    What has other axes, such as one spectrum, keeps them.
     """
-    result = _rising(result, (BANDS,))
+    result = _rising(with_bits(result), (BANDS,))
     turned = {
         name: variable.transpose(*VARIABLES[str(name)][0])
         for name, variable in result.data_vars.items()

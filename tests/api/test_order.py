@@ -11,6 +11,7 @@ import xarray as xr
 
 import dsl_core as dsl
 from dsl_core.io.result.result_arrays import load_arrays
+from dsl_core.model.result import Flag
 from dsl_core.model.result_order import canonical, with_axes
 from tests.cases.small_result import small_result
 
@@ -85,3 +86,39 @@ def test_what_is_in_order_is_left_as_it_is() -> None:
     assert canonical(bare) is bare
     spectrum = usual.dsl.spectrum(4, 2)
     assert with_axes(spectrum) is spectrum
+
+
+def test_masking_leaves_whole_flags_that_tell_what_is_taken_away(tmp_path: Path) -> None:
+    usual = small_result()
+    masked = usual.where(usual.dsl.good)
+    assert masked["flags"].dtype.kind == "f"
+    good = usual.dsl.good.values
+    old = masked.assign(flags=masked["flags"].astype(np.float32))
+    for each in (masked, dsl.load_result(dsl.save_result(old, tmp_path / "a.zarr"))):
+        assert each.dsl.points().sizes["point"] == good.sum()
+        assert each.dsl.spectrum(0, 0).attrs["reasons"] == []
+        assert "not a finite number" in each.dsl.spectrum(4, 2).attrs["reasons"][0]
+        shown = dsl.classify(each, pins=PLACES, measure="angle")["class"].values
+        assert (shown[~good] == 0).all()
+        assert (shown[good] > 0).all()
+        dsl.export(each, tmp_path / "a.npy", overwrite=True)
+        np.testing.assert_array_equal(
+            np.load(tmp_path / "a_flags.npy"), np.where(good, usual["flags"], Flag.NON_FINITE)
+        )
+        dsl.export(each, tmp_path / "a.stl", overwrite=True)
+        dsl.export(each, tmp_path / "a.csv", pixels=[(4, 2), (0, 0)], overwrite=True)
+    stored = load_arrays(tmp_path / "a.zarr")
+    assert (stored["flags"].dtype, stored["reach"].dtype) == (np.uint16, np.uint8)
+
+
+def test_results_saved_with_floats_as_flags_are_read_with_whole_ones(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    usual = small_result()
+    with monkeypatch.context() as before:
+        before.setattr("dsl_core.io.result.result_file.with_bits", lambda result: result)
+        path = dsl.save_result(usual.where(usual.dsl.good), tmp_path / "a.zarr")
+    assert dsl.load_result(path)["flags"].dtype == np.uint16
+    stored = load_arrays(path)
+    assert (stored["flags"].dtype, stored["reach"].dtype) == (np.uint16, np.uint8)
+    np.testing.assert_array_equal(stored["flags"] == 0, usual.dsl.good)

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from dsl_core.errors import StoreError
 from dsl_core.io.result.result_file import checked_attributes, damage_of, own_attributes
 from dsl_core.model.result import VARIABLES
-from dsl_core.model.result_order import BANDS, places_px, rising_order
+from dsl_core.model.result_order import BANDS, as_bits, places_px, rising_order
 from dsl_core.progress import NoProgress, Progress
 
 if TYPE_CHECKING:
@@ -201,6 +201,7 @@ def load_arrays(path: Path, progress: Progress | None = None) -> ResultArrays:
             progress.report("read the result", done, total)
             arrays[name][part] = each.read(part)
             done += 1
+        arrays[name] = as_bits(name, arrays[name])
     missing: tuple[str, ...] = ()
     if "depth_mm" not in arrays:
         # Where pixels are is unknown; their spectra can be looked at all the same.

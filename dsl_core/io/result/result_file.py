@@ -27,7 +27,7 @@ from dsl_core.io.result.arrays import plain, write_variable
 from dsl_core.io.result.inventory import CHECKSUM, INVENTORY, check_inventory, with_inventory
 from dsl_core.io.staging import FolderKind, staged
 from dsl_core.model.result import SCHEMA_VERSION
-from dsl_core.model.result_order import canonical
+from dsl_core.model.result_order import canonical, with_bits
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -47,6 +47,7 @@ def save_result(result: xr.Dataset, path: Path, *, overwrite: bool = False) -> P
     _check_version(result.attrs.get("schema_version"), path)
     import zarr
 
+    result = with_bits(result)
     with staged([path], overwrite=overwrite, kind=RESULT_FOLDER) as (draft,):
         group = zarr.create_group(draft, zarr_format=3)
         labels = labels_of(result)
