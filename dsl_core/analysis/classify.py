@@ -24,6 +24,7 @@ from dsl_core.analysis.mark_colours import Ground, mark_colour
 from dsl_core.errors import DecodeError
 from dsl_core.evaluation.uncertainty import DECIDED_FROM
 from dsl_core.progress import NoProgress, Progress
+from dsl_core.words import counted
 
 Cube = NDArray[np.float32] | NDArray[np.float64]
 Map = NDArray[np.float32]
@@ -170,8 +171,8 @@ def score(
     """Compare every pixel with every class.
 
     Cubes (bands, rows, columns), ``flags`` (rows, columns). Bands that the prior decided, not the data, count
-    for the probability in no pixel. Raises `DecodeError` for too few classes or other bands, and for a
-    probability without deviations.
+    for the probability in no pixel. Raises `DecodeError` for too few classes or other bands, for fewer than
+    `FEWEST_BANDS` bands unless the measure is the difference, and for a probability without deviations.
     """
     classes = marked_by(shared_names(classes), {})
     _check(reflectance, std, classes, measure)
@@ -240,6 +241,11 @@ def _check(reflectance: Cube, std: Cube | None, classes: Sequence[SpectralClass]
     wrong = [each.name for each in classes if len(each.mean) != len(reflectance)]
     if wrong:
         raise DecodeError(f"{wrong[0]} does not have the {len(reflectance)} bands of the result.")
+    if measure is not Measure.RMSE and len(reflectance) < FEWEST_BANDS:
+        raise DecodeError(
+            f"The result has {counted(len(reflectance), 'band')}; to compare shapes of spectra,"
+            f" {FEWEST_BANDS} at least are needed. Reconstruct more bands, or classify by rmse."
+        )
     if measure is Measure.PROBABILITY and std is None:
         raise DecodeError(
             "The result states no deviations, so there are no probabilities. Classify by angle or rmse."
@@ -318,7 +324,10 @@ def _by_distance(
         scores.margin.flat[pixels] = 1.0
         if len(classes) > 1:
             scores.second.flat[pixels] = order[1]
-            scores.margin.flat[pixels] = 1 - nearest / np.maximum(distance[order[1], every], 1e-9)
+            second = distance[order[1], every]
+            # Of two classes that both fit without any difference, neither is better.
+            worse = np.divide(nearest, second, out=np.ones_like(nearest), where=second > 0)
+            scores.margin.flat[pixels] = 1 - worse
 
 
 def _distance(measure: Measure, values: Map, mean: NDArray[np.float64]) -> Map:

@@ -198,3 +198,23 @@ def test_one_or_two_bands_tell_no_materials_apart(bands: int) -> None:
     values = np.full((bands, 4, 5), 0.3)
     with pytest.raises(DecodeError, match=f"has {bands} band.*3 at least"):
         class_of_pixels("x", values, 0.01 * values, np.ones((4, 5), bool))
+
+
+@pytest.mark.parametrize("measure", [Measure.ANGLE, Measure.PROBABILITY])
+@pytest.mark.parametrize("bands", [1, 2])
+def test_too_few_bands_have_no_shape_that_names_a_class(
+    cube: ChartCube, measure: Measure, bands: int
+) -> None:
+    classes = [SpectralClass(name, (Member.of(np.full(bands, 0.5)),)) for name in "ab"]
+    with pytest.raises(DecodeError, match=f"has {bands} band.*3 at least.*rmse"):
+        score(cube.reflectance[:bands], cube.std[:bands], None, cube.flags, classes, measure)
+    by_rmse = score(cube.reflectance[:bands], None, None, cube.flags, classes, Measure.RMSE)
+    assert np.nanmax(by_rmse.margin) == 0
+
+
+def test_two_classes_that_fit_exactly_are_undecided() -> None:
+    values = np.full((3, 1, 1), 0.5, np.float32)
+    classes = [SpectralClass(name, (Member.of(values[:, 0, 0].astype(float)),)) for name in "ab"]
+    scores = score(values, None, None, np.zeros((1, 1), np.uint16), classes, Measure.RMSE)
+    shown = ClassMap.of(scores)
+    assert shown.values[0, 0] == shown.unsure
