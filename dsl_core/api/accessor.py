@@ -53,7 +53,8 @@ class ResultAccessor:
         ``where`` is a mask (rows, columns), or x, y, width and height in pixels of the whole picture.
         ``reflectance_std`` is the scatter of the region's pixels (that of their mean is smaller by the
         root of their number, as far as errors are independent), ``pixel_std`` the mean deviation stated
-        for a single pixel. The attribute ``used`` counts the pixels with a spectrum. Raises `DecodeError`
+        for a single pixel; where only one has a spectrum, both are what is stated for it. The attribute
+        ``used`` counts the pixels with a spectrum. Raises `DecodeError`
         for a region without any.
         """
         self._require_spectra()
@@ -73,7 +74,7 @@ class ResultAccessor:
                 name: (over, values, {"units": "1", "long_name": words})
                 for name, values, words in (
                     ("reflectance", found.mean, "mean reflectance on the Spectralon scale"),
-                    ("reflectance_std", found.deviation, "standard deviation of the pixels"),
+                    ("reflectance_std", found.spread, "standard deviation of the pixels"),
                     ("pixel_std", found.pixel_std, "mean standard deviation stated for a pixel"),
                     ("data_share", found.data_share, "mean share decided by data"),
                 )

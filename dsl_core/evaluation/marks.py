@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -75,7 +76,7 @@ class RegionSpectrum:
 
     ``pixels`` are in the outline, ``used`` of them have a spectrum, of which bands may be missing (NaN).
     ``pixel_std`` is the mean uncertainty stated for a single pixel; a deviation far above it means that the
-    region is not of one material.
+    region is not of one material. A single pixel has no ``deviation`` (NaN).
     """
 
     mean: NDArray[np.float64]
@@ -84,6 +85,11 @@ class RegionSpectrum:
     data_share: NDArray[np.float64]
     pixels: int
     used: int
+
+    @property
+    def spread(self) -> NDArray[np.float64]:
+        """How its pixels differ, (bands,); of a single pixel, the deviation stated for it."""
+        return self.pixel_std if self.used == 1 else self.deviation
 
 
 def region_spectrum(reflectance: Floats, std: Floats, data_share: Floats, mask: Mask) -> RegionSpectrum:
@@ -102,7 +108,7 @@ def region_spectrum(reflectance: Floats, std: Floats, data_share: Floats, mask: 
     )
     return RegionSpectrum(
         mean=_over_pixels(np.nanmean, picked),
-        deviation=_over_pixels(_spread, picked, least=min(2, solid.size)),
+        deviation=_over_pixels(partial(np.nanstd, ddof=1), picked, least=2),
         pixel_std=_over_pixels(np.nanmean, spread),
         data_share=_over_pixels(np.nanmean, share),
         pixels=int(at.size),
@@ -118,11 +124,6 @@ def _over_pixels(
     found = np.full(len(values), np.nan)
     found[enough] = figure(values[enough], axis=1)
     return found
-
-
-def _spread(values: NDArray[np.float64], axis: int) -> NDArray[np.float64]:
-    """The standard deviation of pixels; that of a single one is none."""
-    return np.asarray(np.nanstd(values, axis=axis, ddof=min(1, values.shape[axis] - 1)))
 
 
 def explain_pixel(

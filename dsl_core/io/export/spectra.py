@@ -58,7 +58,14 @@ def named_spectrum(spectrum: xr.Dataset) -> NamedSpectrum:
     name, nm = str(spectrum.attrs.get("name", "spectrum")), spectrum["wavelength_nm"].values
     if "pixel_std" not in spectrum:
         return NamedSpectrum(name, nm, mean, uncertainty=std)
-    return NamedSpectrum(name, nm, mean, std, spectrum["pixel_std"].values, int(spectrum.attrs["used"]))
+    return of_region(name, nm, mean, std, spectrum["pixel_std"].values, int(spectrum.attrs["used"]))
+
+
+def of_region(
+    name: str, nm: Floats, mean: Floats, spread: Floats | None, pixel_std: Floats | None, used: int
+) -> NamedSpectrum:
+    """The mean of the ``used`` pixels of a region and how they differ, which a single one does not."""
+    return NamedSpectrum(name, nm, mean, None if used == 1 else spread, pixel_std, used)
 
 
 def export_spectra(

@@ -51,7 +51,8 @@ def region_table(chosen: Mark, band: int, theme: Theme) -> str:
     spectrum, stated = chosen.spectrum, chosen.pixel_std
     if chosen.kind != "region" or spectrum.std is None or stated is None or band >= len(spectrum.nm):
         return ""
-    figures = (spectrum.mean[band], spectrum.std[band], stated[band])
+    spread = np.nan if chosen.used == 1 else spectrum.std[band]
+    figures = (spectrum.mean[band], spread, stated[band])
     head = [f"{escape(chosen.name)}, {spectrum.nm[band]:g} nm", "mean", "spread ±", "stated ±"]
     cells = "".join(f"<td align='right'>{number_text(float(each), 4)}</td>" for each in figures)
     pixels = f"{chosen.used} of {counted(chosen.pixels, 'pixel')}"

@@ -29,14 +29,14 @@ def mark_of_reference(name: str, colour: int, path: Path, curve: SpectralCurve, 
 
 
 def fill_region(draft: Mark, result: ResultArrays, progress: Progress) -> Mark:
-    """A region with the mean and standard deviation of its pixels."""
+    """A region with the mean and standard deviation of its pixels; of one pixel, that stated for it."""
     from dsl_core.evaluation.marks import mask_of_outline, mask_of_runs, region_spectrum
 
     progress.report("mean of a region", 0, 1)
     shape = result.shape
     mask = mask_of_runs(draft.runs, shape) if draft.runs else mask_of_outline(draft.outline_px, shape)
     found = region_spectrum(result["reflectance"], result["reflectance_std"], result["data_share"], mask)
-    spectrum = Spectrum(result.wavelengths_nm, found.mean, found.deviation, found.data_share, sigmas=1.0)
+    spectrum = Spectrum(result.wavelengths_nm, found.mean, found.spread, found.data_share, sigmas=1.0)
     return replace(draft, spectrum=spectrum, pixels=found.pixels, used=found.used, pixel_std=found.pixel_std)
 
 
@@ -46,7 +46,7 @@ def shown_spectra(marks: Iterable[Mark], result: ResultArrays | None) -> list[Na
 
 
 def _named_spectrum(mark: Mark, result: ResultArrays | None) -> NamedSpectrum:
-    from dsl_core.io.export.spectra import NamedSpectrum
+    from dsl_core.io.export.spectra import NamedSpectrum, of_region
 
     nm, mean, std = mark.spectrum.nm, mark.spectrum.mean, mark.spectrum.std
     match mark.kind:
@@ -56,6 +56,6 @@ def _named_spectrum(mark: Mark, result: ResultArrays | None) -> NamedSpectrum:
             where = "" if at is None else f"pixel at column {at[0]}, row {at[1]}, counted from 0"
             return NamedSpectrum(mark.name, nm, mean, uncertainty=std, pixels=1, where=where)
         case "region":
-            return NamedSpectrum(mark.name, nm, mean, std, mark.pixel_std, mark.used)
+            return of_region(mark.name, nm, mean, std, mark.pixel_std, mark.used)
         case "reference":
             return NamedSpectrum(mark.name, nm, mean)

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 from dsl_app.results.marks.comparison import comparison_html
+from dsl_app.results.marks.spectra import shown_spectra
 from dsl_app.shared.theme import LIGHT
 
 from tests.app.support.results_controller import SQUARE, Bench
@@ -92,3 +93,16 @@ def test_a_region_says_how_its_pixels_differ_and_what_is_stated_for_one(bench: B
     assert "20 of 20 pixels" in html
     for value in (region.spectrum.mean[1], region.spectrum.std[1], region.pixel_std[1]):
         assert f">{value:.4f}<" in html
+
+
+def test_a_region_of_one_pixel_has_the_deviation_stated_for_that(bench: Bench) -> None:
+    bench.control.marks.add_outline(((2.6, 2.6), (3.4, 2.6), (3.4, 3.4), (2.6, 3.4)))
+    region = bench.state.selected_mark
+    assert region is not None
+    assert region.pixel_std is not None
+    np.testing.assert_array_equal(region.spectrum.std, region.pixel_std)
+    assert (region.pixel_std > 0).all()
+    assert ">–<" in comparison_html(bench.state, LIGHT), "a single pixel shows no spread"
+    (exported,) = shown_spectra([region], bench.state.result.value)
+    assert exported.deviation is None
+    assert exported.uncertainty is region.pixel_std
