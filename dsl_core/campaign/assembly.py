@@ -36,7 +36,8 @@ def nominal_rig(devices: DeviceRig) -> Rig:
     if start is None:
         raise CalibrationError(
             f"The rig {devices.name!r} does not describe its lenses, film and colours, so calibration has"
-            " nothing to start from. Its package must set DeviceRig.nominal to the values of the data sheets."
+            " nothing to start from. State the values of the data sheets: 'nominal' of a profile names their"
+            " file, and a package sets DeviceRig.nominal."
         )
     camera, projector = devices.camera.info, devices.projector.info
     sensor = start.sensor.model_copy(update={"bayer": camera.bayer, "bit_depth": camera.bit_depth})

@@ -71,7 +71,7 @@ def run_calibration(
         _take(session, step, guide, Named(progress, step.title), step.key in redo)
     fitted = session.fit(Named(progress, session.recipe.title))
     if not guide.judge(fitted):
-        raise CalibrationError(_verdict(fitted))
+        raise CalibrationError(not_accepted(fitted))
     return session.accept()
 
 
@@ -132,9 +132,8 @@ def _take(session: CalibrationSession, step: Step, guide: Guide, progress: Progr
         session.capture(step, progress)
 
 
-def _verdict(fitted: AcceptedCalibration) -> str:
+def not_accepted(fitted: AcceptedCalibration, kept: bool = True) -> str:
+    """Why a fit was not accepted, with what its figures advise."""
     clauses = "; ".join(f"{figure}. {figure.advice}".rstrip(". ") for figure in failures(fitted.figures))
-    return (
-        f"{fitted.title} was not accepted: {clauses or 'you rejected it'}."
-        " The captures are kept; capture a step again with --redo STEP, or accept with --accept-failed."
-    )
+    why = f"{fitted.title} was not accepted: {clauses or 'you rejected it'}."
+    return f"{why} The captures are kept." if kept else why

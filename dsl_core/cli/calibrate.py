@@ -65,7 +65,7 @@ def selftest(
     """Test the camera and projector first: each figure passes or says what to do."""
     with tempfile.TemporaryDirectory(prefix="dsl-selftest-") as spare:
         folder = campaign or Path(spare) / "campaign"
-        run_guided("selftest", folder, rig, option, set_, yes, json, again=True)
+        run_guided("selftest", folder, rig, option, set_, yes, json, again=True, kept=campaign is not None)
 
 
 @calibrate.command()
@@ -196,7 +196,7 @@ def all_(
         check_name(name)  # reported before anything is captured
     for each, values in settings.items():
         load_recipe(each, values)  # wrong settings are reported before anything is written
-    guide = ConsoleGuide(output, yes, accept_failed)
+    guide = ConsoleGuide(output, campaign, yes, accept_failed)
     with (
         # Before the devices are open there is nothing to resume.
         opened_campaign(campaign, rig, parse_options(option), settings) as (folder, devices),

@@ -25,11 +25,12 @@ if TYPE_CHECKING:
 class ConsoleGuide:
     """Asks on standard error and reads answers from standard input, so that JSON stays alone on output.
 
-    ``unattended`` assumes that every target is placed; ``tolerant`` continues although figures are outside
-    their limits.
+    ``campaign`` is its folder, None if that is not kept. ``unattended`` assumes that every target is placed;
+    ``tolerant`` continues although figures are outside their limits.
     """
 
     output: Output
+    campaign: Path | None
     unattended: bool = False
     tolerant: bool = False
 
@@ -47,7 +48,8 @@ class ConsoleGuide:
         if self.unattended:
             self.output.say(ask)
         else:
-            answer(self.output, f"{ask} Then press Enter (Ctrl-C stops; everything captured is kept): ")
+            kept = "" if self.campaign is None else " (Ctrl-C stops; everything captured is kept)"
+            answer(self.output, f"{ask} Then press Enter{kept}: ")
 
     def looked(self, step: Step, figures: Sequence[Figure]) -> bool:
         """Report what a look found; where it is not good, a person decides."""
@@ -65,11 +67,24 @@ class ConsoleGuide:
         return said.strip().lower() == "go"
 
     def judge(self, fitted: AcceptedCalibration) -> bool:
-        """Print the key figures; accept when all are within their limits, or anything if tolerant."""
+        """Print the key figures; accept when all are within their limits, or anything if tolerant.
+
+        Raises `CalibrationError` with the commands that help.
+        """
+        from dsl_core.campaign.guide import not_accepted
         from dsl_core.model.figure import failures
 
         print_figures(self.output, fitted.figures)
-        return self.tolerant or not failures(fitted.figures)
+        if self.tolerant or not failures(fitted.figures):
+            return True
+        if self.campaign is None:
+            raise CalibrationError(f"{not_accepted(fitted, kept=False)} Then run the command again.")
+        if fitted.name == "selftest":
+            raise CalibrationError(f"{not_accepted(fitted)} Then run the command again.")
+        raise CalibrationError(
+            f"{not_accepted(fitted)} Capture a step again with 'dsl-scan calibrate {fitted.name}"
+            f" {self.campaign} --redo STEP', or accept with --accept-failed."
+        )
 
 
 def print_figures(output: Output, figures: Sequence[Figure]) -> None:
@@ -111,14 +126,22 @@ def opened_campaign(
 
 
 @contextmanager
-def resumed_by(command: str) -> Iterator[None]:
-    """Turn Ctrl-C into a sentence with the command that resumes, and add it to that of a lost device."""
+def resumed_by(command: str | None) -> Iterator[None]:
+    """Turn Ctrl-C into a sentence with the command that resumes, and add it to that of a lost device.
+
+    None where nothing is kept.
+    """
+    how = (
+        "Run the command again."
+        if command is None
+        else f"Everything captured is kept. Resume with: {command}"
+    )
     try:
         yield
     except (KeyboardInterrupt, Cancelled):
-        raise Cancelled(f"Stopped; everything captured is kept. Resume with: {command}") from None
+        raise Cancelled(f"Stopped. {how}") from None
     except DeviceError as error:
-        raise type(error)(f"{error} Everything captured is kept. Resume with: {command}") from error
+        raise type(error)(f"{error} {how}") from error
 
 
 def answer(output: Output, question: str) -> str:
@@ -143,10 +166,12 @@ def run_guided(
     redo: Sequence[str] = (),
     accept_failed: bool = False,
     again: bool = False,
+    kept: bool = True,
 ) -> None:
     """Go through the steps of a calibration that lack captures, fit, and accept; print the figures.
 
-    ``redo`` names steps to capture again; ``again`` repeats every step that was captured before.
+    ``redo`` names steps to capture again; ``again`` repeats every step that was captured before. A campaign
+    that is not ``kept`` is gone when this ends.
     """
     from dsl_core.campaign.guide import run_calibration
     from dsl_core.campaign.recipes import load_recipe
@@ -158,14 +183,14 @@ def run_guided(
     with (
         # Before the devices are open there is nothing to resume.
         opened_campaign(campaign, rig, parse_options(option), settings) as (folder, devices),
-        resumed_by(command),
+        resumed_by(command if kept else None),
     ):
         recipe = load_recipe(name, folder.info.settings.get(name))
         session = CalibrationSession(recipe, devices, folder)
         before = session.accepted()
         if again:
             redo = [each.step.key for each in session.statuses() if each.state == "captured"]
-        guide = ConsoleGuide(output, yes, accept_failed)
+        guide = ConsoleGuide(output, campaign if kept else None, yes, accept_failed)
         with output.progress() as progress:
             accepted = run_calibration(session, guide, progress, redo)
     if accepted == before:
@@ -176,5 +201,6 @@ def run_guided(
     else:
         output.say(f"{accepted.title} is accepted.")
     output.put(name=accepted.name, accepted=accepted.accepted, figures=figures_json(accepted.figures))
-    output.put(campaign=campaign)
+    if kept:
+        output.put(campaign=campaign)
     output.finish()

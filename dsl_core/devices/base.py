@@ -7,6 +7,7 @@ device, what it was asked and what to do. Devices are context managers; ``close`
 
 from __future__ import annotations
 
+import logging
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -20,6 +21,8 @@ from dsl_core.model.frames import Frame
 from dsl_core.model.placement import Placement
 from dsl_core.model.rig import BayerPattern, Rig
 from dsl_core.model.spectral import SpectralCurve
+
+_log = logging.getLogger(__name__)
 
 
 class Device(ABC):
@@ -217,4 +220,11 @@ class DeviceRig:
         return self
 
     def __exit__(self, *failure: object) -> None:
-        self.close()
+        self.close_quietly()
+
+    def close_quietly(self) -> None:
+        """Close every device; what one fails with is logged, as it spoils nothing that was done before."""
+        try:
+            self.close()
+        except Exception as error:
+            _log.warning("The devices of the rig %r did not close properly: %s", self.name, error)

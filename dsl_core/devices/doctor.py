@@ -79,7 +79,9 @@ def examine(profile: RigProfile) -> list[Finding]:
     notes = {kind: _Notes(f"{kind} {part.driver}", found) for kind, part in profile.parts().items()}
     for kind, part in profile.parts().items():
         device = notes[kind].ask(
-            partial(open_device, kind, part.driver, part.settings), OPEN_S, partial(_seen_instead, kind, part)
+            partial(open_device, kind, part.driver, part.settings),
+            OPEN_S,
+            partial(_seen_instead, kind, part, notes[kind].thread),
         )
         if device is not None:
             opened[kind] = device
@@ -114,12 +116,17 @@ class _Notes:
                 " other program uses it."
             )
         except DriverError as error:
-            cause = error.__cause__
-            text = str(cause)
-            if not isinstance(cause, DslError):
-                text = f"Its driver failed ({type(cause).__name__}: {cause}). Check its cable and settings."
+            text = _said(error)
         self.add(Grade.BAD, f"{text} {more(text)}".strip())
         return None
+
+
+def _said(error: DriverError) -> str:
+    """What a driver's error says, and what to do if the driver does not."""
+    cause = error.__cause__
+    if isinstance(cause, DslError):
+        return str(cause)
+    return f"Its driver failed ({type(cause).__name__}: {cause}). Check its cable and settings."
 
 
 def _look(find: Callable[[], list[FoundDevice]], notes: _Notes) -> None:
@@ -129,7 +136,7 @@ def _look(find: Callable[[], list[FoundDevice]], notes: _Notes) -> None:
     except HangingError as error:
         notes.add(Grade.WARNING, f"Looking for devices has not ended for {error.seconds:g} s.")
     except DriverError as error:
-        notes.add(Grade.WARNING, str(error.__cause__))
+        notes.add(Grade.WARNING, _said(error))
     else:
         for device in devices:
             notes.add(Grade.GOOD, f"{device.words}; settings {dict(device.settings)}")
@@ -156,13 +163,14 @@ def _shared_ports(profile: RigProfile) -> list[Finding]:
     ]
 
 
-def _seen_instead(kind: Kind, part: DevicePart, trouble: str) -> str:
+def _seen_instead(kind: Kind, part: DevicePart, thread: DeviceThread, trouble: str) -> str:
     """Which devices the driver sees, for one that cannot be opened; empty where ``trouble`` says so."""
     try:
         read_settings(kind, part.driver, part.settings)
         driver: Driver = find_driver(kind, part.driver)
-        devices = driver.find() if driver.find is not None else []
-    except DeviceError:
+        # What it fails with now says no more than why the device did not open.
+        devices = [] if driver.find is None else thread.call(f"{kind} {part.driver}", driver.find, OPEN_S)
+    except (DeviceError, DriverError, HangingError):
         return ""
     named = [str(value) for each in devices for value in each.settings.values()]
     if any(name and name in trouble for name in named):
@@ -186,7 +194,9 @@ def _try(device: Device, notes: _Notes) -> None:
 
 
 def _try_camera(camera: Camera, notes: _Notes) -> None:
-    info = camera.info
+    info = notes.ask(lambda: camera.info, ANSWER_S)
+    if info is None:
+        return
     low, high = info.exposure_range_ms
     region = f", region {info.region_px}" if info.region_px else ""
     notes.add(
@@ -238,7 +248,9 @@ def _warmth(camera: Camera, notes: _Notes) -> str:
 
 
 def _try_projector(projector: Projector, notes: _Notes) -> None:
-    info = projector.info
+    info = notes.ask(lambda: projector.info, ANSWER_S)
+    if info is None:
+        return
     black = np.zeros((info.height_px, info.width_px), np.uint8)
     if notes.ask(lambda: projector.show(black) or True, ANSWER_S):
         notes.add(
@@ -264,13 +276,16 @@ def _try_spectroradiometer(instrument: Spectroradiometer, notes: _Notes) -> None
 
 def _look_at_light(camera: Camera, projector: Projector, notes: _Notes) -> None:
     """Note whether the camera sees the projector's white against its black."""
-    if projector.info.model == "none":
+    infos = notes.ask(lambda: (camera.info, projector.info), ANSWER_S)
+    if infos is None:
+        return
+    if infos[1].model == "none":
         notes.add(Grade.WARNING, "There is no projector, so nothing can be scanned. Name one in the profile.")
         return
     means = notes.ask(lambda: [_mean(camera, projector, level) for level in (0, 255)], ANSWER_S)
     if means is None:
         return
-    full = 2**camera.info.bit_depth - 1
+    full = 2 ** infos[0].bit_depth - 1
     black, white = (mean / full for mean in means)
     if white - black < _SEEN:
         notes.add(

@@ -149,9 +149,10 @@ def open_device(kind: Kind, name: str, settings: Mapping[str, object]) -> Device
             " Check the connection and its settings."
         ) from error
     if not isinstance(device, _CLASSES[kind]):
-        device.close()
+        if isinstance(device, Device):
+            device.close()
         raise DeviceError(
-            f"The {kind} driver {name!r} opened a {type(device).__name__}, which is not a {kind}."
+            f"The {kind} driver {name!r} returned {type(device).__name__} instead of a {kind}."
             " Update or reinstall its package."
         )
     return device

@@ -6,6 +6,7 @@ is tried again and a scan can be resumed. A call that does not return is given u
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Callable
 from dataclasses import dataclass, fields, replace
 from typing import Any, NoReturn, TypeVar
@@ -33,6 +34,7 @@ from dsl_core.model.frames import Frame
 from dsl_core.model.placement import Placement
 from dsl_core.model.spectral import SpectralCurve
 
+_log = logging.getLogger(__name__)
 T = TypeVar("T")
 #: Longest text of a driver's error that is quoted.
 _QUOTED = 200
@@ -47,6 +49,14 @@ def guarded(rig: DeviceRig, thread: DeviceThread | None) -> DeviceRig:
 
     Raises `DeviceError` when a device does not even say what it is.
     """
+    try:
+        return _behind_guards(rig, thread)
+    except DeviceError:
+        _let_go(rig, thread)
+        raise
+
+
+def _behind_guards(rig: DeviceRig, thread: DeviceThread | None) -> DeviceRig:
     line, patience = _Line(thread), rig.patience
     devices: dict[str, Any] = {
         "camera": _Camera(rig.camera, line, patience),
@@ -66,6 +76,25 @@ def guarded(rig: DeviceRig, thread: DeviceThread | None) -> DeviceRig:
     if standing is not None:
         devices["standing"] = lambda: line.ask(hand, "say what stands there", standing, patience.answer_s)
     return replace(rig, **devices)
+
+
+def _let_go(rig: DeviceRig, thread: DeviceThread | None) -> None:
+    """Close what did open, so that another try finds it free; what does not close either is logged."""
+    line = _Line(thread)
+    for name, device in (
+        ("The camera", rig.camera),
+        ("The projector", rig.projector),
+        ("The stage", rig.stage),
+        ("The spectroradiometer", rig.spectroradiometer),
+    ):
+        if device is None:
+            continue
+        try:
+            line.ask(name, "close", device.close, rig.patience.answer_s)
+        except DslError as error:
+            _log.warning("%s", error)
+    if thread is not None:
+        thread.end()
 
 
 def open_on(thread: DeviceThread | None, name: str, action: Callable[[], T]) -> T:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import keyword
 import re
 from pathlib import Path
 
@@ -39,6 +40,8 @@ def write_new_rig(name: str, folder: Path, taken: list[str]) -> tuple[Path, ...]
             f"A rig cannot be called {name!r}: small letters, digits and single hyphens are needed, such as"
             " room-12 or my-lab. Choose another name."
         )
+    if keyword.iskeyword(name):
+        raise StoreError(f"{name!r} is a word of Python, so no module can have it. Choose another name.")
     if name in taken:
         raise StoreError(f"There is a rig {name!r} already. Choose another name.")
     if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):

@@ -26,7 +26,7 @@ from dsl_core.evaluation.summary import Truth
 from dsl_core.io.linearity import Linearity, linearity_of
 from dsl_core.io.scan.check import require_complete
 from dsl_core.io.scan.folder import ScanReader
-from dsl_core.io.scan.manifest import Manifest, read_manifest
+from dsl_core.io.scan.manifest import Manifest, read_manifest, refuse_other_scan
 from dsl_core.io.scan.origin import is_of_this_computer, model_notes, rig_of_notes
 from dsl_core.io.scan.proof_file import read_proof
 from dsl_core.model.attributes import DOUBTS, PLAN_ATTRIBUTE, SCALE_ATTRIBUTE, plan_of
@@ -92,12 +92,15 @@ def resume(
 
 
 def prepare_resume(rig: DeviceRig, folder: Path, check_drift: bool = True) -> tuple[DeviceRig, CapturePlan]:
-    """Rig and plan to resume a scan with; raises `DriftError` if anything moved since it stopped.
+    """Rig and plan to resume a scan with.
 
-    The rig returned has the same devices and the scan's own calibration, whatever ``rig`` has, which stays as
-    it is.
+    It has the same devices and the scan's own calibration, whatever ``rig`` has, which stays as it is. Raises
+    `StoreError` for other devices or settings, `DriftError` if anything moved since the scan stopped.
     """
     reader = ScanReader(folder)
+    # Pictures of another camera would be taken for another scene.
+    now = {"camera": rig.camera.info, "projector": rig.projector.info}
+    refuse_other_scan(folder, reader.manifest, reader.manifest.model_copy(update=now))
     rig = replace(rig, calibration=reader.calibration or rig.calibration)
     sound = reader.sound()  # a damaged frame is taken again, and tells nothing of the scene
     done = [shot for shot in reader.plan.shots() if shot.index in sound]

@@ -129,7 +129,7 @@ def test_new_captures_whose_fit_nobody_accepted_are_not_passed_over(
         an_hour_ago = (datetime.now(UTC) - timedelta(hours=1)).isoformat(timespec="microseconds")
         for module in (campaign_folder, session_module):
             monkeypatch.setattr(module, "now", lambda: an_hour_ago)
-    with pytest.raises(CalibrationError, match="accept with --accept-failed"):
+    with pytest.raises(CalibrationError, match="The captures are kept"):
         run_calibration(one, Willing(accepts=False), NoProgress(), redo=["dim"])
     again = session(devices, CampaignFolder.open(campaign.path), FakeRecipe())
     assert again.accepted() is None, "the fit of captures that are gone is called good"

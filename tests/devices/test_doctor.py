@@ -96,6 +96,27 @@ def _cannot_find() -> list[FoundDevice]:
 
 CAMERA = Driver("an eye", Trouble, TryCamera, _find)
 SEEN = Driver("an eye", Trouble, TryCamera, lambda: [FoundDevice({"id": "P3"}, "eye on port 3")])
+
+
+def _busy() -> list[FoundDevice]:
+    raise OSError(16, "Device or resource busy")
+
+
+class MuteCamera(TryCamera):
+    """Opens and does not say what it is."""
+
+    closed = 0
+
+    @property
+    def info(self) -> CameraInfo:  # type: ignore[override]
+        raise RuntimeError("no descriptor")
+
+    def close(self) -> None:
+        MuteCamera.closed += 1
+
+
+BUSY = Driver("an eye", Trouble, TryCamera, _busy)
+MUTE = Driver("an eye", Trouble, MuteCamera)
 PROJECTOR = Driver("a lamp", Trouble, TryProjector, brings="a lamp's library")
 STAGE = Driver("a stage", Trouble, TryStage, lambda: [])
 INSTRUMENT = Driver("an instrument", Trouble, TryInstrument, _cannot_find)
@@ -106,6 +127,8 @@ def _drivers(monkeypatch: pytest.MonkeyPatch) -> None:
     values = {
         "camera.try": "CAMERA",
         "camera.seen": "SEEN",
+        "camera.busy": "BUSY",
+        "camera.mute": "MUTE",
         "projector.try": "PROJECTOR",
         "stage.try": "STAGE",
         "spectroradiometer.try": "INSTRUMENT",
@@ -123,6 +146,11 @@ def profile(camera: str = "", instrument: str = "", **changes: object) -> RigPro
         "spectroradiometer": DevicePart(driver="try", settings={"trouble": instrument}),
     }
     return RigProfile.model_validate({"name": "lab"} | parts | changes)
+
+
+def _with_camera(driver: str, trouble: str = "") -> RigProfile:
+    part = DevicePart(driver=driver, settings={"trouble": trouble})
+    return profile().model_copy(update={"camera": part})
 
 
 def grades(found: list[doctor.Finding]) -> dict[str, str]:
@@ -182,6 +210,17 @@ def test_a_camera_that_does_not_see_the_light_is_told() -> None:
     assert any("Take off lens caps" in finding.text for finding in found)
 
 
+def test_a_driver_that_cannot_even_look_or_say_what_it_opened_hides_no_other_device() -> None:
+    found = examine(_with_camera("busy", "absent"))
+    assert grades(found)["camera busy"] == "bad"
+    assert grades(found)["spectroradiometer try"] == "good"
+    found = examine(_with_camera("mute"))
+    assert grades(found)["camera mute"] == "bad"
+    assert grades(found)["spectroradiometer try"] == "good"
+    assert MuteCamera.closed == 1
+    assert "Its driver failed (OSError" in {each.device: each for each in survey()}["camera busy"].text
+
+
 def test_all_failures_are_gathered() -> None:
     found = examine(
         profile(
@@ -214,8 +253,8 @@ def test_devices_on_one_port_are_told() -> None:
 
 
 def test_what_the_driver_sees_is_said_once_and_only_of_devices_that_cannot_be_opened() -> None:
-    wrong = DevicePart(driver="seen", settings={"x": 1})
-    assert doctor._seen_instead("camera", wrong, "x is not a field of it.") == ""
+    wrong, thread = DevicePart(driver="seen", settings={"x": 1}), DeviceThread("try")
+    assert doctor._seen_instead("camera", wrong, thread, "x is not a field of it.") == ""
     part = DevicePart(driver="seen")
-    assert doctor._seen_instead("camera", part, "No camera.") == "The driver sees: eye on port 3."
-    assert doctor._seen_instead("camera", part, "No camera; there is P3.") == ""
+    assert doctor._seen_instead("camera", part, thread, "No camera.") == "The driver sees: eye on port 3."
+    assert doctor._seen_instead("camera", part, thread, "No camera; there is P3.") == ""

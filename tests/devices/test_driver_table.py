@@ -91,5 +91,5 @@ def test_wrong_settings_name_each_field_and_what_there_is() -> None:
 def test_failures_while_opening_become_sentences() -> None:
     with pytest.raises(DeviceError, match="'trolley' failed to open: KeyError"):
         open_device("stage", "trolley", {"port": "broken"})
-    with pytest.raises(DeviceError, match="opened a Trolley, which is not a projector"):
+    with pytest.raises(DeviceError, match="returned Trolley instead of a projector"):
         open_device("projector", "trolley", {"port": "a"})

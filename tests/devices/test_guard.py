@@ -94,6 +94,10 @@ def rig(lab: _Lab, beam: _Lab) -> DeviceRig:
     return guarded(rig, DeviceThread("lab"))
 
 
+def _raise(error: Exception) -> None:
+    raise error
+
+
 def _be_impatient(device: Any) -> None:
     """Only with a device that hangs: on a busy machine, others may take a while."""
     device._patience = Patience(0.05, 0.05, 0.05, 0.05)
@@ -174,6 +178,34 @@ def test_all_calls_come_from_one_thread_which_ends_with_the_last_device(
 def test_without_a_thread_drivers_are_called_where_one_is(lab: _Lab, beam: _Lab) -> None:
     guarded(DeviceRig("lab", lab, beam), None).camera.snap()
     assert lab.threads == [threading.current_thread()]
+
+
+@pytest.mark.parametrize("thread", [True, False])
+def test_what_did_open_is_let_go_where_another_device_does_not_answer(
+    lab: _Lab, beam: _Lab, thread: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    closed: list[str] = []
+
+    def gone() -> None:
+        raise OSError("gone")
+
+    monkeypatch.setattr(_Lab, "info", property(lambda self: lab.camera_info if self is lab else gone()))
+    lab.act["close"] = lambda: closed.append("camera")
+    beam.act["close"] = gone
+    with pytest.raises(DeviceError, match="The projector"):
+        guarded(DeviceRig("lab", lab, beam), DeviceThread("lab") if thread else None)
+    assert closed == ["camera"]
+
+
+def test_a_device_that_does_not_close_spoils_nothing_that_was_done(
+    lab: _Lab, rig: DeviceRig, caplog: pytest.LogCaptureFixture
+) -> None:
+    lab.act["close"] = lambda: _raise(RuntimeError("handle is invalid"))
+    with rig:
+        pass
+    assert "handle is invalid" in caplog.text
+    with pytest.raises(KeyError, match="the reason"), rig:
+        raise KeyError("the reason")
 
 
 @pytest.mark.parametrize("thread", [True, False])

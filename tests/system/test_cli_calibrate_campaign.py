@@ -166,6 +166,11 @@ def test_figures_outside_their_limits_end_in_what_to_do(give: Give, tmp_path: Pa
     assert "Open the aperture" in ending.sentence
     assert "missed: Open the aperture." in ending.out
     assert "needs selftest" in give("calibrate", "geometry", tmp_path / "campaign", "--yes").sentence
+    assert "calibrate selftest" not in ending.sentence
+    assert "The captures are kept" in ending.sentence
+    spare = give("selftest", *TWIN, "--yes", "--set", "largest_dn=1")
+    assert spare.sentence.endswith("Then run the command again.")
+    assert "kept" not in spare.sentence
     look = give("selftest", tmp_path / "other", *TWIN, "--yes", "--set", "good_look=9")
     assert "The step 'dim picture' does not look right" in look.sentence
     assert give("calibrate", "all", tmp_path / "campaign", "--yes", "--accept-failed").code == 0

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from pathlib import Path
 
 import numpy as np
@@ -88,6 +89,17 @@ def test_a_resumed_scan_has_its_own_calibration_and_the_rig_of_the_caller_stays(
     assert resumed.camera is mine.camera
     assert plan == PLAN
     assert mine.calibration is other
+
+
+def test_another_camera_is_told_before_its_picture_is_taken_for_another_scene(
+    folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    ScanReader(folder).store.path(PLAN.shot_count - 1).unlink()
+    rig = replay_rig(_taken(2))
+    other = dataclasses.replace(rig.camera.info, bit_depth=16)
+    monkeypatch.setattr(type(rig.camera), "info", property(lambda self: other))
+    with pytest.raises(StoreError, match="bit depth"):
+        prepare_resume(rig, folder)
 
 
 def test_a_whole_scan_is_left_as_it_is(folder: Path) -> None:

@@ -84,13 +84,13 @@ class RigController:
             from dsl_core.devices.registry import open_rig
 
             if old is not None:
-                close_quietly(old)
+                old.close_quietly()
             devices = open_rig(choice.name, dict(choice.options))
             devices.projector = self._wrap(devices.projector)
             try:
                 check(devices)
             except BaseException:
-                close_quietly(devices)
+                devices.close_quietly()
                 raise
             return devices
 
@@ -272,11 +272,3 @@ def require_answers(devices: DeviceRig) -> None:
     devices.projector.show(np.zeros((info.height_px, info.width_px), np.uint8))
     camera.configure(camera.info.exposure_range_ms[0])
     camera.snap()
-
-
-def close_quietly(devices: DeviceRig) -> None:
-    """Close devices; lost ones may fail to, which must not keep others from being opened."""
-    try:
-        devices.close()
-    except Exception as error:
-        _log.warning("the devices of %s did not close properly: %s", devices.name, error)

@@ -12,6 +12,7 @@ import os
 import subprocess
 import sys
 import time
+from contextlib import suppress
 from dataclasses import replace
 from typing import Any
 
@@ -104,7 +105,9 @@ class ScreenProjector(Projector):
         """End the program; its window goes with it."""
         for stream in (self._process.stdin, self._process.stdout):
             if stream is not None:
-                stream.close()
+                # What was not sent yet has nobody to go to, if the program is gone.
+                with suppress(OSError):
+                    stream.close()
         try:
             self._process.wait(_END_S)
         except subprocess.TimeoutExpired:
