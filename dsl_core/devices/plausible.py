@@ -21,6 +21,8 @@ EXPOSURE_TOLERANCE = 0.05
 COVERED_NM, POSSIBLE_NM = (430.0, 660.0), (150.0, 3000.0)
 #: Samples that a spectrum has at least; as many equal ones at its very peak are clipped.
 FEWEST_SAMPLES, CLIPPED_SAMPLES = 16, 6
+#: Peaks that fall by more than so many steps of rounding are no smooth ones; digits of rounded values.
+STEEP_STEPS, MOST_DIGITS = 10.0, 6
 #: A spectrum of light may fall below zero by this share of its peak.
 NEGATIVE_SHARE = 0.1
 #: Unit of a spectroradiometer's curves.
@@ -128,7 +130,9 @@ def require_light(curve: SpectralCurve, others: Mapping[Any, SpectralCurve], wha
 
     ``what`` names the light, as the keys of ``others`` name theirs. Noise makes every reading differ.
     """
-    values = np.array(curve.values)
+    nm, values = np.array(curve.wavelengths_nm), np.array(curve.values)
+    # Instruments are noisy at the ends of their range, which nothing uses.
+    values = values[(nm >= COVERED_NM[0]) & (nm <= COVERED_NM[1])]
     lowest, peak = float(values.min()), float(values.max())
     fault = ""
     if peak <= 0:
@@ -170,11 +174,35 @@ def _fault_of(nm: NDArray[np.float64], value: NDArray[np.float64], unit: str) ->
     peak = float(value.max())
     if value.min() == peak and peak != 0:
         return f"every value is {peak:g}"
-    if peak > 0 and _longest_run(value == peak) >= CLIPPED_SAMPLES:
-        return f"{_longest_run(value == peak)} neighbouring values are {peak:g}, its largest: it is saturated"
+    start, end = _longest_run(value == peak)
+    if peak > 0 and end - start >= CLIPPED_SAMPLES and _ends_steeply(value, start, end):
+        return f"{end - start} neighbouring values are {peak:g}, its largest: it is saturated"
     return ""
 
 
-def _longest_run(where: NDArray[np.bool_]) -> int:
-    edges = np.flatnonzero(np.diff(np.concatenate(([0], where.astype(np.int8), [0]))))
-    return int((edges[1::2] - edges[::2]).max()) if edges.size else 0
+def _longest_run(where: NDArray[np.bool_]) -> tuple[int, int]:
+    """Start and end (exclusive) of the longest run."""
+    edges = np.flatnonzero(np.diff(np.concatenate(([0], where.astype(np.int8), [0])))).reshape(-1, 2)
+    start, end = edges[int((edges[:, 1] - edges[:, 0]).argmax())]
+    return int(start), int(end)
+
+
+def _ends_steeply(value: NDArray[np.float64], start: int, end: int) -> bool:
+    """Whether what is beside the largest values falls off faster than a smooth peak that was rounded.
+
+    A parabola whose top is flat after rounding falls by 4 steps of it over as many samples as are flat.
+    """
+    beside = value[max(2 * start - end, 0)], value[min(2 * end - start - 1, value.size - 1)]
+    return bool(value[start] - min(beside) > STEEP_STEPS * _rounding_step(value))
+
+
+def _rounding_step(value: NDArray[np.float64]) -> float:
+    """The decimal step of which large values are multiples; 0 where they have too many digits to tell."""
+    first = math.floor(math.log10(value.max()))
+    # Smaller ones may have as many digits, and a finer step.
+    large = value[value >= 10.0**first]
+    for digits in range(1, MOST_DIGITS + 1):
+        step = 10.0 ** (first - digits + 1)
+        if np.abs(large / step - np.rint(large / step)).max() < 1e-3:
+            return float(step)
+    return 0.0

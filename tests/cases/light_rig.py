@@ -43,6 +43,7 @@ class LightWorld:
     stamps: bool = True
     stale: bool = False
     ignores_exposure: bool = False
+    longest_ms: float = 10_000.0
     connected: bool = True
     bend: float = 0.0
     drop: int = 256
@@ -108,7 +109,9 @@ class LightCamera(Camera):
     @property
     def info(self) -> CameraInfo:
         mosaic: BayerPattern = "MONO" if self.world.monochrome else "RGGB"
-        return CameraInfo("light", "L-C", WIDTH, HEIGHT, mosaic, self.world.bits, (0.02, 10_000.0))
+        return CameraInfo(
+            "light", "L-C", WIDTH, HEIGHT, mosaic, self.world.bits, (0.02, self.world.longest_ms)
+        )
 
     def configure(self, exposure_ms: float) -> float:
         self.exposure_ms = 10.0 if self.world.ignores_exposure else exposure_ms

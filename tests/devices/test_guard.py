@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from dsl_core.devices.base import (
     Camera,
@@ -22,7 +23,7 @@ from dsl_core.devices.base import (
 )
 from dsl_core.devices.device_thread import DeviceThread
 from dsl_core.devices.guard import guarded, open_on
-from dsl_core.devices.plausible import require_light
+from dsl_core.devices.plausible import require_light, require_spectrum
 from dsl_core.errors import DeviceError, StoreError
 from dsl_core.model.frames import Frame
 from dsl_core.model.spectral import SpectralCurve
@@ -336,6 +337,29 @@ def test_spectra_that_cannot_be_are_refused(
     assert rig.spectroradiometer is not None
     with pytest.raises(DeviceError, match=sentence):
         rig.spectroradiometer.measure()
+
+
+def _hump(nm: NDArray[np.float64], width_nm: float, digits: int) -> NDArray[np.float64]:
+    values = 0.0123 * np.exp(-0.5 * ((nm - 540) / width_nm) ** 2)
+    return np.array([float(f"{each:.{digits - 1}e}") for each in values])
+
+
+@pytest.mark.parametrize(("step_nm", "width_nm", "digits"), [(1.0, 45.0, 3), (0.1, 16.0, 4), (0.5, 30.0, 2)])
+def test_a_smooth_peak_that_was_rounded_is_not_saturated(
+    step_nm: float, width_nm: float, digits: int
+) -> None:
+    nm = np.arange(380.0, 780.0, step_nm)
+    values = _hump(nm, width_nm, digits)
+    require_spectrum(SpectralCurve.of(nm, values, unit=LIGHT.unit), "The instrument")
+    clipped = SpectralCurve.of(nm, np.minimum(values, 0.0117), unit=LIGHT.unit)
+    with pytest.raises(DeviceError, match="saturated"):
+        require_spectrum(clipped, "The instrument")
+
+
+def test_noise_where_an_instrument_is_hardly_sensitive_is_no_fault_of_the_light() -> None:
+    nm = np.arange(200.0, 1100.0, 5.0)
+    noise = np.where((nm < 330) | (nm > 950), 0.02 * (-1.0) ** np.arange(nm.size), 0.0)
+    require_light(SpectralCurve.of(nm, _hump(nm, 40.0, 6) + noise, unit=LIGHT.unit), {}, "white", "It")
 
 
 @pytest.mark.parametrize(

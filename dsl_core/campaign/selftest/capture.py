@@ -35,6 +35,7 @@ from dsl_core.campaign.selftest.parts import (
     capture_series,
     capture_spread,
     find_level,
+    longest_units,
     white_rate,
 )
 from dsl_core.campaign.selftest.recorder import Recorder
@@ -83,6 +84,9 @@ class SelfTestRun:
         cycle = self._part(lambda: self._cycle(seen))
         rate = white_rate(parts["cycle"], seen.black_dn)
         unit_ms = _unit(cycle)
+        # Nothing is advised that the camera cannot do.
+        longest_ms = longest_units(recorder, unit_ms) * unit_ms
+        self._wanted_ms = tuple(dict.fromkeys(min(each, longest_ms) for each in self._wanted_ms))
         self._part(lambda: self._latency(seen, unit_ms, rate))
         parts["dark"], dark_frames = self._part(lambda: capture_dark(recorder, unit_ms))
         parts["ramps"] = self._part(lambda: capture_ramps(recorder, unit_ms, seen.black_dn))
@@ -123,7 +127,7 @@ class SelfTestRun:
         recorder.settle_ms = found.wait_ms.value + _MARGIN_MS
 
     def _exposures(self, cycle: Cycle) -> tuple[float, ...]:
-        """Exposures whose beat is measured: the published and the advised ones."""
+        """Exposures whose beat is measured, those the camera has: the published and the advised ones."""
         period = cycle.period_ms
         advised = self._wanted_ms if period is None else advised_exposures(period.value, self._wanted_ms)
         return tuple(dict.fromkeys((*PUBLISHED_MS, *advised)))

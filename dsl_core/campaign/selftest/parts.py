@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from itertools import product
 
 import numpy as np
@@ -22,6 +23,8 @@ Frames = tuple[NDArray[np.uint16], NDArray[np.uint16]]
 RAMP_LEVELS = (255, 230, 204, 179, 153, 128, 102, 77, 51, 38, 26)
 _RAMP_AIM, _LONGEST_UNITS = 0.7, 20
 _SERIES_UNITS = (1, 2, 3, 4, 5, 6, 8, 10, 12, 14, 16, 20, 24, 28, 32)
+#: As many exposures make a line.
+_FEWEST_UNITS = 5
 #: The strongest channel reaches its aim at this many units, weaker ones later.
 _FULL_UNITS, _FULL_AIM = 16, 0.85
 _DARK_PAIRS, _LONG_DARK_PAIRS = 4, 2
@@ -58,13 +61,36 @@ def capture_cycle(recorder: Recorder, seen: Survey, rng: np.random.Generator) ->
     return readings
 
 
+def longest_units(recorder: Recorder, unit_ms: float) -> int:
+    """How many units the longest exposure of the camera is, the fewest needed at least.
+
+    Raises `CalibrationError` where it is shorter than these.
+    """
+    longest_ms = recorder.devices.camera.info.exposure_range_ms[1]
+    units = int(longest_ms / unit_ms * (1 + 1e-9))
+    if units < _FEWEST_UNITS:
+        raise CalibrationError(
+            f"The camera exposes {longest_ms:g} ms at most; the self-test needs up to"
+            f" {_FEWEST_UNITS * unit_ms:.3g} ms, {_FEWEST_UNITS} exposures that differ by whole colour"
+            " cycles of the projector. Choose a mode of the camera with longer exposures."
+        )
+    return units
+
+
 def capture_spread(recorder: Recorder, seen: Survey, rate: float, rng: np.random.Generator) -> Readings:
     """Repeats at many exposures, for cameras without time stamps to trust."""
-    recorder.show(find_level(recorder, seen.black_dn, rate, max(_SPREAD_MS)))
-    for exposure_ms in _SPREAD_MS:
+    exposures_ms = _possible(recorder, _SPREAD_MS)
+    recorder.show(find_level(recorder, seen.black_dn, rate, max(exposures_ms)))
+    for exposure_ms in exposures_ms:
         for gap_ms in rng.uniform(*_GAPS_MS, _SPREAD_REPEATS):
             recorder.read(exposure_ms, gap_ms)
     return recorder.collect()
+
+
+def _possible(recorder: Recorder, exposures_ms: Sequence[float]) -> tuple[float, ...]:
+    """Those exposures that the camera has, ms."""
+    low, high = recorder.devices.camera.info.exposure_range_ms
+    return tuple(each for each in exposures_ms if low <= each <= high)
 
 
 def white_rate(cycle: Readings, black_dn: float) -> float:
@@ -155,7 +181,7 @@ def capture_dark(recorder: Recorder, unit_ms: float) -> tuple[Readings, Frames]:
     recorder.show(BLACK)
     for _ in range(_DARK_PAIRS):
         _pair(recorder, recorder.devices.camera.info.exposure_range_ms[0])
-    units = _LONGEST_UNITS
+    units = min(_LONGEST_UNITS, longest_units(recorder, unit_ms))
     while _brightest(recorder, recorder.snap(units * unit_ms)) > 0.9 * recorder.full_scale_dn:
         if units == 1:
             raise CalibrationError(
@@ -181,13 +207,14 @@ def _pair(recorder: Recorder, exposure_ms: float) -> Frames:
 
 def capture_ramps(recorder: Recorder, unit_ms: float, black_dn: float) -> Readings:
     """White, red, green and blue from full drive down, exposed longer the darker they are."""
+    most = min(_LONGEST_UNITS, longest_units(recorder, unit_ms))
     for leds in RAMPS.values():
         units, before = 1, RAMP_LEVELS[0]
         rate = 0.0
         for level in RAMP_LEVELS:
             if rate:
                 predicted = rate * (level / before) ** _GUESSED_GAMMA * unit_ms
-                units = int(np.clip(_RAMP_AIM * recorder.full_scale_dn / predicted, 1, _LONGEST_UNITS))
+                units = int(np.clip(_RAMP_AIM * recorder.full_scale_dn / predicted, 1, most))
             recorder.show((level * leds[0], level * leds[1], level * leds[2]))
             _pair(recorder, units * unit_ms)
             rate = max(recorder.last_mean_dn - black_dn, 1.0) / (units * unit_ms)
@@ -199,12 +226,15 @@ def capture_series(
     recorder: Recorder, unit_ms: float, black_dn: float, white_rate: float
 ) -> tuple[Readings, Readings]:
     """Pairs at rising exposures of one grey, and frames that clip."""
-    recorder.show(find_level(recorder, black_dn, white_rate, _FULL_UNITS * unit_ms, _FULL_AIM))
-    for units in _SERIES_UNITS:
+    longest = longest_units(recorder, unit_ms)
+    series_units = [units for units in _SERIES_UNITS if units <= longest]
+    full_units = min(_FULL_UNITS, max(longest // 2, _FEWEST_UNITS))
+    recorder.show(find_level(recorder, black_dn, white_rate, full_units * unit_ms, _FULL_AIM))
+    for units in series_units:
         _pair(recorder, units * unit_ms)
     series = recorder.collect()
     recorder.show(grey(1.0))
-    _pair(recorder, _SERIES_UNITS[-1] * unit_ms)
+    _pair(recorder, series_units[-1] * unit_ms)
     return series, recorder.collect()
 
 
@@ -215,7 +245,8 @@ def capture_beat(
     white_rate: float,
     rng: np.random.Generator,
 ) -> Readings:
-    """Repeats at irregular times at each exposure."""
+    """Repeats at irregular times at each exposure that the camera has."""
+    exposures_ms = _possible(recorder, exposures_ms)
     recorder.show(find_level(recorder, black_dn, white_rate, max(exposures_ms)))
     for exposure_ms, gap_ms in product(exposures_ms, rng.uniform(*_GAPS_MS, _REPEATS)):
         recorder.read(exposure_ms, gap_ms)

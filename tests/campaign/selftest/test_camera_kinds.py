@@ -67,6 +67,19 @@ def test_a_camera_whose_values_end_early_is_described_as_it_is(
     assert (sensor.bit_depth, sensor.saturation_dn, sensor.step_dn) == (bits, clip_dn, step_dn)
 
 
+def test_a_camera_that_exposes_briefly_is_asked_for_nothing_longer(tmp_path: Path) -> None:
+    found = record_of(LightWorld(cycle_hz=60.0, jitter_ms=0.5, longest_ms=95.0), tmp_path)
+    assert max(found.cycle.advised_ms) == pytest.approx(1000 / 60 * 5, rel=1e-3)
+    assert all(beat.exposure_ms <= 95.0 for beat in found.cycle.beats)
+    assert not failures(RECIPE.figures(found))
+
+
+def test_a_camera_that_exposes_too_briefly_is_told_at_once() -> None:
+    world = LightWorld(cycle_hz=60.0, jitter_ms=0.5, longest_ms=60.0)
+    with pytest.raises(CalibrationError, match=r"exposes 60 ms at most; the self-test needs up to 83\.3 ms"):
+        SelfTestRun(light_rig(world), NoProgress(), RECIPE.wanted_ms).capture()
+
+
 def score(measured: Measured, truth: float) -> float:
     return (measured.value - truth) / measured.std
 
