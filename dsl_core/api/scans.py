@@ -82,7 +82,7 @@ def plan(rig: DeviceRig, preset: str = "reference", **changes: object) -> Captur
                 f"The plan cannot be changed like this: {problems_in_words(error)}. Its fields are"
                 f" {', '.join(CapturePlan.model_fields)}."
             ) from error
-    return fit_plan(chosen, rig)
+    return fit_plan(chosen, rig, keeps_patterns="spectral" in changes)
 
 
 @names_missing_packages

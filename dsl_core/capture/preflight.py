@@ -8,22 +8,25 @@ from dsl_core.devices.base import DeviceRig
 from dsl_core.devices.conditions import check_conditions
 from dsl_core.errors import PlanError
 from dsl_core.model.plan import CapturePlan
-from dsl_core.model.presets import has_usual_exposures, on_cycles
+from dsl_core.model.presets import has_usual_exposures, on_columns, on_cycles
 from dsl_core.model.rig import Rig
 from dsl_core.optics.lines.reach import MOST_UNREACHED, unreached_share, unreached_words
 from dsl_core.optics.parallax import parallax_of
 
 
-def fit_plan(plan: CapturePlan, rig: DeviceRig) -> CapturePlan:
+def fit_plan(plan: CapturePlan, rig: DeviceRig, *, keeps_patterns: bool = False) -> CapturePlan:
     """The plan for the image sizes of a rig's camera and projector.
 
     Exposures that nobody chose, those of a preset, become whole colour cycles, as the calibration measured
-    them or else as the projector claims; others are left as they are.
+    them or else as the projector claims; others are left as they are. A preset's comb becomes as wide as the
+    projector's columns ask, unless the plan ``keeps_patterns``.
     """
     camera, projector = rig.camera.info, rig.projector.info
     if has_usual_exposures(plan):
         known = rig.calibration or projector
         plan = on_cycles(plan, known.frame_period_ms)
+    if not keeps_patterns:
+        plan = on_columns(plan, projector.width_px)
     return plan.sized(camera, projector)
 
 

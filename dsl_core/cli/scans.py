@@ -75,7 +75,7 @@ def plan(
     check_targets([target], overwrite=force)
     output, choice = Output(json), PlanChoice(None, code, lines, comb, setting, sentinels).build()
     with open_rig(rig, parse_options(option)) as devices:
-        made = fit_plan(choice, devices)
+        made = fit_plan(choice, devices, keeps_patterns=comb is not None)
         _require_patterns(made)
         require_possible(devices, made)
         _state(output, made, target.parent, devices)
@@ -121,7 +121,11 @@ def scan(
         )
     with open_rig(rig, options) as devices:
         calibrated, overridden = _calibrate(output, devices, calibration, override)
-        fitted = made if choice.is_written else pipeline.fit_plan(made, calibrated)
+        fitted = (
+            made
+            if choice.is_written
+            else pipeline.fit_plan(made, calibrated, keeps_patterns=comb is not None)
+        )
         _require_patterns(fitted)
         notes = rig_notes(rig, options) | overridden
         if meter if meter is not None else not choice.is_exposed:

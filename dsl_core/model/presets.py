@@ -21,6 +21,9 @@ from dsl_core.model.plan import (
 #: Frame period of the published projector, ms: its exposures are whole multiples, so that every exposure
 #: holds all of its coloured light.
 PUBLISHED_PERIOD_MS = 1000.0 / 60.0
+#: Columns of the published projector, which combs are stated for, and the farthest that lines move from frame
+#: to frame: with edges more than two columns apart pixels between them do not find their column.
+PUBLISHED_COLUMNS, FARTHEST_STEP_PX = 640, 4
 
 
 @dataclass(frozen=True)
@@ -60,15 +63,15 @@ PRESETS: tuple[Preset, ...] = (
     Preset(
         "preview",
         "Preview",
-        "Sixteen combs of lines at two short settings: a first look at depth and spectra, captured in ten"
-        " seconds.",
+        "Combs of lines at two short settings: a first look at depth and spectra, captured in ten seconds"
+        " (15 with 1280 columns).",
         # One setting alone takes 8 s, but where it spares the zero order its first orders drown in noise.
         _plan("preview", _COARSE_COMB, _setting(4, 0.2), _setting(6, 0.8)),
     ),
     Preset(
         "comb",
         "Comb",
-        "Forty combs of lines at both settings: many lines at once.",
+        "Combs of lines at both settings: many lines at once.",
         _plan("comb", _COMB, _DARK, _BRIGHT),
     ),
     Preset(
@@ -126,6 +129,40 @@ def on_cycles(plan: CapturePlan, period_ms: float) -> CapturePlan:
     """The plan with every exposure at whole cycles of a projector's frame period; the rest stays."""
     settings = tuple(_on_cycles(setting, period_ms) for setting in plan.settings)
     return plan.model_copy(update={"settings": settings})
+
+
+def comb_on(comb: LineComb, width_px: int) -> LineComb:
+    """What a comb of the published projector is on one of so many columns, unchanged up to 800.
+
+    Of the same picture from more columns a nanometre of the first orders takes more: lines and period grow
+    with them, in halves, and lines move by the same share of their width as far as columns are found so.
+
+    >>> wide = comb_on(LineComb(width_px=5, step_px=2, period_px=80), 1280)
+    >>> wide.width_px, wide.step_px, wide.period_px
+    (10, 4, 160)
+    """
+    times = max(round(2 * width_px / PUBLISHED_COLUMNS) / 2, 1.0)
+    if times == 1.0:
+        return comb
+    step_px = max(min(int(comb.step_px * times), FARTHEST_STEP_PX), comb.step_px)
+    # Both edges of lines fall between different columns, half a step apart or nearly so.
+    off_px = step_px // 2
+    width = off_px + step_px * round((comb.width_px * times - off_px) / step_px)
+    period_px = step_px * round(comb.period_px * times / step_px)
+    red, green, blue = (round(shift * times) for shift in comb.shifts_px)
+    return LineComb(width_px=width, step_px=step_px, period_px=period_px, shifts_px=(red, green, blue))
+
+
+def on_columns(plan: CapturePlan, width_px: int) -> CapturePlan:
+    """The plan for a projector of so many columns, if its comb is a preset's for its own projector's.
+
+    Combs that somebody chose stay, and so do single lines: of narrow ones there are more.
+    """
+    for preset in PRESETS:
+        comb = preset.plan.spectral
+        if isinstance(comb, LineComb) and plan.spectral == comb_on(comb, plan.projector_size_px[0]):
+            return plan.model_copy(update={"spectral": comb_on(comb, width_px)})
+    return plan
 
 
 def has_usual_exposures(plan: CapturePlan) -> bool:

@@ -14,6 +14,7 @@ from dsl_core.capture.preflight import find_obstacles
 from dsl_core.devices.base import DeviceRig
 from dsl_core.errors import PlanError
 from dsl_core.model.plan import CapturePlan, GrayCode, LineComb, ScanLines, Sentinels, Setting, SpectralSet
+from dsl_core.model.presets import comb_on
 from dsl_core.model.rig import Rig
 from dsl_core.planning.designed import designed_sets
 from dsl_core.planning.expected import Prediction
@@ -24,8 +25,8 @@ if TYPE_CHECKING:
     from dsl_core.planning.samples import SamplePixels
     from dsl_core.planning.store import PredictionStore
 
-#: Width and step of single lines; width, step and period of combs, px; those whose two edges fall between
-#: different columns find the column best.
+#: Width and step of single lines; width, step and period of combs of the published projector, px; those whose
+#: two edges fall between different columns find the column best.
 LINES = ((5, 2), (5, 3), (5, 4), (8, 2))
 COMBS = (
     (6, 4, 64), (5, 2, 64), (6, 4, 128), (5, 3, 96), (5, 2, 80), (9, 2, 64), (9, 2, 80), (4, 3, 192),
@@ -147,13 +148,12 @@ def possible_plans(devices: DeviceRig, rig: Rig) -> list[CapturePlan]:
 def pattern_sets(rig: Rig) -> dict[str, SpectralSet]:
     """Pattern sets by name that fit a rig's projector."""
     found: dict[str, SpectralSet] = {f"lines {w}x{s}": ScanLines(width_px=w, step_px=s) for w, s in LINES}
-    for w, s, p in COMBS:
-        found[f"comb {w}x{s}x{p}"] = LineComb(width_px=w, step_px=s, period_px=p)
-        third = round(p / 3)
-        found[f"colour comb {w}x{s}x{p}"] = LineComb(
-            width_px=w, step_px=s, period_px=p, shifts_px=(0, third, 2 * third)
-        )
     width = rig.projector.width_px
+    for comb in (LineComb(width_px=w, step_px=s, period_px=p) for w, s, p in COMBS):
+        one = comb_on(comb, width)
+        name, third = f"comb {one.width_px}x{one.step_px}x{one.period_px}", round(one.period_px / 3)
+        found[name] = one
+        found[f"colour {name}"] = one.model_copy(update={"shifts_px": (0, third, 2 * third)})
     return found | {
         name: columns for name, columns in designed_sets().items() if len(columns.levels[0]) == width
     }

@@ -6,11 +6,15 @@ from dataclasses import replace
 
 import pytest
 
+from dsl_core.api import scans as api
 from dsl_core.capture.preflight import find_obstacles, find_remarks, fit_plan
 from dsl_core.devices.base import DeviceRig
 from dsl_core.devices.registry import open_rig
-from dsl_core.model.plan import CapturePlan, Setting
-from dsl_core.model.presets import PRESETS
+from dsl_core.model.plan import CapturePlan, LineComb, Setting
+from dsl_core.model.presets import PRESETS, preset_plan
+from dsl_core.model.rig import Rig
+from dsl_core.planning.choice import pattern_sets
+from dsl_core.simulation import sim_devices
 from dsl_core.simulation.published_rig import published_rig
 
 TWIN = {"size": "160x104", "scene": "plane"}
@@ -78,3 +82,22 @@ def test_a_film_whose_orders_miss_the_frame_is_told_before_the_scan(lines_per_mm
     film = rig.film.model_copy(update={"lines_per_mm": lines_per_mm})
     remarks = find_remarks(rig.model_copy(update={"film": film}))
     assert ["No first order reaches 84% of the bands" in each for each in remarks] == [True] * told
+
+
+def test_combs_of_presets_suit_the_columns_of_the_projector(monkeypatch: pytest.MonkeyPatch) -> None:
+    def wide() -> Rig:
+        rig = published_rig()
+        return rig.model_copy(update={"projector": rig.projector.resized(1280, 720)})
+
+    plan = preset_plan("comb")
+    assert plan is not None
+    monkeypatch.setattr(sim_devices, "published_rig", wide)
+    with open_rig("twin", TWIN) as rig:
+        assert fit_plan(plan, rig).spectral == LineComb(width_px=10, step_px=4, period_px=160)
+        assert fit_plan(fit_plan(plan, rig), rig) == fit_plan(plan, rig)
+        assert fit_plan(plan, rig, keeps_patterns=True).spectral == plan.spectral
+        assert api.plan(rig, "comb").spectral == fit_plan(plan, rig).spectral
+        assert api.plan(rig, spectral=plan.spectral).spectral == plan.spectral
+        names = pattern_sets(wide())
+    assert "comb 10x4x160" in names
+    assert "comb 5x2x80" not in names

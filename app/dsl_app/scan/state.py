@@ -16,7 +16,7 @@ from dsl_app.shared.evented import Event, Value
 from dsl_core.capture.preview import BlockGraph
 from dsl_core.capture.runner import State, Status
 from dsl_core.model.plan import CapturePlan, Setting, Shot
-from dsl_core.model.presets import PRESETS, Preset, on_cycles
+from dsl_core.model.presets import PRESETS, Preset, on_columns, on_cycles
 
 
 class Phase(Enum):
@@ -203,7 +203,7 @@ class ScanState:
 def preset_of(plan: CapturePlan, period_ms: float) -> Preset | None:
     """The preset that a plan equals, on a projector with this frame period."""
     for preset in PRESETS:
-        wanted = on_cycles(preset.plan, period_ms)
+        wanted = on_columns(on_cycles(preset.plan, period_ms), plan.projector_size_px[0])
         same_patterns = (plan.code, plan.spectral) == (wanted.code, wanted.spectral)
         if same_patterns and same_settings(plan.settings, wanted.settings):
             return preset

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from dsl_app.scan.plan_editor import PlanEditor
-from dsl_app.scan.state import Phase
+from dsl_app.scan.state import Phase, preset_of
 from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
 from pytestqt.qtbot import QtBot
@@ -14,7 +14,7 @@ from dsl_core.errors import DeviceError
 from dsl_core.io.plan_file import load_plan, save_plan
 from dsl_core.model.frames import Frame
 from dsl_core.model.plan import CapturePlan, Columns, LineComb, ScanLines
-from dsl_core.model.presets import PRESETS
+from dsl_core.model.presets import PRESETS, Preset, on_columns
 from dsl_core.planning.designed import DesignedSet, packed, save_design
 from dsl_core.simulation.sim_devices import SimCamera
 from tests.app.support.scan_bench import COMB, SHORT, SMALL, TWIN, ScanBench, planned_bench
@@ -189,3 +189,9 @@ def test_buttons_ask_for_files(qtbot: QtBot) -> None:
     for button, signal in ((editor.open, editor.open_requested), (editor.save, editor.save_requested)):
         with qtbot.waitSignal(signal):
             QTest.mouseClick(button, Qt.MouseButton.LeftButton)
+
+
+@pytest.mark.parametrize("preset", PRESETS, ids=lambda preset: preset.key)
+def test_a_preset_is_known_on_a_projector_of_more_columns(preset: Preset) -> None:
+    wide = on_columns(preset.plan, 1280).model_copy(update={"projector_size_px": (1280, 720)})
+    assert preset_of(wide, 1000 / 60) == preset

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 from dsl_app.scan.forecast.state import ForecastPoint, identity
 from dsl_core.errors import DslError
 from dsl_core.model.plan import CapturePlan
-from dsl_core.model.presets import PRESETS, on_cycles
+from dsl_core.model.presets import PRESETS, on_columns, on_cycles
 from dsl_core.model.rig import Rig
 from dsl_core.progress import Progress
 
@@ -134,7 +134,10 @@ class ForecastJob:
             store.save()
 
     def _presets(self) -> list[tuple[str, CapturePlan]]:
-        return [(each.key, on_cycles(each.plan, self.rigging.period_ms)) for each in PRESETS]
+        width_px = self.rigging.rig.projector.width_px
+        return [
+            (each.key, on_columns(on_cycles(each.plan, self.rigging.period_ms), width_px)) for each in PRESETS
+        ]
 
     def _next(self, todo: deque[CapturePlan]) -> tuple[CapturePlan, bool] | None:
         """The next plan, and whether it was requested."""
