@@ -22,12 +22,13 @@ def asd(
     white: bool = True,
     values: np.ndarray | None = None,
     counts: np.ndarray = COUNTS,
+    nm: np.ndarray = NM,
 ) -> bytes:
     """A binary file of ASD: counts and a white reference."""
     head = bytearray(484)
     head[:3] = revision
     head[3:20] = b"leaf in the field"
-    struct.pack_into("<ffxxxxxH", head, 191, 400.0, 10.0, NM.size)
+    struct.pack_into("<ffxxxxxH", head, 191, nm[0], nm[1] - nm[0], nm.size)
     head[186], head[199] = kind, 2
     body = (SHARE * COUNTS if values is None else values).astype("<f8").tobytes()
     text = b"white tile"

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from dsl_core.errors import CalibrationError
 from dsl_core.io.reading import read_bounded, require_plain
+from dsl_core.io.spectra.records import most_of
 
 Floats = NDArray[np.float64]
 LIBRARY = "envi spectral library"
@@ -40,8 +41,9 @@ MOST = 2.0
 def read_library(path: Path) -> tuple[Floats, list[str], Floats]:
     """Wavelengths (nm, rising), names, and reflectance (spectra, bands) of a library; NaN for no value.
 
-    ``path`` is the header or the data. Micrometres are converted where the header says so, and a stated
-    scale is divided by. Raises `CalibrationError` that names the file.
+    ``path`` is the header or the data. Micrometres are converted where the header says so, a stated scale
+    is divided by, and bands that ``bbl`` marks as bad have no values; at the ends they are left out. Raises
+    `CalibrationError` that names the file.
     """
     header_path, data_path = _pair(path)
     header = _read_header(header_path)
@@ -55,7 +57,12 @@ def read_library(path: Path) -> tuple[Floats, list[str], Floats]:
     order = np.argsort(nm)
     if np.any(np.diff(nm[order]) <= 0):
         raise CalibrationError(f"{header_path.name}: wavelengths occur twice. Correct the header.")
-    return nm[order], _names(header, len(values)), _reflectance(header_path, header, values)[:, order]
+    is_good = _is_good(header_path, header, len(nm))
+    values = _reflectance(header_path, header, nm, np.where(is_good, values, np.nan))
+    # What is bad at the ends was not measured; in the midst it is a gap, and nobody may bridge it.
+    known = np.flatnonzero(is_good[order])
+    order = order[known[0] : known[-1] + 1]
+    return nm[order], _names(header, len(values)), values[:, order]
 
 
 def _pair(path: Path) -> tuple[Path, Path]:
@@ -156,7 +163,26 @@ def _names(header: Mapping[str, str], count: int) -> list[str]:
     return [name or f"spectrum {i}" for i, name in enumerate(known, 1)]
 
 
-def _reflectance(path: Path, header: Mapping[str, str], values: Floats) -> Floats:
+def _is_good(path: Path, header: Mapping[str, str], bands: int) -> NDArray[np.bool_]:
+    """Bands that the header does not mark with 0 in its list of bad ones, shape (bands,)."""
+    cells = [cell.strip() for cell in header.get("bbl", "").split(",") if cell.strip()]
+    if not cells:
+        return np.ones(bands, bool)
+    try:
+        marks = np.array([float(cell) for cell in cells])
+    except ValueError as error:
+        raise CalibrationError(
+            f"{path.name}: a mark of bbl is not a number ({error}). Correct it."
+        ) from error
+    if len(marks) != bands or not marks.any():
+        raise CalibrationError(
+            f"{path.name}: bbl marks {np.count_nonzero(marks)} of {len(marks)} bands as good, for {bands}"
+            " bands. Correct it, or remove it."
+        )
+    return marks != 0
+
+
+def _reflectance(path: Path, header: Mapping[str, str], nm: Floats, values: Floats) -> Floats:
     """Values as shares of light; NaN for what the header or an absurd number marks as deleted."""
     deleted = ~np.isfinite(values) | (values < DELETED_BELOW)
     try:
@@ -168,7 +194,7 @@ def _reflectance(path: Path, header: Mapping[str, str], values: Floats) -> Float
             f"{path.name}: the scale factor or ignore value is not a number ({error}). Correct the header."
         ) from error
     values = np.where(deleted, np.nan, values / (scale if scale > 0 else 1.0))
-    most = np.nanmax(values, initial=0.0)
+    most = max(most_of(nm, spectrum) for spectrum in values)
     if most > 100 * MOST:
         raise CalibrationError(
             f"{path.name} contains values up to {most:g}; reflectance from 0 to 1 is needed. Add the factor"

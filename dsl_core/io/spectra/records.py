@@ -23,6 +23,7 @@ HEAD_BYTES, MOST_BYTES = 65_536, 16 << 20
 MOST_NUMBER = 1e30
 #: Wavelengths beyond these are no wavelengths of light that an instrument resolves.
 WAVELENGTHS_NM = 150.0, 50_000.0
+VISIBLE_NM = 380.0, 780.0
 
 
 @dataclass(frozen=True)
@@ -63,6 +64,22 @@ def content_of(path: Path) -> bytes:
         raise CalibrationError(
             f"The spectrum {path} cannot be read ({error.strerror or error}). Correct its path."
         ) from error
+
+
+def most_of(nm: Floats, values: Floats) -> float:
+    """How large a spectrum is: its largest value where light is visible, or its median where that is larger.
+
+    At the ends of a detector instruments divide noise by noise, and a single such value says nothing of the
+    scale of the others. Without two values where light is visible it is the largest of all; 0 for none.
+    """
+    low, high = VISIBLE_NM
+    known = np.isfinite(values)
+    if not known.any():
+        return 0.0
+    inside = known & (nm >= low) & (nm <= high)
+    if np.count_nonzero(inside) < 2:
+        return float(max(values[known].max(), 0.0))
+    return float(max(values[inside].max(), np.median(values[known]), 0.0))
 
 
 def rising(path: Path, nm: Floats, values: Floats) -> tuple[Floats, Floats]:

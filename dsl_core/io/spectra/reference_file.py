@@ -9,7 +9,7 @@ import numpy as np
 
 from dsl_core.errors import CalibrationError
 from dsl_core.io.spectra.catalogue import format_of
-from dsl_core.io.spectra.records import Floats, Spectrum
+from dsl_core.io.spectra.records import VISIBLE_NM, Floats, Spectrum
 from dsl_core.io.spectra.spectrum_file import of_kind
 from dsl_core.model.spectral import SpectralCurve
 
@@ -17,7 +17,6 @@ from dsl_core.model.spectral import SpectralCurve
 MIN_VALUES = 2
 #: Of what was deleted in the midst of a spectrum, so much is bridged by a straight line.
 MOST_BRIDGED_NM = 20.0
-VISIBLE_NM = 380.0, 780.0
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ import numpy as np
 
 from dsl_core.errors import CalibrationError
 from dsl_core.io.spectra.catalogue import read_spectra
-from dsl_core.io.spectra.records import Floats, Quantity, Spectrum
+from dsl_core.io.spectra.records import Floats, Quantity, Spectrum, most_of
 from dsl_core.model.spectral import SpectralCurve
 
 #: What radiance is kept in.
@@ -17,7 +17,6 @@ RADIANCE_UNIT = "W/(sr m2 nm)"
 MOST_SHARE = 2.0
 #: Radiance without a stated unit above this is something else; with one, above what the Sun's disc has.
 _MOST_UNSTATED, _MOST_RADIANCE = 100.0, 1e5
-_VISIBLE_NM = 380.0, 780.0
 _CALLED: dict[Quantity, str] = {"reflectance": "reflectance (a share or percent)", "counts": "counts"}
 
 
@@ -69,7 +68,7 @@ def of_kind(
 
 
 def _as_share(path: Path, spectrum: Spectrum) -> Spectrum:
-    most = _most(spectrum)
+    most = most_of(spectrum.nm, spectrum.values)
     if most > 100 * MOST_SHARE:
         raise CalibrationError(
             f"{path.name} contains values up to {most:g}; reflectance from 0 to 1, or percent, is needed."
@@ -81,7 +80,7 @@ def _as_share(path: Path, spectrum: Spectrum) -> Spectrum:
 
 
 def _as_radiance(path: Path, spectrum: Spectrum) -> Spectrum:
-    most = _most(spectrum)
+    most = most_of(spectrum.nm, spectrum.values)
     if most > (_MOST_RADIANCE if spectrum.scaled else _MOST_UNSTATED):
         stated = RADIANCE_UNIT if spectrum.scaled else "no stated unit"
         raise CalibrationError(
@@ -89,14 +88,6 @@ def _as_radiance(path: Path, spectrum: Spectrum) -> Spectrum:
             f" Export radiance in {RADIANCE_UNIT}, with its unit over the column."
         )
     return spectrum
-
-
-def _most(spectrum: Spectrum) -> float:
-    """The largest value where light is visible, where no instrument divides noise by noise."""
-    low, high = _VISIBLE_NM
-    inside = (spectrum.nm >= low) & (spectrum.nm <= high) & np.isfinite(spectrum.values)
-    values = spectrum.values[inside] if np.count_nonzero(inside) > 1 else spectrum.values
-    return float(np.nanmax(values, initial=0.0))
 
 
 def _curve(path: Path, spectrum: Spectrum, covers_nm: tuple[float, float], radiance: bool) -> SpectralCurve:

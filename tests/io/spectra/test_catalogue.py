@@ -86,6 +86,14 @@ def test_an_asd_is_divided_by_its_white_unless_it_is_done(
     np.testing.assert_allclose(curve.values, SHARE, atol=1e-5)
 
 
+def test_noise_of_a_done_asd_beyond_the_visible_does_not_divide_it_by_its_white_again(tmp_path: Path) -> None:
+    nm = 350.0 + 1.0 * np.arange(2151)
+    values = np.where(nm > 2498, 8.0, 0.3)
+    content = made.asd(kind=1, values=values, counts=np.full(nm.size, 2e4), nm=nm)
+    curve = read_spectrum(write(tmp_path / "a.asd", content), COVERS, radiance=False)
+    np.testing.assert_allclose(curve.values[:2000], 0.3, rtol=1e-6)
+
+
 def test_counts_of_target_and_white_are_divided_where_nothing_else_is_reflectance(tmp_path: Path) -> None:
     text = made.sed("Norm. DN (Ref.)\tNorm. DN (Target)\tChan.#")
     dark = text.replace("\t1.000000e-01\t", "\t0.000000e+00\t", 1)

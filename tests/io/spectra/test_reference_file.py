@@ -98,6 +98,42 @@ def test_deleted_values_are_neither_shown_nor_bridged(tmp_path: Path) -> None:
         read_references(path)
 
 
+def test_noise_beyond_the_visible_says_nothing_of_the_scale_of_a_library(tmp_path: Path) -> None:
+    nm = np.arange(350.0, 2501.0, 10.0)
+    listed = {"wavelength": "{" + ",".join(f"{each:g}" for each in nm) + "}", "samples": nm.size}
+    share = 0.3 + 0.1 * np.sin(nm / 200)
+    noisy, percent = share.copy(), 100 * share
+    noisy[-1] = 2.7
+    # In percent, a cloth that is black where light is visible.
+    percent[nm < 800] = 1.5
+    bad = {"bbl": "{" + ",".join("0" if each > 2400 else "1" for each in nm) + "}"}
+    for fields, values in (
+        ({}, noisy),
+        ({"reflectance scale factor": 10000}, noisy * 10000),
+        (bad, np.where(nm > 2400, 5.0, share)),
+        ({}, percent),
+    ):
+        path = write_library(tmp_path / "a.sli", {**listed, **fields})
+        path.write_bytes(np.stack([values, values]).astype("<f4").tobytes())
+        curve = read_reference(path, "Grass")
+        wanted = percent * 0.01 if values is percent else share
+        np.testing.assert_allclose(curve.values[:200], wanted[:200], rtol=1e-5)
+        assert curve.wavelengths_nm[-1] == (2400 if fields is bad else 2500)
+
+
+@pytest.mark.parametrize(
+    ("marks", "told"),
+    [
+        ("{" + "0," * 31 + "}", "marks 0 of 31 bands as good"),
+        ("{1, 0}", "marks 1 of 2 bands as good, for 31 bands"),
+        ("{1, x}", "a mark of bbl is not a number"),
+    ],
+)
+def test_marks_of_bad_bands_that_do_not_fit_are_told(tmp_path: Path, marks: str, told: str) -> None:
+    with pytest.raises(CalibrationError, match=told):
+        read_references(write_library(tmp_path / "a.sli", {"bbl": marks}))
+
+
 @pytest.mark.parametrize(
     ("unit", "in_nm"),
     [

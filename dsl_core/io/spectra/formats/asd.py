@@ -12,7 +12,16 @@ from pathlib import Path
 import numpy as np
 
 from dsl_core.errors import CalibrationError
-from dsl_core.io.spectra.records import MOST_NUMBER, Floats, Format, Quantity, Spectrum, content_of, rising
+from dsl_core.io.spectra.records import (
+    MOST_NUMBER,
+    Floats,
+    Format,
+    Quantity,
+    Spectrum,
+    content_of,
+    most_of,
+    rising,
+)
 
 HEADER_BYTES = 484
 _VERSIONS = {b"ASD", b"asd", *(b"as%d" % revision for revision in range(2, 9))}
@@ -49,7 +58,7 @@ def read_asd(path: Path) -> list[Spectrum]:
     values, end = _values(path, content, HEADER_BYTES, dtype, channels)
     nm = start_nm + step_nm * np.arange(channels, dtype=np.float64)
     quantity = _QUANTITIES.get(kind, "unstated")
-    is_done = kind == 1 and np.nanmax(values, initial=0.0) <= _MOST_SHARE
+    is_done = kind == 1 and most_of(nm, values) <= _MOST_SHARE
     if kind in (0, 1) and not is_done and content[:3] not in (b"ASD", b"asd"):
         white = _white(path, content, end, dtype, channels)
         if white is not None:
@@ -57,7 +66,7 @@ def read_asd(path: Path) -> list[Spectrum]:
                 values, quantity = np.where(white > 0, values / white, np.nan), "reflectance"
         elif kind == 1:
             quantity = "counts"
-    if quantity == "radiance" and np.nanmax(values, initial=0.0) > _MOST_RADIANCE:
+    if quantity == "radiance" and most_of(nm, values) > _MOST_RADIANCE:
         quantity = "counts"
     nm, values = rising(path, nm, values)
     return [Spectrum("", nm, values, quantity, quantity in ("reflectance", "transmittance", "radiance"))]
