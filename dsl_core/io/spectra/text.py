@@ -28,7 +28,8 @@ class Table:
     """Rows of numbers: ``cells`` (rows, columns) with NaN where there is none.
 
     ``titles`` has what stands over each column, units included, and ``names`` the same without a separate
-    line of units; ``header`` is all text before the table and ``lines`` has the number of each row's line.
+    line of units; ``header`` is all text before the table, ``above`` what of it is above the titles, and
+    ``lines`` has the number of each row's line.
     """
 
     header: str
@@ -36,6 +37,7 @@ class Table:
     names: tuple[str, ...]
     cells: Floats
     lines: tuple[int, ...]
+    above: str = ""
 
 
 def decoded(content: bytes) -> str:
@@ -151,27 +153,33 @@ def _table(path: Path, header: list[str], rows: list[list[str]], numbers: list[i
                 " again, or leave out the range that the instrument does not cover."
             )
     separator = ";" if _SEPARATOR.search(first.strip(" |")) else "," if "," in first else " "
-    titles, names = _over(header, width, separator)
-    return Table("\n".join(header), titles, names, cells, tuple(numbers))
+    titles, names, above = _over(header, width, separator)
+    return Table("\n".join(header), titles, names, cells, tuple(numbers), "\n".join(header[:above]))
 
 
-def _over(header: list[str], width: int, separator: str) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """What stands over the columns: titles with units, and names; empty words where nothing does."""
-    lines = [line for line in header[-6:] if line.strip(" \t;,\r#|:=-")]
-    found = [_fitting(line, width, separator) for line in reversed(lines)]
+def _over(header: list[str], width: int, separator: str) -> tuple[tuple[str, ...], tuple[str, ...], int]:
+    """What stands over the columns, and how many lines above that.
+
+    It is titles with units, and names; empty words where nothing stands there.
+    """
+    begins = max(len(header) - 6, 0)
+    places = [i for i in range(begins, len(header)) if header[i].strip(" \t;,\r#|:=-")][::-1]
+    found = [_fitting(header[i], width, separator) for i in places]
     nearest = found[0] if found else None
     if nearest is None:
-        return ("",) * width, ("",) * width
+        return ("",) * width, ("",) * width, len(header)
     above = found[1] if len(found) > 1 else None
     if above is not None and all(_UNIT.fullmatch(cell) for cell in nearest if cell):
         titles = tuple(f"{a} {b}".strip() for a, b in zip(above, nearest, strict=True))
-        return titles, tuple(above)
+        return titles, tuple(above), places[1]
     if above is not None and len(set(nearest)) < width and "" in above[:-1]:
         # One name over the two columns of each spectrum: its wavelengths and its values.
-        return tuple(nearest), tuple(
-            cell or before for before, cell in zip(["", *above], above, strict=False)
+        return (
+            tuple(nearest),
+            tuple(cell or before for before, cell in zip(["", *above], above, strict=False)),
+            places[1],
         )
-    return tuple(nearest), tuple(nearest)
+    return tuple(nearest), tuple(nearest), places[0]
 
 
 def _fitting(line: str, width: int, separator: str) -> list[str] | None:

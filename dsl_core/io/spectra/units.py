@@ -19,6 +19,9 @@ _NANOMETRE = re.compile(r"(?<![a-zA-Z])(?:nm|nanomet(?:er|re)s?)(?![a-zA-Z])", r
 _ANGSTROM = re.compile(r"(?<![a-zA-Z])(?:Å|angstr(?:o|ö)ms?)(?![a-zA-Z])", re.IGNORECASE)
 _WAVENUMBER = re.compile(r"wave ?number|cm\s?(?:\^?-1|⁻¹)|1/cm", re.IGNORECASE)
 _PERCENT = re.compile(r"%|percent", re.IGNORECASE)
+#: The same as a unit: "99 % reflectance" names a white standard.
+_OF_ALL = re.compile(r"(?<!\d)(?<!\d )(?:%|percent)", re.IGNORECASE)
+_UNIT_LINE = re.compile(r"\W*(?:y[- ]?)?units?\b", re.IGNORECASE)
 #: In the order in which they are tried; a unit of power decides before all of them.
 _WORDS: tuple[tuple[Quantity, re.Pattern[str]], ...] = (
     ("irradiance", re.compile(r"irrad|\birr\b", re.IGNORECASE)),
@@ -61,14 +64,26 @@ def counts_rows(title: str, values: Floats) -> bool:
 def quantity_of(title: str, around: str = "") -> tuple[Quantity, float, bool]:
     """The quantity of a column, the factor to shares or W/(sr m2 nm), and whether its unit is stated.
 
-    ``title`` is what is written over the column, ``around`` the rest of the header, which decides only where
-    the title says nothing.
+    ``title`` is what is written over the column, ``around`` the rest of the header, which decides where the
+    title says nothing, and whose unit of the same quantity holds where the title has none.
     """
-    for text in (title, around):
-        found = _quantity(text, everywhere=text is title)
-        if found[0] != "unstated":
-            return found
-    return "unstated", 1.0, False
+    found = _quantity(title, everywhere=True)
+    if found[0] == "unstated":
+        found = _quantity(around, everywhere=False)
+    if found[2]:
+        return found
+    in_lines = (_of_line(line, found[0]) for line in around.split("\n"))
+    # A date or a step may look like "0-1"; only what changes the values is taken from afar.
+    return next((said for said in in_lines if said[0] == found[0] and said[1] != 1.0), found)
+
+
+def _of_line(line: str, quantity: Quantity) -> tuple[Quantity, float, bool]:
+    """The same of one line of a header, which may state the percentage of a quantity without its name."""
+    said = _quantity(line, everywhere=False)
+    is_share = quantity in ("reflectance", "transmittance")
+    if is_share and said[0] == "unstated" and _UNIT_LINE.match(line) and _OF_ALL.search(line):
+        return quantity, 0.01, True
+    return said
 
 
 def _quantity(text: str, everywhere: bool) -> tuple[Quantity, float, bool]:
@@ -82,8 +97,10 @@ def _quantity(text: str, everywhere: bool) -> tuple[Quantity, float, bool]:
         if found is None:
             continue
         near = text if everywhere else text[found.start() : found.start() + 40].split("\n")[0]
+        before = text[: found.start()].rpartition("\n")[2]
+        is_percent = _PERCENT.search(near) if everywhere else _OF_ALL.search(f"{before}{near}")
         is_share = quantity in ("reflectance", "transmittance")
-        if is_share and _PERCENT.search(near):
+        if is_share and is_percent:
             return quantity, 0.01, True
         return quantity, 1.0, is_share and bool(re.search(r"\[1(?:\.0)?\]|\(1\)|0 ?[-.…] ?1\b", near))
     if everywhere and _PERCENT.search(text):

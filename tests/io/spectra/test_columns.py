@@ -46,3 +46,41 @@ def test_a_column_that_counts_rows_under_no_title_is_no_spectrum(tmp_path: Path)
     assert [each.name for each in found.references] == ["leaf", "bark"]
     assert found.as_percent is None
     assert found.references[0].curve.values[0] == pytest.approx(LEAF[0], rel=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("header", "titles", "scale"),
+    [
+        ("Y unit: % reflectance", "Wavelength,Reflectance", 0.01),
+        ("Y unit: % reflectance", "Wavelength,R", 0.01),
+        ("Unit: %", "Wavelength,Reflectance", 0.01),
+        # None of these is the unit of the values.
+        ("White: 99 % reflectance, Spectralon 99%", "Wavelength,Reflectance", 1.0),
+        ("White: 99% reflectance standard, 99 %", "Wavelength,R", 1.0),
+        ("Humidity (%)", "Wavelength,Reflectance", 1.0),
+        ("own", "Wavelength,Reflectance,Std dev [%]", 1.0),
+        ("Reflectance of 2020-10-1", "Wavelength,Reflectance [%]", 0.01),
+    ],
+)
+def test_percent_of_a_header_is_that_of_a_column_without_a_unit(
+    tmp_path: Path, header: str, titles: str, scale: float
+) -> None:
+    path = table(tmp_path / "felt.csv", f"{header}\n{titles}", *[NM, LEAF, LEAF][: titles.count(",") + 1])
+    (found,) = read_columns(path)
+    np.testing.assert_allclose(found.values, LEAF * scale, rtol=1e-4)
+
+
+@pytest.mark.parametrize("title", ["Radiance", "L", "Value"])
+def test_a_unit_of_radiance_in_the_header_holds_whatever_the_column_is_called(
+    tmp_path: Path, title: str
+) -> None:
+    head = "Irradiance unit: W/m2/nm\nUnit: mW/(m2 sr nm)" if title == "Radiance" else "Unit: mW/(m2 sr nm)"
+    path = table(tmp_path / "light.csv", f"{head}\nWavelength (nm),{title}", NM, LEAF)
+    (found,) = read_columns(path)
+    assert (found.quantity, found.scaled) == ("radiance", True)
+    np.testing.assert_allclose(found.values, LEAF * 1e-3, rtol=1e-4)
+
+
+def test_a_date_beside_a_quantity_does_not_state_shares(tmp_path: Path) -> None:
+    path = table(tmp_path / "a.csv", "Reflectance of 2020-10-1\nWavelength,Reflectance", NM, LEAF * 100)
+    assert read_references(path).references[0].curve.values[0] == pytest.approx(LEAF[0], rel=1e-4)

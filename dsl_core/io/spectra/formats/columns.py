@@ -51,7 +51,8 @@ def spectra_of(path: Path, table: Table, known: Known | None = None) -> list[Spe
         values = table.cells[kept, i]
         if np.isfinite(values).any():
             # What the whole header says is of one column only where it is the only one.
-            around = table.header if len(values_of) == 1 or not titles[i] else ""
+            around = "" if len(values_of) > 1 else table.above
+            around = around if titles[i] else table.header
             spectra.append(_spectrum(path, names[i], titles[i], around, nm, values, known))
     return spectra
 
