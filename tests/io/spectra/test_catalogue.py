@@ -125,6 +125,13 @@ def test_radiance_is_in_one_unit(tmp_path: Path, name: str, content: str | bytes
     assert curve.unit == "W/(sr m2 nm)"
 
 
+def test_the_unit_of_a_header_is_used_once_where_light_is_the_only_column(tmp_path: Path) -> None:
+    head = ["Version: 2.3", "Units: uW/cm^2/sr/nm", "Data:", "Wvl\tRad. (Target)"]
+    rows = [f"{nm:.1f}\t{0.1 * r:.6e}" for nm, r in zip(NM, SHARE, strict=True)]
+    (curve,) = read_radiances(write(tmp_path / "a.sed", "\n".join([*head, *rows])), COVERS)
+    np.testing.assert_allclose(curve.values, SHARE * 1e-3, rtol=1e-5)
+
+
 def test_a_quantity_that_a_konica_minolta_states_is_kept(tmp_path: Path) -> None:
     rows = [f"{nm:.0f},{100 * r:.5f}" for nm, r in zip(NM, SHARE, strict=True)]
     content = "\n".join(["Instrument,CS-2000A", "Wavelength [nm],Reflectance [%]", *rows])

@@ -40,7 +40,7 @@ def read_sed(path: Path) -> list[Spectrum]:
         for spectrum in found:
             if _is_white(spectrum):
                 continue
-            if spectrum.quantity == "radiance":
+            if spectrum.quantity == "radiance" and not spectrum.scaled:
                 # Without a line of units, the instruments write W/(m2 sr nm).
                 spectrum = replace(spectrum, values=spectrum.values * factor, scaled=True)
             spectra.append(spectrum)
