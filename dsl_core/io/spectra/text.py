@@ -18,6 +18,8 @@ MIN_ROWS = 8
 #: More cells are no spectra; they would fill the memory.
 MOST_CELLS = 20_000_000
 _NUMBER = re.compile(r"[-+]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][-+]?\d+)?|[-+]?(?:nan|inf)\b", re.IGNORECASE)
+#: What programs write where there is no value.
+_MISSING = re.compile(r"[-+]?nan|n/?a|n\. ?a\.?|#n/a|null|[-–—]+", re.IGNORECASE)
 _DECIMAL_COMMA = re.compile(r"[-+]?\d+(?:,\d+)?(?:[eE][-+]?\d+)?")
 _SEPARATOR = re.compile(r"[;\t|]")
 _UNIT = re.compile(r"[\[(].*[\])]|nm|um|µm|μm|%|counts?|1|[nmµuk]?W[/·* ].*", re.IGNORECASE)
@@ -68,7 +70,7 @@ def cells_of(line: str) -> list[str]:
         cells = [_pointed(cell) for cell in _quoted(line)]
     else:
         words = line.split()
-        if len(words) > 1 and "," in line and all(_DECIMAL_COMMA.fullmatch(word) for word in words):
+        if len(words) > 1 and "," in line and all(map(_is_pointed, words)):
             cells = [_pointed(word) for word in words]
         elif "," in line:
             cells = [cell.strip().strip('"') for cell in line.split(",")]
@@ -87,6 +89,11 @@ def _pointed(cell: str) -> str:
     return cell.replace(",", ".") if _DECIMAL_COMMA.fullmatch(cell) else cell
 
 
+def _is_pointed(word: str) -> bool:
+    """Whether a word between spaces can be a number with a decimal comma, or says that there is none."""
+    return bool(_DECIMAL_COMMA.fullmatch(word) or _MISSING.fullmatch(word))
+
+
 def _quoted(line: str) -> list[str]:
     try:
         return next(csv.reader([line], skipinitialspace=True), [])
@@ -95,7 +102,7 @@ def _quoted(line: str) -> list[str]:
 
 
 def tables_of(path: Path, text: str) -> list[Table]:
-    """All tables of a text; raises `CalibrationError` for a number that is not finite."""
+    """All tables of a text; raises `CalibrationError` for a number that is infinite."""
     tables: list[Table] = []
     header: list[str] = []
     rows: list[list[str]] = []
@@ -126,8 +133,11 @@ def tables_of(path: Path, text: str) -> list[Table]:
 
 
 def is_row(cells: list[str]) -> bool:
-    """Whether a line is a row of a table: a number first, and another behind it."""
-    return len(cells) > 1 and bool(_NUMBER.fullmatch(cells[0])) and any(map(_NUMBER.fullmatch, cells[1:]))
+    """Whether a line is a row of a table: a number first, and another behind it or only missing ones."""
+    if len(cells) < 2 or not _NUMBER.fullmatch(cells[0]):
+        return False
+    rest = cells[1:]
+    return any(map(_NUMBER.fullmatch, rest)) or all(not cell or _MISSING.fullmatch(cell) for cell in rest)
 
 
 def number_of(cell: str) -> float:
@@ -147,9 +157,9 @@ def _table(path: Path, header: list[str], rows: list[list[str]], numbers: list[i
     for i, row in enumerate(rows):
         values = [number_of(cell) for cell in row]
         cells[i, : len(row)] = values
-        if any(_NUMBER.fullmatch(cell) and not math.isfinite(float(cell)) for cell in row):
+        if any(_NUMBER.fullmatch(cell) and math.isinf(float(cell)) for cell in row):
             raise CalibrationError(
-                f"{path.name}, line {numbers[i]}: a value is not a finite number. Measure this spectrum"
+                f"{path.name}, line {numbers[i]}: a value is infinite. Measure this spectrum"
                 " again, or leave out the range that the instrument does not cover."
             )
     separator = ";" if _SEPARATOR.search(first.strip(" |")) else "," if "," in first else " "

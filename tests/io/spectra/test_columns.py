@@ -84,3 +84,26 @@ def test_a_unit_of_radiance_in_the_header_holds_whatever_the_column_is_called(
 def test_a_date_beside_a_quantity_does_not_state_shares(tmp_path: Path) -> None:
     path = table(tmp_path / "a.csv", "Reflectance of 2020-10-1\nWavelength,Reflectance", NM, LEAF * 100)
     assert read_references(path).references[0].curve.values[0] == pytest.approx(LEAF[0], rel=1e-4)
+
+
+@pytest.mark.parametrize("word", ["NA", "NaN", "nan", "n.a.", "N/A", "#N/A", "NULL", "-", "--"])
+@pytest.mark.parametrize(
+    ("separator", "decimal"), [(",", "."), (";", ","), (" ", "."), (" ", ","), ("\t", ".")]
+)
+def test_a_word_for_no_value_is_a_missing_value(
+    tmp_path: Path, word: str, separator: str, decimal: str
+) -> None:
+    lost = (400, 480, 540, 600)
+    rows = [
+        f"{nm}{decimal}0{separator}" + (word if nm in lost else f"{value:.4f}".replace(".", decimal))
+        for nm, value in zip(NM, LEAF, strict=True)
+    ]
+    path = tmp_path / "leaf.txt"
+    path.write_text("\n".join([f"nm{separator}reflectance", *rows]), encoding="utf-8")
+    (leaf,) = read_columns(path)
+    assert leaf.nm.tolist() == NM.tolist()
+    # Between spaces, commas of decimals hide where a title ends.
+    assert leaf.name == ("" if (separator, decimal) == (" ", ",") else "reflectance")
+    np.testing.assert_allclose(leaf.values, np.where(np.isin(NM, lost), np.nan, LEAF), atol=1e-4)
+    (seen,) = read_references(path).references
+    assert (seen.curve.wavelengths_nm[0], seen.curve.wavelengths_nm[-1]) == (410, 700)
