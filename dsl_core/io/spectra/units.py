@@ -61,6 +61,15 @@ def counts_rows(title: str, values: Floats) -> bool:
     return not title.strip() and values.size > 1 and bool(np.all(np.diff(values) == 1))
 
 
+def says_micrometres(words: str) -> bool:
+    """Whether words name micrometres.
+
+    >>> says_micrometres("wavelength (um)"), says_micrometres("humus")
+    (True, False)
+    """
+    return bool(_MICROMETRE.search(words))
+
+
 def quantity_of(title: str, around: str = "") -> tuple[Quantity, float, bool]:
     """The quantity of a column, the factor to shares or W/(sr m2 nm), and whether its unit is stated.
 

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from dsl_core.errors import CalibrationError
 from dsl_core.io.spectra.formats.columns import read_columns
 from dsl_core.io.spectra.reference_file import read_references
 
@@ -107,3 +108,68 @@ def test_a_word_for_no_value_is_a_missing_value(
     np.testing.assert_allclose(leaf.values, np.where(np.isin(NM, lost), np.nan, LEAF), atol=1e-4)
     (seen,) = read_references(path).references
     assert (seen.curve.wavelengths_nm[0], seen.curve.wavelengths_nm[-1]) == (410, 700)
+
+
+def in_lines(path: Path, head: str, behind: str = "", ids: str = "{}") -> Path:
+    """Ten samples, one a line: their numbers, the values of a leaf, and what is behind those."""
+    values = ",".join(f"{value:.5f}" for value in LEAF)
+    path.write_text("\n".join([head, *(f"{ids.format(i)},{values}{behind}" for i in range(1, 11))]))
+    return path
+
+
+@pytest.mark.parametrize("ids", ["{}", "oak {}", "10{}"])
+@pytest.mark.parametrize(
+    ("head", "behind", "falls"),
+    [
+        ("id," + ",".join(map(str, NM[::-1])), "", True),
+        ("id," + ",".join(f"{nm / 1000:g} um" for nm in NM), "", False),
+        ("wavelength (µm)," + ",".join(f"{nm / 1000:g}" for nm in NM), "", False),
+        ("id," + ",".join(map(str, NM)) + ",species,plot", ",oak,3", False),
+        ("id," + ",".join(f"X{nm}" for nm in NM) + ",year2020", ",3", False),
+    ],
+)
+def test_spectra_in_lines_are_read_whatever_is_around_them(
+    tmp_path: Path, head: str, behind: str, falls: bool, ids: str
+) -> None:
+    found = read_columns(in_lines(tmp_path / "oaks.csv", head, behind, ids))
+    assert [each.name for each in found] == [ids.format(i) for i in range(1, 11)]
+    np.testing.assert_allclose(found[0].nm, NM)
+    np.testing.assert_allclose(found[0].values, LEAF[::-1] if falls else LEAF, atol=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("first", "labels"),
+    [
+        ("id", [f"{nm / 1000:g}" for nm in NM]),
+        ("", [f"{nm / 1000:g}" for nm in NM]),
+        ("plot", [f"{nm / 1000:g}" for nm in NM]),
+        ("id", [*map(str, NM[:15]), *map(str, NM[:16])]),
+    ],
+)
+def test_numbers_of_samples_do_not_pass_for_wavelengths(
+    tmp_path: Path, first: str, labels: list[str]
+) -> None:
+    path = in_lines(tmp_path / "oaks.csv", ",".join([first, *labels]))
+    with pytest.raises(CalibrationError, match=f"wavelengths over its columns, from '{labels[0]}' to"):
+        read_columns(path)
+
+
+@pytest.mark.parametrize(
+    ("first", "title"), [("nm", "0.{}"), ("", "0.{}"), ("X", "{}"), ("Wavelength", "{}.5")]
+)
+def test_numbers_over_columns_are_names_beside_a_column_of_wavelengths(
+    tmp_path: Path, first: str, title: str
+) -> None:
+    titles = [title.format(i) for i in range(1, 11)]
+    path = table(tmp_path / "doses.csv", ",".join([first, *titles]), NM, *[LEAF + i / 99 for i in range(10)])
+    found = read_columns(path)
+    assert [each.name for each in found] == titles
+    np.testing.assert_allclose(found[0].nm, NM)
+
+
+def test_a_row_of_rising_or_falling_values_is_no_line_of_wavelengths(tmp_path: Path) -> None:
+    columns = [LEAF * 1000 * (1 - 0.01 * i) for i in range(12)]
+    titles = ",".join(["wavelength", *(f"leaf {chr(97 + i)}" for i in range(12))])
+    found = read_columns(table(tmp_path / "counts.csv", titles, NM / 1000, *columns))
+    assert len(found) == 12
+    np.testing.assert_allclose(found[0].nm, NM)

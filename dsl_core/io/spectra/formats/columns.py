@@ -3,22 +3,34 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from dsl_core.errors import CalibrationError
-from dsl_core.io.spectra.records import WAVELENGTHS_NM, Format, Quantity, Spectrum, content_of, rising
+from dsl_core.io.spectra.records import WAVELENGTHS_NM, Floats, Format, Quantity, Spectrum, content_of, rising
 from dsl_core.io.spectra.text import MIN_ROWS, Table, cells_of, decoded, is_text, number_of, tables_of
-from dsl_core.io.spectra.units import counts_rows, is_beside, quantity_of, to_nanometres
+from dsl_core.io.spectra.units import (
+    counts_rows,
+    is_beside,
+    quantity_of,
+    says_micrometres,
+    to_nanometres,
+)
 
 #: Corrects what a format knows better than its titles say: column's title to quantity.
 Known = Callable[[str], Quantity | None]
 _WAVELENGTH = re.compile(r"wave ?l|wvl|\bwave\b|wellenl|lambda|λ|^\W?(?:nm|um|µm|μm)\W?$", re.IGNORECASE)
 #: Lines in which the wavelengths of a table of lines are looked for.
 MOST_HEADER = 300
-_LABEL = re.compile(r"(?:[A-Za-z]{1,12}[_ ]?)?(\d{3,5}(?:\.\d+)?)(?: ?nm)?", re.IGNORECASE)
+#: How wavelengths are written over columns, in nm and in micrometres; what is before the number is the same.
+_PREFIX = r"(?P<prefix>(?:[A-Za-z]{1,12}[_ ]?)?)"
+_LABEL = re.compile(_PREFIX + r"(?P<number>\d{3,5}(?:\.\d+)?)(?: ?nm)?", re.IGNORECASE)
+_LABEL_UM = re.compile(
+    _PREFIX + r"(?P<number>\d{1,2}(?:\.\d*)?|\.\d+)(?P<unit> ?(?:um|µm|μm))?", re.IGNORECASE
+)
 
 
 def read_columns(path: Path) -> list[Spectrum]:
@@ -44,6 +56,7 @@ def spectra_of(path: Path, table: Table, known: Known | None = None) -> list[Spe
     kept = np.isfinite(given)
     if np.count_nonzero(kept) < MIN_ROWS:
         return []
+    _require_no_lines(path, titles, titles[first], given[kept])
     nm = to_nanometres(path, given[kept], titles[first], table.header)
     values_of = [i for i in columns if i != first and not is_beside(titles[i])]
     spectra = []
@@ -68,31 +81,91 @@ def _spectrum(
     return Spectrum(name, nm, values * factor, quantity, is_scaled)
 
 
+@dataclass(frozen=True)
+class _Labels:
+    """Cells of a line, from ``start`` to before ``end``, that are wavelengths; ``nm`` has shape (cells,)."""
+
+    start: int
+    end: int
+    nm: Floats
+
+    @property
+    def is_spectrum(self) -> bool:
+        """Whether light can have the wavelengths, and they rise or fall."""
+        steps, (low, high) = np.diff(self.nm), WAVELENGTHS_NM
+        within = low <= self.nm.min() and self.nm.max() <= high
+        return bool(within and (np.all(steps > 0) or np.all(steps < 0)))
+
+
 def _in_lines(path: Path, text: str) -> list[Spectrum]:
     """Spectra of a text whose wavelengths stand over its columns, one spectrum a line."""
     lines = text.splitlines()
     for at, line in enumerate(lines[:MOST_HEADER]):
         cells = cells_of(line)
-        labels = [_LABEL.fullmatch(cell) for cell in cells]
-        start = next((i for i in range(len(labels)) if all(labels[i:])), len(labels))
-        if start == 0 or len(cells) - start < MIN_ROWS:
+        found = _labels(cells, _LABEL)
+        if found is None:
+            found = _labels(cells, _LABEL_UM)
+            # A row of values looks the same, where nothing says micrometres.
+            if found is None or not _states_micrometres(cells, found):
+                continue
+        before = cells[: found.start]
+        if not before or any(np.isfinite(number_of(cell)) for cell in before) or not found.is_spectrum:
             continue
-        nm = np.array([float(label[1]) for label in labels[start:] if label])
-        if nm[0] < WAVELENGTHS_NM[0] or np.any(np.diff(nm) <= 0):
-            continue
-        header = "\n".join([*lines[:at], " ".join(cells[:start])])
-        return [s for row in lines[at + 1 :] for s in _line(path, row, start, nm, header)]
+        header = "\n".join([*lines[:at], " ".join(before)])
+        return [s for row in lines[at + 1 :] for s in _line(path, row, found, len(cells), header)]
     return []
 
 
-def _line(path: Path, row: str, start: int, nm: np.ndarray, header: str) -> list[Spectrum]:
+def _labels(cells: Sequence[str], form: re.Pattern[str]) -> _Labels | None:
+    """The longest run of cells of one form; None where it is no spectrum's."""
+    best, start = (0, 0), 0
+    found = [form.fullmatch(cell) for cell in cells]
+    for i, label in enumerate(found):
+        before = found[i - 1] if i else None
+        if label is None or before is None or label["prefix"] != before["prefix"]:
+            start = i
+        if label is not None and i + 1 - start > best[1] - best[0]:
+            best = start, i + 1
+    if best[1] - best[0] < MIN_ROWS:
+        return None
+    numbers = np.array([float(label["number"]) for label in found[slice(*best)] if label is not None])
+    return _Labels(*best, numbers * (1e3 if form is _LABEL_UM else 1.0))
+
+
+def _states_micrometres(cells: Sequence[str], found: _Labels) -> bool:
+    labels = [_LABEL_UM.fullmatch(cell) for cell in cells[found.start : found.end]]
+    in_labels = all(label is not None and label["unit"] for label in labels)
+    return in_labels or says_micrometres(" ".join(cells[: found.start]))
+
+
+def _line(path: Path, row: str, labels: _Labels, width: int, header: str) -> list[Spectrum]:
     cells = cells_of(row)
-    values = np.array([number_of(cell) for cell in cells[start:]])
-    if len(cells) <= start or len(values) > len(nm) or np.count_nonzero(np.isfinite(values)) < MIN_ROWS:
+    values = np.array([number_of(cell) for cell in cells[labels.start : labels.end]])
+    if len(cells) > width or np.count_nonzero(np.isfinite(values)) < MIN_ROWS:
         return []
-    values = np.concatenate([values, np.full(len(nm) - len(values), np.nan)])
-    name = next((cell for cell in cells[:start] if cell), "")
-    return [_spectrum(path, name, " ".join(cells[:start]), header, nm, values, None)]
+    values = np.concatenate([values, np.full(len(labels.nm) - len(values), np.nan)])
+    before = cells[: labels.start]
+    name = next((cell for cell in before if cell), "")
+    return [_spectrum(path, name, " ".join(before), header, labels.nm, values, None)]
+
+
+def _require_no_lines(path: Path, titles: Sequence[str], title: str, given: Floats) -> None:
+    """Raise `CalibrationError` where titles look like wavelengths, and ``given`` like numbers of samples.
+
+    They would pass for wavelengths, of as many spectra as there are bands.
+    """
+    found = _labels(titles, _LABEL) or _labels(titles, _LABEL_UM)
+    if found is None or _WAVELENGTH.search(title):
+        return
+    # "1, 2, 3" over columns are numbers of samples.
+    is_labelled = title and found.is_spectrum and any("." in each for each in titles[found.start : found.end])
+    counts = given[0] < WAVELENGTHS_NM[0] and np.all(np.diff(given) == 1)
+    if is_beside(title) or counts or is_labelled:
+        raise CalibrationError(
+            f"{path.name} seems to have wavelengths over its columns, from {titles[found.start]!r} to"
+            f" {titles[found.end - 1]!r}, but not in nm, or not in order. Write them in nm over the values,"
+            " or 'nm' over a column of wavelengths."
+        )
 
 
 FORMAT = Format(
