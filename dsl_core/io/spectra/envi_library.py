@@ -26,8 +26,11 @@ _KINDS = {
     **{"1": "u1", "2": "i2", "3": "i4", "4": "f4", "5": "f8"},
     **{"12": "u2", "13": "u4", "14": "i8", "15": "u8"},
 }
-_NANOMETRES = {"nanometers": 1.0, "nanometres": 1.0, "nm": 1.0, "micrometers": 1e3, "micrometres": 1e3}
-_NANOMETRES |= {"um": 1e3, "µm": 1e3, "μm": 1e3, "microns": 1e3}
+_NANOMETRES = dict.fromkeys(("nanometers", "nanometres", "nanometer", "nanometre", "nm"), 1.0)
+_NANOMETRES |= dict.fromkeys(
+    ("micrometers", "micrometres", "micrometer", "micrometre", "um", "µm", "μm"), 1e3
+)
+_NANOMETRES |= dict.fromkeys(("microns", "micron"), 1e3)
 #: Without repetitions within each other: the time stays in proportion to the length, whatever the text.
 _FIELD = re.compile(r"^([^=;{}\n]+)=[ \t]*(\{[^{}]*\}|[^\n]*)", re.MULTILINE)
 #: Digits of a whole number, and values of a library, that no instrument reaches.

@@ -138,6 +138,7 @@ def test_marks_of_bad_bands_that_do_not_fit_are_told(tmp_path: Path, marks: str,
     ("unit", "in_nm"),
     [
         *(("Nanometers", 1), ("nanometres", 1), ("nm", 1), ("Micrometers", 1000), ("micrometres", 1000)),
+        *(("Nanometer", 1), ("nanometre", 1), ("Micrometer", 1000), ("micrometre", 1000), ("Micron", 1000)),
         *(("um", 1000), ("\u00b5m", 1000), ("\u03bcm", 1000), ("Microns", 1000)),
     ],
 )
