@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from dsl_core.errors import MissingPackageError, StoreError
 from dsl_core.io.pictures import array_file, camera_raw, open_exr
 from dsl_core.io.pictures.float_scale import SPARKS
+from dsl_core.io.pictures.heads import Head, heads_of
 from dsl_core.io.pictures.mapping import MOST_PICTURES, Mapping, RawLayout
 from dsl_core.io.png_parts import declares_too_much
 from dsl_core.io.reading import read_bounded, require_plain
@@ -50,6 +51,8 @@ _UNREADABLE = (
 #: Larger than any camera's picture, in bytes of its file and in pixels.
 MOST_BYTES, MOST_PIXELS = 1 << 30, 200_000_000
 _FULL = 65535
+#: Where colours are separate planes, OpenCV takes more bits for interleaved ones, without a word.
+_MOST_BITS_APART = 8
 #: Filters of renderers overshoot at edges by less than this share of white.
 FILTERED = 0.02
 #: Bits of frames decoded from sRGB: the steps of dark values are as fine as those of 12 bits.
@@ -261,6 +264,9 @@ def _page_count(path: Path, stamp: tuple[int, int]) -> int:
                 for page in range(count if count <= MOST_PICTURES else 0):
                     head.seek(page)
                     sizes.add(head.size)
+    except Image.UnidentifiedImageError:
+        heads = heads_of(_paged_bytes(path, stamp), MOST_PICTURES + 1)
+        count, sizes = max(len(heads), 1), {(head.width_px, head.height_px) for head in heads}
     except (*_UNREADABLE, Image.DecompressionBombError):
         return 1
     if count > MOST_PICTURES:
@@ -275,21 +281,21 @@ def _paged_bytes(path: Path, stamp: tuple[int, int]) -> bytes:
 
 
 def _image(path: Path, index: int | None = None) -> NDArray[Any]:
-    import io
-
     import cv2
     from PIL import Image
 
     data = _bytes(path) if index is None else _paged_bytes(path, _stamp(path))
     if declares_too_much(data):
         raise _damaged(path)
+    heads = heads_of(data, 1 if index is None else index + 1)
+    if heads and heads[-1].is_apart and heads[-1].bits > _MOST_BITS_APART:
+        raise StoreError(
+            f"{path} stores its colours as separate planes of {heads[-1].bits} bits, which cannot be read."
+            " Save it with interleaved colours (planar configuration: contiguous)."
+        )
     try:
         # The head is read first: a small file may claim a picture that no memory holds.
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")
-            warnings.simplefilter("error", Image.DecompressionBombWarning)
-            with Image.open(io.BytesIO(data)) as head:
-                width, height = head.size
+        width, height = _claimed_px(data, heads)
         if width * height > MOST_PIXELS:
             raise StoreError(f"{path} claims {width} x {height} px, which no camera has. Leave it out.")
         # Through memory, because OpenCV cannot open every path on Windows.
@@ -306,6 +312,25 @@ def _image(path: Path, index: int | None = None) -> NDArray[Any]:
     if found is None:
         raise _damaged(path)
     return np.asarray(found[..., 2::-1] if found.ndim == 3 and found.shape[2] >= 3 else found)
+
+
+def _claimed_px(data: bytes, heads: list[Head]) -> tuple[int, int]:
+    """Width and height as the head of a file says; raises what Pillow raises."""
+    import io
+
+    from PIL import Image
+
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            warnings.simplefilter("error", Image.DecompressionBombWarning)
+            with Image.open(io.BytesIO(data)) as head:
+                return head.size
+    except Image.UnidentifiedImageError:
+        # Pillow knows neither PFM in colour nor TIFF of 64 bits; OpenCV does.
+        if not heads:
+            raise
+        return heads[-1].width_px, heads[-1].height_px
 
 
 def _bytes(path: Path) -> bytes:
