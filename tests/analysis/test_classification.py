@@ -79,6 +79,12 @@ def test_the_table_is_written_with_its_method(found, tmp_path: Path) -> None:  #
     assert lines[0].startswith("# method: probability")
     assert rows[0]["class"] == NAMES[0]
     assert sum(int(row["pixels"]) for row in rows) == made.shown.values.size
+    # The sign of comments begins a colour as well.
+    pandas = pytest.importorskip("pandas")
+    table = pandas.read_csv(tmp_path / "map.csv", comment="#")
+    assert table["pixels"].tolist() == [int(row["pixels"]) for row in rows]
+    assert table["colour"].tolist() == [row["colour"] for row in rows]
+    assert all(colour.startswith("#") for colour in table["colour"])
     with pytest.raises(StoreError, match="does not end in"):
         write_classification(result, made, tmp_path / "map.jpg")
 

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from dsl_core.errors import StoreError
 from dsl_core.io.export.common import provenance_of, require_suffix
-from dsl_core.io.export.wording import deviation_text, figure_text, header_lines
+from dsl_core.io.export.wording import csv_line, deviation_text, figure_text, header_lines
 from dsl_core.io.spectra.formats.own_table import MEAN, WAVELENGTH
 from dsl_core.io.staging import staged
 
@@ -81,7 +81,7 @@ def export_spectra(
     ):
         file.writelines(header_lines(provenance_of(attributes)))
         file.writelines(f"# {' '.join(each.name.split())}: {each.where}\n" for each in spectra if each.where)
-        csv.writer(file).writerows(_rows(spectra, "nan"))
+        file.writelines(map(csv_line, _rows(spectra, "nan")))
     return path
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -10,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dsl_core.io.export.common import provenance, require_suffix
-from dsl_core.io.export.wording import figure_text, header_lines
+from dsl_core.io.export.wording import csv_line, figure_text, header_lines
 from dsl_core.io.staging import staged
 
 if TYPE_CHECKING:
@@ -36,9 +35,8 @@ def export_table(
         draft.open("w", newline="", encoding="utf-8") as file,
     ):
         file.writelines(header_lines({**notes, **provenance(result)}))
-        writer = csv.writer(file)
-        writer.writerow(header)
-        writer.writerows([_text(cell) for cell in row] for row in rows)
+        file.write(csv_line(header))
+        file.writelines(csv_line(map(_text, row)) for row in rows)
     return [path]
 
 

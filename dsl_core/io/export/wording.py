@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Mapping
+import re
+from collections.abc import Iterable, Mapping
 
 import numpy as np
 
@@ -19,6 +20,20 @@ def header_lines(origin: Mapping[str, str]) -> list[str]:
     """
     said = ((key, _in_words(value)) for key, value in origin.items())
     return [f"# {key}: {words}\n" for key, words in said if words]
+
+
+_TO_QUOTE = re.compile(r'[#,"\r\n]')
+
+
+def csv_line(cells: Iterable[object]) -> str:
+    r"""A row of a table as CSV, whose cells with ``#`` are quoted too: no reader takes them for a comment.
+
+    >>> csv_line(["sample #3", "#1f77b4", "a, b", 7, None])
+    '"sample #3","#1f77b4","a, b",7,\r\n'
+    """
+    texts = ("" if cell is None else str(cell) for cell in cells)
+    quoted = ('"' + text.replace('"', '""') + '"' if _TO_QUOTE.search(text) else text for text in texts)
+    return ",".join(quoted) + "\r\n"
 
 
 def _in_words(value: str) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -9,7 +10,7 @@ import pytest
 
 from dsl_core.errors import StoreError
 from dsl_core.io.export.spectra import NamedSpectrum, export_spectra, spectra_as_text
-from dsl_core.io.spectra.reference_file import read_reference
+from dsl_core.io.spectra.reference_file import read_reference, read_references
 
 NM = np.arange(430.0, 661.0, 10.0)
 RAMP = np.linspace(0.1, 0.9, NM.size).astype(np.float32)
@@ -42,6 +43,18 @@ def test_pandas_reads_every_column_with_its_unit(tmp_path: Path) -> None:
     text = path.read_text("utf-8")
     assert "# scan_id: 2026-05-04-chart\n" in text
     assert "# exported_by: dsl-scan" in text
+
+
+def test_a_name_with_the_sign_of_comments_cuts_no_table(tmp_path: Path) -> None:
+    pandas = pytest.importorskip("pandas")
+    named = [replace(REFERENCE, name=name) for name in ("sample #3", '#4 "a", b')]
+    path = export_spectra([*named, REGION], tmp_path / "spectra.csv", SOURCE)
+    table = pandas.read_csv(path, comment="#")
+    assert table.columns[1:3].tolist() == ["sample #3: reflectance (1)", '#4 "a", b: reflectance (1)']
+    assert table.columns[3] == "sky, 50 % grey: reflectance (1)"
+    assert table.dropna(subset=[table.columns[1]]).iloc[:, 1].tolist() == [0.25] * FINER.size
+    names = [each.name for each in read_references(path).references]
+    assert names == ["sample #3", '#4 "a", b', "sky, 50 % grey"]
 
 
 def test_the_clipboard_gets_tabs_and_empty_cells() -> None:
