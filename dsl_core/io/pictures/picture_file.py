@@ -253,7 +253,7 @@ def _too_many(path: Path, count: int) -> StoreError:
 @lru_cache(maxsize=MOST_PICTURES)
 def _page_count(path: Path, stamp: tuple[int, int]) -> int:
     """Pages of one size in a file; 1 where a page is a preview, or whoever loads it says what is wrong."""
-    from PIL import Image
+    from PIL import Image, UnidentifiedImageError
 
     try:
         with warnings.catch_warnings():
@@ -264,7 +264,7 @@ def _page_count(path: Path, stamp: tuple[int, int]) -> int:
                 for page in range(count if count <= MOST_PICTURES else 0):
                     head.seek(page)
                     sizes.add(head.size)
-    except Image.UnidentifiedImageError:
+    except UnidentifiedImageError:
         heads = heads_of(_paged_bytes(path, stamp), MOST_PICTURES + 1)
         count, sizes = max(len(heads), 1), {(head.width_px, head.height_px) for head in heads}
     except (*_UNREADABLE, Image.DecompressionBombError):
@@ -318,7 +318,7 @@ def _claimed_px(data: bytes, heads: list[Head]) -> tuple[int, int]:
     """Width and height as the head of a file says; raises what Pillow raises."""
     import io
 
-    from PIL import Image
+    from PIL import Image, UnidentifiedImageError
 
     try:
         with warnings.catch_warnings():
@@ -326,7 +326,7 @@ def _claimed_px(data: bytes, heads: list[Head]) -> tuple[int, int]:
             warnings.simplefilter("error", Image.DecompressionBombWarning)
             with Image.open(io.BytesIO(data)) as head:
                 return head.size
-    except Image.UnidentifiedImageError:
+    except UnidentifiedImageError:
         # Pillow knows neither PFM in colour nor TIFF of 64 bits; OpenCV does.
         if not heads:
             raise

@@ -182,7 +182,7 @@ def _is_good(path: Path, header: Mapping[str, str], bands: int) -> NDArray[np.bo
             f"{path.name}: bbl marks {np.count_nonzero(marks)} of {len(marks)} bands as good, for {bands}"
             " bands. Correct it, or remove it."
         )
-    return marks != 0
+    return np.asarray(marks != 0)
 
 
 def _reflectance(path: Path, header: Mapping[str, str], nm: Floats, values: Floats) -> Floats:

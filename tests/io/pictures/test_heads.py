@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import struct
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 import pytest
@@ -17,7 +18,9 @@ RGB = np.random.default_rng(0).integers(0, 65535, (6, 8, 3)).astype(np.uint16)
 FORMATS = {"u": 1, "i": 2, "f": 3}
 
 
-def tiff(*pages: NDArray[np.generic], apart: bool = False, order: str = "<", big: bool = False) -> bytes:
+def tiff(
+    *pages: NDArray[np.generic], apart: bool = False, order: Literal["<", ">"] = "<", big: bool = False
+) -> bytes:
     """A TIFF without compression as its specification (revision 6.0) says, of either size of places."""
     place, size = ("Q", 8) if big else ("I", 4)
     numbers = (43, 8, 0) if big else (42,)
@@ -71,7 +74,9 @@ def read(path: Path, content: bytes) -> NDArray[np.generic]:
 
 @pytest.mark.parametrize("order", ["<", ">"])
 @pytest.mark.parametrize("big", [False, True])
-def test_separate_planes_are_read_right_or_refused(tmp_path: Path, order: str, big: bool) -> None:
+def test_separate_planes_are_read_right_or_refused(
+    tmp_path: Path, order: Literal["<", ">"], big: bool
+) -> None:
     small = (RGB >> 8).astype(np.uint8)
     np.testing.assert_array_equal(
         read(tmp_path / "a.tif", tiff(small, apart=True, order=order, big=big)), small
@@ -103,7 +108,7 @@ def test_all_pages_of_64_bits_are_pictures(tmp_path: Path) -> None:
 def test_what_claims_more_than_a_camera_has_is_refused_before_it_is_decoded(
     tmp_path: Path, name: str
 ) -> None:
-    content = b"PF\n60000 60000\n-1.0\n" + bytes(96)
+    content = bytearray(b"PF\n60000 60000\n-1.0\n" + bytes(96))
     if name == "a.tif":
         content = bytearray(tiff(RGB[..., 0] / 65535))
         at = struct.unpack_from("<I", content, 4)[0] + 2
