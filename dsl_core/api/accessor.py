@@ -17,8 +17,8 @@ from dsl_core.io.export import export_by_ending
 from dsl_core.io.result.result_file import save_result
 from dsl_core.model.attributes import SCALE_ATTRIBUTE
 from dsl_core.model.fit import Fit
-from dsl_core.model.result import DEPTH_INVALID
-from dsl_core.model.result_order import with_axes, with_bits
+from dsl_core.model.result import DEPTH_INVALID, VARIABLES, Flag
+from dsl_core.model.result_order import BANDS, with_axes, with_bits
 from dsl_core.solve.normal import BAND_95
 
 if TYPE_CHECKING:
@@ -27,6 +27,8 @@ if TYPE_CHECKING:
 #: The attribute of a result that says when its scan was captured, and what a region keeps of its scan.
 CAPTURED = "captured"
 OF_SCAN = (CAPTURED, SCALE_ATTRIBUTE)
+#: What is said of the spectrum of a pixel, band by band.
+_OF_BANDS = ("reflectance", "reflectance_std", "data_share")
 
 
 @xr.register_dataset_accessor("dsl")  # type: ignore[no-untyped-call]
@@ -40,11 +42,11 @@ class ResultAccessor:
         """Reflectance and its standard deviation over ``wavelength_nm`` at a pixel of the picture.
 
         ``x`` and ``y`` are pixel coordinates, from the upper left corner of the whole picture. The attribute
-        ``reasons`` lists why the pixel is limited; empty is good. Raises `DecodeError` for a pixel that is
-        not in the result, and for a result without spectra.
+        ``reasons`` lists why the pixel is limited; empty is good. What the result does not state is NaN.
+        Raises `DecodeError` for a pixel that is not in the result, and for a result without spectra.
         """
         self._require_spectra()
-        found = self._pixel(x, y)[["reflectance", "reflectance_std", "data_share"]].load()
+        found = _with_unstated(self._pixel(x, y))[list(_OF_BANDS)].load()
         return found.assign_attrs(name=f"x {x}, y {y}", reasons=self.reasons(x, y))
 
     def region(self, where: Place) -> xr.Dataset:
@@ -54,18 +56,16 @@ class ResultAccessor:
         ``reflectance_std`` is the scatter of the region's pixels (that of their mean is smaller by the
         root of their number, as far as errors are independent), ``pixel_std`` the mean deviation stated
         for a single pixel; where only one has a spectrum, both are what is stated for it. The attribute
-        ``used`` counts the pixels with a spectrum. Raises `DecodeError`
-        for a region without any.
+        ``used`` counts the pixels with a spectrum. What the result does not state is NaN. Raises
+        `DecodeError` for a region without any.
         """
         self._require_spectra()
         if np.shape(where) == (2,):
             raise DecodeError(f"A region has several pixels; for the one at {where!r} call spectrum(x, y).")
         result = with_axes(self._result)
         mask = place_mask(result, where)
-        values, std, share = (
-            result[name].values for name in ("reflectance", "reflectance_std", "data_share")
-        )
-        found = region_spectrum(values, std, share, mask)
+        stated = _with_unstated(result)
+        found = region_spectrum(*(stated[name].values for name in _OF_BANDS), mask)
         if found.used == 0:
             raise DecodeError(f"None of the {found.pixels} pixels of the region has a spectrum.")
         over = "wavelength_nm"
@@ -135,12 +135,13 @@ class ResultAccessor:
         pixel = self._pixel(x, y)
         share = pixel["data_share"].values if "data_share" in pixel else None
         nm = self._result["wavelength_nm"].values if "wavelength_nm" in self._result else np.empty(0)
-        return explain_pixel(int(pixel["flags"]), nm, share, float(pixel["depth_std_mm"]))
+        depth_std_mm = float(pixel["depth_std_mm"]) if "depth_std_mm" in pixel else None
+        return explain_pixel(int(_flags(pixel)), nm, share, depth_std_mm)
 
     @property
     def good(self) -> xr.DataArray:
-        """Pixels without any flag, (y, x)."""
-        return self._result["flags"] == 0
+        """Pixels without any flag, (y, x); of a result without flags, those that it has values of."""
+        return _flags(self._result) == 0
 
     @property
     def verdict(self) -> str:
@@ -151,7 +152,7 @@ class ResultAccessor:
     def points(self) -> xr.Dataset:
         """The pixels that have depth: all variables over the dimension ``point``, with ``x`` and ``y``."""
         result = with_axes(self._result)
-        known = (result["flags"] & int(DEPTH_INVALID)) == 0
+        known = (_flags(result) & int(DEPTH_INVALID)) == 0
         stacked = result.stack(point=("y", "x"))
         return stacked.isel(point=np.flatnonzero(known.values.ravel())).reset_index("point")
 
@@ -202,6 +203,26 @@ class ResultAccessor:
     def _require_spectra(self) -> None:
         if "reflectance" not in self._result:
             raise DecodeError("The result contains depth only. Reconstruct the scan with spectra=True.")
+
+
+def _with_unstated(result: xr.Dataset) -> xr.Dataset:
+    """A result with all variables of `_OF_BANDS`; those that it does not hold are NaN."""
+    unknown = {
+        name: xr.full_like(result["reflectance"], np.nan).assign_attrs(units=unit, long_name=words)
+        for name in _OF_BANDS
+        if name not in result
+        for _, unit, words in (VARIABLES[name],)
+    }
+    return result.assign(unknown) if unknown else result
+
+
+def _flags(result: xr.Dataset) -> xr.DataArray:
+    """Flags of the pixels; a result without any shows no more than which pixels it has values of."""
+    if "flags" in result:
+        return with_bits(result)["flags"]
+    known = (result["depth_mm"] if "depth_mm" in result else result["reflectance"]).notnull()
+    known = known.all(BANDS) if BANDS in known.dims else known
+    return xr.where(known, 0, int(Flag.NON_FINITE))
 
 
 def _one_spectrum(given: xr.Dataset) -> xr.Dataset:

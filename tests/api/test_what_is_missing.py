@@ -6,13 +6,19 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import xarray as xr
 
 import dsl_core as dsl
+from dsl_core.cli import main
 from tests.cases.small_result import small_result
 
 
-def test_a_region_of_one_pixel_states_what_is_stated_for_it(tmp_path: Path) -> None:
-    result = dsl.load_result(dsl.save_result(small_result(), tmp_path / "a.zarr"))
+@pytest.fixture
+def result(tmp_path: Path) -> xr.Dataset:
+    return dsl.load_result(dsl.save_result(small_result(), tmp_path / "whole.zarr"))
+
+
+def test_a_region_of_one_pixel_states_what_is_stated_for_it(result: xr.Dataset, tmp_path: Path) -> None:
     pixel, other = result.dsl.spectrum(4, 2), result.dsl.spectrum(6, 3)
     region = result.dsl.region((4, 2, 1, 1))
     np.testing.assert_allclose(region["reflectance_std"], pixel["reflectance_std"])
@@ -23,3 +29,37 @@ def test_a_region_of_one_pixel_states_what_is_stated_for_it(tmp_path: Path) -> N
     text = (tmp_path / "region.csv").read_text("utf-8")
     assert "deviation of its pixels" not in text
     assert "uncertainty of a pixel" in text
+
+
+@pytest.mark.parametrize("name", ["reflectance_std", "data_share", "flags", "depth_std_mm", "depth_mm"])
+def test_what_a_result_does_not_state_is_unknown_and_the_rest_is_told(
+    result: xr.Dataset, tmp_path: Path, name: str
+) -> None:
+    less = result.drop_vars(name)
+    for found, known in (
+        (less.dsl.spectrum(4, 3), result.dsl.spectrum(4, 3)),
+        (less.dsl.region((1, 1, 3, 2)), result.dsl.region((1, 1, 3, 2))),
+    ):
+        np.testing.assert_array_equal(found["reflectance"], known["reflectance"])
+        assert set(found.data_vars) == set(known.data_vars)
+    is_known = name != "reflectance_std"
+    assert bool(less.dsl.spectrum(4, 3)["reflectance_std"].notnull().all()) is is_known
+    assert bool(less.dsl.region((1, 1, 3, 2))["pixel_std"].notnull().all()) is is_known
+    assert bool(less.dsl.spectrum(4, 3)["data_share"].notnull().all()) is (name != "data_share")
+    assert less.dsl.reasons(4, 3) == []
+    assert bool(less.dsl.reasons(4, 2)) is (name != "flags")
+    assert bool(less.dsl.reasons(3, 0))
+    assert less.dsl.points().sizes == {**result.dsl.points().sizes}
+    assert not less.dsl.good[0, 3]
+    path = dsl.save_result(less, tmp_path / "less.zarr")
+    places = ["--at", "pixel=4,3", "--at", "region=1,1,3,2"]
+    assert main(["spectra", str(path), *places, "-o", str(tmp_path / "a.csv")]) == 0
+    assert dsl.read_spectra(tmp_path / "a.csv")["pixel"].notnull().all()
+
+
+def test_bands_alone_are_a_result_as_well(result: xr.Dataset) -> None:
+    less = result[["reflectance"]]
+    assert (
+        less.dsl.good.values.tolist() == result["reflectance"].notnull().all("wavelength_nm").values.tolist()
+    )
+    assert less.dsl.spectrum(4, 3).attrs["reasons"] == []
