@@ -12,7 +12,7 @@ from __future__ import annotations
 from functools import cache
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 Floats = NDArray[np.float64]
 Cube = NDArray[np.float32] | NDArray[np.float64]
@@ -26,7 +26,8 @@ MOST_RMS = 1.5
 OWN_SHARE = 0.1
 #: Fewer pairs than this many a band tell nothing.
 _PAIRS_PER_BAND, _MOST_PAIRS = 4, 40_000
-_USUAL = (1.0, 0.8, 0.45, 0.2, 0.08, 0.03)
+#: The usual correlation of bands that are so many steps apart, before each has a share of its own.
+_USUAL, _USUAL_STEP_NM = (1.0, 0.8, 0.45, 0.2, 0.08, 0.03), 5.0
 
 
 def band_correlation(reflectance: Cube, std: Cube, good: NDArray[np.bool_]) -> Floats | None:
@@ -65,13 +66,23 @@ def _pairs(reflectance: Cube, std: Cube, good: NDArray[np.bool_], axis: int) -> 
     return np.asarray(pairs[:, np.isfinite(pairs).all(0)])
 
 
+def usual_correlation(bands_nm: ArrayLike) -> Floats:
+    """The correlation (bands, bands) that results usually have, where too few pixels tell it; read only.
+
+    It follows from how far apart bands (bands,), nm, are: those of finer steps hang together more closely.
+    """
+    return _usual_of(tuple(np.asarray(bands_nm, np.float64).tolist()))
+
+
 @cache
-def usual_correlation(bands: int) -> Floats:
-    """The correlation (bands, bands) that results usually have, where too few pixels tell it; read only."""
-    found = np.zeros((bands, bands))
-    for lag, value in enumerate(_USUAL[:bands]):
-        found += np.diag(np.full(bands - lag, value), lag)
-        found += np.diag(np.full(bands - lag, value), -lag) if lag else 0.0
+def _usual_of(bands_nm: tuple[float, ...]) -> Floats:
+    from scipy.interpolate import PchipInterpolator
+
+    # Even about zero, so that a fraction of a step costs less than its share.
+    lags = np.arange(-len(_USUAL) + 1, len(_USUAL)) * _USUAL_STEP_NM
+    smooth = PchipInterpolator(lags, (*_USUAL[:0:-1], *_USUAL), extrapolate=False)
+    nm = np.array(bands_nm)
+    found = np.nan_to_num(smooth(nm - nm[:, None]))
     values, vectors = np.linalg.eigh(found)
     found = (vectors * np.maximum(values, 1e-3)) @ vectors.T
     level = np.sqrt(np.diag(found))

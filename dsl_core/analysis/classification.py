@@ -129,7 +129,8 @@ def classify_result(
     values, std, share = (result[name].values if name in result else None for name in names)
     assert values is not None
     flags = result["flags"].values if "flags" in result else np.zeros(values.shape[1:], np.uint16)
-    scores = score(values, std, share, flags, classes, measure, brightness, progress)
+    nm = result["wavelength_nm"].values
+    scores = score(values, std, share, flags, classes, measure, brightness, progress, nm)
     return Classification.of(scores, limits, brightness, areas_of(result))
 
 

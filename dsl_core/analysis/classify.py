@@ -167,12 +167,15 @@ def score(
     measure: Measure = Measure.PROBABILITY,
     brightness: Brightness = "stated",
     progress: Progress | None = None,
+    bands_nm: NDArray[np.float64] | None = None,
 ) -> Scores:
     """Compare every pixel with every class.
 
-    Cubes (bands, rows, columns), ``flags`` (rows, columns). Bands that the prior decided, not the data, count
-    for the probability in no pixel. Raises `DecodeError` for too few classes or other bands, for fewer than
-    `FEWEST_BANDS` bands unless the measure is the difference, and for a probability without deviations.
+    Cubes (bands, rows, columns), ``flags`` (rows, columns). ``bands_nm`` (bands,) say how bands err together
+    where too few pixels do; without them, they are taken to be the usual 5 nm apart. Bands that the prior
+    decided, not the data, count for the probability in no pixel. Raises `DecodeError` for too few classes or
+    other bands, for fewer than `FEWEST_BANDS` bands unless the measure is the difference, and for a
+    probability without deviations.
     """
     classes = marked_by(shared_names(classes), {})
     _check(reflectance, std, classes, measure)
@@ -195,7 +198,9 @@ def score(
     judged &= np.isfinite(std).all(0)
     at, done = np.flatnonzero(judged), 0
     shape = _shapes(reflectance, at, classes)
-    correlations = _correlations(reflectance, std, shape.reshape(flags.shape), flags == 0, len(classes))
+    bands_nm = 5.0 * np.arange(len(reflectance)) if bands_nm is None else bands_nm
+    of_shapes = shape.reshape(flags.shape)
+    correlations = _correlations(reflectance, std, of_shapes, flags == 0, len(classes), bands_nm)
     flat = [cube.reshape(len(cube), -1) for cube in (reflectance, std)]
     decided = None if data_share is None else data_share.reshape(len(data_share), -1) >= DECIDED_FROM
     for pixels, alike, bands in _alike(at, shape, decided, len(reflectance)):
@@ -222,12 +227,17 @@ def _shapes(reflectance: Cube, at: NDArray[np.intp], classes: Sequence[SpectralC
 
 
 def _correlations(
-    reflectance: Cube, std: Cube, shape: NDArray[np.intp], good: Mask, count: int
+    reflectance: Cube,
+    std: Cube,
+    shape: NDArray[np.intp],
+    good: Mask,
+    count: int,
+    bands_nm: NDArray[np.float64],
 ) -> list[NDArray[np.float64]]:
     """How bands err together in pixels of each shape; of all together where one has too few pixels."""
     together = band_correlation(reflectance, std, good & (shape >= 0))
     if together is None:
-        together = usual_correlation(len(reflectance))
+        together = usual_correlation(bands_nm)
     each = (band_correlation(reflectance, std, good & (shape == index)) for index in range(count))
     return [together if found is None else found for found in each]
 

@@ -135,7 +135,7 @@ def colours_of(
     """
     if reference is not None and reference not in spectra:
         raise DecodeError(f"There is no spectrum {reference!r} to compare with: {', '.join(spectra)}.")
-    shared = usual_correlation(len(bands_nm)) if correlation is None else correlation
+    shared = usual_correlation(bands_nm) if correlation is None else correlation
     found = []
     for light in lights:
         require_bands(bands_nm, light)

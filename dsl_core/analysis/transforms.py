@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from enum import Enum
-from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,7 +27,7 @@ def transformed(
 ) -> tuple[Floats, Floats | None]:
     """A spectrum (bands,) and its deviations after a transform.
 
-    Deviations are propagated to first order, with the correlation that bands of a result usually have; the
+    Deviations are propagated to first order, with the correlation that bands at ``nm`` usually have; the
     level, for instance, leaves a normalised spectrum. Without deviations there are none. A spectrum that is
     not finite, or has no level, stays as it is or becomes NaN.
     """
@@ -42,13 +41,8 @@ def transformed(
     if spread is None:
         return found, None
     factor = slope * np.nan_to_num(spread)
-    variance = np.einsum("ij,jk,ik->i", factor, _correlation(len(values)), factor)
+    variance = np.einsum("ij,jk,ik->i", factor, usual_correlation(nm), factor)
     return found, np.sqrt(np.maximum(variance, 0))
-
-
-@cache
-def _correlation(bands: int) -> Floats:
-    return usual_correlation(bands)
 
 
 def _normalised(nm: Floats, values: Floats) -> tuple[Floats, Floats]:

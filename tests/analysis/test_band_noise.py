@@ -19,7 +19,19 @@ def test_the_correlation_of_bands_is_found_from_neighbouring_pixels() -> None:
 def test_few_pixels_tell_nothing_and_what_is_usual_can_be_inverted() -> None:
     cube = chart_cube()
     assert band_correlation(cube.reflectance[:, :3, :8], cube.std[:, :3, :8], cube.flags[:3, :8] == 0) is None
-    for bands in (3, 47):
-        usual = usual_correlation(bands)
+    for bands_nm in (np.arange(3) * 5.0, np.arange(430, 661, 5.0), np.arange(430, 661, 2.5)):
+        usual = usual_correlation(bands_nm)
         assert np.linalg.eigvalsh(usual)[0] >= OWN_SHARE * 0.99
         assert np.allclose(np.diag(usual), 1)
+
+
+def test_the_usual_correlation_goes_by_wavelength_and_not_by_number() -> None:
+    wide, usual, fine = (usual_correlation(np.arange(430, 661, step)) for step in (10.0, 5.0, 2.5))
+    # Every other band of a finer result, and one that lies between those of a wider one.
+    np.testing.assert_allclose(usual[::2, ::2], wide, atol=0.01)
+    np.testing.assert_allclose(fine[::2, ::2], usual, atol=0.01)
+    assert usual[20, 21] < fine[40, 41] < 1 - OWN_SHARE
+    # Where bands have been left out, those on both sides do not hang together as neighbours do.
+    assert (
+        usual_correlation([430.0, 435.0, 470.0])[1, 2] < 0.01 < 0.7 < usual_correlation([430.0, 435.0])[0, 1]
+    )

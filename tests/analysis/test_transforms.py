@@ -14,7 +14,7 @@ STD = np.full(len(NM), 0.004)
 @pytest.mark.parametrize("transform", list(Transform))
 def test_deviations_are_those_of_repeated_measurements(transform: Transform) -> None:
     rng = np.random.default_rng(1)
-    root = np.linalg.cholesky(usual_correlation(len(NM)))
+    root = np.linalg.cholesky(usual_correlation(NM))
     # The hull of a noisy spectrum has other corners: deviations to first order are of small noise.
     small = 1e-3
     shots = MEAN + small * STD * (root @ rng.standard_normal((len(NM), 3000))).T

@@ -97,6 +97,7 @@ class AnswersController:
                 way.measure,
                 way.brightness,
                 progress,
+                result.wavelengths_nm,
             )
             areas = PixelAreas.of(*(result.known(name) for name in ("points_mm", "normals", "depth_std_mm")))
             made = Classification.of(scores, brightness=way.brightness, areas=areas)

@@ -107,7 +107,7 @@ def _compared(name: str, measured: Mark, curve: SpectralCurve, theme: Theme) -> 
     """The rows of one comparison, which begin with the name of what is compared with."""
     name, spectrum = escape(name), measured.spectrum
     try:
-        together = usual_correlation(len(spectrum.nm))
+        together = usual_correlation(spectrum.nm)
         found = compare(spectrum.mean, spectrum.nm, curve, measured.band_std, together)
     except DslError as error:
         return [f"<tr><td>{name}</td><td colspan='3'>{escape(str(error))}</td></tr>"]
