@@ -17,6 +17,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from dsl_core.analysis.alike import groups_alike, nearest_shapes
 from dsl_core.analysis.band_noise import band_correlation, usual_correlation
 from dsl_core.analysis.classes import FEWEST_BANDS, NOT_JUDGED, SpectralClass, marked_by, shared_names
 from dsl_core.analysis.likelihood import Block, class_fit
@@ -197,49 +198,44 @@ def score(
     assert std is not None
     judged &= np.isfinite(std).all(0)
     at, done = np.flatnonzero(judged), 0
-    shape = _shapes(reflectance, at, classes)
     bands_nm = 5.0 * np.arange(len(reflectance)) if bands_nm is None else bands_nm
-    of_shapes = shape.reshape(flags.shape)
-    correlations = _correlations(reflectance, std, of_shapes, flags == 0, len(classes), bands_nm)
+    alike, correlations = _correlations(reflectance, std, at, flags == 0, classes, bands_nm)
     flat = [cube.reshape(len(cube), -1) for cube in (reflectance, std)]
     decided = None if data_share is None else data_share.reshape(len(data_share), -1) >= DECIDED_FROM
-    for pixels, alike, bands in _alike(at, shape, decided, len(reflectance)):
+    for pixels, group, bands in _alike(at, alike, decided, len(reflectance)):
         progress.report("compare with the classes", done, at.size)
         done += pixels.size
         if np.count_nonzero(bands) < FEWEST_BANDS:
             continue
         values, spread = (np.asarray(cube[np.ix_(bands, pixels)], np.float32) for cube in flat)
-        correlation = correlations[alike][np.ix_(bands, bands)]
+        correlation = correlations[group][np.ix_(bands, bands)]
         block = Block.of(values, spread, correlation, brightness == "free")
         _by_probability(scores, block, pixels, [_of_bands(each, bands) for each in classes])
     return scores
 
 
-def _shapes(reflectance: Cube, at: NDArray[np.intp], classes: Sequence[SpectralClass]) -> NDArray[np.intp]:
-    """Which class's spectrum each pixel (flat) is most like in shape, -1 where nothing is judged."""
-    shape = np.full(reflectance[0].size, -1, np.intp)
-    flat = reflectance.reshape(len(reflectance), -1)
-    means = np.stack([each.mean / max(float(np.linalg.norm(each.mean)), 1e-9) for each in classes])
-    for start in range(0, at.size, _AT_ONCE):
-        pixels = at[start : start + _AT_ONCE]
-        shape[pixels] = np.argmax(means.astype(np.float32) @ flat[:, pixels], axis=0)
-    return shape
-
-
 def _correlations(
     reflectance: Cube,
     std: Cube,
-    shape: NDArray[np.intp],
+    at: NDArray[np.intp],
     good: Mask,
-    count: int,
+    classes: Sequence[SpectralClass],
     bands_nm: NDArray[np.float64],
-) -> list[NDArray[np.float64]]:
-    """How bands err together in pixels of each shape; of all together where one has too few pixels."""
-    together = band_correlation(reflectance, std, good & (shape >= 0))
+) -> tuple[NDArray[np.intp], list[NDArray[np.float64]]]:
+    """How bands err together in each group of pixels; of all together where one has too few pixels.
+
+    The group of each pixel (flat), -1 where nothing is judged, and the correlation of each group.
+    """
+    shape = nearest_shapes(reflectance, at, classes)
+    together = band_correlation(reflectance, std, good & (shape >= 0).reshape(good.shape))
     if together is None:
         together = usual_correlation(bands_nm)
-    each = (band_correlation(reflectance, std, good & (shape == index)) for index in range(count))
-    return [together if found is None else found for found in each]
+    groups = groups_alike(reflectance, std, shape, good.ravel(), classes, together)
+    of_groups = groups.reshape(good.shape)
+    each = (
+        band_correlation(reflectance, std, good & (of_groups == group)) for group in range(groups.max() + 1)
+    )
+    return groups, [together if found is None else found for found in each]
 
 
 def _check(reflectance: Cube, std: Cube | None, classes: Sequence[SpectralClass], measure: Measure) -> None:

@@ -1,6 +1,7 @@
 import numpy as np
 import pytest
 
+from dsl_core.analysis.alike import groups_alike
 from dsl_core.analysis.classes import (
     Member,
     SpectralClass,
@@ -218,3 +219,42 @@ def test_two_classes_that_fit_exactly_are_undecided() -> None:
     scores = score(values, None, None, np.zeros((1, 1), np.uint16), classes, Measure.RMSE)
     shown = ClassMap.of(scores)
     assert shown.values[0, 0] == shown.unsure
+
+
+@pytest.mark.parametrize("stripe_px", [1, 12, 40])
+@pytest.mark.parametrize(("together_nm", "apart"), [(8.0, 0.01), (15.0, 0.01), (8.0, 0.006)])
+def test_names_of_similar_materials_are_as_sure_as_they_are_right(
+    stripe_px: int, together_nm: float, apart: float
+) -> None:
+    """Two classes about one deviation apart; pixels have exactly the deviations that are stated."""
+    rng, std, nm = np.random.default_rng(3), 0.01, np.arange(430.0, 661.0, 5.0)
+    correlation = np.exp(-0.5 * ((nm[:, None] - nm) / together_nm) ** 2)
+    root = np.linalg.cholesky(correlation + 1e-6 * np.eye(len(nm)))
+    first = 0.3 + 0.1 * np.sin(nm / 40)
+    spectra = np.stack([first, first + apart * np.cos(nm / 25)])
+    material = np.broadcast_to(np.arange(80) // stripe_px % 2, (120, 80))
+    noise = np.tensordot(root, rng.standard_normal((len(nm), *material.shape)), axes=1)
+    values = (np.moveaxis(spectra[material], -1, 0) + std * noise).astype(np.float32)
+    classes = [SpectralClass(n, (Member.of(s),)) for n, s in zip("ab", spectra, strict=True)]
+    flags = np.zeros(material.shape, np.uint16)
+    scores = score(values, np.full_like(values, std), None, flags, classes, bands_nm=nm)
+    for least in (0.6, 0.8, 0.95):
+        told = scores.margin >= least
+        said_wrong = float(np.mean(1 - scores.margin[told]))
+        wrong = float(np.mean((scores.best != material)[told]))
+        assert wrong < 1.25 * said_wrong + 2 * np.sqrt(said_wrong / told.sum())
+    if stripe_px > 1:
+        assert (scores.margin >= 0.95).mean() > 0.05, "caution leaves no name"
+
+
+def test_shades_of_grey_share_no_correlation_though_their_shapes_are_confused() -> None:
+    cube = chart_cube(count=2)
+    spectra = np.stack([np.full(len(cube.reflectance), level) for level in (0.9, 0.1, 0.1005)])
+    nearest = np.arange(cube.flags.size) % 3
+    values = np.moveaxis(spectra[nearest.reshape(cube.flags.shape)], -1, 0)
+    classes = [SpectralClass(n, (Member.of(s),)) for n, s in zip("abc", spectra, strict=True)]
+    good, together = np.ones(nearest.size, bool), np.eye(len(values))
+    group = groups_alike(values, np.full_like(values, 0.005), nearest, good, classes, together)
+    assert [len(np.unique(group[nearest == index])) for index in range(3)] == [1, 1, 1]
+    assert group[0] != group[1]
+    assert group[1] == group[2]
