@@ -12,7 +12,11 @@ Map = NDArray[np.float64]
 LEAST_COSINE = 0.1
 
 
-def pixel_areas_mm2(points_mm: Cube, normals: Cube | None = None) -> Map:
+#: Columns and rows of the camera's picture, whole numbers, that pixels are in; None where nobody says.
+Places = tuple[NDArray[np.integer] | None, NDArray[np.integer] | None]
+
+
+def pixel_areas_mm2(points_mm: Cube, normals: Cube | None = None, places_px: Places = (None, None)) -> Map:
     """Area of the surface that each pixel sees, mm2, (rows, columns); NaN without a point.
 
     NaN everywhere where all points lie on one line of pixels, which does not say how far apart rays are.
@@ -21,12 +25,15 @@ def pixel_areas_mm2(points_mm: Cube, normals: Cube | None = None) -> Map:
     ``z^2 J / |n . r|`` out of a plane with normal n: r is the ray with unit depth, J the area between
     neighbouring rays, from a smooth fit to all rays. Triangles between the points themselves would grow with
     the noise of depth. Without a normal the surface is taken to face the camera's axis.
+
+    ``places_px`` say where columns or rows have been left out. Of every n-th column, each stands for n.
     """
     depth = points_mm[2].astype(np.float64)
     with np.errstate(divide="ignore", invalid="ignore"):
         ray_x, ray_y = points_mm[0] / depth, points_mm[1] / depth
     known = np.isfinite(ray_x) & np.isfinite(ray_y)
-    gradients = _gradients(np.stack([ray_x, ray_y]), known)
+    columns, rows = (_steps(at, size) for at, size in zip(places_px, depth.shape[::-1], strict=True))
+    gradients = _gradients(np.stack([ray_x, ray_y]), known, columns, rows)
     if gradients is None:
         return np.full(depth.shape, np.nan)
     (xx, xy), (yx, yy) = gradients
@@ -46,21 +53,32 @@ def depth_relative_std(points_mm: Cube, depth_std_mm: Cube | None) -> Map | None
         return np.asarray(depth_std_mm.astype(np.float64) / points_mm[2])
 
 
-def _gradients(rays: Map, known: NDArray[np.bool_]) -> tuple[tuple[Map, Map], ...] | None:
+def _steps(places_px: NDArray[np.integer] | None, size: int) -> Map:
+    """Places in the steps that pixels are apart where none are left out."""
+    if places_px is None or size < 2:
+        return np.arange(size, dtype=np.float64)
+    step = max(int(np.gcd.reduce(np.diff(places_px))), 1)
+    return np.asarray((places_px - places_px.min()) / step)
+
+
+def _gradients(
+    rays: Map, known: NDArray[np.bool_], columns: Map, rows: Map
+) -> tuple[tuple[Map, Map], ...] | None:
     """Change of rays' slopes (2, rows, columns) per column and per row, of fits to known pixels.
 
     A cubic where pixels are spread widely enough, in few columns or rows the polynomial that they determine;
     None where that is none.
     """
-    v, u = np.nonzero(known)
-    if not v.size:
+    at_row, at_column = np.nonzero(known)
+    if not at_row.size:
         return None
-    thin = slice(None, None, max(len(v) // 20_000, 1))
+    thin = slice(None, None, max(at_row.size // 20_000, 1))
+    u, v = columns[at_column], rows[at_row]
     # By the pixels that are known: in a narrow strip of a large picture, powers would all but coincide.
     middles = [(at.min() + at.max()) / 2 for at in (u, v)]
     scales = [max((at.max() - at.min()) / 2, 0.5) for at in (u, v)]
     x, y = ((at[thin] - middle) / scale for at, middle, scale in zip((u, v), middles, scales, strict=True))
-    slopes = rays[:, v[thin], u[thin]].T.astype(np.float64)
+    slopes = rays[:, at_row[thin], at_column[thin]].T.astype(np.float64)
     for degree in (3, 2, 1):
         powers = [(i, j) for i in range(degree + 1) for j in range(degree + 1 - i)]
         design = np.stack([x**i * y**j for i, j in powers], axis=1)
@@ -69,7 +87,7 @@ def _gradients(rays: Map, known: NDArray[np.bool_]) -> tuple[tuple[Map, Map], ..
             break
     else:
         return None
-    row, column = np.indices(known.shape, np.float64)
+    column, row = np.meshgrid(columns, rows)
     places = (column - middles[0]) / scales[0], (row - middles[1]) / scales[1]
     return tuple(_derivatives(each, powers, places, scales) for each in factors.T)
 

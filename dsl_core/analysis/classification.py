@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dsl_core.analysis.area_deviation import class_deviations
-from dsl_core.analysis.areas import Cube, depth_relative_std, pixel_areas_mm2
+from dsl_core.analysis.areas import Cube, Places, depth_relative_std, pixel_areas_mm2
 from dsl_core.analysis.class_table import ClassRow, class_table
 from dsl_core.analysis.classes import FEWEST_BANDS, SpectralClass, class_of_pixels
 from dsl_core.analysis.classify import Brightness, ClassMap, Limits, Measure, Scores, score
@@ -24,6 +24,7 @@ from dsl_core.io.export.class_map import (
 )
 from dsl_core.io.export.common import require_suffix
 from dsl_core.io.export.table import export_table
+from dsl_core.model.result_order import columns_and_rows_px
 from dsl_core.progress import Progress
 
 if TYPE_CHECKING:
@@ -47,12 +48,17 @@ class PixelAreas:
 
     @classmethod
     def of(
-        cls, points_mm: Cube | None, normals: Cube | None = None, depth_std_mm: Cube | None = None
+        cls,
+        points_mm: Cube | None,
+        normals: Cube | None = None,
+        depth_std_mm: Cube | None = None,
+        places_px: Places = (None, None),
     ) -> PixelAreas | None:
-        """The areas of points (3, rows, columns); None without points."""
+        """The areas of points (3, rows, columns), as by `pixel_areas_mm2`; None without points."""
         if points_mm is None:
             return None
-        return cls(pixel_areas_mm2(points_mm, normals), depth_relative_std(points_mm, depth_std_mm))
+        mm2 = pixel_areas_mm2(points_mm, normals, places_px)
+        return cls(mm2, depth_relative_std(points_mm, depth_std_mm))
 
 
 @dataclass(frozen=True)
@@ -152,7 +158,8 @@ def within_nm(result: xr.Dataset, low_nm: float, high_nm: float) -> xr.Dataset:
 def areas_of(result: xr.Dataset) -> PixelAreas | None:
     """Areas of the pixels; None for a result without points."""
     names = ("points_mm", "normals", "depth_std_mm")
-    return PixelAreas.of(*(result[name].values if name in result else None for name in names))
+    given = (result[name].values if name in result else None for name in names)
+    return PixelAreas.of(*given, places_px=columns_and_rows_px(result))
 
 
 def classes_of_masks(result: xr.Dataset, masks: Mapping[str, Mask]) -> tuple[SpectralClass, ...]:

@@ -259,17 +259,17 @@ def _check(reflectance: Cube, std: Cube | None, classes: Sequence[SpectralClass]
 
 
 def _alike(
-    at: NDArray[np.intp], shape: NDArray[np.intp], decided: Mask | None, bands: int
+    at: NDArray[np.intp], group: NDArray[np.intp], decided: Mask | None, bands: int
 ) -> Iterator[tuple[NDArray[np.intp], int, Mask]]:
-    """Pixels in blocks of one shape of which the data decide the same bands, with shape and bands."""
+    """Pixels in blocks of one group of which the data decide the same bands, with group and bands."""
     if decided is None:
         patterns, which = np.ones((1, bands), bool), np.zeros(at.size, np.intp)
     else:
         packed = np.packbits(decided[:, at], axis=0)
         _, first, which = np.unique(packed, axis=1, return_index=True, return_inverse=True)
         patterns, which = decided[:, at[first]].T, which.ravel()
-    order = np.lexsort((shape[at], which))
-    at, keys = at[order], np.stack([which[order], shape[at[order]]])
+    order = np.lexsort((group[at], which))
+    at, keys = at[order], np.stack([which[order], group[at[order]]])
     borders = np.flatnonzero(np.any(np.diff(keys, axis=1), axis=0)) + 1
     for members, key in zip(np.split(at, borders), np.split(keys, borders, axis=1), strict=True):
         for start in range(0, members.size, _AT_ONCE):

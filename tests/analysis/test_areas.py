@@ -4,6 +4,8 @@ import numpy as np
 import pytest
 
 from dsl_core.analysis.areas import pixel_areas_mm2
+from dsl_core.analysis.classification import areas_of
+from tests.cases.chart_cube import chart_result
 
 
 def test_a_tilted_plane_has_its_area_whatever_the_noise_of_depth() -> None:
@@ -68,3 +70,30 @@ def test_pixels_on_one_line_have_no_known_area(line: str) -> None:
     shown[where.get(line, (np.arange(60), np.arange(60) + 7))] = True
     points, _ = seen_plane(shown)
     assert np.isnan(pixel_areas_mm2(points)).all()
+
+
+@pytest.mark.parametrize(
+    "kept",
+    [np.r_[10:30, 60:80], np.flatnonzero(np.arange(80) % 10 < 6), np.r_[70:40:-1, 20:0:-1], np.r_[3, 4, 40]],
+)
+@pytest.mark.parametrize("axis", [1, 2])
+def test_pixels_keep_their_areas_where_others_are_left_out(kept: np.ndarray, axis: int) -> None:
+    points, each_mm2 = seen_plane(np.ones((80, 80), bool))
+    places = (np.arange(80), kept) if axis == 1 else (kept, np.arange(80))
+    areas = pixel_areas_mm2(points.take(kept, axis), None, places)
+    np.testing.assert_allclose(areas, each_mm2, rtol=1e-3)
+
+
+def test_of_every_third_column_each_stands_for_three() -> None:
+    points, each_mm2 = seen_plane(np.ones((60, 80), bool))
+    areas = pixel_areas_mm2(points[..., 1::3], None, (np.arange(1, 80, 3), np.arange(60)))
+    np.testing.assert_allclose(areas, 3 * each_mm2, rtol=1e-3)
+
+
+def test_a_result_says_itself_what_is_left_out() -> None:
+    whole = chart_result()
+    known = areas_of(whole)
+    part = areas_of(whole.isel(x=np.r_[5:20, 40:55]))
+    assert known is not None
+    assert part is not None
+    np.testing.assert_allclose(part.mm2, known.mm2[:, np.r_[5:20, 40:55]], rtol=1e-3)

@@ -99,7 +99,8 @@ class AnswersController:
                 progress,
                 result.wavelengths_nm,
             )
-            areas = PixelAreas.of(*(result.known(name) for name in ("points_mm", "normals", "depth_std_mm")))
+            given = (result.known(name) for name in ("points_mm", "normals", "depth_std_mm"))
+            areas = PixelAreas.of(*given, places_px=result.places_px)
             made = Classification.of(scores, brightness=way.brightness, areas=areas)
             return Materials(name, made, (*made.notes, *doubts, *notes))
 
