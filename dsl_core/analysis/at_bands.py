@@ -25,8 +25,10 @@ class BandValues:
     std: Floats
 
 
-def band_widths_nm(bands_nm: Floats) -> Floats:
-    """Full width at half height (nm) of bands (bands,) as a result has them: the distance of its bands."""
+def band_widths_nm(bands_nm: Floats, stated_nm: float | None = None) -> Floats:
+    """Full width at half height (nm) of bands (bands,): the distance of bands where nobody states it."""
+    if stated_nm is not None:
+        return np.full(len(bands_nm), stated_nm)
     if len(bands_nm) < 2:
         return np.ones(len(bands_nm))
     return np.asarray(np.gradient(np.asarray(bands_nm, np.float64)))
@@ -65,17 +67,18 @@ def _spread(fine: Floats, mass: Floats, nm: Floats) -> Floats:
     return np.asarray(row)
 
 
-def at_bands(curve: SpectralCurve, bands_nm: Floats) -> BandValues:
+def at_bands(curve: SpectralCurve, bands_nm: Floats, width_nm: float | None = None) -> BandValues:
     """A spectrum at the bands (nm) of a result, a mean over the triangle of each.
 
-    Raises `CalibrationError` where the spectrum does not cover them.
+    ``width_nm`` is how wide they are (`stated_band_width_nm`); their distance, unless it is known. Raises
+    `CalibrationError` where the spectrum does not cover them.
     The deviation holds that of the curve, if it states one, and what its sampling leaves open where it is
     coarser than the bands: half of the difference between straight lines and a smooth curve between samples.
     """
     from scipy.interpolate import PchipInterpolator
 
     nm, values = np.asarray(curve.wavelengths_nm), np.asarray(curve.values)
-    widths = band_widths_nm(bands_nm)
+    widths = band_widths_nm(bands_nm, width_nm)
     weights = band_weights(nm, bands_nm, widths)
     missing = ~np.isfinite(weights).all(1)
     if missing.any():

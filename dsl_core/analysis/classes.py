@@ -98,13 +98,14 @@ def components_of(covariance: Floats) -> tuple[Floats, Floats]:
 
 
 def classes_of_library(
-    library: SpectralLibrary, bands_nm: Floats, relative_error: float = 0.0
+    library: SpectralLibrary, bands_nm: Floats, relative_error: float = 0.0, width_nm: float | None = None
 ) -> tuple[tuple[SpectralClass, ...], tuple[str, ...]]:
     """The groups of a library as classes at bands (nm), and notes on entries that are left out.
 
     ``relative_error`` is the standard deviation, as a share of reflectance, that its spectra have because
-    another instrument measured them: of the level of each, and a quarter of it of single bands. Raises
-    `CalibrationError` when no entry covers the bands, or for an error that is none.
+    another instrument measured them: of the level of each, and a quarter of it of single bands.
+    ``width_nm`` is how wide the bands are, as `at_bands` needs it. Raises `CalibrationError` when no entry
+    covers the bands, or for an error that is none.
     """
     if not 0 <= relative_error < 1:
         raise CalibrationError(
@@ -114,7 +115,7 @@ def classes_of_library(
     notes = []
     for entry in library.entries:
         try:
-            found = at_bands(entry.curve, bands_nm)
+            found = at_bands(entry.curve, bands_nm, width_nm)
         except CalibrationError as error:
             notes.append(f"{entry.name} ({entry.file.name}) is left out. {error}")
         else:

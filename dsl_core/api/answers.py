@@ -11,6 +11,7 @@ import numpy as np
 from dsl_core.api import FilePath
 from dsl_core.api.places import Place, place_mask
 from dsl_core.errors import DecodeError
+from dsl_core.model.attributes import stated_band_width_nm
 from dsl_core.model.result_order import with_axes
 from dsl_core.progress import Progress
 
@@ -68,9 +69,9 @@ def classify(
     if library is not None:
         paths = [library] if not isinstance(library, Sequence) or isinstance(library, str) else library
         read = read_library([Path(path) for path in paths], grouping, progress=progress)
-        found, left_out = classes_of_library(
-            read, result["wavelength_nm"].values, relative_error=library_error
-        )
+        nm = result["wavelength_nm"].values
+        width_nm = stated_band_width_nm(result.attrs, nm)
+        found, left_out = classes_of_library(read, nm, library_error, width_nm)
         classes += found
         notes += [*read.notes, *left_out]
     if pins:

@@ -182,6 +182,7 @@ def _classes(
     from dsl_core.analysis.library import read_library
     from dsl_core.analysis.places import colours_of_marks, require_spectra
     from dsl_core.io.result.annotations_file import load_annotations
+    from dsl_core.model.attributes import stated_band_width_nm
 
     require_spectra(result)
     classes: list[SpectralClass] = []
@@ -189,9 +190,9 @@ def _classes(
     if library:
         table = Path(group) if group.lower().endswith(".csv") else None
         read = read_library(library, "auto" if table else group, table, progress)
-        found, left_out = classes_of_library(
-            read, result["wavelength_nm"].values, relative_error=library_error
-        )
+        nm = result["wavelength_nm"].values
+        width_nm = stated_band_width_nm(result.attrs, nm)
+        found, left_out = classes_of_library(read, nm, library_error, width_nm)
         classes += found
         notes += [*read.notes, *left_out]
     masks = _masks(path, result, pins, at)

@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Mapping
 from typing import Any
 
+import numpy as np
+from numpy.typing import ArrayLike
 from pydantic import ValidationError
 
 from dsl_core.model.plan import CapturePlan
@@ -16,6 +19,38 @@ PLAN_ATTRIBUTE = "capture_plan"
 SCALE_ATTRIBUTE = "reflectance_scale_rel_std"
 #: Name of that which lists sentences about pictures that do not show their pattern.
 DOUBTS = "frames_in_doubt"
+#: Names of those that say how wide the bands of a reconstruction are, and where the first of them is.
+BAND_WIDTH, FIRST_BAND = "band_width_nm", "first_band_nm"
+#: A band is one of those if it is off by no more than this share of their width.
+_ON_BAND = 1e-3
+
+
+def band_attributes(bands_nm: ArrayLike) -> dict[str, float]:
+    """What is stated of bands (bands,), nm, that are next to each other; nothing of others."""
+    nm = np.asarray(bands_nm, np.float64)
+    steps = np.abs(np.diff(nm))
+    if not steps.size or not steps[0] > 0 or np.ptp(steps) > _ON_BAND * steps[0]:
+        return {}
+    return {BAND_WIDTH: round(float(steps.mean()), 6), FIRST_BAND: float(nm[0])}
+
+
+def stated_band_width_nm(attributes: Mapping[Any, Any], bands_nm: ArrayLike) -> float | None:
+    """How wide bands (bands,), nm, are of which others may have been left out.
+
+    None where nobody says, and for bands that are not among those stated, as means of several are not.
+
+    >>> stated = band_attributes([430.0, 435.0, 440.0])
+    >>> stated_band_width_nm(stated, [430.0, 440.0]), stated_band_width_nm(stated, [432.5])
+    (5.0, None)
+    """
+    try:
+        width, first = (float(attributes[name]) for name in (BAND_WIDTH, FIRST_BAND))
+    except (KeyError, TypeError, ValueError):
+        return None
+    if not (0 < width < math.inf and math.isfinite(first)):
+        return None
+    steps = (np.asarray(bands_nm, np.float64) - first) / width
+    return width if bool((np.abs(steps - np.rint(steps)) <= _ON_BAND).all()) else None
 
 
 def sentences_of(attributes: Mapping[Any, Any], name: str) -> tuple[str, ...]:

@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from dsl_core.model.attributes import band_attributes
+
 if TYPE_CHECKING:
     import xarray as xr
 
@@ -133,7 +135,8 @@ def build_result(
     }
     used = {d for name in arrays for d in VARIABLES[name][0]}
     coords = {k: v for k, v in coords.items() if k in used}
-    return xr.Dataset(data, coords=coords, attrs={"schema_version": SCHEMA_VERSION, **attributes})
+    stated = {"schema_version": SCHEMA_VERSION, **band_attributes(wavelengths_nm), **attributes}
+    return xr.Dataset(data, coords=coords, attrs=stated)
 
 
 #: What each flag is called below a picture.

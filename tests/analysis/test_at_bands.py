@@ -1,8 +1,13 @@
+from pathlib import Path
+
 import numpy as np
 import pytest
 
+import dsl_core as dsl
 from dsl_core.analysis.at_bands import at_bands, band_weights
 from dsl_core.errors import CalibrationError
+from dsl_core.model.attributes import band_attributes, stated_band_width_nm
+from dsl_core.model.result import build_result
 from dsl_core.model.spectral import SpectralCurve
 
 BANDS_NM = np.arange(430.0, 661.0, 5.0)
@@ -38,3 +43,35 @@ def test_coarse_samples_are_less_sure_between_them_and_stated_deviations_are_kep
 def test_what_a_spectrum_does_not_cover_is_not_made_up() -> None:
     with pytest.raises(CalibrationError, match="500 to 600 nm; the bands from 430 to 660"):
         at_bands(SpectralCurve.of([500.0, 600.0], [0.1, 0.2]), BANDS_NM)
+
+
+def test_bands_that_were_picked_are_as_wide_as_they_were_reconstructed() -> None:
+    edge = SpectralCurve.of(FINE_NM, np.where(FINE_NM > 590, 0.6, 0.05))
+    whole = at_bands(edge, BANDS_NM).values
+    for picked in (np.arange(0, len(BANDS_NM), 10), np.r_[0:14, 23:47], np.array([33])):
+        nm = BANDS_NM[picked]
+        width_nm = stated_band_width_nm(band_attributes(BANDS_NM), nm)
+        found = at_bands(edge, nm, width_nm)
+        np.testing.assert_allclose(found.values, whole[picked], atol=1e-6)
+    means_nm = BANDS_NM[:46].reshape(-1, 2).mean(1)
+    assert stated_band_width_nm(band_attributes(BANDS_NM), means_nm) is None
+
+
+def test_a_result_says_how_wide_its_bands_are_whatever_is_picked_of_it(tmp_path: Path) -> None:
+    lines = (f"{nm:g},{0.6 if nm > 590 else 0.05}\n" for nm in np.arange(400, 701, 1))
+    (tmp_path / "edge.csv").write_text("nm,red edge (1)\n" + "".join(lines))
+    rising = np.where(BANDS_NM > 591, 0.6, np.where(BANDS_NM < 589, 0.05, 0.325))
+    cube = np.broadcast_to(rising[:, None, None], (len(BANDS_NM), 2, 2)).astype(np.float32)
+    arrays = {"reflectance": cube, "flags": np.zeros((2, 2), np.uint16)}
+    result = build_result(arrays, BANDS_NM, {}).sel(wavelength_nm=np.arange(450.0, 651.0, 50.0))
+    saved = dsl.load_result(dsl.save_result(result, tmp_path / "a.zarr"))
+    found = dsl.classify(saved, library=tmp_path / "edge.csv", measure="rmse", worst=0.01)
+    assert float(found["fit"].max()) < 0.001
+
+
+@pytest.mark.parametrize(
+    "stated", [{}, {"band_width_nm": "wide"}, {"band_width_nm": -5.0, "first_band_nm": 430.0}]
+)
+def test_widths_that_nobody_states_are_the_distance_of_bands(stated: dict[str, object]) -> None:
+    assert stated_band_width_nm(stated, BANDS_NM) is None
+    assert band_attributes([430.0, 435.0, 450.0]) == band_attributes([430.0]) == {}

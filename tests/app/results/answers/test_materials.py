@@ -79,9 +79,9 @@ def test_what_a_library_may_be_off_by_belongs_to_its_classes(
     told: list[float] = []
     real = classes.classes_of_library
 
-    def told_of(library: Any, bands_nm: Any, relative_error: float = 0.0) -> Any:
+    def told_of(library: Any, bands_nm: Any, relative_error: float = 0.0, *rest: Any) -> Any:
         told.append(relative_error)
-        return real(library, bands_nm, relative_error=relative_error)
+        return real(library, bands_nm, relative_error, *rest)
 
     monkeypatch.setattr(classes, "classes_of_library", told_of)
     for way in (Way(), Way(library_error=0.05)):
