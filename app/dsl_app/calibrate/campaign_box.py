@@ -14,6 +14,7 @@ from dsl_app.calibrate.state import CalibrateState
 from dsl_app.connection.state import RigState
 from dsl_app.shared.evented import follow_any
 from dsl_app.shared.known_files import first_free
+from dsl_app.shared.paths import there
 from dsl_app.shared.widgets.dialogs import dialog_buttons
 from dsl_app.shared.widgets.forms import label, push_button, set_role, show_parts
 from dsl_app.shared.widgets.layouts import STRETCH, column_of, row_of
@@ -69,7 +70,7 @@ class NewCampaignDialog(QDialog):
         trouble = ""
         if not self.name.text().strip() or "/" in self.name.text():
             trouble = "Give the campaign a name without slashes."
-        elif self.target.exists():
+        elif there(self.target):
             trouble = f"{self.target.name} already exists in this folder. Choose another name, or open it."
         self._text.setText(trouble)
         self.begin.setEnabled(not trouble)

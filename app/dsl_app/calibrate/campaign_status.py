@@ -8,6 +8,7 @@ from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
 from dsl_app.calibrate.state import ABOUT, About, Row, RowState
+from dsl_app.shared.paths import is_dir
 from dsl_core.campaign.common.captures import read_note
 from dsl_core.campaign.common.recipe import AnyRecipe
 from dsl_core.campaign.recipes import campaign_recipes, recipe_names
@@ -146,9 +147,9 @@ def count_captured(campaign: CampaignFolder, name: str) -> tuple[int, int]:
     It had as many as when the last of them was captured; 0 is unknown.
     """
     home = campaign.home(name)
-    if not home.is_dir():
+    if not is_dir(home):
         return 0, 0
-    notes = (read_note(folder) for folder in home.iterdir() if folder.is_dir())
+    notes = (read_note(folder) for folder in home.iterdir() if is_dir(folder))
     done = [note for note in notes if note is not None and note.finished and not note.refused]
     last = max(done, key=lambda note: note.finished, default=None)
     return len(done), 0 if last is None else last.steps

@@ -18,6 +18,7 @@ from dsl_app.connection.state import RigChoice
 from dsl_app.shared.evented import Event
 from dsl_app.shared.jobs.base import Job, JobRunner
 from dsl_app.shared.notify import NO_RIG, Notifier, sentence_of
+from dsl_app.shared.paths import is_file
 from dsl_app.shared.widget_state import LabelState
 from dsl_core.campaign.guide import calibrated_rig
 from dsl_core.campaign.products import Products, write_products
@@ -68,7 +69,7 @@ class CalibrateController:
         False for anything else.
         """
         folder = path.parent if path.name == CAMPAIGN_NAME else path
-        if (folder / CAMPAIGN_NAME).is_file():
+        if is_file(folder / CAMPAIGN_NAME):
             self.open_campaign(folder)
             return True
         return self.library.offer(path)

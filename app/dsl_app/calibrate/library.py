@@ -10,6 +10,7 @@ from dsl_app.calibrate.state import CalibrateState, DriftVerdict
 from dsl_app.connection.controller import RIG, RigController
 from dsl_app.shared.jobs.base import Job, JobRunner
 from dsl_app.shared.notify import NO_RIG, Notifier
+from dsl_app.shared.paths import is_file
 from dsl_core.io.calibration_library import CalibrationLibrary, LibraryEntry, LibraryLine
 from dsl_core.progress import Progress
 
@@ -78,7 +79,7 @@ class LibraryController:
     def offer(self, path: Path) -> bool:
         """Import a file if it looks like a calibration; False if it does not."""
         try:
-            is_one = path.suffix.lower() == ".json" and path.is_file() and _MARK in path.read_bytes()
+            is_one = path.suffix.lower() == ".json" and is_file(path) and _MARK in path.read_bytes()
         except OSError:
             is_one = False
         if is_one:

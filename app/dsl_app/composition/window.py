@@ -18,6 +18,7 @@ from dsl_app.composition.rig_profiles import ProfileAction
 from dsl_app.connection.state import Link, RigChoice, RigState
 from dsl_app.shared.evented import Value
 from dsl_app.shared.known_files import Kind
+from dsl_app.shared.paths import is_dir
 from dsl_app.shared.settings import demo_folder
 from dsl_app.shared.widgets.page import PageWidget
 from dsl_app.shell.application import make_window, open_first_page
@@ -307,7 +308,7 @@ class Composition(QObject):
         control.wizard_ready.connect(lambda pair: self._open_wizard(*pair))
         self.calibration_in_use.serve_library(state)
         last = Path(settings.campaign)
-        if settings.campaign and last.is_dir():
+        if settings.campaign and is_dir(last):
             control.open_campaign(last)
 
         def remember(facts: CampaignFacts | None) -> None:

@@ -20,6 +20,8 @@ from dsl_app.importing.state import (
 )
 from dsl_app.shared.jobs.base import Job, JobRunner
 from dsl_app.shared.notify import Notifier, sentence_of
+from dsl_app.shared.paths import barrier
+from dsl_core.errors import StoreError
 from dsl_core.io.calibration_library import CalibrationLibrary, load_calibration
 from dsl_core.model.rig import Rig
 from dsl_core.progress import Progress
@@ -130,6 +132,8 @@ def look_at(request: ImportRequest, library: CalibrationLibrary) -> Found:
     """What the folder of an request contains; raises `StoreError`."""
     from dsl_core.workflows import exchange
 
+    if reason := barrier(request.folder):
+        raise StoreError(f"{request.folder} cannot be read ({reason}). Choose another folder.")
     look = exchange.look_at(request.folder, base_of(request, library), _size(request))
     return Found(
         request.folder, look.kind, rows_of(look.table), summary_of(look.kind, look.table), look.obstacle

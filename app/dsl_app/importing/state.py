@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Literal
 
 from dsl_app.shared.evented import Event, Value
 from dsl_app.shared.known_files import first_free
+from dsl_app.shared.paths import there
 from dsl_core.words import quoted
 
 if TYPE_CHECKING:
@@ -136,7 +137,7 @@ def trouble_of(found: Found, request: ImportRequest) -> str:
         return found.obstacle
     if not request.target.stem.strip() or request.target.name.startswith("."):
         return "Enter a name."
-    if request.target.exists():
+    if there(request.target):
         return f"{request.target.name} already exists. Choose another name or folder."
     return ""
 

@@ -20,6 +20,7 @@ from dsl_app.shared.evented import Event
 from dsl_app.shared.jobs.base import Job, JobRunner, JobState
 from dsl_app.shared.known_files import RESULT_NAME, Kind, kind_of
 from dsl_app.shared.notify import Notifier, sentence_of
+from dsl_app.shared.paths import is_file
 from dsl_app.shared.spectrum import Pixel
 from dsl_app.shared.undo import Change, UndoStack
 from dsl_core.errors import DslError
@@ -86,7 +87,7 @@ class ResultsController:
     def _offer(self, session: Path) -> None:
         """Open the result next to a scan, or offer to reconstruct it; says why if it cannot be read."""
         target = session.with_suffix(".zarr")
-        if (target / RESULT_NAME).is_file():
+        if is_file(target / RESULT_NAME):
             self._load(target)
         elif reason := _unreadable(session):
             self._notifier.tell("error", reason)

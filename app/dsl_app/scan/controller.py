@@ -18,6 +18,7 @@ from dsl_app.scan.state import InterruptedScan, Phase, Reconnection, ScanState
 from dsl_app.shared.jobs.base import Job, JobRunner, JobState
 from dsl_app.shared.known_files import Kind, kind_of
 from dsl_app.shared.notify import Notifier, sentence_of
+from dsl_app.shared.paths import is_file, there
 from dsl_app.shared.undo import UndoStack
 from dsl_core.capture.runner import State, Status
 from dsl_core.devices.base import DeviceRig
@@ -279,7 +280,7 @@ class ScanController:
     def _choose_target(self) -> None:
         """Name the next scan, in the folder where the person saves scans."""
         typed = named_target(self._folder, self._name)
-        is_free = bool(self._name) and not typed.exists()
+        is_free = bool(self._name) and not there(typed)
         self.state.target.set(typed if is_free else fresh_target(self._folder, self._clock()))
 
     def reconstruct(self, session: Path) -> None:
@@ -298,7 +299,7 @@ class ScanController:
         if kind_of(path) in (Kind.PLAN, Kind.PATTERNS):
             self.plans.open_plan(path)
             return True
-        if not (path / MANIFEST_NAME).is_file():
+        if not is_file(path / MANIFEST_NAME):
             return False
         if self.state.phase.value.is_busy:
             self._notifier.tell("info", _BUSY)
@@ -318,7 +319,7 @@ class ScanController:
         """Offer to resume a scan that lacks frames; False when there is nothing to resume."""
         from dsl_core.io.scan.folder import ScanReader
 
-        if not (folder / MANIFEST_NAME).is_file():
+        if not is_file(folder / MANIFEST_NAME):
             return False
         reader = ScanReader(folder)
         missing, total = len(reader.missing()), reader.plan.shot_count

@@ -22,6 +22,7 @@ from dsl_app.scan.reconstruction_time import about
 from dsl_app.scan.state import CalibrationChoice, Facts, Phase, ScanState
 from dsl_app.shared.evented import follow_any
 from dsl_app.shared.known_files import breakable
+from dsl_app.shared.paths import there
 from dsl_app.shared.widgets.forms import (
     ChoiceBox,
     allow,
@@ -229,7 +230,7 @@ class RunBox(QGroupBox):
         state = self._state
         finished = state.finished.value
         # It may have been reconstructed from another page.
-        has_result = finished is not None and finished.with_suffix(".zarr").exists()
+        has_result = finished is not None and there(finished.with_suffix(".zarr"))
         shown = run_controls(
             state.phase.value,
             state.interrupted.value,

@@ -16,6 +16,7 @@ from dsl_app.scan.controller import ScanController
 from dsl_app.scan.state import CalibrationChoice, ScanState, preset_of
 from dsl_app.session.records import ComparePart, ResultsPart, ScanPart, SeriesPart
 from dsl_app.shared.evented import Value
+from dsl_app.shared.paths import is_file, there
 from dsl_core.evaluation.time_sweep import FIGURES
 from dsl_core.io import MANIFEST_NAME
 from dsl_core.io.result.result_arrays import ResultArrays
@@ -88,11 +89,11 @@ def restore_scan(part: ScanPart, control: ScanController) -> None:
     """
     control.state.then_reconstruct.set(part.then_reconstruct)
     control.state.meters.set(part.meters)
-    if (part.target / MANIFEST_NAME).is_file() and not is_complete(part.target):
+    if is_file(part.target / MANIFEST_NAME) and not is_complete(part.target):
         control.open(part.target)
         return
     control.plans.change_plan(part.plan)
-    if not part.target.exists():
+    if not there(part.target):
         control.plans.set_target(part.target)
     if part.calibration:
         control.plans.choose_calibration(CalibrationChoice(part.calibration, part.calibration))

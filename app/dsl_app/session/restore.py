@@ -10,6 +10,7 @@ from PySide6.QtCore import QObject
 from dsl_app.session.records import Session
 from dsl_app.session.store import SessionStore
 from dsl_app.shared.evented import Value
+from dsl_app.shared.paths import there
 from dsl_app.shared.widgets.ticker import Ticker
 from dsl_app.shell.main_window import MainWindow
 
@@ -109,7 +110,7 @@ class SessionRestore(QObject):
         if session.results is not None:
             window.page_of("results")
             assert self.results is not None
-            if not session.results.path.exists():
+            if not there(session.results.path):
                 window.open_path(session.results.path)
             else:
                 parts.restore_result(session.results, self.results)

@@ -8,6 +8,7 @@ from enum import Enum
 from itertools import chain, count, islice
 from pathlib import Path
 
+from dsl_app.shared.paths import barrier, is_dir, is_file, there
 from dsl_core.io import CAMPAIGN_NAME, MANIFEST_NAME, PUBLISHED_PLACES, PUBLISHED_STARTS
 from dsl_core.io.reading import read_json
 from dsl_core.words import counted
@@ -41,34 +42,34 @@ class Kind(Enum):
 
 def kind_of(path: Path) -> Kind:
     """The kind of a file or folder."""
-    if not path.exists():
+    if not there(path):
         return Kind.MISSING
     for name, kind in (
         (MANIFEST_NAME, Kind.SCAN),
         (RESULT_NAME, Kind.RESULT),
         (CAMPAIGN_NAME, Kind.CAMPAIGN),
     ):
-        if (path / name).is_file():
+        if is_file(path / name):
             return kind
-    if path.is_dir() and _is_published(path):
+    if is_dir(path) and _is_published(path):
         return Kind.PUBLISHED
-    if path.is_dir() and _has_pictures(path):
+    if is_dir(path) and _has_pictures(path):
         return Kind.PICTURES
     suffix = path.suffix.lower()
-    if suffix == ".json" and path.is_file():
+    if suffix == ".json" and is_file(path):
         return _kind_of_json(path)
     # The window comes up before numpy, which the formats need.
     from dsl_core.io.spectra.catalogue import suffixes
 
-    return Kind.REFERENCE if suffix in suffixes() and path.is_file() else Kind.UNKNOWN
+    return Kind.REFERENCE if suffix in suffixes() and is_file(path) else Kind.UNKNOWN
 
 
 def _is_published(folder: Path) -> bool:
     """Whether a folder has the published layout, perhaps incomplete."""
-    if any((folder / place).exists() for place in PUBLISHED_PLACES):
+    if any(there(folder / place) for place in PUBLISHED_PLACES):
         return True
     try:
-        names = [each.name.lower() for each in folder.iterdir() if each.is_dir()]
+        names = [each.name.lower() for each in folder.iterdir() if is_dir(each)]
     except OSError:
         return False
     return any(re.sub("[^a-z0-9]", "", name).startswith(PUBLISHED_STARTS) for name in names)
@@ -97,7 +98,10 @@ def has_pictures(folder: Path) -> bool:
     """Whether a folder, or one directly in it, has a capture's pictures; not for the published layout."""
     if kind_of(folder) is not Kind.UNKNOWN:
         return kind_of(folder) is Kind.PICTURES
-    return folder.is_dir() and any(each.is_dir() and _has_pictures(each) for each in folder.iterdir())
+    try:
+        return is_dir(folder) and any(is_dir(each) and _has_pictures(each) for each in folder.iterdir())
+    except OSError:
+        return False
 
 
 def _kind_of_json(path: Path) -> Kind:
@@ -125,7 +129,7 @@ def meant_by(path: Path) -> Path:
 def first_free(folder: Path, stem: str, suffix: str = "") -> Path:
     """A path in a folder that does not exist yet: its name is the stem, with a number if that is taken."""
     names = chain((stem,), (f"{stem}-{number}" for number in count(2)))
-    return next(path for name in names if not (path := folder / f"{name}{suffix}").exists())
+    return next(path for name in names if not there(path := folder / f"{name}{suffix}"))
 
 
 def breakable(path: Path | str) -> str:
@@ -135,6 +139,8 @@ def breakable(path: Path | str) -> str:
 
 def refusal(path: Path) -> str:
     """Why nothing opened a path, and what to do."""
+    if reason := barrier(path):
+        return f"{path} cannot be read ({reason}). Choose another file, or change the rights to its folder."
     match kind_of(path):
         case Kind.MISSING:
             return f"{path} no longer exists. Choose another file, or connect its drive."
@@ -179,12 +185,12 @@ def _of_pictures(path: Path) -> str:
     from dsl_core.io.pictures.candidates import FEWEST
     from dsl_core.io.pictures.picture_file import PICTURES
 
-    if path.is_file() and path.suffix.lower() in PICTURES | ARCHIVES:
+    if is_file(path) and path.suffix.lower() in PICTURES | ARCHIVES:
         return (
             f"{path.name} is opened only with all pictures of its capture. Drop their folder, or choose it"
             " with File, Import."
         )
-    if not path.is_dir():
+    if not is_dir(path):
         return ""
     if few := len(list(_pictures(path))):
         return (
@@ -196,6 +202,6 @@ def _of_pictures(path: Path) -> str:
 
 def _is_empty(path: Path) -> bool:
     try:
-        return path.is_dir() and not any(path.iterdir())
+        return is_dir(path) and not any(path.iterdir())
     except OSError:
         return False

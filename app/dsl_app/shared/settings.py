@@ -10,6 +10,7 @@ from typing import Any, Literal
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from dsl_app.shared.evented import Value
+from dsl_app.shared.paths import barrier, there
 from dsl_core.errors import StoreError
 from dsl_core.io.atomic import set_aside, write_atomic
 from dsl_core.io.reading import read_json
@@ -74,9 +75,11 @@ class RecentFiles:
 
 
 def entry_text(path: Path) -> str:
-    """How lists show a recent file: its name and folder, and whether it is missing."""
+    """How lists show a recent file: its name and folder, and whether it is missing or cannot be seen."""
     text = f"{path.name}  –  {path.parent}"
-    return text if path.exists() else f"{text}  (missing)"
+    if there(path):
+        return text
+    return f"{text}  ({'no access' if barrier(path) else 'missing'})"
 
 
 def settings_folder() -> Path:

@@ -15,6 +15,8 @@ from contextlib import suppress
 from itertools import chain
 from pathlib import Path
 
+from dsl_app.shared.paths import is_file
+
 _log = logging.getLogger(__name__)
 #: What every page needs.
 _SHARED = ("dsl_app.connection.controller", "dsl_app.rig.projector_screens", "dsl_app.session.restore")
@@ -177,5 +179,5 @@ def _load_bulk(name: str) -> None:
     load = ctypes.CDLL(None).dlopen  # unlike ctypes.CDLL(path), a function that is called frees the lock
     load.restype = ctypes.c_void_p
     path = Path(found.origin).parent / _BULK[name]
-    if path.is_file():
+    if is_file(path):
         load(str(path).encode(), os.RTLD_NOW | os.RTLD_GLOBAL)

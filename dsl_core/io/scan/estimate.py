@@ -58,5 +58,13 @@ def estimate(plan: CapturePlan, folder: Path, latency_ms: float) -> Estimate:
 
 
 def _existing(folder: Path) -> Path:
-    """The folder, or the nearest one above it that exists."""
-    return next(path for path in (folder, *folder.absolute().parents) if path.exists())
+    """The folder, or the nearest one above it that can be seen."""
+    return next(path for path in (folder, *folder.absolute().parents) if _is_seen(path))
+
+
+def _is_seen(path: Path) -> bool:
+    try:
+        return path.exists()
+    except OSError:
+        # A folder above it may not be entered, or the name is too long: whoever writes there says so.
+        return False

@@ -8,6 +8,7 @@ import pytest
 from dsl_app.composition.window import Composition, StartOptions
 from dsl_app.results.page import ResultsPage
 from dsl_app.scan.page import ScanPage
+from dsl_app.shared.settings import Settings, save_settings
 from dsl_app.shell.main_window import MainWindow
 from PySide6.QtCore import QMimeData, QPoint, QPointF, Qt, QUrl
 from PySide6.QtGui import QDragEnterEvent, QDropEvent
@@ -17,6 +18,7 @@ from pytestqt.qtbot import QtBot
 from dsl_core.io.plan_file import save_plan
 from dsl_core.io.result.annotations_file import Annotations, PinRecord, save_annotations
 from dsl_core.model.plan import CapturePlan, LineComb
+from tests.app.support.locked import lock
 from tests.app.support.real_window import show_window
 from tests.app.support.small_result import RED, write_reference, write_small_result
 
@@ -129,4 +131,29 @@ def test_a_plan_is_planned(qtbot: QtBot, window: MainWindow, tmp_path: Path) -> 
     assert isinstance(page, ScanPage)
     qtbot.waitUntil(lambda: page.plan.period.value() == 64, timeout=30_000)
     qtbot.waitUntil(lambda: not window.parts.runner.active, timeout=30_000)
+    window.close()
+
+
+def test_folders_that_may_not_be_entered_keep_nothing_from_opening(
+    qtbot: QtBot, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    locked = tmp_path / "locked"
+    (locked / "campaign").mkdir(parents=True)
+    settings = Settings(
+        recent=[str(locked / "cup.zarr")], output_folder=str(locked), campaign=str(locked / "campaign")
+    )
+    (tmp_path / "home").mkdir()
+    assert save_settings(settings, tmp_path / "home" / "settings.json") == ""
+    lock(monkeypatch, locked)
+    window = Composition(StartOptions()).open_window(tmp_path / "home")
+    show_window(qtbot, window)
+    (entry,) = window.recent_menu.actions()[:1]
+    assert entry.text().endswith("(no access)")
+    for page in ("scan", "calibrate", "start"):
+        window.open_page(page)
+        assert window.page == page
+    drop(window, locked / "cup.zarr")
+    qtbot.waitUntil(lambda: bool(window.toasts.shown), timeout=10_000)
+    assert "cannot be read (Permission denied)" in window.toasts.shown[-1].text
+    qtbot.waitUntil(lambda: not window.parts.runner.active, timeout=10_000)
     window.close()

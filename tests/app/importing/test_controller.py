@@ -23,6 +23,7 @@ from dsl_core.io.scan.folder import ScanReader
 from dsl_core.progress import CallbackProgress
 from tests.app.importing.published_folders import Folders, make_folders
 from tests.app.support.doubles import InlineRunner, RecordingNotifier
+from tests.app.support.locked import lock
 
 SHARED = Path(os.environ.get("DSL_SHARED", Path(__file__).parents[4] / "shared"))
 CAPTURES = SHARED / "data"
@@ -248,3 +249,13 @@ def test_folders_are_known_by_their_layout(made: Folders, scene: Path, tmp_path:
     (tmp_path / "other" / "pictures").mkdir(parents=True)
     assert kind_of(tmp_path / "other") is Kind.UNKNOWN
     assert kind_of(made.scan) is Kind.SCAN
+
+
+def test_a_folder_that_may_not_be_read_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    bench, locked = Bench(tmp_path), tmp_path / "locked"
+    locked.mkdir()
+    lock(monkeypatch, locked)
+    bench.control.look(locked, bench.home)
+    assert bench.notifier.told[-1] == (
+        "error", f"{locked} cannot be read (Permission denied). Choose another folder."
+    )  # fmt: skip

@@ -54,3 +54,8 @@ def test_an_estimate_is_said_in_minutes_and_megabytes() -> None:
 def test_frames_are_compressed_to_three_fifths_beside_a_margin_of_64_mib(plan: CapturePlan) -> None:
     assert needed_bytes(plan, 0) == 64 * 2**20
     assert needed_bytes(plan, plan.shot_count) == int(0.6 * plan.raw_bytes) + 64 * 2**20
+
+
+def test_the_disk_is_known_of_a_place_that_cannot_be_seen(tmp_path: Path) -> None:
+    barred = tmp_path / ("ü" * 140) / "scan.dsl"
+    assert estimate(CapturePlan(), barred, latency_ms=50.0).free_bytes > 0

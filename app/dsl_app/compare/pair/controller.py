@@ -15,6 +15,7 @@ from dsl_app.shared.evented import Value
 from dsl_app.shared.jobs.base import Job, JobRunner
 from dsl_app.shared.known_files import RESULT_NAME
 from dsl_app.shared.notify import Notifier, sentence_of
+from dsl_app.shared.paths import is_file
 from dsl_app.shared.spectrum import Pixel
 from dsl_core.evaluation.summary import Truth
 from dsl_core.io.result.result_arrays import ResultArrays, load_arrays
@@ -39,7 +40,7 @@ class PairController:
 
         Results opened together are read one after the other.
         """
-        if not (path / RESULT_NAME).is_file():
+        if not is_file(path / RESULT_NAME):
             return False
         self._waiting.append(path)
         self._open_next()
@@ -51,7 +52,7 @@ class PairController:
 
     def open_side(self, path: Path, second: bool) -> None:
         """Read a result as A, or as B."""
-        if not (path / RESULT_NAME).is_file():
+        if not is_file(path / RESULT_NAME):
             self._notifier.tell("warning", f"{path.name} is not a result. Choose a folder NAME.zarr.")
             return
         side = self.state.second if second else self.state.first

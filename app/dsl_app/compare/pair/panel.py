@@ -13,6 +13,7 @@ from dsl_app.compare.pair.sides import PairSides
 from dsl_app.compare.pair.state import Pair, PairState, pair_display
 from dsl_app.compare.verdict_table import VerdictTable
 from dsl_app.shared.evented import follow_any
+from dsl_app.shared.paths import there
 from dsl_app.shared.settings import RecentFiles
 from dsl_app.shared.spectrum import spectrum_of_pixel
 from dsl_app.shared.theme import Theme
@@ -105,7 +106,7 @@ class PairPanel(QWidget):
         """Whether a recent file is a result that is not compared yet."""
         sides = self._state.first.value, self._state.second.value
         taken = [side.arrays.path for side in sides if side is not None]
-        return path.suffix == RESULT_SUFFIX and path.exists() and path not in taken
+        return path.suffix == RESULT_SUFFIX and there(path) and path not in taken
 
     def _use(self, path: Path) -> None:
         self._control.open_side(path, second=self._state.first.value is not None)

@@ -11,6 +11,7 @@ from dsl_app.compare.series.state import SeriesKind, SeriesRow, SeriesState
 from dsl_app.shared.jobs.base import Job, JobRunner
 from dsl_app.shared.known_files import RESULT_NAME
 from dsl_app.shared.notify import Notifier
+from dsl_app.shared.paths import is_dir, is_file
 from dsl_app.shared.undo import Change, UndoStack
 from dsl_core.errors import Cancelled, DecodeError, DslError
 from dsl_core.evaluation.seen_target import Region
@@ -292,9 +293,9 @@ class SeriesController:
 
 def results_in(path: Path) -> list[Path]:
     """A result itself, or all results in a folder."""
-    if (path / RESULT_NAME).is_file():
+    if is_file(path / RESULT_NAME):
         return [path]
-    return sorted(each.parent for each in path.glob(f"*/{RESULT_NAME}")) if path.is_dir() else []
+    return sorted(each.parent for each in path.glob(f"*/{RESULT_NAME}")) if is_dir(path) else []
 
 
 def read_plane(row: SeriesRow, region: Region | None, progress: Progress) -> SeriesRow:

@@ -24,6 +24,7 @@ from dsl_app.importing.captures.state import (
     Stated,
 )
 from dsl_app.shared.notify import sentence_of
+from dsl_app.shared.paths import is_file
 from dsl_app.shared.wording import in_window
 from dsl_core.errors import CalibrationError, DslError
 from dsl_core.io.pictures.mapping import Mapping
@@ -119,7 +120,7 @@ def rig_of(
         return None, "Without a calibration the scan has columns and no depth; one can be given later."
     if chosen == NOMINAL:
         return published_rig(), "The rig of the publication, as it was designed: depth is approximate."
-    if Path(chosen).is_file() and not _is_rig(Path(chosen)):
+    if is_file(Path(chosen)) and not _is_rig(Path(chosen)):
         return _stereo(Path(chosen), request, camera_px, mapping.projector_size_px)
     rig = load_calibration(chosen, library)
     return rig, f"{rig.name}: {_distance(rig)}."

@@ -10,6 +10,7 @@ from typing import Any
 from dsl_app.results.state import BAND_KEY, BANDS_KEY, COLOUR_KEY, ResultsState, depth_key
 from dsl_app.shared.jobs.base import Job, JobRunner
 from dsl_app.shared.notify import Notifier
+from dsl_app.shared.paths import is_dir, is_file, there
 from dsl_core.io.export.format import Exporter, Format
 from dsl_core.io.result.result_arrays import ResultArrays
 from dsl_core.optics.levels import top_of
@@ -39,7 +40,7 @@ class ExportController:
             return "Select at least one format."
         if not name:
             return "Enter a name for the files."
-        if not Path(folder).is_dir():
+        if not is_dir(Path(folder)):
             return f"{folder} is not a folder. Choose an existing one."
         taken = self.taken(targets)
         if taken and not replace:
@@ -51,7 +52,7 @@ class ExportController:
     def taken(self, targets: dict[str, Path]) -> list[Path]:
         """Files that an export would replace."""
         result = self.state.result.value
-        return [] if result is None else [path for path in expected_files(targets, result) if path.exists()]
+        return [] if result is None else [path for path in expected_files(targets, result) if there(path)]
 
     def write(self, targets: dict[str, Path], overwrite: bool) -> None:
         """Write the result to a path per format key.
@@ -86,7 +87,7 @@ class ExportController:
         self._runner.submit(Job(f"Export {result.path.stem}", work, self._exported))
 
     def _exported(self, written: Sequence[Path]) -> None:
-        size = size_words(sum(path.stat().st_size for path in written if path.is_file()))
+        size = size_words(sum(path.stat().st_size for path in written if is_file(path)))
         self._notifier.tell(
             "info",
             f"Wrote {counted(len(written), 'file')}, {size}, to {written[0].parent}.",

@@ -12,6 +12,7 @@ from dsl_app.results.marks.spectra import NO_SPECTRUM, fill_region, mark_of_refe
 from dsl_app.results.state import Mark, ResultsState
 from dsl_app.shared.jobs.base import Job, JobRunner
 from dsl_app.shared.notify import Notifier
+from dsl_app.shared.paths import barrier, there
 from dsl_app.shared.spectrum import spectrum_of_pixel
 from dsl_core.errors import DslError
 from dsl_core.io.atomic import set_aside
@@ -113,7 +114,8 @@ class MarkStorage:
         )
 
     def _damaged(self, result: ResultArrays, sentence: str) -> None:
-        if annotations_path(result.path).exists():
+        path = annotations_path(result.path)
+        if there(path) or barrier(path):
             self._fail(sentence)
         else:  # it was set aside, so that nothing can replace it
             self._notifier.tell("warning", sentence)
@@ -166,7 +168,7 @@ class MarkStorage:
         assert self.state.result.value is not None
         path = annotations_path(self.state.result.value.path)
         where = set_aside(path)
-        if path.exists():
+        if there(path) or barrier(path):
             self._reason = "the file cannot be renamed; check the permissions of its folder and its drive"
             self._offer()
             return

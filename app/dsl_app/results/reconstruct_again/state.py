@@ -7,6 +7,7 @@ from pathlib import Path
 
 from dsl_app.shared.evented import Event, Value
 from dsl_app.shared.known_files import first_free
+from dsl_app.shared.paths import there
 from dsl_core.errors import DslError, PlanError
 from dsl_core.model.base import what_is_wrong
 from dsl_core.model.spectral import WavelengthGrid
@@ -121,7 +122,7 @@ def trouble_of(request: ReconstructionRequest, source: ReconstructionSource) -> 
     if not name or "/" in name or "\\" in name:
         return "Enter a name without slashes."
     target = target_of(request, source)
-    if target.exists() and not request.replace:
+    if there(target) and not request.replace:
         return f"{target.name} already exists. Choose another name, or allow replacing it."
     return ""
 

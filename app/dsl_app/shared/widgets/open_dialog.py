@@ -10,6 +10,7 @@ from PySide6.QtGui import QAbstractFileIconProvider, QIcon
 from PySide6.QtWidgets import QFileDialog, QFileIconProvider, QFileSystemModel, QWidget
 
 from dsl_app.shared.known_files import Kind, kind_of, meant_by
+from dsl_app.shared.paths import is_dir, is_file
 from dsl_app.shared.widgets.ask_file import chosen_in, start_folder
 
 #: Folders that are opened whole.
@@ -40,7 +41,7 @@ class _Icons(QFileIconProvider):
 
 def is_thing(path: Path) -> bool:
     """Whether a folder is opened whole."""
-    return path.is_dir() and kind_of(path) in THINGS
+    return is_dir(path) and kind_of(path) in THINGS
 
 
 class _Things(QSortFilterProxyModel):
@@ -82,7 +83,7 @@ class OpenDialog(QFileDialog):
         folder = folder or start_folder()
         place = Path(folder)
         # One that does not exist yet would be taken for a name that was typed, and nothing could be chosen.
-        super().__init__(parent, title, folder if place.is_dir() else str(place.parent))
+        super().__init__(parent, title, folder if is_dir(place) else str(place.parent))
         self._takes_folders = takes_folders
         self.chosen: Path | None = None
         self.setOption(QFileDialog.Option.DontUseNativeDialog)
@@ -112,7 +113,7 @@ class OpenDialog(QFileDialog):
     def accept(self) -> None:
         """Choose what is selected, or enter it."""
         names = [Path(name) for name in self.selectedFiles()]
-        if len(names) == 1 and (names[0].is_file() or is_thing(names[0]) or self._takes_folders):
+        if len(names) == 1 and (is_file(names[0]) or is_thing(names[0]) or self._takes_folders):
             self._choose(names[0])
         else:
             super().accept()
@@ -137,4 +138,4 @@ class OpenDialog(QFileDialog):
     def ask_folder(cls, parent: QWidget | None, title: str, folder: str = "") -> Path | None:
         """A folder that a person chooses, who sees what is in it; a file stands for its folder."""
         path = cls.ask(parent, title, folder, takes_folders=True, filters=(ALL,))
-        return path.parent if path is not None and path.is_file() else path
+        return path.parent if path is not None and is_file(path) else path

@@ -9,6 +9,7 @@ from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QShowEvent
 from PySide6.QtWidgets import QListWidget, QListWidgetItem, QWidget
 
+from dsl_app.shared.paths import there
 from dsl_app.shared.plain_tip import plain_tip
 from dsl_app.shared.settings import RecentFiles, entry_text
 from dsl_app.shared.widgets.forms import label, named
@@ -45,7 +46,7 @@ class RecentList(QWidget):
             item = QListWidgetItem(entry_text(path))
             item.setData(Qt.ItemDataRole.UserRole, str(path))
             item.setToolTip(plain_tip(str(path)))
-            if not path.exists():
+            if not there(path):
                 item.setForeground(self.palette().placeholderText())
             self.files.addItem(item)
         rows = max(self.files.sizeHintForRow(0), 1) * self.files.count()

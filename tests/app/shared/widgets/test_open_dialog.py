@@ -10,6 +10,8 @@ from PySide6.QtCore import QFileInfo
 from PySide6.QtWidgets import QLineEdit, QTreeView
 from pytestqt.qtbot import QtBot
 
+from tests.app.support.locked import lock
+
 
 @pytest.fixture
 def home(tmp_path: Path) -> Path:
@@ -107,3 +109,14 @@ def test_a_filter_shows_scans_or_results_alone(qtbot: QtBot, home: Path) -> None
     qtbot.waitUntil(lambda: names() == {"leaf.dsl", "plain"})
     dialog.filterSelected.emit(ALL)
     qtbot.waitUntil(lambda: names() == {"leaf.dsl", "leaf.zarr", "plain"})
+
+
+def test_folders_that_may_not_be_entered_are_folders(
+    qtbot: QtBot, home: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    lock(monkeypatch, home / "leaf.zarr")
+    assert not is_thing(home / "leaf.zarr")
+    dialog = _dialog(qtbot, home)
+    info = QFileInfo(str(home / "leaf.zarr"))
+    assert not dialog._icons.icon(info).isNull()
+    assert dialog._icons.type(info) not in ("Scan", "Result")
