@@ -14,7 +14,7 @@ from dsl_app.calibrate.state import CalibrateState
 from dsl_app.connection.state import RigState
 from dsl_app.shared.evented import follow_any
 from dsl_app.shared.known_files import first_free
-from dsl_app.shared.paths import there
+from dsl_app.shared.paths import expanded, place_trouble, there
 from dsl_app.shared.widgets.dialogs import dialog_buttons
 from dsl_app.shared.widgets.forms import label, push_button, set_role, show_parts
 from dsl_app.shared.widgets.layouts import STRETCH, column_of, row_of
@@ -55,11 +55,12 @@ class NewCampaignDialog(QDialog):
         self.name.setFocus()
         self.name.selectAll()
         self.resize(540, self.sizeHint().height())
+        self._check()
 
     @property
     def target(self) -> Path:
         """The folder of the campaign."""
-        return Path(self.folder.text()).expanduser() / self.name.text().strip()
+        return expanded(Path(self.folder.text())) / self.name.text().strip()
 
     def _browse(self) -> None:
         name = QFileDialog.getExistingDirectory(self, "Folder of campaigns", self.folder.text())
@@ -70,6 +71,8 @@ class NewCampaignDialog(QDialog):
         trouble = ""
         if not self.name.text().strip() or "/" in self.name.text():
             trouble = "Give the campaign a name without slashes."
+        elif barred := place_trouble(self.target):
+            trouble = barred
         elif there(self.target):
             trouble = f"{self.target.name} already exists in this folder. Choose another name, or open it."
         self._text.setText(trouble)

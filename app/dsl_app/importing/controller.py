@@ -20,7 +20,7 @@ from dsl_app.importing.state import (
 )
 from dsl_app.shared.jobs.base import Job, JobRunner
 from dsl_app.shared.notify import Notifier, sentence_of
-from dsl_app.shared.paths import barrier
+from dsl_app.shared.paths import barrier, expanded
 from dsl_core.errors import StoreError
 from dsl_core.io.calibration_library import CalibrationLibrary, load_calibration
 from dsl_core.model.rig import Rig
@@ -76,7 +76,7 @@ class ImportController:
         if found is not None:
             suffix = SUFFIXES[found.kind]
             plain = name.strip().removesuffix(suffix).replace("/", "-")
-            self.change(target=home.expanduser() / f"{plain}{suffix}")
+            self.change(target=expanded(home) / f"{plain}{suffix}")
 
     def _look(self, request: ImportRequest, done: Any) -> None:
         self._looks += 1

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Literal
 
 from dsl_app.shared.evented import Event, Value
 from dsl_app.shared.known_files import first_free
-from dsl_app.shared.paths import there
+from dsl_app.shared.paths import place_trouble, there
 from dsl_core.words import quoted
 
 if TYPE_CHECKING:
@@ -139,7 +139,7 @@ def trouble_of(found: Found, request: ImportRequest) -> str:
         return "Enter a name."
     if there(request.target):
         return f"{request.target.name} already exists. Choose another name or folder."
-    return ""
+    return place_trouble(request.target)
 
 
 def command_of(found: Found, request: ImportRequest) -> str:

@@ -19,6 +19,7 @@ from dsl_app.scan.state import (
 from dsl_app.shared.jobs.base import Job, JobRunner
 from dsl_app.shared.known_files import Kind, kind_of
 from dsl_app.shared.notify import NO_RIG, Notifier
+from dsl_app.shared.paths import place_trouble, there
 from dsl_app.shared.undo import Change, UndoStack
 from dsl_core.devices.base import DeviceRig
 from dsl_core.devices.conditions import check_conditions
@@ -360,10 +361,9 @@ def _obstacles(
 
 
 def _place(target: Path) -> Iterator[str]:
-    try:
-        if (target / MANIFEST_NAME).exists():
-            yield f"{target.name} already contains a scan. Choose another name, or open it to resume it."
-        elif target.exists():
-            yield f"{target} exists and is not a scan. Choose another name."
-    except OSError as error:
-        yield f"{target} cannot be accessed ({error.strerror}). Choose another folder."
+    if trouble := place_trouble(target):
+        yield trouble
+    elif there(target / MANIFEST_NAME):
+        yield f"{target.name} already contains a scan. Choose another name, or open it to resume it."
+    elif there(target):
+        yield f"{target} exists and is not a scan. Choose another name."

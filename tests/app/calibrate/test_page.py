@@ -18,6 +18,7 @@ from PySide6.QtWidgets import (
     QAbstractSpinBox,
     QComboBox,
     QLineEdit,
+    QWidget,
 )
 from pytestqt.qtbot import QtBot
 
@@ -155,3 +156,23 @@ def test_the_page_names_every_calibration() -> None:
     from dsl_core.campaign.recipes import recipe_names
 
     assert tuple(ABOUT) == recipe_names()
+
+
+@pytest.mark.parametrize(
+    ("folder", "name", "told"),
+    [
+        ("~no-such-user/campaigns", "first", "~no-such-user is no home folder"),
+        ("", "ä" * 130, "The name is too long"),
+    ],
+)
+def test_a_campaign_is_not_begun_where_it_cannot_be(
+    qtbot: QtBot, tmp_path: Path, folder: str, name: str, told: str
+) -> None:
+    host = QWidget()
+    qtbot.addWidget(host)
+    dialog = NewCampaignDialog(tmp_path, "twin", host)
+    assert dialog.begin.isEnabled()
+    dialog.folder.setText(folder or str(tmp_path))
+    dialog.name.setText(name)
+    assert not dialog.begin.isEnabled()
+    assert told in dialog._text.text()

@@ -259,3 +259,17 @@ def test_a_folder_that_may_not_be_read_is_told(tmp_path: Path, monkeypatch: pyte
     assert bench.notifier.told[-1] == (
         "error", f"{locked} cannot be read (Permission denied). Choose another folder."
     )  # fmt: skip
+
+
+def test_a_place_that_cannot_be_is_told(bench: Bench, made: Folders) -> None:
+    bench.look(made.scene)
+    bench.control.change(base=str(made.own))
+    for name, home, told in (
+        ("first", Path("~no-such-user"), "~no-such-user is no home folder"),
+        ("ä" * 130, bench.home, "The name is too long"),
+    ):
+        bench.control.rename(name, home)
+        assert told in bench.trouble
+        assert not bench.control.start()
+    bench.control.rename("first", bench.home)
+    assert bench.trouble == ""

@@ -457,6 +457,24 @@ def test_a_place_that_is_taken_is_refused(bench: ScanBench, tmp_path: Path) -> N
     assert "exists and is not a scan" in facts.obstacles[0]
 
 
+@pytest.mark.parametrize("folder", ["", "not there yet"])
+def test_a_name_that_is_too_long_is_said_before_the_start(
+    bench: ScanBench, tmp_path: Path, folder: str
+) -> None:
+    bench.scans.plans.set_target(tmp_path / folder / "scan")
+    bench.scans.name_scan("ä" * 130)
+    facts = bench.state.facts.value
+    assert facts is not None
+    assert "The name is too long" in facts.obstacles[0]
+    bench.scans.start()
+    assert phase(bench) is Phase.PLANNING
+    assert bench.notifier.told[-1] == ("warning", facts.obstacles[0])
+    bench.scans.plan_new_scan()
+    bench.scans.name_scan("short")
+    assert bench.state.facts.value is not None
+    assert bench.state.facts.value.obstacles == ()
+
+
 def test_a_calibration_of_other_settings_needs_an_override(bench: ScanBench, tmp_path: Path) -> None:
     devices = bench.rig.state.devices.value
     assert devices is not None

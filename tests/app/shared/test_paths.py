@@ -6,9 +6,10 @@ from pathlib import Path
 
 import pytest
 from dsl_app.shared.known_files import Kind, first_free, has_pictures, kind_of, refusal
-from dsl_app.shared.paths import barrier, is_dir, is_file, there
+from dsl_app.shared.paths import MOST_NAME_BYTES, barrier, expanded, is_dir, is_file, place_trouble, there
 from dsl_app.shared.settings import entry_text
 
+from dsl_core.io.staging import staged
 from tests.app.support.locked import lock
 
 #: A name of 280 bytes.
@@ -58,3 +59,23 @@ def test_recent_files_and_free_names_of_a_barred_folder_are_listed(locked: Path)
     assert entry_text(locked / "cup.zarr").endswith("(no access)")
     assert entry_text(locked.parent / "gone.zarr").endswith("(missing)")
     assert first_free(locked, "scan", ".dsl") == locked / "scan.dsl"
+
+
+def test_a_home_that_nobody_has_is_told(tmp_path: Path) -> None:
+    assert expanded(Path("~") / "scans") == Path.home() / "scans"
+    nobody = expanded(Path("~no-such-user") / "scans" / "a.dsl")
+    assert "~no-such-user is no home folder" in place_trouble(nobody)
+    assert place_trouble(tmp_path / "~b" / "a.dsl") == ""
+
+
+def test_a_name_has_room_for_what_is_added_while_it_is_written(tmp_path: Path) -> None:
+    longest = tmp_path / ("é" * (MOST_NAME_BYTES // 2))
+    assert place_trouble(longest) == ""
+    with staged([longest]) as (draft,):
+        draft.touch()
+    assert is_file(longest)
+    assert "has 221 bytes, and 220 are possible" in place_trouble(tmp_path / f"{longest.name}a")
+
+
+def test_a_barred_place_is_told(locked: Path) -> None:
+    assert "cannot be accessed (Permission denied)" in place_trouble(locked / "a.dsl")

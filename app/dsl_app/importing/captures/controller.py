@@ -27,6 +27,7 @@ from dsl_app.importing.captures.state import (
 from dsl_app.shared.jobs.base import Job, JobRunner
 from dsl_app.shared.known_files import first_free
 from dsl_app.shared.notify import sentence_of
+from dsl_app.shared.paths import expanded
 from dsl_core.errors import DslError
 from dsl_core.io.calibration_library import CalibrationLibrary
 from dsl_core.io.pictures.mapping import Mapping
@@ -184,7 +185,7 @@ class CapturesController:
     def rename(self, name: str, home: Path) -> None:
         """Save under a name in a folder."""
         plain = name.strip().removesuffix(SUFFIX).replace("/", "-")
-        self._request(target=home.expanduser() / f"{plain}{SUFFIX}")
+        self._request(target=expanded(home) / f"{plain}{SUFFIX}")
 
     def _request(self, **what: Any) -> None:
         self._say(Place.TARGET, "")

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dsl_app.shared.evented import Event, Value
-from dsl_app.shared.paths import there
+from dsl_app.shared.paths import place_trouble, there
 from dsl_app.shared.wording import in_window
 from dsl_core.io.pictures.mapping import Mapping
 from dsl_core.words import counted, sentence
@@ -135,7 +135,7 @@ def target_trouble(request: CaptureRequest) -> str:
     for path in (target, result) if request.calibration != NONE else (target,):
         if there(path):
             return f"{path.name} already exists. Choose another name or folder."
-    return ""
+    return place_trouble(target)
 
 
 # View ----------------------------------------------------------------------------------------------

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from dsl_app.importing.captures.controller import CapturesController
-from dsl_app.importing.captures.state import CapturesState, Imported, Place, captures_view
+from dsl_app.importing.captures.state import NOMINAL, NONE, CapturesState, Imported, Place, captures_view
 
 from dsl_core.errors import StoreError
 from dsl_core.io.calibration_library import CalibrationLibrary
@@ -194,3 +194,17 @@ def test_a_calibration_is_checked_without_decoding_again(control: CapturesContro
     control.choose_calibration("")
     assert troubles(control) == {}
     assert control.state.decoded.value is decoded
+
+
+@pytest.mark.parametrize("calibration", [NONE, NOMINAL])
+def test_a_place_that_cannot_be_is_said_beside_it(
+    control: CapturesController, tmp_path: Path, calibration: str
+) -> None:
+    control.choose_calibration(calibration)
+    control.rename("first", Path("~no-such-user"))
+    assert "~no-such-user is no home folder" in troubles(control)[Place.TARGET]
+    control.rename("ä" * 130, tmp_path)
+    assert "The name is too long" in troubles(control)[Place.TARGET]
+    assert not captures_view(control.state).can_import
+    control.rename("first", tmp_path)
+    assert Place.TARGET not in troubles(control)
