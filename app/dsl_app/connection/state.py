@@ -7,6 +7,7 @@ from enum import Enum
 from typing import TYPE_CHECKING
 
 from dsl_app.shared.evented import Value
+from dsl_core.words import quoted
 
 if TYPE_CHECKING:
     # The window comes up before numpy.
@@ -32,7 +33,8 @@ class RigChoice:
     @property
     def command(self) -> str:
         """How the command line names it."""
-        parts = [f"--rig {self.name}", *(f"--option {key}={value}" for key, value in self.options)]
+        parts = [f"--rig {quoted(self.name)}"]
+        parts += [f"--option {quoted(f'{key}={value}')}" for key, value in self.options]
         return " ".join(parts)
 
     @property

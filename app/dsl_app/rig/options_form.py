@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Callable
 
 from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QFormLayout, QLineEdit, QWidget
 
 from dsl_app.shared.widgets.forms import ChoiceBox, named, quiet
+from dsl_core.words import quoted
 
 #: The longest label of the form around this one.
 LONGEST_LABEL = "Projector"
@@ -77,7 +79,10 @@ class OptionsForm(QWidget):
         self.scene.activated.connect(lambda _: self._choose("scene", str(self.scene.currentData())))
         tip = "Size of the simulated camera's image: smaller ones are quicker"
         self.size_px = ChoiceBox("Size", tip, SIZES, lambda size: self._choose("size", size))
-        tip = "Other options as name=value, separated by spaces; the help on this page (F1) lists them"
+        tip = (
+            "Other options as name=value, separated by spaces, in quotes where they contain some; the help on"
+            " this page (F1) lists them"
+        )
         self.text = named(QLineEdit(), "Options of the rig", tip)
         self.text.setPlaceholderText("none")
         self.text.textChanged.connect(lambda _: self._show())
@@ -109,7 +114,7 @@ class OptionsForm(QWidget):
         """Show options, each in one place."""
         chosen = CHOSEN if self._is_simulated else ()
         self._picked = {key: value for key, value in sorted(options) if key in chosen}
-        self.text.setText(" ".join(f"{key}={value}" for key, value in options if key not in chosen))
+        self.text.setText(" ".join(quoted(f"{key}={value}") for key, value in options if key not in chosen))
         self.text.setCursorPosition(0)
         self._show()
 
@@ -129,6 +134,22 @@ class OptionsForm(QWidget):
 
 
 def parse_options(text: str) -> tuple[tuple[str, str], ...]:
-    """Options from ``key=value`` texts separated by spaces; a word without ``=`` means ``on``."""
-    pairs = [part.partition("=") for part in text.split()]
+    """Options from ``key=value`` texts separated by spaces; a word without ``=`` means ``on``.
+
+    Quotes hold a value with spaces together, as in a terminal; one without its other half is a character.
+
+    >>> parse_options("noise 'scan=/home/Max M/a b.dsl'")
+    (('noise', 'on'), ('scan', '/home/Max M/a b.dsl'))
+    """
+    pairs = [part.partition("=") for part in _words(text)]
     return tuple((key, value if sign else "on") for key, sign, value in pairs)
+
+
+def _words(text: str) -> list[str]:
+    reader = shlex.shlex(text, posix=True, punctuation_chars=False)
+    # Paths of Windows have backslashes, and values may have any sign.
+    reader.whitespace_split, reader.escape, reader.commenters = True, "", ""
+    try:
+        return list(reader)
+    except ValueError:
+        return text.split()

@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
-from dsl_app.rig.options_form import OptionsForm, SceneBox
+import shlex
+
+import pytest
+from dsl_app.connection.state import RigChoice
+from dsl_app.rig.options_form import OptionsForm, SceneBox, parse_options
 from pytestqt.qtbot import QtBot
 
 SCENES = (("plane", "A white wall"), ("face", "A face"))
@@ -55,3 +59,40 @@ def test_other_rigs_have_no_scene(qtbot: QtBot) -> None:
     form.set_rig("twin")
     assert list(form.options) == [("scene", "face")]
     assert form.form.isRowVisible(form.scene)
+
+
+@pytest.mark.parametrize(
+    "value",
+    [
+        "/home/Max Mustermann/a b.dsl",
+        r"C:\data\a b.dsl",
+        r"C:\data\a.dsl",
+        "/home/O'Brien/a b#1.dsl",
+        '"b"',
+        "",
+    ],
+)
+def test_options_that_are_shown_are_read_back_whatever_they_contain(qtbot: QtBot, value: str) -> None:
+    form = OptionsForm(lambda: SCENES)
+    qtbot.addWidget(form)
+    form.set_rig("replay")
+    options = (("scan", value), ("realtime", "on"))
+    form.show_options(options)
+    assert form.options == options
+    command = shlex.split(RigChoice("room 12", options).command)
+    assert command == ["--rig", "room 12", "--option", f"scan={value}", "--option", "realtime=on"]
+
+
+@pytest.mark.parametrize(
+    ("typed", "value"),
+    [
+        ("scan='/a b.dsl'", "/a b.dsl"),
+        ('scan="/a b.dsl"', "/a b.dsl"),
+        ("'scan=/a b.dsl'", "/a b.dsl"),
+        (r"scan=C:\a.dsl", r"C:\a.dsl"),
+        ("scan=/O'Brien", "/O'Brien"),
+        ("scan=a#1", "a#1"),
+    ],
+)
+def test_quotes_hold_a_value_together(typed: str, value: str) -> None:
+    assert parse_options(typed) == (("scan", value),)

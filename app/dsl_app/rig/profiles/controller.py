@@ -25,6 +25,7 @@ from dsl_core.devices.profile import RigProfile
 from dsl_core.errors import DeviceError, DslError, TakenError
 from dsl_core.io.rig_profile import load_profile, save_profile
 from dsl_core.progress import Progress
+from dsl_core.words import quoted
 
 T = TypeVar("T")
 
@@ -164,7 +165,7 @@ class ProfileController:
 
     def command_line(self) -> str:
         """The command that tries the devices of the saved profile."""
-        return f"dsl-scan rigs doctor {self.state.draft.value.target}"
+        return f"dsl-scan rigs doctor {quoted(self.state.draft.value.target)}"
 
 
 def find_devices(progress: Progress) -> tuple[Found, ...]:

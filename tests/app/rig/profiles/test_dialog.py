@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from pathlib import Path
 
 import pytest
@@ -265,3 +266,13 @@ def test_who_wants_to_connect_a_first_rig_begins_with_its_profile(
     QTest.mouseClick(start.connect_rig, LEFT)
     assert window.page == "rig"
     assert bool(window.findChildren(ProfileDialog)) is not has_rig
+
+
+def test_the_command_names_a_profile_whose_name_has_spaces(qtbot: QtBot) -> None:
+    bench = Bench(qtbot)
+    bench.control.open(None)
+    bench.control.change(name="room 12")
+    command = shlex.split(bench.control.command_line())
+    assert command[:3] == ["dsl-scan", "rigs", "doctor"]
+    assert Path(command[3]).stem == "room 12"
+    assert len(command) == 4
