@@ -23,13 +23,14 @@ class Way:
     """How spectra are compared with classes.
 
     ``library_error`` is the standard deviation of the spectra of a library, as a share of them; ``grouping``
-    says what of a library makes a class.
+    says what of a library makes a class; ``limits`` are the usual ones of the measure for None.
     """
 
     measure: Measure = Measure.PROBABILITY
     brightness: Brightness = "stated"
     library_error: float = 0.0
     grouping: str = "auto"
+    limits: Limits | None = None
 
 
 #: Reads or makes the classes for a result, with notes.
@@ -102,7 +103,7 @@ class AnswersController:
             )
             given = (result.known(name) for name in ("points_mm", "normals", "depth_std_mm"))
             areas = PixelAreas.of(*given, places_px=result.places_px)
-            made = Classification.of(scores, brightness=way.brightness, areas=areas)
+            made = Classification.of(scores, way.limits, way.brightness, areas)
             return Materials(name, made, (*made.notes, *doubts, *notes))
 
         def done(materials: Materials) -> None:

@@ -18,7 +18,7 @@ from dsl_app.shared.widgets.icons import swatch
 from dsl_app.shared.widgets.layouts import STRETCH, column_of, row_of
 from dsl_app.shared.widgets.read_table import RIGHT, ReadTable, cell
 from dsl_app.shared.widgets.save_dialog import ask_target
-from dsl_core.analysis.classify import Brightness, Limits, Measure
+from dsl_core.analysis.classify import Brightness, Limits, Measure, Scores
 from dsl_core.io.spectra.catalogue import suffixes
 from dsl_core.words import capitalised, counted
 
@@ -66,6 +66,7 @@ class MaterialsPanel(QWidget):
         super().__init__()
         self._state, self._control, self._theme = state, control, DARK
         self._library: Path | None = None
+        self._shown_scores: Scores | None = None
         self.measure = ChoiceBox(
             "By",
             "How spectra are compared: the probability by the deviations of the bands, the spectral angle, or"
@@ -89,7 +90,7 @@ class MaterialsPanel(QWidget):
             "What of a folder or file becomes a class: each subfolder and, of spectra in none, each name;"
             " 'leaf 1' and 'leaf 2' are one class by names without numbers",
             _GROUPINGS,
-            lambda _: self._regroup(),
+            lambda _: self._by_library_again(),
         )
         self.grouping.be_narrow()
         self.worst = NumberBox("Limit", 0, 1, 0.01, "", 3)
@@ -131,14 +132,15 @@ class MaterialsPanel(QWidget):
         )
 
     def _connect(self) -> None:
-        control = self._control
         self.folder.clicked.connect(self.choose_folder)
         self.file.clicked.connect(self.choose_file)
-        self.marks.clicked.connect(lambda: control.from_marks(self.way))
+        self.marks.clicked.connect(self.use_marks)
         self.write.clicked.connect(self.choose_target)
         for box in (self.worst, self.margin):
             box.setKeyboardTracking(True)
-            box.valueChanged.connect(lambda _: control.set_limits(self.worst.value(), self.margin.value()))
+            box.valueChanged.connect(lambda _: self._limit())
+        self.free.toggled.connect(lambda _: self._compare_again())
+        self.error.valueChanged.connect(lambda _: self._by_library_again(self._is_of_chosen_measure))
 
     def _keep_room(self) -> None:
         """Keep the room of the legend and of its notes: nothing moves under a click when they come."""
@@ -151,7 +153,8 @@ class MaterialsPanel(QWidget):
         """How to compare, as it is chosen."""
         brightness: Brightness = "free" if self.free.isChecked() else "stated"
         error, grouping = self.error.value() / 100, self.grouping.currentData()
-        return Way(Measure(self.measure.currentData()), brightness, error, grouping)
+        limits = Limits(self.worst.value(), self.margin.value())
+        return Way(Measure(self.measure.currentData()), brightness, error, grouping, limits)
 
     def choose_folder(self) -> None:
         """Ask for the folder of a library."""
@@ -167,16 +170,41 @@ class MaterialsPanel(QWidget):
         if path is not None:
             self.use_library(path)
 
+    def use_marks(self) -> None:
+        """Look for the spectra of what is marked."""
+        self._library = None
+        self._control.from_marks(self.way)
+
     def use_library(self, path: Path) -> None:
         """Look for the spectra of a file or folder."""
         self._library = path
         self._control.from_library(path, self.way)
 
-    def _regroup(self) -> None:
-        """Show the map by other classes of the same library, if it is by one."""
+    @property
+    def _is_of_chosen_measure(self) -> bool:
+        """Whether the map that is shown is by the measure that is chosen for the next one."""
         materials = self._state.materials.value
-        if materials is not None and self._library is not None and materials.name == self._library.name:
-            self._control.from_library(self._library, self.way)
+        return materials is not None and materials.found.scores.measure is self.way.measure
+
+    def _limit(self) -> None:
+        """Put the map under the limits, unless they are for the next one, by another measure."""
+        if self._is_of_chosen_measure:
+            self._control.set_limits(self.worst.value(), self.margin.value())
+
+    def _by_library_again(self, wanted: bool = True) -> None:
+        """Show the map by other classes of the same library, if it is by one."""
+        materials, library = self._state.materials.value, self._library
+        if not wanted or materials is None or library is None:
+            return
+        if materials.name == library.name:
+            self._control.from_library(library, self.way)
+
+    def _compare_again(self) -> None:
+        """Show the map by the other kind of comparison, from the classes that it has."""
+        if self._is_of_chosen_measure and self._library is None:
+            self._control.from_marks(self.way)
+        else:
+            self._by_library_again(self._is_of_chosen_measure)
 
     def choose_target(self) -> None:
         """Ask for a file and write the map."""
@@ -191,10 +219,17 @@ class MaterialsPanel(QWidget):
 
     def _new_measure(self) -> None:
         """Other limits belong to another measure; a map that is shown keeps its own."""
-        measure = Measure(self.measure.currentData())
+        measure, materials = Measure(self.measure.currentData()), self._state.materials.value
+        limits = Limits.usual(measure)
+        if materials is not None and materials.found.scores.measure is measure:
+            limits = materials.found.limits
+        self._offer(measure, limits)
+
+    def _offer(self, measure: Measure, limits: Limits) -> None:
+        """Offer what belongs to a measure."""
         for box in (self.free, self.error):
             allow(box, measure is Measure.PROBABILITY, "Belongs to the probability; choose that above.")
-        self._offer_limits(measure, Limits.usual(measure))
+        self._offer_limits(measure, limits)
 
     def _offer_limits(self, measure: Measure, limits: Limits) -> None:
         (low, high, decimals, unit), tip = _WORST[measure]
@@ -217,9 +252,7 @@ class MaterialsPanel(QWidget):
         self.text.setToolTip(plain_tip("" if materials is None else _method(materials)))
         if materials is None:
             return
-        with quiet(self.measure):
-            self.measure.choose(materials.found.scores.measure)
-        self._offer_limits(materials.found.scores.measure, materials.found.limits)
+        self._follow_scores(materials.found.scores, materials.found.limits)
         rows, colours = [], materials.found.shown.palette(self._theme.ground)
         for row in materials.found.rows:
             if not row.pixels and len(materials.found.rows) > 20:
@@ -229,6 +262,15 @@ class MaterialsPanel(QWidget):
             figures = (cell(text, "", RIGHT) for text in (row.pixels_text, row.share_text, row.area_text))
             rows.append((first, *figures))
         self.table.show_rows(rows)
+
+    def _follow_scores(self, scores: Scores, limits: Limits) -> None:
+        """Choose the measure of a new map; other limits or colours leave what is chosen for the next one."""
+        if scores is self._shown_scores:
+            # A box that is written to while a person types in it loses what is typed.
+            return
+        self._shown_scores = scores
+        self.measure.choose(scores.measure)
+        self._offer(scores.measure, limits)
 
     def apply_theme(self, theme: Theme) -> None:
         """Apply the colours of a theme."""

@@ -14,11 +14,12 @@ from dsl_app.results.layers import materials_table, tinted_by
 from dsl_app.results.state import Materials
 from dsl_app.shared.theme import DARK, LIGHT
 from dsl_app.shared.widgets.forms import NumberBox
+from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QLabel
 from pytestqt.qtbot import QtBot
 
 from dsl_core.analysis import classes
-from dsl_core.analysis.classify import ClassMap, Measure
+from dsl_core.analysis.classify import ClassMap, Limits, Measure
 from tests.app.support.results_bench import Bench as Window
 from tests.app.support.results_bench import bench as window
 from tests.app.support.results_controller import SQUARE, Bench
@@ -189,6 +190,72 @@ def test_the_panel_is_a_legend_with_areas(qtbot: QtBot, bench: Bench) -> None:
     assert "By marks: spectral angle" in panel.text.toolTip()
     panel.clear.click()
     assert not panel.write.isEnabled()
+
+
+def _choose_measure(panel: MaterialsPanel, measure: Measure) -> None:
+    panel.measure.choose(measure)
+    panel.measure.activated.emit(panel.measure.currentIndex())
+
+
+def _type(box: NumberBox, text: str) -> None:
+    box.setFocus()
+    box.selectAll()
+    QTest.keyClicks(box, text)
+    box.clearFocus()
+
+
+def test_limits_of_another_measure_are_for_the_next_map(qtbot: QtBot, bench: Bench) -> None:
+    panel = MaterialsPanel(bench.state, bench.control.answers)
+    qtbot.addWidget(panel)
+    panel.show()
+    for pixel in ((30, 5), (3, 3)):
+        bench.control.marks.pin(pixel)
+    panel.marks.click()
+    by_probability = _shown(bench)
+    _choose_measure(panel, Measure.ANGLE)
+    _type(panel.worst, "0.3")
+    panel.apply_theme(LIGHT)
+    assert _shown(bench) is by_probability
+    assert panel.way.measure is Measure.ANGLE
+    assert panel.worst.value() == 0.3
+    _choose_measure(panel, Measure.PROBABILITY)
+    assert panel.worst.value() == by_probability.found.limits.worst
+    _choose_measure(panel, Measure.ANGLE)
+    _type(panel.worst, "0.3")
+    panel.marks.click()
+    assert _shown(bench).found.scores.measure is Measure.ANGLE
+    assert _shown(bench).found.limits == Limits(0.3, 0.1)
+    # The map is of the measure now and follows what is typed to its end.
+    _type(panel.worst, "0.25")
+    assert _shown(bench).found.limits == Limits(0.25, 0.1)
+
+
+def test_another_brightness_or_library_error_makes_the_map_again(
+    qtbot: QtBot, bench: Bench, tmp_path: Path
+) -> None:
+    panel = MaterialsPanel(bench.state, bench.control.answers)
+    qtbot.addWidget(panel)
+    for pixel in ((30, 5), (3, 3)):
+        bench.control.marks.pin(pixel)
+    panel.marks.click()
+    before = _shown(bench)
+    panel.error.setValue(5.0)
+    assert _shown(bench) is before, "the error is of spectra of a library"
+    panel.free.click()
+    assert _shown(bench).found.brightness == "free"
+    assert _shown(bench).name == "marks"
+    panel.use_library(_library(tmp_path))
+    before = _shown(bench)
+    panel.error.setValue(2.0)
+    again = _shown(bench)
+    assert again.name == before.name
+    assert again.found.scores is not before.found.scores
+    panel.free.click()
+    assert _shown(bench).found.brightness == "stated"
+    _choose_measure(panel, Measure.ANGLE)
+    before = _shown(bench)
+    panel.free.setChecked(True)
+    assert _shown(bench) is before, "a map keeps its own measure"
 
 
 def test_notes_are_two_lines_that_leave_the_legend_alone(qtbot: QtBot, bench: Bench) -> None:
