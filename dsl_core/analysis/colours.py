@@ -48,7 +48,8 @@ HEADER = ("place", "light", "L*", "±L*", "a*", "±a*", "b*", "±b*", "ΔE00", "
 class Colour:
     """A colour under a light: L*a*b* (3,) relative to the perfect diffuser; deviations NaN if not known.
 
-    ``delta_e`` is CIEDE2000 to a reference under the same light; None without one.
+    ``delta_e`` is CIEDE2000 to a reference under the same light; None without one. Its deviation is that of
+    what is known of the two, and NaN where neither deviation is.
     """
 
     name: str
@@ -61,9 +62,10 @@ class Colour:
     @property
     def cells(self) -> tuple[str | float | None, ...]:
         """Its row in a table, as `HEADER` names the columns."""
-        known = (None if math.isnan(std) else std for std in self.lab_std)
-        pairs = (value for pair in zip(self.lab, known, strict=True) for value in pair)
-        return (self.name, self.light, *pairs, self.delta_e, self.delta_e_std)
+        pairs = (value for pair in zip(self.lab, self.lab_std, strict=True) for value in pair)
+        figures = (*pairs, self.delta_e, self.delta_e_std)
+        known = (None if value is None or math.isnan(value) else value for value in figures)
+        return (self.name, self.light, *known)
 
 
 @cache
@@ -128,7 +130,7 @@ def colours_of(
     """The colour of each spectrum (values and deviations, bands each) under each light.
 
     A band that is missing (NaN) is taken to lie between its neighbours. Deviations that are all NaN are not
-    known: no colour has one then, and differences have that of the other.
+    known: no colour has one then, and differences have that of the other, or none.
     ``correlation`` (bands, bands) says how bands err together; the usual one of a result otherwise.
     Differences are to the spectrum named ``reference``. Raises `DecodeError` for unknown lights or names, and
     for bands that hold too little of a colour.
@@ -140,7 +142,7 @@ def colours_of(
     for light in lights:
         require_bands(bands_nm, light)
         weights = xyz_weights(bands_nm, light)
-        labs = {}
+        labs, sure = {}, {name: bool(np.isfinite(std).any()) for name, (_, std) in spectra.items()}
         for name, (values, std) in spectra.items():
             known = np.isfinite(values)
             if known.all() or not known.any():
@@ -151,9 +153,9 @@ def colours_of(
         for name, (lab, covariance) in labs.items():
             difference: tuple[float | None, float | None] = (None, None)
             if reference is not None and name != reference:
-                difference = _difference(lab, covariance, *labs[reference])
-            is_known = np.isfinite(spectra[name][1]).any()
-            deviations = np.sqrt(np.diag(covariance)) if is_known else np.full(3, np.nan)
+                value, std = _difference(lab, covariance, *labs[reference])
+                difference = value, std if sure[name] or sure[reference] else math.nan
+            deviations = np.sqrt(np.diag(covariance)) if sure[name] else np.full(3, np.nan)
             found.append(Colour(name, light, _three(lab), _three(deviations), *difference))
     return found
 

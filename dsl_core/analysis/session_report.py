@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -72,14 +73,19 @@ def colour_table(colours: list[Colour]) -> ReportTable:
     """Colours as a table: a line for each mark and light."""
     rows: list[tuple[str, ...]] = []
     for each in colours:
-        lab = [f"{v:.2f} ± {s:.2f}" for v, s in zip(each.lab, each.lab_std, strict=True)]
-        difference = "" if each.delta_e is None else f"{each.delta_e:.2f} ± {each.delta_e_std:.2f}"
+        lab = [_figure(*figure) for figure in zip(each.lab, each.lab_std, strict=True)]
+        difference = "" if each.delta_e is None else _figure(each.delta_e, each.delta_e_std)
         rows.append((each.name, each.light, *lab, difference))
     heads: tuple[str, ...] = ("Mark", "Light", "L*", "a*", "b*", "ΔE00")
     if not any(row[-1] for row in rows):
         heads, rows = heads[:-1], [row[:-1] for row in rows]
     note = "CIE 1931 observer, relative to the perfect diffuser; ± one deviation."
     return ReportTable("Colours", heads, tuple(tuple(row) for row in rows), note)
+
+
+def _figure(value: float, std: float | None) -> str:
+    """A figure with its deviation, if that is known."""
+    return f"{value:.2f}" if std is None or math.isnan(std) else f"{value:.2f} ± {std:.2f}"
 
 
 def _materials(found: Classification) -> tuple[ReportPicture, ReportTable]:

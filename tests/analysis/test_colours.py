@@ -1,7 +1,10 @@
+import math
+
 import numpy as np
 import pytest
 
 from dsl_core.analysis.colours import ILLUMINANTS, colours_of, lab_of, lights_for, xyz_weights
+from dsl_core.analysis.session_report import colour_table
 from dsl_core.errors import DecodeError
 from dsl_core.optics.charts import chart_reflectance
 from dsl_core.optics.colour import delta_e_2000
@@ -54,6 +57,25 @@ def test_bands_that_err_together_make_a_colour_less_sure() -> None:
         for c in (np.eye(len(NM)), np.ones((len(NM),) * 2))
     )
     assert together.lab_std[0] > 3 * lone.lab_std[0]
+
+
+def test_a_difference_of_colours_without_deviations_has_none() -> None:
+    chart, unknown = chart_reflectance(NM), np.full(len(NM), np.nan)
+    spectra = {
+        "foliage": (chart["foliage"], unknown),
+        "magenta": (chart["magenta"], unknown),
+        "cyan": (chart["cyan"], np.full(len(NM), 0.01)),
+    }
+    alone, _, sure = colours_of(spectra, NM, ("D65",), "magenta")
+    assert alone.delta_e_std is not None
+    assert math.isnan(alone.delta_e_std)
+    assert alone.cells[-1] is None
+    assert sure.delta_e_std is not None
+    assert sure.delta_e_std > 0.1, "that of the one which is known"
+    table = colour_table([alone, sure])
+    assert "±" not in "".join(table.rows[0])
+    assert "nan" not in "".join(table.rows[0])
+    assert table.rows[1][-1].endswith(f"± {sure.delta_e_std:.2f}")
 
 
 def test_unknown_lights_and_names_are_told() -> None:

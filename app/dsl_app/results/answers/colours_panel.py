@@ -80,7 +80,7 @@ class ColoursPanel(QWidget):
             first = cell(each.name)
             first.setIcon(swatch(self._theme.pin(marks[each.name].colour)))
             texts = [_value(v, s) for v, s in zip(each.lab, each.lab_std, strict=True)]
-            texts.append("" if each.delta_e is None else _value(each.delta_e, each.delta_e_std or 0.0))
+            texts.append("" if each.delta_e is None else _value(each.delta_e, each.delta_e_std))
             rows.append((first, *(cell(text, "", RIGHT) for text in texts)))
         self.table.show_rows(rows)
 
@@ -137,9 +137,9 @@ def _labelled(marks: Iterable[Mark]) -> dict[str, Mark]:
     return found
 
 
-def _value(value: float, std: float) -> str:
+def _value(value: float, std: float | None) -> str:
     """A figure to the second digit of its deviation, two places at most; without one if it is not known."""
-    if math.isnan(std):
+    if std is None or math.isnan(std):
         return f"{value:.2f}".replace("-", "−")
     places = 2 if std < 0.995 else 1 if std < 9.95 else 0
     # Thin spaces: five columns have to fit next to the picture.

@@ -14,7 +14,7 @@ from pytestqt.qtbot import QtBot
 from dsl_core.optics.colour import reflectance_to_lab
 from tests.app.support.results_controller import SQUARE, Bench
 from tests.app.support.results_controller import bench as bench
-from tests.app.support.small_result import BLUE, write_reference
+from tests.app.support.small_result import BLUE, RED, write_reference
 
 
 def test_marks_have_colours_and_differences_to_the_selected_one(qtbot: QtBot, bench: Bench) -> None:
@@ -54,6 +54,25 @@ def test_a_reference_that_states_no_deviation_has_none(qtbot: QtBot, bench: Benc
     cells = QGuiApplication.clipboard().text().splitlines()[2].split("\t")
     assert cells[0] == "tile"
     assert [cell == "" for cell in cells[2:8]] == [False, True] * 3
+
+
+def test_a_difference_of_references_without_deviations_has_none(
+    qtbot: QtBot, bench: Bench, tmp_path: Path
+) -> None:
+    panel = ColoursPanel(bench.state)
+    qtbot.addWidget(panel)
+    panel.show()
+    for name, curve in (("tile.csv", BLUE), ("other.csv", RED)):
+        bench.control.marks.add_reference(write_reference(tmp_path / name, curve))
+    bench.state.selected.set(bench.state.marks.value[0].key)
+    panel.apply_theme(LIGHT)
+    shown = panel.table.item(1, 4)
+    assert shown is not None
+    assert float(shown.text()) > 1
+    panel.copy.click()
+    other = QGuiApplication.clipboard().text().splitlines()[2].split("\t")
+    assert float(other[8]) > 1
+    assert other[9] == ""
 
 
 def test_names_are_read_in_a_narrow_table(qtbot: QtBot, bench: Bench) -> None:
