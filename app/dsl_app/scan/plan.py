@@ -70,6 +70,7 @@ class ScanPlanController:
         self._stops = [
             rig.devices.follow(lambda _: self.take_rig()),
             state.phase.changed.connect(self._phase_changed),
+            state.then_reconstruct.changed.connect(lambda _: self._what_follows_changed()),
         ]
 
     # Plan ------------------------------------------------------------------------------------------
@@ -153,14 +154,20 @@ class ScanPlanController:
         state = self.state
         session = state.interrupted.value
         facts = find_facts(
-            self._devices, state.plan.value, state.target.value, self.calibration, state.override.value
-        )
+            self._devices, state.plan.value, state.target.value, self.calibration, state.override.value,
+            state.then_reconstruct.value,
+        )  # fmt: skip
         if session is not None:
             is_there = self._devices is not None and was_taken_with(session, self._rig.choice.value)
             connects = not is_there and session.rig_to_open is not None
             needs = () if self._devices or connects else (connect_first(session),)
             facts = replace(facts, obstacles=needs, remarks=(), connects=connects, is_calibrated=True)
         state.facts.set(facts)
+
+    def _what_follows_changed(self) -> None:
+        # The name of a scan that runs is its own, and not taken.
+        if not self.state.phase.value.is_busy:
+            self.refresh()
 
     def _fitted(self, plan: CapturePlan) -> CapturePlan:
         from dsl_core.pipeline import fit_plan
@@ -318,18 +325,27 @@ def read_plan(path: Path, now: CapturePlan) -> CapturePlan:
 
 
 def find_facts(
-    devices: DeviceRig | None, plan: CapturePlan, target: Path, calibration: Rig | None, override: bool
+    devices: DeviceRig | None,
+    plan: CapturePlan,
+    target: Path,
+    calibration: Rig | None,
+    override: bool,
+    reconstructs: bool,
 ) -> Facts:
-    """Frames, seconds and bytes of a plan, with a sentence for each obstacle and remark."""
+    """Frames, seconds and bytes of a plan, with a sentence for each obstacle and remark.
+
+    Where a scan ``reconstructs`` at its end, the place of its result must be free, too.
+    """
     from dsl_core.capture.preflight import find_remarks
 
     latency_ms = 0.0 if devices is None else devices.projector.info.latency_ms
     needs = estimate(plan, target, latency_ms)
     differ = devices is not None and calibration is not None and bool(check_conditions(calibration, devices))
-    obstacles = [*_obstacles(devices, plan, calibration, override), *_place(target)]
+    is_calibrated = devices is None or calibration is not None
+    has_result = reconstructs and is_calibrated
+    obstacles = [*_obstacles(devices, plan, calibration, override), *_place(target, has_result)]
     if needs.free_bytes < needs.needed_bytes:
         obstacles.append("There is not enough disk space. Free some space, or choose another drive.")
-    is_calibrated = devices is None or calibration is not None
     return Facts(
         needs.frames,
         needs.seconds,
@@ -360,10 +376,16 @@ def _obstacles(
         yield sentence(clause)
 
 
-def _place(target: Path) -> Iterator[str]:
+def _place(target: Path, has_result: bool) -> Iterator[str]:
+    result = target.with_suffix(".zarr")
     if trouble := place_trouble(target):
         yield trouble
     elif there(target / MANIFEST_NAME):
         yield f"{target.name} already contains a scan. Choose another name, or open it to resume it."
     elif there(target):
         yield f"{target} exists and is not a scan. Choose another name."
+    elif has_result and there(result):
+        yield (
+            f"{result.name}, the result of this scan, already exists. Choose another name, or untick"
+            " 'Reconstruct at the end'."
+        )

@@ -475,6 +475,24 @@ def test_a_name_that_is_too_long_is_said_before_the_start(
     assert bench.state.facts.value.obstacles == ()
 
 
+def test_a_scan_is_not_begun_whose_result_could_not_be_saved(bench: ScanBench, tmp_path: Path) -> None:
+    (tmp_path / "cup.zarr").mkdir()
+    bench.state.then_reconstruct.set(True)
+    bench.scans.plans.set_target(tmp_path / "cup")
+    bench.scans.start()
+    assert phase(bench) is Phase.PLANNING
+    assert "cup.zarr, the result of this scan, already exists" in bench.notifier.told[-1][1]
+    bench.state.then_reconstruct.set(False)
+    facts = bench.state.facts.value
+    assert facts is not None
+    assert not facts.obstacles
+    bench.state.then_reconstruct.set(True)
+    bench.scans.plans.set_target(tmp_path / "bowl")
+    facts = bench.state.facts.value
+    assert facts is not None
+    assert not facts.obstacles
+
+
 def test_a_calibration_of_other_settings_needs_an_override(bench: ScanBench, tmp_path: Path) -> None:
     devices = bench.rig.state.devices.value
     assert devices is not None
