@@ -21,6 +21,8 @@ RECENT_COUNT = 12
 HOME_VARIABLE = "DSL_SCAN_HOME"
 #: What a program that is killed must know next time; the page that was open is offered again.
 EARLY = ("rig", "rig_options", "recent", "tour_seen", "campaign", "campaigns_folder", "calibration")
+#: Options are of their rig.
+_RIG = {"rig", "rig_options"}
 
 
 class Settings(BaseModel):
@@ -118,10 +120,16 @@ def load_settings(path: Path) -> tuple[Settings, str]:
     An invalid field keeps its default; a file that cannot be read is set aside. Settings never keep the
     application from starting.
     """
+    settings, trouble = _load(path)
+    return Settings() if settings is None else settings, trouble
+
+
+def _load(path: Path) -> tuple[Settings | None, str]:
+    """As `load_settings`, with None where there is no file."""
     try:
         content = read_json(path)
     except FileNotFoundError:
-        return Settings(), ""
+        return None, ""
     except (OSError, ValueError) as error:
         aside = set_aside(path)
         return Settings(), f"The settings {path} could not be read ({error}); the defaults are used.{aside}"
@@ -152,10 +160,49 @@ def _tolerant(content: dict[str, Any], path: Path) -> tuple[Settings, str]:
         )
 
 
-def save_early(settings: Settings, path: Path) -> str:
-    """Write what must outlive a crash now; the rest stays as it was saved. Returns what went wrong."""
-    saved, trouble = load_settings(path)
-    if trouble:
+class SettingsFile:
+    """The file of settings: only what changed here is written, as other windows keep theirs in it, too."""
+
+    def __init__(self, settings: Settings, path: Path) -> None:
+        """``settings`` are as they were read, and change from now on."""
+        self.path, self._settings = path, settings
+        self._known = settings.model_copy(deep=True)
+
+    def save(self) -> str:
+        """Write what changed; all of it where the file is gone or wrong. Returns what went wrong, or ""."""
+        saved, trouble = _load(self.path)
+        if trouble:
+            return save_settings(self._settings, self.path)
+        return self._save_over(saved, tuple(Settings.model_fields))
+
+    def save_early(self) -> str:
+        """Write what must outlive a crash now; the rest stays as it was saved. Returns what went wrong."""
+        saved, trouble = _load(self.path)
+        return trouble or self._save_over(saved, EARLY)
+
+    def _save_over(self, saved: Settings | None, names: tuple[str, ...]) -> str:
+        now, known = self._settings, self._known
+        saved = saved or known
+        changed = {name for name in names if getattr(now, name) != getattr(known, name)}
+        if changed & _RIG:
+            changed |= _RIG
+        values = {name: getattr(now, name) for name in changed}
+        if "recent" in changed:
+            values["recent"] = _joined(now.recent, known.recent, saved.recent)
+        trouble = save_settings(saved.model_copy(update=values), self.path)
+        if not trouble:
+            self._known = known.model_copy(deep=True, update={name: getattr(now, name) for name in names})
         return trouble
-    early = {name: getattr(settings, name) for name in EARLY}
-    return save_settings(saved.model_copy(update=early), path)
+
+
+def _joined(now: list[str], known: list[str], saved: list[str]) -> list[str]:
+    """Recent files of two windows: those opened here since ``known``, then those on disk.
+
+    What was forgotten here is left out.
+    """
+    rest = list(now)
+    while rest != [name for name in known if name in rest]:
+        rest.pop(0)
+    opened, forgotten = now[: len(now) - len(rest)], set(known) - set(now)
+    others = (name for name in saved if name not in opened and name not in forgotten)
+    return [*opened, *others][:RECENT_COUNT]

@@ -19,7 +19,7 @@ from dsl_app.shared.jobs.memory import CHECK_MS, GarbageCollector
 from dsl_app.shared.jobs.qt_runner import QtRunner
 from dsl_app.shared.known_files import Kind
 from dsl_app.shared.notify import Notifier
-from dsl_app.shared.settings import RecentFiles, load_settings, settings_folder
+from dsl_app.shared.settings import RecentFiles, SettingsFile, load_settings, settings_folder
 from dsl_app.shared.theme import DARK, LIGHT, Theme
 from dsl_app.shared.undo import UndoStack
 from dsl_app.shared.widgets.icons import icon
@@ -99,12 +99,13 @@ def make_window(
     """
     path = (folder or settings_folder()) / "settings.json"
     settings, trouble = load_settings(path)
+    file = SettingsFile(settings, path)
     if theme is not None:
         settings.theme = theme  # type: ignore[assignment]
     records = LogRecords()
     logging.getLogger().addHandler(records)
     logging.getLogger("dsl_core").setLevel(logging.INFO)
-    parts = Parts(settings, path, records, QtRunner(), UndoStack(), set_theme, RecentFiles(settings))
+    parts = Parts(settings, file, records, QtRunner(), UndoStack(), set_theme, RecentFiles(settings))
     settings.page = settings.page if settings.page in pages else next(iter(pages))
     window = MainWindow(parts, pages, commands or {}, handlers or {})
     records.setParent(window)

@@ -13,7 +13,7 @@ from PySide6.QtWidgets import QMainWindow, QStackedWidget
 
 from dsl_app.shared.jobs.qt_runner import QtRunner
 from dsl_app.shared.known_files import Kind, has_pictures, kind_of, meant_by, refusal
-from dsl_app.shared.settings import RecentFiles, Settings, save_early, save_settings
+from dsl_app.shared.settings import RecentFiles, Settings, SettingsFile
 from dsl_app.shared.theme import DARK, Theme, style_sheet
 from dsl_app.shared.undo import UndoStack
 from dsl_app.shared.widgets.dialogs import confirm
@@ -42,12 +42,17 @@ class Parts:
     """What the window is made of and passes to its pages."""
 
     settings: Settings
-    settings_path: Path
+    settings_file: SettingsFile
     records: LogRecords
     runner: QtRunner
     undo: UndoStack
     set_theme: Callable[[str], Theme]
     recent: RecentFiles
+
+    @property
+    def settings_path(self) -> Path:
+        """Where the settings are kept."""
+        return self.settings_file.path
 
 
 class PagedWindow(QMainWindow):
@@ -197,13 +202,13 @@ class PagedWindow(QMainWindow):
     def save_settings(self) -> None:
         """Write the settings, including the layout."""
         save_layout(self, self.parts.settings)
-        trouble = save_settings(self.parts.settings, self.parts.settings_path)
+        trouble = self.parts.settings_file.save()
         if trouble:
             _log.warning("%s", trouble)
 
     def save_early(self) -> None:
         """Write what must outlive a crash."""
-        trouble = save_early(self.parts.settings, self.parts.settings_path)
+        trouble = self.parts.settings_file.save_early()
         if trouble:
             _log.warning("%s", trouble)
 

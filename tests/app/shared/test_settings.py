@@ -5,11 +5,12 @@ from pathlib import Path
 
 from dsl_app.shared.settings import (
     RECENT_COUNT,
+    RecentFiles,
     Settings,
+    SettingsFile,
     demo_folder,
     folder_for,
     load_settings,
-    save_early,
     save_settings,
 )
 
@@ -45,10 +46,64 @@ def test_one_wrong_field_costs_only_itself(tmp_path: Path) -> None:
 def test_what_must_outlive_a_crash_is_written_alone(tmp_path: Path) -> None:
     path = tmp_path / "settings.json"
     save_settings(Settings(theme="dark", page="results"), path)
-    now = Settings(theme="light", page="scan", rig="bench", rig_options={"port": "3"}, tour_seen=True)
-    assert save_early(now, path) == ""
+    now = load_settings(path)[0]
+    file = SettingsFile(now, path)
+    now.theme, now.page, now.rig = "light", "scan", "bench"
+    now.rig_options, now.tour_seen = {"port": "3"}, True
+    assert file.save_early() == ""
     expected = Settings(theme="dark", page="results", rig="bench", rig_options={"port": "3"}, tour_seen=True)
     assert load_settings(path) == (expected, "")
+
+
+def _opened(path: Path) -> tuple[Settings, SettingsFile]:
+    settings, trouble = load_settings(path)
+    assert trouble == ""
+    return settings, SettingsFile(settings, path)
+
+
+def test_of_two_windows_each_keeps_what_was_chosen_in_the_other(tmp_path: Path) -> None:
+    path = tmp_path / "settings.json"
+    start = [str(tmp_path / name) for name in ("old.dsl", "older.dsl", "gone.dsl")]
+    save_settings(Settings(recent=start, rig="bench", page="scan"), path)
+    (first, first_file), (second, second_file) = _opened(path), _opened(path)
+    second.theme, second.calibration = "light", "room 7"
+    second.remember(tmp_path / "second.zarr")
+    second.rig_options = {"port": "3"}
+    assert second_file.save_early() == ""
+    assert second_file.save() == ""
+    first.page = "results"
+    first.remember(tmp_path / "first.zarr")
+    first.remember(tmp_path / "older.dsl")
+    RecentFiles(first).forget(tmp_path / "gone.dsl")
+    assert first_file.save_early() == ""
+    assert first_file.save() == ""
+    now = load_settings(path)[0]
+    assert (now.theme, now.calibration, now.page) == ("light", "room 7", "results")
+    assert (now.rig, now.rig_options) == ("bench", {"port": "3"})
+    assert [Path(name).name for name in now.recent] == ["older.dsl", "first.zarr", "second.zarr", "old.dsl"]
+
+
+def test_options_are_kept_with_the_rig_that_they_are_of(tmp_path: Path) -> None:
+    path = tmp_path / "settings.json"
+    save_settings(Settings(), path)
+    (first, first_file), (second, second_file) = _opened(path), _opened(path)
+    second.rig_options = {"scene": "box"}
+    assert second_file.save() == ""
+    first.rig = "bench"
+    assert first_file.save() == ""
+    now = load_settings(path)[0]
+    assert (now.rig, now.rig_options) == ("bench", {})
+
+
+def test_settings_are_written_whole_where_their_file_is_gone(tmp_path: Path) -> None:
+    path = tmp_path / "settings.json"
+    save_settings(Settings(theme="dark", rig="bench"), path)
+    for save in (SettingsFile.save, SettingsFile.save_early):
+        settings, file = _opened(path)
+        settings.tour_seen = True
+        path.unlink()
+        assert save(file) == ""
+        assert load_settings(path) == (Settings(theme="dark", rig="bench", tour_seen=True), "")
 
 
 def test_a_folder_that_cannot_be_written_is_told(tmp_path: Path) -> None:
