@@ -35,6 +35,7 @@ from dsl_app.shared.widgets.hints import FocusRing
 from dsl_app.shared.widgets.inside import apply_theme_inside, apply_theme_to
 from dsl_app.shared.widgets.layouts import STRETCH, column_of, row_of, splitter
 from dsl_app.shared.widgets.read_table import ReadTable, cell
+from dsl_app.shared.widgets.save_dialog import with_ending
 from dsl_core.io.calibration_library import LibraryLine
 
 if TYPE_CHECKING:
@@ -213,12 +214,11 @@ class LibraryPanel(QGroupBox):
         line = self.line
         if line is None:
             return
-        name, chosen = QFileDialog.getSaveFileName(
-            self, "Export a calibration", str(Path(start_folder()) / f"{line.name}.json"), ";;".join(FORMS)
-        )
+        kinds, draft = ";;".join(FORMS), str(Path(start_folder()) / f"{line.name}.json")
+        name, chosen = QFileDialog.getSaveFileName(self, "Export a calibration", draft, kinds)
         if name:
-            # The dialog has asked whether to replace an existing file.
-            self._commands.export(self.key, Path(name), FORMS.get(chosen, "entry"), overwrite=True)
+            path, may_replace = with_ending(name, chosen or kinds, kinds)
+            self._commands.export(self.key, path, FORMS.get(chosen, "entry"), overwrite=may_replace)
 
     def _import(self) -> None:
         path = ask_file(self, "Import a calibration", "Calibrations (*.json)")

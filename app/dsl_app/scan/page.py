@@ -28,6 +28,7 @@ from dsl_app.shared.widgets.forms import Banner, show_button
 from dsl_app.shared.widgets.help_window import set_help
 from dsl_app.shared.widgets.layouts import STRETCH, SideArea, boxed, column_of, row_of, splitter, tabs_of
 from dsl_app.shared.widgets.page import PageWidget
+from dsl_app.shared.widgets.save_dialog import ask_place
 from dsl_app.shared.widgets.ticker import Ticker
 
 #: Interval at which the state of the scan is fetched, ms: ten pictures a second look live.
@@ -181,9 +182,9 @@ class ScanPage(PageWidget):
 
     def _save_plan(self) -> None:
         proposed = str(self._state.target.value.parent / "plan.json")
-        name, _ = QFileDialog.getSaveFileName(self, "Save the plan", proposed, PLANS)
-        if name:
-            self._controller.plans.save_plan(Path(name))
+        path = ask_place(self, "Save the plan", proposed, PLANS)
+        if path is not None:
+            self._controller.plans.save_plan(path)
 
     def _show_plan(self) -> None:
         state = self._state

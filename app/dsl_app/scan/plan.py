@@ -126,7 +126,6 @@ class ScanPlanController:
 
     def save_plan(self, path: Path) -> None:
         """Save the plan to a file; the file dialog has asked before replacing one."""
-        target = path if path.suffix else path.with_suffix(".json")
         plan = self.state.plan.value
 
         def done(written: Path) -> None:
@@ -134,8 +133,8 @@ class ScanPlanController:
                 self.state.plan_file.set(written)
             self._notifier.tell("info", f"The plan is saved in {written}.")
 
-        work = lambda progress: save_plan(plan, target, overwrite=True)  # noqa: E731
-        self._runner.submit(Job(f"Save {target.name}", work, done, is_minor=True))
+        work = lambda progress: save_plan(plan, path, overwrite=True)  # noqa: E731
+        self._runner.submit(Job(f"Save {path.name}", work, done, is_minor=True))
 
     def _is_locked(self) -> bool:
         """Whether a scan has begun, whose plan must not change."""

@@ -13,7 +13,7 @@ from pathlib import Path
 
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QKeySequence
-from PySide6.QtWidgets import QDialog, QFileDialog, QLabel, QTextBrowser, QWidget
+from PySide6.QtWidgets import QDialog, QLabel, QTextBrowser, QWidget
 
 from dsl_app.shared.settings import Settings
 from dsl_app.shared.widgets.dialogs import command_window, text_window
@@ -21,6 +21,7 @@ from dsl_app.shared.widgets.figure_file import FORMATS, save_figure
 from dsl_app.shared.widgets.forms import named
 from dsl_app.shared.widgets.help_window import help_of, help_window
 from dsl_app.shared.widgets.open_dialog import OpenDialog
+from dsl_app.shared.widgets.save_dialog import ask_place
 from dsl_app.shell.actions import ACTIONS, Action
 from dsl_app.shell.paged_window import PagedWindow
 from dsl_app.shell.tour import STEPS, Tour, TourStep
@@ -91,29 +92,27 @@ class WindowActions:
             )
             return
         draft = str(Path(self._parts.settings.output_folder) / f"{figure.name}.svg")
-        name, _ = QFileDialog.getSaveFileName(self._window, "Save plot", draft, FORMATS)
-        if not name:
+        path = ask_place(self._window, "Save plot", draft, FORMATS)
+        if path is None:
             return
         try:
-            save_figure(figure, Path(name), self._window.theme)
+            save_figure(figure, path, self._window.theme)
         except DslError as error:
             self._toasts.tell("error", str(error))
         else:
-            self._toasts.tell("info", f"Saved as {name}.")
+            self._toasts.tell("info", f"Saved as {path}.")
 
     def _save_report_bundle(self) -> None:
-        name, _ = QFileDialog.getSaveFileName(
-            self._window, "Save report bundle", "dsl-scan-report.zip", "Zip (*.zip)"
-        )
-        if not name:
+        path = ask_place(self._window, "Save report bundle", "dsl-scan-report.zip", "Zip (*.zip)")
+        if path is None:
             return
         try:
             lines = [text for _, text in self._parts.records.lines]
-            write_report_bundle(Path(name), lines, self._parts.settings)
+            write_report_bundle(path, lines, self._parts.settings)
         except DslError as error:
             self._toasts.tell("error", str(error))
         else:
-            self._toasts.tell("info", f"Saved as {name}.")
+            self._toasts.tell("info", f"Saved as {path}.")
 
     # Jobs ------------------------------------------------------------------------------------------
 

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 from dsl_app.calibrate.library_panel import DriftWindow, LibraryPanel
@@ -10,6 +12,7 @@ from dsl_app.calibrate.state import DriftVerdict
 from PySide6.QtCore import QEvent
 from PySide6.QtWidgets import (
     QApplication,
+    QFileDialog,
     QLabel,
 )
 
@@ -32,6 +35,21 @@ def test_a_drift_check_shows_its_figures(stage: Stage) -> None:
     assert cell(window.table, 0, 2) == "0.80 ± 0.10 px"
     assert cell(window.table, 0, 4) == "Hold it still."
     window.close()
+
+
+def test_an_export_has_the_ending_by_which_it_is_imported(
+    panel: LibraryPanel, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    asked: list[tuple[object, ...]] = []
+    monkeypatch.setattr(LibraryPanel, "line", SimpleNamespace(name="room 12"))
+    monkeypatch.setattr(LibraryPanel, "key", "room 12")
+    monkeypatch.setattr(panel._commands, "export", lambda *given, **how: asked.append((*given, how)))
+    folder = "Published layout, a folder (*)"
+    for kind, form, name in (("", "entry", "room.v2.json"), (folder, "published", "room.v2")):
+        chosen = (str(tmp_path / "room.v2"), kind)
+        monkeypatch.setattr(QFileDialog, "getSaveFileName", lambda *_, chosen=chosen: chosen)
+        panel._export()
+        assert asked.pop() == ("room 12", tmp_path / name, form, {"overwrite": form == "published"})
 
 
 def test_a_missed_drift_check_offers_to_check_again_and_to_go_on(

@@ -428,11 +428,11 @@ def test_a_plan_is_saved_and_opened_by_the_buttons(
     qtbot: QtBot, ready: Bench, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     page, bench, _ = ready
-    path = str(tmp_path / "mine.json")
-    monkeypatch.setattr(QFileDialog, "getSaveFileName", lambda *_: (path, ""))
-    monkeypatch.setattr(QFileDialog, "getOpenFileName", lambda *_: (path, ""))
+    path = tmp_path / "Plan v1.2.json"
+    monkeypatch.setattr(QFileDialog, "getSaveFileName", lambda *_: (str(tmp_path / "Plan v1.2"), ""))
+    monkeypatch.setattr(QFileDialog, "getOpenFileName", lambda *_: (str(path), ""))
     click(page.plan.save)
-    qtbot.waitUntil((tmp_path / "mine.json").is_file)
+    qtbot.waitUntil(path.is_file)
     bench.scans.plans.choose_preset("quick")
     click(page.plan.open)
     qtbot.waitUntil(lambda: bench.state.preset is PRESETS[0])

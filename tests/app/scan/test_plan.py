@@ -37,7 +37,7 @@ def design(folder: Path, width_px: int = 640) -> Path:
 
 def test_a_saved_plan_is_planned_again_and_undone(bench: ScanBench, tmp_path: Path) -> None:
     bench.scans.plans.change_plan(COMB)
-    bench.scans.plans.save_plan(tmp_path / "mine")
+    bench.scans.plans.save_plan(tmp_path / "mine.json")
     assert load_plan(tmp_path / "mine.json") == bench.state.plan.value
     assert "--plan" in bench.scans.command_line()
     bench.scans.plans.choose_preset("quick")

@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 from dsl_app.shared.jobs.base import Job
 from dsl_app.shared.undo import Change
+from dsl_app.shared.widgets import save_dialog
 from dsl_app.shared.widgets.page import PageWidget
 from dsl_app.shell import toasts
 from dsl_app.shell.actions import ACTIONS, PAGES
@@ -138,12 +139,13 @@ def test_a_known_file_becomes_a_recent_one(window: MainWindow, tmp_path: Path) -
     assert window.parts.settings.recent == [str(tmp_path)]
 
 
-def test_a_report_bundle_replaces_a_file_after_the_dialog_has_asked(
+def test_a_report_bundle_replaces_a_file_after_a_person_was_asked(
     window: MainWindow, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     path = tmp_path / "report.zip"
     path.write_text("old")
-    monkeypatch.setattr(QFileDialog, "getSaveFileName", lambda *_: (str(path), ""))
+    monkeypatch.setattr(QFileDialog, "getSaveFileName", lambda *_: (str(path.with_suffix("")), ""))
+    monkeypatch.setattr(save_dialog, "confirm", lambda *_, **__: True)
     window.actions_by_key["report_bundle"].trigger()
     assert window.toasts.shown[-1].text == f"Saved as {path}."
     assert set(zipfile.ZipFile(path).namelist()) == {"log.txt", "settings.json", "versions.json"}

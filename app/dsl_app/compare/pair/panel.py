@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QFileDialog, QSizePolicy, QSplitter, QWidget
+from PySide6.QtWidgets import QSizePolicy, QSplitter, QWidget
 
 from dsl_app.compare.pair.controller import PairController
 from dsl_app.compare.pair.pictures import PairControls, PairPictures
@@ -25,6 +25,7 @@ from dsl_app.shared.widgets.layouts import STRETCH, boxed, column_of, row_of, sp
 from dsl_app.shared.widgets.open_dialog import ALL, RESULTS, OpenDialog
 from dsl_app.shared.widgets.plots import CalmPlot, colour_legend
 from dsl_app.shared.widgets.recent_list import RecentList
+from dsl_app.shared.widgets.save_dialog import ask_place
 from dsl_app.shared.widgets.spectrum_curve import SpectrumCurve
 
 RESULT_SUFFIX = ".zarr"
@@ -116,9 +117,9 @@ class PairPanel(QWidget):
         if pair is None:
             return
         start = pair.first.arrays.path.with_suffix(".html")
-        name, _ = QFileDialog.getSaveFileName(self, "Write the report", str(start), "Web page (*.html)")
-        if name:
-            self._control.write_report(Path(name))
+        path = ask_place(self, "Write the report", str(start), "Web page (*.html)")
+        if path is not None:
+            self._control.write_report(path)
 
     def _show(self) -> None:
         show_parts(self, pair_display(self._state))

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QKeySequence, QShortcut
-from PySide6.QtWidgets import QFileDialog, QWidget
+from PySide6.QtWidgets import QWidget
 
 from dsl_app.compare.series.controller import SeriesController
 from dsl_app.compare.series.picture import SeriesPicture
@@ -21,6 +19,7 @@ from dsl_app.shared.widgets.forms import ChoiceBox, push_button, remark_line, sh
 from dsl_app.shared.widgets.help_window import set_help
 from dsl_app.shared.widgets.layouts import STRETCH, column_of, row_of, splitter
 from dsl_app.shared.widgets.open_dialog import OpenDialog
+from dsl_app.shared.widgets.save_dialog import ask_place
 from dsl_core.evaluation.stage_test import stage_table
 from dsl_core.evaluation.time_sweep import FIGURES
 
@@ -92,9 +91,9 @@ class SeriesPanel(QWidget):
         if not rows:
             return
         start = rows[0].path.parent / "series.html"
-        name, _ = QFileDialog.getSaveFileName(self, "Write the report", str(start), "Web page (*.html)")
-        if name:
-            self._control.write_report(Path(name))
+        path = ask_place(self, "Write the report", str(start), "Web page (*.html)")
+        if path is not None:
+            self._control.write_report(path)
 
     def _show(self) -> None:
         display = series_display(self._state)

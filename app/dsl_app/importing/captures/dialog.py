@@ -31,6 +31,7 @@ from dsl_app.shared.widgets.forms import (
 from dsl_app.shared.widgets.help_window import add_help_key
 from dsl_app.shared.widgets.layouts import STRETCH, boxed, column_of, row_of
 from dsl_app.shared.widgets.open_dialog import OpenDialog
+from dsl_app.shared.widgets.save_dialog import ask_place
 from dsl_core.model.plan import MOST_PX
 
 if TYPE_CHECKING:
@@ -275,9 +276,9 @@ class CapturesDialog(JobDialog):
 
     def _save(self) -> None:
         draft = str(Path(self.home.text()) / f"{self.name.text()}.mapping.json")
-        name, _ = QFileDialog.getSaveFileName(self, "Save the mapping", draft, MAPPINGS)
-        if name:
-            self._commands.save_mapping(Path(name))
+        path = ask_place(self, "Save the mapping", draft, MAPPINGS)
+        if path is not None:
+            self._commands.save_mapping(path)
 
     def done(self, result: int) -> None:
         """Stop what still runs for the dialog."""

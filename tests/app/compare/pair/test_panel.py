@@ -15,7 +15,7 @@ from dsl_app.shared.theme import DARK, LIGHT
 from dsl_app.shared.widgets.inside import apply_theme_to, stop_following
 from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QApplication
+from PySide6.QtWidgets import QApplication, QFileDialog
 from pytestqt.qtbot import QtBot
 
 from tests.app.support.compare_bench import make_result, make_variant
@@ -118,6 +118,20 @@ def test_a_name_with_signs_of_markup_is_whole_above_its_picture(
     qtbot.waitUntil(lambda: state.pair.value is not None, timeout=20_000)
     titles = [title.item.toPlainText() for title in page.pictures.content.titles]
     assert [" ".join(title.split()) for title in titles] == ["A chart", "B Mitte <2>", "A − B"]
+
+
+def test_a_report_without_an_ending_gets_that_of_a_page(
+    qtbot: QtBot, bench: Bench, chart: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    page, state, control = bench
+    for second in (False, True):
+        control.open_side(chart, second)
+        qtbot.waitUntil(lambda: not state.busy.value, timeout=20_000)
+    monkeypatch.setattr(QFileDialog, "getSaveFileName", lambda *_: (str(tmp_path / "report"), ""))
+    written: list[Path] = []
+    monkeypatch.setattr(control, "write_report", written.append)
+    page.report.click()
+    assert written == [tmp_path / "report.html"]
 
 
 @pytest.mark.slow

@@ -130,6 +130,6 @@ def test_accuracy_over_time_and_its_report(
     panel.figure.setCurrentIndex(1)
     panel.figure.activated.emit(1)
     assert "Reflectance" in panel.plot.content.plot.getPlotItem().getAxis("left").labelText
-    monkeypatch.setattr(QFileDialog, "getSaveFileName", lambda *_: (str(tmp_path / "s.html"), ""))
+    monkeypatch.setattr(QFileDialog, "getSaveFileName", lambda *_: (str(tmp_path / "s"), ""))
     QTest.mouseClick(panel.report, Qt.MouseButton.LeftButton)
     qtbot.waitUntil(lambda: (tmp_path / "s.html").exists(), timeout=30_000)

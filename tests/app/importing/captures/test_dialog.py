@@ -90,7 +90,7 @@ def test_dropped_pictures_are_corrected_by_mouse_and_become_a_scan(
     settle(qtbot, dialog)
     assert dialog.go.isEnabled()
     file = tmp_path / "m.json"
-    monkeypatch.setattr(QFileDialog, "getSaveFileName", lambda *_: (str(file), ""))
+    monkeypatch.setattr(QFileDialog, "getSaveFileName", lambda *_: (str(file.with_suffix("")), ""))
     QTest.mouseClick(dialog.save, LEFT)
     assert load_mapping(file).parts[stripes].kind == "stripes"
     QTest.mouseClick(dialog.command, LEFT)
