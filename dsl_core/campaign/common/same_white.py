@@ -25,8 +25,9 @@ SAME_LEVEL, OTHER_LEVEL = 0.12, 0.35
 SAME = 0.01
 #: Share of saturated pixels from which on white says nothing.
 MOST_SATURATED = 0.01
-#: Upright strips of a picture, of which a line and its orders light fewer than half.
-STRIPS = 16
+#: Tiles along either side of a picture: a line and its orders light fewer than half of all, however the
+#: camera is turned.
+TILES = 16
 #: What one picture of black is off by, times the lines it is taken off, as a share of their light: beyond it
 #: lamps that flicker would decide whether white is the same.
 MOST_OF_BLACK = 0.02
@@ -96,17 +97,17 @@ def _white_of(scan: FrameSource, full_scale_dn: float) -> tuple[Shot | None, flo
 
 
 def _above(pixels: NDArray[np.uint16], dark: NDArray[np.uint16]) -> tuple[float, float]:
-    """What a picture shows above black, DN: mean of all pixels, and that of strips which no line lights."""
-    columns = pixels.mean(0, dtype=np.float64) - dark.mean(0, dtype=np.float64)
-    strips = [strip.mean() for strip in np.array_split(columns, STRIPS)]
-    return float(columns.mean()), float(np.median(strips))
+    """What a picture shows above black, DN: mean of all pixels, and that of tiles which no line lights."""
+    above = np.subtract(pixels, dark, dtype=np.float64)
+    tiles = [tile.mean() for row in np.array_split(above, TILES) for tile in np.array_split(row, TILES, 1)]
+    return float(above.mean()), float(np.median(tiles))
 
 
 def _light_of(above: NDArray[np.float64]) -> float:
     """Light of pictures that are white together, DN, from `_above` of each (pictures, 2).
 
     One picture of black is taken off all of them. Where lamps flicker, each has its own black, which its
-    unlit strips show, with a little halo.
+    unlit tiles show, with a little halo.
     """
     total, unlit = float(above[:, 0].sum()), above[:, 1]
     if len(above) < 3:

@@ -37,6 +37,8 @@ class Scanned(Bench):
     code: GrayCode | NoCode = GrayCode(rows=False)
     #: Light of the room's lamps beside that in black, DN, which beats from picture to picture.
     lamps_dn = 0.0
+    #: How far the camera is turned about its axis, degrees.
+    roll_deg = 0.0
 
     def scan_of(self, step: Step) -> Any:
         return self
@@ -57,14 +59,23 @@ class Scanned(Bench):
         share = {"white": 1.0, "spectral": 1 / self.plan.spectral_count}.get(shot.role, 0.0)
         more = RATE * 200.0 * light * self.factor * share
         beat = np.sin(1.1 * shot.index + 1.5) if shot.role == "spectral" else 1.0
-        lit = np.where(np.arange(80) // 5 == shot.index % 16, 16.0, 0.0) if shot.role == "spectral" else 1.0
+        lit = _line(self.roll_deg, shot.index % 16) if shot.role == "spectral" else 1.0
         return _dithered(RIG.sensor.black_level_dn + more * lit + 1 + beat * self.lamps_dn)
 
 
+def _line(roll_deg: float, index: int) -> np.ndarray:
+    """Light of one of 16 lines that tile a turned picture, 1 for all together, brightest in the middle."""
+    y, x = np.mgrid[:60, :80]
+    across = x * np.cos(np.radians(roll_deg)) + y * np.sin(np.radians(roll_deg))
+    place = np.argsort(np.argsort(across, None, kind="stable")).reshape(60, 80)
+    fall_off = 1 + 0.3 * np.cos(2 * np.pi * (index - 7.5) / 16)
+    return np.where(place // 300 == index, 16.0 * fall_off, 0.0)
+
+
 def _dithered(mean: float | np.ndarray) -> np.ndarray:
-    """Whole numbers with this mean, (60, 80)."""
-    steps = np.linspace(0, 1, 4800, endpoint=False).reshape(60, 80)
-    return np.floor(mean + steps).astype(np.uint16)
+    """Whole numbers with this mean all over the picture, as noise of a camera makes them, (60, 80)."""
+    steps = np.random.default_rng(0).permutation(np.linspace(0, 1, 4800, endpoint=False))
+    return np.floor(mean + steps.reshape(60, 80)).astype(np.uint16)
 
 
 @pytest.fixture
@@ -92,6 +103,7 @@ def as_it_was(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(Scanned, "level", 1.0)
     monkeypatch.setattr(Scanned, "code", GrayCode(rows=False))
     monkeypatch.setattr(Scanned, "lamps_dn", 0.0)
+    monkeypatch.setattr(Scanned, "roll_deg", 0.0)
 
 
 def test_white_of_the_same_light_is_accepted(bench: Scanned) -> None:
@@ -111,6 +123,14 @@ def test_another_exposure_than_the_one_requested_is_told(
     for factor in (1 - 1.2 * allowed, 1 + 1.2 * allowed):
         with pytest.raises(CalibrationError, match=rf"It: white of the scan has {factor:.2f} times"):
             require_same_white(seen(bench, factor, level), STEP)
+
+
+@pytest.mark.parametrize("roll_deg", [-90.0, 20.0, 45.0, 90.0, 180.0])
+def test_a_camera_may_be_turned_about_its_axis(bench: Scanned, roll_deg: float) -> None:
+    Scanned.code, Scanned.roll_deg = NoCode(), roll_deg
+    require_same_white(seen(bench, 1.0), STEP)
+    with pytest.raises(CalibrationError, match=r"has 0\.8[0-9] times"):
+        require_same_white(seen(bench, 0.85), STEP)
 
 
 @pytest.mark.parametrize("factor", [1.0, 0.83, 1.17])
