@@ -27,6 +27,8 @@ DENSITY_STD = 0.04
 #: So many others say how distance goes with wavelength; so many at least say the film's line density, and
 #: fewer are compared with its data sheet.
 ENOUGH, FEW = 5, 3
+#: Keeps a quadratic through filters of one wavelength finite; its deviation says that it is unknown.
+NEARLY_NOTHING = 1e-10
 #: Where film or target are not square to the light, density seems to change with wavelength by so much.
 ASKEW = 0.01
 #: Peaks wider than this (rms columns of `dispersion`'s projector, 16 nm) or with less than this share of the
@@ -51,23 +53,26 @@ def found_wavelengths(rig: Rig, filters: Sequence[PlacedFilter]) -> list[tuple[f
     """Where each filter is by the places of its orders: wavelength and deviation (nm), None without orders.
 
     Each filter is compared with a quadratic through all others of the same order, robustly; with few others,
-    with the line density that the middle one of them sees; with fewer, with the film's data sheet.
+    or where that says less, with the line density that the middle one of them sees; with fewer, with the
+    film's data sheet.
     """
-    by_order = {order: _by_others(filters, order) for order in (1, -1)}
+    by_order = [_by_others(rig, filters, order) for order in (1, -1)]
     found: list[tuple[float, float] | None] = []
     for i, each in enumerate(filters):
-        estimates = [by_order[order][i] for order in by_order if by_order[order][i] is not None]
-        known = [e for e in estimates if e is not None] or _by_density(rig, filters, i) or _by_film(rig, each)
-        if not known:
+        known = [estimate for order in by_order if (estimate := order[i]) is not None]
+        # A quadratic says next to nothing of a filter far from all others.
+        ways = [way for way in (known, _by_density(rig, filters, i)) if way] or [_by_film(rig, each)]
+        best = min(ways, key=lambda way: min((std for _, std in way), default=np.inf))
+        if not best:
             found.append(None)
             continue
-        nm, std = np.array(known).T
+        nm, std = np.array(best).T
         # Both orders share what makes a filter's centre uncertain: their mean is no more certain than either.
         found.append((float((nm / std**2).sum() / (std**-2.0).sum()), float(std.min())))
     return found
 
 
-def _by_others(filters: Sequence[PlacedFilter], order: int) -> list[tuple[float, float] | None]:
+def _by_others(rig: Rig, filters: Sequence[PlacedFilter], order: int) -> list[tuple[float, float] | None]:
     nm = np.array([each.effective_nm for each in filters])
     at = np.array([abs(each.offsets_px.get(order, (np.nan, 0.0))[0]) for each in filters])
     spread = np.array([each.offsets_px.get(order, (np.nan, 0.0))[1] for each in filters])
@@ -75,22 +80,33 @@ def _by_others(filters: Sequence[PlacedFilter], order: int) -> list[tuple[float,
     seen = np.isfinite(at)
     nm_per_px = float(np.ptp(nm[seen])) / max(float(np.ptp(at[seen])), 1e-6) if seen.any() else 0.0
     tolerance = np.hypot(centre, nm_per_px * spread)
+    # Wavelength over sine, which is nearly straight, so that the answer is a wavelength.
+    sine = np.sin(np.arctan(at / rig.projector.fx_px))
     found: list[tuple[float, float] | None] = []
     for i in range(len(filters)):
         others = seen & (np.arange(len(filters)) != i)
         if not np.isfinite(at[i]) or others.sum() < ENOUGH:
             found.append(None)
             continue
-        # Wavelength over distance, so that the answer is a wavelength whatever the dispersion.
-        x = (at - at[others].mean()) / max(float(np.ptp(at[others])), 1e-6)
-        weight = 1 / tolerance[others]
-        for _ in range(20):
-            fit = np.polynomial.Polynomial.fit(x[others], nm[others], 2, w=weight)
-            sigmas = np.abs(nm[others] - fit(x[others])) / tolerance[others]
-            # Cauchy weights: a wrong filter among the others pulls no more.
-            weight = 1 / tolerance[others] / np.sqrt(1 + (sigmas / 2) ** 2)
-        found.append((float(fit(x[i])), float(tolerance[i]) * (1 + max(0.0, abs(float(x[i])) - 0.5))))
+        x = (sine - sine[others].mean()) / max(float(np.ptp(sine[others])), 1e-9)
+        value, std = _through(x[others], nm[others], tolerance[others], float(x[i]))
+        found.append((value, float(np.hypot(tolerance[i], std))))
     return found
+
+
+def _through(x: Floats, values: Floats, std: Floats, at: float) -> tuple[float, float]:
+    """A quadratic through values (n,) with deviations, robustly: what it is elsewhere, with its deviation."""
+    powers = np.vander(x, 3)
+    weight = 1 / std
+    for _ in range(20):
+        weighted = powers * weight[:, None]
+        covariance = np.linalg.inv(weighted.T @ weighted + NEARLY_NOTHING * np.eye(3))
+        fit = covariance @ (weighted.T @ (values * weight))
+        sigmas = np.abs(values - powers @ fit) / std
+        # Cauchy weights: a wrong filter among the others pulls no more.
+        weight = 1 / std / np.sqrt(1 + (sigmas / 2) ** 2)
+    there = np.array([at**2, at, 1.0])
+    return float(there @ fit), float(np.sqrt(there @ covariance @ there))
 
 
 def _by_density(rig: Rig, filters: Sequence[PlacedFilter], index: int) -> list[tuple[float, float]]:

@@ -100,6 +100,41 @@ def test_two_swapped_filters_of_four_are_named_and_the_others_are_not() -> None:
     assert "where those of 610 ± 6 nm should be" in verdicts[1][1]
 
 
+UNEVEN = (
+    (430.0, 440.0, 450.0, 460.0, 470.0, 480.0, 650.0),
+    (430.0, 450.0, 470.0, 490.0, 510.0, 530.0, 650.0),
+    (405.0, 450.0, 470.0, 488.0, 500.0, 520.0, 532.0, 633.0),
+    (540.0, 550.0, 560.0, 570.0, 580.0, 590.0, 450.0),
+    (450.0, 450.1, 450.2, 450.3, 450.4, 450.5, 600.0),
+)
+
+
+def drawn(centres: tuple[float, ...], rng: np.random.Generator, swapped: int | None = None) -> list[bool]:
+    """Which filters are refused, all within a nanometre of their labels, or one of them 20 nm off."""
+    filters = []
+    for index, nm in enumerate(centres):
+        really = nm + rng.normal() + 20.0 * (index == swapped)
+        offsets = {m: (m * offset_px(really) + rng.normal(0, 0.3), 0.3) for m in (1, -1)}
+        filters.append(PlacedFilter(nm, nm, False, offsets))
+    found = found_wavelengths(published_rig(), filters)
+    return [
+        verdict(published_rig(), each, where, 3.0, 1.0)[0] for each, where in zip(filters, found, strict=True)
+    ]
+
+
+@pytest.mark.parametrize("centres", UNEVEN)
+def test_a_filter_far_from_all_others_is_no_other_one(centres: tuple[float, ...]) -> None:
+    rng = np.random.default_rng(0)
+    assert not np.any([drawn(centres, rng) for _ in range(15)])
+
+
+@pytest.mark.parametrize("centres", UNEVEN)
+def test_a_wrong_filter_in_an_uneven_set_is_refused_wherever_it_is(centres: tuple[float, ...]) -> None:
+    rng = np.random.default_rng(0)
+    for index in range(len(centres)):
+        assert drawn(centres, rng, index)[index], centres[index]
+
+
 @pytest.mark.parametrize("density", [0.97, 1.03])
 def test_four_filters_show_a_film_unlike_its_data_sheet_and_raise_no_doubt(density: float) -> None:
     filters = placed({nm: density * nm for nm in CENTRES})[2:6]
