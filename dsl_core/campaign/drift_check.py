@@ -9,7 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dsl_core import pipeline
+from dsl_core.campaign.common.recipe import Bench
+from dsl_core.campaign.common.white_shot import FILL, LONG_RATIO, WhiteLevel, bracket, shoot_white
 from dsl_core.devices.base import DeviceRig
+from dsl_core.errors import CalibrationError
 from dsl_core.model.figure import Figure
 from dsl_core.model.frames import FrameSource
 from dsl_core.model.placement import Placement
@@ -33,6 +36,8 @@ LINE_STEP_PX = 40
 PIXELS = 4000
 #: Certified reflectance of a fresh Spectralon over the visible bands.
 SPECTRALON = 0.99
+#: Share of the pixels that white must not saturate: of fewer the plane and its light are not known.
+LEAST_SOUND = 0.5
 #: The user cannot lower the exposures of the quick shot.
 SATURATED_ADVICE = (
     "The check uses its own exposures. Set aperture, gain and the projector's brightness as they were at"
@@ -55,17 +60,40 @@ def quick_plan(period_ms: float = PUBLISHED_PERIOD_MS) -> CapturePlan:
     return on_cycles(plan, period_ms)
 
 
+def drift_settings(rig: Rig, white: WhiteLevel) -> tuple[Setting, ...]:
+    """The settings of the quick shot, darker ones where a test shot says that white would saturate in them.
+
+    Raises `CalibrationError` where white saturates in the darkest setting.
+    """
+    if white.saturated:
+        raise CalibrationError(
+            f"White is overexposed in one colour cycle at drive level {white.level:g}. {SATURATED_ADVICE}"
+        )
+    usual, response = quick_plan(rig.frame_period_ms).settings, rig.projector_response
+    code = usual[0]
+    light = float(response.radiance(code.level) - response.radiance(0.0))
+    range_dn = rig.sensor.full_scale_dn - rig.sensor.black_level_dn
+    if white.brightest * light * code.exposure_ms <= FILL * range_dn:
+        return usual
+    return bracket(rig, white, "The target", LONG_RATIO)
+
+
 def measure_drift(
     devices: DeviceRig, rig: Rig, folder: Path, spectralon: bool, progress: Progress | None = None
 ) -> tuple[Figure, ...]:
     """Take the quick shot into a session folder and compare it with the calibration.
 
     The light is judged only when the target is the Spectralon. Raises `CalibrationError` when the target does
-    not fill the picture, and what a scan raises.
+    not fill the picture or is far too bright, and what a scan raises.
     """
     from dsl_core.io.scan.folder import ScanReader
 
-    plan = pipeline.fit_plan(quick_plan(rig.frame_period_ms), devices)
+    plan = quick_plan(rig.frame_period_ms)
+    # What plays a check back has no other pictures to show.
+    if not devices.only_repeats:
+        white = shoot_white(Bench(devices, folder, rig))
+        plan = plan.model_copy(update={"settings": drift_settings(rig, white)})
+    plan = pipeline.fit_plan(plan, devices)
     pipeline.scan(devices, plan, folder, progress)
     return drift_figures(ScanReader(folder), rig, spectralon, progress)
 
@@ -88,7 +116,7 @@ def drift_figures(
     plan = check_source(source, rig)
     merged = MergedScan(source, rig)
     code, white = decode_columns(merged, progress)
-    require_light(white.radiance, white.saturated, SATURATED_ADVICE)
+    require_light(white.radiance, white.saturated, SATURATED_ADVICE, LEAST_SOUND)
     column, row, depth_mm = _maps(rig, code, white)
     fit = fit_plane(rig, depth_mm, np.isfinite(depth_mm))
     # At random, since any regular step would meet the colours of the mosaic unevenly.

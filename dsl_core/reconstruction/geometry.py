@@ -339,11 +339,14 @@ def require_pixels(flags: NDArray[np.uint16]) -> None:
 
 
 def require_light(
-    white: NDArray[np.float32], saturated: NDArray[np.bool_], advice: str = _ADVICE[Flag.SATURATED]
+    white: NDArray[np.float32],
+    saturated: NDArray[np.bool_],
+    advice: str = _ADVICE[Flag.SATURATED],
+    least_share: float = MIN_SHARE,
 ) -> None:
-    """Raise `DecodeError` with advice when nearly all of the white frame (rows, columns) is saturated."""
+    """Raise `DecodeError` with advice when of the white frame (rows, columns) too small a share is sound."""
     share = float(np.mean(saturated | ~np.isfinite(white)))
-    if share > 1 - MIN_SHARE:
+    if share > 1 - least_share:
         raise DecodeError(
             f"The white frame is saturated in {share:.0%} of its pixels at every setting, so nothing can be"
             f" measured. {advice}"

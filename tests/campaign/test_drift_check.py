@@ -4,18 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from dsl_core.calibration.drift.geometry import smooth_part
-from dsl_core.campaign.drift_check import drift_figures, quick_plan
+from dsl_core.campaign.common.white_shot import WhiteLevel
+from dsl_core.campaign.drift_check import drift_figures, drift_settings, measure_drift, quick_plan
 from dsl_core.errors import CalibrationError, DecodeError
 from dsl_core.model.figure import failures
 from dsl_core.model.geometry import Pose
 from dsl_core.model.plan import CapturePlan
 from dsl_core.model.rig import Rig
-from dsl_core.simulation.sim_devices import SimCamera
+from dsl_core.simulation.published_rig import published_rig
+from dsl_core.simulation.sim_devices import SimCamera, open_twin
 from tests.cases.twin_scan import MemoryScan, twin_scan
 
 #: Pixels whose light is compared: enough to see, few enough to be quick.
@@ -87,6 +90,44 @@ def test_saturated_white_gets_advice_for_a_shot_without_settings_to_lower(
     with pytest.raises(DecodeError, match="its own exposures") as found:
         drift_figures(replace(scan, frames=bright), rig, spectralon=False, pixels=FEW)
     assert "plan's settings" not in str(found.value)
+
+
+def test_white_that_is_saturated_nearly_everywhere_is_not_called_a_missing_plane(
+    shot: tuple[Rig, MemoryScan],
+) -> None:
+    rig, scan = shot
+    bright = [np.full_like(frame, rig.sensor.full_scale_dn) for frame in scan.frames]
+    for frame, seen in zip(bright, scan.frames, strict=True):
+        frame[:, :8] = seen[:, :8]
+    with pytest.raises(DecodeError, match="saturated in 95% of its pixels"):
+        drift_figures(replace(scan, frames=tuple(bright)), rig, spectralon=False, pixels=FEW)
+
+
+def test_settings_are_the_usual_ones_unless_white_saturates_in_them() -> None:
+    rig = published_rig()
+    usual, response = quick_plan(rig.frame_period_ms).settings, rig.projector_response
+    range_dn = rig.sensor.full_scale_dn - rig.sensor.black_level_dn
+    light = float(response.radiance(0.2) - response.radiance(0.0))
+    limit = 0.9 * range_dn / (light * usual[0].exposure_ms)
+    assert drift_settings(rig, WhiteLevel(0.99 * limit, np.ones(3), 0.0, False)) == usual
+    short, long = drift_settings(rig, WhiteLevel(4 * limit, np.ones(3), 0.0, False))
+    light = float(response.radiance(short.level) - response.radiance(0.0))
+    assert 0.3 * range_dn < 4 * limit * light * short.exposure_ms <= 0.9 * range_dn
+    assert long.exposure_ms > short.exposure_ms
+    with pytest.raises(CalibrationError, match="overexposed in one colour cycle"):
+        drift_settings(rig, WhiteLevel(limit, np.ones(3), 0.0, True))
+
+
+@pytest.mark.slow
+def test_a_brighter_rig_is_checked_and_brighter_light_is_told(tmp_path: Path) -> None:
+    devices = open_twin({"size": "112x72", "scene": "plane", "brightness": "4"})
+    rig = devices.calibration
+    assert rig is not None
+    assert failures(measure_drift(devices, rig, tmp_path / "one.dsl", spectralon=True)) == ()
+    dimmer = rig.model_copy(update={"white_scale": rig.white_scale / 4})
+    missed = failures(measure_drift(devices, dimmer, tmp_path / "two.dsl", spectralon=True))
+    assert [figure.name.split(",")[0] for figure in missed] == ["white signal"] * 3
+    assert [figure.value for figure in missed] == pytest.approx([4.0] * 3, rel=0.01)
 
 
 @pytest.mark.slow
