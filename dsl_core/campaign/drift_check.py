@@ -19,6 +19,7 @@ from dsl_core.model.placement import Placement
 from dsl_core.model.plan import CapturePlan, GrayCode, ScanLines, Setting
 from dsl_core.model.presets import PUBLISHED_PERIOD_MS, on_cycles
 from dsl_core.model.rig import Rig
+from dsl_core.model.spectral import SpectralCurve
 from dsl_core.progress import Progress
 
 if TYPE_CHECKING:
@@ -34,8 +35,8 @@ PLACEMENT = Placement(target="spectralon", film=True)
 LINE_STEP_PX = 40
 #: Pixels whose light is compared, chosen at random.
 PIXELS = 4000
-#: Certified reflectance of a fresh Spectralon over the visible bands.
-SPECTRALON = 0.99
+#: Certified reflectance of a fresh Spectralon, for rigs that do not know that of their white.
+SPECTRALON = SpectralCurve(wavelengths_nm=(400.0, 700.0), values=(0.99, 0.99))
 #: Share of the pixels that white must not saturate: of fewer the plane and its light are not known.
 LEAST_SOUND = 0.5
 #: The user cannot lower the exposures of the quick shot.
@@ -83,8 +84,9 @@ def measure_drift(
 ) -> tuple[Figure, ...]:
     """Take the quick shot into a session folder and compare it with the calibration.
 
-    The light is judged only when the target is the Spectralon. Raises `CalibrationError` when the target does
-    not fill the picture or is far too bright, and what a scan raises.
+    The light is judged only when the target is the ``spectralon``: the white that it was calibrated with.
+    Raises `CalibrationError` when the target does not fill the picture or is far too bright, and what a scan
+    raises.
     """
     from dsl_core.io.scan.folder import ScanReader
 
@@ -124,12 +126,13 @@ def drift_figures(
     figures = geometry_drift(rig, column, row, depth_mm, fit)
     stack, profiles = stack_lines(merged, progress), spectral_profiles(plan)[:, :, 0].astype(float)
     lines = _signals(rig, fit, chosen, profiles, stack.radiance, stack.std)
-    figures += film_drift(rig, lines, SPECTRALON)
+    white_reflectance = (rig.white_reflectance if spectralon else None) or SPECTRALON
+    figures += film_drift(rig, lines, white_reflectance)
     if spectralon:
         std = np.where(white.saturated, np.inf, np.sqrt(white.variance))
         full = np.ones((1, profiles.shape[1]))
         seen = _signals(rig, fit, chosen, full, white.radiance[None], std[None])
-        figures += light_drift(rig, seen, SPECTRALON)
+        figures += light_drift(rig, seen, white_reflectance)
     return tuple(figures)
 
 

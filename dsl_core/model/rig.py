@@ -269,7 +269,8 @@ class Rig(Record):
     ``fitted_lean_px`` is the lean of the lines whose columns they are fitted to, None if these are of a code.
     ``white_scale_rel_std`` and, for each wavelength, ``chain_rel_std`` are relative standard deviations that
     the calibration leaves in every reflectance; ``reference_rel_std`` is that of the white which all of them
-    refer to, and which no picture shows.
+    refer to, and which no picture shows. ``white_reflectance`` is what was stated of that white, None where
+    nobody noted it.
     ``filter_index`` is the effective index of the bandpass filters with its deviation, None where they shift
     nothing.
     """
@@ -288,6 +289,7 @@ class Rig(Record):
     white_scale: float = Field(gt=0)
     white_scale_rel_std: float = Field(default=0.0, ge=0)
     reference_rel_std: float = Field(default=0.0, ge=0)
+    white_reflectance: SpectralCurve | None = None
     chain_rel_std: SpectralCurve | None = None
     reference_distance_mm: float = Field(default=700.0, gt=0)
     frame_period_ms: float = Field(default=1000.0 / 60.0, gt=0)

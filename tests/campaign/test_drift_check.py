@@ -17,6 +17,7 @@ from dsl_core.model.figure import failures
 from dsl_core.model.geometry import Pose
 from dsl_core.model.plan import CapturePlan
 from dsl_core.model.rig import Rig
+from dsl_core.model.spectral import SpectralCurve
 from dsl_core.simulation.published_rig import published_rig
 from dsl_core.simulation.sim_devices import SimCamera, open_twin
 from tests.cases.twin_scan import MemoryScan, twin_scan
@@ -144,6 +145,21 @@ def test_the_light_is_compared_with_a_spectralon(shot: tuple[Rig, MemoryScan]) -
         figure for figure in drift_figures(scan, brighter, spectralon=True, pixels=FEW) if not figure.passed
     ]
     assert [figure.name.split(",")[0] for figure in missed] == ["white signal"] * 3
+
+
+@pytest.mark.slow
+def test_the_light_is_compared_with_the_white_it_was_calibrated_with() -> None:
+    devices, scan = twin_scan(quick_plan(), size="112x72", scene="plane", reflectance="0.5")
+    rig = devices.calibration
+    assert rig is not None
+    grey = rig.model_copy(update={"white_reflectance": SpectralCurve.of([400.0, 700.0], [0.5, 0.5])})
+    assert failures(drift_figures(scan, grey, spectralon=True, pixels=FEW)) == ()
+    missed = failures(drift_figures(scan, rig, spectralon=True, pixels=FEW))
+    assert [figure.value for figure in missed] == pytest.approx([0.5 / 0.99] * 3, rel=0.01)
+    # Another white than that of the calibration.
+    wrong = rig.model_copy(update={"white_reflectance": SpectralCurve.of([400.0, 700.0], [0.95, 0.95])})
+    missed = failures(drift_figures(scan, wrong, spectralon=True, pixels=FEW))
+    assert [figure.value for figure in missed] == pytest.approx([0.5 / 0.95] * 3, rel=0.01)
 
 
 @pytest.mark.parametrize(

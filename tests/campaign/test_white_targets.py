@@ -242,6 +242,8 @@ def test_a_lamp_that_comes_on_between_the_pictures_is_told(after: int, tmp_path:
 def test_what_is_not_known_of_the_spectralon_is_part_of_every_reflectance(module_folder: Path) -> None:
     start, rig, _ = spectralon(1, module_folder / "spectralon-1")
     assert rig.reference_rel_std == SpectralonRecipe().reflectance_rel_std
+    assert rig.white_reflectance is not None
+    assert set(rig.white_reflectance.values) == {SpectralonRecipe().reflectance}
     with pytest.raises(CalibrationError, match="cannot be 2; give a share such as"):
         SpectralonRecipe(reflectance_rel_std=2.0).fit(
             Bench(twin(1), module_folder / "spectralon-1", start), NONE

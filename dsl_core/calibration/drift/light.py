@@ -17,7 +17,7 @@ from dsl_core.errors import CalibrationError
 from dsl_core.model.conditions import colours_named
 from dsl_core.model.figure import Figure
 from dsl_core.model.rig import Rig
-from dsl_core.model.spectral import WavelengthGrid
+from dsl_core.model.spectral import SpectralCurve, WavelengthGrid
 from dsl_core.optics.correspondence import correspondence
 from dsl_core.optics.pixel_model import PixelModel
 from dsl_core.optics.spectra import ORDERS, SECOND_ORDERS, Bands
@@ -64,7 +64,7 @@ class PlaneSignals:
     std: Floats
 
 
-def light_drift(rig: Rig, white: PlaneSignals, reflectance: float) -> list[Figure]:
+def light_drift(rig: Rig, white: PlaneSignals, reflectance: SpectralCurve) -> list[Figure]:
     """Measured over predicted white signal of each colour that is seen, for a target of known reflectance."""
     expected = _Plane(rig, white, reflectance).signals()[0]
     usable = np.isfinite(white.std[0]) & (expected > 0.2 * np.median(expected))
@@ -88,17 +88,18 @@ def light_drift(rig: Rig, white: PlaneSignals, reflectance: float) -> list[Figur
                 unit="1",
                 low=1 - LIGHT_LIMIT,
                 high=1 + LIGHT_LIMIT,
-                advice="Light or exposure has changed, or the target is not the Spectralon: let the projector"
-                " warm up and clean the target; otherwise repeat the spectralon calibration.",
+                advice="Light or exposure has changed, or the target is not the white that it was calibrated"
+                " with: let the projector warm up and clean the target; otherwise repeat the spectralon"
+                " calibration.",
             )
         )
     return figures
 
 
-def film_drift(rig: Rig, lines: PlaneSignals, reflectance: float) -> list[Figure]:
+def film_drift(rig: Rig, lines: PlaneSignals, reflectance: SpectralCurve) -> list[Figure]:
     """Displacement of each first order (px) and its brightness over the zero order, against the calibration.
 
-    ``reflectance`` is only a scale: the brightness is divided by that of the zero order.
+    The level of ``reflectance`` does not count: the brightness is divided by that of the zero order.
     """
     plane = _Plane(rig, lines, reflectance)
     zero = plane.signals((0,))
@@ -181,7 +182,7 @@ def _shift(data: Floats, model: Floats, slope: Floats, std: Floats) -> tuple[flo
 class _Plane:
     """What the calibration expects of a plane of known reflectance under the patterns shown."""
 
-    def __init__(self, rig: Rig, signals: PlaneSignals, reflectance: float) -> None:
+    def __init__(self, rig: Rig, signals: PlaneSignals, reflectance: SpectralCurve) -> None:
         profiles = np.repeat(signals.profiles[:, :, None], 3, axis=2)
         self.model = PixelModel(rig, Bands.of(rig, GRID), profiles, correspondence(rig))
         place = torch.as_tensor(signals.pixels), torch.as_tensor(signals.depth_mm)
@@ -195,6 +196,7 @@ class _Plane:
         """
         shading = torch.as_tensor(self.shading)
         operator = self.model.operator(self.traced.displaced(shift_px), shading, orders=orders)
-        target = torch.full((self.model.bands.count, len(shading)), self.reflectance).to(shading)
+        bands = torch.as_tensor(self.reflectance.at(self.model.bands.centres_nm)).to(shading)
+        target = bands[:, None].expand(-1, len(shading))
         every_colour = operator.forward(target).numpy()
         return np.asarray(every_colour[self.colours, :, np.arange(len(shading))].T)

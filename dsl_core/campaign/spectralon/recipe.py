@@ -114,6 +114,7 @@ class SpectralonRecipe(Recipe[SpectralonCalibration]):
                 "emission": record.emission.curves,
                 "flat_field": record.flat_field,
                 "reference_rel_std": record.reflectance_rel_std,
+                "white_reflectance": record.reflectance,
             }
         )
         return match_whites(known, record.white, record.reflectance)

@@ -14,6 +14,7 @@ from dsl_core.calibration.drift import light
 from dsl_core.calibration.drift.light import PlaneSignals, _film_figures, _shift, film_drift, light_drift
 from dsl_core.errors import CalibrationError
 from dsl_core.model.figure import Figure
+from dsl_core.model.spectral import SpectralCurve
 from dsl_core.optics.correspondence import GratingModel, zero_order
 from dsl_core.optics.sensor import bayer_channels
 from dsl_core.optics.shading import Plane, plane_shading
@@ -21,6 +22,7 @@ from dsl_core.optics.spectra import chain_response
 from dsl_core.simulation.published_rig import published_rig
 
 REFLECTANCE, NOISE = 0.99, 2e-3
+WHITE = SpectralCurve.of([400.0, 700.0], [REFLECTANCE] * 2)
 NM = np.arange(400.0, 701.0)
 RIG = published_rig()
 RIG = RIG.model_copy(
@@ -92,7 +94,7 @@ def by_name(figures: list[Figure]) -> dict[str, Figure]:
 
 @pytest.mark.slow
 def test_a_film_as_it_was_has_not_moved() -> None:
-    figures = film_drift(RIG, signals(), REFLECTANCE)
+    figures = film_drift(RIG, signals(), WHITE)
     assert all(figure.passed for figure in figures)
     for order in ("+1", "-1"):
         found = by_name(figures)
@@ -102,7 +104,7 @@ def test_a_film_as_it_was_has_not_moved() -> None:
 
 @pytest.mark.slow
 def test_a_displaced_order_and_a_dim_one_are_each_told() -> None:
-    found = by_name(film_drift(RIG, signals({-1: 0.9}, {1: 0.5}), REFLECTANCE))
+    found = by_name(film_drift(RIG, signals({-1: 0.9}, {1: 0.5}), WHITE))
     assert found["displacement of order +1"].value == pytest.approx(0.5, abs=0.06)
     assert found["displacement of order -1"].value == pytest.approx(0.0, abs=0.05)
     assert found["brightness of order +1"].value == pytest.approx(1.0, abs=0.02)
@@ -116,7 +118,7 @@ def test_a_displaced_order_and_a_dim_one_are_each_told() -> None:
 @pytest.mark.slow
 def test_brightness_of_all_orders_alike_is_not_the_films() -> None:
     dim = {0: 0.8, 1: 0.8, -1: 0.8}
-    found = by_name(film_drift(RIG, signals(dim), REFLECTANCE))
+    found = by_name(film_drift(RIG, signals(dim), WHITE))
     assert found["brightness of order +1"].value == pytest.approx(1.0, abs=0.01)
 
 
@@ -124,7 +126,7 @@ def test_wrong_pixels_do_no_harm_and_widen_no_shift() -> None:
     seen = signals()
     dust = np.random.default_rng(1).random(seen.pixels.size) < 0.05
     radiance = np.where(dust, 1.5 * seen.radiance, seen.radiance)
-    found = by_name(film_drift(RIG, replace(seen, radiance=radiance), REFLECTANCE))
+    found = by_name(film_drift(RIG, replace(seen, radiance=radiance), WHITE))
     assert found["displacement of order +1"].value == pytest.approx(0.0, abs=0.08)
     assert found["brightness of order +1"].value == pytest.approx(1.0, abs=0.02)
 
@@ -133,7 +135,7 @@ def test_wrong_pixels_do_no_harm_and_widen_no_shift() -> None:
 def test_white_is_compared_colour_by_colour(level: float) -> None:
     seen = signals(white=True)
     dim = np.where(seen.colours == 2, level, 1.0)
-    figures = light_drift(RIG, replace(seen, radiance=seen.radiance * dim), REFLECTANCE)
+    figures = light_drift(RIG, replace(seen, radiance=seen.radiance * dim), WHITE)
     red, green, blue = (figure.value for figure in figures)
     assert (red, green) == pytest.approx((1.0, 1.0), abs=0.01)
     assert blue == pytest.approx(level, abs=0.01)
@@ -146,11 +148,11 @@ def test_saturated_pixels_do_not_count_and_too_few_are_told() -> None:
     spoilt = replace(
         seen, radiance=np.where(half, 3.0, 1.0) * seen.radiance, std=np.where(half, np.inf, seen.std)
     )
-    assert all(figure.passed for figure in light_drift(RIG, spoilt, REFLECTANCE))
+    assert all(figure.passed for figure in light_drift(RIG, spoilt, WHITE))
     with pytest.raises(CalibrationError, match="Only 0 red pixels"):
-        light_drift(RIG, replace(seen, std=np.full(seen.std.shape, np.inf)), REFLECTANCE)
+        light_drift(RIG, replace(seen, std=np.full(seen.std.shape, np.inf)), WHITE)
     with pytest.raises(CalibrationError, match="light only 0 of the chosen pixels directly"):
-        film_drift(RIG, replace(signals(), std=np.full((16, 3000), np.inf)), REFLECTANCE)
+        film_drift(RIG, replace(signals(), std=np.full((16, 3000), np.inf)), WHITE)
 
 
 def shifted(shift_px: float, gain: float, noise: float, seed: int) -> tuple[np.ndarray, ...]:
@@ -230,7 +232,7 @@ def test_the_deviation_of_white_is_that_of_a_median_beside_that_of_the_scale(
     monkeypatch.setattr(light, "_Plane", lambda *_: Expected(expected, expected, expected))
     ratio = np.tile(np.repeat([0.9, 1.0, 1.1, 1.3], 3), 50)
     rig = RIG.model_copy(update={"white_scale_rel_std": 0.003})
-    for figure in light_drift(rig, even_signals(ratio * expected), 0.99):
+    for figure in light_drift(rig, even_signals(ratio * expected), WHITE):
         assert figure.value == pytest.approx(1.05)
         # Half of the deviations from the median are within 0.05, the others 0.15 and 0.25.
         spread = 1.4826022185 * (0.05 + 0.15) / 2
@@ -245,10 +247,10 @@ def test_fifty_pixels_of_a_colour_are_needed(
     expected = np.ones((1, count))
     monkeypatch.setattr(light, "_Plane", lambda *_: Expected(expected, expected, expected))
     if enough:
-        assert len(light_drift(RIG, even_signals(expected), 0.99)) == 3
+        assert len(light_drift(RIG, even_signals(expected), WHITE)) == 3
     else:
         with pytest.raises(CalibrationError, match="Only 49 red pixels"):
-            light_drift(RIG, even_signals(expected), 0.99)
+            light_drift(RIG, even_signals(expected), WHITE)
 
 
 def test_first_orders_are_judged_where_they_are_nearly_all_there_is(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -267,7 +269,7 @@ def test_first_orders_are_judged_where_they_are_nearly_all_there_is(monkeypatch:
 
     monkeypatch.setattr(light, "_shift", noted)
     lines = even_signals(8.0 + np.arange(count)[None] * 1e-3)
-    film_drift(RIG, lines, 0.99)
+    film_drift(RIG, lines, WHITE)
     scale = float(np.median(lines.radiance / zero))
     chosen = np.r_[50:500, 550:600]
     for data, model, slope, std in asked:
