@@ -49,7 +49,12 @@ class CapturesController:
     # Folder ----------------------------------------------------------------------------------------
 
     def open(self, folder: Path) -> None:
-        """Guess what the pictures of a folder are; the request keeps calibration and where to save."""
+        """Guess what the pictures of a folder are; the request keeps calibration and where to save.
+
+        As all that follows from the request, it waits for the end of an import, which it would stop.
+        """
+        if self.state.is_importing.value:
+            return
         request = self.state.request.value
         target = first_free(request.target.parent, folder.name, SUFFIX)
         self.state.request.set(replace(request, folder=folder, target=target, chosen="", projector_px=(0, 0)))
@@ -59,7 +64,7 @@ class CapturesController:
     def guess(self) -> None:
         """Guess, with the size of the projector and the set that were chosen."""
         request = self.state.request.value
-        if request.folder is None:
+        if request.folder is None or self.state.is_importing.value:
             return
         self._forget(Listing())
         self.state.stated.set(None)
@@ -188,6 +193,8 @@ class CapturesController:
         self._request(target=expanded(home) / f"{plain}{SUFFIX}")
 
     def _request(self, **what: Any) -> None:
+        if self.state.is_importing.value:
+            return
         self._say(Place.TARGET, "")
         self.state.request.set(replace(self.state.request.value, **what))
 
@@ -196,7 +203,7 @@ class CapturesController:
     def _check(self, only_files: bool = False) -> None:
         """List the files by the mapping, then decode them; what was decoded stays if the mapping did."""
         request, stated = self.state.request.value, self.state.stated.value
-        if request.folder is None or stated is None:
+        if request.folder is None or stated is None or self.state.is_importing.value:
             return
         folder, mapping = request.folder, stated.mapping
         if not only_files:

@@ -162,6 +162,7 @@ class CapturesView:
     target: Said
     columns: Said
     values: Said
+    can_set: bool
     can_guess: bool
     can_change: bool
     can_import: bool
@@ -197,6 +198,7 @@ def captures_view(state: CapturesState) -> CapturesView:
         target=said(Place.TARGET, Said(f"Creates {request.target.name}{_also(request)}.")),
         columns=_about_columns(state.decoded.value),
         values=_about_values(state.decoded.value),
+        can_set=not importing,
         can_guess=request.folder is not None and not importing,
         can_change=stated is not None and not importing,
         can_import=stated is not None and not troubles and not busy,

@@ -208,3 +208,31 @@ def test_a_place_that_cannot_be_is_said_beside_it(
     assert not captures_view(control.state).can_import
     control.rename("first", tmp_path)
     assert Place.TARGET not in troubles(control)
+
+
+def test_nothing_stops_an_import_but_its_dialog(folder: Path, tmp_path: Path) -> None:
+    runner, ended = ManualRunner(), list[Imported]()
+    control = control_of(tmp_path, runner)
+    control.state.done.connect(ended.append)
+    control.open(folder)
+    runner.run_all()
+    control.start()
+    for step in (
+        lambda: control.open(tmp_path),
+        control.guess,
+        lambda: control.choose_calibration(NOMINAL),
+        lambda: control.set_unit(1000.0),
+        lambda: control.set_direction(True),
+        lambda: control.set_curves("camera", None),
+        lambda: control.set_projector((32, 24)),
+        lambda: control.choose_set("left"),
+        lambda: control.rename("other", tmp_path),
+    ):
+        step()
+    assert len(runner.waiting) == 1
+    assert control.state.busy.value == "Importing"
+    assert control.state.request.value.calibration == NONE
+    runner.run_all()
+    (made,) = ended
+    assert made.scan == tmp_path / "scans" / "set.dsl"
+    assert not ScanReader(made.scan).missing()

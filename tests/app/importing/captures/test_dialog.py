@@ -6,14 +6,25 @@ from pathlib import Path
 
 import pytest
 from dsl_app.composition.window import Composition, StartOptions
+from dsl_app.importing.captures.controller import CapturesController
 from dsl_app.importing.captures.dialog import CapturesDialog
-from dsl_app.importing.captures.state import NOMINAL
+from dsl_app.importing.captures.state import NOMINAL, CapturesState
 from dsl_app.importing.dialog import ImportDialog
 from dsl_app.shared.widgets.open_dialog import OpenDialog
 from dsl_app.shell.main_window import MainWindow
 from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QApplication, QFileDialog, QPlainTextEdit, QSpinBox
+from PySide6.QtWidgets import (
+    QAbstractButton,
+    QAbstractSpinBox,
+    QApplication,
+    QComboBox,
+    QFileDialog,
+    QLineEdit,
+    QPlainTextEdit,
+    QSpinBox,
+    QWidget,
+)
 from pytestqt.qtbot import QtBot
 
 from dsl_core.io.scan.folder import ScanReader
@@ -21,6 +32,7 @@ from dsl_core.workflows.captures import load_mapping
 from tests.app.composition.test_drops import drop
 from tests.app.composition.test_names import complaints
 from tests.app.importing.captures.small_capture import make_capture
+from tests.app.support.doubles import InlineRunner
 from tests.app.support.real_window import show_window
 
 PATIENCE_MS = 60_000
@@ -150,3 +162,23 @@ def test_import_opens_the_dialog_that_fits_the_folder(
     assert dialog._state.request.value.folder == folder.parent
     assert not is_open()
     dialog.reject()
+
+
+def test_all_that_would_change_an_import_rests_while_it_runs(
+    qtbot: QtBot, folder: Path, tmp_path: Path
+) -> None:
+    state, host = CapturesState(tmp_path / "scans"), QWidget()
+    qtbot.addWidget(host)
+    dialog = CapturesDialog(state, CapturesController(state, InlineRunner()), host)
+    dialog.open_folder(folder)
+    kinds = (QAbstractButton, QComboBox, QLineEdit, QAbstractSpinBox)
+    parts = [each for kind in kinds for each in dialog.findChildren(kind)]
+    assert {dialog.go, dialog.calibration, dialog.home, dialog.curves} <= {*parts}
+    state.is_importing.set(True)
+    # What is left closes the dialog, shows the command, or selects what the table shows.
+    others = (dialog.buttons, dialog.files)
+    kept = [each for each in parts if each.isEnabled() and each.parent() not in others]
+    assert kept == []
+    state.is_importing.set(False)
+    assert dialog.calibration.isEnabled()
+    assert dialog.home.isEnabled()
