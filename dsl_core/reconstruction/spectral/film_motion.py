@@ -24,7 +24,7 @@ from dsl_core.model.rig import Rig
 from dsl_core.optics.correspondence import GratingModel
 from dsl_core.optics.pixel_model import PixelModel
 from dsl_core.optics.spectra import ORDERS
-from dsl_core.reconstruction.spectral.causes import beside_curves
+from dsl_core.reconstruction.spectral.causes import MOST_EXCESS, beside_curves
 from dsl_core.reconstruction.spectral.probing.held_out import Hypothesis, explains_others
 from dsl_core.reconstruction.spectral.probing.probe import LEADING, Probe
 from dsl_core.reconstruction.spectral.probing.probe import PRIOR_STD as PARAMETER_STD
@@ -36,6 +36,9 @@ Floats = NDArray[np.float64]
 FIELDS = ("tilt_x_deg", "tilt_y_deg", "roll_deg", "bend_per_mm", "distance_mm")
 PRIOR_STD = np.array([0.3, 0.3, 0.3, 0.0005, 0.3])
 STEPS = np.array([1e-2, 1e-2, 1e-2, 1e-5, 1e-2])
+#: From how many deviations on a motion is doubtful that does not explain pixels which its fit has not seen:
+#: of few frames these tell too little. Frames must otherwise fit.
+DOUBTFUL = 4.0
 #: By how much lines that are not symmetric may displace both orders alike, px.
 LOPSIDED_PX = 0.03
 #: Less displacement of the orders than this (px, root mean square) is no motion that matters, at bands of
@@ -111,18 +114,24 @@ def fit_motion(scan: ProbedScan, probe: Probe) -> FilmMotion | None:
 def _motion_of(
     effect: Floats, probe: Probe, kept: list[int], found: Floats, covariance: Floats, moves: Hypothesis
 ) -> FilmMotion | None:
-    """The motion of the ``kept`` fields, found to be (k,); None where it is too small, or could be chance."""
+    """The motion of the ``kept`` fields, found to be (k,); None where it is too small, or could be chance.
+
+    What is hardly chance and explains no other pixels is not sure.
+    """
     shift = effect[probe.sound][:, _SHIFT][..., kept]
     squares = (shift @ found) ** 2, np.einsum("nok,kl,nol->no", shift, covariance, shift)
     shift_px, shift_std_px = (float(np.sqrt(np.mean(square))) for square in squares)
     if shift_px < LEAST_MOTION_PX * coarseness(probe.step_nm):
         return None
-    # Without the film, gains and profile explain a part already.
-    if not explains_others(moves, len(kept)):
-        return None
     values, std = np.zeros((2, len(FIELDS)))
     values[kept], std[kept] = found, np.sqrt(np.diag(covariance))
-    return FilmMotion(values, std, shift_px, shift_std_px)
+    # Without the film, gains and profile explain a part already.
+    if explains_others(moves, len(kept)):
+        return FilmMotion(values, std, shift_px, shift_std_px)
+    fits = probe.usual_chi_square < 1 + MOST_EXCESS and coarseness(probe.step_nm) <= 1
+    if fits and (np.abs(values) > DOUBTFUL * std).any():
+        return FilmMotion(values, std, shift_px, shift_std_px, sure=False)
+    return None
 
 
 def coarseness(step_nm: float) -> float:

@@ -71,7 +71,7 @@ def follow(scan: ProbedScan, as_calibrated: bool = False, rows_px: float | None 
             break
         there = moved(model, more)
         after = probe(replace(scan, model=there))
-        if after is None or not fits_better(found, after):
+        if after is None or not more.sure or not fits_better(found, after):
             # Spectra that curve along wide bands displace the orders as well.
             if motion is None and coarseness(found.step_nm) <= 1:
                 motion, doubt = replace(more, sure=False), (there, after)
