@@ -2,24 +2,24 @@
 
 from __future__ import annotations
 
-import logging
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from dsl_app.calibrate.state import CalibrateState
     from dsl_app.scan.controller import ScanController
+    from dsl_app.shared.notify import Notifier
     from dsl_app.shared.settings import Settings
-
-_log = logging.getLogger(__name__)
 
 
 class CalibrationInUse:
     """Serves whichever of the two pages have been opened."""
 
-    def __init__(self, settings: Settings, save: Callable[[], object] = lambda: None) -> None:
+    def __init__(
+        self, settings: Settings, notifier: Notifier, save: Callable[[], object] = lambda: None
+    ) -> None:
         """``save`` writes the settings: the choice must outlive a computer that loses its power."""
-        self._settings, self._save = settings, save
+        self._settings, self._notifier, self._save = settings, notifier, save
         self._library: CalibrateState | None = None
         self._scans: ScanController | None = None
 
@@ -35,21 +35,24 @@ class CalibrationInUse:
         if self._settings.calibration:
             self._choose(scans, self._settings.calibration)
         scans.state.calibration.changed.connect(lambda choice: self._chosen(choice.key))
+        # What was chosen on the other page is not in use either.
+        scans.state.refused.connect(lambda _: self._chosen(scans.state.calibration.value.key))
 
     def _use(self, key: str) -> None:
         self._remember(key)
         if self._scans is not None and key:
             self._choose(self._scans, key)
 
-    @staticmethod
-    def _choose(scans: ScanController, key: str) -> None:
+    def _choose(self, scans: ScanController, key: str) -> None:
         from dsl_app.scan.state import CalibrationChoice
         from dsl_core.io.calibration_library import CalibrationLibrary
 
         if key.partition("@")[0] in CalibrationLibrary().names():
             scans.plans.choose_calibration(CalibrationChoice(key, key))
-        else:
-            _log.warning("The library no longer has a calibration %r; scans use the rig's own.", key)
+        elif key != scans.state.calibration.value.key:
+            used = scans.state.calibration.value.in_use
+            self._notifier.tell("warning", f"The library no longer has the calibration {key!r}. {used}")
+            self._chosen(scans.state.calibration.value.key)
 
     def _chosen(self, key: str) -> None:
         """Remember what was chosen on the Scan page."""

@@ -224,7 +224,7 @@ class Composition(QObject):
     @cached_property
     def calibration_in_use(self) -> CalibrationInUse:
         """The calibration that scans use."""
-        return CalibrationInUse(self.window.parts.settings, self.window.save_early)
+        return CalibrationInUse(self.window.parts.settings, self.window.toasts, self.window.save_early)
 
     @cached_property
     def reconstruct_again(self) -> ReconstructAgainAction:

@@ -18,7 +18,7 @@ from dsl_app.scan.state import (
 )
 from dsl_app.shared.jobs.base import Job, JobRunner
 from dsl_app.shared.known_files import Kind, kind_of
-from dsl_app.shared.notify import NO_RIG, Notifier
+from dsl_app.shared.notify import NO_RIG, Notifier, sentence_of
 from dsl_app.shared.paths import place_trouble, there
 from dsl_app.shared.undo import Change, UndoStack
 from dsl_core.devices.base import DeviceRig
@@ -253,9 +253,15 @@ class ScanPlanController:
             self.state.calibration.set(choice)
             self.refresh()
 
+        def failed(error: Exception) -> None:
+            used = self.state.calibration.value.in_use
+            self._notifier.tell("error", f"{sentence_of(error)} {used}")
+            if turn == self._turn:
+                self.state.refused.emit(choice)
+
         work = lambda progress: self._library.find(choice.key).rig  # noqa: E731
         title = f"Open the calibration {choice.key}"
-        self._runner.submit(Job(title, work, done, is_minor=True))
+        self._runner.submit(Job(title, work, done, failed, is_minor=True))
 
     def _choose_later(self, choice: CalibrationChoice) -> None:
         is_news = choice != self._next and choice.key != self.state.calibration.value.key

@@ -54,6 +54,7 @@ class CalibrationBox(QGroupBox):
         self.stops = [
             state.calibrations.follow(self._list),
             state.calibration.follow(self._mark),
+            state.refused.connect(lambda _: self._mark(state.calibration.value)),
             state.override.follow(self.override.setChecked),
             state.facts.follow(self._show_facts),
         ]

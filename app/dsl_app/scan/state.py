@@ -71,6 +71,11 @@ class CalibrationChoice:
         where = self.name if self.key or self == OWN_CALIBRATION else f"{self.name} (the rig's own)"
         return f"{where}, {self.date[:10]}" if self.date else where
 
+    @property
+    def in_use(self) -> str:
+        """A sentence that scans use it."""
+        return f"Scans use {self.name if self.key else 'the calibration of the rig itself, if it has one'}."
+
 
 OWN_CALIBRATION = CalibrationChoice("", "none")
 
@@ -144,6 +149,7 @@ class ScanState:
     result; ``lacks_calibration`` says of the one completed last that it contains no calibration to be
     reconstructed with; ``is_reconstructing`` says that one is being made, and ``depth`` is that of it, mm,
     while its spectra are computed; ``reconstruction_s`` is how long one of the plan is expected to take.
+    ``refused`` fires with a calibration that was chosen and cannot be read; the one before stays in use.
     ``is_seen`` says that the page is on screen, where everything is said; ``wanted`` asks for it.
     """
 
@@ -153,6 +159,7 @@ class ScanState:
         self.target = Value(target)
         self.calibrations: Value[tuple[CalibrationChoice, ...]] = Value((OWN_CALIBRATION,))
         self.calibration = Value(OWN_CALIBRATION)
+        self.refused: Event[CalibrationChoice] = Event()
         self.override = Value(False)
         self.check_drift = Value(True)
         self.meters = Value(True)

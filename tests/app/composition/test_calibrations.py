@@ -138,10 +138,34 @@ def test_a_scan_with_other_settings_is_refused_unless_overridden(qtbot: QtBot, w
     assert scan.run.start.isEnabled()
 
 
-def test_a_calibration_that_is_gone_is_forgotten(qtbot: QtBot, window: MainWindow) -> None:
+def test_a_calibration_that_is_gone_is_forgotten_and_told_once(qtbot: QtBot, window: MainWindow) -> None:
     window.parts.settings.calibration = "gone"
     scan = window.open_page("scan")
     assert isinstance(scan, ScanPage)
     idle(qtbot, window)
+    window.open_page("calibrate")
+    idle(qtbot, window)
     assert scan._state.calibration.value.key == ""
-    assert window.toasts.shown == ()
+    assert window.parts.settings.calibration == ""
+    (toast,) = window.toasts.shown
+    assert "no longer has the calibration 'gone'. Scans use the calibration of the rig itself" in toast.text
+
+
+def test_a_calibration_that_cannot_be_read_is_in_use_nowhere(qtbot: QtBot, window: MainWindow) -> None:
+    library = CalibrationLibrary()
+    for name in ("room 12", "torn"):
+        library.store(name, published_rig())
+    scan, calibrate = window.open_page("scan"), window.open_page("calibrate")
+    assert isinstance(scan, ScanPage)
+    assert isinstance(calibrate, CalibratePage)
+    calibrate._state.in_use.set("room 12")
+    qtbot.waitUntil(lambda: scan._state.calibration.value.key == "room 12", timeout=60_000)
+    idle(qtbot, window)
+    for file in (library.home / "torn").rglob("*.json"):
+        file.write_text("{ torn")
+    calibrate._state.in_use.set("torn")
+    qtbot.waitUntil(lambda: calibrate._state.in_use.value == "room 12", timeout=60_000)
+    idle(qtbot, window)
+    assert scan._state.calibration.value.key == "room 12"
+    assert window.parts.settings.calibration == "room 12"
+    assert window.toasts.shown[-1].text.endswith("Scans use room 12.")

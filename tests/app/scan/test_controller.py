@@ -560,6 +560,18 @@ def test_a_calibration_that_is_read_when_a_scan_starts_waits_for_its_end(
     assert bench.state.calibration.value.key == "bench"
 
 
+def test_a_calibration_that_cannot_be_read_leaves_the_one_in_use(bench: ScanBench) -> None:
+    before, refused = bench.state.calibration.value, list[CalibrationChoice]()
+    bench.state.refused.connect(refused.append)
+    bench.scans.plans.choose_calibration(CalibrationChoice("gone", "gone"))
+    assert [choice.key for choice in refused] == ["gone"]
+    assert bench.state.calibration.value is before
+    level, text = bench.notifier.told[-1]
+    assert level == "error"
+    assert "no calibration 'gone'" in text
+    assert text.endswith("Scans use the calibration of the rig itself, if it has one.")
+
+
 def test_of_two_calibrations_that_are_read_at_once_the_one_chosen_last_counts(
     bench: ScanBench, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import shutil
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import replace
@@ -257,6 +258,21 @@ def test_an_override_is_shown_as_it_is(ready: Bench) -> None:
     assert page.calibration.override.isVisible()
     page.calibration.override.click()
     assert not bench.state.override.value
+
+
+def test_a_calibration_that_cannot_be_read_is_not_shown_as_if_in_use(qtbot: QtBot, ready: Bench) -> None:
+    page, bench, _ = ready
+    bench.library.store("torn", bench.calibration)
+    bench.scans.plans.load_library()
+    qtbot.waitUntil(lambda: page.calibration.choice.findData("torn") > 0, timeout=60_000)
+    shutil.rmtree(bench.library.home / "torn")
+    page.calibration.choice.setFocus()
+    QTest.keyClick(page.calibration.choice, Qt.Key.Key_Down)
+    assert page.calibration.choice.currentData() == "torn"
+    qtbot.waitUntil(lambda: bool(bench.notifier.told), timeout=60_000)
+    assert bench.state.calibration.value.key == ""
+    assert page.calibration.choice.currentData() == ""
+    assert "no calibration 'torn'" in bench.notifier.told[-1][1]
 
 
 def test_no_reconstruction_is_promised_without_calibration(ready: Bench) -> None:
