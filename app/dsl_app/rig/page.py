@@ -256,9 +256,11 @@ class RigPage(PageWidget):
         return RigChoice(str(self._rig.currentData()), self.options.options)
 
     def _change_options(self) -> None:
-        """Put another scene in front of a connected camera at once."""
+        """Put another scene in front of a connected camera at once, unless a job needs it as it is."""
         if self._state.link.value is Link.OPEN and not self._state.used_by.value:
             self._connect_form()
+        # The button says what a click on it does for what the form shows now.
+        self._show()
 
     def _toggle_live(self) -> None:
         if self._state.live.value:

@@ -285,3 +285,24 @@ def test_a_scan_has_the_projector_for_itself(qtbot: QtBot, bench: Bench) -> None
     assert all(widget.isEnabled() for widget in controls)
     assert "640 × 360" in panel._note.text()
     assert not notifier.told
+
+
+def test_a_scene_chosen_during_a_scan_is_not_shown_as_if_it_were_connected(
+    qtbot: QtBot, bench: Bench
+) -> None:
+    page, state, _, _ = bench
+    connect(qtbot, page, state)
+    connected = state.choice.value
+    state.used_by.set("Scan first")
+    scene = page.options.scene
+    for name, button in (("face", "Connect"), ("plane", "Disconnect"), ("face", "Connect")):
+        scene.fill()
+        scene.choose(name)
+        scene.activated.emit(scene.currentIndex())
+        assert state.choice.value == connected
+        assert page.connect_button.text() == button
+    state.used_by.set("")
+    assert page.connect_button.text() == "Connect"
+    click(page.connect_button)
+    qtbot.waitUntil(lambda: dict(state.choice.value.options)["scene"] == "face", timeout=90_000)
+    qtbot.waitUntil(lambda: page.connect_button.text() == "Disconnect", timeout=90_000)
