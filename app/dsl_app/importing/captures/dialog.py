@@ -236,8 +236,8 @@ class CapturesDialog(JobDialog):
         self.curves.setVisible(view.asks_unit)
         self.guess.setEnabled(view.can_guess)
         of_calibration = self.calibration, self.rig_file, self.unit_mm, self.from_projector, self.curves
-        for control in (self.choose, self.set, *of_calibration, self.name, self.home, self.browse):
-            control.setEnabled(view.can_set)
+        for field in (self.choose, self.set, *of_calibration, self.name, self.home, self.browse):
+            field.setEnabled(view.can_set)
         self.load.setEnabled(view.can_guess)
         for control in (self.editor, self.save, self.width_px, self.height_px):
             control.setEnabled(view.can_change)

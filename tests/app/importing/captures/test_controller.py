@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -217,7 +218,7 @@ def test_nothing_stops_an_import_but_its_dialog(folder: Path, tmp_path: Path) ->
     control.open(folder)
     runner.run_all()
     control.start()
-    for step in (
+    steps: tuple[Callable[[], object], ...] = (
         lambda: control.open(tmp_path),
         control.guess,
         lambda: control.choose_calibration(NOMINAL),
@@ -227,7 +228,8 @@ def test_nothing_stops_an_import_but_its_dialog(folder: Path, tmp_path: Path) ->
         lambda: control.set_projector((32, 24)),
         lambda: control.choose_set("left"),
         lambda: control.rename("other", tmp_path),
-    ):
+    )
+    for step in steps:
         step()
     assert len(runner.waiting) == 1
     assert control.state.busy.value == "Importing"
