@@ -138,8 +138,8 @@ def parse_options(text: str) -> tuple[tuple[str, str], ...]:
 
     Quotes hold a value with spaces together, as in a terminal; one without its other half is a character.
 
-    >>> parse_options("noise 'scan=/home/Max M/a b.dsl'")
-    (('noise', 'on'), ('scan', '/home/Max M/a b.dsl'))
+    >>> parse_options("noise 'scan=/data/Max M/a b.dsl'")
+    (('noise', 'on'), ('scan', '/data/Max M/a b.dsl'))
     """
     pairs = [part.partition("=") for part in _words(text)]
     return tuple((key, value if sign else "on") for key, sign, value in pairs)

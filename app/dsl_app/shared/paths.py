@@ -61,7 +61,7 @@ def place_trouble(path: Path) -> str:
     """Why nothing can be created with this path, and what to do; empty where nothing is known against it."""
     first = path.parts[0] if path.parts else ""
     if first.startswith("~"):
-        return f"{first} is no home folder: this computer has no such user. Choose another folder."
+        return f"{first} is not a home folder: this computer has no such user. Choose another folder."
     size = len(os.fsencode(path.name))
     if size > MOST_NAME_BYTES:
         return (

@@ -161,7 +161,7 @@ def test_the_page_names_every_calibration() -> None:
 @pytest.mark.parametrize(
     ("folder", "name", "told"),
     [
-        ("~no-such-user/campaigns", "first", "~no-such-user is no home folder"),
+        ("~no-such-user/campaigns", "first", "~no-such-user is not a home folder"),
         ("", "ä" * 130, "The name is too long"),
     ],
 )

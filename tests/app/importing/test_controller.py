@@ -265,7 +265,7 @@ def test_a_place_that_cannot_be_is_told(bench: Bench, made: Folders) -> None:
     bench.look(made.scene)
     bench.control.change(base=str(made.own))
     for name, home, told in (
-        ("first", Path("~no-such-user"), "~no-such-user is no home folder"),
+        ("first", Path("~no-such-user"), "~no-such-user is not a home folder"),
         ("ä" * 130, bench.home, "The name is too long"),
     ):
         bench.control.rename(name, home)

@@ -64,10 +64,10 @@ def test_other_rigs_have_no_scene(qtbot: QtBot) -> None:
 @pytest.mark.parametrize(
     "value",
     [
-        "/home/Max Mustermann/a b.dsl",
+        "/data/Max M/a b.dsl",
         r"C:\data\a b.dsl",
         r"C:\data\a.dsl",
-        "/home/O'Brien/a b#1.dsl",
+        "/data/O'Brien/a b#1.dsl",
         '"b"',
         "",
     ],

@@ -64,7 +64,7 @@ def test_recent_files_and_free_names_of_a_barred_folder_are_listed(locked: Path)
 def test_a_home_that_nobody_has_is_told(tmp_path: Path) -> None:
     assert expanded(Path("~") / "scans") == Path.home() / "scans"
     nobody = expanded(Path("~no-such-user") / "scans" / "a.dsl")
-    assert "~no-such-user is no home folder" in place_trouble(nobody)
+    assert "~no-such-user is not a home folder" in place_trouble(nobody)
     assert place_trouble(tmp_path / "~b" / "a.dsl") == ""
 
 

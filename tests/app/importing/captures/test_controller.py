@@ -203,7 +203,7 @@ def test_a_place_that_cannot_be_is_said_beside_it(
 ) -> None:
     control.choose_calibration(calibration)
     control.rename("first", Path("~no-such-user"))
-    assert "~no-such-user is no home folder" in troubles(control)[Place.TARGET]
+    assert "~no-such-user is not a home folder" in troubles(control)[Place.TARGET]
     control.rename("ä" * 130, tmp_path)
     assert "The name is too long" in troubles(control)[Place.TARGET]
     assert not captures_view(control.state).can_import
