@@ -158,7 +158,7 @@ class ScanPage(PageWidget):
         self.plan.open_requested.connect(self._open_plan)
         self.plan.save_requested.connect(self._save_plan)
         self.stops = [
-            *follow_any(self._show_plan, state.plan, state.period_ms),
+            *follow_any(self._show_plan, state.plan, state.period_ms, state.longest_ms),
             state.interrupted.follow(lambda _: self._show_phase(state.phase.value)),
             state.interrupted.changed.connect(lambda _: self._show_reconnection(state.reconnection.value)),
             state.phase.follow(self._show_phase),
@@ -188,7 +188,7 @@ class ScanPage(PageWidget):
 
     def _show_plan(self) -> None:
         state = self._state
-        self.plan.set_plan(state.plan.value, state.period_ms.value)
+        self.plan.set_plan(state.plan.value, state.period_ms.value, state.longest_ms.value)
 
     def _show_phase(self, phase: Phase) -> None:
         fixed = phase.is_busy or self._state.interrupted.value is not None

@@ -183,6 +183,7 @@ class ScanPlanController:
         if devices is not None:
             info = devices.projector.info
             state.period_ms.set(info.frame_period_ms)
+            state.longest_ms.set(devices.camera.info.exposure_range_ms[1])
             state.latency_ms.set(info.latency_ms)
             if not self._is_locked():
                 self.take_plan(on_cycles(self._fitted(state.plan.value), info.frame_period_ms))

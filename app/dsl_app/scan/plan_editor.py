@@ -5,7 +5,7 @@ from __future__ import annotations
 from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QFormLayout, QGridLayout, QGroupBox, QWidget
 
-from dsl_app.scan.state import preset_of
+from dsl_app.scan.state import LONGEST_MS, preset_of
 from dsl_app.shared.plain_tip import plain_tip
 from dsl_app.shared.widgets.forms import ChoiceBox, NumberBox, WholeBox, label, push_button, quiet
 from dsl_app.shared.widgets.help_window import set_help
@@ -18,7 +18,9 @@ OWN_PURPOSE = "Not a preset; the table shows what to expect."
 LINES, COMB, COLOURS, FILE = "lines", "comb", "colours", "file"
 WIDEST_PX = 4096
 MOST_SETTINGS = 4
-LONGEST_MS = 30_000.0
+SHORTEST_MS, LEAST_LEVEL = 0.1, 0.001
+#: An hour: some cameras name no longest exposure.
+MOST_MS = 3_600_000.0
 _EXPOSURE_TIP = "Exposures are whole LED cycles, so that each contains all colours of the projector."
 
 
@@ -83,8 +85,8 @@ class PlanEditor(QGroupBox):
         if key:
             self.preset_chosen.emit(key)
 
-    def set_plan(self, plan: CapturePlan, period_ms: float) -> None:
-        """Show a plan on a projector with this frame period."""
+    def set_plan(self, plan: CapturePlan, period_ms: float, longest_ms: float = LONGEST_MS) -> None:
+        """Show a plan on a projector with this frame period and a camera with this longest exposure."""
         self._plan = plan
         preset = preset_of(plan, period_ms)
         self.preset.choose("" if preset is None else preset.key)
@@ -97,7 +99,7 @@ class PlanEditor(QGroupBox):
         self.period.setEnabled(isinstance(plan.spectral, LineComb))
         if isinstance(plan.spectral, ScanLines | LineComb):
             self._show_lines(plan.spectral)
-        self.settings.set_settings(plan.settings, period_ms)
+        self.settings.set_settings(plan.settings, period_ms, longest_ms)
 
     def _offer_file(self, on: bool) -> None:
         """List designed patterns only while they are in use: they come from a file or the curve."""
@@ -161,8 +163,8 @@ class SettingRows(QWidget):
         self._grid.setVerticalSpacing(4)
         self._grid.setColumnStretch(0, 1)
 
-    def set_settings(self, settings: tuple[Setting, ...], period_ms: float) -> None:
-        """Show settings for a projector with this frame period."""
+    def set_settings(self, settings: tuple[Setting, ...], period_ms: float, longest_ms: float) -> None:
+        """Show settings for a projector with this frame period and a camera with this longest exposure."""
         same = len(settings) == len(self._settings) and self._rows
         self._settings, self._period_ms = settings, period_ms
         if not same:
@@ -172,9 +174,13 @@ class SettingRows(QWidget):
             exposure.setSingleStep(period_ms)
             cycles = whole_cycles(setting.exposure_ms, period_ms)
             exposure.setToolTip(plain_tip(f"{cycles} LED cycles of {period_ms:.2f} ms. {_EXPOSURE_TIP}"))
-            for box, value in ((exposure, setting.exposure_ms), (level, setting.level)):
-                with quiet(box):
-                    box.setValue(value)
+            with quiet(exposure, level):
+                # A plan of another rig is shown as it is, too.
+                exposure.setMinimum(min(SHORTEST_MS, setting.exposure_ms))
+                exposure.setMaximum(max(min(longest_ms, MOST_MS), setting.exposure_ms))
+                exposure.setValue(setting.exposure_ms)
+                level.setMinimum(min(LEAST_LEVEL, setting.level))
+                level.setValue(setting.level)
 
     def _build(self) -> None:
         while (item := self._grid.takeAt(0)) is not None:
@@ -194,25 +200,34 @@ class SettingRows(QWidget):
         tab_in_place(self)
 
     def _add_row(self, i: int) -> None:
-        exposure = NumberBox(f"Exposure of setting {i + 1}", 0.1, LONGEST_MS, 1, "ms", 1, _EXPOSURE_TIP)
+        exposure = NumberBox(
+            f"Exposure of setting {i + 1}", SHORTEST_MS, LONGEST_MS, 1, "ms", 1, _EXPOSURE_TIP
+        )
         level = NumberBox(
-            f"Level of setting {i + 1}", 0.01, 1, 1, decimals=2, tip="Drive level of lit columns, 0 to 1"
+            f"Level of setting {i + 1}",
+            LEAST_LEVEL,
+            1,
+            1,
+            decimals=3,
+            tip="Drive level of lit columns, 0 to 1",
         )
         level.setSingleStep(0.05)
         remove = push_button("×", "Remove this setting from the plan", lambda: self._remove(i))
         remove.setFixedWidth(28)
         remove.setAccessibleName(f"Remove setting {i + 1}")
         remove.setEnabled(len(self._settings) > 1)
-        exposure.valueChanged.connect(lambda _: self._edited(i))
-        level.valueChanged.connect(lambda _: self._edited(i))
+        exposure.valueChanged.connect(lambda shown_ms: self._expose(i, shown_ms))
+        level.valueChanged.connect(lambda shown: self._edit(i, level=round(shown, 3)))
         for column, widget in enumerate((exposure, level, remove)):
             self._grid.addWidget(widget, i + 1, column)
         self._rows.append((exposure, level))
 
-    def _edited(self, i: int) -> None:
-        exposure, level = self._rows[i]
-        cycles = whole_cycles(exposure.value(), self._period_ms)
-        made = Setting(exposure_ms=cycles * self._period_ms, level=round(level.value(), 2))
+    def _expose(self, i: int, shown_ms: float) -> None:
+        self._edit(i, exposure_ms=whole_cycles(shown_ms, self._period_ms) * self._period_ms)
+
+    def _edit(self, i: int, **changes: float) -> None:
+        """Change one figure of a setting: the other one may be shown rounded."""
+        made = Setting.model_validate(self._settings[i].model_dump() | changes)
         self.changed.emit((*self._settings[:i], made, *self._settings[i + 1 :]))
 
     def _add(self) -> None:

@@ -18,6 +18,9 @@ from dsl_core.capture.runner import State, Status
 from dsl_core.model.plan import CapturePlan, Setting, Shot
 from dsl_core.model.presets import PRESETS, Preset, on_columns, on_cycles
 
+#: The longest exposure that is offered while no camera says its own.
+LONGEST_MS = 30_000.0
+
 
 class Phase(Enum):
     """Phases of a scan; the values are shown."""
@@ -144,11 +147,12 @@ class ScanState:
     ``trouble`` says what interrupted the scan (empty: nothing), ``note`` how the last one ended.
     ``plan_file`` is the file that holds exactly the current plan, if there is one. ``check_drift`` compares
     two old frames before an interrupted scan resumes. ``meters`` measures the scene before a new scan and
-    scales exposures to it, where nobody chose them. ``period_ms`` is the LED cycle
-    of the rig's projector. ``finished`` is the scan that was completed last, ``result`` fires with each new
-    result; ``lacks_calibration`` says of the one completed last that it contains no calibration to be
-    reconstructed with; ``is_reconstructing`` says that one is being made, and ``depth`` is that of it, mm,
-    while its spectra are computed; ``reconstruction_s`` is how long one of the plan is expected to take.
+    scales exposures to it, where nobody chose them. ``period_ms`` is the LED cycle of the rig's projector,
+    ``longest_ms`` the longest exposure of its camera. ``finished`` is the scan that was completed last,
+    ``result`` fires with each new result; ``lacks_calibration`` says of the one completed last that it
+    contains no calibration to be reconstructed with; ``is_reconstructing`` says that one is being made, and
+    ``depth`` is that of it, mm, while its spectra are computed; ``reconstruction_s`` is how long one of the
+    plan is expected to take.
     ``refused`` fires with a calibration that was chosen and cannot be read; the one before stays in use.
     ``is_seen`` says that the page is on screen, where everything is said; ``wanted`` asks for it.
     """
@@ -169,6 +173,7 @@ class ScanState:
         self.lacks_calibration = Value(False)
         self.facts: Value[Facts | None] = Value(None)
         self.period_ms = Value(1000.0 / 60.0)
+        self.longest_ms = Value(LONGEST_MS)
         self.latency_ms = Value(0.0)
         self.phase = Value(Phase.PLANNING)
         self.status = Value(Status(State.IDLE))

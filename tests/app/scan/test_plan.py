@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import math
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +14,7 @@ from pytestqt.qtbot import QtBot
 from dsl_core.errors import DeviceError
 from dsl_core.io.plan_file import load_plan, save_plan
 from dsl_core.model.frames import Frame
-from dsl_core.model.plan import CapturePlan, Columns, LineComb, ScanLines
+from dsl_core.model.plan import CapturePlan, Columns, LineComb, ScanLines, Setting
 from dsl_core.model.presets import PRESETS, Preset, on_columns
 from dsl_core.planning.designed import DesignedSet, packed, save_design
 from dsl_core.simulation.sim_devices import SimCamera
@@ -180,6 +181,32 @@ def test_designed_patterns_stay_so_when_something_else_is_edited(qtbot: QtBot) -
     assert told[-1].spectral == columns
     editor.set_plan(CapturePlan(), 1000 / 60)
     assert editor.patterns.count() == 3
+
+
+def test_what_is_not_edited_of_a_setting_stays_as_it_is(qtbot: QtBot) -> None:
+    editor = PlanEditor()
+    qtbot.addWidget(editor)
+    told: list[CapturePlan] = []
+    editor.plan_changed.connect(told.append)
+    given = (Setting(exposure_ms=60_000.0, level=0.125), Setting(exposure_ms=1000 / 60, level=1 / 3))
+    editor.set_plan(CapturePlan(settings=given, code_settings=(0,)), 1000 / 60, 10_000.0)
+    shown = [[box.text() for box in row] for row in editor.settings._rows]
+    assert shown == [["60000.0 ms", "0.125"], ["16.7 ms", "0.333"]]
+    editor.settings._rows[0][1].setValue(0.5)
+    assert told[-1].settings == (Setting(exposure_ms=60_000.0, level=0.5), given[1])
+    editor.settings._rows[1][0].setValue(34)
+    assert told[-1].settings == (given[0], Setting(exposure_ms=2 * 1000 / 60, level=1 / 3))
+
+
+def test_exposures_go_as_far_as_those_of_the_camera(bench: ScanBench, qtbot: QtBot) -> None:
+    devices = bench.rig.state.devices.value
+    assert devices is not None
+    assert bench.state.longest_ms.value == devices.camera.info.exposure_range_ms[1]
+    editor = PlanEditor()
+    qtbot.addWidget(editor)
+    for longest_ms, most_ms in ((120_000.0, 120_000.0), (math.inf, 3_600_000.0)):
+        editor.set_plan(CapturePlan(), 1000 / 60, longest_ms)
+        assert editor.settings._rows[0][0].maximum() == most_ms
 
 
 def test_buttons_ask_for_files(qtbot: QtBot) -> None:
