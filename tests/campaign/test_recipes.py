@@ -17,6 +17,52 @@ def test_every_recipe_has_its_name_and_needs_only_earlier_ones() -> None:
         assert set(recipe.needs) <= set(names[:index])
 
 
+@pytest.mark.parametrize(
+    ("name", "key", "text", "told"),
+    [
+        ("geometry", "ratio", "-1", "ratio must be at least 1"),
+        ("geometry", "ratio", "nan", "ratio must be a finite number"),
+        ("geometry", "poses", "2", "poses must be at least"),
+        ("geometry", "poses", "100000", "poses must be at most 99"),
+        ("selftest", "wanted_ms", "166,-7", "wanted_ms.1 must be greater than 0"),
+        ("selftest", "wanted_ms", "nan", "wanted_ms.0 must be a finite number"),
+        ("spectralon", "reflectance", "99", "reflectance must be at most 1.05"),
+        ("spectralon", "reflectance", "0,99", "reflectance must be a number"),
+        (
+            "spectralon",
+            "reflectance_rel_std",
+            "0.5",
+            "reflectance_rel_std must be less than 0.2",
+        ),
+        ("spectralon", "readings", "0", "readings must be at least 1"),
+        ("spectralon", "depth_mm", "inf", "depth_mm must be a finite number"),
+        ("color-checker", "depth_mm", "-1", "depth_mm must be greater than 0"),
+        (
+            "color-checker",
+            "corners_px",
+            "[[0,0],[1,0],[1,NaN],[0,1]]",
+            "corners_px.2.1 must be a finite number",
+        ),
+        ("bandpass", "filters_nm", "430,5,450", "filters_nm.1 must be at least 300"),
+        ("bandpass", "long_ratio", "0.5", "long_ratio must be at least 1"),
+        ("bandpass", "line_px", "0", "line_px must be at least 1"),
+        ("depth-stage", "stage_std_mm", "0", "stage_std_mm must be greater than 0"),
+        ("depth-stage", "positions_mm", "620,nan", "positions_mm.1 must be a finite number"),
+    ],
+)
+def test_a_setting_that_cannot_be_is_told_before_anything_is_captured(
+    name: str, key: str, text: str, told: str
+) -> None:
+    with pytest.raises(CalibrationError, match=f"A setting of {name} is wrong: {told}"):
+        load_recipe(name, {key: text})
+
+
+def test_settings_at_their_bounds_are_taken() -> None:
+    assert load_recipe("geometry", {"ratio": "1", "poses": "99"})
+    assert load_recipe("spectralon", {"reflectance": "1.05", "depth_mm": "655"})
+    assert load_recipe("depth-stage", {"positions_mm": "-3,0,5", "filters_nm": "450"})
+
+
 def test_settings_are_read_from_text() -> None:
     kind = FakeRecipe
     built = _build(kind, "fake", {"keys": "day", "scale": "3", "bad_steps": '["day"]'})

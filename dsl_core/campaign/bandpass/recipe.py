@@ -18,6 +18,7 @@ from dsl_core.calibration.light.zero_order import ZeroOrderFit
 from dsl_core.calibration.orders.bandpass import SeenFilter, fit_bandpass, plane_pixels, plane_profile
 from dsl_core.calibration.orders.dispersion import widening
 from dsl_core.calibration.orders.order_light import filter_light
+from dsl_core.campaign.common.bounds import Count, FilterNm, Positive, Ratio, Reflectance
 from dsl_core.campaign.common.depths import target_depth_mm
 from dsl_core.campaign.common.flat_target import diffuser_lines, line_frames, scan_lines_of
 from dsl_core.campaign.common.recipe import Bench, Recipe, Step, naming
@@ -76,12 +77,12 @@ class BandpassRecipe(Recipe[BandpassCalibration]):
     needs = ("geometry", "spectralon")
     record_type = BandpassCalibration
 
-    filters_nm: tuple[float, ...] = FILTERS_NM
-    line_px: int = 5
-    long_ratio: float = 1.0
-    pixels: int = 20_000
-    depth_mm: float | None = None
-    reflectance: float = 0.99
+    filters_nm: tuple[FilterNm, ...] = FILTERS_NM
+    line_px: Count = 5
+    long_ratio: Ratio = 1.0
+    pixels: Count = 20_000
+    depth_mm: Positive | None = None
+    reflectance: Reflectance = 0.99
 
     def steps(self, bench: Bench) -> tuple[Step, ...]:
         """The target without filter, then through each filter, from blue to red."""

@@ -24,6 +24,7 @@ from dsl_core.calibration.colour.patches import (
     orient_chart,
     patch_samples,
 )
+from dsl_core.campaign.common.bounds import Finite, Positive
 from dsl_core.campaign.common.depths import seen_whole_mm
 from dsl_core.campaign.common.flat_target import WHITE, capture_uniform, read_uniform
 from dsl_core.campaign.common.recipe import Bench, Recipe, Step, naming
@@ -43,7 +44,8 @@ from dsl_core.progress import Progress
 RATIO = 6.0
 #: Width and height of the 24 patches of a large chart, with which it must be in view.
 PATCHES_MM = (312.0, 208.0)
-_Corners = tuple[tuple[float, float], tuple[float, float], tuple[float, float], tuple[float, float]]
+_Corner = tuple[Finite, Finite]
+_Corners = tuple[_Corner, _Corner, _Corner, _Corner]
 
 
 _NO_COLOURS = (
@@ -70,7 +72,7 @@ class ColorCheckerRecipe(Recipe[ColorCheckerCalibration]):
 
     chart: str = "BabelColor Average"
     corners_px: _Corners | None = None
-    depth_mm: float | None = None
+    depth_mm: Positive | None = None
 
     def steps(self, bench: Bench) -> tuple[Step, ...]:
         """One step: code and uniform pictures of the chart."""

@@ -13,6 +13,7 @@ from dsl_core.calibration.film.depth_stage import StageData, StageFilter, calibr
 from dsl_core.calibration.film.order_paths import LineFrames, thinned
 from dsl_core.calibration.geometry.plane_refinement import lone_plane
 from dsl_core.calibration.geometry.stage_planes import column_limit_px, require_steps
+from dsl_core.campaign.common.bounds import Count, FilterNm, Finite, Positive, Reflectance
 from dsl_core.campaign.common.depths import stage_depths_mm
 from dsl_core.campaign.common.flat_target import (
     diffuser_lines,
@@ -102,12 +103,12 @@ class DepthStageRecipe(Recipe[DepthStageCalibration]):
     needs = ("geometry", "spectralon", "bandpass")
     record_type = DepthStageCalibration
 
-    positions_mm: tuple[float, ...] = ()
-    filters_nm: tuple[float, ...] = (450.0, 540.0, 640.0)
-    code_step_px: int = 4
-    filter_step_px: int = 16
-    stage_std_mm: float = 0.02
-    reflectance: float = 0.99
+    positions_mm: tuple[Finite, ...] = ()
+    filters_nm: tuple[FilterNm, ...] = (450.0, 540.0, 640.0)
+    code_step_px: Count = 4
+    filter_step_px: Count = 16
+    stage_std_mm: Positive = 0.02
+    reflectance: Reflectance = 0.99
     chain: bool = True
     grid: bool = False
 

@@ -4,13 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterator
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
+from pydantic import Field
 
 from dsl_core.calibration.geometry.bundle import SHARED
 from dsl_core.calibration.geometry.pose_series import MIN_POSES, exposure_warning, observe_series
 from dsl_core.calibration.geometry.projector_corners import observe_pose
 from dsl_core.calibration.geometry.solve import calibrate_geometry
+from dsl_core.campaign.common.bounds import Ratio
 from dsl_core.campaign.common.recipe import SCAN_NAME, Bench, Recipe, Step
 from dsl_core.campaign.common.white_shot import bracket, shoot_white
 from dsl_core.campaign.geometry.board_poses import default_poses
@@ -29,6 +32,8 @@ from dsl_core.progress import Progress
 #: The board that nobody has chosen: a rig that places boards itself may get one with other squares.
 USUAL_BOARD = Checkerboard(columns=11, rows=7, square_mm=20.0)
 BOARD_NAME = "board.json"
+#: More are no mistake of a board or a lens that ten do not show.
+MOST_POSES = 99
 
 
 @dataclass(frozen=True)
@@ -47,8 +52,8 @@ class GeometryRecipe(Recipe[GeometryCalibration]):
     record_type = GeometryCalibration
 
     board: Board = USUAL_BOARD
-    poses: int = 10
-    ratio: float = 1.0
+    poses: Annotated[int, Field(ge=MIN_POSES, le=MOST_POSES)] = 10
+    ratio: Ratio = 1.0
     left_out: tuple[str, ...] = ()
 
     def steps(self, bench: Bench) -> tuple[Step, ...]:

@@ -10,6 +10,7 @@ import numpy as np
 from dsl_core.calibration.selftest.figures import AMBIENT, selftest_figures
 from dsl_core.calibration.selftest.readings import ROUNDING_DN2
 from dsl_core.calibration.selftest.record import WANTED_MS, analyse
+from dsl_core.campaign.common.bounds import Positive
 from dsl_core.campaign.common.recipe import Bench, Recipe, Step, naming
 from dsl_core.campaign.selftest.capture import ARCHIVE_NAME, SEED, SelfTestRun, load_capture, save_capture
 from dsl_core.campaign.selftest.recorder import Recorder
@@ -41,7 +42,7 @@ class SelfTestRecipe(Recipe[SelfTest]):
     keeps_frames = False
     record_type = SelfTest
 
-    wanted_ms: tuple[float, ...] = WANTED_MS
+    wanted_ms: tuple[Positive, ...] = WANTED_MS
 
     def steps(self, bench: Bench) -> tuple[Step, ...]:
         """One step, film off, on a white target."""

@@ -15,6 +15,14 @@ from dsl_core.calibration.light.spectralon import (
     spectralon_calibration,
 )
 from dsl_core.calibration.light.spectralon_figures import spectralon_figures, unevenness_of_middle
+from dsl_core.campaign.common.bounds import (
+    LEAST_REFLECTANCE,
+    MOST_REFLECTANCE,
+    Count,
+    Positive,
+    Reflectance,
+    RelativeStd,
+)
 from dsl_core.campaign.common.depths import target_depth_mm
 from dsl_core.campaign.common.flat_target import capture_uniform, middle, read_uniform
 from dsl_core.campaign.common.recipe import Bench, Recipe, Step, naming
@@ -51,13 +59,13 @@ class SpectralonRecipe(Recipe[SpectralonCalibration]):
     needs = ("geometry",)
     record_type = SpectralonCalibration
 
-    reflectance: float = 0.99
+    reflectance: Reflectance = 0.99
     reflectance_file: str = ""
     # Certificates state half a percent, which is two deviations.
-    reflectance_rel_std: float = 0.0025
-    readings: int = 16
+    reflectance_rel_std: RelativeStd = 0.0025
+    readings: Count = 16
     emission_folder: str = ""
-    depth_mm: float | None = None
+    depth_mm: Positive | None = None
 
     def steps(self, bench: Bench) -> tuple[Step, ...]:
         """Spectra of the LEDs, then pictures."""
@@ -157,7 +165,7 @@ class SpectralonRecipe(Recipe[SpectralonCalibration]):
             )
         if self.reflectance_file:
             return read_spectrum(Path(self.reflectance_file), radiance=False)
-        if not 0.05 < self.reflectance <= 1.05:
+        if not LEAST_REFLECTANCE <= self.reflectance <= MOST_REFLECTANCE:
             raise CalibrationError(
                 f"The reflectance of the Spectralon cannot be {self.reflectance:g}; give a share such as"
                 " 0.99, from its certificate."

@@ -17,6 +17,9 @@ from dsl_core.campaign.common.recipe import AnyRecipe
 from dsl_core.model.placement import Placement
 from dsl_core.words import capitalised
 
+#: As many values of a list are named one by one.
+MOST_LISTED = 4
+
 
 def setting_rows(
     recipe: AnyRecipe, settings: Mapping[str, str], placement: Placement | None = None
@@ -41,6 +44,7 @@ def setting_rows(
                 settings.get(each.name, text),
                 _doc(kind, each.name),
                 as_text(options.get(each.name)),
+                "" if each.name not in settings else _understood(getattr(recipe, each.name)),
             )
         )
     return tuple(found)
@@ -72,6 +76,20 @@ def as_text(value: Any) -> str:
         case tuple():
             return json.dumps(value)
     return str(value)
+
+
+def _understood(value: Any) -> str:
+    """How a list of numbers was read, as a sentence; empty for anything else.
+
+    >>> _understood((166.0, 7.0)), _understood((430.0, 440.0, 450.0, 460.0, 470.0)), _understood((0.5,))
+    ('Read as 2 values: 166 and 7.', 'Read as 5 values from 430 to 470.', '')
+    """
+    if not isinstance(value, tuple) or len(value) < 2 or not all(isinstance(each, float) for each in value):
+        return ""
+    texts = [as_text(each) for each in value]
+    if len(texts) > MOST_LISTED:
+        return f"Read as {len(texts)} values from {as_text(min(value))} to {as_text(max(value))}."
+    return f"Read as {len(texts)} values: {', '.join(texts[:-1])} and {texts[-1]}."
 
 
 def _kind(value: Any) -> str:
@@ -106,9 +124,12 @@ def trouble_in_titles(text: str, name: str) -> str:
     'Distance of the target (mm) must be a number.'
     >>> trouble_in_titles("A setting of geometry is wrong: board.columns must be 3.", "geometry")
     'Board: columns must be 3.'
+    >>> trouble_in_titles("A setting of bandpass is wrong: depth_mm.1 must be 3 (given 5).", "bandpass")
+    'Distance of the target (mm) must be 3 (given 5).'
     """
     wrong = text.removeprefix(f"A setting of {name} is wrong: ")
-    found = re.match(r"(\w+)(\.?)", wrong)
+    # The number of a value in a list counts from 0; which one it is, is seen.
+    found = re.match(r"(\w+)(?:\.\d+\b)*(\.?)", wrong)
     if wrong == text or found is None:
         return text
     return setting_title(found[1]) + ": " * bool(found[2]) + wrong[found.end() :]

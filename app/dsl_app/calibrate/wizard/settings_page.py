@@ -8,7 +8,7 @@ from typing import TypeVar
 
 from pydantic import TypeAdapter, ValidationError
 from PySide6.QtCore import Signal
-from PySide6.QtWidgets import QCheckBox, QFormLayout, QHBoxLayout, QLineEdit, QWidget
+from PySide6.QtWidgets import QCheckBox, QFormLayout, QHBoxLayout, QLabel, QLineEdit, QWidget
 
 from dsl_app.calibrate.setting_words import setting_title
 from dsl_app.calibrate.wizard.state import SettingRow
@@ -34,6 +34,7 @@ class SettingsPage(QWidget):
         super().__init__()
         self._shown: tuple[SettingRow, ...] = ()
         self.fields: dict[str, QLineEdit | QCheckBox | BoardEdit] = {}
+        self._docs: dict[str, QLabel] = {}
         self._intro = label(INTRODUCTION, "muted", wraps=True)
         self._trouble = remark_line()
         self._trouble.setProperty("role", "bad")
@@ -58,6 +59,8 @@ class SettingsPage(QWidget):
         self._intro.setText(INTRODUCTION if rows else NOTHING)
         for row in rows:
             field = self.fields[row.key]
+            if row.key in self._docs:
+                self._docs[row.key].setText(f"{row.doc} {row.understood}".strip())
             if isinstance(field, QCheckBox):
                 field.setChecked(row.value == "true")
             elif isinstance(field, BoardEdit):
@@ -69,7 +72,7 @@ class SettingsPage(QWidget):
     def _build(self, rows: tuple[SettingRow, ...]) -> None:
         while self._form.rowCount():
             self._form.removeRow(0)
-        self.fields = {}
+        self.fields, self._docs = {}, {}
         for row in rows:
             name = setting_title(row.key)
             field = self._field(row, name)
@@ -78,7 +81,7 @@ class SettingsPage(QWidget):
                 self._form.addRow(name, field)
                 continue
             # What explains a field stands close to it.
-            doc = label(row.doc, "muted", wraps=True)
+            doc = self._docs[row.key] = label(row.doc, "muted", wraps=True)
             self._form.addRow(name, boxed(column_of(field, doc, margins=0, spacing=2)))
 
     def _field(self, row: SettingRow, name: str) -> QLineEdit | QCheckBox | BoardEdit:

@@ -75,7 +75,8 @@ class Fit:
 class SettingRow:
     """A setting of the recipe as text; ``doc`` explains it, ``kind`` chooses how it is edited.
 
-    ``used`` is what an empty field stands for where the rig decides that.
+    ``used`` is what an empty field stands for where the rig decides that; ``understood`` says how a list of
+    numbers was read, as a comma parts numbers and is no decimal sign.
     """
 
     key: str
@@ -84,6 +85,7 @@ class SettingRow:
     value: str
     doc: str
     used: str = ""
+    understood: str = ""
 
 
 @dataclass(frozen=True)

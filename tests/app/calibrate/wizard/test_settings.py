@@ -52,6 +52,14 @@ def test_what_the_rig_decides_is_shown_where_a_field_is_empty() -> None:
     assert rows["filters_nm"].used == ""
 
 
+def test_a_list_says_how_it_was_read() -> None:
+    recipe = load_recipe("selftest", {"wanted_ms": "166,7"})
+    (row,) = setting_rows(recipe, {"wanted_ms": "166,7"})
+    assert row.understood == "Read as 2 values: 166 and 7."
+    (row,) = setting_rows(load_recipe("selftest"), {})
+    assert row.understood == "", "a default was not typed"
+
+
 def test_rows_are_explained_by_the_docstring() -> None:
     assert ROWS["board"].doc == "The printed board."
     assert ROWS["filters_nm"].doc == "The filters, in nm."

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
-from dsl_app.calibrate.wizard.settings_page import BoardEdit
+from dsl_app.calibrate.wizard.settings import setting_rows
+from dsl_app.calibrate.wizard.settings_page import BoardEdit, SettingsPage
 from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import (
+    QLabel,
     QLineEdit,
 )
 from pytestqt.qtbot import QtBot
 
+from dsl_core.campaign.recipes import load_recipe
 from dsl_core.io.campaign_folder import CampaignFolder
 from tests.app.calibrate.page_stage import Stage, click
 
@@ -34,6 +37,16 @@ def test_settings_are_typed_and_wrong_ones_explained(stage: Stage) -> None:
     stage.idle()
     assert CampaignFolder.open(stage.bench.campaign).info.settings == {"selftest": {"scale": "3"}}
     assert not wizard.settings._trouble.isVisible()
+
+
+def test_a_list_with_a_decimal_comma_is_seen_to_be_two_values(qtbot: QtBot) -> None:
+    page = SettingsPage()
+    qtbot.addWidget(page)
+    for text, read in (("166.7", ""), ("166,7", " Read as 2 values: 166 and 7.")):
+        settings = {"wanted_ms": text}
+        page.show_settings(setting_rows(load_recipe("selftest", settings), settings))
+        docs = [line.text() for line in page.findChildren(QLabel)]
+        assert f"The exposures that scans should use.{read}" in docs
 
 
 def test_boards_are_edited_as_fields(qtbot: QtBot) -> None:
