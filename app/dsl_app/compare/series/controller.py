@@ -77,7 +77,8 @@ class SeriesController:
         gone = rows[at]
 
         def put_back() -> None:
-            now = self.state.rows.value
+            # It may have been added again meanwhile, and has one place all the same.
+            now = [row for row in self.state.rows.value if row.path != path]
             self._set_rows((*now[:at], gone, *now[at:]))
 
         self._undo.push(

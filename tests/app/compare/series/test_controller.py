@@ -104,6 +104,21 @@ def test_what_cannot_count_is_left_out_with_its_reason(
     assert len(series.state.test.value.positions_mm) == len(stage) + 1
 
 
+def test_a_row_that_was_added_again_is_there_once_after_undo(
+    series: SeriesController, undo: UndoStack, stage: list[Path]
+) -> None:
+    series.add(stage)
+    series.set_position(stage[1], 725.5)
+    series.remove(stage[1])
+    series.add([stage[1]])
+    undo.undo()
+    rows = series.state.rows.value
+    assert [row.path for row in rows] == stage
+    assert rows[1].position_mm == 725.5
+    undo.redo()
+    assert [row.path for row in series.state.rows.value] == [stage[0], *stage[2:]]
+
+
 def test_a_region_is_read_again(series: SeriesController, undo: UndoStack, stage: list[Path]) -> None:
     series.add(stage)
     series.set_region((4, 4, 36, 28))
