@@ -131,7 +131,7 @@ def _stage_numbers(state: SeriesState) -> list[tuple[str, ...]]:
         i, target = counted.get(row.path), row.target
         found.append(
             (
-                "" if row.position_mm is None else f"{row.position_mm:g}",
+                "" if row.position_mm is None else f"{row.position_mm:.10g}",
                 "–" if target is None else str(target.plane.pixels),
                 "–" if target is None else f"{target.plane.rms_mm:.3f}",
                 "–" if test is None or i is None else f"{test.free.deviations_mm[i]:+.4f}",

@@ -90,3 +90,9 @@ def test_of_scans_the_ones_that_no_faster_one_beats_are_named() -> None:
         ("10.0", "No faster scan is better"),
         ("30.0", ""),
     ]
+
+
+def test_a_position_is_shown_as_it_was_typed() -> None:
+    state = state_of((), SeriesKind.STAGE)
+    state.rows.set((SeriesRow(A, 1000.0025), SeriesRow(B, 700.0)))
+    assert [texts.numbers[0] for texts in row_texts(state)] == ["1000.0025", "700"]
