@@ -24,6 +24,15 @@ def capitalised(text: str) -> str:
     return f"{text[:1].upper()}{text[1:]}"
 
 
+def in_groups(value: float, digits: int = 0) -> str:
+    """A number with its thousands apart, by a space: a comma that is typed is a decimal point.
+
+    >>> in_groups(21402.37, 1).split(), in_groups(999)
+    (['21', '402.4'], '999')
+    """
+    return f"{value:,.{digits}f}".replace(",", chr(0xA0))
+
+
 def sentence(clause: str) -> str:
     """A clause as a sentence of its own.
 

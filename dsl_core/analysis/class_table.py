@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from dsl_core.analysis.area_deviation import ClassDeviations
 from dsl_core.analysis.classify import ClassMap
+from dsl_core.words import in_groups
 
 #: Areas and their deviations from here on are told in whole mm2.
 _LARGE_MM2, _LARGE_STD_MM2 = 100.0, 10.0
@@ -50,10 +51,10 @@ class ClassRow:
     def pixels_text(self) -> str:
         """The pixels with their deviation.
 
-        >>> ClassRow("red", 1, 1308, 0.5, 98.04, 41.7, 3.04).pixels_text
-        '1,308 ± 42'
+        >>> ClassRow("red", 1, 1308, 0.5, 98.04, 41.7, 3.04).pixels_text.replace(chr(0xA0), "")
+        '1308 ± 42'
         """
-        return f"{self.pixels:,}{_deviation(self.pixels_std, 0)}"
+        return f"{in_groups(self.pixels)}{_deviation(self.pixels_std, 0)}"
 
     @property
     def area_text(self) -> str:
@@ -67,11 +68,11 @@ class ClassRow:
         spread = self.area_std_mm2
         # Without a deviation, edges of a large area are known to no tenth.
         digits = int((self.area_mm2 < _LARGE_MM2) if spread is None else spread < _LARGE_STD_MM2)
-        return f"{self.area_mm2:,.{digits}f}{_deviation(spread, digits)}"
+        return f"{in_groups(self.area_mm2, digits)}{_deviation(spread, digits)}"
 
 
 def _deviation(std: float | None, digits: int) -> str:
-    return "" if std is None else f" ± {std:,.{digits}f}"
+    return "" if std is None else f" ± {in_groups(std, digits)}"
 
 
 def class_table(

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from dsl_core.analysis.areas import pixel_areas_mm2
+from dsl_core.analysis.class_table import ClassRow
 from dsl_core.analysis.classification import areas_of
 from tests.cases.chart_cube import chart_result
 
@@ -97,3 +98,9 @@ def test_a_result_says_itself_what_is_left_out() -> None:
     assert known is not None
     assert part is not None
     np.testing.assert_allclose(part.mm2, known.mm2[:, np.r_[5:20, 40:55]], rtol=1e-3)
+
+
+def test_thousands_of_a_table_are_no_decimal_commas() -> None:
+    row = ClassRow("red", 1, 51308, 0.5, 21402.3, 1341.7, 1203.0)
+    texts = [text.replace(chr(0xA0), " ") for text in (row.pixels_text, row.area_text)]
+    assert texts == ["51 308 ± 1 342", "21 402 ± 1 203"]

@@ -14,6 +14,7 @@ from dsl_core.evaluation.marks import distance_between
 from dsl_core.evaluation.shape import PlaneFit, Section, fit_plane, section
 from dsl_core.io.result.result_arrays import ResultArrays
 from dsl_core.model.figure import with_std
+from dsl_core.words import in_groups
 
 
 class Measure(Enum):
@@ -76,8 +77,8 @@ def measure_plane(result: ResultArrays, mask: NDArray[np.bool_]) -> Measured:
 
 def _plane_text(fit: PlaneFit) -> str:
     expected = f" (noise alone {fit.expected_mm:.2g})" if np.isfinite(fit.expected_mm) else ""
-    left_out = f", {fit.points - fit.used:,} too far off" if fit.used < fit.points else ""
+    left_out = f", {in_groups(fit.points - fit.used)} too far off" if fit.used < fit.points else ""
     return (
-        f"Plane of {fit.used:,} points{left_out}: flat to {fit.rms_mm:.2g} mm RMS{expected}, range"
+        f"Plane of {in_groups(fit.used)} points{left_out}: flat to {fit.rms_mm:.2g} mm RMS{expected}, range"
         f" {fit.range_mm:.2g} mm, tilt {with_std(fit.tilt_deg, fit.tilt_std_deg, 4)}°"
     )
