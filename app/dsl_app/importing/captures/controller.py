@@ -88,14 +88,17 @@ class CapturesController:
         self.guess()
 
     def set_projector(self, size_px: Size) -> None:
-        """Set the size of the projector; a mapping as guessed is guessed again for it."""
+        """Set the size of the projector, 0 for not known; a mapping as guessed is guessed again for it.
+
+        Any other mapping has a size, and keeps that where none is given.
+        """
         stated = self.state.stated.value
         self._request(projector_px=size_px)
-        if stated is None or not all(size_px):
+        if stated is None:
             return
         if stated.is_guessed:
             self.guess()
-        else:
+        elif all(size_px):
             self._change(lambda mapping: fields.with_projector(mapping, size_px))
 
     # Mapping ---------------------------------------------------------------------------------------

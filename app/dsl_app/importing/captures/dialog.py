@@ -162,9 +162,7 @@ class CapturesDialog(JobDialog):
     def _connect(self) -> None:
         state, commands = self._state, self._commands
         for box in (self.width_px, self.height_px):
-            box.valueChanged.connect(
-                lambda _: commands.set_projector((self.width_px.value(), self.height_px.value()))
-            )
+            box.valueChanged.connect(lambda _: self._set_projector())
         self.unit_mm.valueChanged.connect(commands.set_unit)
         self.from_projector.toggled.connect(commands.set_direction)
         for field in (self.name, self.home):
@@ -197,6 +195,13 @@ class CapturesDialog(JobDialog):
             # Text that is being typed is not replaced.
             if not field.hasFocus():
                 field.setText(text)
+
+    def _set_projector(self) -> None:
+        size_px = self.width_px.value(), self.height_px.value()
+        self._commands.set_projector(size_px)
+        if not all(size_px):
+            # The size of the mapping at hand holds until another one is guessed.
+            self._show_mapping()
 
     def _show_mapping(self) -> None:
         stated = self._state.stated.value

@@ -110,6 +110,22 @@ def test_another_projector_is_guessed_again_or_set(control: CapturesController) 
     stated = control.state.stated.value
     assert stated is not None
     assert (stated.mapping.projector_size_px, stated.mapping.channel) == (PROJECTOR, "red")
+    control.set_projector((PROJECTOR[0], 0))
+    stated = control.state.stated.value
+    assert stated is not None
+    assert stated.mapping.projector_size_px == PROJECTOR, "a mapping has a size"
+
+
+@pytest.mark.slow
+def test_a_mapping_as_guessed_is_guessed_again_where_the_size_is_not_known(
+    control: CapturesController,
+) -> None:
+    control.set_projector((32, 30))
+    control.set_projector((32, 0))
+    stated = control.state.stated.value
+    assert stated is not None
+    assert stated.is_guessed
+    assert any("is assumed" in each for each in stated.mapping.unsure)
 
 
 @pytest.mark.slow

@@ -105,6 +105,8 @@ def test_dropped_pictures_are_corrected_by_mouse_and_become_a_scan(
     monkeypatch.setattr(QFileDialog, "getSaveFileName", lambda *_: (str(file.with_suffix("")), ""))
     QTest.mouseClick(dialog.save, LEFT)
     assert load_mapping(file).parts[stripes].kind == "stripes"
+    dialog.height_px.setValue(0)
+    assert (dialog.width_px.value(), dialog.height_px.value()) == load_mapping(file).projector_size_px
     QTest.mouseClick(dialog.command, LEFT)
     (text,) = dialog.findChildren(QPlainTextEdit)
     assert f"--mapping {file}" in text.toPlainText()
