@@ -14,6 +14,7 @@ from dsl_core.capture.preview import BINS
 
 _NAMES = ("red", "green", "blue")
 _COLOURS = ("#d94545", "#3fa34d", "#3f7fd9")
+_GREY = "#8c8c8c"
 
 
 class CountsHistogram(pg.PlotWidget):  # type: ignore[misc]
@@ -36,17 +37,26 @@ class CountsHistogram(pg.PlotWidget):  # type: ignore[misc]
             for colour, name in zip(_COLOURS, _NAMES, strict=True)
         ]
 
+        #: Of a camera without colours; it has no name, as it is alone.
+        self.grey = self.plot(pen=pg.mkPen(_GREY, width=1))
+
     def show_counts(
         self, counts: NDArray[np.int64] | None, levels: int, is_logarithmic: bool = False
     ) -> None:
-        """Show pixels (3, `BINS`) of a camera with so many levels; None clears what was shown."""
+        """Show pixels of a camera with so many levels; None clears what was shown.
+
+        ``counts`` are (3, `BINS`), or (1, `BINS`) of a camera without colours.
+        """
         self.setXRange(0, levels, padding=0)
         positions = (np.arange(BINS) + 0.5) * levels / BINS
-        for place, curve in enumerate(self.curves):
-            if counts is None:
-                curve.setData([], [])
-            else:
-                curve.setData(positions, np.log10(counts[place] + 1) if is_logarithmic else counts[place])
+        is_grey = counts is not None and len(counts) == 1
+        self.legend.setVisible(not is_grey)
+        for curve in (*self.curves, self.grey):
+            curve.setData([], [])
+        if counts is not None:
+            heights = np.log10(counts + 1) if is_logarithmic else counts
+            for curve, height in zip([self.grey] if is_grey else self.curves, heights, strict=True):
+                curve.setData(positions, height)
         self.setLabel("left", "log₁₀ pixels" if is_logarithmic else "pixels")
 
     def apply_theme(self, theme: Theme) -> None:

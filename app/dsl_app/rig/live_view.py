@@ -211,13 +211,11 @@ class LiveView(QWidget):
         assert self._frame is not None
         pixels = cut(self._frame.pixels, self.region)
         found = statistics(pixels, self._camera.bayer, self._full_scale_dn)
-        self._pixels = found.histogram
+        is_mono = self._camera.bayer == "MONO"
+        self._pixels = found.histogram.sum(0, keepdims=True) if is_mono else found.histogram
         self._show_histogram()
         worst = max(found.saturated)
-        shares = "  ".join(
-            f"{name} {100 * share:.2f} %" for name, share in zip(_CHANNELS, found.saturated, strict=True)
-        )
-        self._saturated.setText(f"saturated  {shares}")
+        self._saturated.setText(f"saturated  {_saturated_text(found.saturated, is_mono)}")
         set_role(self._saturated, "bad" if worst > MANY_SATURATED else "muted")
         self._focus.setText(f"focus score {found.focus:.3g}")
         self._show_rate()
@@ -281,3 +279,10 @@ class LiveView(QWidget):
     def show_all(self) -> None:
         """Show the whole picture."""
         self.view.fit()
+
+
+def _saturated_text(shares: tuple[float, float, float], is_mono: bool) -> str:
+    """The share of saturated pixels of each colour, or of all where there is one: two of four are green."""
+    if is_mono:
+        return f"{100 * (shares[0] + 2 * shares[1] + shares[2]) / 4:.2f} %"
+    return "  ".join(f"{name} {100 * share:.2f} %" for name, share in zip(_CHANNELS, shares, strict=True))

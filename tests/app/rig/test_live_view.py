@@ -44,6 +44,28 @@ def test_a_picture_that_was_made_is_shown_unless_settings_have_changed(qtbot: Qt
     assert [curve.getData()[1] for curve in curves] == [None] * 3, "no counts of a camera that is gone"
 
 
+def test_a_camera_without_colours_has_one_curve_and_one_share(qtbot: QtBot) -> None:
+    view = LiveView()
+    qtbot.addWidget(view)
+    pixels = np.full((12, 16), 64, np.uint16)
+    pixels[0] = 4095
+    for bayer, counts, text in (
+        ("MONO", [0, 0, 0, 192], "saturated  8.33 %"),
+        ("RGGB", [48, 96, 48, 0], "saturated  R 16.67 %  G 8.33 %  B 0.00 %"),
+    ):
+        view.set_camera(CameraInfo("test", "1", 16, 12, bayer, 12, (0.01, 1000.0)))
+        draw = view.draw.value
+        assert draw is not None
+        view._figures_at = 0.0
+        frame = Frame(pixels, 10.0, 0.0)
+        view.show_frame(frame, (draw, draw(frame.pixels)))
+        assert view._saturated.text() == text
+        shown = view.histogram.content
+        data = [curve.getData()[1] for curve in (*shown.curves, shown.grey)]
+        assert [0 if each is None else each.sum() for each in data] == counts
+        assert shown.legend.isVisible() == (bayer != "MONO")
+
+
 def test_a_camera_that_ends_below_its_bits_is_saturated_there(qtbot: QtBot) -> None:
     view = LiveView()
     qtbot.addWidget(view)
