@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from datetime import datetime
 from pathlib import Path
 
@@ -29,6 +30,7 @@ from dsl_core.io.scan.origin import rig_notes
 from dsl_core.words import quoted
 
 _PHASES = {State.RUNNING: Phase.RUNNING, State.PAUSED: Phase.PAUSED, State.CANCELLING: Phase.STOPPING}
+_AWAY = " Its folder can no longer be read: connect its drive, or open the scan where it is now."
 _BUSY = "A scan is running. Wait until it ends, or cancel it; frames captured so far are kept."
 
 
@@ -231,9 +233,11 @@ class ScanController:
 
     def _failed(self, error: Exception) -> None:
         folder = self._end(Phase.LOST)
-        self._offer_to_resume(folder)
+        is_there = self._offer_to_resume(folder)
         session = self.state.interrupted.value
-        safe = f" {session.done} of {session.total} frames are saved in {folder}." if session else ""
+        safe = ""
+        if session is not None:
+            safe = f" {session.done} of {session.total} frames are saved in {folder}." if is_there else _AWAY
         story = f"The scan stopped: {sentence_of(error)}{safe}"
         self.state.trouble.set(story)
         if not self.state.is_seen.value:
@@ -247,14 +251,25 @@ class ScanController:
     def _cancelled(self) -> None:
         self._offer_to_resume(self._end(Phase.STOPPED))
 
-    def _offer_to_resume(self, folder: Path) -> None:
+    def _offer_to_resume(self, folder: Path) -> bool:
         """Offer to resume, if the scan can be read; one of which nothing was saved is planned again."""
+        is_there = False
         try:
-            if not self._remember(folder):
+            is_there = self._remember(folder)
+            if not is_there:
                 self._choose_target()
         except DslError as error:
             self._notifier.tell("error", str(error))
+        if not is_there:
+            self._count_saved()
         self.plans.refresh()
+        return is_there
+
+    def _count_saved(self) -> None:
+        """Count what was saved since a scan was resumed that can no longer be read, for when it can again."""
+        session, status = self.state.interrupted.value, self.state.status.value
+        if session is not None and status.total == session.total:
+            self.state.interrupted.set(replace(session, done=max(session.done, status.done)))
 
     def _end(self, phase: Phase) -> Path:
         assert self._scan is not None

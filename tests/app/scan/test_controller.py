@@ -252,6 +252,33 @@ def test_a_lost_camera_keeps_all_frames_and_the_scan_goes_on_later(
     assert ScanReader(tmp_path / "first.dsl").missing() == []
 
 
+def test_a_folder_that_is_gone_with_a_resumed_scan_is_not_said_to_hold_its_frames(
+    bench: ScanBench, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    with monkeypatch.context() as lost:
+        fail_from(lost, 5)
+        bench.scans.start()
+    write = ScanWriter.write
+
+    def away(self: ScanWriter, shot: Shot, frame: Frame) -> None:
+        if shot.index >= 9:
+            (tmp_path / "first.dsl").rename(tmp_path / "moved.dsl")
+            raise StoreError("The drive is gone.")
+        write(self, shot, frame)
+
+    with monkeypatch.context() as going:
+        going.setattr(ScanWriter, "write", away)
+        bench.rig.connect(TWIN)
+        bench.scans.start()
+    assert phase(bench) is Phase.LOST
+    assert "The drive is gone" in bench.state.trouble.value
+    assert "can no longer be read" in bench.state.trouble.value
+    assert "frames are saved" not in bench.state.trouble.value
+    session = bench.state.interrupted.value
+    assert session is not None
+    assert session.done == 9
+
+
 def test_frames_of_the_scan_before_are_not_shown_as_those_of_one_that_saved_none(
     bench: ScanBench, monkeypatch: pytest.MonkeyPatch
 ) -> None:
