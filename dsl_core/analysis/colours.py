@@ -153,8 +153,8 @@ def colours_of(
         for name, (lab, covariance) in labs.items():
             difference: tuple[float | None, float | None] = (None, None)
             if reference is not None and name != reference:
-                value, std = _difference(lab, covariance, *labs[reference])
-                difference = value, std if sure[name] or sure[reference] else math.nan
+                distance, its_std = _difference(lab, covariance, *labs[reference])
+                difference = distance, its_std if sure[name] or sure[reference] else math.nan
             deviations = np.sqrt(np.diag(covariance)) if sure[name] else np.full(3, np.nan)
             found.append(Colour(name, light, _three(lab), _three(deviations), *difference))
     return found

@@ -8,6 +8,7 @@ from dsl_app.shared.theme import DARK, LIGHT
 from pytestqt.qtbot import QtBot
 
 from dsl_core.devices.base import CameraInfo
+from dsl_core.model.conditions import BayerPattern
 from dsl_core.model.frames import Frame
 
 
@@ -49,10 +50,11 @@ def test_a_camera_without_colours_has_one_curve_and_one_share(qtbot: QtBot) -> N
     qtbot.addWidget(view)
     pixels = np.full((12, 16), 64, np.uint16)
     pixels[0] = 4095
-    for bayer, counts, text in (
+    cases: tuple[tuple[BayerPattern, list[int], str], ...] = (
         ("MONO", [0, 0, 0, 192], "saturated  8.33 %"),
         ("RGGB", [48, 96, 48, 0], "saturated  R 16.67 %  G 8.33 %  B 0.00 %"),
-    ):
+    )
+    for bayer, counts, text in cases:
         view.set_camera(CameraInfo("test", "1", 16, 12, bayer, 12, (0.01, 1000.0)))
         draw = view.draw.value
         assert draw is not None

@@ -41,7 +41,12 @@ def test_a_person_is_asked_about_the_file_with_the_ending_that_is_added(
     parent, asked = QWidget(), list[str]()
     qtbot.addWidget(parent)
     monkeypatch.setattr(QFileDialog, "getSaveFileName", lambda *_: (str(tmp_path / "Plan v1.2"), ""))
-    monkeypatch.setattr(save_dialog, "confirm", lambda *about, **_: asked.append(about[2]) or answer)
+
+    def answered(_: QWidget, title: str, text: str, **buttons: str) -> bool:
+        asked.append(text)
+        return answer
+
+    monkeypatch.setattr(save_dialog, "confirm", answered)
     path = tmp_path / "Plan v1.2.html"
     assert ask_place(parent, "Write", "draft.html", KINDS) == path
     assert asked == []
