@@ -21,6 +21,8 @@ from dsl_core.reconstruction.findings.flag_findings import FEWEST, SpectralCount
 MOST_UNDECIDED = 0.5
 #: Bands wider than this many lines leave structure in the data that straight pieces cannot follow.
 WIDEST_BAND = 1.25
+#: Name of what is found of their width.
+WIDE_BANDS = "width of a band in lines"
 
 
 def line_width_nm(
@@ -53,12 +55,13 @@ def band_findings(step_nm: float, line_nm: float, spectra: SpectralCounts) -> It
     wide = step_nm / line_nm
     yield FitFinding.judged(
         "bands",
-        "width of a band in lines",
+        WIDE_BANDS,
         wide,
         "1",
         WIDEST_BAND,
         f"Bands of {step_nm:g} nm are coarse for lines that are {line_nm:.0f} nm wide.",
-        f"Reconstruct with bands of at most {line_nm:.0f} nm.",
+        f"Reconstruct with bands of at most {line_nm:.0f} nm. Until then, nothing shows whether colours and"
+        " surfaces are as the model has them.",
     )
     bands = spectra.reached + spectra.unreached
     if bands >= FEWEST:

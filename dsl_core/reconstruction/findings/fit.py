@@ -15,7 +15,10 @@ from dsl_core.optics.parallax import parallax_of
 from dsl_core.reconstruction.calibration_age import CHANGED_REL_STD
 from dsl_core.reconstruction.findings.band_findings import band_findings, line_width_nm
 from dsl_core.reconstruction.findings.flag_findings import SpectralCounts, share_findings
-from dsl_core.reconstruction.findings.known_causes import without_drift_that_is_none
+from dsl_core.reconstruction.findings.known_causes import (
+    without_drift_that_is_none,
+    without_misfit_of_wide_bands,
+)
 from dsl_core.reconstruction.findings.line_edges import edge_findings
 from dsl_core.reconstruction.findings.model_findings import MOVED, cause_findings
 from dsl_core.reconstruction.spectral.film_motion import orders_off_px
@@ -52,6 +55,7 @@ def fit_of(
         findings += without_drift_that_is_none(of_model, [*findings])
     turn = None if followed is None else followed.turn
     common = [rig.white_scale_rel_std, rig.reference_rel_std, 0.0 if turn is None else turn.level_rel_std]
+    findings = without_misfit_of_wide_bands(findings)
     fit = Fit.of(findings, () if error is None else np.round(error.relative, 4).tolist())
     fit = fit.model_copy(update={"common_rel_std": float(np.linalg.norm(common))})
     if followed is None or not followed.has_changed:

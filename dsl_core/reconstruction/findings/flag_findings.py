@@ -22,6 +22,8 @@ MOST_UNUSUAL_AREA = 0.003
 BRIGHTEST = 0.99
 #: Fewer pixels say nothing.
 FEWEST = 50
+#: Names of what is found of spectra that do not explain the frames, in areas, and here and there.
+POOR_AREAS, POOR_FIT = "poor fit of whole areas", "poor fit"
 
 
 @dataclass(frozen=True)
@@ -156,7 +158,7 @@ def _of_spectra(
     of_areas = in_areas((flags & int(Flag.POOR_FIT)) != 0, is_measured)
     yield _share(
         "surfaces",
-        "poor fit of whole areas",
+        POOR_AREAS,
         of_areas / measured,
         MOST_POOR_AREA,
         "No spectrum explains the line frames of whole areas, which hold {0} of the pixels: surfaces there"
@@ -167,7 +169,7 @@ def _of_spectra(
     )
     yield _share(
         "mixed pixels",
-        "poor fit",
+        POOR_FIT,
         (spectra.poor - of_areas) / measured,
         MOST_POOR,
         "No spectrum explains the line frames of {0} of the pixels, here and there.",

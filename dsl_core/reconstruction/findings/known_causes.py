@@ -5,12 +5,21 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from dsl_core.model.fit import FitFinding
-from dsl_core.reconstruction.findings.model_findings import DRIFT_LEFT
+from dsl_core.reconstruction.findings.band_findings import WIDE_BANDS
+from dsl_core.reconstruction.findings.flag_findings import POOR_AREAS, POOR_FIT
+from dsl_core.reconstruction.findings.model_findings import (
+    COLOUR_GAINS,
+    COLOURS_DISAGREE,
+    DRIFT_LEFT,
+    MISFIT,
+)
 from dsl_core.reconstruction.light.told import BLACK_AGAIN, DRIFT
 from dsl_core.reconstruction.spectral.order_balance import BALANCE
 
 #: What may be left of a drift in frames that follow the light: so much, and so many deviations of it.
 MOST_LEFT, SIGMAS = 0.05, 4.5
+#: What bands that are too wide for the lines look like: straight pieces follow no spectrum then.
+BY_WIDE_BANDS = frozenset({POOR_AREAS, POOR_FIT, COLOUR_GAINS, COLOURS_DISAGREE, MISFIT})
 
 
 def with_known_causes(findings: Iterable[FitFinding]) -> list[FitFinding]:
@@ -34,6 +43,20 @@ def _by_black(finding: FitFinding) -> FitFinding:
             " film was turned over.",
         }
     )
+
+
+def without_misfit_of_wide_bands(findings: Iterable[FitFinding]) -> list[FitFinding]:
+    """The same findings, where bands too wide for the lines are told and may be all that does not fit.
+
+    Nobody should look for a fault of the camera, the film or the surface before bands are narrower.
+    """
+    found = list(findings)
+    if not any(each.significant and each.name == WIDE_BANDS for each in found):
+        return found
+    return [
+        each.model_copy(update={"significant": False}) if each.name in BY_WIDE_BANDS else each
+        for each in found
+    ]
 
 
 def without_drift_that_is_none(

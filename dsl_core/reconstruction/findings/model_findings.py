@@ -48,6 +48,9 @@ LEAST_DEPTH_SHARE = 0.001
 DRIFT_LEFT = "change of the light over the scan"
 #: Name of what is found of the second orders.
 SECONDS = "light of the second orders"
+#: Names of what is found of the colours of the camera, and of all that frames and model differ by.
+COLOURS_DISAGREE, COLOUR_GAINS = "disagreement of the colours", "gains of the camera's colours, blue from red"
+MISFIT = "misfit of most pixels"
 #: Added to findings whose effect the spectra of the result already allow for.
 CORRECTED = " The spectra of this result are corrected for it."
 #: Words, decimals and unit of the numbers of a film, as in `FIELDS`.
@@ -114,7 +117,7 @@ def cause_findings(
     if probe.curves is not None:
         yield FitFinding.judged(
             "curves",
-            "disagreement of the colours",
+            COLOURS_DISAGREE,
             (probe.curves.rms, probe.curves.std),
             "1",
             MOST_CURVES,
@@ -127,7 +130,7 @@ def cause_findings(
     usual = probe.usual_chi_square
     yield FitFinding.judged(
         "profile",
-        "misfit of most pixels",
+        MISFIT,
         float(np.sqrt(usual)),
         "deviations",
         MOST_CHI_SQUARE**0.5,
@@ -163,7 +166,7 @@ def _colour_gains(probe: Probe, displaced: bool) -> Iterator[FitFinding]:
     value, std = gains.apart
     found = FitFinding.judged(
         "curves",
-        "gains of the camera's colours, blue from red",
+        COLOUR_GAINS,
         (value, std),
         "1",
         MOST_COLOUR_GAIN,

@@ -4,9 +4,20 @@ from __future__ import annotations
 
 import pytest
 
-from dsl_core.model.fit import FitFinding
-from dsl_core.reconstruction.findings.known_causes import with_known_causes, without_drift_that_is_none
-from dsl_core.reconstruction.findings.model_findings import DRIFT_LEFT
+from dsl_core.model.fit import Fit, FitFinding
+from dsl_core.reconstruction.findings.band_findings import band_findings
+from dsl_core.reconstruction.findings.flag_findings import POOR_AREAS, POOR_FIT, SpectralCounts
+from dsl_core.reconstruction.findings.known_causes import (
+    with_known_causes,
+    without_drift_that_is_none,
+    without_misfit_of_wide_bands,
+)
+from dsl_core.reconstruction.findings.model_findings import (
+    COLOUR_GAINS,
+    COLOURS_DISAGREE,
+    DRIFT_LEFT,
+    MISFIT,
+)
 from dsl_core.reconstruction.light.told import BLACK_AGAIN, DRIFT
 from dsl_core.reconstruction.spectral.order_balance import BALANCE
 
@@ -40,3 +51,16 @@ def test_light_whose_course_is_known_has_not_drifted_much_beyond_it(
     )
     found = without_drift_that_is_none([seen], known)
     assert [each.significant for each in found] == [is_told]
+
+
+@pytest.mark.parametrize("name", [POOR_AREAS, POOR_FIT, COLOUR_GAINS, COLOURS_DISAGREE, MISFIT])
+@pytest.mark.parametrize(("step_nm", "is_told"), [(46.0, False), (5.0, True)])
+def test_bands_too_wide_for_the_lines_are_told_alone(name: str, step_nm: float, is_told: bool) -> None:
+    misfit = finding(name, 0.98, "Surfaces are fluorescent.")
+    drift = finding("change of the light", 0.9, "The light has changed.")
+    bands = band_findings(step_nm, 10.0, SpectralCounts())
+    fit = Fit.of(without_misfit_of_wide_bands([misfit, drift, *bands]))
+    assert ("fluorescent" in fit.words) == is_told
+    assert ("coarse for lines" in fit.words) == (not is_told)
+    assert "The light has changed." in fit.words, "no width of bands makes light drift"
+    assert {each.name for each in fit.findings} >= {name}
