@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from dsl_core.analysis.band_noise import usual_correlation
 from dsl_core.errors import DecodeError
-from dsl_core.optics.colour import delta_e_2000, read_columns, xyz_to_lab
+from dsl_core.optics.colour import LEAST_SEEN, delta_e_2000, read_columns, seen_shares, xyz_to_lab
 
 Floats = NDArray[np.float64]
 #: Illuminants by the names of colour-science, with words for a person.
@@ -35,10 +35,6 @@ ILLUMINANTS: dict[str, str] = {
 #: Those of a table unless others are wanted.
 USUAL = ("A", "D50", "D65", "FL11", "LED-B3")
 
-
-#: Least shares of X, Y and Z of the perfect diffuser that bands must hold. Missing ends are continued as they
-#: are at the last band, which is right for short ones alone.
-LEAST_SEEN = (0.7, 0.7, 0.55)
 
 #: What `Colour.cells` are.
 HEADER = ("place", "light", "L*", "±L*", "a*", "±a*", "b*", "±b*", "ΔE00", "±ΔE00")
@@ -91,9 +87,7 @@ def xyz_weights(bands_nm: Floats, light: str) -> Floats:
 def require_bands(bands_nm: Floats, light: str) -> None:
     """Raise `DecodeError` where bands leave out too much of what makes a colour under a light."""
     nm, matching = _table(light)
-    half = abs(bands_nm[-1] - bands_nm[0]) / max(len(bands_nm) - 1, 1) / 2
-    inside = (nm >= bands_nm.min() - half) & (nm <= bands_nm.max() + half)
-    seen = matching[:, inside].sum(1) / matching.sum(1)
+    seen = seen_shares(bands_nm, nm, matching)
     if np.any(seen < LEAST_SEEN):
         least = int((seen - LEAST_SEEN).argmin())
         raise DecodeError(

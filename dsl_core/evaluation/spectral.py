@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from dsl_core.errors import DecodeError
 from dsl_core.model.spectral import SpectralCurve
-from dsl_core.optics.colour import delta_e_2000, reflectance_to_lab
+from dsl_core.optics.colour import delta_e_2000, hold_colour, reflectance_to_lab
 
 Floats = NDArray[np.float64]
 Value = TypeVar("Value", float, Floats)
@@ -35,6 +35,12 @@ class SpectralErrors(Generic[Value]):
 def first_of(errors: SpectralErrors[Floats]) -> dict[str, float]:
     """Those of the first spectrum, by name."""
     return {name: float(values[0]) for name, values in vars(errors).items()}
+
+
+def known_of_first(errors: SpectralErrors[Floats], bands_nm: Floats) -> dict[str, float]:
+    """As `first_of`, with NaN for colours of which bands (bands,), nm, hold too little."""
+    unknown = {} if hold_colour(bands_nm) else dict.fromkeys(("delta_e", "delta_e_scaled"), float("nan"))
+    return first_of(errors) | unknown
 
 
 def spectral_errors(measured: Floats, truth: Floats, wavelengths_nm: Floats) -> SpectralErrors[Floats]:
@@ -126,7 +132,8 @@ MIN_BANDS = 5
 class SpectrumComparison(SpectralErrors[float]):
     """How a spectrum differs from a reference over the bands they share.
 
-    ``std`` has one standard deviation of each figure; None where no deviation of a band is known.
+    ``std`` has one standard deviation of each figure; None where no deviation of a band is known. Differences
+    of colour are NaN where these bands hold too little of one.
     """
 
     bands: int
@@ -165,7 +172,7 @@ def compare(
         None if reference.std is None else np.interp(bands, nm, np.asarray(reference.std)),
     )
     return SpectrumComparison(
-        **first_of(found),
+        **known_of_first(found, bands),
         bands=count,
         range_nm=(float(bands[0]), float(bands[-1])),
         std=_deviations(measured, wanted, bands, found, [_steps(each, together) for each in stds]),

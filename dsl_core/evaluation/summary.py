@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from dsl_core.errors import DecodeError
 from dsl_core.evaluation.depth import DepthScore, depth_score
 from dsl_core.evaluation.scatter import std_of_mean
-from dsl_core.evaluation.spectral import Peak, SpectralErrors, first_of, peak_width, spectral_errors
+from dsl_core.evaluation.spectral import Peak, SpectralErrors, known_of_first, peak_width, spectral_errors
 from dsl_core.evaluation.uncertainty import DECIDED_FROM, HonestyCheck, check_honesty
 
 if TYPE_CHECKING:
@@ -65,6 +65,7 @@ class PatchScore(SpectralErrors[float]):
 
     ``truth``, ``mean``, ``std`` (scatter from pixel to pixel), ``posterior_std`` (mean, as the result states
     it) and ``data_share`` have shape (bands,); ``coverage`` is the measured share of the patch's lit pixels.
+    Differences of colour are NaN where the bands of the result hold too little of one.
     """
 
     name: str
@@ -221,7 +222,7 @@ def _score(sample: _Sample, bands: Floats) -> PatchScore:
         std=sample.reflectance.std(axis=1),
         posterior_std=None if sample.std is None else np.nanmean(sample.std, axis=1, dtype=np.float64),
         data_share=None if sample.share is None else np.nanmean(sample.share, axis=1, dtype=np.float64),
-        **first_of(ours),
+        **known_of_first(ours, bands),
         pixel_rmse=float(np.sqrt(np.mean(pixels.rmse**2))),
         pixel_angle_rad=float(pixels.angle_rad.mean()),
         truth_peak=truth_peak,

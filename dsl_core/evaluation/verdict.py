@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
@@ -98,7 +99,7 @@ def figures(evaluation: Evaluation) -> dict[str, float]:
         found["fwhm_nm"] = evaluation.mean_fwhm_nm
     if evaluation.spectral_calibration is not None:
         found["spectral_coverage_95"] = evaluation.spectral_calibration.coverage_95
-    return found
+    return {name: value for name, value in found.items() if not math.isnan(value)}
 
 
 def deviations(evaluation: Evaluation) -> dict[str, float]:
@@ -113,7 +114,7 @@ def deviations(evaluation: Evaluation) -> dict[str, float]:
     }
     if (depth := evaluation.depth) is not None:
         stds |= {"depth_rmse_mm": depth.rmse_std_mm, "depth_bias_mm": depth.bias_std_mm}
-    return {name: std for name, std in stds.items() if std is not None}
+    return {name: std for name, std in stds.items() if std is not None and not math.isnan(std)}
 
 
 def verdicts(evaluation: Evaluation, goals: Mapping[str, Goal] | None = None) -> tuple[Verdict, ...]:

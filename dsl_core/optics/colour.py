@@ -31,6 +31,9 @@ CIE_1931_XYZ: Floats = _TABLE[1:4]
 CIE_D65: Floats = _TABLE[4]
 #: XYZ (D65 white, Y = 1) to linear sRGB, IEC 61966-2-1.
 _XYZ_TO_SRGB = np.array([[3.2406, -1.5372, -0.4986], [-0.9689, 1.8758, 0.0415], [0.0557, -0.2040, 1.0570]])
+#: Least shares of X, Y and Z of the perfect diffuser that bands must hold for a colour. Missing ends are
+#: continued as they are at the last band, which is right for short ones alone.
+LEAST_SEEN = (0.7, 0.7, 0.55)
 _LUT_STEPS = 4096
 #: Pixels per block, so that intermediates stay in the processor's cache.
 _BLOCK = 32768
@@ -86,6 +89,25 @@ def _observer_weights(shape: tuple[int, ...], content: bytes, illuminant: str) -
     weights = np.asarray(matching @ spread.T / matching[1].sum())
     weights.flags.writeable = False
     return weights
+
+
+def seen_shares(bands_nm: Floats, nm: Floats, matching: Floats) -> Floats:
+    """Shares of X, Y and Z (3,) of the perfect diffuser that bands (bands,), nm, hold.
+
+    ``matching`` (3, wavelengths) is observer times illuminant at ``nm``. Bands reach half a step beyond ends.
+    """
+    half = abs(bands_nm[-1] - bands_nm[0]) / max(len(bands_nm) - 1, 1) / 2
+    inside = (nm >= bands_nm.min() - half) & (nm <= bands_nm.max() + half)
+    return np.asarray(matching[:, inside].sum(1) / matching.sum(1))
+
+
+def hold_colour(bands_nm: Floats) -> bool:
+    """Whether bands (bands,), nm, hold enough of a colour under D65 for a figure of it.
+
+    >>> hold_colour(np.arange(430.0, 661.0, 5.0)), hold_colour(np.arange(440.0, 461.0, 5.0))
+    (True, False)
+    """
+    return bool((seen_shares(np.asarray(bands_nm), CIE_NM, CIE_1931_XYZ * CIE_D65) >= LEAST_SEEN).all())
 
 
 def reflectance_to_xyz(cube: AnyFloats, wavelengths_nm: Floats, illuminant: str = "D65") -> AnyFloats:

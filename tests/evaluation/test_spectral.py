@@ -143,3 +143,12 @@ def test_a_comparison_without_stated_deviations_has_none() -> None:
     curve = SpectralCurve.of(GRID, TRUTH[:, 0])
     assert compare(0.9 * TRUTH[:, 0], GRID, curve).std is None
     assert compare(0.9 * TRUTH[:, 0], GRID, curve, np.full(len(GRID), np.nan)).std is None
+
+
+def test_a_reference_of_few_wavelengths_has_no_colour_to_compare() -> None:
+    nm = np.arange(430.0, 661.0, 5.0)
+    whole = compare(np.full(47, 0.5), nm, SpectralCurve.of([400.0, 700.0], [0.4, 0.4]))
+    part = compare(np.full(47, 0.5), nm, SpectralCurve.of([500.0, 550.0], [0.4, 0.4]))
+    assert whole.delta_e > 1
+    assert np.isnan([part.delta_e, part.delta_e_scaled]).all()
+    assert part.rmse == pytest.approx(whole.rmse)

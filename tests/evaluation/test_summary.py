@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 
 from dsl_core.errors import DecodeError
+from dsl_core.evaluation.report.scan_report import _patch_note
 from dsl_core.evaluation.summary import Evaluation, Truth, evaluate, interior
-from dsl_core.evaluation.verdict import Goal, figures, verdicts
+from dsl_core.evaluation.verdict import Goal, deviations, figures, verdicts
 
 
 def test_depth_is_judged_over_lit_pixels(known: Any) -> None:
@@ -126,3 +127,17 @@ def test_estimates_have_a_deviation_and_counts_have_none(known: Any) -> None:
 def test_a_goal_for_an_unknown_figure_is_refused(known: Any) -> None:
     with pytest.raises(KeyError):
         verdicts(evaluate(known.result, known.truth), {"beauty": Goal(1.0)})
+
+
+def test_bands_that_hold_too_little_of_a_colour_have_no_colour_difference(known: Any) -> None:
+    nm = known.result["wavelength_nm"].values
+    some = np.flatnonzero((nm >= 440) & (nm <= 460))
+    result = known.result.isel(wavelength_nm=some)
+    truth = replace(known.truth, targets=(0,), spectra=known.truth.spectra[:, some])
+    found = evaluate(result, truth)
+    assert np.isnan(found.patches[0].delta_e)
+    whole = evaluate(known.result, replace(truth, spectra=known.truth.spectra))
+    assert figures(found).keys() == figures(whole).keys() - {"delta_e"}
+    assert "delta_e" not in deviations(found)
+    assert not any("CIEDE2000" in row.figure for row in verdicts(found))
+    assert _patch_note(found.patches[0]) == f"RMSE {found.patches[0].rmse:.3f}"

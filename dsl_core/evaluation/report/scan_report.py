@@ -198,7 +198,8 @@ def _spectra(content: ReportContent, pixels: Sequence[tuple[int, int]]) -> list[
 def _patch_note(patch: PatchScore) -> str:
     if patch.peak is not None:
         return f"FWHM {patch.peak.fwhm_nm:.1f} nm"
-    return f"RMSE {patch.rmse:.3f} · ΔE00 {patch.delta_e:.1f}"
+    colour = "" if np.isnan(patch.delta_e) else f" · ΔE00 {patch.delta_e:.1f}"
+    return f"RMSE {patch.rmse:.3f}{colour}"
 
 
 def _true_spectrum(

@@ -131,6 +131,8 @@ def _compared(name: str, measured: Mark, curve: SpectralCurve, theme: Theme) -> 
 def _figure(found: SpectrumComparison, name: str, decimals: int) -> str:
     """A figure of a comparison with its deviation, where that is known."""
     value = getattr(found, name)
+    if not np.isfinite(value):
+        return number_text(value, decimals)
     std = None if found.std is None else getattr(found.std, name)
     if not std:
         return f"{value:.{decimals}f}"

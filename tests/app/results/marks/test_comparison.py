@@ -78,7 +78,9 @@ def test_a_short_reference_says_its_range(bench: Bench, tmp_path: Path) -> None:
     short = tmp_path / "short.csv"
     short.write_text("\n".join(f"{nm},0.5" for nm in range(500, 551, 5)))
     bench.control.marks.add_reference(short)
-    assert "only 500–550 nm, scaled by" in select(bench, 0)
+    html = select(bench, 0)
+    assert "only 500–550 nm, scaled by" in html
+    assert html.count("<td align='right'>–</td>") == 2, "so few wavelengths have no colour"
 
 
 def test_a_region_says_how_its_pixels_differ_and_what_is_stated_for_one(bench: Bench) -> None:
