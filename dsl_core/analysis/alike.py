@@ -71,7 +71,8 @@ def groups_alike(
         level_std, level_std[:, None]
     )
     _, group = connected_components(near_level & (of_shape == of_shape[:, None]), directed=False)
-    return _by_level(reflectance, nearest, of_shape, group, levels, shapes)
+    of_classes = of_shape.astype(np.intp), group.astype(np.intp)
+    return _by_level(reflectance, nearest, *of_classes, levels, shapes)
 
 
 def _by_level(

@@ -158,8 +158,8 @@ def within_nm(result: xr.Dataset, low_nm: float, high_nm: float) -> xr.Dataset:
 def areas_of(result: xr.Dataset) -> PixelAreas | None:
     """Areas of the pixels; None for a result without points."""
     names = ("points_mm", "normals", "depth_std_mm")
-    given = (result[name].values if name in result else None for name in names)
-    return PixelAreas.of(*given, places_px=columns_and_rows_px(result))
+    points_mm, normals, std_mm = (result[name].values if name in result else None for name in names)
+    return PixelAreas.of(points_mm, normals, std_mm, columns_and_rows_px(result))
 
 
 def classes_of_masks(result: xr.Dataset, masks: Mapping[str, Mask]) -> tuple[SpectralClass, ...]:

@@ -198,8 +198,8 @@ def score(
     assert std is not None
     judged &= np.isfinite(std).all(0)
     at, done = np.flatnonzero(judged), 0
-    bands_nm = 5.0 * np.arange(len(reflectance)) if bands_nm is None else bands_nm
-    alike, correlations = _correlations(reflectance, std, at, flags == 0, classes, bands_nm)
+    nm = np.arange(0.0, 5.0 * len(reflectance), 5.0) if bands_nm is None else bands_nm
+    alike, correlations = _correlations(reflectance, std, at, flags == 0, classes, nm)
     flat = [cube.reshape(len(cube), -1) for cube in (reflectance, std)]
     decided = None if data_share is None else data_share.reshape(len(data_share), -1) >= DECIDED_FROM
     for pixels, group, bands in _alike(at, alike, decided, len(reflectance)):

@@ -65,7 +65,8 @@ class ResultAccessor:
         result = with_axes(self._result)
         mask = place_mask(result, where)
         stated = _with_unstated(result)
-        found = region_spectrum(*(stated[name].values for name in _OF_BANDS), mask)
+        values, std, share = (stated[name].values for name in _OF_BANDS)
+        found = region_spectrum(values, std, share, mask)
         if found.used == 0:
             raise DecodeError(f"None of the {found.pixels} pixels of the region has a spectrum.")
         over = "wavelength_nm"
@@ -222,7 +223,7 @@ def _flags(result: xr.Dataset) -> xr.DataArray:
         return with_bits(result)["flags"]
     known = (result["depth_mm"] if "depth_mm" in result else result["reflectance"]).notnull()
     known = known.all(BANDS) if BANDS in known.dims else known
-    return xr.where(known, 0, int(Flag.NON_FINITE))
+    return known.copy(data=np.where(known.values, 0, int(Flag.NON_FINITE)))
 
 
 def _one_spectrum(given: xr.Dataset) -> xr.Dataset:

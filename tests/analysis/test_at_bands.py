@@ -1,7 +1,9 @@
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 import dsl_core as dsl
 from dsl_core.analysis.at_bands import at_bands, band_weights
@@ -62,7 +64,7 @@ def test_a_result_says_how_wide_its_bands_are_whatever_is_picked_of_it(tmp_path:
     (tmp_path / "edge.csv").write_text("nm,red edge (1)\n" + "".join(lines))
     rising = np.where(BANDS_NM > 591, 0.6, np.where(BANDS_NM < 589, 0.05, 0.325))
     cube = np.broadcast_to(rising[:, None, None], (len(BANDS_NM), 2, 2)).astype(np.float32)
-    arrays = {"reflectance": cube, "flags": np.zeros((2, 2), np.uint16)}
+    arrays: dict[str, NDArray[Any]] = {"reflectance": cube, "flags": np.zeros((2, 2), np.uint16)}
     result = build_result(arrays, BANDS_NM, {}).sel(wavelength_nm=np.arange(450.0, 651.0, 50.0))
     saved = dsl.load_result(dsl.save_result(result, tmp_path / "a.zarr"))
     found = dsl.classify(saved, library=tmp_path / "edge.csv", measure="rmse", worst=0.01)

@@ -101,8 +101,9 @@ class AnswersController:
                 progress,
                 result.wavelengths_nm,
             )
-            given = (result.known(name) for name in ("points_mm", "normals", "depth_std_mm"))
-            areas = PixelAreas.of(*given, places_px=result.places_px)
+            names = ("points_mm", "normals", "depth_std_mm")
+            points_mm, normals, std_mm = (result.known(name) for name in names)
+            areas = PixelAreas.of(points_mm, normals, std_mm, result.places_px)
             made = Classification.of(scores, way.limits, way.brightness, areas)
             return Materials(name, made, (*made.notes, *doubts, *notes))
 
