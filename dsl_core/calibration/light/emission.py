@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dsl_core.calibration.light.emission_checks import require_repeats, white_of_parts
+from dsl_core.calibration.light.emission_noise import noise_of_single
 from dsl_core.errors import CalibrationError
 from dsl_core.model.calibration.spectralon import (
     COLOURS,
@@ -59,8 +60,12 @@ def measured_emission(readings: EmissionReadings, reflectance: SpectralCurve) ->
     # White minus the sum of the three contains black twice.
     miss = noise["white"] + sum(noise[c] for c in _LEDS) + 4 * noise["black"]
     additivity_std = float(np.sqrt((miss * step**2).sum())) / total
-    spread = np.stack([noise[c] + noise["black"] for c in _LEDS])
     parts, apart = white_of_parts(white, leds, np.sqrt(miss))
+    # Only from here on: spectra that do not agree must not excuse themselves by it.
+    single = [c for c in COLOURS if len(readings.readings[c]) == 1]
+    variance = noise_of_single(nm, mean, variance, parts, single)
+    noise = {c: variance[c] / reflectance.at(nm) ** 2 for c in COLOURS}
+    spread = np.stack([noise[c] + noise["black"] for c in _LEDS])
     if abs(additivity - 1) < ADDITIVE:
         leds, spread = _with_white(leds, white, spread, noise)
     found = _smoothed(
