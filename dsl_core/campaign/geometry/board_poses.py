@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import product
 
 import numpy as np
@@ -22,6 +22,8 @@ Floats = NDArray[np.float64]
 CLEARANCE = 0.015
 #: Steps in which a board is moved to the middle until both devices see all of it.
 SHARES = np.linspace(1, 0, 11)
+#: Places each way of the camera's view at which a board is tried that does not fit anywhere near its middle.
+PLACES = 41
 #: Boards stand between these shares of the rig's depth range: in the middle of it, as far as they fit.
 NEAR, FAR = 0.2, 0.7
 #: Cells each way of the camera's picture by which is asked how much of it the projector lights.
@@ -153,7 +155,8 @@ def _fitted(board: Board, rig: Rig, wish: tuple[float, ...]) -> BoardPose | None
     """The pose nearest to a wish whose squares are all in view, farther away if necessary; None for none."""
     across, down, far, *turns = wish
     nearest, farthest = depths_mm(rig, NEAR + far * (FAR - NEAR), FAR)
-    for depth in np.linspace(nearest, farthest, 6):
+    depths = np.linspace(nearest, farthest, 6)
+    for depth in depths:
         low, high = _view_mm(rig.camera, float(depth))
         middle, half = (low + high) / 2, (high - low) / 2
         for shares in sorted(product(SHARES, SHARES), key=sum, reverse=True):
@@ -161,7 +164,30 @@ def _fitted(board: Board, rig: Rig, wish: tuple[float, ...]) -> BoardPose | None
             pose = BoardPose(float(x), float(y), float(depth), *turns)
             if in_view(pose, board, rig):
                 return pose
-    return None
+    # What both see need not contain the middle of the camera's picture.
+    found = (_aside(BoardPose(across, down, float(depth), *turns), board, rig) for depth in depths)
+    return next((pose for pose in found if pose is not None), None)
+
+
+def _aside(wish: BoardPose, board: Board, rig: Rig) -> BoardPose | None:
+    """The pose wherever both devices see all squares, its place (-1 to 1 each way) among all of these.
+
+    None where there is no such place at the depth of the wish.
+    """
+    low, high = _view_mm(rig.camera, wish.depth_mm)
+    places = np.array(list(product(*np.linspace(low, high, PLACES).T)))
+    outline = outline_mm(replace(wish, x_mm=0.0, y_mm=0.0), board)
+    points = (outline[:, None] + np.pad(places.T, ((0, 1), (0, 0)))[..., None]).reshape(3, -1)
+    in_projector = rig.pose.matrix @ points + rig.pose.vector_mm[:, None]
+    views = (rig.camera, points), (rig.projector, in_projector)
+    seen = np.all([_within(lens, each, CLEARANCE * lens.width_px) for lens, each in views], 0)
+    possible = places[seen.reshape(len(places), -1).all(1)]
+    if not len(possible):
+        return None
+    low, high = possible.min(0), possible.max(0)
+    wanted = (low + high) / 2 + (high - low) / 2 * (wish.x_mm, wish.y_mm)
+    x, y = possible[np.linalg.norm(possible - wanted, axis=1).argmin()]
+    return replace(wish, x_mm=float(x), y_mm=float(y))
 
 
 def _view_mm(lens: Lens, depth_mm: float) -> tuple[Floats, Floats]:

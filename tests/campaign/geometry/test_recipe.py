@@ -21,6 +21,7 @@ from dsl_core.errors import CalibrationError
 from dsl_core.model.board import Charuco, Checkerboard
 from dsl_core.model.calibration.geometry import GeometryCalibration
 from dsl_core.model.calibration.pose_frames import PoseFrames
+from dsl_core.model.geometry import Pose
 from dsl_core.model.placement import Placement
 from dsl_core.model.rig import Rig
 from dsl_core.optics.pinhole import project, rays_at
@@ -246,6 +247,38 @@ def test_devices_described_as_looking_past_each_other_are_named_instead_of_the_b
     aside = rig.pose.model_copy(update={"translation_mm": (350.0, 0.0, 0.0)})
     with pytest.raises(CalibrationError, match=r"projector lights \d+% of the camera.*correct the pose"):
         default_poses(BOARD, rig.model_copy(update={"pose": aside}), 5)
+
+
+def aside(shift: tuple[float, float], baseline_mm: float | None = None) -> Rig:
+    """Lenses without distortion, the projector's shifted by shares of its picture; or with parallel axes."""
+    rig = published_rig()
+    straight = {"distortion": (0.0,) * 5, "cx_px": rig.projector.cx_px + 640 * shift[0]}
+    lens = rig.projector.model_copy(update={**straight, "cy_px": rig.projector.cy_px + 360 * shift[1]})
+    parallel = Pose(rotation=((1, 0, 0), (0, 1, 0), (0, 0, 1)), translation_mm=(baseline_mm or 0.0, 0, 0))
+    return rig.model_copy(update={"projector": lens, "pose": parallel if baseline_mm else rig.pose})
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("rig", "square_mm"),
+    [
+        (aside((0.3, 0)), 15.0),
+        (aside((0, 0.45)), 15.0),
+        (aside((0, 0), 100.0), 8.0),
+        (aside((0, 0), 250.0), 8.0),
+    ],
+)
+def test_boards_go_where_both_devices_see_them_however_far_aside(rig: Rig, square_mm: float) -> None:
+    board = Checkerboard(columns=9, rows=6, square_mm=square_mm)
+    poses = default_poses(board, rig, 6)
+    assert all(in_view(pose, board, rig) for pose in poses)
+    # Poses that differ in their wished place differ in their place, as far as there is room.
+    left, right = poses[1].x_mm, poses[2].x_mm
+    upper, lower = poses[1].y_mm, poses[3].y_mm
+    assert left < right
+    assert upper < lower
+    with pytest.raises(CalibrationError, match="does not fit into the view of camera and projector"):
+        default_poses(Checkerboard(columns=9, rows=6, square_mm=3 * square_mm), rig, 6)
 
 
 def test_boards_stand_at_the_depths_that_the_rig_is_for() -> None:
