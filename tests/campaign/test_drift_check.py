@@ -18,6 +18,7 @@ from dsl_core.model.geometry import Pose
 from dsl_core.model.plan import CapturePlan
 from dsl_core.model.rig import Rig
 from dsl_core.model.spectral import SpectralCurve
+from dsl_core.simulation import sim_devices
 from dsl_core.simulation.published_rig import published_rig
 from dsl_core.simulation.sim_devices import SimCamera, open_twin
 from tests.cases.twin_scan import MemoryScan, twin_scan
@@ -176,6 +177,42 @@ def test_what_has_changed_is_named(shot: tuple[Rig, MemoryScan], change: Change,
     missed = failures(drift_figures(scan, change(rig), False, pixels=FEW))
     assert any(figure.name.startswith(name) for figure in missed), missed
     assert all(figure.advice for figure in missed)
+
+
+@pytest.fixture(scope="module")
+def fine_film() -> tuple[Rig, MemoryScan]:
+    """A rig whose film has 1000 lines/mm, most of whose first orders miss the picture, and its quick shot."""
+    rig = _changed(published_rig(), "film", lines_per_mm=1000.0)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(sim_devices, "published_rig", lambda: rig)
+        devices, scan = twin_scan(quick_plan(), size="160x104", scene="plane")
+    assert devices.calibration is not None
+    return devices.calibration, scan
+
+
+@pytest.mark.slow
+def test_a_film_of_many_lines_has_not_moved_because_little_of_it_is_seen(
+    fine_film: tuple[Rig, MemoryScan],
+) -> None:
+    rig, scan = fine_film
+    figures = drift_figures(scan, rig, spectralon=False)
+    assert failures(figures) == ()
+    assert [figure.name.split(" ")[0] for figure in figures if "order" in figure.name] == [
+        "light",
+        "brightness",
+    ] * 2
+
+
+@pytest.mark.slow
+def test_another_film_is_told_where_little_of_the_calibrated_one_is_seen(
+    fine_film: tuple[Rig, MemoryScan], shot: tuple[Rig, MemoryScan]
+) -> None:
+    _, scan = shot
+    calibrated = _changed(shot[0], "film", lines_per_mm=fine_film[0].film.lines_per_mm)
+    missed = failures(drift_figures(scan, calibrated, spectralon=False))
+    assert [figure.name for figure in missed] == [
+        f"brightness of order {order}, over calibration" for order in ("+1", "-1")
+    ]
 
 
 def test_a_target_that_is_too_small_is_told() -> None:

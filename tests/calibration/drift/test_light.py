@@ -206,8 +206,11 @@ def test_figures_have_limits_on_both_sides() -> None:
 class Expected:
     """What the calibration expects, as given: the zero order, one first order, and another beside it."""
 
-    def __init__(self, zero: np.ndarray, here: np.ndarray, other: np.ndarray) -> None:
-        self.zero, self.here, self.other = zero, here, other
+    def __init__(self, zero: np.ndarray, here: np.ndarray, other: np.ndarray, share: float = 1.0) -> None:
+        self.zero, self.here, self.other, self.share = zero, here, other, share
+
+    def inside(self, order: int) -> np.ndarray:
+        return np.full(self.here.shape[1], self.share)
 
     def signals(self, orders: tuple[int, ...] = (), shift_px: float = 0.0) -> np.ndarray:
         if orders == (0,) or not orders:
@@ -292,3 +295,52 @@ def test_signals_far_off_pull_as_those_at_the_limit() -> None:
     pulls = [abs(float(np.clip(off / scale, -limit, limit).mean())) for limit in (1.345, 2.0, 0.9)]
     assert pulls[0] < 5e-3
     assert min(pulls[1:]) > 0.02
+
+
+@pytest.mark.parametrize(
+    ("count", "share", "figures"),
+    [
+        (200, 0.61, ["displacement of order", "brightness of order"]),
+        (200, 0.59, ["light of order", "brightness of order"]),
+        (200, 0.41, ["light of order", "brightness of order"]),
+        (200, 0.39, ["light of order"]),
+        (199, 0.61, ["signals of order"]),
+        (199, 0.39, ["signals of order"]),
+    ],
+)
+def test_an_order_of_which_too_little_is_seen_is_not_judged(
+    count: int, share: float, figures: list[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    zero, here = np.full((1, 600), 4.0), np.zeros((1, 600))
+    here[0, :count] = 1.0
+    expected = Expected(zero, here, 1e-6 * here, share)
+    monkeypatch.setattr(light, "_Plane", lambda *_: expected)
+    monkeypatch.setattr(light, "_shift", lambda *_: (9.0, 1.0, 0.1, 0.1))
+    found = film_drift(RIG, even_signals(zero + 1e-3), WHITE)
+    assert [figure.name[: len(name)] for figure, name in zip(found, 2 * figures, strict=True)] == 2 * figures
+    assert [figure.passed for figure in found] == [not f.name.startswith("displacement") for f in found]
+    told = [figure for figure in found if "too" in figure.name]
+    value = pytest.approx(100 * share) if count == 200 else count
+    assert all(figure.value == value and figure.advice for figure in told)
+    # Pixels that are spoilt are no fault of the film.
+    spoilt = even_signals(zero + 1e-3)
+    spoilt.std[0, :10] = np.inf
+    if count == 200 and share > 0.4:
+        with pytest.raises(CalibrationError, match="lights only 190 of the chosen pixels"):
+            film_drift(RIG, spoilt, WHITE)
+
+
+def test_light_from_outside_the_picture_is_none_of_an_orders_share() -> None:
+    """Of a film with more lines per mm, orders are farther away and wider."""
+    shares = []
+    for lines_per_mm in (300.0, 500.0, 1000.0, 1600.0):
+        film = RIG.film.model_copy(update={"lines_per_mm": lines_per_mm})
+        plane = light._Plane(RIG.model_copy(update={"film": film}), signals(), WHITE)
+        inside = plane.inside(1)
+        assert inside.shape == (len(CHOSEN),)
+        assert inside.min() >= 0.0
+        assert inside.max() <= 1.0 + 1e-9
+        shares.append(inside.mean())
+    assert shares == sorted(shares, reverse=True)
+    assert shares[0] > 0.7
+    assert shares[-1] < 0.05
