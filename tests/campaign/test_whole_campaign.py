@@ -38,7 +38,7 @@ def test_the_rig_is_nearer_to_the_truth_than_the_data_sheet(calibrated: Calibrat
     assert rig.film.lines_per_mm == pytest.approx(truth.film.lines_per_mm, rel=2e-3)
     assert rig.pose.vector_mm == pytest.approx(truth.pose.vector_mm, abs=0.5)
     assert rig.projector_response.gamma == pytest.approx(truth.projector_response.gamma, rel=0.01)
-    # Two filters tell nothing of what lies between them.
+    # Few filters tell less of what lies between them.
     for order in (1, -1):
         found, true, start = (each.efficiency[order].at(450.0) for each in (rig, truth, nominal))
         assert abs(found - true) < 0.1 * abs(start - true)

@@ -2,8 +2,8 @@
 
 The light of the order relative to the zero order is the mean of the efficiency over what filter, LEDs and
 camera let pass, not its value at the filter's centre. The logarithm of the efficiency is a smooth function,
-a straight line and a Gaussian process, as smooth as the data say (`solve.smooth_functions`); the means are
-linearised around the curve itself.
+a straight line and a Gaussian process, as smooth as the data say (`solve.smooth_functions`), or as films are
+where few filters say nothing of it; the means are linearised around the curve itself.
 """
 
 from __future__ import annotations
@@ -30,6 +30,10 @@ AMPLITUDES, LENGTHS, NOISE_FACTORS = (
     (1.0, 1.4, 2.0, 4.0, 8.0),
 )
 MIN_SAMPLES, ROUNDS = 2, 4
+#: Fewer filters than this, so many nm apart, do not say how a curve bends between them: it may bend as those
+#: of films do.
+FEW, APART_NM = 5, 5.0
+FEW_AMPLITUDE, FEW_LENGTH_NM = 0.2, 75.0
 #: Least relative deviation of a ratio: nonlinearity of a camera and what scatters inside it.
 LEAST_STD = 8e-4
 #: An order stands out from the noise when its ratio is so many deviations above nothing.
@@ -68,6 +72,7 @@ def fit_efficiency(order: int, samples: Sequence[RatioSample]) -> EfficiencyFit:
     std = np.hypot([s.std / s.ratio for s in used], LEAST_STD)
     trend = np.polynomial.Polynomial.fit(light @ FINE_NM, np.log(ratio), 1, w=1 / std)
     log_curve = trend(NODES_NM)
+    is_few = _apart(used) < FEW
     for _ in range(ROUNDS):
         value = np.exp(hats @ log_curve)
         mean = light @ value
@@ -77,8 +82,8 @@ def fit_efficiency(order: int, samples: Sequence[RatioSample]) -> EfficiencyFit:
         solution = solve_smooth(
             Equations.of(design, target, std),
             [SmoothPrior(NODES_NM, LEVEL_STD, RISE_STD)],
-            amplitudes=AMPLITUDES,
-            lengths=LENGTHS,
+            amplitudes=(FEW_AMPLITUDE,) if is_few else AMPLITUDES,
+            lengths=(FEW_LENGTH_NM,) if is_few else LENGTHS,
             noise_factors=NOISE_FACTORS,
         )
         log_curve = solution.values + level
@@ -97,6 +102,15 @@ def _curve(log_values: Floats, log_std: Floats) -> SpectralCurve:
 
 def _centre(sample: RatioSample) -> float:
     return float((sample.light * FINE_NM).sum() / sample.light.sum())
+
+
+def _apart(samples: Sequence[RatioSample]) -> int:
+    """How many filters differ in their centres; colours of one filter do by a nanometre or two."""
+    count, last_nm = 0, -np.inf
+    for centre_nm in sorted(_centre(sample) for sample in samples):
+        if centre_nm - last_nm >= APART_NM:
+            count, last_nm = count + 1, centre_nm
+    return count
 
 
 def second_order_share(

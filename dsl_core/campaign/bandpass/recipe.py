@@ -54,6 +54,8 @@ MAX_OFF_NM, OFF_SIGMAS = 1.0, 3.0
 #: A clear film passes at least this share of the light in all its orders; one that seems to pass less stands
 #: before a target that reflects less than stated.
 LEAST_PASSED = 0.7
+#: Where the efficiency is judged, which spectra need between the filters as well, nm.
+USED_NM = np.arange(430.0, 661.0, 5.0)
 #: Where the share of the orders is judged, nm.
 MIDDLE_NM = 550.0
 #: A bulge over 300 mm at which the efficiency is off by .3 %, which is as well as it is known.
@@ -233,10 +235,10 @@ def bandpass_figures(record: BandpassCalibration, done: Collection[str] = ()) ->
     figures = [
         Figure(
             name=f"efficiency of order {order:+d}, deviation",
-            value=100 * float(np.median(_relative_std(record.efficiency[order], centres))),
+            value=100 * float(np.median(_relative_std(record.efficiency[order], USED_NM))),
             unit="%",
             high=2.0,
-            advice="Use more filters, or a longer second exposure (long_ratio).",
+            advice="Use more filters, spread from blue to red, or a longer second exposure (long_ratio).",
         )
         for order in (1, -1)
     ]

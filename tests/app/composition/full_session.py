@@ -57,7 +57,7 @@ SETTINGS: dict[str, dict[str, str]] = {
     "geometry": {"board": "7 5 30", "poses": "4"},
     "spectralon": {},
     "color-checker": {},
-    "bandpass": {"filters_nm": "450,640", "line_px": "10", "pixels": "1500"},
+    "bandpass": {"filters_nm": "450:650:50", "line_px": "10", "pixels": "1500"},
     "depth-stage": {
         "positions_mm": "620,850",
         "filters_nm": "450,640",

@@ -17,6 +17,7 @@ from dsl_core.errors import CalibrationError
 from dsl_core.model.spectral import SpectralCurve
 from dsl_core.optics.filters import FINE_NM, nominal_filter, passed
 from dsl_core.simulation.published_rig import published_rig
+from dsl_core.simulation.random_rig import random_rig
 from dsl_core.solve.smooth_functions import solve_smooth
 
 NM = np.arange(430.0, 661.0, 5.0)
@@ -53,6 +54,26 @@ def test_few_filters_give_a_curve_with_larger_deviation_between_them() -> None:
     spread = np.interp(NM, fit.curve.wavelengths_nm, fit.curve.std) / truth
     assert np.all(np.abs(fit.curve.at(NM) / truth - 1) < 4 * spread)
     assert np.interp(600.0, NM, spread) > 2 * np.interp(545.0, NM, spread)
+
+
+@pytest.mark.parametrize("centres", [(450, 640), (450, 550, 650), (430, 500, 570, 660)])
+def test_few_filters_do_not_say_that_a_curve_is_straight(centres: tuple[int, ...]) -> None:
+    inside = []
+    for seed in range(6):
+        rig, rng = random_rig(seed, published_rig()), np.random.default_rng(seed)
+        for order in (1, -1):
+            truth = rig.efficiency[order]
+            light = [light for nm in centres for light in passed(rig, nominal_filter(nm)) if light.any()]
+            ratio = [float(each @ truth.at(FINE_NM) / each.sum()) for each in light]
+            seen = [
+                RatioSample(r * (1 + 2e-3 * rng.normal()), 2e-3 * r, each)
+                for r, each in zip(ratio, light, strict=True)
+            ]
+            found = fit_efficiency(order, seen).curve
+            assert found.std is not None
+            std = np.interp(NM, found.wavelengths_nm, found.std)
+            inside.append(np.abs(found.at(NM) - truth.at(NM)) < 1.96 * std)
+    assert np.mean(inside) > 0.9
 
 
 def test_scatter_beyond_the_stated_noise_is_noticed() -> None:

@@ -1,0 +1,54 @@
+"""What a calibration with bandpass filters is judged by."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from dsl_core.campaign.bandpass.recipe import bandpass_figures
+from dsl_core.model.calibration.bandpass import BandpassCalibration, FilterSample
+from dsl_core.model.spectral import SpectralCurve
+
+NM = np.arange(400.0, 701.0, 2.0)
+CENTRES_NM = (450.0, 640.0)
+
+
+def record(between_rel_std: float) -> BandpassCalibration:
+    """Two filters: efficiency as good as .1 % at their centres, and less good elsewhere."""
+    known = np.abs(np.subtract.outer(NM, CENTRES_NM)).min(1) < 5
+    efficiency = SpectralCurve.of(NM, 0.1 + 0 * NM, std=0.1 * np.where(known, 1e-3, between_rel_std))
+    response = SpectralCurve.of(NM, 1 + 0 * NM, std=np.full(len(NM), 1e-3))
+    return BandpassCalibration(
+        filters=tuple(
+            FilterSample(
+                filter_nm=nm,
+                effective_nm=nm,
+                found_nm=nm,
+                found_std_nm=1.0,
+                curve_measured=False,
+                zero_dn_per_ms=(1.0, 1.0, 1.0),
+                orders=(),
+            )
+            for nm in CENTRES_NM
+        ),
+        efficiency={1: efficiency, -1: efficiency},
+        second_order_share=0.04,
+        second_order_share_std=0.01,
+        misfit={1: 1.0, -1: 1.0},
+        response=(response, response, response),
+        white_scale=1.0,
+        white_scale_rel_std=0.01,
+        blur_px=0.69,
+        blur_std_px=0.02,
+        halo_peak_per_px=0.0,
+        halo_peak_std_per_px=0.0,
+        halo_decay_px=30.0,
+        halo_decay_std_px=1.0,
+    )
+
+
+def test_efficiency_is_judged_between_the_filters_as_well() -> None:
+    for between, passes in ((0.019, True), (0.1, False)):
+        figures = [each for each in bandpass_figures(record(between)) if "efficiency" in each.name]
+        assert [each.passed for each in figures] == [passes, passes]
+        assert np.allclose([each.value for each in figures], 100 * between)
+    assert "Use more filters, spread from blue to red" in figures[0].advice
