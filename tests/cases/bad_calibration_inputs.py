@@ -286,7 +286,7 @@ CASES = (
         "all filters off alike",
         "figures of the bandpass filters",
         _redo("bandpass", *THROUGH),
-        r"Bandpass filters was not accepted: .*all filters against the LEDs' spectra (5\.9|6\.\d)\d* ± 0\.\d+ nm",
+        r"Bandpass filters was not accepted: .*all filters against the LEDs' spectra (5\.9|6\.\d)\d* ± 0\.",
         {"filter_off_nm": "6"},
         touched=tuple(f"bandpass/{step}" for step in THROUGH),
         quick=False,

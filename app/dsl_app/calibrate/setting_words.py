@@ -16,6 +16,7 @@ TITLES = {
     "emission_folder": "Folder with spectra of the LEDs",
     "filter_step_px": "Step of the lines through a filter (px)",
     "filters_nm": "Centres of the filters (nm)",
+    "fwhm_nm": "Width of the filters, where not measured (nm)",
     "grid": "Model columns from the data, too",
     "left_out": "Steps to leave out of the fit",
     "line_px": "Width of a line (px)",

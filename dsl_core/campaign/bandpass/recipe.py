@@ -24,6 +24,7 @@ from dsl_core.campaign.common.flat_target import diffuser_lines, line_frames, sc
 from dsl_core.campaign.common.recipe import Bench, Recipe, Step, naming
 from dsl_core.campaign.common.same_white import keep_white, require_same_white
 from dsl_core.campaign.common.white_shot import (
+    FWHM_NM,
     LONG_RATIO,
     FilterNote,
     WhiteLevel,
@@ -33,6 +34,7 @@ from dsl_core.campaign.common.white_shot import (
     film_light,
     note_of_filter,
     require_filter,
+    require_width,
     shoot_white,
 )
 from dsl_core.errors import CalibrationError
@@ -43,6 +45,7 @@ from dsl_core.model.placement import Placement
 from dsl_core.model.plan import CapturePlan, GrayCode, NoCode, ScanLines, Setting
 from dsl_core.model.rig import Rig
 from dsl_core.model.spectral import SpectralCurve
+from dsl_core.optics.filters import nominal_filter
 from dsl_core.optics.unlit import first_order_reach_px, unlit_px
 from dsl_core.progress import Progress
 from dsl_core.words import sentence
@@ -70,7 +73,8 @@ class BandpassRecipe(Recipe[BandpassCalibration]):
     ``filters_nm`` are the nominal centres of the filters; ``line_px`` is the width and step of the lines
     through a filter, which must tile the frame; ``long_ratio`` above 1 adds a second, longer exposure, for
     noisy cameras; ``pixels`` is how many camera pixels are used; ``depth_mm`` is the distance of the target,
-    by default two fifths into the rig's depth range; ``reflectance`` is the reflectance of the target.
+    by default two fifths into the rig's depth range; ``reflectance`` is the reflectance of the target;
+    ``fwhm_nm`` is the width at half of their peak of filters whose transmission is not measured.
     """
 
     name = "bandpass"
@@ -85,11 +89,13 @@ class BandpassRecipe(Recipe[BandpassCalibration]):
     pixels: Count = 20_000
     depth_mm: Positive | None = None
     reflectance: Reflectance = 0.99
+    fwhm_nm: Positive = FWHM_NM
 
     def steps(self, bench: Bench) -> tuple[Step, ...]:
         """The target without filter, then through each filter, from blue to red."""
         if len(set(self.filters_nm)) < 2:
             raise CalibrationError("Bandpass filters: at least two different filters are needed.")
+        require_width(self.fwhm_nm, "Bandpass filters")
         depth_mm = target_depth_mm(bench.rig, self.depth_mm)
         where: dict[str, float | str] = {"depth_mm": depth_mm}
         first = Step(
@@ -119,7 +125,7 @@ class BandpassRecipe(Recipe[BandpassCalibration]):
         nm = step.placement.filter_nm
         if nm is None:
             return figures
-        return (*figures, colour_figure(bench.rig, white, note_of_filter(bench.devices, nm)))
+        return (*figures, colour_figure(bench.rig, white, note_of_filter(bench.devices, nm, self.fwhm_nm)))
 
     def capture(self, bench: Bench, step: Step, progress: Progress) -> None:
         """Choose exposures by a test shot and scan; a scan that was begun keeps its own exposures."""
@@ -155,7 +161,7 @@ class BandpassRecipe(Recipe[BandpassCalibration]):
         nm = step.placement.filter_nm
         if nm is None:
             return self._plan(bench.rig, step, white)
-        note = note_of_filter(bench.devices, nm)
+        note = note_of_filter(bench.devices, nm, self.fwhm_nm)
         open_white = self._white_of(bench, self.steps(bench)[0])
         require_filter(bench.rig, white, note, step.title, open_white)
         plan = self._plan(bench.rig, step, white)
@@ -226,7 +232,9 @@ class BandpassRecipe(Recipe[BandpassCalibration]):
                 f"{step.title}: the zero order is saturated in {light.saturated:.0%} of the pixels. Capture"
                 " the step again with nothing changed since the test shot."
             )
-        return SeenFilter(note.filter_nm, note.transmission, note.measured, light)
+        # A width that is stated after the capture counts as well.
+        curve = note.transmission if note.measured else nominal_filter(note.filter_nm, self.fwhm_nm)
+        return SeenFilter(note.filter_nm, curve, note.measured, light)
 
 
 def bandpass_figures(record: BandpassCalibration, done: Collection[str] = ()) -> tuple[Figure, ...]:

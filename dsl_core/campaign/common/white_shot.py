@@ -21,8 +21,9 @@ from dsl_core.model.figure import Figure
 from dsl_core.model.plan import Setting
 from dsl_core.model.rig import Rig
 from dsl_core.model.spectral import SpectralCurve
-from dsl_core.optics.filters import nominal_filter
+from dsl_core.optics.filters import FINE_NM, nominal_filter, passed
 from dsl_core.optics.sensor import bayer_channels
+from dsl_core.optics.spectra import chain_response
 
 #: Share of the range above black that white may reach; a line is dimmer by what the orders of others add.
 FILL = 0.9
@@ -42,8 +43,11 @@ TOO_DARK = 0.02
 MOST_OTHER = 20.0
 #: Colours that fit a filter this many nm away this much better (chi-square) are those of another filter.
 COLOUR_NM, COLOUR_GAIN = 14.0, 12.0
-#: White without a filter is at least this many times brighter than through one.
-OPEN_FACTOR = 3.0
+#: What looks like a missing filter is at least this share of white without one, and nearer to it (by factors)
+#: than to what the filter passes as far as the rig is known.
+LEAST_OPEN = 0.5
+#: Width at half of its peak of a filter whose transmission nobody measured, nm; the least and most of one.
+FWHM_NM, LEAST_FWHM_NM, MOST_FWHM_NM = 10.0, 2.0, 50.0
 _ATTEMPTS = 14
 
 
@@ -190,11 +194,22 @@ class FilterNote(Record):
     measured: bool
 
 
-def note_of_filter(devices: DeviceRig, filter_nm: float) -> FilterNote:
-    """What is known of a rig's filter: its measured transmission, or a nominal one."""
+def require_width(fwhm_nm: float, title: str) -> None:
+    """Raise `CalibrationError` where a width at half maximum is none of a bandpass filter."""
+    if not LEAST_FWHM_NM <= fwhm_nm <= MOST_FWHM_NM:
+        raise CalibrationError(
+            f"{title}: fwhm_nm={fwhm_nm:g} was given, the width of the filters at half of their peak;"
+            f" {LEAST_FWHM_NM:g} to {MOST_FWHM_NM:g} nm are possible. State what their data sheet says."
+        )
+
+
+def note_of_filter(devices: DeviceRig, filter_nm: float, fwhm_nm: float = FWHM_NM) -> FilterNote:
+    """What is known of a rig's filter: its measured transmission, or a nominal one of a width."""
     curve = devices.filters.get(filter_nm)
     return FilterNote(
-        filter_nm=filter_nm, transmission=curve or nominal_filter(filter_nm), measured=curve is not None
+        filter_nm=filter_nm,
+        transmission=curve or nominal_filter(filter_nm, fwhm_nm),
+        measured=curve is not None,
     )
 
 
@@ -219,9 +234,22 @@ def require_filter(
     ``open_white`` is the brightness without a filter (DN per ms at full drive), None where it is not known.
     """
     again = f"Put the filter of {note.filter_nm:g} nm in front of the camera and capture the step again."
-    if open_white is not None and white.brightest * OPEN_FACTOR > open_white:
-        raise CalibrationError(f"{title}: the picture is about as bright as without a filter. {again}")
+    if open_white is not None:
+        expected, share = _share_passed(rig, note), white.brightest / open_white
+        if share > max(LEAST_OPEN, expected**0.5):
+            raise CalibrationError(
+                f"{title}: the picture is about as bright as without a filter: {share:.2f} times, where"
+                f" {expected:.2f} is expected. {again} If it is there and broader than assumed, state how"
+                " broad (fwhm_nm) or measure its transmission."
+            )
     figure = colour_figure(rig, white, note)
     if not figure.passed:
         found = f"the colours are those of a filter of about {note.filter_nm + figure.value:.0f} nm"
         raise CalibrationError(f"{title}: {found}. {again}")
+
+
+def _share_passed(rig: Rig, note: FilterNote) -> float:
+    """What the filter passes of white in the brightest colour of each, as far as the rig is known."""
+    colours = list(mosaic_colours(rig.sensor.bayer))
+    white = chain_response(rig, 0, FINE_NM).sum((1, 2))[colours].max()
+    return float(passed(rig, note.transmission).sum(1)[colours].max() / white)

@@ -24,6 +24,7 @@ from dsl_core.campaign.common.flat_target import (
 from dsl_core.campaign.common.recipe import Bench, Recipe, Step, naming
 from dsl_core.campaign.common.same_white import keep_white, require_same_white
 from dsl_core.campaign.common.white_shot import (
+    FWHM_NM,
     LONG_RATIO,
     LONGEST_MS,
     WhiteLevel,
@@ -31,6 +32,7 @@ from dsl_core.campaign.common.white_shot import (
     bright_setting,
     film_light,
     note_of_filter,
+    require_width,
     shoot_white,
 )
 from dsl_core.campaign.depth_stage.figures import depth_stage_figures
@@ -46,6 +48,7 @@ from dsl_core.model.plan import CapturePlan, GrayCode, NoCode, ScanLines, Settin
 from dsl_core.model.result import DEPTH_INVALID, Flag
 from dsl_core.model.rig import ProjectorResponse, Rig
 from dsl_core.model.spectral import SpectralCurve
+from dsl_core.optics.filters import nominal_filter
 from dsl_core.progress import Progress
 
 if TYPE_CHECKING:
@@ -94,7 +97,7 @@ class DepthStageRecipe(Recipe[DepthStageCalibration]):
     without filter, at most 5; ``filter_step_px`` is the step of the lines through filters, which may be far
     apart. ``reflectance`` is the reflectance of the target; ``chain`` lets the plane correct the product of
     response, emission and efficiency; ``grid`` adds a model of the columns derived from the data, which needs
-    three positions.
+    three positions. ``fwhm_nm`` is the width at half of their peak of filters without measured transmission.
     """
 
     name = "depth-stage"
@@ -111,9 +114,11 @@ class DepthStageRecipe(Recipe[DepthStageCalibration]):
     reflectance: Reflectance = 0.99
     chain: bool = True
     grid: bool = False
+    fwhm_nm: float = FWHM_NM
 
     def steps(self, bench: Bench) -> tuple[Step, ...]:
         """At each position the plane without filter, then through each filter."""
+        require_width(self.fwhm_nm, "Depth stage")
         positions, filters = self._positions_mm(bench), sorted(set(self.filters_nm))
         if len(positions) < 2 or not filters:
             raise CalibrationError(
@@ -171,7 +176,9 @@ class DepthStageRecipe(Recipe[DepthStageCalibration]):
             positions_mm=tuple(note.position_mm for note in notes),
             stage_std_mm=self.stage_std_mm,
             columns=tuple(each.columns for each in seen),
-            filters=tuple(_filter_of(bench.kept(step, STAGE_NOTE, StageNote)) for step in filtered[:count]),
+            filters=tuple(
+                _filter_of(bench.kept(step, STAGE_NOTE, StageNote), self.fwhm_nm) for step in filtered[:count]
+            ),
             frames=lambda position, name: self._lines(bench, filtered[position * count + name]),
             exposures=sum(bench.scan_of(step).plan.shot_count for step in steps),
         )
@@ -200,7 +207,7 @@ class DepthStageRecipe(Recipe[DepthStageCalibration]):
             position = bench.devices.stage.move_to(position)
         if nm is None:
             return StageNote(position_mm=position)
-        known = note_of_filter(bench.devices, nm)
+        known = note_of_filter(bench.devices, nm, self.fwhm_nm)
         return StageNote(
             position_mm=position,
             filter_nm=nm,
@@ -344,10 +351,11 @@ def _filtered(position_mm: float, filters_nm: list[float]) -> list[Step]:
     ]
 
 
-def _filter_of(note: StageNote) -> StageFilter:
+def _filter_of(note: StageNote, fwhm_nm: float) -> StageFilter:
     assert note.filter_nm is not None
     assert note.transmission is not None
-    return StageFilter(note.filter_nm, note.transmission, note.measured)
+    curve = note.transmission if note.measured else nominal_filter(note.filter_nm, fwhm_nm)
+    return StageFilter(note.filter_nm, curve, note.measured)
 
 
 @dataclass(frozen=True)

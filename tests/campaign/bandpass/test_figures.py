@@ -2,11 +2,20 @@
 
 from __future__ import annotations
 
-import numpy as np
+from types import SimpleNamespace
+from typing import Any
 
-from dsl_core.campaign.bandpass.recipe import bandpass_figures
+import numpy as np
+import pytest
+
+from dsl_core.campaign.bandpass import recipe
+from dsl_core.campaign.bandpass.recipe import BandpassRecipe, bandpass_figures
+from dsl_core.campaign.common.white_shot import FilterNote
 from dsl_core.model.calibration.bandpass import BandpassCalibration, FilterSample
+from dsl_core.model.plan import ScanLines
 from dsl_core.model.spectral import SpectralCurve
+from dsl_core.optics.filters import nominal_filter
+from tests.cases.small_rig import small_rig
 
 NM = np.arange(400.0, 701.0, 2.0)
 CENTRES_NM = (450.0, 640.0)
@@ -52,3 +61,26 @@ def test_efficiency_is_judged_between_the_filters_as_well() -> None:
         assert [each.passed for each in figures] == [passes, passes]
         assert np.allclose([each.value for each in figures], 100 * between)
     assert "Use more filters, spread from blue to red" in figures[0].advice
+
+
+@pytest.mark.parametrize("measured", [False, True])
+def test_a_width_that_is_stated_after_the_capture_counts(
+    monkeypatch: pytest.MonkeyPatch, measured: bool
+) -> None:
+    curve = nominal_filter(450.0)
+    bench: Any = SimpleNamespace(
+        kept=lambda *given: FilterNote(filter_nm=450.0, transmission=curve, measured=measured),
+        scan_of=lambda step: None,
+    )
+    scan: Any = SimpleNamespace(pixels=None)
+    for name, value in {
+        "scan_lines_of": ScanLines(width_px=5, step_px=5),
+        "line_frames": (None, None),
+        "plane_pixels": None,
+        "filter_light": SimpleNamespace(saturated=0.0),
+    }.items():
+        monkeypatch.setattr(recipe, name, lambda *given, value=value: value)
+    step: Any = SimpleNamespace(title="Blue")
+    seen = BandpassRecipe(fwhm_nm=20.0)._filter(bench, small_rig(), step, scan)
+    assert seen.transmission == (curve if measured else nominal_filter(450.0, 20.0))
+    assert seen.measured_curve == measured

@@ -12,18 +12,23 @@ from dsl_core.campaign.common.recipe import Bench
 from dsl_core.campaign.common.white_shot import (
     FILL,
     LONGEST_MS,
+    FilterNote,
     WhiteLevel,
     bracket,
     bright_setting,
     film_light,
     note_of_filter,
     require_filter,
+    require_width,
     shoot_white,
 )
 from dsl_core.errors import CalibrationError
 from dsl_core.model.figure import failures
 from dsl_core.model.placement import Placement
 from dsl_core.model.rig import Rig
+from dsl_core.model.spectral import SpectralCurve
+from dsl_core.optics.filters import FINE_NM, nominal_filter, passed
+from dsl_core.optics.spectra import chain_response
 from tests.cases.film_bench import film_bench, place
 from tests.cases.small_rig import small_rig
 
@@ -75,6 +80,50 @@ def test_another_filter_and_none_are_refused(bench: Bench) -> None:
     other = note_of_filter(bench.devices, 450.0)
     with pytest.raises(CalibrationError, match=r"Blue: the colours are those of a filter of about \d+ nm"):
         require_filter(bench.rig, seen, other, "Blue", open_white.brightest)
+
+
+def test_a_broad_filter_is_none_that_is_missing(bench: Bench) -> None:
+    """As far as its width is known, and where it is not, up to half of white."""
+    rig, curve = bench.rig, nominal_filter(450.0, 25.0, 0.9)
+    share = passed(rig, curve).sum(1).max() / chain_response(rig, 0, FINE_NM).sum((1, 2)).max()
+    assert share > 0.33
+    assumed = note_of_filter(replace(bench.devices, filters={}), 450.0)
+    for note in (assumed, FilterNote(filter_nm=450.0, transmission=curve, measured=True)):
+        require_filter(rig, through(rig, curve, share), note, "Blue", 1.0)
+        for open_share in (0.75, 1.0):
+            with pytest.raises(
+                CalibrationError, match=r"without a filter: (0\.75|1\.00) times, where 0\.\d+"
+            ):
+                require_filter(rig, through(rig, curve, open_share), note, "Blue", 1.0)
+
+
+def test_lasers_are_as_narrow_as_the_filter_before_them(bench: Bench) -> None:
+    nm = np.arange(390.0, 711.0, 0.5)
+    lasers = tuple(SpectralCurve.of(nm, np.exp(-(((nm - at) / 1.2) ** 2))) for at in (638.0, 525.0, 450.0))
+    rig, note = bench.rig.model_copy(update={"emission": lasers}), note_of_filter(bench.devices, 450.0)
+    share = passed(rig, note.transmission).sum(1).max() / chain_response(rig, 0, FINE_NM).sum((1, 2)).max()
+    assert share > 0.5
+    require_filter(rig, through(rig, note.transmission, share), note, "Blue", 1.0)
+    with pytest.raises(CalibrationError, match=r"as bright as without a filter: 0\.95 times"):
+        require_filter(rig, through(rig, note.transmission, 0.95), note, "Blue", 1.0)
+
+
+def through(rig: Rig, transmission: SpectralCurve, share: float) -> WhiteLevel:
+    """White through a filter, so many times as bright as one without."""
+    mean = passed(rig, transmission).sum(1)
+    return WhiteLevel(share, share * mean / mean.max(), 0.0, False)
+
+
+def test_filters_that_nobody_measured_are_as_wide_as_stated(bench: Bench) -> None:
+    devices = replace(bench.devices, filters={})
+    assert note_of_filter(devices, 450.0).transmission == nominal_filter(450.0, 10.0)
+    assert note_of_filter(devices, 450.0, 20.0).transmission == nominal_filter(450.0, 20.0)
+    measured = replace(bench.devices, filters={450.0: nominal_filter(451.0, 9.0)})
+    assert note_of_filter(measured, 450.0, 20.0).transmission == nominal_filter(451.0, 9.0)
+    require_width(2.0, "It")
+    for fwhm_nm in (0.0, 1.9, 51.0):
+        with pytest.raises(CalibrationError, match=rf"It: fwhm_nm={fwhm_nm:g} was given.*2 to 50 nm"):
+            require_width(fwhm_nm, "It")
 
 
 @pytest.mark.parametrize(("cycles", "expected"), [(10.0, 9), (1.2, 1), (1e4, None)])
