@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal, Self
+from typing import Annotated, Any, Literal, Self
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field, model_validator
+from pydantic import Field, field_validator, model_validator
 
 from dsl_core.model.base import Record
 
@@ -38,6 +38,12 @@ class Charuco(Record):
     marker_mm: float = Field(gt=0)
     dictionary: str = Field(default="DICT_5X5_100", pattern=r"^DICT_[A-Z0-9_]+$")
     legacy: bool = False
+
+    @field_validator("dictionary", mode="before")
+    @classmethod
+    def _spelled_alike(cls, given: Any) -> Any:
+        """OpenCV has some names in two spellings, as DICT_APRILTAG_36h11 and DICT_APRILTAG_36H11."""
+        return given.upper() if isinstance(given, str) else given
 
     @model_validator(mode="after")
     def _check(self) -> Self:

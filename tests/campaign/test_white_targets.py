@@ -202,6 +202,14 @@ def test_spectra_may_come_from_files(tmp_path: Path) -> None:
         recipe.capture(bench, first, NONE)
 
 
+def test_grey_standards_may_be_as_dark_as_they_are_sold() -> None:
+    for share in (0.02, 0.05, 0.99):
+        assert SpectralonRecipe(reflectance=share)._reflectance().at(550.0) == share
+    for share in (0.0, 0.019, 1.06, 5.0):
+        with pytest.raises(CalibrationError, match=rf"cannot be {share:g}; give a share of 0\.02 or more"):
+            SpectralonRecipe(reflectance=share)._reflectance()
+
+
 def test_an_impossible_reflectance_and_chart_are_told(module_folder: Path) -> None:
     start, _, _ = spectralon(1, module_folder / "spectralon-1")
     bench = Bench(twin(1), module_folder / "spectralon-1", start)

@@ -197,6 +197,13 @@ def require_steps(positions_mm: Sequence[float], distances_mm: Sequence[float] |
     distances = np.asarray(distances_mm, float)
     rise, offset = np.polyfit(positions - positions.mean(), distances, 1)
     bent = np.abs(distances - offset - rise * (positions - positions.mean())).max() > tolerance
+    if rise < 0:
+        raise CalibrationError(
+            f"At the stage's positions {', '.join(f'{p:g}' for p in positions)} mm the planes are"
+            f" {', '.join(f'{d:.1f}' for d in distances)} mm away: the stage counts towards the camera, and"
+            " positions are distances from it. Set towards_camera for the stage in the rig's profile, or"
+            " state positions that grow with the distance; if planes were exchanged, capture them again."
+        )
     off = distances - positions
     off -= np.median(off)
     worst = int(np.abs(off).argmax())

@@ -7,7 +7,7 @@ from typing import Annotated
 from pydantic import Field
 
 #: The least and most that a white target reflects; less is none, more is given in percent.
-LEAST_REFLECTANCE, MOST_REFLECTANCE = 0.05, 1.05
+LEAST_REFLECTANCE, MOST_REFLECTANCE = 0.02, 1.05
 
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]

@@ -167,7 +167,7 @@ class SpectralonRecipe(Recipe[SpectralonCalibration]):
             return read_spectrum(Path(self.reflectance_file), radiance=False)
         if not LEAST_REFLECTANCE <= self.reflectance <= MOST_REFLECTANCE:
             raise CalibrationError(
-                f"The reflectance of the Spectralon cannot be {self.reflectance:g}; give a share such as"
-                " 0.99, from its certificate."
+                f"The reflectance of the Spectralon cannot be {self.reflectance:g}; give a share of"
+                f" {LEAST_REFLECTANCE:g} or more, such as 0.99, from its certificate."
             )
         return SpectralCurve.of([400.0, 700.0], [self.reflectance] * 2)

@@ -103,6 +103,16 @@ def test_a_board_that_is_not_there_and_unknown_markers_are_named() -> None:
         find_corners(flat, odd, "pose 3")
 
 
+@pytest.mark.parametrize("name", ["DICT_APRILTAG_36h11", "DICT_APRILTAG_36H11", "DICT_ARUCO_MIP_36h12"])
+def test_markers_are_named_in_either_spelling_of_opencv(name: str) -> None:
+    board = Charuco(columns=8, rows=6, square_mm=20.0, marker_mm=15.0, dictionary=name)
+    assert board == Charuco.model_validate_json(board.model_dump_json())
+    assert board.dictionary == name.upper()
+    flat = np.full((120, 160), 50.0, np.float32)
+    with pytest.raises(CalibrationError, match="was not found in pose 3"):
+        find_corners(flat, board, "pose 3")
+
+
 def test_squares_counted_in_place_of_corners_are_told() -> None:
     squares = np.kron(np.indices((6, 8)).sum(0) % 2, np.ones((24, 24)))
     picture = np.pad(squares, 30, constant_values=1).astype(np.float32)

@@ -122,6 +122,9 @@ def test_steps_flatness_and_agreement_have_limits() -> None:
         require_steps(at, np.array([600.0, 702.0, 800.0]))
     with pytest.raises(CalibrationError, match=r"1\.030 times as far apart"):
         require_steps(at, np.array([600.0, 703.0, 806.0]))
+    for towards in ([800.0, 700.0, 600.0], [800.0, 698.0, 600.0]):
+        with pytest.raises(CalibrationError, match=r"0, 100, 200 mm .* 800\.0, .* counts towards the camera"):
+            require_steps(at, np.array(towards))
     require_plane(at, np.array([0.1, 0.49, 0.1]))
     with pytest.raises(CalibrationError, match=r"position 100 mm are 0\.51 px RMS off those of a plane"):
         require_plane(at, np.array([0.1, 0.51, 0.1]))
