@@ -195,7 +195,7 @@ class FilterNote(Record):
 
 
 def require_width(fwhm_nm: float, title: str) -> None:
-    """Raise `CalibrationError` where a width at half maximum is none of a bandpass filter."""
+    """Raise `CalibrationError` where no bandpass filter has such a width at half of its peak."""
     if not LEAST_FWHM_NM <= fwhm_nm <= MOST_FWHM_NM:
         raise CalibrationError(
             f"{title}: fwhm_nm={fwhm_nm:g} was given, the width of the filters at half of their peak;"
