@@ -5,10 +5,12 @@ from __future__ import annotations
 import pytest
 
 from dsl_core.campaign.depth_stage.figures import depth_stage_figures
+from dsl_core.campaign.depth_stage.recipe import StageNote, _filter_of
 from dsl_core.model.calibration.chain import ChainCorrection
 from dsl_core.model.calibration.depth_stage import DepthStageCalibration, HeldOutError, StagePosition
 from dsl_core.model.figure import Figure
 from dsl_core.model.spectral import SpectralCurve
+from dsl_core.optics.filters import nominal_filter
 from dsl_core.simulation.published_rig import published_rig
 
 RIG = published_rig()
@@ -137,3 +139,10 @@ def test_filters_that_shift_otherwise_than_before_are_told(
     figure = figure_of(name, {600.0: 0.01, 900.0: 0.01}, 0.04, None, (now, before))
     assert figure.value == pytest.approx(now[0] - before[0])
     assert figure.passed is passed
+
+
+@pytest.mark.parametrize("measured", [False, True])
+def test_filters_that_nobody_measured_are_as_wide_as_stated(measured: bool) -> None:
+    curve = nominal_filter(450.0)
+    note = StageNote(position_mm=700.0, filter_nm=450.0, transmission=curve, measured=measured)
+    assert _filter_of(note, 20.0).transmission == (curve if measured else nominal_filter(450.0, 20.0))
