@@ -37,6 +37,7 @@ def known_pixels(geometry: Geometry) -> Pixels:
         geometry.amplitude_std,
         geometry.offset,
         geometry.offset_std,
+        geometry.column_std_px,
         valid,
     )
 

@@ -102,7 +102,7 @@ class Readers:
         none, valid = np.zeros(shape, np.float32), np.zeros(shape, bool)
         valid[self.pixel[1], self.pixel[0]] = True
         depth, shading = (np.full(shape, value, np.float32) for value in (DEPTH_MM, self.shading))
-        known = Pixels(columns_px(self.column), depth, shading, none, none, none, none, none, valid)
+        known = Pixels(columns_px(self.column), depth, shading, none, none, none, none, none, none, valid)
         dark = np.zeros((self.plan.spectral_count, *shape), np.float32)
         model = correspondence(self.rig)
         return SpectralReconstruction(

@@ -38,7 +38,7 @@ def scan() -> ProbedScan:
     model = model_of_plan(rig, plan, WavelengthGrid(step_nm=10.0), GratingModel(rig))
     none = np.zeros(SHAPE, np.float32)
     depth = np.full(SHAPE, DEPTH_MM, np.float32)
-    pixels = Pixels(none, depth, none, none, none, none, none, none, np.ones(SHAPE, bool))
+    pixels = Pixels(none, depth, none, none, none, none, none, none, none, np.ones(SHAPE, bool))
     return ProbedScan(model, pixels, none[None], none[None], Prior())
 
 

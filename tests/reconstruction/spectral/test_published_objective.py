@@ -85,7 +85,7 @@ def a_plane(options: AdamOptions | None = None) -> tuple[PublishedReconstruction
     plan, grid, model = CapturePlan(), WavelengthGrid(step_nm=10.0), correspondence(rig)
     depth, shading = (np.full((72, 112), value, np.float32) for value in (700.0, SHADING))
     none, frames = np.zeros_like(depth), np.zeros((plan.spectral_count, 72, 112), np.float32)
-    known = Pixels(none, depth, shading, none, none, none, none, none, depth > 0)
+    known = Pixels(none, depth, shading, none, none, none, none, none, none, depth > 0)
     solver = PublishedReconstruction(
         rig, plan, grid, model, frames, np.ones_like(frames), known, options=options
     )

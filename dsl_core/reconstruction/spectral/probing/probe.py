@@ -165,6 +165,8 @@ def probe(scan: ProbedScan) -> Probe | None:
     camera = scan.model.rig.camera
     wide = camera.width_px / camera.fx_px > ONE_VIEW
     whole = together.pop("normal"), together.pop("score")
+    if not scan.model.single:
+        whole = with_columns_unsure(*whole, scan.pixels.column_std_px.ravel()[targets])
     own, white = len(PARAMETERS), _white(scan)
     return Probe(
         **together,
@@ -181,6 +183,20 @@ def probe(scan: ProbedScan) -> Probe | None:
         sideways=_sideways(scan, column, traced),
         uneven=unevenness(scan.pixels.amplitude, targets),
     )
+
+
+def with_columns_unsure(normal: Floats, score: Floats, std_px: NDArray[np.floating]) -> tuple[Floats, Floats]:
+    """Equations (n, p, p), (n, p) of parameters of pixels whose columns are as sure as ``std_px`` (n,).
+
+    A column that is off puts depth off and displaces both first orders as far. Where lines share frames,
+    columns are off by what first orders do to zero orders, in the same way all over a picture: taken as
+    certain, they look like a film that has moved.
+    """
+    alike = normal[:, :, 0] + normal[:, :, 1]
+    lever = alike[:, 0] + alike[:, 1] + np.maximum(np.asarray(std_px, np.float64), 1e-6) ** -2.0
+    taken = alike / lever[:, None]
+    asked = score[:, 0] + score[:, 1]
+    return normal - taken[:, :, None] * alike[:, None], score - taken * asked[:, None]
 
 
 def _lines(scan: ProbedScan, targets: Indices, column_px: Tensor) -> LineProbe:

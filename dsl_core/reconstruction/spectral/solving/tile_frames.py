@@ -23,8 +23,8 @@ class Pixels:
     """What is known of every pixel before its spectrum: arrays of shape (rows, columns).
 
     ``amplitude`` and ``amplitude_std`` (DN per ms) are those of the zero order in the pixel's own colour,
-    ``offset`` the residual dark signal and ``offset_std`` how far all frames may be off it; ``valid`` pixels
-    get a spectrum.
+    ``offset`` the residual dark signal and ``offset_std`` how far all frames may be off it; ``column_std_px``
+    is the deviation of the column, and of depth with it; ``valid`` pixels get a spectrum.
     """
 
     column_px: NDArray[np.float32]
@@ -35,6 +35,7 @@ class Pixels:
     amplitude_std: NDArray[np.float32]
     offset: NDArray[np.float32]
     offset_std: NDArray[np.float32]
+    column_std_px: NDArray[np.float32]
     valid: NDArray[np.bool_]
 
 

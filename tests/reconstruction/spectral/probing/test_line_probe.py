@@ -30,7 +30,7 @@ def probed(blur: float, tail: float, noise: float = 0.0, width: float = 1.0) -> 
     frames = level * ((1 - tail) * light(blur) + tail * light(TAIL_BLUR))
     frames += noise * rng.standard_normal(frames.shape)
     none, known = np.zeros(SHAPE, np.float32), np.ones(SHAPE, bool)
-    pixels = Pixels(column, none, none, none, none, none, none, none, known)
+    pixels = Pixels(column, none, none, none, none, none, none, none, none, known)
     std = np.full(frames.shape, max(noise, 1e-3), np.float32)
     radiance = frames.astype(np.float32)
     widths = torch.full((column.size,), width, dtype=torch.float64)

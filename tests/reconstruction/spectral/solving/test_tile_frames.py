@@ -30,8 +30,9 @@ def tile(
     valid = np.ones(SHAPE, bool)
     valid[5, 8] = False
     known = Pixels(
-        full(100.0), full(700.0), full(1.0), full(0.0), amplitude, full(std), full(offset), full(std), valid
-    )
+        full(100.0), full(700.0), full(1.0), full(0.0), amplitude, full(std), full(offset), full(std),
+        full(0.0), valid,
+    )  # fmt: skip
     radiance = np.stack([(k + 1) * LEVEL for k in range(FRAMES)]) + np.float32(offset)
     deviation = np.full(radiance.shape, std, np.float32)
     deviation[1, 4, 8] = np.inf
