@@ -163,6 +163,7 @@ def probed(monkeypatch: pytest.MonkeyPatch, share: float, varied: bool, **model:
         model=SimpleNamespace(**given | model),
         pixels=SimpleNamespace(
             valid=np.ones(size, bool), column_px=np.zeros(size), amplitude=np.ones((1, size)),
+            column_std_px=np.zeros(size),
         ), radiance=None, std=None,
     )  # fmt: skip
     found = probe_module.probe(scan)
