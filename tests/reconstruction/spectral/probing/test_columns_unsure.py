@@ -58,4 +58,5 @@ def test_a_coarse_film_under_a_comb_has_not_moved(monkeypatch: pytest.MonkeyPatc
     devices, scan = twin_scan(preset_plan("preview"), scene="face", size="112x72", seed="3")
     assert devices.calibration is not None
     found = Fit.read(pipeline.reconstruct(scan, devices.calibration).attrs)
+    assert found is not None
     assert [each.name for each in found.significant if each.part in {"film", "geometry"}] == []
