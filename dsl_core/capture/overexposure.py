@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from dsl_core.devices.base import DeviceRig
 from dsl_core.model.plan import CapturePlan, Shot
+from dsl_core.optics.sensor import end_near_full
 
 #: Share of the picture from which on a person is told; highlights and a wall behind an object are usual.
 MOST_OVEREXPOSED = 0.5
@@ -28,7 +29,7 @@ class ExposureWatch:
     """Takes the frames of a scan in their order; ``found`` says how much of white is overexposed, if much."""
 
     def __init__(self, plan: CapturePlan, full_scale_dn: int) -> None:
-        """Pixels that reach ``full_scale_dn`` are saturated."""
+        """Pixels that reach ``full_scale_dn``, or where white ends just below it, are saturated."""
         self._waits_for = {shot.index for shot in plan.shots() if shot.role == "white"}
         self._full_scale_dn = full_scale_dn
         self._always: NDArray[np.bool_] | None = None
@@ -40,6 +41,7 @@ class ExposureWatch:
             return
         self._waits_for.discard(shot.index)
         # One colour is enough to tell a code and to find a line.
+        self._full_scale_dn = end_near_full(pixels, self._full_scale_dn)
         saturated = by_colour(pixels).min(axis=0) >= self._full_scale_dn
         self._always = saturated if self._always is None else self._always & saturated
         share = float(self._always.mean())

@@ -31,6 +31,7 @@ def doubts_of_white(taker: ShotTaker, white: Shot, seen: NDArray[np.uint16], rig
     if written is not None:
         return written.sentence
     bright = raster.take(seen)
+    noise.find_end(bright, channels)
     return missing_light(bright, black, rig, channels, noise, raster) or doubt_of_levels(
         bright, black, dim, white.level, rig.projector_response, channels, noise
     )

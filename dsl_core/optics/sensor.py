@@ -16,6 +16,12 @@ Floats = NDArray[np.float64]
 SEEN = 5
 #: So many steps of one size are no chance.
 ALIKE = 10
+#: Where values end, as many pixels have the last one, and so many times as many as those next below it.
+PILE, TIMES = 20, 10.0
+#: Share of the pile that may be above it: hot pixels.
+ABOVE = 0.01
+#: Cameras as they are end above this share of their bit depth's range; below it, something cuts them off.
+NEAR_FULL = 0.9
 
 
 def bayer_channels(bayer: BayerPattern, rows: int, columns: int) -> NDArray[np.int64]:
@@ -68,6 +74,33 @@ def step_of(total: NDArray[np.int64]) -> int:
     step = int(steps[order[middle]])
     # Pictures converted from fewer bits have steps of two neighbouring sizes, such as 16 and 17.
     return step if np.count_nonzero(np.abs(steps - step) <= 1) >= ALIKE else 1
+
+
+def end_of(total: NDArray[np.int64], low_dn: int) -> int | None:
+    """The value from ``low_dn`` on at which pictures end, from how often each occurs, shape (values,).
+
+    None if no value has so many pixels that it is where brighter light piles up: noise spreads all other
+    light over neighbouring values.
+    """
+    end = low_dn + int(total[low_dn:].argmax())
+    pile, below = int(total[end]), total[max(end - max(end // 100, 8), 0) : end]
+    if pile < PILE or pile < TIMES * below.mean() or total[end + 1 :].sum() > ABOVE * pile:
+        return None
+    return end
+
+
+def end_near_full(pixels: NDArray[np.unsignedinteger], full_scale_dn: int) -> int:
+    """Where the values of a picture end: ``full_scale_dn``, or a little below it where many pixels have that.
+
+    Many cameras saturate below the largest number of their bit depth, as those do whose 12 bits are moved up
+    to 16. A picture without saturated pixels does not say so.
+    """
+    low_dn = int(np.ceil(NEAR_FULL * full_scale_dn))
+    bright = pixels[pixels >= low_dn]
+    if bright.size < PILE:
+        return full_scale_dn
+    end = end_of(np.bincount(np.minimum(bright, full_scale_dn), minlength=full_scale_dn + 1), low_dn)
+    return full_scale_dn if end is None else end
 
 
 def digitise(

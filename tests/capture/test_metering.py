@@ -41,6 +41,8 @@ class Bench(Camera, Projector):
     room: float = 0.0
     #: How many pixels of the first row hold numbers.
     numbers: int = 0
+    #: Where values end.
+    ends_dn: int = FULL_DN
 
     @property
     def info(self) -> CameraInfo:  # type: ignore[override]
@@ -59,7 +61,7 @@ class Bench(Camera, Projector):
         light = (self.curve(self.shown[-1] / 255) ** 2.2 + self.room) * self.exposures_ms[-1] * self.dn_per_ms
         signal = light * np.tile(self.colours, (10, 20))
         signal[:, : round(40 * self.highlights)] *= 50
-        pixels = np.clip(signal + BLACK_DN, 0, FULL_DN).astype(np.uint16)
+        pixels = np.clip(signal + BLACK_DN, 0, self.ends_dn).astype(np.uint16)
         self.frames += 1
         written = np.random.default_rng(self.frames).integers(0, FULL_DN + 1, self.numbers)
         pixels[0, : self.numbers] = written
@@ -114,6 +116,12 @@ def test_white_that_saturates_in_every_colour_shortens_all_exposures_alike() -> 
     assert found.notes == {"exposures": found.sentence}
     assert bench.exposures_ms == [200.0, 20.0], "one frame, and one more as that one was saturated"
     assert bench.shown[-1] == 0, "the projector is dark afterwards"
+
+
+@pytest.mark.parametrize("ends_dn", [4094, 4080])
+def test_white_that_ends_below_full_scale_is_saturated_there(ends_dn: int) -> None:
+    bench = Bench(light_for(2.4, 200.0), ends_dn=ends_dn)
+    assert exposures(meter(rig_of(bench), plan_of((200.0, 1.0), (400.0, 1.0)))) == [90.0, 180.0]
 
 
 @pytest.mark.parametrize("share", [0.25, 1.2])
@@ -275,6 +283,11 @@ def test_levels_that_are_changed_on_their_way_are_doubted(
     told = [float(each) for each in re.findall(r"(\d\.\d\d) in (?:red|green|blue)", doubt)]
     assert told == pytest.approx([share] * len(told), abs=0.02)
     assert len(told) == colours
+
+
+def test_colours_that_end_below_full_scale_say_nothing_of_their_level() -> None:
+    colours = np.array([[0.2, 1.3], [1.3, 1.1]])
+    assert doubt_of(Bench(light_for(1.0, 200.0, 0.5), colours=colours, ends_dn=4090)) == ""
 
 
 def test_faint_light_says_nothing_of_its_level() -> None:

@@ -25,7 +25,7 @@ FULL_DN = 1023
 
 def white(share: float) -> np.ndarray[tuple[int, ...], np.dtype[np.uint16]]:
     """A picture of which this share of the cells of 2 x 2 pixels is saturated in every colour."""
-    cells = np.full(25, FULL_DN - 1, np.uint16)
+    cells = np.arange(FULL_DN - 25, FULL_DN, dtype=np.uint16)
     cells[: round(25 * share)] = FULL_DN
     return np.kron(cells.reshape(5, 5), np.ones((2, 2), np.uint16))
 
@@ -53,6 +53,13 @@ def test_what_one_colour_still_measures_does_not_count() -> None:
     for shot in PLAN.shots():
         watch.add(shot, pixels)
     assert watch.found == ""
+
+
+def test_white_that_ends_below_full_scale_is_saturated_there() -> None:
+    watch, pixels = ExposureWatch(PLAN, FULL_DN), white(1.0) - 3
+    for shot in PLAN.shots():
+        watch.add(shot, pixels)
+    assert "100%" in watch.found
 
 
 def test_a_scan_tells_it_once_and_ends_as_usual(tmp_path, caplog) -> None:  # type: ignore[no-untyped-def]

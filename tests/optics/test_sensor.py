@@ -7,7 +7,7 @@ import pytest
 from pydantic import ValidationError
 
 from dsl_core.model.rig import FlatField, Rig, Sensor
-from dsl_core.optics.sensor import digitise, gain_at_pixels, raw_variance, relative_gain
+from dsl_core.optics.sensor import digitise, end_near_full, gain_at_pixels, raw_variance, relative_gain
 from dsl_core.reconstruction.surface import reconstruct_surface
 from dsl_core.simulation.published_rig import published_rig
 
@@ -104,3 +104,25 @@ def test_light_is_rounded_where_noise_is_smaller_than_that_of_steps(
     step_dn: int, read_noise_dn: float, rounds: bool
 ) -> None:
     assert Sensor(step_dn=step_dn, read_noise_dn=read_noise_dn).rounds_light == rounds
+
+
+@pytest.mark.parametrize(
+    ("bits", "ends_dn"), [(8, 250), (12, 4094), (12, 4080), (12, 3700), (14, 16380), (16, 65520)]
+)
+def test_values_end_where_bright_pixels_pile_up_just_below_full_scale(bits: int, ends_dn: int) -> None:
+    full_dn = 2**bits - 1
+    sensor = Sensor(bit_depth=bits, electrons_per_dn=10 * 2.0 ** (12 - bits), saturation_dn=ends_dn)
+    light = np.tile(np.linspace(0.0, 1.3 * full_dn, 200, dtype=np.float32), (50, 1))
+    values = digitise(sensor, light, np.random.default_rng(0))
+    assert end_near_full(values, full_dn) == ends_dn
+    values[0, :2] = full_dn
+    assert end_near_full(values, full_dn) == ends_dn, "hot pixels are no light"
+
+
+@pytest.mark.parametrize(("light", "ends_dn"), [(0.97, 4095), (1.5, 4095), (1.5, 3000)])
+def test_neither_noise_nor_full_scale_nor_what_cuts_values_off_is_such_an_end(
+    light: float, ends_dn: int
+) -> None:
+    sensor = Sensor(black_level_dn=0.0, saturation_dn=ends_dn)
+    values = digitise(sensor, np.full((60, 90), light * 4095, np.float32), np.random.default_rng(0))
+    assert end_near_full(values, 4095) == 4095

@@ -1,32 +1,57 @@
-"""What a camera's counts are worth: what its calibration or data sheet says, unless pictures are noisier."""
+"""What counts of a camera are worth: what its calibration or data sheet says, unless pictures differ."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
 
 import numpy as np
+from numpy.typing import NDArray
 
 from dsl_core.capture.proof.raster import Counts, Floats
 from dsl_core.model.rig import Sensor
+from dsl_core.optics.seen_noise import noisier
+from dsl_core.optics.sensor import end_near_full
 
 #: Pictures whose variance is remembered, as each is compared with several.
 _REMEMBERED = 8
+#: Where values end, the second of the colours has at least this share of the pixels.
+OTHER_COLOUR = 0.1
 
 
 @dataclass
 class Noise:
-    """What a camera's counts are worth."""
+    """What a camera's counts are worth: by the ``stated`` sensor, with ``excess`` times its variance."""
 
-    sensor: Sensor
+    stated: Sensor
+    excess: float = field(default=1.0, init=False)
+    sensor: Sensor = field(init=False)
     _known: dict[int, tuple[Counts | Floats, Floats]] = field(
         default_factory=dict, init=False, repr=False, compare=False
     )
 
-    def take(self, sensor: Sensor) -> None:
-        """Count by another sensor from now on."""
-        if sensor != self.sensor:
-            self.sensor = sensor
+    def __post_init__(self) -> None:
+        """Believe what is stated."""
+        self.sensor = self.stated
+
+    def take(self, excess: float) -> None:
+        """Take counts to have ``excess`` times the variance stated from now on."""
+        if excess != self.excess:
+            self.excess, self.sensor = excess, noisier(self.stated, excess)
             self._known.clear()
+
+    def find_end(self, counts: Counts, channels: NDArray[np.int8]) -> None:
+        """Believe what a picture, of these ``channels``, shows of where values end, just below full scale.
+
+        Light without noise piles up as well, but in one colour alone.
+        """
+        end = end_near_full(counts, self.stated.full_scale_dn)
+        if end == self.stated.full_scale_dn:
+            return
+        piled = np.bincount(channels[counts == end], minlength=3)
+        if np.unique(channels).size > 1 and np.sort(piled)[1] < OTHER_COLOUR * piled.sum():
+            return
+        self.stated = self.stated.model_copy(update={"saturation_dn": end})
+        self.sensor = self.sensor.model_copy(update={"saturation_dn": end})
 
     @classmethod
     def of(cls, sensor: Sensor | None, bit_depth: int) -> Noise:

@@ -56,7 +56,8 @@ class FrameProof:
         #: What the last picture said of the pairs of the first code, one by one.
         self.reviewed: list[Finding] = []
         self._later = LaterPictures(known)
-        self._sentinels = SentinelProof(known.noise, known.raster, known.raster.channels(known.bayer))
+        self._channels = known.raster.channels(known.bayer)
+        self._sentinels = SentinelProof(known.noise, known.raster, self._channels)
         self._bright_black = BrightBlack(known.noise)
         self._hidden = HiddenParts(known.noise)
         self._neighbours = LineNeighbours(known.noise, known.raster.shape[1])
@@ -72,6 +73,8 @@ class FrameProof:
 
     def judge_raster(self, shot: Shot, seen: Counts) -> Finding:
         """The same of what a `Raster` takes of a mosaic."""
+        if shot.role in ("white", "code"):
+            self._known.noise.find_end(seen, self._channels)
         found = self._unless_repeated(self._judge(shot, seen), seen)
         if shot.role == "spectral" and not found.is_wrong:
             wrong = self._unless_black_is_bright(found, seen) or self._unless_hidden(found, seen)

@@ -16,7 +16,7 @@ from dsl_core.model.fit import FitFinding
 from dsl_core.model.frames import FrameSource
 from dsl_core.model.plan import CapturePlan, Shot
 from dsl_core.model.rig import Sensor
-from dsl_core.optics.sensor import bayer_channels, step_of
+from dsl_core.optics.sensor import bayer_channels, end_of, step_of
 from dsl_core.reconstruction.light.own_noise import own_noise
 from dsl_core.reconstruction.light.setting_ratios import compared_rows
 
@@ -24,12 +24,10 @@ Counts = NDArray[np.int64]
 
 #: Scan lines that are looked at, besides white and black.
 LINES = 8
-#: Where values end, as many pixels have the last one, and so many times as many as those next below it.
-PILE, TIMES = 20, 10.0
 #: The second of the three colours has at least this share of them: noise-free light piles up in one alone.
 OTHER_COLOUR = 0.1
-#: Share of the range that saturation is looked for in, and of the pile that may be above it: hot pixels.
-UPPER, ABOVE = 0.25, 0.01
+#: Share of the range that saturation is not looked for in.
+UPPER = 0.25
 #: Values nearer to full scale than this share of it count as saturated anyway.
 MARGIN = 0.02
 
@@ -57,15 +55,11 @@ def saturation_dn(counts: Counts, sensor: Sensor) -> int | None:
     """
     total = counts.sum(0)
     low = int(sensor.black_level_dn + UPPER * (sensor.full_scale_dn - sensor.black_level_dn))
-    end = low + int(total[low:].argmax())
-    if end >= (1 - MARGIN) * sensor.full_scale_dn:
+    end = end_of(total, low)
+    if end is None or end >= (1 - MARGIN) * sensor.full_scale_dn:
         return None
-    pile, below = int(total[end]), total[max(end - max(end // 100, 8), 0) : end]
-    colours = np.sort(counts[:, end])
-    several = colours[1] >= OTHER_COLOUR * pile or np.count_nonzero(counts.any(1)) == 1
-    if pile < PILE or pile < TIMES * below.mean() or total[end + 1 :].sum() > ABOVE * pile or not several:
-        return None
-    return end
+    several = np.sort(counts[:, end])[1] >= OTHER_COLOUR * total[end] or np.count_nonzero(counts.any(1)) == 1
+    return end if several else None
 
 
 def _counts(source: FrameSource, sensor: Sensor) -> Counts:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from scipy.ndimage import uniform_filter1d
 
 from dsl_core.capture.proof.finding import Verdict
 from dsl_core.capture.proof.judging.known import Known
@@ -40,8 +41,12 @@ class FlatScene:
         bayer: BayerPattern,
         led: tuple[float, float, float] = (1, 1, 1),
         shares: tuple[float, float, float] = (1, 1, 1),
+        light_dn: float = 2000.0,
+        ends_dn: int = 4095,
+        blur_px: int = 1,
     ) -> None:
         width, height = plan.camera_size_px
+        self._light_dn, self._ends_dn, self._blur_px = light_dn, ends_dn, blur_px
         self._plan, self._rng = plan, np.random.default_rng(width)
         self._column = np.arange(width) * COLUMNS // width
         self._gain = (np.array([0.8, 1.0, 0.6]) * led)[bayer_channels(bayer, height, width)]
@@ -50,9 +55,10 @@ class FlatScene:
     def take(self, shot: Shot) -> NDArray[np.uint16]:
         image = pattern_image(self._plan, self._plan.original(shot)).astype(float)
         share = (image.reshape(8, COLUMNS, -1).mean(0) / max(image.max(), 1)) @ self._shares
-        light = 100 + 2000 * share[self._column][None] * self._gain
+        seen = uniform_filter1d(share[self._column], self._blur_px, mode="nearest")
+        light = 100 + self._light_dn * seen[None] * self._gain
         values = self._rng.normal(light, np.sqrt(4 + 0.1 * light))
-        return np.asarray(values.round().clip(0, 4095), np.uint16)
+        return np.asarray(values.round().clip(0, self._ends_dn), np.uint16)
 
 
 @pytest.mark.parametrize(
@@ -65,6 +71,16 @@ def test_right_pictures_of_any_camera_pass(width: int, height: int, bayer: Bayer
     found = [proof.judge(shot, scene.take(shot)).verdict for shot in plan.shots()]
     assert set(found) <= {Verdict.RIGHT, Verdict.UNTOLD}
     assert found.count(Verdict.RIGHT) > len(found) / 2
+
+
+@pytest.mark.parametrize("ends_dn", [4095, 4094, 4080])
+@pytest.mark.parametrize("bayer", ["RGGB", "MONO"])
+def test_bright_pictures_pass_wherever_their_values_end(bayer: BayerPattern, ends_dn: int) -> None:
+    plan = plan_of(640, 72)
+    proof = FrameProof(plan, None, 12, bayer)
+    scene = FlatScene(plan, bayer, light_dn=20_000, ends_dn=ends_dn, blur_px=15)
+    found = [proof.judge(shot, scene.take(shot)) for shot in plan.shots()]
+    assert [each for each in found if each.is_wrong] == []
 
 
 def coloured(width: int, height: int) -> CapturePlan:

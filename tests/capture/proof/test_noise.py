@@ -9,7 +9,6 @@ from dsl_core.capture.proof.code.code_pairs import CodePairs, Pair
 from dsl_core.capture.proof.noise import Noise
 from dsl_core.capture.proof.raster import Raster
 from dsl_core.model.rig import Sensor
-from dsl_core.optics.seen_noise import noisier
 
 SENSOR = Sensor(black_level_dn=100.0, electrons_per_dn=10.0, read_noise_dn=2.0)
 RASTER = Raster((128, 96))
@@ -43,7 +42,7 @@ def test_another_sensor_counts_for_pictures_that_are_known_too() -> None:
     noise = Noise(SENSOR)
     taken = RASTER.take(np.full((96, 128), 500, np.uint16))
     stated = noise.variance(taken).copy()
-    noise.take(noisier(SENSOR, 9.0))
+    noise.take(9.0)
     assert noise.variance(taken) == pytest.approx(9 * stated, rel=0.01)
 
 
@@ -100,3 +99,23 @@ def test_the_least_noise_of_all_pairs_counts() -> None:
     assert 9.0 * 0.8 < least < first
     pairs.learn_noise(noisy_pair(6.0, 4), RASTER)
     assert excess_of(noise) == least
+
+
+def test_values_end_where_those_of_several_colours_pile_up_below_full_scale() -> None:
+    channels = RASTER.channels("RGGB")
+    lit = np.random.default_rng(0).normal(np.linspace(100, 6000, channels.size), 30)
+    counts = lit.clip(0, 4094).astype(np.uint16)
+    noise = Noise(SENSOR)
+    one_colour = counts.copy()
+    one_colour[channels != 1] = 500
+    noise.find_end(one_colour, channels)
+    assert noise.sensor.full_scale_dn == 4095, "it may be light without noise"
+    noise.take(4.0)
+    noise.find_end(counts, channels)
+    assert noise.sensor.full_scale_dn == 4094
+    assert excess_of(noise) == pytest.approx(4.0)
+    noise.take(9.0)
+    assert noise.sensor.full_scale_dn == 4094
+    mono = Noise(SENSOR)
+    mono.find_end(counts, RASTER.channels("MONO"))
+    assert mono.sensor.full_scale_dn == 4094

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from dsl_core.capture.proof.finding import Verdict
 from dsl_core.capture.proof.noise import Noise
 from dsl_core.capture.proof.raster import Counts, Floats, Raster
-from dsl_core.optics.seen_noise import noise_excess, noisier
+from dsl_core.optics.seen_noise import noise_excess
 
 #: A pixel breaks the sum by more than this share of its contrast, and by so many standard deviations.
 BROKEN_SHARE, BROKEN_SIGMAS = 0.3, 6.0
@@ -35,7 +35,7 @@ class CodePairs:
 
     def __init__(self, noise: Noise) -> None:
         """Start without any."""
-        self._noise, self._stated = noise, noise.sensor
+        self._noise = noise
         self.pairs: dict[int, Pair] = {}
         self._least_excess = np.inf
 
@@ -67,11 +67,11 @@ class CodePairs:
             return
         other = next(reversed(self.pairs.values()))
         one, before = ((a.reshape(raster.shape), b.reshape(raster.shape)) for a, b in (pair, other))
-        variance, full = Noise(self._stated).variance, self._stated.full_scale_dn
-        excess = noise_excess(one, before, variance, full)
+        stated = self._noise.stated
+        excess = noise_excess(one, before, Noise(stated).variance, stated.full_scale_dn)
         if excess is not None:
             self._least_excess = min(self._least_excess, excess)
-            self._noise.take(noisier(self._stated, self._least_excess))
+            self._noise.take(self._least_excess)
 
     def broken(self, pair: Pair, expected: Floats | None) -> NDArray[np.bool_] | None:
         """Pixels that break the sum of a pair, flat; None if it holds or nothing can be told.
