@@ -23,6 +23,9 @@ SHORT_PX = 0.02
 CLIPPED, NO_STRUCTURE = 1e-6, 1e-6
 #: What the noise of a pixel seems to tell of a shift: a quarter, and a fifth more, as sums of many scatter.
 OF_NOISE = 0.3
+#: A shift of the whole picture leaves less by more than chance does: six deviations of what differences of
+#: two sums of squares scatter by, times the root of the number of pixels.
+BY_CHANCE = 12.0
 
 
 @dataclass(frozen=True)
@@ -63,7 +66,7 @@ def tile_shifts(old: Floats, new: Floats, variance: Floats, tiles: tuple[int, in
     """Shifts of ``tiles`` (down, across) from ``old`` to ``new``, whose difference has this ``variance``."""
     from scipy.ndimage import spline_filter
 
-    common = _common_shift(old, new)
+    common = _common_shift(old, new, variance)
     old = spline_filter(old, order=3, mode="nearest")
     down, across = (
         np.linspace(0, size, count + 1).astype(int) for size, count in zip(old.shape, tiles, strict=True)
@@ -148,14 +151,34 @@ def _moved(old: Floats, part: tuple[slice, slice], shift: Floats) -> tuple[Float
     return wide[1:-1, 1:-1], gx, gy
 
 
-def _common_shift(old: Floats, new: Floats) -> tuple[float, float]:
+def _common_shift(old: Floats, new: Floats, variance: Floats) -> tuple[float, float]:
     """Shift (x, y) of most of the picture, whole pixels, by the correlation of edges; 0 unless sure."""
     window = np.outer(np.hanning(old.shape[0]), np.hanning(old.shape[1]))
     first, second = (np.fft.rfft2(_edges(each) * window) for each in (old, new))
     peak = np.fft.irfft2(second * first.conj(), old.shape)
     at = np.unravel_index(int(peak.argmax()), peak.shape)
     y, x = (int(i) if i <= size // 2 else int(i) - size for i, size in zip(at, peak.shape, strict=True))
-    return (float(x), float(y)) if max(abs(x), abs(y)) > 1 and peak.max() > 1.05 * peak[0, 0] else (0.0, 0.0)
+    is_far = max(abs(x), abs(y)) > 1 and peak.max() > 1.05 * peak[0, 0]
+    # Where nothing has edges, those of noise correlate anywhere.
+    return (float(x), float(y)) if is_far and _explains(old, new, variance, x, y) else (0.0, 0.0)
+
+
+def _explains(old: Floats, new: Floats, variance: Floats, x: int, y: int) -> bool:
+    """Whether the old picture, moved by (x, y) whole pixels, is nearer to the new one than as it is."""
+    there, before = (
+        tuple(slice(max(by, 0), size + min(by, 0)) for by, size in zip(shift, old.shape, strict=True))
+        for shift in ((y, x), (-y, -x))
+    )
+    root = 1 / np.sqrt(variance[there].ravel())
+    root[root < np.sqrt(CLIPPED) * root.max(initial=0)] = 0
+    seen = new[there].ravel() * root
+    count = np.count_nonzero(root)
+
+    def left(part: tuple[slice, ...]) -> float:
+        design = np.stack([old[part].ravel() * root, root], 1)
+        return float(np.sum((seen - design @ np.linalg.lstsq(design, seen)[0]) ** 2))
+
+    return count > 0 and left(there) > (1 + BY_CHANCE / np.sqrt(count)) * left(before)
 
 
 def _edges(picture: Floats) -> Floats:

@@ -59,6 +59,27 @@ def test_the_gradients_of_noise_tell_nothing() -> None:
         assert got.sigmas.max() < 6
 
 
+@pytest.mark.parametrize("stripes", [False, True])
+def test_edges_of_noise_are_no_common_shift(stripes: bool) -> None:
+    wall = np.full((180, 320), 85.0)
+    wall[:, :13] *= 0.6
+    if stripes:
+        wall *= np.arange(320) % 4 < 2
+    for seed in range(8):
+        got = found(wall, wall, seed)
+        assert got.length.max() < 3
+        assert got.change.max() < 0.1
+
+
+@pytest.mark.parametrize("contrast", [900.0, 60.0])
+@pytest.mark.parametrize("by", [(70, -10), (-3, 4)])
+def test_far_shifts_are_found_whatever_becomes_of_the_light(by: tuple[int, int], contrast: float) -> None:
+    world = 200 + contrast * gaussian_filter(np.random.default_rng(7).normal(size=(240, 400)), 2.0)
+    old, moved = (world[30 - y : 210 - y, 75 - x : 325 - x] for x, y in ((0, 0), by))
+    got = found(0.8 * moved + 30, old)
+    assert (np.median(got.x), np.median(got.y)) == pytest.approx(by, abs=0.15)
+
+
 def test_an_empty_picture_tells_nothing() -> None:
     flat = np.full((48, 72), 100.0)
     got = tile_shifts(flat, flat, np.ones_like(flat), (2, 3))
