@@ -35,7 +35,7 @@ class ScanWatches:
             return cls(exposure)
         camera, sensor = rig.camera.info, rig.calibration.sensor if rig.calibration else None
         proof = FrameProof(plan, rig.calibration, camera.bit_depth, camera.bayer)
-        return cls(exposure, proof, SentinelWatch(plan, sensor), SeenFrames(plan))
+        return cls(exposure, proof, SentinelWatch(plan, sensor, camera.bit_depth), SeenFrames(plan))
 
     def learn(self, sink: FrameSink, stored: FrameSource) -> None:
         """Let sentinels look at what earlier runs stored; what the ``sink`` misses is not read."""

@@ -6,7 +6,7 @@ hardly moves in the picture, but the stripes on it do.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Collection, Iterable
 from dataclasses import replace
 
 import numpy as np
@@ -16,16 +16,63 @@ from dsl_core.capture.motion import Movement, moved_between
 from dsl_core.model.frames import FrameSource
 from dsl_core.model.plan import CapturePlan, Shot
 from dsl_core.model.rig import Sensor
+from dsl_core.optics.seen_noise import PAIRS, seen_sensor, usual_sensor
+from dsl_core.patterns.inverse_pairs import inverse_pairs
+from dsl_core.solve.thinned import spread_rows
+
+#: Rows of a frame that its noise is told by.
+ROWS = 64
+
+
+class SensorWatch:
+    """Takes the frames of a scan, and says what their counts are worth, of a calibrated camera or another."""
+
+    def __init__(self, plan: CapturePlan, sensor: Sensor | None, bit_depth: int) -> None:
+        """A ``sensor`` that is known counts as it is; without one, frames have this ``bit_depth``."""
+        self._known, self._stated = sensor, usual_sensor(bit_depth)
+        sets = [] if sensor or not plan.code_count else inverse_pairs(plan.code, plan.projector_size_px)
+        self._pairs = sets[0][:PAIRS] if sets else ()
+        patterns = {number for pair in self._pairs for number in pair}
+        self._pattern_of = {
+            shot.index: shot.pattern
+            for shot in (plan.shots() if patterns else ())
+            if (shot.role, shot.setting) == ("code", min(plan.code_settings)) and shot.pattern in patterns
+        }
+        self._seen: dict[int, NDArray[np.uint16]] = {}
+
+    @property
+    def wanted(self) -> frozenset[int]:
+        """Indices of the shots that are looked at."""
+        return frozenset(self._pattern_of)
+
+    def add(self, shot: Shot, pixels: NDArray[np.uint16]) -> None:
+        """Look at a frame (rows, columns), DN."""
+        if shot.index in self._pattern_of:
+            self._seen[shot.pattern] = pixels[spread_rows(pixels.shape[0], ROWS)]
+
+    def forget(self, gone: Collection[int]) -> None:
+        """Forget frames that were withdrawn."""
+        for index in gone:
+            self._seen.pop(self._pattern_of.get(index, -1), None)
+
+    def given(self, black: NDArray[np.uint16]) -> Sensor:
+        """The sensor of a scan with this black picture."""
+        if self._known is not None:
+            return self._known
+        pairs = [(self._seen[a], self._seen[b]) for a, b in self._pairs if {a, b} <= self._seen.keys()]
+        return seen_sensor(self._stated, black, pairs)
 
 
 class SentinelWatch:
     """Takes the frames of a scan in their order, and says when something has moved."""
 
-    def __init__(self, plan: CapturePlan, sensor: Sensor | None = None) -> None:
-        """Without a ``sensor``, a usual one is assumed."""
-        self._sensor = sensor or Sensor()
+    def __init__(self, plan: CapturePlan, sensor: Sensor | None = None, bit_depth: int = 12) -> None:
+        """Without a ``sensor``, that which frames of ``bit_depth`` show is assumed."""
+        self._sensor = SensorWatch(plan, sensor, bit_depth)
         self._old = {s.index: plan.original(s) for s in plan.shots() if s.role == "sentinel"}
         self._references = plan.references()
+        others = (*self._old.values(), *self._references.values())
+        self._compared = frozenset(self._old) | {shot.index for shot in others}
         self._kept: dict[int, NDArray[np.uint16]] = {}
         self._black: dict[int, int] = {}
         self._still: dict[str, int] = {}
@@ -34,8 +81,7 @@ class SentinelWatch:
     @property
     def wanted(self) -> frozenset[int]:
         """Indices of the shots that are looked at."""
-        references = {shot.index for shot in self._references.values()}
-        return frozenset(self._old) | {shot.index for shot in self._old.values()} | references
+        return self._compared | self._sensor.wanted
 
     def learn(self, stored: FrameSource, there: Iterable[Shot]) -> None:
         """Look at frames of earlier runs."""
@@ -46,6 +92,9 @@ class SentinelWatch:
     def add(self, shot: Shot, pixels: NDArray[np.uint16]) -> None:
         """Look at a frame (rows, columns), DN; ``found`` says what moved, first of all."""
         if self.found is not None or shot.index not in self.wanted:
+            return
+        self._sensor.add(shot, pixels)
+        if shot.index not in self._compared:
             return
         self._kept[shot.index] = pixels
         old = self._old.get(shot.index)
@@ -69,9 +118,10 @@ class SentinelWatch:
             return None
         old = {role: self._kept[shot.index] for role, shot in there.items()}
         new = {role: take(shot) for role, shot in there.items()}
+        sensor = self._sensor.given(old["black"])
         for role in sorted(there.keys() - {"black"}, reverse=True):
             pairs = (old[role], old["black"]), (new[role], new["black"])
-            if found := moved_between(*pairs, self._sensor, role == "code"):
+            if found := moved_between(*pairs, sensor, role == "code"):
                 return found
         return None
 
@@ -80,6 +130,7 @@ class SentinelWatch:
         gone = {shot.index for shot in shots}
         self._kept = {index: pixels for index, pixels in self._kept.items() if index not in gone}
         self._still = {role: index for role, index in self._still.items() if index not in gone}
+        self._sensor.forget(gone)
         self._black = {}
         self.found = None
 
@@ -88,9 +139,8 @@ class SentinelWatch:
         if old is None or not {black, old_black, index, old.index} <= self._kept.keys():
             return
         kept = self._kept
-        self.found = moved_between(
-            (kept[old.index], kept[old_black]), (kept[index], kept[black]), self._sensor, old.role == "code"
-        )
+        before, now = (kept[old.index], kept[old_black]), (kept[index], kept[black])
+        self.found = moved_between(before, now, self._sensor.given(before[1]), old.role == "code")
         if self.found is None:
             self._still[old.role] = index
         else:
@@ -99,9 +149,12 @@ class SentinelWatch:
 
 
 def movement_of(
-    source: FrameSource, sensor: Sensor | None = None, missing: Iterable[int] = ()
+    source: FrameSource, sensor: Sensor | None = None, missing: Iterable[int] = (), bit_depth: int = 12
 ) -> Movement | None:
-    """What moved during a scan with all frames but those ``missing``; reads its sentinels."""
-    watch, gone = SentinelWatch(source.plan, sensor), set(missing)
+    """What moved during a scan with all frames but those ``missing``; reads its sentinels.
+
+    Without a ``sensor``, that which frames of ``bit_depth`` show is assumed.
+    """
+    watch, gone = SentinelWatch(source.plan, sensor, bit_depth), set(missing)
     watch.learn(source, (shot for shot in source.plan.shots() if shot.index not in gone))
     return watch.found

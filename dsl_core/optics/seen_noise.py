@@ -8,12 +8,14 @@ surface is smooth.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dsl_core.model.rig import Sensor
+from dsl_core.optics.sensor import raw_variance
 from dsl_core.solve.robust import robust_std
 
 Counts = NDArray[np.uint16]
@@ -28,6 +30,10 @@ FEWEST = 24
 STATED_HOLDS, MOST = 1.5, 8.0
 #: Deviations over those stated that no two exposures have.
 NO_NOISE = 0.2
+#: Pairs that are compared, each with the next: of a wrong picture, others show that it is not noise.
+PAIRS = 3
+#: Share of the pixels of black that may be darker than the black level.
+DARKER = 0.05
 
 
 def noise_excess(
@@ -67,3 +73,34 @@ def noisier(sensor: Sensor, excess: float) -> Sensor:
         "read_noise_dn": sensor.read_noise_dn * float(np.sqrt(excess)),
     }
     return sensor.model_copy(update=update) if excess != 1 else sensor
+
+
+def usual_sensor(bit_depth: int) -> Sensor:
+    """A sensor like the published camera's with this bit depth, whose black level nobody knows."""
+    share = 2.0 ** (bit_depth - 12)
+    return Sensor(
+        bit_depth=bit_depth,
+        black_level_dn=0.0,
+        electrons_per_dn=Sensor().electrons_per_dn / share,
+        read_noise_dn=max(2.0 * share, 0.5),
+    )
+
+
+def least_excess(pairs: Sequence[Pair], sensor: Sensor) -> float:
+    """The least `noise_excess` of pairs over what a sensor states, each compared with the next; 1 of one."""
+
+    def variance(counts: Counts) -> NDArray[np.floating]:
+        return raw_variance(sensor, counts.astype(np.float32) - np.float32(sensor.black_level_dn))
+
+    found = [noise_excess(one, other, variance, sensor.full_scale_dn) for one, other in pairwise(pairs)]
+    return min((each for each in found if each is not None), default=1.0)
+
+
+def seen_sensor(stated: Sensor, black: Counts, pairs: Sequence[Pair]) -> Sensor:
+    """A sensor with the black level that a black picture shows, and the noise of ``pairs`` of a code.
+
+    All are raw mosaics (rows, columns). Light of the room counts as black level where it is everywhere; its
+    noise is in that of pairs.
+    """
+    sensor = stated.model_copy(update={"black_level_dn": float(np.quantile(black, DARKER))})
+    return noisier(sensor, least_excess(pairs, sensor))

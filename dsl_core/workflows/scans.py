@@ -106,7 +106,8 @@ def prepare_resume(rig: DeviceRig, folder: Path, check_drift: bool = True) -> tu
     done = [shot for shot in reader.plan.shots() if shot.index in sound]
     if check_drift and 0 < len(done) < reader.plan.shot_count:
         sensor = None if reader.calibration is None else reader.calibration.sensor
-        moved = movement_of(reader, sensor, (s.index for s in reader.plan.shots() if s.index not in sound))
+        gone = (s.index for s in reader.plan.shots() if s.index not in sound)
+        moved = movement_of(reader, sensor, gone, rig.camera.info.bit_depth)
         if moved is not None and moved.after is not None:
             # What was captured after a motion does not show how things should be.
             done = [shot for shot in done if shot.index <= moved.after]

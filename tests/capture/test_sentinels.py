@@ -4,13 +4,17 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy.ndimage import gaussian_filter
+from scipy.ndimage import gaussian_filter, shift
 
 from dsl_core.capture.runner import Runner, State
 from dsl_core.capture.sentinels import SentinelWatch, movement_of
 from dsl_core.capture.sink import WatchedSink
 from dsl_core.errors import DriftError
-from dsl_core.model.plan import CapturePlan, GrayCode, ScanLines, Sentinels
+from dsl_core.model.plan import CapturePlan, GrayCode, ScanLines, Sentinels, Setting
+from dsl_core.model.rig import Sensor
+from dsl_core.optics.seen_noise import PAIRS
+from dsl_core.optics.sensor import digitise
+from dsl_core.patterns.images import pattern_image
 from dsl_core.simulation.published_rig import published_rig
 from tests.cases.changing_rig import Change, changing, from_shot, shifted
 from tests.cases.memory_sink import MemorySink
@@ -22,8 +26,6 @@ SIZE = (96, 64)
 @pytest.fixture(scope="module")
 def scene() -> RenderedScene:
     """A textured plane that faces the camera: column x of the picture sees column x of the projector."""
-    from dsl_core.patterns.images import pattern_image
-
     plan = CapturePlan(
         camera_size_px=SIZE,
         projector_size_px=SIZE,
@@ -193,4 +195,51 @@ def test_a_scan_without_sentinels_looks_at_its_first_pictures(scene: RenderedSce
     alone = scene.plan.model_copy(update={"sentinels": None})
     references = {shot.index for shot in alone.references().values()}
     assert len(references) == 3
-    assert SentinelWatch(alone).wanted == references
+    assert SentinelWatch(alone, scene.calibration.sensor).wanted == references
+    assert len(SentinelWatch(alone).wanted - references) == 2 * PAIRS, (
+        "of an unknown sensor, the code as well"
+    )
+
+
+#: None of these sensors is the one that is assumed of a camera that is not calibrated.
+SENSORS = [
+    Sensor(),
+    Sensor(black_level_dn=64.0, electrons_per_dn=2.5, read_noise_dn=1.0),
+    Sensor(black_level_dn=16.0, electrons_per_dn=2.5, read_noise_dn=3.0),
+    Sensor(bit_depth=8, black_level_dn=4.0, electrons_per_dn=40.0, read_noise_dn=0.3),
+    Sensor(bit_depth=16, black_level_dn=1000.0, electrons_per_dn=0.2, read_noise_dn=16.0),
+]
+
+
+def seen_of(sensor: Sensor, white_dn: float, texture: np.ndarray, shift_px: float) -> str:
+    """What is said of a surface in white and stripes, ``white_dn`` of 12 bits, that moves after 40 shots."""
+    plan = CapturePlan(
+        camera_size_px=texture.shape[::-1],
+        projector_size_px=(64, 8),
+        code=GrayCode(rows=False),
+        spectral=ScanLines(width_px=4, step_px=2),
+        settings=(Setting(exposure_ms=100, level=0.5),),
+        code_settings=(0,),
+        sentinels=Sentinels(every=20),
+    )
+    rng, watch = np.random.default_rng(0), SentinelWatch(plan, None, sensor.bit_depth)
+    column = np.arange(texture.shape[1]) * 64 // texture.shape[1]
+    for shot in plan.shots():
+        drive = pattern_image(plan, plan.original(shot)).reshape(8, 64, -1).mean((0, 2))
+        light = white_dn * 2.0 ** (sensor.bit_depth - 12) * (drive / max(drive.max(), 1))[column] * texture
+        if shot.index >= 40:
+            light = shift(light, (0, shift_px), order=3, mode="nearest")
+        watch.add(shot, digitise(sensor, light.astype(np.float32), rng))
+    return "" if watch.found is None else watch.found.sentence
+
+
+@pytest.mark.parametrize("sensor", SENSORS)
+@pytest.mark.parametrize("white_dn", [67.0, 300.0])
+def test_the_noise_of_a_camera_that_is_not_calibrated_is_no_motion(sensor: Sensor, white_dn: float) -> None:
+    assert seen_of(sensor, white_dn, np.ones((144, 222)), 0.0) == ""
+
+
+@pytest.mark.parametrize("sensor", SENSORS)
+def test_motion_is_told_by_a_camera_that_is_not_calibrated(sensor: Sensor) -> None:
+    texture = 1 + 2 * gaussian_filter(np.random.default_rng(3).normal(size=(144, 222)), 2.0)
+    assert "moved by 0.8 ± 0.1 px" in seen_of(sensor, 300.0, texture.clip(0.1), 0.8)

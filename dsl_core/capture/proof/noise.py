@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from dsl_core.capture.proof.raster import Counts, Floats
 from dsl_core.model.rig import Sensor
-from dsl_core.optics.seen_noise import noisier
+from dsl_core.optics.seen_noise import noisier, usual_sensor
 from dsl_core.optics.sensor import end_near_full
 
 #: Pictures whose variance is remembered, as each is compared with several.
@@ -56,18 +56,7 @@ class Noise:
     @classmethod
     def of(cls, sensor: Sensor | None, bit_depth: int) -> Noise:
         """Of a known sensor, or else of one like the published camera's with this bit depth."""
-        if sensor is not None:
-            return cls(sensor)
-        share = 2.0 ** (bit_depth - 12)
-        usual = Sensor()
-        return cls(
-            Sensor(
-                bit_depth=bit_depth,
-                black_level_dn=0.0,
-                electrons_per_dn=usual.electrons_per_dn / share,
-                read_noise_dn=max(2.0 * share, 0.5),
-            )
-        )
+        return cls(usual_sensor(bit_depth) if sensor is None else sensor)
 
     @property
     def least_variance(self) -> float:

@@ -141,9 +141,9 @@ def prove(
     """
     found = seen.report(calibration, bit_depth, bayer, knows_light)
     sensor = None if calibration is None else calibration.sensor
-    altered = alteration_of(source, sensor, missing)
+    altered = alteration_of(source, sensor, missing, bit_depth)
     # Pictures that are mixed or filtered look as if something had moved.
-    moved = None if altered else movement_of(source, sensor, missing)
+    moved = None if altered else movement_of(source, sensor, missing, bit_depth)
     return ScanProof(
         judged=found.judged,
         untold=found.untold,

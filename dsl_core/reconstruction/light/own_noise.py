@@ -2,22 +2,17 @@
 
 from __future__ import annotations
 
-from itertools import pairwise
-
 import numpy as np
 from numpy.typing import NDArray
 
 from dsl_core.model.fit import FitFinding
 from dsl_core.model.frames import FrameSource
 from dsl_core.model.rig import Sensor
-from dsl_core.optics.seen_noise import STATED_HOLDS, noise_excess, noisier
-from dsl_core.optics.sensor import raw_variance
+from dsl_core.optics.seen_noise import PAIRS, STATED_HOLDS, least_excess, noisier
 from dsl_core.patterns.inverse_pairs import inverse_pairs
 from dsl_core.reconstruction.light.setting_ratios import compared_rows
 
 Counts = NDArray[np.uint16]
-#: Pairs that are compared, each with the next: of a wrong picture, others show that it is not noise.
-PAIRS = 3
 
 
 def own_noise(source: FrameSource, sensor: Sensor) -> tuple[Sensor, tuple[FitFinding, ...]]:
@@ -36,12 +31,8 @@ def own_noise(source: FrameSource, sensor: Sensor) -> tuple[Sensor, tuple[FitFin
         frame = source.read(shots[pattern])
         return frame[compared_rows(frame.shape[0])]
 
-    def variance(counts: Counts) -> NDArray[np.floating]:
-        return raw_variance(sensor, counts.astype(np.float32) - np.float32(sensor.black_level_dn))
-
     pairs = [(seen(one), seen(other)) for one, other in (sets[0][:PAIRS] if sets else ())]
-    found = [noise_excess(one, other, variance, sensor.full_scale_dn) for one, other in pairwise(pairs)]
-    excess = min((each for each in found if each is not None), default=1.0)
+    excess = least_excess(pairs, sensor)
     return noisier(sensor, excess), () if excess == 1 else (_noisy(float(np.sqrt(excess))),)
 
 
