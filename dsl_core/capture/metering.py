@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dsl_core.capture.exposure import PatternImage, RetryPolicy, ShotTaker
-from dsl_core.capture.overexposure import by_colour, full_scale_dn
+from dsl_core.capture.overexposure import black_level_dn, by_colour, full_scale_dn
 from dsl_core.capture.proof.lasting.missing_light import NO_LIGHT, no_light
 from dsl_core.capture.white_levels import doubts_of_white
 from dsl_core.devices.base import DeviceRig
@@ -85,11 +85,11 @@ def meter(
     response = ProjectorResponse() if known is None else known.projector_response
     period_ms = rig.projector.info.frame_period_ms if known is None else known.frame_period_ms
     fit = _Fit(plan, period_ms, rig.camera.info.exposure_range_ms, response)
-    black_dn = 0.0 if known is None else known.sensor.black_level_dn
     taker = ShotTaker(rig, plan, pattern_image, RetryPolicy(), token)
     doubt = ""
     try:
-        seen, shot, pixels = _measure(taker, white, fit, full_scale_dn(rig), black_dn, rig.camera.info.bayer)
+        levels = full_scale_dn(rig), black_level_dn(rig)
+        seen, shot, pixels = _measure(taker, white, fit, *levels, rig.camera.info.bayer)
         if rig.calibration is not None and not seen.missing:
             doubt = doubts_of_white(taker, shot, pixels, rig.calibration)
     except DeviceError as error:

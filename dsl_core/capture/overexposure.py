@@ -19,6 +19,17 @@ def full_scale_dn(rig: DeviceRig) -> int:
     return (1 << rig.camera.info.bit_depth) - 1 if known is None else known.sensor.full_scale_dn
 
 
+def black_level_dn(rig: DeviceRig) -> float:
+    """The number of a pixel without light, by the calibration or data sheets of such a camera; else 0."""
+    known = rig.calibration or rig.nominal
+    if known is None:
+        return 0.0
+    camera, sensor = rig.camera.info, known.sensor
+    return (
+        sensor.black_level_dn if (sensor.bayer, sensor.bit_depth) == (camera.bayer, camera.bit_depth) else 0.0
+    )
+
+
 def by_colour(pixels: NDArray[np.unsignedinteger]) -> NDArray[np.unsignedinteger]:
     """The pixels of each cell of a raw mosaic (rows, columns), DN, shape (4, rows // 2, columns // 2)."""
     rows, columns = (2 * (length // 2) for length in pixels.shape)

@@ -11,7 +11,7 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from dsl_core.devices.base import Camera, Device, Projector, Spectroradiometer, Stage
+from dsl_core.devices.base import Camera, CameraInfo, Device, Projector, Spectroradiometer, Stage
 from dsl_core.devices.device_thread import DeviceThread, DriverError, HangingError
 from dsl_core.devices.driver_table import (
     Driver,
@@ -26,6 +26,7 @@ from dsl_core.devices.plausible import require_frame, require_spectrum
 from dsl_core.devices.profile import DevicePart, RigProfile
 from dsl_core.errors import DeviceError, DslError
 from dsl_core.model.frames import Frame
+from dsl_core.model.rig import Rig, Sensor
 
 T = TypeVar("T")
 #: How long a device may take to open, to answer, and to measure a spectrum, s.
@@ -36,6 +37,10 @@ _TRIAL_FRAMES = 3
 _FEWEST_VALUES = 24
 #: White has to be brighter than black by this share of full scale to count as seen.
 _SEEN = 0.02
+
+
+#: What findings on the file with the figures of data sheets are called.
+DATA_SHEETS = "data sheets"
 
 
 class Grade(StrEnum):
@@ -72,8 +77,11 @@ def survey() -> list[Finding]:
     return found
 
 
-def examine(profile: RigProfile) -> list[Finding]:
-    """Open and try every device of a profile, whatever the others do; nothing is moved."""
+def examine(profile: RigProfile, nominal: Rig | None = None) -> list[Finding]:
+    """Open and try every device of a profile, whatever the others do; nothing is moved.
+
+    ``nominal`` is what its data sheets say, which has to fit the camera.
+    """
     found = _shared_ports(profile)
     opened: dict[Kind, Device] = {}
     notes = {kind: _Notes(f"{kind} {part.driver}", found) for kind, part in profile.parts().items()}
@@ -89,6 +97,8 @@ def examine(profile: RigProfile) -> list[Finding]:
     camera, projector = opened.get("camera"), opened.get("projector")
     if isinstance(camera, Camera) and isinstance(projector, Projector):
         _look_at_light(camera, projector, _Notes("camera and projector", found, notes["camera"].thread))
+    if isinstance(camera, Camera) and nominal is not None:
+        _compare(camera.info, nominal.sensor, _Notes(DATA_SHEETS, found))
     for kind, device in opened.items():
         notes[kind].ask(device.close, ANSWER_S)
         notes[kind].thread.end()
@@ -217,6 +227,17 @@ def _try_camera(camera: Camera, notes: _Notes) -> None:
         )
     took_s = (frames[-1].timestamp_s - frames[0].timestamp_s) / (len(frames) - 1)
     notes.add(Grade.GOOD, f"{len(frames)} frames of {frames[0].exposure_ms:g} ms, one every {took_s:.3f} s")
+
+
+def _compare(camera: CameraInfo, sensor: Sensor, notes: _Notes) -> None:
+    """Note where the nominal sensor is not the camera's."""
+    if (sensor.bayer, sensor.bit_depth) != (camera.bayer, camera.bit_depth):
+        notes.add(
+            Grade.WARNING,
+            f"The nominal sensor is {sensor.bayer} of {sensor.bit_depth} bits, the camera {camera.bayer} of"
+            f" {camera.bit_depth} bits: its black level is not believed. Set the camera's pixel format, or"
+            " correct bayer, bit_depth and black_level_dn of the file 'nominal'.",
+        )
 
 
 def _frames(camera: Camera) -> list[Frame]:

@@ -5,12 +5,13 @@ from __future__ import annotations
 from pathlib import Path
 
 from dsl_core.devices.base import DeviceRig
-from dsl_core.devices.doctor import Finding, Grade, examine
+from dsl_core.devices.doctor import DATA_SHEETS, Finding, Grade, examine
 from dsl_core.devices.profile import RigProfile, open_parts
 from dsl_core.errors import DeviceError, DslError
 from dsl_core.io.calibration_library import library_home
 from dsl_core.io.records import read_record, write_record
 from dsl_core.io.rig_file import load_rig
+from dsl_core.model.rig import Rig
 
 SUFFIX = ".json"
 
@@ -54,17 +55,18 @@ def save_profile(profile: RigProfile, path: Path, *, overwrite: bool = False) ->
 def examine_profile(path: Path) -> list[Finding]:
     """Try the devices of a profile, and read its file ``nominal``; raises `DeviceError` for the profile."""
     profile = load_profile(path)
-    return [*examine(profile), *examine_nominal(profile, path.parent)]
+    nominal, trouble = read_nominal(profile, path.parent)
+    return [*examine(profile, nominal), *trouble]
 
 
-def examine_nominal(profile: RigProfile, folder: Path) -> list[Finding]:
-    """Read the file ``nominal`` of a profile in a folder: what is wrong with it, or nothing."""
+def read_nominal(profile: RigProfile, folder: Path) -> tuple[Rig | None, list[Finding]]:
+    """What the file ``nominal`` of a profile in a folder says, None without one, and its faults."""
     if profile.nominal:
         try:
-            load_rig(folder / profile.nominal)
+            return load_rig(folder / profile.nominal), []
         except DslError as error:
-            return [Finding("data sheets", Grade.BAD, str(error))]
-    return []
+            return None, [Finding(DATA_SHEETS, Grade.BAD, str(error))]
+    return None, []
 
 
 def open_profile(path: Path) -> DeviceRig:

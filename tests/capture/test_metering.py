@@ -80,8 +80,9 @@ class Screen(Projector):
         self.bench.show(image)
 
 
-def rig_of(bench: Bench) -> DeviceRig:
-    sensor = small_rig().sensor.model_copy(update={"black_level_dn": BLACK_DN, "bit_depth": 12})
+def rig_of(bench: Bench, nominal_bits: int = 12, nominal_dn: float = BLACK_DN) -> DeviceRig:
+    update = {"black_level_dn": nominal_dn, "bit_depth": nominal_bits}
+    sensor = small_rig().sensor.model_copy(update=update)
     nominal = small_rig().model_copy(update={"sensor": sensor, "frame_period_ms": PERIOD_MS})
     return DeviceRig("bench", bench, Screen(bench), nominal=nominal, sleep=lambda seconds: None)
 
@@ -116,6 +117,13 @@ def test_white_that_saturates_in_every_colour_shortens_all_exposures_alike() -> 
     assert found.notes == {"exposures": found.sentence}
     assert bench.exposures_ms == [200.0, 20.0], "one frame, and one more as that one was saturated"
     assert bench.shown[-1] == 0, "the projector is dark afterwards"
+
+
+def test_the_black_level_of_another_bit_depth_is_not_believed() -> None:
+    plan = plan_of((200.0, 1.0))
+    found = meter(rig_of(Bench(light_for(0.9, 200.0)), 16, 16 * BLACK_DN), plan)
+    assert found.plan == plan
+    assert not found.is_told
 
 
 @pytest.mark.parametrize("ends_dn", [4094, 4080])

@@ -21,6 +21,7 @@ from dsl_core.errors import DeviceError
 from dsl_core.model.base import Record
 from dsl_core.model.frames import Frame
 from dsl_core.model.spectral import SpectralCurve
+from tests.cases.small_rig import small_rig
 
 T = TypeVar("T")
 
@@ -172,6 +173,16 @@ def test_a_sound_rig_is_described_and_nothing_is_moved() -> None:
         "380 to 800 nm",
     ):
         assert words in text
+
+
+@pytest.mark.parametrize(("bits", "is_told"), [(16, False), (12, True)])
+def test_data_sheets_of_another_bit_depth_are_told(bits: int, is_told: bool) -> None:
+    nominal = small_rig()
+    sensor = nominal.sensor.model_copy(update={"bayer": "RGGB", "bit_depth": bits})
+    found = examine(profile(), nominal.model_copy(update={"sensor": sensor}))
+    told = [each.text for each in found if each.device == "data sheets"]
+    assert bool(told) is is_told
+    assert all("RGGB of 12 bits, the camera RGGB of 16 bits" in each for each in told)
 
 
 @pytest.mark.parametrize(

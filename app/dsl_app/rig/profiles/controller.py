@@ -93,7 +93,7 @@ class ProfileController:
     def try_devices(self) -> None:
         """Open and try every device of the draft."""
         from dsl_core.devices.doctor import examine
-        from dsl_core.io.rig_profile import examine_nominal
+        from dsl_core.io.rig_profile import read_nominal
 
         if self._is_in_use():
             self.state.trouble.set("A rig is connected, and its devices are taken. Disconnect it, then try.")
@@ -105,7 +105,8 @@ class ProfileController:
             return
 
         def work(_progress: Progress) -> list[Finding]:
-            return [*examine(profile), *examine_nominal(profile, draft.target.parent)]
+            nominal, trouble = read_nominal(profile, draft.target.parent)
+            return [*examine(profile, nominal), *trouble]
 
         def done(found: Any) -> None:
             self.state.tried.set(draft)

@@ -109,7 +109,7 @@ def test_a_profile_is_made_of_what_was_found_and_edited_again(bench: Bench) -> N
 
 def test_trying_says_beside_the_fields_what_works(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
     said = [Finding("camera uvc", Grade.GOOD, "640 x 480 px"), Finding("projector none", Grade.BAD, "None.")]
-    monkeypatch.setattr(doctor, "examine", lambda profile: said)
+    monkeypatch.setattr(doctor, "examine", lambda profile, nominal: said)
     QTest.mouseClick(bench.dialog.save, LEFT)
     assert "The rig has no name" in bench.dialog.trouble.text()
     bench.fill_in()
@@ -132,7 +132,9 @@ def test_the_blue_button_leads_from_name_to_look_try_and_save(
         dialog = bench.dialog
         return [each.text() for each in (dialog.look, dialog.test, dialog.save) if is_blue(each)]
 
-    monkeypatch.setattr(doctor, "examine", lambda profile: [Finding("camera uvc", Grade.GOOD, "640 px")])
+    monkeypatch.setattr(
+        doctor, "examine", lambda profile, nominal: [Finding("camera uvc", Grade.GOOD, "640 px")]
+    )
     found = bench.dialog.forms["camera"].found
     assert bench.dialog.focusWidget() is bench.dialog.name
     assert (found.currentText(), blue()) == ("not looked for yet", ["&Look for devices"])
@@ -163,7 +165,9 @@ def test_what_is_wrong_with_a_setting_stands_below_its_field_until_it_is_right(b
 def test_devices_are_tried_without_a_name_and_with_their_data_sheets(
     bench: Bench, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(doctor, "examine", lambda profile: [Finding("camera uvc", Grade.GOOD, "640 px")])
+    monkeypatch.setattr(
+        doctor, "examine", lambda profile, nominal: [Finding("camera uvc", Grade.GOOD, "640 px")]
+    )
     bench.fill_in()
     bench.control.change(name="", nominal="nowhere.json")
     QTest.mouseClick(bench.dialog.test, LEFT)
