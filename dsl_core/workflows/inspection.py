@@ -19,6 +19,7 @@ from dsl_core.errors import CalibrationError, DecodeError, StoreError
 from dsl_core.io import MANIFEST_NAME
 from dsl_core.io.calibration_library import CalibrationLibrary
 from dsl_core.io.result.result_arrays import ResultArrays
+from dsl_core.io.scan.as_exposed import as_exposed
 from dsl_core.io.scan.check import require_complete
 from dsl_core.io.scan.folder import ScanReader
 from dsl_core.io.scan.manifest import read_manifest
@@ -117,7 +118,8 @@ def read_block(result: ResultArrays, pixel: tuple[int, int], progress: Progress 
     """Read the frames of a result's scan around its pixel (x, y); raises `StoreError`, `CalibrationError`."""
     progress, reader = progress or NoProgress(), ScanReader(find_scan(result))
     require_complete(reader)
-    rig, plan = _calibration(reader, result), reader.plan
+    rig, reader = _calibration(reader, result), as_exposed(reader)
+    plan = reader.plan
     width, height = plan.camera_size_px
     # Even corners keep the phase of the Bayer mosaic.
     at_x, at_y = result.in_picture(pixel)

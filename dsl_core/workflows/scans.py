@@ -24,6 +24,7 @@ from dsl_core.errors import CalibrationError, DecodeError, DriftError, StoreErro
 from dsl_core.evaluation.cost import COSTS_ATTRIBUTE, StageTimer
 from dsl_core.evaluation.summary import Truth
 from dsl_core.io.linearity import Linearity, linearity_of
+from dsl_core.io.scan.as_exposed import as_exposed
 from dsl_core.io.scan.check import require_complete
 from dsl_core.io.scan.folder import ScanReader
 from dsl_core.io.scan.manifest import Manifest, read_manifest, refuse_other_scan
@@ -139,12 +140,12 @@ def reconstruct_scan(
         _require_conditions(folder, reader.manifest, calibration)
     rig, options = with_imported_sensor(reader, calibration_of(reader, calibration)), options or Options()
     proof = read_proof(reader, rig)
-    watched = WatchedSource(reader)
+    watched = WatchedSource(exposed := as_exposed(reader))
     progress = progress or NoProgress()
     # An import is dated by when it was made, and nobody knows when its pictures were taken.
     stated = rig if is_import(reader) else aged(rig, reader.manifest.created)
     result = reconstruct(
-        watched if proof is None else reader, stated, options, progress, timer, sink, seen_geometry
+        watched if proof is None else exposed, stated, options, progress, timer, sink, seen_geometry
     )
     if proof is None:
         with timer.stage("compare frames with their patterns"):
@@ -275,7 +276,7 @@ def is_made_of(target: Path, key: str) -> bool:
 
 def prove_scan(folder: Path) -> ScanProof:
     """What the pictures of a scan show but damaged ones, and what moved in it; raises `StoreError`."""
-    reader = ScanReader(folder)
+    reader = as_exposed(ScanReader(folder))
     seen = SeenFrames(reader.plan)
     seen.read_missing(reader)
     camera = reader.manifest.camera
