@@ -245,7 +245,9 @@ def _state(output: Output, plan: CapturePlan, folder: Path, devices: DeviceRig) 
 def _done(output: Output, target: Path, status: Status) -> None:
     from dsl_core.workflows.scans import known_doubts
 
-    output.say(f"All {status.total} frames are saved in {target} ({status.elapsed_s:.1f} s). {_next(target)}")
+    output.say(
+        f"All {status.total} frames are saved in {target} ({status.elapsed_s:.1f} s). {next_step(target)}"
+    )
     if status.overexposed:  # said on standard error when it was seen
         output.put(overexposed=status.overexposed)
     if status.warning:
@@ -260,8 +262,9 @@ def _done(output: Output, target: Path, status: Status) -> None:
     output.finish()
 
 
-def _next(target: Path) -> str:
+def next_step(target: Path) -> str:
     """What follows a scan: without a calibration of its own it needs one, which may have to be made first."""
+    from dsl_core.devices.replay import NAME
     from dsl_core.io.calibration_library import CalibrationLibrary
     from dsl_core.io.scan.folder import ScanReader
     from dsl_core.io.scan.origin import rig_of_notes
@@ -274,6 +277,11 @@ def _next(target: Path) -> str:
         return (
             f"The scan has no calibration. Next: {command} --calibration NAME, where NAME is that of its rig"
             f" in the library, which has: {', '.join(known)}."
+        )
+    if reader.manifest.rig_name == NAME:
+        return (
+            "The scan has no calibration, and the library is empty. Next: calibrate the rig that captured the"
+            f" scan played back, which 'replay' cannot be, then {command} --calibration CAMPAIGN"
         )
     rig, options = rig_of_notes(reader.manifest.notes) or ("RIG", {})
     words = " ".join([f"--rig {quoted(rig)}", *(f"--option {key}={v}" for key, v in options.items())])

@@ -11,6 +11,9 @@ from dsl_core.model.frames import Frame, FrameSource
 from dsl_core.model.plan import Shot
 from dsl_core.model.rig import BayerPattern, Rig
 
+#: What the rig is called in scans of it.
+NAME = "replay"
+
 
 class ReplayCamera(Camera):
     """Delivers the frame of the shot that was announced, at the time it would have been taken."""
@@ -80,17 +83,25 @@ class ReplayProjector(Projector):
         self._info.require_image(image)
 
 
-def replay_rig(source: FrameSource, calibration: Rig | None = None) -> DeviceRig:
+def replay_rig(
+    source: FrameSource,
+    calibration: Rig | None = None,
+    camera: CameraInfo | None = None,
+    projector: ProjectorInfo | None = None,
+) -> DeviceRig:
     """A rig whose camera plays back ``source``; it waits for nothing.
 
-    Raises `DeviceError` from its devices when asked for a shot or size that the scan does not have.
+    Without a ``calibration``, the ``camera`` and ``projector`` that the scan was captured with say what
+    mosaic of how many bits its frames are, and how long the projector shows one; usual ones are taken without
+    these. Raises `DeviceError` from its devices when asked for a shot or size that the scan does not have.
     """
-    sensor = calibration.sensor if calibration else None
-    camera = ReplayCamera(source, sensor.bayer, sensor.bit_depth) if sensor else ReplayCamera(source)
-    period_ms = calibration.frame_period_ms if calibration else 1000.0 / 60.0
+    sensor = calibration.sensor if calibration else camera
+    eye = ReplayCamera(source, sensor.bayer, sensor.bit_depth) if sensor else ReplayCamera(source)
+    known = calibration or projector
+    period_ms = known.frame_period_ms if known else 1000.0 / 60.0
     return DeviceRig(
-        name="replay",
-        camera=camera,
+        name=NAME,
+        camera=eye,
         projector=ReplayProjector(source, period_ms),
         calibration=calibration,
         sleep=lambda seconds: None,

@@ -29,4 +29,4 @@ def open_replay(options: dict[str, str]) -> DeviceRig:
         raise DeviceError(f"The rig 'replay' takes one option, scan=NAME.dsl; given: {given}.")
     (folder,) = options.values()
     reader = ScanReader(folder)
-    return replay_rig(reader, reader.calibration)
+    return replay_rig(reader, reader.calibration, reader.manifest.camera, reader.manifest.projector)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -16,6 +17,7 @@ from dsl_core.errors import DeviceError, StoreError
 from dsl_core.io.scan.folder import ScanReader, ScanWriter
 from dsl_core.model.frames import Frame
 from dsl_core.model.plan import CapturePlan, GrayCode, LineComb, Setting
+from dsl_core.model.rig import BayerPattern
 from dsl_core.patterns.images import pattern_image
 from tests.cases.memory_sink import MemorySink
 
@@ -63,6 +65,19 @@ def test_a_stored_scan_is_replayed_by_name(tmp_path: Path) -> None:
     for shot in PLAN.shots():
         np.testing.assert_array_equal(again.read(shot), original.read(shot))
         np.testing.assert_array_equal(reader.read(shot), original.read(shot))
+
+
+@pytest.mark.parametrize(("bayer", "bits"), [("MONO", 8), ("GBRG", 14), ("RGGB", 12)])
+def test_a_scan_without_calibration_is_replayed_as_its_camera_took_it(
+    tmp_path: Path, bayer: BayerPattern, bits: int
+) -> None:
+    taken = replay_rig(_scan())
+    taken.camera._info = replace(taken.camera.info, bayer=bayer, bit_depth=bits)  # type: ignore[attr-defined]
+    taken.projector._info = replace(taken.projector.info, frame_period_ms=8.0)  # type: ignore[attr-defined]
+    ScanWriter.create(tmp_path / "scan.dsl", PLAN, taken).close()
+    with open_rig("replay", {"scan": str(tmp_path / "scan.dsl")}) as rig:
+        assert (rig.camera.info.bayer, rig.camera.info.bit_depth) == (bayer, bits)
+        assert rig.projector.info.frame_period_ms == 8.0
 
 
 def test_replay_says_what_it_needs(tmp_path: Path) -> None:

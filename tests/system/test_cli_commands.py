@@ -13,12 +13,16 @@ import pytest
 
 import dsl_core
 from dsl_core.cli.options import PlanChoice, PlanSource
+from dsl_core.cli.scans import next_step
+from dsl_core.devices.replay import replay_rig
 from dsl_core.errors import PlanError
+from dsl_core.io.calibration_library import CalibrationLibrary
 from dsl_core.io.plan_file import load_plan, save_plan
 from dsl_core.io.result.result_file import load_result
-from dsl_core.io.scan.folder import ScanReader
+from dsl_core.io.scan.folder import ScanReader, ScanWriter
 from dsl_core.model.plan import EnsembleCode, GrayCode, LineComb, Setting, XorCode
 from dsl_core.model.presets import PRESETS, preset_plan
+from tests.cases.memory_sink import MemorySink
 
 from .conftest import SMALL_PLAN, SMALL_RIG, Give
 
@@ -159,6 +163,19 @@ def test_a_scan_exposes_for_the_scene_unless_exposures_were_chosen(
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("is_replay", [False, True])
+def test_what_plays_a_scan_back_is_not_to_be_calibrated(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, is_replay: bool
+) -> None:
+    monkeypatch.setattr(CalibrationLibrary, "names", lambda self: [])
+    rig = replay_rig(MemorySink(preset_plan("quick")))
+    folder = tmp_path / "a.dsl"
+    ScanWriter.create(folder, preset_plan("quick"), rig if is_replay else None).close()
+    advice = next_step(folder)
+    assert ("the rig that captured the scan played back" in advice) == is_replay
+    assert ("'dsl-scan calibrate all" in advice) != is_replay
+
+
 def test_reconstruct_says_what_each_stage_costs(give: Give, finished: Path, tmp_path: Path) -> None:
     target = tmp_path / "depth.zarr"
     ending = give("reconstruct", finished / "scan.dsl", "-o", target, "--depth-only", "--no-refine", "--json")
