@@ -22,15 +22,21 @@ Camera = Callable[[NDArray[np.float64]], NDArray[np.float64]]
 
 
 def summed(
-    code: float | list[float] = 1.0, camera: Camera = lambda light: light, pairs: int = 6, edges: float = 0.2
+    code: float | list[float] = 1.0,
+    camera: Camera = lambda light: light,
+    pairs: int = 6,
+    edges: float = 0.2,
+    shot: float = 0.0,
+    spread: tuple[float, float] = (0.6, 1.2),
 ) -> CodeSum | None:
     """Of pairs with so much light each, as a camera tells it; a share of the pixels sees the edges."""
     rng = np.random.default_rng(3)
 
     def seen(light: NDArray[np.float64]) -> Counts:
-        return np.rint(camera(light) + BLACK + rng.normal(0, 3, PIXELS)).astype(np.uint16)
+        noise = rng.normal(0, 1, PIXELS) * np.sqrt(9 + shot**2 * WHITE * light)
+        return np.rint(camera(light) + BLACK + noise).clip(0).astype(np.uint16)
 
-    light = WHITE * rng.uniform(0.6, 1.2, PIXELS)
+    light = WHITE * rng.uniform(*spread, PIXELS)
     shares = code if isinstance(code, list) else [code] * pairs
     taken: dict[int, Pair] = {}
     for number, share in enumerate(shares):
@@ -53,6 +59,14 @@ def test_a_code_with_another_share_of_the_light_than_white_is_told(share: float,
     one = found(share)
     assert one.share == pytest.approx(share, abs=0.005)
     assert (one.is_uneven, one.is_curved) == (is_told, False)
+
+
+@pytest.mark.parametrize(("share", "is_told"), [(1.0, False), (0.92, True)])
+def test_noise_of_white_is_no_light_that_the_code_lacks(share: float, is_told: bool) -> None:
+    one = summed(share, edges=0.0, shot=0.06, spread=(1.0, 1.0))
+    assert one is not None
+    assert one.share == pytest.approx(share, abs=0.015)
+    assert one.is_uneven == is_told
 
 
 def test_light_that_settles_while_the_code_is_captured_does_not_depend_on_the_picture() -> None:

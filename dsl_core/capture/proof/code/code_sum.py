@@ -11,6 +11,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from dsl_core.capture.proof.code.code_pairs import Pair
 from dsl_core.capture.proof.noise import Noise
@@ -63,41 +64,53 @@ def code_sum(
 
     None where pairs say too little: there are fewer than three, or few pixels are ``lit``.
     """
-    # Half of the pixels have most of the light.
-    at = lit.index[lit.contrast >= np.median(lit.contrast)] if lit.index.size else lit.index
-    if at.size < FEWEST:
+    if lit.index.size < FEWEST or len(pairs) < 3:
         return None
-    white, black = (each[at].astype(np.float32) for each in ends)
+    white, black = (each[lit.index].astype(np.float32) for each in ends)
     light = white - black
-    variance = noise.variance(ends[0])[at] + noise.variance(ends[1])[at]
+    noises = (noise.variance(ends[0]) + noise.variance(ends[1]))[lit.index]
+    parts = {n: tuple(each[lit.index].astype(np.float32) for each in pair) for n, pair in pairs.items()}
+    together = np.sum([one + other for one, other in parts.values()], axis=0)
+
     shares: dict[int, float] = {}
     edges: list[tuple[float, float, float]] = []
-    for number, pair in pairs.items():
-        one, other = (each[at].astype(np.float32) - black for each in pair)
+    for number, (seen, inverse) in parts.items():
+        one, other = seen - black, inverse - black
+        at = _brighter(together - seen - inverse)
         fainter, total = np.minimum(one, other), one + other
-        away, edge = fainter < AWAY * light, fainter > AT_EDGE * light
+        away, edge = at & (fainter < AWAY * light), at & (fainter > AT_EDGE * light)
         if int(away.sum()) < FEWEST:
             continue
         shares[number] = _ratio(total[away], light[away])
         wanted = float(light[edge].sum(dtype=np.float64))
         if wanted > 0:
             more = float(total[edge].sum(dtype=np.float64)) - shares[number] * wanted
-            edges.append((more, wanted, 4 * float(variance[edge].sum())))
+            edges.append((more, wanted, 4 * float(noises[edge].sum())))
     if len(shares) < 3:
         return None
     values = np.array(list(shares.values()))
     share = float(np.median(values))
-    std = 2 * float(np.sqrt(variance.sum())) / float(light.sum())
+    final = np.add(*parts[max(pairs)])
+    at = _brighter(together - final)
+    mean = float(light[at].mean())
+    std = 2 * float(np.sqrt(noises[at].sum())) / float(light[at].sum())
     std = float(np.hypot(std, np.median(np.abs(values - share)) / np.sqrt(len(values))))
-    allowed = LEAST + SIGMAS * std + 2 * UNSEEN_DN / float(light.mean())
-    one, other = (each[at].astype(np.float32) - black for each in pairs[max(pairs)])
-    last = _ratio(one + other, light) - 1
+    allowed = LEAST + SIGMAS * std + 2 * UNSEEN_DN / mean
+    last = _ratio((final - 2 * black)[at], light[at]) - 1
     if last * (share - 1) < LAST * (share - 1) ** 2:
         allowed = np.inf
-    more, wanted, noises = np.sum(edges, 0) if edges else (0.0, 0.0, 0.0)
-    if wanted < FEWEST_EDGES * float(light.mean()):
+    more, wanted, spread = np.sum(edges, 0) if edges else (0.0, 0.0, 0.0)
+    if wanted < FEWEST_EDGES * mean:
         return CodeSum(share, std, allowed, 0.0, np.inf)
-    return CodeSum(share, std, allowed, float(more / wanted), float(np.sqrt(noises) / wanted))
+    return CodeSum(share, std, allowed, float(more / wanted), float(np.sqrt(spread) / wanted))
+
+
+def _brighter(others: NDArray[np.floating]) -> NDArray[np.bool_]:
+    """Half of the pixels, which have most of the light, by the sum of all pairs but the one that is compared.
+
+    Chosen by white, it would be brighter than the pair by its noise.
+    """
+    return np.asarray(others >= np.median(others))
 
 
 def _ratio(seen: np.ndarray, wanted: np.ndarray) -> float:
