@@ -36,9 +36,9 @@ Floats = NDArray[np.float64]
 FIELDS = ("tilt_x_deg", "tilt_y_deg", "roll_deg", "bend_per_mm", "distance_mm")
 PRIOR_STD = np.array([0.3, 0.3, 0.3, 0.0005, 0.3])
 STEPS = np.array([1e-2, 1e-2, 1e-2, 1e-5, 1e-2])
-#: From how many deviations on a motion is doubtful that does not explain pixels which its fit has not seen:
-#: of few frames these tell too little. Frames must otherwise fit.
-DOUBTFUL = 4.0
+#: Deviations of a motion of one kind that is doubtful, and by how much less it explains pixels which its fit
+#: has not seen than one that is sure: of few frames these tell too little. Frames must otherwise fit.
+DOUBTFUL, LESS_FALL = 4.0, 9.0
 #: By how much lines that are not symmetric may displace both orders alike, px.
 LOPSIDED_PX = 0.03
 #: Less displacement of the orders than this (px, root mean square) is no motion that matters, at bands of
@@ -96,7 +96,7 @@ def fit_motion(scan: ProbedScan, probe: Probe) -> FilmMotion | None:
     if not probe.places or not isinstance(scan.model.correspondence, GratingModel):
         return None
     effect = _effect(scan, scan.model.correspondence, probe)
-    kept = list(range(len(FIELDS)))
+    kept, doubt = list(range(len(FIELDS))), None
     while kept:
         count = len(kept)
         moves = beside_curves(probe, *_design(effect[..., kept], PRIOR_STD[kept], probe.step_nm))
@@ -106,9 +106,11 @@ def fit_motion(scan: ProbedScan, probe: Probe) -> FilmMotion | None:
         # What could be chance helps no pixel, and harms those at the edge of the frame.
         sure = sigmas > SIGMAS
         if sure.all() or (sure.any() and count == len(FIELDS)):
-            return _motion_of(effect, probe, kept, np.where(sure, found, 0.0), covariance, moves)
+            doubt = _motion_of(effect, probe, kept, np.where(sure, found, 0.0), covariance, moves)
+            if doubt is not None and doubt.sure:
+                return doubt
         del kept[int(sigmas.argmin())]
-    return None
+    return doubt
 
 
 def _motion_of(
@@ -129,7 +131,8 @@ def _motion_of(
     if explains_others(moves, len(kept)):
         return FilmMotion(values, std, shift_px, shift_std_px)
     fits = probe.usual_chi_square < 1 + MOST_EXCESS and coarseness(probe.step_nm) <= 1
-    if fits and (np.abs(values) > DOUBTFUL * std).any():
+    alone = len(kept) == 1 and abs(found[0]) > DOUBTFUL * std[kept[0]]
+    if fits and alone and explains_others(moves, 1, LESS_FALL):
         return FilmMotion(values, std, shift_px, shift_std_px, sure=False)
     return None
 

@@ -26,11 +26,11 @@ class Hypothesis:
     prior_std: Floats
 
 
-def explains_others(asked: Hypothesis, first: int) -> bool:
+def explains_others(asked: Hypothesis, first: int, least_fall: float = LEAST_FALL) -> bool:
     """Whether the ``first`` values, fitted to some cells of the picture, explain the others surely better.
 
-    Better than the values after them do alone. What a few cells ask for, an error of their own, explains no
-    others.
+    Better than the values after them do alone, by ``least_fall`` of chi-square. What a few cells ask for, an
+    error of their own, explains no others.
     """
     rest, rest_std = asked.sums.tail(first), asked.prior_std[first:]
     cell = asked.sums.cell
@@ -42,4 +42,4 @@ def explains_others(asked: Hypothesis, first: int) -> bool:
         fall[here] = (asked.sums.falls(fit.values) - rest.falls(without.values))[here]
         excess = max(excess, fit.excess)
     total = float(fall.sum())
-    return total > LEAST_FALL * excess and total > FALL_SIGMAS * float(np.linalg.norm(fall))
+    return total > least_fall * excess and total > FALL_SIGMAS * float(np.linalg.norm(fall))
