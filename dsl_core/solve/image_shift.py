@@ -172,13 +172,13 @@ def _explains(old: Floats, new: Floats, variance: Floats, x: int, y: int) -> boo
     root = 1 / np.sqrt(variance[there].ravel())
     root[root < np.sqrt(CLIPPED) * root.max(initial=0)] = 0
     seen = new[there].ravel() * root
-    count = np.count_nonzero(root)
+    count = int(np.count_nonzero(root))
 
     def left(part: tuple[slice, ...]) -> float:
         design = np.stack([old[part].ravel() * root, root], 1)
         return float(np.sum((seen - design @ np.linalg.lstsq(design, seen)[0]) ** 2))
 
-    return count > 0 and left(there) > (1 + BY_CHANCE / np.sqrt(count)) * left(before)
+    return bool(count) and left(there) > (1 + BY_CHANCE / count**0.5) * left(before)
 
 
 def _edges(picture: Floats) -> Floats:

@@ -168,9 +168,9 @@ def test_what_plays_a_scan_back_is_not_to_be_calibrated(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, is_replay: bool
 ) -> None:
     monkeypatch.setattr(CalibrationLibrary, "names", lambda self: [])
-    rig = replay_rig(MemorySink(preset_plan("quick")))
-    folder = tmp_path / "a.dsl"
-    ScanWriter.create(folder, preset_plan("quick"), rig if is_replay else None).close()
+    plan, folder = PRESETS[0].plan, tmp_path / "a.dsl"
+    rig = replay_rig(MemorySink(plan))
+    ScanWriter.create(folder, plan, rig if is_replay else None).close()
     advice = next_step(folder)
     assert ("the rig that captured the scan played back" in advice) == is_replay
     assert ("'dsl-scan calibrate all" in advice) != is_replay

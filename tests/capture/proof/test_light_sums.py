@@ -27,6 +27,7 @@ def summed(
     pairs: int = 6,
     edges: float = 0.2,
     shot: float = 0.0,
+    halo: float = 0.0,
     spread: tuple[float, float] = (0.6, 1.2),
 ) -> CodeSum | None:
     """Of pairs with so much light each, as a camera tells it; a share of the pixels sees the edges."""
@@ -41,11 +42,15 @@ def summed(
     taken: dict[int, Pair] = {}
     for number, share in enumerate(shares):
         part = np.where(rng.random(PIXELS) < edges, rng.uniform(0.3, 0.7, PIXELS), rng.random(PIXELS) > 0.5)
+        part = halo + (1 - 2 * halo) * part
         taken[number] = seen(share * part * light), seen(share * (1 - part) * light)
     white, black = seen(light), seen(0 * light)
+    sensor = Sensor()
+    if shot:
+        sensor = Sensor(black_level_dn=BLACK, electrons_per_dn=1 / (shot**2 * WHITE), read_noise_dn=3.0)
     at, ones = np.arange(PIXELS), np.ones(PIXELS, np.float32)
     lit = Lit(at, at, black.astype(np.float32), (white - black).astype(np.float32), ones)
-    return code_sum(taken, (white, black), lit, Noise.of(Sensor(), 12))
+    return code_sum(taken, (white, black), lit, Noise(sensor))
 
 
 def found(code: float | list[float] = 1.0, camera: Camera = lambda light: light) -> CodeSum:
@@ -67,6 +72,12 @@ def test_noise_of_white_is_no_light_that_the_code_lacks(share: float, is_told: b
     assert one is not None
     assert one.share == pytest.approx(share, abs=0.015)
     assert one.is_uneven == is_told
+
+
+def test_noise_of_light_beside_stripes_makes_no_edges() -> None:
+    one = summed(pairs=10, edges=0.05, shot=0.12, halo=0.12, spread=(1.0, 1.0))
+    assert one is not None
+    assert not one.is_curved
 
 
 def test_light_that_settles_while_the_code_is_captured_does_not_depend_on_the_picture() -> None:

@@ -27,8 +27,8 @@ UNSEEN_DN = 0.5
 #: while the code is captured is no matter of bright and dark pictures.
 LAST = 0.4
 #: A pixel is at an edge if both patterns give it more than this share of its light, and away from edges if
-#: one of them gives it less than that.
-AT_EDGE, AWAY = 0.2, 0.1
+#: one of them gives it less than that; where so many deviations of noise are less than lies between.
+AT_EDGE, AWAY, EDGE_SIGMAS = 0.2, 0.1, 3.0
 #: Pixels needed to say anything, and those at edges, of all pairs together.
 FEWEST, FEWEST_EDGES = 60, 24
 
@@ -78,7 +78,10 @@ def code_sum(
         one, other = seen - black, inverse - black
         at = _brighter(together - seen - inverse)
         fainter, total = np.minimum(one, other), one + other
-        away, edge = at & (fainter < AWAY * light), at & (fainter > AT_EDGE * light)
+        away = at & (fainter < AWAY * light)
+        # Noise would make edges of pixels away from them, of which there are many more.
+        sigma = np.sqrt(noise.variance(np.minimum(*pairs[number]))[lit.index])
+        edge = at & (fainter > AT_EDGE * light) & (EDGE_SIGMAS * sigma < (AT_EDGE - AWAY) * light)
         if int(away.sum()) < FEWEST:
             continue
         shares[number] = _ratio(total[away], light[away])
