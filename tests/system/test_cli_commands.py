@@ -168,7 +168,8 @@ def test_what_plays_a_scan_back_is_not_to_be_calibrated(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, is_replay: bool
 ) -> None:
     monkeypatch.setattr(CalibrationLibrary, "names", lambda self: [])
-    plan, folder = PRESETS[0].plan, tmp_path / "a.dsl"
+    plan, folder = preset_plan("reference"), tmp_path / "a.dsl"
+    assert plan is not None
     rig = replay_rig(MemorySink(plan))
     ScanWriter.create(folder, plan, rig if is_replay else None).close()
     advice = next_step(folder)
