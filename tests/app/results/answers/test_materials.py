@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -353,7 +354,7 @@ def test_a_class_has_the_colour_of_its_mark_wherever_it_is_shown(
     control.answers.write(tmp_path / "map.hdr")
     lines = (tmp_path / "map.csv").read_text().splitlines()
     for name, index in names.items():
-        assert any(line.startswith(f"{name},{LIGHT.pin(index)},") for line in lines)
+        assert any(row[:2] == [name, LIGHT.pin(index)] for row in csv.reader(lines))
         levels = ", ".join(str(level) for level in bytes.fromhex(LIGHT.pin(index)[1:]))
         assert levels.replace(" ", "") in (tmp_path / "map.hdr").read_text().replace(" ", "")
 
