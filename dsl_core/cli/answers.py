@@ -326,11 +326,12 @@ def report(
     """Write pictures, spectra and colours of marks, materials and origin of a result as one document."""
     from dsl_core.analysis.classification import classify_result
     from dsl_core.analysis.session_report import ENDINGS, session_content, write_report
+    from dsl_core.io.neighbours import beside_result, stem_of
     from dsl_core.io.result.annotations_file import load_annotations
     from dsl_core.io.result.result_file import load_result
 
     output = Output(json)
-    targets = list(outputs) or [path.with_name(f"{path.stem}_report.html")]
+    targets = list(outputs) or [beside_result(path, "_report.html")]
     wrong = [str(each) for each in targets if each.suffix.lower() not in ENDINGS]
     if wrong:
         raise PlanError(f"{wrong[0]} must end in {' or '.join(ENDINGS)}: choose one for --output.")
@@ -340,7 +341,7 @@ def report(
         if library or materials:
             classes, _ = _classes(path, result, library, 0.0, "auto", materials, (), progress)
             found = classify_result(result, classes, progress=progress)
-        content = session_content(path.stem, result, load_annotations(path), found)
+        content = session_content(stem_of(path), result, load_annotations(path), found)
         for target in targets:
             write_report(content, target, overwrite=force)
     output.say(f"Written: {', '.join(str(target) for target in targets)}")

@@ -90,6 +90,7 @@ def reconstruct(
 ) -> None:
     """Turn frames into depth, points, normals, reflectance and their uncertainty."""
     from dsl_core.io.calibration_library import load_calibration
+    from dsl_core.io.neighbours import result_beside
     from dsl_core.io.objects.address import shown
     from dsl_core.io.objects.rooms import brought, published
     from dsl_core.io.result.result_file import RESULT_FOLDER
@@ -97,7 +98,7 @@ def reconstruct(
 
     output = Output(json)
     options = reconstruction_options(bands, model, solver, refine, depth_only, as_calibrated, device)
-    place = target or scan.with_suffix(".zarr")
+    place = target or result_beside(scan)
     with ExitStack() as stack:
         with output.progress() as progress:
             folder = stack.enter_context(brought(scan, progress))

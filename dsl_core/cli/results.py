@@ -46,18 +46,19 @@ def evaluate(
     from dsl_core import pipeline
     from dsl_core.evaluation.report.scan_report import report_content
     from dsl_core.evaluation.verdict import deviations, figures
+    from dsl_core.io.neighbours import beside_result, stem_of
     from dsl_core.io.result.result_file import load_result, read_attributes
     from dsl_core.workflows import scans
 
     if report is None:
         read_attributes(path)
-        report = path.with_suffix(".html")
+        report = beside_result(path, ".html")
     output = Output(json)
     check_targets([report], overwrite=force)
     result = load_result(path)
     truth = scans.truth_of(result, truth_rig, parse_options(option))
     evaluation = pipeline.evaluate(result, truth)
-    pipeline.write_report(report_content(path.stem, result, truth, evaluation), report, force)
+    pipeline.write_report(report_content(stem_of(path), result, truth, evaluation), report, force)
     print_figures(output, evaluation)
     print_fit(output, result)
     output.say(f"The report is saved in {report}")

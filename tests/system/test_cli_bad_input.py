@@ -282,6 +282,22 @@ def test_a_scan_is_named_so_that_it_is_found_again(
     assert not list(tmp_path.iterdir())
 
 
+def test_a_scan_and_its_result_are_given_from_inside(
+    give: Give, finished: Path, scan_copy: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(scan_copy)
+    assert "already contains a scan" in give("scan", ".").sentence
+    assert give("reconstruct", ".", "--depth-only").code == 0
+    assert "exists" in give("reconstruct", "../scan.dsl", "--depth-only").sentence
+    assert give("batch", ".", "--depth-only").out.endswith("1 complete before.\n")
+    monkeypatch.chdir(shutil.copytree(finished / "scan.zarr", scan_copy.parent / "whole.zarr"))
+    for command in ("evaluate", "report"):
+        assert give(command, ".").code == 0
+    assert "Nothing is marked" in give("spectra", ".", "--pins").sentence
+    made = {"scan.dsl", "scan.zarr", "whole.zarr", "whole.html", "whole_report.html"}
+    assert {each.name for each in scan_copy.parent.iterdir()} == made
+
+
 def test_a_bug_is_called_one(give: Give, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("dsl_core.io.describe.describe", lambda *_: 1 / 0)
     ending = give("info", "absent")

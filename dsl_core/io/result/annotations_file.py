@@ -7,6 +7,7 @@ from typing import Literal
 
 from dsl_core.errors import StoreError
 from dsl_core.io.atomic import set_aside
+from dsl_core.io.neighbours import beside_result
 from dsl_core.io.records import read_record, replace_record
 from dsl_core.model.base import Record
 
@@ -54,7 +55,7 @@ class Annotations(Record):
 
 def annotations_path(result: Path) -> Path:
     """Where the marks of a result are."""
-    return result.with_suffix(".marks.json")
+    return beside_result(result, ".marks.json")
 
 
 def save_annotations(annotations: Annotations, result: Path) -> Path:

@@ -26,6 +26,7 @@ from dsl_core.errors import DriveError, StoreError
 from dsl_core.io import MANIFEST_NAME
 from dsl_core.io.atomic import make_folder, remove_partials, store_error
 from dsl_core.io.kinds import whose_inside
+from dsl_core.io.neighbours import SCAN_SUFFIX, named
 from dsl_core.io.patience import drive_error, is_away, patiently
 from dsl_core.io.records import replace_record
 from dsl_core.io.scan.capture_log import CaptureLog, LogEntry, read_log
@@ -38,17 +39,19 @@ from dsl_core.model.plan import CapturePlan, Shot, describe_shot, spoken_number
 from dsl_core.model.rig import Rig
 
 _logger = logging.getLogger(__name__)
-SUFFIX = ".dsl"
+SUFFIX = SCAN_SUFFIX
 LOG_NAME = "frames.jsonl"
 FRAMES_NAME = "frames"
 
 
 def require_name(folder: Path) -> None:
     """Raise `StoreError` unless the name of a new scan is that of one, by which it is found again."""
+    folder = named(folder)
     if folder.suffix != SUFFIX:
+        # An ending of letters is that of a file; "leaf 1.5" has none.
+        stem = folder.with_suffix("") if folder.suffix[1:].isalpha() else folder
         raise StoreError(
-            f"{folder} is not the name of a scan: those end in {SUFFIX}."
-            f" Name it {folder.with_suffix(SUFFIX)}."
+            f"{folder} is not the name of a scan: those end in {SUFFIX}. Name it {stem}{SUFFIX}."
         )
 
 

@@ -12,6 +12,7 @@ from pathlib import Path
 from dsl_core.errors import Cancelled, StoreError
 from dsl_core.extras import require_package
 from dsl_core.io import MANIFEST_NAME
+from dsl_core.io.neighbours import result_beside
 from dsl_core.io.objects.address import Address, address_of
 from dsl_core.io.objects.store import ObjectFolder
 from dsl_core.io.reading import read_bounded, read_json
@@ -112,7 +113,7 @@ def tasks_of(
     """
     tasks = []
     for scan in scans:
-        target = scan.with_suffix(".zarr")
+        target = result_beside(scan)
         target = target if results is None else results / target.name
         given = scan, target, calibration, options or Options()
         tasks.append(ScanTask(*given, override_calibration, overwrite))
