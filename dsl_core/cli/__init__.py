@@ -6,7 +6,9 @@ success, 1 a bug, 2 wrong input (one sentence says what to do), 130 stopped by t
 
 from __future__ import annotations
 
+import codecs
 import gc
+import io
 import sys
 from collections.abc import Sequence
 
@@ -18,6 +20,7 @@ _COLLECTION = (50_000, 20, 50)
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run a command line (that of the process if not given) and return its exit code."""
     gc.set_threshold(*_COLLECTION)
+    _say_what_the_stream_can()
     try:
         # Inside, so that Ctrl-C while it loads ends in a sentence as well.
         from dsl_core.solve.heap import keep_freed_memory
@@ -31,3 +34,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except KeyboardInterrupt:
         print("Stopped before anything was done.", file=sys.stderr)
         return 130
+
+
+def _say_what_the_stream_can() -> None:
+    """Let a letter that a pipe or file cannot take, as Greek ones on Windows, become a question mark."""
+    stream = sys.stdout
+    if isinstance(stream, io.TextIOWrapper) and codecs.lookup(stream.encoding).name != "utf-8":
+        stream.reconfigure(errors="replace")

@@ -71,3 +71,21 @@ def test_a_reader_that_leaves_early_causes_no_traceback(arguments: list[str], co
     assert "Traceback" not in found.stderr
     assert "BrokenPipe" not in found.stderr
     assert found.returncode == code
+
+
+def _said(arguments: list[str], **environment: str) -> subprocess.CompletedProcess[bytes]:
+    return subprocess.run(
+        [sys.executable, "-m", "dsl_core", *arguments],
+        env={**os.environ, "PYTHONPATH": str(Path(__file__).parents[2]), **environment},
+        capture_output=True,
+        timeout=60,
+        check=False,
+    )
+
+
+@pytest.mark.parametrize("encoding", ["cp1252", "ascii"])
+def test_letters_that_a_pipe_cannot_take_are_replaced(encoding: str) -> None:
+    found = _said(["effects"], PYTHONIOENCODING=encoding)
+    assert (found.returncode, found.stderr) == (0, b"")
+    # In Unicode, the letter sigma.
+    assert "4095 DN, 3934 ?" in found.stdout.decode(encoding)
