@@ -9,6 +9,7 @@ from __future__ import annotations
 import codecs
 import gc
 import io
+import os
 import sys
 from collections.abc import Sequence
 
@@ -20,6 +21,7 @@ _COLLECTION = (50_000, 20, 50)
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run a command line (that of the process if not given) and return its exit code."""
     gc.set_threshold(*_COLLECTION)
+    _open_missing_streams()
     _say_what_the_stream_can()
     try:
         # Inside, so that Ctrl-C while it loads ends in a sentence as well.
@@ -34,6 +36,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except KeyboardInterrupt:
         print("Stopped before anything was done.", file=sys.stderr)
         return 130
+
+
+def _open_missing_streams() -> None:
+    """Replace standard streams that are closed, as services and jobs may have them, by ones for nothing."""
+    for name, mode in (("stdin", "r"), ("stdout", "w"), ("stderr", "w")):
+        if getattr(sys, name) is None:
+            setattr(sys, name, open(os.devnull, mode, encoding="utf-8"))  # noqa: SIM115 - for the whole process
 
 
 def _say_what_the_stream_can() -> None:

@@ -5,6 +5,7 @@ An error becomes a sentence, and a traceback only on request.
 
 from __future__ import annotations
 
+import contextlib
 import json
 import logging
 import os
@@ -217,14 +218,16 @@ def _complain(code: int, sentence: str, kind: str, as_json: bool) -> int:
     if as_json:
         try:
             print(json.dumps({"error": {"kind": kind, "message": sentence}, "exit_code": code}), flush=True)
-        except BrokenPipeError:
+        except OSError:
             _leave_quietly()
     if sentence:
-        print(sentence, file=sys.stderr)
+        # Where errors cannot be written either, the exit code tells.
+        with contextlib.suppress(OSError):
+            print(sentence, file=sys.stderr)
     return code
 
 
 def _leave_quietly() -> int:
-    """The reader of our output has closed it, as ``head`` does: not an error."""
+    """Nobody takes our output now, as after ``head`` has closed it: no error of its own."""
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
     return OK

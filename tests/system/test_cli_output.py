@@ -83,6 +83,38 @@ def _said(arguments: list[str], **environment: str) -> subprocess.CompletedProce
     )
 
 
+@pytest.mark.slow
+@pytest.mark.skipif(sys.platform == "win32", reason="Windows has neither such a shell nor /dev/full")
+@pytest.mark.parametrize(
+    ("command", "code"),
+    [
+        ("scenes >&-", 0),
+        ("scenes 2>&-", 0),
+        ("scenes --json <&- >&- 2>&-", 0),
+        ("info absent 2>&-", 2),
+        ("info absent --json >/dev/full", 2),
+        ("info absent 2>/dev/full", 2),
+        ("scenes --json >/dev/full", 2),
+    ],
+)
+def test_streams_that_are_closed_or_full_change_no_exit_code(command: str, code: int) -> None:
+    if "/dev/full" in command and not os.path.exists("/dev/full"):
+        pytest.skip("This system has no /dev/full.")
+    found = subprocess.run(
+        ["sh", "-c", f"'{sys.executable}' -m dsl_core {command}"],
+        env={**os.environ, "PYTHONPATH": str(Path(__file__).parents[2])},
+        capture_output=True,
+        text=True,
+        timeout=60,
+        check=False,
+    )
+    assert found.returncode == code
+    assert "Traceback" not in found.stderr
+    assert "bug" not in found.stdout + found.stderr
+    if command == "scenes --json >/dev/full":
+        assert found.stderr.startswith("No space left on device.")
+
+
 @pytest.mark.parametrize("encoding", ["cp1252", "ascii"])
 def test_letters_that_a_pipe_cannot_take_are_replaced(encoding: str) -> None:
     found = _said(["effects"], PYTHONIOENCODING=encoding)
