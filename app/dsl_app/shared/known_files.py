@@ -10,6 +10,7 @@ from pathlib import Path
 
 from dsl_app.shared.paths import barrier, is_dir, is_file, there
 from dsl_core.io import CAMPAIGN_NAME, MANIFEST_NAME, PUBLISHED_PLACES, PUBLISHED_STARTS
+from dsl_core.io.neighbours import RESULT_SUFFIX
 from dsl_core.io.reading import read_json
 from dsl_core.words import counted
 
@@ -122,7 +123,9 @@ def meant_by(path: Path) -> Path:
     if path.name in (MANIFEST_NAME, RESULT_NAME, CAMPAIGN_NAME):
         return path.parent
     if path.name.endswith(_MARKS):
-        return path.with_name(path.name.removesuffix(_MARKS) + ".zarr")
+        plain = path.with_name(path.name.removesuffix(_MARKS))
+        # A result may have been given a name without an ending.
+        return plain if is_file(plain / RESULT_NAME) else plain.with_name(f"{plain.name}{RESULT_SUFFIX}")
     return path
 
 

@@ -8,6 +8,7 @@ from dsl_app.shared.known_files import RESULT_NAME, Kind, breakable, first_free,
 from dsl_app.shared.settings import RecentFiles, Settings
 
 from dsl_core.io import MANIFEST_NAME
+from dsl_core.io.result.annotations_file import annotations_path
 
 
 @pytest.mark.parametrize(
@@ -83,6 +84,10 @@ def test_folders_and_files_of_no_use_are_told_in_a_sentence(tmp_path: Path) -> N
 
 def test_marks_mean_the_result_beside_them(tmp_path: Path) -> None:
     assert meant_by(tmp_path / "leaf.marks.json") == tmp_path / "leaf.zarr"
+    (tmp_path / "leaf 1.5").mkdir()
+    (tmp_path / "leaf 1.5" / RESULT_NAME).touch()
+    for result in (tmp_path / "leaf 1.5", tmp_path / "leaf 1.6.zarr"):
+        assert meant_by(annotations_path(result)) == result
 
 
 def test_a_free_name_counts_on_from_those_that_are_taken(tmp_path: Path) -> None:

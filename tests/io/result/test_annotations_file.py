@@ -25,6 +25,16 @@ def test_marks_come_back_as_they_were(tmp_path: Path) -> None:
     assert load_annotations(tmp_path / "scan.zarr") == marks
 
 
+def test_a_dot_in_a_name_belongs_to_it(tmp_path: Path) -> None:
+    for name in ("leaf 1.5", "leaf 1.6", "leaf 1.7.zarr"):
+        save_annotations(Annotations(pins=(PinRecord(name=name, pixel=(3, 4)),)), tmp_path / name)
+    assert [load_annotations(tmp_path / name).pins[0].name for name in ("leaf 1.5", "leaf 1.6")] == [
+        "leaf 1.5",
+        "leaf 1.6",
+    ]
+    assert (tmp_path / "leaf 1.7.marks.json").exists()
+
+
 def test_no_file_means_no_marks(tmp_path: Path) -> None:
     assert load_annotations(tmp_path / "scan.zarr") == Annotations()
 
