@@ -28,6 +28,16 @@ def test_a_path_with_a_name_stays_as_it_was_given() -> None:
     assert stem_of(Path(".zarr")) == ".zarr"
 
 
+def test_the_name_proposed_for_a_scan_keeps_what_was_given() -> None:
+    for given, proposed in (
+        ("leaf 1.5", r"leaf 1\.5\.dsl\."),
+        ("leaf.json", r"leaf\.dsl\."),
+        ("a", r"a\.dsl\."),
+    ):
+        with pytest.raises(StoreError, match=f"Name it {proposed}$"):
+            require_name(Path(given))
+
+
 def test_a_whole_drive_is_neither_scan_nor_result() -> None:
     with pytest.raises(StoreError, match="is a whole drive, not a scan or result"):
         beside_result(Path("/"), ".html")

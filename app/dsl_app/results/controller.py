@@ -24,6 +24,7 @@ from dsl_app.shared.paths import is_file
 from dsl_app.shared.spectrum import Pixel
 from dsl_app.shared.undo import Change, UndoStack
 from dsl_core.errors import DslError
+from dsl_core.io.neighbours import beside_result, result_beside
 from dsl_core.io.result.completed import completed
 from dsl_core.io.result.result_arrays import ResultArrays, load_arrays
 from dsl_core.model.result_sink import Maps
@@ -86,7 +87,7 @@ class ResultsController:
 
     def _offer(self, session: Path) -> None:
         """Open the result next to a scan, or offer to reconstruct it; says why if it cannot be read."""
-        target = session.with_suffix(".zarr")
+        target = result_beside(session)
         if is_file(target / RESULT_NAME):
             self._load(target)
         elif reason := _unreadable(session):
@@ -99,7 +100,7 @@ class ResultsController:
         session = self.state.offer.value
         if session is None:
             return
-        target = session.with_suffix(".zarr")
+        target = result_beside(session)
 
         def work(progress: Progress) -> ResultArrays:
             from dsl_core.io.scan.folder import ScanReader
@@ -224,7 +225,7 @@ class ResultsController:
         result = self.state.result.value
         if result is None:
             return ""
-        path, points = (quoted(each) for each in (result.path, result.path.with_suffix(".ply")))
+        path, points = (quoted(each) for each in (result.path, beside_result(result.path, ".ply")))
         return f"dsl-scan export {path} ply {points}"
 
     # Look ------------------------------------------------------------------------------------------

@@ -12,6 +12,7 @@ from dsl_app.scan.reconstruction_time import Pace
 from dsl_app.scan.state import ScanState
 from dsl_app.shared.jobs.base import Job, JobRunner
 from dsl_app.shared.notify import Notifier, sentence_of
+from dsl_core.io.neighbours import result_beside
 from dsl_core.model.plan import CapturePlan
 from dsl_core.model.result_sink import Maps
 from dsl_core.progress import Progress
@@ -74,7 +75,7 @@ class Reconstructor:
         def see(maps: Maps) -> None:
             self._seen_depth = np.asarray(maps["depth_mm"], np.float32)
 
-        return reconstruct_to(session.with_suffix(".zarr"), session, progress=progress, seen_geometry=see)
+        return reconstruct_to(result_beside(session), session, progress=progress, seen_geometry=see)
 
     def _finish(self) -> None:
         self._seen_depth = None

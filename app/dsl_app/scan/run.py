@@ -35,6 +35,7 @@ from dsl_app.shared.widgets.forms import (
 )
 from dsl_app.shared.widgets.layouts import column_of, row_of
 from dsl_core.capture.runner import Status
+from dsl_core.io.neighbours import result_beside
 from dsl_core.model.plan import Columns
 
 
@@ -231,7 +232,7 @@ class RunBox(QGroupBox):
         state = self._state
         finished = state.finished.value
         # It may have been reconstructed from another page.
-        has_result = finished is not None and there(finished.with_suffix(".zarr"))
+        has_result = finished is not None and there(result_beside(finished))
         shown = run_controls(
             state.phase.value,
             state.interrupted.value,

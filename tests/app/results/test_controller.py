@@ -51,6 +51,14 @@ def test_a_scan_is_offered_or_its_result_opened(bench: Bench, tmp_path: Path) ->
     assert "reconstruct" in bench.control.command_line()
 
 
+def test_a_dot_in_the_name_of_a_scan_belongs_to_it(bench: Bench, tmp_path: Path) -> None:
+    import_pictures(make_capture(tmp_path / "set"), tmp_path / "set.dsl", first_mapping(12, PROJECTOR))
+    shutil.copytree(tmp_path / "small.zarr", tmp_path / "leaf 1.zarr")
+    shutil.move(tmp_path / "set.dsl", tmp_path / "leaf 1.5")
+    bench.control.open(tmp_path / "leaf 1.5")
+    assert bench.state.offer.value == tmp_path / "leaf 1.5", "the result is that of another scan"
+
+
 def test_a_scan_that_lacks_a_part_is_refused_at_once(bench: Bench, tmp_path: Path) -> None:
     capture = make_capture(tmp_path / "set")
     import_pictures(capture, tmp_path / "other.dsl", first_mapping(12, PROJECTOR))

@@ -97,6 +97,14 @@ def test_two_scans_never_have_one_result(folder: Path, tmp_path: Path) -> None:
         tasks_of(find_scans(folder), tmp_path / "results")
 
 
+def test_scans_that_differ_after_a_dot_have_two_results(folder: Path) -> None:
+    scans = [folder / "a.dsl", folder / "c.dsl"]
+    for scan, name in zip(scans, ("leaf 1.5", "leaf 1.6"), strict=True):
+        scan.rename(folder / name)
+    tasks = tasks_of([folder / "leaf 1.5", folder / "leaf 1.6"])
+    assert [each.target.name for each in tasks] == ["leaf 1.5.zarr", "leaf 1.6.zarr"]
+
+
 def test_a_failed_scan_does_not_stop_the_others_and_is_told(folder: Path) -> None:
     found = _batch(folder)
     assert {name: each.state for name, each in found.items()} == {"a": "made", "b": "failed", "c": "made"}

@@ -9,7 +9,6 @@ from typing import Any
 
 from dsl_app.results.reconstruct_again.state import (
     OWN,
-    RESULT_SUFFIX,
     Reconstructed,
     ReconstructionRequest,
     ReconstructionSource,
@@ -27,6 +26,7 @@ from dsl_app.shared.notify import Notifier
 from dsl_core.errors import StoreError
 from dsl_core.evaluation.cost import costs_of
 from dsl_core.io.calibration_library import CalibrationLibrary
+from dsl_core.io.neighbours import result_beside
 from dsl_core.progress import Progress
 
 
@@ -148,7 +148,7 @@ def read_source(path: Path, library: tuple[str, ...]) -> ReconstructionSource:
             before: Path | None = path
             scan = scan_of(path, load_result(path).attrs)
         case Kind.SCAN:
-            before, scan = path.with_suffix(RESULT_SUFFIX), path
+            before, scan = result_beside(path), path
         case _:
             raise StoreError(
                 f"{path.name} is not a scan: {what_is_at(path)}. Choose a folder NAME.dsl with all of its"

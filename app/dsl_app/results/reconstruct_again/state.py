@@ -9,11 +9,11 @@ from dsl_app.shared.evented import Event, Value
 from dsl_app.shared.known_files import first_free
 from dsl_app.shared.paths import there
 from dsl_core.errors import DslError, PlanError
+from dsl_core.io.neighbours import RESULT_SUFFIX, SCAN_SUFFIX, stem_of
 from dsl_core.model.base import what_is_wrong
 from dsl_core.model.spectral import WavelengthGrid
 from dsl_core.words import quoted
 
-RESULT_SUFFIX = ".zarr"
 #: Bytes of a result per pixel: depth, points, normals, colour and their deviations; and per pixel and band.
 PIXEL_BYTES, BAND_BYTES = 68, 6
 #: Key of the calibration that is stored in the scan.
@@ -88,7 +88,7 @@ def target_of(request: ReconstructionRequest, source: ReconstructionSource) -> P
 
 def fresh_name(session: Path) -> str:
     """An unused name for a result of a scan."""
-    return first_free(session.parent, session.stem, RESULT_SUFFIX).stem
+    return first_free(session.parent, stem_of(session, SCAN_SUFFIX), RESULT_SUFFIX).stem
 
 
 def bands_of(request: ReconstructionRequest) -> WavelengthGrid:
