@@ -3,19 +3,22 @@
 from __future__ import annotations
 
 import contextlib
+import json
 import os
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from dsl_core.errors import Cancelled, StoreError
 from dsl_core.extras import require_package
 from dsl_core.io import MANIFEST_NAME
-from dsl_core.io.neighbours import result_beside
+from dsl_core.io.neighbours import SCAN_SUFFIX, result_beside
 from dsl_core.io.objects.address import Address, address_of
 from dsl_core.io.objects.store import ObjectFolder
 from dsl_core.io.reading import read_bounded, read_json
+from dsl_core.io.scan.folder import LOG_NAME
+from dsl_core.io.sealed import SealError, unseal
 from dsl_core.model.options import Options
 from dsl_core.model.rig import Rig
 from dsl_core.progress import Progress
@@ -50,18 +53,18 @@ class BatchReport:
 
 
 def find_scans(source: Path) -> list[Path]:
-    """Scans of a folder and of those in it, or of a list: a text file with a path on each line.
+    """Scans of a folder and of those in it, links included, or of a list: a text file with a path a line.
 
-    Paths of a list are relative to its folder; lines that are empty or begin with # are skipped. Raises
-    `StoreError` when there are none.
+    A scan is found once, whatever links lead to it. Paths of a list are relative to its folder; lines that
+    are empty or begin with # are skipped. Raises `StoreError` when there are none.
     """
     address = address_of(source)
     if address is not None:
         return _scans_at(address)
     if source.is_dir():
-        if (source / MANIFEST_NAME).is_file():
+        if _is_scan(source):
             return [source]
-        found = sorted(path.parent for path in source.rglob(MANIFEST_NAME))
+        found = sorted(path for path in _folders_in(source) if _is_scan(path))
         if not found:
             raise StoreError(f"{source} contains no scan (NAME.dsl). Give a folder with scans, or a list.")
         return found
@@ -85,17 +88,60 @@ def find_scans(source: Path) -> list[Path]:
     return list(dict.fromkeys(found))
 
 
+def _folders_in(top: Path) -> Iterator[Path]:
+    """A folder and all in it, each once: by its own path where that is in there, otherwise by a link."""
+    starts, seen = [top], set[str]()
+    for start in starts:
+        for place, inner, _ in os.walk(start):
+            real = os.path.realpath(place)
+            if real in seen:
+                inner.clear()
+                continue
+            seen.add(real)
+            inner.sort()
+            starts += [Path(place, name) for name in inner if os.path.islink(os.path.join(place, name))]
+            yield Path(place)
+
+
+def _is_scan(folder: Path) -> bool:
+    """Whether a folder is a scan, perhaps a damaged one; other programs have files called as its manifest."""
+    if not (folder / MANIFEST_NAME).is_file():
+        return False
+    if folder.suffix == SCAN_SUFFIX or (folder / LOG_NAME).exists():
+        return True
+    try:
+        return _describes_scan(read_bounded(folder / MANIFEST_NAME))
+    except OSError:
+        return True  # what is wrong with it is told where it is read
+
+
+def _describes_scan(manifest: bytes) -> bool:
+    try:
+        content = json.loads(unseal(manifest))
+    except SealError:
+        return True  # sealed as ours are, and damaged since
+    except (ValueError, RecursionError):
+        return False
+    return isinstance(content, dict) and content.keys() >= {"plan", "versions"}
+
+
 def _listed(folder: Path, line: str) -> Path:
     return folder / line if address_of(Path(line)) is None else Path(line)
 
 
 def _scans_at(address: Address) -> list[Path]:
     require_package("obstore")
-    names = sorted(ObjectFolder(address).listed())
-    manifests = [name for name in names if name.rpartition("/")[2] == MANIFEST_NAME]
-    if not manifests:
+    objects = ObjectFolder(address)
+    names = objects.listed()
+    manifests = [name for name in sorted(names) if name.rpartition("/")[2] == MANIFEST_NAME]
+    found = []
+    for name in manifests:
+        scan, log = Path(f"{address}/{name}").parent, f"{name.removesuffix(MANIFEST_NAME)}{LOG_NAME}"
+        if scan.suffix == SCAN_SUFFIX or log in names or _describes_scan(objects.get(name) or b""):
+            found.append(scan)
+    if not found:
         raise StoreError(f"{address} contains no scan (NAME.dsl). Give a folder with scans, or a list.")
-    return [Path(f"{address}/{name}").parent for name in manifests]
+    return found
 
 
 def tasks_of(

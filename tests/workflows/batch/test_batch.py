@@ -24,6 +24,7 @@ from dsl_core.workflows.batch.batch import PIXEL_BYTES, find_scans, needed_bytes
 from dsl_core.workflows.batch.report import batch_page, batch_sentences, batch_table, is_batch_page
 from dsl_core.workflows.batch.runner import Ended, Rows
 from dsl_core.workflows.batch.task import Outcome, ScanTask, do_task
+from tests.cases.object_store import running
 
 OPTIONS = Options(spectra=False, refine_columns=False, band_rows=16)
 
@@ -88,6 +89,51 @@ def test_scans_are_found_in_folders_and_lists(folder: Path, tmp_path: Path) -> N
             find_scans(nothing)
     with pytest.raises(StoreError, match="contains no scan"):
         find_scans(folder / "a.dsl" / "frames")
+
+
+def test_scans_behind_links_are_found_once(folder: Path, tmp_path: Path) -> None:
+    study = tmp_path / "study"
+    study.mkdir()
+    for name, target in (("a.dsl", folder / "c.dsl"), ("more", folder), ("loop", study)):
+        try:
+            (study / name).symlink_to(target, target_is_directory=True)
+        except OSError:
+            pytest.skip("Links cannot be made here.")
+    shutil.move(folder / "a.dsl", study / "own.dsl")
+    (folder / "again.dsl").symlink_to(study / "own.dsl", target_is_directory=True)
+    found = [str(path.relative_to(study)) for path in find_scans(study)]
+    assert found == ["a.dsl", "more/b.dsl", "own.dsl"]
+
+
+def test_a_manifest_of_other_software_is_no_scan(folder: Path) -> None:
+    (folder / "site").mkdir()
+    for place in (folder, folder / "site"):
+        (place / "manifest.json").write_text('{"name": "app", "icons": []}')
+    (folder / "a.dsl").rename(folder / "leaf 1.5")
+    (folder / "leaf 1.5" / "frames.jsonl").unlink()
+    (folder / "b.dsl" / "manifest.json").write_text("{")
+    (folder / "c.dsl").rename(folder / "leaf 1.6")
+    (folder / "leaf 1.6" / "manifest.json").write_text("{")
+    shutil.copytree(folder / "leaf 1.5", folder / "leaf 1.7")
+    manifest = folder / "leaf 1.7" / "manifest.json"
+    manifest.write_text(manifest.read_text().replace('"plan"', '"plam"'))
+    found = [path.name for path in find_scans(folder)]
+    assert found == ["b.dsl", "leaf 1.5", "leaf 1.6", "leaf 1.7"], "damaged scans are scans"
+
+
+def test_a_manifest_of_other_software_in_a_store_is_no_scan(monkeypatch: pytest.MonkeyPatch) -> None:
+    pytest.importorskip("obstore", reason="the extra s3 is not installed")
+    with running() as store:
+        for name, value in store.environment().items():
+            monkeypatch.setenv(name, value)
+        for name in ("a.dsl/manifest.json", "leaf 1.5/manifest.json", "leaf 1.5/frames.jsonl"):
+            store.put(f"day/{name}", b"{")
+        store.put("day/leaf 1.6/manifest.json", b'{"plan": {}, "versions": {}}')
+        store.put("day/site/manifest.json", b'{"name": "app"}')
+        found = [path.name for path in find_scans(Path("s3://bucket/day"))]
+        assert found == ["a.dsl", "leaf 1.5", "leaf 1.6"]
+        with pytest.raises(StoreError, match="contains no scan"):
+            find_scans(Path("s3://bucket/day/site"))
 
 
 def test_two_scans_never_have_one_result(folder: Path, tmp_path: Path) -> None:
