@@ -15,6 +15,7 @@ from dsl_core.cli.output import Output
 from dsl_core.cli.pictures import board_of, calibrate_camera_pictures, calibrate_pictures
 from dsl_core.errors import CalibrationError
 from dsl_core.evaluation.cost import StageCost, StageTimer
+from dsl_core.words import quoted
 
 if TYPE_CHECKING:
     from dsl_core.devices.base import DeviceRig
@@ -200,7 +201,7 @@ def all_(
     with (
         # Before the devices are open there is nothing to resume.
         opened_campaign(campaign, rig, parse_options(option), settings) as (folder, devices),
-        resumed_by(f"dsl-scan calibrate all {campaign}"),
+        resumed_by(f"dsl-scan calibrate all {quoted(campaign)}"),
     ):
         for each, reason in omitted(campaign_recipes(folder), devices).items():
             output.say(f"{each} is left out: {reason}")

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 from dsl_core.cli.options import parse_size
 from dsl_core.cli.output import Output
 from dsl_core.errors import PlanError, StoreError
+from dsl_core.words import quoted
 
 if TYPE_CHECKING:
     from dsl_core.io.linearity import Linearity
@@ -69,7 +70,7 @@ def import_capture(
     if target is not None:
         with output.progress() as progress:
             captures.import_pictures(source, target, mapping, rig, progress)
-        output.say(f"Imported to {target}. Next: dsl-scan reconstruct {target} --depth-only")
+        output.say(f"Imported to {target}. Next: dsl-scan reconstruct {quoted(target)} --depth-only")
         output.put(imported=target)
 
 

@@ -14,6 +14,7 @@ from dsl_core.cli.output import Output
 from dsl_core.cli.results import print_figures
 from dsl_core.evaluation.cost import StageTimer
 from dsl_core.io import MANIFEST_NAME
+from dsl_core.words import quoted
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -44,7 +45,7 @@ def demo(
     width, height = parse_size("--size", size)
     options = with_effects({"scene": scene, "size": f"{width}x{height}"}, effects, tolerance)
     folder = _choose_folder(out, options)
-    with resumed_by(f"dsl-scan demo -o {out}"):
+    with resumed_by(f"dsl-scan demo -o {quoted(out)}"):
         _capture(output, timer, folder, options)
         result = _reconstruct(output, timer, folder)
     figures = _evaluate(output, timer, folder, result)

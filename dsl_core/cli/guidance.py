@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 from dsl_core.cli.options import parse_options
 from dsl_core.cli.output import Output
 from dsl_core.errors import CalibrationError, Cancelled, DeviceError
+from dsl_core.words import quoted
 
 if TYPE_CHECKING:
     from dsl_core.campaign.common.recipe import Step
@@ -83,7 +84,7 @@ class ConsoleGuide:
             raise CalibrationError(f"{not_accepted(fitted)} Then run the command again.")
         raise CalibrationError(
             f"{not_accepted(fitted)} Capture a step again with 'dsl-scan calibrate {fitted.name}"
-            f" {self.campaign} --redo STEP', or accept with --accept-failed."
+            f" {quoted(self.campaign)} --redo STEP', or accept with --accept-failed."
         )
 
 
@@ -178,7 +179,7 @@ def run_guided(
     from dsl_core.campaign.session import CalibrationSession
 
     output, settings = Output(json), {name: parse_options(set_)}
-    command = f"dsl-scan {name if name == 'selftest' else f'calibrate {name}'} {campaign}"
+    command = f"dsl-scan {name if name == 'selftest' else f'calibrate {name}'} {quoted(campaign)}"
     load_recipe(name, settings[name])  # wrong settings are reported before anything is written
     with (
         # Before the devices are open there is nothing to resume.

@@ -81,7 +81,8 @@ def plan(
         _state(output, made, target.parent, devices)
     save_plan(made, target, overwrite=force)
     output.say(
-        f"The plan is saved in {target}. Next: dsl-scan scan SCAN.dsl --plan {target} and the same rig."
+        f"The plan is saved in {target}."
+        f" Next: dsl-scan scan SCAN.dsl --plan {quoted(target)} and the same rig."
     )
     output.put(plan=target)
     output.finish()
@@ -117,7 +118,7 @@ def scan(
     if (target / MANIFEST_NAME).exists():
         raise StoreError(
             f"{target} already contains a scan."
-            f" Resume it with 'dsl-scan resume {target}', or choose a new name."
+            f" Choose a new name, or resume it with: dsl-scan resume {quoted(target)}"
         )
     with open_rig(rig, options) as devices:
         calibrated, overridden = _calibrate(output, devices, calibration, override)
@@ -132,7 +133,7 @@ def scan(
             fitted, metered = _metered(output, calibrated, fitted)
             notes |= metered
         _state(output, fitted, target, calibrated)
-        with output.progress() as progress, resumed_by(f"dsl-scan resume {target}"):
+        with output.progress() as progress, resumed_by(f"dsl-scan resume {quoted(target)}"):
             status = pipeline.scan(calibrated, fitted, target, progress, notes)
     _done(output, target, status)
 
@@ -162,7 +163,7 @@ def resume(
     output = Output(json)
     _say_gaps(output, target)
     opened = open_rig(rig, parse_options(option)) if rig else scans.reopen_rig(target)
-    with opened as devices, output.progress() as progress, resumed_by(f"dsl-scan resume {target}"):
+    with opened as devices, output.progress() as progress, resumed_by(f"dsl-scan resume {quoted(target)}"):
         status = scans.resume(devices, target, progress, drift)
     _done(output, target, status)
 
@@ -284,7 +285,8 @@ def next_step(target: Path) -> str:
             f" scan played back, which 'replay' cannot be, then {command} --calibration CAMPAIGN"
         )
     rig, options = rig_of_notes(reader.manifest.notes) or ("RIG", {})
-    words = " ".join([f"--rig {quoted(rig)}", *(f"--option {key}={v}" for key, v in options.items())])
+    given = [quoted(f"{key}={value}") for key, value in options.items()]
+    words = " ".join([f"--rig {quoted(rig)}", *(f"--option {each}" for each in given)])
     return (
         "The scan has no calibration, and the library is empty. Next: calibrate the rig with"
         f" 'dsl-scan calibrate all CAMPAIGN {words}', then {command} --calibration CAMPAIGN"

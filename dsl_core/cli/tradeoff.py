@@ -13,6 +13,7 @@ from dsl_core.cli.options import CalibrationName, Force, Json, RigName, RigOptio
 from dsl_core.cli.output import Output
 from dsl_core.errors import CalibrationError, PlanError
 from dsl_core.io.staging import check_targets
+from dsl_core.words import quoted
 
 if TYPE_CHECKING:
     from dsl_core.devices.base import DeviceRig
@@ -75,7 +76,8 @@ def tradeoff(
         save_plan(chosen.plan, plan, overwrite=force)
         output.put(plan_file=plan)
         output.say(
-            f"The plan is saved in {plan}. Next: dsl-scan scan SCAN.dsl --plan {plan} and the same rig."
+            f"The plan is saved in {plan}."
+            f" Next: dsl-scan scan SCAN.dsl --plan {quoted(plan)} and the same rig."
         )
     output.finish()
 
@@ -123,7 +125,7 @@ def design(
     made = DesignedSet(
         name=f"designed {frames}",
         rig=known.name,
-        command=f"dsl-scan design {target.name} --frames {frames} --orders {orders}",
+        command=f"dsl-scan design {quoted(target.name)} --frames {frames} --orders {orders}",
         frames=frames,
         width_px=found.levels.shape[1],
         lines=found.lines.name,

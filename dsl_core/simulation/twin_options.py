@@ -41,7 +41,10 @@ def _positive(value: object, info: ValidationInfo) -> float:
 
 
 def _whole(value: object, info: ValidationInfo) -> int:
-    return int(number(str(info.field_name), value))
+    found = number(str(info.field_name), value)
+    if not found.is_integer():
+        raise DeviceError(f"The twin's option {info.field_name} must be a whole number, not {value!r}.")
+    return int(found)
 
 
 def _switch(value: object, info: ValidationInfo) -> bool:

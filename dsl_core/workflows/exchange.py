@@ -21,6 +21,7 @@ from dsl_core.model.plan import CapturePlan
 from dsl_core.model.rig import Rig
 from dsl_core.pipeline import scan
 from dsl_core.progress import Progress
+from dsl_core.words import quoted
 from dsl_core.workflows.scans import calibration_of
 
 #: Note of a scan that says from which files it was made.
@@ -95,7 +96,8 @@ def _poses_hint(root: Path) -> str:
     if not any(root.glob("*/graycode_*.*")):
         return ""
     return (
-        f" Its folders may be poses of a board: 'dsl-scan calibrate geometry {root} --pictures' reads them."
+        " Its folders may be poses of a board:"
+        f" 'dsl-scan calibrate geometry {quoted(root)} --pictures' reads them."
     )
 
 

@@ -38,6 +38,8 @@ def test_texts_are_read_and_those_of_the_scene_are_left() -> None:
         ("size", "890", "size must be like 890x580 (16 to 4096 pixels per side), not '890'"),
         ("size", "8x8", "size must be like 890x580 (16 to 4096 pixels per side), not '8x8'"),
         ("seed", "-1", "option seed must be a number of at least 0, not '-1'"),
+        ("seed", "1e-3", "option seed must be a whole number, not '1e-3'"),
+        ("truth", "2.5", "option truth must be a whole number, not '2.5'"),
         ("sigma", "much", "option sigma must be a number of at least 0, not 'much'"),
         ("brightness", "inf", "option brightness must be a number of at least 0, not 'inf'"),
         ("brightness", "0", "option brightness must be above 0, not '0'"),

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 import dsl_core
+from dsl_core import pipeline
 from dsl_core.cli.options import PlanChoice, PlanSource
 from dsl_core.cli.scans import next_step
 from dsl_core.devices.replay import replay_rig
@@ -20,6 +21,7 @@ from dsl_core.io.calibration_library import CalibrationLibrary
 from dsl_core.io.plan_file import load_plan, save_plan
 from dsl_core.io.result.result_file import load_result
 from dsl_core.io.scan.folder import ScanReader, ScanWriter
+from dsl_core.io.scan.origin import rig_notes
 from dsl_core.model.plan import EnsembleCode, GrayCode, LineComb, Setting, XorCode
 from dsl_core.model.presets import PRESETS, preset_plan
 from tests.cases.memory_sink import MemorySink
@@ -175,6 +177,24 @@ def test_what_plays_a_scan_back_is_not_to_be_calibrated(
     advice = next_step(folder)
     assert ("the rig that captured the scan played back" in advice) == is_replay
     assert ("'dsl-scan calibrate all" in advice) != is_replay
+
+
+def test_commands_to_copy_are_quoted_for_a_shell(
+    give: Give, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def stop(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(CalibrationLibrary, "names", lambda self: [])
+    assert "Next: dsl-scan scan SCAN.dsl --plan 'my plan.json' and" in give("plan", "my plan.json").out
+    scan, plan = Path("my scan.dsl"), PRESETS[0].plan
+    ScanWriter.create(scan, plan, notes=rig_notes("lab", {"port": "COM 3"})).close()
+    assert "calibrate all CAMPAIGN --rig lab --option 'port=COM 3''" in next_step(scan)
+    assert give("scan", scan).sentence.endswith("resume it with: dsl-scan resume 'my scan.dsl'")
+    monkeypatch.setattr(pipeline, "scan", stop)
+    stopped = give("scan", "new scan.dsl", *SMALL_RIG, *SMALL_PLAN, "--keep-exposure")
+    assert stopped.sentence.endswith("Resume with: dsl-scan resume 'new scan.dsl'")
 
 
 def test_reconstruct_says_what_each_stage_costs(give: Give, finished: Path, tmp_path: Path) -> None:
