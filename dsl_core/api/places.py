@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,15 +14,18 @@ if TYPE_CHECKING:
     import xarray as xr
 
 #: A mask (rows, columns), a pixel (x, y), or x, y, width and height, in pixels of the whole picture.
-Place = NDArray[np.bool_] | Sequence[int]
+Place: TypeAlias = "NDArray[np.bool_] | xr.DataArray | Sequence[int]"
+#: The axes of a mask.
+_AXES = ("y", "x")
 
 
 def place_mask(result: xr.Dataset, place: Place, name: str = "The region") -> NDArray[np.bool_]:
     """The mask (rows, columns) of a place of a result, called ``name``.
 
-    Raises `DecodeError` for what is not a place, and for one outside the result.
+    A mask that names its axes ``x`` and ``y`` may have them in any order, and marks the pixels that its own
+    coordinates say. Raises `DecodeError` for what is not a place, and for one outside the result.
     """
-    given, rows, columns = np.asarray(place), result["y"].values, result["x"].values
+    given, rows, columns = _by_names(result, place, name), result["y"].values, result["x"].values
     if given.dtype == bool:
         if given.shape == (len(rows), len(columns)):
             return given
@@ -44,6 +47,38 @@ def place_mask(result: xr.Dataset, place: Place, name: str = "The region") -> ND
             f" ({extent_of(result)}). Choose a place inside it."
         )
     return np.asarray(inside_y[:, None] & inside_x)
+
+
+def _by_names(result: xr.Dataset, place: Place, name: str) -> NDArray[Any]:
+    """A place as numbers; a mask with axes that have names is put on rows and columns of the result."""
+    import xarray as xr
+
+    if not isinstance(place, xr.DataArray) or not set(_AXES) & set(place.dims):
+        return np.asarray(place)
+    if set(place.dims) != set(_AXES):
+        raise DecodeError(
+            f"{name}: the axes of the mask are {', '.join(map(str, place.dims))}."
+            " Give one over y and x alone."
+        )
+    for axis in _AXES:
+        if axis in place.coords and axis in result.coords:
+            place = _on_axis(result, place, axis, name)
+    return np.asarray(place.transpose(*_AXES).values)
+
+
+def _on_axis(result: xr.Dataset, mask: xr.DataArray, axis: str, name: str) -> xr.DataArray:
+    """The mask at the coordinates of the result on one axis; raises `DecodeError` where it lacks any."""
+    wanted, own = result[axis].values, mask.get_index(axis)
+    if np.array_equal(own, wanted):
+        return mask
+    places = own.get_indexer(wanted) if own.is_unique else np.full(len(wanted), -1)
+    if (places < 0).any():
+        raise DecodeError(
+            f"{name}: the mask is that of another place: its {axis} goes from {own[0]} to {own[-1]}, that of"
+            f" the result from {wanted[0]} to {wanted[-1]}. Give a mask of this result, or of one that"
+            " contains it."
+        )
+    return mask.isel({axis: places})
 
 
 def extent_of(result: xr.Dataset) -> str:
