@@ -17,9 +17,10 @@ from dsl_core.devices.registry import open_rig as open_by_texts
 from dsl_core.devices.registry import rig_names
 from dsl_core.errors import CalibrationError, PlanError
 from dsl_core.extras import names_missing_packages
-from dsl_core.io import calibration_library
+from dsl_core.io import MANIFEST_NAME, calibration_library
 from dsl_core.io.scan.folder import ScanReader
-from dsl_core.io.scan.origin import rig_notes
+from dsl_core.io.scan.manifest import read_manifest
+from dsl_core.io.scan.origin import refuse_other_rig, rig_notes
 from dsl_core.model.base import problems_in_words, what_is_wrong
 from dsl_core.model.options import Options
 from dsl_core.model.plan import CapturePlan
@@ -110,13 +111,16 @@ def scan(
 ) -> ScanReader:
     """Capture a plan (the reference plan if none is given) into a folder, and return the stored scan.
 
-    Every frame is on disk before the next is taken. A folder with an unfinished scan of the same plan is
-    resumed. Raises `PlanError` for a plan that is impossible on the rig, `DeviceError` for a device that
-    fails and `StoreError` where the folder cannot be written or contains something else.
+    Every frame is on disk before the next is taken. A folder with an unfinished scan of the same plan and rig
+    is resumed, and one with a finished scan is left as it is. Raises `PlanError` for a plan that is
+    impossible on the rig, `DeviceError` for a device that fails and `StoreError` where the folder cannot be
+    written or contains something else, such as a scan of another rig or with other options.
     """
     from dsl_core import pipeline
 
     path = Path(folder)
+    if (path / MANIFEST_NAME).exists():
+        refuse_other_rig(path, read_manifest(path).notes, rig.notes)
     pipeline.scan(rig, plan or pipeline.fit_plan(CapturePlan(), rig), path, progress, dict(rig.notes))
     return ScanReader(path)
 

@@ -69,6 +69,14 @@ def test_a_finished_scan_is_not_captured_again(scan: ScanReader) -> None:
     assert not dsl.load_scan(str(scan.folder)).missing()
 
 
+def test_a_scan_of_another_scene_is_not_handed_out_as_the_new_one(scan: ScanReader) -> None:
+    words = r"scene is color-checker in the scan and sphere now; .* seed is not"
+    with dsl.open_rig("twin", size="112x72", scene="sphere", seed=3) as rig:
+        plan = dsl.plan(rig, "quick")
+        with pytest.raises(StoreError, match=words):
+            dsl.scan(rig, scan.folder, plan)
+
+
 def test_plans_by_name_and_with_changes() -> None:
     with dsl.open_rig("twin", size="112x72") as rig:
         changed = dsl.plan(rig, "balanced", name="mine")

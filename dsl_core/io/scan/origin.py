@@ -8,6 +8,7 @@ import platform
 from collections.abc import Mapping
 from pathlib import Path
 
+from dsl_core.errors import StoreError
 from dsl_core.model.rig import Rig
 
 _RIG, _OPTIONS, _COMPUTER = "scanned_with", "scanned_with_options", "scanned_on"
@@ -49,6 +50,43 @@ def rig_of_notes(notes: Mapping[str, object]) -> tuple[str, dict[str, str]] | No
     if not isinstance(options, dict):
         return None
     return str(notes[_RIG]), {str(key): str(value) for key, value in options.items()}
+
+
+def refuse_other_rig(folder: Path, stored: Mapping[str, object], given: Mapping[str, object]) -> None:
+    """Raise `StoreError` where notes of a scan and of a rig name another rig, or options that differ.
+
+    The twin's scene is an option, so its frames would be those of another scene. Notes that name no rig,
+    such as those of devices that a script has put together, tell nothing.
+    """
+    was, now = rig_of_notes(stored), rig_of_notes(given)
+    if was is None or now is None:
+        return
+    pairs = [("its rig", was[0], now[0])] + [
+        (f"the option {key}", was[1].get(key), now[1].get(key))
+        for key in sorted(was[1].keys() | now[1].keys())
+    ]
+    found = [
+        f"{what} is {_said(old)} in the scan and {_said(new)} now"
+        for what, old, new in pairs
+        if not _is_same(old, new)
+    ]
+    if found:
+        raise StoreError(
+            f"{folder} belongs to another scan: {'; '.join(found)}."
+            " Open the rig as it was for that scan, or choose a new name."
+        )
+
+
+def _said(value: str | None) -> str:
+    return "not given" if value is None else value
+
+
+def _is_same(one: str | None, other: str | None) -> bool:
+    """Whether two texts say the same; scripts write 650.0 for what is typed as 650."""
+    try:
+        return one == other or float(str(one)) == float(str(other))
+    except ValueError:
+        return False
 
 
 def model_notes(rig: Rig, correspondence: str) -> dict[str, str]:

@@ -6,11 +6,13 @@ from pathlib import Path
 
 import pytest
 
+from dsl_core.errors import StoreError
 from dsl_core.io.scan.origin import (
     calibration_digest,
     is_of_this_computer,
     model_notes,
     model_of_notes,
+    refuse_other_rig,
     rig_notes,
     rig_of_notes,
 )
@@ -40,6 +42,25 @@ def test_options_that_nobody_noted_are_none() -> None:
         "twin",
         {"noise": "1"},
     )
+
+
+def test_another_scene_or_rig_is_refused_with_what_differs() -> None:
+    stored = rig_notes("twin", {"scene": "plane", "depth_mm": "650"})
+    with pytest.raises(
+        StoreError, match=r"the option scene is plane in the scan and sphere now\. Open the rig as"
+    ):
+        refuse_other_rig(Path("a.dsl"), stored, rig_notes("twin", {"scene": "sphere", "depth_mm": "650"}))
+    with pytest.raises(
+        StoreError, match=r"its rig is twin in the scan and lab now; .*seed is not given in the"
+    ):
+        refuse_other_rig(Path("a.dsl"), rig_notes("twin", {}), rig_notes("lab", {"seed": "3"}))
+
+
+def test_the_same_rig_and_devices_of_a_script_are_not_another() -> None:
+    stored = rig_notes("twin", {"scene": "plane", "depth_mm": "650"})
+    refuse_other_rig(Path("a.dsl"), stored, rig_notes("twin", {"depth_mm": "650.0", "scene": "plane"}))
+    refuse_other_rig(Path("a.dsl"), stored, {"note": "mine"})
+    refuse_other_rig(Path("a.dsl"), {}, stored)
 
 
 def test_a_scan_knows_its_computer_and_user_without_naming_them(monkeypatch: pytest.MonkeyPatch) -> None:
