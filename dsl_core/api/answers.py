@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, Literal, get_args
 
 import numpy as np
 
@@ -47,17 +47,19 @@ def classify(
     The dataset holds ``class`` (y, x), an index into the coordinate ``label``, ``fit`` and ``margin`` (y, x),
     and for each label ``pixels`` and ``area_mm2``, with ``pixels_std`` and ``area_std_mm2``; the attribute
     ``notes`` lists what was converted or left out of the library, and why areas are NaN. Raises
-    `CalibrationError` for a library without usable spectra and `DecodeError` for places without spectra or a
-    result that has none.
+    `CalibrationError` for a library without usable spectra and `DecodeError` for places without spectra, a
+    result that has none, or a measure or brightness that there is not.
     """
     import xarray as xr
 
     from dsl_core.analysis.classes import classes_of_library, known_classes
     from dsl_core.analysis.classification import classes_of_masks, classify_result, within_nm
-    from dsl_core.analysis.classify import Limits, Measure
+    from dsl_core.analysis.classify import Brightness, Limits, Measure
     from dsl_core.analysis.library import read_library
     from dsl_core.analysis.places import require_spectra
 
+    _require_choice("measure", measure, [each.value for each in Measure])
+    _require_choice("brightness", brightness, get_args(Brightness))
     require_spectra(result)
     result = with_axes(result)
     if library is None and not pins:
@@ -99,6 +101,11 @@ def classify(
         variables["area_std_mm2"] = ("label", stds, {"units": "mm2"})
     coords = {"label": labels, "y": result["y"], "x": result["x"]}
     return xr.Dataset(variables, coords=coords, attrs={"method": made.method, "notes": [*made.notes, *notes]})
+
+
+def _require_choice(name: str, given: object, choices: Sequence[str]) -> None:
+    if given not in choices:
+        raise DecodeError(f"The {name} of a classification is {' or '.join(choices)}, not {given!r}.")
 
 
 def _or_nan(value: float | None) -> float:
