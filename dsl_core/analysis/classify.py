@@ -37,6 +37,8 @@ Brightness = Literal["stated", "free"]
 _AT_ONCE = 8192
 #: Classes of a map that ENVI, and a colour table, can hold.
 MOST_CLASSES = 250
+#: What a map calls the pixels that have no class; no class is called that.
+_NOT_JUDGED, _NONE, _UNSURE = "not judged", "none of these", "undecided"
 NOT_JUDGED_COLOUR, NONE_COLOUR, UNSURE_COLOUR = "#000000", "#777777", "#c8c8c8"
 
 
@@ -151,7 +153,7 @@ class ClassMap:
     @property
     def labels(self) -> tuple[str, ...]:
         """A name for every value of the map."""
-        return ("not judged", *self.names, "none of these", "undecided")
+        return (_NOT_JUDGED, *self.names, _NONE, _UNSURE)
 
     def palette(self, ground: Ground = "light") -> tuple[str, ...]:
         """A colour ``#rrggbb`` for every value of the map: of a class, that of the mark it comes from."""
@@ -175,8 +177,8 @@ def score(
     Cubes (bands, rows, columns), ``flags`` (rows, columns). ``bands_nm`` (bands,) say how bands err together
     where too few pixels do; without them, they are taken to be the usual 5 nm apart. Bands that the prior
     decided, not the data, count for the probability in no pixel. Raises `DecodeError` for too few classes or
-    other bands, for fewer than `FEWEST_BANDS` bands unless the measure is the difference, and for a
-    probability without deviations.
+    other bands, for a class with a name of pixels without one, for fewer than `FEWEST_BANDS` bands unless the
+    measure is the difference, and for a probability without deviations.
     """
     classes = marked_by(shared_names(classes), {})
     _check(reflectance, std, classes, measure)
@@ -243,6 +245,11 @@ def _check(reflectance: Cube, std: Cube | None, classes: Sequence[SpectralClass]
         raise DecodeError(
             f"A class map needs 1 to {MOST_CLASSES} classes; given {len(classes)}. Choose other spectra, or"
             " group them."
+        )
+    taken = [each.name for each in classes if each.name in (_NOT_JUDGED, _NONE, _UNSURE)]
+    if taken:
+        raise DecodeError(
+            f"No class can be called {taken[0]!r}: a class map calls pixels without a class so. Rename it."
         )
     wrong = [each.name for each in classes if len(each.mean) != len(reflectance)]
     if wrong:

@@ -27,3 +27,9 @@ def test_a_choice_that_there_is_not_is_told_with_those_that_there_are(
 ) -> None:
     with pytest.raises(DecodeError, match=words):
         dsl.classify(small_result(), pins=PINS, **wrong)
+
+
+@pytest.mark.parametrize("name", ["none of these", "undecided", "not judged"])
+def test_no_class_takes_the_name_of_pixels_without_one(name: str) -> None:
+    with pytest.raises(DecodeError, match=f"No class can be called '{name}'.*Rename it"):
+        dsl.classify(small_result(), pins={name: PINS["a"], "b": PINS["b"]}, measure="angle")
