@@ -10,7 +10,7 @@ import numpy as np
 import xarray as xr
 
 from dsl_core.api import FilePath
-from dsl_core.api.places import Place, extent_of, place_mask
+from dsl_core.api.places import Place, as_array, extent_of, place_mask, require_picture
 from dsl_core.errors import DecodeError
 from dsl_core.evaluation.marks import explain_pixel, largest_difference, region_spectrum
 from dsl_core.io.export import export_by_ending
@@ -60,7 +60,8 @@ class ResultAccessor:
         `DecodeError` for a region without any.
         """
         self._require_spectra()
-        if np.shape(where) == (2,):
+        require_picture(self._result)
+        if as_array(where).shape == (2,) and as_array(where).dtype.kind in "iuf":
             raise DecodeError(f"A region has several pixels; for the one at {where!r} call spectrum(x, y).")
         result = with_axes(self._result)
         mask = place_mask(result, where)
@@ -151,7 +152,11 @@ class ResultAccessor:
         return "" if fit is None else fit.words
 
     def points(self) -> xr.Dataset:
-        """The pixels that have depth: all variables over the dimension ``point``, with ``x`` and ``y``."""
+        """The pixels that have depth: all variables over the dimension ``point``, with ``x`` and ``y``.
+
+        Raises `DecodeError` for what is not a result, such as one spectrum.
+        """
+        require_picture(self._result)
         result = with_axes(self._result)
         known = (_flags(result) & int(DEPTH_INVALID)) == 0
         stacked = result.stack(point=("y", "x"))
@@ -180,6 +185,7 @@ class ResultAccessor:
         """
         import matplotlib.pyplot as plt
 
+        self._require_spectra()
         shown = self._result if x is None or y is None else self.spectrum(x, y)
         if shown["reflectance"].ndim != 1:
             raise DecodeError("Say which pixel to draw: plot(x=..., y=...), or spectrum(x, y).dsl.plot().")
@@ -192,8 +198,11 @@ class ResultAccessor:
         return axes
 
     def _pixel(self, x: int, y: int) -> xr.Dataset:
-        if "x" not in self._result.dims:
-            raise DecodeError("This is one spectrum, not a result: it has no pixels to choose from.")
+        require_picture(self._result)
+        if not all(as_array(each).ndim == 0 and as_array(each).dtype.kind in "iuf" for each in (x, y)):
+            raise DecodeError(
+                f"A pixel is two numbers, x and y; given {x!r} and {y!r}. For several, use region."
+            )
         try:
             return with_bits(self._result.sel(x=x, y=y))
         except KeyError as error:
@@ -204,6 +213,11 @@ class ResultAccessor:
     def _require_spectra(self) -> None:
         if "reflectance" not in self._result:
             raise DecodeError("The result contains depth only. Reconstruct the scan with spectra=True.")
+        if BANDS not in self._result["reflectance"].dims:
+            raise DecodeError(
+                "The result has one band, without the axis of bands. Choose a list of one, such as"
+                f" result.isel({BANDS}=[3]), which keeps the axis."
+            )
 
 
 def _with_unstated(result: xr.Dataset) -> xr.Dataset:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Literal, get_args
 import numpy as np
 
 from dsl_core.api import FilePath
-from dsl_core.api.places import Place, place_mask
+from dsl_core.api.places import Place, place_mask, require_picture
 from dsl_core.errors import DecodeError
 from dsl_core.model.attributes import stated_band_width_nm
 from dsl_core.model.result_order import with_axes
@@ -61,6 +61,7 @@ def classify(
     _require_choice("measure", measure, [each.value for each in Measure])
     _require_choice("brightness", brightness, get_args(Brightness))
     require_spectra(result)
+    require_picture(result)
     result = with_axes(result)
     if library is None and not pins:
         raise DecodeError("There is nothing to compare with. Give a library of spectra, pins, or both.")
@@ -130,6 +131,7 @@ def colours(
     from dsl_core.analysis.colours import colours_of
     from dsl_core.analysis.places import spectra_of_masks
 
+    require_picture(result)
     result, lights = with_axes(result), [lights] if isinstance(lights, str) else lights
     masks = {name: place_mask(result, place, name) for name, place in pins.items()}
     spectra = spectra_of_masks(result, masks)

@@ -33,13 +33,13 @@ def place_mask(result: xr.Dataset, place: Place, name: str = "The region") -> ND
             f"{name}: the mask has shape {given.shape}; the result has {len(rows)} rows and {len(columns)}"
             " columns."
         )
-    is_whole = given.dtype.kind in "iuf" and bool((given == np.rint(given)).all())
-    if given.shape not in ((2,), (4,)) or not is_whole:
+    numbers = whole_numbers(given)
+    if numbers is None or len(numbers) not in (2, 4):
         raise DecodeError(
             f"{name}: a place is a mask of {len(rows)} x {len(columns)}, a pixel x, y, or x, y, width,"
             f" height in whole pixels; given {place!r}."
         )
-    x, y, width, height = (*(int(value) for value in given), 1, 1)[:4]
+    x, y, width, height = (*numbers, 1, 1)[:4]
     inside_y, inside_x = (rows >= y) & (rows < y + height), (columns >= x) & (columns < x + width)
     if not (inside_y.any() and inside_x.any()):
         raise DecodeError(
@@ -49,12 +49,45 @@ def place_mask(result: xr.Dataset, place: Place, name: str = "The region") -> ND
     return np.asarray(inside_y[:, None] & inside_x)
 
 
+def require_picture(result: xr.Dataset) -> None:
+    """Raise `DecodeError` for what has no rows or no columns, such as one spectrum."""
+    lacking = [axis for axis in _AXES if axis not in result.dims]
+    if len(lacking) == 2:
+        raise DecodeError("This is one spectrum, not a result: it has no pixels to choose from.")
+    if lacking:
+        raise DecodeError(
+            f"The result has no axis {lacking[0]}, since one {lacking[0]} of it was chosen. Choose a list of"
+            f" one, such as result.isel({lacking[0]}=[30]), which keeps the axis."
+        )
+
+
+def whole_numbers(given: object) -> tuple[int, ...] | None:
+    """The whole numbers of a sequence; None where it is none, or holds anything else.
+
+    >>> whole_numbers((1, 2.0)), whole_numbers((1, float("inf"))), whole_numbers((1.5, 2))
+    ((1, 2), None, None)
+    """
+    values = as_array(given)
+    if values.ndim != 1 or values.dtype.kind not in "iuf":
+        return None
+    is_whole = np.isfinite(values) & (values == np.rint(values))
+    return tuple(int(value) for value in values) if is_whole.all() else None
+
+
+def as_array(given: Any) -> NDArray[Any]:
+    """What was given as an array; without a value where lists in it differ in length."""
+    try:
+        return np.asarray(given)
+    except ValueError:
+        return np.empty(0, object)
+
+
 def _by_names(result: xr.Dataset, place: Place, name: str) -> NDArray[Any]:
     """A place as numbers; a mask with axes that have names is put on rows and columns of the result."""
     import xarray as xr
 
     if not isinstance(place, xr.DataArray) or not set(_AXES) & set(place.dims):
-        return np.asarray(place)
+        return as_array(place)
     if set(place.dims) != set(_AXES):
         raise DecodeError(
             f"{name}: the axes of the mask are {', '.join(map(str, place.dims))}."

@@ -8,10 +8,10 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
 from pydantic import ValidationError
 
 from dsl_core.api import FilePath
+from dsl_core.api.places import as_array, whole_numbers
 from dsl_core.devices.base import DeviceRig
 from dsl_core.devices.registry import open_rig as open_by_texts
 from dsl_core.devices.registry import rig_names
@@ -41,14 +41,14 @@ def rigs() -> list[str]:
 
 
 @names_missing_packages
-def open_rig(name: str = "twin", **options: object) -> DeviceRig:
+def open_rig(name: FilePath = "twin", **options: object) -> DeviceRig:
     """Open the devices of a rig; use it in a ``with`` statement, so that they are closed.
 
     ``name`` is one of `rigs`, or the path of a rig profile. ``options`` are those that ``dsl-scan rigs``
     lists, as text, numbers, True and False, or a size as (width, height). Raises `DeviceError` for an unknown
     rig or option, and for devices that cannot be opened. A calibrated rig is read by `load_calibration`.
     """
-    texts = {key: _as_text(value) for key, value in options.items()}
+    name, texts = os.fspath(name), {key: _as_text(value) for key, value in options.items()}
     rig = open_by_texts(name, texts)
     return replace(rig, notes={**rig.notes, **rig_notes(name, texts)})
 
@@ -86,9 +86,15 @@ def plan(rig: DeviceRig, preset: str = "reference", **changes: object) -> Captur
     return fit_plan(chosen, rig, keeps_patterns="spectral" in changes)
 
 
+def _plan(rig: DeviceRig, given: CapturePlan | str) -> CapturePlan:
+    return given if isinstance(given, CapturePlan) else plan(rig, given)
+
+
 @names_missing_packages
-def predict(rig: DeviceRig, plan: CapturePlan, calibration: Rig | FilePath | None = None) -> Prediction:
-    """What a plan is expected to reach on a rig, with its own calibration unless another is given.
+def predict(rig: DeviceRig, plan: CapturePlan | str, calibration: Rig | FilePath | None = None) -> Prediction:
+    """What a plan, or the preset of that name, is expected to reach on a rig.
+
+    It is predicted with the calibration of the rig unless another is given.
 
     ``seconds`` is the time of the capture, ``pixel_rmse`` the error of reflectance of a single pixel,
     ``depth_std_mm`` that of depth. Nothing is captured. Raises `CalibrationError` where the rig has no
@@ -102,15 +108,19 @@ def predict(rig: DeviceRig, plan: CapturePlan, calibration: Rig | FilePath | Non
             f"Nothing can be predicted for the rig {rig.name!r}, which has no calibration. Give one, such as"
             ' calibration="rig.json".'
         )
-    return prediction.predict(known, plan, latency_ms=rig.projector.info.latency_ms)
+    return prediction.predict(known, _plan(rig, plan), latency_ms=rig.projector.info.latency_ms)
 
 
 @names_missing_packages
 def scan(
-    rig: DeviceRig, folder: FilePath, plan: CapturePlan | None = None, progress: Progress | None = None
+    rig: DeviceRig,
+    folder: FilePath,
+    plan: CapturePlan | str | None = None,
+    progress: Progress | None = None,
 ) -> ScanReader:
-    """Capture a plan (the reference plan if none is given) into a folder, and return the stored scan.
+    """Capture a plan, or the preset of that name, into a folder, and return the stored scan.
 
+    Without one, it is the reference plan.
     Every frame is on disk before the next is taken. A folder with an unfinished scan of the same plan and rig
     is resumed, and one with a finished scan is left as it is. Raises `PlanError` for a plan that is
     impossible on the rig, `DeviceError` for a device that fails and `StoreError` where the folder cannot be
@@ -121,7 +131,8 @@ def scan(
     path = Path(folder)
     if (path / MANIFEST_NAME).exists():
         refuse_other_rig(path, read_manifest(path).notes, rig.notes)
-    pipeline.scan(rig, plan or pipeline.fit_plan(CapturePlan(), rig), path, progress, dict(rig.notes))
+    chosen = pipeline.fit_plan(CapturePlan(), rig) if plan is None else _plan(rig, plan)
+    pipeline.scan(rig, chosen, path, progress, dict(rig.notes))
     return ScanReader(path)
 
 
@@ -204,8 +215,9 @@ def _device(name: str) -> str:
 
 def _grid(given: Any) -> WavelengthGrid:
     """Bands by the centres of the first and the last and their distance, nm."""
-    if isinstance(given, str) or np.shape(given) != (3,):
-        shown = repr(given) if isinstance(given, str) or np.ndim(given) != 1 else f"{len(given)} values"
+    values = as_array(given)
+    if values.shape != (3,):
+        shown = f"{len(values)} values" if values.ndim == 1 and len(values) else repr(given)
         raise PlanError(
             f"bands_nm are the centres of the first and of the last band and their distance in nm, such as"
             f" (430, 660, 5); given {shown}."
@@ -215,15 +227,18 @@ def _grid(given: Any) -> WavelengthGrid:
         return WavelengthGrid(start_nm=first, stop_nm=last, step_nm=step)
     except ValidationError as error:
         words = "; ".join(what_is_wrong(fault) for fault in error.errors())
-        raise PlanError(f"bands_nm cannot be {first:g}, {last:g}, {step:g}: {words}.") from error
+        shown = ", ".join(f"{each:g}" if isinstance(each, float | int) else repr(each) for each in given)
+        raise PlanError(f"bands_nm cannot be {shown}: {words}.") from error
 
 
 def _region(given: Sequence[int], size_px: tuple[int, int]) -> tuple[int, int, int, int]:
     """The region, which must be a part of a picture of this width and height."""
-    if len(given) != 4:
-        shown = tuple(given) if np.ndim(given) == 1 and len(given) < 9 else f"{np.shape(given)} values"
-        raise PlanError(f"A region is x, y, width and height, given {shown}.")
-    x, y, width, height = (int(value) for value in given)
+    numbers = whole_numbers(given)
+    if numbers is None or len(numbers) != 4:
+        values = as_array(given)
+        shown = repr(given) if values.ndim < 2 and values.size < 9 else f"{values.shape} values"
+        raise PlanError(f"A region is x, y, width and height in whole pixels, given {shown}.")
+    x, y, width, height = numbers
     if x < 0 or y < 0 or width < 1 or height < 1 or x + width > size_px[0] or y + height > size_px[1]:
         raise PlanError(
             f"The region x {x}, y {y}, width {width}, height {height} is not a part of the picture of"

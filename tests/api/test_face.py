@@ -309,7 +309,9 @@ def test_what_is_not_in_a_result_is_told(result: xr.Dataset, scan: ScanReader) -
         result.dsl.spectrum(50, 30).dsl.spectrum(50, 30)
     with pytest.raises(PlanError, match=r"bands_nm are .* given 11 values"):
         dsl.reconstruct(scan, bands_nm=np.arange(450, 651, 20))  # type: ignore[arg-type]
-    with pytest.raises(PlanError, match=r"A region is x, y, width and height, given \(72, 112\) values"):
+    with pytest.raises(
+        PlanError, match=r"A region is x, y, width and height in whole pixels, given \(72, 112\) values"
+    ):
         dsl.reconstruct(scan, region_px=np.ones((72, 112), bool))  # type: ignore[arg-type]
     with pytest.raises(StoreError, match="The library has no calibration 'nobody'"):
         dsl.reconstruct(scan, "nobody")

@@ -45,6 +45,10 @@ def save_result(result: xr.Dataset, path: Path, *, overwrite: bool = False) -> P
     disk fails, or the dataset is not a result of this version.
     """
     _check_version(result.attrs.get("schema_version"), path)
+    if not {"x", "y"} & set(result.dims):
+        raise StoreError(
+            f"{path}: the dataset has no pixels, as a single spectrum has none. Export it as a table (.csv)."
+        )
     import zarr
 
     result = with_bits(result)

@@ -1,0 +1,96 @@
+"""What scripts give by mistake: every failure is one of `dsl_core.errors`."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+import xarray as xr
+
+import dsl_core as dsl
+import dsl_core.api.accessor
+from dsl_core.api.scans import _grid, _region
+from dsl_core.errors import CalibrationError, DecodeError, DeviceError, PlanError, StoreError
+from tests.cases.small_result import small_result
+
+Ask = Callable[[xr.Dataset], Any]
+
+
+@pytest.mark.parametrize(
+    ("ask", "words"),
+    [
+        (
+            lambda r: r.isel(wavelength_nm=3).dsl.spectrum(4, 2),
+            r"one band, .* result.isel\(wavelength_nm=\[3\]",
+        ),
+        (lambda r: r.isel(wavelength_nm=3).dsl.region((1, 1, 3, 2)), "has one band"),
+        (lambda r: r.isel(y=3).dsl.points(), r"has no axis y, .* result.isel\(y=\[30\]\)"),
+        (lambda r: r.isel(y=3).dsl.region((1, 3, 3, 1)), "has no axis y"),
+        (lambda r: r.isel(x=3).dsl.spectrum(3, 2), "has no axis x"),
+        (lambda r: dsl.colours(r.isel(y=3), {"a": (1, 3)}), "has no axis y"),
+        (lambda r: dsl.classify(r.isel(y=3), pins={"a": (1, 3)}), "has no axis y"),
+        (lambda r: r.dsl.spectrum(4, 2).dsl.points(), "one spectrum, not a result"),
+        (lambda r: r.dsl.spectrum(4, 2).dsl.region((1, 1, 2, 2)), "one spectrum, not a result"),
+        (lambda r: r.dsl.spectrum([4, 5], 2), r"A pixel is two numbers, x and y; given \[4, 5\] and 2"),
+        (lambda r: r.dsl.spectrum(slice(0, 3), 2), "A pixel is two numbers"),
+        (lambda r: r.dsl.region((1, 1, float("inf"), 2)), "in whole pixels"),
+        (lambda r: r.dsl.region([(1, 2), (3,)]), "in whole pixels"),
+        (lambda r: r[["depth_mm", "flags"]].dsl.plot(x=4, y=2), "contains depth only"),
+    ],
+)
+def test_a_part_of_a_result_says_what_it_lacks(ask: Ask, words: str) -> None:
+    with pytest.raises(DecodeError, match=words):
+        ask(small_result())
+
+
+def test_what_keeps_its_axes_is_answered() -> None:
+    result = small_result()
+    assert result.isel(y=[3]).dsl.points().sizes["point"] == result.sizes["x"]
+    assert result.isel(wavelength_nm=[3]).dsl.spectrum(4, 2).sizes["wavelength_nm"] == 1
+    point = result.dsl.points().isel(point=3)
+    assert result.dsl.spectrum(point["x"], point["y"]).attrs["name"]
+
+
+def test_one_spectrum_is_no_result_to_save(tmp_path: Path) -> None:
+    with pytest.raises(StoreError, match=r"a.zarr: the dataset has no pixels.*\.csv"):
+        small_result().dsl.spectrum(4, 2).dsl.save(tmp_path / "a.zarr")
+    assert not (tmp_path / "a.zarr").exists()
+
+
+@pytest.mark.parametrize(
+    "region", [(1.9, 2.9, 10.7, 10.2), (1, 2, float("nan"), 4), ("a", 1, 2, 3), "1,2,3,4", ((1, 2), (3,)), 5]
+)
+def test_a_region_is_of_whole_pixels(region: Any) -> None:
+    with pytest.raises(PlanError, match="A region is x, y, width and height in whole pixels, given"):
+        _region(region, (112, 72))
+    assert _region((1.0, 2, 10, 10), (112, 72)) == (1, 2, 10, 10)
+
+
+@pytest.mark.parametrize("bands", [(430, "x", 5), ((1, 2), (3,), 4), "430", (430, None, 5)])
+def test_bands_are_numbers(bands: Any) -> None:
+    with pytest.raises(PlanError, match="bands_nm"):
+        _grid(bands)
+
+
+def test_a_preset_is_a_plan_by_its_name(tmp_path: Path) -> None:
+    with dsl.open_rig("twin", size="16x16") as rig:
+        with pytest.raises(PlanError, match="no plan 'best'; choose preview"):
+            dsl.scan(rig, tmp_path / "a.dsl", "best")
+        with pytest.raises(PlanError, match="no plan 'best'"):
+            dsl.predict(rig, "best")
+        scan = dsl.scan(rig, tmp_path / "a.dsl", "preview")
+        assert scan.plan == dsl.plan(rig, "preview")
+        rig.calibration = None
+        with pytest.raises(CalibrationError, match="Nothing can be predicted"):
+            dsl.predict(rig, "preview")
+
+
+def test_a_rig_profile_may_be_a_path(tmp_path: Path) -> None:
+    with pytest.raises(DeviceError, match="nope"):
+        dsl.open_rig(tmp_path / "nope.json")
+    (tmp_path / "lab.json").write_text(json.dumps({"no": "profile"}), encoding="utf-8")
+    with pytest.raises(DeviceError, match=r"lab\.json"):
+        dsl.open_rig(tmp_path / "lab.json")
