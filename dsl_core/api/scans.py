@@ -15,7 +15,7 @@ from dsl_core.api.places import as_array, whole_numbers
 from dsl_core.devices.base import DeviceRig
 from dsl_core.devices.registry import open_rig as open_by_texts
 from dsl_core.devices.registry import rig_names
-from dsl_core.errors import CalibrationError, PlanError
+from dsl_core.errors import CalibrationError, DecodeError, PlanError
 from dsl_core.extras import names_missing_packages
 from dsl_core.io import MANIFEST_NAME, calibration_library
 from dsl_core.io.scan.folder import ScanReader
@@ -199,18 +199,13 @@ def _calibration(given: Rig | FilePath | None) -> Rig | None:
 
 
 def _device(name: str) -> str:
-    """A device of torch by its name; raises `PlanError` for a name that is none."""
-    from dsl_core.reconstruction.torch_device import DEVICES, torch_device
-
-    if name in DEVICES:
-        return torch_device(name)
-    import torch
+    """A device of torch by its name; raises `PlanError` for one that is not there."""
+    from dsl_core.solve.torch_device import torch_device
 
     try:
-        torch.device(name)
-    except RuntimeError as error:
-        raise PlanError(f"There is no device {name!r}; choose {', '.join(DEVICES)}.") from error
-    return name
+        return torch_device(name)
+    except DecodeError as error:
+        raise PlanError(str(error)) from error
 
 
 def _grid(given: Any) -> WavelengthGrid:

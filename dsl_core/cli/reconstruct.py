@@ -22,7 +22,7 @@ from dsl_core.cli.results import coverage, print_fit
 from dsl_core.errors import PlanError
 from dsl_core.evaluation.cost import StageTimer
 from dsl_core.io.staging import check_targets, write_text
-from dsl_core.reconstruction.torch_device import DEVICES, torch_device
+from dsl_core.solve.torch_device import DEVICES, torch_device
 
 if TYPE_CHECKING:
     from dsl_core.model.options import Options as ReconstructionOptions

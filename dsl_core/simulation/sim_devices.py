@@ -18,7 +18,7 @@ from dsl_core.devices.base import (
     Stage,
 )
 from dsl_core.devices.registry import with_options
-from dsl_core.errors import DeviceError, PlanError
+from dsl_core.errors import DecodeError, DeviceError, PlanError
 from dsl_core.extras import require_package
 from dsl_core.model.frames import Frame
 from dsl_core.model.rig import Rig
@@ -34,6 +34,7 @@ from dsl_core.simulation.rendered_scene import EffectRequest, Setup
 from dsl_core.simulation.scenes.catalogue import make_scene
 from dsl_core.simulation.twin_options import TwinOptions, number
 from dsl_core.simulation.world import Clock, World
+from dsl_core.solve.torch_device import torch_device
 
 _log = logging.getLogger(__name__)
 
@@ -190,7 +191,7 @@ def open_twin(options: dict[str, str]) -> DeviceRig:
             ambient_dn_per_ms=chosen.ambient_dn_per_ms,
             led_cycle_ms=1000.0 / chosen.led_cycle_hz if chosen.led_cycle_hz else None,
             defocus_px=chosen.defocus_px,
-            device=chosen.device,
+            device=_device(chosen.device),
             foreign=chosen.foreigners,
         ),
         scene_at=lambda position_mm: make_scene(chosen.scene, **of_scene),
@@ -224,6 +225,14 @@ def open_twin(options: dict[str, str]) -> DeviceRig:
     if chosen.truth is not None:
         devices.calibration = None
     return devices
+
+
+def _device(name: str) -> str:
+    """Where pictures are computed, told now if it is not there, not with the first picture of a scan."""
+    try:
+        return torch_device(name)
+    except DecodeError as error:
+        raise DeviceError(f"The twin cannot compute pictures on {name!r}. {error}") from error
 
 
 def _true_rig(nominal: Rig, chosen: TwinOptions) -> Rig:

@@ -53,6 +53,12 @@ def _switch(value: object, info: ValidationInfo) -> bool:
     return value == "on"
 
 
+def _device(value: object) -> str:
+    if value not in ("cpu", "cuda"):
+        raise DeviceError(f"The twin's option device must be 'cpu' or 'cuda', not {value!r}.")
+    return str(value)
+
+
 def _size(value: object) -> tuple[int, int] | None:
     if value == "":
         return None
@@ -89,7 +95,9 @@ class TwinOptions(Record):
         default=0.0, description="additional Gaussian noise, of full scale; known to the calibration"
     )
     film: Switch = Field(default=True, description="diffraction film in front of the projector, on or off")
-    device: str = Field(default="cpu", description="where pictures are computed: cpu or cuda")
+    device: Annotated[str, BeforeValidator(_device)] = Field(
+        default="cpu", description="where pictures are computed: cpu or cuda"
+    )
     realtime: Switch = Field(default=False, description="on: waits as long as real devices would")
     effects: str = Field(
         default="usual",

@@ -12,7 +12,7 @@ import xarray as xr
 
 import dsl_core as dsl
 import dsl_core.api.accessor
-from dsl_core.api.scans import _grid, _region
+from dsl_core.api.scans import _device, _grid, _region
 from dsl_core.errors import CalibrationError, DecodeError, DeviceError, PlanError, StoreError
 from tests.cases.small_result import small_result
 
@@ -94,3 +94,9 @@ def test_a_rig_profile_may_be_a_path(tmp_path: Path) -> None:
     (tmp_path / "lab.json").write_text(json.dumps({"no": "profile"}), encoding="utf-8")
     with pytest.raises(DeviceError, match=r"lab\.json"):
         dsl.open_rig(tmp_path / "lab.json")
+
+
+@pytest.mark.parametrize("name", ["cuda:99", "abacus", None])
+def test_a_device_that_is_not_there_is_told(name: Any) -> None:
+    with pytest.raises(PlanError, match=r"no device .* choose cpu, cuda, auto"):
+        _device(name)

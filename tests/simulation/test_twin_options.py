@@ -74,3 +74,13 @@ def test_a_stage_stands_where_the_option_says() -> None:
     assert devices.camera.world.truth.depth_mm == pytest.approx(650.0)
     with pytest.raises(DeviceError, match="option depth_mm must be a number of at least 0, not 'near'"):
         open_twin({"scene": "plane", "depth_mm": "near"})
+
+
+def test_a_device_that_is_not_there_is_told_before_anything_is_captured(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    with pytest.raises(DeviceError, match="option device must be 'cpu' or 'cuda', not 'abc'"):
+        open_twin({"size": "16x16", "device": "abc"})
+    monkeypatch.setattr("dsl_core.solve.torch_device.has_cuda", lambda: False)
+    with pytest.raises(DeviceError, match=r"on 'cuda'\. There is no CUDA device, .* Choose the device cpu"):
+        open_twin({"size": "16x16", "device": "cuda"})

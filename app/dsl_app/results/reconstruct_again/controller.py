@@ -108,7 +108,7 @@ def reconstruct(
     from dsl_core.io.result.result_file import RESULT_FOLDER
     from dsl_core.io.staging import check_targets
     from dsl_core.pipeline import Options
-    from dsl_core.reconstruction.torch_device import torch_device
+    from dsl_core.solve.torch_device import torch_device
     from dsl_core.workflows.scans import reconstruct_to
 
     check_targets([target], overwrite=request.replace, kind=RESULT_FOLDER)
@@ -140,7 +140,7 @@ def read_source(path: Path, library: tuple[str, ...]) -> ReconstructionSource:
     from dsl_core.io.scan.check import require_complete
     from dsl_core.io.scan.folder import ScanReader
     from dsl_core.model.plan import NoSpectral
-    from dsl_core.reconstruction.torch_device import has_cuda
+    from dsl_core.solve.torch_device import has_cuda
     from dsl_core.workflows.inspection import scan_of
 
     match kind_of(path):
