@@ -16,7 +16,7 @@ from importlib.metadata import EntryPoint
 from pathlib import Path
 from typing import Any
 
-from pydantic import BaseModel
+from pydantic import BaseModel, ValidationError
 
 from dsl_core.devices.base import DeviceRig
 from dsl_core.devices.device_thread import DeviceThread
@@ -24,6 +24,7 @@ from dsl_core.devices.guard import guarded, open_on
 from dsl_core.devices.plugin_points import points_of
 from dsl_core.errors import DeviceError, DslError
 from dsl_core.extras import missing_package
+from dsl_core.model.base import problems_in_words
 from dsl_core.version import __version__
 
 GROUP = "dsl_scan.rigs"
@@ -123,6 +124,8 @@ def open_rig(name: str, options: dict[str, str] | None = None) -> DeviceRig:
         rig = open_on(thread, name, lambda: function(dict(options or {})))
     except DslError:
         raise
+    except ValidationError as error:
+        raise DeviceError(_refused(points[0], function, error)) from error
     except Exception as error:
         first = f"{UNPLUGGED} {WRITTEN_WRONG}" if isinstance(error, OF_CODE) else UNPLUGGED
         raise DeviceError(
@@ -131,6 +134,15 @@ def open_rig(name: str, options: dict[str, str] | None = None) -> DeviceRig:
     if not isinstance(rig, DeviceRig):
         raise DeviceError(_fault(points[0], f"opened as {type(rig).__name__} instead of DeviceRig"))
     return rig if is_unguarded else guarded(rig, thread)
+
+
+def _refused(point: EntryPoint, function: OpenRig, error: ValidationError) -> str:
+    """Which options a rig refuses; a record that is none of its options is a fault of its package."""
+    record = getattr(function, "options", None)
+    if record is None or error.title != record.__name__:
+        return _fault(point, f"failed to open: {error.title}: {problems_in_words(error)}", WRITTEN_WRONG)
+    words = problems_in_words(error, len(error.errors()), "all of them together")
+    return f"The rig {point.name!r} cannot have these options: {words}. 'dsl-scan rigs' lists them."
 
 
 def _profiles() -> Any:

@@ -59,13 +59,16 @@ def what_is_wrong(fault: Mapping[str, Any]) -> str:
     return wanted.format_map({k: f"{v:g}" if isinstance(v, float) else v for k, v in told.items()})
 
 
-def problems_in_words(error: ValidationError, most: int = 1) -> str:
-    """The first fields of a record that are wrong, as ``name.of.field must be such (given value)``."""
-    return "; ".join(_problem(fault) for fault in error.errors()[:most])
+def problems_in_words(error: ValidationError, most: int = 1, whole: str = "the file") -> str:
+    """The first fields of a record that are wrong, as ``name.of.field must be such (given value)``.
+
+    ``whole`` is what the record is called where no single field of it is to blame.
+    """
+    return "; ".join(_problem(fault, whole) for fault in error.errors()[:most])
 
 
-def _problem(fault: Mapping[str, Any]) -> str:
-    where = ".".join(map(str, fault["loc"])) or "the file"
+def _problem(fault: Mapping[str, Any], whole: str) -> str:
+    where = ".".join(map(str, fault["loc"])) or whole
     words = what_is_wrong(fault)
     if fault["type"] == "missing":
         return f"{where} {words}"

@@ -206,3 +206,23 @@ def test_two_packages_with_one_name_are_told_apart(install: Install) -> None:
     install("other_rig", mean="other_rig:open_rig")
     with pytest.raises(DeviceError, match="packages mean_rig and other_rig both provide a rig 'mean'"):
         open_rig("mean")
+
+
+def test_a_wrong_option_is_told_by_its_name_and_blames_no_cables(install: Install) -> None:
+    source = DRIVER + (
+        "\n\nclass Own(BaseModel):\n    level: int\n\n\n"
+        "def open_checked(options):\n    MeanOptions.model_validate(options)\n"
+        "    Own(level=options['gain'])\n\n\n"
+        "open_checked.options = MeanOptions\n"
+    )
+    install("checked_rig", source=source, checked="checked_rig:open_checked")
+    with pytest.raises(DeviceError) as raised:
+        open_rig("checked", {"gain": "loud"})
+    assert str(raised.value) == (
+        "The rig 'checked' cannot have these options: port is missing; gain must be a number (given 'loud')."
+        " 'dsl-scan rigs' lists them."
+    )
+    # A record of the package's own is no option of a person.
+    with pytest.raises(DeviceError, match=r"checked_rig 1.2 failed to open: Own: level must be .*2.5") as own:
+        open_rig("checked", {"gain": "2.5", "port": "1"})
+    assert "cables" not in str(own.value)

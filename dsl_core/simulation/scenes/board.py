@@ -6,8 +6,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import ValidationError
 
 from dsl_core.errors import PlanError
+from dsl_core.model.base import problems_in_words
 from dsl_core.model.board import Board, Charuco, Checkerboard
 from dsl_core.simulation.scenes import materials as spectra
 from dsl_core.simulation.scenes.surfaces import ENDLESS, Paint, tilted, turned, uniform
@@ -67,12 +69,25 @@ def board(
 
 
 def printed_board(columns: int, rows: int, square_mm: float, marker_mm: float, dictionary: str) -> Board:
-    """A board of ``columns`` x ``rows`` inner corners; a ChArUco when the markers have a size."""
+    """A board of ``columns`` x ``rows`` inner corners; a ChArUco when the markers have a size.
+
+    Raises `PlanError` for a board that cannot be.
+    """
     if marker_mm == 0:
         return Checkerboard(columns=columns, rows=rows, square_mm=square_mm)
-    return Charuco(
-        columns=columns + 1, rows=rows + 1, square_mm=square_mm, marker_mm=marker_mm, dictionary=dictionary
-    )
+    try:
+        return Charuco(
+            columns=columns + 1,
+            rows=rows + 1,
+            square_mm=square_mm,
+            marker_mm=marker_mm,
+            dictionary=dictionary,
+        )
+    except ValidationError as error:
+        raise PlanError(
+            f"The board of the scene cannot be printed: {problems_in_words(error)}. Markers have names of"
+            " OpenCV, such as DICT_5X5_100."
+        ) from error
 
 
 @dataclass(frozen=True)

@@ -101,3 +101,9 @@ def test_impossible_boards_are_refused() -> None:
         make_scene("board", marker_mm=8, dictionary="DICT_9X9_50")
     with pytest.raises(PlanError, match="tilt_y_deg"):
         make_scene("board", tilt_y_deg=80)
+
+
+@pytest.mark.parametrize("name", ["nope", "DICT_NOPE"])
+def test_markers_that_nobody_has_are_told(name: str) -> None:
+    with pytest.raises(PlanError, match=f"{name.upper()}.* DICT_5X5_100"):
+        make_scene("board", marker_mm=15.0, dictionary=name)
