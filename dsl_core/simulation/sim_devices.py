@@ -32,6 +32,7 @@ from dsl_core.simulation.published_rig import published_rig
 from dsl_core.simulation.random_rig import random_rig
 from dsl_core.simulation.rendered_scene import EffectRequest, Setup
 from dsl_core.simulation.scenes.catalogue import make_scene
+from dsl_core.simulation.scenes.surfaces import Rectangle
 from dsl_core.simulation.twin_options import TwinOptions, number
 from dsl_core.simulation.world import Clock, World
 from dsl_core.solve.torch_device import torch_device
@@ -45,6 +46,8 @@ EXPOSURE_RANGE_MS = (0.019, 30_000.0)
 STAGE_RANGE_MM = (500.0, 1000.0)
 #: Scenes that a stage can carry towards and away from the camera.
 STAGED = ("plane", "stage")
+#: Options of the scene `stage` that say where it stands.
+STAGE_SAYS = ("position_mm", "index")
 
 
 class SimCamera(Camera):
@@ -201,7 +204,7 @@ def open_twin(options: dict[str, str]) -> DeviceRig:
         clock=Clock(sleep=time.sleep) if chosen.realtime else Clock(),
     )
     if chosen.scene in STAGED:
-        world.position_mm = number("depth_mm", of_scene.pop("depth_mm", "700"))
+        world.position_mm = _taken_position_mm(chosen.scene, of_scene)
         world.scene_at = lambda position_mm: make_scene("plane", depth_mm=position_mm, **of_scene)
     # Built once now, so that a wrong name or option is told before anything is captured.
     try:
@@ -233,6 +236,18 @@ def _device(name: str) -> str:
         return torch_device(name)
     except DecodeError as error:
         raise DeviceError(f"The twin cannot compute pictures on {name!r}. {error}") from error
+
+
+def _taken_position_mm(scene: str, of_scene: dict[str, str]) -> float:
+    """Where the stage stands by the options of the scene, which lose those that say so."""
+    said = [name for name in ("depth_mm", *(STAGE_SAYS if scene == "stage" else ())) if name in of_scene]
+    if len(said) > 1:
+        raise PlanError(f"Options {' and '.join(said)} all say where the stage stands. Give one of them.")
+    if said in ([], ["depth_mm"]):
+        return number("depth_mm", of_scene.pop("depth_mm", "700"))
+    (surface,) = make_scene("stage", **{said[0]: of_scene.pop(said[0])}).surfaces
+    assert isinstance(surface, Rectangle)
+    return float(surface.centre_mm[2])
 
 
 def _true_rig(nominal: Rig, chosen: TwinOptions) -> Rig:

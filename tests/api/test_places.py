@@ -8,14 +8,15 @@ import xarray as xr
 
 import dsl_core as dsl
 import dsl_core.api.accessor
-from dsl_core.api.places import place_mask
+from dsl_core.api.places import Place, place_mask
 from dsl_core.errors import DecodeError
 from tests.cases.small_result import small_result
 
 
 def _box(result: xr.Dataset) -> xr.DataArray:
     """A rectangle as xarray makes it, by its coordinates: its axes are x, y."""
-    return (result.x >= 2) & (result.x < 5) & (result.y >= 1) & (result.y < 3)
+    found: xr.DataArray = (result.x >= 2) & (result.x < 5) & (result.y >= 1) & (result.y < 3)
+    return found
 
 
 def _square() -> xr.Dataset:
@@ -32,8 +33,8 @@ def test_a_mask_of_xarray_marks_the_pixels_that_its_coordinates_say() -> None:
     upside_down = result.isel(y=slice(None, None, -1))
     for each, where in ((result, mask), (upside_down, mask), (result, _box(upside_down))):
         xr.testing.assert_allclose(each.dsl.region(where), wanted)
-    pins = {"a": mask, "b": (5, 4)}
-    by_box = {"a": (2, 1, 3, 2), "b": (5, 4)}
+    pins: dict[str, Place] = {"a": mask, "b": (5, 4)}
+    by_box: dict[str, Place] = {"a": (2, 1, 3, 2), "b": (5, 4)}
     xr.testing.assert_identical(dsl.colours(result, pins, "D65"), dsl.colours(result, by_box, "D65"))
     found, known = (dsl.classify(result, pins=each, measure="angle") for each in (pins, by_box))
     xr.testing.assert_identical(found, known)

@@ -7,6 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 import xarray as xr
 
@@ -66,7 +67,7 @@ def test_one_spectrum_is_no_result_to_save(tmp_path: Path) -> None:
 def test_a_region_is_of_whole_pixels(region: Any) -> None:
     with pytest.raises(PlanError, match="A region is x, y, width and height in whole pixels, given"):
         _region(region, (112, 72))
-    assert _region((1.0, 2, 10, 10), (112, 72)) == (1, 2, 10, 10)
+    assert _region(np.array([1.0, 2, 10, 10]), (112, 72)) == (1, 2, 10, 10)  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize("bands", [(430, "x", 5), ((1, 2), (3,), 4), "430", (430, None, 5)])

@@ -5,6 +5,7 @@ from __future__ import annotations
 import pytest
 
 from dsl_core.errors import DeviceError, PlanError
+from dsl_core.simulation.scenes.catalogue import make_scene
 from dsl_core.simulation.sim_devices import SimCamera, open_twin
 from dsl_core.simulation.twin_options import TwinOptions
 
@@ -84,3 +85,42 @@ def test_a_device_that_is_not_there_is_told_before_anything_is_captured(
     monkeypatch.setattr("dsl_core.solve.torch_device.has_cuda", lambda: False)
     with pytest.raises(DeviceError, match=r"on 'cuda'\. There is no CUDA device, .* Choose the device cpu"):
         open_twin({"size": "16x16", "device": "cuda"})
+
+
+@pytest.mark.parametrize(
+    ("texts", "depth_mm"),
+    [
+        ({}, 700.0),
+        ({"position_mm": "750"}, 750.0),
+        ({"index": "3"}, 600 + 3 * 300 / 14),
+        ({"index": "14", "reflectance": "0.5"}, 900.0),
+    ],
+)
+def test_a_stage_takes_the_options_that_are_listed_for_it(texts: dict[str, str], depth_mm: float) -> None:
+    devices = open_twin({"scene": "stage", "size": "16x16", **texts})
+    assert devices.stage is not None
+    assert devices.stage.position_mm == pytest.approx(depth_mm)
+    assert isinstance(devices.camera, SimCamera)
+    world = devices.camera.world
+    assert world.truth.depth_mm == pytest.approx(depth_mm)
+    devices.stage.move_to(650.0)
+    assert world.truth.depth_mm == pytest.approx(650.0)
+    # The scene by itself stands where the twin puts it.
+    if "reflectance" not in texts:
+        seen = make_scene("stage", **texts).render(world.rig.camera, world.rig.pose.projector_centre_mm)
+        assert seen.depth_mm == pytest.approx(depth_mm)
+
+
+@pytest.mark.parametrize(
+    ("texts", "words"),
+    [
+        ({"index": "15"}, "Option index must be between 0 and 14, not 15"),
+        ({"index": "near"}, "Option index of scene 'stage' must be a whole number"),
+        ({"position_mm": "5"}, "Option position_mm must be between 100 and 5000 mm, not 5"),
+        ({"position_mm": "650", "index": "3"}, "Options position_mm and index all say where"),
+        ({"depth_mm": "650", "index": "3"}, "Options depth_mm and index all say where"),
+    ],
+)
+def test_a_stage_stands_at_one_place_within_its_range(texts: dict[str, str], words: str) -> None:
+    with pytest.raises(PlanError, match=words):
+        open_twin({"scene": "stage", "size": "16x16", **texts})

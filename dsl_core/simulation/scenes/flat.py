@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -46,11 +44,15 @@ def bowed(
     return Scene("bowed", f"diffuser at {depth_mm:g} mm, bowed by {bow_mm:g} mm", (ball,), palette)
 
 
-def stage(index: int = 7, position_mm: float = math.nan) -> Scene:
-    """A flat white diffuser at one of 15 stage positions, 600 to 900 mm (index 0 to 14), or anywhere."""
-    if math.isnan(position_mm):
+def stage(position_mm: float = 700.0, index: int = -1) -> Scene:
+    """A flat white diffuser on the stage, anywhere or at one of 15 positions, 600 to 900 mm (index 0 to 14).
+
+    With an ``index`` of -1, ``position_mm`` says where.
+    """
+    if index != -1:
         check_range("index", index, 0, len(_STAGE_POSITIONS_MM) - 1)
         position_mm = _STAGE_POSITIONS_MM[index]
+    check_range("position_mm", position_mm, 100, 5000, "mm")
     flat = plane(position_mm)
     description = f"white diffuser on the stage at {position_mm:.1f} mm"
     return Scene("stage", description, flat.surfaces, flat.materials)
