@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Annotated, Literal, Protocol, Self
 
-from pydantic import Field, model_validator
+from pydantic import Field, field_validator, model_validator
 
 from dsl_core.model.base import Record
 from dsl_core.model.captured_code import CapturedCode
@@ -111,6 +111,13 @@ class Setting(Record):
 
     exposure_ms: float = Field(gt=0)
     level: float = Field(gt=0, le=1)
+
+    @field_validator("level")
+    @classmethod
+    def _is_light(cls, level: float) -> float:
+        if round(255 * level) == 0:
+            raise ValueError("it rounds to drive 0 of 255, which is black; 0.002 is the least that is light")
+        return level
 
 
 class Sentinels(Record):
@@ -277,8 +284,9 @@ class CapturePlan(Record):
 
     @property
     def _sentinel_code(self) -> int:
-        """The frame of the code that shows a small motion."""
-        return 2 * min(_SENTINEL_BIT, self.code_bits[0] - 1)
+        """The frame of the code that shows a small motion; of a code from elsewhere, any frame."""
+        bit = min(_SENTINEL_BIT, self.code_bits[0] - 1)
+        return min(max(2 * bit, 0), self.code_count - 1) if self.code_count else 0
 
     def _rounds(self) -> Iterator[tuple[int, tuple[int, ...]]]:
         """After how many other shots each round of sentinels comes, and which of these it repeats."""

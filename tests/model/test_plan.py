@@ -1,6 +1,8 @@
 import numpy as np
+import pytest
+from pydantic import ValidationError
 
-from dsl_core.model.plan import CapturePlan, GrayCode, NoCode, NoSpectral, Sentinels
+from dsl_core.model.plan import CapturePlan, GrayCode, NoCode, NoSpectral, Sentinels, Setting
 from dsl_core.patterns.images import pattern_image
 
 
@@ -34,3 +36,12 @@ def test_plans_of_earlier_versions_have_no_sentinels() -> None:
     old = CapturePlan.model_validate_json(CapturePlan().model_dump_json(exclude={"sentinels"}))
     assert old == CapturePlan()
     assert old.sentinel_count == 0
+
+
+@pytest.mark.parametrize(("level", "is_light"), [(0.001, False), (0.0019, False), (0.002, True), (1.0, True)])
+def test_a_level_that_no_projector_can_show_is_refused(level: float, is_light: bool) -> None:
+    if is_light:
+        assert Setting(exposure_ms=100.0, level=level).level == level
+        return
+    with pytest.raises(ValidationError, match="rounds to drive 0 of 255"):
+        Setting(exposure_ms=100.0, level=level)

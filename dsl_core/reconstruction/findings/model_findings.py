@@ -25,6 +25,10 @@ from dsl_core.reconstruction.spectral.probing.probe import Probe
 from dsl_core.reconstruction.spectral.turned import Turn
 from dsl_core.solve.normal import BAND_95
 
+#: Name of what is found of the light of both orders.
+GAIN_OF_BOTH = "gain of both orders against the zero order"
+#: With less light of both first orders than this, relative to what is expected, there is no film.
+WITHOUT_FILM = -0.7
 #: Blur and tail of the lines below which neither is worth a finding.
 MOST_BLUR, MOST_TAIL = 0.03, 0.004
 #: Relative deviation of a blur beyond which lines, side by side in few frames, do not show it: what they seem
@@ -84,6 +88,10 @@ def cause_findings(
     these were calibrated, 0 where nobody noted it. ``turn`` is what of that may be a changed pose.
     """
     causes = fit_causes(probe)
+    if causes.common_gain + SIGMAS * causes.common_std < WITHOUT_FILM:
+        # All else that frames lack follows from that.
+        yield _without_film(causes)
+        return
     if motion is not None:
         of_film = _motion(motion, probe, calibrated_px, turn)
         if turn is None:
@@ -299,6 +307,19 @@ def _film(causes: Causes, probe: Probe) -> FitFinding:
     )
 
 
+def _without_film(causes: Causes) -> FitFinding:
+    return FitFinding.judged(
+        "film",
+        GAIN_OF_BOTH,
+        (causes.common_gain, causes.common_std),
+        "1",
+        MOST_GAIN,
+        "First orders have no light: the film is missing, turned away, or another one than was calibrated."
+        " Reflectance is not measured, whatever its deviations say; depth is not concerned.",
+        "Mount the film in front of the projector as it was when calibrated, and scan again.",
+    )
+
+
 def _gains(causes: Causes, corrected: bool) -> Iterator[FitFinding]:
     plus, minus = causes.gain
     common = causes.common_gain
@@ -314,7 +335,7 @@ def _gains(causes: Causes, corrected: bool) -> Iterator[FitFinding]:
     )
     yield FitFinding.judged(
         "response",
-        "gain of both orders against the zero order",
+        GAIN_OF_BOTH,
         (common, causes.common_std),
         "1",
         MOST_GAIN,
