@@ -11,6 +11,9 @@ from torch import Tensor
 from dsl_core.model.plan import CapturePlan, LineComb, ScanLines
 
 Place = TypeVar("Place", float, Tensor)
+#: Edges of a comb's lines that are farther apart leave pixels between them no slope that tells their column,
+#: px: all of its patterns together do.
+FARTHEST_EDGES_PX = 3
 
 
 @dataclass(frozen=True)
@@ -25,12 +28,18 @@ class LineSet:
 
     @classmethod
     def of(cls, plan: CapturePlan) -> LineSet | None:
-        """The lines of a plan; None when its pattern set does not consist of equally spaced lines."""
+        """The lines of a plan.
+
+        None when its pattern set does not consist of equally spaced lines, and for combs of lines whose edges
+        are so far apart that a line by itself does not tell a column.
+        """
         width = plan.projector_size_px[0]
         match plan.spectral:
             case ScanLines(width_px=w, step_px=s):
                 return cls(w, s, (w - 1) / 2, plan.spectral_count, plan.spectral_count)
             case LineComb(width_px=w, step_px=s, period_px=p, shifts_px=(0, 0, 0)) if p % s == 0:
+                if max(w % s or s, -w % s) > FARTHEST_EDGES_PX:
+                    return None
                 return cls(w, s, (w - 1) / 2, -(-(width - w // 2) // s), p // s)
         return None
 
