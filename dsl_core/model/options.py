@@ -57,8 +57,9 @@ class Options:
     ``solver`` is ``best`` or, to compare with it, ``published`` (Adam on the published objective),
     ``nearest-line`` or ``colour-basis``. ``surface_window_px`` is the window of normals; None takes it from
     the image's width, which is wrong for a piece cut out of a larger image. ``as_calibrated`` corrects
-    nothing in the calibration by what the scan itself shows. ``region_px`` (x, y, width, height) keeps only
-    that part of the picture and solves spectra there alone; depth and the check of the model use all of it.
+    nothing in the calibration by what the scan itself shows, nor does ``refine_columns`` False: columns of
+    the code alone are too coarse to judge lines by. ``region_px`` (x, y, width, height) keeps only that part
+    of the picture and solves spectra there alone; depth and the check of the model use all of it.
     ``band_rows`` is the most rows of the picture whose frames are in memory at once; None: as memory allows.
     """
 

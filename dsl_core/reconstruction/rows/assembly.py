@@ -105,7 +105,8 @@ class Assembly:
             geometry.depth_mm,
             geometry.flags[self._rows, self._columns] | self.poor * np.uint16(int(Flag.POOR_FIT)),
             None if solver is None else self.counts,
-            None if solver is None else solver.followed,
+            # Columns of the code alone are off by more than what is looked for in lines.
+            solver.followed if solver is not None and self._options.refine_columns else None,
             None if solver is None else solver.error,
             with_known_causes([*findings, *(() if solver is None else solver.findings)]),
         )

@@ -101,7 +101,8 @@ def row_solver(
 
     best = SpectralReconstruction(
         rig, plan, options.grid, model, *cubes(picked), pixels,
-        device=options.device, as_calibrated=options.as_calibrated, rows_px=rows_px,
+        device=options.device, rows_px=rows_px,
+        as_calibrated=options.as_calibrated or not options.refine_columns,
     )  # fmt: skip
     if frames.light is not None and frames.light.flickers:
         found = frame_levels(best.probed, frames.light.std)

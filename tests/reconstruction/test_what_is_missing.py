@@ -1,4 +1,4 @@
-"""A scan whose film is missing says so, and nothing that follows from it."""
+"""A scan without its film, or without columns by its lines, says so, and nothing that follows from it."""
 
 from __future__ import annotations
 
@@ -20,3 +20,13 @@ def test_a_missing_film_is_named_first(spectral: ScanLines | LineComb) -> None:
     assert fit is not None
     assert fit.significant[0].part == "film"
     assert "film is missing" in fit.significant[0].sentence
+
+
+def test_columns_of_the_code_alone_judge_no_lines() -> None:
+    plan = CapturePlan(code=GrayCode(rows=False), spectral=ScanLines(width_px=5, step_px=4))
+    devices, scan = twin_scan(plan, size="112x72", scene="color-checker")
+    fit = Fit.read(
+        pipeline.reconstruct(scan, devices.calibration, pipeline.Options(refine_columns=False)).attrs
+    )
+    assert fit is not None
+    assert not {"response", "light", "orders", "film"} & {each.part for each in fit.significant}
