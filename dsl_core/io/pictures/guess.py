@@ -181,7 +181,7 @@ def _doubts_of_digits(candidate: Candidate, look: _Look, found: Recognised) -> l
 def _recognised(look: _Look, slots: tuple[int | None, ...]) -> Recognised | None:
     """What the pictures show as they are, or as pictures for screens where that makes more sense."""
     found = recognise(look.probes, slots)
-    if found is not None and found.misfit < AS_ENCODED:
+    if found is not None and found.misfit_upright < AS_ENCODED:
         return found
     decoded = recognise(look.decoded, slots)
     return min((each for each in (found, decoded) if each), key=lambda each: each.misfit, default=None)

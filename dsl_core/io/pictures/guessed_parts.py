@@ -163,14 +163,16 @@ def _unit(reading: StripeReading, length: int) -> int:
 def _phases(
     axis: Axis, block: Block, reading: PhaseReading, blocks: Sequence[Block], size_px: Size, probes: Probes
 ) -> tuple[Part, list[str]]:
-    fringes, start = reading.fringes, reading.start_deg
+    fringes, start, direction = reading.fringes, reading.start_deg, reading.direction
     stripes = next((b for b in blocks if b.axis == block.axis and isinstance(b.reading, StripeReading)), None)
     pictures = [p for p in block.slots if p is not None]
     doubts = _disagreement(axis, reading, len(pictures))
     if stripes is not None and isinstance(stripes.reading, StripeReading):
         lines = probes.across if block.axis == "columns" else probes.down
         number = numbers_of(lines, stripes.slots, stripes.reading)
-        turns, start = turns_per_number(lines, pictures[: reading.steps], reading.direction, number)
+        # The direction of phases is that along the picture, where numbers of a mirrored one fall.
+        direction = direction if stripes.reading.rises else (-1 if direction == 1 else 1)
+        turns, start = turns_per_number(lines, pictures[: reading.steps], direction, number)
         length = size_px[0] if axis == "columns" else size_px[1]
         fringes = (length / _unit(stripes.reading, length) * turns,)
         if len(reading.fringes) > 1:
@@ -190,7 +192,7 @@ def _phases(
         steps=reading.steps,
         order=reading.order,
         start_deg=start,
-        direction=reading.direction,
+        direction=direction,
     )
     return part, doubts
 

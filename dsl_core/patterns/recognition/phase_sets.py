@@ -127,7 +127,7 @@ def read_phase_sets(
     turns = _turns(waves, lines.pairs)
     if turns is None:
         return None
-    # Columns are taken to rise along the lines; whoever sees a mirror image says so.
+    # Columns are taken to rise along the lines; stripes beside them, or whoever sees a mirror image, say so.
     direction: Literal[1, -1] = 1 if turns[int(np.argmax(np.abs(turns)))] > 0 else -1
     if sets == 1:
         whole = 1.0 if abs(turns[0]) < ONE_FRINGE else 0.0
@@ -210,16 +210,17 @@ def turns_per_number(
 ) -> tuple[float, float]:
     """Periods of a sinusoid in one stripe, a power of two, and its start in degrees (of a quarter turn).
 
-    ``number`` (lines, length) is what stripes say.
+    ``number`` (lines, length) is what stripes say, ``direction`` that of the phase where numbers rise, which
+    they need not do along the lines.
     """
     phase = np.angle(_wave(lines, pictures)) * direction
     change = np.angle(np.exp(1j * np.diff(phase, axis=-1))) / TURN
     step = np.diff(number, axis=-1)
     near = lines.pairs & (np.abs(step) <= 1)
     turns = 2.0 ** np.round(np.log2(max(abs(change[near].sum()) / max(abs(step[near].sum()), 1), 1e-3)))
-    # At the edge of a stripe the column is known.
-    edge = near & (step == 1)
-    expected = TURN * turns * number[:, 1:]
+    # At the edge of a stripe the column is known: there the stripe of the larger number begins.
+    edge = near & (np.abs(step) == 1)
+    expected = TURN * turns * np.maximum(number[:, 1:], number[:, :-1])
     between = phase[:, 1:] - np.pi * change
     off = np.angle(np.exp(1j * (between - expected))[edge].mean()) if edge.any() else 0.0
     return float(turns), float(90 * np.round(np.rad2deg(off) / 90))

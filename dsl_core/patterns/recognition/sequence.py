@@ -69,6 +69,13 @@ class Recognised:
     probes: Probes
 
     @property
+    def misfit_upright(self) -> float:
+        """The misfit but for what speaks against numbers that fall, which tells nothing of the values."""
+        readings = [block.reading for block in self.blocks]
+        falling = sum(isinstance(each, StripeReading) and not each.rises for each in readings)
+        return self.misfit - UNLIKELY * falling
+
+    @property
     def digits(self) -> frozenset[tuple[Axis, int]]:
         """What is coded: for each axis its digits, or its periods."""
         return frozenset(

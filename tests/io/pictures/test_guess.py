@@ -46,6 +46,22 @@ def test_the_mapping_finds_its_files_and_says_what_they_are(tmp_path: Path, gray
     assert any("7 bits of columns up to 12" in sentence for sentence in guess.mapping.unsure)
 
 
+@pytest.mark.parametrize("period_px", [16.0, 8.0])
+def test_sinusoids_of_a_mirrored_picture_rise_with_the_numbers_of_their_stripes(
+    tmp_path: Path, period_px: float
+) -> None:
+    sets: list[tuple[str, Stripes | Phases]] = [("columns", Stripes(bits=7, inverse=False))]
+    sets += [("columns", Phases(periods_px=(period_px,), steps=4, start_deg=90))]
+    pictures, white, black = frames(sets)
+    mirrored = {f"{i:02}.png": each[:, ::-1] for i, each in enumerate([*pictures, white, black])}
+    mapping = guess_mapping(write(tmp_path, mirrored), PROJECTOR).mapping
+    assert mapping.parts[:2] == (
+        StripePictures(bits=7, inverse="none"),
+        PhasePictures(fringes=(128 / period_px,), steps=4, start_deg=90.0, direction=1),
+    )
+    assert any("columns fall along the picture" in sentence for sentence in mapping.unsure)
+
+
 @pytest.mark.slow
 def test_one_of_two_cameras_is_taken_and_the_other_named(tmp_path: Path, gray: Pictures) -> None:
     pictures = {f"cam{c}_{i:02d}.png": p for c in (1, 2) for i, p in enumerate(gray)}
@@ -328,7 +344,7 @@ def test_values_that_make_sense_as_they_are_are_not_taken_for_those_of_a_screen(
 
     def recognise(probes: str, _slots: tuple[int, ...]) -> object:
         misfit = misfits[probes]
-        return None if misfit is None else SimpleNamespace(misfit=misfit, of=probes)
+        return None if misfit is None else SimpleNamespace(misfit=misfit, misfit_upright=misfit, of=probes)
 
     monkeypatch.setattr("dsl_core.io.pictures.guess.recognise", recognise)
     look: Any = SimpleNamespace(probes="as they are", decoded="decoded")
