@@ -141,6 +141,12 @@ def _stripes(
         doubts.append(f"{axis}: another code or order of digits fits nearly as well")
     if not reading.rises:
         doubts.append(f"{axis} fall along the picture: camera or projector may be mirrored")
+    if reading.code == "binary":
+        doubts.append(
+            f"binary digits of {axis} look the same where patterns are inverses and the picture is"
+            " mirrored: if positions run the wrong way, set inverse_first of the mapping to"
+            f" {'false' if reading.inverse_first else 'true'}"
+        )
     part = StripePictures(
         axis=axis,
         code=reading.code,

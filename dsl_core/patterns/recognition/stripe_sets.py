@@ -46,7 +46,8 @@ _CODES: tuple[tuple[Literal["gray", "binary", "xor"], int], ...] = (
 class StripeReading:
     """How the pictures of a set are to be read, and how rough its numbers then are (0 to 1).
 
-    ``rival`` is the roughness of the best reading that is another one; ``numbers`` are the least and the
+    ``rival`` is the roughness of the best reading that is another one, but for binary code read the other way
+    round with its inverses; ``numbers`` are the least and the
     largest that are common. ``rises`` says whether they rise along the lines.
     """
 
@@ -73,7 +74,7 @@ def read_set(lines: Lines, pictures: Sequence[int | None]) -> StripeReading | No
     if not found or found[0].roughness > ROUGH:
         return None
     best = found[0]
-    others = [r.roughness for r in found[1:] if r.rises or not best.rises]
+    others = [r.roughness for r in found[1:] if (r.rises or not best.rises) and not _is_twin(r, best)]
     return StripeReading(**{**vars(best), "rival": min(others, default=1.0)})
 
 
@@ -86,6 +87,13 @@ def numbers_of(lines: Lines, pictures: Sequence[int | None], reading: StripeRead
     return number_of(spec, _word(lines, ordered, reading.inverse_first))
 
 
+def _is_twin(one: StripeReading, other: StripeReading) -> bool:
+    """Whether two readings of binary code differ in nothing but direction, so that no picture tells which."""
+    if not one.code == other.code == "binary":
+        return False
+    return (one.first, one.inverse) == (other.first, other.inverse)
+
+
 def _word(lines: Lines, digits: Sequence[NDArray[np.bool_]], inverse_first: bool) -> NDArray[np.int32]:
     word = np.zeros(lines.lit.shape, np.int32)
     for digit in digits:
@@ -95,7 +103,10 @@ def _word(lines: Lines, digits: Sequence[NDArray[np.bool_]], inverse_first: bool
 
 def _preference(reading: StripeReading) -> tuple[float, bool, bool]:
     # Nearly equal ones: rising before falling, patterns before inverses.
-    return round(reading.roughness / (2 * FLOOR)), not reading.rises, reading.inverse_first
+    likely = not reading.rises, reading.inverse_first
+    # Binary code that falls is that of its inverses rising: turned cameras are commoner than inverses first.
+    first, second = likely[::-1] if reading.code == "binary" else likely
+    return round(reading.roughness / (2 * FLOOR)), first, second
 
 
 def _readings(lines: Lines, pictures: Sequence[int | None]) -> Iterator[StripeReading]:

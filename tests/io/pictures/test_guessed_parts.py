@@ -109,6 +109,16 @@ def test_what_is_unsure_of_stripes_is_said() -> None:
     assert part_of(Block("white", (0,)), [], (4, 3), None) == (WhitePicture(), [])  # type: ignore[arg-type]
 
 
+@pytest.mark.parametrize(("inverse_first", "other"), [(False, "true"), (True, "false")])
+def test_binary_digits_may_be_those_of_a_mirrored_picture_which_is_said(
+    inverse_first: bool, other: str
+) -> None:
+    block = stripes("columns", 10, 500, code="binary", inverse_first=inverse_first)
+    (doubt,) = part_of(block, [block], (1024, 768), None)[1]  # type: ignore[arg-type]
+    assert "the picture is mirrored" in doubt
+    assert doubt.endswith(f"set inverse_first of the mapping to {other}")
+
+
 @pytest.mark.parametrize(
     ("low", "rows", "offset", "said"),
     [

@@ -57,6 +57,26 @@ def test_digits_are_told_by_how_steadily_their_numbers_run(
     assert reading.rises
 
 
+@pytest.mark.parametrize(
+    "code", [Stripes(bits=7, code="binary"), Stripes(bits=7), Stripes(bits=7, code="xor")]
+)
+@pytest.mark.parametrize("inverse", [True, False])
+@pytest.mark.parametrize("first", ["most", "least"])
+def test_digits_of_a_mirrored_picture_fall_and_are_not_taken_for_inverses(
+    code: Stripes, inverse: bool, first: str
+) -> None:
+    pictures, white, black = frames([("columns", code.model_copy(update={"inverse": inverse}))])
+    step = 2 if inverse else 1
+    digits = [pictures[k : k + step] for k in range(0, len(pictures), step)]
+    ordered = digits if first == "most" else digits[::-1]
+    run = [picture for digit in ordered for picture in digit]
+    found = _recognised([each[:, ::-1] for each in [*run, white, black]])
+    reading = _stripes(found, "columns")
+    assert (reading.code, reading.first, reading.inverse_first) == (code.code, first, False)
+    assert not reading.rises
+    assert reading.is_sure
+
+
 @pytest.mark.slow
 def test_rows_and_columns_are_told_apart_in_either_order_and_with_a_picture_absent() -> None:
     pictures, white, black = frames([("rows", Stripes(bits=7)), ("columns", Stripes(bits=7))])
