@@ -65,6 +65,7 @@ def import_capture(
         if encoding is not None:
             mapping = mapping.model_copy(update={"encoding": encoding})
         _print(output, mapping, arrange(source, mapping).table)
+        _print_doubts(output, source, mapping)
     _print_linearity(output, source, mapping)
     _print_decided(output, source, mapping, options)
     if target is not None:
@@ -162,6 +163,17 @@ def encoding_named(text: str | None) -> Encoding | None:
         case None | "linear" | "srgb":
             return text
     raise PlanError(f"--encoding must be linear or srgb, not {text!r}. Leave it out to find it out.")
+
+
+def _print_doubts(output: Output, source: Path, mapping: Mapping) -> None:
+    """What the pictures show against a mapping; raises `StoreError` where it cannot be theirs."""
+    from dsl_core.io.pictures.mapped_doubts import doubts_of_mapping
+    from dsl_core.io.pictures.source import open_pictures
+
+    doubts = doubts_of_mapping(open_pictures(source, mapping))
+    for sentence in doubts:
+        output.say(f"Unsure: {sentence}.")
+    output.put(unsure=[*mapping.unsure, *doubts])
 
 
 def _print_linearity(output: Output, source: Path, mapping: Mapping) -> None:

@@ -14,6 +14,7 @@ from dsl_core.devices.base import DeviceRig
 from dsl_core.devices.replay import ReplayCamera, ReplayProjector
 from dsl_core.errors import CalibrationError, StoreError
 from dsl_core.io import MANIFEST_NAME
+from dsl_core.io.pictures.mapped_doubts import require_pairs
 from dsl_core.io.pictures.mapping import Mapping
 from dsl_core.io.pictures.source import PictureScan, open_pictures
 from dsl_core.io.records import read_record
@@ -80,10 +81,11 @@ def import_pictures(
     """Make a scan of a folder of pictures; an interrupted import resumes.
 
     Without a calibration the scan tells columns, and depth once one is given to its reconstruction. Raises
-    `StoreError` naming the first picture that cannot be used, or when the target holds another scan, and
-    `CalibrationError` when the calibration is for other sizes.
+    `StoreError` naming the first picture that cannot be used or that is not the inverse it should be, or when
+    the target holds another scan, and `CalibrationError` when the calibration is for other sizes.
     """
     source, progress = open_pictures(root, mapping), progress or NoProgress()
+    require_pairs(source)
     sensor = sensor_of(source)
     rig = None if calibration is None else calibration.model_copy(update={"sensor": sensor})
     if rig is not None:

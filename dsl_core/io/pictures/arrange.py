@@ -44,13 +44,18 @@ class Slot:
 
 @dataclass(frozen=True)
 class Arrangement:
-    """The pictures of a folder and what they show; ``frames`` are those of the code in its order."""
+    """The pictures of a folder and what they show; ``frames`` are those of the code in its order.
+
+    ``listed`` are all pictures in the order of the mapping, ``pairs`` those of patterns with their inverses.
+    """
 
     code: CodeSet
     frames: tuple[Picture, ...]
     white: Picture | None
     black: Picture | None
     table: tuple[tuple[str, str], ...]
+    listed: tuple[Picture, ...]
+    pairs: tuple[tuple[Axis, Picture, Picture], ...]
 
 
 def arrange(folder: Path, mapping: Mapping) -> Arrangement:
@@ -224,7 +229,22 @@ def _arrangement(
         lights.get("white"),
         lights.get("black"),
         tuple(table),
+        tuple(found.values()),
+        tuple(_pairs_of(mapping, slots, found)),
     )
+
+
+def _pairs_of(
+    mapping: Mapping, slots: list[Slot], found: dict[Slot, Picture]
+) -> Iterator[tuple[Axis, Picture, Picture]]:
+    """Patterns and their inverses, of digits of which both are there."""
+    for index, part in enumerate(mapping.parts):
+        if not isinstance(part, StripePictures) or part.inverse == "none":
+            continue
+        own = sorted((s for s in slots if s.part == index), key=lambda slot: slot.frame)
+        for one, other in zip(own[0::2], own[1::2], strict=True):
+            if one in found and other in found:
+                yield part.axis, found[one], found[other]
 
 
 def _shown(picture: Picture, folder: Path) -> str:

@@ -42,21 +42,22 @@ class PictureScan:
     def read(self, shot: Shot) -> NDArray[np.uint16]:
         """The frame of a shot, (rows, columns), DN; raises `StoreError` naming the picture that is wrong."""
         if shot.role == "white":
-            return self._load(self.arrangement.white) if self.arrangement.white else self._extremes[1]
+            return self.load(self.arrangement.white) if self.arrangement.white else self._extremes[1]
         if shot.role == "black":
-            return self._load(self.arrangement.black) if self.arrangement.black else self._extremes[0]
-        return self._load(self.arrangement.frames[shot.pattern])
+            return self.load(self.arrangement.black) if self.arrangement.black else self._extremes[0]
+        return self.load(self.arrangement.frames[shot.pattern])
 
     @cached_property
     def _extremes(self) -> tuple[NDArray[np.uint16], NDArray[np.uint16]]:
         """The darkest and the brightest value of each pixel."""
-        low = high = self._load(self.arrangement.frames[0])
+        low = high = self.load(self.arrangement.frames[0])
         for picture in self.arrangement.frames[1:]:
-            frame = self._load(picture)
+            frame = self.load(picture)
             low, high = np.minimum(low, frame), np.maximum(high, frame)
         return low, high
 
-    def _load(self, picture: Picture) -> NDArray[np.uint16]:
+    def load(self, picture: Picture) -> NDArray[np.uint16]:
+        """A picture as a frame, (rows, columns), DN; raises `StoreError` naming it when it is wrong."""
         frame = load_mosaic(picture, self.mapping, self.bit_depth)
         width, height = self.plan.camera_size_px
         if frame.shape != (height, width):

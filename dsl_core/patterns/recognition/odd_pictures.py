@@ -47,10 +47,14 @@ def odd_pairs(lines: Lines, pictures: Sequence[int | None], reading: StripeReadi
     """Clear pictures and what should be their inverses that do not go against each other."""
     if reading.inverse == "none":
         return []
+    both = pairs_of(pictures, reading.inverse)
+    return odd_among(lines, [(one, other) for one, other in both if one is not None and other is not None])
+
+
+def odd_among(lines: Lines, pairs: Sequence[tuple[int, int]]) -> list[tuple[int, int]]:
+    """Those of some pairs that are clear and do not go against each other."""
     found = []
-    for one, other in pairs_of(pictures, reading.inverse):
-        if one is None or other is None:
-            continue
+    for one, other in pairs:
         a, b = lines.of(one) - 0.5, lines.of(other) - 0.5
         if min(np.abs(a).mean(), np.abs(b).mean()) < CLEAR:
             continue

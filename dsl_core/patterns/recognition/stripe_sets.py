@@ -47,8 +47,8 @@ class StripeReading:
     """How the pictures of a set are to be read, and how rough its numbers then are (0 to 1).
 
     ``rival`` is the roughness of the best reading that is another one, but for binary code read the other way
-    round with its inverses; ``numbers`` are the least and the
-    largest that are common. ``rises`` says whether they rise along the lines.
+    round with its inverses; ``numbers`` are the least and the largest that are common. ``rises`` says whether
+    they rise along the lines.
     """
 
     code: Literal["gray", "binary", "xor"]
