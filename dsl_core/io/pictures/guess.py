@@ -106,7 +106,10 @@ def guess_mapping(
         found = _recognised(look, tuple(slots))
         if found is not None and (best is None or found.misfit < best[2].misfit):
             best = candidate, look, found
-        if best is not None and best[2].misfit < DOUBTFUL and not _alike_next(order, number, whole):
+        if best is None or best[2].misfit >= DOUBTFUL or _alike_next(order, number, whole):
+            continue
+        # Two dark pictures pass for a digit and its inverse, until one of them is left out.
+        if not (best[2].has_odd_pair and any(each in whole for each in order[number + 1 : number + 2])):
             break
     if best is not None and best[0] in whole and len(names) > 1:
         best = _single_instead(best, single) or best

@@ -100,6 +100,19 @@ class Recognised:
         readings = [block.reading for block in self.blocks]
         return any(isinstance(each, StripeReading) and each.inverse != "none" for each in readings)
 
+    @property
+    def has_odd_pair(self) -> bool:
+        """Whether a clear pattern and its inverse do not go against each other."""
+        return any(
+            odd_pairs(
+                self.probes.across if block.axis == "columns" else self.probes.down,
+                block.slots,
+                block.reading,
+            )
+            for block in self.blocks
+            if isinstance(block.reading, StripeReading)
+        )
+
 
 def recognise(probes: Probes, slots: Slots) -> Recognised | None:
     """The reading of a sequence of pictures that makes most sense, or None when none does."""

@@ -74,6 +74,20 @@ def test_one_of_two_cameras_is_taken_and_the_other_named(tmp_path: Path, gray: P
         guess_mapping(folder, PROJECTOR, "left")
 
 
+def test_a_picture_with_the_lens_covered_is_no_inverse_of_the_black_one(
+    tmp_path: Path, gray: Pictures
+) -> None:
+    dark = np.asarray(np.random.default_rng(3).normal(1, 0.6, gray[0].shape).clip(0, 9).round(), np.uint16)
+    rows = frames([("rows", Stripes(bits=7))])[0]
+    pictures = {f"pattern_{i:02}.png": p for i, p in enumerate([*gray[:14], *rows])}
+    pictures |= {"white.png": gray[14], "black.png": gray[15], "dark.png": dark}
+    mapping = guess_mapping(write(tmp_path, pictures), PROJECTOR).mapping
+    assert [part.kind for part in mapping.parts] == ["black", "stripes", "stripes", "white"]
+    assert mapping.parts[1] == StripePictures(bits=7)
+    assert "dark.png" not in mapping.files
+    assert mapping.unsure == ("1 picture does not belong to the code and is not used",)
+
+
 def test_lights_and_axes_may_be_in_folders_of_their_own(tmp_path: Path, gray: Pictures) -> None:
     pictures = {f"v/{i}.png": p for i, p in enumerate(gray[:14])} | {"w.png": gray[14], "b.png": gray[15]}
     guess = guess_mapping(write(tmp_path, pictures), PROJECTOR)
