@@ -8,7 +8,14 @@ from math import gcd
 import numpy as np
 
 from dsl_core.errors import StoreError
-from dsl_core.io.pictures.mapping import BlackPicture, Part, PhasePictures, StripePictures, WhitePicture
+from dsl_core.io.pictures.mapping import (
+    BlackPicture,
+    Part,
+    PhasePictures,
+    Skipped,
+    StripePictures,
+    WhitePicture,
+)
 from dsl_core.model.captured_code import Axis
 from dsl_core.patterns.recognition.phase_sets import PhaseReading, turns_per_number
 from dsl_core.patterns.recognition.probes import Probes
@@ -93,6 +100,9 @@ def part_of(
         return _stripes(axis, block.reading, size_px, next((c for c in centred if c is not None), None))
     if isinstance(block.reading, PhaseReading):
         return _phases(axis, block, block.reading, blocks, size_px, probes)
+    if block.kind == "skip":
+        count = len(block.slots)
+        return Skipped(count=count), [f"{count} pictures beside the stripes show no pattern and are not used"]
     return (WhitePicture() if block.kind == "white" else BlackPicture()), []
 
 

@@ -22,6 +22,8 @@ LEAST_AMPLITUDE, AMPLITUDE_SPREAD, MEAN_SPREAD = 0.08, 0.25, 0.1
 LEAST_RUN = 20
 #: Noise of the change of a phase from pixel to pixel, turns.
 LEAST_CHANGE = 0.04
+#: Pictures that turn less than this along the lines show no position, as white, black and dark together do.
+LEAST_TURNS = 0.05
 #: Turns of a set that may still be one fringe over the whole projector.
 ONE_FRINGE = 1.05
 #: Most fringes of a set that are tried, and how far from a whole number they may be, of all and at least.
@@ -151,6 +153,12 @@ def read_phase_sets(
     others = (each for each in ranked if each[4] != start or np.ptp(ratios[each[3]]) > 1e-9)
     rival = min((each[0] for each in others), default=np.pi / most)
     return PhaseReading(steps, order, fringes, start, direction, share * most, rival * most, most)
+
+
+def turn_nowhere(lines: Lines, pictures: Sequence[int]) -> bool:
+    """Whether steps of what passes for a sinusoid are the same all along the lines."""
+    turns = _turns([_wave(lines, pictures)], lines.pairs)
+    return turns is not None and abs(float(turns[0])) < LEAST_TURNS
 
 
 def _ranked(

@@ -19,6 +19,7 @@ from dsl_core.patterns.recognition.phase_sets import (
     read_phase_sets,
     sinusoid_runs,
     steps_of_strided,
+    turn_nowhere,
 )
 from dsl_core.patterns.recognition.probes import Lines, Probes
 from dsl_core.patterns.recognition.stripe_sets import ROUGH, StripeReading, read_set
@@ -249,7 +250,8 @@ def _with_phases(
     reading = read_phase_sets(lines, present[start:end], steps, "set")
     if reading is None:
         return [], np.inf
-    phases = Block("phases", tuple(present[start:end]), axis, reading)
+    run_of_phases = tuple(present[start:end])
+    phases = Block("phases", run_of_phases, axis, reading)
     if not others:
         return [phases], _phase_cost(reading)
     stripes = read_set(lines, others)
@@ -257,6 +259,9 @@ def _with_phases(
         return [], np.inf
     block = Block("stripes", tuple(others), axis, stripes)
     off = reading.off_rad / MOST_OFF_RAD
+    if turn_nowhere(lines, run_of_phases[:steps]):
+        # More lights than white and black, such as a picture with the lens covered.
+        phases = Block("skip", run_of_phases, axis)
     return ([block, phases] if rest[0] else [phases, block]), _cost(stripes) + off
 
 

@@ -10,7 +10,7 @@ import pytest
 
 from dsl_core.errors import StoreError
 from dsl_core.io.pictures.guessed_parts import _stripes, _unit, guessed_size, part_of
-from dsl_core.io.pictures.mapping import PhasePictures, StripePictures, WhitePicture
+from dsl_core.io.pictures.mapping import PhasePictures, Skipped, StripePictures, WhitePicture
 from dsl_core.model.captured_code import Axis
 from dsl_core.patterns.recognition.phase_sets import PhaseReading
 from dsl_core.patterns.recognition.probes import Lines, Probes
@@ -175,3 +175,9 @@ def test_stripes_say_the_period_of_sinusoids_beside_them(monkeypatch: pytest.Mon
     part, _ = part_of(phases, [phases, stripes("columns", 9, 511)], (512, 384), Probes(lines, lines, 1.0))
     assert isinstance(part, PhasePictures)
     assert (part.fringes, part.start_deg) == ((128.0, 64.0, 16.0), 90.0)
+
+
+def test_pictures_that_are_no_part_of_the_code_are_left_out_and_counted() -> None:
+    part, (doubt,) = part_of(Block("skip", (4, 5, 6)), [], (4, 3), None)  # type: ignore[arg-type]
+    assert part == Skipped(count=3)
+    assert doubt == "3 pictures beside the stripes show no pattern and are not used"

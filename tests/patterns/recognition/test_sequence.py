@@ -147,6 +147,14 @@ def test_one_fringe_is_not_taken_for_another_axis() -> None:
     assert found.digits == {("columns", 3)}
 
 
+def test_lights_beside_stripes_are_no_steps_of_a_sinusoid() -> None:
+    pictures, white, black = frames([("columns", Stripes(bits=7))])
+    found = _recognised([*pictures, white, black, white])
+    assert found is not None
+    assert [(kind, count) for kind, _, count in found.content] == [("stripes", 14), ("skip", 3)]
+    assert _stripes(found, "columns").bits == 7
+
+
 @pytest.mark.parametrize(("share", "noise"), [(0.45, 0.004), (1.0, 0.1)])
 def test_white_and_black_are_no_coarse_digit_of_a_part_or_among_noise(share: float, noise: float) -> None:
     whole = scene()
