@@ -14,6 +14,7 @@ import os
 import re
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -73,20 +74,39 @@ class PublishedScan:
                 f"{self.root} lacks {len(lacking)} of {self.plan.shot_count} frames: {first.expected} is"
                 f" {first.status} ({first.advice}). Complete the folder; the import's table lists every file."
             )
+        self._require_left_aligned()
+
+    def _require_left_aligned(self) -> None:
+        """Raise `StoreError` when values end where ``bit_depth`` does, with bits that left-aligned ones lack.
+
+        The brightest frames come first, so that the first one settles it as a rule.
+        """
+        most, unused = 2**self.bit_depth - 1, 2 ** (_CONTAINER_BITS - self.bit_depth) - 1
+        bits = 0
+        for _, path in sorted(self.found.files.items(), key=lambda each: each[0][0] != "white"):
+            rgb = _read_rgb(path)
+            if rgb.dtype.itemsize == 1 or rgb.max() > most:
+                return
+            # What a program put between the samples may have any bits, at the border everywhere.
+            bits |= int(np.bitwise_or.reduce(self._sampled(rgb)[1:-1, 1:-1], axis=None))
+        if bits & unused:
+            raise StoreError(
+                f"No image of {self.root} holds a value above {most}, and their lowest bits are in use: their"
+                f" {self.bit_depth} bits are right-aligned, but the published layout has them left-aligned in"
+                f" 16. Multiply all values by {unused + 1} and save the images again."
+            )
 
     def read(self, shot: Shot) -> NDArray[np.uint16]:
         """The mosaic of a shot, shape (rows, columns), DN; raises `StoreError` when it is not there."""
-        import cv2
-
         place: Place = (shot.role, shot.setting, shot.pattern)
         path = self.found.files.get(place)
         if path is None:
             record = self.found.by_place[place]
             raise StoreError(f"{self.root / record.expected} is {record.status}: {record.advice}.")
-        image = cv2.imread(str(path), cv2.IMREAD_UNCHANGED)
-        if image is None or image.ndim != 3:
-            raise StoreError(f"{path} is damaged: it cannot be decoded. Copy it again or capture it again.")
-        rgb = _right_aligned(np.asarray(image)[..., ::-1], self.bit_depth)
+        return self._sampled(_right_aligned(_read_rgb(path), self.bit_depth))
+
+    def _sampled(self, rgb: NDArray[Any]) -> NDArray[Any]:
+        """What the mosaic has at each pixel, (rows, columns), of an image (rows, columns, 3)."""
         channels = bayer_channels(self.bayer, *rgb.shape[:2])
         return np.take_along_axis(rgb, channels[..., None], axis=-1)[..., 0]
 
@@ -173,6 +193,20 @@ def _write_rgb(mosaic: NDArray[np.uint16], path: Path, bayer: BayerPattern, bit_
     path.parent.mkdir(parents=True, exist_ok=True)
     data = cv2.imencode(".png", np.ascontiguousarray(values[..., ::-1]), [cv2.IMWRITE_PNG_COMPRESSION, 1])[1]
     path.write_bytes(data.tobytes())
+
+
+def _read_rgb(path: Path) -> NDArray[Any]:
+    """An image as stored, (rows, columns, 3) in the order R, G, B; raises `StoreError`."""
+    import cv2
+
+    # Through memory, because OpenCV cannot open every path on Windows.
+    try:
+        image = cv2.imdecode(np.fromfile(path, np.uint8), cv2.IMREAD_UNCHANGED)
+    except (OSError, cv2.error):
+        image = None
+    if image is None or image.ndim != 3:
+        raise StoreError(f"{path} is damaged: it cannot be decoded. Copy it again or capture it again.")
+    return np.asarray(image)[..., ::-1]
 
 
 def _right_aligned(image: NDArray[np.generic], bit_depth: int) -> NDArray[np.uint16]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import shutil
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -264,3 +265,40 @@ def test_other_pixels_make_another_dataset_and_another_place_does_not(tmp_path: 
     file = elsewhere / "intensity1/capture_0000.png"
     cv2.imwrite(str(file), np.asarray(cv2.imread(str(file), cv2.IMREAD_UNCHANGED)) ^ 1)
     assert open_dataset(elsewhere).fingerprint() != before
+
+
+def _change(folder: Path, change: Callable[[NDArray[np.uint16]], NDArray[np.uint16]]) -> None:
+    for path in folder.rglob("*.png"):
+        image = np.asarray(cv2.imread(str(path), cv2.IMREAD_UNCHANGED), np.uint16)
+        cv2.imwrite(str(path), change(image))
+
+
+def test_values_at_the_lower_end_of_16_bits_are_refused(folder: Path) -> None:
+    _change(folder, lambda image: image >> np.uint16(4))
+    with pytest.raises(
+        StoreError, match=r"holds a value above 4095, .* right-aligned.*Multiply all values by 16"
+    ):
+        open_dataset(folder).require_frames()
+    # A camera of 16 bits has no room for another alignment.
+    open_dataset(folder, bit_depth=16).require_frames()
+
+
+def test_dark_frames_and_interpolated_values_are_not_taken_for_right_aligned_ones(folder: Path) -> None:
+    def dark(image: NDArray[np.uint16]) -> NDArray[np.uint16]:
+        raw = np.full(image.shape[:2], 16 * 3, np.uint16)
+        raw[::2, ::3] = 16 * 200
+        return np.asarray(cv2.cvtColor(raw, cv2.COLOR_BayerRGGB2BGR), np.uint16)
+
+    _change(folder, dark)
+    open_dataset(folder).require_frames()
+
+
+def test_images_are_read_below_names_that_opencv_cannot_open(
+    folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def imread(*_: object) -> None:
+        """On Windows, OpenCV opens no path with characters of other languages."""
+
+    monkeypatch.setattr(cv2, "imread", imread)
+    shot = next(PLAN.shots())
+    np.testing.assert_array_equal(open_dataset(folder).read(shot), Memory().read(shot))
