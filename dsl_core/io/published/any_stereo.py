@@ -82,6 +82,13 @@ def load_any_stereo(
             f"{path} lacks {' and '.join(lacking)}; it has {has}{odd}. Name them like cam_K, proj_K, R and T"
             " (3 x 3, 3 x 3, 3 x 3 and 3 numbers), from camera to projector."
         )
+    if parts.both_placed is not None:
+        of_camera, of_projector = parts.both_placed
+        raise CalibrationError(
+            f"{path} has a pose of the camera ({of_camera}) and one of the projector ({of_projector}), so"
+            " that neither leads from one to the other. Give one R and T from camera to projector instead:"
+            " for poses x = R X + t of points X of the world, R = Rp Rc^T and T = tp - R tc."
+        )
     given = {"camera": camera_size_px, "projector": projector_size_px}
     try:
         camera, projector = (

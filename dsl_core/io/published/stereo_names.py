@@ -40,13 +40,15 @@ class Parts:
     """Numbers by what they are, the names that they have in a file, and what was taken for granted.
 
     Matrices are (3, 3), distortions flat, ``turn`` (3, 3) or (3,), ``shift`` (3,). ``is_inverse`` says that a
-    name tells the pose to lead from the projector to the camera.
+    name tells the pose to lead from the projector to the camera. ``both_placed`` names the poses of camera
+    and projector where a file has one of each, so that neither leads from one device to the other.
     """
 
     values: dict[str, NDArray[np.float64]] = field(default_factory=dict)
     names: dict[str, str] = field(default_factory=dict)
     taken: list[str] = field(default_factory=list)
     is_inverse: bool = False
+    both_placed: tuple[str, str] | None = None
 
     def add(self, part: str, name: str, values: NDArray[np.float64]) -> None:
         """Note a part and its name."""
@@ -57,6 +59,7 @@ def parts_of(numbers: Numbers) -> Parts:
     """What a file with these numbers says of two devices; parts that it lacks are absent."""
     best = max((_of_pair(numbers, *pair) for pair in _PAIRS), key=lambda each: len(each.values))
     _add_pose(best, numbers)
+    best.both_placed = _both_placed(best, numbers)
     return best
 
 
@@ -118,10 +121,12 @@ def _add_matrix(found: Parts, part: str, name: str, values: NDArray[np.float64])
         found.taken.append(f"{name} is fx, fy, cx, cy")
         return
     matrix = values.reshape(3, 3)
-    if not matrix[:2, 2].any() and matrix[2, :2].any():
-        # MATLAB multiplies rows from the left, and counts pixels from 1.
-        matrix = matrix.T - np.array([[0, 0, 1], [0, 0, 1], [0, 0, 0]])
-        found.taken.append(f"{name} is written as in MATLAB: transposed, with pixels from 1")
+    # MATLAB multiplies rows from the left (not in the ``K`` of later versions), and counts pixels from 1.
+    transposed = not matrix[:2, 2].any() and bool(matrix[2, :2].any())
+    if transposed or "cameraparameters" in _plain(name):
+        matrix = (matrix.T if transposed else matrix) - np.array([[0, 0, 1], [0, 0, 1], [0, 0, 0]])
+        how = "transposed, with pixels from 1" if transposed else "with pixels from 1"
+        found.taken.append(f"{name} is written as in MATLAB: {how}")
     found.add(part, name, matrix)
 
 
@@ -147,6 +152,24 @@ def _add_pose(found: Parts, numbers: Numbers) -> None:
             found.add("rotation", name, matrix[:3, :3])
             found.add("translation", name, matrix[:3, 3])
             found.is_inverse |= is_inverse
+
+
+def _both_placed(found: Parts, numbers: Numbers) -> tuple[str, str] | None:
+    """Names of a pose of the camera, and of the projector's taken for the one between them; else None."""
+    camera, projector = "(?:camera|cam)", "(?:projector|proj)"
+    for part, words, sizes, still in (
+        ("rotation", _TURN, {9, 3}, (np.eye(3), np.zeros(3))),
+        ("translation", _SHIFT, {3}, (np.zeros(3),)),
+        ("rotation", _BOTH, {12, 16}, (np.eye(4), np.eye(3, 4))),
+    ):
+        taken = found.names.get(part, "")
+        if not any(re.fullmatch(rf"{projector}{words}|[rt]p", each) for each in _endings(taken)):
+            continue
+        name = _named(numbers, f"{camera}{words}|{words}(?:{camera}|c)", sizes)
+        # In a camera at the origin, looking along z, both are the same.
+        if name is not None and not any(np.array_equal(numbers[name].ravel(), s.ravel()) for s in still):
+            return name, taken
+    return None
 
 
 def _named(numbers: Numbers, words: str, sizes: set[int]) -> str | None:

@@ -100,6 +100,49 @@ def test_matlab_writes_matrices_transposed_and_counts_from_one(tmp_path: Path) -
     assert any("as in MATLAB" in each for each in found.taken)
 
 
+def test_later_matlab_does_not_transpose_but_counts_from_one(tmp_path: Path) -> None:
+    one = np.array([[0, 0, 1], [0, 0, 1], [0, 0, 0]])
+    first, second = ({"K": k + one, "ImageSize": size[::-1]} for k, size in ((K, CAMERA), (P, PROJECTOR)))
+    pose = {"R": R, "Translation": T[:, 0]}
+    path = as_json(
+        tmp_path / "m.json", {"CameraParameters1": first, "CameraParameters2": second, "PoseCamera2": pose}
+    )
+    found = load_any_stereo(path)
+    require_right(found, has_distortion=False)
+    assert "CameraParameters1.K is written as in MATLAB: with pixels from 1" in found.taken
+
+
+WORLD_R: Floats = np.asarray(cv2.Rodrigues(np.array([0.4, 0.1, -0.05]))[0], np.float64)
+WORLD_T = np.array([-100.0, -80, 900])
+
+
+@pytest.mark.parametrize(
+    ("poses", "of_camera", "of_projector"),
+    [
+        ({"cam_R": WORLD_R, "cam_T": WORLD_T, "proj_R": R, "proj_T": T}, "cam_R", "proj_R"),
+        ({"Rc": WORLD_R, "Tc": WORLD_T, "Rp": R, "Tp": T}, "Rc", "Rp"),
+        ({"cam_R": np.eye(3), "cam_T": WORLD_T, "proj_R": R, "proj_T": T}, "cam_T", "proj_T"),
+        (
+            {"camera": {"rvec": [0.4, 0, 0], "tvec": WORLD_T}, "projector": {"rvec": VECTOR, "tvec": T}},
+            r"camera\.rvec", r"projector\.rvec",
+        ),
+        ({"cam_pose": np.c_[WORLD_R, WORLD_T], "proj_pose": np.c_[R, T]}, "cam_pose", "proj_pose"),
+    ],
+)  # fmt: skip
+def test_poses_of_both_devices_are_not_taken_for_the_one_between_them(
+    tmp_path: Path, poses: dict[str, Any], of_camera: str, of_projector: str
+) -> None:
+    path = as_json(tmp_path / "c.json", {"cam_K": K, "proj_K": P} | poses)
+    with pytest.raises(CalibrationError, match=rf"camera \({of_camera}\) and .*\({of_projector}\).*Rp Rc"):
+        load_any_stereo(path, CAMERA, PROJECTOR)
+
+
+def test_a_camera_at_the_origin_leaves_the_projectors_pose_the_one_between_them(tmp_path: Path) -> None:
+    poses = {"cam_R": np.eye(3), "cam_T": [0, 0, 0], "proj_R": R, "proj_T": T}
+    path = as_json(tmp_path / "c.json", {"cam_K": K, "proj_K": P, **poses})
+    require_right(load_any_stereo(path, CAMERA, PROJECTOR), has_distortion=False)
+
+
 def test_radial_coefficients_of_matlab_stand_around_the_tangential_ones(tmp_path: Path) -> None:
     radial, tangential = [-0.1, 0.02, 0.3], [0.001, -0.002]
     camera = {"K": K, "RadialDistortion": radial, "TangentialDistortion": tangential}
