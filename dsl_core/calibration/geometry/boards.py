@@ -85,7 +85,8 @@ def other_board(grey: NDArray[np.float32], board: Board) -> str:
     for more in (1, 0, -1):
         for other in (1, 0, -1):
             size = columns + more, rows + other
-            if min(size) < 3 or not (more or other):
+            # The same board turned by 90 degrees is no other one.
+            if min(size) < 3 or sorted(size) == sorted((columns, rows)):
                 continue
             if cv2.findChessboardCornersSB(picture, size, flags=cv2.CALIB_CB_NORMALIZE_IMAGE)[0]:
                 return (

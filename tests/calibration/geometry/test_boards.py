@@ -247,3 +247,11 @@ def test_a_board_in_a_small_picture_is_found_with_squares_of_four_pixels() -> No
     found = find_corners(grey, board, "the picture").points_px
     off = min(np.abs(found - each).max() for each in (true, true[::-1]))
     assert off < 0.4
+
+
+def test_a_board_that_is_turned_is_no_other_board() -> None:
+    # 6 x 5 inner corners, as stated, and upright in the picture.
+    squares = np.kron(np.indices((7, 6)).sum(0) % 2, np.ones((24, 24)))
+    picture = np.pad(squares, 30, constant_values=1).astype(np.float32)
+    assert other_board(picture, Checkerboard(columns=6, rows=5, square_mm=10)) == ""
+    assert other_board(picture, Checkerboard(columns=6, rows=6, square_mm=10)).startswith(" A board of 6 x 5")
