@@ -55,6 +55,9 @@ _FULL = 65535
 _MOST_BITS_APART = 8
 #: Filters of renderers overshoot at edges by less than this share of white.
 FILTERED = 0.02
+#: What noise leaves below 0 where a dark picture is subtracted: nothing reaches this share of white. Numbers
+#: that ran over their type, and differences of pictures, go far below it.
+_NOISE = 0.1
 #: Bits of frames decoded from sRGB: the steps of dark values are as fine as those of 12 bits.
 DECODED_BITS = 16
 
@@ -144,10 +147,20 @@ def load_mosaic(picture: Picture, mapping: Mapping, bit_depth: int) -> NDArray[n
 
 def _share_of_white(values: NDArray[Any], white: float) -> NDArray[Any]:
     """Values as shares of white; sparks become white, and what a filter of a renderer left below 0 black."""
-    share = values / white
+    share = _without_noise(values / white, 1.0)
     if np.count_nonzero(share > 1) <= SPARKS * share.size and share.min() > -FILTERED:
         share = share.clip(0, 1)
     return np.asarray(share)
+
+
+def _without_noise(values: NDArray[Any], white: float) -> NDArray[Any]:
+    """Values below 0 as black where they are so near to it, for a ``white``, as noise of dark pixels is."""
+    below = values[values < 0]
+    if below.size and below.min() > -_NOISE * white:
+        # The square root of the mean square: a few pixels may be further away than noise usually is.
+        spread = float(np.sqrt(np.mean(np.square(below, dtype=np.float64))))
+        return np.maximum(values, 0) if spread < FILTERED * white else values
+    return values
 
 
 def _one_channel(values: NDArray[Any], mapping: Mapping) -> NDArray[Any]:
@@ -176,10 +189,18 @@ def _whole(values: NDArray[Any], picture: Picture, mapping: Mapping, bit_depth: 
     """Values as whole numbers that fit into the bits, at their lower end; raises `StoreError`."""
     if values.dtype.kind == "f":
         values = np.rint(values)
-    if not np.isfinite(values).all() or values.min() < 0 or values.max() > _FULL:
+    if values.dtype.kind in "if":
+        values = _without_noise(values, _FULL if mapping.left_aligned else 2**bit_depth - 1)
+    if not np.isfinite(values).all() or values.max() > _FULL:
         raise StoreError(
             f"{picture} holds values from {values.min():g} to {values.max():g}; 0 to {_FULL} are possible."
             " State full_scale, the value of white, in the mapping, or save whole numbers."
+        )
+    if values.min() < 0:
+        raise StoreError(
+            f"{picture} holds values from {values.min():g} to {values.max():g}, further below 0 than noise"
+            " gets. Add one offset to all pictures of the capture, that of black included, so that none is"
+            " below 0."
         )
     frame = values.astype(np.uint16)
     if mapping.left_aligned:

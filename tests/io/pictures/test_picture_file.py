@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from dsl_core.errors import StoreError
 from dsl_core.io.pictures import picture_file
@@ -133,3 +134,36 @@ def test_floats_for_screens_run_to_one_unless_their_end_is_stated(
     frame = load_mosaic(Picture(tmp_path / "f.npy"), mapping, 16)
     assert frame[0].tolist() == [0, 65535]
     assert frame[1, 0] == pytest.approx(65535 * float(srgb_decode(np.array([128 / 255]))[0]), abs=1)
+
+
+def _dark_subtracted(noise: float) -> NDArray[np.float64]:
+    """A picture from black to white (1) with noise, a share of white."""
+    light = np.linspace(0, 1, 4000).reshape(40, 100)
+    return np.asarray(light + np.random.default_rng(2).normal(0, noise, light.shape))
+
+
+@pytest.mark.parametrize("kind", [np.float32, np.int16])
+def test_noise_below_a_subtracted_dark_picture_is_black(tmp_path: Path, kind: type[np.generic]) -> None:
+    values = _dark_subtracted(0.012)
+    assert values.min() < -0.02
+    np.save(tmp_path / "a.npy", np.rint(values * 3000).astype(kind))
+    frame = load_mosaic(Picture(tmp_path / "a.npy"), MAPPING, 12)
+    assert np.array_equal(frame, np.rint(values.clip(0) * 3000))
+    np.save(tmp_path / "f.npy", values.astype(np.float32))
+    scaled = MAPPING.model_copy(update={"full_scale": 1.1})
+    frame = load_mosaic(Picture(tmp_path / "f.npy"), scaled, 12)
+    assert np.abs(frame - np.rint(values.clip(0) / 1.1 * 4095)).max() <= 1
+
+
+@pytest.mark.parametrize(
+    "values",
+    [
+        pytest.param(_dark_subtracted(0.012) - 0.5, id="difference of pictures"),
+        pytest.param(np.where(_dark_subtracted(0) > 0.9, -0.15, 0.5), id="ran over"),
+        pytest.param(_dark_subtracted(0.001) - 0.08, id="too much subtracted"),
+    ],
+)
+def test_values_far_below_zero_ask_for_an_offset(tmp_path: Path, values: NDArray[np.float64]) -> None:
+    np.save(tmp_path / "a.npy", np.rint(values * 3000).astype(np.int16))
+    with pytest.raises(StoreError, match=r"further below 0 than noise gets\. Add one offset to all pictures"):
+        load_mosaic(Picture(tmp_path / "a.npy"), MAPPING, 12)
