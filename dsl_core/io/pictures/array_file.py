@@ -33,6 +33,8 @@ _COLOURS = (3, 4)
 _OTHER = re.compile(r"patt|proj|code|mask|truth|depth|calib|xyz|point", re.IGNORECASE)
 #: Pictures that a capture has besides those of its patterns, and that may have a name of their own.
 _ENDS = re.compile(r"white|black|dark|ambient|full|(?<![a-z])o(?:n|ff)(?![a-z])", re.IGNORECASE)
+#: Names of a picture without the projector's light: the first that a file has is its black.
+_UNLIT = (r"black|(?<![a-z])off(?![a-z])", "ambient", "dark")
 #: Bytes of a number by MATLAB's name of its type.
 _MATLAB_BYTES = {"logical": 1, "int8": 1, "uint8": 1, "int16": 2, "uint16": 2, "int32": 4, "uint32": 4} | {
     "single": 4, "double": 8,
@@ -129,7 +131,7 @@ def _chosen(path: Path, shapes: Shapes, pictures_last: bool) -> list[str]:
         if len(stacks) == 1:
             ((name, shape),) = stacks.items()
             ends = [each for each in shapes if _ENDS.search(each) and shapes[each] == shape]
-            return [*sorted(ends, key=natural), name]
+            return [*sorted(_with_one_black(ends), key=natural), name]
         is_whole = len(single) >= FEWEST or among is shapes or len(own) == len(shapes)
         if not stacks and single and is_whole and len({among[name] for name in single}) == 1:
             return single
@@ -138,6 +140,13 @@ def _chosen(path: Path, shapes: Shapes, pictures_last: bool) -> list[str]:
         f"{path} holds {f'arrays ({listed})' if listed else 'no array of numbers'}, and none alone is the"
         " pictures of a capture. Save those of the camera as one array in a file .npy."
     )
+
+
+def _with_one_black(names: list[str]) -> list[str]:
+    """Names without those of unlit pictures that a better one makes needless."""
+    unlit = [[name for name in names if re.search(words, name, re.IGNORECASE)] for words in _UNLIT]
+    best = next((found for found in unlit if found), [])
+    return [name for name in names if name in best or not any(name in found for found in unlit)]
 
 
 def _is_picture(shape: tuple[int, ...]) -> bool:

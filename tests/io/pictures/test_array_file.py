@@ -108,3 +108,21 @@ def test_an_archive_next_to_pictures_is_something_else(tmp_path: Path) -> None:
     write(tmp_path, {f"{i}.png": picture for i, picture in enumerate(STACK)})
     np.savez(tmp_path / "calibration.npz", K=np.eye(3))
     assert [path.name for path in picture_files(tmp_path, ("*",))] == [f"{i}.png" for i in range(7)]
+
+
+@pytest.mark.parametrize(
+    ("names", "taken"),
+    [
+        (("white", "black", "dark", "ambient"), ("black", "white")),
+        (("white", "dark", "ambient"), ("ambient", "white")),
+        (("white", "dark"), ("dark", "white")),
+        (("light_on", "light_off", "dark"), ("light_off", "light_on")),
+    ],
+)
+def test_an_archive_has_one_black_and_it_is_that_of_the_projector(
+    tmp_path: Path, names: tuple[str, ...], taken: tuple[str, ...]
+) -> None:
+    lights = {name: STACK[0] + 3 * k for k, name in enumerate(names)}
+    np.savez(tmp_path / "a.npz", images=STACK, **lights)  # type: ignore[arg-type]
+    wanted = np.concatenate([np.stack([lights[name] for name in taken]), STACK])
+    np.testing.assert_array_equal(read_pictures(tmp_path / "a.npz"), wanted)

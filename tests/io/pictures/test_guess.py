@@ -378,3 +378,17 @@ def test_looking_goes_on_for_absent_pictures_and_for_files_without_strays_alone(
     assert not _alike_next([every, other], 0, whole)
     assert not _alike_next([without_strays, every], 0, whole)
     assert not _alike_next([every, without_strays], 1, whole)
+
+
+@pytest.mark.parametrize("axes", [("columns",), ("columns", "rows")])
+def test_black_and_a_closed_lens_are_no_digit(tmp_path: Path, axes: tuple[str, ...]) -> None:
+    pictures, white, black = frames([(axis, Stripes(bits=7)) for axis in axes])
+    dark = np.random.default_rng(3).normal(1, 0.6, white.shape).clip(0).round().astype(np.uint16)
+    named = {f"pattern_{i:02d}.png": each for i, each in enumerate(pictures)}
+    mapping = guess_mapping(
+        write(tmp_path, {**named, "white.png": white, "black.png": black, "dark.png": dark}), PROJECTOR
+    ).mapping
+    stripes = [StripePictures.model_validate({"axis": axis, "bits": 7}) for axis in axes]
+    assert mapping.parts == (BlackPicture(), *stripes, WhitePicture())
+    assert mapping.files[0] == "black.png"
+    assert mapping.unsure == ("1 picture does not belong to the code and is not used",)
