@@ -22,6 +22,8 @@ MOST_ALONE = 3
 #: Patterns of files that are tried, from the folder itself to folders in its folders.
 _EVERYTHING = (("*",), ("*", "*/*"), ("*", "*/*", "*/*/*"))
 _LAST_NUMBER = re.compile(r"\d+(?!.*\d)")
+#: An exposure in a name.
+_EXPOSURE = re.compile(r"\d+(?:[.,]\d+)?[mu]s(?![a-z])", re.IGNORECASE)
 
 
 @dataclass(frozen=True)
@@ -58,9 +60,7 @@ def candidates(folder: Path) -> tuple[list[Candidate], list[Candidate]]:
             f"{folder} contains {counted(len(pictures), 'picture')} (PNG, TIFF, JPEG, BMP, PGM, NPY, NPZ,"
             f" MAT, camera raw); a capture has at least {FEWEST}. {_advice(folder)}"
         )
-    groups: dict[str, list[Path]] = {}
-    for path in files:
-        groups.setdefault(_key(folder, path), []).append(path)
+    groups = _groups(folder, files)
     by_folder: dict[str, list[Path]] = {}
     for path in files:
         by_folder.setdefault(path.relative_to(folder).parent.as_posix(), []).append(path)
@@ -76,6 +76,24 @@ def candidates(folder: Path) -> tuple[list[Candidate], list[Candidate]]:
         for candidate in _variants(folder, group, files, _name(folder, group))
     ]
     return whole, single
+
+
+def _groups(folder: Path, files: Sequence[Path]) -> dict[str, list[Path]]:
+    """Files whose names differ by their last number alone, or by all but an exposure at their end."""
+    groups: dict[str, list[Path]] = {}
+    by_exposure: dict[str, list[Path]] = {}
+    for path in files:
+        groups.setdefault(_key(folder, path), []).append(path)
+        by_exposure.setdefault(f"{path.parent}/{_exposure(path)}", []).append(path)
+    if max(map(len, groups.values()), default=0) < FEWEST <= min(map(len, by_exposure.values()), default=0):
+        return by_exposure
+    return groups
+
+
+def _exposure(path: Path) -> str:
+    """The exposure that ends a name; empty if none does."""
+    found = [each for each in _EXPOSURE.finditer(path.stem) if each.end() == len(path.stem)]
+    return found[0].group() if found else ""
 
 
 def _without_strays(files: Sequence[Path], groups: Collection[Sequence[Path]]) -> Iterator[list[Path]]:
@@ -171,6 +189,8 @@ def _number(path: Path) -> int | None:
 
 def _name(folder: Path, group: Sequence[Path]) -> str:
     parents = {path.parent for path in group}
+    if len({_exposure(path) for path in group}) == 1 and _exposure(group[0]):
+        return group[0].with_name(_exposure(group[0])).relative_to(folder).as_posix()
     if len(parents) == 1 and group[0].parent != folder:
         return group[0].relative_to(folder).parent.as_posix()
     return _LAST_NUMBER.sub("", group[0].stem).strip(" _-.") or group[0].stem

@@ -92,7 +92,7 @@ def pictures_in(path: Path) -> list[Picture]:
 
 
 def load_values(picture: Picture, raw: RawLayout | None = None) -> NDArray[Any]:
-    """Values as stored, (rows, columns) or (rows, columns, 3) in the order R, G, B.
+    """Values as stored, (rows, columns) or (rows, columns, 3) in the order R, G, B; true is 255.
 
     Raises `StoreError` that names the file, says what is wrong with it and what to do.
     """
@@ -108,6 +108,9 @@ def load_values(picture: Picture, raw: RawLayout | None = None) -> NDArray[Any]:
         values = _from_exr(path)
     else:
         values = _image(path, picture.index)
+    if values.dtype.kind == "b":
+        # As pictures of one bit are read.
+        values = values.astype(np.uint8) * np.uint8(255)
     if values.ndim == 3 and values.shape[2] == 1:
         values = values[..., 0]
     if values.ndim == 3 and values.shape[2] in (3, 4):

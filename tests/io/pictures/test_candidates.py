@@ -97,3 +97,22 @@ def test_each_file_that_stands_alone_may_be_the_only_stray(tmp_path: Path) -> No
 def test_pictures_named_by_numbers_alone_are_called_by_the_first(tmp_path: Path) -> None:
     folder = folder_of(tmp_path / "scan", *numbered("", 1, 2, 3, 4), *numbered("white", 1, 2, 3, 4))
     assert [each.name for each in candidates(folder)[1]] == ["1", "white"]
+
+
+@pytest.mark.parametrize("within", ["", "left/"])
+def test_exposures_that_end_names_are_captures_of_their_own(tmp_path: Path, within: str) -> None:
+    stems = [*(f"{within}{k}_" for k in range(4)), f"{within}white_"]
+    names = [f"{stem}{exposure}.png" for exposure in ("0.5ms", "80ms") for stem in stems]
+    _, single = candidates(folder_of(tmp_path, *names))
+    assert [each.name for each in single] == [f"{within}0.5ms", f"{within}80ms"]
+    wanted = {f"{stem}80ms.png".removeprefix(within) for stem in stems}
+    assert set(names_of(single[1])) == wanted
+
+
+def test_times_that_end_names_are_no_exposures(tmp_path: Path) -> None:
+    names = [f"cam{c}_{33 * k:04d}ms.png" for c in (1, 2) for k in range(5)]
+    _, single = candidates(folder_of(tmp_path, *names))
+    assert [(each.name, each.files) for each in single if not each.absent] == [
+        ("cam1_ms", ("cam1_*ms.png",)), ("cam2_ms", ("cam2_*ms.png",)),
+    ]  # fmt: skip
+    assert candidates(folder_of(tmp_path / "one", *(f"a_{33 * k}ms.png" for k in range(5))))[1] == []

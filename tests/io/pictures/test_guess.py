@@ -392,3 +392,10 @@ def test_black_and_a_closed_lens_are_no_digit(tmp_path: Path, axes: tuple[str, .
     assert mapping.parts == (BlackPicture(), *stripes, WhitePicture())
     assert mapping.files[0] == "black.png"
     assert mapping.unsure == ("1 picture does not belong to the code and is not used",)
+
+
+def test_one_of_two_exposures_that_end_names_is_taken(tmp_path: Path, gray: Pictures) -> None:
+    named = {f"{i}_{ms}ms.png": np.rint(p * (ms / 80)) for ms in (40, 80) for i, p in enumerate(gray)}
+    guess = guess_mapping(write(tmp_path, named), PROJECTOR)
+    assert guess.mapping.parts == (StripePictures(bits=7), WhitePicture(), BlackPicture())
+    assert (guess.mapping.name, guess.others) == ("40ms", ("80ms",))

@@ -64,6 +64,11 @@ def test_bits_are_moved_to_the_lower_end_and_floats_scaled(tmp_path: Path) -> No
         load_mosaic(Picture(tmp_path / "a.tif"), MAPPING, 8)
 
 
+def test_true_is_white(tmp_path: Path) -> None:
+    np.save(tmp_path / "a.npy", GREY > 100)
+    assert np.array_equal(load_mosaic(Picture(tmp_path / "a.npy"), MAPPING, 8), np.where(GREY > 100, 255, 0))
+
+
 def test_one_array_may_hold_all_pictures(tmp_path: Path) -> None:
     wide = np.tile(GREY, 2)
     np.save(tmp_path / "all.npy", np.stack([wide + i for i in range(5)]))
