@@ -103,9 +103,10 @@ class FolderSurvey:
             return
         numbered, stray = _numbered(folder, count)
         shift = 1 if count > 1 and 0 not in numbered and count in numbered else 0
+        words = self._of_shift(role, setting) if shift else ""
         for pattern in range(count):
             candidates = numbered.pop(pattern + shift, [])
-            self._look_at_frame((role, setting, pattern), folder, candidates, shift)
+            self._look_at_frame((role, setting, pattern), folder, candidates, words)
             stray += candidates[1:]
         stray += [path for paths in numbered.values() for path in paths]
         for path in sorted(stray):
@@ -113,7 +114,7 @@ class FolderSurvey:
             advice = "not a frame of the plan, ignored; check that the plan is the scan's"
             self.add(FileRecord("", name, "extra", advice))
 
-    def _look_at_frame(self, place: Place, folder: Path, candidates: list[Path], shift: int) -> None:
+    def _look_at_frame(self, place: Place, folder: Path, candidates: list[Path], shift: str) -> None:
         role, setting, pattern = place
         wanted = folder_name(role, setting)
         expected = f"{wanted}/{file_name(role, pattern)}"
@@ -125,12 +126,22 @@ class FolderSurvey:
         status, advice = _judge(probe_png(path), self.plan)
         if status == "ok":
             if shift:
-                status, advice = "misnamed", "the numbers start at 1; used as if they started at 0"
+                status, advice = "misnamed", shift
             elif role in {"spectral", "code"} and not _is_named(path, role, pattern):
                 status, advice = "misnamed", f"used by its number; rename it to {file_name(role, pattern)}"
             elif folder.name != wanted and _bare(folder.name) == _bare(wanted):
                 status, advice = "misnamed", f"used; rename the folder to {wanted}"
         self.add(FileRecord(expected, found, status, advice), place, path)
+
+    def _of_shift(self, role: Role, setting: int) -> str:
+        """Advice on numbers that start at 1: where another setting's do not, one may be missing."""
+        advice = "the numbers start at 1; used as if they started at 0"
+        for other, values in enumerate(self.plan.settings):
+            folder = find_folder(self.root, role, other, values) if other != setting else None
+            if folder is not None and 0 in _numbered(folder, 0)[0]:
+                doubt = f"though those of {folder.name} do: check that the first one is not missing here"
+                return f"{advice}, {doubt}"
+        return advice
 
 
 def survey(root: Path, plan: CapturePlan) -> FolderSurvey:

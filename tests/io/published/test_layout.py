@@ -92,6 +92,18 @@ def test_numbers_from_one_are_used_as_if_from_zero(tmp_path: Path) -> None:
     assert [record.status for record in looked_at(tmp_path, "code", 3).records] == ["missing", "ok", "ok"]
 
 
+def test_numbers_from_one_are_doubted_where_another_setting_counts_from_zero(tmp_path: Path) -> None:
+    for setting, numbers in ((1, (1, 2, 3)), (2, (0, 1, 2))):
+        for n in numbers:
+            png(tmp_path / f"ldr_exposure{setting}/capture_{n:04d}.png")
+    told = {record.advice for record in looked_at(tmp_path, "spectral", 3).records}
+    assert told == {
+        "the numbers start at 1; used as if they started at 0, though those of ldr_exposure2 do: check that"
+        " the first one is not missing here"
+    }
+    assert {record.advice for record in looked_at(tmp_path, "spectral", 3, 1).records} == {""}
+
+
 def test_a_frame_of_another_name_is_used_by_its_number_and_what_is_too_many_is_not(tmp_path: Path) -> None:
     folder = tmp_path / "graycode_exposure1"
     png(folder / "graycode_00.png")
