@@ -16,6 +16,7 @@ from tests.cases.twin_scan import twin_scan
 def test_a_missing_film_is_named_first(spectral: ScanLines | LineComb) -> None:
     plan = CapturePlan(code=GrayCode(rows=False), spectral=spectral)
     devices, scan = twin_scan(plan, size="112x72", scene="color-checker", film="off")
+    assert devices.calibration is not None
     fit = Fit.read(pipeline.reconstruct(scan, devices.calibration).attrs)
     assert fit is not None
     assert fit.significant[0].part == "film"
@@ -25,6 +26,7 @@ def test_a_missing_film_is_named_first(spectral: ScanLines | LineComb) -> None:
 def test_columns_of_the_code_alone_judge_no_lines() -> None:
     plan = CapturePlan(code=GrayCode(rows=False), spectral=ScanLines(width_px=5, step_px=4))
     devices, scan = twin_scan(plan, size="112x72", scene="color-checker")
+    assert devices.calibration is not None
     fit = Fit.read(
         pipeline.reconstruct(scan, devices.calibration, pipeline.Options(refine_columns=False)).attrs
     )

@@ -123,6 +123,6 @@ def test_an_archive_has_one_black_and_it_is_that_of_the_projector(
     tmp_path: Path, names: tuple[str, ...], taken: tuple[str, ...]
 ) -> None:
     lights = {name: STACK[0] + 3 * k for k, name in enumerate(names)}
-    np.savez(tmp_path / "a.npz", images=STACK, **lights)  # type: ignore[arg-type]
+    np.savez(tmp_path / "a.npz", images=STACK, **lights)
     wanted = np.concatenate([np.stack([lights[name] for name in taken]), STACK])
     np.testing.assert_array_equal(read_pictures(tmp_path / "a.npz"), wanted)
