@@ -54,6 +54,28 @@ def test_pictures_become_columns_and_with_a_calibration_depth(
     assert np.nanmedian(depth[:10]) == pytest.approx(834, rel=0.1)
 
 
+def test_pictures_that_go_against_a_mapping_are_told_or_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    pictures, white, black = frames([("columns", Stripes(bits=7))])
+    named = {f"{i:02d}.png": p for i, p in enumerate([*pictures, white, black])}
+    write(tmp_path / "set", named)
+    assert main(["import", "set", "--guess", "--projector", "128x96"]) == 0
+    capsys.readouterr()
+    by_mapping = ["--mapping", "set.mapping.json"]
+    assert main(["import", "set", *by_mapping]) == 0
+    assert "Unsure" not in capsys.readouterr().out
+    write(tmp_path / "spoilt", named | {"05.png": pictures[0]})
+    assert main(["import", "spoilt", *by_mapping]) == 0
+    assert "Unsure: 04.png and 05.png should be a pattern" in " ".join(capsys.readouterr().out.split())
+    write(tmp_path / "shifted", named | {"dark.png": black})
+    (tmp_path / "shifted" / "07.png").unlink()
+    assert main(["import", "shifted", *by_mapping, "-o", "a.dsl"]) == 2
+    assert "a picture is missing, or another stands in its place" in " ".join(capsys.readouterr().err.split())
+    assert not Path("a.dsl").exists()
+
+
 def test_a_folder_of_no_capture_ends_in_one_sentence(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
