@@ -102,7 +102,9 @@ def part_of(
         return _phases(axis, block, block.reading, blocks, size_px, probes)
     if block.kind == "skip":
         count = len(block.slots)
-        return Skipped(count=count), [f"{count} pictures beside the stripes show no pattern and are not used"]
+        return Skipped(count=count), [
+            f"{count} pictures next to the stripes show no pattern and are not used"
+        ]
     return (WhitePicture() if block.kind == "white" else BlackPicture()), []
 
 
