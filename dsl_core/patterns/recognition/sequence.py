@@ -259,8 +259,9 @@ def _with_phases(
         return [], np.inf
     block = Block("stripes", tuple(others), axis, stripes)
     off = reading.off_rad / MOST_OFF_RAD
-    if turn_nowhere(lines, run_of_phases[:steps]):
-        # More lights than white and black, such as a picture with the lens covered.
+    levels = [float(lines.of(picture).mean()) for picture in run_of_phases]
+    if turn_nowhere(lines, run_of_phases[:steps]) and not any(DARK < level < BRIGHT for level in levels):
+        # More lights than white and black, such as a picture with the lens covered; blurred digits are grey.
         phases = Block("skip", run_of_phases, axis)
     return ([block, phases] if rest[0] else [phases, block]), _cost(stripes) + off
 

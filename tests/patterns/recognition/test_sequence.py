@@ -155,6 +155,13 @@ def test_lights_beside_stripes_are_no_steps_of_a_sinusoid() -> None:
     assert _stripes(found, "columns").bits == 7
 
 
+def test_a_digit_that_is_blurred_to_grey_is_no_light_that_is_left_out() -> None:
+    pictures, white, black = frames([("columns", Stripes(bits=7))])
+    grey = np.asarray((white + black) // 2, np.uint16)
+    found = _recognised([*pictures, grey, grey, white, black])
+    assert found is None or all(block.kind != "skip" for block in found.blocks)
+
+
 @pytest.mark.parametrize(("share", "noise"), [(0.45, 0.004), (1.0, 0.1)])
 def test_white_and_black_are_no_coarse_digit_of_a_part_or_among_noise(share: float, noise: float) -> None:
     whole = scene()
