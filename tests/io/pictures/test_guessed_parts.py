@@ -180,4 +180,4 @@ def test_stripes_say_the_period_of_sinusoids_beside_them(monkeypatch: pytest.Mon
 def test_pictures_that_are_no_part_of_the_code_are_left_out_and_counted() -> None:
     part, (doubt,) = part_of(Block("skip", (4, 5, 6)), [], (4, 3), None)  # type: ignore[arg-type]
     assert part == Skipped(count=3)
-    assert doubt == "3 pictures beside the stripes show no pattern and are not used"
+    assert doubt == "3 pictures next to the stripes show no pattern and are not used"
