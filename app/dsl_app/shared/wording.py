@@ -23,6 +23,7 @@ PHRASES = (
     (": name one with --set", ""),
     ("or write a new one with 'dsl-scan plan'.", "or save another one on the Scan page."),
     ("'dsl-scan design' writes one.", "Open another one."),
+    ("'dsl-scan rigs' lists them.", "The form on the Rig page lists them."),
     (
         "it is a scan; 'dsl-scan reconstruct' makes a result of it",
         "it is a scan; open and reconstruct it first",
