@@ -24,6 +24,17 @@ if TYPE_CHECKING:
 MOST_BYTES = 64 << 20
 
 
+def there(path: Path) -> bool:
+    """Whether something with this path can be seen.
+
+    Not where a folder above it may not be entered or a name is too long: `Path.exists` raises there.
+    """
+    try:
+        return path.exists()
+    except OSError:
+        return False
+
+
 def read_bounded(path: Path, most_bytes: int = MOST_BYTES) -> bytes:
     """The content of a file; raises `OSError` for a pipe, a device, a folder and what is larger."""
     if require_plain(path) > most_bytes:

@@ -9,16 +9,10 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
+from dsl_core.io.reading import there as there
+
 #: File systems take names of 255 bytes; while a file is written, its name has up to 18 more.
 MOST_NAME_BYTES = 220
-
-
-def there(path: Path) -> bool:
-    """Whether something with this path can be seen."""
-    try:
-        return path.exists()
-    except OSError:
-        return False
 
 
 def is_file(path: Path) -> bool:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from dsl_core.errors import StoreError
+from dsl_core.io.reading import there
 from dsl_core.model.plan import CapturePlan
 
 #: Share of the raw size that compressed frames take at most in practice (measured 0.27 to 0.5 on 12 bit
@@ -59,12 +60,4 @@ def estimate(plan: CapturePlan, folder: Path, latency_ms: float) -> Estimate:
 
 def _existing(folder: Path) -> Path:
     """The folder, or the nearest one above it that can be seen."""
-    return next(path for path in (folder, *folder.absolute().parents) if _is_seen(path))
-
-
-def _is_seen(path: Path) -> bool:
-    try:
-        return path.exists()
-    except OSError:
-        # A folder above it may not be entered, or the name is too long: whoever writes there says so.
-        return False
+    return next(path for path in (folder, *folder.absolute().parents) if there(path))
