@@ -78,14 +78,13 @@ class ConsoleGuide:
         print_figures(self.output, fitted.figures)
         if self.tolerant or not failures(fitted.figures):
             return True
-        if self.campaign is None:
-            raise CalibrationError(f"{not_accepted(fitted, kept=False)} Then run the command again.")
-        if fitted.name == "selftest":
-            raise CalibrationError(f"{not_accepted(fitted)} Then run the command again.")
-        raise CalibrationError(
-            f"{not_accepted(fitted)} Capture a step again with 'dsl-scan calibrate {fitted.name}"
-            f" {quoted(self.campaign)} --redo STEP', or accept with --accept-failed."
-        )
+        remedy = "Then run the command again."
+        if self.campaign is not None and fitted.name != "selftest":
+            remedy = (
+                f"Capture a step again with 'dsl-scan calibrate {fitted.name} {quoted(self.campaign)}"
+                " --redo STEP', or accept with --accept-failed."
+            )
+        raise CalibrationError(f"{not_accepted(fitted, kept=self.campaign is not None)} {remedy}")
 
 
 def print_figures(output: Output, figures: Sequence[Figure]) -> None:

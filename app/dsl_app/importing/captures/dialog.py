@@ -200,7 +200,7 @@ class CapturesDialog(JobDialog):
         size_px = self.width_px.value(), self.height_px.value()
         self._commands.set_projector(size_px)
         if not all(size_px):
-            # The size of the mapping at hand holds until another one is guessed.
+            # The size in the current mapping stays until another mapping is guessed.
             self._show_mapping()
 
     def _show_mapping(self) -> None:
