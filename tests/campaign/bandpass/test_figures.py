@@ -15,6 +15,7 @@ from dsl_core.model.calibration.bandpass import BandpassCalibration, FilterSampl
 from dsl_core.model.plan import ScanLines
 from dsl_core.model.spectral import SpectralCurve
 from dsl_core.optics.filters import nominal_filter
+from tests.cases.bandpass_record import bandpass_record
 from tests.cases.small_rig import small_rig
 
 NM = np.arange(400.0, 701.0, 2.0)
@@ -26,33 +27,19 @@ def record(between_rel_std: float) -> BandpassCalibration:
     known = np.abs(np.subtract.outer(NM, CENTRES_NM)).min(1) < 5
     efficiency = SpectralCurve.of(NM, 0.1 + 0 * NM, std=0.1 * np.where(known, 1e-3, between_rel_std))
     response = SpectralCurve.of(NM, 1 + 0 * NM, std=np.full(len(NM), 1e-3))
-    return BandpassCalibration(
-        filters=tuple(
-            FilterSample(
-                filter_nm=nm,
-                effective_nm=nm,
-                found_nm=nm,
-                found_std_nm=1.0,
-                curve_measured=False,
-                zero_dn_per_ms=(1.0, 1.0, 1.0),
-                orders=(),
-            )
-            for nm in CENTRES_NM
-        ),
-        efficiency={1: efficiency, -1: efficiency},
-        second_order_share=0.04,
-        second_order_share_std=0.01,
-        misfit={1: 1.0, -1: 1.0},
-        response=(response, response, response),
-        white_scale=1.0,
-        white_scale_rel_std=0.01,
-        blur_px=0.69,
-        blur_std_px=0.02,
-        halo_peak_per_px=0.0,
-        halo_peak_std_per_px=0.0,
-        halo_decay_px=30.0,
-        halo_decay_std_px=1.0,
-    )
+    filters = [
+        FilterSample(
+            filter_nm=nm,
+            effective_nm=nm,
+            found_nm=nm,
+            found_std_nm=1.0,
+            curve_measured=False,
+            zero_dn_per_ms=(1.0, 1.0, 1.0),
+            orders=(),
+        )
+        for nm in CENTRES_NM
+    ]
+    return bandpass_record(filters, efficiency, (response, response, response))
 
 
 def test_efficiency_is_judged_between_the_filters_as_well() -> None:

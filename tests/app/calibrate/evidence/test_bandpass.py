@@ -12,6 +12,7 @@ from pytestqt.qtbot import QtBot
 from dsl_core.model.calibration.bandpass import BandpassCalibration, FilterSample, OrderSample
 from dsl_core.model.spectral import SpectralCurve
 from tests.app.calibrate.evidence_bench import NM, THEMES, bump, curves, points, row_texts, shown
+from tests.cases.bandpass_record import bandpass_record
 
 
 def order(number: int, ratio: float) -> OrderSample:
@@ -34,22 +35,12 @@ def sample(nm: float, found_nm: float | None, std_nm: float | None = 0.6) -> Fil
 
 def calibration(**changes: Any) -> BandpassCalibration:
     slope = SpectralCurve.of(NM, 0.2 - NM / 5000).model_copy(update={"std": (0.001,) * len(NM)})
-    made = BandpassCalibration(
-        filters=(sample(450.0, 451.2), sample(550.0, 590.0), sample(650.0, None)),
-        efficiency={1: slope, -1: slope},
-        second_order_share=0.04,
-        second_order_share_std=0.01,
-        misfit={1: 1.0, -1: 1.0},
-        response=(bump(600, 30), bump(540, 30), bump(460, 30)),
-        white_scale=1.0,
-        white_scale_rel_std=0.01,
-        blur_px=0.69,
-        blur_std_px=0.02,
-        halo_peak_per_px=0.0,
-        halo_peak_std_per_px=0.0,
-        halo_decay_px=30.0,
-        halo_decay_std_px=1.0,
-        warnings=("the filter of 550 nm: its first orders stand where 590 nm belongs; put the right one in",),
+    warning = "the filter of 550 nm: its first orders stand where 590 nm belongs; put the right one in"
+    made = bandpass_record(
+        (sample(450.0, 451.2), sample(550.0, 590.0), sample(650.0, None)),
+        slope,
+        (bump(600, 30), bump(540, 30), bump(460, 30)),
+        warnings=(warning,),
     )
     return made.model_copy(update=changes)
 
