@@ -16,21 +16,26 @@ LEVELS = (("Everything", logging.DEBUG), ("Information", logging.INFO), ("Warnin
 
 
 class LogRecords(QObject, logging.Handler):
-    """Passes log records of any thread to the window's thread and keeps the last ones."""
+    """Passes log records of any thread to the window's thread, where the last ones are kept."""
 
     arrived = Signal(int, str)
+    _sent = Signal(int, str)
 
     def __init__(self, parent: QObject | None = None) -> None:
         QObject.__init__(self, parent)
         logging.Handler.__init__(self, logging.DEBUG)
         self.setFormatter(logging.Formatter("%(asctime)s  %(levelname)-7s  %(name)s  %(message)s"))
         self.lines: deque[tuple[int, str]] = deque(maxlen=MOST_LINES)
+        self._sent.connect(self._keep)
 
     def emit(self, record: logging.LogRecord) -> None:  # type: ignore[override]
-        """Keep a record and pass it on."""
-        text = self.format(record)
-        self.lines.append((record.levelno, text))
-        self.arrived.emit(record.levelno, text)
+        """Pass a record on."""
+        self._sent.emit(record.levelno, self.format(record))
+
+    def _keep(self, level: int, text: str) -> None:
+        """Keep a line, in the window's thread: who reads them there and hears of new ones has each once."""
+        self.lines.append((level, text))
+        self.arrived.emit(level, text)
 
 
 class LogPanel(QWidget):
@@ -51,7 +56,6 @@ class LogPanel(QWidget):
         self.view.setMaximumBlockCount(MOST_LINES)
         self.view.setAccessibleName("Log")
         self.view.setToolTip("What the program did and what went wrong, the latest at the bottom")
-        self.view.setPlaceholderText("No messages yet.")
         row = row_of(QLabel("Show"), self._level, self._filter, copy)
         column_of(row, self.view, on=self)
         self._level.currentIndexChanged.connect(self._refill)
@@ -66,7 +70,15 @@ class LogPanel(QWidget):
     def _add(self, level: int, text: str) -> None:
         if self._matches(level, text):
             self.view.appendPlainText(text)
+        self._say_why_empty()
 
     def _refill(self) -> None:
         lines = [text for level, text in self._records.lines if self._matches(level, text)]
         self.view.setPlainText("\n".join(lines))
+        self._say_why_empty()
+
+    def _say_why_empty(self) -> None:
+        hidden = len(self._records.lines) > 0
+        self.view.setPlaceholderText(
+            "No message has the level and the text chosen above." if hidden else "No messages yet."
+        )
