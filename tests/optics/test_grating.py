@@ -94,18 +94,35 @@ def test_light_traced_forward_through_the_film_meets_the_point() -> None:
     assert (out.y * scale + leaving.y * along - goal.y).abs().max() < 1e-3
 
 
-def test_iteration_has_converged(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_no_step_takes_time_for_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     rig = published_rig()
     pixels, depth = sampled(rig)
-    few = GratingModel(rig).exact(pixels, depth, 1, BANDS_NM)
-    monkeypatch.setattr(grating, "ITERATIONS", grating.ITERATIONS - 1)
-    fewer = GratingModel(rig).exact(pixels, depth, 1, BANDS_NM)
-    monkeypatch.setattr(grating, "ITERATIONS", 60)
-    many = GratingModel(rig).exact(pixels, depth, 1, BANDS_NM)
+    found = {}
+    for steps in (grating.STEPS - 1, grating.STEPS, 60):
+        monkeypatch.setattr(grating, "STEPS", steps)
+        found[steps] = GratingModel(rig).exact(pixels, depth, 1, BANDS_NM)
+    fewer, few, many = found.values()
     inside = many.inside(640, 360)
-    assert (few.columns - many.columns)[inside].abs().max() < 3e-4
-    assert (few.rows - many.rows)[inside].abs().max() < 3e-4
-    assert (fewer.columns - many.columns)[inside].abs().max() > 3e-4, "a step that takes time for nothing"
+    assert (few.columns - many.columns)[inside].abs().max() < 3e-5
+    assert (few.rows - many.rows)[inside].abs().max() < 3e-5
+    assert (fewer.columns - many.columns)[inside].abs().max() > 3e-5
+
+
+@pytest.mark.parametrize(
+    ("film_mm", "scene_mm"), [(29, 700), (29, 300), (60, 300), (80, 300), (29, 100), (150, 300), (5, 20000)]
+)
+def test_light_arrives_where_it_is_sent_wherever_the_film_is(film_mm: float, scene_mm: float) -> None:
+    """A ray in the plane across the lines is traced forwards, by the sine of its angle alone."""
+    frame = FilmFrame.of(Film(distance_mm=film_mm, lines_per_mm=500.0))
+    sent = torch.atan(torch.linspace(-0.32, 0.32, 33, dtype=torch.float64))
+    for order in (1, -1):
+        for nm in NM:
+            leaving = torch.asin(torch.sin(sent) - order * nm / frame.period_nm)
+            across = film_mm * torch.tan(sent) + (scene_mm - film_mm) * torch.tan(leaving)
+            there = Vectors(across, torch.zeros_like(across), torch.full_like(across, scene_mm))
+            back = incoming_direction(frame, there, order, nm.expand(len(sent)))
+            # 1,000 columns a radian, as the published projector has nearly.
+            assert 1000 * (back.x / back.z - torch.tan(sent)).abs().max() < 2e-3
 
 
 def test_interpolation_over_wavelength_is_exact_to_a_hundredth_column() -> None:
@@ -145,7 +162,7 @@ def test_film_of_no_lines_bends_nothing() -> None:
 def test_light_through_a_bent_film_leaves_from_where_it_meets_it(
     order: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(grating, "ITERATIONS", 80)
+    monkeypatch.setattr(grating, "STEPS", 80)
     film = Film(
         lines_per_mm=200, bend_per_mm=0.03, tilt_x_deg=2.0, tilt_y_deg=-4.0, roll_deg=3.0, distance_mm=30.0
     )
