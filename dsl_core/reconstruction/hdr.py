@@ -151,7 +151,7 @@ class HdrMerger:
         gained: Sequence[tuple[float, float]] | None = None,
     ) -> None:
         """The same into ``radiance`` and ``std``, of half or single precision, both (rows, columns)."""
-        saturated = _room().of(self.shape, bool)
+        saturated = _room().of("saturated", self.shape, bool)
         if std.dtype == np.float16:
             self._merge(raws, levels, gained, radiance, _NO_VALUES, std.view(np.uint16), saturated)
         else:
@@ -183,7 +183,7 @@ class HdrMerger:
             black = np.stack(
                 [gained_black(each, *more, self._level_dn) for each, more in zip(black, gained, strict=True)]
             )
-        counts = _room().of(self._black.shape, np.uint16)
+        counts = _room().of("counts", self._black.shape, np.uint16)
         np.stack(raws, out=counts)
         merge_settings(
             counts, black, self._floor, self._gains * light, self._shots * light, self._limit_dn,

@@ -7,7 +7,7 @@ from collections import deque
 from collections.abc import Callable, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass, replace
-from typing import Any, Protocol, TypeVar
+from typing import Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,6 +31,7 @@ from dsl_core.reconstruction.hdr import (
     setting_gains_ms,
 )
 from dsl_core.reconstruction.light.setting_ratios import Ratio, compare_settings
+from dsl_core.reconstruction.room import Room
 
 T = TypeVar("T")
 Floats = NDArray[np.float32]
@@ -245,15 +246,14 @@ def decode_columns(scan: MergedScan, progress: Progress | None = None) -> tuple[
     return decoder.finish(), white
 
 
-def stack_lines(
-    scan: MergedScan, progress: Progress | None = None, empty: Callable[..., NDArray[Any]] = np.empty
-) -> LineStack:
+def stack_lines(scan: MergedScan, progress: Progress | None = None, room: Room | None = None) -> LineStack:
     """Read and merge every spectral frame; deviations take half precision wherever it holds them.
 
-    ``empty`` makes the arrays, of a shape and a type.
+    The stack is in the memory of ``room``, if given, where the next one will be as well.
     """
-    shape = (scan.plan.spectral_count, *scan.black_std.shape)
-    stack = LineStack(empty(shape, np.float32), empty(shape, deviation_type(scan)), scan.black_std)
+    shape, room = (scan.plan.spectral_count, *scan.black_std.shape), room or Room()
+    radiance = room.of("radiance", shape, np.float32)
+    stack = LineStack(radiance, room.of("std", shape, deviation_type(scan)), scan.black_std)
 
     def load(k: int) -> None:
         scan.merge_line(k, None, stack.radiance[k], stack.std[k])

@@ -10,20 +10,20 @@ from numpy.typing import DTypeLike, NDArray
 
 
 class Room:
-    """An array of each type, as large as was ever needed."""
+    """An array for each use, as large as was ever needed."""
 
     def __init__(self) -> None:
-        self._kept: dict[np.dtype[np.generic], NDArray[Any]] = {}
+        self._kept: dict[str, NDArray[Any]] = {}
 
-    def of(self, shape: tuple[int, ...], dtype: DTypeLike) -> NDArray[Any]:
-        """An array of a shape, with any content; earlier ones of its type must not be used any more."""
+    def of(self, use: str, shape: tuple[int, ...], dtype: DTypeLike) -> NDArray[Any]:
+        """An array of a shape, with any content; earlier ones of this use must not be used any more."""
         kind, count = np.dtype(dtype), math.prod(shape)
-        kept = self._kept.get(kind)
-        if kept is None or kept.size < count:
+        kept = self._kept.get(use)
+        if kept is None or kept.size < count or kept.dtype != kind:
             # The old one is let go before the new one is made.
-            self._kept.pop(kind, None)
+            self._kept.pop(use, None)
             del kept
-            kept = self._kept[kind] = np.empty(count, kind)
+            kept = self._kept[use] = np.empty(count, kind)
         return kept[:count].reshape(shape)
 
     def clear(self) -> None:

@@ -129,7 +129,7 @@ class ScanFrames:
             scan = self._scan()
             if not self.in_one:
                 scan = MergedScan(RowsOf(self.source, band.near), self.rig, self._exposed, compares=False)
-            stack = stack_lines(scan, progress, self._room.of)
+            stack = stack_lines(scan, progress, self._room)
             if self._light is not None:
                 self._light.steady(stack)
             self._held = band, stack
