@@ -91,8 +91,9 @@ class SpectrumPanel(QWidget):
             self._show_band()
             return
         nm = result.wavelengths_nm
-        self.item.setXRange(nm[0], nm[-1], padding=0.02)
+        # Old limits would cut the new range.
         self.item.getViewBox().setLimits(xMin=nm[0] - 20, xMax=nm[-1] + 20)
+        self.item.setXRange(nm[0], nm[-1], padding=0.02)
         self._top = min(max(1.08 * spread_of(result["reflectance"][::6], 0.5, 99.8)[1], 0.1), TOP)
         self._show_band()
         self._draw_again()
@@ -134,7 +135,7 @@ class SpectrumPanel(QWidget):
         self._show_cursor(self._state.cursor.value)
         low, high = _RANGES.get(transform, (0.0, self._top))
         high += len(self._curves) * self._step
-        # Old limits would cut the new range.
+        # Old limits would cut the new range here, too.
         self.item.getViewBox().setLimits(yMin=min(-0.5, 4 * low), yMax=max(3.0, 4 * high))
         self.item.setYRange(low, high, padding=PADDING)
 

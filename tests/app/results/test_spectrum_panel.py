@@ -10,6 +10,7 @@ from dsl_app.results.spectrum_panel import MOST_BANDS
 from dsl_app.results.state import ResultView
 from dsl_app.shared.widgets.spectrum_curve import SpectrumCurve
 
+from dsl_core.io.result.result_file import load_result, save_result
 from tests.app.support.results_bench import Bench
 from tests.app.support.results_bench import bench as bench
 from tests.app.support.small_result import NM, write_small_result
@@ -83,3 +84,15 @@ def test_a_result_of_depth_only_says_why_there_are_no_curves(bench: Bench, tmp_p
     assert panel.note.text().startswith("This result has depth only.")
     assert bench.page.marks.hint.text() == panel.note.text(), "nothing can be pinned"
     assert (panel.note.isVisible(), panel.band_line.isVisible()) == (True, False)
+
+
+def test_the_graph_shows_all_bands_of_a_result_after_one_of_fewer(bench: Bench, tmp_path: Path) -> None:
+    whole = bench.state.result.value
+    assert whole is not None
+    low, high = bench.page.spectra.content.item.viewRange()[0]
+    part = load_result(whole.path).sel(wavelength_nm=slice(500.0, 600.0))
+    bench.window.open_path(save_result(part, tmp_path / "part.zarr"))
+    assert bench.page.spectra.content.item.viewRange()[0] == pytest.approx([498, 602], abs=1)
+    bench.window.open_path(whole.path)
+    assert bench.page.spectra.content.item.viewRange()[0] == pytest.approx([low, high])
+    assert (low < NM[0], high > NM[-1]) == (True, True)
