@@ -166,6 +166,10 @@ class PairFigures(QSplitter):
 
     def _show_pair(self, pair: Pair | None) -> None:
         self.table.show_verdicts(() if pair is None else pair.rows)
+        sides = () if pair is None else (pair.first, pair.second)
+        bands_nm = [nm for side in sides for nm in side.arrays.wavelengths_nm]
+        if bands_nm:
+            self.plot.setXRange(min(bands_nm), max(bands_nm), padding=0.02)
         self._show_cursor()
 
     def _show_cursor(self) -> None:

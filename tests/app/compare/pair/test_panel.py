@@ -6,9 +6,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 from dsl_app.compare.pair.controller import PairController
-from dsl_app.compare.pair.panel import PairPanel
+from dsl_app.compare.pair.panel import PairFigures, PairPanel
 from dsl_app.compare.pair.sides import SmallDepth
-from dsl_app.compare.pair.state import PairQuantity, PairState
+from dsl_app.compare.pair.state import Pair, PairQuantity, PairState, Side
 from dsl_app.shared.jobs.qt_runner import QtRunner
 from dsl_app.shared.settings import RecentFiles, Settings
 from dsl_app.shared.theme import DARK, LIGHT
@@ -18,6 +18,7 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QFileDialog
 from pytestqt.qtbot import QtBot
 
+from dsl_core.io.result.result_arrays import ResultArrays
 from tests.app.support.compare_bench import make_result, make_variant
 from tests.app.support.doubles import RecordingNotifier
 
@@ -188,3 +189,17 @@ def test_pictures_stay_where_they_are_while_work_is_told(qtbot: QtBot, bench: Be
     QApplication.processEvents()
     assert not page.hint.isVisible()
     assert page.parts.geometry() == before
+
+
+def test_spectra_are_drawn_over_the_bands_of_both_results(qtbot: QtBot) -> None:
+    state = PairState()
+    figures = PairFigures(state)
+    qtbot.addWidget(figures)
+    sides = []
+    for name, nm in (("near", np.arange(700.0, 901.0, 10.0)), ("far", np.arange(800.0, 1001.0, 10.0))):
+        depth = np.full((2, 3), 700.0, np.float32)
+        arrays = {"depth_mm": depth, "reflectance": np.full((nm.size, 2, 3), 0.5, np.float32)}
+        sides.append(Side(name, ResultArrays(Path(f"{name}.zarr"), nm, arrays)))
+    state.pair.set(Pair(sides[0], sides[1], ((10, 0),), ()))
+    assert figures.plot.getPlotItem().viewRange()[0] == pytest.approx([694, 1006])
+    stop_following(figures)
