@@ -25,7 +25,7 @@ from dsl_app.results.cloud.views import (
     prepare_cloud_view,
 )
 from dsl_app.results.controller import ResultsController
-from dsl_app.results.layers import Layers, materials_table, rgb_of, tinted_by, within
+from dsl_app.results.layers import NOTHING, Layers, materials_table, rgb_of, tinted_by, within
 from dsl_app.results.state import ResultsState, ResultView, Tool
 from dsl_app.shared.jobs.base import Job, JobRunner
 from dsl_app.shared.spectrum import Pixel
@@ -168,11 +168,8 @@ class CloudPanel(QWidget):
             # Even while hidden: a closed result must not stay in memory.
             self._layers, self._grid = None, Grid((0, 0), np.empty(0, np.intp))
             self._picking.take(np.empty((0, 3), np.float32), self._grid.flat, 1)
-            self._show_measured(None)
-        if self.view is None or not self.isVisible():
-            return
-        if result is None or "points_mm" not in result.arrays:
-            self._hint.setText("This result has no points.")
+            self._begin_again()
+        if self.view is None or result is None or not self.isVisible():
             return
         if self._layers is None:
             self._layers = Layers(result)
@@ -217,8 +214,10 @@ class CloudPanel(QWidget):
             return
         layer = self._layers.layer(self._state)
         if layer is None:
-            return
-        colours = rgb_of(layer).reshape(-1, 3)[self._grid.flat]
+            # The picture beside says why.
+            colours = np.full(self._picking.points.shape, tuple(bytes.fromhex(NOTHING[1:])), np.uint8)
+        else:
+            colours = rgb_of(layer).reshape(-1, 3)[self._grid.flat]
         materials, search = self._state.materials.value, self._state.search.value
         if materials is not None:
             shown = materials.found.shown
@@ -266,9 +265,14 @@ class CloudPanel(QWidget):
 
     def _start_measuring(self, kind: Measure) -> None:
         self._measure = kind
-        self._picked.clear()
-        self._show_measured(None)
+        self._begin_again()
         self._show_hint()
+
+    def _begin_again(self) -> None:
+        """Forget what is measured, and what a person is about to measure or to draw."""
+        self._picked.clear()
+        self._lasso, self._press = [], None
+        self._show_measured(None)
 
     def _measure_pixel(self, pixel: Pixel) -> None:
         result = self._state.result.value

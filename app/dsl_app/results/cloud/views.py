@@ -46,7 +46,7 @@ DRAWING = "Drawing the first 3D picture…"
 SLOW = "Without a graphics card this can take a minute. Everything else can be used meanwhile."
 SLOW_MS = 3000
 #: Said where no point is to be drawn.
-NO_POINTS = "No pixel with a depth is shown: the result has none, or none within the limits of depth."
+NO_POINTS = "No point is shown: the result has none, or none within the limits of depth."
 _BUTTONS: dict[Qt.MouseButton, MouseButton] = {
     Qt.MouseButton.LeftButton: "Left",
     Qt.MouseButton.MiddleButton: "Middle",
@@ -314,7 +314,7 @@ class StaticCloud(CloudView):
 
     def __init__(self, why: str) -> None:
         super().__init__()
-        self._picture = label("", name="Picture of the point cloud")
+        self._picture = label("", "muted", wraps=True, name="Picture of the point cloud")
         self._picture.setAlignment(Qt.AlignmentFlag.AlignCenter)
         # It fits into its room, whatever that is, and asks for none.
         self._picture.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Ignored)
@@ -330,6 +330,8 @@ class StaticCloud(CloudView):
         self._drawn = points, colours
         picture = static_picture(points, colours, self._background)
         if picture is None:
+            self._whole = QPixmap()
+            self._picture.setText(NO_POINTS)
             return
         height, width = picture.shape[:2]
         image = QImage(picture.data, width, height, 3 * width, QImage.Format.Format_RGB888).copy()

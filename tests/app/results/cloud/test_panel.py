@@ -10,9 +10,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 from dsl_app.results.cloud import panel as cloud_panel
+from dsl_app.results.cloud.measuring import Measure
 from dsl_app.results.cloud.render_window import RenderWindow, graphics_work
 from dsl_app.results.cloud.views import DRAWING, InteractiveCloud, StaticCloud
-from dsl_app.results.state import ResultView, Tool
+from dsl_app.results.layers import NOTHING
+from dsl_app.results.state import QualityMap, ResultView, Tool
 from dsl_app.shared.theme import DARK, LIGHT
 from PySide6.QtCore import QPoint, Qt
 from PySide6.QtTest import QTest
@@ -20,23 +22,79 @@ from PySide6.QtWidgets import QLabel
 from pytestqt.qtbot import QtBot
 
 from dsl_core.errors import Cancelled
+from dsl_core.io.result.result_file import load_result, save_result
 from tests.app.results.cloud.test_views import _picture, cloud_view, place_of
 from tests.app.support.results_bench import Bench, move
 from tests.app.support.results_bench import bench as bench
 from tests.app.support.small_result import write_small_result
 
 
-def test_without_graphics_the_cloud_is_a_picture_with_a_sentence(
-    bench: Bench, qtbot: QtBot, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def _still_view(bench: Bench, qtbot: QtBot, monkeypatch: pytest.MonkeyPatch) -> StaticCloud:
+    """The view where nothing draws in 3D, with its points."""
     monkeypatch.setattr(cloud_panel, "prepare_cloud_view", lambda: False)
     bench.control.show(ResultView.CLOUD)
     qtbot.waitUntil(lambda: bench.page.cloud.view is not None)
     view = bench.page.cloud.view
-    assert view is not None
+    assert isinstance(view, StaticCloud)
+    qtbot.waitUntil(lambda: not view._picture.pixmap().isNull())
+    return view
+
+
+def _open_farther(bench: Bench, folder: Path, *without: str) -> None:
+    """Open a result that is twice as far away, without some arrays."""
+    assert bench.state.result.value is not None
+    data = load_result(bench.state.result.value.path).load()
+    for name in ("depth_mm", "points_mm"):
+        data[name] *= 2
+    bench.window.open_path(save_result(data.drop_vars(list(without)), folder / "farther.zarr"))
+
+
+def test_without_graphics_the_cloud_is_a_picture_with_a_sentence(
+    bench: Bench, qtbot: QtBot, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    view = _still_view(bench, qtbot, monkeypatch)
     labels = view.findChildren(QLabel)
-    qtbot.waitUntil(lambda: any(not label.pixmap().isNull() for label in labels))
     assert any("cannot be rotated here" in label.text() for label in labels)
+
+
+def test_a_result_without_the_colours_that_are_chosen_is_grey(
+    bench: Bench, qtbot: QtBot, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    view = _still_view(bench, qtbot, monkeypatch)
+    bench.state.cloud_by.set(ResultView.QUALITY)
+    bench.state.quality.set(QualityMap.DEPTH_SPREAD)
+    _open_farther(bench, tmp_path, "depth_std_mm")
+    qtbot.waitUntil(lambda: view._drawn is not None and bool(view._drawn[0][:, 2].min() >= 1400))
+    assert view._drawn is not None
+    assert {tuple(colour) for colour in view._drawn[1].tolist()} == {tuple(bytes.fromhex(NOTHING[1:]))}
+    assert bench.page.image.content.legend.text() == "This result has no deviation of depth."
+
+
+def test_a_result_without_points_leaves_nothing_of_the_one_before(
+    bench: Bench, qtbot: QtBot, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    view = _still_view(bench, qtbot, monkeypatch)
+    _open_farther(bench, tmp_path, "points_mm")
+    # Its pixels have a depth.
+    qtbot.waitUntil(lambda: view._picture.text().startswith("No point is shown: the result has none"))
+    view.resize(view.size() * 0.9)
+    assert view._picture.pixmap().isNull()
+
+
+def test_a_measurement_does_not_go_on_in_another_result(
+    bench: Bench, qtbot: QtBot, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    _still_view(bench, qtbot, monkeypatch)
+    panel = bench.page.cloud
+    panel.tools.measure_chosen.emit(Measure.DISTANCE)
+    panel._measure_pixel((30, 20))
+    panel._lasso, panel._press = [(0.0, 0.0)], (0.0, 0.0)
+    _open_farther(bench, tmp_path)
+    assert (panel._lasso, panel._press) == ([], None)
+    panel._measure_pixel((3, 3))
+    assert panel._hint.text() == Measure.DISTANCE.value
+    panel._measure_pixel((30, 20))
+    assert panel._hint.text().startswith("Distance ")
 
 
 def test_it_says_what_it_does_until_there_is_a_picture(
