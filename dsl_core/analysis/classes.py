@@ -141,19 +141,25 @@ def class_of_pixels(
     """The class of marked pixels: their mean, and how they vary more than their deviations say.
 
     Cubes (bands, rows, columns), mask and ``flags`` (rows, columns): pixels that get no class define none,
-    unless there are no others. Raises `DecodeError` where no pixel has a spectrum.
+    unless there are no others. Raises `DecodeError` where no pixel has a spectrum with deviations.
     """
     if flags is not None and (mask & ((flags & int(NOT_JUDGED)) == 0)).any():
         mask = mask & ((flags & int(NOT_JUDGED)) == 0)
     y, x = np.nonzero(mask)
     values, spread = reflectance[:, y, x].astype(np.float64), std[:, y, x].astype(np.float64)
-    known = np.isfinite(values).all(0) & np.isfinite(spread).all(0)
+    has_spectrum = np.isfinite(values).all(0)
+    known = has_spectrum & np.isfinite(spread).all(0)
     values, spread = values[:, known], spread[:, known]
     count = values.shape[1]
     if len(values) < FEWEST_BANDS:
         raise DecodeError(
             f"The result has {counted(len(values), 'band')}; {FEWEST_BANDS} at least tell materials apart."
             " Reconstruct more bands."
+        )
+    if count == 0 and has_spectrum.any():
+        raise DecodeError(
+            f"{name}: none of its {len(y)} pixels has deviations of its spectrum. Mark another place, or name"
+            " materials from a library by spectral angle."
         )
     if count == 0:
         raise DecodeError(f"{name}: none of its {len(y)} pixels has a spectrum. Mark another place.")

@@ -173,6 +173,11 @@ def test_pixels_of_pins_find_their_material(cube: ChartCube) -> None:
 def test_wrong_input_is_told(cube: ChartCube) -> None:
     with pytest.raises(DecodeError, match="1 to 250 classes; given 0"):
         score(cube.reflectance, cube.std, None, cube.flags, [])
+    unknown = np.full_like(cube.std, np.nan)
+    with pytest.raises(DecodeError, match=r"none of its .* has deviations .* by spectral angle"):
+        class_of_pixels("x", cube.reflectance, unknown, cube.material == 1)
+    with pytest.raises(DecodeError, match=r"has a spectrum\. Mark another place"):
+        class_of_pixels("x", np.full_like(cube.reflectance, np.nan), unknown, cube.material == 1)
     with pytest.raises(DecodeError, match="states no deviations"):
         score(cube.reflectance, None, None, cube.flags, _classes(cube))
     with pytest.raises(DecodeError, match="does not have the 24 bands"):
