@@ -10,7 +10,7 @@ from PySide6.QtWidgets import QFrame
 
 from dsl_app.results.state import ResultsState
 from dsl_app.shared.evented import follow_any
-from dsl_app.shared.spectrum import Pixel, number_text
+from dsl_app.shared.spectrum import Pixel, number_text, number_with_std
 from dsl_app.shared.widgets.forms import label
 from dsl_app.shared.widgets.layouts import column_of
 from dsl_core.evaluation.marks import explain_pixel
@@ -30,15 +30,14 @@ def pixel_text(result: ResultArrays, pixel: Pixel, band: int) -> str:
     if "points_mm" in result.arrays:
         x, y, z = (float(v) for v in result.at("points_mm", pixel))
         spread = float(result.at("depth_std_mm", pixel)) if "depth_std_mm" in result.arrays else math.nan
-        place = f"x {number_text(x, 1)}  y {number_text(y, 1)}  z {number_text(z, 2)}"
-        parts.append(f"{place} ± {number_text(spread, 2)} mm" if math.isfinite(z) else "no depth")
+        place = f"x {number_text(x, 1)}  y {number_text(y, 1)}  z {number_with_std(z, spread, 2)} mm"
+        parts.append(place if math.isfinite(z) else "no depth")
     if result.has_spectra:
         value, std = (
             float(result.at(name, pixel)[band]) if name in result.arrays else math.nan
             for name in ("reflectance", "reflectance_std")
         )
-        value_text = f"{number_text(value, 3)} ± {number_text(std, 3)}"
-        known = value_text if math.isfinite(value) else "no reflectance"
+        known = number_with_std(value, std, 3) if math.isfinite(value) else "no reflectance"
         parts.append(f"{result.wavelengths_nm[band]:g} nm  {known}")
     return BETWEEN.join(parts)
 

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dsl_core.io.result.result_arrays import ResultArrays
+from dsl_core.model.figure import with_std
 from dsl_core.solve.normal import BAND_95
 
 #: Column and row of a pixel.
@@ -51,3 +52,14 @@ def number_text(value: float, decimals: int) -> str:
     ('−1.2', '–')
     """
     return f"{value:.{decimals}f}".replace("-", "−") if np.isfinite(value) else "–"
+
+
+def number_with_std(value: float, std: float, decimals: int) -> str:
+    """A number and its deviation with at most so many decimals; a dash for what is not known.
+
+    >>> number_with_std(-0.4, 0.012, 3), number_with_std(702.5, 0.004, 2), number_with_std(702.5, np.nan, 2)
+    ('−0.400 ± 0.012', '702.50 ± 0.01', '702.50 ± –')
+    """
+    if np.isfinite(value) and np.isfinite(std) and std > 0:
+        return with_std(value, std, decimals).replace("-", "−")
+    return f"{number_text(value, decimals)} ± {number_text(std, decimals)}"

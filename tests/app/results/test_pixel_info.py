@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
+from dsl_app.results.pixel_info import pixel_text
 from pytestqt.qtbot import QtBot
 
 from tests.app.support.results_bench import Bench, move
@@ -38,3 +41,14 @@ def test_a_bad_pixel_says_why(bench: Bench) -> None:
     assert np.isfinite(dashed).sum() == 5
     bench.control.point_at((9, 9))
     assert "has no flags" in bench.page.pixel_info.reasons.text()
+
+
+def test_a_deviation_that_is_known_is_not_told_as_zero(bench: Bench) -> None:
+    result = bench.state.result.value
+    assert result is not None
+    tiny = {name: result[name] * np.float32(1e-3) for name in ("depth_std_mm", "reflectance_std")}
+    text = pixel_text(replace(result, arrays={**result.arrays, **tiny}), (20, 8), 23)
+    assert text.endswith("z 710.00 ± 0.01 mm   ·   545 nm  0.400 ± 0.001")
+    unknown = {name: result[name] * np.float32(np.nan) for name in tiny}
+    text = pixel_text(replace(result, arrays={**result.arrays, **unknown}), (20, 8), 23)
+    assert text.endswith("z 710.00 ± – mm   ·   545 nm  0.400 ± –")

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dsl_app.shared.evented import Value
-from dsl_app.shared.spectrum import Pixel, number_text
+from dsl_app.shared.spectrum import Pixel, number_text, number_with_std
 from dsl_app.shared.widget_state import ButtonState, LabelState
 from dsl_app.shared.wording import short_name
 from dsl_core.evaluation.summary import Truth
@@ -225,8 +225,12 @@ def cursor_text(state: PairState) -> str:
     decimals, unit = (2, " mm") if state.shown.value is PairQuantity.DEPTH else (3, "")
     of_both = (("A", a, std_a), ("B", b, std_b), ("A − B", a - b, math.hypot(std_a, std_b)))
     values = "   ".join(
-        f"{name} {number_text(value, decimals)}"
-        + (f" ± {number_text(std, decimals)}" if std > 0 and math.isfinite(value) else "")
+        f"{name} "
+        + (
+            number_with_std(value, std, decimals)
+            if std > 0 and math.isfinite(value)
+            else number_text(value, decimals)
+        )
         for name, value, std in of_both
     )
     x_px, y_px = pair.first.arrays.in_picture(pixel)

@@ -153,6 +153,11 @@ def test_values_under_the_cursor_have_their_deviations_but_for_the_truth() -> No
     assert cursor_text(state) == "column 2, row 1:   A 700.00 ± 0.03   B 700.00   A − B 0.00 ± 0.03 mm"
     state.pair.set(Pair(first, replace(first, name="again"), ((0, 0),), ()))
     assert cursor_text(state).endswith("B 700.00 ± 0.03   A − B 0.00 ± 0.04 mm")
+    # A deviation that is known is no zero.
+    tiny = {name: each / 100 for name, each in stds.items()}
+    small = replace(first, arrays=replace(first.arrays, arrays={**first.arrays.arrays, **tiny}))
+    state.pair.set(Pair(small, second, ((0, 0),), ()))
+    assert "A 700.00 ± 0.01   B 700.00 " in cursor_text(state)
     # Where one states none, nobody knows how sure the difference is.
     state.pair.set(Pair(first, side("plain", 702.5, 0.75), ((0, 0),), ()))
     assert cursor_text(state).endswith("A 700.00 ± 0.03   B 702.50   A − B −2.50 mm")
