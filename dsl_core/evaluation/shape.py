@@ -41,13 +41,19 @@ class PlaneFit:
 def fit_plane(points_mm: Floats, depth_std_mm: Floats | None = None) -> PlaneFit | None:
     """The plane through points (n, 3), weighted by the deviation of their depths; None for fewer than four.
 
+    Points without a deviation are left out, unless fewer than four have one: then it is known of none.
+
     Depth errs along the ray of a pixel. Along a ray a plane's inverse depth is affine in the ray, ``1/z =
     (n . ray) / d``, so that the fit is linear in what is uncertain. Points off the plane by far more than
     others count less.
     """
     points = np.asarray(points_mm, np.float64)
     std = None if depth_std_mm is None else np.asarray(depth_std_mm, np.float64)
-    known = np.isfinite(points).all(1) & (True if std is None else np.isfinite(std) & (std > 0))
+    known = there = np.isfinite(points).all(1)
+    if std is not None:
+        known = there & np.isfinite(std) & (std > 0)
+        if known.sum() < 4:
+            std, known = None, there
     points = points[known]
     if len(points) < 4:
         return None
@@ -124,7 +130,8 @@ class Section:
 
     ``along_mm`` runs along the straight line between the two points, from 0 to its length; ``height_mm`` is
     how far the surface is from that line, towards the camera; ``std_mm`` the deviation of that height by the
-    deviations of depth, those of the two points among them. NaN where the surface has no point.
+    deviations of depth, those of the two points among them. NaN where the surface has no point, or where one
+    of these deviations is not known.
     """
 
     along_mm: NDArray[np.float64]
@@ -165,7 +172,7 @@ def _with_ends(own: NDArray[np.float64], share: NDArray[np.float64]) -> NDArray[
 
     ``own`` are those of the points alone, ``share`` how far along the line each is. The ends are on it.
     """
-    first, last = np.nan_to_num(own[[0, -1]])
+    first, last = own[[0, -1]]
     total = np.asarray(np.sqrt(own**2 + ((1 - share) * first) ** 2 + (share * last) ** 2))
     total[[0, -1]] = np.where(np.isfinite(own[[0, -1]]), 0.0, np.nan)
     return total

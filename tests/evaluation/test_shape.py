@@ -49,6 +49,23 @@ def test_what_stands_out_does_not_tilt_the_plane() -> None:
     assert fit_plane(np.full((9, 3), np.nan)) is None
 
 
+@pytest.mark.parametrize("std_mm", [0.0, np.nan])
+def test_a_plane_is_found_where_nobody_knows_the_deviations(std_mm: float) -> None:
+    points = _tilted(20.0).reshape(3, -1).T
+    fit = fit_plane(points, np.full(len(points), std_mm))
+    assert fit is not None
+    assert (fit.used, fit.tilt_deg) == (len(points), pytest.approx(20.0))
+    assert np.isnan(fit.expected_mm)
+
+
+def test_a_section_is_as_unknown_as_the_ends_of_its_line() -> None:
+    std = np.full(SHAPE, 0.3)
+    std[24, 60] = np.nan
+    cut = section(_tilted(20.0), std, (4, 24), (60, 24))
+    assert cut is not None
+    assert np.isnan(cut.std_mm[1:]).all()
+
+
 def test_a_section_of_a_step_shows_its_height_and_length() -> None:
     rays = _rays()
     depth = np.where((np.arange(64) > 20) & (np.arange(64) < 44), 690.0, 700.0) * np.ones(SHAPE)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from enum import Enum
 
@@ -39,11 +38,9 @@ def measure_points(result: ResultArrays, kind: Measure, first: Pixel, last: Pixe
     """The distance or section between two pixels that have points."""
     a, b = (np.asarray(result.at("points_mm", pixel), np.float64) for pixel in (first, last))
     std = result.known("depth_std_mm")
-    a_std, b_std = (
-        0.0 if std is None else float(np.nan_to_num(std[pixel[1], pixel[0]])) for pixel in (first, last)
-    )
+    a_std, b_std = (0.0 if std is None else float(std[pixel[1], pixel[0]]) for pixel in (first, last))
     distance = distance_between(a, b, a_std, b_std)
-    text = f"Distance {_with_deviation(distance.mm, distance.std_mm)} mm"
+    text = f"Distance {with_std(distance.mm, distance.std_mm, 3)} mm"
     if kind is Measure.DISTANCE:
         return Measured(text, (a, b))
     cut = section(result["points_mm"], std, first, last)
@@ -52,18 +49,6 @@ def measure_points(result: ResultArrays, kind: Measure, first: Pixel, last: Pixe
     low, high = np.nanmin(cut.height_mm), np.nanmax(cut.height_mm)
     span = f"height from {low:.2f} to {high:.2f} mm".replace("-", "−")
     return Measured(f"{text}, {span}", (a, b), cut)
-
-
-def _with_deviation(value: float, std: float) -> str:
-    """A value as exactly as its deviation allows.
-
-    >>> _with_deviation(190.1712, 0.0084), _with_deviation(190.1712, 1.2), _with_deviation(3.14159, 0.0)
-    ('190.171 ± 0.008', '190.2 ± 1.2', '3.14')
-    """
-    if not std > 0:
-        return f"{value:.2f}"
-    digits = min(max(1 - math.floor(math.log10(std) + 0.3), 0), 3)
-    return f"{value:.{digits}f} ± {std:.{digits}f}"
 
 
 def measure_plane(result: ResultArrays, mask: NDArray[np.bool_]) -> Measured:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -20,9 +21,19 @@ def result(tmp_path_factory: pytest.TempPathFactory) -> ResultArrays:
 def test_a_distance_has_its_deviation(result: ResultArrays) -> None:
     found = measure_points(result, Measure.DISTANCE, (3, 12), (33, 12))
     a, b = (result.at("points_mm", pixel) for pixel in ((3, 12), (33, 12)))
-    assert f"{np.linalg.norm(b - a):.2f} ± " in found.text
+    assert f"{np.linalg.norm(b - a):.3f} ± " in found.text
     assert found.section is None
     assert found.ends is not None
+
+
+@pytest.mark.parametrize(("std_mm", "told"), [(np.nan, "± unknown mm"), (1e-5, "± 0.001 mm")])
+def test_a_distance_claims_no_more_than_is_known_of_its_ends(
+    result: ResultArrays, std_mm: float, told: str
+) -> None:
+    std = np.full(result.shape, 1e-5, np.float32)
+    std[12, 33] = std_mm
+    stated = replace(result, arrays={**result.arrays, "depth_std_mm": std})
+    assert measure_points(stated, Measure.DISTANCE, (3, 12), (33, 12)).text.endswith(told)
 
 
 def test_a_section_of_a_flat_wall_is_flat(result: ResultArrays) -> None:
