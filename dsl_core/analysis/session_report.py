@@ -51,7 +51,7 @@ def session_content(
             spectrum_curve(name, f"{int(masks[name].sum())} px", bands[known], mean[known], std[known])
             for name, (mean, std) in spectra.items()
             for known in (np.isfinite(mean),)
-            if known.all() or known.sum() > 1
+            if known.any()
         ]
         tables = []
         try:

@@ -120,9 +120,10 @@ def _over_pixels(
     figure: Callable[..., Any], values: NDArray[np.float64], least: int = 1
 ) -> NDArray[np.float64]:
     """A figure (bands,) of values (bands, pixels); NaN for bands that fewer pixels than ``least`` have."""
-    enough = np.isfinite(values).sum(axis=1) >= least
+    is_known = np.isfinite(values)
+    enough = is_known.sum(axis=1) >= least
     found = np.full(len(values), np.nan)
-    found[enough] = figure(values[enough], axis=1)
+    found[enough] = figure(np.where(is_known, values, np.nan)[enough], axis=1)
     return found
 
 

@@ -48,6 +48,29 @@ def test_a_report_holds_marks_colours_and_materials_as_page_and_on_paper(tmp_pat
         write_report(content, tmp_path / "r.docx")
 
 
+def test_a_report_of_one_band_draws_it_as_a_level_line(tmp_path: Path) -> None:
+    content = session_content("one", chart_result().isel(wavelength_nm=[12]), MARKS)
+    (curve, *_), (page, paper) = content.curves, (tmp_path / "r.html", tmp_path / "r.pdf")
+    (_, left), (_, right) = (pair.split(",") for pair in curve.line.split())
+    assert left == right
+    assert len(curve.band.split()) == 4
+    assert [(tick.at, tick.label) for tick in curve.x_ticks] == [(100.0, "550")]
+    assert "550" in write_report(content, page).read_text(encoding="utf-8")
+    assert write_report(content, paper).exists()
+
+
+def test_values_that_are_not_finite_are_left_out_of_a_report(tmp_path: Path) -> None:
+    result = chart_result()
+    for name in ("reflectance", "reflectance_std"):
+        # Of a pin, and of a region.
+        result[name][3, 40, 9] = np.inf
+        result[name][5, 20, 4] = np.inf
+    content = session_content("inf", result, MARKS)
+    assert [len(curve.line.split()) for curve in content.curves] == [23, 24]
+    assert all(len(curve.band.split()) == 2 * len(curve.line.split()) for curve in content.curves)
+    assert write_report(content, tmp_path / "r.html").exists()
+
+
 def test_a_legend_on_paper_is_whole_and_stays_on_its_page() -> None:
     flags = np.zeros((60, 90), np.uint32)
     for place, flag in enumerate(Flag):

@@ -55,10 +55,13 @@ def spectrum_curve(
     shown = [values] + ([truth] if truth is not None else [])
     if std is not None:
         # Most of the band has to fit, too; where it is wide for want of light, it may leave the drawing.
-        shown.append(np.full(1, np.nanmedian(values + BAND_95 * std)))
+        reach = values + BAND_95 * std
+        reach = reach[np.isfinite(reach)]
+        shown.append(np.median(reach, keepdims=True) if reach.size else reach)
+    known = np.concatenate(shown)
     # A dark patch is not drawn larger than this: its noise would fill the drawing.
-    top = _nice_top(max(_LEAST_TOP, *(float(np.nanmax(each)) for each in shown)))
-    x = (bands - bands[0]) / (bands[-1] - bands[0]) * WIDTH
+    top = _nice_top(max(_LEAST_TOP, *known[np.isfinite(known)].tolist()))
+    x = _across(bands)
     return Curve(
         title,
         note,
@@ -74,10 +77,17 @@ def spectrum_curve(
 
 def share_curve(bands: Floats, share: Floats) -> Curve:
     """The mean share of data in each band, shape (bands,)."""
-    x = (bands - bands[0]) / (bands[-1] - bands[0]) * WIDTH
+    x = _across(bands)
     ticks = (Tick(HEIGHT, "0"), Tick(0.0, "1"))
     note = "mean over pixels: 1 is decided by data alone, 0 by the prior alone"
     return Curve("Data share", note, points(x, share, 1.0), x_ticks=wavelength_ticks(bands), y_ticks=ticks)
+
+
+def _across(bands: Floats) -> Floats:
+    """Where bands are over the width; a single one is both ends of a level line, as a point draws nothing."""
+    if len(bands) == 1:
+        return np.array([0.0, WIDTH])
+    return (bands - bands[0]) / (bands[-1] - bands[0]) * WIDTH
 
 
 def calibration_curve(title: str, found: HonestyCheck) -> Curve:
@@ -104,14 +114,20 @@ def rainbow(bands: Floats) -> list[tuple[float, str]]:
 
 
 def points(x: Floats, y: Floats, top: float) -> str:
-    """SVG points; values outside the drawing are cut at its rim, values that are not finite left out."""
-    height = (1.0 - np.clip(y / top, -0.04, 1.04)) * HEIGHT
-    return " ".join(f"{a:.1f},{b:.1f}" for a, b in zip(x, height, strict=True) if np.isfinite(b))
+    """SVG points; values outside the drawing are cut at its rim, values that are not finite left out.
+
+    A single value is that of all places.
+    """
+    height = (1.0 - np.clip(np.where(np.isfinite(y), y, np.nan) / top, -0.04, 1.04)) * HEIGHT
+    level = np.broadcast_to(height, x.shape)
+    return " ".join(f"{a:.1f},{b:.1f}" for a, b in zip(x, level, strict=True) if np.isfinite(b))
 
 
 def wavelength_ticks(bands: Floats) -> tuple[Tick, ...]:
     """Ticks at round wavelengths between the first and the last band (nm), which span the width."""
     first, last = float(bands[0]), float(bands[-1])
+    if first == last:
+        return (Tick(WIDTH / 2, f"{first:g}"),)
     step = 50.0 if last - first <= 400 else 200.0
     inner = np.arange(np.ceil(first / step) * step, last + 1, step)
     return tuple(Tick((nm - first) / (last - first) * WIDTH, f"{nm:g}") for nm in inner.tolist())
@@ -173,8 +189,8 @@ def _band(x: Floats, values: Floats, std: Floats | None, top: float) -> str:
     """SVG points of the outline of a 95 % band, empty where no deviation is known."""
     if std is None:
         return ""
-    spread = BAND_95 * std
-    return points(np.r_[x, x[::-1]], np.r_[values + spread, (values - spread)[::-1]], top)
+    low, high = (np.broadcast_to(values + side * BAND_95 * std, x.shape) for side in (-1, 1))
+    return points(np.r_[x, x[::-1]], np.r_[high, low[::-1]], top)
 
 
 def _nice_top(largest: float) -> float:

@@ -14,6 +14,7 @@ import pytest
 from matplotlib.image import imread
 
 from dsl_core.evaluation.cost import StageCost
+from dsl_core.evaluation.report.curves import spectrum_curve
 from dsl_core.evaluation.report.pictures import flag_picture, value_picture
 from dsl_core.evaluation.report.scan_report import ReportContent, render_report, report_content
 from dsl_core.evaluation.summary import evaluate
@@ -211,3 +212,9 @@ def test_pixels_of_a_part_are_named_as_in_the_whole_picture(full: ReportContent)
     )
     assert whole
     assert said == {(str(int(row) + 50), str(int(column) + 100)) for row, column in whole}
+
+
+def test_a_spectrum_of_infinite_deviation_is_drawn_without_a_band() -> None:
+    bands = np.array([440.0, 450.0, 460.0])
+    curve = spectrum_curve("x", "", bands, np.full(3, 0.5), np.full(3, np.inf))
+    assert (len(curve.line.split()), curve.band) == (3, "")
