@@ -23,6 +23,7 @@ from dsl_core.evaluation.report.scan_report import (
 )
 from dsl_core.io.result.annotations_file import Annotations
 from dsl_core.io.staging import write_text
+from dsl_core.model.figure import with_std
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -85,7 +86,7 @@ def colour_table(colours: list[Colour]) -> ReportTable:
 
 def _figure(value: float, std: float | None) -> str:
     """A figure with its deviation, if that is known."""
-    return f"{value:.2f}" if std is None or math.isnan(std) else f"{value:.2f} ± {std:.2f}"
+    return with_std(value, std, 2) if std and math.isfinite(std) else f"{value:.2f}"
 
 
 def _materials(found: Classification) -> tuple[ReportPicture, ReportTable]:

@@ -7,7 +7,7 @@ import pytest
 from dsl_core.analysis import pdf_report
 from dsl_core.analysis.classes import class_of_pixels
 from dsl_core.analysis.classification import classify_result
-from dsl_core.analysis.session_report import session_content, write_report
+from dsl_core.analysis.session_report import _figure, session_content, write_report
 from dsl_core.cli import main
 from dsl_core.errors import StoreError
 from dsl_core.evaluation.report.pictures import flag_picture
@@ -57,6 +57,11 @@ def test_a_report_of_one_band_draws_it_as_a_level_line(tmp_path: Path) -> None:
     assert [(tick.at, tick.label) for tick in curve.x_ticks] == [(100.0, "550")]
     assert "550" in write_report(content, page).read_text(encoding="utf-8")
     assert write_report(content, paper).exists()
+
+
+def test_a_known_deviation_of_a_colour_is_not_told_as_zero() -> None:
+    figures = [_figure(41.0, std) for std in (0.42, 0.003, float("nan"), None)]
+    assert figures == ["41.00 ± 0.42", "41.00 ± 0.01", "41.00", "41.00"]
 
 
 def test_values_that_are_not_finite_are_left_out_of_a_report(tmp_path: Path) -> None:
