@@ -87,7 +87,7 @@ def _across(bands: Floats) -> Floats:
     """Where bands are over the width; a single one is both ends of a level line, as a point draws nothing."""
     if len(bands) == 1:
         return np.array([0.0, WIDTH])
-    return (bands - bands[0]) / (bands[-1] - bands[0]) * WIDTH
+    return np.asarray((bands - bands[0]) / (bands[-1] - bands[0]) * WIDTH)
 
 
 def calibration_curve(title: str, found: HonestyCheck) -> Curve:

@@ -90,7 +90,7 @@ def test_a_measurement_does_not_go_on_in_another_result(
     panel._measure_pixel((30, 20))
     panel._lasso, panel._press = [(0.0, 0.0)], (0.0, 0.0)
     _open_farther(bench, tmp_path)
-    assert (panel._lasso, panel._press) == ([], None)
+    assert [panel._lasso, panel._press] == [[], None]
     panel._measure_pixel((3, 3))
     assert panel._hint.text() == Measure.DISTANCE.value
     panel._measure_pixel((30, 20))
