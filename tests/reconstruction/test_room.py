@@ -21,7 +21,8 @@ def test_uses_do_not_share_and_what_does_not_fit_is_made_anew() -> None:
     radiance, std = (room.of(use, (6,), np.float32) for use in ("radiance", "std"))
     assert not np.shares_memory(radiance, std)
     larger, other = room.of("radiance", (2, 6), np.float32), room.of("std", (6,), np.float16)
-    assert (larger.shape, larger.dtype) == ((2, 6), np.float32)
+    assert larger.shape == (2, 6)
+    assert larger.dtype == np.float32
     assert other.dtype == np.float16
     assert not np.shares_memory(radiance, larger)
 
