@@ -41,8 +41,21 @@ class ScreenId:
 
 def pixel_size(screen: QScreen) -> tuple[int, int]:
     """Width and height of a screen in real pixels, whatever the display scaling."""
-    ratio = screen.devicePixelRatio()
-    return round(screen.geometry().width() * ratio), round(screen.geometry().height() * ratio)
+    ratio, area = screen.devicePixelRatio(), screen.geometry()
+    return _real_pixels(area.width(), ratio), _real_pixels(area.height(), ratio)
+
+
+def _real_pixels(scaled: int, ratio: float) -> int:
+    """The size that a screen has whose scaled size is a whole number: several are rounded to the same.
+
+    Sizes of screens are even, which leaves one up to 200 %. Of more, the smallest claims no pixel too many.
+
+    >>> _real_pixels(731, 1.75), _real_pixels(781, 1.75), _real_pixels(1367, 1.0)
+    (1280, 1366, 1367)
+    """
+    around = range(int((scaled - 1) * ratio), int((scaled + 1) * ratio) + 1)
+    even = [size for size in around if size % 2 == 0 and int(size / ratio + 0.5) == scaled]
+    return min(even, default=round(scaled * ratio))
 
 
 def describe_screen(screen: QScreen) -> str:
@@ -166,7 +179,7 @@ class ProjectorWindow(QWidget):
         # In units of real pixels, so that display scaling moves and stretches nothing.
         painter.scale(1 / ratio, 1 / ratio)
         across, down = pixel_size(self.screen())
-        painter.fillRect(QRect(0, 0, across + 1, down + 1), QColor(0, 0, 0))
+        painter.fillRect(QRect(0, 0, across + 2, down + 2), QColor(0, 0, 0))
         if self._image is not None:
             k = max(self.factor(self._image.width(), self._image.height()), 1)
             width, height = k * self._image.width(), k * self._image.height()
@@ -241,8 +254,8 @@ class ScreenProjector(Projector):
             across, down = pixel_size(screen)
             raise DeviceError(
                 f"The projector's screen {screen.name()} has {across} × {down} px, and patterns have"
-                f" {width} × {height} px. Set the screen to the full size of the projector, or choose another"
-                " one on the Rig page."
+                f" {width} × {height} px. Set the screen to the full size of the projector and a scaling of"
+                " 100 %, or choose another one on the Rig page."
             )
 
     def _on_screen(self, image: NDArray[np.uint8]) -> None:

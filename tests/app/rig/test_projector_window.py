@@ -10,6 +10,7 @@ from typing import cast
 import numpy as np
 import pytest
 from dsl_app.rig.projector_window import ProjectorWindow, ScreenProjector, pixel_size
+from PySide6.QtCore import QRect
 from PySide6.QtGui import QGuiApplication, QScreen
 from pytestqt.qtbot import QtBot
 
@@ -65,6 +66,29 @@ class _Armed:
 
     def repaint(self) -> None:
         """Nothing is painted."""
+
+
+class _Scaled:
+    """A screen whose geometry is rounded as Qt rounds it."""
+
+    def __init__(self, width: int, height: int, ratio: float) -> None:
+        self._size, self._ratio = (width, height), ratio
+
+    def devicePixelRatio(self) -> float:
+        return self._ratio
+
+    def geometry(self) -> QRect:
+        return QRect(0, 0, *(int(size / self._ratio + 0.5) for size in self._size))
+
+
+@pytest.mark.parametrize("ratio", [1.0, 1.25, 1.5, 1.75, 2.0])
+@pytest.mark.parametrize(
+    "size",
+    [(608, 684), (854, 480), (912, 1140), (1280, 720), (1280, 800), (1366, 768), (1400, 1050), (1680, 1050),
+     (1920, 1080), (1920, 1200), (2560, 1600), (3840, 2160)],
+)  # fmt: skip
+def test_a_scaled_screen_keeps_its_number_of_pixels(size: tuple[int, int], ratio: float) -> None:
+    assert pixel_size(cast(QScreen, _Scaled(*size, ratio))) == size
 
 
 def test_a_pattern_that_the_screen_would_cut_is_refused(qtbot: QtBot) -> None:
