@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dsl_core.errors import DecodeError
-from dsl_core.optics.colour import delta_e_2000, reflectance_to_lab
+from dsl_core.optics.colour import delta_e_2000, hold_colour, reflectance_to_lab
 from dsl_core.progress import NoProgress, Progress
 
 Floats = NDArray[np.float32] | NDArray[np.float64]
@@ -53,7 +53,12 @@ def angle_map(cube: Floats, spectrum: Floats) -> Map:
 def colour_difference_map(
     cube: Floats, spectrum: Floats, wavelengths_nm: NDArray[np.float64], progress: Progress | None = None
 ) -> Map:
-    """CIEDE2000 under D65 between each pixel of (bands, rows, columns) and a spectrum (bands,)."""
+    """CIEDE2000 under D65 between each pixel of (bands, rows, columns) and a spectrum (bands,).
+
+    NaN where a pixel has no spectrum, and everywhere if the bands hold too little of a colour.
+    """
+    if not hold_colour(wavelengths_nm):
+        return np.full(cube.shape[1:], np.nan, np.float32)
     progress = progress or NoProgress()
     lab = reflectance_to_lab(np.asarray(spectrum, np.float64)[:, None, None], wavelengths_nm)
     out = np.empty(cube.shape[1:], np.float32)

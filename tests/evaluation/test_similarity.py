@@ -33,6 +33,15 @@ def test_metamers_look_alike_and_are_not() -> None:
     assert found.same_spectrum(0.05).tolist() == [[True, False, True]]
 
 
+def test_bands_that_hold_no_colour_have_no_metamers_and_are_still_searched() -> None:
+    cube = np.full((NM.size, 1, 2), 0.5, np.float32)
+    cube[1:, 0, 1] = 0.1
+    found = likeness(cube, cube[:, 0, 0], NM + 270)
+    assert np.isnan(found.delta_e).all()
+    assert not found.metamers(2.0, 0.05).any()
+    assert found.same_spectrum(0.05).tolist() == [[True, False]]
+
+
 def test_a_spectrum_is_not_continued_beyond_its_ends() -> None:
     bands = np.arange(430.0, 661.0, 10.0)
     nm = np.arange(400.0, 701.0, 3.0)

@@ -147,16 +147,21 @@ class Search:
 
     @property
     def share(self) -> float | None:
-        """Share found of the pixels that have a spectrum; None where no pixel has one."""
-        known = int(np.isfinite(self.likeness.angle_rad).sum())
+        """Share found of the pixels that have a spectrum or colour; None where no pixel has one."""
+        is_spectral = self.mode is SearchMode.SPECTRUM
+        known = int(np.isfinite(self.likeness.angle_rad if is_spectral else self.likeness.delta_e).sum())
         return int(self.found.sum()) / known if known else None
 
     @property
     def noise_of_alike_rad(self) -> float:
-        """The angle that deviations make alone in most pixels of the same colour; 0 if it is not known."""
+        """The angle that deviations make alone in most pixels of the same colour; 0 if it is not known.
+
+        Where no pixel has a colour, all count that have a spectrum.
+        """
         if self.noise_rad is None:
             return 0.0
-        noise = self.noise_rad[self.likeness.delta_e <= self.within_delta_e]
+        known = np.isfinite(self.likeness.angle_rad)
+        noise = self.noise_rad[known & ~(self.likeness.delta_e > self.within_delta_e)]
         return float(np.median(noise)) if noise.size else 0.0
 
 

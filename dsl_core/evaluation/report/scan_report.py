@@ -28,6 +28,7 @@ from dsl_core.model.fit import ATTRIBUTE, Fit
 from dsl_core.model.plan import CapturePlan
 from dsl_core.model.rendered_effects import RenderedEffects
 from dsl_core.model.result_order import columns_and_rows_px
+from dsl_core.optics.colour import hold_colour
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -142,7 +143,7 @@ def _pictures(content: ReportContent, pixels: Sequence[tuple[int, int]]) -> list
     result = content.result
     found: list[ReportPicture] = []
     if "rgb" in result:
-        picture = colour_picture(result["rgb"].values, "Colour", "as seen under daylight (D65), in sRGB")
+        picture = colour_picture(result["rgb"].values, "Colour", _colour_caption(content))
         rows, columns = result["rgb"].shape[1:]
         pins = tuple(
             (100 * (column + 0.5) / columns, 100 * (row + 0.5) / rows, str(number))
@@ -169,6 +170,12 @@ def _pictures(content: ReportContent, pixels: Sequence[tuple[int, int]]) -> list
         caption = "the most serious flag of each pixel; shares count every flag"
         found.append(flag_picture(result["flags"].values.astype(np.int64), "Flags", caption))
     return found
+
+
+def _colour_caption(content: ReportContent) -> str:
+    if "reflectance" in content.result and not hold_colour(_bands(content)):
+        return "in sRGB as if the spectra went on unchanged: the bands hold too little of a colour"
+    return "as seen under daylight (D65), in sRGB"
 
 
 def _spectra(content: ReportContent, pixels: Sequence[tuple[int, int]]) -> list[Curve]:

@@ -153,6 +153,15 @@ def test_without_truth_pixels_of_a_grid_are_shown(known: Any) -> None:
     assert len(re.findall(r"Pixel \d", text)) == 6
 
 
+def test_colours_of_bands_that_the_eye_does_not_see_are_not_called_seen(known: Any) -> None:
+    page = render_report(ReportContent("Plain", known.result))
+    assert "as seen under daylight" in page
+    nm = known.result["wavelength_nm"]
+    infrared = render_report(ReportContent("Plain", known.result.assign_coords(wavelength_nm=nm + 300)))
+    assert "as seen under daylight" not in infrared
+    assert "hold too little of a colour" in infrared
+
+
 def test_a_result_without_any_value_still_gives_a_page(known: Any) -> None:
     empty = known.result.copy(deep=True)
     for name in ("depth_mm", "depth_std_mm", "reflectance", "reflectance_std", "rgb"):

@@ -50,6 +50,13 @@ def test_depth_alone_lacks_nothing_of_bands(tmp_path: Path) -> None:
     assert "reach" not in result.arrays
 
 
+def test_bands_that_the_eye_does_not_see_are_said_to_hold_no_colour(tmp_path: Path) -> None:
+    seen = completed(load_arrays(of(tmp_path, build_result({"reflectance": CUBE}, NM, {}))))
+    assert "colour" not in missing_text(seen)
+    text = missing_text(replace(seen, wavelengths_nm=NM + 250))
+    assert "The bands, 700 to 900 nm, hold too little of a colour" in text
+
+
 def test_bands_rise_and_axes_are_in_their_order(tmp_path: Path) -> None:
     stored = build_result({"reflectance": CUBE, "depth_mm": CUBE[0]}, NM, {})
     result = load_arrays(

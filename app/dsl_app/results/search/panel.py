@@ -12,7 +12,13 @@ from dsl_app.shared.widgets.layouts import STRETCH, row_of
 from dsl_core.words import capitalised
 
 HINT = "Select a pin, region or reference, or point at a pixel; then search the whole picture for it."
-
+#: What is said where no pixel can be compared.
+NONE_HAS = {
+    SearchMode.SPECTRUM: "No pixel of this result has a spectrum.",
+    SearchMode.METAMERS: (
+        "No pixel of this result has a colour: it has no spectra, or too few bands from about 430 to 660 nm."
+    ),
+}
 #: A limit so many times the angle that deviations make alone is exceeded by few pixels by chance.
 CLEAR_OF_NOISE = 2.0
 
@@ -79,7 +85,7 @@ def search_text(search: Search | None) -> str:
     if search is None:
         return HINT
     if search.share is None:
-        return "No pixel of this result has a spectrum."
+        return NONE_HAS[search.mode]
     criteria = {
         SearchMode.SPECTRUM: f"have the spectrum of {search.name} (angle up to {search.within_rad:g} rad)",
         SearchMode.METAMERS: (

@@ -54,6 +54,12 @@ def test_the_share_found_is_of_pixels_with_a_spectrum(bench: Bench) -> None:
     assert search.share == 18 * 24 / (36 * 24 - 1)
     nowhere = replace(search.likeness, angle_rad=np.full_like(search.likeness.angle_rad, np.nan))
     assert replace(search, likeness=nowhere).share is None
+    # Near infrared, no pixel has a colour that others could look like; spectra are compared all the same.
+    invisible = replace(search.likeness, delta_e=nowhere.angle_rad)
+    assert "has a colour" in search_text(replace(search, likeness=invisible, mode=SearchMode.METAMERS))
+    without_colour = replace(search, likeness=invisible)
+    assert without_colour.share == search.share
+    assert without_colour.noise_of_alike_rad > 0
 
 
 def test_what_was_found_is_said_in_a_sentence(bench: Bench) -> None:
