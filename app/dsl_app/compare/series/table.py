@@ -112,11 +112,11 @@ def row_texts(state: SeriesState) -> list[RowTexts]:
     kind, points = state.kind.value, state.points
     numbers = _stage_numbers(state) if kind is SeriesKind.STAGE else _sweep_numbers(state)
     is_sweep = kind is SeriesKind.SWEEP
-    best = {points[i].name for i in best_points(points, state.figure.value)} if is_sweep else set()
+    best = {points[i] for i in best_points(points, state.figure.value)} if is_sweep else set()
     found = []
     for row, texts in zip(state.rows.value, numbers, strict=True):
         trouble = row.trouble(kind)
-        good = "No faster scan is better" if row.point is not None and row.point.name in best else ""
+        good = "No faster scan is better" if row.point in best else ""
         remark = trouble or (good if row.is_read(kind) else "Not read yet")
         found.append(RowTexts(row.name, texts, remark, bool(trouble)))
     return found

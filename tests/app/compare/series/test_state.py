@@ -92,6 +92,18 @@ def test_of_scans_the_ones_that_no_faster_one_beats_are_named() -> None:
     ]
 
 
+def test_of_scans_of_one_name_in_two_folders_the_better_one_is_named() -> None:
+    monday, tuesday = Path("mon/scan.zarr"), Path("tue/scan.zarr")
+    state = state_of((monday, tuesday), SeriesKind.SWEEP)
+    state.rows.set(
+        (
+            SeriesRow(monday, point=SweepPoint("scan", 10.0, depth_mm=0.1)),
+            SeriesRow(tuesday, point=SweepPoint("scan", 60.0, depth_mm=0.5)),
+        )
+    )
+    assert [row.remark for row in row_texts(state)] == ["No faster scan is better", ""]
+
+
 def test_a_position_is_shown_as_it_was_typed() -> None:
     state = state_of((), SeriesKind.STAGE)
     state.rows.set((SeriesRow(A, 1000.0025), SeriesRow(B, 700.0)))
