@@ -74,6 +74,8 @@ def compare_results(
 ) -> ResultDifference:
     """Compare depth (h, w) and reflectance (bands, h, w) over pairs of bands; NaN where there is nothing.
 
+    Bands that no pixel has in both are left out.
+
     Raises `DecodeError` when the sizes differ or no pixel has a depth in both.
     """
     require_same_size(first_mm, second_mm)
@@ -131,23 +133,28 @@ def _with_spectra(
     size = first.shape[-2:]
     # Sums band by band: the cubes are large, their difference would be as large again.
     square, total, product, powers = np.zeros(size), np.zeros(size), np.zeros(size), np.zeros((2, *size))
+    common = 0
     for done, (i, k) in enumerate(bands):
         progress.report("compare bands", done, len(bands))
         a, b = first[i].astype(np.float64), second[k].astype(np.float64)
-        square += (b - a) ** 2
-        total += b - a
+        change = b - a
+        if not np.isfinite(change).any():
+            continue  # a band that no pixel has in both would leave no pixel to compare
+        common += 1
+        square += change**2
+        total += change
         product += a * b
         powers += (a**2, b**2)
     known = np.isfinite(square)
-    if not known.any():
+    if not (common and known.any()):
         return depth
     norm = np.sqrt(powers[0] * powers[1])
     cosine = np.divide(product, norm, out=np.zeros_like(norm), where=norm > 0)
     angle = np.where(known, np.arccos(cosine.clip(-1, 1)), np.nan)
-    square, total = square / len(bands), total / len(bands)
+    square, total = square / common, total / common
     return replace(
         depth,
-        bands=len(bands),
+        bands=common,
         reflectance_rms=float(np.sqrt(square[known].mean())),
         reflectance_bias=float(total[known].mean()),
         mean_angle_rad=float(angle[known].mean()),

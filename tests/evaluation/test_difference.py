@@ -37,6 +37,20 @@ def test_spectra_are_compared_over_common_bands() -> None:
     assert ("Common bands", "2") in [(row.figure, row.value) for row in difference_table(found)]
 
 
+def test_a_band_that_no_pixel_has_leaves_the_others_compared() -> None:
+    depth = np.full((2, 2), 700.0)
+    first, second = np.full((3, 2, 2), 0.4), np.full((3, 2, 2), 0.5)
+    second[1] = np.nan
+    bands = [(0, 0), (1, 1), (2, 2)]
+    found = compare_results(depth, depth, first, second, bands)
+    assert found.bands == 2
+    assert (found.reflectance_rms, found.reflectance_bias) == pytest.approx((0.1, 0.1))
+    # A pixel that lacks a band of others is not compared.
+    second[0, 0, 0] = np.nan
+    assert compare_results(depth, depth, first, second, bands).reflectance_rms == pytest.approx(0.1)
+    assert compare_results(depth, depth, first, second, [(1, 1)]).reflectance_rms is None
+
+
 def test_results_that_do_not_fit_say_why() -> None:
     with pytest.raises(DecodeError, match="5 x 4 and 6 x 4 pixels"):
         compare_results(np.zeros((4, 5)), np.zeros((4, 6)))

@@ -90,15 +90,21 @@ class Pair:
         return self.first.std(shown, i, pixel), self.second.std(shown, k, pixel)
 
     def mean_reflectance(self) -> tuple[Floats, Floats] | None:
-        """Reflectance of A and B over their common bands, images (h, w); None where they have none."""
-        if not self.bands:
-            return None
+        """Reflectance of A and B over their common bands, images (h, w); None where they have none.
+
+        Bands that no pixel has in both are left out.
+        """
         sums: list[Any] = [0.0, 0.0]
+        count = 0
         for band in range(len(self.bands)):
             images = self.images(PairQuantity.BAND, band)
             assert images is not None
-            sums = [sum_ + np.asarray(image, np.float64) for sum_, image in zip(sums, images, strict=True)]
-        return sums[0] / len(self.bands), sums[1] / len(self.bands)
+            if np.isfinite(images[0] - images[1]).any():
+                sums = [
+                    sum_ + np.asarray(image, np.float64) for sum_, image in zip(sums, images, strict=True)
+                ]
+                count += 1
+        return (sums[0] / count, sums[1] / count) if count else None
 
     def nm(self, band: int) -> float:
         """Wavelength of a common band."""

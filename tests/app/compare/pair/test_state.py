@@ -164,3 +164,19 @@ def test_values_under_the_cursor_have_their_deviations_but_for_the_truth() -> No
     state.pair.set(Pair(first, replace(first, name="again"), ((0, 0),), ()))
     state.shown.set(PairQuantity.BAND)
     assert cursor_text(state).endswith("A 0.500 ± 0.012   B 0.500 ± 0.012   A − B 0.000 ± 0.017")
+
+
+def test_the_mean_over_bands_leaves_out_those_that_no_pixel_has() -> None:
+    arrays = side("a", 700.0, 0.5).arrays
+    cube = np.repeat(arrays["reflectance"], 2, axis=0)
+    cube[1] = np.nan
+    two = Side(
+        "a",
+        replace(
+            arrays, wavelengths_nm=np.array([550.0, 560.0]), arrays={**arrays.arrays, "reflectance": cube}
+        ),
+    )
+    means = Pair(two, two, ((0, 0), (1, 1)), ()).mean_reflectance()
+    assert means is not None
+    assert means[0] == pytest.approx(np.full((2, 3), 0.5))
+    assert Pair(two, two, ((1, 1),), ()).mean_reflectance() is None
