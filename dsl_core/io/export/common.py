@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from dsl_core.errors import StoreError
 from dsl_core.model.fit import ATTRIBUTE, Fit
+from dsl_core.optics.colour import reflectance_to_srgb
 from dsl_core.version import __version__
 
 if TYPE_CHECKING:
@@ -40,6 +41,15 @@ def require_suffix(path: Path, *suffixes: str) -> None:
 def plane(result: xr.Dataset, name: str) -> NDArray[np.float32]:
     """A variable as float32, dimensions as in the result; NaN where there is no answer."""
     return np.asarray(result[name].values, np.float32)
+
+
+def colours(result: xr.Dataset) -> NDArray[np.float32] | None:
+    """Colours in sRGB (3, rows, columns): those of the result, else of its spectra, as the window shows."""
+    if "rgb" in result:
+        return plane(result, "rgb")
+    if "reflectance" in result:
+        return reflectance_to_srgb(plane(result, "reflectance"), np.array(wavelengths_nm(result)))
+    return None
 
 
 def wavelengths_nm(result: xr.Dataset) -> list[float]:

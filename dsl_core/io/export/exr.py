@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from dsl_core.errors import StoreError
 from dsl_core.io.atomic import disk_full, is_full
-from dsl_core.io.export.common import plane, provenance, require, require_suffix, wavelengths_nm
+from dsl_core.io.export.common import colours, plane, provenance, require, require_suffix, wavelengths_nm
 from dsl_core.io.staging import staged
 from dsl_core.optics.colour import srgb_decode
 from dsl_core.solve.many import Check, never
@@ -50,9 +50,10 @@ def export_exr(
         channel_name(w): np.ascontiguousarray(band)
         for w, band in zip(wavelengths_nm(result), cube, strict=True)
     }
-    if "rgb" in result:
+    rgb = colours(result)
+    if rgb is not None:
         check()
-        linear = srgb_decode(plane(result, "rgb"))
+        linear = srgb_decode(rgb)
         channels |= {name: np.ascontiguousarray(c) for name, c in zip("RGB", linear, strict=True)}
     if "depth_mm" in result:
         check()

@@ -14,7 +14,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from dsl_core.io.export.common import ascii_text, plane, provenance, require, require_suffix, wavelengths_nm
+from dsl_core.io.export.common import (
+    ascii_text,
+    colours,
+    plane,
+    provenance,
+    require,
+    require_suffix,
+    wavelengths_nm,
+)
 from dsl_core.io.staging import staged
 from dsl_core.solve.grid_mesh import GridMesh
 from dsl_core.solve.many import Check, never
@@ -90,8 +98,9 @@ def _columns(result: xr.Dataset, lit: NDArray[np.bool_], check: Check) -> dict[s
     for name, properties in (("points_mm", ("x", "y", "z")), ("normals", ("nx", "ny", "nz"))):
         if name in result:
             columns.update(zip(properties, plane(result, name)[:, lit].astype("<f4"), strict=True))
-    if "rgb" in result:
-        levels = np.nan_to_num(np.clip(plane(result, "rgb")[:, lit], 0, 1)) * 255
+    rgb = colours(result)
+    if rgb is not None:
+        levels = np.nan_to_num(np.clip(rgb[:, lit], 0, 1)) * 255
         columns.update(zip(("red", "green", "blue"), np.rint(levels).astype("u1"), strict=True))
     if "reflectance" in result:
         for band, wavelength in enumerate(wavelengths_nm(result)):

@@ -6,6 +6,7 @@ the PNG's text chunks (PNG specification, 3rd edition, section 11.3.4).
 
 from __future__ import annotations
 
+from collections.abc import Callable, Container, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -13,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dsl_core.errors import StoreError
-from dsl_core.io.export.common import plane, provenance, require, require_suffix, wavelengths_nm
+from dsl_core.io.export.common import colours, plane, provenance, require, require_suffix, wavelengths_nm
 from dsl_core.io.staging import staged
 from dsl_core.model.result import FLAG_COLOURS, FLAG_NAMES, Flag, gravest_flag
 from dsl_core.optics.levels import Levels, between, three_bands
@@ -57,45 +58,80 @@ def export_png(
     from PIL import Image
     from PIL.PngImagePlugin import PngInfo
 
-    pictures: dict[str, Picture] = {}
-    if light != "D65" and "reflectance" in result:
-        lit = relight(plane(result, "reflectance"), np.array(wavelengths_nm(result)), light, adapted)
-        name = f"rgb_{light}" if adapted else f"rgb_{light}_unadapted"
-        pictures[name] = rgb_picture(lit, colour_levels)
-    elif "rgb" in result:
-        pictures["rgb"] = rgb_picture(plane(result, "rgb"), colour_levels)
-    if "depth_mm" in result:
-        pictures["depth"] = depth_picture(plane(result, "depth_mm"), depth_levels_mm)
-    if "reflectance" in result:
-        band, wavelength = nearest_band(result, band_nm)
-        reflectance = np.asarray(result["reflectance"][band].values)
-        pictures[f"{wavelength:g}nm"] = band_picture(reflectance, band_levels)
-        if bands_nm is not None:
-            found = [nearest_band(result, nm) for nm in bands_nm]
-            cube = np.stack([np.asarray(result["reflectance"][place].values) for place, _ in found])
-            name = "_".join(f"{nm:g}" for _, nm in found)
-            pictures[f"{name}nm"] = rgb_picture(three_bands(cube, (0, 1, 2), bands_levels))
-    if "flags" in result:
-        pictures["flags"] = flags_picture(result["flags"].values)
-    if not pictures:
+    has_bands = "reflectance" in result
+    centres = wavelengths_nm(result) if has_bands else []
+    look: dict[str, Any] = {"band_nm": band_nm, "light": light, "adapted": adapted, "bands_nm": bands_nm}
+    files = picture_files(path, {str(name) for name in result.variables}, centres, **look)
+    if not files:
         require(result, "A picture", "rgb")
+
+    def band(nm: float | None) -> NDArray[np.float32]:
+        return np.asarray(result["reflectance"][nearest_band(centres, nm)[0]].values)
+
+    def colour() -> Picture:
+        if light == "D65" or not has_bands:
+            rgb = colours(result)
+            assert rgb is not None
+        else:
+            rgb = relight(plane(result, "reflectance"), np.array(centres), light, adapted)
+        return rgb_picture(rgb, colour_levels)
+
+    def three() -> Picture:
+        cube = np.stack([band(nm) for nm in bands_nm or ()])
+        return rgb_picture(three_bands(cube, (0, 1, 2), bands_levels))
+
+    drawn: dict[str, Callable[[], Picture]] = {
+        "colour": colour,
+        "depth": lambda: depth_picture(plane(result, "depth_mm"), depth_levels_mm),
+        "band": lambda: band_picture(band(band_nm), band_levels),
+        "bands": three,
+        "flags": lambda: flags_picture(result["flags"].values),
+    }
     texts = PngInfo()
     for key, text in provenance(result).items():
         texts.add_itxt(key.encode("latin-1", "replace")[:79], text)
-    targets = {path.with_name(f"{path.stem}_{name}.png"): picture for name, picture in pictures.items()}
-    with staged(list(targets), overwrite=overwrite) as drafts:
-        for draft, picture in zip(drafts, targets.values(), strict=True):
+    with staged(list(files.values()), overwrite=overwrite) as drafts:
+        for draft, shown in zip(drafts, files, strict=True):
             check()
-            Image.fromarray(picture).save(draft, format="PNG", pnginfo=texts)
-    return list(targets)
+            Image.fromarray(drawn[shown]()).save(draft, format="PNG", pnginfo=texts)
+    return list(files.values())
 
 
-def nearest_band(result: xr.Dataset, band_nm: float | None) -> tuple[int, float]:
+def picture_files(
+    path: Path,
+    held: Container[str],
+    centres_nm: Sequence[float],
+    *,
+    band_nm: float | None = None,
+    light: str = "D65",
+    adapted: bool = True,
+    bands_nm: tuple[float, float, float] | None = None,
+) -> dict[str, Path]:
+    """The files that `export_png` writes of a result that holds variables, by what they show.
+
+    Raises `StoreError` as it does for a wavelength.
+    """
+    has_bands = "reflectance" in held
+    names: dict[str, str] = {}
+    if has_bands or "rgb" in held:
+        under = f"_{light}" if adapted else f"_{light}_unadapted"
+        names["colour"] = f"rgb{under if has_bands and light != 'D65' else ''}"
+    if "depth_mm" in held:
+        names["depth"] = "depth"
+    if has_bands:
+        names["band"] = f"{nearest_band(centres_nm, band_nm)[1]:g}nm"
+        if bands_nm is not None:
+            names["bands"] = "_".join(f"{nearest_band(centres_nm, nm)[1]:g}" for nm in bands_nm) + "nm"
+    if "flags" in held:
+        names["flags"] = "flags"
+    return {shown: path.with_name(f"{path.stem}_{name}.png") for shown, name in names.items()}
+
+
+def nearest_band(centres: Sequence[float], band_nm: float | None) -> tuple[int, float]:
     """Index and centre (nm) of the band closest to a wavelength, of the middle band for None.
 
     Raises `StoreError` for a wavelength that no band holds.
     """
-    centres = wavelengths_nm(result)
     if band_nm is None:
         return len(centres) // 2, centres[len(centres) // 2]
     best = int(np.argmin(np.abs(np.array(centres) - band_nm)))

@@ -316,6 +316,18 @@ def test_png_text_is_read_by_another_library(tmp_path: Path) -> None:
         assert image.text["calibration"] == "twin μ-rig"
 
 
+def test_colours_of_spectra_are_exported_where_a_result_holds_none(tmp_path: Path) -> None:
+    result = small_result()
+    own = export_png(result, tmp_path / "own.png")
+    spectral = result.drop_vars("rgb")
+    files = export_png(spectral, tmp_path / "spectral.png")
+    assert [file.name for file in files] == [file.name.replace("own", "spectral") for file in own]
+    points = [
+        export(each, tmp_path / name, "ply")[0] for each, name in ((result, "a.ply"), (spectral, "b.ply"))
+    ]
+    assert points[0].stat().st_size == points[1].stat().st_size
+
+
 def test_pictures_of_nothing_and_of_the_middle_band(tmp_path: Path) -> None:
     result = small_result()
     result["depth_mm"][...] = np.nan

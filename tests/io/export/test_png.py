@@ -5,15 +5,10 @@ from __future__ import annotations
 import cv2
 import numpy as np
 import pytest
-import xarray as xr
 
 from dsl_core.errors import StoreError
 from dsl_core.io.export.png import band_picture, depth_picture, flags_picture, nearest_band, rgb_picture
 from dsl_core.model.result import FLAG_COLOURS, FLAG_NAMES, Flag
-
-
-def bands(*nm: float) -> xr.Dataset:
-    return xr.Dataset({"reflectance": (("wavelength_nm",), np.zeros(len(nm)))}, {"wavelength_nm": list(nm)})
 
 
 def turbo(level: int) -> list[int]:
@@ -21,19 +16,19 @@ def turbo(level: int) -> list[int]:
 
 
 def test_the_nearest_band_is_at_most_half_the_widest_gap_away() -> None:
-    uneven = bands(450.0, 460.0, 490.0)
+    uneven = [450.0, 460.0, 490.0]
     assert nearest_band(uneven, None) == (1, 460.0)
-    assert nearest_band(bands(450.0, 460.0, 470.0, 480.0), None) == (2, 470.0)
+    assert nearest_band([450.0, 460.0, 470.0, 480.0], None) == (2, 470.0)
     assert nearest_band(uneven, 504.9) == (2, 490.0)
     assert nearest_band(uneven, 435.1) == (0, 450.0)
     for outside in (505.1, 434.9, float("nan")):
         with pytest.raises(StoreError, match="run from 450 to 490"):
             nearest_band(uneven, outside)
-    assert nearest_band(bands(550.0), 550.4) == (0, 550.0)
+    assert nearest_band([550.0], 550.4) == (0, 550.0)
     with pytest.raises(StoreError, match=r"no band at 550\.6"):
-        nearest_band(bands(550.0), 550.6)
-    assert nearest_band(bands(450.0, 470.0), 479.9) == (1, 470.0)
-    assert nearest_band(bands(550.0, 550.2), 550.6) == (1, 550.2), "half a nanometre at least"
+        nearest_band([550.0], 550.6)
+    assert nearest_band([450.0, 470.0], 479.9) == (1, 470.0)
+    assert nearest_band([550.0, 550.2], 550.6) == (1, 550.2), "half a nanometre at least"
 
 
 def test_levels_are_rounded_clipped_and_marked_where_unknown() -> None:

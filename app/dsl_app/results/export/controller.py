@@ -52,7 +52,9 @@ class ExportController:
     def taken(self, targets: dict[str, Path]) -> list[Path]:
         """Files that an export would replace."""
         result = self.state.result.value
-        return [] if result is None else [path for path in expected_files(targets, result) if there(path)]
+        if result is None:
+            return []
+        return [path for path in expected_files(targets, result, picture_choice(self.state)) if there(path)]
 
     def write(self, targets: dict[str, Path], overwrite: bool) -> None:
         """Write the result to a path per format key.
@@ -64,9 +66,7 @@ class ExportController:
             return
         pins = [mark.pixel for mark in state.marks.value if mark.pixel and not mark.trouble]
         pixels = [result.in_picture(pin) for pin in pins]
-        band_nm = float(result.wavelengths_nm[state.band.value]) if result.has_spectra else None
-        light, adapted = state.picture_light.value
-        look = picture_look(state)
+        look = {**picture_choice(state), **picture_look(state)}
 
         def work(progress: Progress) -> list[Path]:
             from dsl_core.io.export import export_csv, export_png, formats
@@ -75,7 +75,7 @@ class ExportController:
             exporters: dict[str, Exporter] = {
                 **{form.key: form.write for form in formats().values()},
                 "csv": partial(export_csv, pixels=pixels),
-                "png": partial(export_png, band_nm=band_nm, light=light, adapted=adapted, **look),
+                "png": partial(export_png, **look),
             }
             data, written = load_result(result.path), []
             for done, (form, path) in enumerate(targets.items()):
@@ -104,8 +104,20 @@ def size_words(count: int) -> str:
     return f"{count / 1e6:.1f} MB" if count >= 1e6 else f"{max(round(count / 1e3), 1)} kB"
 
 
+def picture_choice(state: ResultsState) -> dict[str, Any]:
+    """What exported pictures show of that on the screen: the band, the light, and three bands as colours."""
+    result, bands = state.result.value, state.bands.value
+    light, adapted = state.picture_light.value
+    choice: dict[str, Any] = {"light": light, "adapted": adapted}
+    if result is not None and result.has_spectra:
+        choice["band_nm"] = float(result.wavelengths_nm[state.band.value])
+        if bands is not None:
+            choice["bands_nm"] = tuple(float(result.wavelengths_nm[band]) for band in bands)
+    return choice
+
+
 def picture_look(state: ResultsState) -> dict[str, Any]:
-    """What exported pictures take over from those on the screen: three bands as colours, and levels."""
+    """The levels that exported pictures take over from those on the screen."""
     result, bands, levels = state.result.value, state.bands.value, state.levels.value
     limits = state.depth_limits.value
     look: dict[str, Any] = {
@@ -115,28 +127,29 @@ def picture_look(state: ResultsState) -> dict[str, Any]:
     }
     if result is not None and bands is not None:
         look["bands_levels"] = levels.get(BANDS_KEY, (0.0, top_of(result["reflectance"])))
-        look["bands_nm"] = tuple(float(result.wavelengths_nm[band]) for band in bands)
     return {name: value for name, value in look.items() if value is not None}
 
 
-def expected_files(targets: dict[str, Path], result: ResultArrays) -> list[Path]:
-    """Files that an export writes."""
+def expected_files(targets: dict[str, Path], result: ResultArrays, choice: dict[str, Any]) -> list[Path]:
+    """Files that an export writes; ``choice`` is that of pictures."""
     from dsl_core.io.export.depth_maps import depth_files
     from dsl_core.io.export.mesh.export import mesh_files
+    from dsl_core.io.export.png import picture_files
 
+    held = set(result.arrays) - set(result.missing)
     files: list[Path] = []
     for form, path in targets.items():
         if form == "envi":
             headers = [path]
-            if "reflectance_std" in result.arrays:
+            if "reflectance_std" in held:
                 headers.append(path.with_name(f"{path.stem}_std.hdr"))
             files += [file for header in headers for file in (header, header.with_suffix(".img"))]
         elif form in ("tiff", "npy"):
-            files += depth_files(path, "depth_std_mm" in result.arrays, "flags" in result.arrays)
+            files += depth_files(path, "depth_std_mm" in held, "flags" in held)
         elif form == "obj":
-            files += mesh_files(path, "rgb" in result.arrays)
+            files += mesh_files(path, "rgb" in held)
         elif form == "png":
-            files += sorted(path.parent.glob(f"{path.stem}_*.png"))
+            files += picture_files(path, held, result.wavelengths_nm.tolist(), **choice).values()
         else:
             files.append(path)
     return files

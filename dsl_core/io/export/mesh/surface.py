@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dsl_core.errors import StoreError
-from dsl_core.io.export.common import plane, require
+from dsl_core.io.export.common import colours, plane, require
 from dsl_core.io.export.png import rgb_picture
 from dsl_core.model.result import Flag
 from dsl_core.solve.grid_mesh import GridMesh, mesh_of_grid, normals_of
@@ -70,7 +70,8 @@ def surface_of(result: xr.Dataset, every: int = 1, check: Check = never) -> Surf
         fitted = plane(result, "normals").reshape(3, -1)[:, mesh.pixels].T
         known = np.isfinite(fitted).all(1)
         normals[known] = fitted[known] / np.linalg.norm(fitted[known], axis=1, keepdims=True)
-    texture = _texture(plane(result, "rgb")) if "rgb" in result else None
+    rgb = colours(result)
+    texture = None if rgb is None else _texture(rgb)
     return Surface(vertices, normals, places, mesh.triangles, texture)
 
 

@@ -10,6 +10,7 @@ from dsl_app.results.layers import Layers, rgb_of
 from dsl_app.results.state import ResultView
 
 from dsl_core.io.export import formats
+from dsl_core.io.result.result_file import load_result, save_result
 from tests.app.support.results_controller import Bench
 from tests.app.support.results_controller import bench as bench
 from tests.app.support.small_result import write_small_result
@@ -54,6 +55,33 @@ def test_pictures_are_exported_as_they_are_shown(bench: Bench, tmp_path: Path) -
     flagged = result["flags"] != 0
     assert flagged.sum() == 2
     np.testing.assert_array_equal(files["a_flags.png"][:24, :36][flagged], rgb_of(layer)[flagged])
+
+
+@pytest.mark.parametrize("name", ["cup", "cup[1]"])
+def test_only_pictures_that_would_be_written_are_in_the_way(tmp_path: Path, name: str) -> None:
+    saved = write_small_result(tmp_path)
+    bench = Bench(saved)
+    targets = {"png": tmp_path / f"{name}.png"}
+    for other in ("photo", "2_depth", "rgb_A"):
+        (tmp_path / f"{name}_{other}.png").touch()
+    assert bench.control.export.taken(targets) == []
+    bench.state.bands.set((0, 1, 2))
+    bench.control.export.write(targets, overwrite=False)
+    written = {path.name for path in bench.control.export.taken(targets)}
+    parts = ("rgb", "depth", "545nm", "430_435_440nm", "flags")
+    assert written == {f"{name}_{part}.png" for part in parts}
+    bench.control.relight("A", adapted=True)
+    assert f"{name}_rgb_A.png" in {path.name for path in bench.control.export.taken(targets)}
+
+
+def test_files_of_what_a_result_lacks_are_not_in_the_way(tmp_path: Path) -> None:
+    whole = load_result(write_small_result(tmp_path), lazy=False)
+    lacking = whole.drop_vars(["depth_std_mm", "flags", "reflectance_std"])
+    bench = Bench(save_result(lacking, tmp_path / "lacking.zarr"))
+    targets = {form: tmp_path / f"a.{suffix}" for form, suffix in (("tiff", "tiff"), ("envi", "hdr"))}
+    for name in ("a_std.tiff", "a_flags.tiff", "a_std.hdr", "a_std.img"):
+        (tmp_path / name).touch()
+    assert bench.control.export.taken(targets) == []
 
 
 @pytest.mark.parametrize(
