@@ -104,7 +104,6 @@ class ViewBar(QWidget):
         for box in (self.near, self.far):
             # Narrow, as the colour choice is in the same row; arrow keys replace the buttons.
             box.setButtonSymbols(NumberBox.ButtonSymbols.NoButtons)
-            box.setFixedWidth(box.fontMetrics().horizontalAdvance("0000.0 mm") + 14)
         self.automatic = check_box(
             "Auto", "Show all depths; the colours cover nearly all pixels, outliers get the end colours"
         )
@@ -231,11 +230,13 @@ class ViewBar(QWidget):
         """Show the limits of the state, or those of the colours if there are none."""
         result, limits = self._state.result.value, self._state.depth_limits.value
         self.automatic.setChecked(limits is None)
-        if limits is None and result is not None:
-            limits = spread_of(result["depth_mm"])
-        for box, value in zip((self.near, self.far), limits or (), strict=False):
+        nearly_all = (0.0, 1000.0) if result is None else spread_of(result["depth_mm"])
+        for box, value in zip((self.near, self.far), limits or nearly_all, strict=True):
             with quiet(box):
+                box.fit(*nearly_all, 1)
                 box.setValue(value)
+            longest = max("0000.0 mm", box.text(), key=len)
+            box.setFixedWidth(box.fontMetrics().horizontalAdvance(longest) + 14)
 
     def _new_result(self) -> None:
         self._show_limits()

@@ -187,3 +187,17 @@ def test_a_result_of_depth_alone_offers_neither_colours_nor_bands(bench: Bench, 
     assert [bar.views[view].toolTip() for view in needy] == tips
     assert state.cloud_by.value is ResultView.COLOUR
     assert all(bar.views[view].isEnabled() for view in ResultView)
+
+
+@pytest.mark.parametrize("scale", [1e-3, 300.0])
+def test_depth_limits_hold_nearly_all_depths_in_metres_and_far_away(
+    bench: Bench, tmp_path: Path, scale: float
+) -> None:
+    result = load_result(tmp_path / "small.zarr").load()
+    result["depth_mm"] = result["depth_mm"] * scale
+    bench.control.open(save_result(result, tmp_path / "scaled.zarr"))
+    bench.bar.automatic.click()
+    limits = bench.state.depth_limits.value
+    assert limits is not None
+    assert limits == pytest.approx((700 * scale, 717.5 * scale), abs=0.1 * scale)
+    assert bench.notifier.told == []

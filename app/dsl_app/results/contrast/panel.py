@@ -120,7 +120,7 @@ class ContrastPanel(QWidget):
         with quiet(self.levels, self.low, self.high):
             self.levels.setRegion(shown.levels)
             for box, value in zip((self.low, self.high), shown.levels, strict=True):
-                box.setDecimals(decimals)
+                box.fit(*shown.levels, decimals)
                 box.setSuffix(suffix)
                 box.setSingleStep((shown.edges[-1] - shown.edges[0]) / 50)
                 box.setValue(value)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import fields
@@ -80,6 +81,12 @@ class NumberBox(CalmWheel, QDoubleSpinBox):
         named(self, name, tip or name)
         if unit:
             self.setSuffix(f" {unit}")
+
+    def fit(self, low: float, high: float, decimals: int) -> None:
+        """Take values of a span: far beyond its end, and to a hundredth of it; at least these decimals."""
+        span = high - low
+        self.setDecimals(max(decimals, 2 - math.floor(math.log10(span))) if span > 0 else decimals)
+        self.setMaximum(max(self.maximum(), 10 * high))
 
     def validate(self, text: str, place: int) -> tuple[QValidator.State, str, int]:
         """Take a comma for the point that it means."""

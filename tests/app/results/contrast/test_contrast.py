@@ -10,11 +10,12 @@ import pytest
 from dsl_app.results.contrast.controller import ContrastController, apart
 from dsl_app.results.contrast.histogram import histogram_of
 from dsl_app.results.layers import Layers, rgb_of
-from dsl_app.results.state import ResultsState, ResultView
+from dsl_app.results.state import QualityMap, ResultsState, ResultView
 from PySide6.QtCore import QPoint, QPointF, Qt
 from PySide6.QtTest import QTest
 
 from dsl_core.io.result.result_arrays import ResultArrays, load_arrays
+from dsl_core.io.result.result_file import load_result, save_result
 from tests.app.support.results_bench import Bench, move
 from tests.app.support.results_bench import bench as bench
 from tests.app.support.small_result import BLUE, DARK, RED, write_small_result
@@ -151,3 +152,20 @@ def test_three_bands_are_exported_as_they_are_shown(bench: Bench, tmp_path: Path
     np.testing.assert_allclose(
         exported[shown[..., 3] > 0], shown[shown[..., 3] > 0, :3].astype(float), atol=1
     )
+
+
+def test_contrast_of_small_deviations_is_typed_in_figures_that_they_have(
+    bench: Bench, tmp_path: Path
+) -> None:
+    result = load_result(write_small_result(tmp_path / "other")).load()
+    result["reflectance_std"][:] = 3e-4
+    bench.control.open(save_result(result, tmp_path / "small deviations.zarr"))
+    bench.control.show(ResultView.QUALITY)
+    bench.state.quality.set(QualityMap.SPREAD)
+    bench.state.contrast.set(True)
+    panel = bench.page.contrast
+    assert panel is not None
+    high = panel.high.value()
+    assert high > 0
+    panel.low.setValue(1e-4)
+    assert bench.state.levels.value["reflectance_std"] == pytest.approx((1e-4, high))
