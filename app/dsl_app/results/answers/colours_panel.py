@@ -22,6 +22,7 @@ from dsl_core.analysis.at_bands import at_bands
 from dsl_core.analysis.colours import HEADER, ILLUMINANTS, Colour, colours_of, lights_for
 from dsl_core.errors import CalibrationError, DecodeError
 from dsl_core.model.attributes import stated_band_width_nm
+from dsl_core.optics.colour import hold_colour
 
 EMPTY = "Pin pixels, mark regions or add references; their colours under a light are listed here."
 THIN = chr(0x200A)
@@ -101,7 +102,9 @@ class ColoursPanel(QWidget):
                 except CalibrationError:
                     continue
                 mean, std = at.values, None if mark.curve.std is None else at.std
-            if len(mean) == len(bands) and np.isfinite(mean).all():
+            known = np.isfinite(mean)
+            # Bands that are missing lie between others, if enough are left for a colour.
+            if len(mean) == len(bands) and (known.all() or (known.any() and hold_colour(bands[known]))):
                 unknown = np.full(len(bands), np.nan)
                 spectra[name] = np.asarray(mean, float), unknown if std is None else np.asarray(std, float)
         return colours_of(spectra, bands, lights, reference if reference in spectra else None)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 from dsl_app.results.answers.colours_panel import EMPTY, THIN, ColoursPanel, _value
 from dsl_app.shared.theme import LIGHT
@@ -11,10 +12,11 @@ from dsl_app.shared.widgets.read_table import LEAST_WIDE_PX, RIGHT, cell
 from PySide6.QtGui import QGuiApplication
 from pytestqt.qtbot import QtBot
 
+from dsl_core.io.result.result_file import load_result, save_result
 from dsl_core.optics.colour import reflectance_to_lab
 from tests.app.support.results_controller import SQUARE, Bench
 from tests.app.support.results_controller import bench as bench
-from tests.app.support.small_result import BLUE, RED, write_reference
+from tests.app.support.small_result import BLUE, RED, write_reference, write_small_result
 
 
 def test_marks_have_colours_and_differences_to_the_selected_one(qtbot: QtBot, bench: Bench) -> None:
@@ -38,6 +40,21 @@ def test_marks_have_colours_and_differences_to_the_selected_one(qtbot: QtBot, be
     lines = QGuiApplication.clipboard().text().splitlines()
     assert lines[0].startswith("place\tlight\tL*")
     assert len(lines) == 1 + 2 * panel.light.count()
+
+
+def test_a_mark_that_lacks_a_band_has_a_colour_and_one_of_a_few_bands_has_none(
+    qtbot: QtBot, tmp_path: Path
+) -> None:
+    result = load_result(write_small_result(tmp_path)).load()
+    result["reflectance"][3] = np.nan
+    result["reflectance"][:20, 5, 3] = np.nan
+    bench = Bench(save_result(result, tmp_path / "lacking.zarr"))
+    panel = ColoursPanel(bench.state)
+    qtbot.addWidget(panel)
+    panel.show()
+    for pixel in ((30, 5), (3, 5)):
+        bench.control.marks.pin(pixel)
+    assert [panel.table.item(row, 0).text() for row in range(panel.table.rowCount())] == ["pin 1"]  # type: ignore[union-attr]
 
 
 def test_a_reference_that_states_no_deviation_has_none(qtbot: QtBot, bench: Bench, tmp_path: Path) -> None:
