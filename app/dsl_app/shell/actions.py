@@ -181,13 +181,11 @@ ACTIONS: tuple[Action, ...] = (
         "Copy s&pectra",
         "Results",
         "",
-        "Copy the selected spectra as a table for a spreadsheet",
+        "Copy the ticked spectra as a table for a spreadsheet",
         "results",
         separator=True,
     ),
-    Action(
-        "export_spectra", "E&xport spectra…", "Results", "", "Save the selected spectra as CSV", "results"
-    ),
+    Action("export_spectra", "E&xport spectra…", "Results", "", "Save the ticked spectra as CSV", "results"),
     Action(
         "series_add",
         "Add to a s&eries…",
