@@ -278,7 +278,8 @@ class ResultsController:
             )
             return
         text = "showing all depths" if limits is None else "limiting depth"
-        self._undo.push(Change(text, partial(value.set, limits), partial(value.set, before)))
+        change = Change(text, partial(value.set, limits), partial(value.set, before), owner=self.state)
+        self._undo.push(change)
 
     def relight(self, light: str, adapted: bool) -> None:
         """Show the colours under another light; after several quick requests, under the last."""

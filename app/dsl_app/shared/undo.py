@@ -15,13 +15,15 @@ DEPTH = 200
 class Change:
     """A change in words, and how to do and undo it.
 
-    ``obstacle`` says why neither is possible now; empty when both are.
+    ``obstacle`` says why neither is possible now; empty when both are. ``owner`` is whoever may have it
+    forgotten.
     """
 
     text: str
     do: Callable[[], object]
     undo: Callable[[], object]
     obstacle: Callable[[], str] = str
+    owner: object = None
 
 
 class UndoStack:
@@ -68,8 +70,8 @@ class UndoStack:
             self.changed.emit(None)
         return reason
 
-    def clear(self) -> None:
-        """Forget all changes, as when another result is opened."""
-        self._done.clear()
-        self._undone.clear()
+    def forget(self, owner: object) -> None:
+        """Forget the changes of an owner, as those of a result when another one is opened."""
+        for changes in (self._done, self._undone):
+            changes[:] = [change for change in changes if change.owner is not owner]
         self.changed.emit(None)

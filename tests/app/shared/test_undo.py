@@ -34,3 +34,14 @@ def test_a_change_that_cannot_be_taken_back_now_stays_and_says_why() -> None:
     reasons[0] = "A scan runs."
     assert stack.redo() == "A scan runs."
     assert (pins, stack.undo_text, stack.redo_text) == ([0], "", "pin")
+
+
+def test_changes_of_one_owner_are_forgotten_and_those_of_others_stay() -> None:
+    stack, done, result = UndoStack(), list[str](), object()
+    for text, owner in (("position", None), ("pin", result), ("plan", None), ("region", result)):
+        stack.push(Change(text, lambda text=text: done.append(text), done.pop, owner=owner))  # type: ignore[misc]
+    stack.undo()
+    stack.forget(result)
+    assert (stack.undo_text, stack.redo_text) == ("plan", "")
+    stack.undo()
+    assert stack.undo_text == "position"

@@ -179,7 +179,7 @@ class MarksController:
 
     def _change(self, text: str, after: tuple[Mark, ...]) -> None:
         before = self.state.marks.value
-        self._undo.push(Change(text, self._setter(after), self._setter(before)))
+        self._undo.push(Change(text, self._setter(after), self._setter(before), owner=self.state))
 
     def _setter(self, marks: tuple[Mark, ...]) -> Callable[[], None]:
         def set_marks() -> None:
@@ -239,8 +239,8 @@ class MarksController:
     # Read ------------------------------------------------------------------------------------------
 
     def load(self) -> None:
-        """Read the marks of the result that was just opened; clears the undo history."""
-        self._undo.clear()
+        """Read the marks of the result that was just opened; forgets the changes to those of another."""
+        self._undo.forget(self.state)
         self._storage.read()
 
     @property

@@ -6,6 +6,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from dsl_app.shared.undo import Change
+from dsl_app.shell.actions import ACTIONS
 
 from dsl_core.io.result.annotations_file import load_annotations
 from tests.app.support.results_controller import SQUARE, Bench
@@ -187,3 +189,25 @@ def test_a_library_asks_which_spectrum_and_its_name_finds_it_again(bench: Bench,
     path.with_suffix(".hdr").unlink()
     assert bench.control.open(path)
     assert "has no header" in bench.told
+
+
+def test_every_ticked_spectrum_is_copied_and_the_menu_says_so(bench: Bench) -> None:
+    marks, copied = bench.control.marks, list[str]()
+    for pixel in ((3, 3), (10, 3), (30, 3)):
+        marks.pin(pixel)
+    bench.state.selected.set(bench.state.marks.value[0].key)
+    marks.show(False, bench.state.marks.value[1].key)
+    marks.copy_spectra(copied.append)
+    assert "Copied 2 spectra" in bench.told
+    tips = {action.key: action.tip for action in ACTIONS}
+    assert all(" ticked " in tips[key] for key in ("copy_spectra", "export_spectra"))
+
+
+def test_what_was_done_elsewhere_can_still_be_undone_when_a_result_is_opened(
+    bench: Bench, tmp_path: Path
+) -> None:
+    bench.undo.push(Change("position", int, int))
+    bench.control.marks.pin((4, 4))
+    bench.control.limit_depth((701.0, 710.0))
+    assert bench.control.open(tmp_path / "small.zarr")
+    assert bench.undo.undo_text == "position"
