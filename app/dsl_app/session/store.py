@@ -1,13 +1,15 @@
 """Saves the session on disk while the program runs, and finds the session of a program that crashed. No Qt.
 
-Each running program has a file of its own, named by its process. It removes the file when it ends normally:
-a file whose process no longer runs is from a crash.
+Each running program has a file of its own, named by its computer, as several may share the folder, and its
+process. It removes the file when it ends normally: a file whose process no longer runs is from a crash.
 """
 
 from __future__ import annotations
 
 import logging
 import os
+import platform
+import re
 from collections.abc import Callable
 from concurrent.futures import Executor, Future
 from contextlib import suppress
@@ -42,7 +44,8 @@ class SessionStore:
         self._writing.set_result("")
         self._folder, self._collect = folder, collect
         self._process = os.getpid() if process is None else process
-        self._path = folder / f"{_PREFIX}{self._process}.json"
+        self._host = re.sub(r"[^\w.-]", "_", platform.node())
+        self._path = folder / f"{_PREFIX}{self._host}-{self._process}.json"
         self._latest: Session | None = None
         self._has_complained = False
 
@@ -89,15 +92,18 @@ class SessionStore:
             self._path.unlink()
 
     def crashed_session(self) -> tuple[Session | None, str]:
-        """The newest session of a program that crashed, and a sentence on one that cannot be read.
+        """The newest session of a program that crashed here, and a sentence on one that cannot be read.
 
         All sessions of crashed programs are removed, so that they are offered once.
         """
         newest: Session | None = None
         trouble = ""
         for path in sorted(self._folder.glob(f"{_PREFIX}*.json"), key=_age, reverse=True):
-            number = path.stem.removeprefix(_PREFIX)
-            if not number.isdigit() or (int(number) != self._process and is_running(int(number))):
+            # Files of earlier versions name no computer.
+            host, _, number = path.stem.removeprefix(_PREFIX).rpartition("-")
+            if host not in ("", self._host) or not number.isdigit():
+                continue
+            if int(number) != self._process and is_running(int(number)):
                 continue
             try:
                 found = Session.model_validate_json(read_bounded(path))

@@ -5,6 +5,7 @@ import threading
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
+import pytest
 from dsl_app.session.records import ResultsPart, Session
 from dsl_app.session.store import SessionStore, is_running
 
@@ -45,6 +46,20 @@ def test_what_a_running_program_has_open_is_left_to_it(tmp_path: Path) -> None:
     other.save()
     assert is_running(os.getpid())
     assert SessionStore(tmp_path, Session, process=NOBODY).crashed_session() == (None, "")
+
+
+def test_what_a_program_on_another_computer_has_open_is_left_to_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, gone: int
+) -> None:
+    monkeypatch.setattr("platform.node", lambda: "lab-2")
+    elsewhere = SessionStore(tmp_path, lambda: LEAF, process=gone)
+    elsewhere.save()
+    monkeypatch.setattr("platform.node", lambda: "lab 1")
+    assert SessionStore(tmp_path, Session).crashed_session() == (None, "")
+    here = SessionStore(tmp_path, lambda: LEAF, process=gone)
+    here.save()
+    assert SessionStore(tmp_path, Session).crashed_session() == (LEAF, "")
+    assert [path.name for path in tmp_path.iterdir()] == [f"session-lab-2-{gone}.json"]
 
 
 def test_a_damaged_session_is_put_aside_with_a_sentence(tmp_path: Path) -> None:
