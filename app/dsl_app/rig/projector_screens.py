@@ -9,7 +9,7 @@ from PySide6.QtGui import QGuiApplication
 from PySide6.QtWidgets import QWidget
 
 from dsl_app.rig.projector_panel import LOST
-from dsl_app.rig.projector_window import ProjectorWindow, ScreenLabel, describe_screen
+from dsl_app.rig.projector_window import LOST_SCREEN, ProjectorWindow, ScreenLabel, describe_screen
 from dsl_app.shared.notify import Notifier
 from dsl_core.errors import DslError
 
@@ -27,13 +27,7 @@ class ProjectorScreens(QObject):
         self._window, self._notifier = window, notifier
         self._labels: list[ScreenLabel] = []
         self.projector_window = ProjectorWindow()
-        self.projector_window.lost.connect(
-            lambda name: notifier.tell(
-                "error",
-                f"The projector's screen {name} was disconnected. Connect it again and choose it on the Rig"
-                " page.",
-            )
-        )
+        self.projector_window.lost.connect(lambda name: notifier.tell("error", LOST_SCREEN.format(name)))
         self.projector_window.restored.connect(
             lambda name: notifier.tell(
                 "info", f"The screen {name} is connected again. Choose it on the Rig page to use it."
@@ -42,12 +36,12 @@ class ProjectorScreens(QObject):
         window.destroyed.connect(self.projector_window.close)
 
     def serve(self, page: RigPage) -> None:
-        """Serve a Rig page, and update its list when screens are connected or disconnected."""
+        """Serve a Rig page, and update its list when screens are connected, disconnected or lost."""
         page.projector.identify.connect(self.identify)
         page.projector.screen_chosen.connect(lambda name: self._choose(page, name))
         application = QGuiApplication.instance()
         assert isinstance(application, QGuiApplication)
-        for signal in (application.screenAdded, application.screenRemoved):
+        for signal in (application.screenAdded, application.screenRemoved, self.projector_window.lost):
             signal.connect(lambda _screen: self._list(page))
 
     def identify(self) -> None:

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from PySide6.QtCore import QRect, Qt, QThread, Signal
+from PySide6.QtCore import QRect, Qt, QThread, QTimer, Signal
 from PySide6.QtGui import QColor, QFont, QGuiApplication, QImage, QPainter, QPaintEvent, QScreen
 from PySide6.QtWidgets import QWidget
 
@@ -22,6 +22,13 @@ from dsl_core.errors import DeviceError
 
 #: How long a pattern may take to be painted before the window counts as stuck, s.
 PAINT_TIMEOUT_S = 2.0
+#: How long screens may take to find their places when the desktop is arranged anew, ms.
+SETTLE_MS = 300
+#: What is said of a screen that can no longer be covered.
+LOST_SCREEN = (
+    "The projector's screen {} was disconnected or mirrored. Extend the desktop onto it and choose it again"
+    " on the Rig page."
+)
 
 
 @dataclass(frozen=True)
@@ -78,8 +85,8 @@ def mirrors(screen: QScreen) -> list[QScreen]:
 class ProjectorWindow(QWidget):
     """Shows one image on one screen, pixel by pixel, enlarged by a whole factor.
 
-    ``lost`` tells that the screen was disconnected (the window hides at once and stays hidden), ``restored``
-    that it is connected again.
+    ``lost`` tells that the screen was disconnected or mirrored (the window hides and stays hidden),
+    ``restored`` that it is connected again.
     """
 
     lost = Signal(str)
@@ -110,6 +117,8 @@ class ProjectorWindow(QWidget):
         assert isinstance(application, QGuiApplication)
         application.screenRemoved.connect(self._screen_removed)
         application.screenAdded.connect(self._screen_added)
+        for screen in QGuiApplication.screens():
+            screen.geometryChanged.connect(self._rearranged)
 
     def arm(self, screen: QScreen, alone: bool = False) -> None:
         """Cover a screen in black; raises `DeviceError` for a mirrored screen, or the only one.
@@ -150,7 +159,7 @@ class ProjectorWindow(QWidget):
 
     @property
     def lost_screen(self) -> str:
-        """Name of the screen that was disconnected while it was covered; empty once another is chosen."""
+        """Name of the screen that was lost while it was covered; empty once another is chosen."""
         screen = self._screen_id
         return screen.name if screen is not None and not self.isVisible() else ""
 
@@ -194,8 +203,20 @@ class ProjectorWindow(QWidget):
             # Window managers move the window onto the operator's screen: it must be gone before.
             self.hide()
             self.lost.emit(screen.name())
+        self._rearranged()
+
+    def _rearranged(self) -> None:
+        QTimer.singleShot(SETTLE_MS, self, self._leave_mirrored)
+
+    def _leave_mirrored(self) -> None:
+        """Hide where the desktop is covered, too, which `arm` refuses."""
+        if self.is_armed and mirrors(self.screen()):
+            self.hide()
+            self.lost.emit(self.screen().name())
 
     def _screen_added(self, screen: QScreen) -> None:
+        screen.geometryChanged.connect(self._rearranged)
+        self._rearranged()
         if self._screen_id is not None and ScreenId.of(screen) == self._screen_id:
             self.restored.emit(screen.name())
 
@@ -228,10 +249,7 @@ class ScreenProjector(Projector):
         """Show drive levels; returns when they are painted and the latency has passed."""
         self.info.require_image(image)
         if self._window.lost_screen:
-            raise DeviceError(
-                f"The projector's screen {self._window.lost_screen} was disconnected. Connect it again and"
-                " choose it on the Rig page."
-            )
+            raise DeviceError(LOST_SCREEN.format(self._window.lost_screen))
         if not self._window.is_armed:
             if self._behind is None:
                 raise DeviceError(

@@ -122,11 +122,18 @@ def main() -> None:
     ScreenProjector(window, behind).show(half)
     assert behind.shown == 1
 
+    again = screen(PROJECTOR)
+    assert again is not None
+    window.arm(again)
+    wait(lambda: window.is_armed)
     set_monitor(display, "MIRROR", "1280/300x720/170+1280+0", "none")
     wait(lambda: screen("MIRROR") is not None)
     second = screen(PROJECTOR)
     assert second is not None
     assert mirrors(second)
+    wait(lambda: not window.isVisible())
+    assert told[-1] == "lost PROJECTOR"
+    window.disarm()
     try:
         window.arm(second)
     except DeviceError as error:

@@ -9,7 +9,7 @@ from typing import cast
 
 import numpy as np
 import pytest
-from dsl_app.rig.projector_window import ProjectorWindow, ScreenProjector, pixel_size
+from dsl_app.rig.projector_window import SETTLE_MS, ProjectorWindow, ScreenProjector, pixel_size
 from PySide6.QtCore import QRect
 from PySide6.QtGui import QGuiApplication, QScreen
 from pytestqt.qtbot import QtBot
@@ -44,7 +44,7 @@ def test_pixels_are_exact_and_the_window_survives_unplugging(scale: str) -> None
     assert "differing pixels at 1:1: 0" in done.stdout
     assert "differing pixels at 1:2: 0" in done.stdout
     assert "mirrored: The screen" in done.stdout
-    assert "lost: The projector's screen PROJECTOR was disconnected." in done.stdout
+    assert "lost: The projector's screen PROJECTOR was disconnected or mirrored." in done.stdout
 
 
 class _Armed:
@@ -105,3 +105,21 @@ def test_a_pattern_that_the_screen_would_cut_is_refused(qtbot: QtBot) -> None:
 
     with pytest.raises(DeviceError, match=f"has {across} × {down} px, and patterns have {across + 1} ×"):
         Large(cast(ProjectorWindow, window)).show(np.zeros((down, across + 1), np.uint8))
+
+
+def test_the_window_leaves_a_screen_that_comes_to_show_the_desktop(
+    qtbot: QtBot, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    window, told, overlapping = ProjectorWindow(), list[str](), list[QScreen]()
+    qtbot.addWidget(window)
+    monkeypatch.setattr("dsl_app.rig.projector_window.mirrors", lambda _screen: overlapping)
+    window.lost.connect(told.append)
+    screen = QGuiApplication.primaryScreen()
+    window.arm(screen, alone=True)
+    screen.geometryChanged.emit(screen.geometry())
+    qtbot.wait(2 * SETTLE_MS)
+    assert window.is_armed
+    overlapping.append(screen)
+    screen.geometryChanged.emit(screen.geometry())
+    qtbot.waitUntil(lambda: told == [screen.name()])
+    assert (window.isVisible(), window.lost_screen) == (False, screen.name())
