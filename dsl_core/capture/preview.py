@@ -136,8 +136,8 @@ class BlockGraph:
     """What a block of pixels saw of each pattern.
 
     ``position_px`` (patterns,) is where each pattern's first line begins on the projector; ``mean_dn``
-    (settings, patterns, 3) are raw counts in R, G, B, NaN where no frame is there yet. The block is
-    ``block_px`` wide and high and holds ``pixel``, ``(x, y)``.
+    (settings, patterns, 3) are raw counts in R, G, B, of a monochrome camera (settings, patterns, 1), NaN
+    where no frame is there yet. The block is ``block_px`` wide and high and holds ``pixel``, ``(x, y)``.
     """
 
     pixel: tuple[int, int]
@@ -183,6 +183,9 @@ class BlockGraphs:
             return None
         means = self._means[..., row, column].copy()
         means[~self._there] = np.nan
+        if self._bayer == "MONO":
+            # What stands for green is the mean of two pixels of each cell.
+            means = means @ np.array([[0.25], [0.5], [0.25]], np.float32)
         return BlockGraph(pixel, self.block_px, line_positions(self._plan), means)
 
 

@@ -42,10 +42,10 @@ HALF_PX = 24
 class IntensityGraph:
     """One pixel, (x, y) in the camera's picture, over the frames of its pattern set.
 
-    ``measured``, ``std`` and ``model`` have shape (3, frames), DN per ms; the model is None where the pixel
-    has no spectrum. ``zero`` is the frame of the zero order, ``orders`` the frame of each wavelength through
-    +1 and -1 (NaN where the light would start outside the projector's frame); both are empty for pattern
-    sets in which a frame shows several lines.
+    ``measured``, ``std`` and ``model`` have shape (3, frames), of a monochrome camera (1, frames), DN per ms;
+    the model is None where the pixel has no spectrum. ``zero`` is the frame of the zero order, ``orders`` the
+    frame of each wavelength through +1 and -1 (NaN where the light would start outside the projector's
+    frame); both are empty for pattern sets in which a frame shows several lines.
     """
 
     pixel: tuple[int, int]
@@ -166,11 +166,13 @@ def intensity_graph(block: FrameBlock, result: ResultArrays, pixel: tuple[int, i
     measured = demosaic(block.radiance[part], bayer)[:, :, y - top, x - left].T
     variance = demosaic_variance(block.variance[part], bayer)[:, :, y - top, x - left].T
     model, zero, orders = _expected(block, result, pixel)
+    # All three colours of a monochrome camera are the same.
+    count = 1 if bayer == "MONO" else 3
     return IntensityGraph(
         at,
-        np.asarray(measured, np.float64),
-        np.sqrt(np.asarray(variance, np.float64)),
-        model,
+        np.asarray(measured[:count], np.float64),
+        np.sqrt(np.asarray(variance[:count], np.float64)),
+        None if model is None else model[:count],
         zero,
         orders,
         result.wavelengths_nm,

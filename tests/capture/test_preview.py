@@ -117,6 +117,17 @@ def test_a_graph_fills_frame_by_frame(bayer: BayerPattern) -> None:
     assert np.isfinite(graph.mean_dn).sum() == 3
 
 
+def test_a_monochrome_camera_has_one_curve() -> None:
+    graphs = BlockGraphs(PLAN, "MONO")
+    mosaic = np.tile(np.array([[10, 20], [30, 60]], np.uint16), (5, 9))
+    graphs.add(lines(1)[2], mosaic)
+    graph = graphs.graph((3, 4))
+    assert graph is not None
+    assert graph.mean_dn.shape == (2, 4, 1)
+    assert graph.mean_dn[1, 2].tolist() == [30]
+    assert np.isfinite(graph.mean_dn).sum() == 1
+
+
 def test_blocks_are_means_and_grow_until_the_budget_holds() -> None:
     graphs = BlockGraphs(PLAN, "RGGB", budget_bytes=2000)
     assert graphs.block_px == 4

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -63,6 +64,16 @@ def test_a_pixel_at_the_corner_has_a_graph_too(result: ResultArrays) -> None:
     assert intensity_graph(block, result, (0, 0)).measured.shape[0] == 3
     with pytest.raises(DecodeError, match="outside"):
         intensity_graph(block, result, (90, 60))
+
+
+def test_a_monochrome_camera_has_one_curve(result: ResultArrays) -> None:
+    y, x = np.argwhere(np.isfinite(result["reflectance"][0]) & np.isfinite(result["shading"]))[0].tolist()
+    block = read_block(result, (x, y))
+    sensor = block.rig.sensor.model_copy(update={"bayer": "MONO"})
+    mono = replace(block, rig=block.rig.model_copy(update={"sensor": sensor}))
+    graph = intensity_graph(mono, result, (x, y))
+    assert graph.model is not None
+    assert graph.measured.shape == graph.std.shape == graph.model.shape == (1, block.plan.spectral_count)
 
 
 def test_a_scan_that_is_elsewhere_is_asked_for(result: ResultArrays, tmp_path: Path) -> None:

@@ -1,8 +1,9 @@
-"""A window with the intensity graph of a pixel: its three colours in every frame, against the model."""
+"""A window with the intensity graph of a pixel: its colours in every frame, against the model."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pyqtgraph as pg
@@ -17,13 +18,13 @@ from dsl_app.shared.widgets.dialogs import use_room
 from dsl_app.shared.widgets.forms import check_box, label
 from dsl_app.shared.widgets.help_window import add_help_key
 from dsl_app.shared.widgets.layouts import column_of
-from dsl_app.shared.widgets.plots import RGB_COLOURS, CalmPlot, colour_legend
+from dsl_app.shared.widgets.plots import MONO_COLOUR, RGB_COLOURS, CalmPlot, colour_legend
 from dsl_core.model.plan import spoken_number
 
 if TYPE_CHECKING:
     from dsl_core.workflows.inspection import IntensityGraph
 
-CHANNELS = ("R", "G", "B")
+COLOURS = dict(zip("RGB", RGB_COLOURS, strict=True))
 #: Wavelengths that are labelled along the first orders, nm.
 LABELLED_NM = 50.0
 ORDER_NAMES = {1: "+1", -1: "−1"}
@@ -59,14 +60,8 @@ class IntensityWindow(QDialog):
         for span in self.spans.values():
             span.setZValue(-10)
             self.item.addItem(span, ignoreBounds=True)
-        points = {"pen": None, "symbol": "o", "symbolSize": 3, "symbolPen": None}
-        channels = list(zip(CHANNELS, RGB_COLOURS, strict=True))
-        self.measured = [
-            self.item.plot(**points, symbolBrush=colour, name=f"{name} measured") for name, colour in channels
-        ]
-        self.model = [
-            self.item.plot(pen=pg.mkPen(colour, width=1.4), name=f"{name} model") for name, colour in channels
-        ]
+        self.measured: list[Any] = []
+        self.model: list[Any] = []
         self.faint = check_box(
             "Scale to the first orders",
             "The zero order is far brighter and extends beyond the plot; clear this to show all of it",
@@ -89,7 +84,8 @@ class IntensityWindow(QDialog):
             return
         self.setWindowTitle(f"Intensity graph of pixel {graph.pixel[0]}, {graph.pixel[1]}")
         frames = spoken_number(0) + np.arange(graph.measured.shape[1])
-        for c in range(3):
+        self._make_curves(COLOURS if len(graph.measured) == len(COLOURS) else {"": MONO_COLOUR})
+        for c in range(len(graph.measured)):
             self.measured[c].setData(frames, graph.measured[c])
             if graph.model is None:
                 self.model[c].setData([], [])
@@ -107,6 +103,22 @@ class IntensityWindow(QDialog):
         self.item.getAxis("top").setTicks([ticks(graph)])
         self._scale()
         self.text.setText(graph_text(graph))
+
+    def _make_curves(self, colours: Mapping[str, str]) -> None:
+        """A curve each for measured and model of colours, which are named in the legend."""
+        if len(colours) == len(self.measured):
+            return
+        for curve in (*self.measured, *self.model):
+            self.item.removeItem(curve)
+        points = {"pen": None, "symbol": "o", "symbolSize": 3, "symbolPen": None}
+        self.measured = [
+            self.item.plot(**points, symbolBrush=colour, name=f"{name} measured".strip())
+            for name, colour in colours.items()
+        ]
+        self.model = [
+            self.item.plot(pen=pg.mkPen(colour, width=1.4), name=f"{name} model".strip())
+            for name, colour in colours.items()
+        ]
 
     def _scale(self) -> None:
         graph = self._graph
@@ -176,8 +188,9 @@ def graph_text(graph: IntensityGraph) -> str:
     if graph.model is None:
         parts.append("The pixel has no spectrum, so there is no model to compare with.")
     else:
+        of_colours = " and colours" if len(graph.measured) == len(COLOURS) else ""
         miss = float(np.sqrt(np.nanmean((graph.measured - graph.model) ** 2)))
-        parts.append(f"Measured and model differ by {miss:.3g} DN/ms (RMS over all frames and colours).")
+        parts.append(f"Measured and model differ by {miss:.3g} DN/ms (RMS over all frames{of_colours}).")
     return " ".join(parts)
 
 

@@ -18,7 +18,7 @@ from dsl_app.shared.widgets.help_window import set_help
 from dsl_app.shared.widgets.hints import FocusRing
 from dsl_app.shared.widgets.layouts import column_of
 from dsl_app.shared.widgets.pictures import DEPTH, PictureView, arrow_step, colour_map
-from dsl_app.shared.widgets.plots import CalmPlot
+from dsl_app.shared.widgets.plots import MONO_COLOUR, CalmPlot
 from dsl_core.capture.preview import BlockGraph
 from dsl_core.model.plan import CapturePlan, Shot, spoken_number
 from dsl_core.optics.levels import between, spread_of
@@ -147,7 +147,7 @@ class ScanView(QSplitter):
 
 
 class GraphPlot(QWidget):
-    """R, G and B of a pixel over the projector's columns; earlier settings are dotted."""
+    """R, G and B of a pixel, or its brightness, over the projector's columns; earlier settings are dotted."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -175,14 +175,17 @@ class GraphPlot(QWidget):
         settings = len(graph.mean_dn)
         self._make_curves(settings)
         begun = [i for i in range(settings) if np.isfinite(graph.mean_dn[i]).any()]
+        colours = CHANNEL_COLOURS if graph.mean_dn.shape[2] == 3 else (MONO_COLOUR,)
+        for curve in self._curves:
+            curve.setVisible(False)
         for i in range(settings):
-            for channel in range(3):
+            for channel, colour in enumerate(colours):
                 curve = self._curves[3 * i + channel]
                 curve.setVisible(i in begun)
                 # The setting being captured is drawn solid.
                 old = bool(begun) and i != begun[-1]
                 style = Qt.PenStyle.DotLine if old else Qt.PenStyle.SolidLine
-                curve.setPen(pg.mkPen(CHANNEL_COLOURS[channel], width=1, style=style))
+                curve.setPen(pg.mkPen(colour, width=1, style=style))
                 curve.setData(graph.position_px, graph.mean_dn[i, :, channel], connect="finite")
         self.plot.enableAutoRange(axis="y")
         if len(graph.position_px):
@@ -191,8 +194,6 @@ class GraphPlot(QWidget):
     def _make_curves(self, settings: int) -> None:
         while len(self._curves) < 3 * settings:
             self._curves.append(self.plot.plot([], []))
-        for curve in self._curves[3 * settings :]:
-            curve.setVisible(False)
 
 
 def covered_px(shown: LivePicture) -> tuple[int, int]:

@@ -50,6 +50,22 @@ def test_the_intensity_graph_shows_orders_in_nm(bench: Bench) -> None:
     assert not window.isVisible()
 
 
+def test_a_monochrome_camera_has_one_curve_without_a_colour(bench: Bench) -> None:
+    frames, measured = np.linspace(60.0, 110.0, NM.size), np.full((3, 200), 2.0)
+    colour = IntensityGraph((4, 5), measured, measured, measured, 150.0, {1: frames}, NM)
+    mono = replace(colour, measured=measured[:1], std=measured[:1], model=measured[:1])
+    window = bench.page.graph
+
+    def legend() -> list[str]:
+        return [text.text for _, text in window.item.legend.items]
+
+    for graph, names in ((mono, [""]), (colour, ["R ", "G ", "B "]), (mono, [""])):
+        bench.state.graph.set(graph)
+        assert legend() == [f"{name}{what}" for what in ("measured", "model") for name in names]
+        assert len(window.measured) == len(window.model) == len(names)
+        assert ("colours" in window.text.text()) == (graph is colour)
+
+
 def test_without_its_scan_a_graph_is_refused_in_words(bench: Bench) -> None:
     bench.window.do("intensity_graph")
     assert "Point at a pixel" in bench.window.toasts.shown[-1].text

@@ -20,6 +20,8 @@ TIMES_S = (5, 10, 20, 30, 60, 120, 300, 600, 1200, 3600)
 NARROW = 8.0
 #: Red, green and blue that are told apart on both themes.
 RGB_COLOURS = ("#e0524d", "#2fa84f", "#4c8dff")
+#: That of a monochrome camera, on either theme.
+MONO_COLOUR = "#8a8f98"
 
 
 class CalmPlot(pg.PlotWidget):  # type: ignore[misc]

@@ -1,0 +1,24 @@
+"""The intensity graph of a scan that runs."""
+
+from __future__ import annotations
+
+import numpy as np
+from dsl_app.scan.view import CHANNEL_COLOURS, GraphPlot
+from dsl_app.shared.widgets.plots import MONO_COLOUR
+from pytestqt.qtbot import QtBot
+
+from dsl_core.capture.preview import BlockGraph
+
+
+def test_a_monochrome_camera_has_one_grey_curve_for_each_setting(qtbot: QtBot) -> None:
+    plot = GraphPlot()
+    qtbot.addWidget(plot)
+
+    def shown(channels: int) -> list[str]:
+        counts = np.full((2, 4, channels), 7.0, np.float32)
+        plot.show_graph(BlockGraph((3, 4), 2, np.arange(4.0), counts))
+        return [curve.opts["pen"].color().name() for curve in plot._curves if curve.isVisible()]
+
+    for _ in range(2):
+        assert shown(3) == [*CHANNEL_COLOURS, *CHANNEL_COLOURS]
+        assert shown(1) == [MONO_COLOUR, MONO_COLOUR]
