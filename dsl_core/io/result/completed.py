@@ -58,6 +58,6 @@ def missing_text(result: ResultArrays) -> str:
     if result.has_spectra and not hold_colour(bands := result.wavelengths_nm):
         sentences.append(
             f"The bands, {bands.min():g} to {bands.max():g} nm, hold too little of a colour: the colours of"
-            " pictures are as if the spectra went on unchanged."
+            " pictures are as if the spectra continued unchanged."
         )
     return " ".join(sentences)
