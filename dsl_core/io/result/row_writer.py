@@ -121,7 +121,11 @@ class RowWriter:
         elif "scale_factor" in array.attrs and not fitting:
             array = self._widen(group, name, part)
         packed = packing if "scale_factor" in array.attrs else None
-        array[..., rows, :] = encoded(values, array.dtype, packed)
+        self._store(array, name, rows, encoded(values, array.dtype, packed))
+
+    def _store(self, array: zarr.Array[Any], name: str, rows: slice, values: NDArray[Any]) -> None:
+        """Write rows, safe before their note is: a chunk that a power cut has taken reads as zeros."""
+        array[..., rows, :] = values
         before = ["0"] * (array.ndim - 2)
         for chunk in range(rows.start // self._height, -(-rows.stop // self._height)):
             make_safe(self.work / _ARRAYS / name / "c" / Path(*before, str(chunk), "0"))
@@ -141,7 +145,7 @@ class RowWriter:
             if self._note(rows).is_file():
                 steps = np.asarray(old[..., rows, :])
                 values = steps.astype(np.float32) * np.float32(packing.step)
-                wide[..., rows, :] = np.where(steps == packing.fill, np.float32(np.nan), values)
+                self._store(wide, name, rows, np.where(steps == packing.fill, np.float32(np.nan), values))
         shutil.rmtree(aside)
         return wide
 
@@ -160,7 +164,10 @@ class RowWriter:
         self._labels = labels_of(like)
         with self._writing():
             for name, variable in like.coords.variables.items():
-                if name not in self._labels and str(name) not in group:
+                if name not in self._labels:
+                    # Those of a run that was interrupted may lack their chunks, which read as zeros.
+                    if str(name) in group:
+                        del group[str(name)]
                     write_variable(group, str(name), variable)
         return opened(self.work / _ARRAYS, {**like.attrs, "labels": self._labels})
 

@@ -4,15 +4,19 @@ from __future__ import annotations
 
 import errno
 import os
+import shutil
+from collections import Counter
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 import xarray as xr
+import zarr
 
 from dsl_core.errors import StoreError
 from dsl_core.io.result import row_writer
+from dsl_core.io.result.arrays import write_variable
 from dsl_core.io.result.result_file import load_result, save_result
 from dsl_core.io.result.row_writer import RowWriter
 from dsl_core.model.result import build_result
@@ -93,12 +97,12 @@ def test_a_longer_last_band_is_kept_where_earlier_rows_are_too_bright_to_be_pack
 ) -> None:
     given = maps()
     given["reflectance"][:, :4] *= 9.0
-    safe: set[str] = set()
-    monkeypatch.setattr(row_writer, "make_safe", lambda file: safe.add(file.parts[-2]))
+    safe = Counter[tuple[str, str]]()
+    monkeypatch.setattr(row_writer, "make_safe", lambda file: safe.update([(file.parts[-5], file.parts[-2])]))
     found = write(tmp_path / "r.zarr", given, bands=(slice(0, 4), slice(4, 10)))
     np.testing.assert_allclose(found["reflectance"], given["reflectance"], atol=3e-5, rtol=0)
-    # Rows 8 and 9 are in a file of their own.
-    assert safe == {"0", "1", "2"}
+    # Rows 8 and 9 are in a file of their own. Those stored again have a note before they are.
+    assert [safe["reflectance", chunk] for chunk in "012"] == [1, 2, 2]
 
 
 def test_rows_that_are_there_are_not_asked_for_again(tmp_path: Path) -> None:
@@ -135,6 +139,25 @@ def test_what_a_killed_run_left_half_written_is_not_in_the_result(tmp_path: Path
             (next(writer.work.glob("*/zarr.json")).parent / name).write_bytes(b"{")
     write(target, given)
     assert [path.name for path in target.rglob("*.partial")] == []
+
+
+@pytest.mark.parametrize("axis", ["y", "x", "wavelength_nm"])
+def test_axes_of_a_run_that_was_interrupted_while_it_wrote_them_are_written_again(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, axis: str
+) -> None:
+    target, given = tmp_path / "r.zarr", maps()
+
+    def dies(group: zarr.Group, name: str, variable: xr.Variable) -> None:
+        write_variable(group, name, variable)
+        if name == axis:
+            shutil.rmtree(tmp_path / ".r.zarr.unfinished" / "result.zarr" / axis / "c")
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    with monkeypatch.context() as patch:
+        patch.setattr(row_writer, "write_variable", dies)
+        with pytest.raises(StoreError, match="disk is full"):
+            write(target, given)
+    xr.testing.assert_identical(write(target, given), write(tmp_path / "again.zarr", given))
 
 
 @pytest.mark.parametrize("change", ["key", "half written"])
