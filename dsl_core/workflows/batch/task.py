@@ -106,7 +106,7 @@ def _done(task: ScanTask, seen_rows: SeenRows | None) -> Outcome:
         folder = stack.enter_context(brought(task.scan))
         # A draft is our own.
         inner = replace(task, scan=folder, target=draft, overwrite=task.overwrite or target is not None)
-        outcome = _done_here(inner, seen_rows)
+        outcome = _done_here(inner, seen_rows, is_room=target is not None)
     taken_over = (claim.taken_over,) if claim is not None and claim.taken_over else ()
     state = outcome.state if target is None else "made"
     return replace(
@@ -123,10 +123,12 @@ def _options_for(reader: ScanReader, options: Options) -> Options:
     return replace(options, spectra=False) if is_import(reader) else options
 
 
-def _done_here(task: ScanTask, seen_rows: SeenRows | None) -> Outcome:
+def _done_here(task: ScanTask, seen_rows: SeenRows | None, *, is_room: bool = False) -> Outcome:
+    """The target may be a room, which is claimed by whoever lends it."""
     reader = ScanReader(task.scan)
     options = _options_for(reader, task.options)
-    with Claim(task.target) as claim:
+    with contextlib.ExitStack() as stack:
+        claim = None if is_room else stack.enter_context(Claim(task.target))
         outcome = Outcome(task.scan, task.target, "kept")
         if not is_made_of(task.target, key_of_result(reader, task.calibration, options)):
             if task.target.exists() and not task.overwrite:
@@ -135,7 +137,7 @@ def _done_here(task: ScanTask, seen_rows: SeenRows | None) -> Outcome:
                     " or version. Choose another folder for results, or allow it to be replaced."
                 )
             outcome = _made(task, options, seen_rows)
-        remarks = (claim.taken_over,) if claim.taken_over else ()
+    remarks = (claim.taken_over,) if claim is not None and claim.taken_over else ()
     return _with_figures(replace(outcome, remarks=remarks))
 
 

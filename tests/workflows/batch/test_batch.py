@@ -14,6 +14,9 @@ from dsl_core.devices.registry import open_rig
 from dsl_core.errors import Cancelled, StoreError
 from dsl_core.io.atomic import write_atomic
 from dsl_core.io.claims import Claim
+from dsl_core.io.objects import rooms
+from dsl_core.io.objects.address import address_of
+from dsl_core.io.objects.rooms import brought
 from dsl_core.io.result import row_writer
 from dsl_core.io.result.result_file import load_result
 from dsl_core.io.scan.folder import ScanReader
@@ -134,6 +137,28 @@ def test_a_manifest_of_other_software_in_a_store_is_no_scan(monkeypatch: pytest.
         assert found == ["a.dsl", "leaf 1.5", "leaf 1.6"]
         with pytest.raises(StoreError, match="contains no scan"):
             find_scans(Path("s3://bucket/day/site"))
+
+
+@pytest.mark.parametrize("place", ["s3://bucket/out/a.zarr", "a.zarr"])
+def test_a_scan_in_a_store_is_done_once(
+    scan: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, place: str
+) -> None:
+    pytest.importorskip("obstore", reason="the extra s3 is not installed")
+    monkeypatch.setattr(rooms, "user_cache_path", lambda name: tmp_path / "cache")
+    target = Path(place) if address_of(Path(place)) else tmp_path / place
+    task = ScanTask(Path("s3://bucket/day/a.dsl"), target, options=OPTIONS)
+    with running() as store:
+        for name, value in store.environment().items():
+            monkeypatch.setenv(name, value)
+        for file in (each for each in scan.rglob("*") if each.is_file()):
+            store.put(f"day/a.dsl/{file.relative_to(scan).as_posix()}", file.read_bytes())
+        made = do_task(task)
+        assert (made.state, made.sentence) == ("made", "")
+        assert (made.scan, made.target, made.pixels_with_depth > 0.05) == (task.scan, target, True)
+        assert do_task(task).state == "kept"
+        with brought(target) as folder:
+            assert "depth_mm" in load_result(folder, lazy=False)
+        assert not list((tmp_path / "cache" / "objects").glob("*")), "nothing is left here"
 
 
 def test_two_scans_never_have_one_result(folder: Path, tmp_path: Path) -> None:
