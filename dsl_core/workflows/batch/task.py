@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from dsl_core.errors import DslError, TakenError
+from dsl_core.errors import DslError, StoreError, TakenError
 from dsl_core.evaluation.cost import StageTimer
 from dsl_core.extras import names_missing_packages, require_package
 from dsl_core.io.claims import Claim, ClaimedError
@@ -130,15 +130,24 @@ def _done_here(task: ScanTask, seen_rows: SeenRows | None, *, is_room: bool = Fa
     with contextlib.ExitStack() as stack:
         claim = None if is_room else stack.enter_context(Claim(task.target))
         outcome = Outcome(task.scan, task.target, "kept")
-        if not is_made_of(task.target, key_of_result(reader, task.calibration, options)):
+        if not _is_there(task, key_of_result(reader, task.calibration, options)):
             if task.target.exists() and not task.overwrite:
                 raise TakenError(
                     f"{task.target} already exists, made of other frames or with another calibration, options"
-                    " or version. Choose another folder for results, or allow it to be replaced."
+                    " or version. Choose another folder for results, or allow it to be replaced with --force."
                 )
             outcome = _made(task, options, seen_rows)
     remarks = (claim.taken_over,) if claim is not None and claim.taken_over else ()
     return _with_figures(replace(outcome, remarks=remarks))
+
+
+def _is_there(task: ScanTask, key: str) -> bool:
+    try:
+        return is_made_of(task.target, key)
+    except StoreError as error:
+        if task.overwrite:  # whatever is wrong with it
+            return False
+        raise TakenError(f"{error} To do that, allow it to be replaced with --force.") from error
 
 
 def _made(task: ScanTask, options: Options, seen_rows: SeenRows | None) -> Outcome:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import shutil
 from collections.abc import Generator, Mapping
 from pathlib import Path
@@ -202,11 +203,22 @@ def test_complete_results_of_the_same_frames_and_options_are_kept(folder: Path) 
     assert do_task(forced).state == "kept"
 
 
-def test_a_damaged_result_is_not_taken_for_complete(folder: Path) -> None:
-    _batch(folder)
-    chunk = next(path for path in (folder / "a.zarr" / "depth_mm").rglob("*") if path.name != "zarr.json")
-    shutil.rmtree(chunk) if chunk.is_dir() else chunk.unlink()
-    assert "is damaged" in _batch(folder)["a"].sentence
+@pytest.mark.parametrize("what", ["is damaged", "is a result of schema version 0"])
+def test_a_result_that_cannot_be_read_is_told_and_replaced_where_that_is_allowed(
+    scan: Path, tmp_path: Path, what: str
+) -> None:
+    shutil.copytree(scan, tmp_path / "a.dsl")
+    assert _batch(tmp_path)["a"].state == "made"
+    if what == "is damaged":
+        shutil.rmtree(tmp_path / "a.zarr" / "depth_mm" / "c")
+    else:
+        about = tmp_path / "a.zarr" / "zarr.json"
+        about.write_text(re.sub(r'"schema_version": \d+', '"schema_version": 0', about.read_text()))
+    refused = _batch(tmp_path)["a"].sentence
+    assert what in refused
+    assert refused.endswith("allow it to be replaced with --force.")
+    assert _batch(tmp_path, overwrite=True)["a"].state == "made"
+    assert _batch(tmp_path)["a"].state == "kept"
 
 
 @pytest.mark.slow
