@@ -7,6 +7,7 @@ import time
 import traceback
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
@@ -92,29 +93,32 @@ def do_task(task: ScanTask, seen_rows: SeenRows | None = None) -> Outcome:
 def _done(task: ScanTask, seen_rows: SeenRows | None) -> Outcome:
     if address_of(task.scan) is None and address_of(task.target) is None:
         return _done_here(task, seen_rows)
-    target, claim = address_of(task.target), None
+    target, remarks = address_of(task.target), tuple[str, ...]()
     with contextlib.ExitStack() as stack:
         if target is not None:
             require_package("obstore")
             with brought(task.scan, wanted=lambda name: not name.startswith("frames/c.")) as folder:
                 reader = ScanReader(folder)
                 key = key_of_result(reader, task.calibration, _options_for(reader, task.options))
-            claim = stack.enter_context(ObjectClaim(target))
-            if published_as(ObjectFolder(target), MADE_OF) == key:
+
+            def is_there() -> bool:
+                return published_as(ObjectFolder(target), MADE_OF) == key
+
+            remarks = _claimed(stack, partial(ObjectClaim, target), is_there)
+            if is_there():
                 return Outcome(task.scan, task.target, "kept")
         draft = stack.enter_context(published(task.target, overwrite=task.overwrite))
         folder = stack.enter_context(brought(task.scan))
         # A draft is our own.
         inner = replace(task, scan=folder, target=draft, overwrite=task.overwrite or target is not None)
         outcome = _done_here(inner, seen_rows, is_room=target is not None)
-    taken_over = (claim.taken_over,) if claim is not None and claim.taken_over else ()
     state = outcome.state if target is None else "made"
     return replace(
         outcome,
         scan=task.scan,
         target=task.target,
         state=state,
-        remarks=(*taken_over, *outcome.remarks),
+        remarks=(*remarks, *outcome.remarks),
     )
 
 
@@ -127,18 +131,37 @@ def _done_here(task: ScanTask, seen_rows: SeenRows | None, *, is_room: bool = Fa
     """The target may be a room, which is claimed by whoever lends it."""
     reader = ScanReader(task.scan)
     options = _options_for(reader, task.options)
+    is_there = partial(_is_there, task, key_of_result(reader, task.calibration, options))
     with contextlib.ExitStack() as stack:
-        claim = None if is_room else stack.enter_context(Claim(task.target))
-        outcome = Outcome(task.scan, task.target, "kept")
-        if not _is_there(task, key_of_result(reader, task.calibration, options)):
-            if task.target.exists() and not task.overwrite:
-                raise TakenError(
-                    f"{task.target} already exists, made of other frames or with another calibration, options"
-                    " or version. Choose another folder for results, or allow it to be replaced with --force."
-                )
-            outcome = _made(task, options, seen_rows)
-    remarks = (claim.taken_over,) if claim is not None and claim.taken_over else ()
-    return _with_figures(replace(outcome, remarks=remarks))
+        remarks = () if is_room else _claimed(stack, partial(Claim, task.target), is_there)
+        if is_there():
+            outcome = Outcome(task.scan, task.target, "kept", remarks=remarks)
+        elif task.target.exists() and not task.overwrite:
+            raise TakenError(
+                f"{task.target} already exists, made of other frames or with another calibration, options"
+                " or version. Choose another folder for results, or allow it to be replaced with --force."
+            )
+        else:
+            outcome = replace(_made(task, options, seen_rows), remarks=remarks)
+    return _with_figures(outcome)
+
+
+def _claimed(
+    stack: contextlib.ExitStack, claim: Callable[[], Claim | ObjectClaim], is_there: Callable[[], bool]
+) -> tuple[str, ...]:
+    """Claim a result while a stack lasts; remarks on whose claim was taken over.
+
+    One that is there is not claimed where nothing can be written, nor needs to be.
+    """
+    try:
+        held = stack.enter_context(claim())
+    except ClaimedError:
+        raise
+    except StoreError:
+        if is_there():
+            return ()
+        raise
+    return (held.taken_over,) if held.taken_over else ()
 
 
 def _is_there(task: ScanTask, key: str) -> bool:

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import errno
+import os
 import re
 import shutil
 from collections.abc import Generator, Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -156,7 +159,8 @@ def test_a_scan_in_a_store_is_done_once(
         made = do_task(task)
         assert (made.state, made.sentence) == ("made", "")
         assert (made.scan, made.target, made.pixels_with_depth > 0.05) == (task.scan, target, True)
-        assert do_task(task).state == "kept"
+        store.refuse = lambda method, name: None if method in ("GET", "HEAD") else 403
+        assert do_task(task).state == "kept", "also for who may write nothing there"
         with brought(target) as folder:
             assert "depth_mm" in load_result(folder, lazy=False)
         assert not list((tmp_path / "cache" / "objects").glob("*")), "nothing is left here"
@@ -201,6 +205,26 @@ def test_complete_results_of_the_same_frames_and_options_are_kept(folder: Path) 
     forced = tasks_of([folder / "a.dsl"], options=Options(spectra=False), overwrite=True)[0]
     assert do_task(forced).state == "made"
     assert do_task(forced).state == "kept"
+
+
+def test_complete_results_are_kept_where_nothing_can_be_written(
+    scan: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    shutil.copytree(scan, tmp_path / "a.dsl")
+    _batch(tmp_path)
+    shutil.copytree(scan, tmp_path / "b.dsl")
+    opened = os.open
+
+    def refuses(path: Any, flags: int, *mode: int, **more: Any) -> int:
+        if flags & (os.O_WRONLY | os.O_RDWR) and tmp_path in Path(path).parents:
+            raise OSError(errno.EROFS, os.strerror(errno.EROFS))
+        return opened(path, flags, *mode, **more)
+
+    monkeypatch.setattr(os, "open", refuses)
+    found = _batch(tmp_path)
+    assert (found["a"].state, found["b"].state) == ("kept", "failed")
+    assert found["a"].pixels_with_depth > 0.05
+    assert "Read-only" in found["b"].sentence
 
 
 @pytest.mark.parametrize("what", ["is damaged", "is a result of schema version 0"])
