@@ -135,7 +135,7 @@ def _done_here(task: ScanTask, seen_rows: SeenRows | None, *, is_room: bool = Fa
     with contextlib.ExitStack() as stack:
         remarks = () if is_room else _claimed(stack, partial(Claim, task.target), is_there)
         if is_there():
-            outcome = Outcome(task.scan, task.target, "kept", remarks=remarks)
+            outcome = Outcome(task.scan, task.target, "kept")
         elif task.target.exists() and not task.overwrite:
             raise TakenError(
                 f"{task.target} already exists, made of other frames or with another calibration, options"

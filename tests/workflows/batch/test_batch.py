@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 import os
+import platform
 import re
 import shutil
 from collections.abc import Generator, Mapping
@@ -17,10 +18,11 @@ from dsl_core import pipeline
 from dsl_core.devices.registry import open_rig
 from dsl_core.errors import Cancelled, StoreError
 from dsl_core.io.atomic import write_atomic
-from dsl_core.io.claims import Claim
+from dsl_core.io.claims import Claim, Owner
 from dsl_core.io.objects import rooms
 from dsl_core.io.objects.address import address_of
 from dsl_core.io.objects.rooms import brought
+from dsl_core.io.records import replace_record
 from dsl_core.io.result import row_writer
 from dsl_core.io.result.result_file import load_result
 from dsl_core.io.scan.folder import ScanReader
@@ -225,6 +227,17 @@ def test_complete_results_are_kept_where_nothing_can_be_written(
     assert (found["a"].state, found["b"].state) == ("kept", "failed")
     assert found["a"].pixels_with_depth > 0.05
     assert "Read-only" in found["b"].sentence
+
+
+def test_a_claim_that_was_taken_over_is_told_only_of_what_was_made(scan: Path, tmp_path: Path) -> None:
+    shutil.copytree(scan, tmp_path / "a.dsl")
+    dead = Owner(host=platform.node(), process=7)
+    for state, remarks in (("made", 1), ("kept", 0)):
+        replace_record(tmp_path / ".a.zarr.owner.json", dead)
+        found = _batch(tmp_path)["a"]
+        told = [each for each in found.remarks if "was begun by process 7" in each]
+        assert (found.state, len(told)) == (state, remarks)
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["a.dsl", "a.zarr"]
 
 
 @pytest.mark.parametrize("what", ["is damaged", "is a result of schema version 0"])
