@@ -23,7 +23,7 @@ from dsl_core.pipeline import Options
 from dsl_core.progress import Progress
 from dsl_core.workflows.scans import reconstruct_to
 
-_ENDING, _KEY, _LOCK = ".unfinished", "key.json", "writer.lock"
+_ENDING, _KEY, _LOCK, _ARRAYS = ".unfinished", "key.json", "writer.lock", "result.zarr"
 #: After the facts, a key ends with shape, origin, height of a band of rows, and wavelengths.
 _LAYOUT = re.compile(r"\((\d+), \d+\) \(\d+, \d+\) ([1-9]\d*) \[")
 #: What reading a damaged key raises; the last two are for what is nested too deeply.
@@ -77,10 +77,13 @@ def unfinished_scans(folder: Path) -> tuple[UnfinishedScan, ...]:
 
 
 def unfinished_results(folder: Path) -> tuple[UnfinishedResult, ...]:
-    """Interrupted reconstructions of a folder whose scan is in it; the others are left out."""
+    """Interrupted reconstructions of a folder whose scan is in it; the others are left out.
+
+    One whose arrays are gone is of a result that was moved to its place: there is nothing to continue.
+    """
     found = []
     for work in sorted(folder.glob(f".*{_ENDING}")):
-        if not _is_in_use(work / _LOCK):
+        if (work / _ARRAYS).is_dir() and not _is_in_use(work / _LOCK):
             with contextlib.suppress(*_UNREADABLE):
                 found.append(_read(work))
     return tuple(found)

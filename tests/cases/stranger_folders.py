@@ -25,7 +25,7 @@ def _make_begun(folder: Path) -> None:
     options = repr(Options(spectra=False))
     facts = json.dumps(["1", manifest, {}, small_rig().model_dump_json(), options])
     work = folder / ".a.zarr.unfinished"
-    work.mkdir()
+    (work / "result.zarr").mkdir(parents=True)
     (work / "key.json").write_text(f"{facts}\n(8, 12) (0, 0) 4 [430.0, 440.0]")
     (work / "rows.0.4.json").write_text("{}")
 

@@ -14,7 +14,7 @@ import torch
 from dsl_core import pipeline
 from dsl_core.capture.metering import WHITE_IN_DOUBT
 from dsl_core.devices.registry import open_rig
-from dsl_core.io import MANIFEST_NAME
+from dsl_core.io import MANIFEST_NAME, staging
 from dsl_core.io.atomic import write_atomic
 from dsl_core.io.records import replace_record
 from dsl_core.io.result import row_writer
@@ -76,6 +76,26 @@ def test_an_interrupted_reconstruction_is_found_and_continued(killed: Path, tmp_
     assert (found.done, found.total, found.options) == (1, 2, OPTIONS)
     assert resume_result(found) == tmp_path / "a.zarr"
     assert "depth_mm" in load_result(tmp_path / "a.zarr")
+    assert unfinished_results(tmp_path) == ()
+
+
+def test_a_run_killed_as_its_result_was_moved_in_is_not_offered(
+    killed: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def dies(folder: Path) -> None:
+        if (folder / "a.zarr").exists():
+            raise KeyboardInterrupt
+
+    work = tmp_path / ".a.zarr.unfinished"
+    by_earlier_versions = shutil.copytree(work, tmp_path / "copy")
+    with monkeypatch.context() as patch:
+        patch.setattr(staging, "sync_folder", dies)
+        with pytest.raises(KeyboardInterrupt):
+            scans.reconstruct_to(tmp_path / "a.zarr", killed, None, OPTIONS)
+    assert (load_result(tmp_path / "a.zarr").sizes["y"], work.exists()) == (32, False)
+    by_earlier_versions.rename(work)
+    assert len(unfinished_results(tmp_path)) == 1
+    shutil.rmtree(work / "result.zarr")
     assert unfinished_results(tmp_path) == ()
 
 

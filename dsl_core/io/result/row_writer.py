@@ -177,7 +177,8 @@ class RowWriter:
             seal_folder(self.work / _ARRAYS, {**attributes, "labels": self._labels})
             with staged([self._target], overwrite=self._overwrite, kind=RESULT_FOLDER) as (draft,):
                 os.replace(self.work / _ARRAYS, draft)
-        self._tidy()
+                # Before the result is there, so that a kill leaves nothing that seems to be its beginning.
+                self._tidy()
         return self._target
 
     def __enter__(self) -> Self:
