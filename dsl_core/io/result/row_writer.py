@@ -78,6 +78,9 @@ class RowWriter:
             if self._is_of(key):
                 for leftover in (self.work / _ARRAYS).rglob("*" + PARTIAL_SUFFIX):
                     leftover.unlink()  # of zarr, which writes beside a file as we do, and was killed
+                for folder in (self.work / _ARRAYS).iterdir():
+                    if folder.is_dir() and folder.name not in VARIABLES:
+                        shutil.rmtree(folder)  # an axis, which may lack its values and would read as zeros
                 done = len(list(self.work.glob("rows.*.json")))
                 _log.warning(
                     "Continued where a run was interrupted: %d of %d bands are there.", done, len(bands)
@@ -165,9 +168,6 @@ class RowWriter:
         with self._writing():
             for name, variable in like.coords.variables.items():
                 if name not in self._labels:
-                    # Those of a run that was interrupted may lack their chunks, which read as zeros.
-                    if str(name) in group:
-                        del group[str(name)]
                     write_variable(group, str(name), variable)
         return opened(self.work / _ARRAYS, {**like.attrs, "labels": self._labels})
 

@@ -141,16 +141,19 @@ def test_what_a_killed_run_left_half_written_is_not_in_the_result(tmp_path: Path
     assert [path.name for path in target.rglob("*.partial")] == []
 
 
-@pytest.mark.parametrize("axis", ["y", "x", "wavelength_nm"])
+@pytest.mark.parametrize(
+    ("axis", "lacks"), [("y", "c"), ("x", "c"), ("wavelength_nm", "c"), ("wavelength_nm", "zarr.json")]
+)
 def test_axes_of_a_run_that_was_interrupted_while_it_wrote_them_are_written_again(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, axis: str
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, axis: str, lacks: str
 ) -> None:
     target, given = tmp_path / "r.zarr", maps()
 
     def dies(group: zarr.Group, name: str, variable: xr.Variable) -> None:
         write_variable(group, name, variable)
         if name == axis:
-            shutil.rmtree(tmp_path / ".r.zarr.unfinished" / "result.zarr" / axis / "c")
+            begun = tmp_path / ".r.zarr.unfinished" / "result.zarr" / axis
+            shutil.move(begun / lacks, tmp_path / "lost")
             raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
     with monkeypatch.context() as patch:
