@@ -154,13 +154,14 @@ def _claimed(
     One that is there is not claimed where nothing can be written, nor needs to be.
     """
     try:
-        held = stack.enter_context(claim())
+        held = claim()
     except ClaimedError:
         raise
     except StoreError:
         if is_there():
             return ()
         raise
+    stack.enter_context(held)
     return (held.taken_over,) if held.taken_over else ()
 
 
