@@ -139,7 +139,7 @@ def _done_here(task: ScanTask, seen_rows: SeenRows | None, *, is_room: bool = Fa
         elif task.target.exists() and not task.overwrite:
             raise TakenError(
                 f"{task.target} already exists, made of other frames or with another calibration, options"
-                " or version. Choose another folder for results, or allow it to be replaced with --force."
+                " or version. Choose another folder for results, or replace it with --force."
             )
         else:
             outcome = replace(_made(task, options, seen_rows), remarks=remarks)
@@ -171,7 +171,7 @@ def _is_there(task: ScanTask, key: str) -> bool:
     except StoreError as error:
         if task.overwrite:  # whatever is wrong with it
             return False
-        raise TakenError(f"{error} To do that, allow it to be replaced with --force.") from error
+        raise TakenError(f"{error} With --force, it is replaced.") from error
 
 
 def _made(task: ScanTask, options: Options, seen_rows: SeenRows | None) -> Outcome:

@@ -253,7 +253,7 @@ def test_a_result_that_cannot_be_read_is_told_and_replaced_where_that_is_allowed
         about.write_text(re.sub(r'"schema_version": \d+', '"schema_version": 0', about.read_text()))
     refused = _batch(tmp_path)["a"].sentence
     assert what in refused
-    assert refused.endswith("allow it to be replaced with --force.")
+    assert refused.endswith("With --force, it is replaced.")
     assert _batch(tmp_path, overwrite=True)["a"].state == "made"
     assert _batch(tmp_path)["a"].state == "kept"
 
