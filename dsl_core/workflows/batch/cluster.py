@@ -6,10 +6,12 @@ import contextlib
 import time
 import uuid
 from collections.abc import Callable, Generator, Iterator, Mapping
+from dataclasses import replace
 from queue import SimpleQueue
 from typing import Any
 
 from dsl_core.errors import Cancelled, DeviceError
+from dsl_core.io.objects.address import address_of
 from dsl_core.version import __version__
 from dsl_core.workflows.batch.runner import Ended, Rows, given_up
 from dsl_core.workflows.batch.task import Outcome, ScanTask, SeenRows, do_task
@@ -36,6 +38,7 @@ class Cluster:
         from distributed import Event
 
         topic, told = f"dsl-scan-{uuid.uuid4().hex}", SimpleQueue[Rows]()
+        tasks = {number: _anywhere(task) for number, task in tasks.items()}
         with self._client() as client:
             client.subscribe_topic(topic, lambda event: told.put(Rows(*event[1])))
             # Not pure: done again where somebody has deleted the result since.
@@ -124,6 +127,14 @@ class Cluster:
             f"The scheduler {self._address} was lost. Results that were complete are kept: start it, and"
             " run the same command again."
         )
+
+
+def _anywhere(task: ScanTask) -> ScanTask:
+    """The task with whole paths: a worker runs in another folder."""
+    scan, target = (
+        path if address_of(path) is not None else path.absolute() for path in (task.scan, task.target)
+    )
+    return replace(task, scan=scan, target=target)
 
 
 def _version() -> str:

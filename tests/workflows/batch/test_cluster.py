@@ -52,6 +52,23 @@ def test_every_task_is_done_once_and_tells_of_its_rows(address: str, tmp_path: P
     assert [work.begun(task) for task in tasks.values()] == [1, 1, 1]
 
 
+def test_paths_lead_to_the_same_from_the_folder_of_a_worker(
+    address: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    given = {
+        0: ScanTask(Path("scans/a.dsl"), Path("results/a.zarr")),
+        1: ScanTask(Path("s3://bucket/b.dsl"), tmp_path / "b.zarr"),
+    }
+    got = {e.task: e.outcome for e in Cluster(address, _told).run(given) if isinstance(e, Ended)}
+    assert (got[0].scan, got[0].target) == (tmp_path / "scans/a.dsl", tmp_path / "results/a.zarr")
+    assert (got[1].scan, got[1].target) == (given[1].scan, given[1].target)
+
+
+def _told(task: ScanTask, seen_rows: SeenRows | None) -> Outcome:
+    return Outcome(task.scan, task.target, "made")
+
+
 def test_what_a_task_raises_on_a_worker_is_its_outcome_alone(address: str, tmp_path: Path) -> None:
     found = {
         e.task: e.outcome
