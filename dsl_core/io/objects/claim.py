@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import threading
+import uuid
 from pathlib import PurePosixPath
 from typing import Self
 
@@ -33,8 +34,8 @@ class ObjectClaim:
     def _take_over(self, target: Address, lapse_s: float) -> None:
         owner = self._folder.get(self._name)
         who = "another process" if owner is None else str(Owner.model_validate_json(owner))
-        # By the clock of the store, which a new object of ours tells.
-        probe = f"{self._name}.now"
+        # By the clock of the store, which a new object of ours tells; others who ask have another.
+        probe = f"{self._name}.{uuid.uuid4().hex}"
         self._folder.put(probe, b"")
         known = self._folder.listed()
         self._folder.remove([probe])

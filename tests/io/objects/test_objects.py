@@ -182,6 +182,25 @@ def test_a_claim_in_a_store_holds_and_lapses(twin: ObjectStoreTwin) -> None:
     assert not [name for name in twin.objects if ".claims" in name]
 
 
+def test_several_may_ask_at_once_who_has_a_claim(
+    twin: ObjectStoreTwin, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    listed, asked = ObjectFolder.listed, list[str]()
+
+    def meanwhile(self: ObjectFolder) -> dict[str, store.Found]:
+        if not asked:
+            asked.append("by another")
+            with pytest.raises(ClaimedError):
+                ObjectClaim(RESULT)
+        return listed(self)
+
+    with ObjectClaim(RESULT):
+        monkeypatch.setattr(ObjectFolder, "listed", meanwhile)
+        with pytest.raises(ClaimedError, match="is being made by process"):
+            ObjectClaim(RESULT)
+    assert not [name for name in twin.objects if ".claims" in name]
+
+
 def test_an_owner_renews_its_claim(twin: ObjectStoreTwin) -> None:
     with ObjectClaim(RESULT, beat_s=0.01) as claim:
         for _ in range(500):
