@@ -92,7 +92,7 @@ def reconstruct(
     from dsl_core.io.calibration_library import load_calibration
     from dsl_core.io.neighbours import result_beside
     from dsl_core.io.objects.address import shown
-    from dsl_core.io.objects.rooms import brought, published
+    from dsl_core.io.objects.rooms import bring_frames, brought, published
     from dsl_core.io.result.result_file import RESULT_FOLDER
     from dsl_core.io.scan.manifest import read_manifest
 
@@ -101,13 +101,14 @@ def reconstruct(
     place = target or result_beside(scan)
     with ExitStack() as stack:
         with output.progress() as progress:
-            folder = stack.enter_context(brought(scan, progress))
+            folder = stack.enter_context(brought(scan, progress, frames=False))
             draft = stack.enter_context(published(place, overwrite=force, progress=progress))
-        if target is None and draft.exists():
-            read_manifest(folder)  # that it is no scan is told before that its result exists
-        # What is here of a result in a store is our own, from a run that was stopped.
-        force = force or draft != place
-        check_targets([draft], overwrite=force, kind=RESULT_FOLDER)
+            if target is None and draft.exists():
+                read_manifest(folder)  # that it is no scan is told before that its result exists
+            # What is here of a result in a store is our own, from a run that was stopped.
+            force = force or draft != place
+            check_targets([draft], overwrite=force, kind=RESULT_FOLDER)
+            bring_frames(scan, folder, progress)
         rig = load_calibration(calibration) if calibration else None
         if rig is None and _tells_columns_only(folder):
             found = _decode(output, folder, draft, force)

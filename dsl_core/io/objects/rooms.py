@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import shutil
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -17,6 +17,9 @@ from dsl_core.io.objects.copies import fetch, publish, published_as, taken
 from dsl_core.io.objects.store import ObjectFolder
 from dsl_core.progress import Progress
 
+#: How names of a scan's frames begin.
+_FRAMES = "frames/c."
+
 
 def room_of(address: Address) -> Path:
     """Where a folder of a store is kept here until it is no longer needed."""
@@ -25,13 +28,12 @@ def room_of(address: Address) -> Path:
 
 
 @contextmanager
-def brought(
-    path: Path, progress: Progress | None = None, wanted: Callable[[str], bool] = lambda name: True
-) -> Iterator[Path]:
+def brought(path: Path, progress: Progress | None = None, *, frames: bool = True) -> Iterator[Path]:
     """A folder with what is at a path: the path itself, or a copy of what is at its address.
 
-    The copy is removed when the block ends well; one that was interrupted is completed the next time. Raises
-    `StoreError`, and `MissingPackageError` without the extra.
+    Without ``frames`` it is what tells of a scan; `bring_frames` brings these. The copy is removed when the
+    block ends well; one that was interrupted is completed the next time. Raises `StoreError`, and
+    `MissingPackageError` without the extra.
     """
     address = address_of(path)
     if address is None:
@@ -40,9 +42,16 @@ def brought(
     require_package("obstore")
     room = room_of(address)
     with Claim(room):
-        fetch(ObjectFolder(address), room, progress, wanted)
+        fetch(ObjectFolder(address), room, progress, lambda name: frames or not name.startswith(_FRAMES))
         yield room
         shutil.rmtree(room.parent, ignore_errors=True)
+
+
+def bring_frames(path: Path, folder: Path, progress: Progress | None = None) -> None:
+    """Complete the folder that `brought` lends for a path, in its block; raises `StoreError`."""
+    address = address_of(path)
+    if address is not None:
+        fetch(ObjectFolder(address), folder, progress)
 
 
 @contextmanager

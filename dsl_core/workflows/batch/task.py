@@ -20,7 +20,7 @@ from dsl_core.io.claims import Claim, ClaimedError
 from dsl_core.io.objects.address import address_of
 from dsl_core.io.objects.claim import ObjectClaim
 from dsl_core.io.objects.copies import published_as
-from dsl_core.io.objects.rooms import brought, published
+from dsl_core.io.objects.rooms import bring_frames, brought, published
 from dsl_core.io.objects.store import ObjectFolder
 from dsl_core.io.scan.folder import ScanReader
 from dsl_core.model.attributes import DOUBTS, sentences_of
@@ -95,11 +95,14 @@ def _done(task: ScanTask, seen_rows: SeenRows | None) -> Outcome:
         return _done_here(task, seen_rows)
     target, remarks = address_of(task.target), tuple[str, ...]()
     with contextlib.ExitStack() as stack:
-        if target is not None:
+        folder = stack.enter_context(brought(task.scan, frames=False))
+        reader = ScanReader(folder)
+        key = key_of_result(reader, task.calibration, _options_for(reader, task.options))
+        if target is None:
+            if _is_there(task, key):
+                return _with_figures(Outcome(task.scan, task.target, "kept"))
+        else:
             require_package("obstore")
-            with brought(task.scan, wanted=lambda name: not name.startswith("frames/c.")) as folder:
-                reader = ScanReader(folder)
-                key = key_of_result(reader, task.calibration, _options_for(reader, task.options))
 
             def is_there() -> bool:
                 return published_as(ObjectFolder(target), MADE_OF) == key
@@ -108,7 +111,7 @@ def _done(task: ScanTask, seen_rows: SeenRows | None) -> Outcome:
             if is_there():
                 return Outcome(task.scan, task.target, "kept")
         draft = stack.enter_context(published(task.target, overwrite=task.overwrite))
-        folder = stack.enter_context(brought(task.scan))
+        bring_frames(task.scan, folder)
         # A draft is our own.
         inner = replace(task, scan=folder, target=draft, overwrite=task.overwrite or target is not None)
         outcome = _done_here(inner, seen_rows, is_room=target is not None)
@@ -136,11 +139,6 @@ def _done_here(task: ScanTask, seen_rows: SeenRows | None, *, is_room: bool = Fa
         remarks = () if is_room else _claimed(stack, partial(Claim, task.target), is_there)
         if is_there():
             outcome = Outcome(task.scan, task.target, "kept")
-        elif task.target.exists() and not task.overwrite:
-            raise TakenError(
-                f"{task.target} already exists, made of other frames or with another calibration, options"
-                " or version. Choose another folder for results, or replace it with --force."
-            )
         else:
             outcome = replace(_made(task, options, seen_rows), remarks=remarks)
     return _with_figures(outcome)
@@ -154,24 +152,30 @@ def _claimed(
     One that is there is not claimed where nothing can be written, nor needs to be.
     """
     try:
-        held = claim()
+        held = stack.enter_context(claim())
     except ClaimedError:
         raise
     except StoreError:
         if is_there():
             return ()
         raise
-    stack.enter_context(held)
     return (held.taken_over,) if held.taken_over else ()
 
 
 def _is_there(task: ScanTask, key: str) -> bool:
+    """Whether a result is there; raises `TakenError` where it is another one, which must not be replaced."""
     try:
-        return is_made_of(task.target, key)
+        found = is_made_of(task.target, key)
     except StoreError as error:
         if task.overwrite:  # whatever is wrong with it
             return False
-        raise TakenError(f"{error} With --force, it is replaced.") from error
+        raise TakenError(f"{error} To do that, allow it to be replaced with --force.") from error
+    if not found and task.target.exists() and not task.overwrite:
+        raise TakenError(
+            f"{task.target} already exists, made of other frames or with another calibration, options"
+            " or version. Choose another folder for results, or allow it to be replaced with --force."
+        )
+    return found
 
 
 def _made(task: ScanTask, options: Options, seen_rows: SeenRows | None) -> Outcome:
