@@ -7,34 +7,32 @@ import os
 import platform
 import re
 import shutil
-from collections.abc import Generator, Iterator, Mapping
-from dataclasses import replace
+from collections.abc import Generator, Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
-from dsl_core import pipeline
-from dsl_core.devices.registry import open_rig
 from dsl_core.errors import Cancelled, StoreError
 from dsl_core.io.atomic import write_atomic
 from dsl_core.io.claims import Claim, Owner
-from dsl_core.io.objects import rooms, store
-from dsl_core.io.objects.address import address_of
-from dsl_core.io.objects.rooms import brought
 from dsl_core.io.records import replace_record
 from dsl_core.io.result import row_writer
 from dsl_core.io.result.result_file import load_result
 from dsl_core.io.scan.folder import ScanReader
-from dsl_core.model.presets import PRESETS
 from dsl_core.pipeline import Options
 from dsl_core.progress import CallbackProgress, NoProgress
-from dsl_core.workflows.batch.batch import PIXEL_BYTES, find_scans, needed_bytes, run_batch, tasks_of
+from dsl_core.workflows.batch.batch import (
+    PIXEL_BYTES,
+    find_scans,
+    needed_bytes,
+    run_batch,
+    tasks_of,
+)
 from dsl_core.workflows.batch.report import batch_page, batch_sentences, batch_table, is_batch_page
 from dsl_core.workflows.batch.runner import Ended, Rows
 from dsl_core.workflows.batch.task import Outcome, ScanTask, do_task
-from tests.cases.object_store import ObjectStoreTwin, running
 
 OPTIONS = Options(spectra=False, refine_columns=False, band_rows=16)
 
@@ -52,16 +50,6 @@ class Here:
             outcome = do_task(task, lambda done, total, rows=rows: rows.append(done))  # type: ignore[misc]
             yield from (Rows(number, done) for done in rows)
             yield Ended(number, outcome)
-
-
-@pytest.fixture(scope="module")
-def scan(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """To be copied, not changed."""
-    folder = tmp_path_factory.mktemp("scans") / "a.dsl"
-    with open_rig("twin", {"scene": "plane", "size": "48x32"}) as devices:
-        plan = next(p.plan for p in PRESETS if p.key == "quick")
-        pipeline.scan(devices, pipeline.fit_plan(plan, devices), folder)
-    return folder
 
 
 @pytest.fixture
@@ -129,88 +117,6 @@ def test_a_manifest_of_other_software_is_no_scan(folder: Path) -> None:
     manifest.write_text(manifest.read_text().replace('"plan"', '"plam"'))
     found = [path.name for path in find_scans(folder)]
     assert found == ["b.dsl", "leaf 1.5", "leaf 1.6", "leaf 1.7"], "damaged scans are scans"
-
-
-def test_a_manifest_of_other_software_in_a_store_is_no_scan(monkeypatch: pytest.MonkeyPatch) -> None:
-    pytest.importorskip("obstore", reason="the extra s3 is not installed")
-    with running() as twin:
-        for name, value in twin.environment().items():
-            monkeypatch.setenv(name, value)
-        for name in ("a.dsl/manifest.json", "leaf 1.5/manifest.json", "leaf 1.5/frames.jsonl"):
-            twin.put(f"day/{name}", b"{")
-        twin.put("day/leaf 1.6/manifest.json", b'{"plan": {}, "versions": {}}')
-        twin.put("day/site/manifest.json", b'{"name": "app"}')
-        found = [path.name for path in find_scans(Path("s3://bucket/day"))]
-        assert found == ["a.dsl", "leaf 1.5", "leaf 1.6"]
-        with pytest.raises(StoreError, match="contains no scan"):
-            find_scans(Path("s3://bucket/day/site"))
-
-
-@pytest.fixture
-def stored(scan: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[ObjectStoreTwin]:
-    """A store with the scan as ``s3://bucket/day/a.dsl``; what is brought from it is in ``cache``."""
-    pytest.importorskip("obstore", reason="the extra s3 is not installed")
-    monkeypatch.setattr(rooms, "user_cache_path", lambda name: tmp_path / "cache")
-    with running() as twin:
-        for name, value in twin.environment().items():
-            monkeypatch.setenv(name, value)
-        for file in (each for each in scan.rglob("*") if each.is_file()):
-            twin.put(f"day/a.dsl/{file.relative_to(scan).as_posix()}", file.read_bytes())
-        yield twin
-
-
-def _frames_brought(twin: ObjectStoreTwin) -> list[str]:
-    """Names of the frames that were brought since the last time."""
-    found = [name for method, name in twin.requests if method == "GET" and "/frames/c." in name]
-    twin.requests.clear()
-    return found
-
-
-@pytest.mark.parametrize("place", ["s3://bucket/out/a.zarr", "a.zarr"])
-def test_a_scan_in_a_store_is_done_once(stored: ObjectStoreTwin, tmp_path: Path, place: str) -> None:
-    target = Path(place) if address_of(Path(place)) else tmp_path / place
-    task = ScanTask(Path("s3://bucket/day/a.dsl"), target, options=OPTIONS)
-    made = do_task(task)
-    assert (made.state, made.sentence) == ("made", "")
-    assert (made.scan, made.target, made.pixels_with_depth > 0.05) == (task.scan, target, True)
-    assert _frames_brought(stored)
-    stored.refuse = lambda method, name: None if method in ("GET", "HEAD") else 403
-    assert do_task(task).state == "kept", "also for who may write nothing there"
-    stored.refuse = lambda method, name: None
-    other = replace(task, options=Options(spectra=False))
-    assert "already exists" in do_task(other).sentence
-    assert not _frames_brought(stored), "what they are is told without them"
-    assert do_task(task).state == "kept"
-    with brought(target) as folder:
-        assert "depth_mm" in load_result(folder, lazy=False)
-    assert not list((tmp_path / "cache" / "objects").glob("*")), "nothing is left here"
-
-
-@pytest.mark.parametrize("place", ["s3://bucket/out/a.zarr", "a.zarr"])
-def test_a_scan_that_was_brought_in_part_is_completed(
-    stored: ObjectStoreTwin, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, place: str
-) -> None:
-    monkeypatch.setattr(store, "_RETRY", {"max_retries": 0})
-    target = Path(place) if address_of(Path(place)) else tmp_path / place
-    task = ScanTask(Path("s3://bucket/day/a.dsl"), target, options=OPTIONS)
-    seen = set[str]()
-
-    def vanishes(method: str, name: str) -> int | None:
-        if "/frames/c." not in name:
-            return None
-        if len(seen) == 5:
-            return 503
-        seen.add(name)
-        return None
-
-    stored.refuse = vanishes
-    assert "does not answer" in do_task(task).sentence
-    stored.refuse = lambda method, name: None
-    _frames_brought(stored)
-    assert do_task(task).state == "made"
-    rest = _frames_brought(stored)
-    assert rest
-    assert not seen & set(rest)
 
 
 def test_two_scans_never_have_one_result(folder: Path, tmp_path: Path) -> None:
