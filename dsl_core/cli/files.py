@@ -187,14 +187,16 @@ def info(
     verify: Annotated[
         bool,
         typer.Option(
-            "--verify", help="Also read every frame of a scan, and say which do not show their pattern."
+            "--verify",
+            help="Also read every frame of a scan, and say which do not show their pattern; or every value of"
+            " a result.",
         ),
     ] = False,
     json: Json = False,
 ) -> None:
     """Show what a folder or file contains and whether it is complete.
 
-    With --verify, the exit code is 2 if anything is wrong with a scan.
+    With --verify, the exit code is 2 if anything is wrong with a scan or result.
     """
     from dsl_core.io.describe import describe
     from dsl_core.io.objects.rooms import brought

@@ -13,7 +13,7 @@ from dsl_core.io import CAMPAIGN_NAME, MANIFEST_NAME
 from dsl_core.io.campaign_folder import CampaignFolder
 from dsl_core.io.plan_file import load_plan
 from dsl_core.io.reading import read_bounded, read_json
-from dsl_core.io.result.result_file import has_checksums, load_result
+from dsl_core.io.result.result_file import check_values, has_checksums, load_result
 from dsl_core.io.rig_file import load_rig
 from dsl_core.io.scan.check import find_problems
 from dsl_core.io.scan.folder import ScanReader
@@ -28,7 +28,7 @@ Facts = dict[str, Any]
 
 
 def describe(path: Path, verify: bool = False) -> Facts:
-    """Facts about a scan, result, campaign, rig or plan; ``verify`` also reads every frame of a scan.
+    """Facts about a scan, result, campaign, rig or plan; ``verify`` also reads all frames or values.
 
     Raises `StoreError` when the path is none of them, and the reader's own error when it is a damaged one.
     """
@@ -37,7 +37,7 @@ def describe(path: Path, verify: bool = False) -> Facts:
     if (path / CAMPAIGN_NAME).is_file():
         return _campaign(CampaignFolder.open(path))
     if (path / "zarr.json").is_file():
-        return _result(path)
+        return _result(path, verify)
     if path.is_file() and path.suffix.lower() == ".json":
         return _json(path)
     if not path.exists():
@@ -84,13 +84,16 @@ def _campaign(campaign: CampaignFolder) -> Facts:
     }
 
 
-def _result(path: Path) -> Facts:
+def _result(path: Path, verify: bool) -> Facts:
     result = load_result(path)
+    if verify:
+        check_values(path)
+    checksums = f"of every chunk, {'compared' if verify else 'not compared'}"
     facts: Facts = {
         "kind": "result",
         "size_px": [result.sizes["x"], result.sizes["y"]],
         "variables": [str(name) for name in result.data_vars],
-        "checksums": "of every chunk" if has_checksums(path) else _UNCHECKED,
+        "checksums": checksums if has_checksums(path) else _UNCHECKED,
     }
     if "wavelength_nm" in result.coords:
         centres = result["wavelength_nm"].values

@@ -133,6 +133,14 @@ def opened(path: Path, stored: Mapping[str, Any], *, lazy: bool = True) -> xr.Da
         raise damage_of(path, error) from error
 
 
+def check_values(path: Path) -> None:
+    """Read every value of a result, array by array; raises `StoreError` where a chunk is damaged."""
+    from dsl_core.io.result.stored_arrays import stored_arrays
+
+    for array in stored_arrays(path, partial(damage_of, path)).values():
+        array.stored((slice(None),) * len(array.shape))
+
+
 def has_checksums(path: Path) -> bool:
     """Whether damage to a result is noticed; False for those of earlier versions."""
     return INVENTORY in read_attributes(path)

@@ -52,6 +52,9 @@ def test_a_damaged_band_is_told_when_it_is_read(copied: Path) -> None:
     data = bytearray(path.read_bytes())
     data[len(data) // 2] ^= 1
     path.write_bytes(data)
+    assert "not compared" in describe(copied)["checksums"]
+    with pytest.raises(StoreError, match="is damaged"):
+        describe(copied, verify=True)
     lazy = load_result(copied)
     lazy["depth_mm"].load()
     with pytest.raises(StoreError, match="is damaged"):
@@ -97,7 +100,8 @@ def _without_checksums(folder: Path) -> None:
 def test_a_result_of_an_earlier_version_opens_and_says_so(
     copied: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
-    assert describe(copied)["checksums"] == "of every chunk"
+    assert describe(copied)["checksums"] == "of every chunk, not compared"
+    assert describe(copied, verify=True)["checksums"] == "of every chunk, compared"
     _without_checksums(copied)
     assert load_result(copied).sizes["wavelength_nm"] == 5
     assert "was written without checksums" in caplog.text
