@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from dsl_core.evaluation.cost import StageCost
+from dsl_core.io.objects.address import shown
 from dsl_core.progress import Progress
 
 if TYPE_CHECKING:
@@ -150,11 +151,11 @@ class _Bars:
 
 
 def _plain(value: Any) -> Any:
-    """A value that every JSON reader accepts: no NaN, no infinity, paths as text."""
+    """A value that every JSON reader accepts: no NaN, no infinity, paths as they are written."""
     if isinstance(value, Mapping):
         return {str(key): _plain(item) for key, item in value.items()}
     if isinstance(value, list | tuple):
         return [_plain(item) for item in value]
     if isinstance(value, float) and not math.isfinite(value):
         return None
-    return str(value) if isinstance(value, Path) else value
+    return shown(value) if isinstance(value, Path) else value

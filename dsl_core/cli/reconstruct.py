@@ -118,7 +118,7 @@ def reconstruct(
                 options = replace(options, spectra=False)
             found = _reconstruct(output, folder, draft, rig, options, override, force)
     output.say(f"{found} The result is saved in {shown(place)}")
-    output.put(result=shown(place))
+    output.put(result=place)
     output.finish()
 
 

@@ -18,6 +18,7 @@ from dsl_core.cli.scans import next_step
 from dsl_core.devices.replay import replay_rig
 from dsl_core.errors import PlanError
 from dsl_core.io.calibration_library import CalibrationLibrary
+from dsl_core.io.objects import rooms
 from dsl_core.io.plan_file import load_plan, save_plan
 from dsl_core.io.result.result_file import load_result
 from dsl_core.io.scan.folder import ScanReader, ScanWriter
@@ -25,6 +26,7 @@ from dsl_core.io.scan.origin import rig_notes
 from dsl_core.model.plan import EnsembleCode, GrayCode, LineComb, Setting, XorCode
 from dsl_core.model.presets import PRESETS, preset_plan
 from tests.cases.memory_sink import MemorySink
+from tests.cases.object_store import running
 
 from .conftest import SMALL_PLAN, SMALL_RIG, Give
 
@@ -210,6 +212,22 @@ def test_reconstruct_says_what_each_stage_costs(give: Give, finished: Path, tmp_
     assert "save the result" in give(
         "reconstruct", finished / "scan.dsl", "-o", target, "--depth-only", "--force"
     ).out  # fmt: skip
+
+
+def test_frames_are_not_brought_from_a_store_where_the_result_is_taken(
+    give: Give, finished: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pytest.importorskip("obstore", reason="the extra s3 is not installed")
+    monkeypatch.setattr(rooms, "user_cache_path", lambda name: tmp_path / "cache")
+    with running() as store:
+        for name, value in store.environment().items():
+            monkeypatch.setenv(name, value)
+        for file in (each for each in (finished / "scan.dsl").rglob("*") if each.is_file()):
+            store.put(f"a.dsl/{file.relative_to(finished / 'scan.dsl').as_posix()}", file.read_bytes())
+        ended = give("reconstruct", "s3://bucket/a.dsl", "-o", finished / "scan.zarr")
+        assert (ended.code, "already exists" in ended.sentence) == (2, True)
+        assert not [name for _, name in store.requests if "/frames/c." in name]
+        assert give("reconstruct", "s3://bucket/a.dsl", "-o", tmp_path / "a.zarr", "--depth-only").code == 0
 
 
 def test_evaluate_finds_the_truth_by_itself(give: Give, finished: Path, tmp_path: Path) -> None:

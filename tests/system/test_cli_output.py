@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import json
 import os
 import subprocess
 import sys
@@ -18,6 +19,14 @@ class Terminal(io.StringIO):
 
     def isatty(self) -> bool:
         return True
+
+
+def test_addresses_keep_both_slashes_for_programs(capsys: pytest.CaptureFixture[str]) -> None:
+    output = Output(True)
+    output.put(scans=[{"scan": Path("s3://bucket/x/a.dsl"), "result": Path("x") / "a.zarr"}])
+    output.finish()
+    told = {"scan": "s3://bucket/x/a.dsl", "result": str(Path("x") / "a.zarr")}
+    assert json.loads(capsys.readouterr().out) == {"scans": [told]}
 
 
 def test_bars_give_way_to_what_is_said_and_asked(

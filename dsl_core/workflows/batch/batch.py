@@ -16,7 +16,7 @@ from dsl_core.errors import Cancelled, StoreError
 from dsl_core.extras import require_package
 from dsl_core.io import MANIFEST_NAME
 from dsl_core.io.neighbours import SCAN_SUFFIX, result_beside
-from dsl_core.io.objects.address import Address, address_of
+from dsl_core.io.objects.address import Address, address_of, shown
 from dsl_core.io.objects.store import ObjectFolder
 from dsl_core.io.reading import read_bounded, read_json
 from dsl_core.io.scan.folder import LOG_NAME
@@ -170,8 +170,8 @@ def tasks_of(
         other = by_target.setdefault(task.target, task.scan)
         if other != task.scan:
             raise StoreError(
-                f"{other} and {task.scan} would both become {task.target}. Rename one of them, or leave the"
-                " folder for results out."
+                f"{shown(other)} and {shown(task.scan)} would both become {shown(task.target)}. Rename one of"
+                " them, or leave the folder for results out."
             )
     return tasks
 

@@ -6,6 +6,7 @@ from collections.abc import Generator, Mapping
 from dataclasses import dataclass
 from typing import Protocol
 
+from dsl_core.io.objects.address import shown
 from dsl_core.words import counted
 from dsl_core.workflows.batch.task import Outcome, ScanTask
 
@@ -42,6 +43,6 @@ def given_up(task: ScanTask, how: str) -> Outcome:
         task.scan,
         task.target,
         "failed",
-        f"The process that reconstructed {task.scan} died {counted(MOST_DEATHS, 'time')}, {how}. It may need"
-        " more memory than there is: use fewer jobs, or another machine.",
+        f"The process that reconstructed {shown(task.scan)} died {counted(MOST_DEATHS, 'time')}, {how}. It"
+        " may need more memory than there is: use fewer jobs, or another machine.",
     )
