@@ -152,13 +152,14 @@ def _claimed(
     One that is there is not claimed where nothing can be written, nor needs to be.
     """
     try:
-        held = stack.enter_context(claim())
+        held = claim()
     except ClaimedError:
         raise
     except StoreError:
         if is_there():
             return ()
         raise
+    stack.enter_context(held)
     return (held.taken_over,) if held.taken_over else ()
 
 
@@ -169,11 +170,11 @@ def _is_there(task: ScanTask, key: str) -> bool:
     except StoreError as error:
         if task.overwrite:  # whatever is wrong with it
             return False
-        raise TakenError(f"{error} To do that, allow it to be replaced with --force.") from error
+        raise TakenError(f"{error} With --force, it is replaced.") from error
     if not found and task.target.exists() and not task.overwrite:
         raise TakenError(
             f"{task.target} already exists, made of other frames or with another calibration, options"
-            " or version. Choose another folder for results, or allow it to be replaced with --force."
+            " or version. Choose another folder for results, or replace it with --force."
         )
     return found
 
