@@ -9,6 +9,7 @@ they expect. What is left out: edges, shadows, and whatever the linear model get
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -149,11 +150,12 @@ class VirtualPixels:
         last = rig.camera.width_px * rig.camera.height_px - 1
         neighbour, _ = zero_order(rig, (self.pixels + 1).clip(max=last), self.depth)
         #: Columns of the projector from a pixel to the next, (samples,).
-        self.pitch_px = neighbour - self.column
+        self.pitch_px = (neighbour - self.column).to(self.shading)
         self.blur_px = demosaic_blur_px(torch.stack([self.column, neighbour], 1).numpy())
-        #: Zero order as one sample of the mosaic sees it, and as the reconstruction models it.
+        #: Share of each colour that demosaicing takes from the neighbouring columns, (samples, 3).
+        self.sideways = like(sideways_shares(rig, view.pixels), self.shading)
+        #: Zero order as one sample of the mosaic sees it.
         self.direct = self.model.zero_light(self.shading)
-        self.modelled = self.model.zero_light(self.shading, self.blur_px)
         self.matrices = self._matrices()
 
     def _matrices(self) -> Matrices:
@@ -170,20 +172,25 @@ class VirtualPixels:
         one = torch.ones_like(self.shading)
         return model.operator(traced, one, self.blur_px, model.orders).matrix()
 
-    def zero_at(self, columns_px: Tensor) -> Tensor:
-        """The reconstruction's zero-order operator of unit shading at columns, (n, 3, frames, bands)."""
-        moments = self.model.zero_moments(self.shading)
-        return torch.einsum("nlf,clj->ncfj", self.modelled.at(columns_px), moments)
+    def demosaiced(
+        self, light: Callable[[Tensor], Tensor], columns_px: Tensor, sample: int | slice | Tensor
+    ) -> Tensor:
+        """Light (n, 3 or 1, LEDs, frames) at columns (n,) of samples as colours show it, (n, 3, ...).
 
-    def _zero_signal(self, model: PixelModel, spectra: Tensor) -> Tensor:
-        """Zero order as demosaicing gives it, each colour from its own neighbours, of unit shading."""
-        column, pitch = self.column.to(self.shading), self.pitch_px.to(self.shading)
-        sideways = 0.5 * (self.direct.at(column - pitch) + self.direct.at(column + pitch))
-        share = like(sideways_shares(self.rig, self.view.pixels), self.shading)
-        here = self.direct.at(column)
-        light = here[:, None] + share[..., None, None] * (sideways - here)[:, None]
-        colour = torch.einsum("clj,srj->srcl", model.zero_moments(self.shading), spectra)
-        return torch.einsum("sclf,srcl->srcf", light, colour)
+        The reconstruction models every sample of the mosaic at its own column, and so does this.
+        """
+        pitch_px, share = self.pitch_px[sample], self.sideways[sample][..., None, None]
+        here = light(columns_px)
+        sideways = 0.5 * (light(columns_px - pitch_px) + light(columns_px + pitch_px))
+        return here + share * (sideways - here)
+
+    def zero_at(
+        self, columns_px: Tensor, sample: int | slice = slice(None), model: PixelModel | None = None
+    ) -> Tensor:
+        """Zero-order operator of unit shading at columns (n,) of samples, (n, 3, frames, bands)."""
+        moments = (model or self.model).zero_moments(self.shading)
+        light = self.demosaiced(lambda at_px: self.direct.at(at_px)[:, None], columns_px, sample)
+        return torch.einsum("nclf,clj->ncfj", light, moments)
 
     def signals(self, spectra: Tensor, bands: Bands | None = None) -> tuple[Tensor, Tensor]:
         """First-order and zero-order radiance, each (samples, spectra, 3, frames), DN per ms.
@@ -196,7 +203,8 @@ class VirtualPixels:
             model = PixelModel(self.rig, bands, model.profiles, model.correspondence, model.lines)
             operator = self._first(model, self.depth)
         first = torch.einsum("scfj,srj->srcf", operator, spectra)
-        return first * shading, self._zero_signal(model, spectra) * shading
+        zero = self.zero_at(self.column.to(self.shading), model=model)
+        return first * shading, torch.einsum("scfj,srj->srcf", zero, spectra) * shading
 
     def run(self, spectra: NDArray[np.float64], first: Tensor, zero: Tensor) -> Outcome:
         """Reconstruct virtual pixels of truth ``spectra`` (samples, spectra, bands inside) from signals."""
@@ -278,8 +286,13 @@ class VirtualPixels:
         if not self.model.single:
             found = (self.column.to(self.shading)[:, None] + error_px).flatten()
             colour = self._white(draw.nodes, (0,)).flatten(0, 1).T
-            direct = self.model.direct_light(self.modelled, found, colour)
-            spread = spread + (self.direct_error * direct.permute(2, 0, 1).reshape(spread.shape)) ** 2
+            own = torch.arange(len(error_px)).repeat_interleave(error_px.shape[1])
+
+            def most(at_px: Tensor) -> Tensor:
+                return self.model.direct_light(self.direct, at_px, colour).permute(2, 0, 1)[:, :, None]
+
+            direct = self.demosaiced(most, found, own).reshape(spread.shape)
+            spread = spread + (self.direct_error * direct) ** 2
         return torch.where(draw.saturated | ~self.measured[:, None], 0.0, 1 / spread)
 
     def _solve(
@@ -297,7 +310,7 @@ class VirtualPixels:
             moved = self.matrices.change[s] * error_px[s, :, None, None, None]
             if not single:
                 found = self.column[s].to(self.shading) + error_px[s]
-                moved = moved + self.zero_at(found) - self.matrices.zero[s]
+                moved = moved + self.zero_at(found, s) - self.matrices.zero[s]
             strength = true.flatten(0, 1).abs().amax(1)
             # Frames without light still say what the black frames were off by.
             used = (strength > DARK * strength.max()) | (not single)

@@ -92,3 +92,16 @@ def test_the_twin_agrees(spectral: ScanLines | LineComb) -> None:
     measured = run_trial(rig, plan(spectral), chart)
     assert found.pixel_rmse == pytest.approx(measured.pixel_rmse, rel=0.2)
     assert found.depth_std_mm == pytest.approx(measured.depth_rmse_mm, rel=0.4)
+
+
+@pytest.mark.parametrize("shifts_px", [(0, 0, 0), (0, 21, 43)], ids=["white", "colours"])
+def test_pictures_of_few_pixels_tell_as_much_of_combs(shifts_px: tuple[int, int, int]) -> None:
+    """Colours come from samples of the mosaic whole lines apart, each of which is modelled at its column."""
+    full, chart = published_rig(), references.chart()
+    comb = LineComb(width_px=6, step_px=4, period_px=64, shifts_px=shifts_px)
+    found = []
+    for camera in (full.camera, full.camera.resized(112, 72)):
+        rig = full.model_copy(update={"camera": camera})
+        found.append(predict(rig, plan(comb), trial_samples(rig, chart), peaks=False))
+    assert found[1].pixel_rmse == pytest.approx(found[0].pixel_rmse, rel=0.3)
+    assert found[1].rmse == pytest.approx(found[0].rmse, rel=0.4)
