@@ -147,10 +147,11 @@ class VirtualPixels:
         self.depth = torch.as_tensor(view.depth_mm, dtype=torch.float64)
         self.column, _ = zero_order(rig, self.pixels, self.depth)
         _, self.slope_mm = triangulate(rig, self.pixels, self.column)
-        last = rig.camera.width_px * rig.camera.height_px - 1
-        neighbour, _ = zero_order(rig, (self.pixels + 1).clip(max=last), self.depth)
+        # The last pixel of a row has its neighbour on the left.
+        side = torch.where((self.pixels + 1) % rig.camera.width_px == 0, -1, 1)
+        neighbour, _ = zero_order(rig, self.pixels + side, self.depth)
         #: Columns of the projector from a pixel to the next, (samples,).
-        self.pitch_px = (neighbour - self.column).to(self.shading)
+        self.pitch_px = (side * (neighbour - self.column)).to(self.shading)
         self.blur_px = demosaic_blur_px(torch.stack([self.column, neighbour], 1).numpy())
         #: Share of each colour that demosaicing takes from the neighbouring columns, (samples, 3).
         self.sideways = like(sideways_shares(rig, view.pixels), self.shading)

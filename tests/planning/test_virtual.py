@@ -47,6 +47,15 @@ def virtual(rig: Rig, window_px: int) -> VirtualPixels:
     return VirtualPixels(rig, plan, WavelengthGrid(step_nm=10.0), view, surface_window_px=window_px)
 
 
+def test_the_last_column_of_a_picture_is_as_far_from_its_neighbour_as_others() -> None:
+    rig = published_rig()
+    rig = rig.model_copy(update={"camera": rig.camera.resized(24, 18)})
+    view = _of_plane(rig, 700.0, 24 * 9 + np.array([22, 23]), 1.0)
+    plan = CapturePlan(code=GrayCode(rows=False), spectral=ScanLines(step_px=4))
+    pixels = VirtualPixels(rig, plan, WavelengthGrid(step_nm=10.0), view)
+    assert pixels.pitch_px[0] == pytest.approx(float(pixels.pitch_px[1]), rel=0.05)
+
+
 def column_of(std_px: Tensor) -> Column:
     flat = std_px.flatten()
     return Column(
