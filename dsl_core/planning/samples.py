@@ -14,6 +14,7 @@ from dsl_core.model.result import SPECTRUM_INVALID
 from dsl_core.model.rig import Rig
 from dsl_core.optics.correspondence import zero_order
 from dsl_core.optics.pinhole import rays_at
+from dsl_core.optics.sensor import relative_gain
 from dsl_core.optics.shading import shading
 from dsl_core.solve.thinned import thinned
 
@@ -33,8 +34,9 @@ ASKED = 300_000
 class SamplePixels:
     """Sample pixels: flat indices, depth, shading and incidence, each of shape (samples,).
 
-    ``lit_share`` is the share of the picture that the projector lights. ``spectra`` (samples, bands) at
-    ``wavelengths_nm`` are what a quick look saw there, None for reference reflectances.
+    Shading holds the camera's gain, as that of results does. ``lit_share`` is the share of the picture that
+    the projector lights. ``spectra`` (samples, bands) at ``wavelengths_nm`` are what a quick look saw there,
+    None for reference reflectances.
     """
 
     pixels: NDArray[np.int64]
@@ -75,7 +77,9 @@ def plane_samples(rig: Rig, depth_mm: float | None = None, grid: tuple[int, int]
 def _of_plane(rig: Rig, depth_mm: float, pixels: NDArray[np.int64], lit_share: float) -> SamplePixels:
     depth, facing = np.full(pixels.shape, float(depth_mm)), np.array([[0.0], [0.0], [-1.0]])
     points = _points(rig, pixels, depth)
-    return SamplePixels(pixels, depth, shading(rig, points, facing), _incidence(rig, points), lit_share)
+    gain = np.broadcast_to(relative_gain(rig), (rig.camera.height_px, rig.camera.width_px)).ravel()[pixels]
+    light = shading(rig, points, facing) * gain
+    return SamplePixels(pixels, depth, light, _incidence(rig, points), lit_share)
 
 
 def scene_samples(rig: Rig, result: xr.Dataset) -> SamplePixels:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from torch import Tensor
 
-from dsl_core.model.rig import Rig
+from dsl_core.model.rig import FlatField, Rig
 from dsl_core.optics.correspondence import zero_order
 from dsl_core.optics.shading import Plane, plane_shading
 from dsl_core.planning.samples import plane_samples
@@ -46,3 +46,12 @@ def test_samples_have_depth_and_shading_of_their_plane() -> None:
     plane = Plane(np.array([0.0, 0.0, 1 / DEPTH_MM]))
     assert found.depth_mm == pytest.approx(DEPTH_MM)
     assert found.shading == pytest.approx(plane_shading(rig, plane).ravel()[found.pixels], rel=1e-9)
+
+
+def test_samples_get_as_much_light_as_the_camera_s_lens_lets_through() -> None:
+    rig = published_rig()
+    rig = rig.model_copy(update={"camera": rig.camera.resized(160, 104)})
+    field = FlatField(rows_px=(0.0, 103.0), columns_px=(0.0, 159.0), gain=((0.2, 0.4), (0.6, 0.8)))
+    even, found = (plane_samples(each) for each in (rig, rig.model_copy(update={"flat_field": field})))
+    rows, columns = np.divmod(found.pixels, 160)
+    assert found.shading == pytest.approx(even.shading * (0.2 + 0.4 * rows / 103 + 0.2 * columns / 159))
