@@ -131,6 +131,15 @@ def on_cycles(plan: CapturePlan, period_ms: float) -> CapturePlan:
     return plan.model_copy(update={"settings": settings})
 
 
+def column_scale(width_px: int) -> float:
+    """How many columns of a projector so wide show what one of the published projector shows, in halves.
+
+    >>> column_scale(800), column_scale(1280), column_scale(1920)
+    (1.0, 2.0, 3.0)
+    """
+    return max(round(2 * width_px / PUBLISHED_COLUMNS) / 2, 1.0)
+
+
 def comb_on(comb: LineComb, width_px: int) -> LineComb:
     """What a comb of the published projector is on one of so many columns, unchanged up to 800.
 
@@ -141,7 +150,7 @@ def comb_on(comb: LineComb, width_px: int) -> LineComb:
     >>> wide.width_px, wide.step_px, wide.period_px
     (10, 4, 160)
     """
-    times = max(round(2 * width_px / PUBLISHED_COLUMNS) / 2, 1.0)
+    times = column_scale(width_px)
     if times == 1.0:
         return comb
     step_px = max(min(int(comb.step_px * times), FARTHEST_STEP_PX), comb.step_px)

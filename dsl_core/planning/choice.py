@@ -14,7 +14,7 @@ from dsl_core.capture.preflight import find_obstacles
 from dsl_core.devices.base import DeviceRig
 from dsl_core.errors import PlanError
 from dsl_core.model.plan import CapturePlan, GrayCode, LineComb, ScanLines, Sentinels, Setting, SpectralSet
-from dsl_core.model.presets import comb_on
+from dsl_core.model.presets import column_scale, comb_on
 from dsl_core.model.rig import Rig
 from dsl_core.planning.designed import designed_sets
 from dsl_core.planning.expected import Prediction
@@ -146,9 +146,16 @@ def possible_plans(devices: DeviceRig, rig: Rig) -> list[CapturePlan]:
 
 
 def pattern_sets(rig: Rig) -> dict[str, SpectralSet]:
-    """Pattern sets by name that fit a rig's projector."""
-    found: dict[str, SpectralSet] = {f"lines {w}x{s}": ScanLines(width_px=w, step_px=s) for w, s in LINES}
+    """Pattern sets by name that fit a rig's projector.
+
+    Single lines are offered as they are, which find columns best, and as many times as wide and as far apart
+    as a projector has more columns: those take no more frames on it.
+    """
+    found: dict[str, SpectralSet] = {}
     width = rig.projector.width_px
+    for times, (line, step) in product((1.0, column_scale(width)), LINES):
+        one = ScanLines(width_px=round(line * times), step_px=int(step * times))
+        found[f"lines {one.width_px}x{one.step_px}"] = one
     for comb in (LineComb(width_px=w, step_px=s, period_px=p) for w, s, p in COMBS):
         one = comb_on(comb, width)
         name, third = f"comb {one.width_px}x{one.step_px}x{one.period_px}", round(one.period_px / 3)

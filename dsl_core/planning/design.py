@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 
 from dsl_core.errors import PlanError
 from dsl_core.model.plan import CapturePlan, Columns, LineComb, SpectralSet
+from dsl_core.model.presets import column_scale
 from dsl_core.model.rig import Rig
 from dsl_core.model.spectral import WavelengthGrid
 from dsl_core.optics.correspondence import correspondence
@@ -28,12 +29,14 @@ from dsl_core.planning.designed import columns_of
 from dsl_core.planning.judge import Judge
 from dsl_core.progress import NoProgress, Progress
 
-#: Runs of slots, as shares of the columns that a first order's spectrum covers, and widths of lines (px).
+#: Runs of slots, as shares of the columns that a first order's spectrum covers, and widths of lines of the
+#: published projector (px).
 RUNS, WIDTHS_PX = (0.5, 0.62, 0.75), (5, 6, 7, 9, 11)
 SPECTRUM_NM = (430.0, 690.0)
 #: How many kinds of lines are tried in further orders.
 FINALISTS = 3
-#: Dark columns between the lines of a frame, at least: nearer ones act as one wide line.
+#: Dark columns between the lines of a frame, at least, of the published projector: nearer ones act as one
+#: wide line.
 DARK_PX = 4
 #: Draws of an order before a run counts as impossible.
 TRIES = 2000
@@ -41,12 +44,16 @@ TRIES = 2000
 
 @dataclass(frozen=True)
 class MixedLines:
-    """Lines ``width_px`` wide, ``step_px`` apart, in the order of a seed."""
+    """Lines ``width_px`` wide, ``step_px`` apart, in the order of a seed.
+
+    Between the lines of a frame at least ``dark_px`` are dark.
+    """
 
     frames: int
     width_px: int
     step_px: int
     seed: int
+    dark_px: int = DARK_PX
 
     @property
     def name(self) -> str:
@@ -55,7 +62,7 @@ class MixedLines:
 
     def order(self, slots: int) -> NDArray[np.int64]:
         """Frame of each slot; raises `PlanError` where the lines of a frame cannot keep apart."""
-        gap = ceil((self.width_px + DARK_PX) / self.step_px) - 1
+        gap = ceil((self.width_px + self.dark_px) / self.step_px) - 1
         random = np.random.Generator(np.random.PCG64(self.seed))
         found: list[int] = []
         while len(found) < slots:
@@ -164,10 +171,16 @@ def _steps(rig: Rig, frames: int) -> list[int]:
     return sorted({max(round(share * span / frames), 1) for share in RUNS})
 
 
+def _widths(rig: Rig) -> list[int]:
+    """Widths of lines on a rig's projector, px."""
+    return [round(width * column_scale(rig.projector.width_px)) for width in WIDTHS_PX]
+
+
 def _kinds(rig: Rig, frames: int) -> Iterator[MixedLines]:
+    dark_px = round(DARK_PX * column_scale(rig.projector.width_px))
     for step in _steps(rig, frames):
-        for width in WIDTHS_PX:
-            lines = MixedLines(frames, width, step, 1)
+        for width in _widths(rig):
+            lines = MixedLines(frames, width, step, 1, dark_px)
             if step < width:
                 try:
                     lines.order(3 * frames)
@@ -179,6 +192,6 @@ def _kinds(rig: Rig, frames: int) -> Iterator[MixedLines]:
 def _combs(rig: Rig, frames: int) -> Iterator[LineComb]:
     """Combs of as many frames, in the steps of mixed lines."""
     for step in _steps(rig, frames):
-        for width in WIDTHS_PX:
+        for width in _widths(rig):
             if step < width < step * frames:
                 yield LineComb(width_px=width, step_px=step, period_px=step * frames)

@@ -16,8 +16,17 @@ from dsl_core.devices.base import DeviceRig
 from dsl_core.devices.registry import open_rig
 from dsl_core.errors import PlanError, StoreError
 from dsl_core.io.plan_file import load_plan, save_plan
-from dsl_core.model.plan import CapturePlan, GrayCode, LineComb
-from dsl_core.planning.choice import Weighed, candidate_plans, choose, pareto, possible_plans, weigh
+from dsl_core.model.plan import CapturePlan, GrayCode, LineComb, ScanLines
+from dsl_core.planning.choice import (
+    LINES,
+    Weighed,
+    candidate_plans,
+    choose,
+    pareto,
+    pattern_sets,
+    possible_plans,
+    weigh,
+)
 from dsl_core.planning.designed import DesignedSet, load_design, packed, save_design
 from dsl_core.planning.expected import Prediction
 from dsl_core.planning.report import write_tradeoff_report
@@ -153,3 +162,17 @@ def test_candidates_are_named_apart_and_fit_the_rig() -> None:
     assert plans[0].spectral_count == 318
     assert any(isinstance(p.spectral, LineComb) and p.spectral.shifts_px != (0, 0, 0) for p in plans)
     assert all(isinstance(plan.code, GrayCode) for plan in plans)
+
+
+@pytest.mark.parametrize("width_px", [1280, 1920, 3840])
+def test_lines_of_as_few_frames_are_offered_to_a_projector_of_more_columns(width_px: int) -> None:
+    rig = published_rig()
+    wide = rig.model_copy(update={"projector": rig.projector.resized(width_px, width_px * 9 // 16)})
+    offered = pattern_sets(wide)
+    for width, step in LINES:
+        assert f"lines {width}x{step}" in offered
+        times = width_px // 640
+        assert offered[f"lines {times * width}x{times * step}"] == ScanLines(
+            width_px=times * width, step_px=times * step
+        )
+    assert len([name for name in pattern_sets(rig) if name.startswith("lines")]) == len(LINES)

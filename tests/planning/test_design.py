@@ -11,7 +11,7 @@ from dsl_core.model.spectral import WavelengthGrid
 from dsl_core.patterns.multiplexed import profiles
 from dsl_core.planning import design as module
 from dsl_core.planning import judge as judging
-from dsl_core.planning.design import DARK_PX, MixedLines, design
+from dsl_core.planning.design import DARK_PX, MixedLines, _kinds, design
 from dsl_core.planning.designed import designed_sets, load_design
 from dsl_core.planning.judge import Judge, training_spectra
 from dsl_core.resources import resource_path
@@ -89,3 +89,17 @@ def test_sets_that_come_with_the_program_are_the_lines_that_they_name() -> None:
     for lines in expected:
         assert np.array_equal(found[lines.name], lines.levels(640))
     assert [len(columns.levels) for columns in designed_sets().values()] == [16, 32, 64]
+
+
+@pytest.mark.parametrize("frames", [8, 16, 64])
+def test_lines_grow_with_the_columns_of_a_projector(frames: int) -> None:
+    rig = published_rig()
+    wide = rig.model_copy(update={"projector": rig.projector.resized(1920, 1080)})
+    known, found = list(_kinds(rig, frames)), list(_kinds(wide, frames))
+    assert {3 * lines.width_px for lines in known} == {lines.width_px for lines in found}
+    assert {lines.dark_px for lines in known} == {DARK_PX}
+    assert {lines.dark_px for lines in found} == {3 * DARK_PX}
+    levels = found[0].levels(1920)[..., 0]
+    for frame in levels:
+        edges = np.flatnonzero(np.diff(np.r_[0, frame > 0, 0].astype(int)))
+        assert (edges[2::2] - edges[1:-1:2]).min(initial=3 * DARK_PX) >= 3 * DARK_PX
