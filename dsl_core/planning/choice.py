@@ -154,8 +154,8 @@ def pattern_sets(rig: Rig) -> dict[str, SpectralSet]:
     found: dict[str, SpectralSet] = {}
     width = rig.projector.width_px
     for times, (line, step) in product((1.0, column_scale(width)), LINES):
-        one = ScanLines(width_px=round(line * times), step_px=int(step * times))
-        found[f"lines {one.width_px}x{one.step_px}"] = one
+        lines = ScanLines(width_px=round(line * times), step_px=int(step * times))
+        found[f"lines {lines.width_px}x{lines.step_px}"] = lines
     for comb in (LineComb(width_px=w, step_px=s, period_px=p) for w, s, p in COMBS):
         one = comb_on(comb, width)
         name, third = f"comb {one.width_px}x{one.step_px}x{one.period_px}", round(one.period_px / 3)
