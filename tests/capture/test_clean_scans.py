@@ -67,7 +67,9 @@ def test_a_small_object_before_nothing_shows_its_patterns(
         return replace(seen, pixels=pixels)
 
     monkeypatch.setattr(rig.camera, "snap", of_a_small_object)
-    assert scan(rig, fit_plan(plan, rig), tmp_path / "scan.dsl").corrected == 0
+    status = scan(rig, fit_plan(plan, rig), tmp_path / "scan.dsl")
+    assert status.corrected == 0
+    assert status.message == f"All {status.total} frames are saved."
 
 
 @pytest.mark.slow

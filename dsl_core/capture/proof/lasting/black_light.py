@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from dsl_core.capture.proof.noise import Noise
 from dsl_core.capture.proof.raster import Counts, Raster
 from dsl_core.model.rig import ProjectorResponse
+from dsl_core.optics.seen_noise import DARKER
 from dsl_core.words import counted
 
 #: Light of a dark projector, as a share of full light, from which on it is not that of its calibration: so
@@ -28,9 +29,9 @@ FEWEST_BLOCKS, BRIGHT_BLOCK = 12, 0.3
 MOST_APART = 0.1
 #: What the black level may have changed by since its calibration, DN.
 LEVEL_DN = 2.0
-#: A pixel is lit in black if it has more than this share of usual white, and more than so many times what
-#: white adds to it.
-AS_WHITE, TIMES = 0.5, 2.0
+#: A pixel is lit in black if it has more than this share of usual white, more than so many times what white
+#: adds to it, and so many deviations; white is what it is where it adds as many to black.
+AS_WHITE, TIMES, SEEN_SIGMAS = 0.5, 2.0, 6.0
 #: So many such pixels that have a neighbour among them: hot pixels of a sensor are alone.
 FEWEST_LIT = 5
 
@@ -136,13 +137,18 @@ def lit_black(
 
     ``size_px`` is the camera's (width, height).
     """
-    dark_dn = np.float32(noise.sensor.black_level_dn)
+    # Without a calibration, the black level is what the darkest pixels show.
+    dark_dn = np.float32(noise.sensor.black_level_dn or np.quantile(black, DARKER))
     gain, rest = white.astype(np.float32) - black, black.astype(np.float32) - dark_dn
+    # Before nothing, an object may be a small part of the picture, and all the rest of it noise.
+    is_bright = gain > SEEN_SIGMAS * np.sqrt(noise.variance(white) + noise.variance(black))
     usual = np.zeros(gain.shape, np.float32)
     for colour in np.unique(channels):
         own = channels == colour
-        usual[own] = np.quantile(gain[own] + rest[own], 0.75)
-    lit = (rest > AS_WHITE * usual) & (rest > TIMES * np.abs(gain)) & (usual > 0)
+        bright = own & is_bright
+        usual[own] = np.quantile((gain + rest)[bright if bright.any() else own], 0.75)
+    lit = (rest > AS_WHITE * usual) & (rest > TIMES * np.abs(gain))
+    lit &= rest > SEEN_SIGMAS * np.sqrt(noise.variance(black))
     grid = lit.reshape(raster.shape)
     near = np.zeros_like(grid)
     for one, other in ((np.s_[:, 1:], np.s_[:, :-1]), (np.s_[1:], np.s_[:-1])):

@@ -1,0 +1,43 @@
+"""What is as bright in black as in white, where an object fills a small part of the picture."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from dsl_core.capture.proof.lasting.black_light import LitBlack, lit_black
+from dsl_core.capture.proof.noise import Noise
+from dsl_core.capture.proof.raster import Raster
+from dsl_core.model.rig import Sensor
+
+SIZE, OBJECT, POINTER = (160, 96), np.s_[20:50, 60:100], np.s_[4:7, 8:11]
+RASTER = Raster(SIZE)
+CALIBRATED = Sensor(black_level_dn=260.0, read_noise_dn=0.5)
+
+
+def found(object_dn: float, pointer_dn: float = 0.0, sensor: Sensor | None = CALIBRATED) -> LitBlack | None:
+    """Of white and black of an object before nothing, from a camera with a black level of 260 DN."""
+    rng = np.random.default_rng(3)
+
+    def taken(light: float) -> np.ndarray:
+        scene = np.zeros(SIZE[::-1])
+        scene[OBJECT] = light * object_dn
+        scene[POINTER] += pointer_dn
+        noisy = 260 + scene + rng.standard_normal(scene.shape) * np.sqrt(0.25 + scene / 10)
+        return RASTER.take(np.rint(noisy).clip(0, 4095).astype(np.uint16))
+
+    return lit_black(taken(1.0), taken(5e-4), RASTER.channels("RGGB"), Noise.of(sensor, 12), RASTER, SIZE)
+
+
+@pytest.mark.parametrize("sensor", [CALIBRATED, None])
+@pytest.mark.parametrize("object_dn", [3000.0, 300.0, 30.0, 0.0])
+def test_an_object_before_nothing_is_no_pointer(object_dn: float, sensor: Sensor | None) -> None:
+    assert found(object_dn, sensor=sensor) is None
+
+
+@pytest.mark.parametrize("sensor", [CALIBRATED, None])
+@pytest.mark.parametrize("pointer_dn", [3000.0, 1e5])
+def test_a_pointer_beside_it_is_told_with_its_place(pointer_dn: float, sensor: Sensor | None) -> None:
+    seen = found(3000.0, pointer_dn, sensor)
+    assert seen is not None
+    assert (seen.count, seen.columns, seen.rows) == (9, (8, 11), (4, 7))
