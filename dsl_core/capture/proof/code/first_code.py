@@ -140,7 +140,8 @@ class FirstCode:
     def _changed_first(self, shot: Shot) -> Finding | None:
         """Whether light or picture changed before two pairs were right: both wrong alike, they fit."""
         numbers = list(self._pairs.pairs)
-        if len(numbers) == 2 and all(is_unlit(*pair, self._noise) for pair in self._pairs.pairs.values()):
+        pairs = self._pairs.pairs.values()
+        if len(numbers) == 2 and all(is_unlit(*pair, self._noise, self._raster) for pair in pairs):
             again = tuple(each for number in sorted(numbers) for each in self._pair_shots(number))
             return Finding(shot, Verdict.DARK, again, "neither it nor its inverse lights anything in view")
         if not self._disputed or not {pattern // 2 for pattern in self._disputed} <= set(numbers):

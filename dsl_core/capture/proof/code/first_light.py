@@ -23,7 +23,7 @@ from dsl_core.capture.proof.code.code_pairs import (
     Pair,
 )
 from dsl_core.capture.proof.noise import Noise
-from dsl_core.capture.proof.raster import Counts, Floats
+from dsl_core.capture.proof.raster import Counts, Floats, Raster
 
 #: Light of a pair of pictures relative to the last ones from which on it is worth taking it again.
 SETTLED = 0.02
@@ -41,8 +41,8 @@ STRUCTURED = 0.3
 MOST_CHANGE = 5.0
 #: A picture shows light if its pixels differ from those of the inverse pattern by so many deviations ...
 SEEN_SIGMAS = 5.0
-#: ... and so many of them do, as a share of all.
-SEEN_SHARE = 0.001
+#: ... and so many of them do, as a share of all, or so many blocks of them to either side.
+SEEN_SHARE, SEEN_BLOCKS = 0.001, 0.01
 _OF_THE_LAST = " times that of the last ones"
 
 
@@ -196,8 +196,12 @@ def has_moved(before: Pair, now: Pair, noise: Noise) -> bool:
     return int(broken.sum()) < few and FEWEST_BROKEN <= int((changed & ~broken).sum()) < int(lit.sum()) / 2
 
 
-def is_unlit(one: Counts, other: Counts, noise: Noise) -> bool:
+def is_unlit(one: Counts, other: Counts, noise: Noise, raster: Raster) -> bool:
     """Whether nothing shows a pattern nor its inverse, of which every point in the beam sees one."""
-    apart = np.abs(one.astype(np.float32) - other.astype(np.float32))
-    seen = apart > SEEN_SIGMAS * np.sqrt(noise.variance(one) + noise.variance(other))
-    return float(seen.mean()) < SEEN_SHARE
+    apart = one.astype(np.float32) - other.astype(np.float32)
+    variance = noise.variance(one) + noise.variance(other)
+    if float((np.abs(apart) > SEEN_SIGMAS * np.sqrt(variance)).mean()) >= SEEN_SHARE:
+        return False
+    # Faint stripes show in means of blocks, brighter here and darker there; light that flickers does not.
+    blocks = raster.pool(apart) / np.sqrt(raster.pool(variance) / raster.pooled)
+    return min(float((side * blocks > SEEN_SIGMAS).mean()) for side in (-1, 1)) < SEEN_BLOCKS

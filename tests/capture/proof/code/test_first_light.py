@@ -17,11 +17,12 @@ from dsl_core.capture.proof.code.first_light import (
     unsettled_words,
 )
 from dsl_core.capture.proof.noise import Noise
-from dsl_core.capture.proof.raster import Counts
+from dsl_core.capture.proof.raster import Counts, Raster
 from dsl_core.model.rig import Sensor
 
 SENSOR = Sensor()
 NOISE = Noise(SENSOR)
+RASTER = Raster((20, 20))
 #: Colours of 400 pixels, a third each.
 COLOURS = np.asarray(np.arange(400) % 3, np.int8)
 
@@ -110,8 +111,8 @@ def test_a_first_picture_with_enough_light_says_that_nothing_has_changed(light: 
 
 def test_a_pair_is_unlit_if_no_pixel_prefers_the_pattern_or_its_inverse() -> None:
     dark, lit = pictures(0), pictures(100)
-    assert is_unlit(dark[0], dark[1], NOISE)
-    assert not is_unlit(lit[0], lit[1], NOISE)
+    assert is_unlit(dark[0], dark[1], NOISE, RASTER)
+    assert not is_unlit(lit[0], lit[1], NOISE, RASTER)
 
 
 @pytest.mark.parametrize(("sigmas", "pixels", "unlit"), [(6, 1, False), (4, 400, True), (6, 0, True)])
@@ -119,7 +120,27 @@ def test_a_pixel_in_a_thousand_six_deviations_bright_is_lit(sigmas: float, pixel
     one, other = even(2000, 2000).values()
     bright = round(sigmas * float(np.sqrt(2 * NOISE.variance(one)[0])))
     one[:pixels] += np.uint16(bright)
-    assert is_unlit(one, other, NOISE) == unlit
+    assert is_unlit(one, other, NOISE, RASTER) == unlit
+
+
+@pytest.mark.parametrize(
+    ("bits", "faint_dn", "flicker", "unlit"),
+    [(8, 2.0, 1.0, False), (12, 9.0, 1.0, False), (12, 0.0, 1.0, True), (12, 0.0, 1.01, True)],
+)
+def test_the_dark_setting_of_a_plan_is_lit_and_light_that_flickers_is_no_pattern(
+    bits: int, faint_dn: float, flicker: float, unlit: bool
+) -> None:
+    """Of a camera that nobody has calibrated, in a lit room."""
+    raster, rng, room = Raster((160, 96)), np.random.default_rng(0), 40.0 * 2 ** (bits - 8)
+    half = np.arange(160) < 80
+
+    def seen(stripe: np.ndarray, light: float) -> Counts:
+        mean = np.tile(room * light + faint_dn * stripe, (96, 1))
+        noise = 0.5 * 2 ** (bits / 2 - 4) * rng.standard_normal(mean.shape)
+        return raster.take(np.rint(mean + noise).astype(np.uint16))
+
+    one, other = seen(half, flicker), seen(~half, 1.0)
+    assert is_unlit(one, other, Noise.of(None, bits), raster) == unlit
 
 
 @pytest.mark.parametrize(("light", "wrong"), [(0.97, {0, 2}), (0.99, set()), (1.03, {0, 2})])
