@@ -12,20 +12,24 @@ from dsl_core.model.rig import Sensor
 
 
 def alteration_of(
-    source: FrameSource, sensor: Sensor | None = None, missing: Iterable[int] = (), bit_depth: int = 12
+    source: FrameSource,
+    sensor: Sensor | None = None,
+    missing: Iterable[int] = (),
+    bit_depth: int = 12,
+    bayer: str = "RGGB",
 ) -> str:
     """What was done to pictures by the end of a scan, with what to do; empty if nothing shows.
 
     Reads white, black and a frame of the code, and the last sentinels that repeat all three, unless one of
-    them is ``missing``. Without a ``sensor``, that which frames of ``bit_depth`` show is assumed. Raises
-    `StoreError`.
+    them is ``missing``. Without a ``sensor``, that which frames of ``bit_depth`` and ``bayer`` show is
+    assumed. Raises `StoreError`.
     """
     first, last, gone = source.plan.references(), _last_round(source.plan), set(missing)
     if last is None or {shot.index for shot in (*first.values(), *last.values())} & gone:
         return ""
     white, black, code = (source.read(first[role]) for role in _ROLES)
     before, now = (white, black, code), tuple(source.read(last[role]) for role in _ROLES)
-    watch = SensorWatch(source.plan, sensor, bit_depth)
+    watch = SensorWatch(source.plan, sensor, bit_depth, bayer)
     for shot in source.plan.shots():
         if shot.index in watch.wanted - gone:
             watch.add(shot, source.read(shot))

@@ -20,6 +20,7 @@ from dsl_core.capture.proof.lasting.black_light import lit_black
 from dsl_core.capture.proof.noise import Noise
 from dsl_core.capture.proof.raster import Raster
 from dsl_core.capture.put_back import ADVICE
+from dsl_core.capture.sentinels import SensorWatch
 from dsl_core.model.captured_code import CapturedCode
 from dsl_core.model.conditions import COLOUR_NAMES
 from dsl_core.model.plan import CapturePlan, Shot
@@ -44,8 +45,8 @@ TELLING_DN = 2.0
 SATURATED = 0.5
 #: Share of full scale from which on a pixel is saturated.
 FULL = 0.98
-#: Pixels needed to say anything.
-FEWEST = 12
+#: Pixels needed to say anything, and the deviations that white exceeds black by in each.
+FEWEST, LIT_SIGMAS = 12, 5.0
 #: A frame of the code shows another pattern if its pixels differ by this share of white: noise makes less.
 OTHER_PATTERN = 0.08
 #: Something stands before tiles of the picture that have lost light to this share, so many, while others have
@@ -99,8 +100,11 @@ class Explanation:
 class Diagnosis:
     """Keeps the first pictures of the references of a plan, and compares them with later ones."""
 
-    def __init__(self, plan: CapturePlan, sensor: Sensor) -> None:
-        """Without white, black and code in the plan there is never anything to say."""
+    def __init__(self, plan: CapturePlan, sensor: SensorWatch) -> None:
+        """Without white, black and code in the plan there is never anything to say.
+
+        Its first frames say what those of a ``sensor`` that is not calibrated are worth.
+        """
         self._sensor = sensor
         self._shots = plan.references()
         setting = min(plan.code_settings)
@@ -111,6 +115,7 @@ class Diagnosis:
 
     def keep(self, shot: Shot, pixels: Mosaic) -> None:
         """Keep a picture that the scan believes, if it is one of a reference."""
+        self._sensor.add(shot, pixels)
         if shot in self._shots.values() or shot in self._pair:
             self._kept[shot.index] = pixels
 
@@ -132,11 +137,12 @@ class Diagnosis:
             before, now = (_of_pair(*map(picture, self._pair)) for picture in (kept, take))
         else:
             return Explanation()
-        return what_changed(before, now, self._sensor)
+        return what_changed(before, now, self._sensor.given(before.black))
 
     def explain_picture(self, pixels: Mosaic) -> Explanation:
         """What a wrong picture, raw mosaic (rows, columns), shows by itself where references do not."""
-        ends = ends_early(pixels, self._sensor)
+        black = self._kept.get(self._shots["black"].index, pixels) if self._shots else pixels
+        ends = ends_early(pixels, self._sensor.given(black))
         return Explanation(ends, is_of_all=True, seen="its brightest pixels are cut off" if ends else "")
 
 
@@ -227,7 +233,9 @@ def _lights(before: References, now: References, sensor: Sensor) -> _Lights | No
     # All of the picture but what is saturated: of bright pixels alone, a motion would dim many.
     full = FULL * sensor.full_scale_dn
     used = (before.white < full) & (now.white < full)
-    lit = used & (old > 0.25 * np.percentile(old, 95))
+    noise = Noise(sensor)
+    sigma = np.sqrt(noise.variance(before.white) + noise.variance(before.black))
+    lit = used & (old > np.maximum(0.25 * np.percentile(old, 95), LIT_SIGMAS * sigma))
     if lit.sum() < FEWEST:
         return None
     was, is_ = (float(each.black.mean(dtype=np.float64)) - sensor.black_level_dn for each in (before, now))

@@ -21,12 +21,11 @@ from dsl_core.capture.preflight import require_possible
 from dsl_core.capture.proof.verifier import FrameProof
 from dsl_core.capture.proven.shots import ProvenShots
 from dsl_core.capture.put_back import ADVICE, PutBack
-from dsl_core.capture.sentinels import SentinelWatch
+from dsl_core.capture.sentinels import SensorWatch, SentinelWatch
 from dsl_core.devices.base import DeviceRig
 from dsl_core.errors import Cancelled, DriftError, DslError, StoreError
 from dsl_core.model.frames import FrameSink, FrameSource
 from dsl_core.model.plan import CapturePlan, Shot, describe_shot
-from dsl_core.model.rig import Sensor
 from dsl_core.progress import CancelToken, NoProgress, Progress
 
 
@@ -115,10 +114,9 @@ class Runner:
         self._sink = sink
         self._token = token or CancelToken()
         self._taker = ShotTaker(rig, plan, pattern_image, policy or RetryPolicy(), self._token, again=again)
-        sensor = rig.calibration.sensor if rig.calibration else Sensor()
-        self._shots = ProvenShots(
-            self._taker, proof, Diagnosis(plan, sensor), sink, self._token, rig.only_repeats, again
-        )
+        camera, sensor = rig.camera.info, rig.calibration.sensor if rig.calibration else None
+        diagnosis = Diagnosis(plan, SensorWatch(plan, sensor, camera.bit_depth, camera.bayer))
+        self._shots = ProvenShots(self._taker, proof, diagnosis, sink, self._token, rig.only_repeats, again)
         self._stored = stored
         self._progress = progress or NoProgress()
         self._pace = _Pace(clock, rig.projector.info.latency_ms)

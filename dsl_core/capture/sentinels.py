@@ -27,9 +27,10 @@ ROWS = 64
 class SensorWatch:
     """Takes the frames of a scan, and says what their counts are worth, of a calibrated camera or another."""
 
-    def __init__(self, plan: CapturePlan, sensor: Sensor | None, bit_depth: int) -> None:
-        """A ``sensor`` that is known counts as it is; without one, frames have this ``bit_depth``."""
-        self._known, self._stated = sensor, usual_sensor(bit_depth)
+    def __init__(self, plan: CapturePlan, sensor: Sensor | None, bit_depth: int, bayer: str = "RGGB") -> None:
+        """A known ``sensor`` counts as it is; without one, frames have this ``bit_depth`` and ``bayer``."""
+        self._known = sensor
+        self._stated = usual_sensor(bit_depth).model_copy(update={"bayer": bayer})
         sets = [] if sensor or not plan.code_count else inverse_pairs(plan.code, plan.projector_size_px)
         self._pairs = sets[0][:PAIRS] if sets else ()
         patterns = {number for pair in self._pairs for number in pair}

@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -10,6 +11,7 @@ from scipy.ndimage import gaussian_filter
 from dsl_core.capture.diagnosis import Diagnosis, Explanation, References, what_changed
 from dsl_core.capture.proof.verifier import FrameProof
 from dsl_core.capture.runner import Runner
+from dsl_core.capture.sentinels import SensorWatch
 from dsl_core.errors import DeviceError
 from dsl_core.model.plan import CapturePlan, GrayCode, NoCode, ScanLines, Shot
 from dsl_core.model.rig import Sensor
@@ -122,7 +124,7 @@ def test_a_plan_without_a_code_has_no_references() -> None:
     def never(shot: Shot) -> np.ndarray:
         raise AssertionError
 
-    assert Diagnosis(plan, SENSOR).explain(never) == Explanation()
+    assert Diagnosis(plan, SensorWatch(plan, SENSOR, 12)).explain(never) == Explanation()
 
 
 @pytest.fixture(scope="module")
@@ -151,6 +153,31 @@ def test_a_scan_that_stops_says_why(scene: RenderedScene, change: Change, said: 
     proof = FrameProof(scene.plan, scene.calibration)
     with pytest.raises(DeviceError, match=said):
         Runner(rig, scene.plan, MemorySink(scene.plan), token_image, proof=proof).run()
+
+
+def test_a_scan_of_a_camera_that_is_not_calibrated_says_why(scene: RenderedScene) -> None:
+    """Its full scale and black level are not those of the published camera."""
+    share = 16.0
+    sensor = Sensor(bit_depth=16, black_level_dn=4160.0, electrons_per_dn=0.6, read_noise_dn=share)
+    rig = scene.calibration.model_copy(update={"sensor": sensor})
+    other = RenderedScene(
+        scene.plan, rig, {key: rate * np.float32(share) for key, rate in scene.rates.items()}
+    )
+    camera = replace(changing([other], Change(exposure=from_shot(60, 1.0, 0.5)), 1), calibration=None)
+    proof = FrameProof(scene.plan, None, 16)
+    with pytest.raises(DeviceError, match=r"is 0\.50 times what it was when the scan began"):
+        Runner(camera, scene.plan, MemorySink(scene.plan), token_image, proof=proof).run()
+
+
+def test_pictures_without_light_tell_nothing() -> None:
+    """A projector that was off when the scan began has no motion."""
+    rng = np.random.default_rng(7)
+    before, later = (
+        References(*(rng.normal(SENSOR.black_level_dn, 3, (64, 96)).round().astype(np.uint16) for _ in "wbc"))
+        for _ in "12"
+    )
+    noisy = SENSOR.model_copy(update={"read_noise_dn": 3.0})
+    assert what_changed(before, later, noisy) == Explanation()
 
 
 def even(white: np.ndarray | float, room_dn: np.ndarray | float) -> References:

@@ -141,7 +141,7 @@ def prove(
     """
     found = seen.report(calibration, bit_depth, bayer, knows_light)
     sensor = None if calibration is None else calibration.sensor
-    altered = alteration_of(source, sensor, missing, bit_depth)
+    altered = alteration_of(source, sensor, missing, bit_depth, bayer)
     # Pictures that are mixed or filtered look as if something had moved.
     moved = None if altered else movement_of(source, sensor, missing, bit_depth)
     return ScanProof(
