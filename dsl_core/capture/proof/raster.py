@@ -18,6 +18,8 @@ Counts = NDArray[np.uint16]
 _ROWS, _PIXELS = 36, 32_000
 #: Pixels of a row at most; wider pictures are thinned.
 _WIDTH = 1024
+#: This row is always among them: of the colours of the first one, and lit as that is.
+BESIDE = 2
 #: Blocks down and across that stand in for pixels where these are too noisy.
 BLOCKS = 16
 
@@ -31,6 +33,8 @@ class Raster:
         count = min(height, max(_ROWS, _PIXELS // width))
         #: Rows of the picture, in their order.
         self.rows = spread_rows(height, count)
+        if height > count:
+            self.rows = np.unique([*spread_rows(height, count - 1), BESIDE])
         #: Columns of the picture from one of the raster to the next: an even number would miss a colour.
         self.step_px = -(-width // _WIDTH) | 1
         #: Rows and columns of the raster.
