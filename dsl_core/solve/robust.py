@@ -47,10 +47,15 @@ def huber_weights(residual: Floats, sigma: Floats, limit_sigmas: float) -> tuple
     return np.minimum(1.0, limit_sigmas / np.maximum(off, 1e-12)) / (scale * sigma) ** 2, scale
 
 
+def geman_mcclure_weights(residual: Floats, scatter: float) -> Floats:
+    """Weights of Geman and McClure, ``1 / (1 + (r / 3 s)^2)^2`` of residuals r (n,) and their scatter s."""
+    return np.asarray(1 / (1 + (residual / (3 * scatter)) ** 2) ** 2, np.float64)
+
+
 def robust_linear(design: Floats, values: Floats) -> tuple[Floats, Floats, float]:
     """Linear fit of values (n,) by a design (n, k) in which values far off count next to nothing.
 
-    Weights are those of Geman and McClure, ``1 / (1 + (r / 3 s)^2)^2`` of residual r and scatter s.
+    Weights are those of `geman_mcclure_weights`.
     Returns the coefficients (k,), the inverse (k, k) of the weighted normal matrix, and the scatter of
     the residuals in the unit of the values: their covariance is the inverse times the scatter squared.
     """
@@ -61,5 +66,5 @@ def robust_linear(design: Floats, values: Floats) -> tuple[Floats, Floats, float
         found = inverse @ (heavy.T @ values)
         residual = values - design @ found
         scatter = float(robust_std(residual)) + 1e-12
-        weight = 1 / (1 + (residual / (3 * scatter)) ** 2) ** 2
+        weight = geman_mcclure_weights(residual, scatter)
     return found, np.asarray(inverse, np.float64), scatter

@@ -20,7 +20,7 @@ from dsl_core.model.rig import Rig
 from dsl_core.optics.colour_neighbours import bayer_colours
 from dsl_core.optics.lines.line_set import LineSet
 from dsl_core.optics.spectra import chain_response
-from dsl_core.solve.robust import robust_linear
+from dsl_core.solve.robust import geman_mcclure_weights, rms, robust_linear
 
 Floats = NDArray[np.float64]
 #: Distance of red and blue that matters, rms over the picture, px of the projector.
@@ -29,6 +29,12 @@ MOST_APART_PX = 0.004
 SIGMAS = 4.0
 #: How much less sure sums are than neighbours' columns seem to be, as each column is in three of them.
 SHARED = (8 / 3) ** 0.5
+#: Strips of a picture, side by side. Where columns of camera and projector are parallel, all pixels of a
+#: column of the picture are wrong together, so that strips, not pixels, say how sure a fit is.
+STRIPS = 12
+#: How much more than noise of columns (squared) must tell a magnification: where camera and projector look
+#: along one axis, columns are as far from both, and noise alone tells one lens from the other.
+LEAST_TOLD = 10.0
 #: Rows that are looked at have about so many pixels in all; with fewer than the second nobody can tell.
 PIXELS, FEWEST = 60_000, 1000
 #: A pixel that is farther than this from the middle of its neighbours is at an edge, px.
@@ -59,7 +65,8 @@ class ColumnBends:
     """How far columns are from the middle of their neighbours in a row, px, flat over pixels on surfaces.
 
     With it the sign, +1 where green is on both sides and -1 where it is between; whether the other colour is
-    blue; and the distance from the axes of camera and projector in columns.
+    blue; the distance from the axes of camera and projector in columns, and from the camera's in pixels; and
+    the strip of the picture.
     """
 
     bend_px: Floats
@@ -67,10 +74,15 @@ class ColumnBends:
     blue: NDArray[np.bool_]
     camera_px: Floats
     projector_px: Floats
+    pixels_px: Floats
+    strip: NDArray[np.intp]
 
     @classmethod
     def of(cls, rig: Rig, column_px: Floats) -> ColumnBends | None:
-        """Those of a map of columns (rows, columns), NaN where not known; None with too few."""
+        """Those of a map of columns (rows, columns), NaN where not known; None with too few.
+
+        A monochrome camera has none: neighbours see the same light, and surfaces alone bend its columns.
+        """
         height, width = column_px.shape
         pairs = max(height * width // PIXELS, 1)
         rows = np.flatnonzero(np.arange(height) // 2 % pairs == 0)
@@ -79,14 +91,16 @@ class ColumnBends:
         own, other = colours[:, 1:-1], colours[:, :-2]
         bend, slope = q[:, 1:-1] - 0.5 * (q[:, :-2] + q[:, 2:]), 0.5 * (q[:, 2:] - q[:, :-2])
         with np.errstate(invalid="ignore"):
-            good = np.abs(bend) < EDGE_PX
+            good = (np.abs(bend) < EDGE_PX) & (own != other)
         if np.count_nonzero(good) < FEWEST:
             return None
-        camera = (np.arange(1, width - 1) - rig.camera.cx_px) * slope
+        x = np.broadcast_to(np.arange(1, width - 1), bend.shape)
+        pixels = x - rig.camera.cx_px
         sign = np.where(own == _GREEN, -1.0, 1.0)
         blue = (own == _BLUE) | (other == _BLUE)
         projector = q[:, 1:-1] - rig.projector.cx_px
-        return cls(bend[good], sign[good], blue[good], camera[good], projector[good])
+        maps = bend, sign, blue, pixels * slope, projector, pixels, x * STRIPS // width
+        return cls(*(each[good] for each in maps))
 
 
 def own_lateral_colour(
@@ -108,15 +122,18 @@ def fit_lateral_colour(rig: Rig, seen: Sequence[ColumnBends]) -> LateralFit:
     Unknown are the camera's magnifications of red and of blue against green, and the projector's per nm.
     """
     white = white_nm(rig)
-    bend_px, sign, blue, camera_px, projector_px = (
+    bend_px, sign, blue, camera_px, projector_px, pixels_px, strip = (
         np.concatenate([getattr(part, field.name) for part in seen]) for field in fields(ColumnBends)
     )
+    strip = strip + STRIPS * np.repeat(np.arange(len(seen)), [part.strip.size for part in seen])
     step_nm = np.where(blue, white[_BLUE] - white[_GREEN], white[0] - white[_GREEN])
     design = sign[:, None] * np.stack([-camera_px * ~blue, -camera_px * blue, projector_px * step_nm], 1)
-    found, inverse, scatter = robust_linear(design, bend_px)
-    covariance = inverse * (SHARED * scatter) ** 2
+    # A bend has the noise of a column 1.5 times, a slope a half of it (squared).
+    error = np.stack([pixels_px * ~blue, pixels_px * blue, step_nm * 2**0.5], 1) / 3**0.5
+    noise = np.sqrt(np.mean(error**2, 0)) * rms(bend_px) + 1e-12
+    found, covariance = _told(design, noise, bend_px, strip)
     apart = np.stack([-camera_px, camera_px, projector_px * (white[0] - white[_BLUE])], 1)
-    noise = float(np.mean(np.einsum("np,pq,nq->n", apart, covariance, apart)))
+    variance = float(np.mean(np.einsum("np,pq,nq->n", apart, covariance, apart)))
     square = float(np.mean((apart @ found) ** 2))
     green = -SHARES[0] * found[0] - SHARES[2] * found[1]
     colour = LateralColour(
@@ -124,7 +141,26 @@ def fit_lateral_colour(rig: Rig, seen: Sequence[ColumnBends]) -> LateralFit:
         projector_per_nm=float(found[2]),
         white_nm=white,
     )
-    return LateralFit(colour, max(square - noise, 0.0) ** 0.5, noise**0.5)
+    return LateralFit(colour, max(square - variance, 0.0) ** 0.5, variance**0.5)
+
+
+def _told(design: Floats, noise: Floats, bend_px: Floats, strip: NDArray[np.intp]) -> tuple[Floats, Floats]:
+    """What bends (n,) tell by a design (n, 3) with some ``noise`` (3,), and its covariance.
+
+    It is as unsure as pixels or strips say, whichever say more.
+    """
+    scaled = design / noise
+    told, directions = np.linalg.eigh(scaled.T @ scaled / len(scaled))
+    basis = directions[:, told > LEAST_TOLD] / noise[:, None]
+    design = design @ basis
+    found, inverse, scatter = robust_linear(design, bend_px)
+    residual = bend_px - design @ found
+    pull = design * (residual * geman_mcclure_weights(residual, scatter))[:, None]
+    pulls = np.stack([np.bincount(strip, of_one) for of_one in pull.T], 1)
+    by_pixels, by_strips = inverse * (SHARED * scatter) ** 2, inverse @ pulls.T @ pulls @ inverse
+    normal = design.T @ design
+    covariance = max(by_pixels, by_strips, key=lambda each: float(np.sum(each * normal)))
+    return basis @ found, basis @ covariance @ basis.T
 
 
 def white_nm(rig: Rig) -> tuple[float, float, float]:

@@ -137,8 +137,9 @@ def test_a_bend_is_how_far_a_column_is_from_the_middle_of_its_neighbours(
                     # Rows of red and green, and rows of green and blue; green is at odd places of even rows.
                     green = (x + y) % 2 == 1
                     slope = (seen[y, x + 1] - seen[y, x - 1]) / 2
-                    camera, projector = (x - rig.camera.cx_px) * slope, seen[y, x] - rig.projector.cx_px
-                    wanted.append((bend, -1 if green else 1, y % 2 == 1, camera, projector))
+                    pixels, projector = x - rig.camera.cx_px, seen[y, x] - rig.projector.cx_px
+                    sign, strip = -1 if green else 1, int(x / 30 * lateral_colour.STRIPS)
+                    wanted.append((bend, sign, y % 2 == 1, pixels * slope, projector, pixels, strip))
         assert rig.sensor.bayer == "RGGB"
         for got, values in zip(vars(found).values(), zip(*wanted, strict=True), strict=True):
             assert got == pytest.approx(values)
@@ -154,7 +155,7 @@ def test_magnifications_are_a_linear_fit_of_bends_and_as_sure_as_those_are_share
     bends = ColumnBends.of(rig, seen)
     assert found is not None
     assert bends is not None
-    bend, sign, blue, camera, projector = vars(bends).values()
+    bend, sign, blue, camera, projector, _, strip = vars(bends).values()
     red_nm, green_nm, blue_nm = white_nm(rig)
     assert red_nm > green_nm + 30 > blue_nm + 60
     rows = [
@@ -167,10 +168,49 @@ def test_magnifications_are_a_linear_fit_of_bends_and_as_sure_as_those_are_share
     assert found.colour.projector_per_nm == pytest.approx(values[2])
     assert found.colour.white_nm == white_nm(rig)
     apart = np.stack([-camera, camera, projector * (red_nm - blue_nm)], 1)
-    # Each column is in three bends, so that sums scatter by eight thirds more than they seem to.
-    noise = np.mean(((apart @ inverse) * apart).sum(1)) * scatter**2 * 8 / 3
+    # Each column is in three bends, so that sums scatter by eight thirds more than they seem to. Strips of
+    # the picture, each with its own errors, may scatter more.
+    design = sign[:, None] * np.array(rows)
+    left = bend - design @ values
+    weighted = design * (left / (1 + (left / (3 * scatter)) ** 2) ** 2)[:, None]
+    pulls = np.array([weighted[strip == each].sum(0) for each in range(lateral_colour.STRIPS)])
+    by_pixels, by_strips = inverse * scatter**2 * 8 / 3, inverse @ pulls.T @ pulls @ inverse
+    noise = max(np.mean(((apart @ each) * apart).sum(1)) for each in (by_pixels, by_strips))
     assert found.apart_std_px == pytest.approx(np.sqrt(noise))
     assert found.apart_px == pytest.approx(np.sqrt(np.mean((apart @ values) ** 2) - noise))
+
+
+def parallel(rig: Rig) -> tuple[Rig, np.ndarray]:
+    """A rig whose columns run along those of the picture, with the columns of a plane and their noise."""
+    height, width = 200, 112
+    seen = rig.projector.cx_px + 3.0 * (np.arange(width) - rig.camera.cx_px)
+    return rig, seen + np.random.default_rng(3).normal(0, NOISE_PX, (height, width))
+
+
+def test_pixels_of_a_column_of_the_picture_that_are_wrong_together_are_no_lateral_colour(rig: Rig) -> None:
+    for seed in range(8):
+        random = np.random.default_rng(seed)
+        _, seen = parallel(rig)
+        wrong = np.where(random.uniform(size=seen.shape[1]) < 0.3, random.normal(0, 0.15, seen.shape[1]), 0.0)
+        found = own_lateral_colour(rig, LINES, seen + wrong, np.ones(seen.shape, bool))
+        assert found is not None
+        assert not found.present
+
+
+def test_noise_does_not_tell_one_lens_from_the_other_where_both_look_along_one_axis(rig: Rig) -> None:
+    _, seen = parallel(rig)
+    # Beside an edge, by less than an edge is known by.
+    seen[:, 5:7] += np.random.default_rng(0).normal(0, 0.3, (len(seen), 2))
+    found = own_lateral_colour(rig, LINES, seen, np.ones(seen.shape, bool))
+    assert found is not None
+    assert not found.present
+    assert np.abs(found.colour.camera).max() < 1e-4
+
+
+def test_a_monochrome_camera_tells_nothing_of_colours(rig: Rig) -> None:
+    mono = rig.model_copy(update={"sensor": rig.sensor.model_copy(update={"bayer": "MONO"})})
+    seen = columns(rig) + 1e-3 * np.arange(rig.camera.width_px) ** 2
+    assert own_lateral_colour(mono, LINES, seen, np.ones(seen.shape, bool)) is None
 
 
 def test_several_pictures_are_fitted_as_one(rig: Rig) -> None:
