@@ -30,6 +30,7 @@ from dsl_core.optics.correspondence import Correspondence, Footprint, like, zero
 from dsl_core.optics.image_formation import BlurredProfiles, ImageFormation, OrderPath, one_if_grey
 from dsl_core.optics.lines.equations import LineEquations
 from dsl_core.optics.lines.line_set import LineSet
+from dsl_core.optics.lines.reach import sends_light
 from dsl_core.optics.spectra import ORDERS, Bands
 from dsl_core.optics.spread.field import relative_width
 
@@ -140,7 +141,12 @@ class PixelModel:
 
     def reached(self, order: int, pixels: Tensor, depth_mm: Tensor, nm: NDArray[np.float64]) -> Tensor:
         """Whether wavelengths reach pixels through an order from inside the frame, (wavelengths, pixels)."""
-        return self.inside(self.correspondence.trace(pixels, depth_mm, order, nm), margin_px=0.0)
+        return self.reaches(order, self.correspondence.trace(pixels, depth_mm, order, nm), nm)
+
+    def reaches(self, order: int, footprint: Footprint, nm: NDArray[np.float64]) -> Tensor:
+        """The same of a footprint (wavelengths, pixels) that is known: the film must send them that way."""
+        inside = self.inside(footprint, margin_px=0.0)
+        return inside & torch.as_tensor(sends_light(self.rig, order, nm), device=inside.device)[:, None]
 
     def response(self, blur_px: float) -> ProjectorResponse:
         """The projector's response, blurred further: demosaicing averages neighbours, which widens lines."""

@@ -18,6 +18,7 @@ from dsl_core.model.plan import CapturePlan, SpectralSet
 from dsl_core.model.rig import Rig
 from dsl_core.model.spectral import WavelengthGrid
 from dsl_core.optics.correspondence import correspondence
+from dsl_core.optics.lines.reach import sends_light
 from dsl_core.planning.references import FINE_NM
 from dsl_core.planning.samples import SamplePixels, plane_samples
 from dsl_core.planning.virtual import VirtualPixels
@@ -71,7 +72,11 @@ class Judge:
         nm, lens = self.grid.centres_nm, self.rig.projector
         pixels, depth = torch.as_tensor(view.pixels), torch.as_tensor(view.depth_mm)
         trace = correspondence(self.rig).trace
-        reached = [trace(pixels, depth, m, nm).inside(lens.width_px, lens.height_px) for m in (1, -1)]
+        reached = [
+            trace(pixels, depth, m, nm).inside(lens.width_px, lens.height_px)
+            & torch.as_tensor(sends_light(self.rig, m, nm))[:, None]
+            for m in (1, -1)
+        ]
         return np.asarray((reached[0] | reached[1]).all(0).numpy())
 
     def error(self, spectral: SpectralSet) -> float:

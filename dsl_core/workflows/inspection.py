@@ -206,8 +206,8 @@ def _expected(
         for order in ORDERS:
             seen = model.correspondence.trace(*place, order, grid.centres_nm)
             frame = model.lines.position(seen.columns)
-            inside = model.inside(seen, margin_px=0.0)
-            orders[order] = np.where(inside, frame, np.nan)[:, 0]
+            reached = model.reaches(order, seen, grid.centres_nm)
+            orders[order] = np.where(reached, frame, np.nan)[:, 0]
     spectrum = result.at("reflectance", pixel) if result.has_spectra else np.array([np.nan])
     shading = float(result.at("shading", pixel)) if "shading" in result.arrays else np.nan
     if not np.isfinite(spectrum).all() or not np.isfinite(shading):

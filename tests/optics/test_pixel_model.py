@@ -59,6 +59,21 @@ def columns_px(column: int) -> np.ndarray[Any, np.dtype[np.float32]]:
     return np.tile(row, (SIZE[1], 1)).astype(np.float32)
 
 
+def test_an_order_that_the_film_does_not_have_reaches_no_pixel() -> None:
+    rig, nm = published_rig(), GRID.centres_nm
+    middle = rig.camera.height_px // 2 * rig.camera.width_px + rig.camera.width_px // 2
+    place = torch.tensor([middle]), torch.tensor([DEPTH_MM], dtype=torch.float64)
+    for known in ((1, -1), (1,)):
+        some = rig.model_copy(update={"efficiency": {order: rig.efficiency[order] for order in known}})
+        model = model_of_plan(some, CapturePlan(spectral=LINES), GRID, correspondence(some))
+        for order in (1, -1):
+            reached = model.reached(order, *place, nm)
+            assert bool(reached.any()) == (order in known)
+            assert torch.equal(
+                reached, model.reaches(order, model.correspondence.trace(*place, order, nm), nm)
+            )
+
+
 @dataclass(frozen=True)
 class Readers:
     """One pixel of a plane as the solver, the prediction and the intensity graph have it."""

@@ -16,6 +16,8 @@ Floats = NDArray[np.float64]
 MOST_UNREACHED = 0.5
 #: About so many pixels are asked, at so many wavelengths.
 MOST_PIXELS, BANDS = 200, 12
+#: Share of the most that a first order sends of a wavelength from which one is said to send light.
+LEAST_SENT = 0.01
 #: First orders, and steps towards the place on the film where their light passes.
 ORDERS, ITERATIONS = (1, -1), 5
 
@@ -24,10 +26,18 @@ def unreached_words(share: float) -> tuple[str, str]:
     """What is said of that share of the bands, and what to do."""
     return (
         f"No first order reaches {share:.0%} of the bands of lit pixels: the film sends their light beyond"
-        " the projector's frame, and the prior decides about them.",
+        " the projector's frame, or the film has no such order, and the prior decides about them.",
         "Use a film of fewer lines per mm or a projector with a wider field, or move the object to the middle"
         " of the projector's frame; then calibrate again if the rig has changed.",
     )
+
+
+def sends_light(rig: Rig, order: int, wavelengths_nm: Floats) -> NDArray[np.bool_]:
+    """Whether a film sends light of wavelengths (n,) through a first order, (n,): some have only one."""
+    most = max((max(rig.efficiency[m].values) for m in ORDERS if m in rig.efficiency), default=0.0)
+    if order not in rig.efficiency or most <= 0:
+        return np.zeros(len(wavelengths_nm), bool)
+    return np.asarray(rig.efficiency[order].at(wavelengths_nm) > LEAST_SENT * most)
 
 
 def unreached_share(rig: Rig) -> float:
@@ -45,7 +55,11 @@ def unreached_share(rig: Rig) -> float:
         return float("nan")
     ends = WavelengthGrid()
     nm = np.linspace(ends.start_nm, ends.stop_nm, BANDS)
-    reached = [_inside(rig.projector, _sent(rig, points, m * nm / rig.film.period_nm)) for m in ORDERS]
+    reached = [
+        _inside(rig.projector, _sent(rig, points, m * nm / rig.film.period_nm))
+        & sends_light(rig, m, nm)[:, None]
+        for m in ORDERS
+    ]
     return float(1 - (reached[0] | reached[1]).mean())
 
 

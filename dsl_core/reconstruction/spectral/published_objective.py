@@ -28,6 +28,7 @@ from dsl_core.optics.correspondence import Correspondence, Footprint
 from dsl_core.optics.demosaic import demosaic
 from dsl_core.optics.lines.line_set import LineSet
 from dsl_core.optics.lines.profile import step_edge
+from dsl_core.optics.lines.reach import sends_light
 from dsl_core.optics.spectra import ORDERS, chain_response, hat_moments
 from dsl_core.progress import NoProgress, Progress
 from dsl_core.reconstruction.spectral.solving.tile_frames import Pixels
@@ -139,10 +140,12 @@ class PublishedReconstruction:
         index = torch.as_tensor(flat)
         depth = torch.as_tensor(self.pixels.depth_mm.ravel()[flat], dtype=torch.float32)
         width, height = self.plan.projector_size_px
-        footprints: list[Footprint] = [
-            self.model.trace(index, depth, order, self.grid.centres_nm) for order in ORDERS
-        ]
-        plus, minus = (footprint.inside(width, height) for footprint in footprints)
+        nm = self.grid.centres_nm
+        footprints: list[Footprint] = [self.model.trace(index, depth, order, nm) for order in ORDERS]
+        plus, minus = (
+            seen.inside(width, height) & torch.as_tensor(sends_light(self.rig, order, nm))[:, None]
+            for order, seen in zip(ORDERS, footprints, strict=True)
+        )
         use_plus = plus.sum(0) >= minus.sum(0)
         return (
             torch.where(use_plus, 1, -1),

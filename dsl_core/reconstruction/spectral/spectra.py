@@ -305,7 +305,8 @@ def _reach(model: PixelModel, traced: Traced, reported: slice) -> Tensor:
     reach: Tensor | None = None
     for order, bit in ((1, Reach.PLUS_ONE), (-1, Reach.MINUS_ONE)):
         footprint = Footprint(*(each[reported] for each in traced.orders[order]))
-        here = model.inside(footprint, margin_px=0.0).to(torch.uint8).mul_(int(bit))
+        nm = model.bands.centres_nm[reported]
+        here = model.reaches(order, footprint, nm).to(torch.uint8).mul_(int(bit))
         reach = here if reach is None else reach.add_(here)
     assert reach is not None
     return reach.masked_fill_(reach == 0, int(Reach.ZERO_ONLY))

@@ -80,10 +80,11 @@ def stored(misfit: list[float], error: Any = None, **more: Any) -> SpectralMaps:
     contrast = np.zeros((3, 5), np.float32)
     contrast[1, 1:5] = 0.4
     relative = torch.tensor([0.0, 0.1, float("nan"), 0.0], dtype=torch.float64)
+    bands = SimpleNamespace(reported=slice(1, 3), centres_nm=np.arange(BANDS))
     owner: Any = SimpleNamespace(
-        bands=SimpleNamespace(reported=slice(1, 3)), error=error, prior=Prior(), contrast=contrast,
+        bands=bands, error=error, prior=Prior(), contrast=contrast,
         pixels=SimpleNamespace(valid=np.ones((3, 5), bool)), _unsure_level=0.0,
-        model=SimpleNamespace(inside=lambda footprint, margin_px: footprint.columns > 0),
+        model=SimpleNamespace(bands=bands, reaches=lambda order, footprint, nm: footprint.columns > 0),
         _map=lambda values, flat: torch.as_tensor(values.ravel()[flat]).double(),
     )  # fmt: skip
     frames: Any = SimpleNamespace(
