@@ -81,10 +81,11 @@ def of_whites(scan: Pictures) -> Iterator[Witness]:
 def colours_of_whites(scan: Pictures) -> Iterator[ColoursAgain]:
     """The same in each colour, of a camera that sees colours; none where one is nowhere bright enough."""
     bayer, limit = scan.rig.sensor.bayer, 0.9 * scan.rig.sensor.full_scale_dn
-    if bayer == "MONO":
-        return
     for _, _, first, now in _whites_again(scan):
         channels = bayer_channels(bayer, *first.shape)
+        # A monochrome camera lacks two colours, and a picture of one row or column lacks one.
+        if np.bincount(channels.ravel(), minlength=3).min() < FEWEST:
+            return
         bright = np.zeros(first.shape, bool)
         for colour in range(3):
             own = channels == colour

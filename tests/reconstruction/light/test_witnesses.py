@@ -117,3 +117,12 @@ def test_white_is_compared_colour_by_colour_and_something_before_a_part_of_it_is
     assert bluish.std < 0.002
     shaded = found(white * shade)
     assert shaded.apart < max(0.004, 4 * shaded.std)
+
+
+@pytest.mark.parametrize("shape", [(1, 300), (300, 1)])
+def test_a_picture_that_lacks_a_colour_says_nothing_of_colours(shape: tuple[int, int]) -> None:
+    def read(shot: Shot) -> NDArray[np.uint16]:
+        role = PLAN.original(shot).role if shot.role == "sentinel" else shot.role
+        return np.full(shape, 200 if role == "black" else 1200, np.uint16)
+
+    assert list(colours_of_whites(scan_of(source=SimpleNamespace(read=read)))) == []
