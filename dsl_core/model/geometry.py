@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Self
+from typing import Annotated, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +11,8 @@ from pydantic import Field, model_validator
 from dsl_core.model.base import Record
 
 Row3 = tuple[float, float, float]
+#: Row by row, of the 24 parameters of lenses and pose.
+GeometryCovariance = Annotated[tuple[float, ...], Field(min_length=24**2, max_length=24**2)]
 
 
 class Lens(Record):

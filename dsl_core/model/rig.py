@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Literal, Self
+from typing import Annotated, Literal, Self
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field, model_validator
+from pydantic import AfterValidator, Field, model_validator
 
 from dsl_core.model.base import Record
 from dsl_core.model.calibration.accepted import CalibrationNote
@@ -15,14 +15,67 @@ from dsl_core.model.calibration.light_check import LightCheck
 from dsl_core.model.conditions import BayerPattern as BayerPattern
 from dsl_core.model.conditions import CaptureConditions
 from dsl_core.model.conditions import colour_sites as colour_sites
-from dsl_core.model.geometry import Lens, Pose
+from dsl_core.model.geometry import GeometryCovariance, Lens, Pose
 from dsl_core.model.projector.line_spread import LineSpread, Spread
 from dsl_core.model.projector.spread_field import SpreadField
 from dsl_core.model.projector.tone_curve import ToneCurve
-from dsl_core.model.spectral import SpectralCurve
+from dsl_core.model.spectral import LIGHT_NM, NOISE_SHARE, SpectralCurve
 
-Range = tuple[float, float]
+#: Camera and projector nearer to each other than this give no depth: their distance is in another unit.
+LEAST_BASELINE_MM = 1.0
+
+
+def _rising(given: tuple[float, float]) -> tuple[float, float]:
+    low, high = given
+    if not low < high:
+        raise ValueError(f"a range must rise, given {low:g} to {high:g}")
+    return given
+
+
+def _of_light(curve: SpectralCurve) -> SpectralCurve:
+    """The curve, whose samples lie at light in nm and are below zero by noise alone."""
+    first, last = curve.wavelengths_nm[0], curve.wavelengths_nm[-1]
+    if first > LIGHT_NM[1] or last < LIGHT_NM[0]:
+        raise ValueError(
+            f"this curve must have wavelengths of light in nm, between {LIGHT_NM[0]:g} and {LIGHT_NM[1]:g},"
+            f" given {first:g} to {last:g}"
+        )
+    if min(curve.values) < -NOISE_SHARE * max(0.0, *curve.values):
+        raise ValueError(f"values of this curve must not be negative, given {min(curve.values):g}")
+    return curve
+
+
+def _some_light(curve: SpectralCurve) -> SpectralCurve:
+    if max(curve.values) <= 0:
+        raise ValueError(
+            "this curve must have a value above zero: without one, this colour is never measured"
+        )
+    return curve
+
+
+def _has_first_order(efficiency: dict[int, SpectralCurve]) -> dict[int, SpectralCurve]:
+    if not any(order in efficiency and max(efficiency[order].values) > 0 for order in (1, -1)):
+        raise ValueError(
+            "order 1 or -1 must be there with an efficiency above zero: spectra are made of them"
+        )
+    return efficiency
+
+
+def _apart(pose: Pose) -> Pose:
+    distance = float(np.linalg.norm(pose.vector_mm))
+    if distance <= LEAST_BASELINE_MM:
+        raise ValueError(
+            f"camera and projector must be more than {LEAST_BASELINE_MM:g} mm apart, given {distance:.3g} mm;"
+            " translation_mm is in mm"
+        )
+    return pose
+
+
+Range = Annotated[tuple[float, float], AfterValidator(_rising)]
 Rgb = tuple[SpectralCurve, SpectralCurve, SpectralCurve]
+_Curve = Annotated[SpectralCurve, AfterValidator(_of_light)]
+_Colour = Annotated[_Curve, AfterValidator(_some_light)]
+_Colours = tuple[_Colour, _Colour, _Colour]
 #: Share of the depth range at which a single flat target is, with room before and behind it.
 USUAL_DEPTH = 0.4
 #: Relative difference granted between the stated width of a measured line spread and its own.
@@ -73,14 +126,6 @@ class ColumnResidual(Record):
 
     @model_validator(mode="after")
     def _check(self) -> Self:
-        for low, high in (
-            self.column_range_px,
-            self.row_range_px,
-            self.depth_range_mm,
-            self.wavelength_range_nm,
-        ):
-            if not low < high:
-                raise ValueError(f"a range must rise, given {low:g} to {high:g}")
         if len(self.coefficients_px) != len(self.orders) or any(
             len(row) != len(self.degrees) for row in self.coefficients_px
         ):
@@ -113,7 +158,7 @@ class Film(Record):
     another way has a ``shape`` besides.
     """
 
-    distance_mm: float = Field(default=29.0, gt=0)
+    distance_mm: float = Field(default=29.0, gt=1, lt=500)
     lines_per_mm: float = Field(default=500.0, gt=0)
     tilt_x_deg: float = 0.0
     tilt_y_deg: float = 0.0
@@ -141,6 +186,15 @@ class Sensor(Record):
     read_noise_dn: float = Field(default=0.5, ge=0)
     saturation_dn: int | None = Field(default=None, gt=0)
     step_dn: int = Field(default=1, ge=1)
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        if self.black_level_dn >= self.full_scale_dn:
+            raise ValueError(
+                f"black_level_dn, {self.black_level_dn:g} DN, must be below the full scale,"
+                f" {self.full_scale_dn} DN"
+            )
+        return self
 
     @property
     def full_scale_dn(self) -> int:
@@ -231,7 +285,7 @@ class CorrespondenceGrid(Record):
     rows_px: tuple[float, ...]
     columns_px: tuple[float, ...]
     depth_unit_mm: float = 1000.0
-    depth_range_mm: tuple[float, float]
+    depth_range_mm: Range
     coefficients: tuple[float, ...]
 
     @property
@@ -279,27 +333,27 @@ class Rig(Record):
     name: str
     camera: Lens
     projector: Lens
-    pose: Pose
+    pose: Annotated[Pose, AfterValidator(_apart)]
     film: Film
-    response: Rgb
-    emission: Rgb
-    efficiency: dict[int, SpectralCurve]
+    response: _Colours
+    emission: _Colours
+    efficiency: Annotated[dict[int, _Curve], AfterValidator(_has_first_order)]
     sensor: Sensor = Sensor()
     projector_response: ProjectorResponse = ProjectorResponse()
     white_scale: float = Field(gt=0)
     white_scale_rel_std: float = Field(default=0.0, ge=0)
     reference_rel_std: float = Field(default=0.0, ge=0)
-    white_reflectance: SpectralCurve | None = None
-    chain_rel_std: SpectralCurve | None = None
+    white_reflectance: _Curve | None = None
+    chain_rel_std: _Curve | None = None
     reference_distance_mm: float = Field(default=700.0, gt=0)
     frame_period_ms: float = Field(default=1000.0 / 60.0, gt=0)
-    depth_range_mm: tuple[float, float] = (500.0, 1000.0)
+    depth_range_mm: Range = (500.0, 1000.0)
     column_std_px: float = Field(default=0.02, ge=0)
     correspondence: CorrespondenceGrid | None = None
     residual: ColumnResidual | None = None
     flat_field: FlatField | None = None
     lateral_colour: LateralColour | None = None
-    geometry_covariance: tuple[float, ...] | None = None
+    geometry_covariance: GeometryCovariance | None = None
     fitted_lean_px: float | None = None
     filter_index: tuple[float, float] | None = None
     provenance: Provenance = Provenance()

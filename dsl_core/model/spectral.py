@@ -13,6 +13,8 @@ from dsl_core.model.base import Record
 #: What sensors of silicon see, nm.
 LIGHT_NM = (300.0, 1100.0)
 MOST_BANDS = 1001
+#: Negative values down to this share of a curve's largest are noise around zero.
+NOISE_SHARE = 0.02
 
 
 class WavelengthGrid(Record):
@@ -76,6 +78,8 @@ class SpectralCurve(Record):
             raise ValueError("the wavelengths of a curve must rise strictly; sort them and drop repeats")
         if self.std is not None and len(self.std) != len(self.values):
             raise ValueError("a curve's standard deviation needs one value per wavelength")
+        if min(self.std or (0.0,)) < 0:
+            raise ValueError(f"a curve's standard deviation must not be negative, given {min(self.std):g}")
         return self
 
     @classmethod

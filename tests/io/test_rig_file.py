@@ -12,6 +12,8 @@ from dsl_core.errors import CalibrationError, StoreError
 from dsl_core.io.rig_file import load_rig, save_rig
 from tests.cases.small_rig import small_rig
 
+CURVE = {"wavelengths_nm": [550.0], "values": [0.1]}
+
 
 def test_a_rig_comes_back_unchanged(tmp_path: Path) -> None:
     rig = small_rig()
@@ -51,6 +53,20 @@ def _edited(tmp_path: Path, *steps: str | int, value: object) -> Path:
         (("white_scale",), float("nan"), r"white_scale .*finite"),
         (("colour",), "red", "colour is not a field"),
         (("schema_version",), 2, "schema version 2; this program supports version 1"),
+        (("film", "distance_mm"), 0.029, r"film\.distance_mm must be greater than 1 \(given 0.029\)"),
+        (("film", "distance_mm"), 29000.0, r"film\.distance_mm must be less than 500"),
+        (("pose", "translation_mm"), [-0.055, -0.02, 0.022], r"pose: .* apart, given 0\.0625 mm; .* in mm"),
+        (("response", 2, "values"), [0.0, 0.0, 0.0], r"response\.2: .*above zero"),
+        (("emission", 0, "values"), [0.0, -0.05, -1.0], r"emission\.0: .*not be negative, given -1"),
+        (("emission", 1, "wavelengths_nm"), [0.43, 0.545, 0.66], r"emission\.1: .*in nm, .*given 0\.43"),
+        (("response", 0, "std"), [0.1, -0.1, 0.1], r"response\.0: .*deviation must not be negative"),
+        (("efficiency",), {}, "efficiency: order 1 or -1 must be there"),
+        (("efficiency",), {"2": CURVE}, "efficiency: order 1 or -1 must be there"),
+        (("efficiency", "-1"), {**CURVE, "values": [-1.0]}, r"efficiency\.-1: .*not be negative"),
+        (("chain_rel_std",), {**CURVE, "values": [-0.1]}, "chain_rel_std: .*not be negative"),
+        (("sensor", "black_level_dn"), 9000.0, "sensor: black_level_dn, 9000 DN, must be below .* 4095 DN"),
+        (("depth_range_mm",), [1000.0, 500.0], "depth_range_mm: a range must rise, given 1000 to 500"),
+        (("geometry_covariance",), [1.0, 2.0], "geometry_covariance must have at least 576 values"),
     ],
 )
 def test_errors_name_the_field(

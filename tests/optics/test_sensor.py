@@ -111,7 +111,12 @@ def test_light_is_rounded_where_noise_is_smaller_than_that_of_steps(
 )
 def test_values_end_where_bright_pixels_pile_up_just_below_full_scale(bits: int, ends_dn: int) -> None:
     full_dn = 2**bits - 1
-    sensor = Sensor(bit_depth=bits, electrons_per_dn=10 * 2.0 ** (12 - bits), saturation_dn=ends_dn)
+    sensor = Sensor(
+        bit_depth=bits,
+        black_level_dn=20.0,
+        electrons_per_dn=10 * 2.0 ** (12 - bits),
+        saturation_dn=ends_dn,
+    )
     light = np.tile(np.linspace(0.0, 1.3 * full_dn, 200, dtype=np.float32), (50, 1))
     values = digitise(sensor, light, np.random.default_rng(0))
     assert end_near_full(values, full_dn) == ends_dn

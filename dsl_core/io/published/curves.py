@@ -12,12 +12,10 @@ from dsl_core.errors import CalibrationError
 from dsl_core.io.spectra.catalogue import read_spectra
 from dsl_core.io.spectra.records import Spectrum
 from dsl_core.model.rig import Rgb
-from dsl_core.model.spectral import SpectralCurve
+from dsl_core.model.spectral import NOISE_SHARE, SpectralCurve
 
 #: Wavelengths that curves must cover, nm: those of the default bands.
 NEEDED_NM = (430.0, 660.0)
-#: Negative values down to this share of the largest are noise around zero.
-NOISE_SHARE = 0.02
 #: First letters of columns and words for their order.
 _LETTERS = ("r", "g", "b")
 

@@ -7,7 +7,8 @@ import numpy as np
 from dsl_core.errors import CalibrationError
 from dsl_core.io.published.any_stereo import FoundStereo
 from dsl_core.io.published.curves import FoundCurves
-from dsl_core.model.rig import Provenance, Rgb, Rig
+from dsl_core.io.published.stereo_words import doubts
+from dsl_core.model.rig import LEAST_BASELINE_MM, Provenance, Rgb, Rig
 from dsl_core.model.spectral import SpectralCurve
 
 #: Depths between these multiples of the distance of camera and projector are believed.
@@ -24,15 +25,12 @@ def lenses_on(
     """A rig for depth: these lenses and pose; film and scales of ``base`` mean nothing, nor do its curves.
 
     Curves that are given are relative to the largest of them, and are made as large as those of ``base``.
-    Raises `CalibrationError` where camera and projector are at one place.
+    Raises `CalibrationError` where camera and projector are not apart.
     """
     stereo = found.stereo
     distance = float(np.linalg.norm(stereo.pose.vector_mm))
-    if distance == 0:
-        raise CalibrationError(
-            f"In {source} camera and projector are at one place (a translation of zero), so nothing has a"
-            " depth. Correct the translation in the file."
-        )
+    if distance <= LEAST_BASELINE_MM:
+        raise CalibrationError(f"{source}: {next(doubts(stereo))}. A rig needs the true translation, in mm.")
     given = [each.words for each in (camera_curves, led_curves) if each is not None]
     notes = f"film and scales from {base.name!r}; {'; '.join(given)}" if len(given) == 2 else (
         f"film, curves and scales from {base.name!r}: for depth alone{''.join(f'; {each}' for each in given)}"

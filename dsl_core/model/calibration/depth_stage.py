@@ -7,7 +7,7 @@ from typing import Literal
 from dsl_core.model.base import Record
 from dsl_core.model.calibration.chain import ChainCorrection, apply_chain
 from dsl_core.model.calibration.lateral_colour import LateralColour
-from dsl_core.model.geometry import Lens, Pose
+from dsl_core.model.geometry import GeometryCovariance, Lens, Pose
 from dsl_core.model.rig import ColumnResidual, CorrespondenceGrid, Film, Rig
 
 
@@ -82,7 +82,7 @@ class DepthStageCalibration(Record):
     camera: Lens
     projector: Lens
     pose: Pose
-    geometry_covariance: tuple[float, ...] | None = None
+    geometry_covariance: GeometryCovariance | None = None
     column_std_px: float
     depth_std_mm: float
     geometry_pull: float

@@ -214,8 +214,15 @@ def test_a_projector_at_the_camera_is_doubted_and_makes_no_rig(tmp_path: Path) -
     found = load_any_stereo(path, CAMERA, PROJECTOR)
     assert found.doubts == ("camera and projector are at one place, so nothing has a depth",)
     assert placed(found.stereo).endswith("0 mm from the camera (at the same place)")
-    with pytest.raises(CalibrationError, match=r"In c\.json camera and projector are at one place"):
+    with pytest.raises(
+        CalibrationError, match=r"c\.json: camera and projector are at one place, so nothing has a depth\. A"
+    ):
         lenses_on(small_rig(), found, "c.json")
+    metres = load_any_stereo(as_json(tmp_path / "m.json", {**PLAIN, "T": [0.2, 0, 0]}), CAMERA, PROJECTOR)
+    with pytest.raises(
+        CalibrationError, match=r"m\.json: the projector would be 0\.2 mm .*give --unit-mm 1000\."
+    ):
+        lenses_on(small_rig(), metres, "m.json")
 
 
 def test_nested_names_and_vectors(tmp_path: Path) -> None:

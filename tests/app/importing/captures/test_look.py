@@ -119,10 +119,12 @@ def test_what_a_calibration_lacks_is_named(folder: Path, tmp_path: Path) -> None
     assert not troubles
     assert "the projector is 100 mm from the camera" in told
     assert "Missing, so assumed: no camera distortion, no projector distortion." in told
-    told, _ = listed(replace(given, unit_mm=1.0), tmp_path)
+    told, _ = listed(replace(given, unit_mm=20.0), tmp_path)
     assert told.startswith(
-        f"{DOUBT}the projector would be 0.1 mm from the camera; if lengths are in metres, set"
+        f"{DOUBT}the projector would be 2 mm from the camera; if lengths are in metres, set"
     )
+    _, troubles = listed(replace(given, unit_mm=1.0), tmp_path)
+    assert "would be 0.1 mm from the camera; if lengths are in metres, set" in troubles[Place.CALIBRATION]
     file.write_text(json.dumps({key: parts[key] for key in ("cam_K", "R")}))
     assert "lacks projector matrix and translation" in listed(given, tmp_path)[1][Place.CALIBRATION]
     missing = replace(request, calibration=str(tmp_path / "none.json"))
