@@ -41,6 +41,8 @@ MOST_PX, STEP_PX = 8.0, 0.02
 #: Deviations of where a stripe of the code ends (px), and the share of pixels that may say anything. Pixels
 #: that see several columns at once cannot tell the finest stripes, and name any of them.
 EDGES_PX, STRAY = (0.08, 0.25, 0.5, 0.75, 1.0, 1.5), 0.02
+#: Share of a group's pixels on either side of an end of the code's pixels that may be there by error alone.
+ODD = 0.05
 #: What a group is unsure of however many pixels it has: its pixels are wrong together.
 GROUP_STD_PX = 0.02
 #: Rms displacements that matter, px: of lines, whose light is not shaped as a stripe's edge, and of rows.
@@ -208,6 +210,15 @@ def displacement(
     return shifts, stds
 
 
+def _gap_px(places_px: Floats) -> float:
+    """How much farther from an end of the code's pixels places are than evenly spread ones, px.
+
+    Where columns of both devices are parallel, a group sees few phases, and the code tells none between them.
+    """
+    below, above = np.quantile((places_px + 0.5) % 1, (1 - ODD, ODD)) if len(places_px) else (0.0, 1.0)
+    return float(above + 1 - below - 2 * ODD)
+
+
 def _named(away_px: Floats, edge_px: float) -> Floats:
     """Probability that a code names a pixel whose centre is so far from the place that it sees."""
     from scipy.special import ndtr
@@ -233,7 +244,10 @@ def _of_columns(
     column = geometry.column_px[usable].astype(np.float64)
     group = (column.clip(0) / COLUMNS_PX).astype(int)
     groups = int(group.max(initial=0)) + 1
-    found = Disagreement.of(*displacement(code.column[usable], column, group, groups))
+    shift, std = displacement(code.column[usable], column, group, groups)
+    # Neighbouring groups may have the same gap, so that it counts in full.
+    std = np.maximum(std, [_gap_px(column[group == each] + shift[each]) for each in range(groups)])
+    found = Disagreement.of(shift, std)
     if found is None:
         return None
     part, cause, advice = _cause_of(found, blur_px)

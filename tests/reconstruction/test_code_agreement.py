@@ -216,6 +216,17 @@ def test_columns_of_a_code_whose_finest_stripes_are_blurred_tell_of_no_motion(
     assert (found[1] > 0) == told
 
 
+def test_columns_that_are_parallel_to_those_of_the_picture_tell_of_no_motion() -> None:
+    """Each group of columns then sees but one phase or two, and some of its pixels are off."""
+    rng = np.random.default_rng(5)
+    true = np.tile(100.2 + 5.7 * np.arange(80), (60, 1))
+    odd = (rng.random(true.shape) < 0.08) * rng.normal(0, 0.3, true.shape)
+    geometry = cast(Geometry, SimpleNamespace(column_px=true + odd + rng.normal(0, 0.01, true.shape)))
+    named = NamedPlaces(np.rint(true).astype(np.int32), None)
+    found = _of_columns(named, geometry, np.ones(true.shape, bool), 0.6)
+    assert found is None or (found[0].significant, found[1]) == (False, 0.0)
+
+
 @pytest.mark.parametrize(("moved_px", "held_px"), [(0.0, 0.0), (0.06, 0.06)])
 def test_depth_is_as_unsure_as_the_code_says_where_that_is_too_little_for_words(
     moved_px: float, held_px: float
