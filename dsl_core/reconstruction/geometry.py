@@ -321,7 +321,7 @@ def _flags(
     mark(lit & settled.disagree, Flag.CODES_DISAGREE)
     low, high = rig.depth_range_mm
     mark(lit & ~((maps.depth_mm >= low) & (maps.depth_mm <= high)), Flag.OUT_OF_RANGE)
-    mark(saturated & ~maps.refined, Flag.SATURATED)
+    mark(maps.saturated | (saturated & ~maps.refined), Flag.SATURATED)
     return flags
 
 

@@ -65,6 +65,7 @@ def column_of(std_px: Tensor) -> Column:
         flat,
         torch.ones_like(flat, dtype=torch.bool),
         torch.zeros_like(flat, dtype=torch.bool),
+        torch.zeros_like(flat, dtype=torch.bool),
     )
 
 

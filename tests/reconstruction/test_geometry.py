@@ -150,6 +150,8 @@ def test_each_pixel_gets_the_reasons_why_it_fails(monkeypatch: pytest.MonkeyPatc
     assert flagged() == [0, dark, saturated, nan, disagree | refined]
     assert flagged(has_patterns=False) == [0, dark, saturated & ~refined, nan, disagree]
     assert flagged(unusual=[True, True, False, True, False])[:2] == [int(Flag.UNUSUAL_PEAK), dark]
+    too_bright = [True, False, False, False, False]
+    assert flagged(saturated=too_bright)[0] == int(Flag.SATURATED), "a column of its slopes alone"
     low, high = published_rig().depth_range_mm
     far = int(Flag.OUT_OF_RANGE)
     assert flagged(depth_mm=[low, 1, high, 1, high + 1])[4] == disagree | refined | far

@@ -54,7 +54,8 @@ UNUSUAL_CHI_SQUARE = 4.0
 class Column:
     """Refined columns of some pixels and their deviation (px), zero-order amplitude and its deviation.
 
-    ``unusual`` are those whose peak has another shape than expected.
+    ``unusual`` are those whose peak has another shape than expected, ``saturated`` those of which a frame
+    around the peak is saturated.
     """
 
     column_px: Tensor
@@ -63,6 +64,7 @@ class Column:
     amplitude_std: Tensor
     refined: Tensor
     unusual: Tensor
+    saturated: Tensor
 
 
 def refine(peaks: LinePeaks, model_error: float | None = None) -> Column:
@@ -96,7 +98,9 @@ def refine(peaks: LinePeaks, model_error: float | None = None) -> Column:
     otherwise = torch.where(fit.measured, fit.brightest, torch.maximum(fit.amplitude, fit.brightest))
     apart = (q - coarse_px).abs() > APART_PX
     is_loose = (std_px > LOOSE_PX) | (fit.beside < torch.where(apart, CLEAR_SIGMAS, SEEN_SIGMAS))
-    loose = torch.nonzero(good & ~unusual & is_loose).ravel()
+    saturated = peaks.saturated()
+    # Where lines are saturated the code is off by some columns: slopes alone say more.
+    loose = torch.nonzero(good & ~unusual & is_loose & ~saturated).ravel()
     if single and len(loose):
         scale = chi_square[loose].clip(min=1)
         q[loose], std_px[loose] = loose_columns(peaks.some(loose), model_error, fit.amplitude[loose], scale)
@@ -110,6 +114,7 @@ def refine(peaks: LinePeaks, model_error: float | None = None) -> Column:
         torch.where(good | fit.measured, fit.amplitude_std, torch.inf),
         good,
         good & unusual,
+        saturated,
     )
 
 

@@ -76,15 +76,23 @@ class LinePeaks:
         """The profile of a line around columns (pixels,), as far from it as the reach."""
         return LineTable(self.lines.width_px, self.response, reach_px, columns_px, self.widths)
 
-    def window(self) -> tuple[Tensor, Tensor, Tensor]:
-        """Values, variances and line centres (px) of the frames around the peak, each (window, pixels)."""
+    def saturated(self) -> Tensor:
+        """Which pixels have a saturated frame around their peak, (pixels,)."""
+        return torch.isinf(torch.gather(self.std, 0, self.lines.frame(self._beside()))).any(0)
+
+    def _beside(self) -> Tensor:
+        """Virtual lines around the peak, (window, pixels)."""
         widest_px = self.response.blur_px * (1.0 if self.widths is None else float(self.widths.max()))
         half = math.ceil((self.lines.width_px / 2 + 3 * widest_px + 1) / self.lines.step_px)
         if self.lines.step_px <= self.lines.width_px:
             # However sharp lines are: that the next ones are dark is what says where the edge is.
             half = max(half, FEWEST_BESIDE)
         offsets = torch.arange(-half, half + 1, device=self.coarse_px.device)[:, None]
-        line = self.lines.nearest(self.coarse_px) + offsets
+        return self.lines.nearest(self.coarse_px) + offsets
+
+    def window(self) -> tuple[Tensor, Tensor, Tensor]:
+        """Values, variances and line centres (px) of the frames around the peak, each (window, pixels)."""
+        line = self._beside()
         frame = self.lines.frame(line)
         y = torch.gather(self.radiance, 0, frame)
         variance = torch.gather(self.std, 0, frame).to(y.dtype) ** 2

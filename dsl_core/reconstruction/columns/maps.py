@@ -39,8 +39,8 @@ class ColumnMaps:
     """What is found of some pixels, each (P,).
 
     Column and deviation (px), zero-order amplitude and its deviation, dark offset (DN per ms) and how far all
-    frames may still be off it, whether lines refined the column and have another shape there than expected,
-    depth (mm) and its slope (mm per px).
+    frames may still be off it, whether lines refined the column, have another shape there than expected and
+    are saturated, depth (mm) and its slope (mm per px).
     """
 
     column_px: Floats
@@ -51,6 +51,7 @@ class ColumnMaps:
     offset_std: Floats
     refined: NDArray[np.bool_]
     unusual: NDArray[np.bool_]
+    saturated: NDArray[np.bool_]
     depth_mm: NDArray[np.float64]
     slope_mm_per_px: NDArray[np.float64]
 
@@ -58,8 +59,10 @@ class ColumnMaps:
     def empty(cls, count: int) -> ColumnMaps:
         """Room for so many pixels."""
         q, dq, a, da, dark, dark_std = (np.empty(count, np.float32) for _ in range(6))
-        refined, unusual = np.zeros((2, count), bool)
-        return cls(q, dq, a, da, dark, dark_std, refined, unusual, np.empty(count), np.empty(count))
+        refined, unusual, saturated = np.zeros((3, count), bool)
+        return cls(
+            q, dq, a, da, dark, dark_std, refined, unusual, saturated, np.empty(count), np.empty(count)
+        )
 
     def put(self, where: Indices | slice, other: ColumnMaps) -> None:
         """Replace some pixels by those of other maps."""
@@ -111,7 +114,8 @@ class ColumnFinder:
         where = slice(int(pixels[0]), int(pixels[-1]) + 1) if whole else pixels
         column, offset, open_offset = self._columns(where, torch.as_tensor(start_px, device=self.device))
         spread = column.std_px.cpu().numpy()
-        refined, unusual = (v.cpu().numpy() for v in (column.refined, column.unusual))
+        is_so = (column.refined, column.unusual, column.saturated)
+        refined, unusual, saturated = (v.cpu().numpy() for v in is_so)
         if std_px is not None:
             spread = np.where(refined, spread, std_px)
         at = torch.as_tensor(pixels + self.first, device=self.device)
@@ -119,7 +123,7 @@ class ColumnFinder:
         a, da = (v.cpu().numpy() for v in (column.amplitude, column.amplitude_std))
         dark, dark_std = (v.cpu().numpy() for v in (offset, open_offset))
         q, z, dz = (v.cpu().numpy() for v in (column.column_px, depth, slope))
-        return ColumnMaps(q, spread, a, da, dark, dark_std, refined, unusual, z, dz)
+        return ColumnMaps(q, spread, a, da, dark, dark_std, refined, unusual, saturated, z, dz)
 
     def _columns(self, where: Indices | slice, start: Tensor) -> tuple[Column, Tensor, Tensor]:
         """Columns, dark offset, and how far all frames of a pixel may be off it."""
@@ -156,7 +160,7 @@ class ColumnFinder:
         amplitude = torch.as_tensor(self.white.radiance.ravel()[where], device=self.device)
         spread = torch.as_tensor(self.white.variance.ravel()[where], device=self.device).sqrt()
         none = torch.zeros_like(start, dtype=torch.bool)
-        return Column(start, torch.full_like(start, WHOLE_PX_STD), amplitude, spread, none, none)
+        return Column(start, torch.full_like(start, WHOLE_PX_STD), amplitude, spread, none, none, none)
 
 
 def _on_lines(

@@ -123,6 +123,7 @@ def refine_by_profiles(
         torch.where(good, amplitude.abs() * DIRECT_ERROR, torch.inf),
         good,
         torch.zeros_like(good),
+        torch.isinf(s).any(1),
     )
 
 

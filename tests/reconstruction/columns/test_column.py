@@ -224,6 +224,23 @@ def test_rays_that_miss_the_column_have_no_depth() -> None:
     assert torch.isnan(found).all()
 
 
+def test_where_lines_are_saturated_their_slopes_count_more_than_the_code() -> None:
+    """Which may be off by two columns there."""
+    apart = LineSet(width_px=5, step_px=5, first_px=2.0, lines=128, frames=128)
+    column, _, _, _ = noisy(0.0)
+    generator = torch.Generator().manual_seed(5)
+    exact = zero_order_profile(
+        column - apart.centre_px(torch.arange(apart.lines))[:, None], -2.5, 2.5, RESPONSE
+    )
+    radiance = exact + 5e-4 * torch.randn(exact.shape, generator=generator)
+    std = torch.where(exact > 0.3, torch.inf, 5e-4)
+    found = refine(LinePeaks((column + 1.4).round(), radiance, std, apart, RESPONSE))
+    off = ((found.column_px - column) / found.std_px).abs()[found.refined]
+    assert found.saturated.all()
+    assert found.refined.float().mean() > 0.3
+    assert (off < 2).float().mean() > 0.95
+
+
 def test_a_saturated_line_is_as_bright_as_its_flanks_say() -> None:
     column, amplitude, radiance, std = noisy(0.003)
     bright = peaks(column, amplitude) > 0.2 * amplitude
