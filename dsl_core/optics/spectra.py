@@ -25,6 +25,9 @@ PAD_NM, LEAST_LIGHT = 15.0, 0.015
 FADING_NM = 8.0
 #: Bands are as wide in columns as their dispersion to this, px per nm, so that pixels share tables of light.
 SLOPE_STEP = 0.02
+#: Where a film sends a band past its own plane, places say nothing of dispersion: it is at most so many times
+#: what it is along the projector's axis.
+MOST_OBLIQUE = 8.0
 #: Light this far beyond the bands still counts in the zero order.
 BEYOND_NM = 40.0
 
@@ -118,6 +121,7 @@ class Bands:
     reported: slice
     moments: dict[int, NDArray[np.float64]]  # order -> (3 channels, 3 LEDs, bands), DN per ms
     centroids_nm: dict[int, NDArray[np.float64]]
+    most_px_per_nm: float
 
     @classmethod
     def of(cls, rig: Rig, grid: WavelengthGrid) -> Bands:
@@ -128,7 +132,8 @@ class Bands:
         moments, centroids = {}, {}
         for order in (0, *ORDERS, *SECOND_ORDERS):
             moments[order], centroids[order] = hat_moments(rig, order, centres, step)
-        return cls(centres, step, slice(below, below + grid.count), moments, centroids)
+        most_px_per_nm = MOST_OBLIQUE * rig.projector.fx_px / rig.film.period_nm
+        return cls(centres, step, slice(below, below + grid.count), moments, centroids, most_px_per_nm)
 
     @property
     def count(self) -> int:
@@ -142,12 +147,14 @@ class Bands:
 
     def half_width_px(self, columns_px: Tensor) -> float:
         """Half width (px) of a band's triangle: mean dispersion of columns (bands, pixels), in steps."""
-        span_nm = float(self.centres_nm[-1] - self.centres_nm[0])
-        slope = float((columns_px[-1] - columns_px[0]).abs().mean()) / span_nm
+        slope = float(self._slopes(columns_px).mean())
         return max(round(slope / SLOPE_STEP), 1) * SLOPE_STEP * self.step_nm
 
     def half_widths_px(self, columns_px: Tensor) -> Tensor:
         """The same of each pixel by its own columns (bands, pixels), (pixels,)."""
+        return (self._slopes(columns_px) / SLOPE_STEP).round().clip(min=1) * (SLOPE_STEP * self.step_nm)
+
+    def _slopes(self, columns_px: Tensor) -> Tensor:
+        """Mean dispersion of each pixel (px per nm), (pixels,)."""
         span_nm = float(self.centres_nm[-1] - self.centres_nm[0])
-        slope = (columns_px[-1] - columns_px[0]).abs() / span_nm
-        return (slope / SLOPE_STEP).round().clip(min=1) * (SLOPE_STEP * self.step_nm)
+        return ((columns_px[-1] - columns_px[0]).abs() / span_nm).clip(max=self.most_px_per_nm)

@@ -105,3 +105,12 @@ def test_bands_are_as_wide_as_the_mean_dispersion_in_steps(slope: float, steps: 
     assert bands.half_width_px(columns) == pytest.approx(steps * 0.02 * 5.0)
     own = [max(round(abs(slope) * share / 0.02), 1) * 0.02 * 5.0 for share in (0.9, 1.1)]
     assert bands.half_widths_px(columns).tolist() == pytest.approx(own)
+
+
+def test_a_band_that_no_film_sends_there_is_not_as_wide_as_the_picture() -> None:
+    bands = Bands.of(RIG, WavelengthGrid())
+    columns = torch.tensor([[100.0, 100.0], [250.0, 39061.0]], dtype=torch.float64)
+    usual, most = bands.half_widths_px(columns).tolist()
+    along_axis = 5.0 * RIG.projector.fx_px * RIG.film.lines_per_mm / 1e6
+    assert usual < most == pytest.approx(8 * along_axis, abs=0.05)
+    assert bands.half_width_px(columns) < most
