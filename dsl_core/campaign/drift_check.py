@@ -88,6 +88,7 @@ def measure_drift(
     Raises `CalibrationError` when the target does not fill the picture or is far too bright, and what a scan
     raises.
     """
+    from dsl_core.io.scan.as_exposed import as_exposed
     from dsl_core.io.scan.folder import ScanReader
 
     plan = quick_plan(rig.frame_period_ms)
@@ -97,7 +98,7 @@ def measure_drift(
         plan = plan.model_copy(update={"settings": drift_settings(rig, white)})
     plan = pipeline.fit_plan(plan, devices)
     pipeline.scan(devices, plan, folder, progress)
-    return drift_figures(ScanReader(folder), rig, spectralon, progress)
+    return drift_figures(as_exposed(ScanReader(folder)), rig, spectralon, progress)
 
 
 def drift_figures(

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
 from dsl_core.devices.base import Camera, CameraInfo, DeviceRig, Projector, ProjectorInfo
 from dsl_core.errors import DeviceError
 from dsl_core.model.frames import Frame, FrameSource
-from dsl_core.model.plan import Shot
+from dsl_core.model.plan import Setting, Shot
 from dsl_core.model.rig import BayerPattern, Rig
 
 #: What the rig is called in scans of it.
@@ -18,8 +20,17 @@ NAME = "replay"
 class ReplayCamera(Camera):
     """Delivers the frame of the shot that was announced, at the time it would have been taken."""
 
-    def __init__(self, source: FrameSource, bayer: BayerPattern = "RGGB", bit_depth: int = 12) -> None:
-        """Play back ``source``; it stays open and belongs to the caller."""
+    def __init__(
+        self,
+        source: FrameSource,
+        bayer: BayerPattern = "RGGB",
+        bit_depth: int = 12,
+        in_force: Sequence[Setting] = (),
+    ) -> None:
+        """Play back ``source``; it stays open and belongs to the caller.
+
+        ``in_force`` are the settings of its plan as its camera exposed them, which may have rounded.
+        """
         self._source = source
         self._shots: tuple[Shot, ...] = tuple(source.plan.shots())
         width, height = source.plan.camera_size_px
@@ -27,7 +38,9 @@ class ReplayCamera(Camera):
         self._info = CameraInfo(
             "replay", source.plan.name, width, height, bayer, bit_depth, (min(exposures), max(exposures))
         )
-        self._exposure_ms = exposures[0]
+        actual = [setting.exposure_ms for setting in in_force] or exposures
+        self._in_force_ms = dict(zip(exposures, actual, strict=True))
+        self._exposure_ms = actual[0]
         self._index = 0
         self._taken = 0
         self._time_s = 0.0
@@ -38,15 +51,18 @@ class ReplayCamera(Camera):
         return self._info
 
     def configure(self, exposure_ms: float) -> float:
-        """Choose among the exposures of the scan; raises `DeviceError` outside their range."""
+        """Choose among the exposures of the scan and return the one in force.
+
+        Raises `DeviceError` outside their range.
+        """
         low, high = self._info.exposure_range_ms
         if not low <= exposure_ms <= high:
             raise DeviceError(
                 f"The replayed scan has exposures from {low:g} to {high:g} ms, not {exposure_ms:g} ms."
                 " Use the plan of that scan."
             )
-        self._exposure_ms = exposure_ms
-        return exposure_ms
+        self._exposure_ms = self._in_force_ms.get(exposure_ms, exposure_ms)
+        return self._exposure_ms
 
     def prepare(self, shot_index: int, attempt: int = 0) -> None:
         """Choose the frame that `snap` delivers; raises `DeviceError` when the scan has none."""
@@ -88,15 +104,21 @@ def replay_rig(
     calibration: Rig | None = None,
     camera: CameraInfo | None = None,
     projector: ProjectorInfo | None = None,
+    in_force: Sequence[Setting] = (),
 ) -> DeviceRig:
     """A rig whose camera plays back ``source``; it waits for nothing.
 
     Without a ``calibration``, the ``camera`` and ``projector`` that the scan was captured with say what
     mosaic of how many bits its frames are, and how long the projector shows one; usual ones are taken without
-    these. Raises `DeviceError` from its devices when asked for a shot or size that the scan does not have.
+    these. ``in_force`` as for `ReplayCamera`. Raises `DeviceError` from its devices when asked for a shot or
+    size that the scan does not have.
     """
     sensor = calibration.sensor if calibration else camera
-    eye = ReplayCamera(source, sensor.bayer, sensor.bit_depth) if sensor else ReplayCamera(source)
+    eye = (
+        ReplayCamera(source, sensor.bayer, sensor.bit_depth, in_force)
+        if sensor
+        else ReplayCamera(source, in_force=in_force)
+    )
     known = calibration or projector
     period_ms = known.frame_period_ms if known else 1000.0 / 60.0
     return DeviceRig(

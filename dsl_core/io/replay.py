@@ -8,6 +8,7 @@ from dsl_core.devices.base import DeviceRig
 from dsl_core.devices.registry import with_options
 from dsl_core.devices.replay import replay_rig
 from dsl_core.errors import DeviceError
+from dsl_core.io.scan.as_exposed import as_exposed
 from dsl_core.io.scan.folder import ScanReader
 
 
@@ -29,4 +30,5 @@ def open_replay(options: dict[str, str]) -> DeviceRig:
         raise DeviceError(f"The rig 'replay' takes one option, scan=NAME.dsl; given: {given}.")
     (folder,) = options.values()
     reader = ScanReader(folder)
-    return replay_rig(reader, reader.calibration, reader.manifest.camera, reader.manifest.projector)
+    known = reader.calibration, reader.manifest.camera, reader.manifest.projector
+    return replay_rig(reader, *known, in_force=as_exposed(reader).plan.settings)

@@ -14,6 +14,7 @@ from dsl_core.io import MANIFEST_NAME
 from dsl_core.io.published.calibration import check_calibration, holds_calibration, load_calibration
 from dsl_core.io.published.dataset import PUBLISHED_SETTINGS, export_dataset, open_dataset
 from dsl_core.io.published.layout import FileRecord, survey
+from dsl_core.io.scan.as_exposed import as_exposed
 from dsl_core.io.scan.check import require_complete
 from dsl_core.io.scan.folder import ScanReader
 from dsl_core.io.scan.manifest import read_manifest
@@ -31,8 +32,11 @@ _FINGERPRINT = "imported_fingerprint"
 def export_scan(
     folder: Path, target: Path, overwrite: bool = False, progress: Progress | None = None
 ) -> list[Path]:
-    """Write a complete scan in the published dataset layout and return the files; raises `StoreError`."""
-    reader = ScanReader(folder)
+    """Write a complete scan in the published dataset layout and return the files; raises `StoreError`.
+
+    Its plan has the exposures in force: nothing else in that layout says what they were.
+    """
+    reader = as_exposed(ScanReader(folder))
     require_complete(reader)
     sensor = calibration_of(reader).sensor
     return export_dataset(

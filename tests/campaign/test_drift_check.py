@@ -21,6 +21,7 @@ from dsl_core.model.spectral import SpectralCurve
 from dsl_core.simulation import sim_devices
 from dsl_core.simulation.published_rig import published_rig
 from dsl_core.simulation.sim_devices import SimCamera, open_twin
+from tests.cases.rounding import Rounding
 from tests.cases.twin_scan import MemoryScan, twin_scan
 
 #: Pixels whose light is compared: enough to see, few enough to be quick.
@@ -130,6 +131,15 @@ def test_a_brighter_rig_is_checked_and_brighter_light_is_told(tmp_path: Path) ->
     missed = failures(measure_drift(devices, dimmer, tmp_path / "two.dsl", spectralon=True))
     assert [figure.name.split(",")[0] for figure in missed] == ["white signal"] * 3
     assert [figure.value for figure in missed] == pytest.approx([4.0] * 3, rel=0.01)
+
+
+@pytest.mark.slow
+def test_a_camera_that_rounds_exposures_is_no_change_of_the_light(tmp_path: Path) -> None:
+    devices = open_twin({"size": "112x72", "scene": "plane"})
+    devices = replace(devices, camera=Rounding(devices.camera, lambda ms: 1.045))
+    rig = devices.calibration
+    assert rig is not None
+    assert failures(measure_drift(devices, rig, tmp_path / "one.dsl", spectralon=True)) == ()
 
 
 @pytest.mark.slow

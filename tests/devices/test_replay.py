@@ -67,6 +67,16 @@ def test_a_stored_scan_is_replayed_by_name(tmp_path: Path) -> None:
         np.testing.assert_array_equal(reader.read(shot), original.read(shot))
 
 
+def test_frames_keep_the_exposures_in_force_and_the_plan_its_own(tmp_path: Path) -> None:
+    original, again = _scan(), MemorySink(PLAN)
+    with ScanWriter.create(tmp_path / "scan.dsl", PLAN) as writer:
+        for shot in PLAN.shots():
+            writer.write(shot, Frame(original.read(shot), 10.4, 0.1 * shot.index, shot.index + 1))
+    with open_rig("replay", {"scan": str(tmp_path / "scan.dsl")}) as rig:
+        Runner(rig, PLAN, again, pattern_image).run()
+        assert rig.camera.snap().exposure_ms == 10.4
+
+
 @pytest.mark.parametrize(("bayer", "bits"), [("MONO", 8), ("GBRG", 14), ("RGGB", 12)])
 def test_a_scan_without_calibration_is_replayed_as_its_camera_took_it(
     tmp_path: Path, bayer: BayerPattern, bits: int

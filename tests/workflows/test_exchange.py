@@ -11,8 +11,12 @@ import pytest
 from numpy.typing import NDArray
 
 from dsl_core.errors import Cancelled, StoreError
-from dsl_core.io.published.dataset import export_dataset
+from dsl_core.io import MANIFEST_NAME
+from dsl_core.io.published.dataset import export_dataset, open_dataset
+from dsl_core.io.records import replace_record
 from dsl_core.io.scan.folder import ScanReader, ScanWriter
+from dsl_core.io.scan.manifest import read_manifest
+from dsl_core.model.frames import Frame
 from dsl_core.model.plan import CapturePlan, GrayCode, LineComb, Setting, Shot
 from dsl_core.model.rig import Rig
 from dsl_core.progress import CallbackProgress
@@ -70,6 +74,18 @@ def test_another_calibration_is_refused(tmp_path: Path) -> None:
     with pytest.raises(StoreError, match="imported with another calibration"):
         exchange.import_scan(dataset, session, other)
     assert ScanReader(session).calibration == RIG
+
+
+def test_an_exported_plan_has_the_exposures_in_force(tmp_path: Path) -> None:
+    with ScanWriter.create(tmp_path / "scan.dsl", PLAN) as writer:
+        for shot in PLAN.shots():
+            writer.write(shot, Frame(Even(1).read(shot), 1.04 * shot.exposure_ms, 0.1, shot.index + 1))
+    manifest = tmp_path / "scan.dsl" / MANIFEST_NAME
+    known = read_manifest(tmp_path / "scan.dsl").model_copy(update={"calibration": RIG})
+    replace_record(manifest, known)
+    exchange.export_scan(tmp_path / "scan.dsl", tmp_path / "chart")
+    (setting,) = open_dataset(tmp_path / "chart").plan.settings
+    assert setting.exposure_ms == pytest.approx(10.4)
 
 
 def test_a_scan_of_a_rig_is_not_gone_on_with(tmp_path: Path) -> None:

@@ -22,6 +22,7 @@ from dsl_core.errors import CalibrationError, Cancelled, DslError, StoreError
 from dsl_core.io import MANIFEST_NAME
 from dsl_core.io.atomic import make_folder
 from dsl_core.io.records import read_record, replace_record
+from dsl_core.io.scan.as_exposed import as_exposed
 from dsl_core.io.scan.folder import ScanReader
 from dsl_core.model.base import Record
 from dsl_core.model.figure import Figure
@@ -78,8 +79,8 @@ class Bench:
         return self._is_begun(step) and not self.scan_of(step).missing()
 
     def scan_of(self, step: Step) -> ScanReader:
-        """The scan of a step; raises `StoreError`."""
-        return ScanReader(self.step_folder(step) / SCAN_NAME)
+        """The scan of a step, with the exposures in force; raises `StoreError`."""
+        return as_exposed(self._as_planned(step))
 
     def scan(self, step: Step, make_plan: Callable[[], CapturePlan], progress: Progress) -> CapturePlan:
         """Scan a step and return the plan; a scan that was begun continues with its own plan."""
@@ -87,7 +88,7 @@ class Bench:
 
         folder = self.step_folder(step)
         if self._is_begun(step):
-            plan = self.scan_of(step).plan
+            plan = self._as_planned(step).plan
         else:
             plan = pipeline.fit_plan(make_plan(), self.devices)
             make_folder(folder)
@@ -101,6 +102,9 @@ class Bench:
     def kept(self, step: Step, name: str, kind: type[RecordT]) -> RecordT:
         """A record that `keep` wrote; raises `StoreError`."""
         return read_record(self.step_folder(step) / name, kind)
+
+    def _as_planned(self, step: Step) -> ScanReader:
+        return ScanReader(self.step_folder(step) / SCAN_NAME)
 
     def _is_begun(self, step: Step) -> bool:
         return (self.step_folder(step) / SCAN_NAME / MANIFEST_NAME).exists()

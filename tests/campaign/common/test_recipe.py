@@ -15,6 +15,7 @@ from dsl_core.model.plan import CapturePlan, Columns, NoCode, Setting
 from dsl_core.progress import NoProgress
 from tests.cases.faults import FaultPlan, with_faults
 from tests.cases.film_bench import film_bench
+from tests.cases.rounding import Rounding
 
 STEP = Step("one", "Step one", "Place it.", Placement(target="spectralon"))
 
@@ -42,6 +43,19 @@ def test_a_scan_is_planned_once_and_complete_afterwards(bench: Bench) -> None:
     assert bench.scan(STEP, plan, NoProgress()) == made
     assert bench.scan_of(STEP).entries == entries
     assert len(planned) == 1
+
+
+def test_a_fit_reads_the_exposures_in_force_and_a_scan_goes_on_with_its_plan(bench: Bench) -> None:
+    rounded = Rounding(bench.devices.camera, lambda ms: 1.045)
+    bench = replace(bench, devices=replace(bench.devices, camera=rounded))
+    levels = (((1.0,) * 3,) * bench.devices.projector.info.width_px,)
+    settings = (Setting(exposure_ms=20.0, level=1.0),)
+    plan = CapturePlan(
+        name="one", code=NoCode(), spectral=Columns(levels=levels), settings=settings, code_settings=(0,)
+    )
+    bench.scan(STEP, lambda: plan, NoProgress())
+    assert bench.scan_of(STEP).plan.settings[0].exposure_ms == pytest.approx(20.9)
+    assert bench.scan(STEP, lambda: plan, NoProgress()).settings == settings
 
 
 def test_a_step_that_fails_does_not_speak_of_a_scan(bench: Bench) -> None:

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from dsl_core.devices.base import Camera, CameraInfo, DeviceRig
+from dsl_core.devices.base import DeviceRig
 from dsl_core.io.scan.as_exposed import as_exposed
 from dsl_core.io.scan.folder import ScanReader, ScanWriter
 from dsl_core.model.frames import Frame
@@ -17,6 +17,7 @@ from dsl_core.model.plan import CapturePlan, GrayCode, LineComb, Setting
 from dsl_core.pipeline import scan
 from dsl_core.simulation.sim_devices import open_twin
 from dsl_core.workflows.scans import reconstruct_scan
+from tests.cases.rounding import Rounding
 
 PLAN = CapturePlan(
     camera_size_px=(24, 16),
@@ -51,27 +52,6 @@ def test_the_median_of_each_setting_is_in_force(tmp_path: Path) -> None:
     assert reader.plan == PLAN, "what was planned stays known"
     last = list(exposed.plan.shots())[-1]
     assert exposed.read(last)[0, 0] == last.index
-
-
-@dataclass
-class Rounding(Camera):
-    """Another camera with exposures that are longer than those wanted, and says so."""
-
-    camera: Camera
-    longer: Callable[[float], float]
-
-    @property
-    def info(self) -> CameraInfo:
-        return self.camera.info
-
-    def configure(self, exposure_ms: float) -> float:
-        return self.camera.configure(self.longer(exposure_ms) * exposure_ms)
-
-    def prepare(self, shot_index: int, attempt: int = 0) -> None:
-        self.camera.prepare(shot_index, attempt)
-
-    def snap(self, timeout_ms: float = 5000.0) -> Frame:
-        return self.camera.snap(timeout_ms)
 
 
 def rounding_rig(longer: Callable[[float], float]) -> DeviceRig:
