@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import re
 import shlex
 from pathlib import Path
@@ -101,6 +102,16 @@ def test_the_readme_names_every_command_and_no_other(program: Any) -> None:
     text = (ROOT / "README.md").read_text(encoding="utf-8")
     named = re.findall(r"^\| `dsl-scan ([\w-]+)[^`]*` \|", text, re.MULTILINE)
     assert set(named) == set(program.commands)
+
+
+def test_pip_takes_what_the_readme_installs(monkeypatch: pytest.MonkeyPatch) -> None:
+    pip = importlib.import_module("pip._internal.req.constructors")
+    monkeypatch.chdir(ROOT)
+    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    shown = [shlex.split(line) for line in re.findall(r"`pip install ([^`]+)`", text)]
+    taken = [pip.install_req_from_line(what) for (what,) in shown]
+    assert [each.extras for each in taken] == [{"gui"}, {"reconstruct"}, set()]
+    assert {each.link.file_path for each in taken} == {str(ROOT)}
 
 
 def test_pictures_of_the_readme_are_there_and_small() -> None:
