@@ -24,6 +24,7 @@ from dsl_core.errors import CalibrationError, DecodeError, DriftError, StoreErro
 from dsl_core.evaluation.cost import COSTS_ATTRIBUTE, StageTimer
 from dsl_core.evaluation.summary import Truth
 from dsl_core.io.linearity import Linearity, linearity_of
+from dsl_core.io.result.inventory import MADE_OF, check_inventory
 from dsl_core.io.scan.as_exposed import as_exposed
 from dsl_core.io.scan.check import require_complete
 from dsl_core.io.scan.folder import ScanReader
@@ -59,8 +60,6 @@ if TYPE_CHECKING:
 
 #: Attribute of a result: how many frames show too little to be judged by their pattern, as "26 of 150".
 NOT_JUDGED = "frames_not_judged"
-#: Attribute of a result: a digest of all that it depends on.
-MADE_OF = "made_of"
 
 
 def reopen_rig(folder: Path) -> DeviceRig:
@@ -265,13 +264,19 @@ def key_of_result(reader: ScanReader, calibration: Rig | None, options: Options)
 
 def is_made_of(target: Path, key: str) -> bool:
     """Whether a result is there, complete, and of this key; raises `StoreError` where it is damaged."""
-    from dsl_core.io.result.inventory import check_inventory
     from dsl_core.io.result.result_file import read_attributes
 
     if not (target / "zarr.json").is_file():
         return False
     attributes = read_attributes(target)
     return attributes.get(MADE_OF) == key and check_inventory(target, attributes)
+
+
+def says_what_made_it(target: Path) -> bool:
+    """Whether what is there states a key, as results saved from Python do not; raises `StoreError`."""
+    from dsl_core.io.result.result_file import read_attributes
+
+    return (target / "zarr.json").is_file() and MADE_OF in read_attributes(target)
 
 
 def prove_scan(folder: Path) -> ScanProof:

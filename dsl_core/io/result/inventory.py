@@ -22,6 +22,8 @@ from dsl_core.model.base import Record
 
 #: The attributes that are not of the result, but of its folder.
 INVENTORY, CHECKSUM = "inventory", "attributes_crc32"
+#: A digest of all that a folder was reconstructed from. Python may save altered results, which have none.
+MADE_OF = "made_of"
 METADATA_NAME = "zarr.json"
 
 

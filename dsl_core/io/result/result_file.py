@@ -24,7 +24,7 @@ from dsl_core.errors import StoreError
 from dsl_core.io.kinds import what_is_at
 from dsl_core.io.reading import read_json
 from dsl_core.io.result.arrays import plain, write_variable
-from dsl_core.io.result.inventory import CHECKSUM, INVENTORY, check_inventory, with_inventory
+from dsl_core.io.result.inventory import CHECKSUM, INVENTORY, MADE_OF, check_inventory, with_inventory
 from dsl_core.io.staging import FolderKind, staged
 from dsl_core.model.result import SCHEMA_VERSION
 from dsl_core.model.result_order import canonical, with_bits
@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 
 _log = logging.getLogger(__name__)
 #: Attributes on disk that are not the result's.
-_OF_THE_FOLDER = ("labels", INVENTORY, CHECKSUM)
+_OF_THE_FOLDER = ("labels", INVENTORY, CHECKSUM, MADE_OF)
 
 
 def save_result(result: xr.Dataset, path: Path, *, overwrite: bool = False) -> Path:

@@ -22,13 +22,14 @@ from dsl_core.io.objects.claim import ObjectClaim
 from dsl_core.io.objects.copies import published_as
 from dsl_core.io.objects.rooms import bring_frames, brought, published
 from dsl_core.io.objects.store import ObjectFolder
+from dsl_core.io.result.inventory import MADE_OF
 from dsl_core.io.scan.folder import ScanReader
 from dsl_core.model.attributes import DOUBTS, sentences_of
 from dsl_core.model.fit import Fit
 from dsl_core.model.options import Options
 from dsl_core.model.rig import Rig
 from dsl_core.workflows.captures import is_import
-from dsl_core.workflows.scans import MADE_OF, is_made_of, key_of_result, reconstruct_to
+from dsl_core.workflows.scans import is_made_of, key_of_result, reconstruct_to, says_what_made_it
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -172,9 +173,14 @@ def _is_there(task: ScanTask, key: str) -> bool:
             return False
         raise TakenError(f"{error} With --force, it is replaced.") from error
     if not found and task.target.exists() and not task.overwrite:
+        unlike = (
+            "made of other frames or with another calibration, options or version"
+            if says_what_made_it(task.target)
+            else "and does not say what it was made of, as results saved from Python do not"
+        )
         raise TakenError(
-            f"{task.target} already exists, made of other frames or with another calibration, options"
-            " or version. Choose another folder for results, or replace it with --force."
+            f"{task.target} already exists, {unlike}. Choose another folder for results, or replace it"
+            " with --force."
         )
     return found
 
