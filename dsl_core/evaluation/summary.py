@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
@@ -10,7 +11,7 @@ from numpy.typing import NDArray
 
 from dsl_core.errors import DecodeError
 from dsl_core.evaluation.depth import DepthScore, depth_score
-from dsl_core.evaluation.scatter import std_of_mean
+from dsl_core.evaluation.scatter import std_of_mean, std_of_rms
 from dsl_core.evaluation.spectral import Peak, SpectralErrors, known_of_first, peak_width, spectral_errors
 from dsl_core.evaluation.uncertainty import DECIDED_FROM, HonestyCheck, check_honesty
 
@@ -97,13 +98,24 @@ class Evaluation:
 
     def mean(self, figure: str) -> float:
         """Mean of a figure of `PatchScore` over the patches; raises `DecodeError` when there are none."""
-        if not self.patches:
-            raise DecodeError("There is no patch with a known spectrum to average over.")
-        return float(np.mean([getattr(patch, figure) for patch in self.patches]))
+        return float(np.mean(self._of_patches(figure)))
 
     def mean_std(self, figure: str) -> float | None:
         """Standard deviation of such a mean, by its scatter over the patches; None for fewer than two."""
         return std_of_mean([getattr(patch, figure) for patch in self.patches])
+
+    @property
+    def pixel_rmse(self) -> float:
+        """RMSE of single pixels: the root of the mean square over the patches, each of which counts once.
+
+        Raises `DecodeError` when there are none.
+        """
+        return math.sqrt(np.mean(np.square(self._of_patches("pixel_rmse"))))
+
+    @property
+    def pixel_rmse_std(self) -> float | None:
+        """Standard deviation of `pixel_rmse`, by its scatter over the patches; None for fewer than two."""
+        return std_of_rms([patch.pixel_rmse**2 for patch in self.patches])
 
     @property
     def mean_fwhm_nm(self) -> float | None:
@@ -114,6 +126,11 @@ class Evaluation:
     def fwhm_std_nm(self) -> float | None:
         """Standard deviation of `mean_fwhm_nm`, by its scatter over patches; None for fewer than two."""
         return std_of_mean(self._widths_nm)
+
+    def _of_patches(self, figure: str) -> list[float]:
+        if not self.patches:
+            raise DecodeError("There is no patch with a known spectrum to average over.")
+        return [getattr(patch, figure) for patch in self.patches]
 
     @property
     def _widths_nm(self) -> list[float]:

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 from dsl_core.errors import DecodeError
 from dsl_core.evaluation.difference import ResultDifference
-from dsl_core.evaluation.scatter import std_of_rms, with_std
+from dsl_core.evaluation.scatter import with_std
 from dsl_core.evaluation.summary import Evaluation
 from dsl_core.solve.front import front
 
@@ -64,15 +63,14 @@ class SweepPoint:
 
 def point_against_truth(name: str, seconds: float, found: Evaluation) -> SweepPoint:
     """What a scan reached against known truth."""
-    squares = [patch.pixel_rmse**2 for patch in found.patches]
     return SweepPoint(
         name,
         seconds,
         None if found.depth is None else found.depth.rmse_mm,
         None if found.depth is None else found.depth.rmse_std_mm,
-        math.sqrt(sum(squares) / len(squares)) if squares else None,
-        std_of_rms(squares),
-        found.mean("angle_rad") if squares else None,
+        found.pixel_rmse if found.patches else None,
+        found.pixel_rmse_std,
+        found.mean("angle_rad") if found.patches else None,
         found.mean_std("angle_rad"),
     )
 

@@ -90,7 +90,7 @@ def figures(evaluation: Evaluation) -> dict[str, float]:
         found |= {
             "spectral_rmse": evaluation.mean("rmse"),
             "spectral_worst_rmse": max(patch.rmse for patch in evaluation.patches),
-            "spectral_pixel_rmse": evaluation.mean("pixel_rmse"),
+            "spectral_pixel_rmse": evaluation.pixel_rmse,
             "spectral_rmse_scaled": evaluation.mean("rmse_scaled"),
             "spectral_angle_rad": evaluation.mean("angle_rad"),
             "delta_e": evaluation.mean("delta_e"),
@@ -106,7 +106,7 @@ def deviations(evaluation: Evaluation) -> dict[str, float]:
     """Standard deviations of figures, by the same names; those that count what is there have none."""
     stds: dict[str, float | None] = {
         "spectral_rmse": evaluation.mean_std("rmse"),
-        "spectral_pixel_rmse": evaluation.mean_std("pixel_rmse"),
+        "spectral_pixel_rmse": evaluation.pixel_rmse_std,
         "spectral_rmse_scaled": evaluation.mean_std("rmse_scaled"),
         "spectral_angle_rad": evaluation.mean_std("angle_rad"),
         "delta_e": evaluation.mean_std("delta_e"),

@@ -206,7 +206,7 @@ def measure(taken: Captured) -> dict[str, Any]:
         "depth_band": found.depth_calibration.coverage_95,
         "patch_rmse": found.mean("rmse"),
         "angle_rad": found.mean("angle_rad"),
-        "pixel_rmse": float(np.sqrt(np.mean([p.pixel_rmse**2 for p in found.patches]))),
+        "pixel_rmse": found.pixel_rmse,
         "error_p99": float(np.quantile(errors, 0.99)),
         "error_p999": float(np.quantile(errors, 0.999)),
         "spectral_band": None if spectral is None else spectral.coverage_95,

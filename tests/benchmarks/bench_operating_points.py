@@ -47,7 +47,7 @@ def point(plan: CapturePlan, size: str) -> dict[str, float]:
         "frames": plan.shot_count,
         "seconds": round(plan.duration_s(LATENCY_MS), 1),
         "chart_rmse": round(chart.mean("rmse"), 5),
-        "chart_pixel_rmse": round(chart.mean("pixel_rmse"), 5),
+        "chart_pixel_rmse": round(chart.pixel_rmse, 5),
         "filter_fwhm_nm": round(filters.mean_fwhm_nm or float("nan"), 2),
         "depth_rmse_mm": round(chart.depth.rmse_mm, 4),
         "depth_coverage": round(chart.depth.coverage, 4),

@@ -136,9 +136,7 @@ def print_patches(found: Evaluation) -> None:
     ]  # fmt: skip
     mean = [f"{found.mean(name):.4f}" for name in ("rmse", "angle_rad")]
     width = "" if found.mean_fwhm_nm is None else f"{found.mean_fwhm_nm:.2f}"
-    rows.append(
-        ["mean", "", "", *mean, f"{found.mean('delta_e'):.2f}", f"{found.mean('pixel_rmse'):.4f}", width]
-    )
+    rows.append(["mean", "", "", *mean, f"{found.mean('delta_e'):.2f}", f"{found.pixel_rmse:.4f}", width])
     print_table(["patch", "pixels", "solved", "RMSE", "angle rad", "dE00", "pixel RMSE", "FWHM nm"], rows)
 
 
@@ -149,7 +147,7 @@ def figures(found: Evaluation, bright: HonestyCheck, fit: float) -> dict[str, An
         "rmse": found.mean("rmse"),
         "angle_rad": found.mean("angle_rad"),
         "delta_e": found.mean("delta_e"),
-        "pixel_rmse": found.mean("pixel_rmse"),
+        "pixel_rmse": found.pixel_rmse,
         "fwhm_nm": found.mean_fwhm_nm,
         "coverage_95": found.spectral_calibration.coverage_95,
         "decided_share": found.spectral_calibration.share,

@@ -11,6 +11,7 @@ import pytest
 from dsl_core.errors import DecodeError
 from dsl_core.evaluation.report.scan_report import _patch_note
 from dsl_core.evaluation.summary import Evaluation, Truth, evaluate, interior
+from dsl_core.evaluation.time_sweep import point_against_truth
 from dsl_core.evaluation.verdict import Goal, deviations, figures, verdicts
 
 
@@ -39,6 +40,16 @@ def test_patches_have_the_errors_that_were_put_in(known: Any) -> None:
     assert narrow.truth_peak is not None
     assert narrow.peak is not None
     assert narrow.peak.fwhm_nm == pytest.approx(narrow.truth_peak.fwhm_nm, abs=0.1)
+
+
+def test_single_pixels_have_one_rmse_wherever_it_is_told(known: Any) -> None:
+    found = evaluate(known.result, known.truth)
+    one, other = (patch.pixel_rmse for patch in found.patches)
+    assert other > 1.5 * one
+    told = figures(found)["spectral_pixel_rmse"], deviations(found)["spectral_pixel_rmse"]
+    assert told[0] == pytest.approx(np.sqrt((one**2 + other**2) / 2))
+    swept = point_against_truth("scan", 1.0, found)
+    assert (swept.reflectance, swept.reflectance_std) == told
 
 
 def test_calibration_counts_only_bands_that_data_decide(known: Any) -> None:

@@ -299,12 +299,11 @@ def _with_errors(scan: MeasuredScan, found: Evaluation) -> MeasuredScan:
         scan = replace(scan, depth_rmse_mm=found.depth.rmse_mm, coverage=found.depth.coverage)
     if not found.patches:
         return scan
-    squares = [patch.pixel_rmse**2 for patch in found.patches]
     delta_e = found.mean("delta_e")
     return replace(
         scan,
         rmse=found.mean("rmse"),
-        pixel_rmse=math.sqrt(sum(squares) / len(squares)),
+        pixel_rmse=found.pixel_rmse,
         pixel_angle_rad=found.mean("pixel_angle_rad"),
         delta_e=None if math.isnan(delta_e) else delta_e,
         fwhm_nm=found.mean_fwhm_nm,
