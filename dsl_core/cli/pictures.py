@@ -129,7 +129,7 @@ def calibrate_camera_pictures(
 def _mapping_of(
     output: Output, folder: Path, size_px: tuple[int, int], guess: bool, path: Path | None
 ) -> Mapping | None:
-    """What the pictures of each pose show, None for the usual order; says what was guessed."""
+    """What the pictures of each pose show, None for the usual order; says what was guessed or is unsure."""
     from dsl_core.workflows.captures import load_mapping
     from dsl_core.workflows.mapped_poses import guess_poses
     from dsl_core.workflows.pictures import pose_folders
@@ -137,12 +137,13 @@ def _mapping_of(
     if guess and path is not None:
         raise CalibrationError("--guess finds out what --mapping states. Give one of them.")
     if path is not None:
-        return load_mapping(path)
-    if not guess:
+        mapping = load_mapping(path)
+    elif guess:
+        folders = pose_folders(folder)
+        mapping = guess_poses(folders, size_px).mapping
+        output.say(f"Guessed from {folders[0].name}: {words_of(mapping)}.")
+    else:
         return None
-    folders = pose_folders(folder)
-    mapping = guess_poses(folders, size_px).mapping
-    output.say(f"Guessed from {folders[0].name}: {words_of(mapping)}.")
     for sentence in mapping.unsure:
         output.say(f"Unsure: {sentence}.")
     output.put(mapping=mapping.model_dump(mode="json"))

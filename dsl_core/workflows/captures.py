@@ -15,7 +15,7 @@ from dsl_core.devices.replay import ReplayCamera, ReplayProjector
 from dsl_core.errors import CalibrationError, StoreError
 from dsl_core.io import MANIFEST_NAME
 from dsl_core.io.pictures.mapped_doubts import require_pairs
-from dsl_core.io.pictures.mapping import Mapping
+from dsl_core.io.pictures.mapping import Mapping, PhasePictures, untold_direction
 from dsl_core.io.pictures.source import PictureScan, open_pictures
 from dsl_core.io.records import read_record
 from dsl_core.io.scan.check import require_complete
@@ -44,14 +44,23 @@ LIT_SIGMAS = 8.0
 
 
 def load_mapping(path: Path) -> Mapping:
-    """A mapping from its JSON file; raises `StoreError` that names the field that is wrong."""
-    return read_record(
+    """A mapping from its JSON file, unsure of directions that it does not state.
+
+    Raises `StoreError` that names the field that is wrong.
+    """
+    mapping = read_record(
         path,
         Mapping,
         "Correct it, or let 'dsl-scan import FOLDER --guess' write one.",
         called="The mapping",
         fault="is not a mapping",
     )
+    untold = [
+        untold_direction(part.axis, f"direction {part.direction} (frame k of N with the phase + 2πk/N)")
+        for part in mapping.parts
+        if isinstance(part, PhasePictures) and "direction" not in part.model_fields_set
+    ]
+    return mapping.model_copy(update={"unsure": (*mapping.unsure, *untold)})
 
 
 def sensor_of(scan: PictureScan) -> Sensor:

@@ -80,6 +80,16 @@ def test_a_mapping_is_kept_as_a_file_and_its_faults_named(tmp_path: Path) -> Non
         captures.load_mapping(tmp_path / "bad.json")
 
 
+def test_a_mapping_that_states_no_direction_of_sinusoids_is_unsure_of_it(tmp_path: Path) -> None:
+    text = '{"parts": [{"kind": "phases", "axis": "rows", "fringes": [1, 8], "steps": 4%s}], %s}'
+    size = '"projector_size_px": [96, 64]'
+    (path := tmp_path / "a.json").write_text(text % ("", size), encoding="utf-8")
+    (doubt,) = captures.load_mapping(path).unsure
+    assert doubt.startswith("sinusoids do not say which way rows rise: direction 1 (frame k of N")
+    path.write_text(text % (', "direction": 1', size), encoding="utf-8")
+    assert captures.load_mapping(path).unsure == ()
+
+
 def test_columns_without_depth_are_exported_as_arrays(folder: Path, tmp_path: Path) -> None:
     from dsl_core.io.export.depth_maps import export_npy
 

@@ -15,6 +15,7 @@ from dsl_core.io.pictures.mapping import (
     Skipped,
     StripePictures,
     WhitePicture,
+    untold_direction,
 )
 from dsl_core.model.captured_code import Axis
 from dsl_core.patterns.recognition.phase_sets import PhaseReading, turns_per_number
@@ -199,8 +200,7 @@ def _phases(
         way = "to the right" if axis == "columns" else "downwards"
         doubts += [
             _counted_alone(axis, reading),
-            f"sinusoids do not say which way {axis} rise: {way} is assumed; where camera or projector is"
-            " mirrored, give direction of the mapping the other sign",
+            untold_direction(axis, way),
         ]
         if reading.rival_rad < CLEARLY_WORSE * reading.off_rad:
             doubts.append(f"{axis}: where the sinusoids start ({start:g} degrees) is unsure")

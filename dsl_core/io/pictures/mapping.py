@@ -94,6 +94,14 @@ class RawLayout(Record):
     big_endian: bool = False
 
 
+def untold_direction(axis: Axis, assumed: str) -> str:
+    """What is unsure of sinusoids whose direction nobody states."""
+    return (
+        f"sinusoids do not say which way {axis} rise: {assumed} is assumed; where positions run the other"
+        " way, give direction of the mapping the other sign"
+    )
+
+
 class Mapping(Record):
     """Which pictures there are, in natural order of their names, and what they show one after the other.
 
