@@ -37,6 +37,15 @@ _PURPOSE = {
 }
 
 
+def pip_command(extra: str) -> str:
+    """What installs an extra, in double quotes: Windows passes single ones on to pip.
+
+    >>> pip_command("ocean")
+    'pip install "dsl-scan[ocean]"'
+    """
+    return f'pip install "dsl-scan[{extra}]"'
+
+
 def missing_package(error: ModuleNotFoundError) -> MissingPackageError | None:
     """What to install where a module of an extra is missing; None where another module is."""
     module = (error.name or "").partition(".")[0]
@@ -45,7 +54,7 @@ def missing_package(error: ModuleNotFoundError) -> MissingPackageError | None:
         return None
     return MissingPackageError(
         f"This needs the package {module}, which is not installed here. It comes with the extra {extra!r}"
-        f" ({_PURPOSE[extra]}): pip install 'dsl-scan[{extra}]'"
+        f" ({_PURPOSE[extra]}): {pip_command(extra)}"
     )
 
 

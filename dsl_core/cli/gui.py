@@ -11,7 +11,7 @@ import typer
 
 from dsl_core.cli.options import RigOptions, tab_rigs
 from dsl_core.errors import DslError
-from dsl_core.extras import missing_package
+from dsl_core.extras import missing_package, pip_command
 
 #: The window of this package, so that it opens in a source tree without metadata too.
 WINDOW = EntryPoint("dsl-scan-gui", "dsl_app.__main__:main", "gui_scripts")
@@ -54,6 +54,6 @@ def gui(
         missing = missing_package(error) if isinstance(error, ModuleNotFoundError) else None
         raise missing or DslError(
             f"The window cannot be opened here: {error}. Install dsl-scan with its desktop application:"
-            " pip install 'dsl-scan[gui]'."
+            f" {pip_command('gui')}."
         ) from error
     raise typer.Exit(main(words))

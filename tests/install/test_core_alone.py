@@ -92,12 +92,12 @@ def test_what_computes_names_its_extra(found: Any) -> None:
     wanted = "MissingPackageError: This needs the package torch, which is not installed here."
     assert found["twin"].startswith(wanted)
     assert found["evaluate"].startswith(wanted)
-    assert found["evaluate"].endswith("pip install 'dsl-scan[reconstruct]'")
+    assert found["evaluate"].endswith('pip install "dsl-scan[reconstruct]"')
 
 
 def test_commands_do_the_same(found: Any) -> None:
     assert found["codes"] == [0, 0, 0, 2]
-    assert "pip install 'dsl-scan[reconstruct]'" in found["demo"]
+    assert 'pip install "dsl-scan[reconstruct]"' in found["demo"]
 
 
 def test_other_missing_modules_stay_errors_of_python() -> None:

@@ -61,7 +61,7 @@ def test_a_missing_window_is_a_sentence(give: Give, monkeypatch: pytest.MonkeyPa
     monkeypatch.setattr(gui, "WINDOW", EntryPoint("dsl-scan-gui", "no_such_window:main", "gui_scripts"))
     ending = give("gui")
     assert ending.code == 2
-    assert "pip install 'dsl-scan[gui]'" in ending.sentence
+    assert 'pip install "dsl-scan[gui]"' in ending.sentence
 
 
 def test_without_a_screen_the_window_says_so(give: Give, monkeypatch: pytest.MonkeyPatch) -> None:

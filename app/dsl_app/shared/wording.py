@@ -41,7 +41,7 @@ PHRASES = (
 #: The same with what changes in the middle of them.
 PATTERNS = (
     (r"'dsl-scan calibrate geometry .* --pictures' reads", "the calibration of the geometry reads"),
-    (r"pip install 'dsl-scan\[(\w+)\]'", r"the extra \1 of dsl-scan"),
+    (r'pip install "dsl-scan\[(\w+)\]"', r"the extra \1 of dsl-scan"),
 )
 
 
@@ -72,11 +72,11 @@ def in_window(text: str) -> str:
     'The scan contains no calibration. Choose one.'
     >>> in_window("The board of 7 x 5 inner corners was not found.")
     'The board of 7 × 5 inner corners was not found.'
-    >>> in_window("Needs pip install 'dsl-scan[ocean]' (seabreeze)")
+    >>> in_window('Needs pip install "dsl-scan[ocean]" (seabreeze)')
     'Needs the extra ocean of dsl-scan (seabreeze)'
     """
     text = _TIMES.sub(" × ", text)
-    if "--" in text or "'dsl-scan" in text:
+    if "--" in text or "dsl-scan" in text:
         for typed, clicked in PHRASES:
             text = text.replace(typed, clicked)
         for pattern, clicked in PATTERNS:

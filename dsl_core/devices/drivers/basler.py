@@ -12,8 +12,9 @@ from dsl_core.devices.drivers.genicam.camera import GenicamCamera
 from dsl_core.devices.drivers.genicam.port import RawFrame
 from dsl_core.devices.drivers.genicam.settings import GenicamSettings
 from dsl_core.errors import DeviceError
+from dsl_core.extras import pip_command
 
-BRINGS = "pypylon: pip install 'dsl-scan[basler]' (Basler's terms, 240 MB)"
+BRINGS = f"pypylon: {pip_command('basler')} (Basler's terms, 240 MB)"
 
 
 def pylon() -> tuple[Any, Any]:

@@ -15,8 +15,9 @@ from dsl_core.devices.drivers.genicam.camera import GenicamCamera
 from dsl_core.devices.drivers.genicam.port import RawFrame
 from dsl_core.devices.drivers.genicam.settings import GenicamSettings
 from dsl_core.errors import DeviceError
+from dsl_core.extras import pip_command
 
-BRINGS = "harvesters and genicam: pip install 'dsl-scan[genicam]'; the producer (.cti) comes with the camera"
+BRINGS = f"harvesters and genicam: {pip_command('genicam')}; the producer (.cti) comes with the camera"
 #: Where the standard says that producers are installed.
 FOLDERS = "GENICAM_GENTL64_PATH"
 

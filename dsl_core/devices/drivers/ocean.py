@@ -13,10 +13,11 @@ from pydantic import Field
 from dsl_core.devices.base import Spectroradiometer
 from dsl_core.devices.driver_table import Driver, FoundDevice
 from dsl_core.errors import DeviceError
+from dsl_core.extras import pip_command
 from dsl_core.model.base import Record
 from dsl_core.model.spectral import SpectralCurve
 
-BRINGS = "pip install 'dsl-scan[ocean]' (seabreeze)"
+BRINGS = f"{pip_command('ocean')} (seabreeze)"
 COVERED_NM = 430.0, 660.0
 #: Of the largest count: below the first an exposure is made longer, above the second it is saturated.
 _FAINT, _SATURATED = 0.3, 0.95

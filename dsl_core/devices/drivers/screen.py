@@ -23,10 +23,10 @@ from pydantic import Field
 from dsl_core.devices.base import Projector, ProjectorInfo
 from dsl_core.devices.driver_table import Driver
 from dsl_core.errors import DeviceError
-from dsl_core.extras import has_package
+from dsl_core.extras import has_package, pip_command
 from dsl_core.model.base import Record
 
-BRINGS = "the window's libraries: pip install 'dsl-scan[gui]'"
+BRINGS = f"the window's libraries: {pip_command('gui')}"
 _PROGRAM = "dsl_app.rig.projector_process"
 _END_S = 5.0
 #: A display's refresh rate is told in several ways, 59.94 or 60 Hz; another mode differs by more than this.

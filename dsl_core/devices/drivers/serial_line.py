@@ -10,9 +10,10 @@ from functools import partial
 from typing import Any, Protocol, TypeVar
 
 from dsl_core.errors import DeviceError
+from dsl_core.extras import pip_command
 
 T = TypeVar("T")
-BRINGS = "pip install 'dsl-scan[serial]' (pyserial)"
+BRINGS = f"{pip_command('serial')} (pyserial)"
 #: Reading waits in steps of this, s, so that what arrives is seen soon.
 _STEP_S = 0.05
 

@@ -11,8 +11,9 @@ from dsl_core.devices.base import Stage
 from dsl_core.devices.driver_table import Driver
 from dsl_core.devices.drivers.rail import RailSettings
 from dsl_core.errors import DeviceError
+from dsl_core.extras import pip_command
 
-BRINGS = "pip install 'dsl-scan[zaber]' (zaber-motion)"
+BRINGS = f"{pip_command('zaber')} (zaber-motion)"
 
 
 class ZaberSettings(RailSettings):

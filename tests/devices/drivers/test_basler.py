@@ -36,7 +36,7 @@ def open_small(**settings: object) -> GenicamCamera:
 def test_without_the_library_a_sentence_says_what_brings_it(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "pypylon", None)
     for action in (basler.find_cameras, lambda: basler.open_camera(GenicamSettings())):
-        with pytest.raises(DeviceError, match=r"pip install 'dsl-scan\[basler\]'"):
+        with pytest.raises(DeviceError, match=r'pip install "dsl-scan\[basler\]"'):
             action()
 
 

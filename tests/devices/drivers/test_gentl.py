@@ -29,7 +29,7 @@ def producer() -> str:
 def test_without_the_libraries_a_sentence_says_what_brings_them(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "harvesters", None)
     for action in (gentl.find_cameras, lambda: gentl.open_camera(GentlSettings())):
-        with pytest.raises(DeviceError, match=r"pip install 'dsl-scan\[genicam\]'"):
+        with pytest.raises(DeviceError, match=r'pip install "dsl-scan\[genicam\]"'):
             action()
 
 
