@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import logging
 import math
+import platform
 import time
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -14,6 +16,7 @@ from pydantic import Field
 from dsl_core.devices.base import Camera, CameraInfo
 from dsl_core.devices.driver_table import Driver, FoundDevice
 from dsl_core.errors import DeviceError
+from dsl_core.extras import pip_command, require_package
 from dsl_core.model.base import Record
 from dsl_core.model.frames import Frame
 
@@ -22,6 +25,7 @@ CAUTION = (
     "A webcam changes its pictures by gamma, compression, noise reduction and often automatic exposure, in 8"
     " bits. Use it to try the program; depth will be rough, and spectra from it mean nothing."
 )
+BRINGS = f"{pip_command('reconstruct')} (OpenCV)"
 #: Positions of `cv2.CAP_PROP_...`, which are the same in all versions.
 _WIDTH, _HEIGHT, _EXPOSURE, _AUTO_EXPOSURE, _AUTO_WHITE = 3, 4, 15, 21, 44
 #: What Linux's driver takes for manual exposure, and its unit of exposure.
@@ -116,15 +120,18 @@ def as_mosaic(picture: NDArray[np.uint8]) -> NDArray[np.uint16]:
 
 
 def find_cameras() -> list[FoundDevice]:
-    """Webcams that this computer lists."""
-    from pathlib import Path
-
+    """Webcams that Linux lists; raises `DeviceError` on other systems."""
+    if platform.system() != "Linux":
+        raise DeviceError(
+            "Webcams are looked for on Linux alone. State index in the profile: 0 for the first, then 1."
+        )
     devices = [n for n in range(_MOST_DEVICES) if Path(f"/dev/video{n}").exists()]
     return [FoundDevice({"index": n}, f"webcam {n} (/dev/video{n})") for n in devices]
 
 
 def open_camera(settings: UvcSettings) -> UvcCamera:
-    """Open a webcam; raises `DeviceError`."""
+    """Open a webcam; raises `DeviceError`, and `MissingPackageError` without OpenCV."""
+    require_package("cv2")
     import cv2
 
     # OpenCV writes lines of its own to the terminal about each way in which it could not open a webcam.
@@ -137,4 +144,4 @@ def open_camera(settings: UvcSettings) -> UvcCamera:
     return UvcCamera(settings, capture)
 
 
-DRIVER = Driver(f"webcams, for trials only. {CAUTION}", UvcSettings, open_camera, find_cameras)
+DRIVER = Driver(f"webcams, for trials only. {CAUTION}", UvcSettings, open_camera, find_cameras, BRINGS)

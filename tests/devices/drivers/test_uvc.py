@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import platform
+import sys
 from typing import Any
 
 import numpy as np
@@ -9,8 +11,15 @@ import pytest
 
 from dsl_core.devices.base import Camera
 from dsl_core.devices.conformance import CameraConformance
-from dsl_core.devices.drivers.uvc import CAUTION, UvcCamera, UvcSettings, as_mosaic
-from dsl_core.errors import DeviceError
+from dsl_core.devices.drivers.uvc import (
+    CAUTION,
+    UvcCamera,
+    UvcSettings,
+    as_mosaic,
+    find_cameras,
+    open_camera,
+)
+from dsl_core.errors import DeviceError, MissingPackageError
 
 
 class Webcam:
@@ -77,3 +86,17 @@ def test_a_webcam_that_is_not_there_or_breaks_off_is_named() -> None:
     webcam.size = (24, 32)
     with pytest.raises(DeviceError, match="changed its picture to 32 x 24"):
         camera.snap()
+
+
+def test_without_opencv_a_sentence_says_what_brings_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delitem(sys.modules, "cv2", raising=False)
+    monkeypatch.setattr("dsl_core.extras.find_spec", lambda name: None)
+    with pytest.raises(MissingPackageError, match=r'package cv2.*pip install "dsl-scan\[reconstruct\]"'):
+        open_camera(UvcSettings())
+
+
+@pytest.mark.parametrize("system", ["Windows", "Darwin"])
+def test_that_webcams_are_not_looked_for_is_said(monkeypatch: pytest.MonkeyPatch, system: str) -> None:
+    monkeypatch.setattr(platform, "system", lambda: system)
+    with pytest.raises(DeviceError, match="State index in the profile"):
+        find_cameras()
