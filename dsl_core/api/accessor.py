@@ -204,7 +204,8 @@ class ResultAccessor:
                 f"A pixel is two numbers, x and y; given {x!r} and {y!r}. For several, use region."
             )
         try:
-            return with_bits(self._result.sel(x=x, y=y))
+            # Flags of all pixels: averages may be whole numbers at this one. Nothing reads its reach.
+            return with_bits(self._result.drop_vars("reach", errors="ignore")).sel(x=x, y=y)
         except KeyError as error:
             raise DecodeError(
                 f"Pixel x {x}, y {y} is not in the result ({extent_of(self._result)})."
@@ -234,7 +235,7 @@ def _with_unstated(result: xr.Dataset) -> xr.Dataset:
 def _flags(result: xr.Dataset) -> xr.DataArray:
     """Flags of the pixels; a result without any shows no more than which pixels it has values of."""
     if "flags" in result:
-        return with_bits(result)["flags"]
+        return with_bits(result[["flags"]])["flags"]
     known = (result["depth_mm"] if "depth_mm" in result else result["reflectance"]).notnull()
     known = known.all(BANDS) if BANDS in known.dims else known
     return known.copy(data=np.where(known.values, 0, int(Flag.NON_FINITE)))

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from dsl_core.errors import StoreError
 from dsl_core.model.result import VARIABLES, Flag
 
 if TYPE_CHECKING:
@@ -68,8 +69,8 @@ def rising_order(values: ArrayLike) -> NDArray[np.intp] | None:
 def as_bits(name: str, values: NDArray[Any]) -> NDArray[Any]:
     """Values of a variable named ``name``: bits that masking made floats as whole numbers again.
 
-    NaN in flags becomes `Flag.NON_FINITE`, since nothing is left of such a pixel. Other variables, and
-    fractions (a mean of flags is no flag), stay as they are.
+    NaN in flags becomes `Flag.NON_FINITE`, since nothing is left of such a pixel. Other variables stay as
+    they are. Raises `StoreError` for fractions, since a mean of bits names others than those that were set.
 
     >>> as_bits("flags", np.array([4.0, np.nan])).tolist()
     [4, 512]
@@ -78,12 +79,21 @@ def as_bits(name: str, values: NDArray[Any]) -> NDArray[Any]:
         return values
     kind, taken_away = BITS[name]
     filled = np.where(np.isnan(values), taken_away, values)
-    is_whole = bool(((filled >= 0) & (filled <= np.iinfo(kind).max) & (filled == np.rint(filled))).all())
-    return filled.astype(kind) if is_whole else values
+    is_bits = (filled >= 0) & (filled <= np.iinfo(kind).max) & (filled == np.rint(filled))
+    if not is_bits.all():
+        raise StoreError(
+            f"The {name} of the result should be whole numbers, but are averages, such as"
+            f" {filled[~is_bits].flat[0]:g}. Take the largest of the pixels instead, such as"
+            f" result[{name!r}].coarsen(x=2, y=2).max(), or leave them out by drop_vars({name!r})."
+        )
+    return filled.astype(kind)
 
 
 def with_bits(result: xr.Dataset) -> xr.Dataset:
-    """A result whose flags and reach are whole numbers, as by `as_bits`; the very dataset if they are."""
+    """A result whose flags and reach are whole numbers, as by `as_bits`; the very dataset if they are.
+
+    Raises `StoreError` where they are averages.
+    """
     floats = [name for name in BITS if name in result and result[name].dtype.kind == "f"]
     whole = {name: result[name].copy(data=as_bits(name, result[name].values)) for name in floats}
     return result.assign(whole) if whole else result

@@ -10,6 +10,7 @@ import pytest
 import xarray as xr
 
 import dsl_core as dsl
+from dsl_core.errors import StoreError
 from dsl_core.io.result.result_arrays import load_arrays
 from dsl_core.model.result import Flag
 from dsl_core.model.result_order import canonical, with_axes
@@ -109,6 +110,36 @@ def test_masking_leaves_whole_flags_that_tell_what_is_taken_away(tmp_path: Path)
         dsl.export(each, tmp_path / "a.csv", pixels=[(4, 2), (0, 0)], overwrite=True)
     stored = load_arrays(tmp_path / "a.zarr")
     assert [str(stored[name].dtype) for name in ("flags", "reach")] == ["uint16", "uint8"]
+
+
+def test_averaged_flags_are_refused_with_what_to_do(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    groups = small_result().coarsen(x=2, y=2, boundary="trim")
+    averaged = groups.mean()
+    # The one warning of four pixels, 64, averages to the whole number of another.
+    assert float(averaged["flags"][1, 2]) == 16
+    uses: list[Callable[[], object]] = [
+        lambda: dsl.save_result(averaged, tmp_path / "a.zarr"),
+        lambda: dsl.export(averaged, tmp_path / "a.tiff"),
+        lambda: dsl.classify(averaged, pins={"a": (2.5, 1.5)}, measure="angle"),
+        lambda: averaged.dsl.points(),
+        lambda: averaged.dsl.good,
+        lambda: averaged.dsl.reasons(float(averaged["x"][2]), float(averaged["y"][1])),
+    ]
+    for use in uses:
+        with pytest.raises(StoreError, match=r"flags of the result .* averages, such as [\d.]+\. .*\.max"):
+            use()
+    assert not list(tmp_path.iterdir())
+    with monkeypatch.context() as before:
+        before.setattr("dsl_core.io.result.result_file.with_bits", lambda result: result)
+        path = dsl.save_result(averaged, tmp_path / "a.zarr")
+    for load in (dsl.load_result, load_arrays):
+        with pytest.raises(StoreError, match="averages"):
+            load(path)
+    largest = averaged.assign(groups.max()[["flags", "reach"]])
+    for kept in (largest, averaged.drop_vars(["flags", "reach"])):
+        assert kept.dsl.points().sizes["point"]
+        assert load_arrays(dsl.save_result(kept, tmp_path / "b.zarr", overwrite=True)).shape == (3, 4)
+    assert not bool(largest.dsl.good[1, 2])
 
 
 def test_results_saved_with_floats_as_flags_are_read_with_whole_ones(
