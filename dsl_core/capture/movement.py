@@ -12,11 +12,16 @@ from dsl_core.capture.exposure import PatternImage, RetryPolicy, ShotTaker
 from dsl_core.devices.base import DeviceRig
 from dsl_core.model.frames import FrameSource
 from dsl_core.model.plan import Shot
+from dsl_core.model.rig import Sensor
+from dsl_core.optics.seen_noise import usual_sensor
+from dsl_core.optics.sensor import raw_variance
 
 #: Pixels are averaged over blocks of this many rows and columns, so that noise does not pass for movement.
 BLOCK_PX = 8
 #: Changes of brightness or structure that a scan may continue with.
 ALLOWED = 0.03
+#: Deviations of what noise adds up to that it may have more than expected.
+SIGMAS = 3.0
 
 
 @dataclass(frozen=True)
@@ -24,7 +29,8 @@ class MovementReport:
     """How far two takes of the same shots differ.
 
     ``brightness_ratio`` is new over old light; ``change`` the root mean square difference of block means
-    that remains after scaling, as a share of their own root mean square, the largest of all shots compared.
+    that remains after scaling, noise aside, as a share of their own root mean square, the largest of all
+    shots compared.
     """
 
     shots: tuple[int, ...]
@@ -57,10 +63,24 @@ def pick_reference_shots(done: Iterable[Shot]) -> list[Shot]:
     return [*code, *white] or shots[-2:]
 
 
+def pick_dark_shots(done: Iterable[Shot]) -> list[Shot]:
+    """Old shots in one of which every pixel is dark: the last black, or else the first pair of the code."""
+    shots = list(done)
+    black = [shot for shot in shots if shot.role == "black"][-1:]
+    pair = [shot for shot in shots if shot.role == "code" and shot.pattern < 2][:2]
+    return black or (pair if len(pair) == 2 else [])
+
+
 def check_movement(
-    rig: DeviceRig, source: FrameSource, shots: Iterable[Shot], pattern_image: PatternImage
+    rig: DeviceRig,
+    source: FrameSource,
+    shots: Iterable[Shot],
+    pattern_image: PatternImage,
+    dark: Iterable[Shot] = (),
 ) -> MovementReport:
     """Take ``shots`` again and compare them with the stored ones; nothing is stored.
+
+    Stored shots that are ``dark`` show the black level of a camera that is not calibrated.
 
     Raises `DeviceError` when the rig fails, `StoreError` when a stored frame is damaged, ``ValueError``
     without shots.
@@ -69,18 +89,21 @@ def check_movement(
     if not chosen:
         raise ValueError("a check for movement needs at least one shot that was captured before")
     taker = ShotTaker(rig, source.plan, pattern_image, RetryPolicy())
-    black_dn = rig.calibration.sensor.black_level_dn if rig.calibration else 0.0
+    known = rig.calibration.sensor if rig.calibration else None
+    sensor = known or usual_sensor(rig.camera.info.bit_depth)
+    # Light of the room is in the darkest pictures, too.
+    stored = [] if known else [source.read(shot) for shot in dark]
+    black = _blocks(np.minimum.reduce(stored)) if stored else np.array(sensor.black_level_dn)
     try:
         pairs = [
-            (_blocks(source.read(shot)) - black_dn, _blocks(taker.take(shot).pixels) - black_dn)
-            for shot in chosen
+            (_blocks(source.read(shot)) - black, _blocks(taker.take(shot).pixels) - black) for shot in chosen
         ]
     finally:
         taker.show_black()
     old_light = sum(float(old.sum()) for old, _ in pairs)
     new_light = sum(float(new.sum()) for _, new in pairs)
     ratio = new_light / old_light if old_light > 0 else float("inf")
-    change = max(_change(old * ratio, new) for old, new in pairs) if np.isfinite(ratio) else float("inf")
+    change = max(_change(*pair, ratio, sensor) for pair in pairs) if np.isfinite(ratio) else float("inf")
     return MovementReport(tuple(shot.index for shot in chosen), ratio, change)
 
 
@@ -93,7 +116,13 @@ def _blocks(pixels: NDArray[np.uint16]) -> NDArray[np.float64]:
     return means
 
 
-def _change(old: NDArray[np.float64], new: NDArray[np.float64]) -> float:
-    """Root mean square difference over the root mean square of the old signal."""
-    size = float(np.sqrt((old**2).mean()))
-    return float(np.sqrt(((new - old) ** 2).mean())) / size if size > 0 else float("inf")
+def _change(old: NDArray[np.float64], new: NDArray[np.float64], ratio: float, sensor: Sensor) -> float:
+    """Root mean square difference from the old signal times ``ratio`` over that of it, less noise.
+
+    Noise counts with `SIGMAS` of what it scatters by, as few blocks tell little.
+    """
+    size = ratio * float(np.sqrt((old**2).mean()))
+    variance = ratio**2 * raw_variance(sensor, old) + raw_variance(sensor, new)
+    noise = float(variance.mean()) / BLOCK_PX**2 * (1 + SIGMAS * float(np.sqrt(2 / old.size)))
+    left = float(((new - ratio * old) ** 2).mean()) - noise
+    return float(np.sqrt(max(left, 0.0))) / size if size > 0 else float("inf")

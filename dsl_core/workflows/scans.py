@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dsl_core.capture.metering import WHITE_IN_DOUBT
-from dsl_core.capture.movement import check_movement, pick_reference_shots
+from dsl_core.capture.movement import check_movement, pick_dark_shots, pick_reference_shots
 from dsl_core.capture.proof.report import SeenFrames, WatchedSource, prove
 from dsl_core.capture.runner import Status
 from dsl_core.capture.sentinels import movement_of
@@ -111,7 +111,8 @@ def prepare_resume(rig: DeviceRig, folder: Path, check_drift: bool = True) -> tu
         if moved is not None and moved.after is not None:
             # What was captured after a motion does not show how things should be.
             done = [shot for shot in done if shot.index <= moved.after]
-        report = check_movement(rig, reader, pick_reference_shots(done), pattern_image)
+        shots, dark = pick_reference_shots(done), pick_dark_shots(done)
+        report = check_movement(rig, reader, shots, pattern_image, dark)
         if not report.is_stable:
             raise DriftError(report.message)
     return rig, reader.plan

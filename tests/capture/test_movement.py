@@ -9,11 +9,18 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from dsl_core.capture.movement import MovementReport, _blocks, check_movement, pick_reference_shots
+from dsl_core.capture.movement import (
+    MovementReport,
+    _blocks,
+    check_movement,
+    pick_dark_shots,
+    pick_reference_shots,
+)
 from dsl_core.devices.base import DeviceRig
 from dsl_core.devices.replay import replay_rig
 from dsl_core.model.frames import Frame
 from dsl_core.model.plan import CapturePlan, GrayCode, LineComb, Setting
+from dsl_core.model.rig import Sensor
 from dsl_core.patterns.images import pattern_image
 from dsl_core.simulation.published_rig import published_rig
 from tests.cases.memory_sink import MemorySink
@@ -91,6 +98,47 @@ def test_the_black_level_is_no_light() -> None:
     assert report.brightness_ratio == pytest.approx(0.9, abs=0.005)
 
 
+def _patterns(seed: int, white_dn: float, light: float = 1.0) -> MemorySink:
+    """A scan of a wall by a camera with a black level of 260 DN and read noise of 3 DN."""
+    rng, sink = np.random.default_rng(seed), MemorySink(PLAN)
+    for shot in PLAN.shots():
+        image = np.kron(pattern_image(PLAN, shot)[..., 1] > 0, np.ones((2, 2)))
+        scene = np.zeros((48, 64))
+        scene[6:42] = light * white_dn * image
+        noisy = 260 + scene + rng.normal(0, 3, scene.shape)
+        sink.write(shot, Frame(np.round(noisy).clip(0, 4095).astype(np.uint16), shot.exposure_ms))
+    return sink
+
+
+@pytest.mark.parametrize("count", [2, 6, 12])
+@pytest.mark.parametrize("light", [0.8, 1.0, 1.2])
+def test_the_light_of_a_camera_that_is_not_calibrated_is_what_exceeds_its_dark_pictures(
+    light: float, count: int
+) -> None:
+    done = list(PLAN.shots())[:count]
+    rig = replace(replay_rig(_patterns(2, 200.0, light)), calibration=None)
+    shots, dark = pick_reference_shots(done), pick_dark_shots(done)
+    report = check_movement(rig, _patterns(1, 200.0), shots, pattern_image, dark)
+    assert report.brightness_ratio == pytest.approx(light, abs=0.02)
+    assert report.is_stable == (light == 1)
+
+
+def test_black_is_dark_and_so_is_a_pair_of_the_code_but_no_single_picture() -> None:
+    shots = list(PLAN.shots())
+    assert [shot.role for shot in pick_dark_shots(shots)] == ["black"]
+    assert pick_dark_shots(shots[:3]) == shots[:2]
+    assert pick_dark_shots(shots[:1]) == []
+
+
+def test_the_noise_of_dim_pictures_is_no_change_of_structure() -> None:
+    done = list(PLAN.shots())
+    known = published_rig()
+    known = known.model_copy(update={"sensor": known.sensor.model_copy(update={"read_noise_dn": 3.0})})
+    rig = replace(replay_rig(_patterns(2, 12.0)), calibration=known)
+    report = check_movement(rig, _patterns(1, 12.0), pick_reference_shots(done), pattern_image)
+    assert report.change < 0.02
+
+
 def test_without_shots_there_is_nothing_to_compare() -> None:
     with pytest.raises(ValueError, match="at least one shot"):
         check_movement(_rig(lambda scene: scene), _scan(1), [], pattern_image)
@@ -114,9 +162,12 @@ def test_a_change_is_the_largest_of_all_shots_after_scaling() -> None:
         return sink
 
     old, new = frames([100, 300], [200, 200]), frames([60, 140], [100, 100])
-    report = check_movement(replay_rig(new), old, shots, pattern_image)
+    # Noise is taken off; this sensor has that of rounding alone.
+    silent = Sensor(black_level_dn=0.0, read_noise_dn=0.0, electrons_per_dn=1e9)
+    rig = replace(replay_rig(new), calibration=published_rig().model_copy(update={"sensor": silent}))
+    report = check_movement(rig, old, shots, pattern_image)
     assert report.brightness_ratio == pytest.approx(0.5)
-    assert report.change == pytest.approx(10 / np.sqrt((50**2 + 150**2) / 2))
+    assert report.change == pytest.approx(10 / np.sqrt((50**2 + 150**2) / 2), rel=1e-4)
     assert report.shots == (0, 1)
 
 
