@@ -78,7 +78,7 @@ class SpectralCurve(Record):
             raise ValueError("the wavelengths of a curve must rise strictly; sort them and drop repeats")
         if self.std is not None and len(self.std) != len(self.values):
             raise ValueError("a curve's standard deviation needs one value per wavelength")
-        if min(self.std or (0.0,)) < 0:
+        if self.std is not None and min(self.std) < 0:
             raise ValueError(f"a curve's standard deviation must not be negative, given {min(self.std):g}")
         return self
 
