@@ -29,6 +29,8 @@ LEAST_PX, RATIO = 3, 1.7
 #: Error of a slope that a misfit causes, relative to that of as much noise in a single sample: a curved
 #: surface tilts the plane of a window next to the pixel far more than one around it.
 CENTRED, BESIDE = 1.0, 4.0
+#: Rows or columns of a window that must have a depth if they are to tell a slope.
+FEWEST_LINES = 3
 #: Share of a window's pixels that must have a depth if it is to tell how depth scatters.
 BULK = 0.9
 #: A further window must promise this share of the variance: noise alone should not choose it.
@@ -209,13 +211,24 @@ def _box(values: Map, window: int) -> Map:
     )
 
 
+def _lines(valid: NDArray[np.bool_], window: int, axis: int) -> Map:
+    """In how many rows (``axis`` 0) or columns (1) of the window around every pixel there is a depth."""
+    import cv2
+
+    along, across = ((window, 1), (1, window)) if axis == 0 else ((1, window), (window, 1))
+    found = cv2.dilate(valid.astype(np.float32), np.ones(along[::-1], np.uint8))
+    return np.asarray(
+        cv2.boxFilter(found, cv2.CV_32F, across, normalize=False, borderType=cv2.BORDER_CONSTANT)
+    )
+
+
 @dataclass(frozen=True)
 class _Fits:
     """Planes of the windows around every pixel, maps of (rows, columns).
 
     ``fit`` (3, rows, columns) are the coefficients of the rays, ``variance`` that of a slope by the noise
-    of depth, ``misfit`` the square of a slope's error by what the plane leaves, relative to `CENTRED`;
-    ``unit`` the variance of a slope for noise of one; ``count`` the pixels, zero where they are too few;
+    of depth, ``misfit`` the square of its error by what the plane leaves or cannot tell, relative to
+    `CENTRED`; ``unit`` the variance of a slope for noise of one; ``count`` the pixels, zero where too few;
     ``scatter`` the mean square about the plane over the stated variance.
     """
 
@@ -256,7 +269,10 @@ def _plane_fits(
     misfit = _beyond_noise(residual, share * noise, count, window)
     fit = np.stack([alpha, beta, level - alpha * mx - beta * my])
     scatter = _for_each_degree(residual, count) / np.maximum(noise, 1e-30)
-    return _Fits(fit, noise * unit, misfit * unit * count, unit, count, scatter)
+    # Nothing tells a slope through two rows or columns from a jump between them.
+    few_columns, few_rows = (_lines(valid, window, axis) < FEWEST_LINES for axis in (1, 0))
+    unsure = misfit * unit * count + few_columns * alpha**2 + few_rows * beta**2
+    return _Fits(fit, noise * unit, unsure, unit, count, scatter)
 
 
 def _for_each_degree(residual: Map, count: Map) -> Map:

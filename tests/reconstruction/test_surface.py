@@ -9,6 +9,7 @@ from scipy.ndimage import binary_dilation
 
 from dsl_core.model.rig import Rig
 from dsl_core.optics.pinhole import pixel_rays, rays_in
+from dsl_core.optics.sensor import relative_gain
 from dsl_core.reconstruction import surface as surface_module
 from dsl_core.reconstruction.surface import (
     MIXED_REL_STD,
@@ -237,6 +238,24 @@ def test_blocks_of_a_large_picture_make_the_surface_of_the_whole(monkeypatch: py
     np.testing.assert_array_equal(blocks.edge, whole.edge)
     for name in ("normals", "shading", "shading_rel_std"):
         np.testing.assert_allclose(getattr(blocks, name), getattr(whole, name), rtol=1e-6, atol=1e-7)
+
+
+@pytest.mark.parametrize("side", [np.s_[:1, :], np.s_[-1:, :], np.s_[:, :1], np.s_[:, -1:], np.s_[40:41, :]])
+def test_a_single_row_of_another_surface_has_no_sure_slope_from_its_neighbours(
+    side: tuple[slice, slice],
+) -> None:
+    """A plane through it and the row beside it leaves nothing, and is on neither of both surfaces."""
+    rig = small_rig()
+    depth = np.full((80, 120), 700.0)
+    depth[side] = 780.0
+    noisy = depth + np.random.default_rng(0).normal(0, 0.05, depth.shape)
+    found = reconstruct_surface(rig, noisy, np.full(depth.shape, 0.05), 5)
+    to_light = rig.pose.projector_centre_mm[:, None, None] - pixel_rays(rig.camera) * depth
+    distance = np.linalg.norm(to_light, axis=0)
+    facing = -to_light[2] / distance * (rig.reference_distance_mm / distance) ** 2
+    off = np.abs(found.shading / (facing * relative_gain(rig)) - 1) / found.shading_rel_std
+    assert (off[side] < 3).all()
+    assert np.median(found.shading_rel_std) < 0.01
 
 
 def test_planes_are_weighted_least_squares_in_every_window() -> None:
