@@ -39,7 +39,10 @@ REASONS: dict[Flag, str] = {
     Flag.CODE_UNSURE: "a bit of the binary code is too close to its inverse to be decided",
     Flag.OUT_OF_RANGE: "the triangulated depth is outside the calibrated range",
     Flag.NOT_REFINED: "the column could not be refined below one pixel; depth is coarse",
-    Flag.DEPTH_EDGE: "depth jumps next to this pixel; normal and shading are unreliable",
+    Flag.DEPTH_EDGE: (
+        "depth jumps next to this pixel: normal and shading are unreliable; with too few neighbours that have"
+        " a depth, they are not given, and neither is the spectrum"
+    ),
     Flag.BANDS_UNREACHED: (
         "the first orders bring too little light to some bands, or none; prior and zero-order colour decide"
         " there"

@@ -7,6 +7,7 @@ import pytest
 from numpy.typing import NDArray
 from scipy.ndimage import binary_dilation
 
+from dsl_core.model.result import REASONS, Flag
 from dsl_core.model.rig import Rig
 from dsl_core.optics.pinhole import pixel_rays, rays_in
 from dsl_core.optics.sensor import relative_gain
@@ -79,6 +80,9 @@ def test_a_lonely_pixel_has_no_normal() -> None:
     depth[10, 10], depth[40:60, 40:60] = 700.0, 700.0
     surface = reconstruct_surface(rig, depth, np.full(depth.shape, 0.3), 5)
     assert np.isnan(surface.normals[:, 10, 10]).all()
+    assert np.isnan(surface.shading[10, 10]), "and so it has no spectrum"
+    assert surface.edge[10, 10]
+    assert "neither is the spectrum" in REASONS[Flag.DEPTH_EDGE]
     assert np.isfinite(surface.normals[:, 50, 50]).all()
 
 
