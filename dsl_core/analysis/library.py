@@ -11,6 +11,7 @@ from dsl_core.errors import CalibrationError
 from dsl_core.io.reading import read_bounded
 from dsl_core.io.spectra.catalogue import format_of, suffixes
 from dsl_core.io.spectra.formats.one_column import describes_others
+from dsl_core.io.spectra.formats.own_table import BY_PLACE
 from dsl_core.io.spectra.reference_file import as_references, shares_of
 from dsl_core.model.spectral import SpectralCurve
 from dsl_core.progress import NoProgress, Progress
@@ -78,8 +79,21 @@ def read_library(
         because = f" {notes[0]}" if notes else " There is no file of a format that is read here."
         raise CalibrationError(f"There is no reflectance spectrum in {listed}.{because}")
     group_of = _grouped(grouping, paths, [file for _, _, file in found], table)
-    entries = (Entry(name, group_of(name, file), curve, file) for name, curve, file in found)
-    return SpectralLibrary(tuple(entries), tuple(notes))
+    entries = tuple(Entry(name, group_of(name, file), curve, file) for name, curve, file in found)
+    if grouping in ("auto", "none"):
+        notes += _of_several_files(entries)
+    return SpectralLibrary(entries, tuple(notes))
+
+
+def _of_several_files(entries: Sequence[Entry]) -> list[str]:
+    """A note on groups that only a name has brought together from several files."""
+    files_of: dict[str, set[Path]] = {}
+    for entry in entries:
+        if entry.group == _REPEATED.sub("", entry.name) != entry.file.parent.name:
+            files_of.setdefault(entry.group, set()).add(entry.file)
+    met = [f"{group} ({len(files)} files)" for group, files in files_of.items() if len(files) > 1]
+    listed = ", ".join(met[:5]) + (" and more" if len(met) > 5 else "")
+    return [f"Each is one class, since the names are the same: {listed}. Group by file if not."] * bool(met)
 
 
 def _files(paths: Sequence[Path]) -> list[Path]:
@@ -115,7 +129,7 @@ def _entries(file: Path, note: Callable[[str], None]) -> list[tuple[str, Spectra
     spectra, as_percent = shares_of(file, kind.read(file))
     if as_percent is not None:
         note(f"{file.name}: values up to {as_percent:.3g} are read as percent.")
-    if len(spectra) == 1 and not kind.is_named:
+    if len(spectra) == 1 and (not kind.is_named or BY_PLACE.fullmatch(spectra[0].name)):
         # The title over a single column is mostly "reflectance".
         spectra = [replace(spectra[0], name=file.stem)]
     content = as_references(file, spectra)

@@ -3,10 +3,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import dsl_core as dsl
 from dsl_core.analysis.classes import classes_of_library
 from dsl_core.analysis.classify import ClassMap, score
 from dsl_core.analysis.library import read_groups, read_library
+from dsl_core.api.accessor import ResultAccessor
 from dsl_core.errors import CalibrationError
+from tests.cases.small_result import small_result
 from tests.cases.spectra_files import NM, SHARE, asd
 
 BANDS_NM = np.arange(430.0, 661.0, 10.0)
@@ -70,6 +73,32 @@ def test_two_hundred_entries_of_one_name_are_one_class_that_varies(tmp_path: Pat
     # All that varies is the level.
     component = one.members[0].components[0]
     assert np.abs(component / one.mean) == pytest.approx(np.std(levels, ddof=1), rel=0.02)
+
+
+@pytest.mark.parametrize("kind", ["region", "spectrum", "pixels"])
+def test_exported_materials_are_a_class_each_by_their_files(tmp_path: Path, kind: str) -> None:
+    result = small_result()
+    for name in ("orange", "green"):
+        if kind == "pixels":
+            dsl.export(result, tmp_path / f"{name}.csv", pixels=[(4, 2)])
+        else:
+            of = ResultAccessor(result)
+            place = of.region((2, 2, 2, 2)) if kind == "region" else of.spectrum(4, 2)
+            place.dsl.export(tmp_path / f"{name}.csv")
+    library = read_library([tmp_path])
+    assert library.groups == ("green", "orange")
+    assert not library.notes
+
+
+def test_one_class_of_several_files_is_told(tmp_path: Path) -> None:
+    for name in ("a", "b"):
+        _csv(tmp_path / f"{name}.csv", SHARE, SHARE / 2, titles=("leaf", name))
+    library = read_library([tmp_path])
+    assert library.groups == ("leaf", "a", "b")
+    assert library.notes == (
+        "Each is one class, since the names are the same: leaf (2 files). Group by file if not.",
+    )
+    assert read_library([tmp_path], "name").notes == ()
 
 
 def test_groups_by_name_and_by_table(tmp_path: Path) -> None:

@@ -17,6 +17,8 @@ WAVELENGTH, MEAN = "wavelength_nm", ": reflectance (1)"
 _HEAD = re.compile(rf"^(?:\ufeff)?{WAVELENGTH},[^\n]*{re.escape(MEAN)}", re.MULTILINE)
 #: The first columns of a table of pixels, a row for each pixel and band, and what of it is a spectrum.
 PIXELS, REFLECTANCE = ("x_px", "y_px"), "reflectance"
+#: How this program calls a spectrum that nobody has named; alone in a file, its file's name says more.
+BY_PLACE = re.compile(r"mean of \d+ pixels|x [\d.]+, y [\d.]+|spectrum")
 
 
 def is_own(path: Path, head: bytes) -> bool:
