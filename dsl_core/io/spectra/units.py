@@ -18,9 +18,10 @@ _MICROMETRE = re.compile(r"(?<![a-zA-Z])(?:um|µm|μm|micromet(?:er|re)s?|micron
 _NANOMETRE = re.compile(r"(?<![a-zA-Z])(?:nm|nanomet(?:er|re)s?)(?![a-zA-Z])", re.IGNORECASE)
 _ANGSTROM = re.compile(r"(?<![a-zA-Z])(?:Å|angstr(?:o|ö)ms?)(?![a-zA-Z])", re.IGNORECASE)
 _WAVENUMBER = re.compile(r"wave ?number|cm\s?(?:\^?-1|⁻¹)|1/cm", re.IGNORECASE)
-_PERCENT = re.compile(r"%|percent", re.IGNORECASE)
-#: The same as a unit: "99 % reflectance" names a white standard.
-_OF_ALL = re.compile(r"(?<!\d)(?<!\d )(?:%|percent)", re.IGNORECASE)
+#: Percent as a unit: "99 % reflectance" names a white standard, "0-100 %" the values.
+_PERCENT = re.compile(
+    r"(?:(?<!\d)(?<!\d )|(?<![\d.])0 ?(?:-|–|\.\.+|…|to) ?100 ?)(?:%|percent)", re.IGNORECASE
+)
 _UNIT_LINE = re.compile(r"\W*(?:y[- ]?)?units?\b", re.IGNORECASE)
 #: In the order in which they are tried; a unit of power decides before all of them.
 _WORDS: tuple[tuple[Quantity, re.Pattern[str]], ...] = (
@@ -90,7 +91,7 @@ def _of_line(line: str, quantity: Quantity) -> tuple[Quantity, float, bool]:
     """The same of one line of a header, which may state the percentage of a quantity without its name."""
     said = _quantity(line, everywhere=False)
     is_share = quantity in ("reflectance", "transmittance")
-    if is_share and said[0] == "unstated" and _UNIT_LINE.match(line) and _OF_ALL.search(line):
+    if is_share and said[0] == "unstated" and _UNIT_LINE.match(line) and _PERCENT.search(line):
         return quantity, 0.01, True
     return said
 
@@ -107,9 +108,8 @@ def _quantity(text: str, everywhere: bool) -> tuple[Quantity, float, bool]:
             continue
         near = text if everywhere else text[found.start() : found.start() + 40].split("\n")[0]
         before = text[: found.start()].rpartition("\n")[2]
-        is_percent = _PERCENT.search(near) if everywhere else _OF_ALL.search(f"{before}{near}")
         is_share = quantity in ("reflectance", "transmittance")
-        if is_share and is_percent:
+        if is_share and _PERCENT.search(f"{before}{near}"):
             return quantity, 0.01, True
         return quantity, 1.0, is_share and bool(re.search(r"\[1(?:\.0)?\]|\(1\)|0 ?[-.…] ?1\b", near))
     if everywhere and _PERCENT.search(text):
