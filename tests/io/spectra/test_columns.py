@@ -124,7 +124,7 @@ def in_lines(path: Path, head: str, behind: str = "", ids: str = "{}") -> Path:
     return path
 
 
-@pytest.mark.parametrize("ids", ["{}", "oak {}", "10{}"])
+@pytest.mark.parametrize("ids", ["{}", "oak {}", "10{}", "10{:02}"])
 @pytest.mark.parametrize(
     ("head", "behind", "falls"),
     [
@@ -133,6 +133,7 @@ def in_lines(path: Path, head: str, behind: str = "", ids: str = "{}") -> Path:
         ("wavelength (µm)," + ",".join(f"{nm / 1000:g}" for nm in NM), "", False),
         ("id," + ",".join(map(str, NM)) + ",species,plot", ",oak,3", False),
         ("id," + ",".join(f"X{nm}" for nm in NM) + ",year2020", ",3", False),
+        ("wavelength," + ",".join(map(str, NM)), "", False),
     ],
 )
 def test_spectra_in_lines_are_read_whatever_is_around_them(
@@ -162,7 +163,17 @@ def test_numbers_of_samples_do_not_pass_for_wavelengths(
 
 
 @pytest.mark.parametrize(
-    ("first", "title"), [("nm", "0.{}"), ("", "0.{}"), ("X", "{}"), ("Wavelength", "{}.5")]
+    ("first", "title"),
+    [
+        ("nm", "0.{}"),
+        ("", "0.{}"),
+        ("X", "{}"),
+        ("Wavelength", "{}.5"),
+        ("WL", "{}.1"),
+        ("Wavelength", "S10{:02}"),
+        ("wavelength_nm", "1{:02}0"),
+        ("nm", "leaf_2{:02}"),
+    ],
 )
 def test_numbers_over_columns_are_names_beside_a_column_of_wavelengths(
     tmp_path: Path, first: str, title: str

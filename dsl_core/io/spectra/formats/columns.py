@@ -22,7 +22,9 @@ from dsl_core.io.spectra.units import (
 
 #: Corrects what a format knows better than its titles say: column's title to quantity.
 Known = Callable[[str], Quantity | None]
-_WAVELENGTH = re.compile(r"wave ?l|wvl|\bwave\b|wellenl|lambda|λ|^\W?(?:nm|um|µm|μm)\W?$", re.IGNORECASE)
+_WAVELENGTH = re.compile(
+    r"wave ?l|wvl|\bwl\b|\bwave\b|wellenl|lambda|λ|^\W?(?:nm|um|µm|μm)\W?$", re.IGNORECASE
+)
 #: Lines in which the wavelengths of a table of lines are looked for.
 MOST_HEADER = 300
 #: How wavelengths are written over columns, in nm and in micrometres; what is before the number is the same.
@@ -111,9 +113,24 @@ def _in_lines(path: Path, text: str) -> list[Spectrum]:
         before = cells[: found.start]
         if not before or any(np.isfinite(number_of(cell)) for cell in before) or not found.is_spectrum:
             continue
+        if _is_narrower(found, before, lines[at + 1 :]):
+            continue
         header = "\n".join([*lines[:at], " ".join(before)])
         return [s for row in lines[at + 1 :] for s in _line(path, row, found, len(cells), header)]
     return []
+
+
+def _is_narrower(found: _Labels, before: Sequence[str], rows: Sequence[str]) -> bool:
+    """Whether a column before the labels is said to hold wavelengths, and its numbers span more than they do.
+
+    Then the labels are numbers of samples, such as "S1001" to "S1008".
+    """
+    at = next((i for i, title in enumerate(before) if _WAVELENGTH.search(title)), None)
+    if at is None:
+        return False
+    numbers = np.array([number_of(cells[at]) for cells in map(cells_of, rows) if len(cells) > at])
+    given = _Labels(at, at + 1, numbers[np.isfinite(numbers)])
+    return given.nm.size >= MIN_ROWS and given.is_spectrum and bool(np.ptp(given.nm) > np.ptp(found.nm))
 
 
 def _labels(cells: Sequence[str], form: re.Pattern[str]) -> _Labels | None:
