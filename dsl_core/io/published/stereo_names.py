@@ -166,10 +166,14 @@ def _both_placed(found: Parts, numbers: Numbers) -> tuple[str, str] | None:
         if not any(re.fullmatch(rf"{projector}{words}|[rt]p", each) for each in _endings(taken)):
             continue
         name = _named(numbers, f"{camera}{words}|{words}(?:{camera}|c)", sizes)
-        # In a camera at the origin, looking along z, both are the same.
-        if name is not None and not any(np.array_equal(numbers[name].ravel(), s.ravel()) for s in still):
+        if name is not None and not any(_is_nearly(numbers[name].ravel(), s.ravel()) for s in still):
             return name, taken
     return None
+
+
+def _is_nearly(values: NDArray[np.float64], still: NDArray[np.float64]) -> bool:
+    """Whether a camera is at the origin, looking along z, up to rounding; then both poses are the same."""
+    return values.shape == still.shape and np.allclose(values, still, rtol=0, atol=1e-6)
 
 
 def _named(numbers: Numbers, words: str, sizes: set[int]) -> str | None:

@@ -137,8 +137,11 @@ def test_poses_of_both_devices_are_not_taken_for_the_one_between_them(
         load_any_stereo(path, CAMERA, PROJECTOR)
 
 
-def test_a_camera_at_the_origin_leaves_the_projectors_pose_the_one_between_them(tmp_path: Path) -> None:
-    poses = {"cam_R": np.eye(3), "cam_T": [0, 0, 0], "proj_R": R, "proj_T": T}
+@pytest.mark.parametrize("rounding", [0.0, 1e-16, 1e-9])
+def test_a_camera_at_the_origin_leaves_the_projectors_pose_the_one_between_them(
+    tmp_path: Path, rounding: float
+) -> None:
+    poses = {"cam_R": np.eye(3) + rounding, "cam_T": [0, 0, 0], "proj_R": R, "proj_T": T}
     path = as_json(tmp_path / "c.json", {"cam_K": K, "proj_K": P, **poses})
     require_right(load_any_stereo(path, CAMERA, PROJECTOR), has_distortion=False)
 
