@@ -7,6 +7,7 @@ from pathlib import Path
 
 from PySide6.QtWidgets import QFileDialog, QWidget
 
+from dsl_app.shared.paths import there
 from dsl_app.shared.widgets.dialogs import confirm
 
 _ENDING = re.compile(r"\*(\.\w+)")
@@ -40,7 +41,7 @@ def ask_place(parent: QWidget, title: str, draft: str, kinds: str) -> Path | Non
     if target is None:
         return None
     path, is_asked = target
-    if is_asked or not path.exists():
+    if is_asked or not there(path):
         return path
     text = f"{path.name} already exists. Do you want to replace it?"
     return path if confirm(parent, title, text, go="Replace", stay="Keep it") else None

@@ -55,6 +55,15 @@ def test_a_person_is_asked_about_the_file_with_the_ending_that_is_added(
     assert asked == ["Plan v1.2.html already exists. Do you want to replace it?"]
 
 
+def test_a_name_too_long_for_any_file_is_not_asked_about(
+    qtbot: QtBot, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    parent, typed = QWidget(), tmp_path / ("a" * 253)
+    qtbot.addWidget(parent)
+    monkeypatch.setattr(QFileDialog, "getSaveFileName", lambda *_: (str(typed), ""))
+    assert ask_place(parent, "Write", "draft.html", KINDS) == tmp_path / f"{typed.name}.html"
+
+
 def test_a_folder_needs_no_ending() -> None:
     kinds = "Rig (*.json);;Published layout, a folder (*)"
     assert with_ending("a.v2", "Published layout, a folder (*)", kinds) == (Path("a.v2"), True)
