@@ -22,11 +22,20 @@ def test_the_files_bear_the_name(tmp_path: Path) -> None:
         assert "my-lab" not in text
 
 
-@pytest.mark.parametrize("name", ["", "Room", "a b", "-a", "a--b", "../a", "twin", "lambda", "x" * 50])
+@pytest.mark.parametrize(
+    "name",
+    ["", "Room", "a b", "-a", "a--b", "../a", "3d", "twin", "lambda", "x" * 50, "numpy", "email", "dsl-core"],
+)
 def test_names_that_cannot_be_are_refused(tmp_path: Path, name: str) -> None:
     with pytest.raises(StoreError, match="Choose another name"):
         write_new_rig(name, tmp_path / "room", ["twin"])
     assert not (tmp_path / "room").exists()
+
+
+def test_an_empty_folder_of_the_name_is_no_module(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "lab").mkdir()
+    monkeypatch.syspath_prepend(tmp_path)
+    assert write_new_rig("lab", tmp_path / "lab", [])
 
 
 def test_a_folder_with_something_in_it_stays_as_it_is(tmp_path: Path) -> None:
