@@ -26,7 +26,7 @@ def require_spectra(result: xr.Dataset) -> None:
 
 
 def masks_of_marks(marks: Annotations, shape: tuple[int, int]) -> dict[str, Mask]:
-    """Pins and regions of a result as masks by their names; raises `DecodeError` where there are none."""
+    """Pins and regions of a result as masks by their names."""
     masks: dict[str, Mask] = {}
     for pin in marks.pins:
         mask = np.zeros(shape, bool)
@@ -37,11 +37,6 @@ def masks_of_marks(marks: Annotations, shape: tuple[int, int]) -> dict[str, Mask
     for region in marks.regions:
         own = mask_of_runs(region.runs, shape) if region.runs else mask_of_outline(region.outline_px, shape)
         masks[region.name] = masks.get(region.name, np.zeros(shape, bool)) | own
-    if not masks:
-        raise DecodeError(
-            "Nothing is marked on the result. Pin pixels or mark regions of known materials first, or give"
-            " a library."
-        )
     return masks
 
 

@@ -10,7 +10,7 @@ import typer
 
 from dsl_core.cli.options import Force, Json, parse_place, parse_span
 from dsl_core.cli.output import Output
-from dsl_core.errors import PlanError
+from dsl_core.errors import DecodeError, PlanError
 from dsl_core.io.staging import check_targets
 
 if TYPE_CHECKING:
@@ -363,7 +363,7 @@ def _check_places(at: Sequence[str]) -> None:
 
 
 def _masks(path: Path, result: xr.Dataset, pins: bool, at: Sequence[str]) -> dict[str, NDArray[np.bool_]]:
-    """The places that the options name."""
+    """The places that the options name; raises `DecodeError` where they are to be marked and none is."""
     from dsl_core.analysis.places import masks_of_marks
     from dsl_core.api.places import place_mask
     from dsl_core.io.result.annotations_file import load_annotations
@@ -375,4 +375,6 @@ def _masks(path: Path, result: xr.Dataset, pins: bool, at: Sequence[str]) -> dic
         name, place = parse_place("--at", text)
         mask = place_mask(result, place, name)
         masks[name] = masks[name] | mask if name in masks else mask
+    if pins and not masks:
+        raise DecodeError("Nothing is marked on the result. Pin pixels or mark regions in the window first.")
     return masks

@@ -11,7 +11,6 @@ import dsl_core as dsl
 from dsl_core.analysis.classes import Member, SpectralClass
 from dsl_core.analysis.classification import classify_result, write_classification
 from dsl_core.analysis.mark_colours import mark_colour
-from dsl_core.analysis.places import masks_of_marks
 from dsl_core.cli import main
 from dsl_core.errors import DecodeError, StoreError
 from dsl_core.io.result.annotations_file import Annotations, PinRecord, RegionRecord, save_annotations
@@ -162,9 +161,17 @@ def test_the_command_names_pins_and_writes_files(tmp_path: Path, capsys: pytest.
         assert words in capsys.readouterr().err
 
 
-def test_nothing_marked_is_told() -> None:
-    with pytest.raises(DecodeError, match="Nothing is marked"):
-        masks_of_marks(Annotations(), (4, 4))
+@pytest.mark.parametrize("command", ["classify", "spectra", "colours"])
+def test_marks_are_asked_for_only_where_no_other_place_is_named(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], command: str
+) -> None:
+    path = save_result(chart_result(), tmp_path / "chart.zarr")
+    assert main([command, str(path), "--pins"]) == 2
+    told = capsys.readouterr().err
+    assert "Nothing is marked on the result. Pin pixels or mark regions in the window first." in told
+    assert "library" not in told
+    assert main([command, str(path), "--pins", "--at", "leaf=9,40"]) == 0
+    assert "leaf" in capsys.readouterr().out
 
 
 def test_areas_that_nothing_tells_are_not_zero(found) -> None:  # type: ignore[no-untyped-def]
