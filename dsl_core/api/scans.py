@@ -23,7 +23,7 @@ from dsl_core.io.scan.manifest import read_manifest
 from dsl_core.io.scan.origin import refuse_other_rig, rig_notes
 from dsl_core.model.base import problems_in_words, what_is_wrong
 from dsl_core.model.options import Options
-from dsl_core.model.plan import CapturePlan
+from dsl_core.model.plan import CUSTOM, CapturePlan
 from dsl_core.model.presets import PRESETS, preset_plan
 from dsl_core.model.rig import Rig
 from dsl_core.model.spectral import WavelengthGrid
@@ -66,8 +66,8 @@ def plan(rig: DeviceRig, preset: str = "reference", **changes: object) -> Captur
     """What a scan captures: the preset of that name for the picture sizes and exposures of a rig.
 
     Presets are preview, comb, quick, coarse, balanced, columns and reference. ``changes`` replace fields
-    of `CapturePlan`, such as ``settings`` or ``code``. Raises `PlanError` for an unknown preset or field,
-    and for a plan that contradicts itself.
+    of `CapturePlan`, such as ``settings`` or ``code``; a plan with any is a "custom plan", unless ``name``
+    is one of them. Raises `PlanError` for an unknown preset or field, and for a plan that contradicts itself.
     """
     from dsl_core.capture.preflight import fit_plan
 
@@ -77,7 +77,7 @@ def plan(rig: DeviceRig, preset: str = "reference", **changes: object) -> Captur
         raise PlanError(f"There is no plan {preset!r}; choose {known}.")
     if changes:
         try:
-            chosen = CapturePlan.model_validate({**dict(chosen), **changes})
+            chosen = CapturePlan.model_validate({**dict(chosen), "name": CUSTOM, **changes})
         except ValidationError as error:
             raise PlanError(
                 f"The plan cannot be changed like this: {problems_in_words(error)}. Its fields are"

@@ -157,7 +157,8 @@ class PlanChoice:
 
     def build(self) -> CapturePlan:
         """The plan; raises `PlanError` when the choices contradict each other or are impossible."""
-        from dsl_core.model.plan import CapturePlan
+        from dsl_core.model.plan import CUSTOM, CapturePlan
+        from dsl_core.model.presets import preset_plan
 
         details = {
             "--code": self.code,
@@ -171,7 +172,8 @@ class PlanChoice:
             if given:
                 raise PlanError(f"--plan gives the whole plan; leave out {', '.join(given)}, or --plan.")
             return plan_of(self.source)
-        return _checked("plan", lambda: CapturePlan.model_validate(self._fields()))
+        made = _checked("plan", lambda: CapturePlan.model_validate(self._fields()))
+        return made if made == preset_plan(made.name) else made.model_copy(update={"name": CUSTOM})
 
     def _fields(self) -> dict[str, object]:
         from dsl_core.model.presets import CODE_CHOICES, code_of

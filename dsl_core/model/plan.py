@@ -176,6 +176,10 @@ class Sized(Protocol):
         """Rows."""
 
 
+#: Name of a plan of which somebody changed anything without giving it another.
+CUSTOM = "custom plan"
+
+
 class CapturePlan(Record):
     """Everything a scan will do, known before it starts.
 

@@ -79,6 +79,7 @@ def test_a_scan_of_another_scene_is_not_handed_out_as_the_new_one(scan: ScanRead
 
 def test_plans_by_name_and_with_changes() -> None:
     with dsl.open_rig("twin", size="112x72") as rig:
+        assert dsl.plan(rig, "balanced", code_settings=(0,)).name == "custom plan"
         changed = dsl.plan(rig, "balanced", name="mine")
         assert changed.name == "mine"
         assert changed.camera_size_px == (112, 72)

@@ -381,6 +381,12 @@ def test_a_plan_is_a_preset_by_name_or_a_file(tmp_path: Path, monkeypatch: pytes
     assert all(preset.key in option.help for preset in PRESETS)
 
 
+def test_a_plan_bears_the_name_of_a_preset_only_while_it_is_that_one() -> None:
+    assert [PlanChoice().build().name, PlanChoice(sentinels=True).build().name] == ["reference"] * 2
+    for changed in (PlanChoice(lines="5x5"), PlanChoice(code="columns"), PlanChoice(sentinels=False)):
+        assert changed.build().name == "custom plan"
+
+
 @pytest.mark.slow
 def test_the_demo_leaves_a_report_and_never_writes_over_another(
     give: Give, tmp_path: Path, monkeypatch: pytest.MonkeyPatch

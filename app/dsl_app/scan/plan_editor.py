@@ -10,7 +10,7 @@ from dsl_app.shared.plain_tip import plain_tip
 from dsl_app.shared.widgets.forms import ChoiceBox, NumberBox, WholeBox, label, push_button, quiet
 from dsl_app.shared.widgets.help_window import set_help
 from dsl_app.shared.widgets.layouts import row_of, tab_in_place
-from dsl_core.model.plan import CapturePlan, Columns, LineComb, NoCode, ScanLines, Setting
+from dsl_core.model.plan import CUSTOM, CapturePlan, Columns, LineComb, NoCode, ScanLines, Setting
 from dsl_core.model.presets import CODE_CHOICES, PRESETS, code_of, name_of, whole_cycles
 
 OWN = "Custom plan"
@@ -138,7 +138,7 @@ class PlanEditor(QGroupBox):
         self._tell(code=code_of(self.code.currentData()) or NoCode(), spectral=spectral)
 
     def _tell(self, **changes: object) -> None:
-        self.plan_changed.emit(self._plan.model_copy(update={**changes, "name": "custom plan"}))
+        self.plan_changed.emit(self._plan.model_copy(update={**changes, "name": CUSTOM}))
 
 
 def _purpose_of(plan: CapturePlan) -> str:
