@@ -29,7 +29,7 @@ EXTRA_OF = {
     "vtkmodules": "gui",
 }
 _PURPOSE = {
-    "reconstruct": "depth and spectra from frames, the twin, calibration, planning",
+    "reconstruct": "depth and spectra from frames, the twin, calibration, planning, PNG files, webcams",
     "gui": "the window",
     "cluster": "batches on a cluster of Dask",
     "s3": "scans and results in an object store",

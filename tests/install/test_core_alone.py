@@ -59,6 +59,7 @@ def sentence(call):
         return type(error).__name__ + ": " + str(error)
 
 found["twin"] = sentence(lambda: dsl.open_rig("twin").close())
+found["png"] = sentence(lambda: dsl.export(result, folder / "a.png"))
 found["evaluate"] = sentence(lambda: dsl.evaluate(result))
 with contextlib.redirect_stdout(io.StringIO()), contextlib.redirect_stderr(io.StringIO()) as said:
     lines = ("rigs", "scenes", "calibrations list", f"demo -o {folder / 'd'}")
@@ -93,6 +94,11 @@ def test_what_computes_names_its_extra(found: Any) -> None:
     assert found["twin"].startswith(wanted)
     assert found["evaluate"].startswith(wanted)
     assert found["evaluate"].endswith('pip install "dsl-scan[reconstruct]"')
+
+
+def test_the_readme_says_what_is_not_exported(found: Any) -> None:
+    assert found["png"].startswith("MissingPackageError: This needs the package cv2")
+    assert "export (but PNG and the published layout)" in (ROOT / "README.md").read_text(encoding="utf-8")
 
 
 def test_commands_do_the_same(found: Any) -> None:
