@@ -30,7 +30,11 @@ NEAR = 2
 #: A picture that skips more than this share of columns may skip the same ones in all rows: so many edges have
 #: to agree, or several to differ by so many deviations of columns elsewhere, which are so far from them.
 MOST_SKIPPED, FEWEST_EDGES, SIGMAS = 0.2, 20.0, 4.0
-ELSEWHERE = [side * away for away in range(6, 27) for side in (-1, 1)]
+#: Where this share of neighbouring pixels is the same number of columns apart, two or more, all edges agree
+#: anyway: only deviations count then.
+REGULAR = 0.9
+#: Columns elsewhere: those in one row are alike if pixels are 2, 4 or 8 columns apart.
+ELSEWHERE = np.array([[side * away for away in range(6 + k, 30, 4) for side in (-1, 1)] for k in range(4)])
 #: Pixels side by side whose columns are further apart are on different surfaces.
 STEP_PX = 20
 
@@ -61,7 +65,8 @@ def displaced_code(
     sides = [_mean(is_once & _near(side), named) for side in (is_never, is_twice)]
     # Between fine stripes there are none, nor are there in each row of a coarse picture: all together then.
     is_fine = 2 * (is_once & _near(is_never)).sum(1) < is_never.sum(1)
-    skips = _skipped(column) > MOST_SKIPPED
+    skipped, is_regular = _skipped(column)
+    skips = skipped > MOST_SKIPPED
     all_together = _mean(is_never | is_twice | (is_once & _near(is_never | is_twice)), named)
     least, most = (np.where(is_fine | skips, all_together, of(*sides)) for of in (np.minimum, np.maximum))
     expected = least * is_never.sum(1)
@@ -69,28 +74,35 @@ def displaced_code(
     told &= twice > ONCE * most * is_twice.sum(1)
     if skips:
         edges = is_twice @ (named > 0).astype(np.float64) / [abs(one.columns) for one in tried]
-        told &= (edges >= FEWEST_EDGES) | ((edges > 1) & (_deviations(named, is_never, is_twice) > SIGMAS))
+        deviations = _deviations(named, is_never, is_twice)
+        told &= ((edges >= FEWEST_EDGES) & (not is_regular)) | ((edges > 1) & (deviations > SIGMAS))
     if not told.any():
         return None
     return tried[int(np.where(told, expected - never, -1).argmax())]
 
 
-def _skipped(column: NDArray[np.integer]) -> float:
-    """Share of the columns that a picture sees which it skips from pixel to pixel."""
+def _skipped(column: NDArray[np.integer]) -> tuple[float, bool]:
+    """Share of the columns that a picture sees which it skips from pixel to pixel, and whether regularly."""
     steps = np.abs(np.diff(column, axis=1))
-    steps = steps[(column[:, 1:] >= 0) & (column[:, :-1] >= 0) & (steps <= STEP_PX) & (steps > 0)]
-    return 1.0 - steps.size / float(steps.sum()) if steps.size else 1.0
+    steps = steps[(column[:, 1:] >= 0) & (column[:, :-1] >= 0) & (steps <= STEP_PX)]
+    times = np.bincount(steps, minlength=STEP_PX + 1)
+    moves = int(times[1:].sum())
+    if not moves:
+        return 1.0, False
+    return 1.0 - moves / float(steps.sum()), bool(times[2:].max() > REGULAR * times.sum())
 
 
 def _deviations(
     named: NDArray[np.float64], never: NDArray[np.bool_], twice: NDArray[np.bool_]
 ) -> NDArray[np.float64]:
     """By how much columns ``twice`` exceed those ``never`` (tried, width), in deviations of other columns."""
-    moved = np.stack([np.roll(named, -away) for away in (0, *ELSEWHERE)], 1)
+    moved = np.stack([np.roll(named, -away) for away in (0, *ELSEWHERE.flat)], 1)
     one, other = (columns @ moved / columns.sum(1, keepdims=True).clip(1) for columns in (never, twice))
-    apart = (other - one) / np.maximum(one + other, 1e-9)
+    total = one + other
+    # Columns that no pixel sees are no sign that columns are alike.
+    apart = np.divide(other - one, total, out=np.ones_like(total), where=total > 0)
     # The median, as edges of the next stripes may be among those elsewhere.
-    usual = STD_OF_MEDIAN_SIZE * np.median(np.abs(apart[:, 1:]), 1)
+    usual = STD_OF_MEDIAN_SIZE * np.median(np.abs(apart[:, 1:]).reshape(-1, *ELSEWHERE.shape), 2).max(1)
     return np.asarray(apart[:, 0] / usual.clip(1e-9))
 
 

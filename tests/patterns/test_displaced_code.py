@@ -69,6 +69,17 @@ def test_columns_that_no_row_happens_to_see_are_no_displacement(camera_px: int, 
     assert displaced_code(GRAY, SIZE_PX, seen(0, 0, camera_px=camera_px, rows=36, lean_px=lean_px)) is None
 
 
+@pytest.mark.parametrize("code", [GRAY, XorCode(rows=False), EnsembleCode(rows=False)])
+@pytest.mark.parametrize("apart", [2, 3, 4, 8])
+@pytest.mark.parametrize("lean_px", [0.0, 1.0])
+def test_pixels_a_whole_number_of_columns_apart_are_no_displacement(
+    code: BinaryCode, apart: int, lean_px: float
+) -> None:
+    column = seen(0, 0, code, camera_px=590, rows=96, lean_px=lean_px)
+    for first in range(2):
+        assert displaced_code(code, SIZE_PX, column[:, first::apart]) is None
+
+
 def test_a_surface_that_ends_at_the_edge_of_a_stripe_is_no_displacement() -> None:
     column = seen(0, 0)
     assert displaced_code(GRAY, SIZE_PX, np.where((column >= 505) & (column < 512), -1, column)) is None
