@@ -18,6 +18,12 @@ LINES = 16
 SOME = 1000
 #: A pixel is lit when its range reaches this share of the range of bright pixels.
 LIT_SHARE = 0.25
+#: Percentiles of the ranges of pixels that are those of bright ones: usually, and where an object is small.
+BRIGHT, BRIGHT_OF_FEW = 90, 99.5
+#: What only noise changes has no larger range, in standard deviations of the noise.
+MOST_NOISE = 7.0
+#: Of `_noise`: a percentile that edges of stripes hardly reach, and what it is of normal noise.
+QUIET, QUIET_SIGMAS = 75, 1.15 * 6**0.5
 
 
 @dataclass(frozen=True)
@@ -100,8 +106,18 @@ def _relative(pictures: Sequence[Floats]) -> tuple[Lines, float]:
     values = np.stack(pictures)
     low, high = values.min(0), values.max(0)
     span = high - low
-    bright = float(np.percentile(span, 90))
-    lit = span > max(LIT_SHARE * bright, 1e-9)
+    bright, most = np.percentile(span, (BRIGHT, BRIGHT_OF_FEW)).tolist()
+    noise = MOST_NOISE * _noise(values)
+    if bright < noise < most:
+        bright = most
+    lit = span > max(LIT_SHARE * bright, min(noise, bright / 2), 1e-9)
     values -= low
     values /= np.maximum(span, 1e-9)
     return Lines(values, lit), bright
+
+
+def _noise(values: Floats) -> float:
+    """Standard deviation of noise along lines (pictures, lines, length), by the picture that varies least."""
+    # Every second pixel of a line has one colour of a mosaic.
+    bends = np.abs(values[..., 4:] - 2 * values[..., 2:-2] + values[..., :-4]).reshape(len(values), -1)
+    return float(np.percentile(bends, QUIET, axis=1).min()) / QUIET_SIGMAS

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -12,9 +13,10 @@ from dsl_core.errors import StoreError
 from dsl_core.io.pictures.mapped_doubts import doubts_of_mapping
 from dsl_core.io.pictures.mapping import Mapping, StripePictures
 from dsl_core.io.pictures.source import open_pictures
-from dsl_core.model.captured_code import Stripes
+from dsl_core.model.captured_code import CapturedCode, Stripes
+from dsl_core.patterns.captured_code import captured_levels
 from dsl_core.workflows.captures import import_pictures
-from tests.cases.foreign_captures import PROJECTOR, for_screens, frames, write
+from tests.cases.foreign_captures import CAMERA, PROJECTOR, for_screens, frames, scene, write
 
 Pictures = list[NDArray[np.uint16]]
 MAPPING = Mapping(
@@ -57,6 +59,27 @@ def test_a_missing_picture_and_a_stray_one_do_not_shift_the_others_without_a_wor
 def test_pictures_of_their_mapping_leave_no_doubt(tmp_path: Path, both_axes: Pictures, encoded: bool) -> None:
     pictures = [for_screens(each) for each in both_axes] if encoded else both_axes
     assert _doubts(write(tmp_path, _named(pictures))) == []
+
+
+def _of_a_small_object(side: float, brightness: float) -> Pictures:
+    """The same patterns on a square of a share of the picture's width and height, all else unlit."""
+    x, y = np.meshgrid(np.arange(CAMERA[0]) / CAMERA[0], np.arange(CAMERA[1]) / CAMERA[1])
+    square = (np.abs(x - 0.5) < side / 2) & (np.abs(y - 0.5) < side / 2)
+    seen = replace(scene(), albedo=np.where(square, brightness, 0.0))
+    stripes = Stripes(bits=7)
+    codes = CapturedCode(column_sets=(stripes,)), CapturedCode(row_sets=(stripes,))
+    levels = [captured_levels(code, PROJECTOR, i) for code in codes for i in range(stripes.frame_count)]
+    return [seen.picture(each, 7 * i, noise=0.01) for i, each in enumerate(levels)]
+
+
+@pytest.mark.parametrize(("side", "brightness"), [(0.3, 0.8), (0.15, 0.8), (0.35, 0.2), (0.2, 0.2)])
+def test_the_noise_around_a_small_object_is_not_judged(
+    tmp_path: Path, side: float, brightness: float
+) -> None:
+    pictures = _of_a_small_object(side, brightness)
+    assert _doubts(write(tmp_path / "right", _named(pictures))) == []
+    with pytest.raises(StoreError, match="a pattern and its inverse, but they are not"):
+        _doubts(write(tmp_path / "shifted", _named([*pictures[1:], pictures[0]])))
 
 
 def test_one_picture_in_another_s_place_is_named_and_imported(tmp_path: Path, both_axes: Pictures) -> None:
