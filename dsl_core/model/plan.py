@@ -106,6 +106,10 @@ CodeSet = Annotated[GrayCode | XorCode | EnsembleCode | CapturedCode | NoCode, F
 SpectralSet = Annotated[ScanLines | LineComb | Columns | NoSpectral, Field(discriminator="kind")]
 
 
+#: The least drive level in thousandths that projectors show as light, drive 1 of 255.
+LEAST_LEVEL = 0.002
+
+
 class Setting(Record):
     """One camera and projector setting of an HDR bracket: exposure, and pattern drive level 0..1."""
 
@@ -116,7 +120,9 @@ class Setting(Record):
     @classmethod
     def _is_light(cls, level: float) -> float:
         if round(255 * level) == 0:
-            raise ValueError("it rounds to drive 0 of 255, which is black; 0.002 is the least that is light")
+            raise ValueError(
+                f"it rounds to drive 0 of 255, which is black; {LEAST_LEVEL} is the least that is light"
+            )
         return level
 
 

@@ -10,7 +10,16 @@ from dsl_app.shared.plain_tip import plain_tip
 from dsl_app.shared.widgets.forms import ChoiceBox, NumberBox, WholeBox, label, push_button, quiet
 from dsl_app.shared.widgets.help_window import set_help
 from dsl_app.shared.widgets.layouts import row_of, tab_in_place
-from dsl_core.model.plan import CUSTOM, CapturePlan, Columns, LineComb, NoCode, ScanLines, Setting
+from dsl_core.model.plan import (
+    CUSTOM,
+    LEAST_LEVEL,
+    CapturePlan,
+    Columns,
+    LineComb,
+    NoCode,
+    ScanLines,
+    Setting,
+)
 from dsl_core.model.presets import CODE_CHOICES, PRESETS, code_of, name_of, whole_cycles
 
 OWN = "Custom plan"
@@ -18,7 +27,7 @@ OWN_PURPOSE = "Not a preset; the table shows what to expect."
 LINES, COMB, COLOURS, FILE = "lines", "comb", "colours", "file"
 WIDEST_PX = 4096
 MOST_SETTINGS = 4
-SHORTEST_MS, LEAST_LEVEL = 0.1, 0.001
+SHORTEST_MS = 0.1
 #: An hour: some cameras name no longest exposure.
 MOST_MS = 3_600_000.0
 _EXPOSURE_TIP = "Exposures are whole LED cycles, so that each contains all colours of the projector."

@@ -198,6 +198,16 @@ def test_what_is_not_edited_of_a_setting_stays_as_it_is(qtbot: QtBot) -> None:
     assert told[-1].settings == (given[0], Setting(exposure_ms=2 * 1000 / 60, level=1 / 3))
 
 
+def test_the_least_level_that_can_be_typed_is_light(qtbot: QtBot) -> None:
+    editor = PlanEditor()
+    qtbot.addWidget(editor)
+    editor.set_plan(CapturePlan(), 1000 / 60)
+    changed: list[CapturePlan] = []
+    editor.plan_changed.connect(changed.append)
+    editor.settings._rows[0][1].setValue(0.001)
+    assert changed[-1].settings[0].level == 0.002
+
+
 def test_exposures_go_as_far_as_those_of_the_camera(bench: ScanBench, qtbot: QtBot) -> None:
     devices = bench.rig.state.devices.value
     assert devices is not None
