@@ -16,7 +16,7 @@ from dsl_core.errors import DeviceError
 from dsl_core.model.conditions import COLOUR_NAMES
 from dsl_core.model.plan import CapturePlan, Setting, Shot
 from dsl_core.model.rig import BayerPattern, ProjectorResponse, colour_sites
-from dsl_core.optics.sensor import end_near_full
+from dsl_core.optics.sensor import bayer_channels, end_near_full
 from dsl_core.progress import CancelToken
 
 #: What white is to reach where exposures are shortened, as a share of full scale in its dimmest colour: lines
@@ -137,7 +137,7 @@ def _measure(
         shot = replace(white, exposure_ms=exposure_ms, level=darkest.level)
         pixels = taker.take(shot).pixels
         colours = by_colour(pixels)
-        full_dn = end_near_full(pixels, full_dn)
+        full_dn = end_near_full(pixels, full_dn, bayer_channels(bayer, *pixels.shape))
         is_saturated = float(np.mean(colours.min(axis=0) >= full_dn)) > _BRIGHTER
         shorter_ms = fit.exposure_ms(exposure_ms / _SHORTEN)
         is_clipped = is_saturated and shorter_ms >= exposure_ms

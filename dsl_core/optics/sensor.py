@@ -20,6 +20,8 @@ ALIKE = 10
 PILE, TIMES = 20, 10.0
 #: Share of the pile that may be above it: hot pixels.
 ABOVE = 0.01
+#: Where values end, the second of the colours has at least this share of the pixels.
+OTHER_COLOUR = 0.1
 #: Cameras as they are end above this share of their bit depth's range; below it, something cuts them off.
 NEAR_FULL = 0.9
 
@@ -89,18 +91,26 @@ def end_of(total: NDArray[np.int64], low_dn: int) -> int | None:
     return end
 
 
-def end_near_full(pixels: NDArray[np.unsignedinteger], full_scale_dn: int) -> int:
+def end_near_full(
+    pixels: NDArray[np.unsignedinteger], full_scale_dn: int, channels: NDArray[np.integer] | None = None
+) -> int:
     """Where the values of a picture end: ``full_scale_dn``, or a little below it where many pixels have that.
 
     Many cameras saturate below the largest number of their bit depth, as those do whose 12 bits are moved up
-    to 16. A picture without saturated pixels does not say so.
+    to 16. A picture without saturated pixels does not say so. Light without noise piles up as well, but in
+    one colour alone: ``channels`` are those of the pixels, in their shape.
     """
     low_dn = int(np.ceil(NEAR_FULL * full_scale_dn))
     bright = pixels[pixels >= low_dn]
     if bright.size < PILE:
         return full_scale_dn
     end = end_of(np.bincount(np.minimum(bright, full_scale_dn), minlength=full_scale_dn + 1), low_dn)
-    return full_scale_dn if end is None else end
+    if end is None:
+        return full_scale_dn
+    if channels is not None and channels.min() < channels.max():
+        piled = np.sort(np.bincount(channels[pixels == end], minlength=3))
+        return end if piled[1] >= OTHER_COLOUR * piled.sum() else full_scale_dn
+    return end
 
 
 def digitise(

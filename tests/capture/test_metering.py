@@ -126,6 +126,12 @@ def test_the_black_level_of_another_bit_depth_is_not_believed() -> None:
     assert not found.is_told
 
 
+def test_one_colour_without_noise_just_below_full_scale_is_no_end() -> None:
+    brightest = (0.95 * FULL_DN - BLACK_DN) / (FULL_DN - BLACK_DN)
+    found = meter(rig_of(Bench(light_for(COLOURS.min() * brightest, 200.0))), plan_of((200.0, 1.0)))
+    assert f"reaches {COLOURS.min() * brightest:.0%} of full scale" in found.sentence
+
+
 @pytest.mark.parametrize("ends_dn", [4094, 4080])
 def test_white_that_ends_below_full_scale_is_saturated_there(ends_dn: int) -> None:
     bench = Bench(light_for(2.4, 200.0), ends_dn=ends_dn)

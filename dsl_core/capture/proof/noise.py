@@ -14,8 +14,6 @@ from dsl_core.optics.sensor import end_near_full
 
 #: Pictures whose variance is remembered, as each is compared with several.
 _REMEMBERED = 8
-#: Where values end, the second of the colours has at least this share of the pixels.
-OTHER_COLOUR = 0.1
 
 
 @dataclass
@@ -40,15 +38,9 @@ class Noise:
             self._known.clear()
 
     def find_end(self, counts: Counts, channels: NDArray[np.int8]) -> None:
-        """Believe what a picture, of these ``channels``, shows of where values end, just below full scale.
-
-        Light without noise piles up as well, but in one colour alone.
-        """
-        end = end_near_full(counts, self.stated.full_scale_dn)
+        """Believe what a picture, of these ``channels``, shows of where values end, just below full scale."""
+        end = end_near_full(counts, self.stated.full_scale_dn, channels)
         if end == self.stated.full_scale_dn:
-            return
-        piled = np.bincount(channels[counts == end], minlength=3)
-        if np.unique(channels).size > 1 and np.sort(piled)[1] < OTHER_COLOUR * piled.sum():
             return
         self.stated = self.stated.model_copy(update={"saturation_dn": end})
         self.sensor = self.sensor.model_copy(update={"saturation_dn": end})
