@@ -9,6 +9,7 @@ from datetime import UTC, datetime
 from pydantic import ValidationError
 
 from dsl_core.campaign.common.recipe import AnyRecipe, Recipe, RecordT
+from dsl_core.capture.overexposure import black_level_of
 from dsl_core.devices.base import DeviceRig
 from dsl_core.devices.conditions import current_conditions
 from dsl_core.errors import CalibrationError
@@ -30,7 +31,8 @@ def accepted_calibrations(campaign: CampaignFolder, recipes: Sequence[AnyRecipe]
 def nominal_rig(devices: DeviceRig) -> Rig:
     """What is known of a rig before anything is measured; raises `CalibrationError` when nothing is.
 
-    The size, mosaic and frame period that the devices state replace those of the data sheet.
+    The size, mosaic and frame period that the devices state replace those of the data sheet; its black level
+    is not believed where it is of another number of bits.
     """
     start = devices.nominal or devices.calibration
     if start is None:
@@ -40,7 +42,8 @@ def nominal_rig(devices: DeviceRig) -> Rig:
             " file, and a package sets DeviceRig.nominal."
         )
     camera, projector = devices.camera.info, devices.projector.info
-    sensor = start.sensor.model_copy(update={"bayer": camera.bayer, "bit_depth": camera.bit_depth})
+    own = {"bayer": camera.bayer, "bit_depth": camera.bit_depth}
+    sensor = start.sensor.model_copy(update=own | {"black_level_dn": black_level_of(start.sensor, camera)})
     return start.model_copy(
         update={
             "camera": start.camera.resized(camera.width_px, camera.height_px),

@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from dsl_core.devices.base import DeviceRig
+from dsl_core.devices.base import CameraInfo, DeviceRig
 from dsl_core.model.plan import CapturePlan, Shot
+from dsl_core.model.rig import Sensor
 from dsl_core.optics.sensor import end_near_full
 
 #: Share of the picture from which on a person is told; highlights and a wall behind an object are usual.
@@ -22,12 +23,12 @@ def full_scale_dn(rig: DeviceRig) -> int:
 def black_level_dn(rig: DeviceRig) -> float:
     """The number of a pixel without light, by the calibration or data sheets of such a camera; else 0."""
     known = rig.calibration or rig.nominal
-    if known is None:
-        return 0.0
-    camera, sensor = rig.camera.info, known.sensor
-    return (
-        sensor.black_level_dn if (sensor.bayer, sensor.bit_depth) == (camera.bayer, camera.bit_depth) else 0.0
-    )
+    return 0.0 if known is None else black_level_of(known.sensor, rig.camera.info)
+
+
+def black_level_of(sensor: Sensor, camera: CameraInfo) -> float:
+    """The black level stated of a sensor; 0 where the camera counts in another number of bits."""
+    return sensor.black_level_dn if sensor.bit_depth == camera.bit_depth else 0.0
 
 
 def by_colour(pixels: NDArray[np.unsignedinteger]) -> NDArray[np.unsignedinteger]:

@@ -232,10 +232,11 @@ def _try_camera(camera: Camera, notes: _Notes) -> None:
 def _compare(camera: CameraInfo, sensor: Sensor, notes: _Notes) -> None:
     """Note where the nominal sensor is not the camera's."""
     if (sensor.bayer, sensor.bit_depth) != (camera.bayer, camera.bit_depth):
+        doubted = "" if sensor.bit_depth == camera.bit_depth else ": its black level is not believed"
         notes.add(
             Grade.WARNING,
             f"The nominal sensor is {sensor.bayer} of {sensor.bit_depth} bits, the camera {camera.bayer} of"
-            f" {camera.bit_depth} bits: its black level is not believed. Set the camera's pixel format, or"
+            f" {camera.bit_depth} bits{doubted}. Set the camera's pixel format, or"
             " correct bayer, bit_depth and black_level_dn of the file 'nominal'.",
         )
 

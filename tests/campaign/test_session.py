@@ -6,6 +6,7 @@ import json
 import shutil
 from collections.abc import Iterator, Sequence
 from contextlib import nullcontext
+from dataclasses import replace
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
@@ -285,6 +286,17 @@ def test_all_calibrations_make_a_rig_that_says_where_it_comes_from(
     captured = [list(recipe.captured) for recipe in recipes]
     calibrate_all(campaign, devices, Willing(), NoProgress(), recipes=recipes)
     assert [recipe.captured for recipe in recipes] == captured
+
+
+@pytest.mark.parametrize(("bits", "black_dn"), [(12, 260.0), (10, 0.0)])
+def test_the_black_level_of_another_bit_depth_is_not_believed(
+    devices: DeviceRig, bits: int, black_dn: float
+) -> None:
+    assert devices.nominal is not None
+    stated = devices.nominal.sensor.model_copy(update={"bit_depth": bits, "black_level_dn": 260.0})
+    known = replace(devices, nominal=devices.nominal.model_copy(update={"sensor": stated}))
+    assert nominal_rig(known).sensor.bit_depth == devices.camera.info.bit_depth == 12
+    assert nominal_rig(known).sensor.black_level_dn == black_dn
 
 
 def test_what_was_fitted_on_a_superseded_calibration_is_fitted_again(
