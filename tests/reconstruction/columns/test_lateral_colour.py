@@ -137,9 +137,9 @@ def test_a_bend_is_how_far_a_column_is_from_the_middle_of_its_neighbours(
                     # Rows of red and green, and rows of green and blue; green is at odd places of even rows.
                     green = (x + y) % 2 == 1
                     slope = (seen[y, x + 1] - seen[y, x - 1]) / 2
-                    pixels, projector = x - rig.camera.cx_px, seen[y, x] - rig.projector.cx_px
+                    away, projector = x - rig.camera.cx_px, seen[y, x] - rig.projector.cx_px
                     sign, strip = -1 if green else 1, int(x / 30 * lateral_colour.STRIPS)
-                    wanted.append((bend, sign, y % 2 == 1, pixels * slope, projector, pixels, strip))
+                    wanted.append((bend, sign, y % 2 == 1, away * slope, projector, away, strip))
         assert rig.sensor.bayer == "RGGB"
         for got, values in zip(vars(found).values(), zip(*wanted, strict=True), strict=True):
             assert got == pytest.approx(values)
