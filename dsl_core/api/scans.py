@@ -13,8 +13,8 @@ from pydantic import ValidationError
 from dsl_core.api import FilePath
 from dsl_core.api.places import as_array, whole_numbers
 from dsl_core.devices.base import DeviceRig
+from dsl_core.devices.registry import default_options, rig_names
 from dsl_core.devices.registry import open_rig as open_by_texts
-from dsl_core.devices.registry import rig_names
 from dsl_core.errors import CalibrationError, DecodeError, PlanError
 from dsl_core.extras import names_missing_packages
 from dsl_core.io import MANIFEST_NAME, calibration_library
@@ -130,7 +130,7 @@ def scan(
 
     path = Path(folder)
     if (path / MANIFEST_NAME).exists():
-        refuse_other_rig(path, read_manifest(path).notes, rig.notes)
+        refuse_other_rig(path, read_manifest(path).notes, rig.notes, default_options)
     chosen = pipeline.fit_plan(CapturePlan(), rig) if plan is None else _plan(rig, plan)
     pipeline.scan(rig, chosen, path, progress, dict(rig.notes))
     return ScanReader(path)

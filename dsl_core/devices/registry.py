@@ -90,6 +90,17 @@ def rig_names() -> list[str]:
     return sorted({point.name for point in points} | set(_profiles_but(points)))
 
 
+def default_options(name: str) -> dict[str, str]:
+    """The options that a rig has where they are not given, as text; none for a profile, or if it lists none.
+
+    >>> default_options("twin")["film"]
+    'on'
+    """
+    points = [point for point in _points() if point.name == name]
+    options = _options(_load(points[0])) if points else ()
+    return {option.name: option.default for option in options if option.default}
+
+
 def is_built_in(name: str) -> bool:
     """Whether a rig comes with this program, and so controls no devices."""
     return any(point.name == name for point in BUILT_IN)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import platform
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 
 from dsl_core.errors import StoreError
@@ -13,6 +13,9 @@ from dsl_core.model.rig import Rig
 
 _RIG, _OPTIONS, _COMPUTER = "scanned_with", "scanned_with_options", "scanned_on"
 _CALIBRATION, _CORRESPONDENCE = "calibration_digest", "correspondence"
+
+#: Options of the twin that change no picture.
+_OF_NO_PICTURE = {"device", "realtime"}
 
 
 def rig_notes(name: str, options: Mapping[str, str]) -> dict[str, str]:
@@ -52,18 +55,26 @@ def rig_of_notes(notes: Mapping[str, object]) -> tuple[str, dict[str, str]] | No
     return str(notes[_RIG]), {str(key): str(value) for key, value in options.items()}
 
 
-def refuse_other_rig(folder: Path, stored: Mapping[str, object], given: Mapping[str, object]) -> None:
+def refuse_other_rig(
+    folder: Path,
+    stored: Mapping[str, object],
+    given: Mapping[str, object],
+    defaults_of: Callable[[str], Mapping[str, str]],
+) -> None:
     """Raise `StoreError` where notes of a scan and of a rig name another rig, or options that differ.
 
-    The twin's scene is an option, so its frames would be those of another scene. Notes that name no rig,
-    such as those of devices that a script has put together, tell nothing.
+    The twin's scene is an option, so its frames would be those of another scene. Options that are not given
+    are what ``defaults_of`` says of a rig by its name. Notes that name no rig, such as those of devices that
+    a script has put together, tell nothing.
     """
     was, now = rig_of_notes(stored), rig_of_notes(given)
     if was is None or now is None:
         return
+    defaults = defaults_of(now[0]) if was[0] == now[0] else {}
+    before, after = ({**defaults, **options} for _, options in (was, now))
+    kept = (before.keys() | after.keys()) - (_OF_NO_PICTURE if now[0] == "twin" else set())
     pairs = [("its rig", was[0], now[0])] + [
-        (f"the option {key}", was[1].get(key), now[1].get(key))
-        for key in sorted(was[1].keys() | now[1].keys())
+        (f"the option {key}", before.get(key), after.get(key)) for key in sorted(kept)
     ]
     found = [
         f"{what} is {_said(old)} in the scan and {_said(new)} now"

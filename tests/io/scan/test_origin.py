@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+from dsl_core.devices.registry import default_options
 from dsl_core.errors import StoreError
 from dsl_core.io.scan.origin import (
     calibration_digest,
@@ -44,23 +45,41 @@ def test_options_that_nobody_noted_are_none() -> None:
     )
 
 
+def _refuse(stored: dict[str, str], given: dict[str, str]) -> None:
+    refuse_other_rig(Path("a.dsl"), stored, given, default_options)
+
+
 def test_another_scene_or_rig_is_refused_with_what_differs() -> None:
     stored = rig_notes("twin", {"scene": "plane", "depth_mm": "650"})
     with pytest.raises(
         StoreError, match=r"the option scene is plane in the scan and sphere now\. Open the rig as"
     ):
-        refuse_other_rig(Path("a.dsl"), stored, rig_notes("twin", {"scene": "sphere", "depth_mm": "650"}))
+        _refuse(stored, rig_notes("twin", {"scene": "sphere", "depth_mm": "650"}))
     with pytest.raises(
         StoreError, match=r"its rig is twin in the scan and lab now; .*seed is not given in the"
     ):
-        refuse_other_rig(Path("a.dsl"), rig_notes("twin", {}), rig_notes("lab", {"seed": "3"}))
+        _refuse(rig_notes("twin", {}), rig_notes("lab", {"seed": "3"}))
 
 
 def test_the_same_rig_and_devices_of_a_script_are_not_another() -> None:
     stored = rig_notes("twin", {"scene": "plane", "depth_mm": "650"})
-    refuse_other_rig(Path("a.dsl"), stored, rig_notes("twin", {"depth_mm": "650.0", "scene": "plane"}))
-    refuse_other_rig(Path("a.dsl"), stored, {"note": "mine"})
-    refuse_other_rig(Path("a.dsl"), {}, stored)
+    _refuse(stored, rig_notes("twin", {"depth_mm": "650.0", "scene": "plane"}))
+    _refuse(stored, {"note": "mine"})
+    _refuse({}, stored)
+
+
+@pytest.mark.parametrize(
+    "options",
+    [{"film": "on"}, {"scene": "color-checker", "sigma": "0.0"}, {"device": "cuda"}, {"realtime": "on"}],
+)
+def test_options_that_change_no_picture_make_no_other_rig(options: dict[str, str]) -> None:
+    _refuse(rig_notes("twin", {}), rig_notes("twin", options))
+    _refuse(rig_notes("twin", options), rig_notes("twin", {}))
+
+
+def test_an_option_that_only_one_of_two_has_is_said_with_its_default() -> None:
+    with pytest.raises(StoreError, match=r"a\.dsl .*: the option film is off in the scan and on now\."):
+        _refuse(rig_notes("twin", {"film": "off"}), rig_notes("twin", {}))
 
 
 def test_a_scan_knows_its_computer_and_user_without_naming_them(monkeypatch: pytest.MonkeyPatch) -> None:
