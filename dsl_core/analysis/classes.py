@@ -13,12 +13,11 @@ from dsl_core.analysis.at_bands import at_bands
 from dsl_core.analysis.library import SpectralLibrary
 from dsl_core.errors import CalibrationError, DecodeError
 from dsl_core.model.result import SPECTRUM_INVALID, Flag
-from dsl_core.words import counted
 
 Floats = NDArray[np.float64]
 Cube = NDArray[np.float32] | NDArray[np.float64]
 
-#: Fewer bands than this decide nothing.
+#: Fewer bands than this have no shape to compare.
 FEWEST_BANDS = 3
 #: A class of more spectra than this is summed up: a mean, and components of how its spectra vary.
 MOST_MEMBERS = 8
@@ -151,11 +150,6 @@ def class_of_pixels(
     known = has_spectrum & np.isfinite(spread).all(0)
     values, spread = values[:, known], spread[:, known]
     count = values.shape[1]
-    if len(values) < FEWEST_BANDS:
-        raise DecodeError(
-            f"The result has {counted(len(values), 'band')}; {FEWEST_BANDS} at least tell materials apart."
-            " Reconstruct more bands."
-        )
     if count == 0 and has_spectrum.any():
         raise DecodeError(
             f"{name}: none of its {len(y)} pixels has deviations of its spectrum. Mark another place, or name"
@@ -167,7 +161,7 @@ def class_of_pixels(
     averaged = max(min(_PIXELS_TOGETHER / count, 1.0), _IN_COMMON)
     member = Member.of(values.mean(1), np.sqrt(noise * averaged))
     if count > 4 * len(values):
-        components, rest = _more_than_noise(np.cov(values), noise)
+        components, rest = _more_than_noise(np.atleast_2d(np.cov(values)), noise)
         member = replace(member, std=np.sqrt(member.std**2 + rest), components=components)
     return SpectralClass(name, (member,))
 

@@ -200,10 +200,15 @@ def test_shares_and_probabilities_are_at_most_one() -> None:
 
 
 @pytest.mark.parametrize("bands", [1, 2])
-def test_one_or_two_bands_tell_no_materials_apart(bands: int) -> None:
-    values = np.full((bands, 4, 5), 0.3)
-    with pytest.raises(DecodeError, match=f"has {bands} band.*3 at least"):
-        class_of_pixels("x", values, 0.01 * values, np.ones((4, 5), bool))
+def test_marked_pixels_of_one_or_two_bands_are_told_apart_by_their_difference(
+    cube: ChartCube, bands: int
+) -> None:
+    values, std = cube.reflectance[:bands], cube.std[:bands]
+    marked = [class_of_pixels(f"{at}", values, std, cube.material == at) for at in (0, 1)]
+    scores = score(values, std, None, cube.flags, marked, Measure.RMSE)
+    np.testing.assert_array_equal(scores.best[cube.material == 1], 1)
+    with pytest.raises(DecodeError, match=f"has {bands} band.*3 at least.*rmse"):
+        score(values, std, None, cube.flags, marked)
 
 
 @pytest.mark.parametrize("measure", [Measure.ANGLE, Measure.PROBABILITY])
