@@ -37,7 +37,9 @@ def band_attributes(bands_nm: ArrayLike) -> dict[str, float]:
 def stated_band_width_nm(attributes: Mapping[Any, Any], bands_nm: ArrayLike) -> float | None:
     """How wide bands (bands,), nm, are of which others may have been left out.
 
-    None where nobody says, and for bands that are not among those stated, as means of several are not.
+    None where nobody says, and for means of several. Those of an even number are not among the bands stated;
+    those of each 2 p + 1 in turn are so many apart, with p left out before them. Other means of an odd number
+    cannot be told from bands that were picked.
 
     >>> stated = band_attributes([430.0, 435.0, 440.0])
     >>> stated_band_width_nm(stated, [430.0, 440.0]), stated_band_width_nm(stated, [432.5])
@@ -50,7 +52,11 @@ def stated_band_width_nm(attributes: Mapping[Any, Any], bands_nm: ArrayLike) -> 
     if not (0 < width < math.inf and math.isfinite(first)):
         return None
     steps = (np.asarray(bands_nm, np.float64) - first) / width
-    return width if bool((np.abs(steps - np.rint(steps)) <= _ON_BAND).all()) else None
+    places = np.rint(steps)
+    if not (np.abs(steps - places) <= _ON_BAND).all():
+        return None
+    in_turn = np.abs(np.diff(places)) == 2 * np.abs(places[:1]) + 1
+    return None if places[:1].any() and in_turn.size > 1 and in_turn.all() else width
 
 
 def sentences_of(attributes: Mapping[Any, Any], name: str) -> tuple[str, ...]:

@@ -50,13 +50,20 @@ def test_what_a_spectrum_does_not_cover_is_not_made_up() -> None:
 def test_bands_that_were_picked_are_as_wide_as_they_were_reconstructed() -> None:
     edge = SpectralCurve.of(FINE_NM, np.where(FINE_NM > 590, 0.6, 0.05))
     whole = at_bands(edge, BANDS_NM).values
-    for picked in (np.arange(0, len(BANDS_NM), 10), np.r_[0:14, 23:47], np.array([33])):
+    every_third, other_third = np.arange(0, len(BANDS_NM), 3), np.arange(2, len(BANDS_NM), 3)
+    tenth, cut, pair = np.arange(0, len(BANDS_NM), 10), np.r_[0:14, 23:47], np.array([1, 4])
+    for picked in (tenth, cut, np.array([33]), pair, every_third, other_third):
         nm = BANDS_NM[picked]
         width_nm = stated_band_width_nm(band_attributes(BANDS_NM), nm)
         found = at_bands(edge, nm, width_nm)
         np.testing.assert_allclose(found.values, whole[picked], atol=1e-6)
-    means_nm = BANDS_NM[:46].reshape(-1, 2).mean(1)
-    assert stated_band_width_nm(band_attributes(BANDS_NM), means_nm) is None
+
+
+@pytest.mark.parametrize("count", [2, 3, 4, 5])
+@pytest.mark.parametrize("bands_nm", [BANDS_NM, BANDS_NM[::-1]])
+def test_means_of_bands_are_not_as_narrow_as_these(bands_nm: NDArray[np.float64], count: int) -> None:
+    means_nm = bands_nm[: len(bands_nm) // count * count].reshape(-1, count).mean(1)
+    assert stated_band_width_nm(band_attributes(bands_nm), means_nm) is None
 
 
 def test_a_result_says_how_wide_its_bands_are_whatever_is_picked_of_it(tmp_path: Path) -> None:
