@@ -120,7 +120,7 @@ def test_averaged_flags_are_refused_with_what_to_do(tmp_path: Path, monkeypatch:
     uses: list[Callable[[], object]] = [
         lambda: dsl.save_result(averaged, tmp_path / "a.zarr"),
         lambda: dsl.export(averaged, tmp_path / "a.tiff"),
-        lambda: dsl.classify(averaged, pins={"a": (2.5, 1.5)}, measure="angle"),
+        lambda: dsl.classify(averaged, pins=PLACES, measure="angle"),
         lambda: averaged.dsl.points(),
         lambda: averaged.dsl.good,
         lambda: averaged.dsl.reasons(float(averaged["x"][2]), float(averaged["y"][1])),
