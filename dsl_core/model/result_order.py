@@ -83,8 +83,8 @@ def as_bits(name: str, values: NDArray[Any]) -> NDArray[Any]:
     if not is_bits.all():
         raise StoreError(
             f"The {name} of the result should be whole numbers, but are averages, such as"
-            f" {filled[~is_bits].flat[0]:g}. Take the largest of the pixels instead, such as"
-            f" result[{name!r}].coarsen(x=2, y=2).max(), or leave them out by drop_vars({name!r})."
+            f" {filled[~is_bits].flat[0]:g}. Take the largest instead, such as"
+            f" result[{name!r}].coarsen(...).max(), or leave them out by drop_vars({name!r})."
         )
     return filled.astype(kind)
 

@@ -142,6 +142,14 @@ def test_averaged_flags_are_refused_with_what_to_do(tmp_path: Path, monkeypatch:
     assert not bool(largest.dsl.good[1, 2])
 
 
+def test_bands_can_be_averaged_without_what_reached_them() -> None:
+    averaged = small_result().coarsen(wavelength_nm=2, boundary="trim").mean()
+    averaged["reach"][0, 1, 1] = 0.5
+    with pytest.raises(StoreError, match=r"reach of the result .*drop_vars\('reach'\)"):
+        averaged.dsl.region(PLACES["a"])
+    assert averaged.drop_vars("reach").dsl.region(PLACES["a"]).attrs["used"] == 6
+
+
 def test_results_saved_with_floats_as_flags_are_read_with_whole_ones(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
