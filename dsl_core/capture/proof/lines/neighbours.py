@@ -35,6 +35,8 @@ BRIGHT_SIGMAS = 25.0
 LIGHT_SIGMAS, FEW, SURE_SIGMAS = 5.0, 0.002, 6.0
 #: Less than this share of its light is flicker.
 FLICKER = 0.25
+#: Deviation of the second difference of white noise, in its own.
+SECOND_DIFFERENCE = 6**0.5
 #: Differences count up to so many deviations.
 _CLIP = 10.0
 
@@ -73,8 +75,8 @@ class LineNeighbours:
 
     @property
     def are_few(self) -> bool:
-        """Whether too few pictures were compared to say what is usual."""
-        return len(self._changes) < FEWEST_USUAL
+        """Whether too few pictures were compared before the last to say whether that is usual."""
+        return len(self._changes) <= FEWEST_USUAL
 
     def differ_at_first(self, one: Counts, other: Counts, black: Counts) -> bool:
         """Whether two pictures of one shot differ by more than noise, flicker and light of the room.
@@ -85,7 +87,9 @@ class LineNeighbours:
         first, second = first - _of_most(first), second - _of_most(second)
         noise = np.sqrt(self._noise.variance(one) + self._noise.variance(other))
         step = first - second
-        sigma = max(float(robust_std(step / noise)), 1.0)
+        # Noise differs between pixels of one colour beside each other; another smooth pattern hardly does.
+        z = step / noise
+        sigma = max(float(robust_std(z[4:] - 2 * z[2:-2] + z[:-4])) / SECOND_DIFFERENCE, 1.0)
         lost = abs(float(step.sum()))
         is_dimmer = lost > FLICKER * max(abs(float(first.sum())), abs(float(second.sum())))
         is_dimmer &= lost > LIGHT_SIGMAS * sigma * float(np.sqrt((noise**2).sum()))

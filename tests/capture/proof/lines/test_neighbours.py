@@ -203,6 +203,29 @@ def test_two_pictures_of_one_line_are_different_by_all_their_light_or_by_a_few_p
     assert neighbours.differ_at_first(picture(40, lit=100), elsewhere, black), "another line"
 
 
+def test_two_smooth_patterns_that_differ_in_every_pixel_are_different() -> None:
+    rng = np.random.default_rng(3)
+    neighbours = LineNeighbours(Noise.of(Sensor(), 12), 40)
+    at = np.arange(2000) * 2 * np.pi / 25
+
+    def picture(phase: float, light: float = 400.0) -> np.ndarray:
+        level = 300 + light * (1 + np.cos(at + phase))
+        return np.rint(level + rng.normal(0, 2.5, level.size)).astype(np.uint16)
+
+    black = picture(0, light=0)
+    assert not neighbours.differ_at_first(picture(0), picture(0), black)
+    assert neighbours.differ_at_first(picture(0), picture(np.pi / 6), black)
+
+
+def test_the_first_lines_are_few_until_one_was_held_against_three_changes() -> None:
+    neighbours = LineNeighbours(Noise(SENSOR), COLUMNS)
+    few = []
+    for index in range(6):
+        neighbours.is_doubtful(index, _picture(4.0 * index, index, 60.0), None)
+        few.append(neighbours.are_few)
+    assert few == [True, True, True, True, False, False]
+
+
 def test_whole_counts_do_not_make_two_pictures_of_a_faint_line_different() -> None:
     rng = np.random.default_rng(4)
     neighbours = LineNeighbours(Noise.of(Sensor(), 12), 64)
