@@ -196,6 +196,8 @@ class _Camera(_Guard, Camera):
         self._info = line.ask("The camera", "say what it is", lambda: camera.info, patience.answer_s)
         super().__init__(camera, line, patience, f"The camera {self._info.model}")
         self._exposure_ms: float | None = None
+        #: Whether a first row, which is never cut off, had a pixel without any count: no black level.
+        self._had_zero = False
 
     @property
     def info(self) -> CameraInfo:
@@ -222,7 +224,8 @@ class _Camera(_Guard, Camera):
             "take a picture", lambda: (camera.snap(timeout_ms), camera.info), timeout_ms / 1000.0
         )
         _require_same(self._name, self._info, info)
-        require_frame(frame, info, self._exposure_ms)
+        require_frame(frame, info, self._exposure_ms, self._had_zero)
+        self._had_zero |= not frame.pixels[0].all()
         # A driver may fill the same memory again with its next picture.
         return replace(frame, pixels=frame.pixels.copy(), frame_id=int(frame.frame_id))
 

@@ -277,6 +277,16 @@ def test_frames_that_cannot_be_are_refused(frame: Any, sentence: str, lab: _Lab,
         rig.camera.snap()
 
 
+def test_rows_without_any_count_are_dark_where_a_black_picture_had_none_either(
+    lab: _Lab, rig: DeviceRig
+) -> None:
+    rig.camera.configure(10.0)
+    cut = np.repeat([[9], [9], [9], [0]], 6, 1).astype(np.uint16)
+    for pixels in (cut + 9, cut * 0, cut):
+        lab.act["snap"] = lambda pixels=pixels: replace(FRAME, pixels=pixels)
+        np.testing.assert_array_equal(rig.camera.snap().pixels, pixels)
+
+
 def test_a_driver_may_fill_the_same_memory_again(lab: _Lab, rig: DeviceRig) -> None:
     buffer = np.zeros((4, 6), np.uint16)
     lab.act["snap"] = lambda: replace(FRAME, pixels=buffer)
