@@ -7,6 +7,8 @@ import math
 from collections.abc import Callable
 from dataclasses import replace
 
+import numpy as np
+
 from dsl_core.errors import DeviceError
 from dsl_core.model.frames import Frame
 from dsl_core.words import counted
@@ -54,10 +56,12 @@ class FrameOrder:
         self._unbroken = 0
 
     def _require_new(self, frame: Frame, last: Frame) -> None:
-        number, same_time = frame.frame_id, frame.timestamp_s == last.timestamp_s != 0.0
-        if number > last.frame_id and not same_time:
+        number = frame.frame_id
+        # Some clocks tell whole seconds.
+        is_same = frame.timestamp_s == last.timestamp_s != 0.0 and np.array_equal(frame.pixels, last.pixels)
+        if number > last.frame_id and not is_same:
             return
-        if not same_time and number < last.frame_id:
+        if not is_same and number < last.frame_id:
             if any(end - NEAR_WRAP <= last.frame_id < end and number < NEAR_WRAP for end in WRAPS):
                 return
             # Old frames come once; a camera that was switched off and on counts on from there.
@@ -80,6 +84,12 @@ class FrameOrder:
         if 0.0 in (frame.timestamp_s, last.timestamp_s):
             return
         step_s = frame.timestamp_s - last.timestamp_s
+        if step_s == 0:
+            self._tell(
+                "same",
+                f"frames {last.frame_id} and {frame.frame_id} have the same time: the camera's clock is"
+                " coarse or stands still; use the times at which patterns were shown instead",
+            )
         jumps = self._clock is not None and abs(step_s - passed_s) > CLOCK_SLACK_S + CLOCK_SLACK_SHARE * abs(
             passed_s
         )
@@ -104,6 +114,5 @@ def _why_old(frame: Frame, last: Frame) -> str:
     if frame.frame_id < last.frame_id:
         return f"after number {last.frame_id}"
     return (
-        f"with the time of number {last.frame_id}, {frame.timestamp_s:g} s: it is the picture before, or the"
-        " camera's clock stands still"
+        f"with time ({frame.timestamp_s:g} s) and pixels of number {last.frame_id}: it is the picture before"
     )

@@ -11,8 +11,8 @@ from dsl_core.capture.frame_order import FrameOrder, StaleFrameError
 from dsl_core.model.frames import Frame
 
 
-def _frame(number: int, time_s: float) -> Frame:
-    return Frame(np.zeros((2, 2), np.uint16), 1.0, time_s, number)
+def _frame(number: int, time_s: float, dn: int = 0) -> Frame:
+    return Frame(np.full((2, 2), dn, np.uint16), 1.0, time_s, number)
 
 
 @pytest.mark.parametrize(
@@ -20,7 +20,7 @@ def _frame(number: int, time_s: float) -> Frame:
     [
         ((5, 1.0), "again"),
         ((5, 2.0), "again"),
-        ((6, 1.0), "with the time of number 5, 1 s: it is the picture before, or the camera's clock stands"),
+        ((6, 1.0), r"with time \(1 s\) and pixels of number 5: it is the picture before"),
         ((4, 0.5), "after number 5"),
     ],
 )
@@ -46,6 +46,18 @@ def test_a_camera_that_restarts_counts_on_from_there(caplog: pytest.LogCaptureFi
         order.take(_frame(1, 0.1))
     assert order.take(_frame(2, 0.2)).frame_id == 2
     assert "counts its frames from 2 again" in caplog.text
+
+
+def test_pictures_of_one_second_are_new_where_the_clock_tells_no_finer_ones(
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    order = FrameOrder()
+    for number, time_s in ((254, 7.0), (255, 7.0), (0, 7.0), (1, 8.0), (2, 8.0)):
+        assert order.take(_frame(number, time_s, dn=number)).frame_id == number
+    assert caplog.messages == [
+        "frames 254 and 255 have the same time: the camera's clock is coarse or stands still; use the times"
+        " at which patterns were shown instead"
+    ]
 
 
 def test_a_gap_is_told_once_and_only_where_there_are_usually_none(caplog: pytest.LogCaptureFixture) -> None:
