@@ -22,6 +22,19 @@ def led_weights(start_ms: float, exposure_ms: float, period_ms: float) -> NDArra
     return np.array(on) * LEDS * period_ms / exposure_ms
 
 
+def largest_deviation(periods: float) -> float:
+    """The most by which an LED's share of an exposure of so many periods differs from one.
+
+    Of a remaining part f of a period an LED is on at least ``f - 2/3`` and at most ``1/3``.
+    """
+    whole = round(periods)
+    if whole > 0 and abs(periods - whole) < 1e-9 * periods:
+        return 0.0
+    rest = periods - np.floor(periods)
+    on = np.array([max(rest - 1 + 1 / LEDS, 0.0), min(rest, 1 / LEDS)])
+    return float(np.abs(LEDS * (np.floor(periods) / LEDS + on) / periods - 1).max())
+
+
 def _time_on(periods: NDArray[np.float64], led: int) -> NDArray[np.float64]:
     """How long an LED was on since time zero, in periods."""
     within = periods - np.floor(periods)

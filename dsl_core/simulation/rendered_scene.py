@@ -6,10 +6,11 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 from dsl_core.model.plan import CapturePlan, Setting
-from dsl_core.model.rig import ProjectorResponse, Rig
+from dsl_core.model.rig import Rig
 from dsl_core.model.spectral import SpectralCurve
 from dsl_core.simulation.effects.base import LightPath, PatternView, make_view
 from dsl_core.simulation.effects.catalogue import EXTRAS, USUAL_CHOICE, Choice, with_effects
+from dsl_core.simulation.effects.demand import Demand
 from dsl_core.simulation.effects.planner import EffectPlan, plan_effects
 from dsl_core.simulation.effects.tolerance import ONE_DN, Tolerance
 from dsl_core.simulation.foreign.rig_changes import true_rig
@@ -57,16 +58,14 @@ class EffectRequest:
     tolerance: Tolerance = ONE_DN
     settings: tuple[Setting, ...] = CapturePlan().settings
 
-    def allowing(self, exposure_ms: float, level: float, response: ProjectorResponse) -> EffectRequest:
-        """The same with a setting more, if an exposure brings more light than the scene was judged for."""
+    def allowing(self, exposure_ms: float, level: float, setup: Setup) -> EffectRequest:
+        """The same with a setting more, if effects may change more in an exposure than was allowed for."""
         if self.choice.names is not None:
             return self
-        brightest = max(s.exposure_ms * float(response.radiance(s.level)) for s in self.settings)
-        longest = max(s.exposure_ms for s in self.settings)
-        if exposure_ms <= longest and exposure_ms * float(response.radiance(level)) <= brightest:
-            return self
-        more = Setting(exposure_ms=exposure_ms, level=max(level, 1 / 255))
-        return replace(self, settings=(*self.settings, more))
+        more = (*self.settings, Setting(exposure_ms=exposure_ms, level=max(level, 1 / 255)))
+        response, cycle_ms = setup.true_rig.projector_response, setup.led_cycle_ms
+        known, needed = (Demand.of(settings, response, cycle_ms) for settings in (self.settings, more))
+        return self if needed == known else replace(self, settings=more)
 
 
 class SceneInView:

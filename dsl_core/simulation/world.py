@@ -86,8 +86,9 @@ class World:
     where (``noise_key``), on the shot and the attempt, never on what was captured before, so that an
     interrupted scan continues bit for bit.
 
-    ``request`` says what of all that happens is rendered; an exposure that is brighter than its settings
-    allow for adds a setting. Light of a dark projector is taken as steady, whatever the LEDs do.
+    ``request`` says what of all that happens is rendered; an exposure in which effects may change more
+    than in those of its settings adds a setting. Light of a dark projector is taken as steady, whatever the
+    LEDs do.
     """
 
     setup: Setup
@@ -226,7 +227,7 @@ class World:
     def expose(self, exposure_ms: float, shot: int, attempt: int = 0) -> NDArray[np.uint16]:
         """Raw mosaic of one exposure."""
         level = 0.0 if self.image is None else float(self.image.max()) / 255
-        self.request = self.request.allowing(exposure_ms, level, self.rig.projector_response)
+        self.request = self.request.allowing(exposure_ms, level, self.setup)
         rng = np.random.Generator(np.random.SFC64([self.seed, shot, attempt, *self._noise_key()]))
         jitter_ms = JITTER_MS * rng.random() if self.setup.led_cycle_ms else 0.0
         light = self._light(exposure_ms, jitter_ms)

@@ -94,7 +94,7 @@ def largest_difference(
     paths: tuple[LightPath, ...], views: tuple[PatternView, ...], rng: np.random.Generator
 ) -> float:
     """The largest difference of any pixel between two paths, over pictures at the brighter setting, DN."""
-    worst, exposure_ms = 0.0, Limits(paths[0]).exposure_ms
+    worst, exposure_ms = 0.0, Limits(paths[0]).demand.exposure_ms
     for image in random_pictures(rng):
         frames = [frame_dn(path, view, image, exposure_ms) for path, view in zip(paths, views, strict=True)]
         worst = max(worst, float(np.abs(frames[0] - frames[1]).max()))

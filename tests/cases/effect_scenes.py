@@ -114,6 +114,6 @@ def frames_dn(path: LightPath, images: list[NDArray[np.uint8]], exposure_ms: flo
 
 def largest_change(one: LightPath, other: LightPath, images: list[NDArray[np.uint8]]) -> float:
     """The largest difference of any pixel between frames of two paths in the longest exposure, DN."""
-    exposure_ms = Limits(one).exposure_ms
+    exposure_ms = Limits(one).demand.exposure_ms
     first, second = (frames_dn(path, images, exposure_ms) for path in (one, other))
     return float(np.abs(first - second).max())

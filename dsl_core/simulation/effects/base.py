@@ -26,6 +26,7 @@ from dsl_core.model.spectral import SpectralCurve
 from dsl_core.optics.sensor import bayer_channels, raw_variance
 from dsl_core.optics.spectra import chain_response
 from dsl_core.simulation.effects.cost import slowness
+from dsl_core.simulation.effects.demand import Demand
 from dsl_core.simulation.effects.tolerance import EffectBound
 from dsl_core.simulation.foreign.variants import Foreign
 from dsl_core.simulation.rendering.shading import surface_shading
@@ -211,16 +212,10 @@ class Limits:
         """Pixels of the camera."""
         return self.path.truth.depth_mm.size
 
-    @property
-    def exposure_ms(self) -> float:
-        """The longest exposure."""
-        return max(setting.exposure_ms for setting in self.settings)
-
-    @property
-    def light_ms(self) -> float:
-        """The most light of the projector in an exposure, ms of full drive."""
-        response = self.path.rig.projector_response
-        return max(s.exposure_ms * float(response.radiance(s.level)) for s in self.settings)
+    @cached_property
+    def demand(self) -> Demand:
+        """The longest exposure, and the most light of the projector in one."""
+        return Demand.of(self.settings, self.path.rig.projector_response, self.path.led_cycle_ms)
 
     @cached_property
     def halo(self) -> float:
@@ -303,6 +298,12 @@ class Limits:
         return SLACK * (1 + self.glare) * float(self.total.max(initial=0.0))
 
     @cached_property
+    def most_dn(self) -> float:
+        """The brightest signal that an exposure can expect, the room's light included, DN above black."""
+        room_dn = self.path.ambient_dn_per_ms * self.demand.exposure_ms
+        return self.ceiling * self.demand.light_ms + room_dn
+
+    @cached_property
     def floor_dn(self) -> float:
         """Noise of a pixel without light, DN."""
         return float(np.sqrt(raw_variance(self.path.rig.sensor, np.zeros(1))[0]))
@@ -314,7 +315,7 @@ class Limits:
 
     def of_light(self, dn_per_ms: float, reason: str) -> EffectBound:
         """A bound from the signal of white at full drive."""
-        return self.of_dn(dn_per_ms * self.light_ms, reason)
+        return self.of_dn(dn_per_ms * self.demand.light_ms, reason)
 
     def of_share(self, share: float, reason: str) -> EffectBound:
         """A bound as a share of the brightest pixel."""

@@ -4,11 +4,8 @@ from __future__ import annotations
 
 from types import MappingProxyType
 
-import numpy as np
-
 from dsl_core.simulation.effects.base import Effect, Limits
 from dsl_core.simulation.effects.tolerance import EffectBound
-from dsl_core.simulation.led_cycle import LEDS
 
 #: A blur that no sample of the twin shows.
 _SHARP_PX = 1e-3
@@ -56,7 +53,7 @@ class BlackLevel(Effect):
         """Its share of white over the longest exposure."""
         black = limits.path.rig.projector_response.black_fraction
         reason = f"black is {100 * black:.2g} % of white" if black else "the projector has a perfect black"
-        return limits.of_dn(black * limits.ceiling * limits.exposure_ms, reason)
+        return limits.of_dn(black * limits.ceiling * limits.demand.exposure_ms, reason)
 
 
 class Gamma(Effect):
@@ -69,16 +66,11 @@ class Gamma(Effect):
     def bound(self, limits: Limits) -> EffectBound:
         """The largest difference of radiance up to the level of each setting."""
         response = limits.path.rig.projector_response
-        worst_ms = max(
-            s.exposure_ms * float(np.abs(levels - response.light(levels)).max())
-            for s in limits.settings
-            for levels in [np.arange(round(255 * s.level) + 1) / 255]
-        )
         gamma = response.gamma
         reason = "the projector is linear" if gamma == 1 else f"radiance rises with a power of {gamma:.3g}"
         if response.tone is not None:
             reason = "radiance rises with a curve that was measured"
-        return limits.of_dn(worst_ms * limits.ceiling, reason)
+        return limits.of_dn(limits.demand.bent_ms * limits.ceiling, reason)
 
 
 class LedCycle(Effect):
@@ -90,26 +82,8 @@ class LedCycle(Effect):
 
     def bound(self, limits: Limits) -> EffectBound:
         """The largest deviation of an LED's light in an exposure, whenever it starts."""
-        period_ms = limits.path.led_cycle_ms
-        if period_ms is None:
+        if limits.path.led_cycle_ms is None:
             return limits.of_dn(0.0, "the LEDs shine steadily")
-        response = limits.path.rig.projector_response
-        worst_ms = max(
-            s.exposure_ms * float(response.radiance(s.level)) * largest_deviation(s.exposure_ms / period_ms)
-            for s in limits.settings
-        )
+        worst_ms = limits.demand.uneven_ms
         reason = "exposures are not whole numbers of cycles" if worst_ms else "exposures are whole cycles"
         return limits.of_dn(worst_ms * limits.ceiling, reason)
-
-
-def largest_deviation(periods: float) -> float:
-    """The most by which an LED's share of an exposure of so many periods differs from one.
-
-    Of a remaining part f of a period an LED is on at least ``f - 2/3`` and at most ``1/3``.
-    """
-    whole = round(periods)
-    if whole > 0 and abs(periods - whole) < 1e-9 * periods:
-        return 0.0
-    rest = periods - np.floor(periods)
-    on = np.array([max(rest - 1 + 1 / LEDS, 0.0), min(rest, 1 / LEDS)])
-    return float(np.abs(LEDS * (np.floor(periods) / LEDS + on) / periods - 1).max())

@@ -7,7 +7,7 @@ from types import MappingProxyType
 import numpy as np
 
 from dsl_core.model.rig import BayerPattern
-from dsl_core.optics.sensor import bayer_channels
+from dsl_core.optics.sensor import bayer_channels, raw_variance
 from dsl_core.simulation.effects.base import Effect, Image, Limits, PatternView, Signal
 from dsl_core.simulation.effects.tolerance import EffectBound
 
@@ -28,7 +28,7 @@ class Ambient(Effect):
         """That of the longest exposure."""
         ambient = limits.path.ambient_dn_per_ms
         reason = f"the room adds {ambient:.2g} DN/ms" if ambient else "the room is dark"
-        return limits.of_dn(ambient * limits.exposure_ms, reason)
+        return limits.of_dn(ambient * limits.demand.exposure_ms, reason)
 
 
 class Defocus(Effect):
@@ -65,7 +65,7 @@ class ShotNoise(Effect):
     def bound(self, limits: Limits) -> EffectBound:
         """Eight standard deviations at the brightest signal that does not saturate."""
         sensor = limits.path.rig.sensor
-        signal = min(limits.ceiling * limits.light_ms, sensor.full_scale_dn - sensor.black_level_dn)
+        signal = min(limits.most_dn, sensor.full_scale_dn - sensor.black_level_dn)
         noise_dn = float(np.sqrt(signal / sensor.electrons_per_dn))
         return limits.of_dn(TAIL_SIGMAS * noise_dn, f"its standard deviation is up to {noise_dn:.2g} DN")
 
@@ -93,12 +93,15 @@ class Saturation(Effect):
     ideal = MappingProxyType({"rig.sensor.bit_depth": _CONTAINER_BITS})
 
     def bound(self, limits: Limits) -> EffectBound:
-        """What the brightest signal exceeds full scale by."""
-        sensor, path = limits.path.rig.sensor, limits.path
-        brightest = limits.ceiling * limits.light_ms + path.ambient_dn_per_ms * limits.exposure_ms
+        """What the brightest signal and its noise exceed full scale by."""
+        sensor = limits.path.rig.sensor
+        noise_dn = float(np.sqrt(raw_variance(sensor, np.array(limits.most_dn))))
+        brightest = limits.most_dn + TAIL_SIGMAS * noise_dn
         excess = max(brightest + sensor.black_level_dn - sensor.full_scale_dn, 0.0)
         reason = (
-            f"white would read {brightest:.3g} DN above black" if excess else "no pattern reaches full scale"
+            f"white would read up to {brightest:.3g} DN above black"
+            if excess
+            else "no pattern reaches full scale"
         )
         return EffectBound(excess, excess / limits.floor_dn, reason)
 

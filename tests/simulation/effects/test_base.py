@@ -45,7 +45,7 @@ def test_nothing_is_brighter_than_the_ceiling(scene: str) -> None:
 def everything_of(scene: str, troubled: bool) -> tuple[LightPath, EffectPlan, NDArray[np.float32]]:
     """A path with everything, its plan, and its frames."""
     path = (troubled_world if troubled else world_of)(scene).everything()
-    return path, plan_effects(path), frames_dn(path, IMAGES, Limits(path).exposure_ms)
+    return path, plan_effects(path), frames_dn(path, IMAGES, Limits(path).demand.exposure_ms)
 
 
 @pytest.mark.slow
@@ -57,7 +57,7 @@ def test_what_a_scene_calls_for_changes_it_by_more_than_the_tolerance_and_less_t
 ) -> None:
     path, plan, frames = everything_of(scene, name in ("vignetting", "defocus", "ambient"))
     assert name in plan.names
-    without = frames_dn(BY_NAME[name].leave_out(path), IMAGES, Limits(path).exposure_ms)
+    without = frames_dn(BY_NAME[name].leave_out(path), IMAGES, Limits(path).demand.exposure_ms)
     change = float(np.abs(without - frames).max())
     assert plan.tolerance.value < change <= BY_NAME[name].bound(Limits(path)).dn + ROUNDING_DN
 
