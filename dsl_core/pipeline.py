@@ -80,7 +80,8 @@ def open_scan(
     What to do after that is advised in the words of what it is captured for (``again``).
     """
     require_possible(rig, plan)
-    with ScanWriter.open(folder, plan, rig, notes) as writer:
+    expected = {} if rig.expect is None else rig.expect(plan)
+    with ScanWriter.open(folder, plan, rig, {**(notes or {}), **expected}) as writer:
         stored, watches = ScanReader(folder), ScanWatches.of(rig, plan, prove)
         watches.learn(writer, stored)
         sink = watches.over(WatchedSink(writer, watch) if watch else writer)

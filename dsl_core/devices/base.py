@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from dsl_core.errors import DeviceError
 from dsl_core.model.frames import Frame
 from dsl_core.model.placement import Placement
+from dsl_core.model.plan import CapturePlan
 from dsl_core.model.rig import BayerPattern, Rig
 from dsl_core.model.spectral import SpectralCurve
 
@@ -182,6 +183,7 @@ class DeviceRig:
     waits, so that a simulated rig does not have to. ``place`` puts a target before the camera where a rig can
     do that itself, as the twin can; where it is None, a person does it. A rig that places targets puts back
     what was there before with ``put_back``, and says in words with ``standing`` what is there now.
+    ``expect`` is told the plan of a scan that begins or goes on, and gives what the scan should note of it.
     ``nominal`` is what data sheets say of the rig, the start of a calibration. ``filters`` holds measured
     transmissions of bandpass filters by their nominal centres, nm, as far as there are any. ``patience`` says
     when a call that does not return is given up. A rig that ``only_repeats`` plays back an earlier scan:
@@ -198,6 +200,7 @@ class DeviceRig:
     place: Callable[[Placement], None] | None = None
     put_back: Callable[[], None] | None = None
     standing: Callable[[], str] | None = None
+    expect: Callable[[CapturePlan], dict[str, str]] | None = None
     nominal: Rig | None = None
     filters: dict[float, SpectralCurve] = field(default_factory=dict)
     notes: dict[str, str] = field(default_factory=dict)

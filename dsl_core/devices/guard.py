@@ -67,7 +67,7 @@ def _behind_guards(rig: DeviceRig, thread: DeviceThread | None) -> DeviceRig:
     if rig.spectroradiometer is not None:
         devices["spectroradiometer"] = _Spectroradiometer(rig.spectroradiometer, line, patience)
     line.open_devices = len(devices)
-    place, put_back, standing = rig.place, rig.put_back, rig.standing
+    place, put_back, standing, expect = rig.place, rig.put_back, rig.standing, rig.expect
     hand = f"The rig {rig.name!r}"
     if place is not None:
         devices["place"] = lambda what: _place(line, hand, place, what, patience)
@@ -75,6 +75,10 @@ def _behind_guards(rig: DeviceRig, thread: DeviceThread | None) -> DeviceRig:
         devices["put_back"] = lambda: line.ask(hand, "put its target back", put_back, patience.place_s)
     if standing is not None:
         devices["standing"] = lambda: line.ask(hand, "say what stands there", standing, patience.answer_s)
+    if expect is not None:
+        devices["expect"] = lambda plan: line.ask(
+            hand, "prepare for a plan", lambda: expect(plan), patience.place_s
+        )
     return replace(rig, **devices)
 
 

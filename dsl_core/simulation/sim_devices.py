@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 import time
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +22,7 @@ from dsl_core.devices.registry import with_options
 from dsl_core.errors import DecodeError, DeviceError, PlanError
 from dsl_core.extras import require_package
 from dsl_core.model.frames import Frame
+from dsl_core.model.plan import CapturePlan
 from dsl_core.model.rig import Rig
 from dsl_core.model.spectral import SpectralCurve
 from dsl_core.simulation.bandpass_filters import measured_transmissions
@@ -224,10 +226,17 @@ def open_twin(options: dict[str, str]) -> DeviceRig:
     hand = TwinHand(world, drawn, chosen)
     devices.place, devices.put_back, devices.standing = hand, hand.put_back, hand.standing
     if chosen.choice != USUAL_CHOICE:
-        devices.notes["effects"] = describe(world.effect_plan(), chosen.effects).model_dump_json()
+        devices.expect = lambda plan: _expected(world, plan, chosen.effects)
     if chosen.truth is not None:
         devices.calibration = None
     return devices
+
+
+def _expected(world: World, plan: CapturePlan, effects: str) -> dict[str, str]:
+    """Decide on effects for the settings of a plan, and note what was decided."""
+    if plan.settings != world.request.settings:
+        world.request = replace(world.request, settings=plan.settings)
+    return {"effects": describe(world.effect_plan(), effects).model_dump_json()}
 
 
 def _device(name: str) -> str:

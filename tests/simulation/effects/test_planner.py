@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
-import json
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+from dsl_core import pipeline
 from dsl_core.devices.base import DeviceRig
+from dsl_core.devices.guard import guarded
 from dsl_core.errors import DeviceError
-from dsl_core.model.plan import Setting
+from dsl_core.io.scan.manifest import read_manifest
+from dsl_core.model.plan import CapturePlan, GrayCode, NoSpectral, Setting
 from dsl_core.model.projector.tone_curve import ToneCurve
+from dsl_core.model.rendered_effects import RenderedEffects
 from dsl_core.model.rig import FilmShape
 from dsl_core.simulation.effects.base import Limits
 from dsl_core.simulation.effects.catalogue import EXTRAS, NAMES, NEEDED, USUAL, Choice, with_effects
@@ -107,17 +111,14 @@ def world_in(rig: DeviceRig) -> World:
     return rig.camera.world
 
 
-def test_the_twin_renders_what_it_is_asked_to_and_notes_it() -> None:
+def test_the_twin_renders_what_it_is_asked_to() -> None:
     options = {"size": "64x42", "scene": "plane"}
     usual = open_twin(options)
-    assert "effects" not in usual.notes
+    assert usual.expect is None
     assert isinstance(world_in(usual).renderer, Renderer)
     auto = open_twin({**options, "effects": "auto", "tolerance": "0.5sigma"})
-    note = json.loads(auto.notes["effects"])
     plan = world_in(auto).effect_plan()
-    assert note == json.loads(describe(plan, "auto").model_dump_json())
-    assert note["tolerance"] == "0.5 sigma"
-    assert {effect["name"] for effect in note["effects"] if effect["on"]} == plan.names
+    assert str(plan.tolerance) == "0.5 sigma"
     assert {extra.name for extra in world_in(auto).path.extras} == plan.names - USUAL
     none = open_twin({**options, "effects": "none"})
     path = world_in(none).path
@@ -126,6 +127,22 @@ def test_the_twin_renders_what_it_is_asked_to_and_notes_it() -> None:
     assert path.rig.sensor.read_noise_dn == 0
     with pytest.raises(DeviceError, match="no effect"):
         open_twin({**options, "effects": "sparkle"})
+
+
+def test_a_scan_notes_the_effects_that_its_own_settings_call_for(tmp_path: Path) -> None:
+    twin = open_twin({"size": "64x48", "scene": "plane", "effects": "auto"})
+    devices = guarded(twin, None)
+    bright = (Setting(exposure_ms=3000.0, level=0.8),)
+    made = CapturePlan(code=GrayCode(rows=False), spectral=NoSpectral(), settings=bright, code_settings=(0,))
+    plan = pipeline.fit_plan(made, devices)
+    with pipeline.open_scan(devices, plan, tmp_path / "s.dsl", notes=dict(devices.notes)):
+        devices.projector.show(np.full((360, 640, 3), 204, np.uint8))
+        devices.camera.configure(3000.0)
+        devices.camera.snap()
+    rendered = world_in(twin).effect_plan()
+    note = RenderedEffects.of_note(read_manifest(tmp_path / "s.dsl").notes["effects"])
+    assert note == describe(rendered, "auto")
+    assert "ambient" in rendered.names
 
 
 def test_leaving_out_everything_ends_in_an_ideal_rig() -> None:
