@@ -120,14 +120,16 @@ def digitise(
 ) -> NDArray[np.uint16]:
     """Raw mosaic of an expected signal above black (DN), same shape; no noise when ``rng`` is None.
 
-    Shot noise is Gaussian with the Poisson variance, which is exact to a percent above 30 electrons.
+    Values are whole steps of the sensor, or its full scale. Shot noise is Gaussian with the
+    Poisson variance, which is exact to a percent above 30 electrons.
     """
     value = signal_dn + np.float32(sensor.black_level_dn)
     if rng is not None:
         variance = np.maximum(signal_dn, 0) * np.float32(1 / sensor.electrons_per_dn)
         variance += np.float32(sensor.read_noise_dn**2)
         value = value + rng.standard_normal(signal_dn.shape, np.float32) * np.sqrt(variance)
-    return np.asarray(np.clip(np.rint(value), 0, sensor.full_scale_dn), np.uint16)
+    value = np.rint(value / np.float32(sensor.step_dn)) * np.float32(sensor.step_dn)
+    return np.asarray(np.clip(value, 0, sensor.full_scale_dn), np.uint16)
 
 
 def relative_gain(rig: Rig) -> Floats:

@@ -30,6 +30,15 @@ def test_raw_values_have_the_stated_mean_and_variance(signal_dn: float) -> None:
     assert values.var() == pytest.approx(float(raw_variance(sensor, np.array(signal_dn))), rel=0.015)
 
 
+@pytest.mark.parametrize("step_dn", [16, 64])
+def test_sensors_with_steps_have_no_values_between_and_the_stated_variance(step_dn: int) -> None:
+    sensor = Sensor(bit_depth=16, black_level_dn=4160, step_dn=step_dn, electrons_per_dn=1, read_noise_dn=30)
+    values = digitise(sensor, np.full(200_000, 2010, np.float32), np.random.default_rng(0))
+    assert not (values % step_dn).any()
+    assert values.var() == pytest.approx(float(raw_variance(sensor, np.array(2010.0))), rel=0.015)
+    assert digitise(sensor, np.array([1e5], np.float32), None) == sensor.full_scale_dn
+
+
 def test_values_without_noise_are_rounded_and_end_at_full_scale() -> None:
     sensor = published_rig().sensor
     black, full = sensor.black_level_dn, sensor.full_scale_dn

@@ -107,12 +107,12 @@ class Saturation(Effect):
 
 
 class Quantisation(Effect):
-    """Frames hold whole numbers."""
+    """Frames hold whole steps of the sensor."""
 
     name = "quantisation"
     summary = "rounding to whole numbers"
     needed = True
 
     def bound(self, limits: Limits) -> EffectBound:
-        """Half a count."""
-        return limits.of_dn(0.5, "frames contain whole numbers")
+        """Half a step."""
+        return limits.of_dn(limits.path.rig.sensor.step_dn / 2, "frames contain whole numbers")
