@@ -88,7 +88,7 @@ class Glare(ExtraEffect):
     def bound(self, limits: Limits) -> EffectBound:
         """Its share of the mean of the most light."""
         mosaic = bayer_channels(limits.path.rig.sensor.bayer, *limits.path.truth.depth_mm.shape).ravel()
-        mean = max(float(limits.total[mosaic == channel].mean()) for channel in range(3))
+        mean = max(float(limits.total[mosaic == channel].mean()) for channel in np.unique(mosaic))
         return limits.of_light(SLACK * self.share * mean, f"it spreads {100 * self.share:g} % of all light")
 
     def step(self, path: LightPath) -> ImageStep:
@@ -104,9 +104,10 @@ class _GlareStep(ImageStep):
 
     def apply(self, signal: Signal, image: Image) -> Signal:
         """See `ImageStep`; the mean of a colour is that of the mosaic's pixels which see it."""
-        colours = [self.mosaic == channel for channel in range(3)]
-        planes = signal if len(signal) == 3 else np.repeat(signal, 3, 0)
-        veils = [self.share * float(p[c].mean()) for p, c in zip(planes, colours, strict=True)]
+        veils = np.zeros(3, np.float32)
+        for channel in np.unique(self.mosaic):
+            plane = signal[channel if len(signal) == 3 else 0]
+            veils[channel] = self.share * float(plane[self.mosaic == channel].mean())
         if len(signal) == 3:
-            return signal + np.array(veils, np.float32)[:, None, None]
-        return np.asarray(signal + np.array(veils, np.float32)[self.mosaic])
+            return signal + veils[:, None, None]
+        return np.asarray(signal + veils[self.mosaic])
