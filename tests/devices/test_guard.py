@@ -5,6 +5,7 @@ from __future__ import annotations
 import threading
 from collections.abc import Callable, Iterator
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -283,7 +284,7 @@ def test_rows_without_any_count_are_dark_where_a_black_picture_had_none_either(
     rig.camera.configure(10.0)
     cut = np.repeat([[9], [9], [9], [0]], 6, 1).astype(np.uint16)
     for pixels in (cut + 9, cut * 0, cut):
-        lab.act["snap"] = lambda pixels=pixels: replace(FRAME, pixels=pixels)
+        lab.act["snap"] = partial(replace, FRAME, pixels=pixels)
         np.testing.assert_array_equal(rig.camera.snap().pixels, pixels)
 
 
