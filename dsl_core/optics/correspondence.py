@@ -24,8 +24,11 @@ from dsl_core.optics.grating import FilmFrame, Vectors, incoming_direction
 from dsl_core.optics.pinhole import KEPT_PX, project, rays_at, rays_in
 from dsl_core.optics.sensor import bayer_channels
 
-#: Chebyshev nodes over the wavelength range; the interpolation error stays below 1e-3 px.
+#: Chebyshev nodes over the wavelength range. With 480 lines/mm and light of 415 to 675 nm, the interpolation
+#: is wrong by up to 0.04 px in first orders and 0.25 px in second ones.
 NODES = 6
+#: Beyond so many widths of the frame, light is close to grazing incidence, where no polynomial follows it.
+GRAZING = 10
 #: Steps that refine a triangulated depth.
 NEWTON_STEPS = 4
 #: Pixels solved at once.
@@ -244,7 +247,17 @@ class GratingModel:
             return _zero_footprint(self.rig, pixels, depth_mm, len(wavelengths_nm))
         nodes = chebyshev_nodes(*wavelength_range(wavelengths_nm))
         matrix = like(interpolation_matrix(nodes, wavelengths_nm), depth_mm)
-        return Footprint(*(matrix @ q for q in self.exact(pixels, depth_mm, order, nodes)))
+        at_nodes = self.exact(pixels, depth_mm, order, nodes)
+        seen = Footprint(*(matrix @ q for q in at_nodes))
+        width, height = self.rig.projector.width_px, self.rig.projector.height_px
+        grazing = (at_nodes.columns.abs() > GRAZING * width).any(0)
+        if bool(grazing.any()):
+            # Between such nodes the polynomial swings through the frame, where there is no light.
+            again = torch.nonzero(grazing & seen.inside(width, height, width).any(0)).ravel()
+            solved = self.exact(pixels[again], depth_mm[again], order, wavelengths_nm)
+            for found, right in zip(seen, solved, strict=True):
+                found[:, again] = right
+        return seen
 
 
 class HybridModel(GratingModel):

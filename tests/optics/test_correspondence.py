@@ -232,6 +232,21 @@ def test_wavelengths_are_interpolated_as_polynomials_through_chebyshev_nodes() -
     assert wavelength_range(np.array([550.0, 551.5])) == (550.0, 551.5)
 
 
+@pytest.mark.parametrize(("lines_per_mm", "order"), [(600.0, -2), (1000.0, 2), (1200.0, -1), (1400.0, 1)])
+def test_light_that_ends_at_grazing_incidence_does_not_come_from_inside_the_frame(
+    lines_per_mm: float, order: int
+) -> None:
+    rig = published_rig()
+    film = rig.film.model_copy(update={"lines_per_mm": lines_per_mm})
+    rig = rig.model_copy(update={"film": film, "camera": rig.camera.resized(56, 36)})
+    place = torch.arange(56 * 36), torch.full((56 * 36,), 700.0, dtype=torch.float64), order
+    size, nm = (rig.projector.width_px, rig.projector.height_px), np.arange(415.0, 676.0, 5.0)
+    model = GratingModel(rig)
+    traced, exact = model.trace(*place, nm), model.exact(*place, nm)
+    inside = traced.inside(*size)
+    assert bool(((traced.columns - exact.columns)[inside].abs() < 1).all())
+
+
 def test_light_comes_from_inside_the_frame_or_a_margin_left_and_right_of_it() -> None:
     columns = torch.tensor([-0.6, -0.4, 9.4, 9.6, 5.0, 5.0, 5.0, 5.0])
     rows = torch.tensor([2.0, 2.0, 2.0, 2.0, -0.6, -0.4, 7.4, 7.6])
