@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -182,18 +182,30 @@ def test_solver_prediction_and_graph_expect_the_same_frames(readers: Readers) ->
     traced = solver.trace(frames)
     shading = frames.known("shading")
     blur_px = demosaic_blur_px(columns_px(readers.column))
-    solved = solver.model.operator(traced, shading, blur_px).forward(nodes[:, None])[..., 0]
-    both = virtual.matrices.first[0] + virtual.matrices.zero[0]
-    predicted = (both @ nodes) * readers.shading
-    drawn = readers.graph(spectrum(GRID.centres_nm))
+
+    def expected(by_px: float, blur_px: float, orders: tuple[int, ...] | None = None) -> Tensor:
+        there = replace(traced, column_px=traced.column_px + by_px)
+        operator = solver.model.operator(there, shading, blur_px, orders)
+        return operator.forward(nodes[:, None])[..., 0]
+
+    solved, drawn = expected(0.0, blur_px), readers.graph(spectrum(GRID.centres_nm))
     tolerance = 1e-6 * float(solved.abs().max())
     assert np.abs(drawn - solved.numpy()).max() < tolerance
-    assert float((predicted - solved).abs().max()) < tolerance
     # First orders are a few percent of the zero order: alone, they agree as well.
-    first = solver.model.operator(traced, shading, blur_px, solver.model.orders)
-    alone = first.forward(nodes[:, None])[..., 0]
+    first = expected(0.0, blur_px, solver.model.orders)
     calm = (virtual.matrices.first[0] @ nodes) * readers.shading
-    assert float((calm - alone).abs().max()) < 1e-6 * float(alone.abs().max())
+    assert float((calm - first).abs().max()) < 1e-6 * float(first.abs().max())
+    # The solver has each sample of the mosaic at its own column; a colour that is shown is a mean of samples.
+    here, left, right = (
+        expected(by_px, 0.0) - expected(by_px, 0.0, solver.model.orders)
+        for by_px in (0.0, -PITCH_PX, PITCH_PX)
+    )
+    share = virtual.sideways[0, :, None]
+    predicted = (virtual.matrices.zero[0] @ nodes) * readers.shading
+    wanted = here + share * ((left + right) / 2 - here)
+    assert float((predicted - wanted).abs().max()) < tolerance
+    assert float(share.min()) == 0
+    assert float(share.max()) > 0.2
 
 
 class Seen(Exception):
