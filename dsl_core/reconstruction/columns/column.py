@@ -99,11 +99,12 @@ def refine(peaks: LinePeaks, model_error: float | None = None) -> Column:
     apart = (q - coarse_px).abs() > APART_PX
     is_loose = (std_px > LOOSE_PX) | (fit.beside < torch.where(apart, CLEAR_SIGMAS, SEEN_SIGMAS))
     saturated = peaks.saturated()
-    # Where lines are saturated the code is off by some columns: slopes alone say more.
-    loose = torch.nonzero(good & ~unusual & is_loose & ~saturated).ravel()
+    loose = torch.nonzero(good & ~unusual & is_loose).ravel()
     if single and len(loose):
-        scale = chi_square[loose].clip(min=1)
-        q[loose], std_px[loose] = loose_columns(peaks.some(loose), model_error, fit.amplitude[loose], scale)
+        scale, by_slopes = chi_square[loose].clip(min=1), q[loose]
+        q[loose], std = loose_columns(peaks.some(loose), model_error, fit.amplitude[loose], scale)
+        # Light that saturates lines may saturate the code as well, which is off by some columns then.
+        std_px[loose] = torch.where(saturated[loose], torch.maximum(std, (q[loose] - by_slopes).abs()), std)
     std_px = torch.where(good, std_px, torch.full_like(q, 1 / math.sqrt(12)))
     uneven_px = UNEVEN * torch.sqrt(chi_square / fit.information)
     std_px = torch.where(unusual & single, torch.maximum(std_px, uneven_px.clip(max=MOST_UNEVEN_PX)), std_px)

@@ -224,8 +224,8 @@ def test_rays_that_miss_the_column_have_no_depth() -> None:
     assert torch.isnan(found).all()
 
 
-def test_where_lines_are_saturated_their_slopes_count_more_than_the_code() -> None:
-    """Which may be off by two columns there."""
+def test_where_lines_are_saturated_columns_are_as_unsure_as_slopes_and_code_differ() -> None:
+    """The code may be off by two columns there."""
     apart = LineSet(width_px=5, step_px=5, first_px=2.0, lines=128, frames=128)
     column, _, _, _ = noisy(0.0)
     generator = torch.Generator().manual_seed(5)

@@ -222,7 +222,9 @@ def test_what_has_changed_may_have_changed_the_level_of_its_light_as_well(
     said = replace(right.followed, motion=perhaps)
     monkeypatch.setattr(spectra, "follow", lambda *_: said)
     found = solved(*scanned, as_calibrated=False)
-    bright = right.reflectance > 0.5
+    # The difference of larger deviations is lost in their last digits.
+    bright = (right.reflectance > 0.5) & (right.std < 0.1)
+    assert bright.any()
     more = np.sqrt(found.std[bright] ** 2 - right.std[bright] ** 2) / right.reflectance[bright]
     assert np.allclose(more, CHANGED_REL_STD, rtol=0.05)
     depth, flags = np.full((72, 112), 700.0), np.zeros((72, 112), np.uint16)

@@ -34,8 +34,11 @@ def sources(name: str, order: int = 1) -> Sources:
 def test_a_film_of_the_usual_shape_follows_the_grating_equation(order: int) -> None:
     seen = sources("plain", order)
     exact = GratingModel(RIG).exact(PIXELS, DEPTH, order, traced_nm())
-    assert (seen.columns - exact.columns[:, seen.active]).abs().max() < 2e-3
-    assert (seen.rows - exact.rows[:, seen.active]).abs().max() < 2e-3
+    # Beside the frame, where second orders go, places are of no use to anybody.
+    shown = exact.inside(RIG.projector.width_px, RIG.projector.height_px)[:, seen.active]
+    assert shown.any()
+    assert (seen.columns - exact.columns[:, seen.active])[shown].abs().max() < 5e-4
+    assert (seen.rows - exact.rows[:, seen.active])[shown].abs().max() < 5e-4
 
 
 def test_columns_between_traced_wavelengths_are_interpolated() -> None:
