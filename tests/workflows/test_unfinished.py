@@ -11,9 +11,7 @@ import numpy as np
 import pytest
 import torch
 
-from dsl_core import pipeline
 from dsl_core.capture.metering import WHITE_IN_DOUBT
-from dsl_core.devices.registry import open_rig
 from dsl_core.io import MANIFEST_NAME, staging
 from dsl_core.io.atomic import write_atomic
 from dsl_core.io.records import replace_record
@@ -24,7 +22,6 @@ from dsl_core.io.scan.lock import FolderLock
 from dsl_core.io.scan.manifest import read_manifest
 from dsl_core.io.scan.proof_file import PROOF_NAME, read_proof, save_proof
 from dsl_core.model.attributes import DOUBTS
-from dsl_core.model.presets import PRESETS
 from dsl_core.model.result_sink import Maps
 from dsl_core.model.scan_proof import ScanProof
 from dsl_core.pipeline import Options
@@ -39,16 +36,6 @@ from dsl_core.workflows.unfinished import (
 from tests.cases.stranger_folders import FOLDERS
 
 OPTIONS = Options(spectra=False, refine_columns=False, band_rows=16)
-
-
-@pytest.fixture(scope="module")
-def scan(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """To be copied, not changed."""
-    folder = tmp_path_factory.mktemp("scans") / "a.dsl"
-    with open_rig("twin", {"scene": "plane", "size": "48x32"}) as devices:
-        plan = next(p.plan for p in PRESETS if p.key == "quick")
-        pipeline.scan(devices, pipeline.fit_plan(plan, devices), folder)
-    return folder
 
 
 @pytest.fixture

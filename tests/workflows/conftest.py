@@ -1,4 +1,4 @@
-"""A scan of a small picture, for batches."""
+"""A scan of a small picture."""
 
 from __future__ import annotations
 
