@@ -196,18 +196,23 @@ def displacement(
     edges = np.append(centres - STEP_PX / 2, centres[-1] + STEP_PX / 2)
     log_likelihoods = [np.log(_named(centres, edge_px)) for edge_px in EDGES_PX]
     tried = centres[np.abs(centres) < MOST_PX - 0.5]
-    away = named_px - exact_px
     shifts, stds = np.full((2, groups), np.nan)
-    for each in range(groups):
-        seen, _ = np.histogram(away[group == each], edges)
+    for each, away in enumerate(_by_group(named_px - exact_px, group, groups)):
+        seen, _ = np.histogram(away, edges)
         if seen.sum() < FEWEST:
             continue
-        score = np.array([_correlated(seen.astype(np.float64), each, len(tried)) for each in log_likelihoods])
+        score = np.array([_correlated(seen.astype(np.float64), log, len(tried)) for log in log_likelihoods])
         weight = np.exp(score - score.max()).sum(0)
         weight /= weight.sum()
         shifts[each] = weight @ tried
         stds[each] = math.hypot(math.sqrt(float(weight @ (tried - shifts[each]) ** 2)), GROUP_STD_PX)
     return shifts, stds
+
+
+def _by_group(values: Floats, group: NDArray[np.integer], groups: int) -> list[Floats]:
+    """The values (n,) of each group."""
+    ends = np.cumsum(np.bincount(group, minlength=groups))
+    return np.split(values[np.argsort(group, kind="stable")], ends[:-1])
 
 
 def _gap_px(places_px: Floats) -> float:
@@ -246,7 +251,7 @@ def _of_columns(
     groups = int(group.max(initial=0)) + 1
     shift, std = displacement(code.column[usable], column, group, groups)
     # Neighbouring groups may have the same gap, so that it counts in full.
-    std = np.maximum(std, [_gap_px(column[group == each] + shift[each]) for each in range(groups)])
+    std = np.maximum(std, [_gap_px(places) for places in _by_group(column + shift[group], group, groups)])
     found = Disagreement.of(shift, std)
     if found is None:
         return None
