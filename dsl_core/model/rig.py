@@ -33,7 +33,7 @@ def _rising(given: tuple[float, float]) -> tuple[float, float]:
 
 
 def _of_light(curve: SpectralCurve) -> SpectralCurve:
-    """The curve, whose samples lie at light in nm and are below zero by noise alone."""
+    """The curve itself; raises ``ValueError`` if it covers no light, or is negative beyond noise."""
     first, last = curve.wavelengths_nm[0], curve.wavelengths_nm[-1]
     if first > LIGHT_NM[1] or last < LIGHT_NM[0]:
         raise ValueError(

@@ -22,7 +22,7 @@ from dsl_core.errors import DeviceError
 
 #: How long a pattern may take to be painted before the window counts as stuck, s.
 PAINT_TIMEOUT_S = 2.0
-#: How long screens may take to find their places when the desktop is arranged anew, ms.
+#: How long to wait for the screens to settle after the layout of the desktop has changed, ms.
 SETTLE_MS = 300
 #: What is said of a screen that can no longer be covered.
 LOST_SCREEN = (
