@@ -72,7 +72,8 @@ class ClassRow:
 
 
 def _deviation(std: float | None, digits: int) -> str:
-    return "" if std is None else f" ± {in_groups(std, digits)}"
+    # A deviation below the last digit is no zero.
+    return "" if std is None else f" ± {in_groups(max(std, 10.0**-digits), digits)}"
 
 
 def class_table(

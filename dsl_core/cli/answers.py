@@ -265,10 +265,10 @@ def _stds(spectrum: NamedSpectrum) -> list[float]:
 
 
 def _cells(spectrum: NamedSpectrum) -> list[str]:
+    from dsl_core.model.figure import with_std
+
     pairs = zip(spectrum.mean, _stds(spectrum), strict=True)
-    return [
-        "-" if mean != mean else f"{mean:.4f}{'' if std != std else f' ± {std:.4f}'}" for mean, std in pairs
-    ]
+    return ["-" if mean != mean else with_std(mean, std, 4) for mean, std in pairs]
 
 
 def colours(

@@ -107,8 +107,8 @@ def calibrate_camera_pictures(
     terms = zip(("k1", "k2", "p1", "p2", "k3"), lens.distortion, deviation.distortion, strict=True)
     output.table(
         ("camera", "value", "deviation"),
-        [(name.replace("_", " "), f"{value:.2f}", f"{std:.2f}") for name, value, std in values]
-        + [(name, f"{value:.4f}", f"{std:.4f}") for name, value, std in terms],
+        [(name.replace("_", " "), f"{value:.2f}", f"{std:.2g}") for name, value, std in values]
+        + [(name, f"{value:.4f}", f"{std:.2g}") for name, value, std in terms],
     )
     output.table(
         ("picture", "corners", "error px"),
@@ -180,13 +180,15 @@ def _bayer(text: str | None) -> BayerPattern | None:
 
 def print_geometry(output: Output, found: GeometryCalibration) -> None:
     """Lenses, poses and residuals, for a person."""
+    from dsl_core.model.figure import with_std
+
     lenses = (
         ("camera", found.camera, found.camera_deviation),
         ("projector", found.projector, found.projector_deviation),
     )
     names = ("fx_px", "fy_px", "cx_px", "cy_px")
     rows = [
-        (what, *(f"{getattr(lens, name):.2f} ± {getattr(deviation, name):.2f}" for name in names))
+        (what, *(with_std(getattr(lens, name), getattr(deviation, name), 2) for name in names))
         for what, lens, deviation in lenses
     ]
     if found.columns_only:
@@ -211,7 +213,7 @@ def print_geometry(output: Output, found: GeometryCalibration) -> None:
     )
     squares = found.squares
     output.say(
-        f"Squares {squares.square_mm:.3f} ± {squares.square_std_mm:.3f} mm, printed"
+        f"Squares {with_std(squares.square_mm, squares.square_std_mm, 3)} mm, printed"
         f" {found.board.square_mm:g} mm; planes to {found.shape_rms_share:.1e} of their distance."
     )
     for warning in found.warnings:
@@ -219,6 +221,8 @@ def print_geometry(output: Output, found: GeometryCalibration) -> None:
 
 
 def _row(pose: PoseQuality) -> tuple[object, ...]:
+    from dsl_core.model.figure import with_std
+
     unseen = "-" if pose.left_out is None else f"{pose.left_out.square_mm:.3f}"
     return (
         pose.name if pose.used else f"{pose.name} (left out)",
@@ -227,7 +231,7 @@ def _row(pose: PoseQuality) -> tuple[object, ...]:
         f"{pose.camera_rms_px:.3f}",
         f"{pose.projector_rms_px:.3f}",
         f"{pose.tilt_deg:.0f}°",
-        f"{pose.measured.square_mm:.3f} ± {pose.measured.square_std_mm:.3f}",
+        with_std(pose.measured.square_mm, pose.measured.square_std_mm, 3),
         f"{pose.measured.plane_rms_mm:.3f}",
         unseen,
     )

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from math import isfinite
 from typing import Literal
 
+from dsl_core.model.figure import with_std
 from dsl_core.model.frames import FrameSource
 from dsl_core.optics.additivity import Additivity, Telling, additivity, mixed_light, stripe_light
 from dsl_core.patterns.inverse_pairs import inverse_pairs, lone_stripes
@@ -80,7 +81,7 @@ def _judged(found: Additivity | None) -> Linearity:
     figure = found.figure
     if isfinite(found.exponent) and not found.is_linear:
         std = max(found.exponent_std, LEAST_STD)
-        figure += f"; light goes with the value to the power {found.exponent:.1f} ± {std:.1f}"
+        figure += f"; light goes with the value to the power {with_std(found.exponent, std, 1)}"
     if found.is_linear:
         return Linearity("linear", found, f"{LINEAR_WORDS}: {figure}")
     if found.is_srgb:

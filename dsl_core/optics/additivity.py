@@ -16,6 +16,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from dsl_core.model.figure import with_std
 from dsl_core.solve.normal import MEDIAN_OVER_MEAN_STD
 from dsl_core.solve.robust import robust_std
 
@@ -83,7 +84,9 @@ class Additivity:
         'fine stripes are, on average, 13.5 ± 0.5 % of the contrast brighter than half of white'
         """
         where, share = "brighter" if self.excess > 0 else "darker", 50 if self.alone else 100
-        off = f"{share * abs(self.excess):.1f} ± {share * self.excess_std:.1f} % of the contrast {where} than"
+        off = (
+            f"{with_std(share * abs(self.excess), share * self.excess_std, 1)} % of the contrast {where} than"
+        )
         if self.alone:
             return f"fine stripes are, on average, {off} half of white"
         return f"pattern and inverse together are {off} white and black together where stripes meet"

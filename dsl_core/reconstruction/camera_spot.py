@@ -19,6 +19,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from dsl_core.model.figure import with_std
 from dsl_core.model.fit import FitFinding
 from dsl_core.model.result import Flag
 from dsl_core.model.rig import Rig
@@ -246,7 +247,7 @@ def spot_finding(found: CameraSpot) -> FitFinding:
         (found.variance_px2, found.std_px2),
         "px2",
         SHARP_PX**2,
-        f"The camera is out of focus: its pixels see a spot of {found.rms_px:.2f} ± {found.rms_std_px:.2f} px"
-        " (rms). Depths along edges of brightness are corrected for it; spectra there are of both sides.",
+        f"The camera is out of focus: its pixels see a spot of {with_std(found.rms_px, found.rms_std_px, 2)}"
+        " px (rms). Depths along edges of brightness are corrected for it; spectra there are of both sides.",
         "Focus the camera on the object, or narrow its aperture.",
     )

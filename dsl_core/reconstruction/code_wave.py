@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from dsl_core.model.figure import with_std
 from dsl_core.model.fit import FitFinding, matters
 from dsl_core.model.rig import Rig
 from dsl_core.optics.lines.line_set import LineSet
@@ -82,7 +83,7 @@ class OwnWidth:
             (100 * self.wider, 100 * self._telling_std),
             "% of the width",
             100 * MOST_WIDER,
-            f"The light of lines is {100 * abs(self.wider):.0f} ± {100 * self.std:.0f} %"
+            f"The light of lines is {with_std(100 * abs(self.wider), 100 * self.std, 0)} %"
             f" {'wider' if self.wider > 0 else 'narrower'} than calibrated, as the binary code shows between"
             " them. The result follows it.",
             "If a flat matt target shows it, too, focus the projector as for its calibration, or calibrate"

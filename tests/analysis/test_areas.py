@@ -104,3 +104,9 @@ def test_thousands_of_a_table_are_no_decimal_commas() -> None:
     row = ClassRow("red", 1, 51308, 0.5, 21402.3, 1341.7, 1203.0)
     texts = [text.replace(chr(0xA0), " ") for text in (row.pixels_text, row.area_text)]
     assert texts == ["51 308 ± 1 342", "21 402 ± 1 203"]
+
+
+def test_a_deviation_below_the_last_digit_is_no_zero() -> None:
+    row = ClassRow("red", 1, 51308, 0.5, 98.0, 0.3, 0.02, 1e-5)
+    texts = [text.replace(chr(0xA0), " ") for text in (row.pixels_text, row.area_text, row.share_text)]
+    assert texts == ["51 308 ± 1", "98.0 ± 0.1", "50.0 ± 0.1 %"]

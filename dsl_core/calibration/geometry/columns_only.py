@@ -29,6 +29,7 @@ from dsl_core.calibration.geometry.plausible import OUTSIDE
 from dsl_core.calibration.geometry.projector_corners import INLIER_PX, PoseObservation, off_most
 from dsl_core.errors import CalibrationError
 from dsl_core.model.calibration.geometry import GeometryCalibration
+from dsl_core.model.figure import with_std
 from dsl_core.optics.parallax import LEAST_PX
 from dsl_core.solve.robust import robust_std
 
@@ -179,10 +180,10 @@ def columns_only_doubts(found: GeometryCalibration, poses: Sequence[PoseObservat
     ty, ty_std = found.pose.translation_mm[1], found.pose_deviation.translation_mm[1]
     sentences = [
         "Only columns of the projector were seen. Assumed of its rows: square pixels"
-        f" (fy {lens.fy_px:.0f} ± {deviation.fy_px:.0f} px), the axis in the middle"
-        f" (cy {lens.cy_px:.0f} ± {deviation.cy_px:.0f} px), and, as far as the lens does not tell, a"
-        f" projector as high as the camera (ty {ty:.0f} ± {ty_std:.0f} mm). Depth from columns does not need"
-        " them, but spectra through a film do: their error may be ten times as large. Project rows too"
+        f" (fy {with_std(lens.fy_px, deviation.fy_px, 0)} px), the axis in the middle"
+        f" (cy {with_std(lens.cy_px, deviation.cy_px, 0)} px), and, as far as the lens does not tell, a"
+        f" projector as high as the camera (ty {with_std(ty, ty_std, 0)} mm). Depth from columns does not"
+        " need them, but spectra through a film do: their error may be ten times as large. Project rows too"
         " before you measure spectra."
     ]
     if all(_gradient(each)[0] < 0 for each in poses):

@@ -19,6 +19,7 @@ from dsl_core.errors import CalibrationError
 from dsl_core.model.board import Board
 from dsl_core.model.calibration.geometry import GeometryCalibration, LeftOut, LensDeviation
 from dsl_core.model.calibration.pose_frames import PoseFrames
+from dsl_core.model.figure import with_std
 from dsl_core.model.geometry import Lens
 
 #: A pose is blurred when its edges are this many times as wide as those of the others, and so wide (px).
@@ -320,7 +321,7 @@ def doubts(found: GeometryCalibration, tilt_deg: float, baseline_mm: float | Non
 def _k3(lens: Lens, deviation: LensDeviation) -> str:
     """The term that is known least, in words; empty where it is held at zero."""
     std = deviation.distortion[4]
-    return f" (k3 {lens.distortion[4]:.2f} ± {std:.2f})" if std else ""
+    return f" (k3 {with_std(lens.distortion[4], std, 2)})" if std else ""
 
 
 def _most_corner_px(found: GeometryCalibration, lens: Lens) -> float:

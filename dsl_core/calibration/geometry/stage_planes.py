@@ -18,6 +18,7 @@ from dsl_core.calibration.geometry.bundle import CAMERA, PROJECTOR, SHARED, STER
 from dsl_core.calibration.geometry.solve import lens_of
 from dsl_core.errors import CalibrationError
 from dsl_core.model.calibration.geometry import GeometryCalibration
+from dsl_core.model.figure import with_std
 from dsl_core.model.geometry import Lens
 from dsl_core.model.rig import Rig
 from dsl_core.optics.pinhole import distort, rays_at
@@ -279,7 +280,7 @@ def require_agreement(pull: float, bow_mm: float, bow_std_mm: float, rise: float
         raise CalibrationError(
             f"The planes contradict the geometry calibration: it would have to move by {pull:.1f} of"
             f" its own standard deviations, {MAX_PULL:g} are allowed. Check that the target is flat: it seems"
-            f" to bulge towards the camera by {bow_mm:.2f} ± {bow_std_mm:.2f} mm over 300 mm. Compared with"
+            f" to bulge towards the camera by {with_std(bow_mm, bow_std_mm, 2)} mm over 300 mm. Compared with"
             f" the printed board, the stage's steps are {rise:.3f} times as long as reported: check both."
             " Calibrate the geometry again if the camera or projector has been touched since."
         )

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from dsl_core.calibration.orders.dispersion import widening
 from dsl_core.model.conditions import mosaic_colours
+from dsl_core.model.figure import with_std
 from dsl_core.model.rig import Rig
 from dsl_core.model.spectral import SpectralCurve
 from dsl_core.optics.filters import FINE_NM
@@ -153,7 +154,7 @@ def verdict(
     certain = abs(shift) - NOISE_SIGMAS * std
     if certain > WRONG_NM:
         return True, (
-            f"{name}: its first orders are where those of {found[0]:.0f} ± {std:.0f} nm should be."
+            f"{name}: its first orders are where those of {with_std(found[0], std, 0)} nm should be."
             " This is not the requested filter; put the right one in front of the camera and capture the step"
             " again"
         )
@@ -161,7 +162,7 @@ def verdict(
         why = "it may be tilted in the beam" if shift < 0 else "its curve is not the one assumed"
         return (
             False,
-            f"{name}: it passes wavelengths {abs(shift):.1f} ± {std:.1f} nm"
+            f"{name}: it passes wavelengths {with_std(abs(shift), std, 1)} nm"
             f" {'shorter' if shift < 0 else 'longer'} than it should; {why}",
         )
     return False, ""

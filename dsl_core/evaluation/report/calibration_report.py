@@ -156,8 +156,8 @@ def _film(rig: Rig) -> dict[str, str]:
         "Bend": f"{film.bend_per_mm:.5f} per mm",
         "Column uncertainty": f"{rig.column_std_px:.3f} px",
         "Gamma, black": f"{response.gamma:.3f}{tone}, {response.black_fraction:.5f}",
-        "White scale": f"{rig.white_scale:.4g} ± {100 * rig.white_scale_rel_std:.2f} %"
-        + (f", its white itself ± {100 * rig.reference_rel_std:.2f} %" if rig.reference_rel_std else ""),
+        "White scale": f"{rig.white_scale:.4g} ± {100 * rig.white_scale_rel_std:.2g} %"
+        + (f", its white itself ± {100 * rig.reference_rel_std:.2g} %" if rig.reference_rel_std else ""),
         "Depth range": "{:g} to {:g} mm".format(*rig.depth_range_mm),
         "Sensor": (
             f"black {rig.sensor.black_level_dn:.1f} DN, {rig.sensor.electrons_per_dn:.2f} e-/DN,"

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dsl_core.model.calibration.lateral_colour import SHARES, LateralColour
+from dsl_core.model.figure import with_std
 from dsl_core.model.fit import FitFinding
 from dsl_core.model.rig import Rig
 from dsl_core.optics.colour_neighbours import bayer_colours
@@ -188,8 +189,9 @@ def lateral_finding(found: LateralFit) -> FitFinding:
         limit=MOST_APART_PX,
         significant=found.present,
         sentence=(
-            f"Red and blue light of a line lie {found.apart_px:.4f} ± {found.apart_std_px:.4f} columns apart:"
-            " lenses magnify colours differently. Depth and spectra of this result are corrected for it."
+            f"Red and blue light of a line lie {with_std(found.apart_px, found.apart_std_px, 4)} columns"
+            " apart: lenses magnify colours differently. Depth and spectra of this result are corrected for"
+            " it."
         ),
         advice="Use lenses with less lateral colour, or the middle of the picture.",
     )

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from dsl_core.model.figure import with_std
 from dsl_core.model.fit import FitFinding
 from dsl_core.model.rig import ProjectorResponse
 from dsl_core.optics.spread.curves import density
@@ -60,7 +61,7 @@ def _field_finding(field: FieldFit) -> FitFinding:
         limit=100 * MOST_WIDER,
         significant=wider > MOST_WIDER and apart > SIGMAS * std,
         sentence=(
-            f"Lines are wider by {100 * wider:.1f} ± {100 * std * (1 + wider):.1f} % {here} of the measured"
+            f"Lines are wider by {with_std(100 * wider, 100 * std * (1 + wider), 1)} % {here} of the measured"
             f" part of the projector's frame than {there}: its lens spreads them so, or surfaces there are"
             " translucent or out of focus. The result follows it."
         ),
@@ -82,7 +83,7 @@ def _curve_finding(calibrated: ProjectorResponse, found: SpreadFit) -> FitFindin
         100 * elsewhere,
         "% of the light of a line elsewhere than calibrated",
         100 * MOST_ELSEWHERE,
-        f"Lines are spread over {own.blur_px:.3f} ± {found.rms_std_px:.3f} px (rms), by the projector's"
+        f"Lines are spread over {with_std(own.blur_px, found.rms_std_px, 3)} px (rms), by the projector's"
         f" calibration over {calibrated.blur_px:.3f} px; {elsewhere:.1%} of it falls elsewhere, and"
         f" {tails[1]:.1%} instead of {tails[0]:.1%} farther than {TAIL_PX:g} px away. The own spread"
         " of the scan was used.",

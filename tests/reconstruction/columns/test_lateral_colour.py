@@ -8,6 +8,7 @@ import torch
 
 from dsl_core import pipeline
 from dsl_core.model.calibration.lateral_colour import SHARES, LateralColour
+from dsl_core.model.figure import with_std
 from dsl_core.model.fit import Fit
 from dsl_core.model.plan import CapturePlan, GrayCode, ScanLines
 from dsl_core.model.rig import Rig
@@ -234,4 +235,4 @@ def test_lateral_colour_counts_where_it_matters(apart: float, std: float, presen
     assert found.present == present
     finding = lateral_finding(found)
     assert (finding.value, finding.std, finding.limit, finding.significant) == (apart, std, 0.004, present)
-    assert f"{apart:.4f} ± {std:.4f}" in finding.sentence
+    assert f" lie {with_std(apart, std, 4)} columns apart" in finding.sentence

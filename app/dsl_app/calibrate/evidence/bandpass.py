@@ -95,7 +95,7 @@ def _row(each: FilterSample, warnings: tuple[str, ...]) -> list[Cell]:
     own = [warning for warning in warnings if warning.startswith(f"the filter of {each.filter_nm:g} nm:")]
     found, off = "not found", ""
     if each.found_nm is not None:
-        spread = "" if each.found_std_nm is None else f" ± {each.found_std_nm:.1f}"
+        spread = "" if each.found_std_nm is None else f" ± {max(each.found_std_nm, 0.1):.1f}"
         found, off = f"{each.found_nm:.1f}{spread}", f"{each.found_nm - each.effective_nm:+.1f}"
     orders = [sample.order for sample in each.orders if sample.ratio > STANDS_OUT * sample.ratio_std]
     return [
@@ -120,7 +120,7 @@ def _second_orders(record: BandpassCalibration) -> str:
     share, std = 100 * record.second_order_share, 100 * record.second_order_share_std
     most = share + BAND_95 * std
     return (
-        f"Second orders: {share:.2f} ± {std:.2f} % of the first, at most {most:.2f} % (95 %)."
+        f"Second orders: {with_spread(share, std)} % of the first, at most {most:.2f} % (95 %)."
         f" Blur of the projector {with_spread(record.blur_px, record.blur_std_px)} px."
     )
 

@@ -24,7 +24,7 @@ from dsl_app.calibrate.evidence.charts import (
     draw_bars,
     draw_curves,
 )
-from dsl_app.calibrate.evidence.tables import Cell, NumberTable
+from dsl_app.calibrate.evidence.tables import Cell, NumberTable, with_spread
 from dsl_app.shared.widgets.forms import label, push_button, set_role
 from dsl_app.shared.widgets.layouts import boxed, column_of, row_of, tabs_of
 from dsl_app.shared.widgets.plots import RGB_COLOURS
@@ -234,7 +234,7 @@ class ColorCheckerEvidence(Evidence[ColorCheckerCalibration]):
                 share = 100 * view.measured[index]
                 white = np.array([patch.signal[c][-1] for c in range(3)]) / np.maximum(share, 1e-12)
                 std = np.array([patch.std[c][-1] for c in range(3)]) / np.maximum(white, 1e-12)
-                measured = [f"{value:.2f} ± {spread:.2f}" for value, spread in zip(share, std, strict=True)]
+                measured = [with_spread(value, spread) for value, spread in zip(share, std, strict=True)]
                 expected = " / ".join(f"{value:.1f}" for value in 100 * view.expected[index])
             held = 100 * patch.held_out
             rows.append(

@@ -261,7 +261,7 @@ def _film_rows(record: DepthStageCalibration, before: Film) -> list[list[Cell]]:
             name,
             (f"{getattr(before, field):.{digits}f}", "muted"),
             f"{getattr(record.film, field):.{digits}f}",
-            f"± {record.film_std[field]:.{digits}f}",
+            f"± {max(record.film_std[field], 10.0**-digits):.{digits}f}",
             (unit, "muted"),
         ]
         for name, field, unit, digits in FILM

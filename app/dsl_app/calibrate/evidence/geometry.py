@@ -11,7 +11,7 @@ from PySide6.QtWidgets import QGraphicsRectItem, QTableWidgetItem
 
 from dsl_app.calibrate.evidence.base import Evidence, side_by_side, stacked
 from dsl_app.calibrate.evidence.charts import BAR, DOT, Bars, ChartBox, draw_bars, like_a_picture
-from dsl_app.calibrate.evidence.tables import Cell, NumberTable
+from dsl_app.calibrate.evidence.tables import Cell, NumberTable, with_spread
 from dsl_app.shared.widgets.forms import label, push_button, quiet, set_role
 from dsl_app.shared.widgets.layouts import column_of, row_of
 from dsl_core.calibration.geometry.pose_series import CELLS, GOOD_RMS_PX, MIN_POSES
@@ -184,7 +184,7 @@ def _row(pose: PoseQuality) -> list[Cell]:
         f"{pose.projector_rms_px:.3f}",
         f"{pose.distance_mm:.0f}",
         f"{pose.tilt_deg:.0f}",
-        f"{pose.measured.square_mm:.3f} ± {pose.measured.square_std_mm:.3f}",
+        with_spread(pose.measured.square_mm, pose.measured.square_std_mm),
         f"{pose.measured.plane_rms_mm:.3f}",
         ("used", "good") if pose.used else ("does not fit the others", "bad"),
     ]

@@ -22,6 +22,7 @@ from dsl_core.analysis.at_bands import at_bands
 from dsl_core.analysis.colours import HEADER, ILLUMINANTS, Colour, colours_of, lights_for
 from dsl_core.errors import CalibrationError, DecodeError
 from dsl_core.model.attributes import stated_band_width_nm
+from dsl_core.model.figure import with_std
 from dsl_core.optics.colour import hold_colour
 
 EMPTY = "Pin pixels, mark regions or add references; their colours under a light are listed here."
@@ -144,6 +145,5 @@ def _value(value: float, std: float | None) -> str:
     """A figure to the second digit of its deviation, two places at most; without one if it is not known."""
     if std is None or math.isnan(std):
         return f"{value:.2f}".replace("-", "−")
-    places = 2 if std < 0.995 else 1 if std < 9.95 else 0
     # Thin spaces: five columns have to fit next to the picture.
-    return f"{value:.{places}f}{THIN}±{THIN}{std:.{places}f}".replace("-", "−")
+    return with_std(value, std, 2).replace(" ± ", f"{THIN}±{THIN}").replace("-", "−")

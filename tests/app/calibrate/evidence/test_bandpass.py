@@ -66,7 +66,7 @@ def test_filters_and_efficiency_are_shown_with_deviations(qtbot: QtBot, theme: T
     assert np.allclose(drawn[2], (0.04 + 1.96 * 0.01) * np.array(values))
     assert widget.warnings.text().startswith("The filter of 550 nm: its first orders")
     assert "3.96" not in widget.seconds.text()
-    assert "4.00 ± 1.00 % of the first, at most 5.96 % (95 %)" in widget.seconds.text()
+    assert "4.0 ± 1.0 % of the first, at most 5.96 % (95 %)" in widget.seconds.text()
 
 
 def test_without_doubts_no_warning_is_shown(qtbot: QtBot) -> None:

@@ -115,6 +115,7 @@ def test_figures_of_many_marks_are_whole_in_a_window_of_1280_px(qtbot: QtBot, be
     figures = ((41.0, 0.42), (-44.05, 0.85), (-44.05, 12.85), (20.37, 10.2))
     texts = [_value(*figure) for figure in figures]
     assert [text.replace(THIN, "") for text in texts] == ["41.00±0.42", "−44.05±0.85", "−44±13", "20±10"]
+    assert _value(41.0, 0.003).replace(THIN, "") == "41.00±0.01", "not zero"
     panel.table.show()
     panel.table.show_rows([(cell("pin 1"), *(cell(text, "", RIGHT) for text in texts)) for _ in range(40)])
     wide = sum(panel.table.columnWidth(column) for column in range(5))
