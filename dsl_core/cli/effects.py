@@ -44,6 +44,7 @@ def effects(
     json: Json = False,
 ) -> None:
     """Show which effects of light a scene needs, and why: how much each changes at most, and its cost."""
+    from dsl_core.capture.preflight import fit_plan
     from dsl_core.devices.registry import open_rig
     from dsl_core.model.plan import CapturePlan
     from dsl_core.simulation.effects.planner import describe
@@ -60,6 +61,8 @@ def effects(
     with open_rig("twin", with_effects(options, None, tolerance)) as rig:
         assert isinstance(rig.camera, SimCamera)
         world = rig.camera.world
+        # Exposures of a scan are whole cycles of the LEDs where the camera can.
+        captured = fit_plan(captured, rig)
         made = world.effect_plan(replace(world.request, settings=captured.settings))
     output.table(
         ("effect", "what it is", "changes at most", "cost per frame", "", "why"),

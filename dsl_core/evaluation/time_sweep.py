@@ -98,6 +98,12 @@ def require_sweep(points: Sequence[SweepPoint]) -> None:
 
 
 def best_points(points: Sequence[SweepPoint], figure: SweepFigure) -> list[int]:
-    """Numbers of the points that none beats in both seconds and this error, from quick to slow."""
-    known = [(i, error) for i, point in enumerate(points) if (error := point.error(figure)) is not None]
-    return [known[k][0] for k in front([(points[i].seconds, error) for i, error in known])]
+    """Numbers of the points that none beats in both seconds and this error, from quick to slow.
+
+    Of equal points all are named.
+    """
+    errors = [(i, point.error(figure)) for i, point in enumerate(points)]
+    known = {i: (points[i].seconds, error) for i, error in errors if error is not None}
+    pairs = list(known.values())
+    best = {pairs[k] for k in front(pairs)}
+    return sorted((i for i, pair in known.items() if pair in best), key=lambda i: known[i])

@@ -5,6 +5,7 @@ Plans to choose from are pattern sets of every kind times exposures in whole LED
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
@@ -63,9 +64,14 @@ def weigh(
     """Predict every plan that takes no longer than the budget.
 
     A ``store`` of the same rig, latency and view is asked first, and keeps what is new.
+    Raises `PlanError` where every plan takes longer.
     """
     progress = progress or NoProgress()
-    todo = [plan for plan in plans if budget_s is None or plan.duration_s(latency_ms) <= budget_s]
+    seconds = [(plan, plan.duration_s(latency_ms)) for plan in plans]
+    todo = [plan for plan, takes_s in seconds if budget_s is None or takes_s <= budget_s]
+    if budget_s is not None and seconds and not todo:
+        quickest, takes_s = min(seconds, key=lambda each: each[1])
+        raise _too_slow(budget_s, quickest, takes_s)
     found = []
     for done, plan in enumerate(todo, 1):
         expected = None if store is None else store.find(plan, peaks=False)
@@ -96,20 +102,28 @@ def choose(weighed: Sequence[Weighed], budget_s: float | None = None, error: flo
     Raises `PlanError` that says what could be had.
     """
     able = [each for each in weighed if budget_s is None or each.expected.seconds <= budget_s]
-    if not able:
-        raise PlanError(
-            f"No plan takes at most {budget_s:g} s on this rig. Allow more time, or lower its latency."
-        )
+    if budget_s is not None and not able:
+        quickest = min(weighed, key=lambda each: each.expected.seconds)
+        raise _too_slow(budget_s, quickest.plan, quickest.expected.seconds)
     best = min(able, key=lambda each: (each.expected.pixel_rmse, each.expected.seconds))
     if error is None:
         return best
     good = [each for each in able if each.expected.pixel_rmse <= error]
     if not good:
+        within = "" if budget_s is None else f" within {budget_s:g} s"
         raise PlanError(
-            f"No plan is expected to reach a reflectance error of {error:g}; the best,"
+            f"No plan is expected to reach a reflectance error of {error:g}{within}; the best,"
             f" {best.plan.name!r}, reaches {best.expected.pixel_rmse:.4f} in {best.expected.seconds:.0f} s."
         )
     return min(good, key=lambda each: (each.expected.seconds, each.expected.pixel_rmse))
+
+
+def _too_slow(budget_s: float, quickest: CapturePlan, takes_s: float) -> PlanError:
+    # Rounded up, as a budget of what is named here has to be enough.
+    return PlanError(
+        f"No plan takes at most {budget_s:g} s on this rig; the quickest, {quickest.name!r}, takes"
+        f" {math.ceil(10 * takes_s - 1e-6) / 10:g} s. Allow more time, or lower its latency."
+    )
 
 
 def candidate_plans(rig: Rig) -> Iterator[CapturePlan]:

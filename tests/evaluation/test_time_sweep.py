@@ -22,6 +22,11 @@ def test_best_is_what_no_quicker_scan_beats() -> None:
         require_sweep(points[:1])
 
 
+def test_of_equal_scans_all_are_best() -> None:
+    points = [SweepPoint(name, 10.0, depth_mm=1.0, reflectance=0.1) for name in ("one", "other")]
+    assert best_points([*points, SweepPoint("slow", 20.0, depth_mm=1.0)], DEPTH) == [0, 1]
+
+
 def test_every_error_says_how_sure_it_is() -> None:
     point = SweepPoint("good", 30.0, 0.3, 0.01, 0.02, 0.001)
     assert [point.words(figure) for figure in FIGURES] == ["0.300 ± 0.010", "0.0200 ± 0.0010", "–"]

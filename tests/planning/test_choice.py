@@ -61,8 +61,17 @@ def test_a_budget_gets_the_most_accurate_and_an_error_the_quickest() -> None:
 def test_what_cannot_be_had_is_refused_with_what_can() -> None:
     with pytest.raises(PlanError, match=r"'60 s', reaches 0\.0100"):
         choose(PLANS, error=0.001)
-    with pytest.raises(PlanError, match="at most 5 s"):
+    with pytest.raises(PlanError, match=r"at most 5 s on this rig; the quickest, '10 s', takes 10 s"):
         choose(PLANS, budget_s=5)
+    with pytest.raises(PlanError, match=r"error of 0\.01 within 40 s; the best, '30 s', reaches"):
+        choose(PLANS, budget_s=40, error=0.01)
+
+
+def test_plans_that_are_all_too_slow_are_not_predicted() -> None:
+    plan = CapturePlan()
+    told = rf"the quickest, '{plan.name}', takes {plan.duration_s(0.0):.0f} s"
+    with pytest.raises(PlanError, match=told):
+        weigh(published_rig(), [plan], budget_s=1.0)
 
 
 @pytest.mark.parametrize("text", ["", "soon", "-3s", "0", "nan"])

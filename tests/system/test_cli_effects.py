@@ -27,6 +27,20 @@ def test_effects_says_what_a_scene_needs(capsys: pytest.CaptureFixture[str]) -> 
     assert "with all effects" in text
 
 
+@pytest.mark.parametrize("scene", [["plane", "-O", "reflectance=0"], ["filters", "-O", "background=0"]])
+def test_black_materials_have_effects_too(scene: list[str], capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["effects", "--scene", *scene, *SMALL, "--json"]) == 0
+    found = {each["name"]: each for each in json.loads(capsys.readouterr().out)["effects"]}
+    assert (found["film-bend"]["bound_dn"] > 0) == (scene[0] == "filters")
+
+
+def test_leds_are_judged_by_the_exposures_of_a_scan(capsys: pytest.CaptureFixture[str]) -> None:
+    """A scan exposes for whole cycles of the LEDs, so their flashing changes nothing."""
+    assert main(["effects", "--scene", "plane", *SMALL, "-O", "led_cycle_hz=50", "--json"]) == 0
+    found = {each["name"]: each for each in json.loads(capsys.readouterr().out)["effects"]}
+    assert not found["led-cycle"]["on"]
+
+
 @pytest.mark.parametrize(
     ("arguments", "told"),
     [

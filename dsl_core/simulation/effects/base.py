@@ -237,6 +237,11 @@ class Limits:
         direct = (1 + self.halo) * self.white(reflectance, (0,))
         return np.asarray(direct + self.white(reflectance, orders))
 
+    def share(self, light: Floats, reflectance: Floats) -> float:
+        """Largest share of some light in all of it; where materials and colours are black, there is none."""
+        total = self.from_orders(reflectance, self.path.orders)
+        return float(np.divide(light, total, out=np.zeros_like(total), where=total > 0).max(initial=0.0))
+
     @cached_property
     def table(self) -> Floats:
         """Brightest colour of every material at unit shading, DN per ms, (materials,)."""

@@ -43,8 +43,8 @@ class SecondOrders(Effect):
         if not reaches(limits.path, SECOND):
             return limits.of_dn(0.0, "their columns are outside the projector's frame")
         reflectance = limits.path.truth.materials.at(NM)
-        share = limits.white(reflectance, SECOND) / limits.from_orders(reflectance, limits.path.orders)
-        return limits.of_share(float(share.max()), "their columns reach into the projector's frame")
+        share = limits.share(limits.white(reflectance, SECOND), reflectance)
+        return limits.of_share(share, "their columns reach into the projector's frame")
 
     def leave_out(self, path: LightPath) -> LightPath:
         """See `Effect`."""
@@ -90,8 +90,9 @@ class FilmShape(Effect):
             return limits.of_dn(0.0, "the film is ideal in this respect, or there is none")
         reflectance = path.truth.materials.at(NM)
         dispersed = limits.white(reflectance, (*FIRST, *SECOND))
-        share = dispersed / limits.from_orders(reflectance, path.orders)
-        return limits.of_share(float(share.max()), "it moves the columns of all dispersed light")
+        return limits.of_share(
+            limits.share(dispersed, reflectance), "it moves the columns of all dispersed light"
+        )
 
 
 class FilmBend(FilmShape):
