@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,7 +11,7 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from dsl_core.model.conditions import colour_sites
-from dsl_core.model.plan import CapturePlan
+from dsl_core.model.plan import Setting
 from dsl_core.model.rig import Rig, Sensor
 from dsl_core.optics.sensor import bayer_channels, bayer_colours, raw_variance
 from dsl_core.reconstruction.hdr import setting_gains_ms
@@ -32,10 +33,10 @@ class Bracket:
     sensor: Sensor
 
     @classmethod
-    def of(cls, rig: Rig, plan: CapturePlan) -> Bracket:
-        """The bracket of a plan on a rig."""
-        gains = setting_gains_ms(plan.settings, rig.projector_response).tolist()
-        return cls(tuple(gains), tuple(setting.exposure_ms for setting in plan.settings), rig.sensor)
+    def of(cls, rig: Rig, settings: Sequence[Setting]) -> Bracket:
+        """The bracket of settings on a rig."""
+        gains = setting_gains_ms(settings, rig.projector_response).tolist()
+        return cls(tuple(gains), tuple(setting.exposure_ms for setting in settings), rig.sensor)
 
     def floors(self, black: Tensor) -> Tensor:
         """Variance of a raw value of each setting's black frame, DN^2, (settings, ...)."""

@@ -134,7 +134,8 @@ class VirtualPixels:
         self.prior = Prior().at_step(grid.step_nm)
         self.shading = torch.as_tensor(view.shading, dtype=dtype)
         self.window_px = surface_window_px or default_window_px(rig)
-        self.bracket, self.direct_error = Bracket.of(rig, plan), zero_order_error(rig, plan)
+        self.bracket, self.direct_error = Bracket.of(rig, plan.settings), zero_order_error(rig, plan)
+        self.code_bracket = Bracket.of(rig, [plan.settings[i] for i in plan.code_settings])
         self.model = model_of_plan(rig, plan, grid, correspondence(rig))
         self.bands, lines = self.model.bands, self.model.lines
         near_px, far_px = unlit_px(rig, lines.width_px) if lines is not None else (0.0, 0.0)
@@ -371,17 +372,17 @@ class VirtualPixels:
         """Whether a virtual pixel gets a depth, (samples, spectra).
 
         White stands clear of the noise; and where the edge of a stripe is so near that both a pattern of
-        the code and its inverse saturate every setting, the refinement must find the column.
+        the code and its inverse saturate every setting of the code, the refinement must find the column.
         """
         own = self.own[:, None, None]
         whites = self._white(draw.nodes, (0,)), self._white(draw.nodes, ORDERS), draw.black[..., 0]
         direct, first, black = (
             white.gather(2, own.expand(-1, white.shape[1], 1))[..., 0] for white in whites
         )
-        noise = self.bracket.variance(direct, black).sqrt()
+        noise = self.code_bracket.variance(direct, black).sqrt()
         to_edge = 0.5 - (column_px - column_px.round()).abs()
         darker = torch.special.ndtr(-to_edge / self.rig.projector_response.blur_px)
-        unsure = ~torch.isfinite(self.bracket.variance(direct * darker + first / 2, black))
+        unsure = ~torch.isfinite(self.code_bracket.variance(direct * darker + first / 2, black))
         lit: Tensor = ((direct > LIT_SIGMAS * noise) | ~torch.isfinite(noise)) & (refined | ~unsure)
         return lit
 

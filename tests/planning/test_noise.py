@@ -35,15 +35,13 @@ def test_variance_is_that_of_the_merger(radiance: float, black_light: float) -> 
     ]
     merger = HdrMerger(gains, [BlackFrame(black, np.zeros_like(black)) for black in blacks], rig.sensor)
     merged = merger.merge(raws)
-    bracket = Bracket.of(rig, plan)
+    bracket = Bracket.of(rig, plan.settings)
     expected = float(bracket.variance(torch.tensor([radiance]), torch.tensor([black_light]))[0])
     assert expected == pytest.approx(float(merged.variance[0, 0]), rel=0.05)
 
 
 def test_saturation_everywhere_is_infinite_variance() -> None:
-    bracket = Bracket.of(
-        small_rig(), CapturePlan(settings=(Setting(exposure_ms=100, level=1),), code_settings=(0,))
-    )
+    bracket = Bracket.of(small_rig(), [Setting(exposure_ms=100, level=1)])
     assert torch.isinf(bracket.variance(torch.tensor([1000.0]), torch.zeros(1))).all()
 
 

@@ -52,6 +52,15 @@ def test_every_preset_has_an_error_that_is_a_number(preset: Preset) -> None:
 
 
 @pytest.mark.slow
+def test_a_code_that_only_an_overexposed_setting_shows_finds_fewer_pixels() -> None:
+    rig, both = published_rig(), plan(ScanLines(width_px=16, step_px=8))
+    view = plane_samples(rig, grid=(4, 2))
+    bright = both.model_copy(update={"code_settings": (1,)})
+    found = [predict(rig, each, view, peaks=False).coverage for each in (both, bright)]
+    assert found[1] < found[0] - 0.02
+
+
+@pytest.mark.slow
 def test_predictions_are_for_the_depths_that_the_rig_is_for() -> None:
     near = published_rig()
     assert near.usual_depth_mm == 700
