@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from dsl_core.errors import PlanError
 from dsl_core.model.result import SPECTRUM_INVALID
 from dsl_core.model.rig import Rig
+from dsl_core.model.spectral import WavelengthGrid
 from dsl_core.optics.correspondence import zero_order
 from dsl_core.optics.pinhole import rays_at
 from dsl_core.optics.sensor import relative_gain
@@ -28,6 +29,8 @@ GRID, LOOK_GRID = (8, 3), (12, 8)
 RIM = 0.04
 #: Of pictures of more pixels about so many are asked whether the projector lights them, spread over all.
 ASKED = 300_000
+#: Spectra of a look hardly change in so many nm beyond its bands.
+SHORT_NM = 20.0
 
 
 @dataclass(frozen=True)
@@ -85,6 +88,9 @@ def _of_plane(rig: Rig, depth_mm: float, pixels: NDArray[np.int64], lit_share: f
 def scene_samples(rig: Rig, result: xr.Dataset) -> SamplePixels:
     """Some pixels of a quick look at a scene, with the depth, shading and spectrum found there.
 
+    A look whose bands end far from those that plans are predicted for says nothing of the rest: references
+    stand in for its spectra.
+
     Raises `PlanError` when the look has no spectra, another size, or no valid pixel.
     """
     height, width = result["depth_mm"].shape
@@ -102,15 +108,15 @@ def scene_samples(rig: Rig, result: xr.Dataset) -> SamplePixels:
         raise PlanError("The quick look has no pixel with a spectrum. Scan again with more light.")
     pixels = _spread(valid, LOOK_GRID)
     depth = result["depth_mm"].values.ravel()[pixels].astype(np.float64)
-    return SamplePixels(
-        pixels,
-        depth,
-        result["shading"].values.ravel()[pixels].astype(np.float64),
-        _incidence(rig, _points(rig, pixels, depth)),
-        float(valid.mean()),
-        result["reflectance"].values.reshape(-1, valid.size)[:, pixels].T.astype(np.float64),
-        result["wavelength_nm"].values.astype(np.float64),
+    shade = result["shading"].values.ravel()[pixels].astype(np.float64)
+    found = SamplePixels(
+        pixels, depth, shade, _incidence(rig, _points(rig, pixels, depth)), float(valid.mean())
     )
+    nm, bands = result["wavelength_nm"].values.astype(np.float64), WavelengthGrid()
+    if max(nm.min() - bands.start_nm, bands.stop_nm - nm.max()) > SHORT_NM:
+        return found
+    spectra = result["reflectance"].values.reshape(-1, valid.size)[:, pixels].T.astype(np.float64)
+    return replace(found, spectra=spectra, wavelengths_nm=nm)
 
 
 def _inside(rig: Rig, depth_mm: float) -> tuple[NDArray[np.bool_], float]:

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+import xarray as xr
 from torch import Tensor
 
 from dsl_core.model.rig import FlatField, Rig
 from dsl_core.optics.correspondence import zero_order
 from dsl_core.optics.shading import Plane, plane_shading
-from dsl_core.planning.samples import plane_samples
+from dsl_core.planning.samples import plane_samples, scene_samples
 from dsl_core.simulation.published_rig import published_rig
 
 DEPTH_MM = 700.0
@@ -55,3 +56,22 @@ def test_samples_get_as_much_light_as_the_camera_s_lens_lets_through() -> None:
     even, found = (plane_samples(each) for each in (rig, rig.model_copy(update={"flat_field": field})))
     rows, columns = np.divmod(found.pixels, 160)
     assert found.shading == pytest.approx(even.shading * (0.2 + 0.4 * rows / 103 + 0.2 * columns / 159))
+
+
+@pytest.mark.parametrize(("bands", "its_own"), [(range(430, 661, 10), True), (range(450, 471, 2), False)])
+def test_spectra_of_a_look_stand_only_for_bands_that_it_has(bands: range, its_own: bool) -> None:
+    rig = published_rig()
+    rig = rig.model_copy(update={"camera": rig.camera.resized(16, 10)})
+    shape, nm = (10, 16), np.array(bands, float)
+    look = xr.Dataset(
+        {
+            "depth_mm": (("y", "x"), np.full(shape, DEPTH_MM)),
+            "shading": (("y", "x"), np.full(shape, 0.8)),
+            "flags": (("y", "x"), np.zeros(shape, np.uint32)),
+            "reflectance": (("wavelength_nm", "y", "x"), np.full((len(nm), *shape), 0.3)),
+        },
+        coords={"wavelength_nm": nm},
+    )
+    found = scene_samples(rig, look)
+    assert found.depth_mm == pytest.approx(DEPTH_MM)
+    assert (found.spectra is not None) == its_own
