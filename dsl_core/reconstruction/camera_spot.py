@@ -165,7 +165,8 @@ def fit_spot(
     (px) if it is of that shape, ``steps`` (2, rows, columns) those of columns from pixel to pixel, across and
     down.
     """
-    doubtful = int(Flag.NOT_REFINED | Flag.UNUSUAL_PEAK)
+    # Beside an edge of depth columns jump or bend by the surface, whatever the spot.
+    doubtful = int(Flag.NOT_REFINED | Flag.UNUSUAL_PEAK | Flag.DEPTH_EDGE)
     usable = np.isfinite(geometry.depth_mm) & ((geometry.flags & doubtful) == 0)
     seen = _Bends.of(np.where(usable, geometry.column_px, np.nan), geometry.column_std_px)
     # In a picture of two rows nobody knows how columns change across them.

@@ -9,6 +9,7 @@ import pytest
 import torch
 
 from dsl_core.model.plan import CapturePlan, LineComb
+from dsl_core.model.result import Flag
 from dsl_core.model.rig import Rig
 from dsl_core.optics.correspondence import triangulate, zero_order
 from dsl_core.optics.lines.line_set import LineSet
@@ -119,6 +120,24 @@ def test_spectra_are_of_the_place_that_a_pixel_sees() -> None:
     some = after.of_rows(slice(3, 9))
     assert some.seen_depth_mm is not None
     assert np.array_equal(some.seen_depth_mm, before.depth_mm[3:9])
+
+
+def test_edges_of_depth_tell_nothing_of_the_spot() -> None:
+    """The outline of a sphere before a wall made a sharp camera seem out of focus."""
+    before, _ = geometry(rig(), 0.0)
+    x = np.arange(COLUMNS)
+    beyond = np.broadcast_to((x > 25).astype(np.float32) + (x > 55), SHAPE)
+    near = np.broadcast_to(np.isin(x % 30, (24, 25, 26, 27)), SHAPE)
+    plain = replace(
+        before,
+        amplitude=(0.3 + 0.3 * beyond).astype(np.float32),
+        column_px=(before.column_px + 0.5 * np.isin(x % 30, (25, 26))).astype(np.float32),
+    )
+    told = replace(plain, flags=before.flags | np.where(near, int(Flag.DEPTH_EDGE), 0).astype(np.uint16))
+    found = [follow_spot(rig(), LINES, each)[1] for each in (plain, told)]
+    assert found[0] is not None
+    assert found[0].present
+    assert found[1] is None
 
 
 def test_pixels_that_see_a_point_and_other_patterns_change_nothing() -> None:
