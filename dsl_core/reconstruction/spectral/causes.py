@@ -162,6 +162,11 @@ def fit_causes(probe: Probe) -> Causes:
     design[:, 2:4, first : first + 2] = [[1.0, 0.5], [1.0, -0.5]]
     prior_std = np.r_[np.full(first, PRIOR_STD[0]), PRIOR_STD[2:LEADING]]
     prior_std[first : first + 2] *= [0.5**0.5, 2**0.5]
+    for order in np.flatnonzero(~probe.seen_orders):
+        # One order has nothing to differ from; its lines light bands one after another, so that a drift looks
+        # like a spectrum.
+        prior_std[_TERMS * order : _TERMS * (order + 1)] = NONE_STD
+        prior_std[[first + 1, -1]] = NONE_STD
     sums = CellSums.of(probe, design)
     fit = sums.fit(prior_std)
     displaced = explains_others(beside_curves(probe, design, prior_std), first)

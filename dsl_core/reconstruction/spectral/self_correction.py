@@ -72,8 +72,9 @@ def follow(scan: ProbedScan, as_calibrated: bool = False, rows_px: float | None 
         there = moved(model, more)
         after = probe(replace(scan, model=there))
         if after is None or not more.sure or not fits_better(found, after):
-            # Spectra that curve along wide bands displace the orders as well.
-            if motion is None and coarseness(found.step_nm) <= 1:
+            # Spectra that curve along wide bands displace the orders as well; and what displaces one order
+            # where there is no other can be more than a film.
+            if motion is None and coarseness(found.step_nm) <= 1 and found.seen_orders.all():
                 motion, doubt = replace(more, sure=False), (there, after)
             break
         model, found = there, after

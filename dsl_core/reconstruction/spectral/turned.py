@@ -140,14 +140,14 @@ def _fit(scan: ProbedScan, moved: GratingModel, of_film: Probe) -> Floats:
     nm = scan.model.bands.centres_nm[scan.model.bands.reported][[0, -1]]
     kind = type(scan.model.correspondence)
     assert issubclass(kind, GratingModel)
-    wanted = _columns(moved, pixels, depth, nm)
+    wanted = _columns(moved, pixels, depth, nm)[of_film.seen_orders]
     width = scan.model.rig.projector.width_px
     shown = (wanted > 0) & (wanted < width - 1)
 
     def left(changes: Floats) -> Floats:
         rig = with_pose(scan.model.rig, changes)
         here = _columns(kind(rig), pixels, triangulate(rig, pixels, column)[0], nm)
-        return np.asarray(wanted - here)
+        return np.asarray(wanted - here[of_film.seen_orders])
 
     changes = np.zeros(len(STEPS))
     for _ in range(ROUNDS):

@@ -199,3 +199,20 @@ def test_a_response_that_is_off_is_more_so_far_from_where_it_was_measured() -> N
     assert common_error(probe, replace(quiet, common_std=0.02)) == 0
     assert common_error(probe, replace(quiet, gain=np.array([0.014, 0.014]))) == 0
     assert common_error(probe, replace(quiet, explained=(1.0, 0.1, 1.0, 1.0, 1.0))) == 0
+
+
+def test_of_one_order_nothing_is_asked_that_takes_two() -> None:
+    """What noise asks of a drift or of an order that is not there made depth ten times as unsure."""
+    probe = probe_of()
+    minus = [PARAMETERS.index(name) for name in ("shift -1", "gain -1", "stretch -1")]
+    normal, score = probe.normal.copy(), probe.score.copy()
+    normal[:, minus], normal[:, :, minus], score[:, minus] = 0.0, 0.0, 0.0
+    one = replace(probe, normal=normal, score=score)
+    assert one.seen_orders.tolist() == [True, False]
+    found = fit_causes(one)
+    assert np.abs(found.shift_px[:, 1]).max() < 1e-6
+    assert found.shift_px[:, 0] == pytest.approx(probe.score[:, 0] / INFORMATION, abs=1e-4)
+    assert found.gain == pytest.approx([0.03, 0.03], abs=1e-4)
+    assert not found.drifts
+    assert not found.unequal
+    assert probe.seen_orders.all()

@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from dsl_core.model.rig import BayerPattern
+from dsl_core.optics.lines.reach import LEAST_SENT
 from dsl_core.optics.spectra import ORDERS
 from dsl_core.optics.spread.field import widths_at
 from dsl_core.reconstruction.spectral.probing.colour_gains import ColourGains, colour_gains
@@ -109,6 +110,13 @@ class Probe:
         """
         even = np.zeros(len(self.pixel), bool) if self.uneven is None else self.uneven < EVEN
         return float(np.median(self.chi_square[even] if even.sum() >= FEWEST else self.chi_square))
+
+    @cached_property
+    def seen_orders(self) -> NDArray[np.bool_]:
+        """Which of `ORDERS` (2,) frames tell of: a film may have one only, or send one out of the frame."""
+        gains = [PARAMETERS.index("gain +1"), PARAMETERS.index("gain -1")]
+        known = np.nan_to_num(self.normal[:, gains, gains]).sum(0)
+        return np.asarray(known > LEAST_SENT**2 * known.max())
 
     @cached_property
     def sound(self) -> NDArray[np.bool_]:
