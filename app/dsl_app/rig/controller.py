@@ -28,8 +28,6 @@ NO_CAMERA = "No camera is connected. Connect a rig first."
 LOST_AFTER = 3
 #: Shortest time between two live frames, s: without it, the simulated rig would keep a core busy.
 LIVE_PERIOD_S = 1 / 30
-#: A frame belongs to the requested exposure if its own differs by less than this share: cameras round.
-SAME_EXPOSURE = 0.02
 #: Drive level of a dimmed picture over the one before, and the lowest worth trying.
 DIMMER, LEAST_LEVEL = 0.7, 0.05
 #: Live frames that may be on their way when the picture changes.
@@ -49,7 +47,8 @@ class LiveController:
     def __init__(self, rig: RigController, notifier: Notifier) -> None:
         self.rig, self.state, self._notifier = rig, LiveState(), notifier
         self._lock = threading.Lock()
-        self._latest: tuple[Frame, Drawn | None] | None = None
+        #: The newest frame, the exposure that was requested for it, ms, and its picture.
+        self._latest: tuple[Frame, float, Drawn | None] | None = None
         self._counts = FrameCounts()
         #: The devices that were exposed for since they were connected.
         self._looked_at: DeviceRig | None = None
@@ -119,10 +118,10 @@ class LiveController:
         with self._lock:
             latest, self._latest = self._latest, None
         if latest is not None:
-            frame, self.state.drawn = latest
+            frame, requested_ms, self.state.drawn = latest
             self.state.frame.set(frame)
             self.state.counts.set(self._counts)
-            self._exposer.judge(frame)
+            self._exposer.judge(frame, requested_ms)
 
     def _look(self, devices: DeviceRig, progress: Progress) -> None:
         lost, self._counts = 0, FrameCounts()
@@ -131,7 +130,8 @@ class LiveController:
             progress.report("", self._counts.shown, 0)
             start = time.monotonic()
             try:
-                devices.camera.configure(self.state.exposure_ms.value)
+                requested_ms = self.state.exposure_ms.value
+                devices.camera.configure(requested_ms)
                 frame = devices.camera.snap()
             except DeviceError:
                 lost += 1
@@ -140,16 +140,16 @@ class LiveController:
                     raise
                 continue
             lost = 0
-            self._post(frame)
+            self._post(frame, requested_ms)
             time.sleep(max(LIVE_PERIOD_S - (time.monotonic() - start), 0))
 
-    def _post(self, frame: Frame) -> None:
+    def _post(self, frame: Frame, requested_ms: float) -> None:
         """Keep a frame and its picture for `fetch_frame`; one that was not fetched meanwhile is skipped."""
         draw = self.state.draw.value
         drawn = None if draw is None else (draw, draw(frame.pixels))
         with self._lock:
             skipped = int(self._latest is not None)
-            self._latest = frame, drawn
+            self._latest = frame, requested_ms, drawn
         counts = self._counts
         self._counts = replace(counts, shown=counts.shown + 1 - skipped, skipped=counts.skipped + skipped)
 
@@ -269,10 +269,13 @@ class AutoExposer:
         self._state.is_exposing.set(True)
         self._set(search.start_from(self._state.exposure_ms.value))
 
-    def judge(self, frame: Frame) -> None:
-        """Take a frame into account, unless it was exposed before the exposure was changed."""
-        search, asked_ms = self._search, self._state.exposure_ms.value
-        if search is None or abs(frame.exposure_ms - asked_ms) > SAME_EXPOSURE * asked_ms:
+    def judge(self, frame: Frame, requested_ms: float) -> None:
+        """Take a frame into account, unless it was exposed before the exposure was changed.
+
+        Which one was requested tells, not the frame's own: a camera may round by some per cent.
+        """
+        search = self._search
+        if search is None or requested_ms != self._state.exposure_ms.value:
             return
         if self._stale:
             self._stale -= 1
@@ -281,8 +284,7 @@ class AutoExposer:
         if self._region is not None:
             x, y, width, height = self._region
             pixels = pixels[y : y + height, x : x + width]
-        # The number box rounds: the search continues from the exposure that was requested.
-        following_ms = search.judge(pixels, asked_ms)
+        following_ms = search.judge(pixels, requested_ms)
         if not search.is_over:
             self._set(following_ms)
             return
@@ -297,7 +299,7 @@ class AutoExposer:
         elif search.trouble:
             self._notifier.tell("warning", search.trouble)
         else:
-            self._tell_found(asked_ms, search.share)
+            self._tell_found(requested_ms, search.share)
 
     def _tell_found(self, exposure_ms: float, share: float) -> None:
         text = f"Exposed for {exposure_text(exposure_ms)} at intensity {self._state.level.value:.2f}"

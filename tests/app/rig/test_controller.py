@@ -18,10 +18,11 @@ from dsl_app.shared.jobs.qt_runner import QtRunner
 from numpy.typing import NDArray
 from pytestqt.qtbot import QtBot
 
-from dsl_core.errors import DeviceError
+from dsl_core.capture.auto_exposure import MOST_FRAMES
+from dsl_core.errors import Cancelled, DeviceError
 from dsl_core.model.frames import Frame
 from dsl_core.patterns.trial_pictures import PictureKind
-from dsl_core.progress import NoProgress
+from dsl_core.progress import CallbackProgress, NoProgress
 from dsl_core.simulation.sim_devices import SimCamera, SimProjector
 from tests.app.support.doubles import InlineRunner, RecordingNotifier
 
@@ -192,6 +193,30 @@ def test_one_click_exposes_for_whole_cycles_of_what_the_camera_sees(qtbot: QtBot
     live.stop()
 
 
+def test_the_search_ends_on_a_camera_that_rounds_exposures(monkeypatch: pytest.MonkeyPatch) -> None:
+    live, notifier = controller()
+    live.rig.connect(TWIN)
+    devices = live.rig.state.devices.value
+    assert devices is not None
+    configure = devices.camera.configure
+    # By up to 5 %, as the conformance test lets it: 33.3 ms become 32.
+    monkeypatch.setattr(devices.camera, "configure", lambda ms: configure(4.0 * max(round(ms / 4.0), 1)))
+    monkeypatch.setattr("dsl_app.rig.controller.LIVE_PERIOD_S", 0.0)
+    live.set_exposure(100 / 3)
+    live.show("white", 0.2)
+    live._exposer.begin(None)
+
+    def fetch(_stage: str, done: int, _total: int) -> None:
+        live.fetch_frame()
+        if not live.state.is_exposing.value or done > 2 * MOST_FRAMES:
+            raise Cancelled("enough")
+
+    with pytest.raises(Cancelled):
+        live._look(devices, CallbackProgress(fetch))
+    assert not live.state.is_exposing.value
+    assert notifier.told[-1][1].startswith("Exposed for")
+
+
 def test_a_search_for_the_exposure_ends_with_the_live_view(qtbot: QtBot, start: Start) -> None:
     live, _, runner = start()
     live.expose_automatically(None)
@@ -207,7 +232,7 @@ def expose_in(live: LiveController, dn_per_ms: float) -> None:
     while live.state.is_exposing.value:
         exposure_ms = live.state.exposure_ms.value
         level = min(200 + dn_per_ms * exposure_ms, 4095)
-        live._exposer.judge(Frame(np.full((8, 8), level, np.uint16), exposure_ms, 0.0, 1))
+        live._exposer.judge(Frame(np.full((8, 8), level, np.uint16), exposure_ms, 0.0, 1), exposure_ms)
 
 
 @pytest.mark.parametrize(
@@ -247,7 +272,7 @@ def test_a_dim_scene_is_exposed_for_and_what_would_light_it_is_said(picture: Pic
 def test_frames_that_were_not_fetched_are_counted_as_skipped() -> None:
     live, _ = controller()
     for number in range(3):
-        live._post(Frame(np.zeros((4, 4), np.uint16), 10.0, frame_id=number))
+        live._post(Frame(np.zeros((4, 4), np.uint16), 10.0, frame_id=number), 10.0)
     live.fetch_frame()
     assert live.state.counts.value == FrameCounts(shown=1, lost=0, skipped=2)
     frame = live.state.frame.value
