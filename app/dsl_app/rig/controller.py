@@ -50,7 +50,7 @@ class LiveController:
         #: The newest frame, the exposure that was requested for it, ms, and its picture.
         self._latest: tuple[Frame, float, Drawn | None] | None = None
         self._counts = FrameCounts()
-        #: The devices that were exposed for since they were connected.
+        #: The devices that were exposed for since they were connected, or are being.
         self._looked_at: DeviceRig | None = None
         #: What the panel names before anything is chosen on it.
         self._picture: Picture = KINDS[0], LEVEL, 0
@@ -63,10 +63,9 @@ class LiveController:
         rig.state.live.changed.connect(self._live_changed)
 
     def _devices_changed(self, devices: DeviceRig | None) -> None:
-        # A twin of full size that nobody uses any more would keep 180 MB of its scene.
-        if devices is not self._looked_at:
-            self._looked_at = None
         self.set_exposure(self.state.exposure_ms.value)
+        # A twin of full size that nobody uses any more would keep 180 MB of its scene.
+        self._looked_at = None
 
     # Live view -------------------------------------------------------------------------------------
 
@@ -111,6 +110,9 @@ class LiveController:
 
     def _live_changed(self, is_live: bool) -> None:
         if not is_live:
+            if self.state.is_exposing.value:
+                # What a search that was cut off leaves suits nothing: the next look searches again.
+                self._looked_at = None
             self._exposer.end()
 
     def fetch_frame(self) -> None:
@@ -170,6 +172,9 @@ class LiveController:
         if camera is not None:
             low, high = camera.exposure_range_ms
             exposure_ms = min(max(exposure_ms, low), high)
+        if not self.state.is_exposing.value:
+            # What a person sets is not searched for again.
+            self._looked_at = self.rig.state.devices.value
         self.state.exposure_ms.set(exposure_ms)
 
     # Projector -------------------------------------------------------------------------------------

@@ -342,7 +342,7 @@ class RigPage(PageWidget):
             self._traits.read()
         looks_again, self._looks_again = self._looks_again, False
         if looks_again and self._state.link.value is Link.OPEN and not self._state.used_by.value:
-            self._commands.start()
+            self._commands.look()
 
     def release(self) -> None:
         """Stop the live view and follow nothing more."""

@@ -82,7 +82,13 @@ def test_showing_without_a_rig_says_what_to_do() -> None:
     assert len(notifier.told) == 3
 
 
-def test_a_live_view_lights_the_scene_and_is_exposed_for_it_once(monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize(
+    ("is_cut_off", "is_set_by_hand", "searches_again"),
+    [(False, False, False), (True, False, True), (True, True, False)],
+)
+def test_a_live_view_lights_the_scene_and_is_exposed_for_it_once(
+    monkeypatch: pytest.MonkeyPatch, is_cut_off: bool, is_set_by_hand: bool, searches_again: bool
+) -> None:
     live, _ = controller()
     live.rig.connect(TWIN)
     shown: list[object] = []
@@ -96,8 +102,12 @@ def test_a_live_view_lights_the_scene_and_is_exposed_for_it_once(monkeypatch: py
     for _ in range(2):
         live.look()
         exposes.append(live.state.is_exposing.value)
+        if not is_cut_off:
+            live._exposer.end()
         live.rig.state.live.set(False)
-    assert exposes == [True, False], "an exposure that was set by hand stays"
+        if is_set_by_hand:
+            live.set_exposure(50.0)
+    assert exposes == [True, searches_again], "an exposure that was set by hand stays"
     assert shown == [live._picture] * 2
 
 

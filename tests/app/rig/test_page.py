@@ -140,6 +140,21 @@ def test_the_camera_rests_while_another_page_is_open(qtbot: QtBot, bench: Bench)
     assert not state.live.value
 
 
+def test_a_search_for_the_exposure_that_was_left_is_made_on_return(qtbot: QtBot, bench: Bench) -> None:
+    page, state, _, notifier = bench
+    connect(qtbot, page, state)
+    qtbot.waitUntil(lambda: page._live_state.is_exposing.value, timeout=90_000)
+    page.hide()
+    qtbot.waitUntil(lambda: not state.live.value)
+    assert not notifier.told
+    page.show()
+    qtbot.waitUntil(lambda: bool(notifier.told), timeout=90_000)
+    assert notifier.told[-1][1].startswith("Exposed for ")
+    frame = page._live_state.frame.value
+    assert frame is not None
+    assert np.quantile(frame.pixels, 0.99) < 4095
+
+
 def test_a_wrong_option_is_told_on_the_page(qtbot: QtBot, bench: Bench) -> None:
     page, _, _, notifier = bench
     page.options.text.setText("scene=moon")
