@@ -32,6 +32,14 @@ FETCH_MS = 15
 SIDE_PX, WIDE_SIDE_PX, WIDEST_SIDE_PX = 268, 440, 640
 
 
+class ExposureBox(NumberBox):
+    """An exposure in steps of whole LED cycles, from the nearest: steps from what is rounded would add up."""
+
+    def stepBy(self, steps: int) -> None:
+        """Go to the whole number of cycles that is so many steps away."""
+        self.setValue((round(self.value() / self.singleStep()) + steps) * self.singleStep())
+
+
 class RigPage(PageWidget):
     """Follows the states of rig and live view; ``selftest_requested`` asks for the self-test's wizard.
 
@@ -77,9 +85,8 @@ class RigPage(PageWidget):
             "Open the Scan page, which says how long a scan of this scene takes",
             self.scan_requested,
         )
-        low, high = 0.01, 30_000.0
-        self.exposure = NumberBox(
-            "Exposure", low, high, live.state.exposure_ms.value, "ms", 2, "Exposure of live frames"
+        self.exposure = ExposureBox(
+            "Exposure", 0.01, 30_000.0, live.state.exposure_ms.value, "ms", 2, "Exposure of live frames"
         )
         self.auto = push_button(
             "&Auto exposure",

@@ -10,7 +10,7 @@ from dsl_app.connection.state import Link, RigChoice, RigState
 from dsl_app.rig.controller import LiveController
 from dsl_app.rig.options_form import parse_options
 from dsl_app.rig.page import RigPage
-from dsl_app.rig.state import LOST_PICTURE, NO_RIG, WAITING
+from dsl_app.rig.state import LOST_PICTURE, NO_RIG, WAITING, cycles_text
 from dsl_app.shared.jobs.qt_runner import QtRunner
 from dsl_app.shared.theme import LIGHT
 from PySide6.QtCore import QPoint, QPointF, Qt
@@ -215,6 +215,22 @@ def test_the_wheel_changes_nothing_without_focus(qtbot: QtBot, bench: Bench) -> 
     )  # fmt: skip
     QApplication.sendEvent(page.exposure, wheel)
     assert page.exposure.value() == before
+
+
+@pytest.mark.parametrize("cycle_ms", [1000 / 60, 16.6683, 1000 / 24])
+def test_steps_of_the_exposure_stay_on_whole_cycles(
+    bench: Bench, monkeypatch: pytest.MonkeyPatch, cycle_ms: float
+) -> None:
+    page, _, _, _ = bench
+    box = page.exposure
+    monkeypatch.setattr(RigState, "cycle_ms", cycle_ms)
+    box.setValue(10 * cycle_ms + 1)
+    shown = []
+    for step in 8 * [box.stepUp] + 12 * [box.stepDown]:
+        step()
+        shown.append(cycles_text(page._live_state.exposure_ms.value, cycle_ms))
+    cycles = [*range(11, 19), *range(17, 5, -1)]
+    assert shown == [f"{each} LED cycles" for each in cycles]
 
 
 def test_the_page_names_its_command(bench: Bench) -> None:
