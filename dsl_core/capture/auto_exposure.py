@@ -26,7 +26,7 @@ class ExposureSearch:
     """Judges frames and says how long to expose the next one, until it is `found` or there is `trouble`.
 
     Exposures are whole cycles of ``cycle_ms``, so that each holds all colours of a projector that flashes
-    them one after the other; None leaves them free.
+    them one after the other; None leaves them free, and so does a range that holds no whole cycle.
     """
 
     def __init__(
@@ -37,10 +37,16 @@ class ExposureSearch:
         black_level_dn: float = 0.0,
     ) -> None:
         """``range_ms`` is what the camera can do, and what a person would wait for."""
-        self._cycle_ms = cycle_ms
-        low, high = range_ms
-        self._low = math.ceil(low / cycle_ms) * cycle_ms if cycle_ms else low
-        self._high = max(self._whole(high), self._low)
+        self._cycle_ms: float | None = None
+        self._low, self._high = range_ms
+        if cycle_ms:
+            # A hair of rounding does not cost a cycle.
+            first = max(math.ceil(self._low / cycle_ms - 1e-6), 1)
+            last = math.floor(self._high / cycle_ms + 1e-6)
+            if first <= last:
+                self._cycle_ms = cycle_ms
+                # Beyond its range the camera would not follow, by a hair either.
+                self._low, self._high = max(first * cycle_ms, self._low), min(last * cycle_ms, self._high)
         self._full, self._black = full_scale_dn, black_level_dn
         self._judged = 0
         self.found = False
@@ -108,4 +114,4 @@ class ExposureSearch:
         if not self._cycle_ms:
             return exposure_ms
         # A hair of rounding does not cost a cycle.
-        return max(math.floor(exposure_ms / self._cycle_ms + 1e-6), 1) * self._cycle_ms
+        return math.floor(exposure_ms / self._cycle_ms + 1e-6) * self._cycle_ms

@@ -152,8 +152,25 @@ def test_exposures_are_whole_cycles_within_the_range() -> None:
         30,
         40,
     ]
-    assert ExposureSearch((12.0, 15.0), 1000, 10.0).start_from(1.0) == 20.0
-    assert ExposureSearch((1.0, 2.0), 1000, 10.0)._whole(0.5) == 10.0
+    # Where the range holds no whole cycle, the camera could follow none.
+    assert ExposureSearch((12.0, 15.0), 1000, 10.0).start_from(1.0) == 12.0
+    assert ExposureSearch((1.0, 2.0), 1000, 10.0).start_from(1.5) == 1.5
+    # Nor does it go beyond its range by a hair.
+    assert ExposureSearch((20.0 + 1e-9, 50.0 - 1e-9), 1000, 10.0).start_from(1.0) == 20.0 + 1e-9
+    assert ExposureSearch((20.0 + 1e-9, 50.0 - 1e-9), 1000, 10.0).start_from(99.0) == 50.0 - 1e-9
+
+
+@pytest.mark.parametrize("dn_per_ms", [50.0, 150.0, 3000.0])
+@pytest.mark.parametrize("longest_ms", [30.0, 3 * CYCLE_MS - 1e-9])
+def test_a_camera_of_short_exposures_finds_one_in_steady_light(dn_per_ms: float, longest_ms: float) -> None:
+    snap = scene(dn_per_ms)
+    assert callable(snap)
+    search = ExposureSearch((0.05, longest_ms), FULL, 1000 / 24 if longest_ms == 30 else CYCLE_MS, 200.0)
+    # The camera's limits apply to whatever is asked of it.
+    exposure_ms = min(search.start_from(16.7), longest_ms)
+    while not search.is_over:
+        exposure_ms = min(max(search.judge(snap(exposure_ms), exposure_ms), 0.05), longest_ms)
+    assert "changes" not in search.trouble
 
 
 def test_too_much_light_is_told_from_too_little() -> None:
