@@ -301,10 +301,12 @@ class RigPage(PageWidget):
         if self.live.made is not None:
             self.live.made.set_camera(camera, self._full_scale_dn)
         self.projector.set_projector(self._state.projector)
-        self._show_exposure(self._live_state.exposure_ms.value)
         if camera is not None:
-            self.exposure.setRange(*camera.exposure_range_ms)
-
+            with quiet(self.exposure):
+                # Shown to a tenth of the shortest exposure.
+                self.exposure.fit(0.0, 10 * camera.exposure_range_ms[0], 2)
+                self.exposure.setRange(*camera.exposure_range_ms)
+        self._show_exposure(self._live_state.exposure_ms.value)
         if self._traits is not None and self.isVisible():
             self._traits.read()
 
@@ -313,7 +315,7 @@ class RigPage(PageWidget):
         self.traits.setVisible(bool(words))
 
     def _show_exposure(self, exposure_ms: float) -> None:
-        # The box shows two decimals; the state keeps the exact value.
+        # The box rounds; the state keeps the exact value.
         with quiet(self.exposure):
             self.exposure.setValue(exposure_ms)
             self.exposure.setSingleStep(self._state.cycle_ms or 1.0)

@@ -2,6 +2,8 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Iterator
+from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -231,6 +233,34 @@ def test_steps_of_the_exposure_stay_on_whole_cycles(
         shown.append(cycles_text(page._live_state.exposure_ms.value, cycle_ms))
     cycles = [*range(11, 19), *range(17, 5, -1)]
     assert shown == [f"{each} LED cycles" for each in cycles]
+
+
+@pytest.mark.parametrize(
+    ("shortest_ms", "typed", "exposure_ms", "text"),
+    [
+        (0.01, "0.025", 0.025, "0.025 ms"),
+        (0.004, "0.004", 0.004, "0.0040 ms"),
+        (1.0, "16.67", 16.67, "16.67 ms"),
+    ],
+)
+def test_an_exposure_is_shown_as_fine_as_the_camera_sets_it(
+    qtbot: QtBot, bench: Bench, shortest_ms: float, typed: str, exposure_ms: float, text: str
+) -> None:
+    page, state, _, _ = bench
+    connect(qtbot, page, state)
+    devices, box = state.devices.value, page.exposure
+    assert devices is not None
+    click(page.live_button)
+    qtbot.waitUntil(lambda: not state.live.value)
+    page._live_state.exposure_ms.set(100 / 3)
+    info = replace(devices.camera.info, exposure_range_ms=(shortest_ms, 50.0))
+    camera = SimpleNamespace(info=info, close=devices.camera.close)
+    state.devices.set(replace(devices, camera=camera))  # type: ignore[arg-type]
+    assert page._live_state.exposure_ms.value == 100 / 3
+    box.selectAll()
+    QTest.keyClicks(box, typed)
+    QTest.keyClick(box, Qt.Key.Key_Return)
+    assert (page._live_state.exposure_ms.value, box.text()) == (exposure_ms, text)
 
 
 def test_the_page_names_its_command(bench: Bench) -> None:
