@@ -10,7 +10,6 @@ from PySide6.QtWidgets import (
     QFormLayout,
     QGroupBox,
     QLineEdit,
-    QProgressBar,
     QPushButton,
 )
 
@@ -29,6 +28,7 @@ from dsl_app.shared.widgets.forms import (
     check_box,
     label,
     named,
+    progress_bar,
     push_button,
     set_role,
     show_parts,
@@ -175,7 +175,7 @@ class RunBox(QGroupBox):
         self.then = QCheckBox("Reconstruct at the end")
         self.then.setToolTip("Reconstruct and open the result as soon as all frames are saved")
         self.phase, self.frames, self.time = label(""), label(""), label("")
-        self._bar = named(QProgressBar(), "Progress of the scan")
+        self._bar = progress_bar("Progress of the scan")
         self.remarks = label("", wraps=True)
         self._lay_out()
         self.cancel.clicked.connect(controller.cancel)

@@ -7,12 +7,12 @@ from dataclasses import dataclass
 from typing import Any
 
 from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QMenu, QProgressBar, QSizePolicy, QWidget
+from PySide6.QtWidgets import QMenu, QSizePolicy, QWidget
 
 from dsl_app.shared.jobs.base import Job
 from dsl_app.shared.jobs.qt_runner import QtRunner
 from dsl_app.shared.notify import describe_seconds
-from dsl_app.shared.widgets.forms import label, named, push_button
+from dsl_app.shared.widgets.forms import label, named, progress_bar, push_button
 from dsl_app.shared.widgets.layouts import STRETCH, row_of
 
 #: The widest line of a job's words, px: longer ones take two, and leave room for a message.
@@ -30,7 +30,7 @@ class JobStrip(QWidget):
         self._shown: Job[Any] | None = None
         self._text = label("", name="Running job", wraps=True)
         self._text.setAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
-        self._bar = named(QProgressBar(), "Progress of the running job")
+        self._bar = progress_bar("Progress of the running job")
         self._bar.setFixedWidth(180)
         self._cancel = push_button("Cancel", "Stop this job at the next safe point; finished parts are kept")
         self._cancel.clicked.connect(self._stop_shown)

@@ -11,7 +11,6 @@ from PySide6.QtWidgets import (
     QDialog,
     QListWidget,
     QListWidgetItem,
-    QProgressBar,
     QPushButton,
     QStackedWidget,
     QWidget,
@@ -34,7 +33,16 @@ from dsl_app.shared.evented import follow_any
 from dsl_app.shared.plain_tip import plain_tip
 from dsl_app.shared.theme import DARK, Theme
 from dsl_app.shared.widgets.dialogs import confirm
-from dsl_app.shared.widgets.forms import Banner, check_box, label, named, push_button, quiet, show_button
+from dsl_app.shared.widgets.forms import (
+    Banner,
+    check_box,
+    label,
+    named,
+    progress_bar,
+    push_button,
+    quiet,
+    show_button,
+)
 from dsl_app.shared.widgets.help_window import add_help_key
 from dsl_app.shared.widgets.inside import apply_theme_inside, stop_following
 from dsl_app.shared.widgets.layouts import STRETCH, column_of, row_of
@@ -228,7 +236,7 @@ class WizardButtons(QWidget):
         self.accept = _button("&Accept", "Make this fit the campaign's calibration and write the rig")
         self.following = _button("&Next", "Close this wizard and open that of the next calibration")
         self._text = label("", "muted", name="Current activity")
-        self._bar = named(QProgressBar(), "Progress")
+        self._bar = progress_bar("Progress")
         self._bar.setFixedWidth(BAR_PX)
         # The page above must not jump when work begins.
         policy = self._bar.sizePolicy()

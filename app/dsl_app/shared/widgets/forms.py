@@ -17,6 +17,7 @@ from PySide6.QtWidgets import (
     QDoubleSpinBox,
     QFrame,
     QLabel,
+    QProgressBar,
     QPushButton,
     QSpinBox,
     QStyle,
@@ -33,6 +34,8 @@ W = TypeVar("W", bound=QWidget)
 Clicked = Callable[..., object] | SignalInstance | None
 #: By how much a primary button is higher than its text, px.
 PRIMARY_MORE_PX = 12
+#: How numbers are written in all widgets, as in all texts: other digits beside these would be a riddle.
+NUMBERS = QLocale.c()
 #: Where a button keeps the tooltip that it has while it can be pressed.
 _OWN_TIP = "own-tip"
 _SCROLL = QStyle.PixelMetric.PM_ScrollBarExtent
@@ -72,7 +75,7 @@ class NumberBox(CalmWheel, QDoubleSpinBox):
         tip: str = "",
     ) -> None:
         super().__init__()
-        self.setLocale(QLocale.c())
+        self.setLocale(NUMBERS)
         self.setRange(low, high)
         self.setDecimals(decimals)
         self.setValue(value)
@@ -98,6 +101,7 @@ class WholeBox(CalmWheel, QSpinBox):
 
     def __init__(self, name: str, low: int, high: int, value: int, unit: str = "", tip: str = "") -> None:
         super().__init__()
+        self.setLocale(NUMBERS)
         self.setRange(low, high)
         self.setValue(value)
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
@@ -207,6 +211,13 @@ def named(widget: W, name: str, tip: str = "") -> W:
     if tip:
         widget.setToolTip(plain_tip(tip))
     return widget
+
+
+def progress_bar(name: str) -> QProgressBar:
+    """A bar that tells how far work has come, per cent, with the name that screen readers tell."""
+    made = named(QProgressBar(), name)
+    made.setLocale(NUMBERS)
+    return made
 
 
 @contextmanager

@@ -5,10 +5,12 @@ from dsl_app.shared.widget_state import ButtonState
 from dsl_app.shared.widgets.forms import (
     ChoiceBox,
     NumberBox,
+    WholeBox,
     allow,
     check_box,
     label,
     named,
+    progress_bar,
     push_button,
     quiet,
     show_button,
@@ -119,7 +121,7 @@ def test_a_label_never_reads_its_text_as_markup(qtbot: QtBot) -> None:
     assert words.sizeHint().height() == plain.sizeHint().height()
 
 
-@pytest.mark.parametrize("language", ["de_DE", "en_US", "fr_FR"])
+@pytest.mark.parametrize("language", ["de_DE", "en_US", "fr_FR", "ar_EG"])
 def test_a_number_means_the_same_in_every_language(qtbot: QtBot, language: str) -> None:
     before = QLocale()
     QLocale.setDefault(QLocale(language))
@@ -131,5 +133,10 @@ def test_a_number_means_the_same_in_every_language(qtbot: QtBot, language: str) 
             QTest.keyClicks(box, typed)
             box.interpretText()
             assert (box.value(), box.text()) == (55.5, "55.5 ms")
+        whole, bar = WholeBox("Width", 0, 20_000, 1920, "px"), progress_bar("Progress")
+        for widget in (whole, bar):
+            qtbot.addWidget(widget)
+        bar.setValue(42)
+        assert (whole.text(), bar.text()) == ("1920 px", "42%")
     finally:
         QLocale.setDefault(before)
