@@ -20,6 +20,7 @@ from dsl_app.shared.widgets.layouts import column_of
 from dsl_app.shared.widgets.pictures import DEPTH, PictureView, arrow_step, colour_map
 from dsl_app.shared.widgets.plots import MONO_COLOUR, CalmPlot
 from dsl_core.capture.preview import BlockGraph
+from dsl_core.model.figure import decimals
 from dsl_core.model.plan import CapturePlan, Shot, spoken_number
 from dsl_core.optics.levels import between, spread_of
 
@@ -81,8 +82,9 @@ class FramePicture(QWidget):
         self.view.image.setImage(picture, autoLevels=False, levels=None)
         self.view.image.setRect(0, 0, *depth_mm.shape[::-1])
         self.view.fit()
+        digits = decimals(high - low)
         self._text.setText(
-            f"Depth, {low:.0f} mm (dark) to {high:.0f} mm (bright). Spectra are being computed."
+            f"Depth, {low:.{digits}f} mm (dark) to {high:.{digits}f} mm (bright). Spectra are being computed."
         )
 
     def show_cursor(self, pixel: tuple[int, int] | None) -> None:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from dsl_app.scan.view import CHANNEL_COLOURS, GraphPlot
+import pytest
+from dsl_app.scan.view import CHANNEL_COLOURS, FramePicture, GraphPlot
 from dsl_app.shared.widgets.plots import MONO_COLOUR
 from pytestqt.qtbot import QtBot
 
@@ -22,3 +23,18 @@ def test_a_monochrome_camera_has_one_grey_curve_for_each_setting(qtbot: QtBot) -
     for _ in range(2):
         assert shown(3) == [*CHANNEL_COLOURS, *CHANNEL_COLOURS]
         assert shown(1) == [MONO_COLOUR, MONO_COLOUR]
+
+
+@pytest.mark.parametrize(
+    ("low_mm", "high_mm", "says"),
+    [
+        (400.0, 1000.0, "403 mm (dark) to 997 mm (bright)"),
+        (700.0, 700.4, "700.00 mm (dark) to 700.40 mm (bright)"),
+        (700.0, 700.0, "699.65 mm (dark) to 700.35 mm (bright)"),
+    ],
+)
+def test_the_ends_of_a_depth_are_told_apart(qtbot: QtBot, low_mm: float, high_mm: float, says: str) -> None:
+    picture = FramePicture()
+    qtbot.addWidget(picture)
+    picture.show_depth(np.linspace(low_mm, high_mm, 2000, dtype=np.float32).reshape(40, 50))
+    assert says in picture._text.text()
