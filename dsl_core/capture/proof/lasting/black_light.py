@@ -32,6 +32,8 @@ LEVEL_DN = 2.0
 #: A pixel is lit in black if it has more than this share of usual white, more than so many times what white
 #: adds to it, and so many deviations; white is what it is where it adds as many to black.
 AS_WHITE, TIMES, SEEN_SIGMAS = 0.5, 2.0, 6.0
+#: Where more of the pixels that white lights are lit in black, as a share, the room lights the scene.
+MOST_LIT = 0.5
 #: So many such pixels that have a neighbour among them: hot pixels of a sensor are alone.
 FEWEST_LIT = 5
 
@@ -135,13 +137,11 @@ def lit_black(
 ) -> LitBlack | None:  # fmt: skip
     """Where black, raster of a setting as ``white`` is, has the light of white; None where that is nowhere.
 
-    ``size_px`` is the camera's (width, height).
+    None, too, where it is the room that is so bright. ``size_px`` is the camera's (width, height).
     """
-    # Without a calibration, the black level is what the darkest pixels show.
-    dark_dn = np.float32(noise.sensor.black_level_dn or np.quantile(black, DARKER))
-    gain, rest = white.astype(np.float32) - black, black.astype(np.float32) - dark_dn
-    # Before nothing, an object may be a small part of the picture, and all the rest of it noise.
-    is_bright = gain > SEEN_SIGMAS * np.sqrt(noise.variance(white) + noise.variance(black))
+    gain, rest, is_bright = _light(white, black, noise)
+    if _room(gain, rest, is_bright):
+        return None
     usual = np.zeros(gain.shape, np.float32)
     for colour in np.unique(channels):
         own = channels == colour
@@ -164,6 +164,34 @@ def lit_black(
     step = size_px[0] / raster.shape[1]
     columns = int(across.min() * step), int((across.max() + 1) * step)
     return LitBlack(int(lit.sum()), columns, (int(rows.min()), int(rows.max()) + 1), is_in_stripes)
+
+
+def room_light(white: Counts, black: Counts, level: float, noise: Noise) -> str:
+    """That the room lights most of the scene more than white of a ``level``; empty where it does not."""
+    gain, rest, is_bright = _light(white, black, noise)
+    if not _room(gain, rest, is_bright):
+        return ""
+    times = float(np.median(rest[is_bright] / gain[is_bright]))
+    return (
+        f"The room gives {times:.2g} times the light of the projector's white at a level of {level:g}:"
+        " its noise is in every picture. Darken the room, or use settings of a higher level."
+    )
+
+
+def _light(
+    white: Counts, black: Counts, noise: Noise
+) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.bool_]]:
+    """What white adds to black, what black has itself, and where white surely adds something."""
+    # Without a calibration, the black level is what the darkest pixels show.
+    dark_dn = np.float32(noise.sensor.black_level_dn or np.quantile(black, DARKER))
+    gain, rest = white.astype(np.float32) - black, black.astype(np.float32) - dark_dn
+    # Before nothing, an object may be a small part of the picture, and all the rest of it noise.
+    return gain, rest, gain > SEEN_SIGMAS * np.sqrt(noise.variance(white) + noise.variance(black))
+
+
+def _room(gain: NDArray[np.float32], rest: NDArray[np.float32], is_bright: NDArray[np.bool_]) -> bool:
+    """Whether most of what white lights has more light in black: no pointer or window is so large."""
+    return bool(np.mean(rest[is_bright] > TIMES * gain[is_bright]) > MOST_LIT) if is_bright.any() else False
 
 
 def _alternate(lit: NDArray[np.bool_], rows: NDArray[np.intp]) -> bool:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from dsl_core.capture.proof.lasting.black_light import black_light, lit_black
+from dsl_core.capture.proof.lasting.black_light import black_light, lit_black, room_light
 from dsl_core.capture.proof.lasting.black_values import filled_rows, low_black
 from dsl_core.capture.proof.lasting.missing_light import missing_light
 from dsl_core.capture.proof.lasting.sensor_parts import sensor_parts
@@ -31,9 +31,10 @@ def sentences_of_ends(
     lit = lit_black(white, black, channels, noise, raster, plan.camera_size_px)
     if lit is not None:
         return [lit.sentence]  # the rest would be judged by what is in the picture
-    if rig is None:
-        return []
     level = plan.settings[setting].level
+    room = room_light(white, black, level, noise)
+    if rig is None or room:
+        return [room] if room else []  # room light is not told from the projector's
     glow = black_light(white, black, level, rig.projector_response, channels, noise, raster)
     parts = sensor_parts(white, black, channels, noise, raster, plan.camera_size_px[0])
     found = [low_black(black, noise), filled_rows(black, noise, raster)]

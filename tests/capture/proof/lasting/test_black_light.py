@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from dsl_core.capture.proof.lasting.black_light import LitBlack, lit_black
+from dsl_core.capture.proof.lasting.black_light import LitBlack, lit_black, room_light
 from dsl_core.capture.proof.noise import Noise
-from dsl_core.capture.proof.raster import Raster
+from dsl_core.capture.proof.raster import Counts, Raster
 from dsl_core.model.rig import Sensor
 
 SIZE, OBJECT, POINTER = (160, 96), np.s_[20:50, 60:100], np.s_[4:7, 8:11]
@@ -15,18 +15,24 @@ RASTER = Raster(SIZE)
 CALIBRATED = Sensor(black_level_dn=260.0, read_noise_dn=0.5)
 
 
-def found(object_dn: float, pointer_dn: float = 0.0, sensor: Sensor | None = CALIBRATED) -> LitBlack | None:
-    """Of white and black of an object before nothing, from a camera with a black level of 260 DN."""
+def taken_of(object_dn: float, pointer_dn: float = 0.0, room: float = 5e-4) -> tuple[Counts, Counts]:
+    """White and black of an object before nothing, from a camera with a black level of 260 DN."""
     rng = np.random.default_rng(3)
 
-    def taken(light: float) -> np.ndarray:
+    def taken(light: float) -> Counts:
         scene = np.zeros(SIZE[::-1])
         scene[OBJECT] = light * object_dn
         scene[POINTER] += pointer_dn
         noisy = 260 + scene + rng.standard_normal(scene.shape) * np.sqrt(0.25 + scene / 10)
         return RASTER.take(np.rint(noisy).clip(0, 4095).astype(np.uint16))
 
-    return lit_black(taken(1.0), taken(5e-4), RASTER.channels("RGGB"), Noise.of(sensor, 12), RASTER, SIZE)
+    return taken(1.0 + room), taken(room)
+
+
+def found(object_dn: float, pointer_dn: float = 0.0, sensor: Sensor | None = CALIBRATED) -> LitBlack | None:
+    """Of white and black of an object before nothing."""
+    ends = taken_of(object_dn, pointer_dn)
+    return lit_black(*ends, RASTER.channels("RGGB"), Noise.of(sensor, 12), RASTER, SIZE)
 
 
 @pytest.mark.parametrize("sensor", [CALIBRATED, None])
@@ -41,3 +47,13 @@ def test_a_pointer_beside_it_is_told_with_its_place(pointer_dn: float, sensor: S
     seen = found(3000.0, pointer_dn, sensor)
     assert seen is not None
     assert (seen.count, seen.columns, seen.rows) == (9, (8, 11), (4, 7))
+
+
+@pytest.mark.parametrize("sensor", [CALIBRATED, None])
+@pytest.mark.parametrize(("room", "told"), [(0.01, ""), (1.0, ""), (8.0, "gives 8 times the light")])
+def test_a_bright_room_is_no_pointer(room: float, told: str, sensor: Sensor | None) -> None:
+    white, black = taken_of(300.0, room=room)
+    noise = Noise.of(sensor, 12)
+    assert lit_black(white, black, RASTER.channels("RGGB"), noise, RASTER, SIZE) is None
+    said = room_light(white, black, 0.2, noise)
+    assert (told in said) if told else not said
