@@ -37,7 +37,9 @@ _EVENLY, _FROM_END = 1 / 12, 1 / 3
 class ClassDeviations:
     """One standard deviation by the values of a map: pixels, and area in mm2 (None without points).
 
-    NaN for what is no class. ``beside_mm2`` is what an area has in pixels without a class, on average.
+    NaN for what is no class, and for a class without pixels while some that have a point were not judged: no
+    map says how many of these are of it. ``beside_mm2`` is what an area has in pixels without a class, on
+    average.
     """
 
     pixels: Map
@@ -57,7 +59,10 @@ def class_deviations(
         return None
     variance, _ = _variance(scores, shown, np.ones(shown.values.shape), _FROM_END)
     pixels = np.sqrt(variance)
-    pixels[[0, shown.none, shown.unsure]] = np.nan
+    unknown = np.isin(np.arange(len(pixels)), [0, shown.none, shown.unsure])
+    if not_judged(shown, areas_mm2).any():
+        unknown |= np.bincount(shown.values.ravel(), minlength=len(pixels)) == 0
+    pixels[unknown] = np.nan
     if areas_mm2 is None:
         return ClassDeviations(pixels)
     weights = _everywhere(areas_mm2)
@@ -68,8 +73,14 @@ def class_deviations(
     if depth_relative_std is not None:
         by_depth = 2 * weights * np.nan_to_num(depth_relative_std)
         variance += np.bincount(shown.values.ravel(), by_depth.ravel(), len(variance)) ** 2
-    variance[[0, shown.none, shown.unsure]] = np.nan
+    variance[unknown] = np.nan
     return ClassDeviations(pixels, np.sqrt(variance), beside)
+
+
+def not_judged(shown: ClassMap, areas_mm2: Map | None = None) -> NDArray[np.bool_]:
+    """Pixels (rows, columns) that may be of any class: not judged, though they have a point if any has."""
+    unjudged = shown.values == 0
+    return np.asarray(unjudged if areas_mm2 is None else unjudged & np.isfinite(areas_mm2))
 
 
 def _everywhere(areas_mm2: Map) -> Map:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from dsl_core.analysis.area_deviation import class_deviations
+from dsl_core.analysis.area_deviation import class_deviations, not_judged
 from dsl_core.analysis.areas import Cube, Places, depth_relative_std, pixel_areas_mm2
 from dsl_core.analysis.class_table import ClassRow, class_table
 from dsl_core.analysis.classes import FEWEST_BANDS, SpectralClass, class_of_pixels
@@ -35,6 +35,9 @@ NO_AREAS = (
     "Areas are not known: the pixels that have a point are none, or lie on one line, which does not say how"
     " far apart lines of sight are. Classify a part that is at least two pixels wide and high."
 )
+#: Share of pixels that were not judged which is told, and how.
+MANY_UNJUDGED = 0.05
+UNJUDGED = "{:.0%} of the pixels were not judged (poor fit, saturated or too dark): classes may be larger."
 #: The endings that a class map is written with, and what is written.
 ENDINGS = {".hdr": "ENVI classification", ".ply": "points with their class", ".csv": "table of areas"}
 
@@ -98,8 +101,13 @@ class Classification:
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What is not known of the areas, and why; empty where all is, and for results without points."""
-        return () if self.areas is None or np.isfinite(self.areas.mm2).any() else (NO_AREAS,)
+        """What is not known of the classes and their areas, and why; empty where all is."""
+        mm2 = None if self.areas is None else self.areas.mm2
+        if mm2 is not None and not np.isfinite(mm2).any():
+            return (NO_AREAS,)
+        all_pixels = self.shown.values.size if mm2 is None else int(np.isfinite(mm2).sum())
+        share = np.count_nonzero(not_judged(self.shown, mm2)) / max(all_pixels, 1)
+        return (UNJUDGED.format(share),) if share > MANY_UNJUDGED else ()
 
 
 def method_in_words(measure: Measure, limits: Limits, brightness: Brightness) -> str:

@@ -7,6 +7,7 @@ import pytest
 
 from dsl_core.analysis.area_deviation import class_deviations
 from dsl_core.analysis.class_table import class_table
+from dsl_core.analysis.classification import Classification, PixelAreas
 from dsl_core.analysis.classify import ClassMap, Limits, Measure, Scores
 
 SIZE, FINE = 40, 8
@@ -112,6 +113,22 @@ def test_what_is_undecided_may_be_of_either_class() -> None:
     found = class_deviations(scores, shown)
     assert found is not None
     np.testing.assert_allclose(found.pixels[1:3], [0.6 * SIZE**2, 0.4 * SIZE**2], rtol=1e-3)
+
+
+@pytest.mark.parametrize(("has_point", "known"), [(True, False), (False, True)])
+def test_a_class_without_pixels_is_not_known_to_be_none(has_point: bool, known: bool) -> None:
+    best = np.zeros((SIZE, SIZE), int)
+    best[10:20, 10:20] = -1
+    scores = _scores(best)
+    shown, areas = ClassMap.of(scores), np.full(best.shape, 2.0)
+    if not has_point:
+        areas[10:20, 10:20] = np.nan
+    found = class_deviations(scores, shown, areas)
+    assert found is not None
+    assert found.areas_mm2 is not None
+    assert np.isfinite([found.pixels[2], found.areas_mm2[2]]).tolist() == [known, known]
+    told = Classification.of(scores, areas=PixelAreas(areas)).notes
+    assert [each[:34] for each in told] == ([] if known else ["6% of the pixels were not judged ("])
 
 
 def test_angles_are_no_probabilities() -> None:
