@@ -12,7 +12,7 @@ from dsl_core.campaign.common.recipe import AnyRecipe
 from dsl_core.campaign.recipes import campaign_recipes
 from dsl_core.errors import StoreError
 from dsl_core.io.calibration_library import CalibrationLibrary, LibraryEntry, read_entry
-from dsl_core.io.campaign_folder import CampaignFolder
+from dsl_core.io.campaign_folder import RIG_NAME, CampaignFolder
 from dsl_core.io.records import write_record
 from dsl_core.io.rig_file import load_rig, save_rig
 from dsl_core.io.staging import write_text
@@ -22,7 +22,7 @@ from dsl_core.model.rig import Rig
 if TYPE_CHECKING:
     from dsl_core.evaluation.cost import StageCost
 
-RIG_NAME, REPORT_NAME = "rig.json", "report.html"
+REPORT_NAME = "report.html"
 
 Form = Literal["entry", "rig", "published"]
 

@@ -227,7 +227,8 @@ def all_(
     if traits := traits_in_words(calibrated):
         output.say(traits)
     if made.entry is not None:
-        output.say(f"In the library: {made.entry}. Next: dsl-scan scan SCAN.dsl --calibration {made.entry}")
+        command = f"dsl-scan scan SCAN.dsl --calibration {quoted(made.entry)}"
+        output.say(f"In the library: {made.entry}. Next: {command}")
     output.put(rig=made.rig, report=made.report, library=made.entry, traits=measured_traits(calibrated))
     output.put(figures={note.name: figures_json(note.figures) for note in calibrated.calibrations})
     output.finish()

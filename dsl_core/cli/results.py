@@ -18,6 +18,7 @@ from dsl_core.cli.options import (
 )
 from dsl_core.cli.output import Output
 from dsl_core.errors import PlanError
+from dsl_core.io import MANIFEST_NAME
 from dsl_core.io.staging import check_targets
 from dsl_core.words import counted
 
@@ -163,7 +164,7 @@ def _export(
         with output.progress() as progress:
             return exchange.export_scan(path, target, force, progress)
     if form == "calibration":
-        is_scan = path.is_dir()
+        is_scan = (path / MANIFEST_NAME).is_file()
         rig = calibration_of(ScanReader(path)) if is_scan else load_calibration(str(path))
         return export_calibration(rig, target, overwrite=force)
     if form == "csv":

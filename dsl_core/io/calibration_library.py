@@ -16,8 +16,9 @@ from pathlib import Path
 from typing import Literal
 
 from dsl_core.errors import DslError, StoreError
+from dsl_core.io import CAMPAIGN_NAME
 from dsl_core.io.atomic import write_atomic
-from dsl_core.io.campaign_folder import now
+from dsl_core.io.campaign_folder import RIG_NAME, now
 from dsl_core.io.reading import read_bounded
 from dsl_core.io.records import read_record, replace_record
 from dsl_core.io.rig_file import load_rig
@@ -180,11 +181,16 @@ class CalibrationLibrary:
 
 
 def load_calibration(text: str, library: CalibrationLibrary | None = None) -> Rig:
-    """The rig of a JSON file, or of a name of the library; raises `CalibrationError` or `StoreError`.
+    """The rig of a JSON file, a name of the library or a campaign; raises `CalibrationError` or `StoreError`.
 
-    A file of the library, as `calibrations export` writes it, is taken as well.
+    A file of the library, as `calibrations export` writes it, is taken as well. A name of the library
+    counts before a folder of that name, which is usually the campaign it comes from.
     """
-    path = Path(text)
+    path, shelf = Path(text), library or CalibrationLibrary()
+    if path.is_dir() and text in shelf.names():
+        return shelf.find(text).rig
+    if (path / CAMPAIGN_NAME).is_file():
+        path = path / RIG_NAME
     if path.is_file():
         entry = read_entry(path)
         return load_rig(path) if entry is None else entry.rig
@@ -192,8 +198,8 @@ def load_calibration(text: str, library: CalibrationLibrary | None = None) -> Ri
         what = "a folder" if path.is_dir() else "a pipe or a device"
         raise StoreError(f"{text} is {what}. Give the path of a rig's JSON file, or a library's name.")
     if path.suffix.lower() == ".json" or os.sep in text:
-        raise StoreError(f"There is no file {text}. Give the path of a rig's JSON file, or a library's name.")
-    return (library or CalibrationLibrary()).find(text).rig
+        raise StoreError(f"There is no file {path}. Give the path of a rig's JSON file, or a library's name.")
+    return shelf.find(text).rig
 
 
 def read_entry(path: Path) -> LibraryEntry | None:

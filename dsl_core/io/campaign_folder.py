@@ -8,6 +8,8 @@
     a fit that nobody accepted yet.
 ``NAME.json``
     the accepted calibration; ``history/NAME/`` keeps the ones it replaced.
+``rig.json``
+    the rig with all of them.
 
 Every file is written whole or not at all, so that a campaign can be left and continued at any moment.
 """
@@ -29,6 +31,9 @@ from dsl_core.io.records import read_record, replace_record
 from dsl_core.io.scan.lock import FolderLock
 from dsl_core.model.base import Record
 from dsl_core.model.calibration.accepted import AcceptedCalibration
+
+#: The rig as calibrated by the campaign.
+RIG_NAME = "rig.json"
 
 
 class CampaignInfo(Record):

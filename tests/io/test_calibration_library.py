@@ -8,6 +8,7 @@ import pytest
 
 from dsl_core.errors import CalibrationError, StoreError
 from dsl_core.io.calibration_library import CalibrationLibrary, load_calibration
+from dsl_core.io.campaign_folder import CampaignFolder
 from dsl_core.io.rig_file import save_rig
 from dsl_core.model.rig import Rig
 from tests.cases.small_rig import small_rig
@@ -86,6 +87,21 @@ def test_a_calibration_is_found_by_name_or_file(library: CalibrationLibrary, tmp
         load_calibration("nowhere.json")
     with pytest.raises(StoreError, match=r"is a folder\. Give the path of a rig's"):
         load_calibration(str(tmp_path))
+    campaign = CampaignFolder.begin(tmp_path / "lab", "twin", {}).path
+    with pytest.raises(StoreError, match=r"There is no file .*lab.rig\.json"):
+        load_calibration(str(campaign))
+    save_rig(brighter(5.0), campaign / "rig.json")
+    assert load_calibration(f"{campaign}/").white_scale == 5.0
     (tmp_path / "text.json").write_text("{}")
     with pytest.raises(CalibrationError, match="not valid"):
         load_calibration(str(tmp_path / "text.json"))
+
+
+def test_the_folder_of_its_campaign_does_not_hide_a_name(
+    library: CalibrationLibrary, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    CampaignFolder.begin(Path("lab"), "twin", {})
+    save_rig(brighter(4.0), Path("lab/rig.json"))
+    library.store("lab", brighter(3.0))
+    assert load_calibration("lab").white_scale == 3.0

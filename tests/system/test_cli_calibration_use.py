@@ -133,7 +133,11 @@ def test_what_a_calibration_missed_travels_with_the_rig(
     assert MISSED_ATTRIBUTE not in load_result(result).attrs
 
 
-def test_a_name_of_the_library_is_exported(give: Give, tmp_path: Path, calibrated: Rig) -> None:
+def test_a_name_of_the_library_is_exported(
+    give: Give, tmp_path: Path, calibrated: Rig, monkeypatch: pytest.MonkeyPatch
+) -> None:
     assert calibrated.name == "lab"
+    monkeypatch.chdir(tmp_path)
+    Path("lab").mkdir()  # a folder called so is that of its campaign
     assert give("export", "lab", "calibration", tmp_path / "published").code == 0
     assert (tmp_path / "published" / "calibration" / "calibration_propcam.xml").is_file()
