@@ -107,7 +107,7 @@ def import_pictures(
     }
     if source.made_up:
         notes["not_captured"] = f"{' and '.join(source.made_up)}, made of the extremes of all patterns"
-    _refuse_other_scan(root, target, notes[FINGERPRINT])
+    refuse_other_import(target, f"the pictures of {root}, mapped like this", notes[FINGERPRINT], rig)
     camera = ReplayCamera(source, sensor.bayer, sensor.bit_depth)
     devices = DeviceRig("import", camera, ReplayProjector(source, 1000.0 / 60.0), calibration=rig)
     with ScanWriter.open(target, source.plan, devices, notes) as writer:
@@ -143,12 +143,20 @@ def _require_sizes(source: PictureScan, rig: Rig) -> None:
             )
 
 
-def _refuse_other_scan(root: Path, target: Path, fingerprint: str) -> None:
-    if (target / MANIFEST_NAME).exists() and read_manifest(target).notes.get(FINGERPRINT) != fingerprint:
-        raise StoreError(
-            f"{target} contains a scan that does not come from the pictures of {root}, mapped like this."
-            " A scan is never replaced: choose another name."
-        )
+def refuse_other_import(target: Path, source: str, fingerprint: str, calibration: Rig | None) -> None:
+    """Raise `StoreError` when the target is a scan, but not of this ``source`` with this calibration."""
+    if not (target / MANIFEST_NAME).exists():
+        return
+    stored, advice = read_manifest(target), "choose another name"
+    if stored.notes.get(FINGERPRINT) != fingerprint:
+        why = f"does not come from {source}"
+    elif stored.calibration != calibration:
+        which = "without a" if stored.calibration is None else "with another" if calibration else "with a"
+        why = f"was imported {which} calibration"
+        advice += ", or give this calibration to its reconstruction" if calibration else ""
+    else:
+        return
+    raise StoreError(f"{target} contains a scan that {why}. A scan is never replaced: {advice}.")
 
 
 def with_imported_sensor(reader: ScanReader, rig: Rig) -> Rig:

@@ -10,23 +10,19 @@ from typing import Literal
 from dsl_core.capture.preflight import require_possible
 from dsl_core.devices.replay import replay_rig
 from dsl_core.errors import DslError, StoreError
-from dsl_core.io import MANIFEST_NAME
 from dsl_core.io.published.calibration import check_calibration, holds_calibration, load_calibration
 from dsl_core.io.published.dataset import PUBLISHED_SETTINGS, export_dataset, open_dataset
 from dsl_core.io.published.layout import FileRecord, survey
 from dsl_core.io.scan.as_exposed import as_exposed
 from dsl_core.io.scan.check import require_complete
 from dsl_core.io.scan.folder import ScanReader
-from dsl_core.io.scan.manifest import read_manifest
 from dsl_core.model.plan import CapturePlan
 from dsl_core.model.rig import Rig
 from dsl_core.pipeline import scan
 from dsl_core.progress import Progress
 from dsl_core.words import quoted
+from dsl_core.workflows.captures import FINGERPRINT, refuse_other_import
 from dsl_core.workflows.scans import calibration_of
-
-#: Note of a scan that says from which files it was made.
-_FINGERPRINT = "imported_fingerprint"
 
 
 def export_scan(
@@ -116,24 +112,10 @@ def import_scan(
     source = open_dataset(root, bayer=calibration.sensor.bayer, bit_depth=calibration.sensor.bit_depth)
     if target is not None:
         source.require_frames()
-        notes = {"imported_from": root.absolute().name, _FINGERPRINT: source.fingerprint()}
-        _refuse_other_scan(target, notes[_FINGERPRINT], calibration, root)
+        notes = {"imported_from": root.absolute().name, FINGERPRINT: source.fingerprint()}
+        refuse_other_import(target, f"the files of {root}", notes[FINGERPRINT], calibration)
         scan(replay_rig(source, calibration), source.plan, target, progress, notes, prove=False)
     return source.table
-
-
-def _refuse_other_scan(target: Path, fingerprint: str, calibration: Rig, root: Path) -> None:
-    """Raise `StoreError` when the target is a scan, but not of this dataset with this calibration."""
-    if not (target / MANIFEST_NAME).exists():
-        return
-    stored = read_manifest(target)
-    if stored.notes.get(_FINGERPRINT) != fingerprint:
-        why = f"that does not come from the files of {root}"
-    elif stored.calibration != calibration:
-        why = "that was imported with another calibration"
-    else:
-        return
-    raise StoreError(f"{target} contains a scan {why}. A scan is never replaced: choose another name.")
 
 
 def import_calibration(root: Path, base: Rig, camera_size_px: tuple[int, int] | None) -> Rig:

@@ -51,6 +51,27 @@ def test_an_import_resumes_but_never_replaces(folder: Path, tmp_path: Path) -> N
         captures.import_pictures(folder, tmp_path / "a.dsl", other)
 
 
+def test_another_calibration_is_never_dropped_without_a_word(folder: Path, tmp_path: Path) -> None:
+    rig, target = small_rig(), tmp_path / "a.dsl"
+    sizes = {
+        name: getattr(rig, name).model_copy(update={"width_px": width, "height_px": height})
+        for name, (width, height) in (("camera", CAMERA), ("projector", PROJECTOR))
+    }
+    rig = rig.model_copy(update=sizes)
+    captures.import_pictures(folder, tmp_path / "none.dsl", MAPPING)
+    captures.import_pictures(folder, target, MAPPING, rig)
+    captures.import_pictures(folder, target, MAPPING, rig)
+    other = rig.model_copy(update={"white_scale": 3.0})
+    with pytest.raises(StoreError, match=r"with another calibration.*another name, or give this calibration"):
+        captures.import_pictures(folder, target, MAPPING, other)
+    with pytest.raises(
+        StoreError, match=r"with a calibration\. .* choose another name\.$"
+    ):
+        captures.import_pictures(folder, target, MAPPING)
+    with pytest.raises(StoreError, match="imported without a calibration"):
+        captures.import_pictures(folder, tmp_path / "none.dsl", MAPPING, rig)
+
+
 def test_light_that_was_not_captured_is_made_of_the_others(tmp_path: Path) -> None:
     pictures, white, _ = frames([("columns", Stripes(bits=7))])
     root = write(tmp_path / "set", {f"{i:02d}.png": p for i, p in enumerate(pictures)})
