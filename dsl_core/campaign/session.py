@@ -22,7 +22,6 @@ from dsl_core.campaign.assembly import (
     require_same_devices,
 )
 from dsl_core.campaign.common.captures import (
-    NOTE_NAME,
     CaptureNote,
     other_conditions,
     read_note,
@@ -35,7 +34,7 @@ from dsl_core.campaign.recipes import campaign_recipes
 from dsl_core.devices.base import DeviceRig
 from dsl_core.devices.conditions import current_conditions
 from dsl_core.errors import CalibrationError, StoreError
-from dsl_core.io.campaign_folder import CampaignFolder, later_than, now
+from dsl_core.io.campaign_folder import NOTE_NAME, CampaignFolder, later_than, now
 from dsl_core.io.records import replace_record
 from dsl_core.model.base import Record
 from dsl_core.model.calibration.accepted import AcceptedCalibration

@@ -2,8 +2,8 @@
 
 ``campaign.json``
     rig, its options and those of the calibrations; written when the campaign is begun.
-``NAME/``
-    the captures of one calibration, a folder a step; the recipe's own.
+``NAME/STEP/``
+    the captures of a step of one calibration, with its note and perhaps a scan; the rest is the recipe's own.
 ``candidates/NAME.json``
     a fit that nobody accepted yet.
 ``NAME.json``
@@ -34,6 +34,8 @@ from dsl_core.model.calibration.accepted import AcceptedCalibration
 
 #: The rig as calibrated by the campaign.
 RIG_NAME = "rig.json"
+#: What the folder of a step has: when and how it was captured, and its scan.
+NOTE_NAME, SCAN_NAME = "capture.json", "scan.dsl"
 
 
 class CampaignInfo(Record):

@@ -16,6 +16,7 @@ from dsl_core.devices.conditions import conditions_of
 from dsl_core.errors import StoreError
 from dsl_core.io import MANIFEST_NAME
 from dsl_core.io.atomic import make_folder, sync_folder
+from dsl_core.io.campaign_folder import NOTE_NAME
 from dsl_core.io.reading import read_json
 from dsl_core.io.records import read_record
 from dsl_core.model.base import Record, problems_in_words
@@ -25,7 +26,6 @@ from dsl_core.model.plan import Setting
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-NOTE_NAME = "capture.json"
 _ASIDE = ".replaced"
 _SETTINGS = TypeAdapter(tuple[Setting, ...])
 _CAMERA: TypeAdapter[CameraInfo | None] = TypeAdapter(CameraInfo | None)

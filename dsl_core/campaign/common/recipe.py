@@ -21,6 +21,7 @@ from dsl_core.devices.base import DeviceRig
 from dsl_core.errors import CalibrationError, Cancelled, DslError, StoreError
 from dsl_core.io import MANIFEST_NAME
 from dsl_core.io.atomic import make_folder
+from dsl_core.io.campaign_folder import SCAN_NAME
 from dsl_core.io.records import read_record, replace_record
 from dsl_core.io.scan.as_exposed import as_exposed
 from dsl_core.io.scan.folder import ScanReader
@@ -30,8 +31,6 @@ from dsl_core.model.placement import Placement
 from dsl_core.model.plan import CapturePlan
 from dsl_core.model.rig import Rig
 from dsl_core.progress import Progress
-
-SCAN_NAME = "scan.dsl"
 
 RecordT = TypeVar("RecordT", bound=Record)
 #: Told where points of a target are in the camera's picture: columns and rows, px, shape (points, 2).

@@ -14,12 +14,13 @@ from dsl_core.calibration.geometry.pose_series import MIN_POSES, exposure_warnin
 from dsl_core.calibration.geometry.projector_corners import observe_pose
 from dsl_core.calibration.geometry.solve import calibrate_geometry
 from dsl_core.campaign.common.bounds import Ratio
-from dsl_core.campaign.common.recipe import SCAN_NAME, Bench, Recipe, Step
+from dsl_core.campaign.common.recipe import Bench, Recipe, Step
 from dsl_core.campaign.common.white_shot import bracket, shoot_white
 from dsl_core.campaign.geometry.board_poses import default_poses
 from dsl_core.campaign.geometry.board_size import BoardNote, fitting_board
 from dsl_core.campaign.geometry.figures import geometry_figures, look_at_board
 from dsl_core.errors import CalibrationError
+from dsl_core.io.campaign_folder import SCAN_NAME
 from dsl_core.io.records import read_record
 from dsl_core.model.board import Board, Checkerboard
 from dsl_core.model.calibration.geometry import GeometryCalibration, LeftOut

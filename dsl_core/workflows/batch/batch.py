@@ -9,12 +9,13 @@ import os
 import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from pathlib import Path
+from pathlib import Path, PurePath, PurePosixPath
 from typing import Any
 
 from dsl_core.errors import Cancelled, StoreError
 from dsl_core.extras import require_package
-from dsl_core.io import MANIFEST_NAME
+from dsl_core.io import CAMPAIGN_NAME, MANIFEST_NAME
+from dsl_core.io.campaign_folder import SCAN_NAME
 from dsl_core.io.neighbours import SCAN_SUFFIX, result_beside
 from dsl_core.io.objects.address import Address, address_of, shown
 from dsl_core.io.objects.store import ObjectFolder
@@ -57,8 +58,9 @@ class BatchReport:
 def find_scans(source: Path) -> list[Path]:
     """Scans of a folder and of those in it, links included, or of a list: a text file with a path a line.
 
-    A scan is found once, whatever links lead to it. Paths of a list are relative to its folder; lines that
-    are empty or begin with # are skipped. Raises `StoreError` when there are none.
+    What a campaign of calibrations in the folder has captured is left out. A scan is found once, whatever
+    links lead to it. Paths of a list are relative to its folder; lines that are empty or begin with # are
+    skipped. Raises `StoreError` when there are none.
     """
     address = address_of(source)
     if address is not None:
@@ -66,9 +68,13 @@ def find_scans(source: Path) -> list[Path]:
     if source.is_dir():
         if _is_scan(source):
             return [source]
-        found = sorted(path for path in _folders_in(source) if _is_scan(path))
-        if not found:
-            raise StoreError(f"{source} contains no scan (NAME.dsl). Give a folder with scans, or a list.")
+        found = sorted(
+            path
+            for path in _folders_in(source)
+            if _is_scan(path)
+            and not _is_calibration(path.relative_to(source), lambda name: (source / name).is_file())
+        )
+        _require_any(source, found)
         return found
     if not source.exists():
         raise StoreError(f"{source} does not exist. Give a folder with scans, or a list of them.")
@@ -88,6 +94,18 @@ def find_scans(source: Path) -> list[Path]:
             " file with a path on each line."
         )
     return list(dict.fromkeys(found))
+
+
+def _require_any(source: Path | Address, found: Sequence[Path]) -> None:
+    if not found:
+        raise StoreError(
+            f"{source} contains no scan of an object (NAME.dsl). Give a folder with scans, or a list."
+        )
+
+
+def _is_calibration(inside: PurePath, is_file: Callable[[PurePath], bool]) -> bool:
+    """Whether a scan, by its path in the folder asked for, is of a step of a campaign somewhere in there."""
+    return inside.name == SCAN_NAME and len(inside.parts) > 3 and is_file(inside.parents[2] / CAMPAIGN_NAME)
 
 
 def _folders_in(top: Path) -> Iterator[Path]:
@@ -139,10 +157,11 @@ def _scans_at(address: Address) -> list[Path]:
     found = []
     for name in manifests:
         scan, log = Path(f"{address}/{name}").parent, f"{name.removesuffix(MANIFEST_NAME)}{LOG_NAME}"
+        if _is_calibration(PurePosixPath(name).parent, lambda path: str(path) in names):
+            continue
         if scan.suffix == SCAN_SUFFIX or log in names or _describes_scan(objects.get(name) or b""):
             found.append(scan)
-    if not found:
-        raise StoreError(f"{address} contains no scan (NAME.dsl). Give a folder with scans, or a list.")
+    _require_any(address, found)
     return found
 
 

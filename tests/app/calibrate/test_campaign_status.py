@@ -9,9 +9,8 @@ from datetime import timedelta
 from dsl_app.calibrate.campaign_status import JUDGED_BY, key_figure
 from dsl_app.calibrate.state import RowState
 
-from dsl_core.campaign.common.captures import NOTE_NAME
 from dsl_core.campaign.recipes import recipe_names
-from dsl_core.io.campaign_folder import CampaignFolder
+from dsl_core.io.campaign_folder import NOTE_NAME, CampaignFolder
 from dsl_core.model.figure import Figure
 from tests.app.calibrate.calibrate_bench import (
     CalibrateBench,

@@ -17,6 +17,7 @@ import pytest
 
 from dsl_core.errors import Cancelled, StoreError
 from dsl_core.io.atomic import write_atomic
+from dsl_core.io.campaign_folder import SCAN_NAME, CampaignFolder
 from dsl_core.io.claims import Claim, Owner
 from dsl_core.io.records import replace_record
 from dsl_core.io.result import row_writer
@@ -118,6 +119,21 @@ def test_a_manifest_of_other_software_is_no_scan(folder: Path) -> None:
     manifest.write_text(manifest.read_text().replace('"plan"', '"plam"'))
     found = [path.name for path in find_scans(folder)]
     assert found == ["b.dsl", "leaf 1.5", "leaf 1.6", "leaf 1.7"], "damaged scans are scans"
+
+
+def test_captures_of_a_campaign_are_no_scans_of_objects(folder: Path) -> None:
+    CampaignFolder.begin(folder / "lab", "twin", {})
+    steps = folder / "lab" / "geometry"
+    shutil.copytree(folder / "a.dsl", steps / "pose-01" / SCAN_NAME)
+    shutil.move(folder / "c.dsl", steps / "objects" / "c.dsl")
+    assert [path.name for path in find_scans(folder)] == ["a.dsl", "b.dsl", "c.dsl"]
+    for named in (folder / "lab", steps):
+        assert [path.name for path in find_scans(named)] == ["c.dsl", SCAN_NAME]
+    shutil.rmtree(steps / "objects")
+    for scan in ("a.dsl", "b.dsl"):
+        shutil.rmtree(folder / scan)
+    with pytest.raises(StoreError, match="contains no scan of an object"):
+        find_scans(folder)
 
 
 def test_two_scans_never_have_one_result(folder: Path, tmp_path: Path) -> None:

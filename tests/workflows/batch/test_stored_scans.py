@@ -97,8 +97,11 @@ def test_a_manifest_of_other_software_in_a_store_is_no_scan(monkeypatch: pytest.
             twin.put(f"day/{name}", b"{")
         twin.put("day/leaf 1.6/manifest.json", b'{"plan": {}, "versions": {}}')
         twin.put("day/site/manifest.json", b'{"name": "app"}')
+        for name in ("campaign.json", "geometry/pose-01/scan.dsl/manifest.json"):
+            twin.put(f"day/lab/{name}", b"{}")
         found = [path.name for path in find_scans(Path("s3://bucket/day"))]
         assert found == ["a.dsl", "leaf 1.5", "leaf 1.6"]
+        assert [path.name for path in find_scans(Path("s3://bucket/day/lab"))] == ["scan.dsl"]
         with pytest.raises(StoreError, match="contains no scan"):
             find_scans(Path("s3://bucket/day/site"))
 
